@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: MIT
+// Dna: a plain value that mirrors the MetaHuman DNA format, one struct per layer.
+// Field names are the format's in snake_case; LODs count from 0, the most detailed.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/array.h"
+
+namespace risorius::dna {
+
+using core::Array;
+using core::List;
+using core::Vec2Array;
+using core::Vec3Array;
+
+/// For each LOD a list of indices; LODs may share a list. lods[lod] is a row of `rows`.
+struct LodMapping {
+  Array<std::uint16_t> lods;
+  std::vector<Array<std::uint16_t>> rows;
+  bool operator==(const LodMapping&) const = default;
+};
+
+struct CoordinateSystem {  // axis directions: 0 left 1 right 2 up 3 down 4 front 5 back
+  std::uint16_t x_axis = 1, y_axis = 2, z_axis = 4;
+  bool operator==(const CoordinateSystem&) const = default;
+};
+
+struct Descriptor {
+  std::string name;
+  std::uint16_t archetype = 0;  // 0 asian 1 black 2 caucasian 3 hispanic 4 alien 5 other
+  std::uint16_t gender = 0;     // 0 male 1 female 2 other
+  std::uint16_t age = 0;
+  std::vector<std::pair<std::string, std::string>> metadata;
+  std::uint16_t translation_unit = 0;  // 0 cm 1 m
+  std::uint16_t rotation_unit = 0;     // 0 degrees 1 radians
+  CoordinateSystem coordinate_system;
+  std::uint16_t lod_count = 0;
+  std::uint16_t max_lod = 0;
+  std::string complexity;
+  std::string db_name;
+  bool operator==(const Descriptor&) const = default;
+};
+
+struct DescriptorExt {
+  std::uint32_t rotation_sequence = 0;                // 0 xyz 1 xzy 2 yxz 3 yzx 4 zxy 5 zyx
+  std::array<std::int32_t, 3> rotation_sign{1, 1, 1};  // 1 or -1
+  std::uint8_t face_winding_order = 0;                // 0 ccw 1 cw
+  bool operator==(const DescriptorExt&) const = default;
+};
+
+struct Definition {
+  LodMapping lod_joint_mapping, lod_blend_shape_mapping, lod_animated_map_mapping, lod_mesh_mapping;
+  std::vector<std::string> gui_control_names, raw_control_names, joint_names,
+      blend_shape_channel_names, animated_map_names, mesh_names;
+  Array<std::uint16_t> mesh_blend_shape_channel_mapping_from;  // mesh
+  Array<std::uint16_t> mesh_blend_shape_channel_mapping_to;    // channel
+  Array<std::uint16_t> joint_parents;                          // a root is its own parent
+  Vec3Array neutral_joint_translations;                        // relative to the parent, file units
+  Vec3Array neutral_joint_rotations;                           // relative to the parent, file units
+  bool operator==(const Definition&) const = default;
+};
+
+/// Rows `from <= in <= to: out += slope * in + cut`; six parallel lists.
+struct Conditionals {
+  Array<std::uint16_t> input_indices, output_indices;
+  Array<float> from_values, to_values, slope_values, cut_values;
+  bool operator==(const Conditionals&) const = default;
+};
+
+/// Correctives: a sparse matrix in coordinate form; row = control index of the corrective, column =
+/// control index of a factor.
+struct Psds {
+  Array<std::uint16_t> rows, columns;
+  Array<float> values;
+  bool operator==(const Psds&) const = default;
+};
+
+struct JointGroup {
+  Array<std::uint16_t> lods;            // leading rows used at each LOD, non-increasing
+  Array<std::uint16_t> input_indices;   // columns: control indices
+  Array<std::uint16_t> output_indices;  // rows: joint * 9 + attribute (tx ty tz rx ry rz sx sy sz)
+  Array<float> values;                  // [rows, columns], row-major
+  Array<std::uint16_t> joint_indices;
+  bool operator==(const JointGroup&) const = default;
+};
+
+struct BlendShapeChannels {
+  Array<std::uint16_t> lods, input_indices, output_indices;
+  bool operator==(const BlendShapeChannels&) const = default;
+};
+
+struct AnimatedMaps {
+  Array<std::uint16_t> lods;
+  Conditionals conditionals;
+  bool operator==(const AnimatedMaps&) const = default;
+};
+
+struct Behavior {
+  std::uint16_t psd_count = 0;
+  Conditionals gui_to_raw;
+  Psds psds;
+  std::uint16_t joint_row_count = 0, joint_column_count = 0;
+  List<JointGroup> joint_groups;
+  BlendShapeChannels blend_shape_channels;
+  AnimatedMaps animated_maps;
+  bool operator==(const Behavior&) const = default;
+};
+
+struct BlendShapeTarget {
+  Vec3Array deltas;
+  Array<std::uint32_t> vertex_indices;
+  std::uint16_t blend_shape_channel_index = 0;
+  bool operator==(const BlendShapeTarget&) const = default;
+};
+
+struct Mesh {
+  Vec3Array positions;            // [vertices], file units
+  Vec2Array texture_coordinates;  // u, v
+  Vec3Array normals;
+  Array<std::uint32_t> layout_positions, layout_texture_coordinates, layout_normals;
+  Array<std::uint32_t> face_offsets;  // [faces + 1] into face_layouts, or empty
+  Array<std::uint32_t> face_layouts;  // layout indices of all faces, back to back
+  std::uint16_t maximum_influence_per_vertex = 0;
+  Array<std::uint32_t> skin_offsets;  // [vertices + 1] into the two below, or empty
+  Array<float> skin_weights;
+  Array<std::uint16_t> skin_joint_indices;
+  List<BlendShapeTarget> blend_shape_targets;
+  bool operator==(const Mesh&) const = default;
+};
+
+struct Geometry {
+  List<Mesh> meshes;
+  bool operator==(const Geometry&) const = default;
+};
+
+/// A layer that is kept as bytes, at its place in the file's index.
+struct OpaqueLayer {
+  std::array<char, 4> id{};
+  std::uint32_t version = 0;  // major << 16 | minor
+  std::uint32_t index_position = 0;
+  std::vector<std::uint8_t> bytes;
+  bool operator==(const OpaqueLayer&) const = default;
+};
+
+/// Something odd that could be read safely.
+struct Warning {
+  std::string where;
+  std::string message;
+  bool operator==(const Warning&) const = default;
+};
+
+struct Dna {
+  std::uint16_t generation = 2, version = 8;  // of the file it was read from
+  Descriptor descriptor;
+  DescriptorExt descriptor_ext;
+  Definition definition;
+  Behavior behavior;
+  Geometry geometry;
+  std::vector<OpaqueLayer> opaque_layers;
+  std::vector<std::string> index_order;  // ids as the file listed them, for a rewrite in that order
+  std::vector<Warning> warnings;
+};
+
+}  // namespace risorius::dna
