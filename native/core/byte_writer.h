@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: MIT
+// A big-endian writer into memory.
+#pragma once
+
+#include <bit>
+#include <cstdint>
+#include <span>
+#include <string_view>
+#include <vector>
+
+namespace risorius::core {
+
+class ByteWriter {
+ public:
+  std::size_t position() const { return bytes_.size(); }
+  std::vector<std::uint8_t> take() { return std::move(bytes_); }
+
+  void u8(std::uint8_t v) { bytes_.push_back(v); }
+  void u16(std::uint16_t v) {
+    u8(static_cast<std::uint8_t>(v >> 8));
+    u8(static_cast<std::uint8_t>(v));
+  }
+  void u32(std::uint32_t v) {
+    u16(static_cast<std::uint16_t>(v >> 16));
+    u16(static_cast<std::uint16_t>(v));
+  }
+  void f32(float v) { u32(std::bit_cast<std::uint32_t>(v)); }
+  void raw(std::span<const std::uint8_t> bytes) {
+    bytes_.insert(bytes_.end(), bytes.begin(), bytes.end());
+  }
+  void str(std::string_view text) {
+    u32(static_cast<std::uint32_t>(text.size()));
+    bytes_.insert(bytes_.end(), text.begin(), text.end());
+  }
+  template <class T>
+  void list(std::span<const T> values) {
+    u32(static_cast<std::uint32_t>(values.size()));
+    items(values);
+  }
+  template <class T>
+  void items(std::span<const T> values) {
+    for (const T v : values) {
+      if constexpr (sizeof(T) == 2) {
+        u16(v);
+      } else {
+        u32(std::bit_cast<std::uint32_t>(v));
+      }
+    }
+  }
+  /// Writes v at an earlier position (sizes and offsets that are known only afterwards).
+  void patch_u32(std::size_t at, std::uint32_t v) {
+    for (int i = 0; i < 4; ++i) bytes_[at + i] = static_cast<std::uint8_t>(v >> (24 - 8 * i));
+  }
+
+ private:
+  std::vector<std::uint8_t> bytes_;
+};
+
+}  // namespace risorius::core

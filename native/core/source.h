@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: MIT
+// Where bytes come from: a span in memory or a file that is read piece by piece.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+
+#include "core/result.h"
+
+namespace risorius::core {
+
+class Source {
+ public:
+  virtual ~Source() = default;
+  virtual std::uint64_t size() const = 0;
+  /// Reads up to out.size() bytes at offset. Out: how many there were (fewer only at the end).
+  virtual std::size_t read(std::uint64_t offset, std::span<std::uint8_t> out) = 0;
+};
+
+/// Reads from memory that outlives the source.
+class SpanSource final : public Source {
+ public:
+  explicit SpanSource(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
+  std::uint64_t size() const override { return bytes_.size(); }
+  std::size_t read(std::uint64_t offset, std::span<std::uint8_t> out) override;
+
+ private:
+  std::span<const std::uint8_t> bytes_;
+};
+
+/// Opens a file for reading. No memory map: a file that is cut short meanwhile gives an error and
+/// not a signal. Fails: kIoOpen with the system's reason.
+Result<std::unique_ptr<Source>> open_file(const std::filesystem::path& path);
+
+}  // namespace risorius::core
