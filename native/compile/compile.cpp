@@ -1,0 +1,321 @@
+// SPDX-License-Identifier: MIT
+#include "compile/compile.h"
+
+#include <algorithm>
+#include <cstring>
+#include <map>
+#include <set>
+
+#include "dna/io.h"
+
+namespace risorius::compile {
+
+namespace {
+
+using core::Array;
+using core::ErrorCode;
+using core::fail;
+using core::ok;
+using core::Result;
+using core::Status;
+using rig::Rig;
+
+const dna::OpaqueLayer* find_opaque(const dna::Dna& dna, const char* id) {
+  for (const dna::OpaqueLayer& layer : dna.opaque_layers) {
+    if (std::memcmp(layer.id.data(), id, 4) == 0) return &layer;
+  }
+  return nullptr;
+}
+
+std::uint32_t leading_count(const dna::OpaqueLayer* layer) {
+  if (layer == nullptr || layer->bytes.size() < 4) return 0;
+  const auto& b = layer->bytes;
+  return (std::uint32_t{b[0]} << 24) | (std::uint32_t{b[1]} << 16) | (std::uint32_t{b[2]} << 8) |
+         b[3];
+}
+
+bool has_content(const dna::OpaqueLayer* layer) {
+  return layer != nullptr &&
+         std::ranges::any_of(layer->bytes, [](std::uint8_t byte) { return byte != 0; });
+}
+
+// Controls: raw, corrective, then what networks and RBF poses write. The layers of the latter are
+// kept as bytes: their leading count of names is believed up to the index space of 16 bits, and an
+// index beyond it widens the space, because 2.4 files name no pose controls.
+void count_controls(const dna::Dna& dna, Rig& out) {
+  out.raw_count = static_cast<std::uint32_t>(dna.definition.raw_control_names.size());
+  out.control_count = out.raw_count + dna.behavior.psd_count;
+  for (const char* id : {"mlbh", "mlbe", "rbfb", "rbfe", "twsw", "jbmd"}) {
+    if (has_content(find_opaque(dna, id))) out.ignored_layers.emplace_back(id);
+  }
+  const std::uint32_t networks = leading_count(find_opaque(dna, "mlbh"));
+  const std::uint32_t poses = leading_count(find_opaque(dna, "rbfe"));
+  if (networks > 65535 || poses > 65535) return;
+  out.control_count += networks + poses;
+  if (!has_content(find_opaque(dna, "rbfb")) || poses > 0) return;
+  const auto widen = [&](const Array<std::uint16_t>& indices) {
+    for (const std::uint16_t i : indices) {
+      out.control_count = std::max<std::uint32_t>(out.control_count, std::uint32_t{i} + 1);
+    }
+  };
+  for (const dna::JointGroup& g : dna.behavior.joint_groups) widen(g.input_indices);
+  widen(dna.behavior.blend_shape_channels.input_indices);
+  widen(dna.behavior.animated_maps.conditionals.input_indices);
+}
+
+Status check_controls(const Array<std::uint16_t>& indices, std::uint32_t limit,
+                      const std::string& where) {
+  for (std::size_t i = 0; i < indices.size(); ++i) {
+    if (indices[i] < limit) continue;
+    return fail(ErrorCode::kInvalidIndex, where + "[" + std::to_string(i) + "]",
+                "control " + std::to_string(indices[i]) + ", but there are " +
+                    std::to_string(limit));
+  }
+  return ok();
+}
+
+Status check_lods(const Array<std::uint16_t>& lods, std::uint32_t lod_count,
+                  const std::string& where) {
+  if (lods.size() >= lod_count) return ok();
+  return fail(ErrorCode::kInvalidLength, where + ".lods",
+              std::to_string(lods.size()) + " entries, but there are " +
+                  std::to_string(lod_count) + " LODs");
+}
+
+rig::ConditionalTable compile_table(const dna::Conditionals& source) {
+  rig::ConditionalTable table;
+  const std::size_t n = source.input_indices.size();
+  table.rows.resize(n);
+  for (std::size_t i = n; i-- > 0;) {
+    rig::ConditionalRow& row = table.rows[i];
+    row.input = source.input_indices[i];
+    row.output = source.output_indices[i];
+    row.from = std::min(source.from_values[i], source.to_values[i]);
+    row.to = std::max(source.from_values[i], source.to_values[i]);
+    row.slope = source.slope_values[i];
+    row.cut = source.cut_values[i];
+    const bool same_run = i + 1 < n && table.rows[i + 1].input == row.input &&
+                          table.rows[i + 1].output == row.output;
+    row.run_end = same_run ? table.rows[i + 1].run_end : static_cast<std::uint32_t>(i + 1);
+  }
+  return table;
+}
+
+std::vector<std::uint32_t> row_counts(const Array<std::uint16_t>& lods, std::uint32_t lod_count) {
+  std::vector<std::uint32_t> counts;
+  for (std::uint32_t l = 0; l < lod_count && l < lods.size(); ++l) counts.push_back(lods[l]);
+  return counts;
+}
+
+void compile_neutral(const dna::Dna& dna, Rig& out) {
+  const dna::Definition& d = dna.definition;
+  out.joint_count = static_cast<std::uint32_t>(d.joint_names.size());
+  out.neutral_joints.resize(std::size_t{out.joint_count} * 9, 1.0f);
+  for (std::size_t j = 0; j < out.joint_count; ++j) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      out.neutral_joints[j * 9 + k] = d.neutral_joint_translations.at(j, k);
+      out.neutral_joints[j * 9 + 3 + k] = d.neutral_joint_rotations.at(j, k);
+    }
+  }
+}
+
+// Rows beyond the first LOD's count are never evaluated and not stored.
+Status compile_joint_group(const dna::JointGroup& g, const std::string& where, Rig& out) {
+  if (Status s = check_controls(g.input_indices, out.control_count, where + ".input_indices"); !s) {
+    return s;
+  }
+  rig::JointGroup group;
+  group.lods_begin = static_cast<std::uint32_t>(out.joint_group_lods.size());
+  std::uint32_t rows = 0;
+  if (!g.output_indices.empty()) {
+    if (Status s = check_lods(g.lods, out.lod_count, where); !s) return s;
+  }
+  for (std::uint32_t l = 0; l < out.lod_count; ++l) {
+    const std::uint32_t count = l < g.lods.size() ? g.lods[l] : 0;
+    out.joint_group_lods.push_back(count);
+    rows = std::max(rows, count);
+  }
+  const std::size_t columns = g.input_indices.size();
+  group.row_count = rows;
+  group.column_count = static_cast<std::uint32_t>(columns);
+  group.stride = static_cast<std::uint32_t>((rows + simd::kRowAlignment - 1) /
+                                            simd::kRowAlignment * simd::kRowAlignment);
+  group.values_begin = static_cast<std::uint32_t>(out.joint_values.size());
+  group.inputs_begin = static_cast<std::uint32_t>(out.joint_inputs.size());
+  group.outputs_begin = static_cast<std::uint32_t>(out.joint_outputs.size());
+  out.joint_values.resize(out.joint_values.size() + group.stride * columns, 0.0f);
+  float* values = out.joint_values.data() + group.values_begin;
+  for (std::size_t r = 0; r < rows; ++r) {
+    for (std::size_t c = 0; c < columns; ++c) {
+      values[c * group.stride + r] = g.values[r * columns + c];
+    }
+  }
+  out.joint_inputs.insert(out.joint_inputs.end(), g.input_indices.begin(), g.input_indices.end());
+  out.joint_outputs.insert(out.joint_outputs.end(), g.output_indices.begin(),
+                           g.output_indices.begin() + rows);
+  out.widest_group = std::max(out.widest_group, group.column_count);
+  out.tallest_group = std::max(out.tallest_group, group.stride);
+  out.joint_groups.push_back(group);
+  return ok();
+}
+
+Status compile_joint_groups(const dna::Dna& dna, Rig& out) {
+  const auto& groups = dna.behavior.joint_groups;
+  for (std::size_t i = 0; i < groups.size(); ++i) {
+    const std::string where = "behavior.joint_groups[" + std::to_string(i) + "]";
+    if (Status s = compile_joint_group(groups[i], where, out); !s) return s;
+  }
+  std::set<std::uint16_t> written;
+  for (const std::uint16_t o : out.joint_outputs) written.insert(static_cast<std::uint16_t>(o / 9));
+  out.joints_written.assign(written.begin(), written.end());
+  return ok();
+}
+
+Status compile_psds(const dna::Dna& dna, Rig& out) {
+  const dna::Psds& source = dna.behavior.psds;
+  if (Status s = check_controls(source.columns, out.control_count, "behavior.psds.columns"); !s) {
+    return s;
+  }
+  if (Status s = check_controls(source.rows, out.control_count, "behavior.psds.rows"); !s) {
+    return s;
+  }
+  std::map<std::uint16_t, std::vector<std::size_t>> entries;  // rows may be interleaved
+  for (std::size_t i = 0; i < source.rows.size(); ++i) entries[source.rows[i]].push_back(i);
+  for (const auto& [output, list] : entries) {
+    rig::Psd psd;
+    psd.output = output;
+    psd.factors_begin = static_cast<std::uint32_t>(out.psd_factors.size());
+    for (const std::size_t i : list) {
+      psd.weight *= source.values[i];
+      out.psd_factors.push_back(source.columns[i]);
+    }
+    psd.factors_end = static_cast<std::uint32_t>(out.psd_factors.size());
+    out.psds.push_back(psd);
+  }
+  return ok();
+}
+
+// Marks the controls that something reads at this LOD: columns of joint groups with a value in a row
+// of the LOD, and the inputs of channels and maps within their row counts.
+std::vector<bool> used_controls(const Rig& r, std::uint32_t lod) {
+  std::vector<bool> used(r.control_count, false);
+  for (const rig::JointGroup& g : r.joint_groups) {
+    const std::uint32_t rows = r.joint_group_lods[g.lods_begin + lod];
+    for (std::uint32_t c = 0; c < g.column_count; ++c) {
+      const float* column = r.joint_values.data() + g.values_begin + std::size_t{c} * g.stride;
+      if (std::any_of(column, column + rows, [](float v) { return v != 0.0f; })) {
+        used[r.joint_inputs[g.inputs_begin + c]] = true;
+      }
+    }
+  }
+  for (std::uint32_t i = 0; i < (r.shape_lod_row_counts.empty() ? 0 : r.shape_lod_row_counts[lod]);
+       ++i) {
+    used[r.shape_inputs[i]] = true;
+  }
+  const rig::ConditionalTable& maps = r.animated_maps;
+  for (std::uint32_t i = 0; i < (maps.lod_row_counts.empty() ? 0 : maps.lod_row_counts[lod]); ++i) {
+    used[maps.rows[i].input] = true;
+  }
+  return used;
+}
+
+// Factors before what uses them, ties by ascending output; a cycle's members come last.
+std::vector<std::uint32_t> dependency_order(const Rig& r, const std::vector<std::uint32_t>& psds,
+                                            bool& cycles) {
+  std::vector<std::int32_t> psd_of_control(r.control_count, -1);
+  for (const std::uint32_t p : psds) psd_of_control[r.psds[p].output] = static_cast<int>(p);
+  std::vector<std::uint32_t> order;
+  std::vector<std::uint8_t> done(r.psds.size(), 0);
+  std::vector<std::uint32_t> rest = psds;
+  while (!rest.empty()) {
+    std::vector<std::uint32_t> later;
+    for (const std::uint32_t p : rest) {
+      bool ready = true;
+      for (std::uint32_t f = r.psds[p].factors_begin; f < r.psds[p].factors_end; ++f) {
+        const std::int32_t source = psd_of_control[r.psd_factors[f]];
+        ready = ready && (source < 0 || done[static_cast<std::size_t>(source)] != 0);
+      }
+      if (ready) {
+        done[p] = 1;
+        order.push_back(p);
+      } else {
+        later.push_back(p);
+      }
+    }
+    if (later.size() == rest.size()) {
+      cycles = true;
+      order.insert(order.end(), later.begin(), later.end());
+      break;
+    }
+    rest = std::move(later);
+  }
+  return order;
+}
+
+void schedule_psds(Rig& r) {
+  for (std::uint32_t lod = 0; lod < r.lod_count; ++lod) {
+    const std::vector<bool> used = used_controls(r, lod);
+    std::vector<std::uint32_t> psds;
+    for (std::uint32_t p = 0; p < r.psds.size(); ++p) {
+      if (used[r.psds[p].output]) psds.push_back(p);
+    }
+    r.settled_psds_by_lod.push_back(dependency_order(r, psds, r.psd_cycles));
+    r.psds_by_lod.push_back(std::move(psds));
+  }
+}
+
+Status compile_channels_and_maps(const dna::Dna& dna, Rig& out) {
+  const dna::BlendShapeChannels& s = dna.behavior.blend_shape_channels;
+  const dna::AnimatedMaps& m = dna.behavior.animated_maps;
+  out.blend_shape_count =
+      static_cast<std::uint32_t>(dna.definition.blend_shape_channel_names.size());
+  out.animated_map_count = static_cast<std::uint32_t>(dna.definition.animated_map_names.size());
+  const std::string shapes = "behavior.blend_shape_channels", maps = "behavior.animated_maps";
+  if (Status c = check_controls(s.input_indices, out.control_count, shapes + ".input_indices");
+      !c) {
+    return c;
+  }
+  const auto& map_inputs = m.conditionals.input_indices;
+  if (Status c = check_controls(map_inputs, out.control_count, maps + ".input_indices"); !c) {
+    return c;
+  }
+  if (!s.input_indices.empty()) {
+    if (Status c = check_lods(s.lods, out.lod_count, shapes); !c) return c;
+    out.shape_lod_row_counts = row_counts(s.lods, out.lod_count);
+  }
+  out.animated_maps = compile_table(m.conditionals);
+  if (!map_inputs.empty()) {
+    if (Status c = check_lods(m.lods, out.lod_count, maps); !c) return c;
+    out.animated_maps.lod_row_counts = row_counts(m.lods, out.lod_count);
+  }
+  out.shape_inputs.assign(s.input_indices.begin(), s.input_indices.end());
+  out.shape_outputs.assign(s.output_indices.begin(), s.output_indices.end());
+  return ok();
+}
+
+}  // namespace
+
+Result<Rig> compile(const dna::Dna& dna, const CompileOptions& options) {
+  std::vector<dna::Warning> warnings;
+  if (Status s = dna::validate(dna, warnings); !s) return std::move(s).propagate();
+  Rig out;
+  out.kernels = options.kernels != nullptr ? options.kernels : simd::find_kernels(nullptr);
+  if (out.kernels == nullptr) {
+    return fail(ErrorCode::kInvalidArgument, "RISORIUS_SIMD",
+                std::string("this instruction set is not available; there are: ") +
+                    simd::available_kernels());
+  }
+  out.lod_count = dna.descriptor.lod_count;
+  out.raw_control_names = dna.definition.raw_control_names;
+  out.gui_control_names = dna.definition.gui_control_names;
+  count_controls(dna, out);
+  compile_neutral(dna, out);
+  out.gui_to_raw = compile_table(dna.behavior.gui_to_raw);
+  if (Status s = compile_joint_groups(dna, out); !s) return std::move(s).propagate();
+  if (Status s = compile_channels_and_maps(dna, out); !s) return std::move(s).propagate();
+  if (Status s = compile_psds(dna, out); !s) return std::move(s).propagate();
+  schedule_psds(out);
+  return out;
+}
+
+}  // namespace risorius::compile
