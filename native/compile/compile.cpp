@@ -34,9 +34,13 @@ std::uint32_t leading_count(const dna::OpaqueLayer* layer) {
          b[3];
 }
 
+// Joint metadata says something only where a joint is not in Euler angles: its numbers, not its count.
 bool has_content(const dna::OpaqueLayer* layer) {
-  return layer != nullptr &&
-         std::ranges::any_of(layer->bytes, [](std::uint8_t byte) { return byte != 0; });
+  if (layer == nullptr) return false;
+  const bool metadata = std::memcmp(layer->id.data(), "jbmd", 4) == 0;
+  const std::size_t skip = metadata ? std::min<std::size_t>(4, layer->bytes.size()) : 0;
+  return std::any_of(layer->bytes.begin() + static_cast<std::ptrdiff_t>(skip), layer->bytes.end(),
+                     [](std::uint8_t byte) { return byte != 0; });
 }
 
 // Controls: raw, corrective, then what networks and RBF poses write. The layers of the latter are

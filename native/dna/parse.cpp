@@ -118,6 +118,7 @@ void parse_known_layers(ByteReader& r, const std::vector<IndexEntry>& entries, D
     const IndexEntry* e = find(entries, id);
     return e != nullptr && r.enter(e->offset, e->size);
   };
+  dna.descriptor.coordinate_system = {0, 0, 0};  // what a file without a descriptor is taken to say
   if (enter("desc")) {
     dna.descriptor = detail::read_descriptor(r);
     warn_about_rest(r, dna, "desc");

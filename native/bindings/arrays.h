@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: MIT
+// NumPy views of core arrays and back. A view keeps the buffer alive, not the Dna.
+#pragma once
+
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+
+#include <cmath>
+#include <string>
+
+#include "core/array.h"
+#include "core/result.h"
+
+namespace risorius::bindings {
+
+namespace py = pybind11;
+
+void throw_error(const core::Error& error, const std::string& file = "");
+
+template <class T>
+T unwrap(core::Result<T>&& result, const std::string& file = "") {
+  if (!result) throw_error(result.error(), file);
+  return std::move(result).value();
+}
+
+template <class T>
+py::array read_only_view(const core::Array<T>& values, std::vector<py::ssize_t> shape,
+                         std::vector<py::ssize_t> strides) {
+  if (values.empty()) {
+    py::array_t<T> none(shape);
+    none.attr("flags").attr("writeable") = false;
+    return none;
+  }
+  auto* owner = new std::shared_ptr<const void>(values.owner());
+  py::capsule base(owner, [](void* p) { delete static_cast<std::shared_ptr<const void>*>(p); });
+  py::array view(py::dtype::of<T>(), std::move(shape), std::move(strides), values.data(), base);
+  view.attr("flags").attr("writeable") = false;
+  return view;
+}
+
+template <class T>
+py::array to_numpy(const core::Array<T>& values) {
+  return read_only_view(values, {static_cast<py::ssize_t>(values.size())},
+                        {static_cast<py::ssize_t>(sizeof(T))});
+}
+
+template <std::size_t kPlanes>
+py::array to_numpy(const core::PlanarArray<kPlanes>& array) {
+  const auto n = static_cast<py::ssize_t>(array.count());
+  return read_only_view(array.values, {n, static_cast<py::ssize_t>(kPlanes)},
+                        {static_cast<py::ssize_t>(sizeof(float)),
+                         n * static_cast<py::ssize_t>(sizeof(float))});
+}
+
+[[noreturn]] inline void shape_error(const std::string& name, const std::string& wanted,
+                                     const py::array& given) {
+  throw py::value_error(name + ": an array of shape " + wanted + " was expected, the shape is " +
+                        py::str(given.attr("shape")).cast<std::string>());
+}
+
+/// Copies any sequence into a core array; integers are checked against their type's range.
+template <class T>
+core::Array<T> from_python(const py::object& object, const char* name) {
+  const py::module_ numpy = py::module_::import("numpy");
+  py::array any = py::array::ensure(object);
+  if (!any) throw py::value_error(std::string(name) + ": an array of numbers was expected");
+  if (any.ndim() != 1) shape_error(name, "(n,)", any);
+  if constexpr (std::is_integral_v<T>) {
+    if (any.size() > 0) {
+      if (std::string("iub").find(any.dtype().kind()) == std::string::npos) {
+        throw py::value_error(std::string(name) + ": whole numbers were expected");
+      }
+      const auto low = any.attr("min")().cast<long long>();
+      const auto high = any.attr("max")().cast<long long>();
+      if (low < 0 || high > static_cast<long long>(std::numeric_limits<T>::max())) {
+        throw py::value_error(std::string(name) + ": values from 0 to " +
+                              std::to_string(std::numeric_limits<T>::max()) +
+                              " were expected, found " + std::to_string(low < 0 ? low : high));
+      }
+    }
+  }
+  auto typed = py::array_t<T, py::array::c_style | py::array::forcecast>(any);
+  return core::Array<T>(std::vector<T>(typed.data(), typed.data() + typed.size()));
+}
+
+template <std::size_t kPlanes>
+core::PlanarArray<kPlanes> planar_from_python(const py::object& object, const char* name) {
+  auto typed = py::array_t<float, py::array::c_style | py::array::forcecast>::ensure(object);
+  if (!typed) throw py::value_error(std::string(name) + ": an array of numbers was expected");
+  const bool none = typed.size() == 0;
+  if (!none && (typed.ndim() != 2 || typed.shape(1) != static_cast<py::ssize_t>(kPlanes))) {
+    shape_error(name, "(n, " + std::to_string(kPlanes) + ")", typed);
+  }
+  const std::size_t n = none ? 0 : static_cast<std::size_t>(typed.shape(0));
+  std::vector<float> values(n * kPlanes);
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t p = 0; p < kPlanes; ++p) values[p * n + i] = typed.data()[i * kPlanes + p];
+  }
+  return {core::Array<float>(std::move(values))};
+}
+
+/// Text of unknown encoding: bytes that are not UTF-8 survive the way there and back.
+inline py::str to_python(const std::string& text) {
+  PyObject* decoded = PyUnicode_DecodeUTF8(text.data(), static_cast<Py_ssize_t>(text.size()),
+                                           "surrogateescape");
+  if (decoded == nullptr) throw py::error_already_set();
+  return py::reinterpret_steal<py::str>(decoded);
+}
+
+inline std::string text_from_python(const py::handle& object, const char* name) {
+  if (!PyUnicode_Check(object.ptr())) {
+    throw py::value_error(std::string(name) + ": a text was expected");
+  }
+  PyObject* encoded = PyUnicode_AsEncodedString(object.ptr(), "utf-8", "surrogateescape");
+  if (encoded == nullptr) throw py::error_already_set();
+  return py::reinterpret_steal<py::bytes>(encoded);
+}
+
+}  // namespace risorius::bindings

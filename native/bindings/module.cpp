@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: MIT
+// risorius._native: arrays in, arrays out, errors. No arithmetic.
+#include <pybind11/pybind11.h>
+
+#include "bindings/arrays.h"
+
+namespace risorius::bindings {
+
+void bind_dna(py::module_& m);
+void bind_rig(py::module_& m);
+
+namespace {
+
+PyObject* dna_error_type = nullptr;
+
+}  // namespace
+
+void throw_error(const core::Error& error, const std::string& file) {
+  const std::string text = (file.empty() ? "" : file + ": ") + error.describe();
+  py::object instance = py::reinterpret_borrow<py::object>(dna_error_type)(text);
+  instance.attr("code") = core::to_string(error.code);
+  instance.attr("offset") =
+      error.offset ? py::object(py::int_(*error.offset)) : py::object(py::none());
+  instance.attr("where") = error.where;
+  PyErr_SetObject(dna_error_type, instance.ptr());
+  throw py::error_already_set();
+}
+
+}  // namespace risorius::bindings
+
+PYBIND11_MODULE(_native, m) {
+  m.doc() = "The native part of Risorius: DNA files and rig evaluation.";
+  // Kept for the life of the process, as the interpreter keeps its own exception types.
+  risorius::bindings::dna_error_type =
+      PyErr_NewExceptionWithDoc("risorius.DnaError",
+                                "A DNA file or Dna value that cannot be used.\n\n"
+                                "code: str, e.g. 'truncated'. offset: byte offset in the file or "
+                                "None. where: the DNA field.",
+                                PyExc_ValueError, nullptr);
+  m.attr("DnaError") = pybind11::handle(risorius::bindings::dna_error_type);
+  risorius::bindings::bind_dna(m);
+  risorius::bindings::bind_rig(m);
+}

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <thread>
+#include <vector>
+
+namespace risorius::core {
+
+/// Calls body(begin, end) on ranges that cover [0, n), on up to `threads` threads (0: all cores).
+/// The body may not throw.
+template <class Body>
+void parallel_for(std::size_t n, std::size_t threads, const Body& body) {
+  if (threads == 0) threads = std::max(1u, std::thread::hardware_concurrency());
+  threads = std::min(threads, std::max<std::size_t>(n, 1));
+  if (threads <= 1) {
+    body(std::size_t{0}, n);
+    return;
+  }
+  std::vector<std::jthread> workers;
+  workers.reserve(threads);
+  for (std::size_t t = 0; t < threads; ++t) {
+    workers.emplace_back([&body, n, t, threads] { body(n * t / threads, n * (t + 1) / threads); });
+  }
+}
+
+}  // namespace risorius::core
