@@ -34,13 +34,22 @@ std::uint32_t leading_count(const dna::OpaqueLayer* layer) {
          b[3];
 }
 
-// Joint metadata says something only where a joint is not in Euler angles: its numbers, not its count.
 bool has_content(const dna::OpaqueLayer* layer) {
-  if (layer == nullptr) return false;
-  const bool metadata = std::memcmp(layer->id.data(), "jbmd", 4) == 0;
-  const std::size_t skip = metadata ? std::min<std::size_t>(4, layer->bytes.size()) : 0;
-  return std::any_of(layer->bytes.begin() + static_cast<std::ptrdiff_t>(skip), layer->bytes.end(),
-                     [](std::uint8_t byte) { return byte != 0; });
+  return layer != nullptr &&
+         std::ranges::any_of(layer->bytes, [](std::uint8_t byte) { return byte != 0; });
+}
+
+// jbmd: a count of joints, then translation, rotation and scale representation of each as u16;
+// rotation 1 is a quaternion.
+std::vector<bool> quaternion_joint_flags(const dna::Dna& dna) {
+  std::vector<bool> flags(dna.definition.joint_names.size(), false);
+  const dna::OpaqueLayer* layer = find_opaque(dna, "jbmd");
+  const std::uint32_t count = leading_count(layer);
+  for (std::size_t j = 0; j < count && j < flags.size() && 4 + j * 6 + 6 <= layer->bytes.size();
+       ++j) {
+    flags[j] = layer->bytes[4 + j * 6 + 2] == 0 && layer->bytes[4 + j * 6 + 3] == 1;
+  }
+  return flags;
 }
 
 // Controls: raw, corrective, then what networks and RBF poses write. The layers of the latter are
@@ -49,7 +58,7 @@ bool has_content(const dna::OpaqueLayer* layer) {
 void count_controls(const dna::Dna& dna, Rig& out) {
   out.raw_count = static_cast<std::uint32_t>(dna.definition.raw_control_names.size());
   out.control_count = out.raw_count + dna.behavior.psd_count;
-  for (const char* id : {"mlbh", "mlbe", "rbfb", "rbfe", "twsw", "jbmd"}) {
+  for (const char* id : {"mlbh", "mlbe", "rbfb", "rbfe", "twsw"}) {
     if (has_content(find_opaque(dna, id))) out.ignored_layers.emplace_back(id);
   }
   const std::uint32_t networks = leading_count(find_opaque(dna, "mlbh"));
@@ -163,11 +172,60 @@ Status compile_joint_group(const dna::JointGroup& g, const std::string& where, R
   return ok();
 }
 
+rig::EulerConvention euler_convention(const dna::Dna& dna) {
+  static constexpr std::uint8_t kOrders[6][3] = {{0, 1, 2}, {0, 2, 1}, {1, 0, 2},
+                                                 {1, 2, 0}, {2, 0, 1}, {2, 1, 0}};
+  const dna::DescriptorExt& ext = dna.descriptor_ext;
+  rig::EulerConvention c;
+  const auto* order = kOrders[ext.rotation_sequence < 6 ? ext.rotation_sequence : 0];
+  for (std::size_t i = 0; i < 3; ++i) {
+    c.order[i] = order[i];
+    c.signs[i] = ext.rotation_sign[i] < 0 ? -1.0f : 1.0f;
+  }
+  c.radians_per_unit = dna.descriptor.rotation_unit == 1 ? 1.0f : 0.0174532925199432958f;
+  return c;
+}
+
+// The Euler entries of a column become one quaternion per joint; a missing row is 0.
+void compile_quaternion_joints(const dna::JointGroup& g, std::uint32_t group_index,
+                               const std::vector<bool>& flags, Rig& out) {
+  std::map<std::uint32_t, std::array<std::int32_t, 3>> rows;  // joint -> its rotation rows
+  for (std::uint32_t r = 0; r < out.joint_groups[group_index].row_count; ++r) {
+    const std::uint32_t joint = g.output_indices[r] / 9u, attribute = g.output_indices[r] % 9u;
+    if (attribute < 3 || attribute > 5 || !flags[joint]) continue;
+    auto [at, added] = rows.try_emplace(joint, std::array<std::int32_t, 3>{-1, -1, -1});
+    at->second[attribute - 3] = static_cast<std::int32_t>(r);
+  }
+  const std::size_t columns = g.input_indices.size();
+  for (const auto& [joint, row_of_axis] : rows) {
+    rig::QuaternionJoint q;
+    q.joint = joint;
+    q.group = group_index;
+    q.quaternions_begin = static_cast<std::uint32_t>(out.quaternions.size());
+    q.first_row = UINT32_MAX;
+    for (const std::int32_t r : row_of_axis) {
+      if (r >= 0) q.first_row = std::min(q.first_row, static_cast<std::uint32_t>(r));
+    }
+    for (std::size_t c = 0; c < columns; ++c) {
+      std::array<float, 3> angles{};
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const std::int32_t r = row_of_axis[axis];
+        if (r >= 0) angles[axis] = g.values[static_cast<std::size_t>(r) * columns + c];
+      }
+      out.quaternions.push_back(rig::from_euler(out.euler, angles));
+    }
+    out.quaternion_joints.push_back(q);
+  }
+}
+
 Status compile_joint_groups(const dna::Dna& dna, Rig& out) {
   const auto& groups = dna.behavior.joint_groups;
+  const std::vector<bool> flags = quaternion_joint_flags(dna);
+  out.euler = euler_convention(dna);
   for (std::size_t i = 0; i < groups.size(); ++i) {
     const std::string where = "behavior.joint_groups[" + std::to_string(i) + "]";
     if (Status s = compile_joint_group(groups[i], where, out); !s) return s;
+    compile_quaternion_joints(groups[i], static_cast<std::uint32_t>(i), flags, out);
   }
   std::set<std::uint16_t> written;
   for (const std::uint16_t o : out.joint_outputs) written.insert(static_cast<std::uint16_t>(o / 9));

@@ -72,6 +72,28 @@ void joints(const Rig& rig, std::uint32_t lod, Workspace& work, Pose& pose) noex
   }
 }
 
+// Columns in order, each applied after the ones before (dna-format 12.5, quaternion groups).
+void quaternion_joints(const Rig& rig, std::uint32_t lod, Pose& pose) noexcept {
+  for (const QuaternionJoint& q : rig.quaternion_joints) {
+    const JointGroup& g = rig.joint_groups[q.group];
+    if (q.first_row >= rig.joint_group_lods[g.lods_begin + lod]) continue;
+    Quaternion product;
+    for (std::uint32_t c = 0; c < g.column_count; ++c) {
+      const float v = pose.controls[rig.joint_inputs[g.inputs_begin + c]];
+      if (v == 0.0f) continue;
+      const Quaternion& full = rig.quaternions[q.quaternions_begin + c];
+      const float identity = full.w >= 0.0f ? 1.0f - v : v - 1.0f;
+      const Quaternion blend{full.x * v, full.y * v, full.z * v, full.w * v + identity};
+      const float length = std::sqrt(blend.x * blend.x + blend.y * blend.y + blend.z * blend.z +
+                                     blend.w * blend.w);
+      product = multiply({blend.x / length, blend.y / length, blend.z / length, blend.w / length},
+                         product);
+    }
+    const std::array<float, 3> angles = to_euler(rig.euler, product);
+    std::copy(angles.begin(), angles.end(), pose.joints.begin() + std::size_t{q.joint} * 9 + 3);
+  }
+}
+
 void blend_shapes(const Rig& rig, std::uint32_t lod, Pose& pose) noexcept {
   std::fill(pose.blend_shapes.begin(), pose.blend_shapes.end(), 0.0f);
   const std::uint32_t rows = rig.shape_lod_row_counts.empty() ? 0 : rig.shape_lod_row_counts[lod];
@@ -98,6 +120,7 @@ void correctives_of_last_values(const Rig& rig, std::uint32_t lod, Workspace& wo
 
 void outputs(const Rig& rig, std::uint32_t lod, Workspace& work, Pose& pose) noexcept {
   joints(rig, lod, work, pose);
+  quaternion_joints(rig, lod, pose);
   blend_shapes(rig, lod, pose);
   evaluate_table(rig.animated_maps, lod, pose.controls.data(), pose.animated_maps.data(),
                  pose.animated_maps.size());

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/aligned.h"
+#include "rig/quaternion.h"
 #include "simd/kernels.h"
 
 namespace risorius::rig {
@@ -40,6 +41,14 @@ struct JointGroup {
   std::uint32_t lods_begin = 0;  // lod_count row counts in joint_group_lods
 };
 
+/// One joint of one group whose rotation is a product of quaternions, one per column: column c turns
+/// it by a blend of identity and quaternions[quaternions_begin + c].
+struct QuaternionJoint {
+  std::uint32_t joint = 0, group = 0;
+  std::uint32_t first_row = 0;  // its first rotation row: a LOD with fewer rows leaves it out
+  std::uint32_t quaternions_begin = 0;
+};
+
 struct Rig {
   std::vector<std::string> raw_control_names, gui_control_names;
   std::uint32_t lod_count = 0, joint_count = 0, blend_shape_count = 0, animated_map_count = 0;
@@ -59,6 +68,10 @@ struct Rig {
   std::vector<std::uint32_t> joint_group_lods;
   std::uint32_t widest_group = 0, tallest_group = 0;  // scratch sizes
   std::vector<std::uint16_t> joints_written;          // by any group at any LOD, ascending
+
+  std::vector<QuaternionJoint> quaternion_joints;
+  std::vector<Quaternion> quaternions;
+  EulerConvention euler;
 
   std::vector<std::uint16_t> shape_inputs, shape_outputs;
   std::vector<std::uint32_t> shape_lod_row_counts;

@@ -1,0 +1,26 @@
+# SPDX-License-Identifier: MIT
+"""Where test data lies, and the extras that need data which a clone does not have."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+PROJECT = Path(__file__).resolve().parents[2]
+GOLDEN = PROJECT / "tests" / "data" / "golden"
+SHARED = Path(os.environ.get("RISORIUS_SHARED", PROJECT.parent / "shared"))
+
+_not_run: set[str] = set()
+
+
+def require_extra(path: Path, what: str) -> Path:
+    """Skip an extra whose data a clone does not have; the summary names it."""
+    if not path.exists():
+        _not_run.add(what)
+        pytest.skip(f"extra not run, no data: {what}")
+    return path
+
+
+def pytest_terminal_summary(terminalreporter):
+    for what in sorted(_not_run):
+        terminalreporter.write_line(f"EXTRA NOT RUN (no data): {what}")
