@@ -3,7 +3,10 @@
 
 #include <algorithm>
 #include <cstring>
+#include <functional>
+#include <iterator>
 #include <map>
+#include <queue>
 #include <set>
 
 #include "dna/io.h"
@@ -19,6 +22,9 @@ using core::ok;
 using core::Result;
 using core::Status;
 using rig::Rig;
+
+// Each LOD has its own schedule of correctives: a small file must not ask for gigabytes of them.
+constexpr std::uint32_t kMaxLods = 64;
 
 const dna::OpaqueLayer* find_opaque(const dna::Dna& dna, const char* id) {
   for (const dna::OpaqueLayer& layer : dna.opaque_layers) {
@@ -80,9 +86,9 @@ Status check_controls(const Array<std::uint16_t>& indices, std::uint32_t limit,
                       const std::string& where) {
   for (std::size_t i = 0; i < indices.size(); ++i) {
     if (indices[i] < limit) continue;
-    return fail(ErrorCode::kInvalidIndex, where + "[" + std::to_string(i) + "]",
-                "control " + std::to_string(indices[i]) + ", but there are " +
-                    std::to_string(limit));
+    return fail(
+        ErrorCode::kInvalidIndex, where + "[" + std::to_string(i) + "]",
+        "control " + std::to_string(indices[i]) + ", but there are " + std::to_string(limit));
   }
   return ok();
 }
@@ -91,8 +97,8 @@ Status check_lods(const Array<std::uint16_t>& lods, std::uint32_t lod_count,
                   const std::string& where) {
   if (lods.size() >= lod_count) return ok();
   return fail(ErrorCode::kInvalidLength, where + ".lods",
-              std::to_string(lods.size()) + " entries, but there are " +
-                  std::to_string(lod_count) + " LODs");
+              std::to_string(lods.size()) + " entries, but there are " + std::to_string(lod_count) +
+                  " LODs");
 }
 
 rig::ConditionalTable compile_table(const dna::Conditionals& source) {
@@ -107,8 +113,8 @@ rig::ConditionalTable compile_table(const dna::Conditionals& source) {
     row.to = std::max(source.from_values[i], source.to_values[i]);
     row.slope = source.slope_values[i];
     row.cut = source.cut_values[i];
-    const bool same_run = i + 1 < n && table.rows[i + 1].input == row.input &&
-                          table.rows[i + 1].output == row.output;
+    const bool same_run =
+        i + 1 < n && table.rows[i + 1].input == row.input && table.rows[i + 1].output == row.output;
     row.run_end = same_run ? table.rows[i + 1].run_end : static_cast<std::uint32_t>(i + 1);
   }
   return table;
@@ -151,8 +157,12 @@ Status compile_joint_group(const dna::JointGroup& g, const std::string& where, R
   const std::size_t columns = g.input_indices.size();
   group.row_count = rows;
   group.column_count = static_cast<std::uint32_t>(columns);
-  group.stride = static_cast<std::uint32_t>((rows + simd::kRowAlignment - 1) /
-                                            simd::kRowAlignment * simd::kRowAlignment);
+  group.stride = static_cast<std::uint32_t>((rows + simd::kRowAlignment - 1) / simd::kRowAlignment *
+                                            simd::kRowAlignment);
+  if (out.joint_values.size() + std::size_t{group.stride} * columns > UINT32_MAX) {
+    return fail(ErrorCode::kLimitExceeded, where + ".values",
+                "the matrices of all groups hold more values than an index of 32 bits reaches");
+  }
   group.values_begin = static_cast<std::uint32_t>(out.joint_values.size());
   group.inputs_begin = static_cast<std::uint32_t>(out.joint_inputs.size());
   group.outputs_begin = static_cast<std::uint32_t>(out.joint_outputs.size());
@@ -257,8 +267,8 @@ Status compile_psds(const dna::Dna& dna, Rig& out) {
   return ok();
 }
 
-// Marks the controls that something reads at this LOD: columns of joint groups with a value in a row
-// of the LOD, and the inputs of channels and maps within their row counts.
+// Marks the controls that something reads at this LOD: columns of joint groups with a value in a
+// row of the LOD, and the inputs of channels and maps within their row counts.
 std::vector<bool> used_controls(const Rig& r, std::uint32_t lod) {
   std::vector<bool> used(r.control_count, false);
   for (const rig::JointGroup& g : r.joint_groups) {
@@ -281,36 +291,37 @@ std::vector<bool> used_controls(const Rig& r, std::uint32_t lod) {
   return used;
 }
 
-// Factors before what uses them, ties by ascending output; a cycle's members come last.
+// Factors before what uses them, ties by ascending output; members of a cycle and what hangs on
+// them come last.
 std::vector<std::uint32_t> dependency_order(const Rig& r, const std::vector<std::uint32_t>& psds,
                                             bool& cycles) {
-  std::vector<std::int32_t> psd_of_control(r.control_count, -1);
-  for (const std::uint32_t p : psds) psd_of_control[r.psds[p].output] = static_cast<int>(p);
-  std::vector<std::uint32_t> order;
-  std::vector<std::uint8_t> done(r.psds.size(), 0);
-  std::vector<std::uint32_t> rest = psds;
-  while (!rest.empty()) {
-    std::vector<std::uint32_t> later;
-    for (const std::uint32_t p : rest) {
-      bool ready = true;
-      for (std::uint32_t f = r.psds[p].factors_begin; f < r.psds[p].factors_end; ++f) {
-        const std::int32_t source = psd_of_control[r.psd_factors[f]];
-        ready = ready && (source < 0 || done[static_cast<std::size_t>(source)] != 0);
-      }
-      if (ready) {
-        done[p] = 1;
-        order.push_back(p);
-      } else {
-        later.push_back(p);
-      }
+  constexpr std::uint32_t kNone = UINT32_MAX;
+  std::vector<std::uint32_t> psd_of_control(r.control_count, kNone);
+  for (const std::uint32_t p : psds) psd_of_control[r.psds[p].output] = p;
+  std::vector<std::vector<std::uint32_t>> users(r.psds.size());
+  std::vector<std::uint32_t> waiting_for(r.psds.size(), 0);
+  std::priority_queue<std::uint32_t, std::vector<std::uint32_t>, std::greater<>> ready;
+  for (const std::uint32_t p : psds) {
+    for (std::uint32_t f = r.psds[p].factors_begin; f < r.psds[p].factors_end; ++f) {
+      const std::uint32_t source = psd_of_control[r.psd_factors[f]];
+      if (source == kNone) continue;
+      users[source].push_back(p);
+      ++waiting_for[p];
     }
-    if (later.size() == rest.size()) {
-      cycles = true;
-      order.insert(order.end(), later.begin(), later.end());
-      break;
-    }
-    rest = std::move(later);
+    if (waiting_for[p] == 0) ready.push(p);
   }
+  std::vector<std::uint32_t> order;
+  while (!ready.empty()) {
+    const std::uint32_t p = ready.top();
+    ready.pop();
+    order.push_back(p);
+    for (const std::uint32_t user : users[p]) {
+      if (--waiting_for[user] == 0) ready.push(user);
+    }
+  }
+  cycles = cycles || order.size() < psds.size();
+  std::ranges::copy_if(psds, std::back_inserter(order),
+                       [&](std::uint32_t p) { return waiting_for[p] > 0; });
   return order;
 }
 
@@ -368,6 +379,11 @@ Result<Rig> compile(const dna::Dna& dna, const CompileOptions& options) {
                     simd::available_kernels());
   }
   out.lod_count = dna.descriptor.lod_count;
+  if (out.lod_count > kMaxLods) {
+    return fail(
+        ErrorCode::kLimitExceeded, "descriptor.lod_count",
+        std::to_string(out.lod_count) + " LODs; a rig has at most " + std::to_string(kMaxLods));
+  }
   out.raw_control_names = dna.definition.raw_control_names;
   out.gui_control_names = dna.definition.gui_control_names;
   count_controls(dna, out);

@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: MIT
+// A Dna may have been edited: whatever stands in it, compile gives a Rig or an error with the
+// field.
+#include <chrono>
+#include <functional>
+#include <ostream>
+
+#include "support/face.h"
+
+namespace risorius::compile {
+namespace {
+
+using namespace testing_support;
+using core::ErrorCode;
+
+// Two raw controls, one corrective, one joint group, one channel, one map: everything once.
+dna::Dna good_face() {
+  dna::Dna dna = make_face(2, 1, 2);
+  dna.definition.gui_control_names = names("gui", 1);
+  dna.definition.blend_shape_channel_names = names("shape", 1);
+  dna.definition.animated_map_names = names("map", 1);
+  dna.behavior.gui_to_raw = {{0}, {1}, {0.0f}, {1.0f}, {1.0f}, {0.0f}};
+  dna.behavior.psds.rows = {2, 2};
+  dna.behavior.psds.columns = {0, 1};
+  dna.behavior.psds.values = {1.0f, 1.0f};
+  dna.behavior.joint_groups = std::vector{make_group({2, 1}, {0, 2}, {0, 17}, {1, 2, 3, 4})};
+  dna.behavior.blend_shape_channels.lods = {1, 1};
+  dna.behavior.blend_shape_channels.input_indices = {2};
+  dna.behavior.blend_shape_channels.output_indices = {0};
+  dna.behavior.animated_maps.lods = {1, 0};
+  dna.behavior.animated_maps.conditionals = {{2}, {0}, {0.0f}, {1.0f}, {1.0f}, {0.0f}};
+  return dna;
+}
+
+TEST(Compile, AcceptsTheFaceThatTheOthersBreak) { EXPECT_TRUE(compile(good_face()).has_value()); }
+
+struct Damage {
+  const char* name;
+  std::function<void(dna::Dna&)> apply;
+  ErrorCode code;
+  const char* where;
+};
+void PrintTo(const Damage& damage, std::ostream* out) { *out << damage.where; }
+
+const std::vector<Damage> kDamages{
+    {"GroupInput", [](auto& d) { d.behavior.joint_groups[0].input_indices = {0, 3}; },
+     ErrorCode::kInvalidIndex, "behavior.joint_groups[0].input_indices[1]"},
+    {"GroupOutput", [](auto& d) { d.behavior.joint_groups[0].output_indices = {0, 18}; },
+     ErrorCode::kInvalidIndex, "behavior.joint_groups[0].output_indices[1]"},
+    {"GroupValues", [](auto& d) { d.behavior.joint_groups[0].values = {1.0f, 2.0f, 3.0f}; },
+     ErrorCode::kInvalidLength, "behavior.joint_groups[0].values"},
+    {"GroupRows", [](auto& d) { d.behavior.joint_groups[0].lods = {3, 1}; },
+     ErrorCode::kInvalidValue, "behavior.joint_groups[0].lods[0]"},
+    {"GroupLods", [](auto& d) { d.behavior.joint_groups[0].lods = {2}; }, ErrorCode::kInvalidLength,
+     "behavior.joint_groups[0].lods"},
+    {"PsdColumn", [](auto& d) { d.behavior.psds.columns = {0, 3}; }, ErrorCode::kInvalidIndex,
+     "behavior.psds.columns[1]"},
+    {"PsdRow", [](auto& d) { d.behavior.psds.rows = {3, 2}; }, ErrorCode::kInvalidIndex,
+     "behavior.psds.rows[0]"},
+    {"PsdValues", [](auto& d) { d.behavior.psds.values = {1.0f}; }, ErrorCode::kInvalidLength,
+     "behavior.psds"},
+    {"GuiInput", [](auto& d) { d.behavior.gui_to_raw.input_indices = {1}; },
+     ErrorCode::kInvalidIndex, "behavior.gui_to_raw.input_indices[0]"},
+    {"GuiOutput", [](auto& d) { d.behavior.gui_to_raw.output_indices = {2}; },
+     ErrorCode::kInvalidIndex, "behavior.gui_to_raw.output_indices[0]"},
+    {"GuiLength", [](auto& d) { d.behavior.gui_to_raw.cut_values = {}; }, ErrorCode::kInvalidLength,
+     "behavior.gui_to_raw"},
+    {"ShapeInput", [](auto& d) { d.behavior.blend_shape_channels.input_indices = {3}; },
+     ErrorCode::kInvalidIndex, "behavior.blend_shape_channels.input_indices[0]"},
+    {"ShapeOutput", [](auto& d) { d.behavior.blend_shape_channels.output_indices = {1}; },
+     ErrorCode::kInvalidIndex, "behavior.blend_shape_channels.output_indices[0]"},
+    {"ShapeRows", [](auto& d) { d.behavior.blend_shape_channels.lods = {2, 1}; },
+     ErrorCode::kInvalidValue, "behavior.blend_shape_channels.lods[0]"},
+    {"MapInput", [](auto& d) { d.behavior.animated_maps.conditionals.input_indices = {3}; },
+     ErrorCode::kInvalidIndex, "behavior.animated_maps.input_indices[0]"},
+    {"MapOutput", [](auto& d) { d.behavior.animated_maps.conditionals.output_indices = {1}; },
+     ErrorCode::kInvalidIndex, "behavior.animated_maps.output_indices[0]"},
+    {"MapLods", [](auto& d) { d.behavior.animated_maps.lods = {1}; }, ErrorCode::kInvalidLength,
+     "behavior.animated_maps.lods"},
+    {"NeutralLength", [](auto& d) { d.definition.neutral_joint_rotations.values = {0, 0, 0}; },
+     ErrorCode::kInvalidLength, "definition.neutral_joint_rotations"},
+    {"LodCount", [](auto& d) { d.descriptor.lod_count = 65535; }, ErrorCode::kLimitExceeded,
+     "descriptor.lod_count"},
+    {"Parent", [](auto& d) { d.definition.joint_parents = {0, 2}; }, ErrorCode::kInvalidIndex,
+     "definition.joint_parents[1]"},
+};
+
+class CompileDamaged : public testing::TestWithParam<Damage> {};
+
+TEST_P(CompileDamaged, IsAnErrorWithTheField) {
+  dna::Dna dna = good_face();
+  GetParam().apply(dna);
+  const auto result = compile(dna);
+  ASSERT_FALSE(result.has_value());
+  EXPECT_EQ(result.error().code, GetParam().code) << result.error().describe();
+  EXPECT_EQ(result.error().where, GetParam().where);
+  EXPECT_FALSE(result.error().message.empty());
+}
+
+INSTANTIATE_TEST_SUITE_P(Every, CompileDamaged, testing::ValuesIn(kDamages),
+                         [](const auto& about) { return std::string(about.param.name); });
+
+dna::OpaqueLayer make_layer(const char* id, std::vector<std::uint8_t> bytes) {
+  dna::OpaqueLayer layer;
+  for (std::size_t i = 0; i < 4; ++i) layer.id[i] = id[i];
+  layer.bytes = std::move(bytes);
+  return layer;
+}
+
+TEST(Compile, NamesTheLayersThatAreNotEvaluated) {
+  dna::Dna dna = good_face();
+  dna.opaque_layers = {make_layer("mlbh", std::vector<std::uint8_t>(24, 0)),
+                       make_layer("twsw", {0, 0, 0, 1, 0, 0, 0, 0})};
+  EXPECT_EQ(must_compile(dna).ignored_layers, std::vector<std::string>{"twsw"});
+}
+
+TEST(Compile, ControlsOfNetworksAndPosesFollowTheCorrectives) {
+  dna::Dna dna = good_face();
+  dna.opaque_layers = {make_layer("mlbh", {0, 0, 0, 2}), make_layer("rbfe", {0, 0, 0, 3})};
+  dna.behavior.joint_groups[0].input_indices = {0, 7};
+  const rig::Rig rig = must_compile(dna);
+  EXPECT_EQ(rig.control_count, 2u + 1u + 2u + 3u);
+  EXPECT_EQ(evaluate_once(rig, {1.0f, 1.0f}).controls[7], 0.0f);
+}
+
+TEST(Compile, AbsurdCountInAKeptLayerDoesNotWidenTheControls) {
+  dna::Dna dna = good_face();
+  dna.opaque_layers = {make_layer("mlbh", {255, 255, 255, 255}), make_layer("rbfe", {1})};
+  EXPECT_EQ(must_compile(dna).control_count, 3u);
+}
+
+TEST(Compile, RigKeepsNothingOfTheDna) {
+  auto dna = std::make_unique<dna::Dna>(good_face());
+  const rig::Rig rig = must_compile(*dna);
+  dna.reset();
+  EXPECT_EQ(evaluate_once(rig, {1.0f, 0.5f}).blend_shapes[0], 0.5f);
+}
+
+TEST(Compile, PaddingIsZero) {
+  const rig::Rig rig = must_compile(good_face());
+  const rig::JointGroup& g = rig.joint_groups.at(0);
+  EXPECT_EQ(g.stride % simd::kRowAlignment, 0u);
+  EXPECT_EQ(reinterpret_cast<std::uintptr_t>(rig.joint_values.data()) % 64, 0u);
+  for (std::uint32_t c = 0; c < g.column_count; ++c) {
+    for (std::uint32_t r = g.row_count; r < g.stride; ++r) {
+      EXPECT_EQ(rig.joint_values[g.values_begin + c * g.stride + r], 0.0f);
+    }
+  }
+}
+
+// 60,000 correctives, each reading the next: the order must not cost their square.
+TEST(Compile, LongChainOfCorrectivesCompilesInTime) {
+  constexpr std::uint16_t n = 60000;
+  dna::Dna dna = make_face(1, n, 1, 1);
+  std::vector<std::uint16_t> rows, columns;
+  for (std::uint16_t i = 1; i <= n; ++i) {
+    rows.push_back(i);
+    columns.push_back(i == n ? std::uint16_t{0} : static_cast<std::uint16_t>(i + 1));
+  }
+  dna.definition.blend_shape_channel_names = names("shape", 1);
+  dna.behavior.blend_shape_channels.lods = {n};
+  dna.behavior.blend_shape_channels.input_indices = rows;
+  dna.behavior.blend_shape_channels.output_indices = std::vector<std::uint16_t>(n, 0);
+  dna.behavior.psds.rows = rows;
+  dna.behavior.psds.columns = columns;
+  dna.behavior.psds.values = std::vector<float>(n, 1.0f);
+  const auto begin = std::chrono::steady_clock::now();
+  EXPECT_EQ(evaluate_once(must_compile(dna), {0.5f}).controls[1], 0.5f);
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(1));
+}
+
+}  // namespace
+}  // namespace risorius::compile

@@ -1,0 +1,278 @@
+// SPDX-License-Identifier: MIT
+// The semantics of each stage on faces small enough to be worked out by hand.
+#include <cmath>
+#include <limits>
+
+#include "support/face.h"
+
+namespace risorius::rig {
+namespace {
+
+using namespace testing_support;
+
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+
+// ---- joints
+
+TEST(EvaluateJoints, MatrixTimesControlsUnclamped) {
+  dna::Dna dna = make_face(2, 0, 2);
+  dna.behavior.joint_groups =
+      std::vector{make_group({3, 2}, {1, 0}, {0, 10, 17}, {1, 2, 4, 8, -16, 32})};
+  const Rig rig = must_compile(dna);
+  const Pose pose = evaluate_once(rig, {2.0f, -0.5f});
+  EXPECT_EQ(pose.joints[0], 3.5f);
+  EXPECT_EQ(pose.joints[10], 14.0f);
+  EXPECT_EQ(pose.joints[17], 72.0f);
+}
+
+TEST(EvaluateJoints, LowerLodUsesLeadingRowsAndLeavesTheRestZero) {
+  dna::Dna dna = make_face(1, 0, 1);
+  dna.behavior.joint_groups = std::vector{make_group({3, 1}, {0}, {2, 1, 0}, {1, 2, 3})};
+  const Rig rig = must_compile(dna);
+  const Pose high = evaluate_once(rig, {1.0f}, 0), low = evaluate_once(rig, {1.0f}, 1);
+  EXPECT_EQ(high.joints[0], 3.0f);
+  EXPECT_EQ(low.joints[2], 1.0f);
+  EXPECT_EQ(low.joints[1], 0.0f);
+  EXPECT_EQ(low.joints[0], 0.0f);
+}
+
+TEST(EvaluateJoints, LodBeyondTheLastIsTheLast) {
+  dna::Dna dna = make_face(1, 0, 1);
+  dna.behavior.joint_groups = std::vector{make_group({2, 1}, {0}, {0, 1}, {1, 2})};
+  const Rig rig = must_compile(dna);
+  EXPECT_EQ(evaluate_once(rig, {1.0f}, 4000000000u).joints, evaluate_once(rig, {1.0f}, 1).joints);
+}
+
+TEST(EvaluateJoints, LastGroupThatWritesARowWins) {
+  dna::Dna dna = make_face(2, 0, 1);
+  dna.behavior.joint_groups =
+      std::vector{make_group({1, 1}, {0}, {4}, {1}), make_group({1, 0}, {1}, {4}, {10})};
+  const Rig rig = must_compile(dna);
+  EXPECT_EQ(evaluate_once(rig, {1.0f, 1.0f}, 0).joints[4], 10.0f);
+  EXPECT_EQ(evaluate_once(rig, {1.0f, 0.0f}, 0).joints[4], 0.0f) << "a zero is written as well";
+  EXPECT_EQ(evaluate_once(rig, {1.0f, 1.0f}, 1).joints[4], 1.0f) << "no row at this LOD";
+}
+
+TEST(EvaluateJoints, PoseOfTheFrameBeforeDoesNotShine) {
+  dna::Dna dna = make_face(1, 0, 1);
+  dna.behavior.joint_groups = std::vector{make_group({2, 1}, {0}, {0, 1}, {1, 2})};
+  const Rig rig = must_compile(dna);
+  Workspace work = make_workspace(rig);
+  Pose pose = make_pose(rig);
+  const float one = 1.0f, zero = 0.0f;
+  evaluate(rig, &one, 0, true, work, pose);
+  evaluate(rig, &one, 1, true, work, pose);
+  EXPECT_EQ(pose.joints[1], 0.0f);
+  evaluate(rig, &zero, 0, true, work, pose);
+  EXPECT_EQ(pose.joints[0], 0.0f);
+}
+
+TEST(EvaluateJoints, NanStaysInTheGroupsThatHaveItAsAColumn) {
+  dna::Dna dna = make_face(2, 0, 2);
+  dna.behavior.joint_groups =
+      std::vector{make_group({1, 1}, {0}, {0}, {1}), make_group({1, 1}, {1}, {9}, {1})};
+  const Pose pose = evaluate_once(must_compile(dna), {kNan, 1.0f});
+  EXPECT_TRUE(std::isnan(pose.joints[0]));
+  EXPECT_EQ(pose.joints[9], 1.0f);
+}
+
+// ---- correctives
+
+// Control 2 = corrective of 0 and 1 with the given entries.
+Rig corrective_rig(std::vector<std::uint16_t> columns, std::vector<float> values) {
+  dna::Dna dna = make_face(2, 1, 1);
+  dna.behavior.psds.rows = std::vector<std::uint16_t>(columns.size(), 2);
+  dna.behavior.psds.columns = std::move(columns);
+  dna.behavior.psds.values = std::move(values);
+  dna.behavior.joint_groups = std::vector{make_probe({2})};
+  return must_compile(dna);
+}
+
+TEST(EvaluateCorrectives, ProductOfFactorsClampedToUnitRange) {
+  const Rig rig = corrective_rig({0, 1}, {1, 1});
+  EXPECT_EQ(evaluate_once(rig, {0.5f, 0.25f}).controls[2], 0.125f);
+  EXPECT_EQ(evaluate_once(rig, {2.0f, 0.25f}).controls[2], 0.25f);
+  EXPECT_EQ(evaluate_once(rig, {-1.0f, 0.25f}).controls[2], 0.0f);
+}
+
+TEST(EvaluateCorrectives, WeightsMultiplyAndOnlyTheUpperEndIsClamped) {
+  EXPECT_EQ(evaluate_once(corrective_rig({0, 1}, {2, 4}), {0.5f, 0.125f}).controls[2], 0.5f);
+  EXPECT_EQ(evaluate_once(corrective_rig({0, 1}, {2, 4}), {1.0f, 1.0f}).controls[2], 1.0f);
+  EXPECT_EQ(evaluate_once(corrective_rig({0, 1}, {-2, 4}), {1.0f, 0.5f}).controls[2], -4.0f);
+}
+
+TEST(EvaluateCorrectives, RawControlsKeepTheirUnclampedValue) {
+  const Pose pose = evaluate_once(corrective_rig({0, 1}, {1, 1}), {3.0f, -2.0f});
+  EXPECT_EQ(pose.controls[0], 3.0f);
+  EXPECT_EQ(pose.controls[1], -2.0f);
+}
+
+TEST(EvaluateCorrectives, NanFactorSpoilsTheCorrective) {
+  EXPECT_TRUE(std::isnan(evaluate_once(corrective_rig({0, 1}, {1, 1}), {kNan, 1.0f}).controls[2]));
+}
+
+// Correctives 1, 2, 3 of one raw control, each half of the one that it reads; entries interleaved.
+dna::Dna chain(std::vector<std::uint16_t> rows, std::vector<std::uint16_t> columns) {
+  dna::Dna dna = make_face(1, 3, 1);
+  dna.behavior.psds.values = std::vector<float>(rows.size(), 0.5f);
+  dna.behavior.psds.rows = std::move(rows);
+  dna.behavior.psds.columns = std::move(columns);
+  dna.behavior.joint_groups = std::vector{make_probe({1, 2, 3})};
+  return dna;
+}
+
+TEST(EvaluateCorrectives, SettlingFollowsAChainAgainstTheOrderOfIndices) {
+  const Rig rig = must_compile(chain({1, 2, 3}, {2, 3, 0}));  // 1 reads 2 reads 3 reads raw
+  const Pose settled = evaluate_once(rig, {1.0f}), first = evaluate_once(rig, {1.0f}, 0, false);
+  EXPECT_EQ(settled.controls, (std::vector{1.0f, 0.125f, 0.25f, 0.5f}));
+  EXPECT_EQ(first.controls, (std::vector{1.0f, 0.0f, 0.0f, 0.5f}));
+}
+
+TEST(EvaluateCorrectives, FirstCallReadsNoCorrectiveEvenInTheOrderOfIndices) {
+  const Rig rig = must_compile(chain({1, 2, 3}, {0, 1, 2}));
+  EXPECT_EQ(evaluate_once(rig, {1.0f}).controls, (std::vector{1.0f, 0.5f, 0.25f, 0.125f}));
+  EXPECT_EQ(evaluate_once(rig, {1.0f}, 0, false).controls, (std::vector{1.0f, 0.5f, 0.0f, 0.0f}));
+}
+
+TEST(EvaluateCorrectives, CycleEndsAndIsTheSameEveryTime) {
+  const Rig rig = must_compile(chain({1, 2, 3, 1}, {2, 1, 0, 0}));
+  const Pose a = evaluate_once(rig, {1.0f}), b = evaluate_once(rig, {1.0f});
+  EXPECT_EQ(a.controls, b.controls);
+  EXPECT_EQ(a.controls[1], 0.0f) << "a cycle that nothing starts stays at rest";
+  EXPECT_EQ(a.controls[3], 0.5f) << "what is outside the cycle is settled";
+}
+
+TEST(EvaluateCorrectives, CorrectiveThatNothingUsesAtTheLodStaysZero) {
+  dna::Dna dna = chain({1, 2, 3}, {0, 0, 0});
+  dna.behavior.joint_groups =
+      std::vector{make_group({2, 1}, {1, 2}, {0, 1}, {1, 0, 0, 1})};  // 3 unused, 2 at LOD 0 only
+  const Rig rig = must_compile(dna);
+  EXPECT_EQ(evaluate_once(rig, {1.0f}, 0).controls, (std::vector{1.0f, 0.5f, 0.5f, 0.0f}));
+  EXPECT_EQ(evaluate_once(rig, {1.0f}, 1).controls, (std::vector{1.0f, 0.5f, 0.0f, 0.0f}));
+}
+
+// ---- conditional tables
+
+struct Row {
+  std::uint16_t input, output;
+  float from, to, slope, cut;
+};
+
+Rig table_rig(const std::vector<Row>& rows) {
+  std::vector<std::uint16_t> inputs, outputs;
+  std::vector<float> from, to, slope, cut;
+  for (const Row& r : rows) {
+    inputs.push_back(r.input);
+    outputs.push_back(r.output);
+    from.push_back(r.from);
+    to.push_back(r.to);
+    slope.push_back(r.slope);
+    cut.push_back(r.cut);
+  }
+  dna::Dna dna = make_face(2, 0, 1);
+  dna.definition.gui_control_names = names("gui", 2);
+  dna.behavior.gui_to_raw = {inputs, outputs, from, to, slope, cut};
+  return must_compile(dna);
+}
+
+float mapped(const Rig& rig, float gui, float other = 0.0f) {
+  const float in[2] = {gui, other};
+  float raw[2] = {9.0f, 9.0f};
+  gui_to_raw(rig, in, raw);
+  return raw[0];
+}
+
+TEST(EvaluateTable, BothBoundsAreInside) {
+  const Rig rig = table_rig({{0, 0, 0.25f, 0.5f, 1, 0}});
+  EXPECT_EQ(mapped(rig, 0.25f), 0.25f);
+  EXPECT_EQ(mapped(rig, 0.5f), 0.5f);
+  EXPECT_EQ(mapped(rig, 0.24f), 0.0f) << "outside every range there is nothing";
+  EXPECT_EQ(mapped(rig, 0.51f), 0.0f);
+}
+
+TEST(EvaluateTable, ReversedBoundsAreSwapped) {
+  EXPECT_EQ(mapped(table_rig({{0, 0, 1, 0, 0.5f, 0}}), 0.5f), 0.25f);
+}
+
+TEST(EvaluateTable, OfARunOnlyTheFirstMatchCounts) {
+  const Rig rig = table_rig({{0, 0, 0, 0.5f, 1, 0}, {0, 0, 0.5f, 1, 0.5f, 0.25f}});
+  EXPECT_EQ(mapped(rig, 0.5f), 0.5f) << "both rows hold at the joint; they must not add";
+  EXPECT_EQ(mapped(rig, 1.0f), 0.75f);
+}
+
+TEST(EvaluateTable, RowsOfOtherRunsAddUp) {
+  const Rig rig =
+      table_rig({{0, 0, 0, 1, 0.25f, 0}, {1, 0, 0, 1, 0.25f, 0}, {0, 0, 0, 1, 0.5f, 0}});
+  EXPECT_EQ(mapped(rig, 0.5f, 1.0f), 0.125f + 0.25f + 0.25f);
+}
+
+TEST(EvaluateTable, ResultIsClampedAfterTheSum) {
+  const Rig rig = table_rig({{0, 0, 0, 1, 2, 0}, {1, 0, 0, 1, -1, 0}});
+  EXPECT_EQ(mapped(rig, 1.0f, 0.5f), 1.0f);
+  EXPECT_EQ(mapped(rig, 0.0f, 0.5f), 0.0f);
+  EXPECT_EQ(mapped(rig, 0.5f, 0.25f), 0.75f) << "1 - 0.25: the parts are not clamped";
+}
+
+TEST(EvaluateTable, OutputsThatNoRowNamesAreZero) {
+  const Rig rig = table_rig({{0, 0, 0, 1, 1, 0}});
+  const float in[2] = {1.0f, 1.0f};
+  float raw[2] = {9.0f, 9.0f};
+  gui_to_raw(rig, in, raw);
+  EXPECT_EQ(raw[1], 0.0f);
+}
+
+TEST(EvaluateTable, NanReachesTheOutputsOfItsInput) {
+  EXPECT_TRUE(std::isnan(mapped(table_rig({{0, 0, 0, 1, 1, 0}}), kNan)));
+  EXPECT_EQ(mapped(table_rig({{1, 0, 0, 1, 1, 0}}), kNan, 0.5f), 0.5f);
+}
+
+TEST(EvaluateMaps, LodUsesLeadingRowsEvenInsideARun) {
+  dna::Dna dna = make_face(1, 0, 1);
+  dna.definition.animated_map_names = names("map", 1);
+  dna.behavior.animated_maps.lods = {2, 1};
+  dna.behavior.animated_maps.conditionals = {{0, 0},       {0, 0},       {0.0f, 0.5f},
+                                             {0.5f, 1.0f}, {1.0f, 1.0f}, {0.0f, 0.0f}};
+  const Rig rig = must_compile(dna);
+  EXPECT_EQ(evaluate_once(rig, {0.75f}, 0).animated_maps[0], 0.75f);
+  EXPECT_EQ(evaluate_once(rig, {0.75f}, 1).animated_maps[0], 0.0f);
+  EXPECT_EQ(evaluate_once(rig, {0.25f}, 1).animated_maps[0], 0.25f);
+}
+
+// ---- blend shapes
+
+TEST(EvaluateShapes, CopyTheirControlUnclampedAndTheLastWins) {
+  dna::Dna dna = make_face(2, 0, 1);
+  dna.definition.blend_shape_channel_names = names("shape", 3);
+  dna.behavior.blend_shape_channels.lods = {3, 1};
+  dna.behavior.blend_shape_channels.input_indices = {0, 1, 0};
+  dna.behavior.blend_shape_channels.output_indices = {2, 0, 0};
+  const Rig rig = must_compile(dna);
+  EXPECT_EQ(evaluate_once(rig, {2.5f, -1.0f}, 0).blend_shapes, (std::vector{2.5f, 0.0f, 2.5f}));
+  EXPECT_EQ(evaluate_once(rig, {2.5f, -1.0f}, 1).blend_shapes, (std::vector{0.0f, 0.0f, 2.5f}));
+}
+
+// ---- faces with nothing in them
+
+TEST(Evaluate, EmptyFaceGivesAnEmptyPose) {
+  const Rig rig = must_compile(dna::Dna{});
+  const Pose pose = evaluate_once(rig, {});
+  EXPECT_TRUE(pose.joints.empty());
+  EXPECT_TRUE(pose.controls.empty());
+}
+
+TEST(Evaluate, FaceWithoutLodsRests) {
+  const Rig rig = must_compile(make_face(1, 1, 2, 0));
+  const Pose pose = evaluate_once(rig, {1.0f});
+  EXPECT_EQ(pose.joints, std::vector<float>(18, 0.0f));
+  EXPECT_EQ(pose.controls, (std::vector{1.0f, 0.0f}));
+}
+
+TEST(Evaluate, GroupWithoutRowsOrColumnsDoesNothing) {
+  dna::Dna dna = make_face(1, 0, 1);
+  dna.behavior.joint_groups = std::vector{
+      make_group({}, {0}, {}, {}), make_group({0, 0}, {}, {}, {}), make_group({1, 1}, {}, {3}, {})};
+  EXPECT_EQ(evaluate_once(must_compile(dna), {1.0f}).joints, std::vector<float>(9, 0.0f));
+}
+
+}  // namespace
+}  // namespace risorius::rig

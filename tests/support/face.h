@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: MIT
+// Small faces made in memory, and the shortest way to evaluate them.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "compile/compile.h"
+
+namespace risorius::testing_support {
+
+inline std::vector<std::string> names(const char* stem, std::size_t n) {
+  std::vector<std::string> out;
+  for (std::size_t i = 0; i < n; ++i) out.push_back(stem + std::to_string(i));
+  return out;
+}
+
+/// A face without behavior: joints at the origin, all children of the first.
+inline dna::Dna make_face(std::size_t raw, std::uint16_t psds, std::size_t joints,
+                          std::uint16_t lods = 2) {
+  dna::Dna dna;
+  dna.descriptor.lod_count = lods;
+  dna.definition.raw_control_names = names("raw", raw);
+  dna.definition.joint_names = names("joint", joints);
+  dna.definition.joint_parents = std::vector<std::uint16_t>(joints, 0);
+  dna.definition.neutral_joint_translations.values = std::vector<float>(joints * 3, 0.0f);
+  dna.definition.neutral_joint_rotations.values = std::vector<float>(joints * 3, 0.0f);
+  dna.behavior.psd_count = psds;
+  return dna;
+}
+
+inline dna::JointGroup make_group(std::vector<std::uint16_t> lods,
+                                  std::vector<std::uint16_t> inputs,
+                                  std::vector<std::uint16_t> outputs, std::vector<float> values) {
+  dna::JointGroup g;
+  g.lods = std::move(lods);
+  g.input_indices = std::move(inputs);
+  g.output_indices = std::move(outputs);
+  g.values = std::move(values);
+  return g;
+}
+
+/// A group whose row r passes control inputs[r] to attribute r: shows controls, and uses them.
+inline dna::JointGroup make_probe(const std::vector<std::uint16_t>& inputs, std::size_t lods = 2) {
+  const std::size_t n = inputs.size();
+  std::vector<std::uint16_t> outputs(n);
+  std::vector<float> identity(n * n, 0.0f);
+  for (std::size_t i = 0; i < n; ++i) {
+    outputs[i] = static_cast<std::uint16_t>(i);
+    identity[i * n + i] = 1.0f;
+  }
+  return make_group(std::vector<std::uint16_t>(lods, static_cast<std::uint16_t>(n)), inputs,
+                    outputs, identity);
+}
+
+inline rig::Rig must_compile(const dna::Dna& dna, const simd::Kernels* kernels = nullptr) {
+  compile::CompileOptions options;
+  options.kernels = kernels;
+  core::Result<rig::Rig> result = compile::compile(dna, options);
+  if (!result) {
+    ADD_FAILURE() << result.error().describe();
+    std::abort();
+  }
+  return std::move(result).value();
+}
+
+inline rig::Pose evaluate_once(const rig::Rig& rig, const std::vector<float>& raw,
+                               std::uint32_t lod = 0, bool settle = true) {
+  rig::Workspace work = rig::make_workspace(rig);
+  rig::Pose pose = rig::make_pose(rig);
+  rig::evaluate(rig, raw.data(), lod, settle, work, pose);
+  return pose;
+}
+
+}  // namespace risorius::testing_support
