@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: MIT
+"""The command line. Exit codes: 0 done, 1 the input is bad, 2 the command line is bad."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+
+from . import DnaError, __version__
+from .commands import info, sample
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command. Args: the arguments, else those of the process. Returns: the exit code."""
+    parser = argparse.ArgumentParser(prog="risorius", description="Face rigs from DNA files.")
+    parser.add_argument("--version", action="version", version=__version__)
+    subparsers = parser.add_subparsers(dest="command", required=True)
+    for command in (info, sample):
+        command.add_parser(subparsers)
+    args = parser.parse_args(arguments)
+    try:
+        return int(args.func(args))
+    except DnaError as error:
+        print(f"risorius: {error}", file=sys.stderr)
+        return 1
+    except BrokenPipeError:
+        return 0

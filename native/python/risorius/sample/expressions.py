@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: MIT
+"""What each control of the sample does: displacements of all vertices, and joint motions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..arkit import mapping
+from .polygons import Floats
+from .source import TARGETS, Source
+
+PREFIX = "CTRL_expressions."
+UNITS = TARGETS + "expression/units/caucasian/"
+
+
+@dataclass
+class Expression:
+    """One raw control at 1: where every vertex goes, and how much of it the joints do."""
+
+    displacement: Floats  # [V, 3] in decimetres: the whole motion
+    joints: dict[str, tuple[Floats, Floats]] = field(default_factory=dict)  # rotation, translation
+
+
+def smooth_step(x: Floats) -> Floats:
+    t = np.clip(x, 0, 1)
+    return t * t * (3 - 2 * t)
+
+
+def side_masks(positions: Floats) -> dict[str, Floats]:
+    """Left and right halves that sum to 1; the character's left is +x."""
+    left = smooth_step(positions[:, 0] / 0.5 + 0.5)
+    return {"L": left, "R": 1 - left}
+
+
+def lip_masks(jaw_open: Floats) -> dict[str, Floats]:
+    """Upper and lower that sum to 1: what the opening jaw takes along is lower.
+
+    Space cannot tell the lips apart, they touch; the motion of the jaw can.
+    """
+    travel = np.linalg.norm(jaw_open, axis=1)
+    lower = smooth_step(travel / (0.55 * np.quantile(travel[travel > 0], 0.95)))
+    return {"U": 1 - lower, "D": lower}
+
+
+def rigid_fit(before: Floats, after: Floats) -> tuple[Floats, Floats]:
+    """Rotation [3, 3] and translation of the least-squares rigid motion (Kabsch 1976)."""
+    a, b = before - before.mean(0), after - after.mean(0)
+    u, _, vt = np.linalg.svd(a.T @ b)
+    flip = np.diag([1, 1, np.sign(np.linalg.det(u @ vt))])
+    rotation = (u @ flip @ vt).T
+    return rotation, after.mean(0) - rotation @ before.mean(0)
+
+
+def about(pivot: Floats, rotation: Floats, translation: Floats) -> tuple[Floats, Floats]:
+    """The same rigid motion as a rotation about pivot and a shift of it."""
+    return rotation, translation - pivot + rotation @ pivot
+
+
+def part_rotation(rotation: Floats, share: float) -> Floats:
+    """The rotation by a share of the angle (Rodrigues)."""
+    angle = np.arccos(np.clip((np.trace(rotation) - 1) / 2, -1, 1)) * share
+    axis = np.array(
+        [
+            rotation[2, 1] - rotation[1, 2],
+            rotation[0, 2] - rotation[2, 0],
+            rotation[1, 0] - rotation[0, 1],
+        ]
+    )
+    axis /= max(np.linalg.norm(axis), 1e-12)
+    k = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    return np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * (k @ k)
+
+
+def split_units(source: Source, positions: Floats) -> dict[str, Expression]:
+    """The 52 ARKit units, divided over the raw controls of their row in arkit.toml."""
+    count = len(positions)
+    sides = side_masks(positions)
+    lips = lip_masks(source.face_unit("jawOpen", count))
+    out: dict[str, Expression] = {}
+    for unit, row in mapping().items():
+        whole = source.face_unit(unit, count)
+        names = [name.removeprefix(PREFIX) for name in row]
+        for name in names:
+            mask = np.ones(count)
+            if len(names) > 1:
+                if {n[-1] for n in names} == {"L", "R"}:
+                    mask = mask * sides[name[-1]]
+                if {n[-2] for n in names} == {"U", "D"}:
+                    mask = mask * lips[name[-2]]
+            out[name] = Expression(whole * mask[:, None])
+    return out
+
+
+def extra_units(source: Source, positions: Floats) -> dict[str, Expression]:
+    """Controls beyond ARKit that the FACS-like targets of the data can show."""
+    count = len(positions)
+    sides = side_masks(positions)
+
+    def unit(name: str) -> Floats:
+        return source.target(f"{UNITS}{name}.target.gz", count)
+
+    out = {}
+    halves = {
+        "neckStretch": unit("neck-platysma"),
+        "noseNostrilCompress": unit("nose-compression"),
+        "noseNostrilDepress": unit("nose-depression"),
+        "mouthLipsPress": unit("mouth-compression"),
+        "mouthSharpCornerPull": unit("mouth-corner-puller"),
+    }
+    for name, whole in halves.items():
+        for side, mask in sides.items():
+            out[name + side] = Expression(whole * mask[:, None])
+    out["noseNostrilDilateL"] = Expression(unit("nose-left-dilatation"))
+    out["noseNostrilDilateR"] = Expression(unit("nose-right-dilatation"))
+    out["mouthUp"] = Expression(unit("mouth-elevation"))
+    out["mouthDown"] = Expression(unit("mouth-depression"))
+    return out
+
+
+def add_joint_motion(
+    out: dict[str, Expression], groups: dict[str, Floats], positions: Floats, pivots: dict[str, Floats]
+) -> None:
+    """Give jaw and eyes their joints: the rigid motion that fits teeth and eyeballs best.
+
+    Args:
+        groups: vertex indices by group of the base mesh.
+        pivots: joint positions by name.
+    """
+    teeth = groups["helper-lower-teeth"]
+    jaw = pivots["FACIAL_C_Jaw"]
+    for name in ("jawOpen", "jawLeft", "jawRight", "jawFwd"):
+        moved = positions[teeth] + out[name].displacement[teeth]
+        out[name].joints["FACIAL_C_Jaw"] = about(jaw, *rigid_fit(positions[teeth], moved))
+    forward = out["jawFwd"].joints["FACIAL_C_Jaw"][1]
+    out["jawBack"] = Expression(
+        -0.4 * out["jawFwd"].displacement, {"FACIAL_C_Jaw": (np.eye(3), -0.4 * forward)}
+    )
+    rotation, shift = out["jawOpen"].joints["FACIAL_C_Jaw"]
+    out["jawOpenExtreme"] = Expression(
+        0.4 * out["jawOpen"].displacement,
+        {"FACIAL_C_Jaw": (part_rotation(rotation, 0.4), 0.4 * shift)},
+    )
+    for side, letter in (("L", "l"), ("R", "r")):
+        eye = groups[f"helper-{letter}-eye"]
+        pivot = pivots[f"FACIAL_{side}_Eye"]
+        for look in ("Up", "Down", "Left", "Right"):
+            expression = out[f"eyeLook{look}{side}"]
+            moved = positions[eye] + expression.displacement[eye]
+            rotation, _ = rigid_fit(positions[eye], moved)
+            expression.joints[f"FACIAL_{side}_Eye"] = (rotation, np.zeros(3))
+
+
+def corrective_displacements(out: dict[str, Expression]) -> dict[tuple[str, str], Floats]:
+    """What to add where two controls meet; (a, b) fires with the product of both."""
+    lower = lip_masks(out["jawOpen"].displacement)["D"][:, None]
+    result: dict[tuple[str, str], Floats] = {}
+    for side in ("L", "R"):
+        # The open jaw stretches the lower lip: a smile cannot lift it as far.
+        smile = out[f"mouthCornerPull{side}"].displacement
+        result[("jawOpen", f"mouthCornerPull{side}")] = -0.3 * lower * smile
+        # The lower lid comes half way: the upper lid has that much less to close.
+        blink = out[f"eyeBlink{side}"].displacement
+        raised = out[f"eyeCheekRaise{side}"].displacement
+        travel = np.linalg.norm(blink, axis=1)
+        lid_rise = np.clip(raised[:, 1], 0, None)
+        near = travel > 0.02
+        share = np.zeros(len(blink))
+        share[near] = np.minimum(0.25, lid_rise[near].max() / max(travel.max(), 1e-9))
+        result[(f"eyeBlink{side}", f"eyeCheekRaise{side}")] = -share[:, None] * blink
+        for lips in ("mouthFunnel", "mouthLipsPurse"):
+            # Lips that are pushed forward keep touching the teeth line less when the jaw drops.
+            result[("jawOpen", f"{lips}D{side}")] = -0.25 * out[f"{lips}D{side}"].displacement
+    return result

