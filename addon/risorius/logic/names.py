@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Names are labels: cut to what Blender holds and numbered where they repeat."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+MAX_BYTES = 63
+
+
+def cut(name: str, limit: int = MAX_BYTES) -> str:
+    """Shorten a name to at most `limit` bytes of UTF-8, never inside a character.
+
+    Args:
+        name: any text; bytes that are not UTF-8 may stand in it as lone surrogates.
+        limit: bytes.
+
+    Returns:
+        The same text, or a shorter one that is valid UTF-8; never empty.
+    """
+    clean = name.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
+    clean = clean.replace("\0", "") or "unnamed"
+    return clean.encode("utf-8")[:limit].decode("utf-8", "ignore")
+
+
+def unique_labels(names: Iterable[str], taken: Iterable[str] = ()) -> list[str]:
+    """One label for each name: at most 63 bytes, all different, also from `taken`.
+
+    Args:
+        names: names in index order; long and repeated ones are allowed.
+        taken: labels that must not be given.
+
+    Returns:
+        Labels in the same order. A name that is short and first of its kind stays as it is.
+    """
+    used = set(taken)
+    labels = []
+    for name in names:
+        label = cut(name)
+        number = 0
+        while label in used:
+            number += 1
+            suffix = f".{number:03d}"
+            label = cut(name, MAX_BYTES - len(suffix)) + suffix
+        used.add(label)
+        labels.append(label)
+    return labels
+
+
+def without_lod(mesh_name: str) -> str:
+    """The mesh's name without its level of detail: `head_lod0_mesh` gives `head`."""
+    words = [w for w in mesh_name.split("_") if w]
+    kept = [w for w in words if not (w.lower().startswith("lod") and w[3:].isdigit())]
+    if len(kept) > 1 and kept[-1].lower() == "mesh":
+        kept.pop()
+    return "_".join(kept) or mesh_name

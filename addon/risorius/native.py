@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The single door to the `risorius` wheel that the extension bundles."""
+
+import re
+import sys
+from pathlib import Path
+
+try:
+    import risorius as _risorius
+except ImportError as _error:
+    _risorius = None
+    _reason = str(_error)
+else:
+    _reason = ""
+
+_HERE = Path(__file__).parent
+
+
+def addon_version() -> str:
+    """The version of the add-on, from its manifest."""
+    text = (_HERE / "blender_manifest.toml").read_text(encoding="utf-8")
+    found = re.search(r'^version = "([^"]+)"', text, re.MULTILINE)
+    return found.group(1) if found else "unknown"
+
+
+def problem() -> str:
+    """Why the native module cannot be used, in one or two sentences; empty when all is well."""
+    running = f"{sys.version_info.major}.{sys.version_info.minor}"
+    if _risorius is None:
+        wheels = sorted(p.name for p in (_HERE / "wheels").glob("*.whl"))
+        tags = sorted({t for w in wheels for t in re.findall(r"-cp3(\d+)-", w)}, key=int)
+        have = ", ".join(f"3.{t}" for t in tags) if tags else "no Python at all"
+        return (
+            f"The native module for Python {running} is missing: this package has wheels for "
+            f"{have}. Install the package made for this Blender. ({_reason})"
+        )
+    version = getattr(_risorius, "__version__", "unknown")
+    if version != addon_version():
+        return (
+            f"The native module is version {version}, the add-on is {addon_version()}. "
+            "Install the add-on anew, then restart Blender."
+        )
+    return ""
+
+
+def module():
+    """The `risorius` package.
+
+    Raises:
+        RuntimeError: it is missing or of another version; the text says so.
+    """
+    trouble = problem()
+    if trouble:
+        raise RuntimeError(trouble)
+    return _risorius
+
+
+def dna_error() -> type[Exception]:
+    """The class of errors of bad files, or one that is never raised without the module."""
+    return _risorius.DnaError if _risorius is not None else _Never
+
+
+class _Never(Exception):  # noqa: N818
+    """Stands in where the native module is missing."""
