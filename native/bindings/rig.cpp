@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: MIT
+#include "rig/rig.h"
+
+#include <bit>
+#include <functional>
+
 #include "bindings/arrays.h"
 #include "compile/compile.h"
 #include "core/parallel_for.h"
 #include "rig/morph.h"
-#include "rig/rig.h"
 
 namespace risorius::bindings {
 
@@ -30,6 +34,58 @@ FloatArray vector_argument(const py::object& object, const char* name, std::size
   return array;
 }
 
+// Exponents of all ones are infinities and NaN; without an early exit the compiler vectorises.
+void require_finite(const FloatArray& array, const char* name) {
+  constexpr std::uint32_t kExponent = 0x7f800000u;
+  const float* begin = array.data();
+  std::uint32_t spoiled = 0;
+  for (py::ssize_t i = 0; i < array.size(); ++i) {
+    spoiled |= (std::bit_cast<std::uint32_t>(begin[i]) & kExponent) == kExponent ? 1u : 0u;
+  }
+  if (spoiled != 0) throw py::value_error(std::string(name) + ": finite numbers were expected");
+}
+
+FloatArray matrix_argument(const py::object& object, const char* name, py::ssize_t rows) {
+  FloatArray array = FloatArray::ensure(object);
+  if (!array) throw py::value_error(std::string(name) + ": an array of numbers was expected");
+  if (array.ndim() != 2 || array.shape(0) != rows || array.shape(1) != 3) {
+    shape_error(name, "(" + std::to_string(rows) + ", 3)", array);
+  }
+  require_finite(array, name);
+  return array;
+}
+
+// A caller's array is written in place, or a new one is made.
+py::array_t<float> output_argument(const py::object& object, py::ssize_t rows, const float* base) {
+  if (object.is_none()) return py::array_t<float>({rows, py::ssize_t{3}});
+  if (!py::isinstance<py::array_t<float, py::array::c_style>>(object)) {
+    throw py::value_error("out: a C-contiguous float32 array was expected");
+  }
+  auto out = object.cast<py::array_t<float>>();
+  if (out.ndim() != 2 || out.shape(0) != rows || out.shape(1) != 3) {
+    shape_error("out", "(" + std::to_string(rows) + ", 3)", out);
+  }
+  if (!out.writeable()) throw py::value_error("out: the array is read-only");
+  const std::less<const float*> before;
+  if (base != nullptr && before(base, out.data() + rows * 3) &&
+      before(out.data(), base + rows * 3)) {
+    throw py::value_error("out: an array that does not overlap base was expected");
+  }
+  return out;
+}
+
+py::array evaluate_morph(const rig::Morph& morph, const py::object& weights, const py::object& base,
+                         const py::object& out) {
+  const FloatArray w = vector_argument(weights, "blend_shapes", morph.channel_count);
+  require_finite(w, "blend_shapes");
+  const auto vertices = static_cast<py::ssize_t>(morph.vertex_count);
+  const FloatArray from = base.is_none() ? FloatArray() : matrix_argument(base, "base", vertices);
+  const float* start = base.is_none() ? nullptr : from.data();
+  py::array_t<float> to = output_argument(out, vertices, start);
+  rig::evaluate_morph(morph, w.data(), start, to.mutable_data());
+  return to;
+}
+
 py::array_t<float> copied(const std::vector<float>& values, std::vector<py::ssize_t> shape) {
   py::array_t<float> out(std::move(shape));
   std::copy(values.begin(), values.end(), out.mutable_data());
@@ -49,8 +105,8 @@ RigPtr make_rig(const dna::Dna& dna, const std::optional<std::string>& simd) {
   if (simd) {
     options.kernels = simd::find_kernels(simd->c_str());
     if (options.kernels == nullptr) {
-      throw py::value_error("simd: " + *simd + " is not available here; there are: " +
-                            simd::available_kernels());
+      throw py::value_error("simd: " + *simd +
+                            " is not available here; there are: " + simd::available_kernels());
     }
   }
   return std::make_shared<const rig::Rig>(unwrap(compile::compile(dna, options)));
@@ -148,9 +204,8 @@ void bind_rig_class(py::module_& m) {
       .def("evaluate_batch", &evaluate_batch, py::arg("raw"), py::arg("lod") = 0,
            py::arg("threads") = 0, py::arg("settle") = true,
            "float32[N, R] -> Pose whose fields have a leading N; threads 0 is all cores.")
-      .def("instance", [](const std::shared_ptr<rig::Rig>& r) {
-        return PyInstance{r, rig::Instance(*r)};
-      });
+      .def("instance",
+           [](const std::shared_ptr<rig::Rig>& r) { return PyInstance{r, rig::Instance(*r)}; });
 }
 
 void bind_morph(py::module_& m) {
@@ -159,10 +214,7 @@ void bind_morph(py::module_& m) {
       .def(py::init([](const dna::Dna& dna, std::size_t mesh_index, const py::object& matrix) {
              std::array<float, 9> rows{1, 0, 0, 0, 1, 0, 0, 0, 1};
              if (!matrix.is_none()) {
-               const FloatArray given = FloatArray::ensure(matrix);
-               if (!given || given.ndim() != 2 || given.shape(0) != 3 || given.shape(1) != 3) {
-                 shape_error("matrix", "(3, 3)", py::array::ensure(matrix));
-               }
+               const FloatArray given = matrix_argument(matrix, "matrix", 3);
                std::copy(given.data(), given.data() + 9, rows.begin());
              }
              return std::make_shared<rig::Morph>(
@@ -176,40 +228,9 @@ void bind_morph(py::module_& m) {
                                    static_cast<py::ssize_t>(s.channels.size()), s.channels.data());
                              })
       .def_property_readonly("memory_bytes", &rig::Morph::memory_bytes)
-      .def(
-          "evaluate",
-          [](const rig::Morph& s, const py::object& weights, const py::object& base,
-             const py::object& out) -> py::array {
-            const FloatArray w = vector_argument(weights, "blend_shapes", s.channel_count);
-            const auto vertices = static_cast<py::ssize_t>(s.vertex_count);
-            const auto check = [&](const py::array& a, const char* name) {
-              if (a.ndim() != 2 || a.shape(0) != vertices || a.shape(1) != 3) {
-                shape_error(name, "(" + std::to_string(vertices) + ", 3)", a);
-              }
-            };
-            FloatArray from;
-            if (!base.is_none()) {
-              from = FloatArray::ensure(base);
-              if (!from) throw py::value_error("base: an array of numbers was expected");
-              check(from, "base");
-            }
-            py::array_t<float> to;
-            if (out.is_none()) {
-              to = py::array_t<float>({vertices, py::ssize_t{3}});
-            } else {
-              if (!py::isinstance<py::array_t<float, py::array::c_style>>(out)) {
-                throw py::value_error("out: a C-contiguous float32 array was expected");
-              }
-              to = out.cast<py::array_t<float>>();
-              check(to, "out");
-              if (!to.writeable()) throw py::value_error("out: the array is read-only");
-            }
-            rig::evaluate_morph(s, w.data(), base.is_none() ? nullptr : from.data(),
-                                to.mutable_data());
-            return to;
-          },
-          py::arg("blend_shapes"), py::arg("base") = py::none(), py::arg("out") = py::none(),
-          "float32[B] -> float32[V, 3]: base + sum of weight * delta.");
+      .def("evaluate", &evaluate_morph, py::arg("blend_shapes"), py::arg("base") = py::none(),
+           py::arg("out") = py::none(),
+           "float32[B] -> float32[V, 3]: base + sum of weight * delta.");
 }
 
 }  // namespace

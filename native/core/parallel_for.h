@@ -8,12 +8,12 @@
 
 namespace risorius::core {
 
-/// Calls body(begin, end) on ranges that cover [0, n), on up to `threads` threads (0: all cores).
-/// The body may not throw.
+/// Calls body(begin, end) on ranges that cover [0, n), on up to `threads` threads (0: all cores,
+/// and never more than 256). The body may not throw.
 template <class Body>
 void parallel_for(std::size_t n, std::size_t threads, const Body& body) {
   if (threads == 0) threads = std::max(1u, std::thread::hardware_concurrency());
-  threads = std::min(threads, std::max<std::size_t>(n, 1));
+  threads = std::min({threads, std::max<std::size_t>(n, 1), std::size_t{256}});
   if (threads <= 1) {
     body(std::size_t{0}, n);
     return;

@@ -8,6 +8,7 @@ import sys
 from collections.abc import Sequence
 
 from . import DnaError, __version__
+from .commands import eval as evaluate
 from .commands import info, sample
 
 
@@ -16,7 +17,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="risorius", description="Face rigs from DNA files.")
     parser.add_argument("--version", action="version", version=__version__)
     subparsers = parser.add_subparsers(dest="command", required=True)
-    for command in (info, sample):
+    for command in (info, evaluate, sample):
         command.add_parser(subparsers)
     args = parser.parse_args(arguments)
     try:
