@@ -59,7 +59,8 @@ def parse_controls(texts: list[str], names: list[str]) -> Floats:
         if not equals:
             raise CommandLineError(f"NAME=VALUE was expected, found {text!r}")
         if name not in index:
-            near = difflib.get_close_matches(name, names, 3, 0.5)
+            near = [n for n in names if n.rpartition(".")[2] == name]
+            near = near or difflib.get_close_matches(name, names, 3, 0.5)
             hint = f"; near it: {', '.join(near)}" if near else ""
             raise CommandLineError(f"there is no control {name!r}{hint}")
         try:
@@ -134,7 +135,7 @@ def page(facts: dict[str, Any]) -> str:
 
 
 def run(args: argparse.Namespace) -> int:
-    dna = risorius.load(args.file, layers="behavior")
+    dna = risorius.load(args.file, layers="all")
     rig = risorius.Rig(dna)
     try:
         if not 0 <= args.lod < max(1, rig.lod_count):
