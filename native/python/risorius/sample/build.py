@@ -27,7 +27,9 @@ from .source import PACKAGE, SHA256, TARGETS, BaseMesh, Source, fetch
 
 CM = 10.0  # the data are in decimetres
 FLOOR = 8.168  # what lies under the soles, in decimetres below the data's origin
-NECK_CUT = 5.5
+NECK_CUT = 5.66  # of height less NECK_SLOPE times the distance from the middle, in the base mesh
+NECK_SLOPE = 0.35
+REACH = 1.3  # the hands are as high as the neck, but not as near
 MACRO = {
     "macrodetails/universal-male-young-averagemuscle-averageweight": 1.0,
     "macrodetails/caucasian-male-young": 0.6,
@@ -98,7 +100,12 @@ def make_parts(base: BaseMesh) -> list[Part]:
     out = []
     for lod in (0, 1):
         for name, (groups, *levels) in PARTS.items():
-            corners = [face for group in groups for face in base.faces[group]]
+            corners = [
+                face
+                for group in groups
+                for face in base.faces[group]
+                if abs(base.positions[face[0][0], 0]) < REACH
+            ]
             polygons = Polygons(
                 [[c[0] for c in face] for face in corners],
                 [[c[1] for c in face] for face in corners],
@@ -106,7 +113,8 @@ def make_parts(base: BaseMesh) -> list[Part]:
                 count,
             )
             # Clipping at the neck also drops what is not used; the small parts lie above it.
-            polygons, operator = clip_below(polygons, base.positions[:, 1], NECK_CUT)
+            height = base.positions[:, 1] - NECK_SLOPE * np.abs(base.positions[:, 0])
+            polygons, operator = clip_below(polygons, height, NECK_CUT)
             part = Part(f"{name}_lod{lod}_mesh", compact_uvs(polygons), [operator])
             for _ in range(levels[lod]):
                 part.polygons, operator = subdivide(part.polygons)

@@ -1,11 +1,256 @@
 # SPDX-License-Identifier: MIT
-"""Textures of the sample, painted from anatomy: every texel knows where on the head it lies."""
+"""Textures of the sample, painted from anatomy: every texel knows where on the head it lies.
+
+Colours are sRGB in [0, 1]; lengths are decimetres.
+"""
 
 from __future__ import annotations
 
+import struct
+import zlib
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .polygons import Floats, Polygons
+
+if TYPE_CHECKING:
+    from .. import Dna
+    from .build import Part
+    from .expressions import Expression
+
+HEAD_SIZE = 2048
+EYE_SIZE = 1024
+MASK_SIZE = 512
 
 
-def paint_textures(folder: Path, dna: Any, positions: Any, units: Any, parts: Any) -> dict[str, str]:
-    return {}
+def write_png(path: Path, image: Floats) -> None:
+    """An 8-bit PNG of float [h, w] or [h, w, 3] in [0, 1]; row 0 is the bottom (v = 0)."""
+    pixels = np.clip(np.rint(image[::-1] * 255), 0, 255).astype(np.uint8)
+    height, width = pixels.shape[:2]
+    kind = 0 if pixels.ndim == 2 else 2
+    rows = np.zeros((height, 1 + width * (1 if kind == 0 else 3)), np.uint8)
+    rows[:, 1:] = pixels.reshape(height, -1)
+
+    def chunk(name: bytes, data: bytes) -> bytes:
+        crc = zlib.crc32(name + data)
+        return struct.pack(">I", len(data)) + name + data + struct.pack(">I", crc)
+
+    header = struct.pack(">IIBBBBB", width, height, 8, kind, 0, 0, 0)
+    body = zlib.compress(rows.tobytes(), 6)
+    signature = b"\x89PNG\r\n\x1a\n"
+    path.write_bytes(
+        signature + chunk(b"IHDR", header) + chunk(b"IDAT", body) + chunk(b"IEND", b"")
+    )
+
+
+def smooth(low: float, high: float, x: Floats) -> Floats:
+    t = np.clip((x - low) / (high - low), 0, 1)
+    return t * t * (3 - 2 * t)
+
+
+def noise(size: int, cells: int, random: np.random.Generator) -> Floats:
+    """Smooth noise [size, size] in [-1, 1]: a random grid, interpolated with smooth steps."""
+    grid = random.uniform(-1, 1, (cells + 1, cells + 1))
+    at = np.linspace(0, cells, size, endpoint=False)
+    low = at.astype(int)
+    t = at - low
+    t = t * t * (3 - 2 * t)
+    rows = grid[low] * (1 - t)[:, None] + grid[low + 1] * t[:, None]
+    return rows[:, low] * (1 - t) + rows[:, low + 1] * t
+
+
+def bake(polygons: Polygons, uvs: Floats, values: Floats, size: int) -> tuple[Floats, Floats]:
+    """Values per vertex [V, k] -> image [size, size, k] in texture space, and where it is covered."""
+    image = np.zeros((size, size, values.shape[1]))
+    covered = np.zeros((size, size), bool)
+    for face, uv_face in zip(polygons.faces, polygons.uv_faces, strict=True):
+        for k in range(1, len(face) - 1):
+            corners = [0, k, k + 1]
+            uv = uvs[[uv_face[c] for c in corners]] * size - 0.5
+            low = np.maximum(np.floor(uv.min(axis=0)).astype(int) - 1, 0)
+            high = np.minimum(np.ceil(uv.max(axis=0)).astype(int) + 2, size)
+            if (high <= low).any():
+                continue
+            (ax, ay), (bx, by), (cx, cy) = uv
+            area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
+            if abs(area) < 1e-9:
+                continue
+            x, y = np.meshgrid(np.arange(low[0], high[0]), np.arange(low[1], high[1]))
+            b = ((x - ax) * (cy - ay) - (cx - ax) * (y - ay)) / area
+            c = ((bx - ax) * (y - ay) - (x - ax) * (by - ay)) / area
+            a = 1 - b - c
+            inside = (a >= -1e-3) & (b >= -1e-3) & (c >= -1e-3)
+            weights = np.stack([a[inside], b[inside], c[inside]], axis=1)
+            image[y[inside], x[inside]] = weights @ values[[face[i] for i in corners]]
+            covered[y[inside], x[inside]] = True
+    return image, covered
+
+
+def bleed(image: Floats, covered: Floats, steps: int = 8) -> Floats:
+    """Grow the painted islands, so that filtering finds no foreign colour at their rims."""
+    image, covered = image.copy(), covered.copy()
+    for _ in range(steps):
+        for axis, shift in ((0, 1), (0, -1), (1, 1), (1, -1)):
+            near = np.roll(covered, shift, axis) & ~covered
+            image[near] = np.roll(image, shift, axis)[near]
+            covered |= near
+    image[~covered] = image[covered].mean(axis=0)
+    return image
+
+
+def blend(image: Floats, colour: tuple[float, float, float], mask: Floats) -> Floats:
+    mask = np.clip(mask, 0, 1)[:, :, None]
+    return image * (1 - mask) + np.array(colour) * mask
+
+
+def brow_mask(p: Floats, eye: Floats, random: np.random.Generator) -> Floats:
+    """Strands along an arched line above each eye; p is the texel's place [h, w, 3]."""
+    x, y = np.abs(p[:, :, 0]), p[:, :, 1] - eye[1]
+    t = (x - (eye[0] - 0.19)) / 0.44  # 0 at the nose, 1 at the temple
+    ridge = 0.185 + 0.055 * np.sin(np.clip(t, 0, 1.1) * 2.2) - 0.045 * np.clip(t - 0.55, 0, 1) / 0.5
+    half = 0.036 * (1 - 0.62 * np.clip(t, 0, 1)) * smooth(-0.04, 0.1, t) + 0.002
+    across = (y - ridge) / half
+    body = (1 - smooth(0.45, 1.05, np.abs(across))) * smooth(-0.03, 0.1, t)
+    body *= 1 - smooth(0.9, 1.02, t)
+    front = smooth(0.05, 0.2, p[:, :, 2] - eye[2] + 0.1)
+    # Strands lean outward: lines of equal (t * lean - y) are one strand.
+    phase = (x * (1.0 + 0.8 * np.clip(t, 0, 1)) - y * (1.2 - 0.9 * np.clip(t, 0, 1))) * 620
+    jitter = 2.5 * noise(len(p), 300, random)
+    strands = 0.5 + 0.5 * np.sin(phase + jitter)
+    return np.asarray(body * front * (0.55 + 0.45 * strands))
+
+
+def hair_mask(p: Floats, eye: Floats, random: np.random.Generator) -> Floats:
+    """A shaved head's shadow, with a soft natural hairline."""
+    back = p[:, :, 2] - eye[2]
+    line = np.interp(
+        back, [-1.9, -1.35, -1.05, -0.85, -0.62, -0.45, 0.1], [-0.62, -0.5, -0.2, 0.1, 0.22, 0.5, 0.76]
+    )
+    height = p[:, :, 1] - eye[1] - line
+    wobble = 0.03 * noise(len(p), 60, random)
+    ear = smooth(0.8, 0.86, np.abs(p[:, :, 0])) * (1 - smooth(0.35, 0.45, p[:, :, 1] - eye[1]))
+    return np.asarray(smooth(-0.06, 0.12, height + wobble) * (1 - ear))
+
+
+def lip_mask(part: Part, p: Floats, place: Floats, units: dict[str, Expression]) -> Floats:
+    """The vermilion, from the line where the lips meet.
+
+    That line is where vertices that the jaw takes along touch vertices that it leaves.
+    """
+    travel = np.linalg.norm(part.carry(units["jawOpen"].displacement), axis=1)
+    mouth = np.flatnonzero(np.linalg.norm(part.carry(units["mouthUpperLipRollInL"].displacement), axis=1) > 0.004)
+    mouth = np.union1d(
+        mouth, np.flatnonzero(np.linalg.norm(part.carry(units["mouthUpperLipRollInR"].displacement), axis=1) > 0.004)
+    )
+    low_lip = np.flatnonzero(travel > 0.6 * travel[np.abs(p[:, 0]) < 0.2].max())
+    gap = np.linalg.norm(p[mouth][:, None, :] - p[low_lip][None, :, :], axis=2).min(axis=1)
+    seam = p[mouth[gap < 0.03]]
+    seam = seam[seam[:, 2] > seam[:, 2].max() - 0.25]
+    width = float(np.abs(seam[:, 0]).max())
+    line = np.polyfit(np.abs(seam[:, 0]), seam[:, 1], 2)
+    depth = np.polyfit(np.abs(seam[:, 0]), seam[:, 2], 2)
+    x = np.abs(place[:, :, 0])
+    t = np.clip(x / (1.04 * width), 0, 1)
+    y = place[:, :, 1] - np.polyval(line, np.minimum(x, width))
+    z = place[:, :, 2] - np.polyval(depth, np.minimum(x, width))
+    bow = 1 + 0.10 * np.exp(-(((x - 0.07) / 0.05) ** 2)) - 0.12 * np.exp(-((x / 0.035) ** 2))
+    upper = 0.078 * np.sqrt(1 - t**2) * bow
+    lower = 0.098 * np.sqrt(1 - t**2)
+    high = np.where(y > 0, upper, lower)
+    inside = 1 - smooth(0.8, 1.12, np.abs(y) / np.maximum(high, 1e-3))
+    return np.asarray(inside * (z > -0.2) * (t < 1))
+
+
+def paint_head(part: Part, uvs: Floats, p: Floats, units: dict[str, Expression]) -> tuple[Floats, Floats, Floats]:
+    """Skin colour, covered texels, and places [h, w, 3] of one size for the masks."""
+    random = np.random.default_rng(7)
+    eye = units["_eye"]  # type: ignore[index]
+    blink = sum(np.linalg.norm(part.carry(units[n].displacement), axis=1) for n in ("eyeBlinkL", "eyeBlinkR"))
+    lids = smooth(0.1, 0.8, blink / blink.max())
+    image, covered = bake(part.polygons, uvs, np.column_stack([p, lids]), HEAD_SIZE)
+    place = image[:, :, :3]
+    lips = lip_mask(part, p, place, units)
+    colour = np.ones((HEAD_SIZE, HEAD_SIZE, 3)) * np.array([0.79, 0.60, 0.50])
+    mottle = 0.5 * noise(HEAD_SIZE, 40, random) + 0.3 * noise(HEAD_SIZE, 150, random)
+    colour += 0.018 * mottle[:, :, None] * np.array([0.6, 1.0, 1.0])
+    pores = random.normal(0, 0.008, (HEAD_SIZE, HEAD_SIZE))
+    colour += pores[:, :, None]
+    x, y = np.abs(place[:, :, 0]), place[:, :, 1] - eye[1]
+    z = place[:, :, 2] - eye[2]
+    cheeks = np.exp(-(((x - 0.42) / 0.22) ** 2) - ((y + 0.4) / 0.2) ** 2) * (z > -0.35)
+    nose = np.exp(-((x / 0.16) ** 2) - ((y + 0.42) / 0.16) ** 2) * (z > 0.1)
+    ears = smooth(0.8, 0.9, x) * (np.abs(y + 0.15) < 0.5)
+    colour = blend(colour, (0.78, 0.46, 0.40), 0.4 * cheeks + 0.4 * nose + 0.35 * ears)
+    colour = blend(colour, (0.62, 0.42, 0.36), 0.35 * image[:, :, 3])
+    beard = smooth(-0.62, -0.78, y) * smooth(-0.85, -0.55, z) * (1 - lips)
+    beard *= smooth(-1.45, -1.2, y)
+    speckle = 0.6 + 0.8 * random.random((HEAD_SIZE, HEAD_SIZE))
+    colour = blend(colour, (0.42, 0.33, 0.30), 0.16 * beard * speckle)
+    colour = blend(colour, (0.66, 0.38, 0.36), 0.8 * lips)
+    colour = blend(colour, (0.20, 0.15, 0.13), 0.62 * hair_mask(place, eye, random) * speckle)
+    colour = blend(colour, (0.13, 0.085, 0.06), 0.92 * brow_mask(place, eye, random))
+    return bleed(np.clip(colour, 0, 1), covered), covered, place
+
+
+def paint_eye() -> Floats:
+    """Pupil, fibrous iris with a dark rim, and a sclera that is not white; the gaze in the middle."""
+    random = np.random.default_rng(11)
+    at = (np.arange(EYE_SIZE) + 0.5) / EYE_SIZE - 0.5
+    x, y = np.meshgrid(at, at)
+    angle = 2 * np.pi * np.hypot(x, y)  # from the gaze, in radians
+    around = np.arctan2(y, x)
+    iris, pupil = 0.44, 0.165
+    colour = np.ones((EYE_SIZE, EYE_SIZE, 3)) * np.array([0.90, 0.88, 0.85])
+    veins = smooth(0.7, 0.95, 1 - np.abs(noise(EYE_SIZE, 28, random)))
+    colour = blend(colour, (0.78, 0.42, 0.38), (0.1 + 0.3 * veins) * smooth(0.6, 1.2, angle))
+    fibres = np.zeros_like(angle)
+    for count in (37, 61, 97, 149):
+        fibres += np.sin(count * around + random.uniform(0, 6) + 3 * noise(EYE_SIZE, 24, random))
+    shade = 0.5 + 0.14 * fibres
+    depth = smooth(pupil, iris, angle)
+    base = np.array([0.42, 0.30, 0.16]) * (1 - depth)[:, :, None]
+    base = base + np.array([0.25, 0.29, 0.26]) * depth[:, :, None]
+    inside = (1 - smooth(iris - 0.02, iris + 0.025, angle))[:, :, None]
+    colour = colour * (1 - inside) + base * (0.7 + 0.6 * shade[:, :, None]) * inside
+    rim = np.exp(-(((angle - iris) / 0.045) ** 2))
+    colour = blend(colour, (0.07, 0.07, 0.07), 0.75 * rim)
+    colour = blend(colour, (0.01, 0.01, 0.01), 1 - smooth(pupil - 0.02, pupil + 0.02, angle))
+    return np.clip(colour, 0, 1)
+
+
+def paint_textures(
+    folder: Path, dna: Dna, positions: Floats, units: dict[str, Expression], parts: list[Part]
+) -> dict[str, str]:
+    """Write the textures.
+
+    Returns:
+        Metadata for the DNA: texture:<mesh>:<role> -> file name in the folder; the roles are color
+        and map:<animated map>, a mask of where that map shows.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    head = next(part for part in parts if part.name.startswith("head") and not part.operators[1:])
+    uvs = head.polygons.uvs
+    uvs = (uvs - uvs.min(axis=0)) / (uvs.max(axis=0) - uvs.min(axis=0))
+    p = head.carry(positions)
+    eye_parts = [part for part in parts if part.name.startswith("eyeLeft")]
+    eye = eye_parts[0].carry(positions).mean(axis=0)
+    colour, _, place = paint_head(head, uvs, p, units | {"_eye": eye})  # type: ignore[dict-item]
+    write_png(folder / "head_color.png", colour)
+    write_png(folder / "eye_color.png", paint_eye())
+    step = HEAD_SIZE // MASK_SIZE
+    small = place[::step, ::step]
+    out = {}
+    for side, sign in (("L", 1), ("R", -1)):
+        x, y = sign * small[:, :, 0], small[:, :, 1] - eye[1]
+        mask = np.exp(-(((x - 0.40) / 0.2) ** 2) - ((y + 0.36) / 0.17) ** 2)
+        mask *= small[:, :, 2] > eye[2] - 0.4
+        write_png(folder / f"head_flush_{side}.png", mask)
+        for lod in (0, 1):
+            out[f"texture:head_lod{lod}_mesh:map:head_flush_{side}"] = f"head_flush_{side}.png"
+    for lod in (0, 1):
+        out[f"texture:head_lod{lod}_mesh:color"] = "head_color.png"
+        for eye_side in ("Left", "Right"):
+            out[f"texture:eye{eye_side}_lod{lod}_mesh:color"] = "eye_color.png"
+    return out
