@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: MIT
+# Sourced by demo.sh and test.sh: tools, a private venv, the wheel and the extension's zip.
+# Sets: project, venv, python, step "text" (says what begins and how long the last step took).
+
+project=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+venv="$project/.venv"
+python="$venv/bin/python"
+export PIP_DISABLE_PIP_VERSION_CHECK=1 PYTHONDONTWRITEBYTECODE=1
+export CCACHE_DIR="${CCACHE_DIR:-$HOME/.cache/ccache}"
+unset PYTHONPATH
+
+_begin=$SECONDS
+_last=$SECONDS
+_title=
+step() {
+  [ -n "$_title" ] && echo "--- $_title: $((SECONDS - _last)) s"
+  _last=$SECONDS
+  _title=$1
+  [ -n "$1" ] && echo "=== $1 (at $((SECONDS - _begin)) s)"
+  return 0
+}
+
+install_packages() {
+  local missing=()
+  for package in python3-venv python3-dev g++ cmake ninja-build ccache libgtest-dev libgmock-dev \
+    ffmpeg libxrender1 libxi6 libxkbcommon0 libsm6 libgl1 libegl1 libxxf86vm1 libxfixes3; do
+    dpkg-query -W -f='${Status}' "$package" 2>/dev/null | grep -q 'ok installed' ||
+      missing+=("$package")
+  done
+  [ ${#missing[@]} -eq 0 ] && return 0
+  if ! command -v apt-get > /dev/null || [ "$(id -u)" != 0 ]; then
+    echo "please install: ${missing[*]}" >&2
+    return 1
+  fi
+  apt-get update -qq
+  DEBIAN_FRONTEND=noninteractive apt-get install -y -qq "${missing[@]}" > /dev/null
+}
+
+make_venv() {
+  local stamp
+  stamp="$venv/.$(sha256sum "$project/packaging/requirements.txt" | cut -c1-16)"
+  [ -e "$stamp" ] && return 0
+  # bpy 4.5 is made for Python 3.11, Debian bookworm's own.
+  local base=python3.11
+  command -v $base > /dev/null || base=python3
+  "$base" -m venv "$venv"
+  "$python" -m pip install -q -r "$project/packaging/requirements.txt"
+  touch "$stamp"
+}
+
+build_wheel() {
+  mkdir -p "$project/build/dist"
+  rm -f "$project"/build/dist/risorius-*-cp311-*.whl
+  CMAKE_CXX_COMPILER_LAUNCHER=ccache "$python" -m pip wheel -q --no-build-isolation --no-deps \
+    -w "$project/build/dist" "$project"
+  "$python" -m pip install -q --no-deps --force-reinstall "$project"/build/dist/risorius-*-cp311-*.whl
+}
+
+build_extension() {
+  "$python" "$project/packaging/build_extension.py" --wheels "$project"/build/dist/risorius-*.whl \
+    --out "$project/build/dist"
+}

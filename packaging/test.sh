@@ -1,0 +1,99 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
+# Every test: native, Python, Blender (bpy 4.5, and each `blender` of 4.2 or newer that is found on
+# PATH or named by BLENDER=). Says at the end what ran where. Exit code 0 only if all passed.
+set -uo pipefail
+source "$(dirname "$0")/setup.sh"
+
+table=()
+passed=0
+failed=0
+# note NAME PASSED FAILED SKIPPED; no test at all is a failure
+note() {
+  local p=${2:-0} f=${3:-0} s=${4:-0}
+  if [ $((p + f)) -eq 0 ]; then f=1; fi
+  passed=$((passed + p))
+  failed=$((failed + f))
+  table+=("$(printf '%-34s %6d passed %4d failed %4d not run' "$1" "$p" "$f" "$s")")
+}
+count() { grep -oE "[0-9]+ $2" "$1" | tail -n 1 | grep -oE '^[0-9]+' || echo 0; }
+# note_pytest NAME LOG EXIT: pytest's closing line; a crash without one is a failure
+note_pytest() {
+  local line
+  line=$(mktemp)
+  grep -E '^=.*(passed|failed|error).* in ' "$2" | tail -n 1 > "$line"
+  local f=$(($(count "$line" failed) + $(count "$line" error)))
+  if [ "$3" -ne 0 ] && [ "$f" -eq 0 ]; then f=1; fi
+  note "$1" "$(count "$line" passed)" "$f" "$(count "$line" skipped)"
+  rm -f "$line"
+}
+check() { # check NAME COMMAND...: a tool that passes or fails as a whole
+  local name=$1
+  shift
+  if "$@"; then note "$name" 1 0; else note "$name" 0 1; fi
+}
+logs="$project/build/logs"
+mkdir -p "$logs"
+
+step "tools" && install_packages && make_venv || exit 1
+step "wheel" && build_wheel || exit 1
+step "extension" && build_extension || exit 1
+
+step "GoogleTest"
+cd "$project"
+cmake --preset dev -DCMAKE_CXX_COMPILER_LAUNCHER=ccache -DPython_EXECUTABLE="$python" \
+  -DRISORIUS_BUILD_BINDINGS=OFF > "$logs/cmake.log" 2>&1 &&
+  cmake --build --preset dev -j"$(nproc)" > "$logs/build.log" 2>&1 || tail -n 30 "$logs/build.log"
+ctest --preset dev -j"$(nproc)" > "$logs/ctest.log" 2>&1
+tail -n 25 "$logs/ctest.log"
+total=$(grep -oE 'out of [0-9]+' "$logs/ctest.log" | tail -n 1 | grep -oE '[0-9]+' || echo 0)
+bad=$(grep -oE '[0-9]+ tests failed' "$logs/ctest.log" | grep -oE '^[0-9]+' || echo 0)
+note "GoogleTest" $((total - bad)) "$bad"
+
+step "style"
+check "ruff check" "$venv/bin/ruff" check native addon tests blender_tests packaging
+check "ruff format" "$venv/bin/ruff" format --check -q native addon tests blender_tests packaging
+check "clang-format" sh -c \
+  "find native tests -name '*.h' -o -name '*.cpp' | xargs '$venv/bin/clang-format' --dry-run -Werror"
+check "mypy" "$venv/bin/mypy" --no-error-summary -p risorius
+
+step "Python tests"
+"$python" -m pytest -q -rs tests 2>&1 | tee "$logs/pytest.log" | tail -n 15
+note_pytest "Python $("$python" -c 'import platform; print(platform.python_version())')" \
+  "$logs/pytest.log" "${PIPESTATUS[0]}"
+
+zip=$(ls "$project"/build/dist/risorius-*.zip)
+run_blender() { # run_blender NAME COMMAND...
+  local name=$1 log
+  log="$logs/blender-$(echo "$name" | tr -c 'a-zA-Z0-9.\n' '-').log"
+  shift
+  timeout -s KILL 900 "$@" > "$log" 2>&1
+  local code=$?
+  tail -n 12 "$log"
+  note_pytest "$name" "$log" "$code"
+}
+step "Blender tests in bpy"
+version=$("$python" -c 'import importlib.metadata as m; print(m.version("bpy"))')
+run_blender "bpy $version" "$python" blender_tests/run.py -- --extension "$zip"
+
+for blender in $(printf '%s\n' "${BLENDER:-}" "$(command -v blender || true)" | sort -u); do
+  step "Blender tests in $blender"
+  version=$(timeout -s KILL 60 "$blender" --version 2>/dev/null | grep -oE '^Blender [0-9.]+' | head -n 1)
+  if [ -z "$version" ]; then
+    note "$blender (does not start)" 0 1
+  elif [ "$(printf '%s\n4.2\n' "${version#Blender }" | sort -V | head -n 1)" != 4.2 ]; then
+    table+=("$version at $blender is older than 4.2: not run")
+  else
+    run_blender "$version" "$blender" -b --factory-startup -noaudio --python-exit-code 1 \
+      --python blender_tests/run.py -- --extension "$zip"
+  fi
+done
+
+step ""
+echo
+echo "What ran where:"
+printf '  %s\n' "${table[@]}"
+grep -h 'EXTRA NOT RUN' "$logs"/*.log | sort -u | sed 's/^/  /' || true
+echo
+echo "$passed passed, $failed failed"
+[ "$failed" -eq 0 ]
