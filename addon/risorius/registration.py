@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One ordered list of classes; unregistered in reverse."""
+
+import bpy
+
+from . import native
+from .scene import handlers
+from .ui import import_operators, operators, panels
+
+CLASSES = (*import_operators.CLASSES, *operators.CLASSES, *panels.CLASSES)
+
+
+def _search_property():
+    return bpy.props.StringProperty(
+        name="Search",
+        description="Show only the controls whose name has these words",
+        options={"TEXTEDIT_UPDATE", "SKIP_SAVE"},
+    )
+
+
+def register():
+    """Register classes, menus and handlers; without the native module only words."""
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
+    bpy.types.WindowManager.risorius_search = _search_property()
+    bpy.types.TOPBAR_MT_file_import.append(import_operators.draw_import)
+    bpy.types.VIEW3D_MT_add.append(import_operators.draw_add)
+    trouble = native.problem()
+    if trouble:
+        print(f"Risorius: {trouble}")
+    handlers.register()
+    bpy.app.timers.register(_refresh_once, first_interval=0.0)
+
+
+def _refresh_once():
+    """Data cannot be touched while an add-on registers, so faces are brought up after it."""
+    handlers.refresh()
+
+
+def unregister():
+    """Undo `register` in reverse."""
+    if bpy.app.timers.is_registered(_refresh_once):
+        bpy.app.timers.unregister(_refresh_once)
+    handlers.unregister()
+    bpy.types.VIEW3D_MT_add.remove(import_operators.draw_add)
+    bpy.types.TOPBAR_MT_file_import.remove(import_operators.draw_import)
+    del bpy.types.WindowManager.risorius_search
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)

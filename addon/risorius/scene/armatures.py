@@ -1,0 +1,199 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The deforming armature and the control armature."""
+
+import math
+from contextlib import contextmanager
+
+import bpy
+import numpy as np
+from mathutils import Matrix, Vector
+
+from ..logic import regions
+from . import parts
+
+LIVE_PROPERTIES = (parts.MAPS, parts.CHANNELS)
+
+
+@contextmanager
+def _edit_bones(context, item, collection):
+    """The edit bones of an armature object, which must not be linked anywhere yet.
+
+    Edit bones exist only in edit mode, and only an operator enters it: the one place in
+    scene/ that calls some.
+    """
+    layer = context.view_layer
+    previous = layer.objects.active
+    if previous is not None and previous.mode != "OBJECT":
+        bpy.ops.object.mode_set(mode="OBJECT")
+    collection.objects.link(item)
+    layer.objects.active = item
+    with context.temp_override(active_object=item, object=item, selected_objects=[item]):
+        bpy.ops.object.mode_set(mode="EDIT")
+        try:
+            yield item.data.edit_bones
+        finally:
+            bpy.ops.object.mode_set(mode="OBJECT")
+            layer.objects.active = previous
+            collection.objects.unlink(item)
+
+
+def build_rig(context, plan, made, workshop):
+    """Build the deforming armature in its neutral pose.
+
+    Args:
+        context: a Blender context with a view layer.
+        plan: the CharacterPlan.
+        made: list that every new datablock is put on.
+        workshop: a linked collection in which bones are edited.
+
+    Returns:
+        The armature object; each bone bears its DNA index.
+    """
+    data = bpy.data.armatures.new(f"{plan.name}_rig")
+    made.append(data)
+    rig = bpy.data.objects.new(f"{plan.name}_rig", data)
+    made.append(rig)
+    armature = plan.armature
+    with _edit_bones(context, rig, workshop) as edit_bones:
+        made_bones = {}
+        for joint in armature.order:
+            bone = edit_bones.new(armature.labels[joint])
+            bone.head = (0.0, 0.0, 0.0)
+            bone.tail = (0.0, armature.lengths[joint], 0.0)
+            bone.matrix = Matrix(armature.rest[joint].tolist())
+            if armature.parents[joint] >= 0:
+                bone.parent = made_bones[armature.parents[joint]]
+            made_bones[joint] = bone
+    for joint, label in enumerate(armature.labels):
+        data.bones[label][parts.JOINT] = joint
+    data.display_type = "STICK"
+    rig[parts.MAPS] = [0.0] * max(1, len(plan.map_labels))
+    rig[parts.CHANNELS] = [0.0] * max(1, plan.channel_count)
+    for name in LIVE_PROPERTIES:
+        rig.property_overridable_library_set(f'["{name}"]', True)
+    return rig
+
+
+def build_controls(context, plan, made, workshop):
+    """Build the small control armature with the sliders and the bones that turn things.
+
+    Args: see build_rig.
+
+    Returns:
+        The armature object.
+    """
+    data = bpy.data.armatures.new(f"{plan.name}_controls")
+    made.append(data)
+    controls = bpy.data.objects.new(f"{plan.name}_controls", data)
+    made.append(controls)
+    places = control_places(plan)
+    with _edit_bones(context, controls, workshop) as edit_bones:
+        for name, (position, axis, length, _parent) in places.items():
+            bone = edit_bones.new(name)
+            bone.head = position
+            bone.tail = Vector(position) + Vector(axis) * length
+            bone.use_deform = False
+        for name, (_position, _axis, _length, parent) in places.items():
+            if parent:
+                edit_bones[name].parent = edit_bones[parent]
+    circle = _circle(made, plan.name)
+    for name in places:
+        bone = controls.pose.bones[name]
+        bone.custom_shape = circle
+        bone.use_custom_shape_bone_size = True
+        bone.lock_scale = (True, True, True)
+        if name != "eyes":
+            bone.lock_location = (True, True, True)
+        if name in ("face", "eyes"):
+            bone.lock_rotation = (True, True, True)
+        _shape(bone, name)
+    data.show_names = False
+    controls.show_in_front = True
+    add_properties(controls.pose.bones[parts.FACE], plan.controls)
+    return controls
+
+
+def control_places(plan):
+    """Where the control bones stand: name -> (position, axis, length, parent)."""
+    rest, anchors, size = plan.armature.rest, plan.anchors, plan.size
+    points = np.concatenate([m.positions for m in plan.meshes]).astype(float)
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle = (low + high) / 2
+    head = rest[anchors.head][:3, 3] if anchors.head is not None else middle
+    neck = rest[anchors.neck[0]][:3, 3] if anchors.neck else np.array([middle[0], middle[1], low[2]])
+    up, ahead = (0.0, 0.0, 1.0), (0.0, -1.0, 0.0)
+    places = {
+        "neck": (tuple(neck), up, size * 0.2, ""),
+        "head": (tuple(head), up, size * 0.4, "neck"),
+    }
+    eyes = {}
+    for side, sign in (("L", 1.0), ("R", -1.0)):
+        if side in anchors.eyes:
+            eyes[side] = rest[anchors.eyes[side]][:3, 3]
+        else:
+            eyes[side] = middle + np.array([sign * size * 0.13, -size * 0.25, 0.0])
+        places[f"eye_{side}"] = (tuple(eyes[side]), ahead, size * 0.12, "head")
+    target = (eyes["L"] + eyes["R"]) / 2 + np.array([0.0, -size * 1.6, 0.0])
+    places["eyes"] = (tuple(target), ahead, size * 0.12, "head")
+    places["face"] = ((high[0] + size * 0.25, middle[1], middle[2]), up, size * 0.12, "head")
+    return places
+
+
+def add_properties(bone, controls, maximum=1.0):
+    """Give a pose bone the float property of each ControlPlan: limits, default, words."""
+    for control in controls:
+        bone[control.label] = 0.0
+        describe_property(bone, control.label, control.description, maximum)
+
+
+def describe_property(bone, name, description, maximum):
+    """Set limits, default and description of one control property."""
+    bone.id_properties_ui(name).update(
+        min=0.0,
+        max=maximum,
+        soft_min=0.0,
+        soft_max=1.0,
+        default=0.0,
+        step=1.0,
+        precision=3,
+        description=description,
+    )
+    bone.property_overridable_library_set(f'["{bpy.utils.escape_identifier(name)}"]', True)
+
+
+def key_group(name):
+    """The F-curve group that keys of a control go to."""
+    return regions.TITLES[regions.region_of(name)]
+
+
+def _shape(bone, name):
+    """Turn and size the wire circle so that it surrounds what the bone turns."""
+    if name in ("neck", "head"):  # circle around the upright bone
+        bone.custom_shape_scale_xyz = (1.4, 1.4, 1.4) if name == "head" else (1.7, 1.7, 1.7)
+        bone.custom_shape_rotation_euler = (math.pi / 2, 0.0, 0.0)
+        if name == "head":
+            bone.custom_shape_translation = (0.0, bone.length * 1.6, 0.0)
+            bone.custom_shape_scale_xyz = (0.9, 0.9, 0.9)
+    elif name == "face":  # a disc beside the face, seen from the front
+        bone.custom_shape_scale_xyz = (0.5, 0.5, 0.5)
+    else:  # discs that look ahead
+        scale = 1.2 if name == "eyes" else 0.5
+        bone.custom_shape_scale_xyz = (scale, scale, scale)
+        bone.custom_shape_rotation_euler = (math.pi / 2, 0.0, 0.0)
+        if name != "eyes":
+            bone.custom_shape_translation = (0.0, bone.length * 1.5, 0.0)
+
+
+def _circle(made, name):
+    """A wire circle of radius 1 in the xy plane, in no collection: only bones show it."""
+    count = 32
+    mesh = bpy.data.meshes.new(f"{name}_circle")
+    made.append(mesh)
+    corners = [
+        (math.cos(2 * math.pi * i / count), math.sin(2 * math.pi * i / count), 0.0)
+        for i in range(count)
+    ]
+    mesh.from_pydata(corners, [(i, (i + 1) % count) for i in range(count)], [])
+    item = bpy.data.objects.new(f"{name}_circle", mesh)
+    made.append(item)
+    return item

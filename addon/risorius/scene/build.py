@@ -1,0 +1,222 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From the bytes of a DNA file to a character in the scene, or to nothing at all."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+
+from .. import native
+from ..logic import names, plans
+from . import armatures, materials, meshes, parts, runtime, storage
+
+
+@dataclass(frozen=True)
+class BuildOptions:
+    """What the user chose.
+
+    Attributes:
+        lods: levels whose meshes are built.
+        mode: LIVE, KEYS or AUTO.
+        normals: keep the file's normals.
+        materials: build materials.
+        textures: load the textures that the file names.
+    """
+
+    lods: tuple[int, ...] = (0,)
+    mode: str = "AUTO"
+    normals: bool = True
+    materials: bool = True
+    textures: bool = True
+
+
+def import_file(context, path, options, progress=lambda _share: None):
+    """Build a character from a file.
+
+    Args:
+        context: a Blender context with scene and view layer.
+        path: of the DNA file.
+        options: BuildOptions.
+        progress: called with 0..1.
+
+    Returns:
+        The deforming armature, and warnings as sentences.
+
+    Raises:
+        DnaError: the file is bad or cannot be read.
+        PlanError, SpaceError: there is no character in it.
+    """
+    risorius = native.module()
+    dna = risorius.load(str(path))
+    content = Path(path).read_bytes()
+    progress(0.15)
+    unit = context.scene.unit_settings.scale_length
+    plan = plans.plan_character(dna, Path(path).stem, options.lods, unit)
+    progress(0.25)
+    made = []
+    try:
+        rig, warnings = _build(context, plan, dna, content, path, options, made, progress)
+    except BaseException:
+        _remove(made)
+        raise
+    live = runtime.of(rig)
+    return rig, [*dna.warnings, *warnings, *plans.layer_warnings(live.rig.ignored_layers)]
+
+
+def _build(context, plan, dna, content, path, options, made, progress):
+    text = storage.store(plan.name, content, made)
+    workshop = bpy.data.collections.new(f"{plan.name} (in the making)")
+    made.append(workshop)
+    context.scene.collection.children.link(workshop)
+    rig = armatures.build_rig(context, plan, made, workshop)
+    controls = armatures.build_controls(context, plan, made, workshop)
+    _connect(context, plan, rig, controls, text, path)
+    progress(0.4)
+    built = []
+    for number, mesh_plan in enumerate(plan.meshes):
+        item = meshes.build_mesh(plan, mesh_plan, rig, made, options.normals)
+        rig[f"{parts.MESH_PREFIX}{number:03d}"] = item
+        built.append(item)
+        progress(0.4 + 0.3 * (number + 1) / len(plan.meshes))
+    warnings = []
+    # Drivers are made only after the properties that they read have reached the evaluated
+    # copies: one that was evaluated before stays invalid for ever.
+    objects = [rig, controls, *built]
+    for item in objects:
+        workshop.objects.link(item)
+    settle(context, rig, controls)
+    if options.materials:
+        folder = _texture_folder(path) if options.textures else None
+        by_base, warnings = materials.build_materials(plan, rig, made, folder)
+        for item, mesh_plan in zip(built, plan.meshes, strict=True):
+            item.data.materials.append(by_base[mesh_plan.base])
+    progress(0.8)
+    _add_shapes(plan, dna, rig, built, options.mode)
+    for item in built:
+        made.append(item.data.shape_keys)
+    progress(0.95)
+    _into_place(context, plan, workshop, rig, controls)
+    show_lod(rig, _first(plan))
+    return rig, warnings
+
+
+def _first(plan):
+    return min(lod for mesh in plan.meshes for lod in mesh.lods)
+
+
+def settle(context, *items):
+    """Bring new custom properties to the evaluated copies."""
+    for item in items:
+        item.update_tag()
+    context.view_layer.update()
+
+
+def _connect(context, plan, rig, controls, text, path):
+    controls[parts.RIG] = rig
+    rig[parts.CONTROLS] = controls
+    rig[parts.DNA] = text
+    rig[parts.UNIT] = context.scene.unit_settings.scale_length
+    rig[parts.LOD] = 0
+    rig[parts.SOURCE] = _source(path)
+    for key, value in plan.origin.items():
+        controls.data[names.cut(f"dna_{key}")] = value
+
+
+def _source(path):
+    """The path as kept for Reload: relative where the .blend has a place."""
+    try:
+        return bpy.path.relpath(str(path)) if bpy.data.filepath else str(path)
+    except ValueError:  # another drive
+        return str(path)
+
+
+def _texture_folder(path):
+    path = Path(path)
+    return path.with_name(f"{path.stem}_textures")
+
+
+def _add_shapes(plan, dna, rig, built, mode):
+    labels = channel_labels(dna)
+    for item, mesh_plan in zip(built, plan.meshes, strict=True):
+        count = len(mesh_plan.channels)
+        chosen = mode
+        if mode == "AUTO":
+            chosen = meshes.automatic_mode(count, len(mesh_plan.positions))
+        meshes.set_mode(
+            item, rig, dna.meshes[mesh_plan.index], plan.space.delta_matrix, labels, chosen
+        )
+
+
+def channel_labels(dna):
+    """Names of the real shape keys, by channel."""
+    return names.unique_labels(dna.blend_shape_channel_names, ["Basis", plans.LIVE_KEY])
+
+
+def _into_place(context, plan, workshop, rig, controls):
+    """Name the collection; select the controls, hide the deforming bones."""
+    workshop.name = plan.name
+    rig.hide_set(True, view_layer=context.view_layer)
+    for item in context.view_layer.objects:
+        item.select_set(False, view_layer=context.view_layer)
+    controls.select_set(True, view_layer=context.view_layer)
+    context.view_layer.objects.active = controls
+
+
+def show_lod(rig, lod):
+    """Show the meshes of one level, in viewport and render, and evaluate that level."""
+    rig[parts.LOD] = int(lod)
+    for item in parts.meshes_of(rig):
+        hidden = int(lod) not in list(item.get(parts.LODS, [lod]))
+        item.hide_viewport = item.hide_render = hidden
+    rig.update_tag()
+
+
+def lods_of(rig):
+    """The levels that a character has meshes for, in order."""
+    return sorted({int(v) for m in parts.meshes_of(rig) for v in m.get(parts.LODS, [])})
+
+
+def change_mode(rig, mode):
+    """Switch the meshes of a character to LIVE or KEYS shapes; AUTO chooses by size."""
+    live = runtime.of(rig)
+    for item in parts.meshes_of(rig):
+        dna_mesh = live.dna.meshes[item[parts.MESH]]
+        chosen = mode
+        if mode == "AUTO":
+            chosen = meshes.automatic_mode(
+                len(dna_mesh.blend_shape_targets), len(dna_mesh.positions)
+            )
+        labels = channel_labels(live.dna)
+        meshes.set_mode(item, rig, dna_mesh, live.space.delta_matrix, labels, chosen)
+    runtime.forget_outputs()
+
+
+def remove(rig):
+    """Take a character and all that belongs to it out of the file."""
+    controls = parts.controls_of(rig)
+    text = rig.get(parts.DNA)
+    items = parts.meshes_of(rig)
+    data = [i.data for i in (*items, rig, controls) if i is not None]
+    used = [m for i in items for m in i.data.materials if m is not None]
+    collections = [c for c in bpy.data.collections if rig.name in c.objects]
+    circles = {b.custom_shape for b in controls.pose.bones if b.custom_shape} if controls else ()
+    data += [c.data for c in circles]
+    _remove([i for i in (*items, rig, controls, *circles) if i is not None])
+    _remove([d for d in {*data, *used} if d.users == 0])
+    if text is not None and text.users == 0:
+        _remove([text])
+    _remove([c for c in collections if not c.all_objects])
+
+
+def _remove(made):
+    """Remove those datablocks that still live."""
+    alive = []
+    for item in made:
+        try:
+            # A Key leaves with its mesh.
+            if item is not None and not isinstance(item, bpy.types.Key):
+                alive.append(item if item.name else item)
+        except ReferenceError:
+            continue
+    if alive:
+        bpy.data.batch_remove(list(dict.fromkeys(alive)))

@@ -1,0 +1,224 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Meshes with their weights, and their shape keys in both modes."""
+
+import re
+
+import bmesh
+import bpy
+import numpy as np
+
+from ..logic.plans import AUTO_LIMIT, LIVE_KEY
+from . import parts
+
+_DRIVEN = re.compile(r'^\["channels"\]\[(\d+)\]$')
+
+
+def build_mesh(plan, mesh_plan, rig, made, normals=True):
+    """Build one mesh object: faces, UVs, custom normals, vertex groups, armature modifier.
+
+    Args:
+        plan: the CharacterPlan.
+        mesh_plan: the MeshPlan.
+        rig: the deforming armature object.
+        made: list that every new datablock is put on.
+        normals: whether the file's normals are kept as custom normals.
+
+    Returns:
+        The mesh object, not linked anywhere.
+    """
+    name = f"{plan.name}_{mesh_plan.label}"
+    mesh = bpy.data.meshes.new(name)
+    made.append(mesh)
+    mesh.vertices.add(len(mesh_plan.positions))
+    mesh.vertices.foreach_set("co", mesh_plan.positions.ravel())
+    mesh.loops.add(len(mesh_plan.corners))
+    mesh.loops.foreach_set("vertex_index", mesh_plan.corners)
+    mesh.polygons.add(len(mesh_plan.face_starts))
+    mesh.polygons.foreach_set("loop_start", mesh_plan.face_starts)
+    mesh.update(calc_edges=True)
+    item = bpy.data.objects.new(name, mesh)
+    made.append(item)
+    _add_weights(item, mesh_plan, plan.armature.labels)
+    mesh.polygons.foreach_set("use_smooth", np.ones(len(mesh.polygons), bool))
+    if mesh_plan.uvs is not None:
+        layer = mesh.uv_layers.new(name="UVMap", do_init=False)
+        layer.uv.foreach_set("vector", mesh_plan.uvs.ravel())
+    if normals and mesh_plan.normals is not None:
+        mesh.normals_split_custom_set(mesh_plan.normals)
+    _add_center_distance(mesh, mesh_plan)
+    modifier = item.modifiers.new("Armature", "ARMATURE")
+    modifier.object = rig
+    item.parent = rig
+    item[parts.RIG] = rig
+    item[parts.MESH] = mesh_plan.index
+    item[parts.LODS] = list(mesh_plan.lods)
+    return item
+
+
+def _add_weights(item, mesh_plan, labels):
+    """Vertex groups of the joints that this mesh uses, filled through the deform layer."""
+    used = np.unique(mesh_plan.skin_joints)
+    group_of = {int(j): item.vertex_groups.new(name=labels[int(j)]).index for j in used}
+    edit = bmesh.new()
+    try:
+        edit.from_mesh(item.data)
+        layer = edit.verts.layers.deform.verify()
+        offsets = mesh_plan.skin_offsets.tolist()
+        groups = [group_of[j] for j in mesh_plan.skin_joints.tolist()]
+        weights = mesh_plan.skin_weights.tolist()
+        for vertex, begin, end in zip(edit.verts, offsets[:-1], offsets[1:], strict=True):
+            held = vertex[layer]
+            for i in range(begin, end):
+                # A joint may stand twice at a vertex: its weights add up.
+                held[groups[i]] = held.get(groups[i], 0.0) + weights[i]
+        edit.to_mesh(item.data)
+    finally:
+        edit.free()
+
+
+def _add_center_distance(mesh, mesh_plan):
+    """For eyes an attribute `iris`: distance from the axis of its eye, 0 at the pupil, 1 at the
+    rim of the ball, 2 behind; for materials that have no texture."""
+    if mesh_plan.kind != "eyes" or not len(mesh_plan.positions):
+        return
+    points = mesh_plan.positions.astype(np.float64)
+    middle = (points[:, 0].min() + points[:, 0].max()) / 2
+    wide = np.ptp(points[:, 0]) > 1.6 * np.ptp(points[:, 2])
+    sides = points[:, 0] > middle if wide else np.ones(len(points), bool)
+    values = np.full(len(points), 2.0, np.float32)
+    for side in (sides, ~sides):
+        if not side.any():
+            continue
+        own = points[side]
+        center = (own.min(axis=0) + own.max(axis=0)) / 2
+        radius = max(float(np.ptp(own[:, 2])) / 2, 1e-9)
+        distance = np.hypot(own[:, 0] - center[0], own[:, 2] - center[2]) / radius
+        values[side] = np.where(own[:, 1] < center[1], distance, 2.0)
+    attribute = mesh.attributes.new("iris", "FLOAT", "POINT")
+    attribute.data.foreach_set("value", values)
+
+
+def automatic_mode(target_count, vertex_count):
+    """KEYS where real keys are cheap enough each frame, else LIVE."""
+    return "KEYS" if target_count * vertex_count < AUTO_LIMIT else "LIVE"
+
+
+def real_channels(item):
+    """Shape key name -> channel, of the keys of a mesh that channel drivers move."""
+    key = item.data.shape_keys
+    found = {}
+    for curve in key.animation_data.drivers if key and key.animation_data else ():
+        for variable in curve.driver.variables:
+            match = _DRIVEN.match(variable.targets[0].data_path)
+            name = re.match(r'key_blocks\["(.*)"\]\.value$', curve.data_path)
+            if match and name:
+                found[bpy.utils.unescape_identifier(name.group(1))] = int(match.group(1))
+    return found
+
+
+def set_mode(item, rig, dna_mesh, matrix, labels, mode):
+    """Bring a mesh's shapes into LIVE or KEYS mode; the same vertices in both.
+
+    What the user changed in a real key stays: such a key is kept as a real one in LIVE mode.
+    Keys of the user's own are not touched.
+
+    Args:
+        item: mesh object.
+        rig: its deforming armature.
+        dna_mesh: the Mesh of the Dna.
+        matrix: float32[3, 3] that takes deltas to Blender units.
+        labels: shape key names by channel.
+        mode: LIVE or KEYS.
+    """
+    if not dna_mesh.blend_shape_targets:
+        item[parts.MODE] = mode
+        return
+    if item.data.shape_keys is None:
+        item.shape_key_add(name="Basis", from_mix=False)
+    deltas = _deltas_by_channel(dna_mesh, matrix)
+    if mode == "KEYS":
+        _to_keys(item, rig, deltas, labels)
+    else:
+        _to_live(item, deltas)
+    item[parts.MODE] = mode
+
+
+def _deltas_by_channel(dna_mesh, matrix):
+    """Channel -> (vertex indices, float32[K, 3] deltas); targets of one channel are joined."""
+    joined = {}
+    for target in dna_mesh.blend_shape_targets:
+        indices = np.asarray(target.vertex_indices, np.int64)
+        moved = np.asarray(target.deltas, np.float32).reshape(-1, 3) @ matrix.T
+        joined.setdefault(int(target.blend_shape_channel_index), []).append((indices, moved))
+    return {
+        channel: (np.concatenate([i for i, _ in pairs]), np.concatenate([d for _, d in pairs]))
+        for channel, pairs in joined.items()
+    }
+
+
+def points_of(block):
+    """Coordinates of a shape key, float32[V, 3]."""
+    flat = np.empty(len(block.points) * 3, np.float32)
+    block.points.foreach_get("co", flat)
+    return flat.reshape(-1, 3)
+
+
+def _to_keys(item, rig, deltas, labels):
+    key = item.data.shape_keys
+    basis = points_of(key.reference_key)
+    there = set(real_channels(item).values())
+    for channel, (indices, moved) in deltas.items():
+        if channel in there:
+            continue
+        block = item.shape_key_add(name=labels[channel], from_mix=False)
+        block.slider_min, block.slider_max = -10.0, 10.0
+        block.value = 0.0
+        points = basis.copy()
+        np.add.at(points, indices, moved)
+        block.points.foreach_set("co", points.ravel())
+        drive_key(key, block, rig, channel)
+    live = key.key_blocks.get(LIVE_KEY)
+    if live is not None:
+        item.shape_key_remove(live)
+    if parts.REAL in key:
+        del key[parts.REAL]
+
+
+def _to_live(item, deltas):
+    key = item.data.shape_keys
+    basis = points_of(key.reference_key)
+    size = float(np.max(np.ptp(basis, axis=0), initial=0.0))
+    kept = []
+    for name, channel in real_channels(item).items():
+        block = key.key_blocks.get(name)
+        points = basis.copy()
+        indices, moved = deltas.get(channel, (np.zeros(0, np.int64), np.zeros((0, 3))))
+        np.add.at(points, indices, moved)
+        if block is None or np.max(np.abs(points_of(block) - points), initial=0.0) < size * 1e-6:
+            key.driver_remove(f'key_blocks["{bpy.utils.escape_identifier(name)}"].value')
+            if block is not None:
+                item.shape_key_remove(block)
+        else:
+            kept.append(channel)
+    if kept:
+        key[parts.REAL] = kept
+    if key.key_blocks.get(LIVE_KEY) is None:
+        block = item.shape_key_add(name=LIVE_KEY, from_mix=False)
+        block.value = 1.0
+
+
+def drive_key(key, block, rig, channel):
+    """Drive a key's value by its channel through a plain SUM driver."""
+    name = bpy.utils.escape_identifier(block.name)
+    curve = key.driver_add(f'key_blocks["{name}"].value')
+    plain_driver(curve, rig, f'["{parts.CHANNELS}"][{channel}]')
+
+
+def plain_driver(curve, rig, data_path):
+    """Make an F-curve follow one property of the rig, without any expression."""
+    curve.driver.type = "SUM"
+    variable = curve.driver.variables.new()
+    variable.type = "SINGLE_PROP"
+    variable.targets[0].id_type = "OBJECT"
+    variable.targets[0].id = rig
+    variable.targets[0].data_path = data_path

@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is compiled from a character's DNA, kept by the hash of its content.
+
+Holds no Blender object: it is found anew, or rebuilt, after load, undo, append and enable.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .. import native
+from ..logic import names, plans
+from ..logic.space import make_joint_space, world_matrices, yaw_pitch
+from . import parts, storage
+
+DEFAULT_EYE_ANGLE = np.radians(30.0)
+
+
+@dataclass
+class Runtime:
+    """Compiled data of one DNA at one unit scale.
+
+    Attributes:
+        dna: the file; rig: its risorius.Rig; space: its Space.
+        labels: property names of the raw controls, by index.
+        joints: JointSpace of the joints that the evaluator owns.
+        rest: float64[J, 4, 4] neutral joints.
+        anchors: joints of neck, head and eyes.
+        look: control name -> yaw or pitch (radians) that a value of 1 gives; by side.
+        morphs: mesh index -> risorius.Morph.
+    """
+
+    dna: object
+    rig: object
+    space: object
+    labels: list
+    joints: object
+    rest: object
+    anchors: object
+    look: dict
+    morphs: dict = field(default_factory=dict)
+
+    def morph(self, mesh_index):
+        """The compiled shapes of a mesh, made when first asked for."""
+        if mesh_index not in self.morphs:
+            self.morphs[mesh_index] = native.module().Morph(
+                self.dna, mesh_index, matrix=self.space.delta_matrix
+            )
+        return self.morphs[mesh_index]
+
+
+_cache = {}
+outputs = {}  # (what, session uid) -> what was last written there
+
+
+def of(rig):
+    """The Runtime of a character.
+
+    Args:
+        rig: its deforming armature.
+
+    Returns:
+        Runtime, or None where the armature has lost its DNA.
+    """
+    text = rig.get(parts.DNA)
+    digest = storage.content_hash(text)
+    if not digest:
+        return None
+    key = (digest, float(rig.get(parts.UNIT, 1.0)))
+    if key not in _cache:
+        _cache[key] = _compile(storage.content(text), key[1])
+    return _cache[key]
+
+
+def _compile(content, unit):
+    risorius = native.module()
+    dna = risorius.load(content)
+    rig = risorius.Rig(dna)
+    space = plans.space_of(dna, unit)
+    anchors = plans.find_anchors(dna.joint_names)
+    owned = {int(j) for j in rig.joint_indices_written} | set(anchors.neck)
+    if anchors.head is not None:
+        owned.add(anchors.head)
+    rest = world_matrices(
+        space.rotations(dna.neutral_joint_rotations),
+        space.points(dna.neutral_joint_translations),
+        np.asarray(dna.joint_parents),
+    )
+    runtime = Runtime(
+        dna=dna,
+        rig=rig,
+        space=space,
+        labels=names.unique_labels(dna.raw_control_names),
+        joints=make_joint_space(space, dna.neutral_joint_rotations, sorted(owned)),
+        rest=rest,
+        anchors=anchors,
+        look={},
+    )
+    runtime.look = _measure_look(runtime)
+    return runtime
+
+
+def _measure_look(runtime):
+    """How far each look control turns its eye: side -> list of (control, yaw, pitch) at 1."""
+    found = {}
+    where = {name.rsplit(".", 1)[-1]: i for i, name in enumerate(runtime.dna.raw_control_names)}
+    for side in "LR":
+        turns = []
+        for direction, yaw, pitch in (
+            ("Left", 1.0, 0.0),
+            ("Right", -1.0, 0.0),
+            ("Up", 0.0, 1.0),
+            ("Down", 0.0, -1.0),
+        ):
+            control = where.get(f"eyeLook{direction}{side}")
+            if control is not None:
+                angle = _response(runtime, control, side, bool(yaw))
+                turns.append((control, yaw * angle, pitch * angle))
+        found[side] = turns
+    return found
+
+
+def _response(runtime, control, side, horizontal):
+    """The angle in radians that a look control turns its eye by at full value."""
+    joint = runtime.anchors.eyes.get(side)
+    if joint is None:
+        return DEFAULT_EYE_ANGLE
+    raw = np.zeros(len(runtime.labels), np.float32)
+    raw[control] = 1.0
+    delta = runtime.rig.evaluate(raw).joints[joint, 3:6]
+    neutral = np.asarray(runtime.dna.neutral_joint_rotations, np.float64)[joint]
+    before, after = runtime.space.rotations(np.stack([neutral, neutral + delta]))
+    parent = runtime.rest[joint][:3, :3] @ before.T
+    turned = parent @ after @ before.T @ parent.T @ np.array([0.0, -1.0, 0.0])
+    yaw, pitch = yaw_pitch(turned)
+    angle = abs(yaw if horizontal else pitch)
+    return angle if angle > np.radians(2.0) else DEFAULT_EYE_ANGLE
+
+
+def forget_outputs():
+    """Let the next evaluation write everything: after undo, load and changes of shape mode."""
+    outputs.clear()
+
+
+def forget():
+    """Drop all compiled data."""
+    _cache.clear()
+    outputs.clear()

@@ -1,0 +1,265 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators that bring faces in: from a file, the sample, and again from its source."""
+
+from contextlib import contextmanager
+from pathlib import Path
+
+import bpy
+from bpy_extras.io_utils import ImportHelper
+
+from .. import native
+from ..logic.plans import PlanError
+from ..logic.space import SpaceError
+from ..scene import build, parts
+
+MODES = (
+    ("AUTO", "Automatic", "Real shape keys where a mesh has few, else the live sum"),
+    ("LIVE", "Live Sum", "One shape key per mesh that is summed natively: fast"),
+    ("KEYS", "Shape Keys", "Every channel is a real, driven shape key: editable, exportable"),
+)
+
+
+def explain(path, error):
+    """One sentence for what is wrong with a file."""
+    text = str(error).strip().rstrip(".")
+    name = Path(path).name
+    return f"{text}." if name in text else f"{name}: {text}."
+
+
+def usable(cls):
+    """Poll: whether the native module is there; says why when it is not."""
+    trouble = native.problem()
+    if trouble:
+        cls.poll_message_set(trouble)
+    return not trouble
+
+
+@contextmanager
+def _progress(context):
+    manager = context.window_manager
+    manager.progress_begin(0, 100)
+    try:
+        yield lambda share: manager.progress_update(round(share * 100))
+    finally:
+        manager.progress_end()
+
+
+def import_character(operator, context, path, options):
+    """Build a character and report on it.
+
+    Args:
+        operator: reports through it.
+        context: Blender context.
+        path: of the DNA file.
+        options: build.BuildOptions.
+
+    Returns:
+        What `execute` returns.
+    """
+    try:
+        with _progress(context) as progress:
+            rig, warnings = build.import_file(context, path, options, progress)
+    except (native.dna_error(), PlanError, SpaceError, OSError) as error:
+        operator.report({"ERROR"}, explain(path, error))
+        return {"CANCELLED"}
+    for warning in warnings[:5]:
+        operator.report({"WARNING"}, str(warning))
+    if len(warnings) > 5:
+        operator.report({"WARNING"}, f"and {len(warnings) - 5} more warnings")
+    count = len(parts.meshes_of(rig))
+    operator.report({"INFO"}, f"{Path(path).name}: {count} meshes, ready to move")
+    return {"FINISHED"}
+
+
+class RISORIUS_OT_import_dna(bpy.types.Operator, ImportHelper):
+    """Build a face from a MetaHuman DNA file"""
+
+    bl_idname = "risorius.import_dna"
+    bl_label = "Import DNA"
+    bl_options = {"REGISTER", "UNDO", "PRESET"}
+
+    filename_ext = ".dna"
+    filter_glob: bpy.props.StringProperty(default="*.dna", options={"HIDDEN"})
+    lods: bpy.props.BoolVectorProperty(
+        name="Levels of Detail",
+        description="Levels whose meshes are built; 0 is the finest",
+        size=8,
+        default=(True, False, False, False, False, False, False, False),
+    )
+    shape_mode: bpy.props.EnumProperty(
+        name="Shapes", description="How blend shapes are kept", items=MODES, default="AUTO"
+    )
+    use_normals: bpy.props.BoolProperty(
+        name="Custom Normals", description="Keep the file's own normals", default=True
+    )
+    use_materials: bpy.props.BoolProperty(
+        name="Materials", description="Build skin, eyes, teeth and lashes", default=True
+    )
+    use_textures: bpy.props.BoolProperty(
+        name="Textures",
+        description="Load the textures that lie beside the file, and pack them",
+        default=True,
+    )
+
+    @classmethod
+    def poll(cls, context):
+        return usable(cls)
+
+    def execute(self, context):
+        options = build.BuildOptions(
+            lods=tuple(i for i, chosen in enumerate(self.lods) if chosen) or (0,),
+            mode=self.shape_mode,
+            normals=self.use_normals,
+            materials=self.use_materials,
+            textures=self.use_materials and self.use_textures,
+        )
+        return import_character(self, context, self.filepath, options)
+
+    def invoke(self, context, event):
+        if self.filepath:  # dropped onto the window
+            return self.execute(context)
+        return ImportHelper.invoke(self, context, event)
+
+    def draw(self, _context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        row = layout.row(heading="Detail", align=True)
+        row.use_property_split = False
+        for level in range(8):
+            row.prop(self, "lods", index=level, text=str(level), toggle=True)
+        layout.prop(self, "shape_mode")
+        column = layout.column(heading="Keep")
+        column.prop(self, "use_normals")
+        column.prop(self, "use_materials")
+        row = column.row()
+        row.active = self.use_materials
+        row.prop(self, "use_textures")
+
+
+class RISORIUS_FH_dna(bpy.types.FileHandler):
+    """Drop a DNA file onto the 3D view"""
+
+    bl_idname = "RISORIUS_FH_dna"
+    bl_label = "MetaHuman DNA"
+    bl_import_operator = "risorius.import_dna"
+    bl_file_extensions = ".dna"
+
+    @classmethod
+    def poll_drop(cls, context):
+        return context.area is not None and context.area.type in {"VIEW_3D", "OUTLINER"}
+
+
+class RISORIUS_OT_add_character(bpy.types.Operator):
+    """Add the free sample face; its data (48 MB) is downloaded the first time"""
+
+    bl_idname = "risorius.add_character"
+    bl_label = "Face"
+    bl_options = {"REGISTER", "UNDO"}
+
+    shape_mode: bpy.props.EnumProperty(
+        name="Shapes", description="How blend shapes are kept", items=MODES, default="AUTO"
+    )
+
+    @classmethod
+    def poll(cls, context):
+        return usable(cls)
+
+    def execute(self, context):
+        folder = Path(bpy.utils.extension_path_user(_package(), path="sample", create=True))
+        path = folder / f"face-{native.addon_version()}.dna"
+        if not path.is_file():
+            trouble = _build_sample(path, folder)
+            if trouble:
+                self.report({"ERROR"}, trouble)
+                return {"CANCELLED"}
+        options = build.BuildOptions(mode=self.shape_mode)
+        return import_character(self, context, path, options)
+
+
+def _package():
+    return __package__.rpartition(".")[0]
+
+
+def _build_sample(path, folder):
+    """Build the sample DNA; returns a sentence where it cannot be built."""
+    native.module()
+    from risorius import sample
+
+    wheels = sorted(folder.glob("*.whl"))
+    online = bpy.app.online_access
+    try:
+        sample.build_sample(path, data=wheels[0] if wheels else None, offline=not online)
+    except (sample.SourceError, OSError) as error:
+        advice = "" if online else " Allow online access in the preferences (System) first."
+        return f"The sample face could not be built: {str(error).rstrip('.')}.{advice}"
+    return ""
+
+
+class RISORIUS_OT_reload(bpy.types.Operator):
+    """Build the active face anew from its source file; the values of its controls stay"""
+
+    bl_idname = "risorius.reload"
+    bl_label = "Reload from Source"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        if not usable(cls):
+            return False
+        rig = parts.active_rig(context)
+        if rig is None:
+            cls.poll_message_set("Select a face first.")
+            return False
+        path = bpy.path.abspath(rig.get(parts.SOURCE, ""))
+        if not path or not Path(path).is_file():
+            cls.poll_message_set("The source file is not there any more.")
+            return False
+        return True
+
+    def execute(self, context):
+        old = parts.active_rig(context)
+        path = bpy.path.abspath(old[parts.SOURCE])
+        levels = tuple(build.lods_of(old)) or (0,)
+        modes = {m.get(parts.MODE) for m in parts.meshes_of(old)}
+        mode = modes.pop() if len(modes) == 1 else "AUTO"
+        before = parts.face_bone(old)
+        values = {k: float(v) for k, v in before.items() if isinstance(v, int | float)}
+        animation = parts.controls_of(old).animation_data
+        action = animation.action if animation else None
+        result = import_character(self, context, path, build.BuildOptions(levels, mode))
+        if result != {"FINISHED"}:
+            return result
+        rig = parts.rig_of(context.view_layer.objects.active)
+        face = parts.face_bone(rig)
+        for name, value in values.items():
+            if name in face:
+                face[name] = value
+        controls = parts.controls_of(rig)
+        if action is not None:
+            data = controls.animation_data_create()
+            data.action = action
+            if hasattr(data, "action_slot") and data.action_slot is None and len(action.slots):
+                data.action_slot = action.slots[0]
+        build.remove(old)
+        controls.update_tag()
+        context.view_layer.update()
+        return {"FINISHED"}
+
+
+def draw_import(self, _context):
+    """Entry of File > Import."""
+    self.layout.operator(RISORIUS_OT_import_dna.bl_idname, text="MetaHuman DNA (.dna)")
+
+
+def draw_add(self, _context):
+    """Entry of the 3D view's Add menu."""
+    self.layout.operator(RISORIUS_OT_add_character.bl_idname, text="Face", icon="USER")
+
+
+CLASSES = (
+    RISORIUS_OT_import_dna,
+    RISORIUS_FH_dna,
+    RISORIUS_OT_add_character,
+    RISORIUS_OT_reload,
+)

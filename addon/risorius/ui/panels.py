@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The sidebar tab `Face`."""
+
+import textwrap
+
+import bpy
+
+from .. import native
+from ..logic import plans, regions
+from ..scene import build, parts, runtime
+
+_ICONS = {
+    "brow": "MOD_CURVE",
+    "eye": "HIDE_OFF",
+    "nose": "MONKEY",
+    "cheek": "MATSPHERE",
+    "mouth": "USER",
+    "jaw": "MOD_SIMPLEDEFORM",
+    "tongue": "MOD_SMOOTH",
+    "teeth": "SNAP_FACE",
+    "neck": "ARMATURE_DATA",
+    "ear": "SPEAKER",
+    "other": "DOT",
+}
+_OPEN = {"brow", "eye", "mouth", "jaw"}
+
+
+class _FacePanel:
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Face"
+
+
+def _write(layout, text, icon="NONE"):
+    """A sentence in as many lines as a narrow sidebar needs."""
+    column = layout.column(align=True)
+    column.scale_y = 0.8
+    for number, line in enumerate(textwrap.wrap(text, 38)):
+        column.label(text=line, icon=icon if number == 0 else "BLANK1")
+
+
+class RISORIUS_PT_character(_FacePanel, bpy.types.Panel):
+    bl_idname = "RISORIUS_PT_character"
+    bl_label = "Face"
+    bl_order = 0
+
+    def draw(self, context):
+        layout = self.layout
+        trouble = native.problem()
+        if trouble:
+            _write(layout, trouble, "ERROR")
+            return
+        rig = parts.active_rig(context)
+        if rig is None:
+            _draw_start(layout)
+            return
+        live = runtime.of(rig)
+        controls = parts.controls_of(rig)
+        if live is None or controls is None:
+            _write(layout, "This face has lost its data or its control armature.", "ERROR")
+            return
+        layout.label(text=rig.name.removesuffix("_rig"), icon="USER")
+        _draw_detail(layout, rig)
+        _draw_shapes(layout, rig)
+        row = layout.row(align=True)
+        row.operator("risorius.reset", icon="LOOP_BACK").region = ""
+        row.operator("risorius.key", text="Key All", icon="KEYFRAME_HLT").region = ""
+        for warning in plans.layer_warnings(live.rig.ignored_layers):
+            _write(layout, warning, "INFO")
+
+
+def _draw_start(layout):
+    _write(layout, "No face is selected.", "INFO")
+    layout.operator("risorius.add_character", text="Add a Face", icon="USER")
+    layout.operator("risorius.import_dna", text="Import DNA", icon="IMPORT")
+
+
+def _draw_detail(layout, rig):
+    levels = build.lods_of(rig)
+    if len(levels) < 2:
+        return
+    row = layout.row(align=True)
+    row.label(text="Detail")
+    for level in levels:
+        current = level == rig.get(parts.LOD, 0)
+        row.operator("risorius.set_lod", text=str(level), depress=current).lod = level
+
+
+def _draw_shapes(layout, rig):
+    modes = {m.get(parts.MODE) for m in parts.meshes_of(rig)}
+    row = layout.row(align=True)
+    row.label(text="Shapes")
+    for mode, text in (("LIVE", "Live"), ("KEYS", "Keys")):
+        row.operator("risorius.set_shape_mode", text=text, depress=mode in modes).mode = mode
+
+
+class RISORIUS_PT_controls(_FacePanel, bpy.types.Panel):
+    bl_idname = "RISORIUS_PT_controls"
+    bl_label = "Controls"
+    bl_order = 1
+
+    @classmethod
+    def poll(cls, context):
+        rig = None if native.problem() else parts.active_rig(context)
+        return rig is not None and parts.controls_of(rig) is not None
+
+    def draw(self, context):
+        layout = self.layout
+        rig = parts.active_rig(context)
+        live, face = runtime.of(rig), parts.face_bone(rig)
+        if live is None:
+            return
+        search = context.window_manager.risorius_search
+        layout.prop(context.window_manager, "risorius_search", text="", icon="VIEWZOOM")
+        shown = [n for n in live.labels if n in face and regions.matches(n, search)]
+        for region, indices in regions.group_controls(shown).items():
+            names = [shown[i] for i in indices]
+            if search:
+                _draw_region_header(layout.row(), region)
+                _draw_sliders(layout, face, names)
+                continue
+            header, body = layout.panel(
+                f"RISORIUS_PT_region_{region}", default_closed=region not in _OPEN
+            )
+            _draw_region_header(header, region)
+            if body is not None:
+                _draw_sliders(body, face, names)
+        if not shown:
+            _write(layout, "No control has these words in its name.", "INFO")
+
+
+def _draw_region_header(layout, region):
+    layout.label(text=regions.TITLES[region], icon=_ICONS[region])
+    row = layout.row(align=True)
+    row.emboss = "NONE"
+    row.operator("risorius.reset", text="", icon="LOOP_BACK").region = region
+    row.operator("risorius.key", text="", icon="KEY_HLT").region = region
+
+
+def _draw_sliders(layout, face, names):
+    """Sliders, a left and its right control side by side."""
+    column = layout.column(align=True)
+    there = set(names)
+    for name in names:
+        left = f"{name[:-1]}L"
+        if name.endswith("R") and left in there:
+            continue
+        pair = [name, f"{name[:-1]}R"] if name == left and f"{name[:-1]}R" in there else [name]
+        row = column.row(align=True)
+        for one in pair:
+            quoted = bpy.utils.escape_identifier(one)
+            row.prop(face, f'["{quoted}"]', text=regions.title(one), slider=True)
+
+
+class RISORIUS_PT_options(_FacePanel, bpy.types.Panel):
+    bl_idname = "RISORIUS_PT_options"
+    bl_label = "Options"
+    bl_order = 2
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context):
+        return RISORIUS_PT_controls.poll(context)
+
+    def draw(self, context):
+        layout = self.layout
+        rig = parts.active_rig(context)
+        on = bool(parts.controls_of(rig).get(parts.OVERDRIVE))
+        layout.operator("risorius.set_overdrive", depress=on).enable = not on
+        layout.operator("risorius.separate", icon="UNLINKED")
+        layout.operator("risorius.reload", icon="FILE_REFRESH")
+        live = runtime.of(rig)
+        if live is not None:
+            column = layout.column(align=True)
+            column.scale_y = 0.8
+            column.label(text=f"{len(live.labels)} controls, {live.rig.joint_count} joints")
+            column.label(text=f"{live.rig.blend_shape_count} shapes, {live.rig.simd}")
+
+
+CLASSES = (RISORIUS_PT_character, RISORIUS_PT_controls, RISORIUS_PT_options)
