@@ -19,7 +19,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     subparsers = parser.add_subparsers(dest="command", required=True)
     for command in (info, evaluate, sample):
         command.add_parser(subparsers)
-    args = parser.parse_args(arguments)
+    args, rest = parser.parse_known_args(arguments)
+    # argparse ends a list of operands at the first option: FILE --json NAME=1.
+    if any(text.startswith("-") for text in rest) or (rest and not hasattr(args, "controls")):
+        parser.error(f"unrecognized arguments: {' '.join(rest)}")
+    if rest:
+        args.controls += rest
     try:
         return int(args.func(args))
     except DnaError as error:

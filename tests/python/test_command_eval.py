@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: MIT
+"""The command `risorius eval`."""
+
+import json
+
+import numpy as np
+import pytest
+import risorius
+from conftest import GOLDEN
+from risorius.cli import main
+from risorius.commands.eval import ATTRIBUTES
+
+FILE = str(GOLDEN / "core.dna")
+JAW = "CTRL_expressions.jawOpen"
+
+
+def test_json_is_the_pose(capsys):
+    assert main(["eval", FILE, f"{JAW}=0.75", "--lod", "1", "--json"]) == 0
+    facts = json.loads(capsys.readouterr().out)
+    rig = risorius.Rig(risorius.load(FILE))
+    raw = np.zeros(4, np.float32)
+    raw[rig.raw_control_names.index(JAW)] = 0.75
+    pose = rig.evaluate(raw, lod=1)
+    joints = np.zeros_like(pose.joints)
+    for row in facts["joints"]:
+        joints[row["index"]] = [
+            row[a] for a in ["tx", "ty", "tz", "rx", "ry", "rz", "sx", "sy", "sz"]
+        ]
+    np.testing.assert_array_equal(joints, pose.joints)
+    maps = np.zeros_like(pose.animated_maps)
+    for row in facts["animated_maps"]:
+        maps[row["index"]] = row["value"]
+    np.testing.assert_array_equal(maps, pose.animated_maps)
+    assert facts["raw_controls"] == [
+        {"name": JAW, "index": rig.raw_control_names.index(JAW), "value": 0.75}
+    ]
+    assert facts["lod"] == 1
+
+
+def test_page_names_what_moves(capsys):
+    assert main(["eval", FILE, f"{JAW}=1"]) == 0
+    page = capsys.readouterr().out
+    assert "FACIAL_R_Eye2" in page
+    assert "shape_jawOpen" in page
+
+
+def test_gui_controls_go_through_the_table(capsys):
+    name = risorius.load(FILE).gui_control_names[2]
+    assert main(["eval", FILE, "--gui", f"{name}=1", "--json"]) == 0
+    facts = json.loads(capsys.readouterr().out)
+    rig = risorius.Rig(risorius.load(FILE))
+    raw = rig.gui_to_raw([0, 0, 1])
+    assert {r["index"]: r["value"] for r in facts["raw_controls"]} == {
+        i: float(raw[i]) for i in np.flatnonzero(raw)
+    }
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["jawOpen=1"], JAW),
+        ([JAW], "NAME=VALUE"),
+        ([f"{JAW}=wide"], "wide"),
+        ([f"{JAW}=nan"], "nan"),
+        ([f"{JAW}=1e99"], "1e99"),
+        (["--lod", "2"], "--lod"),
+        (["--lod", "-1"], "--lod"),
+    ],
+)
+def test_bad_command_line_is_exit_code_2(capsys, arguments, message):
+    assert main(["eval", FILE, *arguments]) == 2
+    output = capsys.readouterr()
+    assert message in output.err
+    assert output.out == ""
+
+
+def test_bad_input_is_exit_code_1(tmp_path, capsys):
+    bad = tmp_path / "bad.dna"
+    bad.write_bytes(b"not a face")
+    assert main(["eval", str(bad)]) == 1
+    assert main(["eval", str(tmp_path / "absent.dna")]) == 1
+    assert capsys.readouterr().out == ""
+
+
+def test_layers_that_are_not_evaluated_are_named(capsys):
+    assert main(["eval", str(GOLDEN / "tiny_v28.dna")]) == 0
+    assert "rbfb" in capsys.readouterr().err
+
+
+def test_options_may_stand_among_the_controls(capsys):
+    assert main(["eval", FILE, "--lod", "1", f"{JAW}=0.5", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["raw_controls"][0]["value"] == 0.5
+    with pytest.raises(SystemExit, match="2"):
+        main(["eval", FILE, f"{JAW}=0.5", "--unknown"])
+    with pytest.raises(SystemExit, match="2"):
+        main(["info", FILE, "more"])
