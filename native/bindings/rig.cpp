@@ -244,7 +244,6 @@ void bind_rig(py::module_& m) {
       .def_readonly("blend_shapes", &PoseArrays::blend_shapes)
       .def_readonly("animated_maps", &PoseArrays::animated_maps)
       .def_readonly("controls", &PoseArrays::controls);
-  bind_rig_class(m);
   py::class_<PyInstance>(m, "Instance",
                          "One face through time, with the reference's one-frame latencies.")
       .def_property(
@@ -254,6 +253,7 @@ void bind_rig(py::module_& m) {
         const FloatArray in = vector_argument(raw, "raw", s.rig->raw_count);
         return to_arrays(*s.rig, s.instance.evaluate(in.data()));
       });
+  bind_rig_class(m);
   bind_morph(m);
   m.def("available_simd", [] { return std::string(simd::available_kernels()); });
 }

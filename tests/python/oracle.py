@@ -39,7 +39,9 @@ def table(conditionals, rows, values, output_count):
 
 def correctives(dna, controls, used, settle):
     """Fill the corrective part of controls in place (those in `used`)."""
-    rows, columns, values = (np.asarray(a) for a in (dna.psds.rows, dna.psds.columns, dna.psds.values))
+    rows, columns, values = (
+        np.asarray(a) for a in (dna.psds.rows, dna.psds.columns, dna.psds.values)
+    )
     before = np.clip(controls, 0, 1)
     for _ in range(len(set(rows.tolist())) + 1 if settle else 1):
         source = np.clip(controls, 0, 1) if settle else before
@@ -58,7 +60,9 @@ def used_controls(dna, lod):
     for group in dna.joint_groups:
         rows = int(group.lods[lod]) if len(group.lods) else 0
         matrix = np.asarray(group.values)[:rows]
-        used |= {int(c) for c in group.input_indices[np.any(matrix != 0, axis=0)]} if rows else set()
+        used |= (
+            {int(c) for c in group.input_indices[np.any(matrix != 0, axis=0)]} if rows else set()
+        )
     shapes, maps = dna.blend_shape_channels, dna.animated_maps
     if len(shapes.lods):
         used |= set(shapes.input_indices[: shapes.lods[lod]].tolist())

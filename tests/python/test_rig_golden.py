@@ -92,7 +92,9 @@ def check_rig(folder, name, simd):
         for lod, offset in enumerate(case["lodRecordOffsets"]):
             expected = golden.record(offset)
             if case["kind"] == "gui":  # the table's own rounding: two roundings a row
-                np.testing.assert_allclose(raw, expected["rawControls"], rtol=0, atol=8 * oracle.EPS)
+                np.testing.assert_allclose(
+                    raw, expected["rawControls"], rtol=0, atol=8 * oracle.EPS
+                )
                 raw = expected["rawControls"]
             pose = rig.evaluate(raw, lod=lod, settle=False)
             bounds = oracle.evaluate(

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,7 +22,16 @@ from .. import (
 from . import expressions as ex
 from .controls import gui_table
 from .paint import paint_textures
-from .polygons import Floats, Operator, Polygons, clip_below, compact_uvs, subdivide, vertex_normals
+from .polygons import (
+    Floats,
+    Ints,
+    Operator,
+    Polygons,
+    clip_below,
+    compact_uvs,
+    subdivide,
+    vertex_normals,
+)
 from .source import PACKAGE, SHA256, TARGETS, BaseMesh, Source, fetch
 
 CM = 10.0  # the data are in decimetres
@@ -77,7 +86,7 @@ class Part:
         return values
 
 
-def group_indices(base: BaseMesh) -> dict[str, np.ndarray]:
+def group_indices(base: BaseMesh) -> dict[str, Ints]:
     return {
         name: np.unique([corner[0] for face in faces for corner in face])
         for name, faces in base.faces.items()
@@ -123,7 +132,7 @@ def make_parts(base: BaseMesh) -> list[Part]:
     return out
 
 
-def joint_positions(positions: Floats, groups: dict[str, np.ndarray]) -> dict[str, Floats]:
+def joint_positions(positions: Floats, groups: dict[str, Ints]) -> dict[str, Floats]:
     """World positions of the joints, in decimetres."""
 
     def middle(group: str) -> Floats:
@@ -144,7 +153,7 @@ def joint_positions(positions: Floats, groups: dict[str, np.ndarray]) -> dict[st
 
 
 def spine_weights(positions: Floats, joints: dict[str, Floats]) -> Floats:
-    """Weights [V, 7] of the chain spine_04, neck_01, neck_02, head by height along a tilted neck."""
+    """Weights [V, 7] of spine_04, neck_01, neck_02 and head by height along a tilted neck."""
     height = positions[:, 1] - 0.25 * (positions[:, 2] - joints["neck_02"][2])
     levels = [joints[n][1] for n in ("spine_04", "neck_01", "neck_02", "head")]
     middles = [levels[0] + 0.15, levels[1] + 0.1, levels[2] + 0.15, levels[3] - 0.05]
@@ -160,7 +169,7 @@ def spine_weights(positions: Floats, joints: dict[str, Floats]) -> Floats:
 
 def skin_weights(
     positions: Floats,
-    groups: dict[str, np.ndarray],
+    groups: dict[str, Ints],
     joints: dict[str, Floats],
     jaw_open: ex.Expression,
 ) -> Floats:
@@ -171,11 +180,15 @@ def skin_weights(
     weights = spine_weights(positions, joints)
     rotation, shift = jaw_open.joints["FACIAL_C_Jaw"]
     pivot = joints["FACIAL_C_Jaw"]
-    rigid = pivot + shift + (positions - pivot) @ rotation.T - positions
+    rigid: Floats = pivot + shift + (positions - pivot) @ rotation.T - positions
     length = np.einsum("ij,ij->i", rigid, rigid)
     share = np.einsum("ij,ij->i", jaw_open.displacement, rigid) / np.maximum(length, 1e-9)
     jaw = np.clip(share, 0, 1) * (length > 1e-6)
-    for group, value in (("helper-lower-teeth", 1), ("helper-tongue", 1), ("helper-upper-teeth", 0)):
+    for group, value in (
+        ("helper-lower-teeth", 1),
+        ("helper-tongue", 1),
+        ("helper-upper-teeth", 0),
+    ):
         jaw[groups[group]] = value
     weights *= (1 - jaw)[:, None]
     weights[:, 4] = jaw
@@ -197,7 +210,7 @@ def bind_displacement(
         w = weights[:, names.index(name)]
         matrices += w[:, None, None] * (rotation - np.eye(3))
         offsets += w[:, None] * (joints[name] + shift - rotation @ joints[name])
-    wanted = positions + expression.displacement - offsets
+    wanted: Floats = positions + expression.displacement - offsets
     return np.linalg.solve(matrices, wanted[:, :, None])[:, :, 0] - positions
 
 
@@ -302,7 +315,7 @@ def add_gui(dna: Dna, raw: list[str]) -> None:
     dna.gui_to_raw = conditionals(rows)
 
 
-def conditionals(rows: list[tuple[int, int, float, float, float, float]]) -> Conditionals:
+def conditionals(rows: Sequence[tuple[int, int, float, float, float, float]]) -> Conditionals:
     columns = list(zip(*rows, strict=True))
     return Conditionals(
         input_indices=columns[0],
@@ -350,13 +363,16 @@ def add_behavior(
     dna.joint_row_count = 9 * len(names)
     dna.joint_column_count = len(raw) + len(correctives)
     count = len(raw) + len(correctives)
-    shaped_controls = [i for i in range(count) if dna.blend_shape_channel_names]
     dna.blend_shape_channels = BlendShapeChannels(
-        lods=[count] * 2, input_indices=shaped_controls, output_indices=shaped_controls
+        lods=[count] * 2, input_indices=range(count), output_indices=range(count)
     )
     flush = []
     for output, side in enumerate("LR"):
-        for name, slope in (("mouthCornerPull", 0.45), ("eyeCheekRaise", 0.35), ("mouthCheekBlow", 0.5)):
+        for name, slope in (
+            ("mouthCornerPull", 0.45),
+            ("eyeCheekRaise", 0.35),
+            ("mouthCheekBlow", 0.5),
+        ):
             flush.append((raw.index(name + side), output, 0, 1, slope, 0))
         flush.append((raw.index("jawOpenExtreme"), output, 0, 1, 0.7, 0))
     dna.animated_maps = AnimatedMaps(lods=[len(flush)] * 2, conditionals=conditionals(flush))
@@ -378,7 +394,9 @@ def add_targets(mesh: Mesh, deltas: list[Floats]) -> None:
     mesh.blend_shape_targets = targets
 
 
-def assemble(source: Source, say: Callable[[str], None]) -> tuple[Dna, list[Part], Floats, dict]:
+def assemble(
+    source: Source, say: Callable[[str], None]
+) -> tuple[Dna, list[Part], Floats, dict[str, ex.Expression]]:
     """The whole Dna, its parts, the shaped positions and the expressions."""
     base = source.base_mesh()
     groups = group_indices(base)
@@ -418,7 +436,11 @@ def assemble(source: Source, say: Callable[[str], None]) -> tuple[Dna, list[Part
 
 
 def build_sample(
-    path: Path, *, data: Path | None = None, offline: bool = False, say: Callable[[str], None] = print
+    path: Path,
+    *,
+    data: Path | None = None,
+    offline: bool = False,
+    say: Callable[[str], None] = print,
 ) -> Dna:
     """Build the sample person and write it with its textures.
 

@@ -120,7 +120,10 @@ def extra_units(source: Source, positions: Floats) -> dict[str, Expression]:
 
 
 def add_joint_motion(
-    out: dict[str, Expression], groups: dict[str, Floats], positions: Floats, pivots: dict[str, Floats]
+    out: dict[str, Expression],
+    groups: dict[str, Floats],
+    positions: Floats,
+    pivots: dict[str, Floats],
 ) -> None:
     """Give jaw and eyes their joints: the rigid motion that fits teeth and eyeballs best.
 
@@ -144,7 +147,6 @@ def add_joint_motion(
     )
     for side, letter in (("L", "l"), ("R", "r")):
         eye = groups[f"helper-{letter}-eye"]
-        pivot = pivots[f"FACIAL_{side}_Eye"]
         for look in ("Up", "Down", "Left", "Right"):
             expression = out[f"eyeLook{look}{side}"]
             moved = positions[eye] + expression.displacement[eye]

@@ -62,7 +62,7 @@ def noise(size: int, cells: int, random: np.random.Generator) -> Floats:
 
 
 def bake(polygons: Polygons, uvs: Floats, values: Floats, size: int) -> tuple[Floats, Floats]:
-    """Values per vertex [V, k] -> image [size, size, k] in texture space, and where it is covered."""
+    """Values per vertex [V, k] -> image [size, size, k] by texture space, and covered texels."""
     image = np.zeros((size, size, values.shape[1]))
     covered = np.zeros((size, size), bool)
     for face, uv_face in zip(polygons.faces, polygons.uv_faces, strict=True):
@@ -126,7 +126,9 @@ def hair_mask(p: Floats, eye: Floats, random: np.random.Generator) -> Floats:
     """A shaved head's shadow, with a soft natural hairline."""
     back = p[:, :, 2] - eye[2]
     line = np.interp(
-        back, [-1.9, -1.35, -1.05, -0.85, -0.62, -0.45, 0.1], [-0.62, -0.5, -0.2, 0.1, 0.22, 0.5, 0.76]
+        back,
+        [-1.9, -1.35, -1.05, -0.85, -0.62, -0.45, 0.1],
+        [-0.62, -0.5, -0.2, 0.1, 0.22, 0.5, 0.76],
     )
     height = p[:, :, 1] - eye[1] - line
     wobble = 0.03 * noise(len(p), 60, random)
@@ -140,9 +142,14 @@ def lip_mask(part: Part, p: Floats, place: Floats, units: dict[str, Expression])
     That line is where vertices that the jaw takes along touch vertices that it leaves.
     """
     travel = np.linalg.norm(part.carry(units["jawOpen"].displacement), axis=1)
-    mouth = np.flatnonzero(np.linalg.norm(part.carry(units["mouthUpperLipRollInL"].displacement), axis=1) > 0.004)
+    mouth = np.flatnonzero(
+        np.linalg.norm(part.carry(units["mouthUpperLipRollInL"].displacement), axis=1) > 0.004
+    )
     mouth = np.union1d(
-        mouth, np.flatnonzero(np.linalg.norm(part.carry(units["mouthUpperLipRollInR"].displacement), axis=1) > 0.004)
+        mouth,
+        np.flatnonzero(
+            np.linalg.norm(part.carry(units["mouthUpperLipRollInR"].displacement), axis=1) > 0.004
+        ),
     )
     low_lip = np.flatnonzero(travel > 0.6 * travel[np.abs(p[:, 0]) < 0.2].max())
     gap = np.linalg.norm(p[mouth][:, None, :] - p[low_lip][None, :, :], axis=2).min(axis=1)
@@ -163,11 +170,15 @@ def lip_mask(part: Part, p: Floats, place: Floats, units: dict[str, Expression])
     return np.asarray(inside * (z > -0.2) * (t < 1))
 
 
-def paint_head(part: Part, uvs: Floats, p: Floats, units: dict[str, Expression]) -> tuple[Floats, Floats, Floats]:
-    """Skin colour, covered texels, and places [h, w, 3] of one size for the masks."""
+def paint_head(
+    part: Part, uvs: Floats, p: Floats, eye: Floats, units: dict[str, Expression]
+) -> tuple[Floats, Floats]:
+    """Skin colour [h, w, 3] and each texel's place [h, w, 3]; eye is the left eye's middle."""
     random = np.random.default_rng(7)
-    eye = units["_eye"]  # type: ignore[index]
-    blink = sum(np.linalg.norm(part.carry(units[n].displacement), axis=1) for n in ("eyeBlinkL", "eyeBlinkR"))
+    blink = sum(
+        np.linalg.norm(part.carry(units[n].displacement), axis=1)
+        for n in ("eyeBlinkL", "eyeBlinkR")
+    )
     lids = smooth(0.1, 0.8, blink / blink.max())
     image, covered = bake(part.polygons, uvs, np.column_stack([p, lids]), HEAD_SIZE)
     place = image[:, :, :3]
@@ -191,11 +202,11 @@ def paint_head(part: Part, uvs: Floats, p: Floats, units: dict[str, Expression])
     colour = blend(colour, (0.66, 0.38, 0.36), 0.8 * lips)
     colour = blend(colour, (0.20, 0.15, 0.13), 0.62 * hair_mask(place, eye, random) * speckle)
     colour = blend(colour, (0.13, 0.085, 0.06), 0.92 * brow_mask(place, eye, random))
-    return bleed(np.clip(colour, 0, 1), covered), covered, place
+    return bleed(np.clip(colour, 0, 1), covered), place
 
 
 def paint_eye() -> Floats:
-    """Pupil, fibrous iris with a dark rim, and a sclera that is not white; the gaze in the middle."""
+    """Pupil, iris with fibres and a dark rim, sclera that is not white; the gaze in the middle."""
     random = np.random.default_rng(11)
     at = (np.arange(EYE_SIZE) + 0.5) / EYE_SIZE - 0.5
     x, y = np.meshgrid(at, at)
@@ -236,7 +247,7 @@ def paint_textures(
     p = head.carry(positions)
     eye_parts = [part for part in parts if part.name.startswith("eyeLeft")]
     eye = eye_parts[0].carry(positions).mean(axis=0)
-    colour, _, place = paint_head(head, uvs, p, units | {"_eye": eye})  # type: ignore[dict-item]
+    colour, place = paint_head(head, uvs, p, eye, units)
     write_png(folder / "head_color.png", colour)
     write_png(folder / "eye_color.png", paint_eye())
     step = HEAD_SIZE // MASK_SIZE

@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: MIT
-"""Polygon meshes as linear operators: whatever is done to positions is done to every displacement."""
+"""Polygon meshes as linear operators: what is done to positions is done to displacements."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+Floats = NDArray[Any]  # NumPy's stubs lose the type in arithmetic
+Ints = NDArray[Any]
 
 
 class Operator:
