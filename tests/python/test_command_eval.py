@@ -23,9 +23,7 @@ def test_json_is_the_pose(capsys):
     pose = rig.evaluate(raw, lod=1)
     joints = np.zeros_like(pose.joints)
     for row in facts["joints"]:
-        joints[row["index"]] = [
-            row[a] for a in ["tx", "ty", "tz", "rx", "ry", "rz", "sx", "sy", "sz"]
-        ]
+        joints[row["index"]] = [row[a] for a in ATTRIBUTES]
     np.testing.assert_array_equal(joints, pose.joints)
     maps = np.zeros_like(pose.animated_maps)
     for row in facts["animated_maps"]:
