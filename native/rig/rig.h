@@ -109,7 +109,8 @@ Workspace make_workspace(const Rig& rig);
 void gui_to_raw(const Rig& rig, const float* gui, float* raw) noexcept;
 
 /// Turns raw controls into a pose. Allocates nothing.
-/// In:   raw     float32[R], not clamped here; NaN or infinity spoils what it drives and nothing else
+/// In:   raw     float32[R], not clamped here; NaN or infinity spoils every row of the joint groups
+///               that have it as a column, its shapes, maps and correctives, and nothing else
 ///       lod     clamped to the last LOD
 ///       settle  true: correctives of correctives are evaluated in the order of their dependency, so
 ///               that the pose is a function of raw alone; false: they read 0, as on the reference's
