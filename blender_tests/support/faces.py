@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A small face-like DNA of our own: two meshes, LODs, joints, channels, maps, odd names."""
+
+import numpy as np
+import risorius
+
+CONTROLS = (
+    "CTRL_expressions.jawOpen",
+    "CTRL_expressions.mouthCornerPullL",
+    "CTRL_expressions.mouthCornerPullR",
+    "CTRL_expressions.browDownL",
+    "CTRL_expressions.eyeLookLeftL",
+    "CTRL_expressions.eyeLookRightL",
+    "CTRL_expressions.eyeLookUpL",
+    "CTRL_expressions.eyeLookDownL",
+    "CTRL_expressions." + "x" * 90,
+    "twice",
+    "twice",
+)
+JOINTS = ("spine_04", "neck_01", "head", "FACIAL_C_Jaw", "FACIAL_L_Eye", "user_joint", "user_joint")
+PARENTS = (0, 0, 1, 2, 2, 2, 5)
+CHANNELS = 6
+HEAD, JAW, EYE = 2, 3, 4
+UNOWNED = 5
+
+
+def _grid(columns, rows, radius, center):
+    """A patch of a sphere that looks to the file's front (+z): positions and quads."""
+    u, v = np.meshgrid(np.linspace(-1.2, 1.2, columns), np.linspace(-1.2, 1.2, rows))
+    u, v = u.ravel(), v.ravel()
+    unit = np.stack([np.sin(u) * np.cos(v), np.sin(v), np.cos(u) * np.cos(v)], axis=1)
+    i = np.arange(columns - 1)[None] + np.arange(rows - 1)[:, None] * columns
+    faces = np.stack([i, i + 1, i + 1 + columns, i + columns], axis=-1).reshape(-1, 4)
+    uvs = np.stack([u, v], axis=1) / 2.4 + 0.5
+    return unit * radius + center, unit, uvs, faces
+
+
+def _mesh(random, size, radius, center, joints, channels):
+    positions, normals, uvs, faces = _grid(*size, radius, center)
+    count = len(positions)
+    weights = random.random((count, len(joints))).astype(np.float32)
+    weights /= weights.sum(axis=1, keepdims=True)
+    targets = []
+    for channel in channels:
+        moved = np.sort(random.choice(count, count // 3, replace=False))
+        targets.append(
+            risorius.BlendShapeTarget(
+                deltas=random.normal(0, radius * 0.05, (len(moved), 3)).astype(np.float32),
+                vertex_indices=moved.astype(np.uint32),
+                blend_shape_channel_index=channel,
+            )
+        )
+    layout = np.arange(count, dtype=np.uint32)
+    return risorius.Mesh(
+        positions=positions.astype(np.float32),
+        normals=normals.astype(np.float32),
+        texture_coordinates=uvs.astype(np.float32),
+        layout_positions=layout,
+        layout_normals=layout,
+        layout_texture_coordinates=layout,
+        face_offsets=np.arange(0, faces.size + 1, 4, dtype=np.uint32),
+        face_layouts=faces.ravel().astype(np.uint32),
+        maximum_influence_per_vertex=len(joints),
+        skin_offsets=np.arange(0, count * len(joints) + 1, len(joints), dtype=np.uint32),
+        skin_weights=weights.ravel(),
+        skin_joint_indices=np.tile(np.array(joints, np.uint16), count),
+        blend_shape_targets=targets,
+    )
+
+
+def small_face(
+    name="Small",
+    axes=("right", "up", "front"),
+    rotation_sequence="xyz",
+    rotation_signs=(1, 1, 1),
+    rotation_unit="degrees",
+    translation_unit="cm",
+):
+    """A DNA with every kind of thing that the add-on builds; the same at every call."""
+    random = np.random.default_rng(7)
+    dna = risorius.Dna()
+    dna.name, dna.lod_count, dna.max_lod = name, 2, 0
+    dna.coordinate_system = axes
+    dna.rotation_sequence, dna.rotation_signs = rotation_sequence, rotation_signs
+    dna.rotation_unit, dna.translation_unit = rotation_unit, translation_unit
+    dna.raw_control_names = list(CONTROLS)
+    dna.gui_control_names = ["CTRL_C_jaw.ty"]
+    dna.gui_to_raw = risorius.Conditionals(
+        input_indices=[0], output_indices=[0], from_values=[0.0], to_values=[1.0],
+        slope_values=[1.0], cut_values=[0.0],
+    )
+    dna.joint_names, dna.joint_parents = list(JOINTS), np.array(PARENTS, np.uint16)
+    dna.neutral_joint_translations = np.array(
+        [[0, 140, 0], [0, 8, 1], [0, 8, 1], [0, -2, 6], [3, 4, 9], [4, 1, 2], [1, 1, 1]], np.float32
+    )
+    angle = 1.0 if rotation_unit == "degrees" else np.pi / 180
+    dna.neutral_joint_rotations = (random.uniform(-40, 40, (7, 3)) * angle).astype(np.float32)
+    dna.blend_shape_channel_names = ["jaw", "pull_l", "pull_r", "y" * 80, "same", "same"]
+    dna.animated_map_names = ["flush", "wrinkle"]
+    dna.mesh_names = ["head_lod0_mesh", "teeth_lod0_mesh", "head_lod1_mesh"]
+    dna.lod_mesh_mapping = [[0, 1], [2]]
+    dna.lod_joint_mapping = [list(range(7)), list(range(7))]
+    dna.lod_blend_shape_mapping = [list(range(CHANNELS))] * 2
+    dna.lod_animated_map_mapping = [[0, 1]] * 2
+    _behave(dna, random, angle)
+    center = np.array([0.0, 158.0, 2.0])
+    dna.meshes = [
+        _mesh(random, (12, 14), 10.0, center, (1, 2, 3, 4, 5), range(CHANNELS)),
+        _mesh(random, (5, 5), 3.0, center + [0, -3, 5], (3,), (0,)),
+        _mesh(random, (6, 7), 10.0, center, (2, 3), range(CHANNELS)),
+    ]
+    dna.mesh_blend_shape_channel_mapping = [
+        (m, t.blend_shape_channel_index)
+        for m, mesh in enumerate(dna.meshes)
+        for t in mesh.blend_shape_targets
+    ]
+    return dna
+
+
+def _behave(dna, random, angle):
+    """Jaw with all nine attributes, an eye that looks, one corrective, channels and maps."""
+    count = len(CONTROLS)
+    jaw = random.uniform(-1, 1, (9, 3)).astype(np.float32)
+    jaw[3:6] *= 25 * angle
+    jaw[6:] *= 0.2
+    eye = np.zeros((3, 4), np.float32)
+    eye[1, 0], eye[1, 1] = 30 * angle, -28 * angle
+    eye[0, 2], eye[0, 3] = -20 * angle, 22 * angle
+    dna.joint_row_count, dna.joint_column_count = 9 * len(JOINTS), count + 1
+    dna.joint_groups = [
+        risorius.JointGroup(
+            lods=[9, 6], input_indices=[0, 1, count], output_indices=[JAW * 9 + i for i in range(9)],
+            values=jaw, joint_indices=[JAW],
+        ),
+        risorius.JointGroup(
+            lods=[3, 3], input_indices=[4, 5, 6, 7],
+            output_indices=[EYE * 9 + 3, EYE * 9 + 4, EYE * 9 + 5], values=eye, joint_indices=[EYE],
+        ),
+    ]
+    dna.psd_count = 1
+    dna.psds = risorius.Psds(rows=[count, count], columns=[0, 1], values=[1.0, 1.0])
+    dna.blend_shape_channels = risorius.BlendShapeChannels(
+        lods=[CHANNELS, 3], input_indices=[0, 1, 2, count, 8, 9], output_indices=range(CHANNELS)
+    )
+    dna.animated_maps = risorius.AnimatedMaps(
+        lods=[2, 2],
+        conditionals=risorius.Conditionals(
+            input_indices=[0, 3], output_indices=[0, 1], from_values=[0.0, 0.0],
+            to_values=[1.0, 1.0], slope_values=[1.0, 0.5], cut_values=[0.0, 0.0],
+        ),
+    )
