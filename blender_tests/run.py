@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Run the tests inside Blender, or inside the bpy module; the exit code is pytest's.
 
-    python blender_tests/run.py [pytest arguments]
-    blender -b --factory-startup -noaudio --python-exit-code 1 --python blender_tests/run.py -- ...
+python blender_tests/run.py [pytest arguments]
+blender -b --factory-startup -noaudio --python-exit-code 1 --python blender_tests/run.py -- ...
 """
 
 import os
@@ -30,8 +30,19 @@ def main() -> int:
 
     named = [a for a in arguments if Path(a.split("::")[0]).exists()]
     try:
-        return int(pytest.main([*([] if named else [str(HERE)]), "-q", "-p", "no:cacheprovider",
-                                "--rootdir", str(HERE), *arguments]))
+        return int(
+            pytest.main(
+                [
+                    *([] if named else [str(HERE)]),
+                    "-q",
+                    "-p",
+                    "no:cacheprovider",
+                    "--rootdir",
+                    str(HERE),
+                    *arguments,
+                ]
+            )
+        )
     finally:
         shutil.rmtree(user, ignore_errors=True)
 

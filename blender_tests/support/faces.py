@@ -86,8 +86,12 @@ def small_face(
     dna.raw_control_names = list(CONTROLS)
     dna.gui_control_names = ["CTRL_C_jaw.ty"]
     dna.gui_to_raw = risorius.Conditionals(
-        input_indices=[0], output_indices=[0], from_values=[0.0], to_values=[1.0],
-        slope_values=[1.0], cut_values=[0.0],
+        input_indices=[0],
+        output_indices=[0],
+        from_values=[0.0],
+        to_values=[1.0],
+        slope_values=[1.0],
+        cut_values=[0.0],
     )
     dna.joint_names, dna.joint_parents = list(JOINTS), np.array(PARENTS, np.uint16)
     dna.neutral_joint_translations = np.array(
@@ -106,7 +110,7 @@ def small_face(
     center = np.array([0.0, 158.0, 2.0])
     dna.meshes = [
         _mesh(random, (12, 14), 10.0, center, (1, 2, 3, 4, 5), range(CHANNELS)),
-        _mesh(random, (5, 5), 3.0, center + [0, -3, 5], (3,), (0,)),
+        _mesh(random, (5, 5), 3.0, center + np.array([0.0, -3.0, 5.0]), (3,), (0,)),
         _mesh(random, (6, 7), 10.0, center, (2, 3), range(CHANNELS)),
     ]
     dna.mesh_blend_shape_channel_mapping = [
@@ -129,12 +133,18 @@ def _behave(dna, random, angle):
     dna.joint_row_count, dna.joint_column_count = 9 * len(JOINTS), count + 1
     dna.joint_groups = [
         risorius.JointGroup(
-            lods=[9, 6], input_indices=[0, 1, count], output_indices=[JAW * 9 + i for i in range(9)],
-            values=jaw, joint_indices=[JAW],
+            lods=[9, 6],
+            input_indices=[0, 1, count],
+            output_indices=[JAW * 9 + i for i in range(9)],
+            values=jaw,
+            joint_indices=[JAW],
         ),
         risorius.JointGroup(
-            lods=[3, 3], input_indices=[4, 5, 6, 7],
-            output_indices=[EYE * 9 + 3, EYE * 9 + 4, EYE * 9 + 5], values=eye, joint_indices=[EYE],
+            lods=[3, 3],
+            input_indices=[4, 5, 6, 7],
+            output_indices=[EYE * 9 + 3, EYE * 9 + 4, EYE * 9 + 5],
+            values=eye,
+            joint_indices=[EYE],
         ),
     ]
     dna.psd_count = 1
@@ -145,7 +155,11 @@ def _behave(dna, random, angle):
     dna.animated_maps = risorius.AnimatedMaps(
         lods=[2, 2],
         conditionals=risorius.Conditionals(
-            input_indices=[0, 3], output_indices=[0, 1], from_values=[0.0, 0.0],
-            to_values=[1.0, 1.0], slope_values=[1.0, 0.5], cut_values=[0.0, 0.0],
+            input_indices=[0, 3],
+            output_indices=[0, 1],
+            from_values=[0.0, 0.0],
+            to_values=[1.0, 1.0],
+            slope_values=[1.0, 0.5],
+            cut_values=[0.0, 0.0],
         ),
     )

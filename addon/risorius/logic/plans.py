@@ -342,9 +342,7 @@ def _plan_mesh(
         skin_joints=joints,
         skin_weights=np.asarray(mesh.skin_weights, np.float32),
         channels=channels,
-        key_labels=names.unique_labels(
-            [channel_labels[c] for c in channels], ["Basis", LIVE_KEY]
-        ),
+        key_labels=names.unique_labels([channel_labels[c] for c in channels], ["Basis", LIVE_KEY]),
     )
 
 

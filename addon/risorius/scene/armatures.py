@@ -120,7 +120,9 @@ def control_places(plan):
     low, high = points.min(axis=0), points.max(axis=0)
     middle = (low + high) / 2
     head = rest[anchors.head][:3, 3] if anchors.head is not None else middle
-    neck = rest[anchors.neck[0]][:3, 3] if anchors.neck else np.array([middle[0], middle[1], low[2]])
+    neck = (
+        rest[anchors.neck[0]][:3, 3] if anchors.neck else np.array([middle[0], middle[1], low[2]])
+    )
     up, ahead = (0.0, 0.0, 1.0), (0.0, -1.0, 0.0)
     places = {
         "neck": (tuple(neck), up, size * 0.2, ""),

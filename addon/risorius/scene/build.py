@@ -201,9 +201,11 @@ def remove(rig):
     collections = [c for c in bpy.data.collections if rig.name in c.objects]
     circles = {b.custom_shape for b in controls.pose.bones if b.custom_shape} if controls else ()
     data += [c.data for c in circles]
+    images = [n.image for m in used for n in m.node_tree.nodes if n.type == "TEX_IMAGE"]
     _remove([i for i in (*items, rig, controls, *circles) if i is not None])
-    _remove([d for d in {*data, *used} if d.users == 0])
-    if text is not None and text.users == 0:
+    for left in (data, used, [i for i in images if i is not None]):
+        _remove([d for d in dict.fromkeys(left) if d.users == 0])
+    if text is not None and not any(r.get(parts.DNA) == text for r in parts.rigs()):
         _remove([text])
     _remove([c for c in collections if not c.all_objects])
 
@@ -211,12 +213,11 @@ def remove(rig):
 def _remove(made):
     """Remove those datablocks that still live."""
     alive = []
-    for item in made:
+    for item in dict.fromkeys(made):
         try:
-            # A Key leaves with its mesh.
-            if item is not None and not isinstance(item, bpy.types.Key):
-                alive.append(item if item.name else item)
+            if item is not None and item.name and not isinstance(item, bpy.types.Key):
+                alive.append(item)  # a Key leaves with its mesh
         except ReferenceError:
             continue
     if alive:
-        bpy.data.batch_remove(list(dict.fromkeys(alive)))
+        bpy.data.batch_remove(alive)

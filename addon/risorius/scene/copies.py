@@ -50,7 +50,9 @@ def _meshes_pointing_at(rig):
     """All mesh objects of this rig, also linked duplicates that the rig does not list."""
     listed = parts.meshes_of(rig)
     others = [
-        o for o in bpy.data.objects if o.type == "MESH" and o.get(parts.RIG) == rig and o not in listed
+        o
+        for o in bpy.data.objects
+        if o.type == "MESH" and o.get(parts.RIG) == rig and o not in listed
     ]
     return listed + others
 

@@ -140,7 +140,11 @@ def _write_bones(rig, live, deltas, turns, depsgraph):
     bones = rig.pose.bones
     where, rows, mine = _bone_rows(rig, live)
     seen = rig.evaluated_get(depsgraph).pose.bones
-    channels = [("location", 3, location), ("rotation_quaternion", 4, rotation), ("scale", 3, scale)]
+    channels = [
+        ("location", 3, location),
+        ("rotation_quaternion", 4, rotation),
+        ("scale", 3, scale),
+    ]
     if not mine.all():
         # A bulk write that leaves out their animated values would undo them.
         channels += [("rotation_euler", 3, None)]

@@ -95,6 +95,9 @@ def _build(plan, mesh, rig, made, images):
         socket = _add_maps(tree, plan, mesh, rig, socket, color, images)
     if socket is not None:
         tree.links.new(socket, inputs["Base Color"])
+    alpha = images.load(plan.textures.get((mesh.base, "alpha")), data=True)
+    if alpha is not None:
+        tree.links.new(_image_node(tree, alpha, (-900, -500)), inputs["Alpha"])
     _finish(material, tree, shader, mesh, image)
     return material
 
@@ -197,7 +200,7 @@ def _finish(material, tree, shader, mesh, image):
         inputs["Coat Weight"].default_value = 1.0 if mesh.kind == "eyes" else 0.4
         inputs["Coat Roughness"].default_value = 0.03 if mesh.kind == "eyes" else 0.12
     if mesh.kind == "lashes":
-        if image is not None and image.channels == 4:
+        if not inputs["Alpha"].is_linked and image is not None and image.channels == 4:
             node = next(n for n in tree.nodes if n.type == "TEX_IMAGE" and n.image == image)
             tree.links.new(node.outputs["Alpha"], inputs["Alpha"])
         _surface(material)

@@ -26,6 +26,7 @@ def store(name, content, made):
     """
     text = bpy.data.texts.new(f"{name}.dna")
     made.append(text)
+    text.use_fake_user = False  # the armature's pointer keeps it
     text.write(
         f"The DNA file of {name} ({len(content):,} bytes) is kept in this datablock.\n"
         "The character needs it; it is not meant to be edited.\n"

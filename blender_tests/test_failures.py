@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bad files get one sentence and leave nothing behind; a missing wheel is said in words."""
+
+import addon_utils
+import bpy
+import numpy as np
+import pytest
+import risorius
+from support import scene
+from support.faces import small_face
+
+
+def _bad_files(tmp_path):
+    whole = small_face().to_bytes()
+    newer = bytearray(whole)
+    newer[4] = 3
+    empty = risorius.Dna()
+    empty.name = "nothing"
+    flat = small_face()
+    flat.coordinate_system = ("right", "right", "up")
+    content = {
+        "not_a_dna": b"PK\x03\x04 this is something else entirely" * 9,
+        "cut_short": whole[: len(whole) // 2],
+        "cut_in_the_header": whole[:9],
+        "newer": bytes(newer),
+        "empty": b"",
+        "no_geometry": empty.to_bytes(),
+        "flat_axes": flat.to_bytes(),
+    }
+    for name, data in content.items():
+        path = tmp_path / f"{name}.dna"
+        path.write_bytes(data)
+        yield path
+    yield tmp_path / "missing.dna"
+    yield tmp_path
+
+
+def test_bad_files_leave_nothing_behind(tmp_path, mode):
+    before = scene.counts()
+    said = {}
+    for path in _bad_files(tmp_path):
+        with pytest.raises(RuntimeError) as caught:
+            bpy.ops.risorius.import_dna(filepath=str(path), shape_mode=mode)
+        text = str(caught.value).removeprefix("Error: ").strip()
+        assert "Traceback" not in text
+        assert "\n" not in text
+        assert text.endswith(".")
+        said[path.stem] = text
+        assert scene.counts() == before, path.name
+    assert "geometry" in said["no_geometry"]
+    assert "generation" in said["newer"]
+    assert "plane" in said["flat_axes"]
+
+
+def test_a_failure_half_way_leaves_nothing_behind(dna_file, mode, monkeypatch):
+    before = scene.counts()
+    meshes = scene.submodule("scene.meshes")
+
+    def fail(*_arguments):
+        raise MemoryError("planted")
+
+    monkeypatch.setattr(meshes, "set_mode", fail)
+    with pytest.raises(RuntimeError, match="planted"):
+        bpy.ops.risorius.import_dna(filepath=str(dna_file), shape_mode=mode)
+    assert scene.counts() == before
+    assert bpy.context.mode == "OBJECT"
+
+
+def test_missing_wheel_is_said_in_words(monkeypatch):
+    native = scene.submodule("native")
+    monkeypatch.setattr(native, "_risorius", None)
+    monkeypatch.setattr(native, "_reason", "No module named 'risorius'")
+    assert "wheels for" in native.problem()
+    assert "Python 3." in native.problem()
+    with pytest.raises(RuntimeError, match="native module"):
+        bpy.ops.risorius.import_dna(filepath="anything.dna")
+    addon_utils.disable(scene.MODULE)
+    addon_utils.enable(scene.MODULE)
+
+
+def test_wheel_of_another_version_is_said_in_words(monkeypatch):
+    native = scene.submodule("native")
+    monkeypatch.setattr(native._risorius, "__version__", "9.9.9")
+    assert "9.9.9" in native.problem()
+    bpy.context.scene.frame_set(2)
+
+
+def test_no_permission_gets_a_sentence(dna_file, monkeypatch):
+    build = scene.submodule("scene.build")
+
+    class Refusing:
+        DnaError = risorius.DnaError
+
+        @staticmethod
+        def load(path):
+            raise PermissionError(13, "Permission denied", path)
+
+    monkeypatch.setattr(build.native, "module", Refusing)
+    before = scene.counts()
+    with pytest.raises(RuntimeError, match="Permission denied"):
+        bpy.ops.risorius.import_dna(filepath=str(dna_file))
+    assert scene.counts() == before
+
+
+def test_parts_that_were_deleted_do_no_harm(dna_file, mode):
+    rig = scene.load(dna_file, mode)
+    bpy.data.objects.remove(scene.meshes(rig)[1])
+    scene.set_controls(rig, jawOpen=0.4)
+    bpy.data.objects.remove(scene.controls(rig))
+    bpy.context.scene.frame_set(3)
+    bpy.data.objects.remove(rig)
+    bpy.context.scene.frame_set(4)
+
+
+def test_a_face_that_lost_its_data_is_left_alone(dna_file, mode):
+    rig = scene.load(dna_file, mode)
+    bpy.data.texts.remove(rig["risorius_dna"])
+    still = scene.snapshot(rig)
+    scene.face(rig)["CTRL_expressions.jawOpen"] = 1.0
+    scene.update(scene.controls(rig))
+    np.testing.assert_array_equal(scene.snapshot(rig), still)

@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Undo, save and reload, append, duplicate, disable and enable: the face stays a face."""
+
+import addon_utils
+import bpy
+import numpy as np
+import pytest
+from support import scene
+
+
+def _posed(dna_file, mode):
+    rig = scene.load(dna_file, mode)
+    scene.set_controls(rig, jawOpen=0.8, mouthCornerPullL=0.5, browDownL=1.0)
+    return rig
+
+
+def _rig(name="Small_rig"):
+    return bpy.data.objects[name]
+
+
+def _moves_and_is_right(rig, dna_file):
+    scene.set_controls(rig, jawOpen=0.35, mouthCornerPullL=0.9)
+    raw = scene.raw_of(rig, dna_file)
+    assert raw[0] == pytest.approx(0.35)
+    assert scene.error_against_oracle(rig, dna_file, raw) < scene.TOLERANCE
+    bad, seen = scene.invalid_drivers()
+    assert not bad
+    assert seen > 0
+
+
+def test_all_drivers_are_valid_after_import(mode, dna_file):
+    _moves_and_is_right(_posed(dna_file, mode), dna_file)
+
+
+def test_save_and_reload_with_the_source_gone(mode, dna_file, tmp_path):
+    content = dna_file.read_bytes()
+    rig = _posed(dna_file, mode)
+    before = scene.snapshot(rig)
+    blend = tmp_path / "scene.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+    dna_file.unlink()
+    bpy.ops.wm.open_mainfile(filepath=str(blend))
+    np.testing.assert_array_equal(scene.snapshot(_rig()), before)
+    again = tmp_path / "again.dna"
+    again.write_bytes(content)
+    _moves_and_is_right(_rig(), again)
+
+
+def test_append_into_an_empty_file(mode, dna_file, tmp_path):
+    rig = _posed(dna_file, mode)
+    before = scene.snapshot(rig)
+    blend = tmp_path / "library.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+    bpy.ops.wm.read_homefile(use_empty=True)
+    with bpy.data.libraries.load(str(blend)) as (source, target):
+        target.collections = [c for c in source.collections if c == "Small"]
+    bpy.context.scene.collection.children.link(target.collections[0])
+    bpy.context.view_layer.update()
+    np.testing.assert_allclose(scene.snapshot(_rig()), before, atol=1e-6)
+    _moves_and_is_right(_rig(), dna_file)
+
+
+def test_append_beside_the_same_character(mode, dna_file, tmp_path):
+    _posed(dna_file, mode)
+    blend = tmp_path / "library.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend), copy=True)
+    with bpy.data.libraries.load(str(blend)) as (source, target):
+        target.collections = [c for c in source.collections if c == "Small"]
+    bpy.context.scene.collection.children.link(target.collections[0])
+    bpy.context.view_layer.update()
+    other = next(o for o in target.collections[0].objects if "risorius_controls" in o)
+    still = scene.snapshot(_rig())
+    _moves_and_is_right(other, dna_file)
+    np.testing.assert_array_equal(scene.snapshot(_rig()), still)
+
+
+def _duplicate(linked=False):
+    bpy.context.view_layer.objects.active = None
+    objects = [o for o in bpy.context.scene.objects if o.name.startswith("Small")]
+    for item in objects:
+        item.hide_set(False)
+        item.select_set(True)
+    bpy.ops.object.duplicate(linked=linked)
+    bpy.context.view_layer.update()
+    return next(o for o in bpy.context.selected_objects if "risorius_controls" in o)
+
+
+@pytest.mark.parametrize("linked", [False, True])
+def test_duplicate_is_independent(mode, dna_file, linked):
+    rig = _posed(dna_file, mode)
+    copy = _duplicate(linked)
+    assert scene.controls(copy) != scene.controls(rig)
+    still, maps = scene.snapshot(rig), list(rig["maps"])
+    _moves_and_is_right(copy, dna_file)
+    np.testing.assert_array_equal(scene.snapshot(rig), still)
+    assert list(rig["maps"]) == maps
+    assert list(copy["maps"]) != maps
+    ours, theirs = scene.meshes(rig)[0], scene.meshes(copy)[0]
+    assert ours.data.shape_keys != theirs.data.shape_keys
+    assert ours.material_slots[0].material != theirs.material_slots[0].material
+    for item, owner in ((ours, rig), (theirs, copy)):
+        curves = item.material_slots[0].material.node_tree.animation_data.drivers
+        assert {c.driver.variables[0].targets[0].id for c in curves} == {owner}
+    _moves_and_is_right(rig, dna_file)
+
+
+def test_undo_and_redo(mode, dna_file):
+    bpy.context.preferences.edit.use_global_undo = True
+    rig = _posed(dna_file, mode)
+    bpy.ops.ed.undo_push(message="posed")
+    before = scene.snapshot(rig)
+    scene.set_controls(rig, jawOpen=0.0, mouthCornerPullL=0.0)
+    bpy.ops.ed.undo_push(message="straight")
+    after = scene.snapshot(rig)
+    assert bpy.ops.ed.undo() == {"FINISHED"}
+    bpy.context.view_layer.update()
+    assert scene.face(_rig())["CTRL_expressions.jawOpen"] == pytest.approx(0.8)
+    np.testing.assert_allclose(scene.snapshot(_rig()), before, atol=1e-6)
+    assert bpy.ops.ed.redo() == {"FINISHED"}
+    bpy.context.view_layer.update()
+    np.testing.assert_allclose(scene.snapshot(_rig()), after, atol=1e-6)
+    _moves_and_is_right(_rig(), dna_file)
+
+
+def test_disable_and_enable(mode, dna_file):
+    rig = _posed(dna_file, mode)
+    before = scene.snapshot(rig)
+    addon_utils.disable(scene.MODULE)
+    np.testing.assert_array_equal(scene.snapshot(rig), before)
+    scene.set_controls(rig, jawOpen=0.1)
+    bpy.context.scene.frame_set(3)
+    addon_utils.enable(scene.MODULE)
+    addon_utils.enable(scene.MODULE)
+    bpy.context.scene.frame_set(4)
+    raw = scene.raw_of(rig, dna_file)
+    assert scene.error_against_oracle(rig, dna_file, raw) < scene.TOLERANCE
+    _moves_and_is_right(rig, dna_file)
+
+
+def test_no_handler_is_left_after_disable():
+    def ours():
+        return [
+            h
+            for name in dir(bpy.app.handlers)
+            if isinstance(getattr(bpy.app.handlers, name), list)
+            for h in getattr(bpy.app.handlers, name)
+            if "risorius" in getattr(h, "__module__", "")
+        ]
+
+    assert ours()
+    addon_utils.disable(scene.MODULE)
+    assert not ours()
+    addon_utils.enable(scene.MODULE)
+
+
+def test_reload_keeps_values_and_leaves_no_old_parts(mode, dna_file):
+    rig = _posed(dna_file, mode)
+    before, counts = scene.snapshot(rig), scene.counts()
+    assert bpy.ops.risorius.reload() == {"FINISHED"}
+    rig = next(o for o in bpy.data.objects if "risorius_controls" in o)
+    np.testing.assert_allclose(scene.snapshot(rig), before, atol=1e-6)
+    assert scene.counts() == counts
