@@ -11,7 +11,7 @@ FRAME_RATE = 24
 LAST_FRAME = 96
 
 # A blink closes in two frames, holds one, and opens in four.
-BLINKS = [9, 31, 57]
+BLINKS = [9, 25, 64]
 
 TRACKS = {
     # Looks to one side, the eyes lead and the head follows; then back to us.
@@ -153,7 +153,7 @@ SHEET = [
     (1, "neutral"),
     (11, "blink"),
     (23, "look and turn"),
-    (36, "smile"),
+    (37, "smile"),
     (41, "speech: he"),
     (46, "speech: oh"),
     (51, "speech: ah"),

@@ -39,10 +39,10 @@ def build(collection):
     scene = bpy.context.scene
     low, high = bounds(collection)
     unit = high.z - low.z
-    middle = Vector(((low.x + high.x) / 2, (low.y + high.y) / 2, low.z + 0.54 * unit))
+    middle = Vector(((low.x + high.x) / 2, (low.y + high.y) / 2, low.z + 0.55 * unit))
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     camera.data.lens = 85
-    camera.location = middle + Vector((0.42, -3.05, 0.06)) * unit
+    camera.location = middle + Vector((0.36, -2.62, 0.05)) * unit
     aim(camera, middle)
     scene.collection.objects.link(camera)
     scene.camera = camera

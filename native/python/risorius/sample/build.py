@@ -36,8 +36,9 @@ from .source import PACKAGE, SHA256, TARGETS, BaseMesh, Source, fetch
 
 CM = 10.0  # the data are in decimetres
 FLOOR = 8.168  # what lies under the soles, in decimetres below the data's origin
-NECK_CUT = 5.66  # of height less NECK_SLOPE times the distance from the middle, in the base mesh
+NECK_CUT = 5.53  # of height less NECK_SLOPE times the distance from the middle, in the base mesh
 NECK_SLOPE = 0.35
+TEETH_SHOW = 0.035
 REACH = 1.3  # the hands are as high as the neck, but not as near
 MACRO = {
     "macrodetails/universal-male-young-averagemuscle-averageweight": 1.0,
@@ -103,6 +104,28 @@ def shaped(source: Source, base: BaseMesh) -> Floats:
     return out
 
 
+def show_upper_teeth(positions: Floats, groups: dict[str, Ints], jaw_open: Floats) -> None:
+    """Lower the upper teeth until they show some millimetres below the upper lip of an open mouth."""
+    upper = groups["helper-upper-teeth"]
+    body = positions[groups["body"]]
+    still = np.linalg.norm(jaw_open[groups["body"]], axis=1) < 0.03
+    front = positions[upper][:, 2].max() - 0.05
+    lip = body[still & (np.abs(body[:, 0]) < 0.05) & (body[:, 2] > front)]
+    edge = positions[upper][:, 1].min()
+    below_nose = lip[(lip[:, 1] > edge - 0.15) & (lip[:, 1] < edge + 0.25)]
+    positions[upper, 1] += min(0.0, below_nose[:, 1].min() - TEETH_SHOW - edge)
+
+
+def lash_uvs(polygons: Polygons, positions: Floats, skin: Floats) -> tuple[Floats, list[list[int]]]:
+    """u along the lid, v from the root (0) to the tip (1): what a texture of lashes needs."""
+    gap = np.empty(len(positions))
+    for begin in range(0, len(positions), 256):
+        rows = positions[begin : begin + 256]
+        gap[begin : begin + 256] = np.linalg.norm(rows[:, None] - skin[None], axis=2).min(axis=1)
+    v = np.clip(gap / np.quantile(gap, 0.95), 0, 1)
+    return np.column_stack([np.abs(positions[:, 0]), v]), polygons.faces
+
+
 def make_parts(base: BaseMesh) -> list[Part]:
     """Every mesh at both LODs."""
     count = len(base.positions)
@@ -122,7 +145,8 @@ def make_parts(base: BaseMesh) -> list[Part]:
                 count,
             )
             # Clipping at the neck also drops what is not used; the small parts lie above it.
-            height = base.positions[:, 1] - NECK_SLOPE * np.abs(base.positions[:, 0])
+            aside = np.hypot(base.positions[:, 0], 0.35)  # round in front, no point
+            height = base.positions[:, 1] - NECK_SLOPE * aside
             polygons, operator = clip_below(polygons, height, NECK_CUT)
             part = Part(f"{name}_lod{lod}_mesh", compact_uvs(polygons), [operator])
             for _ in range(levels[lod]):
@@ -154,9 +178,11 @@ def joint_positions(positions: Floats, groups: dict[str, Ints]) -> dict[str, Flo
 
 def spine_weights(positions: Floats, joints: dict[str, Floats]) -> Floats:
     """Weights [V, 7] of spine_04, neck_01, neck_02 and head by height along a tilted neck."""
-    height = positions[:, 1] - 0.25 * (positions[:, 2] - joints["neck_02"][2])
+    # Chin and nose hang before the neck, at its height: what lies in front of it is head.
+    ahead = np.clip(positions[:, 2] - joints["head"][2] - 0.45, 0, None)
+    height = positions[:, 1] + 0.8 * ahead
     levels = [joints[n][1] for n in ("spine_04", "neck_01", "neck_02", "head")]
-    middles = [levels[0] + 0.15, levels[1] + 0.1, levels[2] + 0.15, levels[3] - 0.05]
+    middles = [levels[0] + 0.15, levels[1] + 0.1, levels[2] - 0.1, levels[3] - 0.35]
     out = np.zeros((len(positions), len(JOINTS)))
     rest = np.ones(len(positions))
     for k in range(3):
@@ -245,13 +271,16 @@ def eye_uvs(polygons: Polygons, positions: Floats) -> tuple[Floats, list[list[in
     return uvs, polygons.faces
 
 
-def make_mesh(part: Part, positions: Floats, weights: Floats) -> Mesh:
-    """Geometry and skin of a part; positions in decimetres."""
+def make_mesh(part: Part, positions: Floats, skin: Floats, weights: Floats) -> Mesh:
+    """Geometry and skin of a part; skin is the body's vertices; positions in decimetres."""
     p = part.carry(positions)
     polygons = part.polygons
     uvs, uv_faces = polygons.uvs, polygons.uv_faces
     if part.name.startswith("eyeL") or part.name.startswith("eyeR"):
         uvs, uv_faces = eye_uvs(polygons, p)
+    if part.name.startswith("eyelashes"):
+        near = np.abs(skin - p.mean(axis=0))
+        uvs, uv_faces = lash_uvs(polygons, p, skin[(near[:, 1] < 0.3) & (near[:, 2] < 0.3)])
     if part.name.startswith("head"):
         low, high = uvs.min(axis=0), uvs.max(axis=0)  # the texture need not hold the body
         uvs = (uvs - low) / (high - low)
@@ -369,12 +398,12 @@ def add_behavior(
     flush = []
     for output, side in enumerate("LR"):
         for name, slope in (
-            ("mouthCornerPull", 0.45),
-            ("eyeCheekRaise", 0.35),
-            ("mouthCheekBlow", 0.5),
+            ("mouthCornerPull", 0.25),
+            ("eyeCheekRaise", 0.2),
+            ("mouthCheekBlow", 0.35),
         ):
             flush.append((raw.index(name + side), output, 0, 1, slope, 0))
-        flush.append((raw.index("jawOpenExtreme"), output, 0, 1, 0.7, 0))
+        flush.append((raw.index("jawOpenExtreme"), output, 0, 1, 0.35, 0))
     dna.animated_maps = AnimatedMaps(lods=[len(flush)] * 2, conditionals=conditionals(flush))
 
 
@@ -402,6 +431,7 @@ def assemble(
     groups = group_indices(base)
     positions = shaped(source, base)
     positions[:, 1] += FLOOR
+    show_upper_teeth(positions, groups, source.face_unit("jawOpen", len(positions)))
     joints = joint_positions(positions, groups)
     say("reading 52 ARKit units and the further ones")
     units = ex.split_units(source, positions)
@@ -421,7 +451,7 @@ def assemble(
     meshes, mapping = [], []
     for number, part in enumerate(parts):
         p, w = part.carry(positions), part.carry(weights)
-        mesh = make_mesh(part, positions, w)
+        mesh = make_mesh(part, positions, positions[groups["body"]], w)
         deltas = []
         for unit in units.values():
             here = ex.Expression(part.carry(unit.displacement), unit.joints)

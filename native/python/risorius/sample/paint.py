@@ -109,8 +109,8 @@ def brow_mask(p: Floats, eye: Floats, random: np.random.Generator) -> Floats:
     """Strands along an arched line above each eye; p is the texel's place [h, w, 3]."""
     x, y = np.abs(p[:, :, 0]), p[:, :, 1] - eye[1]
     t = (x - (eye[0] - 0.19)) / 0.44  # 0 at the nose, 1 at the temple
-    ridge = 0.185 + 0.055 * np.sin(np.clip(t, 0, 1.1) * 2.2) - 0.045 * np.clip(t - 0.55, 0, 1) / 0.5
-    half = 0.036 * (1 - 0.62 * np.clip(t, 0, 1)) * smooth(-0.04, 0.1, t) + 0.002
+    ridge = 0.165 + 0.055 * np.sin(np.clip(t, 0, 1.1) * 2.2) - 0.045 * np.clip(t - 0.55, 0, 1) / 0.5
+    half = 0.05 * (1 - 0.62 * np.clip(t, 0, 1)) * smooth(-0.04, 0.1, t) + 0.002
     across = (y - ridge) / half
     body = (1 - smooth(0.45, 1.05, np.abs(across))) * smooth(-0.03, 0.1, t)
     body *= 1 - smooth(0.9, 1.02, t)
@@ -231,14 +231,26 @@ def paint_eye() -> Floats:
     return np.clip(colour, 0, 1)
 
 
+def paint_lashes() -> Floats:
+    """Opacity of the lashes' strips: strands that taper from the lid (v = 0) to the tip."""
+    random = np.random.default_rng(5)
+    v, u = np.meshgrid(*[(np.arange(MASK_SIZE) + 0.5) / MASK_SIZE] * 2, indexing="ij")
+    count = 260
+    strand = u * count + 0.8 * v + 0.6 * noise(MASK_SIZE, 16, random)
+    length = random.uniform(0.55, 1.0, count + 8)[np.floor(strand).astype(int).clip(0, count + 7)]
+    across = np.abs(strand - np.floor(strand) - 0.5) * 2
+    width = 0.62 * (1 - v / length)
+    return np.asarray(1 - smooth(-0.12, 0.12, across - width))
+
+
 def paint_textures(
     folder: Path, dna: Dna, positions: Floats, units: dict[str, Expression], parts: list[Part]
 ) -> dict[str, str]:
     """Write the textures.
 
     Returns:
-        Metadata for the DNA: texture:<mesh>:<role> -> file name in the folder; the roles are color
-        and map:<animated map>, a mask of where that map shows.
+        Metadata for the DNA: texture:<mesh>:<role> -> file name in the folder; the roles are
+        color, alpha, and map:<animated map>, a mask of where that map shows.
     """
     folder.mkdir(parents=True, exist_ok=True)
     head = next(part for part in parts if part.name.startswith("head") and not part.operators[1:])
@@ -250,18 +262,20 @@ def paint_textures(
     colour, place = paint_head(head, uvs, p, eye, units)
     write_png(folder / "head_color.png", colour)
     write_png(folder / "eye_color.png", paint_eye())
+    write_png(folder / "lash_alpha.png", paint_lashes())
     step = HEAD_SIZE // MASK_SIZE
     small = place[::step, ::step]
     out = {}
     for side, sign in (("L", 1), ("R", -1)):
         x, y = sign * small[:, :, 0], small[:, :, 1] - eye[1]
-        mask = np.exp(-(((x - 0.40) / 0.2) ** 2) - ((y + 0.36) / 0.17) ** 2)
+        mask = 0.75 * np.exp(-(((x - 0.42) / 0.25) ** 2) - ((y + 0.36) / 0.2) ** 2)
         mask *= small[:, :, 2] > eye[2] - 0.4
         write_png(folder / f"head_flush_{side}.png", mask)
         for lod in (0, 1):
             out[f"texture:head_lod{lod}_mesh:map:head_flush_{side}"] = f"head_flush_{side}.png"
     for lod in (0, 1):
         out[f"texture:head_lod{lod}_mesh:color"] = "head_color.png"
+        out[f"texture:eyelashes_lod{lod}_mesh:alpha"] = "lash_alpha.png"
         for eye_side in ("Left", "Right"):
             out[f"texture:eye{eye_side}_lod{lod}_mesh:color"] = "eye_color.png"
     return out
