@@ -1,0 +1,260 @@
+# SPDX-License-Identifier: MIT
+"""The add-on's logic, which needs no Blender: names, regions, spaces, plans."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+import risorius
+
+LOGIC = Path(__file__).resolve().parents[2] / "addon" / "risorius" / "logic"
+
+
+def _load_logic() -> ModuleType:
+    """The package under a name of its own, so that addon/ never comes onto sys.path."""
+    name = "risorius_addon_logic"
+    if name not in sys.modules:
+        spec = importlib.util.spec_from_file_location(
+            name, LOGIC / "__init__.py", submodule_search_locations=[str(LOGIC)]
+        )
+        assert spec is not None
+        assert spec.loader is not None
+        module = importlib.util.module_from_spec(spec)
+        sys.modules[name] = module
+        spec.loader.exec_module(module)
+    return sys.modules[name]
+
+
+_load_logic()
+names = importlib.import_module("risorius_addon_logic.names")
+regions = importlib.import_module("risorius_addon_logic.regions")
+space = importlib.import_module("risorius_addon_logic.space")
+plans = importlib.import_module("risorius_addon_logic.plans")
+
+
+def test_logic_needs_neither_blender_nor_the_native_module() -> None:
+    for path in LOGIC.glob("*.py"):
+        lines = path.read_text(encoding="utf-8").splitlines()
+        imports = [line for line in lines if line.startswith(("import ", "from "))]
+        assert not [line for line in imports if "bpy" in line or "risorius" in line], path.name
+
+
+class TestNames:
+    def test_short_names_stay(self) -> None:
+        assert names.unique_labels(["a", "b.c", "ü"]) == ["a", "b.c", "ü"]
+
+    def test_repeated_and_long_names_differ_and_fit(self) -> None:
+        labels = names.unique_labels(["x" * 100, "x" * 100, "é" * 40, "same", "same", "same"])
+        assert len(set(labels)) == 6
+        assert all(0 < len(label.encode()) <= 63 for label in labels)
+        assert labels[3:] == ["same", "same.001", "same.002"]
+
+    def test_a_number_that_is_taken_is_passed_over(self) -> None:
+        assert names.unique_labels(["a", "a.001", "a"]) == ["a", "a.001", "a.002"]
+
+    def test_names_that_are_no_text(self) -> None:
+        labels = names.unique_labels(["", "\udcff", "a\0b"])
+        assert all(label.encode("utf-8") for label in labels)
+        assert len(set(labels)) == 3
+
+    @pytest.mark.parametrize(
+        ("name", "wanted"),
+        [("head_lod0_mesh", "head"), ("eyeLeft_lod3_mesh", "eyeLeft"), ("mesh", "mesh")],
+    )
+    def test_meshes_of_one_part_share_a_base(self, name: str, wanted: str) -> None:
+        assert names.without_lod(name) == wanted
+
+
+class TestRegions:
+    @pytest.mark.parametrize(
+        ("control", "region"),
+        [
+            ("CTRL_expressions.browDownL", "brow"),
+            ("CTRL_expressions.eyeCheekRaiseL", "eye"),
+            ("CTRL_expressions.eyelashesUpINL", "eye"),
+            ("CTRL_expressions.mouthCheekBlowL", "cheek"),
+            ("CTRL_expressions.mouthStickyUC", "mouth"),
+            ("CTRL_expressions.jawChinRaiseDL", "jaw"),
+            ("CTRL_expressions.noseNostrilDilateL", "nose"),
+            ("CTRL_expressions.tongueOut", "tongue"),
+            ("CTRL_expressions.teethUpU", "teeth"),
+            ("CTRL_expressions.neckSwallowPh1", "neck"),
+            ("CTRL_expressions.earUpL", "ear"),
+            ("spine_04.qx", "other"),
+        ],
+    )
+    def test_region_by_name(self, control: str, region: str) -> None:
+        assert regions.region_of(control) == region
+
+    def test_groups_hold_every_control_once(self) -> None:
+        controls = ["a.jawOpen", "a.browDownL", "zzz", "a.jawLeft"]
+        groups = regions.group_controls(controls)
+        assert groups == {"brow": [1], "jaw": [0, 3], "other": [2]}
+
+    def test_search_looks_at_name_and_words(self) -> None:
+        control = "CTRL_expressions.mouthCornerPullL"
+        assert regions.matches(control, "corner pull")
+        assert regions.matches(control, "MOUTH")
+        assert not regions.matches(control, "mouth brow")
+
+
+def _space(**changes: object) -> Any:
+    words: dict[str, Any] = {
+        "coordinate_system": ("right", "up", "front"),
+        "translation_unit": "cm",
+        "rotation_unit": "degrees",
+        "rotation_sequence": "xyz",
+        "rotation_signs": (1, 1, 1),
+        "face_winding_order": "ccw",
+    }
+    return space.make_space(**{**words, **changes})
+
+
+class TestSpace:
+    def test_axes_and_units(self) -> None:
+        made = _space()
+        points = made.points(np.array([[100.0, 0, 0], [0, 100, 0], [0, 0, 100]]))
+        np.testing.assert_allclose(points, [[1, 0, 0], [0, 0, 1], [0, -1, 0]], atol=1e-15)
+        assert not made.flip_faces
+
+    def test_scene_scale(self) -> None:
+        points = _space(unit_scale=0.01).points(np.array([[1.0, 2.0, 3.0]]))
+        np.testing.assert_allclose(points, [[1, -3, 2]])
+
+    def test_mirrored_axes_flip_faces_and_clockwise_flips_back(self) -> None:
+        mirrored = ("left", "up", "front")
+        assert _space(coordinate_system=mirrored).flip_faces
+        assert not _space(coordinate_system=mirrored, face_winding_order="cw").flip_faces
+        assert _space(face_winding_order="cw").flip_faces
+
+    @pytest.mark.parametrize(
+        "changes",
+        [
+            {"coordinate_system": ("up", "up", "front")},
+            {"coordinate_system": ("up", "down", "front")},
+            {"coordinate_system": ("#17", "up", "front")},
+            {"translation_unit": "#9"},
+            {"rotation_sequence": "xxz"},
+        ],
+    )
+    def test_unknown_conventions_are_refused_in_a_sentence(self, changes: dict[str, Any]) -> None:
+        with pytest.raises(space.SpaceError, match=r"file's .*\.$"):
+            _space(**changes)
+
+    @pytest.mark.parametrize("sequence", ["xyz", "xzy", "yxz", "yzx", "zxy", "zyx"])
+    @pytest.mark.parametrize("signs", [(1, 1, 1), (1, -1, 1), (-1, -1, 1)])
+    @pytest.mark.parametrize(
+        "axes", [("right", "up", "front"), ("left", "up", "front"), ("front", "right", "up")]
+    )
+    def test_rotation_carries_points_as_in_the_file(
+        self, sequence: str, signs: tuple[int, int, int], axes: tuple[str, str, str]
+    ) -> None:
+        # Turning in the file and converting equals converting and turning in Blender.
+        made = _space(rotation_sequence=sequence, rotation_signs=signs, coordinate_system=axes)
+        angles = np.array([[20.0, -70.0, 130.0]])
+        point = np.array([1.0, 2.0, 3.0])
+        turned = point
+        for letter in sequence:
+            i = "xyz".index(letter)
+            a = np.radians(angles[0, i]) * signs[i]
+            j, k = (i + 1) % 3, (i + 2) % 3
+            new = turned.copy()
+            new[j] = np.cos(a) * turned[j] - np.sin(a) * turned[k]
+            new[k] = np.sin(a) * turned[j] + np.cos(a) * turned[k]
+            turned = new
+        direct = made.points(turned[None])[0]
+        matrix = made.rotations(angles)[0]
+        np.testing.assert_allclose(matrix @ made.points(point[None])[0], direct, atol=1e-12)
+        assert np.linalg.det(matrix) == pytest.approx(1.0)
+
+    def test_quaternions_of_random_and_half_turn_matrices(self) -> None:
+        random = np.random.default_rng(3)
+        angles = np.concatenate([random.uniform(-np.pi, np.pi, (200, 3)), np.eye(3) * np.pi])
+        matrices = space.euler_matrices(angles, (0, 1, 2))
+        for matrix, q in zip(matrices, space.quaternions(matrices), strict=True):
+            assert q[0] >= 0
+            np.testing.assert_allclose(space.quaternion_matrix(q), matrix, atol=1e-12)
+
+    def test_product_and_fraction(self) -> None:
+        a, b = space.quaternions(
+            space.euler_matrices(np.array([[0.3, 1, 2], [1, 0, -1]]), (0, 1, 2))
+        )
+        np.testing.assert_allclose(
+            space.quaternion_matrix(space.quaternion_product(a, b)),
+            space.quaternion_matrix(a) @ space.quaternion_matrix(b),
+            atol=1e-12,
+        )
+        half = space.quaternion_fraction(a, 0.5)
+        np.testing.assert_allclose(space.quaternion_product(half, half), a, atol=1e-12)
+
+    def test_bone_channels_rebuild_the_posed_joint(self) -> None:
+        made = _space(coordinate_system=("left", "up", "front"))
+        random = np.random.default_rng(5)
+        neutral = random.uniform(-90, 90, (4, 3)).astype(np.float32)
+        deltas = random.uniform(-1, 1, (4, 9)).astype(np.float32)
+        deltas[:, 3:6] *= 60
+        joints = space.make_joint_space(made, neutral, [1, 3])
+        location, rotation, scale = joints.bone_channels(deltas)
+        for row, joint in enumerate((1, 3)):
+            rest = made.rotations(neutral[joint : joint + 1])[0]
+            wanted = made.rotations((neutral + deltas[:, 3:6])[joint : joint + 1])[0]
+            found = rest @ space.quaternion_matrix(rotation[row])
+            np.testing.assert_allclose(found, wanted, atol=1e-6)
+            np.testing.assert_allclose(
+                rest @ location[row], made.points(deltas[joint : joint + 1, :3])[0], atol=1e-9
+            )
+            np.testing.assert_allclose(scale[row] - 1, np.abs(made.axes) @ deltas[joint, 6:9])
+
+    def test_parents_may_stand_after_their_children(self) -> None:
+        offsets = np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1]])
+        turn = np.broadcast_to(np.eye(3), (3, 3, 3))
+        world = space.world_matrices(turn, offsets, np.array([1, 2, 2], np.uint16))
+        np.testing.assert_allclose(world[0][:3, 3], [1, 1, 1])
+
+
+class TestPlans:
+    @pytest.mark.parametrize(
+        ("name", "kind"),
+        [
+            ("head_lod0_mesh", "skin"),
+            ("teeth_lod0_mesh", "teeth"),
+            ("saliva_lod0_mesh", "wet"),
+            ("eyeLeft_lod0_mesh", "eyes"),
+            ("eyeshell_lod0_mesh", "wet"),
+            ("eyelashes_lod0_mesh", "lashes"),
+            ("eyeEdge_lod0_mesh", "wet"),
+            ("cartilage_lod0_mesh", "gum"),
+        ],
+    )
+    def test_kind_of_mesh(self, name: str, kind: str) -> None:
+        assert plans.kind_of(name) == kind
+
+    def test_anchors_by_name(self) -> None:
+        found = plans.find_anchors(["spine", "neck_01", "neck_02", "head", "FACIAL_R_Eye"])
+        assert (found.neck, found.head, found.eyes) == ((1, 2), 3, {"R": 4})
+
+    def test_a_file_without_geometry_is_refused_in_a_sentence(self) -> None:
+        with pytest.raises(plans.PlanError, match="no geometry"):
+            plans.plan_character(risorius.Dna(), "nothing")
+
+    def test_a_golden_file_becomes_a_plan(self) -> None:
+        golden = LOGIC.parents[2] / "tests" / "data" / "golden" / "medium.dna"
+        dna = risorius.load(str(golden))
+        plan = plans.plan_character(dna, "medium", (0, 1))
+        wanted = set(dna.lod_mesh_mapping[0].tolist()) | set(dna.lod_mesh_mapping[1].tolist())
+        assert {m.index for m in plan.meshes} == wanted
+        assert [c.label for c in plan.controls] == names.unique_labels(dna.raw_control_names)
+        order = plan.armature.order
+        assert sorted(order) == list(range(len(dna.joint_names)))
+        where = {joint: i for i, joint in enumerate(order)}
+        parents = enumerate(plan.armature.parents)
+        assert all(p < 0 or where[p] < where[j] for j, p in parents)
+        for mesh in plan.meshes:
+            source = dna.meshes[mesh.index]
+            np.testing.assert_allclose(mesh.positions[:, 2], source.positions[:, 1] * 0.01, 1e-5)
