@@ -49,7 +49,8 @@ class ByteWriter {
   }
   /// Writes v at an earlier position (sizes and offsets that are known only afterwards).
   void patch_u32(std::size_t at, std::uint32_t v) {
-    for (int i = 0; i < 4; ++i) bytes_[at + i] = static_cast<std::uint8_t>(v >> (24 - 8 * i));
+    for (std::size_t i = 0; i < 4; ++i)
+      bytes_[at + i] = static_cast<std::uint8_t>(v >> (24 - 8 * i));
   }
 
  private:
