@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Run the tests inside Blender, or inside the bpy module; the exit code is pytest's.
 
-python blender_tests/run.py [pytest arguments]
+python blender_tests/run.py [--extension ZIP] [pytest arguments]
 blender -b --factory-startup -noaudio --python-exit-code 1 --python blender_tests/run.py -- ...
+
+With --extension the add-on and its wheel come from that zip, installed as a user would; without,
+the add-on's folder is used as it stands, with the wheel that Python finds.
 """
 
 import os
@@ -23,6 +26,12 @@ def main() -> int:
     arguments = sys.argv[1:]
     if "bpy" in sys.modules:
         arguments = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
+    if arguments[:1] == ["--"]:
+        arguments = arguments[1:]
+    if "--extension" in arguments:
+        at = arguments.index("--extension")
+        os.environ["RISORIUS_TEST_EXTENSION"] = str(Path(arguments[at + 1]).resolve())
+        del arguments[at : at + 2]
     for folder in os.environ.get("RISORIUS_TEST_PATH", "").split(os.pathsep):
         if folder:
             sys.path.append(folder)
