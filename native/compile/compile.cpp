@@ -293,8 +293,7 @@ std::vector<bool> used_controls(const Rig& r, std::uint32_t lod) {
 
 // Factors before what uses them, ties by ascending output; members of a cycle and what hangs on
 // them come last.
-std::vector<std::uint32_t> dependency_order(const Rig& r, const std::vector<std::uint32_t>& psds,
-                                            bool& cycles) {
+std::vector<std::uint32_t> dependency_order(const Rig& r, const std::vector<std::uint32_t>& psds) {
   constexpr std::uint32_t kNone = UINT32_MAX;
   std::vector<std::uint32_t> psd_of_control(r.control_count, kNone);
   for (const std::uint32_t p : psds) psd_of_control[r.psds[p].output] = p;
@@ -319,7 +318,6 @@ std::vector<std::uint32_t> dependency_order(const Rig& r, const std::vector<std:
       if (--waiting_for[user] == 0) ready.push(user);
     }
   }
-  cycles = cycles || order.size() < psds.size();
   std::ranges::copy_if(psds, std::back_inserter(order),
                        [&](std::uint32_t p) { return waiting_for[p] > 0; });
   return order;
@@ -332,7 +330,7 @@ void schedule_psds(Rig& r) {
     for (std::uint32_t p = 0; p < r.psds.size(); ++p) {
       if (used[r.psds[p].output]) psds.push_back(p);
     }
-    r.settled_psds_by_lod.push_back(dependency_order(r, psds, r.psd_cycles));
+    r.settled_psds_by_lod.push_back(dependency_order(r, psds));
     r.psds_by_lod.push_back(std::move(psds));
   }
 }

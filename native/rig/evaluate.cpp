@@ -34,17 +34,11 @@ float corrective(const Rig& rig, const Psd& psd, const float* values) noexcept {
   return product > 1.0f ? 1.0f : product;
 }
 
-// Factors come before what uses them; only a cycle needs more than one pass.
+// Factors come before what uses them, so one pass settles. Members of a cycle multiply each other
+// from rest and stay there, whatever their order.
 void settled_correctives(const Rig& rig, std::uint32_t lod, float* controls) noexcept {
-  constexpr int kMaxPasses = 64;
-  for (int pass = 0; pass < (rig.psd_cycles ? kMaxPasses : 1); ++pass) {
-    bool changed = false;
-    for (const std::uint32_t p : rig.settled_psds_by_lod[lod]) {
-      const float v = corrective(rig, rig.psds[p], controls);
-      changed = changed || v != controls[rig.psds[p].output];
-      controls[rig.psds[p].output] = v;
-    }
-    if (!changed) return;
+  for (const std::uint32_t p : rig.settled_psds_by_lod[lod]) {
+    controls[rig.psds[p].output] = corrective(rig, rig.psds[p], controls);
   }
 }
 
@@ -84,8 +78,8 @@ void quaternion_joints(const Rig& rig, std::uint32_t lod, Pose& pose) noexcept {
       const Quaternion& full = rig.quaternions[q.quaternions_begin + c];
       const float identity = full.w >= 0.0f ? 1.0f - v : v - 1.0f;
       const Quaternion blend{full.x * v, full.y * v, full.z * v, full.w * v + identity};
-      const float length = std::sqrt(blend.x * blend.x + blend.y * blend.y + blend.z * blend.z +
-                                     blend.w * blend.w);
+      const float length =
+          std::sqrt(blend.x * blend.x + blend.y * blend.y + blend.z * blend.z + blend.w * blend.w);
       product = multiply({blend.x / length, blend.y / length, blend.z / length, blend.w / length},
                          product);
     }

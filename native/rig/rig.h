@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Rig: the compiled, immutable form of a face's behavior. Knows nothing of the file it came from; may
-// be shared by any number of threads and faces.
+// Rig: the compiled, immutable form of a face's behavior. Knows nothing of the file it came from;
+// may be shared by any number of threads and faces.
 #pragma once
 
 #include <cstdint>
@@ -32,8 +32,8 @@ struct Psd {
   std::uint32_t factors_begin = 0, factors_end = 0;
 };
 
-/// A dense matrix from controls to joint attributes, stored by columns: the value of row r and column
-/// c is values[values_begin + c * stride + r]; rows beyond row_count are zero.
+/// A dense matrix from controls to joint attributes, stored by columns: the value of row r and
+/// column c is values[values_begin + c * stride + r]; rows beyond row_count are zero.
 struct JointGroup {
   std::uint32_t values_begin = 0, stride = 0;
   std::uint32_t inputs_begin = 0, column_count = 0;
@@ -41,8 +41,8 @@ struct JointGroup {
   std::uint32_t lods_begin = 0;  // lod_count row counts in joint_group_lods
 };
 
-/// One joint of one group whose rotation is a product of quaternions, one per column: column c turns
-/// it by a blend of identity and quaternions[quaternions_begin + c].
+/// One joint of one group whose rotation is a product of quaternions, one per column: column c
+/// turns it by a blend of identity and quaternions[quaternions_begin + c].
 struct QuaternionJoint {
   std::uint32_t joint = 0, group = 0;
   std::uint32_t first_row = 0;  // its first rotation row: a LOD with fewer rows leaves it out
@@ -56,11 +56,10 @@ struct Rig {
   std::vector<float> neutral_joints;               // [joints, 9], scale 1
 
   ConditionalTable gui_to_raw;
-  std::vector<Psd> psds;                   // ascending output
-  std::vector<std::uint16_t> psd_factors;  // control indices
+  std::vector<Psd> psds;                                        // ascending output
+  std::vector<std::uint16_t> psd_factors;                       // control indices
   std::vector<std::vector<std::uint32_t>> psds_by_lod;          // ascending
   std::vector<std::vector<std::uint32_t>> settled_psds_by_lod;  // factors before what uses them
-  bool psd_cycles = false;
 
   std::vector<JointGroup> joint_groups;
   core::AlignedVector<float> joint_values;
@@ -112,9 +111,10 @@ void gui_to_raw(const Rig& rig, const float* gui, float* raw) noexcept;
 /// In:   raw     float32[R], not clamped here; NaN or infinity spoils every row of the joint groups
 ///               that have it as a column, its shapes, maps and correctives, and nothing else
 ///       lod     clamped to the last LOD
-///       settle  true: correctives of correctives are evaluated in the order of their dependency, so
-///               that the pose is a function of raw alone; false: they read 0, as on the reference's
-///               first call
+///       settle  true: correctives of correctives are evaluated in the order of their dependency,
+///       so
+///               that the pose is a function of raw alone; false: they read 0, as on the
+///               reference's first call
 /// Out:  pose    every field overwritten
 /// From: RigLogic; dna-format 12.1, 12.2, 12.5, 12.6
 void evaluate(const Rig& rig, const float* raw, std::uint32_t lod, bool settle, Workspace& work,

@@ -134,12 +134,11 @@ TEST(EvaluateCorrectives, FirstCallReadsNoCorrectiveEvenInTheOrderOfIndices) {
   EXPECT_EQ(evaluate_once(rig, {1.0f}, 0, false).controls, (std::vector{1.0f, 0.5f, 0.0f, 0.0f}));
 }
 
-TEST(EvaluateCorrectives, CycleEndsAndIsTheSameEveryTime) {
-  const Rig rig = must_compile(chain({1, 2, 3, 1}, {2, 1, 0, 0}));
-  const Pose a = evaluate_once(rig, {1.0f}), b = evaluate_once(rig, {1.0f});
-  EXPECT_EQ(a.controls, b.controls);
-  EXPECT_EQ(a.controls[1], 0.0f) << "a cycle that nothing starts stays at rest";
-  EXPECT_EQ(a.controls[3], 0.5f) << "what is outside the cycle is settled";
+TEST(EvaluateCorrectives, CycleStaysAtRest) {
+  const Rig rig = must_compile(chain({1, 2, 3, 1}, {2, 1, 0, 0}));  // 1 reads 2 and raw, 2 reads 1
+  EXPECT_EQ(evaluate_once(rig, {1.0f}).controls, (std::vector{1.0f, 0.0f, 0.0f, 0.5f}));
+  const Rig self = must_compile(chain({1, 2, 3}, {1, 1, 0}));  // 1 reads itself, 2 hangs on it
+  EXPECT_EQ(evaluate_once(self, {1.0f}).controls, (std::vector{1.0f, 0.0f, 0.0f, 0.5f}));
 }
 
 TEST(EvaluateCorrectives, CorrectiveThatNothingUsesAtTheLodStaysZero) {
