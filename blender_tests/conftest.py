@@ -20,9 +20,10 @@ def installed():
     """The add-on as an extension in a repository of the throw-away user folder."""
     import addon_utils
 
-    package = os.environ.get("RISORIUS_TEST_EXTENSION")
-    if package:
-        return _install(package)
+    if "RISORIUS_TEST_EXTENSION" in os.environ:  # run.py installed it
+        repos = bpy.context.preferences.extensions.repos
+        repository = next(r for r in repos if r.module == "user_default")
+        return Path(repository.directory) / "risorius"
     repository = next(
         (r for r in bpy.context.preferences.extensions.repos if r.module == "user_default"), None
     )
@@ -43,17 +44,6 @@ def installed():
         )
     addon_utils.extensions_refresh(ensure_wheels=False)
     return target
-
-
-def _install(package):
-    """Install the zip as the preferences do; its wheel is unpacked by Blender."""
-    sys.path.insert(0, str(HERE.parent / "packaging"))
-    import install_extension
-
-    install_extension.install(package)
-    repos = bpy.context.preferences.extensions.repos
-    repository = next(r for r in repos if r.module == "user_default")
-    return Path(repository.directory) / "risorius"
 
 
 @pytest.fixture(autouse=True)

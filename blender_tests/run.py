@@ -17,6 +17,29 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 
 
+def install(package: str) -> None:
+    """Install the zip as the preferences do, before anything imports the wheel.
+
+    Raises:
+        RuntimeError: Blender refused it, or Python found another risorius than the zip's.
+    """
+    sys.path.insert(0, str(HERE.parent / "packaging"))
+    import bpy
+    import install_extension
+
+    version = f"python{sys.version_info[0]}.{sys.version_info[1]}"
+    folder = Path(bpy.utils.user_resource("EXTENSIONS"))
+    wheels = folder / ".local" / "lib" / version / "site-packages"
+    wheels.mkdir(parents=True, exist_ok=True)  # Python forgets a folder that was not there
+    sys.path.insert(0, str(wheels))
+    install_extension.install(package)
+    import risorius
+
+    if not Path(risorius.__file__ or "").is_relative_to(wheels):
+        raise RuntimeError(f"{risorius.__file__} is not the zip's wheel")
+    os.environ["RISORIUS_TEST_EXTENSION"] = package
+
+
 def main() -> int:
     """Install the add-on into a throw-away user folder and run pytest on this folder."""
     # Blender reads the user folder when it starts: set before bpy is first imported.
@@ -30,7 +53,7 @@ def main() -> int:
         arguments = arguments[1:]
     if "--extension" in arguments:
         at = arguments.index("--extension")
-        os.environ["RISORIUS_TEST_EXTENSION"] = str(Path(arguments[at + 1]).resolve())
+        install(str(Path(arguments[at + 1]).resolve()))
         del arguments[at : at + 2]
     for folder in os.environ.get("RISORIUS_TEST_PATH", "").split(os.pathsep):
         if folder:

@@ -26,7 +26,8 @@ PROJECT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(PROJECT / "packaging"))
 os.environ.setdefault("BLENDER_USER_RESOURCES", tempfile.mkdtemp(prefix="risorius-bench-"))
 
-import bpy  # noqa: E402
+import bpy  # noqa: E402 isort: skip
+import addon_utils  # noqa: E402 isort: skip
 import install_extension  # noqa: E402
 
 ANIMATED = 60
@@ -48,8 +49,9 @@ def machine():
     return f"{cpu}; Blender {bpy.app.version_string}; Python {platform.python_version()}; {commit}"
 
 
-def import_face(path, mode):
+def import_face(path, mode, package):
     bpy.ops.wm.read_factory_settings(use_empty=True)
+    addon_utils.enable(package, default_set=True)
     begin = time.perf_counter()
     bpy.ops.risorius.import_dna(filepath=str(path), shape_mode=mode)
     seconds = time.perf_counter() - begin
@@ -115,7 +117,7 @@ def measure(path, package, frames):
     """One row of the table per way, for one file."""
     rows = []
     for mode in ("LIVE", "KEYS"):
-        controls, _, seconds = import_face(path, mode)
+        controls, _, seconds = import_face(path, mode, package)
         animate(controls, frames)
         rows.append((f"add-on, {mode}", *step(frames), f"import {seconds:.1f} s"))
     bpy.ops.preferences.addon_disable(module=package)
@@ -123,7 +125,6 @@ def measure(path, package, frames):
     write, bones, keys = write_originals(rig)
     rows.append(("curves only", *step(frames), ""))
     rows.append(("originals", *step(frames, write), f"{bones} bones, {keys} keys"))
-    bpy.ops.preferences.addon_enable(module=package)
     return rows
 
 
