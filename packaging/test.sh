@@ -21,7 +21,7 @@ count() { grep -oE "[0-9]+ $2" "$1" | tail -n 1 | grep -oE '^[0-9]+' || echo 0; 
 note_pytest() {
   local line
   line=$(mktemp)
-  grep -E '^=.*(passed|failed|error).* in ' "$2" | tail -n 1 > "$line"
+  grep -E '[0-9]+ (passed|failed|errors?).* in [0-9.]+s' "$2" | tail -n 1 > "$line"
   local f=$(($(count "$line" failed) + $(count "$line" error)))
   if [ "$3" -ne 0 ] && [ "$f" -eq 0 ]; then f=1; fi
   note "$1" "$(count "$line" passed)" "$f" "$(count "$line" skipped)"
@@ -67,8 +67,12 @@ run_blender() { # run_blender NAME COMMAND...
   local name=$1 log
   log="$logs/blender-$(echo "$name" | tr -c 'a-zA-Z0-9.\n' '-').log"
   shift
-  timeout -s KILL 900 "$@" > "$log" 2>&1
-  local code=$?
+  # A throw-away user folder: a Blender program reads it before the tests could set it.
+  local user code
+  user=$(mktemp -d)
+  BLENDER_USER_RESOURCES="$user" timeout -s KILL 900 "$@" > "$log" 2>&1
+  code=$?
+  rm -rf "$user"
   tail -n 12 "$log"
   note_pytest "$name" "$log" "$code"
 }
