@@ -49,9 +49,9 @@ py::array to_numpy(const core::Array<T>& values) {
 template <std::size_t kPlanes>
 py::array to_numpy(const core::PlanarArray<kPlanes>& array) {
   const auto n = static_cast<py::ssize_t>(array.count());
-  return read_only_view(array.values, {n, static_cast<py::ssize_t>(kPlanes)},
-                        {static_cast<py::ssize_t>(sizeof(float)),
-                         n * static_cast<py::ssize_t>(sizeof(float))});
+  return read_only_view(
+      array.values, {n, static_cast<py::ssize_t>(kPlanes)},
+      {static_cast<py::ssize_t>(sizeof(float)), n * static_cast<py::ssize_t>(sizeof(float))});
 }
 
 [[noreturn]] inline void shape_error(const std::string& name, const std::string& wanted,
@@ -103,8 +103,8 @@ core::PlanarArray<kPlanes> planar_from_python(const py::object& object, const ch
 
 /// Text of unknown encoding: bytes that are not UTF-8 survive the way there and back.
 inline py::str to_python(const std::string& text) {
-  PyObject* decoded = PyUnicode_DecodeUTF8(text.data(), static_cast<Py_ssize_t>(text.size()),
-                                           "surrogateescape");
+  PyObject* decoded =
+      PyUnicode_DecodeUTF8(text.data(), static_cast<Py_ssize_t>(text.size()), "surrogateescape");
   if (decoded == nullptr) throw py::error_already_set();
   return py::reinterpret_steal<py::str>(decoded);
 }

@@ -23,8 +23,7 @@ py::class_<T, std::shared_ptr<T>> value_class(py::module_& m, const char* name, 
     return value;
   }));
   c.def("__copy__", [](const T& self) { return std::make_shared<T>(self); });
-  c.def("__deepcopy__",
-        [](const T& self, const py::dict&) { return std::make_shared<T>(self); });
+  c.def("__deepcopy__", [](const T& self, const py::dict&) { return std::make_shared<T>(self); });
   return c;
 }
 
@@ -199,7 +198,8 @@ void bind_structs(py::module_& m) {
   numbers(table, "cut_values", [](auto& s) -> auto& { return s.cut_values; });
 
   auto psds = value_class<dna::Psds>(
-      m, "Psds", "Correctives as a sparse matrix: rows[i] is driven by columns[i] times values[i].");
+      m, "Psds",
+      "Correctives as a sparse matrix: rows[i] is driven by columns[i] times values[i].");
   numbers(psds, "rows", [](auto& s) -> auto& { return s.rows; });
   numbers(psds, "columns", [](auto& s) -> auto& { return s.columns; });
   numbers(psds, "values", [](auto& s) -> auto& { return s.values; });
@@ -236,8 +236,8 @@ void bind_structs(py::module_& m) {
 }
 
 void bind_meshes(py::module_& m) {
-  auto target = value_class<dna::BlendShapeTarget>(
-      m, "BlendShapeTarget", "Sparse deltas of one channel on one mesh.");
+  auto target = value_class<dna::BlendShapeTarget>(m, "BlendShapeTarget",
+                                                   "Sparse deltas of one channel on one mesh.");
   numbers(target, "deltas", [](auto& s) -> auto& { return s.deltas; });
   numbers(target, "vertex_indices", [](auto& s) -> auto& { return s.vertex_indices; });
   number(target, "blend_shape_channel_index",
@@ -266,8 +266,9 @@ using DnaClass = py::class_<Dna, std::shared_ptr<Dna>>;
 
 void bind_descriptor(DnaClass& c) {
   c.def_property_readonly("generation", [](const Dna& s) { return s.generation; });
-  c.def_property_readonly("version", [](const Dna& s) { return s.version; },
-                          "Minor version of the file it was read from: 8 is 2.8.");
+  c.def_property_readonly(
+      "version", [](const Dna& s) { return s.version; },
+      "Minor version of the file it was read from: 8 is 2.8.");
   text(c, "name", [](auto& s) -> auto& { return s.descriptor.name; });
   choice(c, "archetype", kArchetypes, [](auto& s) -> auto& { return s.descriptor.archetype; });
   choice(c, "gender", kGenders, [](auto& s) -> auto& { return s.descriptor.gender; });
@@ -309,7 +310,8 @@ void bind_descriptor(DnaClass& c) {
       "metadata",
       [](const Dna& s) {
         py::dict out;
-        for (const auto& [key, value] : s.descriptor.metadata) out[to_python(key)] = to_python(value);
+        for (const auto& [key, value] : s.descriptor.metadata)
+          out[to_python(key)] = to_python(value);
         return out;
       },
       [](Dna& s, const py::dict& d) {
@@ -356,7 +358,8 @@ void bind_definition(DnaClass& c) {
       },
       [](Dna& s, const py::object& v) {
         py::array any = py::array::ensure(v);
-        if (any && any.size() == 0) any = py::array_t<std::uint16_t>(std::vector<py::ssize_t>{0, 2});
+        if (any && any.size() == 0)
+          any = py::array_t<std::uint16_t>(std::vector<py::ssize_t>{0, 2});
         if (!any || any.ndim() != 2 || any.shape(1) != 2) {
           shape_error("mesh_blend_shape_channel_mapping", "(n, 2)", any);
         }
@@ -382,7 +385,8 @@ void bind_behavior_and_geometry(DnaClass& c) {
 }
 
 std::uint16_t minor_version(const std::string& version) {
-  if (version.size() == 3 && version.rfind("2.", 0) == 0 && version[2] >= '1' && version[2] <= '8') {
+  if (version.size() == 3 && version.rfind("2.", 0) == 0 && version[2] >= '1' &&
+      version[2] <= '8') {
     return static_cast<std::uint16_t>(version[2] - '0');
   }
   throw py::value_error("version: one of 2.1 to 2.8 was expected, found " + version);
@@ -399,8 +403,8 @@ std::vector<std::uint8_t> serialise(const Dna& self, const std::string& version)
   if (!dropped.empty()) {
     std::string names;
     for (const std::string& d : dropped) names += (names.empty() ? "" : ", ") + d;
-    const std::string message = "version " + version + " cannot hold these layers, they are left " +
-                                "out: " + names;
+    const std::string message =
+        "version " + version + " cannot hold these layers, they are left " + "out: " + names;
     if (PyErr_WarnEx(PyExc_UserWarning, message.c_str(), 2) != 0) throw py::error_already_set();
   }
   return out;
@@ -441,16 +445,19 @@ void bind_whole(DnaClass& c) {
       },
       py::arg("path"), py::arg("version") = "2.8",
       "Writes the file; the old one is whole until the new one is.");
-  c.def_property_readonly("unknown_layers", [](const Dna& s) {
-    py::list out;
-    for (const dna::OpaqueLayer& l : s.opaque_layers) {
-      out.append(py::make_tuple(
-          to_python(std::string(l.id.begin(), l.id.end())),
-          std::to_string(l.version >> 16) + "." + std::to_string(l.version & 0xFFFF),
-          py::bytes(reinterpret_cast<const char*>(l.bytes.data()), l.bytes.size())));
-    }
-    return out;
-  }, "Layers kept as bytes: (id, version, bytes).");
+  c.def_property_readonly(
+      "unknown_layers",
+      [](const Dna& s) {
+        py::list out;
+        for (const dna::OpaqueLayer& l : s.opaque_layers) {
+          out.append(py::make_tuple(
+              to_python(std::string(l.id.begin(), l.id.end())),
+              std::to_string(l.version >> 16) + "." + std::to_string(l.version & 0xFFFF),
+              py::bytes(reinterpret_cast<const char*>(l.bytes.data()), l.bytes.size())));
+        }
+        return out;
+      },
+      "Layers kept as bytes: (id, version, bytes).");
   c.def_property_readonly("layers", [](const Dna& s) {
     py::list out;
     std::size_t opaque = 0;

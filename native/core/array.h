@@ -32,9 +32,7 @@ class Array {
   std::span<const T> span() const { return {data(), size()}; }
   operator std::span<const T>() const { return span(); }
   std::shared_ptr<const void> owner() const { return buffer_; }
-  bool operator==(const Array& other) const {
-    return std::ranges::equal(span(), other.span());
-  }
+  bool operator==(const Array& other) const { return std::ranges::equal(span(), other.span()); }
 
  private:
   std::shared_ptr<const std::vector<T>> buffer_;

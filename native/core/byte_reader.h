@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A checked big-endian reader over a Source. Every error of a parser comes from here or goes through
-// fail() here, so that it has an offset and a field.
+// A checked big-endian reader over a Source. Every error of a parser comes from here or goes
+// through fail() here, so that it has an offset and a field.
 #pragma once
 
 #include <cstdint>

@@ -18,9 +18,9 @@ enum class ErrorCode {
   kInvalidCount,           // a count that cannot fit the bytes left or a limit
   kInvalidLength,          // parallel lists of different lengths
   kInvalidIndex,           // an index outside its space
-  kInvalidValue,           // any other value that makes no sense (cycle, LOD row beyond the matrix ...)
-  kMissingLayer,           // a layer that the operation needs is not in the file
-  kLimitExceeded,          // more than the caller's limits allow
+  kInvalidValue,   // any other value that makes no sense (cycle, LOD row beyond the matrix ...)
+  kMissingLayer,   // a layer that the operation needs is not in the file
+  kLimitExceeded,  // more than the caller's limits allow
   kIoOpen,
   kIoRead,
   kIoWrite,

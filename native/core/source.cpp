@@ -65,8 +65,8 @@ Result<std::unique_ptr<Source>> open_file(const std::filesystem::path& path) {
   }
   std::FILE* file = open_for_reading(path);
   if (file == nullptr) {
-    return fail(ErrorCode::kIoOpen, "", "cannot open " + name + ": " +
-                                            std::generic_category().message(errno));
+    return fail(ErrorCode::kIoOpen, "",
+                "cannot open " + name + ": " + std::generic_category().message(errno));
   }
   const std::uint64_t size = std::filesystem::file_size(path, error);
   if (error) {

@@ -47,9 +47,9 @@ struct Descriptor {
 };
 
 struct DescriptorExt {
-  std::uint32_t rotation_sequence = 0;                // 0 xyz 1 xzy 2 yxz 3 yzx 4 zxy 5 zyx
+  std::uint32_t rotation_sequence = 0;                 // 0 xyz 1 xzy 2 yxz 3 yzx 4 zxy 5 zyx
   std::array<std::int32_t, 3> rotation_sign{1, 1, 1};  // 1 or -1
-  std::uint8_t face_winding_order = 0;                // 0 ccw 1 cw
+  std::uint8_t face_winding_order = 0;                 // 0 ccw 1 cw
   bool operator==(const DescriptorExt&) const = default;
 };
 

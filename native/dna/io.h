@@ -21,11 +21,10 @@ struct ParseOptions {
   bool unknown_layers = true;  // layers of ids that this version does not know
 };
 
-/// Reads a DNA file of generation 2, any minor version (dna-format: container and layers 2.1 to 2.8;
-/// newer minors by the rules of 2.8).
-/// Fails: kNotDna, kUnsupportedGeneration, kTruncated, kInvalidCount, kInvalidLength, kInvalidIndex,
-/// kInvalidValue, kIoRead, each with the byte offset and the field.
-/// Cost: allocates at most a small constant times the bytes present.
+/// Reads a DNA file of generation 2, any minor version (dna-format: container and layers 2.1
+/// to 2.8; newer minors by the rules of 2.8). Fails: kNotDna, kUnsupportedGeneration, kTruncated,
+/// kInvalidCount, kInvalidLength, kInvalidIndex, kInvalidValue, kIoRead, each with the byte offset
+/// and the field. Cost: allocates at most a small constant times the bytes present.
 core::Result<Dna> parse(core::Source& source, const ParseOptions& options = {});
 
 /// Checks that lists that belong together have one length, that every index is in its space, that

@@ -12,10 +12,10 @@ using LayerId = std::array<char, 4>;
 
 struct KnownLayer {
   char id[5];
-  std::uint32_t version;         // major << 16 | minor
-  bool typed;                    // has a struct in Dna; the others are kept as bytes
-  std::uint32_t empty_size;      // bytes of an empty layer, all zero, when it is kept as bytes
-  std::uint16_t since_minor;     // first file version 2.<minor> that has it
+  std::uint32_t version;      // major << 16 | minor
+  bool typed;                 // has a struct in Dna; the others are kept as bytes
+  std::uint32_t empty_size;   // bytes of an empty layer, all zero, when it is kept as bytes
+  std::uint16_t since_minor;  // first file version 2.<minor> that has it
 };
 
 inline constexpr KnownLayer kLayers[] = {

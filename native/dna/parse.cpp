@@ -64,8 +64,8 @@ void parse_sections(ByteReader& r, Dna& dna, const ParseOptions& options) {
     for (std::uint32_t& offset : offsets) offset = r.u32();
   }
   const auto at = [&](int section) {
-    return r.enter(offsets[section], offsets[section] <= file_end ? file_end - offsets[section]
-                                                                  : 0);
+    return r.enter(offsets[section],
+                   offsets[section] <= file_end ? file_end - offsets[section] : 0);
   };
   if (at(0)) dna.descriptor = detail::read_descriptor(r);
   if (options.definition && at(1)) dna.definition = detail::read_definition(r);
@@ -77,7 +77,8 @@ void parse_sections(ByteReader& r, Dna& dna, const ParseOptions& options) {
   }
   if (options.geometry && at(7)) {
     dna.geometry = detail::read_geometry(r, false, options.blend_shapes);
-    const bool mark = !r.failed() && r.left() >= 3 && r.u8() == 'A' && r.u8() == 'N' && r.u8() == 'D';
+    const bool mark =
+        !r.failed() && r.left() >= 3 && r.u8() == 'A' && r.u8() == 'N' && r.u8() == 'D';
     if (!mark && !r.failed()) {
       dna.warnings.push_back({"geometry", "the end mark AND is missing after the last mesh"});
     }
@@ -161,8 +162,8 @@ void parse_indexed(ByteReader& r, Dna& dna, const ParseOptions& options) {
     if (known ? !options.extensions : !options.unknown_layers) continue;
     Field field(r, "layers", static_cast<std::int64_t>(i));
     if (!r.enter(e.offset, e.size)) return;
-    dna.opaque_layers.push_back({e.id, e.version, static_cast<std::uint32_t>(dna.index_order.size()),
-                                 r.bytes(e.size)});
+    dna.opaque_layers.push_back(
+        {e.id, e.version, static_cast<std::uint32_t>(dna.index_order.size()), r.bytes(e.size)});
     dna.index_order.push_back("");  // an opaque layer's place
   }
 }

@@ -67,8 +67,8 @@ class Checker {
   std::optional<core::Error> error_;
 };
 
-void check_lod_mapping(Checker& c, const std::string& where, const LodMapping& m,
-                       std::size_t limit, const char* space) {
+void check_lod_mapping(Checker& c, const std::string& where, const LodMapping& m, std::size_t limit,
+                       const char* space) {
   c.below(where + ".lods", m.lods, m.rows.size(), "index lists");
   for (std::size_t i = 0; i < m.rows.size(); ++i) {
     c.below(where + ".indices[" + std::to_string(i) + "]", m.rows[i], limit, space);
@@ -222,8 +222,7 @@ void check_mesh(Checker& c, const std::string& where, const Dna& dna, const Mesh
     c.below(at + ".vertex_indices", target.vertex_indices, vertices, "vertices");
     if (target.blend_shape_channel_index >= dna.definition.blend_shape_channel_names.size()) {
       c.error(ErrorCode::kInvalidIndex, at + ".blend_shape_channel_index",
-              "channel " + std::to_string(target.blend_shape_channel_index) +
-                  ", but there are " +
+              "channel " + std::to_string(target.blend_shape_channel_index) + ", but there are " +
                   std::to_string(dna.definition.blend_shape_channel_names.size()));
     }
     c.finite(at + ".deltas", target.deltas.values);
@@ -244,9 +243,8 @@ void check_descriptor(Checker& c, const Dna& dna) {
   check_enum(c, "descriptor_ext.rotation_sequence", dna.descriptor_ext.rotation_sequence, 6);
   check_enum(c, "descriptor_ext.face_winding_order", dna.descriptor_ext.face_winding_order, 2);
   const CoordinateSystem& a = d.coordinate_system;
-  const bool axes = a.x_axis < 6 && a.y_axis < 6 && a.z_axis < 6 &&
-                    a.x_axis / 2 != a.y_axis / 2 && a.y_axis / 2 != a.z_axis / 2 &&
-                    a.x_axis / 2 != a.z_axis / 2;
+  const bool axes = a.x_axis < 6 && a.y_axis < 6 && a.z_axis < 6 && a.x_axis / 2 != a.y_axis / 2 &&
+                    a.y_axis / 2 != a.z_axis / 2 && a.x_axis / 2 != a.z_axis / 2;
   if (!axes) c.warn("descriptor.coordinate_system", "the axes do not span space");
 }
 
@@ -264,8 +262,7 @@ Status validate(const Dna& dna, std::vector<Warning>& warnings) {
   if (dna.geometry.meshes.size() > 0 &&
       dna.geometry.meshes.size() != dna.definition.mesh_names.size()) {
     c.warn("geometry.meshes", std::to_string(dna.geometry.meshes.size()) + " meshes, but " +
-                                  std::to_string(dna.definition.mesh_names.size()) +
-                                  " mesh names");
+                                  std::to_string(dna.definition.mesh_names.size()) + " mesh names");
   }
   return std::move(c).status();
 }

@@ -13,10 +13,9 @@ struct Quaternion {
 };
 
 inline Quaternion multiply(const Quaternion& a, const Quaternion& b) {  // Hamilton product
-  return {a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
-          a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x,
-          a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w,
-          a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z};
+  return {
+      a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y, a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x,
+      a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w, a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z};
 }
 
 /// How a file spells Euler angles: axes in the order of rotation, sign per axis, radians per unit.
@@ -40,7 +39,8 @@ inline Quaternion from_euler(const EulerConvention& c, const std::array<float, 3
 
 /// The inverse of from_euler. At the pole the last angle of the order is 0.
 inline std::array<float, 3> to_euler(const EulerConvention& c, const Quaternion& q) {
-  const float m[3][3] = {  // rows are the images of the axes (row vectors)
+  const float m[3][3] = {
+      // rows are the images of the axes (row vectors)
       {1 - 2 * (q.y * q.y + q.z * q.z), 2 * (q.x * q.y + q.w * q.z), 2 * (q.x * q.z - q.w * q.y)},
       {2 * (q.x * q.y - q.w * q.z), 1 - 2 * (q.x * q.x + q.z * q.z), 2 * (q.y * q.z + q.w * q.x)},
       {2 * (q.x * q.z + q.w * q.y), 2 * (q.y * q.z - q.w * q.x), 1 - 2 * (q.x * q.x + q.y * q.y)}};

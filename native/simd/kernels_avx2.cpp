@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Nothing but kernels: functions carry the target attribute one by one, because a file compiled with
-// -mavx2 could give the linker an inline standard function that older CPUs cannot run.
+// Nothing but kernels: functions carry the target attribute one by one, because a file compiled
+// with -mavx2 could give the linker an inline standard function that older CPUs cannot run.
 #include "simd/cpu.h"
 #include "simd/kernels.h"
 
@@ -45,8 +45,8 @@ RISORIUS_TARGET_AVX2 void block_64(const float* values, std::size_t stride,
 }
 
 RISORIUS_TARGET_AVX2 void block_8(const float* values, std::size_t stride,
-                                  const std::uint32_t* columns, const float* weights,
-                                  std::size_t n, float* out) {
+                                  const std::uint32_t* columns, const float* weights, std::size_t n,
+                                  float* out) {
   __m256 even = _mm256_setzero_ps(), odd = even;
   std::size_t i = 0;
   for (; i + 1 < n; i += 2) {

@@ -105,7 +105,7 @@ def shaped(source: Source, base: BaseMesh) -> Floats:
 
 
 def show_upper_teeth(positions: Floats, groups: dict[str, Ints], jaw_open: Floats) -> None:
-    """Lower the upper teeth until they show some millimetres below the upper lip of an open mouth."""
+    """Lower the upper teeth until some millimetres show below the lip of an open mouth."""
     upper = groups["helper-upper-teeth"]
     body = positions[groups["body"]]
     still = np.linalg.norm(jaw_open[groups["body"]], axis=1) < 0.03
