@@ -17,32 +17,13 @@ MODULE = "bl_ext.user_default.risorius"
 
 @pytest.fixture(scope="session")
 def installed():
-    """The add-on as an extension in a repository of the throw-away user folder."""
-    import addon_utils
-
-    if "RISORIUS_TEST_EXTENSION" in os.environ:  # run.py installed it
-        repos = bpy.context.preferences.extensions.repos
-        repository = next(r for r in repos if r.module == "user_default")
-        return Path(repository.directory) / "risorius"
-    repository = next(
-        (r for r in bpy.context.preferences.extensions.repos if r.module == "user_default"), None
-    )
-    if repository is None:
-        repository = bpy.context.preferences.extensions.repos.new(
-            name="User Default", module="user_default"
-        )
-    user = Path(os.environ["RISORIUS_TEST_USER"]) / "extensions" / "user_default"
-    user.mkdir(parents=True, exist_ok=True)
-    repository.use_custom_directory = True
-    repository.custom_directory = str(user)
-    target = user / "risorius"
+    """Whether run.py installed a package; else a copy of the tree in the throw-away folder."""
+    if os.environ.get("RISORIUS_TEST_INSTALLED"):
+        return None
+    target = Path(os.environ["RISORIUS_TEST_USER"]) / "extensions" / "user_default" / "risorius"
     if not target.exists():
-        shutil.copytree(
-            HERE.parent / "addon" / "risorius",
-            target,
-            ignore=shutil.ignore_patterns("__pycache__", "wheels"),
-        )
-    addon_utils.extensions_refresh(ensure_wheels=False)
+        ignored = shutil.ignore_patterns("__pycache__", "wheels")
+        shutil.copytree(HERE.parent / "addon" / "risorius", target, ignore=ignored)
     return target
 
 
@@ -52,7 +33,8 @@ def addon(installed):
     import addon_utils
 
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    _repository(installed)
+    if installed is not None:
+        _repository(installed)
     errors = []
     module = addon_utils.enable(MODULE, handle_error=errors.append)
     assert module is not None, errors
@@ -67,7 +49,7 @@ def _repository(installed):
     repository = next((r for r in repos if r.module == "user_default"), None)
     if repository is None:
         repository = repos.new(name="User Default", module="user_default")
-    if repository.directory.rstrip("/\\") != str(installed.parent):
+    if Path(repository.directory) != installed.parent:
         repository.use_custom_directory = True
         repository.custom_directory = str(installed.parent)
 

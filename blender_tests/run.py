@@ -32,6 +32,8 @@ def _arguments() -> tuple[argparse.Namespace, list[str]]:
 
 def _install(package: Path) -> None:
     """Install a package through Blender's own extension system."""
+    import bpy  # noqa: F401  as a module it brings addon_utils onto the path
+
     sys.path.insert(0, str(HERE.parent / "packaging"))
     from install_extension import install
 
@@ -69,7 +71,7 @@ if __name__ == "__main__":
     code = 1
     try:
         code = main()
-    except BaseException:
+    except BaseException:  # noqa: BLE001  printed, and the exit code says it
         import traceback
 
         traceback.print_exc()
