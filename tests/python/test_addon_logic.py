@@ -97,6 +97,19 @@ class TestRegions:
         groups = regions.group_controls(controls)
         assert groups == {"brow": [1], "jaw": [0, 3], "other": [2]}
 
+    @pytest.mark.parametrize(
+        ("control", "sided", "wanted"),
+        [
+            ("CTRL_expressions.mouthCornerPullL", False, "Corner Pull"),
+            ("CTRL_expressions.mouthCornerPullL", True, "Corner Pull L"),
+            ("CTRL_expressions.mouthFunnelUL", False, "Funnel U"),
+            ("CTRL_expressions.jawOpen", True, "Open"),
+            ("jaw", True, "Jaw"),
+        ],
+    )
+    def test_words_under_a_heading(self, control: str, sided: bool, wanted: str) -> None:
+        assert regions.title_in_region(control, sided) == wanted
+
     def test_search_looks_at_name_and_words(self) -> None:
         control = "CTRL_expressions.mouthCornerPullL"
         assert regions.matches(control, "corner pull")

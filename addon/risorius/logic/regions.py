@@ -59,6 +59,20 @@ def title(control: str) -> str:
     return " ".join(w[:1].upper() + w[1:] for w in words) or control
 
 
+def title_in_region(control: str, sided: bool = True) -> str:
+    """Words for a slider under its region's heading: no `Mouth` before `Corner Pull L`.
+
+    Args:
+        control: the control's name.
+        sided: keep a last L or R; without, both sides share the words.
+    """
+    text = title(control)
+    if not sided and text[-1:] in ("L", "R"):
+        text = text[:-1].rstrip()
+    first, _, rest = text.partition(" ")
+    return rest if rest and first.lower() == region_of(control) else text
+
+
 def region_of(control: str) -> str:
     """The face region of a control, one of REGIONS."""
     word = short_name(control).lower().removeprefix("ctrl_")

@@ -107,7 +107,7 @@ def build_controls(context, plan, made, workshop):
         if name in ("face", "eyes"):
             bone.lock_rotation = (True, True, True)
         _shape(bone, name)
-    data.show_names = False
+    data.bones.active = data.bones[parts.FACE]
     controls.show_in_front = True
     add_properties(controls.pose.bones[parts.FACE], plan.controls)
     return controls
@@ -179,7 +179,7 @@ def _shape(bone, name):
     elif name == "face":  # a disc beside the face, seen from the front
         bone.custom_shape_scale_xyz = (0.5, 0.5, 0.5)
     else:  # discs that look ahead
-        scale = 1.2 if name == "eyes" else 0.5
+        scale = 0.7 if name == "eyes" else 0.5
         bone.custom_shape_scale_xyz = (scale, scale, scale)
         bone.custom_shape_rotation_euler = (math.pi / 2, 0.0, 0.0)
         if name != "eyes":

@@ -138,18 +138,20 @@ def _draw_region_header(layout, region):
 
 
 def _draw_sliders(layout, face, names):
-    """Sliders, a left and its right control side by side."""
+    """One line per control; a left and its right control share it."""
     column = layout.column(align=True)
     there = set(names)
     for name in names:
-        left = f"{name[:-1]}L"
-        if name.endswith("R") and left in there:
+        left, right = f"{name[:-1]}L", f"{name[:-1]}R"
+        if name == right and left in there:
             continue
-        pair = [name, f"{name[:-1]}R"] if name == left and f"{name[:-1]}R" in there else [name]
-        row = column.row(align=True)
-        for one in pair:
+        paired = name == left and right in there
+        line = column.split(factor=0.42, align=True)
+        line.label(text=regions.title_in_region(name, sided=not paired))
+        row = line.row(align=True)
+        for one, text in ((left, "L"), (right, "R")) if paired else ((name, ""),):
             quoted = bpy.utils.escape_identifier(one)
-            row.prop(face, f'["{quoted}"]', text=regions.title(one), slider=True)
+            row.prop(face, f'["{quoted}"]', text=text, slider=True)
 
 
 class RISORIUS_PT_options(_FacePanel, bpy.types.Panel):
