@@ -1,0 +1,205 @@
+# SPDX-License-Identifier: MIT
+"""The sample person: its parts by formula, and the whole against the data that it is made from."""
+
+import tomllib
+from importlib import resources
+
+import numpy as np
+import pytest
+import risorius
+from conftest import _not_run
+from risorius.arkit import mapping
+from risorius.sample import build, expressions, polygons, source
+
+ARKIT = """browDownLeft browDownRight browInnerUp browOuterUpLeft browOuterUpRight cheekPuff
+cheekSquintLeft cheekSquintRight eyeBlinkLeft eyeBlinkRight eyeLookDownLeft eyeLookDownRight
+eyeLookInLeft eyeLookInRight eyeLookOutLeft eyeLookOutRight eyeLookUpLeft eyeLookUpRight
+eyeSquintLeft eyeSquintRight eyeWideLeft eyeWideRight jawForward jawLeft jawOpen jawRight
+mouthClose mouthDimpleLeft mouthDimpleRight mouthFrownLeft mouthFrownRight mouthFunnel mouthLeft
+mouthLowerDownLeft mouthLowerDownRight mouthPressLeft mouthPressRight mouthPucker mouthRight
+mouthRollLower mouthRollUpper mouthShrugLower mouthShrugUpper mouthSmileLeft mouthSmileRight
+mouthStretchLeft mouthStretchRight mouthUpperUpLeft mouthUpperUpRight noseSneerLeft
+noseSneerRight tongueOut""".split()
+CUBE = polygons.Polygons(
+    faces=[[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]],
+    uv_faces=[[0, 1, 2, 3]] * 6,
+    uvs=np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float),
+    vertex_count=8,
+)
+CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
+
+
+def test_the_mapping_holds_the_52_units_with_weights_up_to_one():
+    assert sorted(mapping()) == sorted(ARKIT)
+    for row in mapping().values():
+        assert all(name.startswith("CTRL_expressions.") for name in row)
+        assert all(0 < weight <= 1 for weight in row.values())
+    text = resources.files("risorius").joinpath("arkit.toml").read_text()
+    assert tomllib.loads(text)["prefix"] == "CTRL_expressions."
+
+
+def test_catmull_clark_of_a_cube_is_known():
+    """Corner of the unit cube: (F + 2 R + (n - 3) P) / n with n = 3 gives 5 / 9."""
+    finer, operator = polygons.subdivide(CUBE)
+    p = operator.apply(CORNERS)
+    assert (len(p), len(finer.faces)) == (26, 24)
+    np.testing.assert_allclose(np.abs(p[:8]), 5 / 9)
+    np.testing.assert_allclose(np.sort(np.abs(p[8:14]), axis=1), [[0, 0, 1]] * 6, atol=1e-12)
+    np.testing.assert_allclose(operator.apply(np.ones((8, 1))), 1)
+
+
+def test_borders_follow_the_cubic_curve():
+    square = polygons.Polygons([[0, 1, 2, 3]], [[0, 1, 2, 3]], CUBE.uvs, 4)
+    _, operator = polygons.subdivide(square)
+    p = operator.apply(np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float))
+    np.testing.assert_allclose(p[0], [0.125, 0.125])
+    np.testing.assert_allclose(p[4], [0.5, 0.5])
+
+
+def test_clipping_cuts_edges_at_the_level():
+    rest, operator = polygons.clip_below(CUBE, CORNERS[:, 1], 0.5)
+    p = operator.apply(CORNERS)
+    assert len(rest.faces) == 5
+    assert sorted(np.unique(p[:, 1])) == [0.5, 1.0]
+    np.testing.assert_allclose(operator.apply(np.ones((8, 1))), 1)
+
+
+def test_masks_are_partitions_of_unity():
+    points = np.random.default_rng(1).normal(0, 1, (500, 3))
+    sides = expressions.side_masks(points)
+    np.testing.assert_allclose(sides["L"] + sides["R"], 1)
+    assert sides["L"][points[:, 0] > 0.5].min() == 1
+    jaw = points * np.linspace(0, 1, 500)[:, None]
+    lips = expressions.lip_masks(jaw)
+    np.testing.assert_allclose(lips["U"] + lips["D"], 1)
+
+
+def test_a_rigid_motion_is_found_again():
+    rng = np.random.default_rng(2)
+    points = rng.normal(0, 1, (40, 3))
+    angles = np.radians([20, -10, 5])
+    c, s = np.cos(angles), np.sin(angles)
+    rx = np.array([[1, 0, 0], [0, c[0], -s[0]], [0, s[0], c[0]]])
+    ry = np.array([[c[1], 0, s[1]], [0, 1, 0], [-s[1], 0, c[1]]])
+    rz = np.array([[c[2], -s[2], 0], [s[2], c[2], 0], [0, 0, 1]])
+    rotation = rz @ ry @ rx
+    found, shift = expressions.rigid_fit(points, points @ rotation.T + [1, 2, 3])
+    np.testing.assert_allclose(found, rotation, atol=1e-12)
+    np.testing.assert_allclose(shift, [1, 2, 3], atol=1e-12)
+    np.testing.assert_allclose(build.euler_xyz(found), [20, -10, 5], atol=1e-9)
+    third = expressions.part_rotation(found, 1 / 3)
+    np.testing.assert_allclose(third @ third @ third, found, atol=1e-12)
+
+
+# ---- on the real data, where they can be had
+
+
+@pytest.fixture(scope="module")
+def sample():
+    """(source, dna, parts, shaped positions) of the real person."""
+    try:
+        path = source.fetch()
+    except source.SourceError as error:
+        _not_run.add("the sample's CC0 data")
+        pytest.skip(f"extra not run: {error}")
+    data = source.Source(path)
+    dna, parts, positions, _ = build.assemble(data, lambda _: None)
+    return data, dna, parts, positions
+
+
+def skinned(dna, rig, raw, mesh_index, lod):
+    """Vertices of a mesh by linear blend skinning in float64, written for this test alone."""
+    pose = rig.evaluate(raw, lod=lod)
+    mesh = dna.meshes[mesh_index]
+    p = np.asarray(mesh.positions, float).copy()
+    for target in mesh.blend_shape_targets:
+        weight = float(pose.blend_shapes[target.blend_shape_channel_index])
+        p[target.vertex_indices] += weight * np.asarray(target.deltas, float)
+    rest = np.asarray(dna.neutral_joint_translations, float)
+    posed, bind = [], []
+    for j, parent in enumerate(dna.joint_parents):
+        x, y, z = np.radians(pose.joints[j, 3:6].astype(float))
+        local = np.eye(4)
+        local[:3, :3] = (
+            np.array([[np.cos(z), -np.sin(z), 0], [np.sin(z), np.cos(z), 0], [0, 0, 1]])
+            @ np.array([[np.cos(y), 0, np.sin(y)], [0, 1, 0], [-np.sin(y), 0, np.cos(y)]])
+            @ np.array([[1, 0, 0], [0, np.cos(x), -np.sin(x)], [0, np.sin(x), np.cos(x)]])
+        )
+        local[:3, 3] = rest[j] + pose.joints[j, :3]
+        still = np.eye(4)
+        still[:3, 3] = rest[j]
+        root = parent == j
+        posed.append(local if root else posed[parent] @ local)
+        bind.append(still if root else bind[parent] @ still)
+    moves = np.array([a @ np.linalg.inv(b) for a, b in zip(posed, bind, strict=True)])
+    owner = np.repeat(np.arange(len(p)), np.diff(mesh.skin_offsets.astype(int)))
+    blend = np.zeros((len(p), 4, 4))
+    weights = np.asarray(mesh.skin_weights, float)
+    np.add.at(blend, owner, weights[:, None, None] * moves[mesh.skin_joint_indices])
+    return np.einsum("vij,vj->vi", blend[:, :3, :3], p) + blend[:, :3, 3]
+
+
+@pytest.mark.parametrize("lod", [0, 1])
+def test_extra_each_row_of_the_mapping_gives_back_its_unit(sample, lod):
+    """Within 0.1 % of head height, for every vertex of every mesh."""
+    data, dna, parts, positions = sample
+    rig = risorius.Rig(dna)
+    names = dna.raw_control_names
+    head = np.asarray(dna.meshes[0].positions)
+    chin = 10 * positions[np.linalg.norm(data.face_unit("jawOpen", len(positions)), axis=1) > 0.3]
+    height = head[:, 1].max() - chin[:, 1].min()
+    assert 18 < height < 30
+    worst = {}
+    for unit, row in mapping().items():
+        raw = np.zeros(len(names), np.float32)
+        for name, weight in row.items():
+            raw[names.index(name)] = weight
+        wanted = data.face_unit(unit, len(positions))
+        for index in dna.lod_mesh_mapping[lod]:
+            expected = parts[index].carry(positions + wanted) * build.CM
+            error = np.linalg.norm(skinned(dna, rig, raw, index, lod) - expected, axis=1).max()
+            worst[unit] = max(worst.get(unit, 0), float(error))
+    bad = {unit: error / height for unit, error in worst.items() if error > 0.001 * height}
+    assert bad == {}
+
+
+def test_extra_the_sample_is_sane(sample, tmp_path):
+    _, dna, _, _ = sample
+    assert dna.validate() == []
+    names = dna.raw_control_names
+    assert len(names) == len(set(names))
+    for mesh in dna.meshes:
+        sums = np.add.reduceat(mesh.skin_weights, mesh.skin_offsets[:-1].astype(int))
+        np.testing.assert_allclose(sums, 1, atol=1e-5)
+        assert np.isfinite(mesh.texture_coordinates).all()
+    again = risorius.load(dna.to_bytes())
+    assert again.raw_control_names == names
+    rig = risorius.Rig(dna)
+    gui = np.zeros(len(rig.gui_control_names), np.float32)
+    gui[rig.gui_control_names.index("CTRL_L_eye_blink.ty")] = -0.5
+    raw = rig.gui_to_raw(gui)
+    assert raw[names.index("CTRL_expressions.eyeWidenL")] == 0.5
+    assert raw.sum() == 0.5
+
+
+def test_extra_correctives_fire_only_together(sample):
+    _, dna, _, _ = sample
+    rig = risorius.Rig(dna)
+    names = dna.raw_control_names
+    pair = [names.index(f"CTRL_expressions.{n}") for n in ("jawOpen", "mouthCornerPullL")]
+    raw = np.zeros(len(names), np.float32)
+    raw[pair[0]] = 1
+    assert rig.evaluate(raw).controls[len(names) :].sum() == 0
+    raw[pair[1]] = 0.5
+    fired = rig.evaluate(raw).controls[len(names) :]
+    assert sorted(fired[fired > 0].tolist()) == [0.5]
+
+
+def test_a_missing_wheel_is_one_sentence(tmp_path, monkeypatch):
+    monkeypatch.setenv("RISORIUS_CACHE", str(tmp_path))
+    with pytest.raises(source.SourceError, match="not there"):
+        source.fetch(offline=True)
+    other = tmp_path / source.FILE_NAME
+    other.write_bytes(b"something else")
+    with pytest.raises(source.SourceError, match="hash"):
+        source.Source(other)
