@@ -119,3 +119,87 @@ def test_a_face_that_lost_its_data_is_left_alone(dna_file, mode):
     scene.face(rig)["CTRL_expressions.jawOpen"] = 1.0
     scene.update(scene.controls(rig))
     np.testing.assert_array_equal(scene.snapshot(rig), still)
+
+
+def test_damaged_data_in_the_blend_is_said_once(dna_file, mode, capsys):
+    rig = scene.load(dna_file, mode)
+    text = rig["risorius_dna"]
+    text["risorius_bytes"] = b"damaged"
+    scene.submodule("scene.runtime").forget()
+    for frame in (2, 3, 4):
+        bpy.context.scene.frame_set(frame)
+    assert capsys.readouterr().out.count("cannot be read") == 1
+
+
+def _plant_sample(monkeypatch, tmp_path, dna_file, error=None):
+    """A user folder of the extension, and a builder of samples that copies a small face."""
+    import shutil
+
+    from risorius import sample
+
+    calls = []
+
+    def build_sample(path, **options):
+        calls.append(options)
+        if error is not None:
+            raise error
+        shutil.copy(dna_file, path)
+
+    monkeypatch.setattr(sample, "build_sample", build_sample)
+    monkeypatch.setattr(bpy.utils, "extension_path_user", lambda *_a, **_k: str(tmp_path))
+    return calls
+
+
+def test_add_face_builds_the_sample_once(monkeypatch, tmp_path, dna_file, mode):
+    calls = _plant_sample(monkeypatch, tmp_path, dna_file)
+    for _ in range(2):
+        assert bpy.ops.risorius.add_character(shape_mode=mode) == {"FINISHED"}
+    assert [c["offline"] for c in calls] == [not bpy.app.online_access]
+    assert len([o for o in bpy.data.objects if "risorius_controls" in o]) == 2
+
+
+def test_add_face_without_data_says_why(monkeypatch, tmp_path, dna_file):
+    from risorius import sample
+
+    _plant_sample(monkeypatch, tmp_path, dna_file, sample.SourceError("No data is there."))
+    before = scene.counts()
+    with pytest.raises(RuntimeError, match="could not be built: No data is there"):
+        bpy.ops.risorius.add_character()
+    assert scene.counts() == before
+
+
+def test_a_texture_that_is_missing_is_a_warning(tmp_path):
+    face = small_face()
+    face.metadata = {"texture:head_lod0_mesh:color": "gone.png", "licence": "CC0"}
+    path = tmp_path / "textured.dna"
+    face.save(str(path))
+    rig, warnings = scene.submodule("scene.build").import_file(
+        bpy.context, path, scene.submodule("scene.build").BuildOptions()
+    )
+    assert "The texture gone.png was not found beside the file." in warnings
+    assert scene.controls(rig).data["dna_licence"] == "CC0"
+
+
+def test_textures_are_packed_and_masks_tint_by_their_map(tmp_path):
+    face = small_face()
+    face.metadata = {
+        "texture:head_lod0_mesh:color": "skin.png",
+        "texture:head_lod0_mesh:map:flush": "flush.png",
+    }
+    path = tmp_path / "textured.dna"
+    face.save(str(path))
+    folder = tmp_path / "textured_textures"
+    folder.mkdir()
+    for name in ("skin.png", "flush.png"):
+        image = bpy.data.images.new(name, 4, 4)
+        image.filepath_raw, image.file_format = str(folder / name), "PNG"
+        image.save()
+        bpy.data.images.remove(image)
+    rig = scene.load(path)
+    images = {i.name: i for i in bpy.data.images}
+    assert {"skin.png", "flush.png"} <= set(images)
+    assert all(images[n].packed_file for n in ("skin.png", "flush.png"))
+    tree = scene.meshes(rig)[0].data.materials[0].node_tree
+    value = tree.nodes["risorius_map_000"]
+    assert value.label == "flush"
+    assert value.outputs[0].links[0].to_node.type == "MATH"

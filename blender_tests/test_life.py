@@ -153,10 +153,35 @@ def test_no_handler_is_left_after_disable():
     addon_utils.enable(scene.MODULE)
 
 
-def test_reload_keeps_values_and_leaves_no_old_parts(mode, dna_file):
+def test_reload_keeps_the_controls_and_leaves_no_old_parts(mode, dna_file):
     rig = _posed(dna_file, mode)
+    controls = scene.controls(rig)
+    scene.face(rig).keyframe_insert('["CTRL_expressions.browDownL"]', frame=1)
     before, counts = scene.snapshot(rig), scene.counts()
+    names = {o.name for o in bpy.data.objects} - {"Small_circle"}
     assert bpy.ops.risorius.reload() == {"FINISHED"}
     rig = next(o for o in bpy.data.objects if "risorius_controls" in o)
+    assert scene.controls(rig) == controls
+    assert controls.animation_data.action is not None
+    assert names <= {o.name for o in bpy.data.objects}
     np.testing.assert_allclose(scene.snapshot(rig), before, atol=1e-6)
     assert scene.counts() == counts
+    _moves_and_is_right(rig, dna_file)
+
+
+def test_two_imports_have_names_of_their_own(dna_file):
+    first, second = scene.load(dna_file), scene.load(dna_file)
+    assert (first.name, second.name) == ("Small_rig", "Small.001_rig")
+    assert scene.controls(second).name == "Small.001_controls"
+
+
+def test_undo_of_an_import_leaves_nothing(mode, dna_file):
+    bpy.context.preferences.edit.use_global_undo = True
+    bpy.ops.ed.undo_push(message="before")
+    scene.load(dna_file, mode)
+    bpy.ops.ed.undo_push(message="after")
+    bpy.ops.ed.undo()
+    assert not bpy.data.objects
+    bpy.ops.ed.redo()
+    bpy.context.view_layer.update()
+    _moves_and_is_right(_rig(), dna_file)

@@ -212,7 +212,7 @@ def plan_character(
         space=space,
         armature=_plan_armature(dna, space),
         meshes=meshes,
-        controls=_plan_controls(dna.raw_control_names),
+        controls=plan_controls(dna.raw_control_names),
         map_labels=names.unique_labels(dna.animated_map_names),
         channel_count=len(dna.blend_shape_channel_names),
         anchors=find_anchors(dna.joint_names),
@@ -235,7 +235,8 @@ def _mesh_lods(dna: Any) -> list[tuple[int, ...]]:
     return [tuple(level) for level in levels]
 
 
-def _plan_controls(raw_names: Sequence[str]) -> list[ControlPlan]:
+def plan_controls(raw_names: Sequence[str]) -> list[ControlPlan]:
+    """The sliders of a file's raw controls, in index order."""
     labels = names.unique_labels(raw_names)
     return [
         ControlPlan(i, labels[i], regions.region_of(name), f"{regions.title(name)} ({name})")

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """From the bytes of a DNA file to a character in the scene, or to nothing at all."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import bpy
@@ -52,6 +52,7 @@ def import_file(context, path, options, progress=lambda _share: None):
     progress(0.15)
     unit = context.scene.unit_settings.scale_length
     plan = plans.plan_character(dna, Path(path).stem, options.lods, unit)
+    plan = replace(plan, name=names.unique_labels([plan.name], bpy.data.collections.keys())[0])
     progress(0.25)
     made = []
     try:
@@ -189,6 +190,47 @@ def change_mode(rig, mode):
         labels = channel_labels(live.dna)
         meshes.set_mode(item, rig, dna_mesh, live.space.delta_matrix, labels, chosen)
     runtime.forget_outputs()
+
+
+def replace_character(old, new):
+    """Let a newly built character take the place of an old one, under its controls.
+
+    The old control armature stays, with its values, keys, NLA and whatever points to it.
+
+    Args:
+        old: deforming armature of the character that leaves.
+        new: deforming armature of the one that was built.
+    """
+    controls, spare = parts.controls_of(old), parts.controls_of(new)
+    live = runtime.of(new)
+    face = controls.pose.bones[parts.FACE]
+    maximum = 1.5 if controls.get(parts.OVERDRIVE) else 1.0
+    for control in plans.plan_controls(live.dna.raw_control_names):
+        if control.label not in face:
+            armatures.add_properties(face, [control], maximum)
+    collection = next((c for c in bpy.data.collections if new.name in c.objects), None)
+    names_now = (new.name.removesuffix("_rig"), old.name.removesuffix("_rig"))
+    new[parts.CONTROLS] = controls
+    controls[parts.RIG] = new
+    old[parts.CONTROLS] = spare
+    spare[parts.RIG] = old
+    for home in controls.users_collection:
+        home.objects.unlink(controls)
+    if collection is not None:
+        collection.objects.link(controls)
+    remove(old)
+    _rename(new, collection, *names_now)
+    runtime.forget_outputs()
+
+
+def _rename(rig, collection, before, after):
+    """Give the parts of a character another first part of their names."""
+    items = parts.meshes_of(rig)
+    held = [rig, rig.data, rig.get(parts.DNA), collection, *items, *(i.data for i in items)]
+    held += [m for i in items for m in i.data.materials]
+    for item in dict.fromkeys(h for h in held if h is not None):
+        if item.name.startswith(before):
+            item.name = after + item.name[len(before) :]
 
 
 def remove(rig):

@@ -60,6 +60,12 @@ def _restored(*_arguments):
     runtime.forget_outputs()
     _state["objects"] = -1
     refresh()
+    # The evaluated copies may not have caught up yet: look once more when they have.
+    runtime.forget_outputs()
+    for rig in parts.rigs():
+        controls = parts.controls_of(rig)
+        if controls is not None:
+            controls.update_tag()
 
 
 @persistent

@@ -76,7 +76,8 @@ def _build(plan, mesh, rig, made, images):
     made.append(material)
     color, roughness, specular, subsurface = _LOOKS[mesh.kind]
     material.diffuse_color = color
-    material.use_nodes = True
+    if material.node_tree is None:  # 5.0 always has one and warns about the switch
+        material.use_nodes = True
     tree = material.node_tree
     shader = next(n for n in tree.nodes if n.type == "BSDF_PRINCIPLED")
     inputs = shader.inputs

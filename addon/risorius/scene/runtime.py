@@ -4,13 +4,14 @@
 Holds no Blender object: it is found anew, or rebuilt, after load, undo, append and enable.
 """
 
+import zlib
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from .. import native
 from ..logic import names, plans
-from ..logic.space import make_joint_space, world_matrices, yaw_pitch
+from ..logic.space import SpaceError, make_joint_space, world_matrices, yaw_pitch
 from . import parts, storage
 
 DEFAULT_EYE_ANGLE = np.radians(30.0)
@@ -68,7 +69,12 @@ def of(rig):
         return None
     key = (digest, float(rig.get(parts.UNIT, 1.0)))
     if key not in _cache:
-        _cache[key] = _compile(storage.content(text), key[1])
+        try:
+            _cache[key] = _compile(storage.content(text), key[1])
+        except (native.dna_error(), SpaceError, zlib.error, KeyError) as error:
+            # Said once, not at every frame; the panel says that the data is lost.
+            print(f"Risorius: the data of {rig.name} cannot be read: {error}")
+            _cache[key] = None
     return _cache[key]
 
 

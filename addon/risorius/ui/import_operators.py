@@ -197,7 +197,7 @@ def _build_sample(path, folder):
 
 
 class RISORIUS_OT_reload(bpy.types.Operator):
-    """Build the active face anew from its source file; the values of its controls stay"""
+    """Build the active face anew from its source file; its controls and their keys stay"""
 
     bl_idname = "risorius.reload"
     bl_label = "Reload from Source"
@@ -223,25 +223,13 @@ class RISORIUS_OT_reload(bpy.types.Operator):
         levels = tuple(build.lods_of(old)) or (0,)
         modes = {m.get(parts.MODE) for m in parts.meshes_of(old)}
         mode = modes.pop() if len(modes) == 1 else "AUTO"
-        before = parts.face_bone(old)
-        values = {k: float(v) for k, v in before.items() if isinstance(v, int | float)}
-        animation = parts.controls_of(old).animation_data
-        action = animation.action if animation else None
+        controls = parts.controls_of(old)
         result = import_character(self, context, path, build.BuildOptions(levels, mode))
         if result != {"FINISHED"}:
             return result
-        rig = parts.rig_of(context.view_layer.objects.active)
-        face = parts.face_bone(rig)
-        for name, value in values.items():
-            if name in face:
-                face[name] = value
-        controls = parts.controls_of(rig)
-        if action is not None:
-            data = controls.animation_data_create()
-            data.action = action
-            if hasattr(data, "action_slot") and data.action_slot is None and len(action.slots):
-                data.action_slot = action.slots[0]
-        build.remove(old)
+        build.replace_character(old, parts.rig_of(context.view_layer.objects.active))
+        context.view_layer.objects.active = controls
+        controls.select_set(True, view_layer=context.view_layer)
         controls.update_tag()
         context.view_layer.update()
         return {"FINISHED"}
