@@ -45,13 +45,16 @@ def addon(installed):
 
 def _repository(installed):
     """Factory settings forget the repository's folder."""
+    import addon_utils
+
     repos = bpy.context.preferences.extensions.repos
     repository = next((r for r in repos if r.module == "user_default"), None)
     if repository is None:
         repository = repos.new(name="User Default", module="user_default")
-    if Path(repository.directory) != installed.parent:
-        repository.use_custom_directory = True
-        repository.custom_directory = str(installed.parent)
+    # Set even where it reads so already: setting it is what makes Blender look there.
+    repository.use_custom_directory = True
+    repository.custom_directory = str(installed.parent)
+    addon_utils.extensions_refresh(ensure_wheels=False)
 
 
 @pytest.fixture(params=["LIVE", "KEYS"])
