@@ -106,7 +106,9 @@ def still(path, frame, size):
 
 def film(folder, last):
     scene = bpy.context.scene
-    scene.cycles.samples = 6  # measured: 3.6 CPU-seconds a frame, 10 samples take 5 and look alike
+    if scene.cycles.use_denoising:
+        # Measured: 3.6 CPU-seconds a frame; 10 samples take 5 and look alike.
+        scene.cycles.samples = 6
     scene.render.resolution_x = scene.render.resolution_y = 480
     scene.frame_start, scene.frame_end = 1, last
     scene.render.filepath = str(folder / "frame_####.png")

@@ -99,11 +99,7 @@ def render_settings(scene):
     cycles.samples = 10
     cycles.use_adaptive_sampling = True
     cycles.adaptive_threshold = 0.06
-    cycles.use_denoising = True
-    cycles.denoiser = "OPENIMAGEDENOISE"
-    cycles.denoising_prefilter = "FAST"
-    if hasattr(cycles, "denoising_quality"):
-        cycles.denoising_quality = "BALANCED"
+    _denoise(cycles)
     cycles.max_bounces = 3
     cycles.diffuse_bounces = 2
     cycles.glossy_bounces = 2
@@ -114,6 +110,19 @@ def render_settings(scene):
     scene.render.resolution_percentage = 100
     scene.render.image_settings.file_format = "PNG"
     scene.view_settings.view_transform = "Filmic" if "Filmic" in _transforms(scene) else "Standard"
+
+
+def _denoise(cycles):
+    cycles.use_denoising = True
+    try:
+        cycles.denoiser = "OPENIMAGEDENOISE"
+    except TypeError:  # Debian's Blender is built without it
+        cycles.use_denoising = False
+        cycles.samples, cycles.adaptive_threshold = 64, 0.02
+        return
+    cycles.denoising_prefilter = "FAST"
+    if hasattr(cycles, "denoising_quality"):
+        cycles.denoising_quality = "BALANCED"
 
 
 def _transforms(scene):
