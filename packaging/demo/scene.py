@@ -96,14 +96,14 @@ def render_settings(scene):
     scene.render.engine = "CYCLES"
     cycles = scene.cycles
     cycles.device = "CPU"
-    cycles.samples = 10
+    cycles.samples = 8
     cycles.use_adaptive_sampling = True
     cycles.adaptive_threshold = 0.06
     _denoise(cycles)
     cycles.max_bounces = 3
     cycles.diffuse_bounces = 2
     cycles.glossy_bounces = 2
-    cycles.transparent_max_bounces = 6
+    cycles.transparent_max_bounces = 4
     cycles.caustics_reflective = cycles.caustics_refractive = False
     cycles.use_fast_gi = False
     scene.render.use_persistent_data = True
