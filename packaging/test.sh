@@ -55,7 +55,9 @@ check "ruff check" "$venv/bin/ruff" check native addon tests blender_tests packa
 check "ruff format" "$venv/bin/ruff" format --check -q native addon tests blender_tests packaging
 check "clang-format" sh -c \
   "find native tests -name '*.h' -o -name '*.cpp' | xargs '$venv/bin/clang-format' --dry-run -Werror"
-check "mypy" "$venv/bin/mypy" --no-error-summary -p risorius
+check "mypy of the package" "$venv/bin/mypy" --no-error-summary -p risorius
+check "mypy of addon/logic" "$venv/bin/mypy" --no-error-summary --explicit-package-bases \
+  --follow-imports=silent addon/risorius/logic
 
 step "Python tests"
 "$python" -m pytest -q -rs tests 2>&1 | tee "$logs/pytest.log" | tail -n 15

@@ -107,6 +107,8 @@ def test_only_the_layers_asked_for_are_there():
     dna = risorius.load(path, layers="behavior")
     assert len(dna.joint_groups) > 0
     assert dna.meshes == ()
+    rbf = risorius.load(GOLDEN / "tiny_v28.dna", layers="behavior")
+    assert "rbfb" in risorius.Rig(rbf).ignored_layers  # its controls are counted, though not moved
     dna = risorius.load(path, layers="geometry_without_blend_shapes")
     assert len(dna.meshes) > 0
     assert all(not mesh.blend_shape_targets for mesh in dna.meshes)

@@ -246,7 +246,7 @@ def plan_controls(raw_names: Sequence[str]) -> list[ControlPlan]:
 
 def _plan_textures(dna: Any) -> dict[tuple[str, str], str]:
     """(mesh base, "color" or "map:<animated map>") -> file name, from the metadata."""
-    found = {}
+    found: dict[tuple[str, str], str] = {}
     for key, value in dna.metadata.items():
         words = key.split(":", 2)
         if len(words) == 3 and words[0] == "texture":

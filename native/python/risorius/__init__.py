@@ -52,7 +52,7 @@ _LAYERS = {
     "all": {"definition", "behavior", "geometry", "blend_shapes", "extensions"},
     "descriptor": set[str](),
     "definition": {"definition"},
-    "behavior": {"definition", "behavior"},
+    "behavior": {"definition", "behavior", "extensions"},
     "geometry": {"definition", "geometry", "blend_shapes"},
     "geometry_without_blend_shapes": {"definition", "geometry"},
 }
