@@ -55,6 +55,18 @@ def module():
     return _risorius
 
 
+def sample_module():
+    """The module `risorius.sample`, loaded only when a sample is built.
+
+    Raises:
+        RuntimeError: the wheel is missing or of another version; the text says so.
+    """
+    module()
+    from risorius import sample
+
+    return sample
+
+
 def dna_error() -> type[Exception]:
     """The class of errors of bad files, or one that is never raised without the module."""
     return _risorius.DnaError if _risorius is not None else _Never

@@ -183,9 +183,7 @@ def _package():
 
 def _build_sample(path, folder):
     """Build the sample DNA; returns a sentence where it cannot be built."""
-    native.module()
-    from risorius import sample
-
+    sample = native.sample_module()
     wheels = sorted(folder.glob("*.whl"))
     online = bpy.app.online_access
     try:
