@@ -67,7 +67,7 @@ def build(collection):
         "Rim",
         middle + Vector((1.5, 2.0, 1.4)) * unit,
         middle,
-        1.2 * power,
+        0.5 * power,
         0.9 * unit,
         (0.9, 0.95, 1.0),
     )
