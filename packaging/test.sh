@@ -90,6 +90,8 @@ for blender in $(printf '%s\n' "${BLENDER:-}" "$(command -v blender || true)" | 
   elif [ "$(printf '%s\n4.2\n' "${version#Blender }" | sort -V | head -n 1)" != 4.2 ]; then
     table+=("$version at $blender is older than 4.2: not run")
   else
+    check "manifest, $version" timeout -s KILL 60 "$blender" --factory-startup --command extension \
+      validate "$zip"
     run_blender "$version" "$blender" -b --factory-startup -noaudio --python-exit-code 1 \
       --python blender_tests/run.py -- --extension "$zip"
   fi
