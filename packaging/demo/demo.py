@@ -49,16 +49,6 @@ def import_face(path):
     return next(o for o in made if o.name.endswith("_controls"))
 
 
-def key(owner, path, index, keys, group):
-    """One F-curve with eased keys."""
-    for frame, value in keys:
-        if path == "rotation_euler":
-            owner.rotation_euler[index] = value
-        else:
-            owner[path[2:-2]] = value
-        owner.keyframe_insert(path, index=index, frame=frame, group=group)
-
-
 def curves(action):
     if hasattr(action, "fcurves"):
         return list(action.fcurves)
