@@ -1,19 +1,24 @@
 # SPDX-License-Identifier: MIT
 """Makes a DNA file of a real MetaHuman's size and shape, with no content of one.
 
-    python tests/fullscale/generate.py OUT.dna [--seed N]
+    python tests/fullscale/generate.py OUT.dna [--seed N] [--deltas-per-channel N]
 
 870 joints, 800 channels that move about 800 vertices each, a head of 24,000 vertices and 7 more
 meshes, 8 LODs, 260 raw controls; centimetres, y up, degrees. Like real files it holds what trips
 readers: GUI controls that drive nothing, raw controls that no GUI control drives, a name of 100
 characters, equal names and 12 influences a vertex. The same seed gives the same bytes.
+
+With --deltas-per-channel the meshes are one head per LOD instead, each with half the vertices of
+the one before and shapes only for its LOD's channels: what reading by LOD is measured with.
+2500 gives a file of 50 MB.
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
@@ -24,6 +29,8 @@ from risorius import arkit
 
 Floats = NDArray[np.float32]
 Ints = NDArray[np.int64]
+Triple = tuple[float, float, float]
+Shape = tuple[str, tuple[int, int], Triple, Triple]  # name, grid, radii in cm, centre
 
 JOINTS = 870
 CHANNELS = 800
@@ -37,8 +44,7 @@ LODS = 8
 GROUPS = 60
 INFLUENCES = 12
 HEAD_CENTRE = (0.0, 150.0, 0.0)
-# name, rows x columns of its grid of vertices, radii in cm, centre
-MESHES = (
+MESHES: tuple[Shape, ...] = (
     ("head_lod0_mesh", (150, 160), (7.5, 12.0, 9.5), HEAD_CENTRE),
     ("teeth_lod0_mesh", (60, 70), (2.5, 1.5, 3.0), (0.0, 145.0, 5.0)),
     ("saliva_lod0_mesh", (25, 40), (2.3, 1.0, 2.8), (0.0, 145.0, 5.0)),
@@ -47,6 +53,16 @@ MESHES = (
     ("eyeshell_lod0_mesh", (25, 30), (4.5, 1.4, 1.3), (0.0, 153.0, 7.4)),
     ("eyelashes_lod0_mesh", (40, 50), (4.6, 1.5, 1.4), (0.0, 153.0, 7.5)),
     ("eyeEdge_lod0_mesh", (25, 40), (4.4, 1.3, 1.2), (0.0, 153.0, 7.3)),
+)
+# One head per LOD: the grid of each has half the vertices of the one before.
+HEADS: tuple[Shape, ...] = tuple(
+    (
+        f"head_lod{lod}_mesh",
+        (round(150 * 2 ** (-lod / 2)), round(160 * 2 ** (-lod / 2))),
+        (7.5, 12.0, 9.5),
+        HEAD_CENTRE,
+    )
+    for lod in range(LODS)
 )
 
 
@@ -65,8 +81,12 @@ def joint_names() -> list[str]:
     return names
 
 
+def joint_count(lod: int) -> int:
+    return JOINTS - 90 * lod
+
+
 def add_definition(dna: risorius.Dna) -> None:
-    every_lod = [list(range(JOINTS - 90 * lod)) for lod in range(LODS)]
+    every_lod = [list(range(joint_count(lod))) for lod in range(LODS)]
     dna.gui_control_names = [f"CTRL_L_generated{i:03d}.ty" for i in range(GUI)]
     dna.raw_control_names = raw_names()
     dna.joint_names = joint_names()
@@ -170,8 +190,12 @@ def joint_group(joints: range, random: np.random.Generator) -> risorius.JointGro
     )
 
 
-def make_mesh(index: int, joints: Floats, random: np.random.Generator) -> risorius.Mesh:
-    _, (rows, columns), radii, centre = MESHES[index]
+def make_mesh(
+    shape: Shape,
+    joints: Floats,
+    make_targets: Callable[[Floats], list[risorius.BlendShapeTarget]],
+) -> risorius.Mesh:
+    _, (rows, columns), radii, centre = shape
     grid = np.stack(np.meshgrid(np.arange(rows), np.arange(columns), indexing="ij"), axis=-1)
     places = grid.reshape(-1, 2) / [rows - 1, columns]
     points = surface(places, radii, centre)
@@ -195,7 +219,7 @@ def make_mesh(index: int, joints: Floats, random: np.random.Generator) -> risori
         skin_offsets=np.arange(count + 1) * INFLUENCES,
         skin_weights=weights.ravel(),
         skin_joint_indices=near.ravel(),
-        blend_shape_targets=targets(index, points, random),
+        blend_shape_targets=make_targets(points),
     )
 
 
@@ -209,15 +233,22 @@ def skin(points: Floats, joints: Floats) -> tuple[Ints, Floats]:
     return near, (weights / weights.sum(1, keepdims=True)).astype(np.float32)
 
 
-def targets(
+def part_targets(
     index: int, points: Floats, random: np.random.Generator
 ) -> list[risorius.BlendShapeTarget]:
-    """A soft bump of a random patch per channel: every channel on the head, 100 elsewhere."""
-    head = index == 0
-    channels = range(CHANNELS) if head else sorted(random.choice(CHANNELS, 100, replace=False))
+    """Every channel on the head, 100 elsewhere."""
+    if index == 0:
+        return targets(range(CHANNELS), 800, points, random)
+    channels = sorted(random.choice(CHANNELS, 100, replace=False))
+    return targets(channels, len(points) / 4, points, random)
+
+
+def targets(
+    channels: Sequence[int], mean: float, points: Floats, random: np.random.Generator
+) -> list[risorius.BlendShapeTarget]:
+    """A soft bump of a random patch per channel, of about so many vertices."""
     found = []
     for channel in channels:
-        mean = 800 if head else len(points) / 4
         size = int(np.clip(random.lognormal(np.log(mean) - 0.18, 0.6), 8, len(points) - 1))
         square = np.square(points - points[random.integers(len(points))]).sum(1)
         moved = np.sort(np.argpartition(square, size)[:size])
@@ -234,8 +265,25 @@ def targets(
     return found
 
 
-def generate(seed: int = 1) -> risorius.Dna:
-    """The whole file as a value."""
+def add_heads(
+    dna: risorius.Dna, joints: Floats, deltas_per_channel: int, random: np.random.Generator
+) -> None:
+    """One head per LOD, made of its LOD's joints and channels alone."""
+
+    def head(lod: int) -> risorius.Mesh:
+        def shapes(points: Floats) -> list[risorius.BlendShapeTarget]:
+            mean = deltas_per_channel * len(points) / (HEADS[0][1][0] * HEADS[0][1][1])
+            return targets(range(CHANNELS >> lod), mean, points, random)
+
+        return make_mesh(HEADS[lod], joints[: joint_count(lod)], shapes)
+
+    dna.mesh_names = [name for name, *_ in HEADS]
+    dna.lod_mesh_mapping = [[lod] for lod in range(LODS)]
+    dna.meshes = [head(lod) for lod in range(LODS)]
+
+
+def generate(seed: int = 1, deltas_per_channel: int | None = None) -> risorius.Dna:
+    """The whole file as a value; with deltas_per_channel its meshes are one head per LOD."""
     random = np.random.default_rng(seed)
     dna = risorius.Dna()
     dna.name, dna.archetype, dna.gender, dna.age = "Fullscale", "other", "other", 30
@@ -246,7 +294,13 @@ def generate(seed: int = 1) -> risorius.Dna:
     add_definition(dna)
     joints = add_joints(dna, random)
     add_behavior(dna, random)
-    dna.meshes = [make_mesh(i, joints, random) for i in range(len(MESHES))]
+    if deltas_per_channel is None:
+        dna.meshes = [
+            make_mesh(shape, joints, partial(part_targets, i, random=random))
+            for i, shape in enumerate(MESHES)
+        ]
+    else:
+        add_heads(dna, joints, deltas_per_channel, random)
     pairs = [
         (mesh, target.blend_shape_channel_index)
         for mesh, data in enumerate(dna.meshes)
@@ -260,8 +314,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("out", type=Path)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--deltas-per-channel", type=int, help="one head per LOD, see above")
     args = parser.parse_args()
-    dna = generate(args.seed)
+    dna = generate(args.seed, args.deltas_per_channel)
     dna.save(args.out)
     moved = np.mean([len(t.vertex_indices) for t in dna.meshes[0].blend_shape_targets])
     print(f"{args.out}: {args.out.stat().st_size / 1e6:.1f} MB, {moved:.0f} vertices a channel")
