@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from . import DnaError, __version__
 from .commands import eval as evaluate
-from .commands import info, sample
+from .commands import info, plot, sample
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -17,7 +17,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="risorius", description="Face rigs from DNA files.")
     parser.add_argument("--version", action="version", version=__version__)
     subparsers = parser.add_subparsers(dest="command", required=True)
-    for command in (info, evaluate, sample):
+    for command in (info, evaluate, sample, plot):
         command.add_parser(subparsers)
     args, rest = parser.parse_known_args(arguments)
     # argparse ends a list of operands at the first option: FILE --json NAME=1.

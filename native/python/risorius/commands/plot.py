@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: MIT
+"""risorius plot: a rig as pictures for people who look."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import tempfile
+from pathlib import Path
+
+import risorius
+
+_NEEDS = "risorius: plot draws with Matplotlib, which is not installed: pip install risorius[plot]"
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = subparsers.add_parser(
+        "plot",
+        help="the rig as pictures",
+        description="Draws the face with its joints, the joint matrix, the levels of detail and "
+        "the sizes of the layers: a page that needs nothing but itself, or one sheet.",
+    )
+    parser.add_argument("file", type=Path)
+    parser.add_argument(
+        "-o", "--out", type=Path, required=True, metavar="OUT", help="page.html or picture.png"
+    )
+    parser.add_argument("--lod", type=int, default=0, metavar="N", help="of the face (default 0)")
+    parser.add_argument("--dpi", type=int, default=150, help="of the images, 40 to 600")
+    parser.add_argument("--title", help="in place of the character's name")
+    parser.set_defaults(func=run)
+
+
+def complaint(args: argparse.Namespace) -> str | None:
+    """What is wrong with the command line before the file is looked at."""
+    if args.out.suffix.lower() not in (".html", ".png"):
+        return f"-o: a name ending in .html or .png was expected, found {args.out.name!r}"
+    if not 40 <= args.dpi <= 600:
+        return f"--dpi: 40 to 600 was expected, found {args.dpi}"
+    return None
+
+
+def write(path: Path, data: bytes) -> None:
+    """Write a file whole or not at all: beside it first, then in its place."""
+    handle, beside = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+        umask = os.umask(0)
+        os.umask(umask)
+        os.chmod(beside, 0o666 & ~umask)  # mkstemp's own is for one user only
+        os.replace(beside, path)
+    except BaseException:
+        os.unlink(beside)
+        raise
+
+
+def run(args: argparse.Namespace) -> int:
+    if wrong := complaint(args):
+        print(f"risorius: {wrong}", file=sys.stderr)
+        return 2
+    try:
+        from ..plot import page, sheet
+    except ImportError as error:
+        if (error.name or "").partition(".")[0] != "matplotlib":
+            raise
+        print(_NEEDS, file=sys.stderr)
+        return 1
+    from ..plot.facts import gather
+
+    try:
+        data = args.file.read_bytes()
+    except OSError as error:
+        print(f"risorius: {error}", file=sys.stderr)
+        return 1
+    dna = risorius.load(data)
+    if not 0 <= args.lod < max(1, dna.lod_count):
+        last = max(1, dna.lod_count) - 1
+        print(f"risorius: --lod: 0 to {last} was expected, found {args.lod}", file=sys.stderr)
+        return 2
+    facts = gather(dna, data, args.file.name, args.title)
+    kind = page if args.out.suffix.lower() == ".html" else sheet
+    try:
+        write(args.out, kind.render(facts, args.lod, args.dpi))
+    except OSError as error:
+        print(f"risorius: {error}", file=sys.stderr)
+        return 1
+    print(f"{args.out}: {args.out.stat().st_size / 1e6:.1f} MB")
+    return 0

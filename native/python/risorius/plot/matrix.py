@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: MIT
+"""The joint matrix as an image: which coefficient stands where, and in which colour."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+import risorius
+
+from .regions import REGIONS, majority
+
+Ints = npt.NDArray[np.int64]
+Floats = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Non-zero coefficients: int64[N] row, column and group of each, in a grid of `shape`."""
+
+    rows: Ints
+    columns: Ints
+    groups: Ints
+    shape: tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Block:
+    """A joint group as a rectangle: its first row among the regrouped ones, and its size."""
+
+    group: int
+    region: str
+    top: int
+    rows: int
+    columns: int
+
+
+def group_regions(dna: risorius.Dna, joint_regions: Sequence[str]) -> list[str]:
+    """The region of each joint group: where most of the joints lie that its rows move."""
+    found = []
+    for group in dna.joint_groups:
+        moved = np.unique(np.asarray(group.output_indices, np.int64) // 9)
+        listed = np.asarray(group.joint_indices, np.int64)
+        found.append(majority((moved if len(moved) else listed).tolist(), joint_regions))
+    return found
+
+
+def shape_of(dna: risorius.Dna, controls: int) -> tuple[int, int]:
+    """Rows and columns that hold every coefficient: at least 9 a joint x `controls`."""
+    rows, columns = 9 * len(dna.joint_names), controls
+    for group in dna.joint_groups:
+        # As 64-bit numbers: -1 among unsigned 16-bit ones would be 65,535.
+        rows = max(rows, int(np.max(group.output_indices.astype(np.int64), initial=-1)) + 1)
+        columns = max(columns, int(np.max(group.input_indices.astype(np.int64), initial=-1)) + 1)
+    return rows, columns
+
+
+def by_index(dna: risorius.Dna, controls: int) -> Cells:
+    """The matrix as it is: row 9 * joint + attribute, column = control."""
+    parts = []
+    for number, group in enumerate(dna.joint_groups):
+        row, column = np.nonzero(group.values)
+        at = (np.asarray(group.output_indices)[row], np.asarray(group.input_indices)[column])
+        parts.append((*at, np.full(len(row), number)))
+    return _joined(parts, shape_of(dna, controls))
+
+
+def regrouped(dna: risorius.Dna, regions: Sequence[str]) -> tuple[Cells, list[Block]]:
+    """The rows of a group together, region by region, and its columns pushed to the left.
+
+    Args:
+        dna: a rig.
+        regions: of each joint group.
+
+    Returns:
+        The cells, and the rectangle of each group that has one: what the evaluator stores.
+    """
+    groups = dna.joint_groups
+    order = sorted(range(len(groups)), key=lambda g: (REGIONS.index(regions[g]), g))
+    parts, blocks, top = [], [], 0
+    for number in order:
+        values = groups[number].values
+        if not values.size:
+            continue
+        row, column = np.nonzero(values)
+        parts.append((row + top, column, np.full(len(row), number)))
+        blocks.append(Block(number, regions[number], top, *values.shape))
+        top += values.shape[0]
+    width = max((block.columns for block in blocks), default=0)
+    return _joined(parts, (top, width)), blocks
+
+
+def _joined(parts: Sequence[tuple[Ints, ...]], shape: tuple[int, int]) -> Cells:
+    empty = np.zeros(0, np.int64)
+    rows, columns, groups = (
+        np.concatenate([empty, *(part[i] for part in parts)]).astype(np.int64) for i in range(3)
+    )
+    return Cells(rows, columns, groups, shape)
+
+
+def image(cells: Cells, colors: Floats, limit: tuple[int, int]) -> npt.NDArray[np.uint8]:
+    """The cells as a picture, the empty ones transparent.
+
+    Args:
+        cells: what to draw.
+        colors: float64[groups, 3] in 0..1.
+        limit: the most rows and columns of pixels. A grid that fits has one pixel a cell; else
+            a pixel holds several, in their mean colour, the fuller the more opaque.
+
+    Returns:
+        uint8[h, w, 4], RGBA.
+    """
+    high, wide = (max(1, min(n, most)) for n, most in zip(cells.shape, limit, strict=True))
+    y = cells.rows * high // max(1, cells.shape[0])
+    x = cells.columns * wide // max(1, cells.shape[1])
+    flat, size = y * wide + x, high * wide
+    count = np.bincount(flat, minlength=size).astype(float)
+    picture = np.zeros((size, 4))
+    for channel in range(3):
+        shade = colors[cells.groups, channel] if len(cells.groups) else np.zeros(0)
+        picture[:, channel] = np.bincount(flat, shade, minlength=size) / np.maximum(count, 1)
+    area = np.outer(_spread(cells.shape[0], high), _spread(cells.shape[1], wide)).ravel()
+    # A lone coefficient among fifty zeros must still be seen, hence the floor.
+    fill = np.sqrt(np.minimum(1, count / area))
+    picture[:, 3] = np.where(count > 0, 0.3 + 0.7 * fill, 0)
+    return np.asarray(np.rint(picture * 255), np.uint8).reshape(high, wide, 4)
+
+
+def _spread(cells: int, pixels: int) -> Floats:
+    """How many cells fall on each pixel: float64[pixels]."""
+    places = np.arange(max(1, cells)) * pixels // max(1, cells)
+    return np.bincount(places, minlength=pixels).astype(float)

@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: MIT
+"""All four drawings as one page that needs nothing but itself."""
+
+from __future__ import annotations
+
+import html
+import io
+import re
+from collections.abc import Callable
+
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+
+from . import draw_face, draw_lods, draw_matrix, draw_sizes, words
+from .facts import Facts, counts, descriptor
+from .page_parts import SCRIPT, STYLE
+from .paper import ACCENT, INK, MUTED, RULE, Canvas, settings
+from .regions import COLORS
+
+_VARIABLES = {INK: "--ink", MUTED: "--muted", RULE: "--rule", ACCENT: "--accent"}
+_WIDTH = 12.4  # inches
+
+
+def render(facts: Facts, lod: int, dpi: int) -> bytes:
+    """The page as UTF-8 bytes."""
+    bars = 0.75 + 0.3 * len(facts.layers)
+    with settings():
+        sections = [
+            _section("face", words.FACE, words.face(lod), 8.4, dpi,
+                     lambda canvas: draw_face.draw(canvas, facts, lod, dpi)),
+            _section("matrix", words.MATRIX, words.matrix(facts), 9.2, dpi,
+                     lambda canvas: draw_matrix.draw(canvas, facts, 2 * dpi)),
+            _section("lods", words.LODS, words.lods(), 5.4, dpi,
+                     lambda canvas: draw_lods.draw(canvas, facts)),
+            _section("sizes", words.SIZES, words.sizes(facts), bars, dpi,
+                     lambda canvas: draw_sizes.draw(canvas, facts, with_counts=False),
+                     after=_tables(facts)),
+        ]  # fmt: skip
+    return _document(facts, "\n".join(sections)).encode()
+
+
+def _section(
+    name: str,
+    title: str,
+    caption: str,
+    height: float,
+    dpi: int,
+    draw: Callable[[Canvas], None],
+    after: str = "",
+) -> str:
+    """A heading, a caption, the drawing `height` inches high, and what follows it."""
+    figure = Figure(figsize=(_WIDTH, height), dpi=dpi)
+    FigureCanvasSVG(figure)
+    draw(Canvas(figure, _WIDTH, height))
+    return (
+        f'<section id="{name}"><h2>{html.escape(title)}</h2><p>{html.escape(caption)}</p>'
+        f'<figure tabindex="0">{_svg(figure, name, title)}</figure>{after}</section>'
+    )
+
+
+def _svg(figure: Figure, name: str, title: str) -> str:
+    """A drawing as inline SVG whose inks follow the page's theme."""
+    out = io.StringIO()
+    figure.savefig(out, format="svg", dpi=figure.dpi, metadata={"Date": None, "Creator": None})
+    text = out.getvalue()
+    text = text[text.index("<svg") :]
+    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
+    for ink, variable in _VARIABLES.items():
+        text = text.replace(ink, f"var({variable})")
+    # Drawings on one page must not share the names of their parts.
+    text = re.sub(r'\bid="', f'id="{name}-', text)
+    text = re.sub(r'href="#', f'href="#{name}-', text)
+    text = text.replace("url(#", f"url(#{name}-")
+    # The page gives the size; the viewBox keeps the shape.
+    text = re.sub(r'(<svg[^>]*?) width="[^"]*"', r"\1", text, count=1)
+    text = re.sub(r'(<svg[^>]*?) height="[^"]*"', r"\1", text, count=1)
+    return text.replace("<svg", f'<svg role="img" aria-label="{html.escape(title)}"', 1)
+
+
+def _tables(facts: Facts) -> str:
+    total = max(facts.file_size, 1)
+    layers = "".join(
+        f"<tr><td>{html.escape(layer.title)}</td><td><code>{html.escape(layer.key)}</code></td>"
+        f"<td>{layer.size:,}</td><td>{layer.size / total:.2%}</td></tr>"
+        for layer in facts.layers
+    )
+    numbers = "".join(
+        f"<tr><td>{html.escape(name)}</td><td>{value:,}</td></tr>" for name, value in counts(facts)
+    )
+    return (
+        '<div class="tables"><table><thead><tr><th>part</th><th>key</th><th>bytes</th>'
+        f"<th>share</th></tr></thead><tbody>{layers}</tbody><tfoot><tr><td>file</td><td></td>"
+        f"<td>{facts.file_size:,}</td><td>100%</td></tr></tfoot></table>"
+        "<table><thead><tr><th>count</th><th>number</th></tr></thead>"
+        f"<tbody>{numbers}</tbody></table></div>"
+    )
+
+
+def _document(facts: Facts, sections: str) -> str:
+    title = html.escape(facts.title)
+    legend = "".join(
+        f'<li><i style="background:{COLORS[region]}"></i>{region} <b>{count}</b></li>'
+        for region, count in facts.region_counts().items()
+    )
+    return f"""<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{title}</title>
+<style>{STYLE}</style>
+</head>
+<body>
+<header>
+<h1>{title}</h1>
+<p>{html.escape(facts.file_name)} | {html.escape(descriptor(facts))}</p>
+<nav><a href="#face">face</a> <a href="#matrix">matrix</a> <a href="#lods">levels</a>
+<a href="#sizes">sizes</a></nav>
+</header>
+<ul class="legend" aria-label="Face regions and their joints">{legend}</ul>
+<main>
+{sections}
+</main>
+<footer>Click a picture to enlarge it; then the wheel zooms, dragging moves, Esc closes.
+Made by risorius plot.</footer>
+<dialog id="zoom"><div></div><button aria-label="Close">&times;</button></dialog>
+<script>{SCRIPT}</script>
+</body>
+</html>
+"""

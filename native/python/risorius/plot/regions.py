@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: MIT
+"""Face regions of joints, read from their names, and a colour for each."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Sequence
+
+REGIONS = (
+    "forehead, brow",
+    "eye",
+    "nose",
+    "cheek",
+    "mouth, lips",
+    "teeth, tongue",
+    "jaw, chin",
+    "ear",
+    "neck",
+    "other",
+)
+# Middle lightness, so that one colour reads on white paper and on a dark screen.
+COLORS = {
+    "forehead, brow": "#8f6be0",
+    "eye": "#2e86de",
+    "nose": "#12a5a0",
+    "cheek": "#f0932b",
+    "mouth, lips": "#e04256",
+    "teeth, tongue": "#ec86bd",
+    "jaw, chin": "#a8744a",
+    "ear": "#c9a517",
+    "neck": "#54a24b",
+    "other": "#8b95a1",
+}
+# The order decides: NasolabialBulge is a cheek though it begins like a nose, UnderChin a chin,
+# EyelashesUpper an eye, a joint of the upper lip's rotation a mouth.
+_STARTS = (
+    ("cheek", ("naso", "cheek", "masseter", "sideburn", "temple")),
+    ("forehead, brow", ("forehead", "brow", "eyebrow", "hair", "skull", "corrugator")),
+    ("eye", ("eye", "lid", "lash", "pupil", "iris")),
+    ("nose", ("nose", "nostril")),
+    ("mouth, lips", ("mouth", "lip", "lowerlip", "upperlip")),
+    ("teeth, tongue", ("teeth", "tooth", "tongue", "gum")),
+    ("jaw, chin", ("jaw", "chin", "underchin")),
+    ("ear", ("ear",)),
+    ("neck", ("neck", "adams", "throat", "clavicle", "spine")),
+)
+# FACIAL_L_12IPV_EyelidUpperB1: side and kind say nothing about the place.
+_PREFIX = re.compile(r"^(?:facial_)?(?:[lrc]_)?(?:12ipv_)?", re.IGNORECASE)
+
+
+def region_of(joint: str) -> str:
+    """The face region of a joint, one of REGIONS."""
+    word = _PREFIX.sub("", joint.rpartition(":")[2]).lower()
+    for region, starts in _STARTS:
+        if word.startswith(starts):
+            return region
+    return "other"
+
+
+def regions_of(joints: Iterable[str]) -> list[str]:
+    """The region of each joint."""
+    return [region_of(name) for name in joints]
+
+
+def majority(indices: Iterable[int], regions: Sequence[str]) -> str:
+    """The region that most of some joints lie in; of equals the one that REGIONS names first.
+
+    Args:
+        indices: of joints; those beyond the end are passed over.
+        regions: of every joint.
+    """
+    votes = Counter(regions[i] for i in indices if 0 <= i < len(regions))
+    named = [region for region in REGIONS[:-1] if votes[region]]
+    # One root joint among lips does not make them "other": it wins only with no named region.
+    return max(named, key=lambda region: votes[region]) if named else "other"

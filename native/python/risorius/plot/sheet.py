@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: MIT
+"""All four drawings on one sheet, as PNG."""
+
+from __future__ import annotations
+
+import io
+import textwrap
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure, FigureBase, SubFigure
+
+from . import draw_face, draw_lods, draw_matrix, draw_sizes, words
+from .facts import Facts, descriptor
+from .paper import INK, MUTED, RULE, Canvas, settings
+from .regions import COLORS
+
+# Inches. The face is as wide as two views of a head at the height of the matrix.
+WIDTH, HEAD, UPPER, LOWER = 22.0, 1.15, 9.6, 5.9
+LEFT = 10.8
+_EDGE = 0.35
+
+
+def render(facts: Facts, lod: int, dpi: int) -> bytes:
+    """The sheet as the bytes of a PNG file."""
+    with settings():
+        figure = Figure(figsize=(WIDTH, HEAD + UPPER + LOWER), dpi=dpi, facecolor="white")
+        FigureCanvasAgg(figure)
+        head, upper, lower = _split(figure, rows=[HEAD, UPPER, LOWER])
+        _draw_head(head, facts)
+        widths = [LEFT, WIDTH - LEFT]
+        face, matrix = _split(upper, columns=widths)
+        lods, sizes = _split(lower, columns=widths)
+        right = WIDTH - LEFT
+        draw_face.draw(_panel(face, words.FACE, words.face(lod), LEFT, UPPER), facts, lod, dpi)
+        draw_matrix.draw(
+            _panel(matrix, words.MATRIX, words.matrix(facts), right, UPPER), facts, dpi
+        )
+        draw_lods.draw(_panel(lods, words.LODS, words.lods(), LEFT, LOWER), facts)
+        draw_sizes.draw(
+            _panel(sizes, words.SIZES, words.sizes(facts), right, LOWER), facts, with_counts=True
+        )
+        out = io.BytesIO()
+        figure.savefig(out, format="png", facecolor="white", metadata={"Software": "risorius"})
+        return out.getvalue()
+
+
+def _split(
+    figure: FigureBase, rows: Sequence[float] = (1,), columns: Sequence[float] = (1,)
+) -> list[SubFigure]:
+    """Parts of a figure from top to bottom, or from left to right."""
+    parts = figure.subfigures(
+        len(rows), len(columns), squeeze=False, height_ratios=rows, width_ratios=columns,
+        hspace=0, wspace=0,
+    )  # fmt: skip
+    return list(np.ravel(np.asarray(parts)))
+
+
+def _draw_head(figure: SubFigure, facts: Facts) -> None:
+    """Who this is, and the legend of regions."""
+    edge = _EDGE / WIDTH
+    title = textwrap.shorten(facts.title, 60, placeholder="...")
+    figure.text(edge, 0.64, title, fontsize=22, fontweight="bold", va="center")
+    figure.text(
+        edge, 0.22, f"{facts.file_name} | {descriptor(facts)}", fontsize=10.5, color=MUTED,
+        va="center",
+    )  # fmt: skip
+    found = list(facts.region_counts().items())
+    columns, step = (len(found) + 1) // 2, 2.0 / WIDTH
+    for i, (region, count) in enumerate(found):
+        row, column = divmod(i, columns)
+        x, y = 1 - edge - (columns - column) * step, (0.64, 0.24)[row]
+        figure.text(x, y, "\u25cf", fontsize=15, color=COLORS[region], va="center")
+        figure.text(x + 0.22 / WIDTH, y, region, fontsize=10.5, va="center", color=INK)
+        figure.text(
+            x + 1.78 / WIDTH, y, f"{count:,}", fontsize=10, va="center", ha="right", color=MUTED
+        )
+
+
+def _panel(figure: SubFigure, title: str, caption: str, width: float, height: float) -> Canvas:
+    """A heading with its caption over a place to draw in. Sizes in inches."""
+    edge = _EDGE / width
+    lines = textwrap.wrap(caption, round(width * 13))
+    top = 0.68 + 0.19 * len(lines)
+    head, rest = _split(figure, rows=[top, height - top])
+    rule = head.add_axes((edge, 0.95, 1 - 2 * edge, 0.001))
+    rule.set_axis_off()
+    rule.axhline(0, color=RULE, linewidth=1.2, clip_on=False)
+    head.text(edge, 1 - 0.36 / top, title, fontsize=15, fontweight="bold", va="center")
+    head.text(
+        edge, 1 - 0.58 / top, "\n".join(lines), fontsize=10, color=MUTED, va="top", linespacing=1.3
+    )
+    return Canvas(rest, width, height - top)
