@@ -128,7 +128,8 @@ def frame_of(seen: Scene) -> tuple[float, float, float, float]:
         # The root of a spine may lie metres below a head; the face is the subject.
         reach = 0.1 * float((high - low).max())
         near = np.all((joints[:, :2] > low - reach) & (joints[:, :2] < high + reach), axis=1)
-        used = np.concatenate([used, joints[near]])
+        # Most joints elsewhere: then it is no face, and all of it is shown.
+        used = np.concatenate([used, joints[near] if 2 * near.sum() >= len(near) else joints])
     else:
         used = joints
     low, high = used[:, :2].min(axis=0), used[:, :2].max(axis=0)

@@ -26,7 +26,7 @@ def render(facts: Facts, lod: int, dpi: int) -> bytes:
     bars = 0.75 + 0.3 * len(facts.layers)
     with settings():
         sections = [
-            _section("face", words.FACE, words.face(lod), 8.4, dpi,
+            _section("face", words.FACE, words.face(lod), 8.1, dpi,
                      lambda canvas: draw_face.draw(canvas, facts, lod, dpi)),
             _section("matrix", words.MATRIX, words.matrix(facts), 9.2, dpi,
                      lambda canvas: draw_matrix.draw(canvas, facts, 2 * dpi)),

@@ -27,6 +27,8 @@ h2 { margin: 0; font-size: 1.4rem; }
 section > p { color: var(--muted); margin: 4px 0 16px; max-width: 85ch; }
 figure { margin: 0; cursor: zoom-in; }
 figure:focus-visible { outline: 2px solid var(--accent); border-radius: 6px; }
+/* Matplotlib asks for the nearest pixel, which at this size would drop every other column. */
+figure image { image-rendering: auto !important; }
 figure svg { display: block; width: 100%; height: auto; }
 .tables { display: flex; flex-wrap: wrap; gap: 24px 56px; margin-top: 24px; align-items: start; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; flex: 1 1 320px; }
@@ -42,7 +44,6 @@ dialog div { width: 100%; height: 100%; cursor: grab; touch-action: none;
 dialog svg { width: 100%; height: 100%; }
 /* Outlines and bones stay thin however far one goes in. */
 dialog path { vector-effect: non-scaling-stroke; }
-dialog image { image-rendering: pixelated; }
 body:has(dialog[open]) { overflow: hidden; }
 dialog button { position: fixed; top: 12px; right: 16px; font-size: 1.6rem; line-height: 1;
   width: 44px; height: 44px; border-radius: 50%; border: 1px solid var(--rule);
