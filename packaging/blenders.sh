@@ -23,7 +23,7 @@ done
 if [ ! -x "$root/usr/bin/blender" ]; then
   chroot "$root" sh -c 'apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq \
     --no-install-recommends blender python3-dev python3-numpy python3-venv python3-pip python3-pytest \
-    g++ cmake ninja-build ca-certificates xvfb imagemagick libgl1-mesa-dri' >&2
+    g++ cmake ninja-build nlohmann-json3-dev ca-certificates xvfb imagemagick libgl1-mesa-dri' >&2
 fi
 
 # The wheel: its build tools are plain Python, so they are fetched here, where pip is set up.

@@ -23,7 +23,8 @@ step() {
 install_packages() {
   local missing=()
   for package in python3-venv python3-dev g++ cmake ninja-build ccache libgtest-dev libgmock-dev \
-    ffmpeg libxrender1 libxi6 libxkbcommon0 libsm6 libgl1 libegl1 libxxf86vm1 libxfixes3; do
+    nlohmann-json3-dev ffmpeg libxrender1 libxi6 libxkbcommon0 libsm6 libgl1 libegl1 libxxf86vm1 \
+    libxfixes3; do
     dpkg-query -W -f='${Status}' "$package" 2>/dev/null | grep -q 'ok installed' ||
       missing+=("$package")
   done

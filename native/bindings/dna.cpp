@@ -1,144 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include <array>
 
-#include "bindings/arrays.h"
-#include "core/file_write.h"
-#include "dna/io.h"
-#include "dna/layers.h"
+#include "bindings/fields.h"
 
 namespace risorius::bindings {
 
 namespace {
 
 using dna::Dna;
-
-// A class whose constructor takes its fields by keyword and that prints nothing of its arrays.
-template <class T>
-py::class_<T, std::shared_ptr<T>> value_class(py::module_& m, const char* name, const char* doc) {
-  py::class_<T, std::shared_ptr<T>> c(m, name, doc);
-  c.def(py::init([](const py::kwargs& fields) {
-    auto value = std::make_shared<T>();
-    py::object self = py::cast(value);
-    for (const auto& [key, field] : fields) py::setattr(self, key, field);
-    return value;
-  }));
-  c.def("__copy__", [](const T& self) { return std::make_shared<T>(self); });
-  c.def("__deepcopy__", [](const T& self, const py::dict&) { return std::make_shared<T>(self); });
-  return c;
-}
-
-// Property helpers: `get` maps an object to a reference of the field.
-template <class Class, class Get>
-void numbers(Class& c, const char* name, Get get) {
-  using Owner = typename Class::type;
-  using Field = std::remove_cvref_t<decltype(get(std::declval<Owner&>()))>;
-  c.def_property(
-      name, [get](Owner& self) { return to_numpy(get(self)); },
-      [get, name](Owner& self, const py::object& value) {
-        if constexpr (requires { Field{}.values; }) {
-          constexpr std::size_t planes = std::is_same_v<Field, core::Vec3Array> ? 3 : 2;
-          get(self) = planar_from_python<planes>(value, name);
-        } else {
-          using Number = std::remove_cvref_t<decltype(*get(self).data())>;
-          get(self) = from_python<Number>(value, name);
-        }
-      });
-}
-
-template <class Class, class Get>
-void text(Class& c, const char* name, Get get) {
-  using Owner = typename Class::type;
-  c.def_property(
-      name, [get](Owner& self) { return to_python(get(self)); },
-      [get, name](Owner& self, const py::object& v) { get(self) = text_from_python(v, name); });
-}
-
-template <class Class, class Get>
-void texts(Class& c, const char* name, Get get) {
-  using Owner = typename Class::type;
-  c.def_property(
-      name,
-      [get](Owner& self) {
-        py::list out;
-        for (const std::string& t : get(self)) out.append(to_python(t));
-        return out;
-      },
-      [get, name](Owner& self, const py::iterable& values) {
-        std::vector<std::string> out;
-        for (const py::handle& v : values) out.push_back(text_from_python(v, name));
-        get(self) = std::move(out);
-      });
-}
-
-template <class Class, class Get>
-void number(Class& c, const char* name, Get get) {
-  using Owner = typename Class::type;
-  using Number = std::remove_cvref_t<decltype(get(std::declval<Owner&>()))>;
-  c.def_property(
-      name, [get](Owner& self) { return get(self); },
-      [get](Owner& self, Number value) { get(self) = value; });
-}
-
-// A struct inside another: the element shares the owner's life.
-template <class Class, class Get>
-void part(Class& c, const char* name, Get get) {
-  using Owner = typename Class::type;
-  using Field = std::remove_cvref_t<decltype(get(std::declval<Owner&>()))>;
-  c.def_property(
-      name,
-      [get](const std::shared_ptr<Owner>& self) {
-        return std::shared_ptr<Field>(self, &get(*self));
-      },
-      [get](Owner& self, const Field& value) { get(self) = value; });
-}
-
-template <class Class, class Get>
-void parts(Class& c, const char* name, Get get) {
-  using Owner = typename Class::type;
-  using Field = std::remove_cvref_t<decltype(get(std::declval<Owner&>())[0])>;
-  c.def_property(
-      name,
-      [get](Owner& self) {
-        const auto& list = get(self);
-        py::tuple out(list.size());
-        for (std::size_t i = 0; i < list.size(); ++i) out[i] = list.element_ptr(i);
-        return out;
-      },
-      [get](Owner& self, const py::iterable& values) {
-        std::vector<Field> out;
-        for (const py::handle& v : values) out.push_back(v.cast<const Field&>());
-        get(self) = core::List<Field>(std::move(out));
-      });
-}
-
-// Enumerations read as words; a number that the format does not know reads as "#17".
-template <std::size_t kCount>
-std::string word(const std::array<const char*, kCount>& words, std::uint32_t value) {
-  return value < kCount ? words[value] : "#" + std::to_string(value);
-}
-
-template <class Number, std::size_t kCount>
-Number value_of_word(const std::array<const char*, kCount>& words, const std::string& text,
-                     const char* name) {
-  for (std::size_t i = 0; i < kCount; ++i) {
-    if (text == words[i]) return static_cast<Number>(i);
-  }
-  if (text.size() > 1 && text[0] == '#') return static_cast<Number>(std::stoul(text.substr(1)));
-  std::string known;
-  for (const char* w : words) known += std::string(known.empty() ? "" : ", ") + w;
-  throw py::value_error(std::string(name) + ": one of " + known + " was expected, found " + text);
-}
-
-template <class Class, std::size_t kCount, class Get>
-void choice(Class& c, const char* name, const std::array<const char*, kCount>& words, Get get) {
-  using Owner = typename Class::type;
-  using Number = std::remove_cvref_t<decltype(get(std::declval<Owner&>()))>;
-  c.def_property(
-      name, [get, words](Owner& self) { return word(words, get(self)); },
-      [get, words, name](Owner& self, const std::string& text) {
-        get(self) = value_of_word<Number>(words, text, name);
-      });
-}
 
 constexpr std::array<const char*, 6> kArchetypes{"asian",    "black", "caucasian",
                                                  "hispanic", "alien", "other"};
@@ -148,29 +17,6 @@ constexpr std::array<const char*, 2> kRotationUnits{"degrees", "radians"};
 constexpr std::array<const char*, 6> kDirections{"left", "right", "up", "down", "front", "back"};
 constexpr std::array<const char*, 6> kSequences{"xyz", "xzy", "yxz", "yzx", "zxy", "zyx"};
 constexpr std::array<const char*, 2> kWindings{"ccw", "cw"};
-
-dna::LodMapping lod_mapping_from_python(const py::object& value) {
-  if (py::isinstance<dna::LodMapping>(value)) return value.cast<dna::LodMapping>();
-  dna::LodMapping mapping;
-  std::vector<std::uint16_t> lods;
-  for (const py::handle& row : value) {
-    lods.push_back(static_cast<std::uint16_t>(mapping.rows.size()));
-    mapping.rows.push_back(
-        from_python<std::uint16_t>(py::reinterpret_borrow<py::object>(row), "indices"));
-  }
-  mapping.lods = std::move(lods);
-  return mapping;
-}
-
-template <class Get>
-void lod_mapping(py::class_<Dna, std::shared_ptr<Dna>>& c, const char* name, Get get) {
-  c.def_property(
-      name,
-      [get](const std::shared_ptr<Dna>& self) {
-        return std::shared_ptr<dna::LodMapping>(self, &get(*self));
-      },
-      [get](Dna& self, const py::object& v) { get(self) = lod_mapping_from_python(v); });
-}
 
 void bind_structs(py::module_& m) {
   py::class_<dna::LodMapping, std::shared_ptr<dna::LodMapping>>(
@@ -261,8 +107,6 @@ void bind_meshes(py::module_& m) {
   numbers(mesh, "skin_joint_indices", [](auto& s) -> auto& { return s.skin_joint_indices; });
   parts(mesh, "blend_shape_targets", [](auto& s) -> auto& { return s.blend_shape_targets; });
 }
-
-using DnaClass = py::class_<Dna, std::shared_ptr<Dna>>;
 
 void bind_descriptor(DnaClass& c) {
   c.def_property_readonly("generation", [](const Dna& s) { return s.generation; });
@@ -384,136 +228,18 @@ void bind_behavior_and_geometry(DnaClass& c) {
   parts(c, "meshes", [](auto& s) -> auto& { return s.geometry.meshes; });
 }
 
-std::uint16_t minor_version(const std::string& version) {
-  if (version.size() == 3 && version.rfind("2.", 0) == 0 && version[2] >= '1' &&
-      version[2] <= '8') {
-    return static_cast<std::uint16_t>(version[2] - '0');
-  }
-  throw py::value_error("version: one of 2.1 to 2.8 was expected, found " + version);
-}
-
-std::vector<std::uint8_t> serialise(const Dna& self, const std::string& version) {
-  const std::uint16_t minor = minor_version(version);
-  std::vector<std::string> dropped;
-  core::Result<std::vector<std::uint8_t>> bytes = [&] {
-    py::gil_scoped_release released;
-    return dna::write(self, minor, dropped);
-  }();
-  std::vector<std::uint8_t> out = unwrap(std::move(bytes));
-  if (!dropped.empty()) {
-    std::string names;
-    for (const std::string& d : dropped) names += (names.empty() ? "" : ", ") + d;
-    const std::string message =
-        "version " + version + " cannot hold these layers, they are left " + "out: " + names;
-    if (PyErr_WarnEx(PyExc_UserWarning, message.c_str(), 2) != 0) throw py::error_already_set();
-  }
-  return out;
-}
-
-py::list describe(const std::vector<dna::Warning>& warnings) {
-  py::list out;
-  for (const dna::Warning& w : warnings) out.append(to_python(w.where + ": " + w.message));
-  return out;
-}
-
-void bind_whole(DnaClass& c) {
-  c.def_property_readonly("warnings", [](const Dna& s) { return describe(s.warnings); });
-  c.def(
-      "validate",
-      [](const Dna& s) {
-        std::vector<dna::Warning> warnings;
-        if (core::Status status = dna::validate(s, warnings); !status) throw_error(status.error());
-        return describe(warnings);
-      },
-      "The oddities that can be lived with. Raises DnaError for what cannot.");
-  c.def(
-      "to_bytes",
-      [](const Dna& s, const std::string& version) {
-        const std::vector<std::uint8_t> bytes = serialise(s, version);
-        return py::bytes(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-      },
-      py::arg("version") = "2.8");
-  c.def(
-      "save",
-      [](const Dna& s, const std::filesystem::path& path, const std::string& version) {
-        const std::vector<std::uint8_t> bytes = serialise(s, version);
-        core::Status written = [&] {
-          py::gil_scoped_release released;
-          return core::write_file_atomically(path, bytes);
-        }();
-        if (!written) throw_error(written.error());
-      },
-      py::arg("path"), py::arg("version") = "2.8",
-      "Writes the file; the old one is whole until the new one is.");
-  c.def_property_readonly(
-      "unknown_layers",
-      [](const Dna& s) {
-        py::list out;
-        for (const dna::OpaqueLayer& l : s.opaque_layers) {
-          out.append(py::make_tuple(
-              to_python(std::string(l.id.begin(), l.id.end())),
-              std::to_string(l.version >> 16) + "." + std::to_string(l.version & 0xFFFF),
-              py::bytes(reinterpret_cast<const char*>(l.bytes.data()), l.bytes.size())));
-        }
-        return out;
-      },
-      "Layers kept as bytes: (id, version, bytes).");
-  c.def_property_readonly("layers", [](const Dna& s) {
-    py::list out;
-    std::size_t opaque = 0;
-    for (const std::string& id : s.index_order) {
-      if (!id.empty()) {
-        out.append(to_python(id));
-      } else if (opaque < s.opaque_layers.size()) {
-        const auto& raw = s.opaque_layers[opaque++].id;
-        out.append(to_python(std::string(raw.begin(), raw.end())));
-      }
-    }
-    return out;
-  });
-  c.def("__reduce__", [](const py::object& self) {
-    return py::make_tuple(py::module_::import("risorius").attr("load"),
-                          py::make_tuple(self.attr("to_bytes")()));
-  });
-}
-
-dna::ParseOptions parse_options(bool definition, bool behavior, bool geometry, bool blend_shapes,
-                                bool extensions, bool unknown_layers) {
-  return {definition, behavior, geometry, blend_shapes, extensions, unknown_layers};
-}
-
-std::shared_ptr<Dna> parse(core::Source& source, const dna::ParseOptions& options,
-                           const std::string& file) {
-  core::Result<Dna> result = [&] {
-    py::gil_scoped_release released;
-    return dna::parse(source, options);
-  }();
-  return std::make_shared<Dna>(unwrap(std::move(result), file));
-}
-
 }  // namespace
 
 void bind_dna(py::module_& m) {
   bind_structs(m);
   bind_meshes(m);
+  bind_dna_extensions(m);
   DnaClass c = value_class<Dna>(m, "Dna", "A whole DNA file as a value; see risorius.load.");
   bind_descriptor(c);
   bind_definition(c);
   bind_behavior_and_geometry(c);
-  bind_whole(c);
-  py::class_<dna::ParseOptions>(m, "ParseOptions")
-      .def(py::init(&parse_options), py::kw_only(), py::arg("definition"), py::arg("behavior"),
-           py::arg("geometry"), py::arg("blend_shapes"), py::arg("extensions"),
-           py::arg("unknown_layers"));
-  m.def("parse_bytes", [](const py::bytes& bytes, const dna::ParseOptions& options) {
-    const std::string_view view = bytes;
-    core::SpanSource source({reinterpret_cast<const std::uint8_t*>(view.data()), view.size()});
-    return parse(source, options, "");
-  });
-  m.def("parse_file", [](const std::filesystem::path& path, const dna::ParseOptions& options) {
-    std::unique_ptr<core::Source> source = unwrap(core::open_file(path));
-    return parse(*source, options, path.string());
-  });
+  bind_dna_extension_fields(c);
+  bind_dna_files(m, c);
 }
 
 }  // namespace risorius::bindings

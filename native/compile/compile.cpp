@@ -2,7 +2,6 @@
 #include "compile/compile.h"
 
 #include <algorithm>
-#include <cstring>
 #include <functional>
 #include <iterator>
 #include <map>
@@ -23,63 +22,27 @@ using core::Result;
 using core::Status;
 using rig::Rig;
 
-// Each LOD has its own schedule of correctives: a small file must not ask for gigabytes of them.
-constexpr std::uint32_t kMaxLods = 64;
-
-const dna::OpaqueLayer* find_opaque(const dna::Dna& dna, const char* id) {
-  for (const dna::OpaqueLayer& layer : dna.opaque_layers) {
-    if (std::memcmp(layer.id.data(), id, 4) == 0) return &layer;
-  }
-  return nullptr;
-}
-
-std::uint32_t leading_count(const dna::OpaqueLayer* layer) {
-  if (layer == nullptr || layer->bytes.size() < 4) return 0;
-  const auto& b = layer->bytes;
-  return (std::uint32_t{b[0]} << 24) | (std::uint32_t{b[1]} << 16) | (std::uint32_t{b[2]} << 8) |
-         b[3];
-}
-
-bool has_content(const dna::OpaqueLayer* layer) {
-  return layer != nullptr &&
-         std::ranges::any_of(layer->bytes, [](std::uint8_t byte) { return byte != 0; });
-}
-
-// jbmd: a count of joints, then translation, rotation and scale representation of each as u16;
-// rotation 1 is a quaternion.
 std::vector<bool> quaternion_joint_flags(const dna::Dna& dna) {
   std::vector<bool> flags(dna.definition.joint_names.size(), false);
-  const dna::OpaqueLayer* layer = find_opaque(dna, "jbmd");
-  const std::uint32_t count = leading_count(layer);
-  for (std::size_t j = 0; j < count && j < flags.size() && 4 + j * 6 + 6 <= layer->bytes.size();
-       ++j) {
-    flags[j] = layer->bytes[4 + j * 6 + 2] == 0 && layer->bytes[4 + j * 6 + 3] == 1;
+  const auto& entries = dna.joint_behavior_metadata.joint_representations;
+  for (std::size_t j = 0; j < entries.size() && j < flags.size(); ++j) {
+    flags[j] = entries[j].rotation == 1;
   }
   return flags;
 }
 
-// Controls: raw, corrective, then what networks and RBF poses write. The layers of the latter are
-// kept as bytes: their leading count of names is believed up to the index space of 16 bits, and an
-// index beyond it widens the space, because 2.4 files name no pose controls.
 void count_controls(const dna::Dna& dna, Rig& out) {
-  out.raw_count = static_cast<std::uint32_t>(dna.definition.raw_control_names.size());
-  out.control_count = out.raw_count + dna.behavior.psd_count;
-  for (const char* id : {"mlbh", "mlbe", "rbfb", "rbfe", "twsw"}) {
-    if (has_content(find_opaque(dna, id))) out.ignored_layers.emplace_back(id);
-  }
-  const std::uint32_t networks = leading_count(find_opaque(dna, "mlbh"));
-  const std::uint32_t poses = leading_count(find_opaque(dna, "rbfe"));
-  if (networks > 65535 || poses > 65535) return;
-  out.control_count += networks + poses;
-  if (!has_content(find_opaque(dna, "rbfb")) || poses > 0) return;
-  const auto widen = [&](const Array<std::uint16_t>& indices) {
-    for (const std::uint16_t i : indices) {
-      out.control_count = std::max<std::uint32_t>(out.control_count, std::uint32_t{i} + 1);
-    }
+  const dna::ControlCounts counts = dna::control_counts(dna);
+  out.raw_count = counts.raw;
+  out.control_count = counts.total();
+  const auto ignore = [&](const char* id, bool has_content) {
+    if (has_content) out.ignored_layers.emplace_back(id);
   };
-  for (const dna::JointGroup& g : dna.behavior.joint_groups) widen(g.input_indices);
-  widen(dna.behavior.blend_shape_channels.input_indices);
-  widen(dna.behavior.animated_maps.conditionals.input_indices);
+  ignore("mlbh", dna.machine_learned_behavior != dna::MachineLearnedBehavior{});
+  ignore("mlbe", dna.machine_learned_behavior_ext != dna::MachineLearnedBehaviorExt{});
+  ignore("rbfb", dna.rbf_behavior != dna::RbfBehavior{});
+  ignore("rbfe", dna.rbf_behavior_ext != dna::RbfBehaviorExt{});
+  ignore("twsw", dna.twist_swing_behavior != dna::TwistSwingBehavior{});
 }
 
 Status check_controls(const Array<std::uint16_t>& indices, std::uint32_t limit,
@@ -377,11 +340,6 @@ Result<Rig> compile(const dna::Dna& dna, const CompileOptions& options) {
                     simd::available_kernels());
   }
   out.lod_count = dna.descriptor.lod_count;
-  if (out.lod_count > kMaxLods) {
-    return fail(
-        ErrorCode::kLimitExceeded, "descriptor.lod_count",
-        std::to_string(out.lod_count) + " LODs; a rig has at most " + std::to_string(kMaxLods));
-  }
   out.raw_control_names = dna.definition.raw_control_names;
   out.gui_control_names = dna.definition.gui_control_names;
   count_controls(dna, out);

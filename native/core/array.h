@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/buffer.h"
+
 namespace risorius::core {
 
 /// An immutable array of numbers. Copies share the buffer, which lives as long as any copy, so a
@@ -18,24 +20,38 @@ template <class T>
 class Array {
  public:
   Array() = default;
-  Array(std::vector<T> values)
-      : buffer_(values.empty() ? nullptr
-                               : std::make_shared<const std::vector<T>>(std::move(values))) {}
+  Array(Buffer<T> values) : size_(values.size()), values_(values.release()) {}
+  Array(std::vector<T> values) : size_(values.size()) {
+    if (values.empty()) return;
+    auto owner = std::make_shared<const std::vector<T>>(std::move(values));
+    const T* first = owner->data();
+    values_ = std::shared_ptr<const T>(std::move(owner), first);
+  }
   Array(std::initializer_list<T> values) : Array(std::vector<T>(values)) {}
+  Array(const Array&) = default;
+  Array& operator=(const Array&) = default;
+  Array(Array&& other) noexcept
+      : size_(std::exchange(other.size_, 0)), values_(std::move(other.values_)) {}
+  Array& operator=(Array&& other) noexcept {
+    size_ = std::exchange(other.size_, 0);
+    values_ = std::move(other.values_);
+    return *this;
+  }
 
-  std::size_t size() const { return buffer_ ? buffer_->size() : 0; }
-  bool empty() const { return size() == 0; }
-  const T* data() const { return buffer_ ? buffer_->data() : nullptr; }
+  std::size_t size() const { return size_; }
+  bool empty() const { return size_ == 0; }
+  const T* data() const { return values_.get(); }
   const T* begin() const { return data(); }
-  const T* end() const { return data() + size(); }
-  const T& operator[](std::size_t i) const { return (*buffer_)[i]; }
-  std::span<const T> span() const { return {data(), size()}; }
+  const T* end() const { return data() + size_; }
+  const T& operator[](std::size_t i) const { return values_.get()[i]; }
+  std::span<const T> span() const { return {data(), size_}; }
   operator std::span<const T>() const { return span(); }
-  std::shared_ptr<const void> owner() const { return buffer_; }
+  std::shared_ptr<const void> owner() const { return values_; }
   bool operator==(const Array& other) const { return std::ranges::equal(span(), other.span()); }
 
  private:
-  std::shared_ptr<const std::vector<T>> buffer_;
+  std::size_t size_ = 0;
+  std::shared_ptr<const T> values_;
 };
 
 /// Three (or two) parallel planes of n floats in one buffer: x0..xn-1 y0..yn-1 z0..zn-1, as the

@@ -9,40 +9,57 @@ namespace risorius::core {
 
 namespace {
 
-constexpr std::size_t kWindowBytes = 64 * 1024;
+constexpr std::size_t kFirstRead = 512;
+constexpr std::size_t kWindowBytes = 64 * 1024;  // stays in the cache between kernel and swap
 
-std::uint32_t swap32(std::uint32_t v) {
+std::uint16_t big_endian(std::uint16_t v) {
+  if constexpr (std::endian::native == std::endian::big) return v;
+  return static_cast<std::uint16_t>((v >> 8) | (v << 8));
+}
+
+std::uint32_t big_endian(std::uint32_t v) {
+  if constexpr (std::endian::native == std::endian::big) return v;
   return (v >> 24) | ((v >> 8) & 0xFF00u) | ((v << 8) & 0xFF0000u) | (v << 24);
 }
 
-std::uint16_t swap16(std::uint16_t v) { return static_cast<std::uint16_t>((v >> 8) | (v << 8)); }
-
-template <class T>
-void to_native(T* values, std::size_t n) {
-  if constexpr (std::endian::native == std::endian::little) {
-    for (std::size_t i = 0; i < n; ++i) {
-      if constexpr (sizeof(T) == 2) {
-        values[i] = std::bit_cast<T>(swap16(std::bit_cast<std::uint16_t>(values[i])));
-      } else {
-        values[i] = std::bit_cast<T>(swap32(std::bit_cast<std::uint32_t>(values[i])));
-      }
-    }
+template <class Word, class T>
+void to_native(const std::uint8_t* from, T* to, std::size_t n) {
+  for (std::size_t i = 0; i < n; ++i) {
+    Word v;
+    std::memcpy(&v, from + sizeof(Word) * i, sizeof(Word));
+    v = big_endian(v);
+    std::memcpy(to + i, &v, sizeof(Word));
   }
 }
 
-template <class T>
-std::span<std::uint8_t> as_bytes(T* values, std::size_t n) {
-  return {reinterpret_cast<std::uint8_t*>(values), n * sizeof(T)};
+// As to_native. Out: bit 31 is set when an exponent is all ones (infinite or no number).
+std::uint32_t to_native_floats(const std::uint8_t* from, float* to, std::size_t n) {
+  std::uint32_t seen = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    std::uint32_t v;
+    std::memcpy(&v, from + 4 * i, 4);
+    v = big_endian(v);
+    std::memcpy(to + i, &v, 4);
+    seen |= (v & 0x7FFFFFFFu) + 0x00800000u;
+  }
+  return seen;
 }
 
 }  // namespace
 
-ByteReader::ByteReader(Source& source) : source_(&source), end_(source.size()) {}
+ByteReader::ByteReader(Source& source) : source_(&source), end_(source.size()) {
+  const std::span<const std::uint8_t> view = source.view();
+  if (view.size() == end_) {
+    first_ = at_ = view.data();
+    loaded_ = first_ + view.size();
+  }
+  bound();
+}
 
 std::string ByteReader::where() const {
   std::string text;
   for (const PathPart& part : path_) {
-    if (!text.empty()) text += '.';
+    if (!text.empty() && *part.name != '\0') text += '.';
     text += part.name;
     if (part.index >= 0) text += "[" + std::to_string(part.index) + "]";
   }
@@ -50,7 +67,31 @@ std::string ByteReader::where() const {
 }
 
 void ByteReader::fail_at(std::uint64_t offset, ErrorCode code, std::string message) {
-  if (!error_) error_ = Error{code, offset, where(), std::move(message)};
+  if (error_) return;
+  error_ = Error{code, offset, where(), std::move(message)};
+  bound();
+}
+
+void ByteReader::clear_error() {
+  error_.reset();
+  bound();
+}
+
+// Nothing is ready after a failure: the quick ways need not ask for it.
+void ByteReader::bound() {
+  const auto loaded = static_cast<std::uint64_t>(loaded_ - at_);
+  ready_ = failed() ? at_ : at_ + std::min(loaded, left());
+}
+
+void ByteReader::move_to(std::uint64_t offset) {
+  const auto loaded = static_cast<std::uint64_t>(loaded_ - first_);
+  if (offset >= window_begin_ && offset - window_begin_ <= loaded) {
+    at_ = first_ + (offset - window_begin_);
+    return;
+  }
+  window_begin_ = offset;
+  at_ = loaded_ = first_;
+  next_read_ = 0;
 }
 
 bool ByteReader::enter(std::uint64_t offset, std::uint64_t size) {
@@ -61,71 +102,62 @@ bool ByteReader::enter(std::uint64_t offset, std::uint64_t size) {
                 std::to_string(size) + " bytes were announced from byte " + std::to_string(offset));
     return false;
   }
-  position_ = offset;
+  move_to(offset);
   end_ = offset + size;
+  bound();
   return true;
 }
 
-bool ByteReader::fill(std::span<std::uint8_t> out) {
+bool ByteReader::check_left(std::uint64_t bytes) {
   if (failed()) return false;
-  if (out.size() > left()) {
-    fail_at(position_, ErrorCode::kTruncated,
-            std::to_string(out.size()) + " more bytes were expected, only " +
-                std::to_string(left()) + " are left");
-    return false;
-  }
-  // Short lists come by the ten thousand (skin weights): they go through the window.
-  if (out.size() <= kWindowBytes / 16) {
-    if (!load_window(out.size())) return false;
-    if (!out.empty()) {
-      std::memcpy(out.data(), window_.data() + (position_ - window_begin_), out.size());
-    }
-  } else if (source_->read(position_, out) != out.size()) {
-    fail_at(position_, ErrorCode::kIoRead, "the file became shorter while it was read");
-    return false;
-  }
-  position_ += out.size();
-  return true;
-}
-
-bool ByteReader::load_window(std::size_t n) {
-  if (position_ >= window_begin_ && position_ + n <= window_begin_ + window_size_) return true;
-  window_.resize(kWindowBytes);
-  window_begin_ = position_;
-  window_size_ = source_->read(position_, window_);
-  if (window_size_ >= n) return true;
-  fail_at(position_, ErrorCode::kIoRead, "the file became shorter while it was read");
+  if (bytes <= left()) return true;
+  fail_at(position(), ErrorCode::kTruncated,
+          std::to_string(bytes) + " more bytes were expected, only " + std::to_string(left()) +
+              " are left");
   return false;
 }
 
-const std::uint8_t* ByteReader::small(std::size_t n) {
-  if (failed() || left() < n || !load_window(n)) {
-    if (!failed()) fill({small_, n});  // says what is missing
-    std::memset(small_, 0, sizeof(small_));
-    return small_;
+bool ByteReader::need(std::size_t n) { return check_left(n) && refill(n, n); }
+
+// Out: n bytes are ready, of `wanted` in sequence as many as the window holds. In: wanted <=
+// left().
+bool ByteReader::refill(std::size_t n, std::uint64_t wanted) {
+  if (window_.size() == 0) window_.resize(kWindowBytes);
+  const auto rest = static_cast<std::size_t>(loaded_ - at_);  // a few bytes of a cut number
+  const std::uint64_t begin = position(), most = left();
+  if (rest > 0) std::memmove(window_.data(), at_, rest);
+  next_read_ = std::clamp(2 * next_read_, kFirstRead, kWindowBytes);
+  const std::uint64_t size =
+      std::min({std::max<std::uint64_t>(next_read_, wanted), std::uint64_t{kWindowBytes}, most});
+  const std::size_t got =
+      source_->read(begin + rest, {window_.data() + rest, static_cast<std::size_t>(size) - rest});
+  window_begin_ = begin;
+  first_ = at_ = window_.data();
+  loaded_ = first_ + rest + got;
+  bound();
+  if (rest + got >= n) return true;
+  fail_at(begin, ErrorCode::kIoRead, "the file became shorter while it was read");
+  return false;
+}
+
+template <std::size_t kSize, class Take>
+bool ByteReader::for_runs(std::size_t n, const Take& take) {
+  if (!check_left(std::uint64_t{n} * kSize)) return false;
+  while (n > 0) {
+    const std::size_t run = std::min(n, static_cast<std::size_t>(ready_ - at_) / kSize);
+    if (run == 0) {
+      if (!refill(kSize, std::uint64_t{n} * kSize)) return false;
+      continue;
+    }
+    take(at_, run);
+    at_ += run * kSize;
+    n -= run;
   }
-  const std::uint8_t* at = window_.data() + (position_ - window_begin_);
-  position_ += n;
-  return at;
+  return true;
 }
 
-std::uint8_t ByteReader::u8() { return small(1)[0]; }
-
-std::uint16_t ByteReader::u16() {
-  const std::uint8_t* b = small(2);
-  return static_cast<std::uint16_t>((b[0] << 8) | b[1]);
-}
-
-std::uint32_t ByteReader::u32() {
-  const std::uint8_t* b = small(4);
-  return (std::uint32_t{b[0]} << 24) | (std::uint32_t{b[1]} << 16) | (std::uint32_t{b[2]} << 8) |
-         b[3];
-}
-
-float ByteReader::f32() { return std::bit_cast<float>(u32()); }
-
-std::uint32_t ByteReader::count(std::uint32_t element_size) {
-  const std::uint64_t at = position_;
+std::uint32_t ByteReader::count_slowly(std::uint32_t element_size) {
+  const std::uint64_t at = position();
   const std::uint32_t n = u32();
   if (failed()) return 0;
   if (std::uint64_t{n} * element_size > left()) {
@@ -135,59 +167,109 @@ std::uint32_t ByteReader::count(std::uint32_t element_size) {
                 std::to_string(left()) + " are left");
     return 0;
   }
+  if (n > max_count_) {
+    fail_at(at, ErrorCode::kLimitExceeded,
+            "a count of " + std::to_string(n) + ", the limit is " + std::to_string(max_count_));
+    return 0;
+  }
   return n;
 }
 
 std::string ByteReader::str() {
   std::string text(count(1), '\0');
-  fill(as_bytes(text.data(), text.size()));
+  char* out = text.data();
+  for_runs<1>(text.size(), [&](const std::uint8_t* from, std::size_t n) {
+    std::memcpy(out, from, n);
+    out += n;
+  });
   return text;
 }
 
 std::vector<std::uint8_t> ByteReader::bytes(std::uint64_t size) {
   if (size > left()) {
-    fail_at(position_, ErrorCode::kTruncated,
+    fail_at(position(), ErrorCode::kTruncated,
             std::to_string(size) + " bytes were expected, only " + std::to_string(left()) +
                 " are left");
     return {};
   }
-  std::vector<std::uint8_t> out(static_cast<std::size_t>(size));
-  if (!fill(out)) return {};
-  return out;
+  std::vector<std::uint8_t> all;
+  all.reserve(static_cast<std::size_t>(size));
+  const bool read = for_runs<1>(
+      static_cast<std::size_t>(size),
+      [&](const std::uint8_t* from, std::size_t n) { all.insert(all.end(), from, from + n); });
+  if (!read) return {};
+  return all;
 }
 
 void ByteReader::skip(std::uint64_t size) {
   if (failed()) return;
   if (size > left()) {
-    fail_at(position_, ErrorCode::kTruncated, "a part that is skipped ends beyond the file");
+    fail_at(position(), ErrorCode::kTruncated, "a part that is skipped ends beyond the file");
     return;
   }
-  position_ += size;
+  move_to(position() + size);
+  bound();
 }
 
-void ByteReader::read_f32(float* out, std::size_t n) {
-  if (fill(as_bytes(out, n))) to_native(out, n);
+void ByteReader::read_f32(float* out, std::size_t n, bool* all_finite) {
+  std::uint32_t seen = 0;
+  for_runs<4>(n, [&](const std::uint8_t* from, std::size_t run) {
+    seen |= to_native_floats(from, out, run);
+    out += run;
+  });
+  if (all_finite != nullptr && (seen >> 31) != 0) *all_finite = false;
 }
 void ByteReader::read_u16(std::uint16_t* out, std::size_t n) {
-  if (fill(as_bytes(out, n))) to_native(out, n);
+  for_runs<2>(n, [&](const std::uint8_t* from, std::size_t run) {
+    to_native<std::uint16_t>(from, out, run);
+    out += run;
+  });
 }
 void ByteReader::read_u32(std::uint32_t* out, std::size_t n) {
-  if (fill(as_bytes(out, n))) to_native(out, n);
+  for_runs<4>(n, [&](const std::uint8_t* from, std::size_t run) {
+    to_native<std::uint32_t>(from, out, run);
+    out += run;
+  });
 }
 
-Array<float> ByteReader::f32_list() {
-  std::vector<float> values(count(4));
-  read_f32(values.data(), values.size());
+std::uint32_t ByteReader::append_f32_list(Buffer<float>& to, bool* all_finite) {
+  const std::uint32_t n = count(4);
+  const std::size_t begin = to.size();
+  to.resize(begin + n);
+  read_f32(to.data() + begin, n, all_finite);
+  return failed() ? 0 : n;
+}
+std::uint32_t ByteReader::append_u16_list(Buffer<std::uint16_t>& to) {
+  const std::uint32_t n = count(2);
+  const std::size_t begin = to.size();
+  to.resize(begin + n);
+  read_u16(to.data() + begin, n);
+  return failed() ? 0 : n;
+}
+std::uint32_t ByteReader::append_u32_list(Buffer<std::uint32_t>& to) {
+  const std::uint32_t n = count(4);
+  const std::size_t begin = to.size();
+  to.resize(begin + n);
+  read_u32(to.data() + begin, n);
+  return failed() ? 0 : n;
+}
+
+Array<float> ByteReader::f32_list(bool* all_finite) {
+  Buffer<float> values;
+  append_f32_list(values, all_finite);
+  if (failed()) return {};
   return values;
 }
 Array<std::uint16_t> ByteReader::u16_list() {
-  std::vector<std::uint16_t> values(count(2));
-  read_u16(values.data(), values.size());
+  Buffer<std::uint16_t> values;
+  append_u16_list(values);
+  if (failed()) return {};
   return values;
 }
 Array<std::uint32_t> ByteReader::u32_list() {
-  std::vector<std::uint32_t> values(count(4));
-  read_u32(values.data(), values.size());
+  Buffer<std::uint32_t> values;
+  append_u32_list(values);
+  if (failed()) return {};
   return values;
 }
 

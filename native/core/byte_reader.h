@@ -3,6 +3,7 @@
 // through fail() here, so that it has an offset and a field.
 #pragma once
 
+#include <bit>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -10,42 +11,69 @@
 #include <vector>
 
 #include "core/array.h"
+#include "core/buffer.h"
 #include "core/source.h"
 
 namespace risorius::core {
 
 /// Reads numbers one after the other. After the first failure every read gives zero or an empty
 /// list and error() stays as it was: a parser checks once per struct, not once per number.
+/// A file is read through a window that never reaches beyond end() and begins small after a jump,
+/// so that what is skipped is not read; of memory nothing is copied but into the lists.
 class ByteReader {
  public:
   /// end   reading stops here (the file's size or a layer's end)
   explicit ByteReader(Source& source);
 
-  std::uint64_t position() const { return position_; }
+  ByteReader(const ByteReader&) = delete;
+  ByteReader& operator=(const ByteReader&) = delete;
+
+  std::uint64_t position() const {
+    return window_begin_ + static_cast<std::uint64_t>(at_ - first_);
+  }
   std::uint64_t end() const { return end_; }
-  std::uint64_t left() const { return end_ > position_ ? end_ - position_ : 0; }
+  std::uint64_t left() const { return end_ > position() ? end_ - position() : 0; }
   bool failed() const { return error_.has_value(); }
   const Error& error() const { return *error_; }
   Unexpected take_error() { return Unexpected{*error_}; }
+  /// After this, enter() reads on somewhere else.
+  void clear_error();
+  /// No list may have more elements, whatever the bytes would allow.
+  void set_max_count(std::uint32_t n) { max_count_ = n; }
   void fail_at(std::uint64_t offset, ErrorCode code, std::string message);
 
   /// Restricts reading to [offset, offset + size). Fails when that is outside the source.
   bool enter(std::uint64_t offset, std::uint64_t size);
 
-  std::uint8_t u8();
-  std::uint16_t u16();
-  std::uint32_t u32();
-  float f32();
+  std::uint8_t u8() { return number<std::uint8_t>(); }
+  std::uint16_t u16() { return number<std::uint16_t>(); }
+  std::uint32_t u32() { return number<std::uint32_t>(); }
+  float f32() { return std::bit_cast<float>(u32()); }
   /// A count is believed only if count * element_size bytes are left.
-  std::uint32_t count(std::uint32_t element_size);
+  std::uint32_t count(std::uint32_t element_size) {
+    if (ready_ - at_ >= 4) {
+      const std::uint32_t n = load<std::uint32_t>(at_);
+      if (n <= max_count_ && std::uint64_t{n} * element_size <= left() - 4) {
+        at_ += 4;
+        return n;
+      }
+    }
+    return count_slowly(element_size);
+  }
   std::string str();
   std::vector<std::uint8_t> bytes(std::uint64_t size);
   void skip(std::uint64_t size);
-  Array<float> f32_list();
+  /// all_finite   becomes false when a value is infinite or no number; is never made true
+  Array<float> f32_list(bool* all_finite = nullptr);
   Array<std::uint16_t> u16_list();
   Array<std::uint32_t> u32_list();
-  /// Reads n values without a count, straight into out. In: n already checked by count().
-  void read_f32(float* out, std::size_t n);
+  /// A list, count and values, behind what `to` has. Out: its count; 0 after a failure.
+  std::uint32_t append_f32_list(Buffer<float>& to, bool* all_finite = nullptr);
+  std::uint32_t append_u16_list(Buffer<std::uint16_t>& to);
+  std::uint32_t append_u32_list(Buffer<std::uint32_t>& to);
+  /// Reads n values without a count, straight into out. In: n already checked by count(). What is
+  /// in out after a failure is not defined.
+  void read_f32(float* out, std::size_t n, bool* all_finite = nullptr);
   void read_u16(std::uint16_t* out, std::size_t n);
   void read_u32(std::uint32_t* out, std::size_t n);
 
@@ -58,19 +86,45 @@ class ByteReader {
     const char* name;
     std::int64_t index;
   };
-  bool fill(std::span<std::uint8_t> out);
-  bool load_window(std::size_t n);
-  const std::uint8_t* small(std::size_t n);
+  template <class T>
+  static T load(const std::uint8_t* bytes) {
+    T v = 0;
+    for (std::size_t i = 0; i < sizeof(T); ++i) {
+      v = static_cast<T>(v | static_cast<T>(bytes[i]) << (8 * (sizeof(T) - 1 - i)));
+    }
+    return v;
+  }
+  template <class T>
+  T number() {
+    if (ready_ - at_ < static_cast<std::ptrdiff_t>(sizeof(T)) && !need(sizeof(T))) return 0;
+    const T v = load<T>(at_);
+    at_ += sizeof(T);
+    return v;
+  }
+  std::uint32_t count_slowly(std::uint32_t element_size);
+  /// take(at, n) gets every value once, in runs as long as the window has.
+  template <std::size_t kSize, class Take>
+  bool for_runs(std::size_t n, const Take& take);
+  bool check_left(std::uint64_t bytes);
+  bool need(std::size_t n);
+  bool refill(std::size_t n, std::uint64_t wanted);
+  void move_to(std::uint64_t offset);
+  void bound();
 
   Source* source_;
-  std::uint64_t position_ = 0;
   std::uint64_t end_ = 0;
-  std::vector<std::uint8_t> window_;
+  std::uint32_t max_count_ = 0xFFFFFFFF;
+  // [first_, loaded_) are the bytes from window_begin_ on: the window's, or all of a source in
+  // memory. [at_, ready_) of them may be read: they are inside the region, and nothing failed.
   std::uint64_t window_begin_ = 0;
-  std::size_t window_size_ = 0;
+  const std::uint8_t* first_ = nullptr;
+  const std::uint8_t* at_ = nullptr;
+  const std::uint8_t* ready_ = nullptr;
+  const std::uint8_t* loaded_ = nullptr;
+  Buffer<std::uint8_t> window_;
+  std::size_t next_read_ = 0;
   std::vector<PathPart> path_;
   std::optional<Error> error_;
-  std::uint8_t small_[8] = {};
 };
 
 /// Names the field while it is in scope: Field f(reader, "joint_groups", i);

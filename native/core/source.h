@@ -17,6 +17,8 @@ class Source {
   virtual std::uint64_t size() const = 0;
   /// Reads up to out.size() bytes at offset. Out: how many there were (fewer only at the end).
   virtual std::size_t read(std::uint64_t offset, std::span<std::uint8_t> out) = 0;
+  /// All the bytes, when they are in memory anyway and stay there; else nothing.
+  virtual std::span<const std::uint8_t> view() const { return {}; }
 };
 
 /// Reads from memory that outlives the source.
@@ -25,6 +27,7 @@ class SpanSource final : public Source {
   explicit SpanSource(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
   std::uint64_t size() const override { return bytes_.size(); }
   std::size_t read(std::uint64_t offset, std::span<std::uint8_t> out) override;
+  std::span<const std::uint8_t> view() const override { return bytes_; }
 
  private:
   std::span<const std::uint8_t> bytes_;

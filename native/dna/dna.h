@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -138,20 +139,153 @@ struct Geometry {
   bool operator==(const Geometry&) const = default;
 };
 
-/// A layer that is kept as bytes, at its place in the file's index.
-struct OpaqueLayer {
+/// One layer of a network: y = activation(W x + b).
+struct NeuralNetworkLayer {
+  Array<float> biases;                    // [outputs]
+  Array<float> weights;                   // [outputs, inputs], row-major
+  std::uint16_t activation_function = 0;  // 0 linear 1 relu 2 leakyrelu 3 tanh 4 sigmoid
+  Array<float> activation_parameters;     // leakyrelu: its slope below 0
+  bool operator==(const NeuralNetworkLayer&) const = default;
+};
+
+struct NeuralNetwork {
+  Array<std::uint16_t> output_indices, input_indices;  // control indices
+  List<NeuralNetworkLayer> layers;
+  bool operator==(const NeuralNetwork&) const = default;
+};
+
+/// Layer mlbh: controls that networks write.
+struct MachineLearnedBehavior {
+  std::vector<std::string> ml_control_names;
+  LodMapping lod_neural_network_mapping;
+  std::vector<std::vector<std::string>> region_names;                     // [mesh][region]
+  std::vector<std::vector<Array<std::uint16_t>>> region_network_indices;  // [mesh][region]
+  List<NeuralNetwork> neural_networks;
+  bool operator==(const MachineLearnedBehavior&) const = default;
+};
+
+/// A node of the graph of layer mlbe. parameters: gather and scatter = control indices; MLP = the
+/// network's number, then optionally rows per layer and LOD (layer-major); weighted sum = the
+/// number of outputs, then one float's bits per dependency.
+struct MlOperation {
+  Array<std::uint32_t> parameters;
+  Array<std::uint16_t> operation_set_dependency_indices, operation_dependency_indices;
+  std::uint16_t operation_type = 0;  // 0 unspecified 1 gather 2 scatter 3 MLP 4 weighted sum
+  bool operator==(const MlOperation&) const = default;
+};
+
+struct MlType {
+  std::vector<LodMapping> lod_operation_mappings;  // [operation set]
+  List<List<MlOperation>> operations;              // [operation set][operation]
+  bool operator==(const MlType&) const = default;
+};
+
+/// Joints that networks move: output = joint * stride + attribute, stride 9 or, with quaternions,
+/// 10. Keys: 0 translation 1 rotation (0 Euler 1 quaternion) 2 scale type, 3 4 5 axes, 6 7 8
+/// rotation signs, 9 rotation sequence.
+struct MlJoints {
+  Array<std::uint16_t> parameter_keys, parameter_values, input_indices, output_indices;
+  bool operator==(const MlJoints&) const = default;
+};
+
+/// Layer mlbe.
+struct MachineLearnedBehaviorExt {
+  List<MlType> types;
+  MlJoints joints;
+  bool operator==(const MachineLearnedBehaviorExt&) const = default;
+};
+
+struct RbfSolver {
+  std::string name;
+  Array<std::uint16_t> raw_control_indices, pose_indices;
+  Array<float> raw_control_values;  // [poses, raw controls]: each pose's target
+  float radius = 0.0f;              // file's rotation unit
+  float weight_threshold = 0.0f;
+  std::uint16_t solver_type = 0;       // 0 additive 1 interpolative
+  std::uint16_t automatic_radius = 0;  // 0 on 1 off
+  std::uint16_t distance_method = 0;   // 0 euclidean 1 quaternion 2 swing angle 3 twist angle
+  std::uint16_t normalize_method = 0;  // 0 only above one 1 always
+  std::uint16_t function_type = 0;     // 0 gaussian 1 exponential 2 linear 3 cubic 4 quintic
+  std::uint16_t twist_axis = 0;        // 0 x 1 y 2 z
+  bool operator==(const RbfSolver&) const = default;
+};
+
+struct RbfPose {
+  std::string name;
+  float scale = 0.0f;
+  bool operator==(const RbfPose&) const = default;
+};
+
+/// Layer rbfb.
+struct RbfBehavior {
+  LodMapping lod_solver_mapping;
+  List<RbfSolver> solvers;
+  List<RbfPose> poses;
+  bool operator==(const RbfBehavior&) const = default;
+};
+
+/// What a pose of layer rbfb writes: weights times its value times the input controls.
+struct RbfPoseControls {
+  Array<std::uint16_t> input_control_indices, output_control_indices;
+  Array<float> output_control_weights;
+  bool operator==(const RbfPoseControls&) const = default;
+};
+
+/// Layer rbfe.
+struct RbfBehaviorExt {
+  std::vector<std::string> pose_control_names;
+  List<RbfPoseControls> poses;
+  bool operator==(const RbfBehaviorExt&) const = default;
+};
+
+struct JointRepresentation {
+  std::uint16_t translation = 0;  // 0 vector
+  std::uint16_t rotation = 0;     // 0 Euler angles 1 quaternion
+  std::uint16_t scale = 0;        // 0 vector
+  bool operator==(const JointRepresentation&) const = default;
+};
+
+/// Layer jbmd: one entry per joint.
+struct JointBehaviorMetadata {
+  List<JointRepresentation> joint_representations;
+  bool operator==(const JointBehaviorMetadata&) const = default;
+};
+
+/// A twist or swing setup: spreads the rotation of four controls (x y z w) over joints.
+struct TwistSwingSetup {
+  Array<float> blend_weights;  // one per output joint
+  Array<std::uint16_t> output_joint_indices, input_control_indices;
+  std::uint16_t twist_axis = 0;  // 0 x 1 y 2 z
+  bool operator==(const TwistSwingSetup&) const = default;
+};
+
+/// Layer twsw.
+struct TwistSwingBehavior {
+  List<TwistSwingSetup> twists, swings;
+  bool operator==(const TwistSwingBehavior&) const = default;
+};
+
+/// A layer that this version does not know, kept as bytes at its place in the file's index.
+struct UnknownLayer {
   std::array<char, 4> id{};
   std::uint32_t version = 0;  // major << 16 | minor
-  std::uint32_t index_position = 0;
   std::vector<std::uint8_t> bytes;
-  bool operator==(const OpaqueLayer&) const = default;
+  bool operator==(const UnknownLayer&) const = default;
 };
 
 /// Something odd that could be read safely.
 struct Warning {
   std::string where;
   std::string message;
+  std::optional<std::uint64_t> offset = std::nullopt;  // byte offset in the file, where it is known
   bool operator==(const Warning&) const = default;
+};
+
+/// How many controls the layers name that were not loaded: they keep their places in the control
+/// space raw | corrective | network | RBF pose.
+struct UnreadControls {
+  std::uint32_t psd = 0, ml = 0, rbf_pose = 0;
+  bool operator==(const UnreadControls&) const = default;
 };
 
 struct Dna {
@@ -161,9 +295,29 @@ struct Dna {
   Definition definition;
   Behavior behavior;
   Geometry geometry;
-  std::vector<OpaqueLayer> opaque_layers;
-  std::vector<std::string> index_order;  // ids as the file listed them, for a rewrite in that order
+  MachineLearnedBehavior machine_learned_behavior;
+  MachineLearnedBehaviorExt machine_learned_behavior_ext;
+  RbfBehavior rbf_behavior;
+  RbfBehaviorExt rbf_behavior_ext;
+  JointBehaviorMetadata joint_behavior_metadata;
+  TwistSwingBehavior twist_swing_behavior;
+  UnreadControls unread_controls;
+  std::vector<UnknownLayer> unknown_layers;
+  /// Ids as the file listed them, for a rewrite in that order; "" is the next unknown layer's
+  /// place.
+  std::vector<std::string> index_order;
   std::vector<Warning> warnings;
 };
+
+/// Sizes of the four parts of the control space, in its order. The poses of a 2.4 file, which has
+/// no layer rbfe, are controls of their own.
+struct ControlCounts {
+  std::uint32_t raw = 0, psd = 0, ml = 0, rbf_pose = 0;
+  std::uint32_t total() const { return raw + psd + ml + rbf_pose; }
+};
+ControlCounts control_counts(const Dna& dna);
+
+/// Attributes per joint in the output indices of MlJoints: 9, or 10 with quaternions.
+std::uint16_t ml_joint_stride(const MlJoints& joints);
 
 }  // namespace risorius::dna

@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <cstring>
 
+#include "dna/dna.h"
+
 namespace risorius::dna::detail {
 
 using LayerId = std::array<char, 4>;
@@ -13,36 +15,38 @@ using LayerId = std::array<char, 4>;
 struct KnownLayer {
   char id[5];
   std::uint32_t version;      // major << 16 | minor
-  bool typed;                 // has a struct in Dna; the others are kept as bytes
-  std::uint32_t empty_size;   // bytes of an empty layer, all zero, when it is kept as bytes
   std::uint16_t since_minor;  // first file version 2.<minor> that has it
 };
 
 inline constexpr KnownLayer kLayers[] = {
-    {"desc", 0x10001, true, 0, 2},   {"defn", 0x10001, true, 0, 2},
-    {"bhvr", 0x10001, true, 0, 2},   {"geom", 0x10001, true, 0, 2},
-    {"mlbh", 0x10000, false, 24, 3}, {"rbfb", 0x10000, false, 16, 4},
-    {"rbfe", 0x10000, false, 8, 5},  {"jbmd", 0x10000, false, 4, 4},
-    {"twsw", 0x10000, false, 8, 4},  {"mlbe", 0x10000, false, 20, 6},
-    {"dsce", 0x10000, true, 0, 7},
+    {"desc", 0x10001, 2}, {"defn", 0x10001, 2}, {"bhvr", 0x10001, 2}, {"geom", 0x10001, 2},
+    {"mlbh", 0x10000, 3}, {"rbfb", 0x10000, 4}, {"rbfe", 0x10000, 5}, {"jbmd", 0x10000, 4},
+    {"twsw", 0x10000, 4}, {"mlbe", 0x10000, 6}, {"dsce", 0x10000, 7},
 };
 
-inline const KnownLayer* find_layer(const LayerId& id) {
+/// A layer is known by the exact pair of id and version.
+inline const KnownLayer* find_layer(const LayerId& id, std::uint32_t version) {
   for (const KnownLayer& layer : kLayers) {
-    if (std::memcmp(layer.id, id.data(), 4) == 0) return &layer;
+    if (std::memcmp(layer.id, id.data(), 4) == 0 && layer.version == version) return &layer;
   }
   return nullptr;
 }
 
-/// A layer is known by the exact pair of id and version.
-inline bool is_known(const LayerId& id, std::uint32_t version) {
-  const KnownLayer* layer = find_layer(id);
-  return layer != nullptr && layer->version == version;
-}
-
-inline bool is_typed(const LayerId& id) {
-  const KnownLayer* layer = find_layer(id);
-  return layer != nullptr && layer->typed;
+/// Calls f(id, field name, struct) for each layer that has a struct in Dna, in the table's order.
+/// dsce comes last: its bytes depend on the file's version.
+template <class D, class F>
+void for_each_layer(D& dna, F f) {
+  f("desc", "descriptor", dna.descriptor);
+  f("defn", "definition", dna.definition);
+  f("bhvr", "behavior", dna.behavior);
+  f("geom", "geometry", dna.geometry);
+  f("mlbh", "machine_learned_behavior", dna.machine_learned_behavior);
+  f("rbfb", "rbf_behavior", dna.rbf_behavior);
+  f("rbfe", "rbf_behavior_ext", dna.rbf_behavior_ext);
+  f("jbmd", "joint_behavior_metadata", dna.joint_behavior_metadata);
+  f("twsw", "twist_swing_behavior", dna.twist_swing_behavior);
+  f("mlbe", "machine_learned_behavior_ext", dna.machine_learned_behavior_ext);
+  f("dsce", "descriptor_ext", dna.descriptor_ext);
 }
 
 }  // namespace risorius::dna::detail

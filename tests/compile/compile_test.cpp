@@ -79,7 +79,7 @@ const std::vector<Damage> kDamages{
      "behavior.animated_maps.lods"},
     {"NeutralLength", [](auto& d) { d.definition.neutral_joint_rotations.values = {0, 0, 0}; },
      ErrorCode::kInvalidLength, "definition.neutral_joint_rotations"},
-    {"LodCount", [](auto& d) { d.descriptor.lod_count = 65535; }, ErrorCode::kLimitExceeded,
+    {"LodCount", [](auto& d) { d.descriptor.lod_count = 65535; }, ErrorCode::kInvalidValue,
      "descriptor.lod_count"},
     {"Parent", [](auto& d) { d.definition.joint_parents = {0, 2}; }, ErrorCode::kInvalidIndex,
      "definition.joint_parents[1]"},
@@ -100,33 +100,30 @@ TEST_P(CompileDamaged, IsAnErrorWithTheField) {
 INSTANTIATE_TEST_SUITE_P(Every, CompileDamaged, testing::ValuesIn(kDamages),
                          [](const auto& about) { return std::string(about.param.name); });
 
-dna::OpaqueLayer make_layer(const char* id, std::vector<std::uint8_t> bytes) {
-  dna::OpaqueLayer layer;
-  for (std::size_t i = 0; i < 4; ++i) layer.id[i] = id[i];
-  layer.bytes = std::move(bytes);
-  return layer;
-}
-
 TEST(Compile, NamesTheLayersThatAreNotEvaluated) {
   dna::Dna dna = good_face();
-  dna.opaque_layers = {make_layer("mlbh", std::vector<std::uint8_t>(24, 0)),
-                       make_layer("twsw", {0, 0, 0, 1, 0, 0, 0, 0})};
+  dna::TwistSwingSetup setup;
+  setup.output_joint_indices = {0};
+  setup.blend_weights = {1.0f};
+  setup.input_control_indices = {0, 0, 0, 0};
+  dna.twist_swing_behavior.twists = std::vector{setup};
   EXPECT_EQ(must_compile(dna).ignored_layers, std::vector<std::string>{"twsw"});
 }
 
 TEST(Compile, ControlsOfNetworksAndPosesFollowTheCorrectives) {
   dna::Dna dna = good_face();
-  dna.opaque_layers = {make_layer("mlbh", {0, 0, 0, 2}), make_layer("rbfe", {0, 0, 0, 3})};
+  dna.machine_learned_behavior.ml_control_names = {"m0", "m1"};
+  dna.rbf_behavior_ext.pose_control_names = {"p0", "p1", "p2"};
   dna.behavior.joint_groups[0].input_indices = {0, 7};
   const rig::Rig rig = must_compile(dna);
   EXPECT_EQ(rig.control_count, 2u + 1u + 2u + 3u);
   EXPECT_EQ(evaluate_once(rig, {1.0f, 1.0f}).controls[7], 0.0f);
 }
 
-TEST(Compile, AbsurdCountInAKeptLayerDoesNotWidenTheControls) {
+TEST(Compile, ControlsOfLayersThatWereNotLoadedKeepTheirPlaces) {
   dna::Dna dna = good_face();
-  dna.opaque_layers = {make_layer("mlbh", {255, 255, 255, 255}), make_layer("rbfe", {1})};
-  EXPECT_EQ(must_compile(dna).control_count, 3u);
+  dna.unread_controls = {0, 2, 3};
+  EXPECT_EQ(must_compile(dna).control_count, 8u);
 }
 
 TEST(Compile, RigKeepsNothingOfTheDna) {

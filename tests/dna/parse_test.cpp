@@ -19,8 +19,8 @@ core::Result<Dna> parse_bytes(const Bytes& bytes, const ParseOptions& options = 
 }
 
 Bytes write_bytes(const Dna& dna, std::uint16_t minor = 8) {
-  std::vector<std::string> dropped;
-  core::Result<Bytes> bytes = write(dna, minor, dropped);
+  std::vector<Warning> warnings;
+  core::Result<Bytes> bytes = write(dna, {minor, true}, warnings);
   EXPECT_TRUE(bytes.has_value());
   return bytes ? *bytes : Bytes{};
 }
@@ -57,7 +57,8 @@ TEST(DnaParse, ReadsADescriptorWorkedOutByHand) {
   EXPECT_EQ(d.max_lod, 1);
   EXPECT_EQ(d.db_name, "d");
   ASSERT_EQ(dna->warnings.size(), 1u);  // the byte too many
-  EXPECT_EQ(dna->warnings[0].where, "desc");
+  EXPECT_EQ(dna->warnings[0].where, "descriptor");
+  EXPECT_EQ(dna->warnings[0].offset, 77u);
 }
 
 TEST(DnaWrite, PutsTheDescriptorWhereAHandWould) {
@@ -85,7 +86,7 @@ TEST(DnaParse, PlacesErrorsInTheFileAndTheFormat) {
   core::Result<Dna> dna = parse_bytes(bytes);
   ASSERT_FALSE(dna.has_value());
   EXPECT_EQ(dna.error().code, core::ErrorCode::kInvalidCount);
-  EXPECT_EQ(dna.error().where, "descriptor");
+  EXPECT_EQ(dna.error().where, "descriptor.metadata");
   EXPECT_EQ(dna.error().offset, 39u);
 }
 
@@ -114,11 +115,11 @@ TEST(DnaParse, KeepsUnknownLayersInTheirPlace) {
   bytes[11] = 'x';  // an id that nobody knows
   core::Result<Dna> dna = parse_bytes(bytes);
   ASSERT_TRUE(dna.has_value());
-  ASSERT_EQ(dna->opaque_layers.size(), 1u);
-  EXPECT_EQ(dna->opaque_layers[0].bytes.size(), 51u);
+  ASSERT_EQ(dna->unknown_layers.size(), 1u);
+  EXPECT_EQ(dna->unknown_layers[0].bytes.size(), 51u);
   ParseOptions options;
   options.unknown_layers = false;
-  EXPECT_TRUE(parse_bytes(bytes, options)->opaque_layers.empty());
+  EXPECT_TRUE(parse_bytes(bytes, options)->unknown_layers.empty());
 }
 
 TEST(DnaValidate, FindsACycleOfAnyLength) {

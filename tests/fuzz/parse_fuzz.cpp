@@ -20,13 +20,13 @@ void demand(bool holds, const char* what) {
 }
 
 void check_round_trip(const risorius::dna::Dna& dna) {
-  std::vector<std::string> dropped;
-  auto first = risorius::dna::write(dna, 8, dropped);
+  std::vector<risorius::dna::Warning> warnings;
+  auto first = risorius::dna::write(dna, {}, warnings);
   if (!first) return;  // a list that is too long for the format
   risorius::core::SpanSource source(*first);
   auto again = risorius::dna::parse(source);
   demand(static_cast<bool>(again), "what was written can be read");
-  auto second = risorius::dna::write(*again, 8, dropped);
+  auto second = risorius::dna::write(*again, {}, warnings);
   demand(second && *second == *first, "what was read is written as it was");
 }
 

@@ -107,8 +107,7 @@ def quaternion_rotations(dna, group, rows, inputs, joints, bounds):
     The bound: float32 products of n unit quaternions err by some 8 (n + 2) eps, the reference's
     arc sine by 1e-6; the cosine of the middle angle magnifies both.
     """
-    layers = {name: data for name, _, data in dna.unknown_layers}
-    flags = np.frombuffer(layers.get("jbmd", b"")[4:], ">u2").reshape(-1, 3)[:, 1]
+    flags = dna.joint_behavior_metadata.joint_representations[:, 1]
     matrix = np.asarray(group.values, float)
     outputs = np.asarray(group.output_indices)
     for joint in sorted({int(o) // 9 for o in outputs[:rows] if 3 <= o % 9 <= 5}):

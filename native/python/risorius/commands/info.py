@@ -62,7 +62,7 @@ def describe(dna: risorius.Dna) -> dict[str, Any]:
         "complexity": dna.complexity,
         "db_name": dna.db_name,
         "layers": dna.layers,
-        "layers_kept_as_bytes": {name: len(data) for name, _, data in dna.unknown_layers},
+        "unknown_layers": {name: len(data) for name, _, data in dna.unknown_layers},
         "counts": {
             "gui_controls": len(dna.gui_control_names),
             "raw_controls": len(dna.raw_control_names),
@@ -114,8 +114,8 @@ def page(facts: dict[str, Any]) -> str:
         f"faces {facts['face_winding_order']}",
         f"layers: {' '.join(facts['layers']) or 'none'}",
     ]
-    if facts["layers_kept_as_bytes"]:
-        kept = ", ".join(f"{n} ({s} bytes)" for n, s in facts["layers_kept_as_bytes"].items())
+    if facts["unknown_layers"]:
+        kept = ", ".join(f"{n} ({s} bytes)" for n, s in facts["unknown_layers"].items())
         out.append(f"kept as bytes: {kept}")
     out.append("\ncounts")
     out += [f"  {value:>8}  {key.replace('_', ' ')}" for key, value in facts["counts"].items()]

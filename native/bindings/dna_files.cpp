@@ -1,0 +1,263 @@
+// SPDX-License-Identifier: MIT
+// Dna from and to bytes, files and JSON, and what changes one as a whole.
+#include "bindings/fields.h"
+#include "core/file_write.h"
+#include "core/source.h"
+#include "dna/io.h"
+#include "dna/json.h"
+
+namespace risorius::bindings {
+
+namespace {
+
+using dna::Dna;
+using Bytes = std::vector<std::uint8_t>;
+
+// Runs native work without the interpreter's lock.
+template <class F>
+auto unlocked(F f) {
+  const py::gil_scoped_release released;
+  return f();
+}
+
+py::bytes to_bytes(const Bytes& bytes) {
+  return py::bytes(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+}
+
+core::SpanSource source_of(const py::bytes& bytes) {
+  const std::string_view view = bytes;
+  return core::SpanSource({reinterpret_cast<const std::uint8_t*>(view.data()), view.size()});
+}
+
+std::uint16_t minor_version(const std::string& version) {
+  if (version.size() == 3 && version.rfind("2.", 0) == 0 && version[2] >= '1' &&
+      version[2] <= '8') {
+    return static_cast<std::uint16_t>(version[2] - '0');
+  }
+  throw py::value_error("version: one of 2.1 to 2.8 was expected, found " + version);
+}
+
+bool preserves(const std::string& policy) {
+  if (policy == "preserve" || policy == "ignore") return policy == "preserve";
+  throw py::value_error("unknown_layers: preserve or ignore was expected, found " + policy);
+}
+
+void emit(const std::vector<dna::Warning>& warnings) {
+  for (const dna::Warning& w : warnings) {
+    const std::string text = w.where + ": " + w.message;
+    if (PyErr_WarnEx(PyExc_UserWarning, text.c_str(), 2) != 0) throw py::error_already_set();
+  }
+}
+
+Bytes serialise(const Dna& self, const std::string& version, const std::string& unknown_layers) {
+  const dna::WriteOptions options{minor_version(version), preserves(unknown_layers)};
+  std::vector<dna::Warning> warnings;
+  Bytes out = unwrap(unlocked([&] { return dna::write(self, options, warnings); }));
+  emit(warnings);
+  return out;
+}
+
+py::list describe(const std::vector<dna::Warning>& warnings) {
+  py::list out;
+  for (const dna::Warning& w : warnings) out.append(to_python(w.where + ": " + w.message));
+  return out;
+}
+
+dna::LodSelection lod_selection(const py::object& lods) {
+  dna::LodSelection selection;
+  if (lods.is_none()) return selection;
+  if (py::isinstance<py::tuple>(lods)) {
+    const auto [max_lod, min_lod] = lods.cast<std::pair<std::uint16_t, std::uint16_t>>();
+    selection.max_lod = max_lod;
+    selection.min_lod = min_lod;
+    if (max_lod > min_lod) throw py::value_error("lods: (max_lod, min_lod) is empty");
+    return selection;
+  }
+  selection.lods = lods.cast<std::vector<std::uint16_t>>();
+  if (selection.lods.empty()) throw py::value_error("lods: the list is empty");
+  return selection;
+}
+
+void bind_writing(DnaClass& c) {
+  c.def(
+      "to_bytes",
+      [](const Dna& s, const std::string& version, const std::string& unknown_layers) {
+        return to_bytes(serialise(s, version, unknown_layers));
+      },
+      py::arg("version") = "2.8", py::arg("unknown_layers") = "preserve",
+      "The bytes of a file of this version. What the version cannot hold is a UserWarning by "
+      "layer: "
+      "newer and unknown layers are written all the same (2.1 has no place for them), or with "
+      "unknown_layers='ignore' left out.");
+  c.def(
+      "save",
+      [](const Dna& s, const std::filesystem::path& path, const std::string& version,
+         const std::string& unknown_layers) {
+        const Bytes bytes = serialise(s, version, unknown_layers);
+        unwrap(unlocked([&] { return core::write_file_atomically(path, bytes); }));
+      },
+      py::arg("path"), py::arg("version") = "2.8", py::arg("unknown_layers") = "preserve",
+      "Writes the file; the old one is whole until the new one is.");
+  c.def(
+      "to_json",
+      [](const Dna& s) { return py::str(unwrap(unlocked([&] { return dna::to_json(s); }))); },
+      "The whole value as JSON with the format's own field names. Lossless: numbers are the "
+      "shortest that give the same bits back.");
+  c.def_static(
+      "from_json",
+      [](const py::str& text, const dna::Limits& limits) {
+        const std::string utf8 = text_from_python(text, "text");
+        return std::make_shared<Dna>(
+            unwrap(unlocked([&] { return dna::from_json(utf8, limits); })));
+      },
+      py::arg("text"), py::arg("limits") = dna::Limits{}, "What to_json wrote.");
+}
+
+void bind_layers(DnaClass& c) {
+  c.def_property(
+      "unknown_layers",
+      [](const Dna& s) {
+        py::list out;
+        for (const dna::UnknownLayer& l : s.unknown_layers) {
+          out.append(py::make_tuple(
+              to_python(std::string(l.id.begin(), l.id.end())),
+              std::to_string(l.version >> 16) + "." + std::to_string(l.version & 0xFFFF),
+              to_bytes(l.bytes)));
+        }
+        return out;
+      },
+      [](Dna& s, const std::vector<std::tuple<std::string, std::string, std::string>>& layers) {
+        std::vector<dna::UnknownLayer> out;
+        for (const auto& [id, version, bytes] : layers) {
+          dna::UnknownLayer layer;
+          const std::size_t dot = version.find('.');
+          if (id.size() != 4 || dot == std::string::npos) {
+            throw py::value_error("unknown_layers: (id of 4 letters, '1.0', bytes) was expected");
+          }
+          std::copy(id.begin(), id.end(), layer.id.begin());
+          layer.version = static_cast<std::uint32_t>(std::stoul(version.substr(0, dot)) << 16 |
+                                                     std::stoul(version.substr(dot + 1)));
+          layer.bytes.assign(bytes.begin(), bytes.end());
+          out.push_back(std::move(layer));
+        }
+        s.unknown_layers = std::move(out);
+      },
+      "Layers that this version does not know: (id, version, bytes).");
+  c.def_property_readonly(
+      "layers",
+      [](const Dna& s) {
+        py::list out;
+        std::size_t unknown = 0;
+        for (const std::string& id : s.index_order) {
+          if (!id.empty()) {
+            out.append(to_python(id));
+          } else if (unknown < s.unknown_layers.size()) {
+            const auto& raw = s.unknown_layers[unknown++].id;
+            out.append(to_python(std::string(raw.begin(), raw.end())));
+          }
+        }
+        return out;
+      },
+      "Ids of the file's layers in its order.");
+}
+
+void bind_changes(DnaClass& c) {
+  c.def_property_readonly("warnings", [](const Dna& s) { return describe(s.warnings); });
+  c.def(
+      "validate",
+      [](const Dna& s) {
+        std::vector<dna::Warning> warnings;
+        unwrap(unlocked([&] { return dna::validate(s, warnings); }));
+        return describe(warnings);
+      },
+      "The oddities that can be lived with. Raises DnaError for what cannot.");
+  c.def(
+      "filter_lods",
+      [](const Dna& s, const py::object& lods) {
+        const dna::LodSelection selection = lod_selection(lods);
+        return std::make_shared<Dna>(
+            unwrap(unlocked([&] { return dna::filter_lods(s, selection); })));
+      },
+      py::arg("lods"),
+      "A copy with (max_lod, min_lod) or [lod, ...] only; every index counts in what is left.");
+  c.def("__reduce__", [](const py::object& self) {
+    return py::make_tuple(py::module_::import("risorius").attr("load"),
+                          py::make_tuple(self.attr("to_bytes")()));
+  });
+}
+
+std::shared_ptr<Dna> parse(core::Source& source, const dna::ParseOptions& options,
+                           const std::string& file) {
+  return std::make_shared<Dna>(unwrap(unlocked([&] { return dna::parse(source, options); }), file));
+}
+
+// (is_error, code, where, offset or None, message)
+py::list findings(core::Source& source, const dna::Limits& limits) {
+  py::list out;
+  for (const dna::Finding& f : unlocked([&] { return dna::check(source, limits); })) {
+    const core::Error& e = f.error;
+    out.append(py::make_tuple(f.is_error, core::to_string(e.code), to_python(e.where), e.offset,
+                              to_python(e.message)));
+  }
+  return out;
+}
+
+void bind_options(py::module_& m) {
+  py::class_<dna::Limits>(m, "Limits",
+                          "What a file may ask for at most: bytes of the file, layers in its "
+                          "index, elements of any list, levels of JSON.")
+      .def(py::init(
+               [](std::uint64_t bytes, std::uint32_t layers, std::uint32_t count,
+                  std::uint32_t nesting) { return dna::Limits{bytes, layers, count, nesting}; }),
+           py::kw_only(), py::arg("max_bytes") = dna::Limits{}.max_bytes,
+           py::arg("max_layers") = dna::Limits{}.max_layers,
+           py::arg("max_count") = dna::Limits{}.max_count,
+           py::arg("max_nesting") = dna::Limits{}.max_nesting)
+      .def_readwrite("max_bytes", &dna::Limits::max_bytes)
+      .def_readwrite("max_layers", &dna::Limits::max_layers)
+      .def_readwrite("max_count", &dna::Limits::max_count)
+      .def_readwrite("max_nesting", &dna::Limits::max_nesting);
+  using Options = dna::ParseOptions;
+  py::class_<Options>(m, "ParseOptions")
+      .def(py::init<>())
+      .def_readwrite("definition", &Options::definition)
+      .def_readwrite("behavior", &Options::behavior)
+      .def_readwrite("geometry", &Options::geometry)
+      .def_readwrite("blend_shapes", &Options::blend_shapes)
+      .def_readwrite("machine_learned_behavior", &Options::machine_learned_behavior)
+      .def_readwrite("rbf_behavior", &Options::rbf_behavior)
+      .def_readwrite("joint_behavior_metadata", &Options::joint_behavior_metadata)
+      .def_readwrite("twist_swing_behavior", &Options::twist_swing_behavior)
+      .def_readwrite("unknown_layers", &Options::unknown_layers)
+      .def_readwrite("unreferenced_blend_shapes", &Options::unreferenced_blend_shapes)
+      .def_readwrite("limits", &Options::limits)
+      .def("set_lods",
+           [](Options& self, const py::object& lods) { self.lods = lod_selection(lods); });
+}
+
+}  // namespace
+
+void bind_dna_files(py::module_& m, DnaClass& c) {
+  bind_options(m);
+  bind_writing(c);
+  bind_layers(c);
+  bind_changes(c);
+  m.def("parse_bytes", [](const py::bytes& bytes, const dna::ParseOptions& options) {
+    core::SpanSource source = source_of(bytes);
+    return parse(source, options, "");
+  });
+  m.def("parse_file", [](const std::filesystem::path& path, const dna::ParseOptions& options) {
+    std::unique_ptr<core::Source> source = unwrap(core::open_file(path));
+    return parse(*source, options, path.string());
+  });
+  m.def("check_bytes", [](const py::bytes& bytes, const dna::Limits& limits) {
+    core::SpanSource source = source_of(bytes);
+    return findings(source, limits);
+  });
+  m.def("check_file", [](const std::filesystem::path& path, const dna::Limits& limits) {
+    std::unique_ptr<core::Source> source = unwrap(core::open_file(path));
+    return findings(*source, limits);
+  });
+}
+
+}  // namespace risorius::bindings

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: MIT
+// Memory for numbers that are about to be read, which nobody wrote zeros to.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdlib>
+#include <limits>
+#include <memory>
+#include <new>
+#include <type_traits>
+#include <utility>
+
+namespace risorius::core {
+
+/// An array whose new elements are unset: what fills it touches its memory first and once. Becomes
+/// an Array without a copy. Growing is std::realloc's business, which moves pages and not bytes.
+template <class T>
+class Buffer {
+  static_assert(std::is_trivially_copyable_v<T> && alignof(T) <= alignof(std::max_align_t));
+
+ public:
+  Buffer() = default;
+  explicit Buffer(std::size_t n) { resize(n); }
+
+  std::size_t size() const { return size_; }
+  T* data() { return data_.get(); }
+  T& operator[](std::size_t i) { return data_.get()[i]; }
+
+  /// Keeps what is there. The first time exactly n are allocated, later on half as many again.
+  void resize(std::size_t n) {
+    if (n > capacity_) allocate(capacity_ == 0 ? n : std::max(n, capacity_ + capacity_ / 2));
+    size_ = n;
+  }
+  void reserve(std::size_t n) {
+    if (n > capacity_) allocate(n);
+  }
+  /// Hands the memory over, cut to size.
+  std::shared_ptr<const T> release() {
+    if (size_ < capacity_) allocate(size_);
+    size_ = capacity_ = 0;
+    return std::shared_ptr<const T>(std::move(data_));
+  }
+
+ private:
+  struct Free {
+    void operator()(T* p) const { std::free(p); }
+  };
+  void allocate(std::size_t n) {
+    if (n == 0) {
+      data_.reset();
+    } else {
+      if (n > std::numeric_limits<std::size_t>::max() / sizeof(T)) throw std::bad_alloc();
+      void* p = std::realloc(data_.get(), n * sizeof(T));
+      if (p == nullptr) throw std::bad_alloc();
+      (void)data_.release();  // realloc has freed it or gives it back
+      data_.reset(static_cast<T*>(p));
+    }
+    capacity_ = n;
+  }
+
+  std::unique_ptr<T, Free> data_;
+  std::size_t size_ = 0, capacity_ = 0;
+};
+
+}  // namespace risorius::core

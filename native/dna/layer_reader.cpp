@@ -1,0 +1,248 @@
+// SPDX-License-Identifier: MIT
+#include "dna/layer_reader.h"
+
+#include <algorithm>
+
+namespace risorius::dna::detail {
+
+using core::Array;
+using core::ErrorCode;
+using core::Field;
+using core::List;
+using core::PlanarArray;
+
+// The planes are counted one by one in the file and must agree.
+template <std::size_t kPlanes>
+PlanarArray<kPlanes> LayerReader::planes() {
+  const std::uint64_t first = r_.position();
+  const std::uint32_t n = r_.count(4);
+  if (std::uint64_t{n} * 4 * kPlanes > r_.left()) {
+    r_.fail_at(first, ErrorCode::kInvalidCount,
+               std::to_string(n) + " vectors need more bytes than are left");
+  }
+  if (r_.failed()) return {};
+  std::vector<float> values(std::size_t{n} * kPlanes);
+  r_.read_f32(values.data(), n);
+  for (std::size_t p = 1; p < kPlanes && !r_.failed(); ++p) {
+    const std::uint64_t at = r_.position();
+    const std::uint32_t m = r_.count(4);
+    if (m != n && !r_.failed()) {
+      r_.fail_at(at, ErrorCode::kInvalidLength,
+                 "coordinate list " + std::to_string(p) + " has " + std::to_string(m) +
+                     " values, the first has " + std::to_string(n));
+    }
+    if (!r_.failed()) r_.read_f32(values.data() + p * n, n);
+  }
+  if (r_.failed()) return {};
+  return {Array<float>(std::move(values))};
+}
+
+template PlanarArray<2> LayerReader::planes<2>();
+template PlanarArray<3> LayerReader::planes<3>();
+
+std::vector<bool> LayerReader::wanted(const List<Mesh>*, const LodMapping*, std::size_t n) const {
+  std::vector<bool> keep(n, true);
+  if (plan == nullptr) return keep;
+  for (std::size_t i = 0; i < n; ++i) keep[i] = plan->meshes.keeps(i);
+  return keep;
+}
+
+template <class T>
+std::vector<bool> LayerReader::wanted(const List<T>*, const LodMapping* mapping,
+                                      std::size_t n) const {
+  if (plan == nullptr) return std::vector<bool>(n, true);
+  std::vector<bool> keep = needed(*plan, *mapping, n);
+  if (operations != nullptr) add_networks_of_operations(*plan, *operations, keep);
+  return keep;
+}
+
+// What no kept LOD uses is passed over and leaves an empty element: apply() takes it out.
+template <class T>
+void LayerReader::sized(Name name, List<T>& v, const LodMapping* mapping) {
+  const std::uint64_t layer_end = r_.end();
+  std::vector<T> items;
+  std::uint32_t n = 0;
+  {
+    Field field(r_, name.dna);
+    n = r_.count(4 + empty_size<T>());
+  }
+  items.resize(r_.failed() ? 0 : n);
+  const std::vector<bool> keep = wanted(&v, mapping, items.size());
+  for (std::uint32_t i = 0; i < items.size() && !r_.failed(); ++i) {
+    Field item(r_, name.dna, i);
+    const std::uint64_t at = r_.position();
+    note(at);
+    const std::uint32_t mark = r_.u32();
+    if (r_.failed()) break;
+    const bool is_size = mesh_sizes || !std::is_same_v<T, Mesh>;
+    const std::uint64_t end = is_size ? r_.position() + mark : mark;
+    if (end < r_.position() || end > layer_end) {
+      r_.fail_at(at, ErrorCode::kTruncated,
+                 "the element is said to end at byte " + std::to_string(end) +
+                     ", its layer ends at byte " + std::to_string(layer_end));
+      break;
+    }
+    if (keep[i]) {
+      r_.enter(r_.position(), end - r_.position());
+      describe(*this, items[i]);
+    }
+    if (!r_.failed()) r_.enter(end, layer_end - end);
+  }
+  v = std::move(items);
+}
+
+template void LayerReader::sized(Name, List<Mesh>&, const LodMapping*);
+template void LayerReader::sized(Name, List<NeuralNetwork>&, const LodMapping*);
+template void LayerReader::sized(Name, List<RbfSolver>&, const LodMapping*);
+
+void LayerReader::setups(Name name, List<TwistSwingSetup>& v, bool twist) {
+  Field field(r_, name.dna);
+  std::vector<TwistSwingSetup> items(r_.count(empty_size<TwistSwingSetup>()));
+  for (std::size_t i = 0; i < items.size() && !r_.failed(); ++i) {
+    Field item(r_, "", static_cast<std::int64_t>(i));
+    describe_setup(*this, items[i], twist);
+  }
+  v = std::move(items);
+}
+
+void LayerReader::matrix(Name name, JointGroup& g) {
+  Field field(r_, name.dna);
+  note(r_.position(), 4);
+  if (plan == nullptr) {
+    g.values = r_.f32_list();
+    return;
+  }
+  const std::uint64_t at = r_.position();
+  const std::uint32_t n = r_.count(4);
+  const std::size_t columns = g.input_indices.size(), rows = g.output_indices.size();
+  if (n != rows * columns && !r_.failed()) {
+    r_.fail_at(at, ErrorCode::kInvalidLength,
+               std::to_string(n) + " values, but " + std::to_string(rows) + " rows of " +
+                   std::to_string(columns));
+  }
+  if (r_.failed()) return;
+  std::vector<float> values(cut_rows(*plan, g) * columns);
+  r_.read_f32(values.data(), values.size());
+  r_.skip(std::uint64_t{4} * (n - values.size()));
+  g.values = std::move(values);
+}
+
+// Lists of lists become one flat list and offsets: no allocation per face or vertex. A first pass
+// counts, so that both are allocated once.
+void LayerReader::faces(Mesh& m) {
+  Field field(r_, "faces");
+  note(r_.position());
+  const std::uint32_t n = r_.count(4);
+  if (n == 0) return;
+  const std::uint64_t begin = r_.position();
+  std::size_t total = 0;
+  for (std::uint32_t i = 0; i < n && !r_.failed(); ++i) {
+    const std::uint32_t corners = r_.count(4);
+    r_.skip(std::uint64_t{4} * corners);
+    total += corners;
+  }
+  if (r_.failed()) return;
+  r_.enter(begin, r_.end() - begin);
+  std::vector<std::uint32_t> offsets(std::size_t{n} + 1), layouts(total);
+  for (std::uint32_t i = 0; i < n; ++i) {
+    const std::uint32_t corners = r_.count(4);
+    r_.read_u32(layouts.data() + offsets[i], corners);
+    offsets[i + 1] = offsets[i] + corners;
+  }
+  m.face_offsets = std::move(offsets);
+  m.face_layouts = std::move(layouts);
+}
+
+void LayerReader::skin(Mesh& m) {
+  Field field(r_, "skin_weights");
+  note(r_.position());
+  const std::uint32_t n = r_.count(8);
+  if (n == 0) return;
+  const std::uint64_t begin = r_.position();
+  std::size_t total = 0;
+  for (std::uint32_t i = 0; i < n && !r_.failed(); ++i) {
+    const std::uint64_t at = r_.position();
+    const std::uint32_t weights = r_.count(4);
+    r_.skip(std::uint64_t{4} * weights);
+    const std::uint32_t joints = r_.count(2);
+    r_.skip(std::uint64_t{2} * joints);
+    total += weights;
+    if (weights != joints && !r_.failed()) {
+      Field item(r_, "", i);
+      r_.fail_at(
+          at, ErrorCode::kInvalidLength,
+          std::to_string(weights) + " weights, but " + std::to_string(joints) + " joint indices");
+    }
+  }
+  if (r_.failed()) return;
+  r_.enter(begin, r_.end() - begin);
+  std::vector<std::uint32_t> offsets(std::size_t{n} + 1);
+  std::vector<float> weights(total);
+  std::vector<std::uint16_t> joints(total);
+  for (std::uint32_t i = 0; i < n; ++i) {
+    const std::uint32_t influences = r_.count(4);
+    r_.read_f32(weights.data() + offsets[i], influences);
+    r_.count(2);
+    r_.read_u16(joints.data() + offsets[i], influences);
+    offsets[i + 1] = offsets[i] + influences;
+  }
+  m.skin_offsets = std::move(offsets);
+  m.skin_weights = std::move(weights);
+  m.skin_joint_indices = std::move(joints);
+}
+
+// The channel's number comes last: a target is walked before it is known to be wanted.
+bool LayerReader::target_is_wanted() {
+  if (plan == nullptr) return true;
+  const std::uint64_t begin = r_.position();
+  for (int l = 0; l < 4; ++l) r_.skip(std::uint64_t{4} * r_.count(4));
+  const std::uint16_t channel = r_.u16();
+  if (r_.failed()) return false;
+  // A channel that is not there is read, so that the check of indices names it.
+  const IndexMap& channels = plan->blend_shape_channels;
+  const bool wanted = channel >= channels.size() || channels.keeps(channel);
+  if (wanted) r_.enter(begin, r_.end() - begin);
+  return wanted;
+}
+
+void LayerReader::targets(Mesh& m) {
+  if (!blend_shapes) return;
+  Field field(r_, "blend_shape_targets");
+  const std::uint32_t n = r_.count(empty_size<BlendShapeTarget>());
+  std::vector<BlendShapeTarget> targets;
+  if (plan == nullptr) targets.reserve(n);
+  for (std::uint32_t i = 0; i < n && !r_.failed(); ++i) {
+    Field item(r_, "", i);
+    if (!target_is_wanted()) continue;
+    const std::uint64_t at = r_.position();
+    BlendShapeTarget& t = targets.emplace_back();
+    describe(*this, t);
+    if (t.deltas.count() != t.vertex_indices.size() && !r_.failed()) {
+      r_.fail_at(at, ErrorCode::kInvalidLength,
+                 std::to_string(t.deltas.count()) + " deltas, but " +
+                     std::to_string(t.vertex_indices.size()) + " vertex indices");
+    }
+  }
+  m.blend_shape_targets = std::move(targets);
+}
+
+std::optional<std::uint64_t> find_place(const Places& places, std::string where) {
+  std::optional<std::size_t> index;  // the first one that had to be cut off
+  while (!where.empty()) {
+    if (const auto at = places.find(where); at != places.end()) {
+      const Place& p = at->second;
+      if (!index || p.element_size == 0) return p.offset;
+      const std::uint64_t counts = p.plane == 0 ? 1 : 1 + *index / p.plane;
+      return p.offset + 4 * counts + std::uint64_t{p.element_size} * *index;
+    }
+    const std::size_t cut = where.find_last_of(".[");
+    if (cut == std::string::npos) return std::nullopt;
+    index = where[cut] == '[' && cut + 1 < where.size()
+                ? std::optional<std::size_t>(std::strtoull(where.c_str() + cut + 1, nullptr, 10))
+                : std::nullopt;
+    where.resize(cut);
+  }
+  return std::nullopt;
+}
+
+}  // namespace risorius::dna::detail

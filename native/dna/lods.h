@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: MIT
+// Which LODs are kept, and what that leaves of each index space.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/result.h"
+#include "dna/dna.h"
+
+namespace risorius::dna {
+
+/// LODs count from 0, the most detailed: max_lod is the finest and the smallest number.
+struct LodSelection {
+  std::vector<std::uint16_t> lods;  // these, in any order; empty: max_lod to min_lod
+  std::uint16_t max_lod = 0, min_lod = 65535;
+
+  bool everything() const { return lods.empty() && max_lod == 0 && min_lod == 65535; }
+};
+
+/// A copy with the selected LODs only. Joints, meshes, channels, maps, networks, operations and
+/// solvers that no kept LOD uses are gone, and every index counts in what is left (design ruling
+/// 1; the reference leaves channels, maps and network numbers as they were). Joints that LOD 0
+/// does not list stay, as in the reference, and so do the ancestors of every kept joint, so that
+/// nothing moves. A selection of all LODs changes nothing.
+/// Fails: kInvalidArgument (no LOD of the selection is in the file), kInvalidIndex.
+core::Result<Dna> filter_lods(const Dna& dna, const LodSelection& selection);
+
+/// A copy without the channels of controls that no loaded layer provides, nor those in no LOD.
+core::Result<Dna> remove_unreferenced_blend_shapes(const Dna& dna);
+
+namespace detail {
+
+/// Old index -> new index, where it is kept.
+class IndexMap {
+ public:
+  static constexpr std::uint32_t kDropped = 0xFFFFFFFF;
+  IndexMap() = default;
+  explicit IndexMap(const std::vector<bool>& keep);
+  bool keeps(std::size_t i) const { return i < to_.size() && to_[i] != kDropped; }
+  std::uint16_t operator[](std::size_t i) const { return static_cast<std::uint16_t>(to_[i]); }
+  std::size_t size() const { return to_.size(); }
+  std::size_t kept() const { return kept_; }
+
+ private:
+  std::vector<std::uint32_t> to_;
+  std::size_t kept_ = 0;
+};
+
+struct LodPlan {
+  std::vector<std::uint16_t> lods;  // ascending, each once
+  IndexMap joints, blend_shape_channels, animated_maps, meshes;
+};
+
+/// Nothing when the selection keeps every LOD. In: a definition that validate accepts.
+core::Result<std::optional<LodPlan>> plan_lods(const Descriptor& descriptor,
+                                               const Definition& definition,
+                                               const LodSelection& selection);
+
+/// Elements that a mapping lists at a kept LOD.
+std::vector<bool> needed(const LodPlan& plan, const LodMapping& mapping, std::size_t count);
+
+/// Adds the networks that operations of kept LODs run.
+void add_networks_of_operations(const LodPlan& plan, const MachineLearnedBehaviorExt& ext,
+                                std::vector<bool>& keep);
+
+/// Leading rows that the finest kept LOD uses. Out: lods and output_indices cut to the plan.
+std::size_t cut_rows(const LodPlan& plan, JointGroup& group);
+
+/// Takes out the channels that the plan drops, and the entries that are not kept.
+core::Status drop_channels(const LodPlan& plan, std::vector<bool> entries, Dna& dna);
+
+/// Applies the plan to everything; groups_are_cut says that cut_rows was called while reading.
+core::Status apply(const LodPlan& plan, bool groups_are_cut, Dna& dna);
+
+}  // namespace detail
+}  // namespace risorius::dna
