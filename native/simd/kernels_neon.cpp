@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: MIT
+#include "simd/kernels.h"
+
+#if defined(__aarch64__) || defined(_M_ARM64)
+#include <arm_neon.h>
+
+#define RISORIUS_TARGET
+#include "simd/kernels_inline.h"
+
+namespace risorius::simd {
+
+namespace {
+
+struct V {
+  using Reg = float32x4_t;
+  static constexpr std::size_t kLanes = 4, kBlocks = 16, kBatchBlocks = 5;
+  static constexpr int kBatchFrames = 4;
+  RISORIUS_INLINE static Reg zero() { return vdupq_n_f32(0.0f); }
+  RISORIUS_INLINE static Reg set(float v) { return vdupq_n_f32(v); }
+  RISORIUS_INLINE static Reg load(const float* p) { return vld1q_f32(p); }
+  RISORIUS_INLINE static Reg load(const std::uint16_t* p) {
+    return vcvt_f32_f16(vreinterpret_f16_u16(vld1_u16(p)));
+  }
+  RISORIUS_INLINE static void store(float* p, Reg v) { vst1q_f32(p, v); }
+  RISORIUS_INLINE static Reg madd(Reg a, Reg b, Reg sum) { return vfmaq_f32(sum, a, b); }
+};
+
+}  // namespace
+
+}  // namespace risorius::simd
+
+#include "simd/kernels_body.h"
+
+namespace risorius::simd {
+
+const Kernels* neon_kernels() {
+  static constexpr Kernels kernels = make_kernels("neon");
+  return &kernels;
+}
+
+}  // namespace risorius::simd
+
+#else
+
+namespace risorius::simd {
+
+const Kernels* neon_kernels() { return nullptr; }
+
+}  // namespace risorius::simd
+
+#endif
