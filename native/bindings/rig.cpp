@@ -92,29 +92,84 @@ py::array_t<float> copied(std::span<const float> values, std::vector<py::ssize_t
   return out;
 }
 
+py::ssize_t stride_of(const rig::Rig& rig) { return static_cast<py::ssize_t>(rig.joint_stride); }
+
 PoseArrays to_arrays(const rig::Rig& rig, const rig::Pose& pose) {
   const auto size = [](const std::vector<float>& v) { return static_cast<py::ssize_t>(v.size()); };
-  return {copied(pose.joints, {static_cast<py::ssize_t>(rig.joint_count), 9}),
+  return {copied(pose.joints, {static_cast<py::ssize_t>(rig.joint_count), stride_of(rig)}),
           copied(pose.blend_shapes, {size(pose.blend_shapes)}),
           copied(pose.animated_maps, {size(pose.animated_maps)}),
           copied(pose.controls, {size(pose.controls)})};
 }
 
-RigPtr make_rig(const dna::Dna& dna, const std::string& precision,
-                const std::optional<std::string>& simd) {
+// One of two names, or a ValueError.
+bool is_second(const char* name, const std::string& given, const char* first, const char* second) {
+  if (given == second) return true;
+  if (given == first) return false;
+  throw py::value_error(std::string(name) + ": " + first + " or " + second +
+                        " was expected, found " + given);
+}
+
+const simd::Kernels& kernels_argument(const std::optional<std::string>& simd) {
+  const simd::Kernels* kernels = simd::find_kernels(simd ? simd->c_str() : nullptr);
+  if (kernels != nullptr) return *kernels;
+  throw py::value_error("simd: " + simd.value_or("RISORIUS_SIMD") +
+                        " is not available here; there are: " + simd::available_kernels());
+}
+
+std::shared_ptr<rig::Rig> make_rig(const dna::Dna& dna, const std::string& precision,
+                                   const std::string& rotation,
+                                   const std::optional<std::string>& simd) {
   compile::CompileOptions options;
-  if (precision != "float32" && precision != "float16") {
-    throw py::value_error("precision: float32 or float16 was expected, found " + precision);
+  if (is_second("precision", precision, "float32", "float16")) {
+    options.precision = compile::Precision::kFloat16;
   }
-  if (precision == "float16") options.precision = compile::Precision::kFloat16;
-  if (simd) {
-    options.kernels = simd::find_kernels(simd->c_str());
-    if (options.kernels == nullptr) {
-      throw py::value_error("simd: " + *simd +
-                            " is not available here; there are: " + simd::available_kernels());
-    }
+  if (is_second("rotation", rotation, "euler", "quaternion")) {
+    options.rotation = compile::Rotation::kQuaternion;
   }
-  return std::make_shared<const rig::Rig>(unwrap(compile::compile(dna, options)));
+  if (simd) options.kernels = &kernels_argument(simd);
+  return std::make_shared<rig::Rig>(unwrap(compile::compile(dna, options)));
+}
+
+// Keeps a buffer of Python's; whoever lets go of it last may not hold the interpreter.
+std::shared_ptr<const void> keep(py::buffer buffer, const void* address) {
+  auto* held = new py::buffer_info(buffer.request());
+  return {address, [held](const void*) {
+            const py::gil_scoped_acquire acquired;
+            delete held;
+          }};
+}
+
+// Nobody can change a read-only buffer under a Rig; any other is copied, and so is one that does
+// not lie on 64 bytes.
+std::shared_ptr<rig::Rig> rig_from_bytes(const py::buffer& buffer, bool trusted,
+                                         const std::optional<std::string>& simd) {
+  const py::buffer_info info = buffer.request();
+  if (!PyBuffer_IsContiguous(info.view(), 'C')) {
+    throw py::value_error("bytes: a contiguous buffer was expected");
+  }
+  const auto size = static_cast<std::size_t>(info.size * info.itemsize);
+  const auto* data = static_cast<const std::uint8_t*>(info.ptr);
+  std::shared_ptr<const void> owner;
+  if (info.readonly && reinterpret_cast<std::uintptr_t>(data) % 64 == 0) {
+    owner = keep(buffer, data);
+  } else {
+    auto copy = std::make_shared<core::AlignedVector<std::uint8_t>>(data, data + size);
+    data = copy->data();
+    owner = std::move(copy);
+  }
+  const rig::BlockCheck check = trusted ? rig::BlockCheck::kHeader : rig::BlockCheck::kFull;
+  return std::make_shared<rig::Rig>(
+      unwrap(rig::open_rig({data, size}, std::move(owner), check, kernels_argument(simd))));
+}
+
+// A buffer that keeps its Rig.
+py::memoryview block_of(const py::object& self) {
+  const auto& block = self.cast<const rig::Rig&>().block();
+  py::array_t<std::uint8_t> view({static_cast<py::ssize_t>(block.size())}, {py::ssize_t{1}},
+                                 block.data(), self);
+  view.attr("flags").attr("writeable") = false;
+  return py::memoryview(view);
 }
 
 PoseArrays evaluate(const rig::Rig& rig, const py::object& raw, std::uint32_t lod, bool settle) {
@@ -134,7 +189,7 @@ PoseArrays evaluate_batch(const rig::Rig& rig, const py::object& raw, std::uint3
   }
   const auto n = in.shape(0);
   const auto columns = [](std::uint32_t v) { return static_cast<py::ssize_t>(v); };
-  PoseArrays out{FloatArray({n, columns(rig.joint_count), py::ssize_t{9}}),
+  PoseArrays out{FloatArray({n, columns(rig.joint_count), stride_of(rig)}),
                  FloatArray({n, columns(rig.blend_shape_count)}),
                  FloatArray({n, columns(rig.animated_map_count)}),
                  FloatArray({n, columns(rig.control_count)})};
@@ -144,7 +199,7 @@ PoseArrays evaluate_batch(const rig::Rig& rig, const py::object& raw, std::uint3
   py::gil_scoped_release released;
   core::parallel_for(static_cast<std::size_t>(n), threads, [&](std::size_t begin, std::size_t end) {
     rig::Workspace work = rig::make_batch_workspace(rig);
-    const rig::PoseView part{all.joints + begin * rig.joint_count * 9,
+    const rig::PoseView part{all.joints + begin * rig.joint_count * rig.joint_stride,
                              all.blend_shapes + begin * rig.blend_shape_count,
                              all.animated_maps + begin * rig.animated_map_count,
                              all.controls + begin * rig.control_count};
@@ -156,12 +211,20 @@ PoseArrays evaluate_batch(const rig::Rig& rig, const py::object& raw, std::uint3
 void bind_rig_class(py::module_& m) {
   py::class_<rig::Rig, std::shared_ptr<rig::Rig>>(
       m, "Rig", "A compiled face: turns raw controls into a Pose. Immutable, shared freely.")
-      .def(py::init([](const dna::Dna& dna, const std::string& precision,
-                       const std::optional<std::string>& simd) {
-             return std::const_pointer_cast<rig::Rig>(make_rig(dna, precision, simd));
-           }),
-           py::arg("dna"), py::kw_only(), py::arg("precision") = "float32",
-           py::arg("simd") = py::none())
+      .def(py::init(&make_rig), py::arg("dna"), py::kw_only(), py::arg("precision") = "float32",
+           py::arg("rotation") = "euler", py::arg("simd") = py::none())
+      .def_static("from_bytes", &rig_from_bytes, py::arg("bytes"), py::arg("trusted") = false,
+                  py::arg("simd") = py::none(),
+                  "A Rig from what to_bytes or block gave, of this version and byte order. A "
+                  "read-only buffer on a multiple of 64 bytes is used in place and kept, any other "
+                  "is copied. trusted leaves out the hash and the check of every index.")
+      .def(
+          "to_bytes",
+          [](const rig::Rig& r) {
+            return py::bytes(reinterpret_cast<const char*>(r.block().data()), r.block().size());
+          },
+          "The compiled face as bytes, a cache for from_bytes.")
+      .def("block", &block_of, "The same without a copy: a read-only memoryview of uint8.")
       .def_property_readonly("raw_control_names",
                              [](const rig::Rig& r) {
                                py::list out;
@@ -184,9 +247,21 @@ void bind_rig_class(py::module_& m) {
       .def_property_readonly("simd", [](const rig::Rig& r) { return r.kernels->name; })
       .def_property_readonly("neutral_joints",
                              [](const rig::Rig& r) {
-                               return copied(r.neutral_joints,
-                                             {static_cast<py::ssize_t>(r.joint_count), 9});
+                               return copied(
+                                   r.neutral_joints,
+                                   {static_cast<py::ssize_t>(r.joint_count), stride_of(r)});
                              })
+      .def_property_readonly("rotation",
+                             [](const rig::Rig& r) {
+                               return std::string(r.joint_stride == 10 ? "quaternion" : "euler");
+                             })
+      .def_property_readonly(
+          "initial_raw_controls",
+          [](const rig::Rig& r) {
+            return copied(r.initial_controls.first(r.raw_count),
+                          {static_cast<py::ssize_t>(r.raw_count)});
+          },
+          "float32[R]: 0, but 1 for the w of each rotation that solvers and setups read.")
       .def_property_readonly("joint_indices_written",
                              [](const rig::Rig& r) {
                                return py::array_t<std::uint16_t>(
@@ -202,6 +277,15 @@ void bind_rig_class(py::module_& m) {
             return raw;
           },
           py::arg("gui"), "float32[G] -> float32[R] in [0, 1]")
+      .def(
+          "raw_to_gui",
+          [](const rig::Rig& r, const py::object& raw) {
+            const FloatArray in = vector_argument(raw, "raw", r.raw_count);
+            py::array_t<float> gui(static_cast<py::ssize_t>(r.gui_count));
+            rig::raw_to_gui(r, in.data(), gui.mutable_data());
+            return gui;
+          },
+          py::arg("raw"), "float32[R] -> float32[G], where the table can be reversed")
       .def("evaluate", &evaluate, py::arg("raw"), py::arg("lod") = 0, py::arg("settle") = true,
            "float32[R] -> Pose; a function of raw alone when settle is true.")
       .def("evaluate_batch", &evaluate_batch, py::arg("raw"), py::arg("lod") = 0,
@@ -241,7 +325,8 @@ void bind_morph(py::module_& m) {
 void bind_rig(py::module_& m) {
   py::class_<PoseArrays>(m, "Pose",
                          "joints float32[J, 9]: tx ty tz rx ry rz sx sy sz deltas from neutral in "
-                         "the file's units and axes; blend_shapes[B]; animated_maps[A] in [0, 1]; "
+                         "the file's units and axes, or with rotation='quaternion' [J, 10]: tx ty "
+                         "tz qx qy qz qw sx sy sz; blend_shapes[B]; animated_maps[A] in [0, 1]; "
                          "controls[raw + corrective + ...]")
       .def_readonly("joints", &PoseArrays::joints)
       .def_readonly("blend_shapes", &PoseArrays::blend_shapes)
@@ -252,6 +337,20 @@ void bind_rig(py::module_& m) {
       .def_property(
           "lod", [](const PyInstance& s) { return s.instance.lod(); },
           [](PyInstance& s, std::uint32_t lod) { s.instance.set_lod(lod); })
+      .def_property(
+          "masks",
+          [](const PyInstance& s) {
+            const auto masks = s.instance.masks();
+            return copied(masks, {static_cast<py::ssize_t>(masks.size())});
+          },
+          [](PyInstance& s, const py::object& masks) {
+            const FloatArray in = vector_argument(masks, "masks", s.instance.masks().size());
+            for (py::ssize_t i = 0; i < in.size(); ++i) {
+              s.instance.set_mask(static_cast<std::size_t>(i), in.data()[i]);
+            }
+          },
+          "float32, one per region of each mesh, mesh after mesh; at 0 the region's networks rest. "
+          "A copy: assign all of it.")
       .def("evaluate", [](PyInstance& s, const py::object& raw) {
         const FloatArray in = vector_argument(raw, "raw", s.rig->raw_count);
         return to_arrays(*s.rig, s.instance.evaluate(in.data()));

@@ -11,6 +11,7 @@
 #include <span>
 #include <string_view>
 
+#include "compile/parts.h"
 #include "dna/io.h"
 #include "simd/half.h"
 
@@ -24,16 +25,9 @@ using core::fail;
 using core::ok;
 using core::Result;
 using core::Status;
+using detail::check_controls;
+using detail::Used;
 using rig::RigData;
-
-std::vector<bool> quaternion_joint_flags(const dna::Dna& dna) {
-  std::vector<bool> flags(dna.definition.joint_names.size(), false);
-  const auto& entries = dna.joint_behavior_metadata.joint_representations;
-  for (std::size_t j = 0; j < entries.size() && j < flags.size(); ++j) {
-    flags[j] = entries[j].rotation == 1;
-  }
-  return flags;
-}
 
 void add_text(std::string_view text, RigData& out) {
   out.text.insert(out.text.end(), text.begin(), text.end());
@@ -45,25 +39,9 @@ void count_controls(const dna::Dna& dna, RigData& out) {
   out.raw_count = counts.raw;
   out.psd_count = counts.psd;
   out.control_count = counts.total();
-  const auto ignore = [&](const char* id, bool has_content) {
-    if (has_content) add_text(id, out);
-  };
-  ignore("mlbh", dna.machine_learned_behavior != dna::MachineLearnedBehavior{});
-  ignore("mlbe", dna.machine_learned_behavior_ext != dna::MachineLearnedBehaviorExt{});
-  ignore("rbfb", dna.rbf_behavior != dna::RbfBehavior{});
-  ignore("rbfe", dna.rbf_behavior_ext != dna::RbfBehaviorExt{});
-  ignore("twsw", dna.twist_swing_behavior != dna::TwistSwingBehavior{});
-}
-
-Status check_controls(const Array<std::uint16_t>& indices, std::uint32_t limit,
-                      const std::string& where) {
-  for (std::size_t i = 0; i < indices.size(); ++i) {
-    if (indices[i] < limit) continue;
-    return fail(
-        ErrorCode::kInvalidIndex, where + "[" + std::to_string(i) + "]",
-        "control " + std::to_string(indices[i]) + ", but there are " + std::to_string(limit));
+  for (const dna::UnknownLayer& layer : dna.unknown_layers) {
+    add_text({layer.id.data(), layer.id.size()}, out);
   }
-  return ok();
 }
 
 Status check_lods(const Array<std::uint16_t>& lods, std::uint32_t lod_count,
@@ -92,6 +70,49 @@ std::vector<rig::ConditionalRow> compile_table(const dna::Conditionals& source) 
   return rows;
 }
 
+// Of each GUI control its rows, in ranges of equal bounds.
+void list_gui_ranges(RigData& out) {
+  using Bounds = std::pair<float, float>;
+  std::map<std::uint16_t, std::vector<std::pair<Bounds, std::vector<std::uint32_t>>>> ranges;
+  for (std::uint32_t i = 0; i < out.gui_rows.size(); ++i) {
+    const rig::ConditionalRow& row = out.gui_rows[i];
+    auto& list = ranges[row.input];
+    const Bounds bounds{row.from, row.to};
+    auto at = std::ranges::find(list, bounds, [](const auto& entry) { return entry.first; });
+    if (at == list.end()) at = list.insert(at, {bounds, {}});
+    at->second.push_back(i);
+  }
+  for (const auto& [gui, list] : ranges) {
+    for (const auto& [bounds, rows] : list) {
+      const auto begin = static_cast<std::uint32_t>(out.gui_range_rows.size());
+      out.gui_range_rows.insert(out.gui_range_rows.end(), rows.begin(), rows.end());
+      out.gui_ranges.push_back({gui, begin, static_cast<std::uint32_t>(out.gui_range_rows.size())});
+    }
+  }
+}
+
+bool is_quaternion_w(std::string_view name) {
+  return name.ends_with(".w") || name.ends_with(".qw");
+}
+
+// 0, but 1 for the last part of each quaternion that solvers, setups and networks read or write.
+void compile_initial_controls(const dna::Dna& dna, RigData& out) {
+  out.initial_controls.assign(out.control_count, 0.0f);
+  const auto& names = dna.definition.raw_control_names;
+  const auto mark = [&](const Array<std::uint16_t>& inputs) {
+    for (const std::uint16_t i : inputs) {
+      if (i < names.size() && is_quaternion_w(names[i])) out.initial_controls[i] = 1.0f;
+    }
+  };
+  for (const auto& s : dna.rbf_behavior.solvers) mark(s.raw_control_indices);
+  for (const auto& s : dna.twist_swing_behavior.twists) mark(s.input_control_indices);
+  for (const auto& s : dna.twist_swing_behavior.swings) mark(s.input_control_indices);
+  const auto& ml = dna.machine_learned_behavior.ml_control_names;
+  for (std::size_t i = 0; i < ml.size(); ++i) {
+    if (is_quaternion_w(ml[i])) out.initial_controls[out.raw_count + out.psd_count + i] = 1.0f;
+  }
+}
+
 std::vector<std::uint32_t> row_counts(const Array<std::uint16_t>& lods, std::uint32_t lod_count) {
   std::vector<std::uint32_t> counts;
   for (std::uint32_t l = 0; l < lod_count && l < lods.size(); ++l) counts.push_back(lods[l]);
@@ -101,12 +122,17 @@ std::vector<std::uint32_t> row_counts(const Array<std::uint16_t>& lods, std::uin
 void compile_neutral(const dna::Dna& dna, RigData& out) {
   const dna::Definition& d = dna.definition;
   out.joint_count = static_cast<std::uint32_t>(d.joint_names.size());
-  out.neutral_joints.resize(std::size_t{out.joint_count} * 9, 1.0f);
+  out.neutral_joints.resize(std::size_t{out.joint_count} * out.joint_stride, 1.0f);
   for (std::size_t j = 0; j < out.joint_count; ++j) {
+    float* to = out.neutral_joints.data() + j * out.joint_stride;
+    std::array<float, 3> angles{};
     for (std::size_t k = 0; k < 3; ++k) {
-      out.neutral_joints[j * 9 + k] = d.neutral_joint_translations.at(j, k);
-      out.neutral_joints[j * 9 + 3 + k] = d.neutral_joint_rotations.at(j, k);
+      to[k] = d.neutral_joint_translations.at(j, k);
+      to[3 + k] = angles[k] = d.neutral_joint_rotations.at(j, k);
     }
+    if (out.joint_stride == 9) continue;
+    const rig::Quaternion q = rig::from_euler(out.euler, angles);
+    to[3] = q.x, to[4] = q.y, to[5] = q.z, to[6] = q.w;
   }
 }
 
@@ -169,9 +195,6 @@ std::uint32_t first_row_with_value(const RigData& r, const rig::JointGroup& g, s
       std::find_if(values, values + g.row_count, [](float v) { return v != 0.0f; }) - values);
 }
 
-// [LOD][control]: something reads it there.
-using Used = std::vector<std::vector<bool>>;
-
 // Finds columns by their control; those without any value are left out.
 void index_columns(const dna::Dna& dna, RigData& out, Used& used) {
   struct Entry {
@@ -214,79 +237,40 @@ void mark_shared_rows(RigData& out) {
       written[row] = true;
     }
   }
+}
+
+// Joints that any group, setup or network moves at any LOD.
+void list_joints_written(RigData& out) {
+  std::vector<bool> written(out.joint_count, false);
+  for (const std::uint16_t row : out.joint_outputs) written[row / 9u] = true;
+  for (const rig::TwistSwingOutput& t : out.twist_swing_outputs) written[t.joint] = true;
+  for (const rig::MlJoint& m : out.ml_joints) written[m.joint] = true;
   for (std::uint32_t j = 0; j < out.joint_count; ++j) {
-    const auto begin = written.begin() + std::ptrdiff_t{j} * 9;
-    if (std::find(begin, begin + 9, true) != begin + 9) {
-      out.joints_written.push_back(static_cast<std::uint16_t>(j));
-    }
+    if (written[j]) out.joints_written.push_back(static_cast<std::uint16_t>(j));
   }
 }
 
-rig::EulerConvention euler_convention(const dna::Dna& dna) {
-  static constexpr std::uint8_t kOrders[6][3] = {{0, 1, 2}, {0, 2, 1}, {1, 0, 2},
-                                                 {1, 2, 0}, {2, 0, 1}, {2, 1, 0}};
-  const dna::DescriptorExt& ext = dna.descriptor_ext;
-  rig::EulerConvention c;
-  const auto* order = kOrders[ext.rotation_sequence < 6 ? ext.rotation_sequence : 0];
-  for (std::size_t i = 0; i < 3; ++i) {
-    c.order[i] = order[i];
-    c.signs[i] = ext.rotation_sign[i] < 0 ? -1.0f : 1.0f;
+// With quaternions as output a joint has ten rows: the scale moves by one.
+Status widen_joint_rows(RigData& out) {
+  if (std::size_t{out.joint_count} * 10 > 65536) {
+    return fail(ErrorCode::kLimitExceeded, "definition.joint_names",
+                "more than 6553 joints with quaternions as output");
   }
-  c.radians_per_unit = dna.descriptor.rotation_unit == 1 ? 1.0f : 0.0174532925199432958f;
-  return c;
-}
-
-// The columns that turn a joint at all.
-void add_quaternion_terms(const dna::JointGroup& g, const std::array<std::int32_t, 3>& row_of_axis,
-                          RigData& out) {
-  const std::size_t columns = g.input_indices.size();
-  for (std::size_t c = 0; c < columns; ++c) {
-    std::array<float, 3> angles{};
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const std::int32_t r = row_of_axis[axis];
-      if (r >= 0) angles[axis] = g.values[static_cast<std::size_t>(r) * columns + c];
-    }
-    if (angles == std::array<float, 3>{}) continue;
-    out.quaternion_terms.push_back({rig::from_euler(out.euler, angles), g.input_indices[c]});
+  for (std::uint16_t& row : out.joint_outputs) {
+    const std::uint32_t joint = row / 9u, attribute = row % 9u;
+    row = static_cast<std::uint16_t>(joint * 10 + attribute + (attribute > 5 ? 1 : 0));
   }
-}
-
-// The Euler entries of a column become one quaternion per joint; a missing row is 0.
-void compile_quaternion_joints(const dna::JointGroup& g, std::uint32_t group_index,
-                               const std::vector<bool>& flags, RigData& out) {
-  std::map<std::uint32_t, std::array<std::int32_t, 3>> rows;  // joint -> its rotation rows
-  for (std::uint32_t r = 0; r < out.joint_groups[group_index].row_count; ++r) {
-    const std::uint32_t joint = g.output_indices[r] / 9u, attribute = g.output_indices[r] % 9u;
-    if (attribute < 3 || attribute > 5 || !flags[joint]) continue;
-    auto [at, added] = rows.try_emplace(joint, std::array<std::int32_t, 3>{-1, -1, -1});
-    at->second[attribute - 3] = static_cast<std::int32_t>(r);
-  }
-  for (const auto& [joint, row_of_axis] : rows) {
-    rig::QuaternionJoint q;
-    q.joint = joint;
-    q.group = group_index;
-    q.first_row = UINT32_MAX;
-    for (const std::int32_t r : row_of_axis) {
-      if (r >= 0) q.first_row = std::min(q.first_row, static_cast<std::uint32_t>(r));
-    }
-    q.terms_begin = static_cast<std::uint32_t>(out.quaternion_terms.size());
-    add_quaternion_terms(g, row_of_axis, out);
-    q.terms_end = static_cast<std::uint32_t>(out.quaternion_terms.size());
-    out.quaternion_joints.push_back(q);
-  }
+  return ok();
 }
 
 Status compile_joint_groups(const dna::Dna& dna, RigData& out) {
   const auto& groups = dna.behavior.joint_groups;
-  const std::vector<bool> flags = quaternion_joint_flags(dna);
-  out.euler = euler_convention(dna);
   std::size_t values = 0;
   for (const dna::JointGroup& g : groups) values += g.values.size();
   out.joint_values.reserve(values + simd::kWidest);
   for (std::size_t i = 0; i < groups.size(); ++i) {
     const std::string where = "behavior.joint_groups[" + std::to_string(i) + "]";
     if (Status s = compile_joint_group(groups[i], where, out); !s) return s;
-    compile_quaternion_joints(groups[i], static_cast<std::uint32_t>(i), flags, out);
   }
   out.joint_values.resize(out.joint_values.size() + simd::kWidest);  // kernels read on
   mark_shared_rows(out);
@@ -333,88 +317,6 @@ void mark_channels_and_maps(const RigData& r, Used& used) {
   }
 }
 
-std::span<const std::uint16_t> factors(const RigData& r, const rig::Psd& p) {
-  return {r.psd_factors.data() + p.factors_begin, p.factor_count};
-}
-
-// Factors before what uses them, ties by ascending output; members of a cycle and what hangs on
-// them come last.
-std::vector<std::uint32_t> dependency_order(const RigData& r,
-                                            const std::vector<std::uint32_t>& psds) {
-  constexpr std::uint32_t kNone = UINT32_MAX;
-  std::vector<std::uint32_t> psd_of_control(r.control_count, kNone);
-  for (const std::uint32_t p : psds) psd_of_control[r.psds[p].output] = p;
-  std::vector<std::vector<std::uint32_t>> users(r.psds.size());
-  std::vector<std::uint32_t> waiting_for(r.psds.size(), 0);
-  std::priority_queue<std::uint32_t, std::vector<std::uint32_t>, std::greater<>> ready;
-  for (const std::uint32_t p : psds) {
-    for (const std::uint16_t factor : factors(r, r.psds[p])) {
-      const std::uint32_t source = psd_of_control[factor];
-      if (source == kNone) continue;
-      users[source].push_back(p);
-      ++waiting_for[p];
-    }
-    if (waiting_for[p] == 0) ready.push(p);
-  }
-  std::vector<std::uint32_t> order;
-  while (!ready.empty()) {
-    const std::uint32_t p = ready.top();
-    ready.pop();
-    order.push_back(p);
-    for (const std::uint32_t user : users[p]) {
-      if (--waiting_for[user] == 0) ready.push(user);
-    }
-  }
-  std::ranges::copy_if(psds, std::back_inserter(order),
-                       [&](std::uint32_t p) { return waiting_for[p] > 0; });
-  return order;
-}
-
-// Which factor watches each corrective; kNobody where a corrective is among the factors.
-constexpr std::uint32_t kNobody = UINT32_MAX;
-std::vector<std::uint32_t> choose_watchers(const RigData& r) {
-  std::vector<std::uint32_t> load(r.control_count, 0), watchers;
-  for (const rig::Psd& p : r.psds) {
-    std::uint32_t watcher = kNobody;
-    for (const std::uint16_t f : factors(r, p)) {
-      if (f >= r.raw_count && f < r.raw_count + r.psd_count) {
-        watcher = kNobody;
-        break;
-      }
-      if (watcher == kNobody || load[f] < load[watcher]) watcher = f;
-    }
-    if (watcher != kNobody) ++load[watcher];
-    watchers.push_back(watcher);
-  }
-  return watchers;
-}
-
-void schedule_psds(const Used& used, RigData& r) {
-  const std::vector<std::uint32_t> watchers = choose_watchers(r);
-  r.chained_begins.push_back(0);
-  for (std::uint32_t lod = 0; lod < r.lod_count; ++lod) {
-    std::vector<std::uint32_t> chained;
-    std::vector<std::vector<std::uint16_t>> watched(r.control_count);
-    for (std::uint32_t p = 0; p < r.psds.size(); ++p) {
-      if (!used[lod][r.psds[p].output]) continue;
-      if (watchers[p] == kNobody) {
-        chained.push_back(p);
-      } else {
-        watched[watchers[p]].push_back(static_cast<std::uint16_t>(p));
-      }
-    }
-    for (const auto& list : watched) {
-      r.watch_begins.push_back(static_cast<std::uint32_t>(r.watched.size()));
-      r.watched.insert(r.watched.end(), list.begin(), list.end());
-    }
-    r.watch_begins.push_back(static_cast<std::uint32_t>(r.watched.size()));
-    for (const std::uint32_t p : dependency_order(r, chained)) {
-      r.chained.push_back(static_cast<std::uint16_t>(p));
-    }
-    r.chained_begins.push_back(static_cast<std::uint32_t>(r.chained.size()));
-  }
-}
-
 Status compile_channels_and_maps(const dna::Dna& dna, RigData& out) {
   const dna::BlendShapeChannels& s = dna.behavior.blend_shape_channels;
   const dna::AnimatedMaps& m = dna.behavior.animated_maps;
@@ -457,7 +359,60 @@ Status narrow(RigData& out) {
   return ok();
 }
 
+// Names, sizes and tables.
+void compile_frame(const dna::Dna& dna, RigData& out) {
+  out.lod_count = dna.descriptor.lod_count;
+  out.euler = detail::euler_convention(dna);
+  for (const std::string& name : dna.definition.raw_control_names) add_text(name, out);
+  for (const std::string& name : dna.definition.gui_control_names) add_text(name, out);
+  out.gui_count = static_cast<std::uint32_t>(dna.definition.gui_control_names.size());
+  count_controls(dna, out);
+  compile_neutral(dna, out);
+  compile_initial_controls(dna, out);
+  out.gui_rows = compile_table(dna.behavior.gui_to_raw);
+  list_gui_ranges(out);
+}
+
+Result<RigData> compile_parts(const dna::Dna& dna, const CompileOptions& options) {
+  RigData out;
+  out.joint_stride = options.rotation == Rotation::kQuaternion ? 10 : 9;
+  compile_frame(dna, out);
+  detail::StepLods lods;
+  Used used(out.lod_count, std::vector<bool>(out.control_count, false));
+  if (Status s = compile_joint_groups(dna, out); !s) return std::move(s).propagate();
+  detail::compile_quaternion_joints(dna, out);
+  if (Status s = detail::compile_solvers(dna, out, lods); !s) return std::move(s).propagate();
+  if (Status s = detail::compile_networks(dna, out, lods); !s) return std::move(s).propagate();
+  if (Status s = detail::compile_ml_joints(dna, out); !s) return std::move(s).propagate();
+  detail::compile_twist_and_swing(dna, out);
+  if (Status s = compile_channels_and_maps(dna, out); !s) return std::move(s).propagate();
+  if (Status s = compile_psds(dna, out); !s) return std::move(s).propagate();
+  list_joints_written(out);
+  index_columns(dna, out, used);
+  mark_channels_and_maps(out, used);
+  detail::mark_ml_joints(out, used);
+  detail::schedule(used, lods, out);
+  if (out.joint_stride == 10) {
+    if (Status s = widen_joint_rows(out); !s) return std::move(s).propagate();
+  }
+  if (options.precision == Precision::kFloat16) {
+    if (Status s = narrow(out); !s) return std::move(s).propagate();
+  }
+  return out;
+}
+
 }  // namespace
+
+Status detail::check_controls(const Array<std::uint16_t>& indices, std::uint32_t limit,
+                              const std::string& where) {
+  for (std::size_t i = 0; i < indices.size(); ++i) {
+    if (indices[i] < limit) continue;
+    return fail(
+        ErrorCode::kInvalidIndex, where + "[" + std::to_string(i) + "]",
+        "control " + std::to_string(indices[i]) + ", but there are " + std::to_string(limit));
+  }
+  return ok();
+}
 
 Result<rig::Rig> compile(const dna::Dna& dna, const CompileOptions& options) {
   std::vector<dna::Warning> warnings;
@@ -469,25 +424,9 @@ Result<rig::Rig> compile(const dna::Dna& dna, const CompileOptions& options) {
                 std::string("this instruction set is not available; there are: ") +
                     simd::available_kernels());
   }
-  RigData out;
-  out.lod_count = dna.descriptor.lod_count;
-  for (const std::string& name : dna.definition.raw_control_names) add_text(name, out);
-  for (const std::string& name : dna.definition.gui_control_names) add_text(name, out);
-  out.gui_count = static_cast<std::uint32_t>(dna.definition.gui_control_names.size());
-  count_controls(dna, out);
-  compile_neutral(dna, out);
-  out.gui_rows = compile_table(dna.behavior.gui_to_raw);
-  if (Status s = compile_joint_groups(dna, out); !s) return std::move(s).propagate();
-  if (Status s = compile_channels_and_maps(dna, out); !s) return std::move(s).propagate();
-  if (Status s = compile_psds(dna, out); !s) return std::move(s).propagate();
-  Used used(out.lod_count, std::vector<bool>(out.control_count, false));
-  index_columns(dna, out, used);
-  mark_channels_and_maps(out, used);
-  schedule_psds(used, out);
-  if (options.precision == Precision::kFloat16) {
-    if (Status s = narrow(out); !s) return std::move(s).propagate();
-  }
-  return rig::make_rig(out, *kernels);
+  auto out = compile_parts(dna, options);
+  if (!out) return core::Unexpected{out.error()};
+  return rig::make_rig(*out, *kernels);
 }
 
 }  // namespace risorius::compile

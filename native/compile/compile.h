@@ -12,16 +12,18 @@
 
 namespace risorius::compile {
 
+enum class Rotation { kEuler, kQuaternion };
 enum class Precision { kFloat32, kFloat16 };
 
 struct CompileOptions {
   const simd::Kernels* kernels = nullptr;     // nullptr: the best that this CPU has
   Precision precision = Precision::kFloat32;  // of the joint matrices
+  Rotation rotation = Rotation::kEuler;       // form of the rotations in a pose
 };
 
 /// Compiles the behavior of a face. The result keeps nothing of the Dna.
 /// Fails: kInvalidIndex, kInvalidLength, kInvalidValue with the field: a Dna may have been edited;
-///        kInvalidValue for a joint value beyond 65504 in float16.
+///        kInvalidValue for a joint value beyond 65504 in float16; kLimitExceeded.
 /// From:  dna-format 12; joint matrices by columns, so that inactive columns cost nothing
 core::Result<rig::Rig> compile(const dna::Dna& dna, const CompileOptions& options = {});
 

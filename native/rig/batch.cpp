@@ -12,7 +12,8 @@ namespace {
 using simd::kFrames;
 
 PoseView frame_of(const Rig& rig, const PoseView& first, std::size_t n) {
-  return {first.joints + n * rig.joint_count * 9, first.blend_shapes + n * rig.blend_shape_count,
+  return {first.joints + n * rig.joint_count * rig.joint_stride,
+          first.blend_shapes + n * rig.blend_shape_count,
           first.animated_maps + n * rig.animated_map_count, first.controls + n * rig.control_count};
 }
 
@@ -23,7 +24,7 @@ class Block {
       : rig_(rig), work_(work), first_(first), count_(count) {}
 
   void joints(std::uint32_t lod) noexcept {
-    const std::size_t size = std::size_t{rig_.joint_count} * 9;
+    const std::size_t size = std::size_t{rig_.joint_count} * rig_.joint_stride;
     std::fill(first_.joints, first_.joints + count_ * size, 0.0f);
     list_columns();
     const std::size_t stride = simd::rounded_up(rig_.tallest_group);
@@ -99,7 +100,7 @@ void evaluate_block(const Rig& rig, const float* raw, std::size_t count, std::ui
   }
   block.joints(lod);
   for (std::size_t f = 0; f < count; ++f) {
-    detail::quaternion_joints(rig, lod, frame_of(rig, first, f));
+    detail::rotations(rig, lod, work, frame_of(rig, first, f));
   }
 }
 

@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "rig/rig.h"
+#include "rig/stages.h"
 
 namespace risorius::rig {
 
@@ -15,8 +16,14 @@ using core::fail;
 using core::Result;
 using core::Status;
 
-constexpr std::size_t kAlignment = 64, kArrays = 25;
-constexpr char kMagic[8] = {'R', 'S', 'R', 'I', 'G', 0, 0, 1};  // the last one: the version
+constexpr std::size_t kAlignment = 64;
+constexpr std::size_t kArrays = [] {
+  RigArrays<View> all;
+  std::size_t n = 0;
+  for_each_array(all, [&](const auto&) { ++n; });
+  return n;
+}();
+constexpr char kMagic[8] = {'R', 'S', 'R', 'I', 'G', 0, 0, 2};  // the last one: the version
 constexpr std::uint32_t kByteOrder = 0x01020304;
 
 struct Place {
@@ -57,132 +64,6 @@ std::span<const std::uint8_t> hashed_part(std::span<const std::uint8_t> block) {
 
 Status damaged(const std::string& where, const std::string& message) {
   return fail(ErrorCode::kInvalidValue, "rig." + where, message);
-}
-
-// Indices of one array against the size of another.
-class IndexCheck {
- public:
-  template <class T, class Get>
-  void below(const char* where, const T& values, std::uint64_t limit, Get get) {
-    std::uint64_t most = 0;
-    for (const auto& v : values) most = std::max<std::uint64_t>(most, get(v));
-    if (!values.empty() && most >= limit && where_ == nullptr) where_ = where;
-  }
-  void below(const char* where, View<std::uint16_t> values, std::uint64_t limit) {
-    below(where, values, limit, [](std::uint16_t v) { return v; });
-  }
-  /// begins[0] = 0, never falling, the last one is the size of what it begins in.
-  void begins(const char* where, View<std::uint32_t> values, std::size_t size) {
-    demand(where, std::ranges::is_sorted(values) && (values.empty() || values.back() == size));
-  }
-  void demand(const char* where, bool holds) {
-    if (!holds && where_ == nullptr) where_ = where;
-  }
-  Status status() const {
-    if (where_ == nullptr) return core::ok();
-    return fail(ErrorCode::kInvalidIndex, std::string("rig.") + where_,
-                "a number in it points outside what it counts in");
-  }
-
- private:
-  const char* where_ = nullptr;
-};
-
-void check_sizes(const Rig& r, IndexCheck& c) {
-  const std::uint64_t lods = r.lod_count;
-  c.demand("header", std::uint64_t{r.raw_count} + r.psd_count <= r.control_count &&
-                         r.control_count <= 65536 && r.joint_count <= 65536 &&
-                         r.blend_shape_count <= 65536 && r.animated_map_count <= 65536);
-  c.demand("text_ends", r.text_ends.size() >= std::uint64_t{r.raw_count} + r.gui_count);
-  c.begins("text_ends", r.text_ends, r.text.size());
-  c.demand("neutral_joints", r.neutral_joints.size() == std::uint64_t{r.joint_count} * 9);
-  c.demand("psds", r.psds.size() <= 65536);
-  c.demand("watch_begins", r.watch_begins.size() == lods * (r.control_count + 1));
-  c.demand("chained_begins", r.chained_begins.size() == lods + 1);
-  c.demand("joint_group_lods", r.joint_group_lods.size() == lods * r.joint_groups.size());
-  c.demand("joint_values", r.joint_values.empty() || r.joint_halves.empty());
-  c.demand("joint_column_begins", r.joint_column_begins.size() == r.control_count + std::size_t{1});
-  c.demand("shape_outputs", r.shape_outputs.size() == r.shape_inputs.size());
-  c.demand("shape_lods", r.shape_lods.empty() || r.shape_lods.size() == lods);
-  c.demand("map_lods", r.map_lods.empty() || r.map_lods.size() == lods);
-  for (const std::uint8_t axis : r.euler.order) c.demand("header", axis < 3);
-}
-
-void check_correctives(const Rig& r, IndexCheck& c) {
-  c.below("psd_factors", r.psd_factors, r.control_count);
-  c.below("watched", r.watched, r.psds.size());
-  c.below("chained", r.chained, r.psds.size());
-  c.begins("watch_begins", r.watch_begins, r.watched.size());
-  c.begins("chained_begins", r.chained_begins, r.chained.size());
-  for (const Psd& p : r.psds) {
-    c.demand("psds", p.output >= r.raw_count && p.output < r.raw_count + r.psd_count &&
-                         std::uint64_t{p.factors_begin} + p.factor_count <= r.psd_factors.size());
-  }
-}
-
-void check_groups(const Rig& r, IndexCheck& c) {
-  const std::uint64_t values = r.is_half() ? r.joint_halves.size() : r.joint_values.size();
-  c.below("joint_outputs", r.joint_outputs, std::uint64_t{r.joint_count} * 9);
-  c.below("joints_written", r.joints_written, r.joint_count);
-  c.begins("joint_column_begins", r.joint_column_begins, r.joint_columns.size());
-  std::vector<std::uint32_t> columns(r.joint_groups.size());
-  for (const JointColumn& column : r.joint_columns) {
-    if (column.group >= columns.size()) return c.demand("joint_columns", false);
-    ++columns[column.group];
-    const std::uint64_t end =
-        column.offset + simd::rounded_up(r.joint_groups[column.group].row_count);
-    c.demand("joint_columns", end <= values);
-  }
-  std::uint64_t lists = 0;
-  std::uint32_t tallest = 0;
-  for (std::size_t i = 0; i < columns.size(); ++i) {
-    const JointGroup& g = r.joint_groups[i];
-    c.demand("joint_groups",
-             g.columns_begin == lists && columns[i] == g.column_count &&
-                 g.row_count <= r.tallest_group &&
-                 std::uint64_t{g.outputs_begin} + g.row_count <= r.joint_outputs.size());
-    lists += g.column_count;
-    tallest = std::max(tallest, g.row_count);
-    for (std::uint32_t l = 0; l < r.lod_count; ++l) {
-      c.demand("joint_group_lods", r.joint_group_lods[i * r.lod_count + l] <= g.row_count);
-    }
-  }
-  c.demand("header", lists == r.list_count && tallest == r.tallest_group);
-}
-
-void check_quaternions(const Rig& r, IndexCheck& c) {
-  c.below("quaternion_terms", r.quaternion_terms, r.control_count,
-          [](const QuaternionTerm& t) { return t.control; });
-  for (const QuaternionJoint& q : r.quaternion_joints) {
-    c.demand("quaternion_joints", q.joint < r.joint_count && q.group < r.joint_groups.size() &&
-                                      q.terms_begin <= q.terms_end &&
-                                      q.terms_end <= r.quaternion_terms.size());
-  }
-}
-
-void check_table(const char* where, View<ConditionalRow> rows, std::uint64_t inputs,
-                 std::uint64_t outputs, IndexCheck& c) {
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    c.demand(where, rows[i].input < inputs && rows[i].output < outputs && rows[i].run_end > i &&
-                        rows[i].run_end <= rows.size());
-  }
-}
-
-Status check_everything(const Rig& r) {
-  IndexCheck c;
-  check_sizes(r, c);
-  if (Status sizes = c.status(); !sizes) return sizes;
-  check_correctives(r, c);
-  check_groups(r, c);
-  check_quaternions(r, c);
-  c.below("shape_inputs", r.shape_inputs, r.control_count);
-  c.below("shape_outputs", r.shape_outputs, r.blend_shape_count);
-  const auto most = [](std::uint32_t v) { return v; };
-  c.below("shape_lods", r.shape_lods, r.shape_inputs.size() + 1, most);
-  c.below("map_lods", r.map_lods, r.map_rows.size() + 1, most);
-  check_table("gui_rows", r.gui_rows, r.gui_count, r.raw_count, c);
-  check_table("map_rows", r.map_rows, r.control_count, r.animated_map_count, c);
-  return c.status();
 }
 
 Status check_header(std::span<const std::uint8_t> bytes, const BlockHeader& h) {
@@ -240,7 +121,7 @@ Result<Rig> open_rig(std::span<const std::uint8_t> bytes, std::shared_ptr<const 
   if (h.hash != hash(hashed_part(bytes))) {
     return fail(ErrorCode::kInvalidValue, "rig.hash", "the bytes were changed or cut");
   }
-  if (Status s = check_everything(*rig); !s) return std::move(s).propagate();
+  if (Status s = detail::check_everything(*rig); !s) return std::move(s).propagate();
   return rig;
 }
 

@@ -58,10 +58,14 @@ class Correctives {
       }
     }
   }
-  void chained(std::uint32_t lod, const float* last) noexcept {
-    for (std::uint32_t i = rig_.chained_begins[lod]; i < rig_.chained_begins[lod + 1]; ++i) {
-      const std::uint32_t p = rig_.chained[i];
-      set(p, corrective(rig_, rig_.psds[p], last != nullptr ? last : controls_));
+  // In: from  what they read. The output may be a raw control, which is active by itself.
+  void one(std::uint32_t p, const float* from) noexcept {
+    const std::uint16_t output = rig_.psds[p].output;
+    const float value = corrective(rig_, rig_.psds[p], from);
+    if (output < rig_.raw_count) {
+      controls_[output] = value;
+    } else {
+      set(p, value);
     }
   }
 
@@ -96,7 +100,7 @@ void list_columns(const Rig& rig, Workspace& work, const float* controls) noexce
 }
 
 void joints(const Rig& rig, std::uint32_t lod, Workspace& work, const PoseView& pose) noexcept {
-  std::fill(pose.joints, pose.joints + std::size_t{rig.joint_count} * 9, 0.0f);
+  std::fill(pose.joints, pose.joints + std::size_t{rig.joint_count} * rig.joint_stride, 0.0f);
   list_columns(rig, work, pose.controls);
   for (std::size_t i = 0; i < rig.joint_groups.size(); ++i) {
     const JointGroup& g = rig.joint_groups[i];
@@ -116,6 +120,35 @@ void joints(const Rig& rig, std::uint32_t lod, Workspace& work, const PoseView& 
   }
 }
 
+// Controls that are not at rest, without the correctives.
+std::size_t list_sources(const Rig& rig, const float* controls, std::uint16_t* active) noexcept {
+  const std::size_t n = append_active(controls, 0, rig.raw_count, active);
+  return n + append_active(controls, rig.raw_count + rig.psd_count, rig.control_count, active + n);
+}
+
+// The correctives that a control watches; the others are left at 0.
+void start_correctives(const Rig& rig, std::uint32_t lod, Workspace& work,
+                       float* controls) noexcept {
+  std::fill(controls + rig.raw_count, controls + rig.raw_count + rig.psd_count, 0.0f);
+  std::fill(work.psd_bits.begin(), work.psd_bits.end(), 0u);
+  const std::size_t n = list_sources(rig, controls, work.active.data());
+  Correctives(rig, work, controls).watched(lod, {work.active.data(), n});
+}
+
+// In ascending order: raw, correctives, networks and poses.
+void list_active(const Rig& rig, Workspace& work, const float* controls) noexcept {
+  std::uint16_t* active = work.active.data();
+  std::size_t n = append_active(controls, 0, rig.raw_count, active);
+  for (std::size_t word = 0; word < work.psd_bits.size(); ++word) {
+    for (std::uint64_t bits = work.psd_bits[word]; bits != 0; bits &= bits - 1) {
+      const auto p = word * 64 + static_cast<std::size_t>(std::countr_zero(bits));
+      active[n++] = rig.psds[p].output;
+    }
+  }
+  n += append_active(controls, rig.raw_count + rig.psd_count, rig.control_count, active + n);
+  work.active_count = n;
+}
+
 }  // namespace
 
 namespace detail {
@@ -124,60 +157,56 @@ std::uint32_t clamp_lod(const Rig& rig, std::uint32_t lod) noexcept {
   return rig.lod_count == 0 ? 0 : std::min(lod, rig.lod_count - 1);
 }
 
-void correctives(const Rig& rig, std::uint32_t lod, const float* last, Workspace& work,
-                 float* controls) noexcept {
-  const std::uint32_t raw = rig.raw_count, after = raw + rig.psd_count;
-  std::fill(controls + raw, controls + after, 0.0f);
-  std::fill(work.psd_bits.begin(), work.psd_bits.end(), 0u);
-  std::uint16_t* active = work.active.data();
-  std::size_t n = append_active(controls, 0, raw, active);
-  n += append_active(controls, after, rig.control_count, active + n);
+void run(const Rig& rig, std::uint32_t step, std::uint32_t lod, Workspace& work,
+         float* controls) noexcept {
+  if (step_kind(step) == StepKind::kOperation) {
+    run_operation(rig, step_index(step), lod, work, controls);
+  } else {
+    run_solver(rig, step_index(step), work, controls);
+  }
+}
+
+void settled_controls(const Rig& rig, std::uint32_t lod, Workspace& work,
+                      float* controls) noexcept {
+  for (const std::uint32_t step : rig.steps_of(lod, kEarly)) run(rig, step, lod, work, controls);
+  start_correctives(rig, lod, work, controls);
   Correctives all(rig, work, controls);
-  all.watched(lod, {active, n});
-  all.chained(lod, last);
-  // In ascending order: raw, correctives, networks and poses.
-  n = append_active(controls, 0, raw, active);
-  for (std::size_t word = 0; word < work.psd_bits.size(); ++word) {
-    for (std::uint64_t bits = work.psd_bits[word]; bits != 0; bits &= bits - 1) {
-      const auto p = word * 64 + static_cast<std::size_t>(std::countr_zero(bits));
-      active[n++] = rig.psds[p].output;
+  for (const std::uint32_t step : rig.steps_of(lod, kChained)) {
+    if (step_kind(step) == StepKind::kPsd) {
+      all.one(step_index(step), controls);
+    } else {
+      run(rig, step, lod, work, controls);
     }
   }
-  n += append_active(controls, after, rig.control_count, active + n);
-  work.active_count = n;
+  list_active(rig, work, controls);
+}
+
+void latent_controls(const Rig& rig, std::uint32_t lod, Workspace& work, float* controls) noexcept {
+  for (const std::uint32_t step : rig.steps_of(lod, kReference)) {
+    run(rig, step, lod, work, controls);
+  }
+  if (!rig.steps.empty()) {
+    std::copy(controls, controls + rig.control_count, work.last_controls.begin());
+  }
+  start_correctives(rig, lod, work, controls);
+  Correctives all(rig, work, controls);
+  for (const StepList list : {kChained, kCyclic}) {
+    for (const std::uint32_t step : rig.steps_of(lod, list)) {
+      if (step_kind(step) == StepKind::kPsd) all.one(step_index(step), work.last_controls.data());
+    }
+  }
+  list_active(rig, work, controls);
 }
 
 void begin(const Rig& rig, const float* raw, std::uint32_t lod, bool settle, Workspace& work,
            float* controls) noexcept {
   std::copy(raw, raw + rig.raw_count, controls);
-  std::fill(controls + rig.raw_count, controls + rig.control_count, 0.0f);
-  const float* last = nullptr;
-  if (!settle && !rig.chained.empty()) {
-    std::copy(controls, controls + rig.control_count, work.last_controls.begin());
-    last = work.last_controls.data();
-  }
-  correctives(rig, lod, last, work, controls);
-}
-
-// Columns in order, each applied after the ones before (dna-format 12.5, quaternion groups).
-void quaternion_joints(const Rig& rig, std::uint32_t lod, const PoseView& pose) noexcept {
-  for (const QuaternionJoint& q : rig.quaternion_joints) {
-    if (q.first_row >= rig.joint_group_lods[q.group * rig.lod_count + lod]) continue;
-    Quaternion product;
-    for (std::uint32_t t = q.terms_begin; t < q.terms_end; ++t) {
-      const QuaternionTerm& term = rig.quaternion_terms[t];
-      const float v = pose.controls[term.control];
-      if (v == 0.0f) continue;
-      const Quaternion& full = term.rotation;
-      const float identity = full.w >= 0.0f ? 1.0f - v : v - 1.0f;
-      const Quaternion blend{full.x * v, full.y * v, full.z * v, full.w * v + identity};
-      const float length =
-          std::sqrt(blend.x * blend.x + blend.y * blend.y + blend.z * blend.z + blend.w * blend.w);
-      product = multiply({blend.x / length, blend.y / length, blend.z / length, blend.w / length},
-                         product);
-    }
-    const std::array<float, 3> angles = to_euler(rig.euler, product);
-    std::copy(angles.begin(), angles.end(), pose.joints + std::size_t{q.joint} * 9 + 3);
+  std::copy(rig.initial_controls.begin() + rig.raw_count, rig.initial_controls.end(),
+            controls + rig.raw_count);
+  if (settle) {
+    settled_controls(rig, lod, work, controls);
+  } else {
+    latent_controls(rig, lod, work, controls);
   }
 }
 
@@ -194,7 +223,7 @@ void channels_and_maps(const Rig& rig, std::uint32_t lod, const PoseView& pose) 
 
 void outputs(const Rig& rig, std::uint32_t lod, Workspace& work, const PoseView& pose) noexcept {
   joints(rig, lod, work, pose);
-  quaternion_joints(rig, lod, pose);
+  rotations(rig, lod, work, pose);
   channels_and_maps(rig, lod, pose);
 }
 
@@ -202,7 +231,7 @@ void outputs(const Rig& rig, std::uint32_t lod, Workspace& work, const PoseView&
 
 Pose make_pose(const Rig& rig) {
   Pose pose;
-  pose.joints.resize(std::size_t{rig.joint_count} * 9);
+  pose.joints.resize(std::size_t{rig.joint_count} * rig.joint_stride);
   pose.blend_shapes.resize(rig.blend_shape_count);
   pose.animated_maps.resize(rig.animated_map_count);
   pose.controls.resize(rig.control_count);
@@ -218,6 +247,14 @@ Workspace make_workspace(const Rig& rig) {
   work.column_weights.resize(rig.list_count);
   work.rows.resize(simd::rounded_up(rig.tallest_group));
   work.last_controls.resize(rig.control_count);
+  work.products.resize(rig.quaternion_joints.size());
+  work.quaternion_bits.resize((rig.quaternion_columns.size() + 63) / 64);
+  work.solver.resize(std::size_t{rig.solver_inputs} + 2 * std::size_t{rig.solver_poses});
+  work.masks.assign(rig.mask_count, 1.0f);
+  work.operation_values.resize(rig.operation_values);
+  for (auto& layer : work.layers) layer.resize(simd::rounded_up(rig.widest_layer));
+  work.layer_offsets.resize(std::size_t{rig.widest_layer} + 1);
+  work.layer_weights.resize(std::size_t{rig.widest_layer} + 1);
   return work;
 }
 
@@ -225,17 +262,52 @@ void gui_to_raw(const Rig& rig, const float* gui, float* raw) noexcept {
   evaluate_rows(rig.gui_rows, gui, raw, rig.raw_count);
 }
 
+namespace {
+
+bool inside(const ConditionalRow& row, float raw, float& in) noexcept {
+  in = (raw - row.cut) / row.slope;
+  return row.from <= in && in <= row.to;
+}
+
+// A face without LODs has nothing that moves.
+void rest(const Rig& rig, const float* raw, const PoseView& pose) noexcept {
+  std::copy(raw, raw + rig.raw_count, pose.controls);
+  std::copy(rig.initial_controls.begin() + rig.raw_count, rig.initial_controls.end(),
+            pose.controls + rig.raw_count);
+  std::fill(pose.joints, pose.joints + std::size_t{rig.joint_count} * rig.joint_stride, 0.0f);
+  if (rig.joint_stride == 10) detail::euler_joints(rig, pose.joints);
+  std::fill(pose.blend_shapes, pose.blend_shapes + rig.blend_shape_count, 0.0f);
+  std::fill(pose.animated_maps, pose.animated_maps + rig.animated_map_count, 0.0f);
+}
+
+}  // namespace
+
+void raw_to_gui(const Rig& rig, const float* raw, float* gui) noexcept {
+  std::fill(gui, gui + rig.gui_count, 0.0f);
+  std::uint32_t last = kNone, most = 0;
+  for (const GuiRange& range : rig.gui_ranges) {
+    if (range.gui != last) most = 0;
+    last = range.gui;
+    std::uint32_t count = 0;
+    float first = 0, in = 0;
+    bool found = false;
+    for (std::uint32_t i = range.rows_begin; i < range.rows_end; ++i) {
+      const ConditionalRow& row = rig.gui_rows[rig.gui_range_rows[i]];
+      if (!inside(row, raw[row.output], in)) continue;
+      if (!found) first = in;
+      found = true;
+      count += raw[row.output] != 0.0f ? 1 : 0;
+    }
+    if (count <= most) continue;
+    most = count;
+    gui[range.gui] = first;
+  }
+}
+
 void evaluate(const Rig& rig, const float* raw, std::uint32_t lod, bool settle, Workspace& work,
               const PoseView& pose) noexcept {
   const std::uint32_t level = detail::clamp_lod(rig, lod);
-  if (rig.lod_count == 0) {
-    std::copy(raw, raw + rig.raw_count, pose.controls);
-    std::fill(pose.controls + rig.raw_count, pose.controls + rig.control_count, 0.0f);
-    std::fill(pose.joints, pose.joints + std::size_t{rig.joint_count} * 9, 0.0f);
-    std::fill(pose.blend_shapes, pose.blend_shapes + rig.blend_shape_count, 0.0f);
-    std::fill(pose.animated_maps, pose.animated_maps + rig.animated_map_count, 0.0f);
-    return;
-  }
+  if (rig.lod_count == 0) return rest(rig, raw, pose);
   detail::begin(rig, raw, level, settle, work, pose.controls);
   detail::outputs(rig, level, work, pose);
 }

@@ -28,6 +28,10 @@ class Rig : public RigHeader, public RigArrays<View> {
   std::vector<std::string> ignored_layers() const {
     return texts(raw_count + gui_count, text_ends.size() - raw_count - gui_count);
   }
+  std::span<const std::uint32_t> steps_of(std::uint32_t lod, StepList list) const {
+    const std::uint32_t* begin = step_begins.data() + std::size_t{lod} * kStepLists + list;
+    return steps.subspan(begin[0], begin[1] - begin[0]);
+  }
   bool is_half() const { return !joint_halves.empty(); }
   /// The whole Rig as bytes: a header with version and hash, then the arrays. Written to a file it
   /// is a cache, for machines of the same byte order.
@@ -60,9 +64,9 @@ core::Result<Rig> open_rig(std::span<const std::uint8_t> bytes, std::shared_ptr<
 void seal_block(std::span<std::uint8_t> bytes);
 
 /// The output of one evaluation. Joint values are deltas from neutral in the file's units and axes:
-/// tx ty tz rx ry rz sx sy sz; a scale of 0 is no scale.
+/// tx ty tz rx ry rz sx sy sz, or tx ty tz qx qy qz qw sx sy sz; a scale of 0 is no scale.
 struct Pose {
-  std::vector<float> joints;         // [joints, 9]
+  std::vector<float> joints;         // [joints, stride]
   std::vector<float> blend_shapes;   // [channels]
   std::vector<float> animated_maps;  // [maps], in [0, 1]
   std::vector<float> controls;       // [controls]
@@ -90,6 +94,13 @@ struct Workspace {
   std::vector<float> column_weights;          // [.., 1 or kFrames]
   core::AlignedVector<float> rows;            // [1 or kFrames, tallest group]
   std::vector<float> last_controls;
+  std::vector<Quaternion> products;            // [quaternion joints]
+  std::vector<std::uint64_t> quaternion_bits;  // columns that are not at rest; 0 between calls
+  std::vector<double> solver;                  // a solver's inputs, then two rows of its poses
+  std::vector<float> masks;                    // [regions]; 0: its networks rest
+  core::AlignedVector<float> operation_values, layers[2];
+  std::vector<std::uint32_t> layer_offsets;
+  std::vector<float> layer_weights;
   std::vector<float> frame_weights;       // [controls, kFrames]: a batch's; 0 between calls
   std::vector<std::uint64_t> union_bits;  // controls that any of its frames uses; 0 as well
 };
@@ -104,15 +115,22 @@ Workspace make_batch_workspace(const Rig& rig);
 /// In: gui float32[G]. Out: raw float32[R].
 void gui_to_raw(const Rig& rig, const float* gui, float* raw) noexcept;
 
+/// GUI controls from raw controls, where the table can be reversed: of each GUI control's ranges
+/// (rows of equal bounds) the one that most raw controls other than 0 reverse into decides by its
+/// first row that reverses into it; the others are 0.
+/// In: raw float32[R]. Out: gui float32[G].
+void raw_to_gui(const Rig& rig, const float* raw, float* gui) noexcept;
+
 /// Turns raw controls into a pose. Allocates nothing.
 /// In:   raw     float32[R], not clamped here; NaN or infinity spoils every row of the joint groups
 ///               that have it as a column, its shapes, maps and correctives, and nothing else
 ///       lod     clamped to the last LOD
-///       settle  true: correctives of correctives are evaluated in the order of their dependency,
-///               so that the pose is a function of raw alone; false: they read 0, as on the
+///       settle  true: networks, solvers and correctives are evaluated in the order of their
+///               dependency, so that the pose is a function of raw alone; false: networks, then
+///               solvers, then correctives, each reading the rest of those after it, as on the
 ///               reference's first call
 /// Out:  pose    every field overwritten
-/// From: RigLogic; dna-format 12.1, 12.2, 12.5, 12.6
+/// From: RigLogic; dna-format 12
 void evaluate(const Rig& rig, const float* raw, std::uint32_t lod, bool settle, Workspace& work,
               const PoseView& pose) noexcept;
 inline void evaluate(const Rig& rig, const float* raw, std::uint32_t lod, bool settle,
@@ -128,22 +146,31 @@ inline void evaluate(const Rig& rig, const float* raw, std::uint32_t lod, bool s
 void evaluate_frames(const Rig& rig, const float* raw, std::size_t count, std::uint32_t lod,
                      bool settle, Workspace& work, const PoseView& pose) noexcept;
 
-/// One face through time, with the reference's latency: a corrective reads the correctives of the
-/// previous evaluation.
+/// One face through time, with the reference's latency: networks, then solvers, then correctives
+/// are evaluated, and each reads what comes after it as the previous evaluation left it.
 class Instance {
  public:
   explicit Instance(const Rig& rig);
   std::uint32_t lod() const { return lod_; }
-  /// Another level clears all correctives, as in the reference. Clamped to the last LOD.
+  /// Another level puts all but the raw controls to rest, as in the reference. Clamped to the last
+  /// LOD.
   void set_lod(std::uint32_t lod) noexcept;
   const Pose& evaluate(const float* raw) noexcept;
+  /// One value per region of each mesh, mesh after mesh. At 0 the region's networks are not
+  /// evaluated and what they write rests; other values have no effect.
+  std::span<const float> masks() const { return work_.masks; }
+  /// In: index below the number of masks.
+  void set_mask(std::size_t index, float value) noexcept;
 
  private:
+  void rest() noexcept;
+
   const Rig* rig_;
   std::uint32_t lod_ = 0;
   bool at_rest_ = false;  // the pose is what raw, still in its controls, gives
   Workspace work_;
   Pose pose_;
+  std::vector<float> before_;  // the controls of the frame before
 };
 
 }  // namespace risorius::rig

@@ -6,23 +6,51 @@
 
 namespace risorius::rig::detail {
 
+/// Fails: kInvalidIndex (an index or a size in a block that evaluation cannot take).
+core::Status check_everything(const Rig& rig);
+
 std::uint32_t clamp_lod(const Rig& rig, std::uint32_t lod) noexcept;
 
-/// Fills the correctives of controls, whose others are in place, and work.active.
-/// In: last  what correctives read of correctives: nullptr is what they are now (settled)
-void correctives(const Rig& rig, std::uint32_t lod, const float* last, Workspace& work,
-                 float* controls) noexcept;
-
-/// Raw controls, then the correctives: fills all of controls.
+/// Fills all of controls from the raw ones, and work.active.
+void settled_controls(const Rig& rig, std::uint32_t lod, Workspace& work, float* controls) noexcept;
+/// The same with the reference's latency: the others are still those of the frame before.
+void latent_controls(const Rig& rig, std::uint32_t lod, Workspace& work, float* controls) noexcept;
+/// Raw controls, the others at rest, then one of the two above.
 void begin(const Rig& rig, const float* raw, std::uint32_t lod, bool settle, Workspace& work,
            float* controls) noexcept;
+
+/// One operation of the graph of networks; writes controls if it is a scatter.
+void run_operation(const Rig& rig, std::uint32_t index, std::uint32_t lod, Workspace& work,
+                   float* controls) noexcept;
+/// One RBF solver: overwrites what its poses write.
+void run_solver(const Rig& rig, std::uint32_t index, Workspace& work, float* controls) noexcept;
 
 /// Joints, channels and maps from controls and work.active.
 void outputs(const Rig& rig, std::uint32_t lod, Workspace& work, const PoseView& pose) noexcept;
 
-/// The parts of outputs that a batch has in common with it.
-void quaternion_joints(const Rig& rig, std::uint32_t lod, const PoseView& pose) noexcept;
+/// The parts of outputs that a batch has in common with it. rotations: what comes after the joint
+/// groups, in this order.
+void rotations(const Rig& rig, std::uint32_t lod, Workspace& work, const PoseView& pose) noexcept;
+void euler_joints(const Rig& rig, float* joints) noexcept;
+void quaternion_joints(const Rig& rig, std::uint32_t lod, Workspace& work,
+                       const PoseView& pose) noexcept;
+void twist_and_swing(const Rig& rig, const PoseView& pose) noexcept;
+void ml_joints(const Rig& rig, std::uint32_t lod, const PoseView& pose) noexcept;
 void channels_and_maps(const Rig& rig, std::uint32_t lod, const PoseView& pose) noexcept;
+
+/// Where a joint's rotation begins; what of it is written as the output's form.
+inline float* rotation_of(const Rig& rig, float* joints, std::uint32_t joint) noexcept {
+  return joints + std::size_t{joint} * rig.joint_stride + 3;
+}
+inline void store_rotation(const Rig& rig, const Quaternion& q, float* to) noexcept {
+  if (rig.joint_stride == 10) {
+    to[0] = q.x, to[1] = q.y, to[2] = q.z, to[3] = q.w;
+    return;
+  }
+  const std::array<float, 3> angles = to_euler(rig.euler, q);
+  for (std::size_t a = 0; a < 3; ++a) to[a] = angles[a];
+}
+
 /// Rows of a group to their places.
 inline void scatter(const Rig& rig, const JointGroup& g, std::uint32_t rows, const float* from,
                     float* joints) noexcept {

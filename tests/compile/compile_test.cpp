@@ -107,7 +107,9 @@ TEST(Compile, NamesTheLayersThatAreNotEvaluated) {
   setup.blend_weights = {1.0f};
   setup.input_control_indices = {0, 0, 0, 0};
   dna.twist_swing_behavior.twists = std::vector{setup};
-  EXPECT_EQ(must_compile(dna).ignored_layers(), std::vector<std::string>{"twsw"});
+  EXPECT_TRUE(must_compile(dna).ignored_layers().empty());
+  dna.unknown_layers.push_back({{'n', 'e', 'w', '1'}, 0x10000, {}});
+  EXPECT_EQ(must_compile(dna).ignored_layers(), std::vector<std::string>{"new1"});
 }
 
 TEST(Compile, ControlsOfNetworksAndPosesFollowTheCorrectives) {

@@ -65,5 +65,60 @@ TEST(Instance, FacesOfOneRigKeepTheirOwnState) {
   EXPECT_EQ(a.evaluate(&half).controls[2], 0.5f);
 }
 
+// A network copies control 0; a corrective reads it; another network reads the corrective.
+dna::Dna networks_around_a_corrective() {
+  dna::Dna dna = make_face(1, 1, 1);
+  dna.behavior.psds.rows = {1};
+  dna.behavior.psds.columns = {2};
+  dna.behavior.psds.values = {1.0f};
+  dna.machine_learned_behavior.ml_control_names = {"a", "b"};
+  dna::NeuralNetworkLayer layer;
+  layer.biases = {0.0f};
+  layer.weights = {1.0f};
+  dna::NeuralNetwork first, second;
+  first.layers = second.layers = std::vector{layer};
+  first.input_indices = {0};
+  first.output_indices = {2};
+  second.input_indices = {1};
+  second.output_indices = {3};
+  dna.machine_learned_behavior.neural_networks = std::vector{second, first};
+  dna.machine_learned_behavior.lod_neural_network_mapping.lods = {0, 0};
+  dna.machine_learned_behavior.lod_neural_network_mapping.rows = {{0, 1}};
+  dna.machine_learned_behavior.region_names = {{"nose", "mouth"}};
+  dna.machine_learned_behavior.region_network_indices = {{{}, {1}}};
+  dna.behavior.joint_groups = std::vector{make_probe({1, 3})};
+  return dna;
+}
+
+TEST(Instance, NetworkReadsTheCorrectivesOfTheFrameBefore) {
+  const Rig rig = must_compile(networks_around_a_corrective());
+  Instance face(rig);
+  const float half = 0.5f;
+  EXPECT_EQ(face.evaluate(&half).controls, (std::vector{0.5f, 0.5f, 0.5f, 0.0f}));
+  EXPECT_EQ(face.evaluate(&half).controls, (std::vector{0.5f, 0.5f, 0.5f, 0.5f}));
+  EXPECT_EQ(evaluate_once(rig, {half}).controls, (std::vector{0.5f, 0.5f, 0.5f, 0.5f}));
+}
+
+TEST(Instance, MaskedNetworkRests) {
+  const Rig rig = must_compile(networks_around_a_corrective());
+  Instance face(rig);
+  ASSERT_EQ(face.masks().size(), 2u);
+  const float half = 0.5f;
+  (void)face.evaluate(&half);
+  face.set_mask(1, 0.0f);
+  EXPECT_EQ(face.evaluate(&half).controls, (std::vector{0.5f, 0.0f, 0.0f, 0.5f}));
+  face.set_mask(1, 0.25f);
+  EXPECT_EQ(face.evaluate(&half).controls[2], 0.5f) << "any value but 0 is all of it";
+}
+
+// A network and a corrective that read each other.
+TEST(Instance, CycleRestsWhenSettled) {
+  dna::Dna dna = networks_around_a_corrective();
+  dna.machine_learned_behavior.neural_networks[1].input_indices = {3};
+  dna.machine_learned_behavior.neural_networks[1].layers[0].biases = {0.5f};
+  const Rig rig = must_compile(dna);
+  EXPECT_EQ(evaluate_once(rig, {0.5f}).controls, (std::vector{0.5f, 0.0f, 0.0f, 0.0f}));
+}
+
 }  // namespace
 }  // namespace risorius::rig

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: MIT
+// Joints that the file's joint metadata declares quaternions. From: dna-format 12.5
+#include <algorithm>
+#include <array>
+#include <map>
+#include <numeric>
+
+#include "compile/parts.h"
+
+namespace risorius::compile {
+
+namespace {
+
+using rig::RigData;
+
+std::vector<bool> quaternion_joint_flags(const dna::Dna& dna) {
+  std::vector<bool> flags(dna.definition.joint_names.size(), false);
+  const auto& entries = dna.joint_behavior_metadata.joint_representations;
+  for (std::size_t j = 0; j < entries.size() && j < flags.size(); ++j) {
+    flags[j] = entries[j].rotation == 1;
+  }
+  return flags;
+}
+
+// Rotation rows of a joint in a group, by axis; kNone where there is none.
+using RotationRows = std::array<std::uint32_t, 3>;
+
+std::map<std::uint32_t, RotationRows> rotation_rows(const dna::JointGroup& g, std::uint32_t rows) {
+  std::map<std::uint32_t, RotationRows> out;
+  for (std::uint32_t r = 0; r < rows; ++r) {
+    const std::uint32_t joint = g.output_indices[r] / 9u, attribute = g.output_indices[r] % 9u;
+    if (attribute < 3 || attribute > 5) continue;
+    auto [at, added] = out.try_emplace(joint, RotationRows{rig::kNone, rig::kNone, rig::kNone});
+    at->second[attribute - 3] = r;
+  }
+  return out;
+}
+
+// One column of a group: a term for each joint that it turns at all. A missing row is 0.
+void add_column(const dna::JointGroup& g, std::size_t c, const std::vector<RotationRows>& rows,
+                std::uint32_t first_slot, RigData& out) {
+  const std::size_t columns = g.input_indices.size();
+  rig::QuaternionColumn column;
+  column.control = g.input_indices[c];
+  column.terms_begin = static_cast<std::uint32_t>(out.quaternion_terms.size());
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    std::array<float, 3> angles{};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const std::uint32_t r = rows[i][axis];
+      if (r != rig::kNone) angles[axis] = g.values[std::size_t{r} * columns + c];
+    }
+    if (angles == std::array<float, 3>{}) continue;
+    out.quaternion_terms.push_back(
+        {rig::from_euler(out.euler, angles), first_slot + static_cast<std::uint32_t>(i)});
+  }
+  column.terms_end = static_cast<std::uint32_t>(out.quaternion_terms.size());
+  if (column.terms_end > column.terms_begin) out.quaternion_columns.push_back(column);
+}
+
+void add_group(const dna::JointGroup& g, std::uint32_t index, const std::vector<bool>& flags,
+               std::vector<bool>& euler, RigData& out) {
+  const auto first_slot = static_cast<std::uint32_t>(out.quaternion_joints.size());
+  std::vector<RotationRows> turned;
+  for (const auto& [joint, rows] : rotation_rows(g, out.joint_groups[index].row_count)) {
+    if (!flags[joint]) {
+      euler[joint] = true;
+      continue;
+    }
+    out.quaternion_joints.push_back({joint, index, *std::ranges::min_element(rows)});
+    turned.push_back(rows);
+  }
+  if (turned.empty()) return;
+  for (std::size_t c = 0; c < g.input_indices.size(); ++c) {
+    add_column(g, c, turned, first_slot, out);
+  }
+}
+
+}  // namespace
+
+rig::EulerConvention detail::euler_convention(const dna::Dna& dna) {
+  static constexpr std::uint8_t kOrders[6][3] = {{0, 1, 2}, {0, 2, 1}, {1, 0, 2},
+                                                 {1, 2, 0}, {2, 0, 1}, {2, 1, 0}};
+  const dna::DescriptorExt& ext = dna.descriptor_ext;
+  rig::EulerConvention c;
+  const auto* order = kOrders[ext.rotation_sequence < 6 ? ext.rotation_sequence : 0];
+  for (std::size_t i = 0; i < 3; ++i) {
+    c.order[i] = order[i];
+    c.signs[i] = ext.rotation_sign[i] < 0 ? -1.0f : 1.0f;
+  }
+  c.radians_per_unit = dna.descriptor.rotation_unit == 1 ? 1.0f : 0.0174532925199432958f;
+  return c;
+}
+
+void detail::compile_quaternion_joints(const dna::Dna& dna, RigData& out) {
+  const std::vector<bool> flags = quaternion_joint_flags(dna);
+  std::vector<bool> euler(flags.size(), false);
+  for (std::uint32_t i = 0; i < out.joint_groups.size(); ++i) {
+    add_group(dna.behavior.joint_groups[i], i, flags, euler, out);
+  }
+  for (std::uint32_t j = 0; j < out.joint_count && out.joint_stride == 10; ++j) {
+    if (euler[j]) out.euler_joints.push_back(static_cast<std::uint16_t>(j));
+  }
+  if (out.quaternion_joints.empty()) return;
+  std::vector<std::uint32_t>& list = out.quaternion_column_list;
+  list.resize(out.quaternion_columns.size());
+  std::iota(list.begin(), list.end(), 0u);
+  std::ranges::stable_sort(list, {},
+                           [&](std::uint32_t c) { return out.quaternion_columns[c].control; });
+  out.quaternion_column_begins.assign(out.control_count + std::size_t{1}, 0);
+  for (const auto& column : out.quaternion_columns) {
+    ++out.quaternion_column_begins[column.control + std::size_t{1}];
+  }
+  std::partial_sum(out.quaternion_column_begins.begin(), out.quaternion_column_begins.end(),
+                   out.quaternion_column_begins.begin());
+}
+
+}  // namespace risorius::compile

@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: MIT
+// Radial solvers: targets in the form that inputs take, radii, and inverses. From: dna-format 12.4
+#include <algorithm>
+#include <cmath>
+
+#include "compile/parts.h"
+#include "rig/rbf.h"
+
+namespace risorius::compile {
+
+namespace {
+
+using core::ErrorCode;
+using core::fail;
+using core::ok;
+using core::Status;
+using detail::is_corrective;
+using rig::RigData;
+
+std::uint32_t count_of(const auto& list) { return static_cast<std::uint32_t>(list.size()); }
+
+// Of two targets, by number.
+double distance(const RigData& r, const rig::RbfSolver& s, std::uint32_t a, std::uint32_t b) {
+  const double* targets = r.rbf_targets.data() + s.targets_begin;
+  return rig::rbf_distance(s.distance, targets + std::size_t{a} * s.input_count,
+                           targets + std::size_t{b} * s.input_count, s.input_count);
+}
+
+double mean_distance(const RigData& r, const rig::RbfSolver& s) {
+  double sum = 0;
+  std::uint32_t pairs = 0;
+  for (std::uint32_t a = 0; a < s.pose_count; ++a) {
+    for (std::uint32_t b = a + 1; b < s.pose_count; ++b, ++pairs) sum += distance(r, s, a, b);
+  }
+  return pairs == 0 ? 0.0 : sum / pairs;
+}
+
+// Gauss and Jordan with the largest pivot of each column. Out: the smallest pivot.
+double invert(std::vector<double> m, std::vector<double>& out, std::size_t n) {
+  double smallest = 1.0;
+  out.assign(n * n, 0.0);
+  for (std::size_t i = 0; i < n; ++i) out[i * n + i] = 1.0;
+  for (std::size_t c = 0; c < n; ++c) {
+    std::size_t pivot = c;
+    for (std::size_t r = c + 1; r < n; ++r) {
+      if (std::fabs(m[r * n + c]) > std::fabs(m[pivot * n + c])) pivot = r;
+    }
+    smallest = std::min(smallest, std::fabs(m[pivot * n + c]));
+    if (!(smallest > 0)) return 0.0;
+    for (std::size_t k = 0; k < n; ++k) {
+      std::swap(m[c * n + k], m[pivot * n + k]);
+      std::swap(out[c * n + k], out[pivot * n + k]);
+    }
+    const double scale = 1.0 / m[c * n + c];
+    for (std::size_t k = 0; k < n; ++k) m[c * n + k] *= scale, out[c * n + k] *= scale;
+    for (std::size_t r = 0; r < n; ++r) {
+      const double factor = m[r * n + c];
+      if (r == c || factor == 0) continue;
+      for (std::size_t k = 0; k < n; ++k) {
+        m[r * n + k] -= factor * m[c * n + k];
+        out[r * n + k] -= factor * out[c * n + k];
+      }
+    }
+  }
+  return smallest;
+}
+
+// The matrix of kernels between targets turned over. Targets that are the same but for rounding
+// make it singular: then they share what they are near to, where the reference gives it to any of
+// them.
+void add_inverse(rig::RbfSolver& s, RigData& out) {
+  constexpr double kSingular = 1e-10, kRidge = 1e-8;
+  const std::size_t n = s.pose_count;
+  std::vector<double> kernels(n * n), inverse;
+  for (std::uint32_t a = 0; a < n; ++a) {
+    for (std::uint32_t b = 0; b < n; ++b) {
+      kernels[a * n + b] = rig::rbf_kernel(s.function, distance(out, s, a, b), s.radius);
+    }
+  }
+  if (!(invert(kernels, inverse, n) > kSingular)) {
+    for (std::size_t i = 0; i < n; ++i) kernels[i * n + i] += kRidge;
+    if (!(invert(kernels, inverse, n) > 0)) inverse = kernels;
+  }
+  s.interpolative = 1;
+  s.inverse_begin = count_of(out.rbf_inverses);
+  out.rbf_inverses.insert(out.rbf_inverses.end(), inverse.begin(), inverse.end());
+}
+
+void add_targets(const dna::RbfSolver& source, rig::RbfSolver& s, RigData& out) {
+  s.targets_begin = count_of(out.rbf_targets);
+  for (const float v : source.raw_control_values) {
+    out.rbf_targets.push_back(static_cast<double>(v));
+  }
+  for (std::uint32_t p = 0; p < s.pose_count; ++p) {
+    rig::convert_rbf_inputs(s.distance, s.axis,
+                            out.rbf_targets.data() + s.targets_begin + p * s.input_count,
+                            s.input_count);
+  }
+}
+
+// What a pose writes; in files without layer rbfe it is a control of its own.
+void add_pose(const dna::Dna& dna, std::uint16_t index, RigData& out) {
+  const auto& ext = dna.rbf_behavior_ext;
+  rig::RbfPose pose;
+  pose.scale = dna.rbf_behavior.poses[index].scale;
+  pose.inputs_begin = count_of(out.rbf_pose_inputs);
+  pose.outputs_begin = count_of(out.rbf_outputs);
+  const auto add = [&](std::uint32_t control, float weight) {
+    if (!is_corrective(out, control)) out.rbf_outputs.push_back({control, weight});
+  };
+  if (ext.poses.empty() && ext.pose_control_names.empty()) {
+    const dna::ControlCounts n = dna::control_counts(dna);
+    add(n.raw + n.psd + n.ml + index, 1.0f);
+  } else if (index < ext.poses.size()) {
+    const dna::RbfPoseControls& c = ext.poses[index];
+    for (const std::uint16_t i : c.input_control_indices) out.rbf_pose_inputs.push_back(i);
+    for (std::size_t i = 0; i < c.output_control_indices.size(); ++i) {
+      add(c.output_control_indices[i], c.output_control_weights[i]);
+    }
+  }
+  pose.input_count = count_of(out.rbf_pose_inputs) - pose.inputs_begin;
+  pose.output_count = count_of(out.rbf_outputs) - pose.outputs_begin;
+  out.rbf_poses.push_back(pose);
+}
+
+Status check_solver(const dna::RbfSolver& s, const std::string& where) {
+  const std::size_t n = s.pose_indices.size();
+  if (s.distance_method != rig::kEuclidean && s.raw_control_indices.size() % 4 != 0) {
+    return fail(ErrorCode::kInvalidLength, where + ".raw_control_indices",
+                std::to_string(s.raw_control_indices.size()) +
+                    " controls, but a distance of rotations needs four for each");
+  }
+  if (s.solver_type == 1 && n > 4096) {
+    return fail(ErrorCode::kLimitExceeded, where + ".pose_indices",
+                std::to_string(n) + " poses to interpolate; at most 4096 are supported");
+  }
+  return ok();
+}
+
+void add_solver(const dna::Dna& dna, const dna::RbfSolver& source, RigData& out) {
+  rig::RbfSolver s;
+  s.threshold = source.weight_threshold;
+  s.inputs_begin = count_of(out.rbf_inputs);
+  s.input_count = count_of(source.raw_control_indices);
+  s.poses_begin = count_of(out.rbf_poses);
+  s.pose_count = count_of(source.pose_indices);
+  s.distance = source.distance_method;
+  s.function = source.function_type;
+  s.axis = source.twist_axis;
+  s.always_normalize = source.normalize_method;
+  for (const std::uint16_t i : source.raw_control_indices) out.rbf_inputs.push_back(i);
+  for (const std::uint16_t p : source.pose_indices) add_pose(dna, p, out);
+  add_targets(source, s, out);
+  s.radius = static_cast<double>(source.radius) *
+             (dna.descriptor.rotation_unit == 1 ? 1.0 : 0.017453292519943295);
+  if (source.automatic_radius == 0) s.radius = mean_distance(out, s);
+  if (source.solver_type == 1) add_inverse(s, out);
+  out.solver_inputs = std::max(out.solver_inputs, s.input_count);
+  out.solver_poses = std::max(out.solver_poses, s.pose_count);
+  out.rbf_solvers.push_back(s);
+}
+
+}  // namespace
+
+std::vector<std::uint32_t> detail::listed(const dna::LodMapping& mapping, std::uint32_t lod) {
+  if (lod >= mapping.lods.size() || mapping.lods[lod] >= mapping.rows.size()) return {};
+  const auto& row = mapping.rows[mapping.lods[lod]];
+  return {row.begin(), row.end()};
+}
+
+Status detail::compile_solvers(const dna::Dna& dna, RigData& out, StepLods& lods) {
+  const auto& solvers = dna.rbf_behavior.solvers;
+  for (std::size_t i = 0; i < solvers.size(); ++i) {
+    const std::string where = "rbf_behavior.solvers[" + std::to_string(i) + "]";
+    if (Status s = check_solver(solvers[i], where); !s) return s;
+    add_solver(dna, solvers[i], out);
+  }
+  for (std::uint32_t lod = 0; lod < out.lod_count; ++lod) {
+    lods.solvers.push_back(listed(dna.rbf_behavior.lod_solver_mapping, lod));
+  }
+  return ok();
+}
+
+}  // namespace risorius::compile

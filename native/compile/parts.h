@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: MIT
+// The parts of compile(). Private to native/compile.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/array.h"
+#include "core/result.h"
+#include "dna/dna.h"
+#include "rig/arrays.h"
+
+namespace risorius::compile::detail {
+
+using core::Array;
+using core::Status;
+using rig::RigData;
+
+/// [LOD][control]: an output reads it there.
+using Used = std::vector<std::vector<bool>>;
+
+/// [LOD]: the operations and the solvers that run there, in the order of the file.
+struct StepLods {
+  std::vector<std::vector<std::uint32_t>> operations, solvers;
+};
+
+/// Fails: kInvalidIndex where one is not below limit.
+Status check_controls(const Array<std::uint16_t>& indices, std::uint32_t limit,
+                      const std::string& where);
+/// Correctives own their controls: nothing else writes those.
+inline bool is_corrective(const RigData& r, std::uint32_t control) {
+  return control >= r.raw_count && control < r.raw_count + r.psd_count;
+}
+/// What a mapping lists for a LOD.
+std::vector<std::uint32_t> listed(const dna::LodMapping& mapping, std::uint32_t lod);
+
+rig::EulerConvention euler_convention(const dna::Dna& dna);
+/// After the joint groups.
+void compile_quaternion_joints(const dna::Dna& dna, RigData& out);
+Status compile_solvers(const dna::Dna& dna, RigData& out, StepLods& lods);
+Status compile_networks(const dna::Dna& dna, RigData& out, StepLods& lods);
+Status compile_ml_joints(const dna::Dna& dna, RigData& out);
+void mark_ml_joints(const RigData& r, Used& used);
+void compile_twist_and_swing(const dna::Dna& dna, RigData& out);
+
+/// After everything else: which correctives are watched, and the lists of steps of each LOD.
+void schedule(const Used& used, const StepLods& lods, RigData& out);
+
+}  // namespace risorius::compile::detail
