@@ -7,6 +7,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
+#include <iterator>
 #include <limits>
 #include <numbers>
 #include <random>
@@ -713,6 +715,38 @@ TEST(DnaCoordinates, NumbersThatAreNoneStaySo) {
     EXPECT_LE(std::abs(r[p * 3 + 2]), 180) << p;  // of a huge angle
   }
   for (const float v : out.behavior.joint_groups[0].values) EXPECT_TRUE(std::isnan(v));
+}
+
+// Whatever parse accepts converts or is refused; what was converted is as sound as its source.
+void expect_sound(const std::vector<std::uint8_t>& bytes, const CoordinateTarget& target) {
+  core::SpanSource source(bytes);
+  const core::Result<Dna> dna = parse(source);
+  if (!dna) return;
+  std::vector<Warning> warnings;
+  const core::Result<Dna> out = convert_coordinates(*dna, target, warnings);
+  if (!out) {
+    EXPECT_EQ(out.error().code, core::ErrorCode::kInvalidValue);
+    return;
+  }
+  EXPECT_TRUE(validate(*out, warnings).has_value());
+}
+
+TEST(DnaCoordinates, SurvivesEveryPatchedByte) {
+  std::ifstream file(RISORIUS_TEST_DATA "/golden/tiny_v28.dna", std::ios::binary);
+  std::vector<std::uint8_t> bytes{std::istreambuf_iterator<char>(file), {}};
+  ASSERT_EQ(bytes.size(), 8109u);
+  CoordinateTarget mixing = target_of({3, 5, 0}, 5, {1, -1, 1}), moving = mixing;
+  mixing.translation_unit = std::uint16_t{1};
+  moving.rotation_sequence = std::uint32_t{2};
+  moving.rotation_unit = std::uint16_t{1};
+  for (std::size_t i = 0; i < bytes.size(); ++i) {
+    const std::uint8_t kept = bytes[i];
+    for (const std::uint8_t patch : {std::uint8_t{0x7F}, std::uint8_t{0xFF}}) {
+      bytes[i] = patch;
+      expect_sound(bytes, patch == 0x7F ? moving : mixing);
+    }
+    bytes[i] = kept;
+  }
 }
 
 }  // namespace
