@@ -67,15 +67,22 @@ py::list describe(const std::vector<dna::Warning>& warnings) {
 dna::LodSelection lod_selection(const py::object& lods) {
   dna::LodSelection selection;
   if (lods.is_none()) return selection;
-  if (py::isinstance<py::tuple>(lods)) {
-    const auto [max_lod, min_lod] = lods.cast<std::pair<std::uint16_t, std::uint16_t>>();
-    selection.max_lod = max_lod;
-    selection.min_lod = min_lod;
-    if (max_lod > min_lod) throw py::value_error("lods: (max_lod, min_lod) is empty");
-    return selection;
+  const bool is_range = py::isinstance<py::tuple>(lods);
+  try {
+    if (is_range) {
+      const auto [max_lod, min_lod] = lods.cast<std::pair<std::uint16_t, std::uint16_t>>();
+      selection.max_lod = max_lod;
+      selection.min_lod = min_lod;
+    } else {
+      selection.lods = lods.cast<std::vector<std::uint16_t>>();
+    }
+  } catch (const py::cast_error&) {
+    throw py::value_error("lods: (max_lod, min_lod) or [lod, ...] was expected, found " +
+                          py::repr(lods).cast<std::string>());
   }
-  selection.lods = lods.cast<std::vector<std::uint16_t>>();
-  if (selection.lods.empty()) throw py::value_error("lods: the list is empty");
+  if (is_range ? selection.max_lod > selection.min_lod : selection.lods.empty()) {
+    throw py::value_error("lods: " + py::repr(lods).cast<std::string>() + " has no LOD");
+  }
   return selection;
 }
 

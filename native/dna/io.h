@@ -71,8 +71,11 @@ struct WriteOptions {
 
 /// Serialises. Later versions than 2.1 get an empty layer of each kind that they know and that is
 /// missing, in the order of the source's index. Appends to warnings what the version cannot hold,
-/// by layer. Rewriting a file for its own version gives its bytes.
-/// Fails: kInvalidArgument (another version), kInvalidLength (a list beyond the format's limits).
+/// by layer. What the controls of a layer drive that is left out or was not loaded goes with them,
+/// with a warning, so that the file is whole in itself. Rewriting a file for its own version gives
+/// its bytes.
+/// Fails: kInvalidArgument (another version; a network, pose or setup that needs such a control),
+/// kLimitExceeded (more than the format's 4 GiB), and as validate.
 core::Result<std::vector<std::uint8_t>> write(const Dna& dna, const WriteOptions& options,
                                               std::vector<Warning>& warnings);
 

@@ -308,7 +308,10 @@ class Reader {
     std::set<std::string> outer_used = std::exchange(used_, {"signature", "size", "offset"});
     body();
     for (const auto& member : json.items()) {
-      if (used_.count(member.key()) == 0) error("the member " + member.key() + " is not known");
+      if (used_.count(member.key()) != 0) continue;
+      path_.push_back(member.key());
+      error("this member is not known");
+      path_.pop_back();
     }
     object_ = outer;
     used_ = std::move(outer_used);
@@ -644,9 +647,10 @@ Result<Dna> from_json(std::string_view text, const Limits& limits) {
   } catch (const Json::parse_error& e) {
     return fail(ErrorCode::kNotDna, "", "not JSON: the text cannot be read on from here",
                 e.byte == 0 ? 0 : e.byte - 1);
-  } catch (const Json::exception& e) {  // a number beyond every float
+  } catch (const Json::exception& e) {
+    const std::string text_of_it = e.what();
     return fail(ErrorCode::kInvalidValue, "",
-                std::string("not JSON that can be used: ") + e.what());
+                "a number is beyond every float: " + text_of_it.substr(text_of_it.rfind(' ') + 1));
   }
   Dna dna;
   dna.descriptor.coordinate_system = {0, 0, 0};  // as in a file without this layer

@@ -539,10 +539,11 @@ ControlCounts control_counts(const Dna& dna) {
   n.raw = size(dna.definition.raw_control_names);
   n.psd = dna.behavior.psd_count + dna.unread_controls.psd;
   n.ml = size(dna.machine_learned_behavior.ml_control_names) + dna.unread_controls.ml;
-  n.rbf_pose = size(dna.rbf_behavior_ext.pose_control_names) + dna.unread_controls.rbf_pose;
+  n.rbf_pose = size(dna.rbf_behavior_ext.pose_control_names);
   if (n.rbf_pose == 0 && dna.rbf_behavior_ext.poses.empty()) {
     n.rbf_pose = size(dna.rbf_behavior.poses);
   }
+  n.rbf_pose += dna.unread_controls.rbf_pose;
   return n;
 }
 

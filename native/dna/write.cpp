@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <limits>
+#include <optional>
 #include <string_view>
 
 #include "core/byte_writer.h"
+#include "dna/controls.h"
 #include "dna/io.h"
 #include "dna/layer_writer.h"
 #include "dna/layers.h"
@@ -127,32 +129,61 @@ std::vector<std::uint8_t> write_indexed(const Dna& dna, const WriteOptions& opti
   return w.take();
 }
 
-// One sentence for each layer that the version cannot hold, and whether its content is lost.
-void warn_of_losses(const Dna& dna, const WriteOptions& options, std::vector<Warning>& warnings) {
-  const std::string version = "2." + std::to_string(options.minor);
-  const bool kept = options.newer_layers && options.minor > 1;
-  const std::string fate =
-      kept ? "; it is written all the same, for readers that know it" : "; it is left out";
-  const auto warn = [&](const std::string& id) {
-    warnings.push_back({id, "version " + version + " has no layer " + id + fate});
-  };
+// 2.1 has the classic layers, though not under an index.
+bool holds(std::uint16_t minor, const detail::KnownLayer& layer) {
+  return layer.since_minor <= std::max<std::uint16_t>(minor, 2);
+}
+
+// Layers with content that the version does not know.
+std::vector<std::string> newer_layers(const Dna& dna, std::uint16_t minor) {
+  std::vector<std::string> ids;
   detail::for_each_layer(dna, [&](std::string_view id, const char*, const auto& value) {
     if (value == std::remove_cvref_t<decltype(value)>{}) return;
     for (const detail::KnownLayer& layer : detail::kLayers) {
-      // 2.1 has the classic layers, though not under an index.
-      if (id == layer.id && layer.since_minor > std::max<std::uint16_t>(options.minor, 2)) {
-        warn(layer.id);
-      }
+      if (id == layer.id && !holds(minor, layer)) ids.emplace_back(id);
     }
   });
+  return ids;
+}
+
+// One sentence for each layer that the version cannot hold, and whether its content is lost.
+void warn_of_losses(const Dna& dna, const WriteOptions& options, bool kept,
+                    std::vector<Warning>& warnings) {
+  const std::string version = "version 2." + std::to_string(options.minor);
+  const auto warn = [&](const std::string& id) {
+    warnings.push_back({id, version + " has no layer " + id +
+                                (kept ? "; it is written all the same, for readers that know it"
+                                      : "; it is left out")});
+  };
+  for (const std::string& id : newer_layers(dna, options.minor)) warn(id);
   if (options.minor < 8 && dna.descriptor_ext.face_winding_order != 0) {
     warnings.push_back({"descriptor_ext.face_winding_order",
-                        "version " + version + " cannot say that faces are clockwise (dsce)"});
+                        version + " cannot say that faces are clockwise (dsce)"});
   }
   if (kept) return;
   for (const UnknownLayer& layer : dna.unknown_layers) {
     warn(std::string(layer.id.begin(), layer.id.end()));
   }
+}
+
+// What the file will hold. Nothing when that is everything.
+Result<std::optional<Dna>> reduced(const Dna& dna, std::uint16_t minor, bool kept,
+                                   std::vector<Warning>& warnings) {
+  const std::vector<std::string> lost =
+      kept ? std::vector<std::string>{} : newer_layers(dna, minor);
+  if (lost.empty() && dna.unread_controls == UnreadControls{}) return std::optional<Dna>();
+  Dna out = dna;
+  for (const std::string& id : lost) detail::drop_layer(id, out);
+  auto dropped = detail::forget_unread_controls(out);
+  if (!dropped) return std::move(dropped).propagate();
+  if (*dropped > 0) {
+    warnings.push_back({"behavior", std::to_string(*dropped) +
+                                        " matrix columns, entries and correctives went with the "
+                                        "controls that drove them"});
+  }
+  std::vector<Warning> oddities;
+  if (core::Status valid = validate(out, oddities); !valid) return std::move(valid).propagate();
+  return std::optional<Dna>(std::move(out));
 }
 
 }  // namespace
@@ -166,9 +197,13 @@ Result<std::vector<std::uint8_t>> write(const Dna& dna, const WriteOptions& opti
   }
   std::vector<Warning> oddities;
   if (core::Status valid = validate(dna, oddities); !valid) return std::move(valid).propagate();
-  warn_of_losses(dna, options, warnings);
+  const bool kept = options.newer_layers && options.minor > 1;
+  warn_of_losses(dna, options, kept, warnings);
+  auto smaller = reduced(dna, options.minor, kept, warnings);
+  if (!smaller) return std::move(smaller).propagate();
+  const Dna& whole = smaller->has_value() ? **smaller : dna;
   std::vector<std::uint8_t> bytes =
-      options.minor == 1 ? write_sections(dna) : write_indexed(dna, options);
+      options.minor == 1 ? write_sections(whole) : write_indexed(whole, options);
   if (bytes.size() > std::numeric_limits<std::uint32_t>::max()) {
     return fail(ErrorCode::kLimitExceeded, "", "the file would pass the format's 4 GiB");
   }
