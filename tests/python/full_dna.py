@@ -32,7 +32,7 @@ def full() -> risorius.Dna:
     dna.meshes = [_mesh(1.0, 2), _mesh(2.0, 1)]
     _networks(dna)
     _rotations(dna)
-    return dna
+    return risorius.load(dna.to_bytes())  # with the index of a file
 
 
 def _table(outputs: list[int], inputs: list[int]) -> risorius.Conditionals:
@@ -161,11 +161,14 @@ def _rotations(dna: risorius.Dna) -> None:
 # ---- every change of one field
 
 Step = str | int
-OTHER_WORD = {
-    "other": "asian", "caucasian": "black", "hispanic": "asian", "male": "female",
-    "female": "male", "cm": "m", "m": "cm", "degrees": "radians", "radians": "degrees",
-    "ccw": "cw", "cw": "ccw", "xyz": "zyx", "zyx": "xyz", "yzx": "xyz",
-}  # fmt: skip
+CHOICES = (
+    ("asian", "black", "caucasian", "hispanic", "alien", "other"),
+    ("male", "female", "other"),
+    ("cm", "m"),
+    ("degrees", "radians"),
+    ("xyz", "zyx", "yzx"),
+    ("ccw", "cw"),
+)
 
 
 def is_struct(value: Any) -> bool:
@@ -218,14 +221,14 @@ def others(value: Any) -> Iterator[Any]:
     elif isinstance(value, float):
         yield value + 0.25
     elif isinstance(value, str):
-        yield OTHER_WORD.get(value, value + "x")
+        words = [word for words in CHOICES if value in words for word in words if word != value]
+        yield from words or [value + "x"]
     elif isinstance(value, np.ndarray):
         yield from _other_arrays(value)
     elif isinstance(value, dict):
         yield from _other_dicts(value)
     elif is_mapping(value):
-        rows = [value[lod].tolist() for lod in range(len(value))]
-        yield from _other_lists(rows)
+        yield from _other_lists(_rows(value))
     elif isinstance(value, list | tuple):
         yield from _other_lists(list(value))
 
@@ -249,6 +252,10 @@ def _other_arrays(value: np.ndarray) -> Iterator[np.ndarray]:
         yield np.concatenate([value, value[-1:]])
 
 
+def _rows(mapping: risorius.LodMapping) -> list[list[int]]:
+    return [mapping[lod].tolist() for lod in range(len(mapping))]
+
+
 def _other_dicts(value: dict[str, str]) -> Iterator[dict[str, str]]:
     yield value | {"new": "1"}
     for key in value:
@@ -259,11 +266,12 @@ def _other_dicts(value: dict[str, str]) -> Iterator[dict[str, str]]:
 
 def _other_lists(value: list[Any]) -> Iterator[list[Any]]:
     yield value[::-1]
+    value = [_rows(item) if is_mapping(item) else item for item in value]
     for i, item in enumerate(value):
         yield value[:i] + value[i + 1 :]
         yield [*value[:i], item, *value[i:]]
         if isinstance(item, str):
-            yield [*value[:i], OTHER_WORD.get(item, item + "x"), *value[i + 1 :]]
+            yield [*value[:i], item + "x", *value[i + 1 :]]
         elif isinstance(item, int) and len(value) == 3:  # rotation signs
             yield [*value[:i], -item, *value[i + 1 :]]
         elif isinstance(item, list | np.ndarray):

@@ -92,14 +92,16 @@ def test_what_the_version_cannot_hold_is_a_line_each(tmp_path):
     assert "twsw" in risorius.load(out).layers
 
 
-def test_a_result_that_could_not_be_read_is_refused(tmp_path):
-    """Joint groups of this file read controls of networks, which 2.2 does not have."""
+def test_what_is_left_out_takes_what_it_drove_along(tmp_path):
+    """Joint groups of this file read controls of networks, which 2.1 does not have."""
     out = tmp_path / "face.dna"
     for options in (["--version", "2.1"], ["--layers", "behavior"]):
         done = convert(GOLDEN / "tiny_v28.dna", out, *options)
-        assert done.returncode == 1
-        assert words(done).splitlines()[-1].count("behavior.joint_groups[0].input_indices[0]") == 1
-        assert not out.exists()
+        assert done.returncode == 0
+        assert "went with the controls that drove them" in words(done)
+        dna = risorius.load(out)
+        controls = len(dna.raw_control_names) + dna.psd_count
+        assert all((group.input_indices < controls).all() for group in dna.joint_groups)
 
 
 def test_a_newer_minor_becomes_the_newest_known_with_a_word(tmp_path):
@@ -174,6 +176,39 @@ def test_coordinates_are_handed_on_as_the_properties_spell_them(tmp_path, monkey
     assert risorius.load(out).face_winding_order == "cw"
     assert main(["convert", str(GOLDEN / "tiny_v24.dna"), str(out)]) == 0
     assert len(asked) == 1
+
+
+def test_coordinates_are_those_asked_for(tmp_path):
+    out = tmp_path / "face.dna"
+    arguments = "--axes right front up --translation-unit m --rotation-unit radians --winding cw"
+    done = convert(GOLDEN / "tiny_v22.dna", out, *arguments.split())
+    assert done.returncode == 0
+    assert "risorius: 2.2 becomes 2.8" in words(done).splitlines()  # 2.2 cannot say the winding
+    old, new = risorius.load(GOLDEN / "tiny_v22.dna"), risorius.load(out)
+    assert old.coordinate_system == ("right", "up", "front")
+    assert new.coordinate_system == ("right", "front", "up")
+    assert (new.translation_unit, new.rotation_unit) == ("m", "radians")
+    assert new.face_winding_order == "cw"
+    for a, b in zip(old.meshes, new.meshes, strict=True):
+        np.testing.assert_allclose(b.positions, a.positions[:, [0, 2, 1]] / 100, rtol=1e-6)
+    moved = old.neutral_joint_translations[:, [0, 2, 1]] / 100
+    np.testing.assert_allclose(new.neutral_joint_translations, moved, rtol=1e-6)
+
+
+def test_a_version_that_was_asked_for_stays_with_a_warning(tmp_path):
+    out = tmp_path / "face.dna"
+    done = convert(GOLDEN / "tiny_v22.dna", out, "--version", "2.2", "--winding", "cw")
+    assert done.returncode == 0
+    assert "warning" in words(done)
+    assert "clockwise" in words(done)
+    assert risorius.load(out).version == 2
+
+
+def test_axes_that_make_no_sense_are_refused(tmp_path):
+    done = convert(GOLDEN / "core.dna", tmp_path / "x.dna", "--axes", "right", "left", "up")
+    assert (done.returncode, words(done).count("\n")) == (2, 1)
+    assert "axes" in words(done)
+    assert os.listdir(tmp_path) == []
 
 
 def test_indent_changes_spaces_and_nothing_else(tmp_path):

@@ -175,10 +175,7 @@ def convert(source: risorius.Dna, args: argparse.Namespace) -> tuple[risorius.Dn
     try:
         return risorius.load(data), data
     except risorius.DnaError as error:
-        raise InputError(
-            f"{label(args.input)}: what is left would not fit together, because layers name "
-            f"controls of others that {version} or the options leave out: {error}"
-        ) from error
+        raise InputError(f"{label(args.input)}: the result cannot be read: {error}") from error
 
 
 def json_text(dna: risorius.Dna, indent: int | None) -> bytes:
@@ -229,7 +226,7 @@ def run(args: argparse.Namespace) -> int:
         return 2 if isinstance(error, CommandLineError) else 1
     except risorius.DnaError as error:
         _say(f"{label(args.input)}: {error}")
-        return 1
+        return 2 if error.code == "invalid_argument" else 1
     kind = ", JSON" if args.output_kind == "json" else ""
     print(
         f"{label(args.output, '<stdout>')}: {summary(dna)}, {counted(len(data), 'byte')}{kind}",
