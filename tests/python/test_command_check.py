@@ -156,6 +156,35 @@ def test_a_name_that_is_not_utf8_is_printed(tmp_path):
     assert b"\\udcff.dna: signature: error: not a DNA file" in done.stdout.replace(b"byte 0: ", b"")
 
 
+WRONG = {  # file: place and kind of what is said of it
+    "signature_2": "byte 0: signature: error",
+    "version_3_8": "byte 3: version: error",
+    "count_descname_7fffffff": "byte 187: descriptor.name: error",
+    "index_bhvr_offset_past_eof": "byte 2147483632: behavior: error",
+    "psd_values_empty": "behavior.psds: error",
+    "am_in_ge": "behavior.animated_maps.input_indices[0]: error: index 7000",
+    "desc_archetype_99": "byte 195: descriptor.archetype: warning",
+    "group_value_nan": "behavior.joint_groups[0].values[1]: warning",
+    "group_in_dup": None,
+    "trailing_garbage": None,
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_malformed_golden_files(name, capsys):
+    path = GOLDEN / "malformed" / f"{name}.dna"
+    said = WRONG[name]
+    code = main(["check", str(path)])
+    lines = capsys.readouterr().out.splitlines()
+    assert code == (1 if said and ": error" in said else 0)
+    assert lines[-1].startswith("bad: " if code else "ok: ")
+    if said is None:
+        assert len(lines) == 1
+    else:
+        assert lines[0].startswith(f"{path}: ")
+        assert any(said in line for line in lines[:-1])
+
+
 def test_extra_malformed_files_have_places(capsys):
     manifest = require_extra(MALFORMED / "manifest.json", "malformed golden files")
     bad = 0

@@ -344,6 +344,31 @@ def test_a_bad_command_line_is_exit_code_2(options, tmp_path):
     assert os.listdir(tmp_path) == []
 
 
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("signature_2", ["not a DNA file", "byte 0"]),
+        ("count_descname_7fffffff", ["descriptor.name", "byte 187"]),
+        ("psd_values_empty", ["behavior.psds", "byte 1295"]),
+        ("am_in_ge", ["behavior.animated_maps.input_indices[0]", "7000"]),
+        ("group_value_nan", None),
+        ("trailing_garbage", None),
+    ],
+)
+def test_malformed_golden_files(name, said, tmp_path):
+    source, text = GOLDEN / "malformed" / f"{name}.dna", tmp_path / "face.json"
+    done = convert(source, text)
+    if said:
+        assert (done.returncode, words(done).count("\n")) == (1, 1)
+        assert all(part in words(done) for part in [source.name, *said])
+        assert os.listdir(tmp_path) == []
+        return
+    assert (done.returncode, words(done)) == (0, "")
+    assert convert(text, tmp_path / "again.dna").returncode == 0
+    length = 4330  # of core.dna; what follows the layers is no content
+    assert (tmp_path / "again.dna").read_bytes() == source.read_bytes()[:length]
+
+
 def test_extra_malformed_files_are_converted_or_refused(tmp_path, capsys):
     require_extra(MALFORMED / "manifest.json", "malformed golden files")
     refused = 0

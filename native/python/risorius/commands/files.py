@@ -60,8 +60,7 @@ def from_json(name: str) -> risorius.Dna:
         InputError: not UTF-8, not JSON, not a Dna; with the place.
     """
     try:
-        # A byte order mark is what some editors leave.
-        return risorius.Dna.from_json(read_bytes(name).decode("utf-8-sig"))
+        return risorius.Dna.from_json(read_bytes(name).decode())
     except UnicodeDecodeError as error:
         found = error.object[error.start]
         bad = InputError(f"{label(name)}: not JSON: {found:#04x} is not UTF-8 (byte {error.start})")
