@@ -378,6 +378,9 @@ TEST(DnaCoordinates, PolesKeepTheRotation) {
           const Dna to = converted(dna, target_of(all_axes()[random.below(48)], into, {1, 1, 1}));
           expect_rotation(dna, at(dna.definition.neutral_joint_rotations, 0), to,
                           at(to.definition.neutral_joint_rotations, 0));
+          const Dna back = converted(to, system_of(dna));  // the pole is the target's now
+          expect_rotation(dna, at(dna.definition.neutral_joint_rotations, 0), back,
+                          at(back.definition.neutral_joint_rotations, 0));
         }
       }
     }
@@ -448,6 +451,8 @@ TEST(DnaCoordinates, UnitsReachEverythingThatHasOne) {
   const Dna back = converted(out, system_of(dna));
   EXPECT_EQ(back.definition, dna.definition);
   EXPECT_EQ(back.behavior, dna.behavior);
+  target.rotation_unit = std::nullopt;
+  EXPECT_EQ(converted(dna, target).rbf_behavior, dna.rbf_behavior);
 }
 
 TEST(DnaCoordinates, ARowStaysInItsLods) {
@@ -483,6 +488,19 @@ TEST(DnaCoordinates, MixedRotationRowsComeWithTheFirstOfThem) {
   EXPECT_EQ(warnings[1].where, "behavior.joint_groups[0].lods");
 }
 
+// Turning x by 90 and then y by 30 is turning z by -30 and then x by 90.
+TEST(DnaCoordinates, RotationRowsOfZerosAreLeftOut) {
+  Dna dna = bare_rig(1, 1);
+  dna.behavior.joint_groups = std::vector<JointGroup>{make_group({2}, {3, 4}, {90, 30})};
+  CoordinateTarget target;
+  target.rotation_sequence = 5;
+  const JointGroup g = converted(dna, target).behavior.joint_groups[0];
+  EXPECT_EQ(g.output_indices, (Array<std::uint16_t>{3, 5}));
+  EXPECT_EQ(g.lods, (Array<std::uint16_t>{2}));
+  EXPECT_FLOAT_EQ(g.values[0], 90);
+  EXPECT_FLOAT_EQ(g.values[1], -30);
+}
+
 TEST(DnaCoordinates, QuaternionJointsAreNotSaidToBeApproximate) {
   Dna dna = bare_rig(1, 1);
   dna.behavior.joint_groups = std::vector<JointGroup>{make_group({2}, {3, 4}, {40, 30})};
@@ -515,6 +533,7 @@ TEST(DnaCoordinates, QuaternionTargetsAndTwistAxesTurn) {
   quaternion.raw_control_indices = {0, 1, 2, 3};
   quaternion.raw_control_values = {0.5f, -0.25f, 0.125f, 0.75f};
   quaternion.pose_indices = {0};
+  quaternion.twist_axis = 1;
   plain = quaternion;
   plain.raw_control_indices = {4, 5, 6, 7};  // Euclidean, and no name says quaternion
   dna.rbf_behavior.solvers = std::vector<RbfSolver>{quaternion, plain};
@@ -530,6 +549,7 @@ TEST(DnaCoordinates, QuaternionTargetsAndTwistAxesTurn) {
   const Dna out = converted(dna, target, &warnings);
   EXPECT_EQ(out.rbf_behavior.solvers[0].raw_control_values,
             (Array<float>{-0.5f, -0.125f, 0.25f, 0.75f}));
+  EXPECT_EQ(out.rbf_behavior.solvers[0].twist_axis, 2);
   EXPECT_EQ(out.rbf_behavior.solvers[1].raw_control_values, plain.raw_control_values);
   EXPECT_EQ(out.twist_swing_behavior.twists[0].twist_axis, 2);
   EXPECT_EQ(out.twist_swing_behavior.swings[0].twist_axis, 7);
