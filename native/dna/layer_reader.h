@@ -10,6 +10,7 @@
 
 #include "core/byte_reader.h"
 #include "dna/empty_size.h"
+#include "dna/io.h"
 #include "dna/lods.h"
 #include "dna/schema.h"
 
@@ -30,6 +31,7 @@ class LayerReader {
   const LodPlan* plan = nullptr;
   const MachineLearnedBehaviorExt* operations = nullptr;  // read before the networks they name
   Places* places = nullptr;
+  Known known{true, true};  // about what was read so far
 
   explicit LayerReader(core::ByteReader& reader) : r_(reader) {}
 
@@ -62,10 +64,11 @@ class LayerReader {
     numbers(name, 2, [&] { v = r_.u16_list(); });
   }
   void field(Name name, core::Array<std::uint32_t>& v) {
-    numbers(name, 4, [&] { v = r_.u32_list(); });
+    largest_ = 0;
+    numbers(name, 4, [&] { v = r_.u32_list(&largest_); });
   }
   void field(Name name, core::Array<float>& v) {
-    numbers(name, 4, [&] { v = r_.f32_list(); });
+    numbers(name, 4, [&] { v = r_.f32_list(&known.finite); });
   }
   template <std::size_t kPlanes>
   void field(Name name, core::PlanarArray<kPlanes>& v) {
@@ -157,8 +160,11 @@ class LayerReader {
   template <class T>
   std::vector<bool> wanted(const core::List<T>*, const LodMapping* mapping, std::size_t n) const;
   bool target_is_wanted();
+  bool channel_is_wanted(std::uint16_t channel) const;
+  std::size_t cut_vertex(float* weights, std::uint16_t* joints, std::size_t n);
 
   core::ByteReader& r_;
+  std::uint32_t largest_ = 0;  // number in the uint32 list that was read last
 };
 
 /// Where an error about `where` (a field of validate) lies in the file.

@@ -93,6 +93,7 @@ class Parser {
     }
     return std::move(dna_);
   }
+  detail::Known known() const { return layer_.known; }
 
  private:
   using Body = void (Parser::*)();
@@ -377,9 +378,10 @@ Error with_offset(core::Source& source, const ParseOptions& options, Error error
 }  // namespace
 
 Result<Dna> parse(core::Source& source, const ParseOptions& options) {
-  Result<Dna> dna = Parser(source, options, nullptr, nullptr).run();
+  Parser parser(source, options, nullptr, nullptr);
+  Result<Dna> dna = parser.run();
   if (!dna) return core::Unexpected{with_offset(source, options, dna.error())};
-  if (Status valid = validate(*dna, dna->warnings); !valid) {
+  if (Status valid = detail::validate(*dna, parser.known(), dna->warnings); !valid) {
     // With a LOD filter the field's number counts what was kept, the file's bytes do not.
     if (!options.lods.everything()) return std::move(valid).propagate();
     return core::Unexpected{with_offset(source, options, valid.error())};
