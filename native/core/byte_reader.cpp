@@ -207,6 +207,13 @@ std::uint32_t ByteReader::count_slowly(std::uint32_t element_size) {
   return n;
 }
 
+std::optional<std::uint16_t> ByteReader::peek_u16(std::uint64_t offset) {
+  std::uint8_t bytes[2];
+  if (failed() || offset < position() || end_ < 2 || offset > end_ - 2) return std::nullopt;
+  if (source_->read(offset, bytes) != 2) return std::nullopt;
+  return load<std::uint16_t>(bytes);
+}
+
 std::string ByteReader::str() {
   std::string text(count(1), '\0');
   char* out = text.data();

@@ -60,6 +60,8 @@ class ByteReader {
     }
     return count_slowly(element_size);
   }
+  /// The number at offset, if it lies between here and end(). Reading goes on where it was.
+  std::optional<std::uint16_t> peek_u16(std::uint64_t offset);
   std::string str();
   std::vector<std::uint8_t> bytes(std::uint64_t size);
   void skip(std::uint64_t size);

@@ -216,17 +216,15 @@ bool LayerReader::channel_is_wanted(std::uint16_t channel) const {
   return channel >= channels.size() || channels.keeps(channel);
 }
 
-// The channel's number comes last: one look at where it must be if the lists are as long as the
-// first says, and when it is not wanted a walk over them, as they really are.
+// The channel's number comes last: one look at where it is if the lists are as long as the first
+// says, and when it is not wanted a walk over them, as they really are.
 bool LayerReader::target_is_wanted() {
   const std::uint64_t begin = r_.position();
   const auto go_back = [&] { return r_.enter(begin, r_.end() - begin); };
-  const std::uint64_t lists = std::uint64_t{16} * r_.count(4) + 12;
-  if (!r_.failed() && lists + 2 <= r_.left()) {
-    r_.skip(lists);
-    if (channel_is_wanted(r_.u16())) return go_back();
-  }
+  const std::uint64_t n = r_.count(4);
+  const std::optional<std::uint16_t> likely = r_.peek_u16(begin + 16 + 16 * n);
   go_back();
+  if (likely && channel_is_wanted(*likely)) return true;
   for (int l = 0; l < 4; ++l) r_.skip(std::uint64_t{4} * r_.count(4));
   const std::uint16_t channel = r_.u16();
   return !r_.failed() && channel_is_wanted(channel) && go_back();

@@ -48,6 +48,7 @@ class CountingSource final : public core::Source {
 struct Row {
   std::string name;
   std::vector<double> ms;
+  std::function<void(Row&)> count_bytes = [](Row&) {};
   std::uint64_t bytes_read = 0, bytes_kept = 0;
 };
 
@@ -171,7 +172,7 @@ class Bench {
     });
   }
 
-  void print() const;
+  void print();
 
  private:
   Row& add(const char* name) {
@@ -188,11 +189,13 @@ class Bench {
   }
   template <class Load>
   void count(Row& row, const dna::ParseOptions& options, const Load& load) {
-    const auto file = open(path_);
-    CountingSource source(*file);
-    must(dna::parse(source, options));
-    row.bytes_read = source.bytes();
-    row.bytes_kept = bytes_kept(load);
+    row.count_bytes = [this, options, load](Row& r) {
+      const auto file = open(path_);
+      CountingSource source(*file);
+      must(dna::parse(source, options));
+      r.bytes_read = source.bytes();
+      r.bytes_kept = bytes_kept(load);
+    };
   }
 
   const char* path_;
@@ -214,13 +217,14 @@ std::string cpu_model() {
   return "unknown CPU";
 }
 
-void Bench::print() const {
+void Bench::print() {
   const double plain = median(rows_.front()->ms);
   std::printf("\n%s, %s, commit %s\n\n", cpu_model().c_str(), RISORIUS_COMPILER, RISORIUS_COMMIT);
   std::printf("%-30s %9s %8s %12s %12s %9s\n", "what", "ms", "MB/s", "bytes read", "bytes kept",
               "of plain");
   for (const auto& row : rows_) {
     if (row->ms.empty()) continue;
+    row->count_bytes(*row);
     const double ms = median(row->ms);
     const double speed = static_cast<double>(row->bytes_read) / 1e3 / ms;
     std::printf("%-30s %9.3f %8.0f %12llu %12llu %8.0f%%\n", row->name.c_str(), ms, speed,
