@@ -72,6 +72,7 @@ void LayerReader::sized(Name name, List<T>& v, const LodMapping* mapping) {
     Field item(r_, name.dna, i);
     const std::uint64_t at = r_.position();
     note(at);
+    if (plan != nullptr) r_.enter(at, std::min<std::uint64_t>(4, r_.left()));  // nothing behind it
     const std::uint32_t mark = r_.u32();
     if (r_.failed()) break;
     const bool is_size = mesh_sizes || !std::is_same_v<T, Mesh>;
@@ -122,9 +123,11 @@ void LayerReader::matrix(Name name, JointGroup& g) {
   }
   if (r_.failed()) return;
   Buffer<float> values(cut_rows(*plan, g) * columns);
+  const std::uint64_t layer_end = r_.end(), begin = r_.position(),
+                      end = begin + std::uint64_t{4} * n;
+  r_.enter(begin, std::uint64_t{4} * values.size());  // not a byte of the other rows
   r_.read_f32(values.data(), values.size(), &known.finite);
-  r_.skip(std::uint64_t{4} * (n - values.size()));
-  if (!r_.failed()) g.values = std::move(values);
+  if (r_.enter(end, layer_end - end)) g.values = std::move(values);
 }
 
 namespace {
@@ -252,10 +255,16 @@ void LayerReader::targets(Mesh& m) {
   m.blend_shape_targets = std::move(targets);
 }
 
+void LayerReader::add_place(const Place& place) {
+  std::string where = r_.where();
+  if (!places->only.empty() && !places->only.starts_with(where)) return;
+  places->fields.emplace(std::move(where), place);
+}
+
 std::optional<std::uint64_t> find_place(const Places& places, std::string where) {
   std::optional<std::size_t> index;  // the first one that had to be cut off
   while (!where.empty()) {
-    if (const auto at = places.find(where); at != places.end()) {
+    if (const auto at = places.fields.find(where); at != places.fields.end()) {
       const Place& p = at->second;
       if (!index || p.element_size == 0) return p.offset;
       const std::uint64_t counts = p.plane == 0 ? 1 : 1 + *index / p.plane;

@@ -22,7 +22,12 @@ struct Place {
   std::uint32_t element_size = 0;  // 0: not a list of numbers
   std::uint32_t plane = 0;         // numbers in each plane of vectors, 0: no planes
 };
-using Places = std::map<std::string, Place>;
+
+/// Every field's place, or those that a message about the field `only` may need.
+struct Places {
+  std::map<std::string, Place> fields;
+  std::string only;
+};
 
 class LayerReader {
  public:
@@ -116,8 +121,9 @@ class LayerReader {
     read();
   }
   void note(std::uint64_t at, std::uint32_t element_size = 0, std::uint32_t plane = 0) {
-    if (places != nullptr) places->insert({r_.where(), {at, element_size, plane}});
+    if (places != nullptr) add_place({at, element_size, plane});
   }
+  void add_place(const Place& place);
 
   // Elements of lists.
   void element(std::string& v) { v = r_.str(); }

@@ -145,9 +145,15 @@ class Parser {
       for (std::uint32_t& offset : offsets) offset = r_.u32();
     }
     std::vector<std::pair<std::uint64_t, std::uint64_t>> ranges{{0, r_.position()}};
+    // A section ends where another begins: reading ahead does not touch one that is not wanted.
+    const auto end_of = [&](std::uint64_t begin) {
+      std::uint64_t end = std::max(begin, file_end);
+      for (const std::uint32_t other : offsets)
+        end = other > begin ? std::min<std::uint64_t>(end, other) : end;
+      return end;
+    };
     const auto section = [&](int i, const char* name, auto body) {
-      const std::uint64_t size = offsets[i] <= file_end ? file_end - offsets[i] : 0;
-      const bool good = read(name, offsets[i], size, body);
+      const bool good = read(name, offsets[i], end_of(offsets[i]) - offsets[i], body);
       ranges.emplace_back(offsets[i], r_.position());
       return good;
     };
@@ -370,6 +376,7 @@ class Parser {
 Error with_offset(core::Source& source, const ParseOptions& options, Error error) {
   if (error.offset || error.code == ErrorCode::kInvalidArgument) return error;
   detail::Places places;
+  places.only = error.where;
   static_cast<void>(Parser(source, options, &places, nullptr).run());
   error.offset = detail::find_place(places, error.where);
   return error;
