@@ -44,6 +44,8 @@ class ByteReader {
 
   /// Restricts reading to [offset, offset + size). Fails when that is outside the source.
   bool enter(std::uint64_t offset, std::uint64_t size);
+  /// The window begins small again, as after a jump: little of what comes next may be wanted.
+  void read_small() { next_read_ = 0; }
 
   std::uint8_t u8() { return number<std::uint8_t>(); }
   std::uint16_t u16() { return number<std::uint16_t>(); }

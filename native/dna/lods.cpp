@@ -204,9 +204,9 @@ void apply_to_joint_group(const LodPlan& plan, const Where& where, Lookup& looku
       joints.push_back(plan.joints[joint]);
     }
   }
-  if (outputs.size() < rows) {
+  if (outputs.size() < rows) drop_rows(keep, g.lods);
+  if (outputs.size() * columns < g.values.size()) {
     g.values = select_rows(g.values, columns, keep);
-    drop_rows(keep, g.lods);
   }
   g.output_indices = std::move(outputs);
   g.joint_indices = std::move(joints);

@@ -104,6 +104,7 @@ class Parser {
     if (r_.failed() || error_) return false;
     {
       Field field(r_, name);
+      r_.read_small();
       if (r_.enter(offset, size)) body();
     }
     if (!r_.failed()) return true;
@@ -148,8 +149,9 @@ class Parser {
     // A section ends where another begins: reading ahead does not touch one that is not wanted.
     const auto end_of = [&](std::uint64_t begin) {
       std::uint64_t end = std::max(begin, file_end);
-      for (const std::uint32_t other : offsets)
-        end = other > begin ? std::min<std::uint64_t>(end, other) : end;
+      for (const std::uint64_t other : offsets) {
+        if (other > begin) end = std::min(end, other);
+      }
       return end;
     };
     const auto section = [&](int i, const char* name, auto body) {
@@ -314,15 +316,21 @@ class Parser {
     if (has_winding) layer_.field("face_winding_order", dna_.descriptor_ext.face_winding_order);
   }
 
-  // The control space counts what layers name that were not asked for.
+  // The control space counts what layers name that were not asked for: only their counts are read.
   void count_unread_controls() {
     const auto names = [&](const char* id, bool loaded, std::uint32_t& count) {
       const IndexEntry* e = loaded ? nullptr : find(id);
-      if (e != nullptr && e->size >= 4) read(id, e->offset, e->size, [&] { count = r_.count(4); });
+      if (e == nullptr || e->size < 4) return;
+      read(id, e->offset, 4, [&] {
+        count = r_.u32();
+        if (count <= (e->size - 4) / 4) return;
+        r_.fail_at(e->offset, ErrorCode::kInvalidCount,
+                   std::to_string(count) + " names need more bytes than the layer has");
+      });
     };
     const IndexEntry* bhvr = options_.behavior ? nullptr : find("bhvr");
     if (bhvr != nullptr) {
-      read("behavior", bhvr->offset, bhvr->size,
+      read("behavior", bhvr->offset, std::min(bhvr->size, 2u),
            [&] { layer_.field("psd_count", dna_.behavior.psd_count); });
       dna_.unread_controls.psd = std::exchange(dna_.behavior.psd_count, std::uint16_t{0});
     }
