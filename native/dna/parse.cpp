@@ -380,6 +380,13 @@ class Parser {
   std::optional<Error> error_;
 };
 
+Result<Dna> run_parser(core::Source& source, const ParseOptions& options, detail::Known& known) {
+  Parser parser(source, options, nullptr, nullptr);
+  Result<Dna> dna = parser.run();
+  known = parser.known();
+  return dna;
+}
+
 // The same bytes once more, this time noting where each field lies: the price of an error.
 Error with_offset(core::Source& source, const ParseOptions& options, Error error) {
   if (error.offset || error.code == ErrorCode::kInvalidArgument) return error;
@@ -393,13 +400,14 @@ Error with_offset(core::Source& source, const ParseOptions& options, Error error
 }  // namespace
 
 Result<Dna> parse(core::Source& source, const ParseOptions& options) {
-  Parser parser(source, options, nullptr, nullptr);
-  Result<Dna> dna = parser.run();
+  detail::Known known;
+  Result<Dna> dna = run_parser(source, options, known);
   if (!dna) return core::Unexpected{with_offset(source, options, dna.error())};
-  if (Status valid = detail::validate(*dna, parser.known(), dna->warnings); !valid) {
+  if (Status valid = detail::validate(*dna, known, dna->warnings); !valid) {
     // With a LOD filter the field's number counts what was kept, the file's bytes do not.
     if (!options.lods.everything()) return std::move(valid).propagate();
-    return core::Unexpected{with_offset(source, options, valid.error())};
+    dna = std::move(valid).propagate();  // what was read goes before it is read again
+    return core::Unexpected{with_offset(source, options, dna.error())};
   }
   if (!options.unreferenced_blend_shapes && options.definition) {
     return remove_unreferenced_blend_shapes(*dna);
