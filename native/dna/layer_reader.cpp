@@ -123,11 +123,9 @@ void LayerReader::matrix(Name name, JointGroup& g) {
   }
   if (r_.failed()) return;
   Buffer<float> values(cut_rows(*plan, g) * columns);
-  const std::uint64_t layer_end = r_.end(), begin = r_.position(),
-                      end = begin + std::uint64_t{4} * n;
-  r_.enter(begin, std::uint64_t{4} * values.size());  // not a byte of the other rows
   r_.read_f32(values.data(), values.size(), &known.finite);
-  if (r_.enter(end, layer_end - end)) g.values = std::move(values);
+  r_.skip(std::uint64_t{4} * (n - values.size()));
+  if (!r_.failed()) g.values = std::move(values);
 }
 
 namespace {
