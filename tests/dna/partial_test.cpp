@@ -266,7 +266,16 @@ struct Selection {
 };
 
 std::vector<Selection> selections() {
-  return {{{{0}}, {0}}, {{{1}}, {1}}, {{{3}}, {3}}, {{{2, 0}}, {0, 2}}, {{{}, 2}, {2, 3}}};
+  std::vector<Selection> out;
+  const std::vector<std::uint16_t> lists[] = {{0}, {1}, {3}, {0, 2}};
+  for (const std::vector<std::uint16_t>& lods : lists) {
+    Selection& s = out.emplace_back();
+    s.selection.lods = s.kept = lods;
+  }
+  Selection& coarse = out.emplace_back();
+  coarse.selection.max_lod = 2;
+  coarse.kept = {2, 3};
+  return out;
 }
 
 ParseOptions by_lod(const Selection& s) {
