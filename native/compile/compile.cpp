@@ -26,6 +26,8 @@ using core::Result;
 using core::Status;
 using rig::RigData;
 
+constexpr std::uint32_t kNobody = UINT32_MAX;
+
 std::vector<bool> quaternion_joint_flags(const dna::Dna& dna) {
   std::vector<bool> flags(dna.definition.joint_names.size(), false);
   const auto& entries = dna.joint_behavior_metadata.joint_representations;
@@ -152,12 +154,11 @@ Status compile_joint_group(const dna::JointGroup& g, const std::string& where, R
                 "the matrices of all groups hold more values than an index of 32 bits reaches");
   }
   group.values_begin = static_cast<std::uint32_t>(out.joint_values.size());
-  group.outputs_begin = static_cast<std::uint32_t>(out.joint_outputs.size());
+  group.rows_begin = static_cast<std::uint32_t>(out.joint_outputs.size());
   out.joint_values.resize(out.joint_values.size() + *rows * columns);
   transpose(g.values.data(), *rows, columns, out.joint_values.data() + group.values_begin);
   out.joint_outputs.insert(out.joint_outputs.end(), g.output_indices.begin(),
                            g.output_indices.begin() + *rows);
-  out.tallest_group = std::max(out.tallest_group, *rows);
   out.joint_groups.push_back(group);
   return ok();
 }
@@ -204,21 +205,51 @@ void index_columns(const dna::Dna& dna, RigData& out, Used& used) {
                    out.joint_column_begins.begin());
 }
 
-// A group at rest need not write its zeros, unless another group wrote there before.
-void mark_shared_rows(RigData& out) {
-  std::vector<bool> written(std::size_t{out.joint_count} * 9, false);
-  for (rig::JointGroup& g : out.joint_groups) {
-    for (std::uint32_t r = 0; r < g.row_count; ++r) {
-      const std::uint16_t row = out.joint_outputs[g.outputs_begin + r];
-      if (written[row]) g.writes_always = 1;
-      written[row] = true;
+// Which row each joint attribute takes at a LOD; the last group that writes it wins.
+std::vector<std::uint32_t> rows_by_attribute(const RigData& r, std::uint32_t lod) {
+  std::vector<std::uint32_t> rows(std::size_t{r.joint_count} * 9, kNobody);
+  for (std::size_t i = 0; i < r.joint_groups.size(); ++i) {
+    const rig::JointGroup& g = r.joint_groups[i];
+    for (std::uint32_t row = 0; row < r.joint_group_lods[i * r.lod_count + lod]; ++row) {
+      rows[r.joint_outputs[g.rows_begin + row]] = g.rows_begin + row;
     }
   }
-  for (std::uint32_t j = 0; j < out.joint_count; ++j) {
-    const auto begin = written.begin() + std::ptrdiff_t{j} * 9;
-    if (std::find(begin, begin + 9, true) != begin + 9) {
-      out.joints_written.push_back(static_cast<std::uint16_t>(j));
+  return rows;
+}
+
+// The rows that one block of attributes takes, as pieces of rows that follow each other.
+std::vector<simd::Piece> pieces_of(std::span<const std::uint32_t> rows, std::size_t block) {
+  std::vector<simd::Piece> pieces;
+  std::uint32_t next = kNobody;
+  for (std::size_t p = 0; p < rows.size(); ++p) {
+    if (rows[p] == kNobody) continue;
+    if (rows[p] != next) pieces.push_back({rows[p], 0, static_cast<std::uint16_t>(block)});
+    pieces.back().mask = static_cast<std::uint16_t>(pieces.back().mask | (1u << p));
+    next = rows[p] + 1;
+  }
+  if (pieces.empty()) pieces.push_back({0, 0, static_cast<std::uint16_t>(block)});
+  return pieces;
+}
+
+void compile_pieces(RigData& out) {
+  out.extra_begins.push_back(0);
+  for (std::uint32_t lod = 0; lod < out.lod_count; ++lod) {
+    const std::vector<std::uint32_t> rows = rows_by_attribute(out, lod);
+    for (std::size_t at = 0; at < rows.size(); at += simd::kPlaces) {
+      const std::size_t count = std::min(simd::kPlaces, rows.size() - at);
+      const auto pieces = pieces_of(std::span(rows).subspan(at, count), at / simd::kPlaces);
+      out.joint_pieces.push_back(pieces[0]);
+      out.extra_pieces.insert(out.extra_pieces.end(), pieces.begin() + 1, pieces.end());
     }
+    out.extra_begins.push_back(static_cast<std::uint32_t>(out.extra_pieces.size()));
+  }
+}
+
+void list_joints_written(RigData& out) {
+  std::vector<bool> written(out.joint_count, false);
+  for (const std::uint16_t o : out.joint_outputs) written[o / 9u] = true;
+  for (std::uint32_t j = 0; j < out.joint_count; ++j) {
+    if (written[j]) out.joints_written.push_back(static_cast<std::uint16_t>(j));
   }
 }
 
@@ -289,7 +320,8 @@ Status compile_joint_groups(const dna::Dna& dna, RigData& out) {
     compile_quaternion_joints(groups[i], static_cast<std::uint32_t>(i), flags, out);
   }
   out.joint_values.resize(out.joint_values.size() + simd::kWidest);  // kernels read on
-  mark_shared_rows(out);
+  compile_pieces(out);
+  list_joints_written(out);
   return ok();
 }
 
@@ -371,7 +403,6 @@ std::vector<std::uint32_t> dependency_order(const RigData& r,
 }
 
 // Which factor watches each corrective; kNobody where a corrective is among the factors.
-constexpr std::uint32_t kNobody = UINT32_MAX;
 std::vector<std::uint32_t> choose_watchers(const RigData& r) {
   std::vector<std::uint32_t> load(r.control_count, 0), watchers;
   for (const rig::Psd& p : r.psds) {
@@ -389,18 +420,26 @@ std::vector<std::uint32_t> choose_watchers(const RigData& r) {
   return watchers;
 }
 
+std::uint16_t another_factor(const RigData& r, const rig::Psd& p, std::uint32_t watcher) {
+  for (const std::uint16_t f : factors(r, p)) {
+    if (f != watcher) return f;
+  }
+  return static_cast<std::uint16_t>(watcher);
+}
+
 void schedule_psds(const Used& used, RigData& r) {
   const std::vector<std::uint32_t> watchers = choose_watchers(r);
   r.chained_begins.push_back(0);
   for (std::uint32_t lod = 0; lod < r.lod_count; ++lod) {
     std::vector<std::uint32_t> chained;
-    std::vector<std::vector<std::uint16_t>> watched(r.control_count);
+    std::vector<std::vector<rig::Watch>> watched(r.control_count);
     for (std::uint32_t p = 0; p < r.psds.size(); ++p) {
       if (!used[lod][r.psds[p].output]) continue;
       if (watchers[p] == kNobody) {
         chained.push_back(p);
       } else {
-        watched[watchers[p]].push_back(static_cast<std::uint16_t>(p));
+        watched[watchers[p]].push_back(
+            {static_cast<std::uint16_t>(p), another_factor(r, r.psds[p], watchers[p])});
       }
     }
     for (const auto& list : watched) {

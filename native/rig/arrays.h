@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "rig/quaternion.h"
+#include "simd/kernels.h"
 
 namespace risorius::rig {
 
@@ -30,9 +31,14 @@ struct Psd {
 /// padding.
 struct JointGroup {
   std::uint32_t values_begin = 0, row_count = 0, column_count = 0;
-  std::uint32_t outputs_begin = 0;  // row_count indices into the joint attributes
+  std::uint32_t rows_begin = 0;     // its rows among those of all groups
   std::uint32_t columns_begin = 0;  // where its list of active columns begins: a sum of counts
-  std::uint32_t writes_always = 0;  // 1: an earlier group writes some of its rows, which it resets
+};
+
+/// A corrective, found by a factor that watches it.
+struct Watch {
+  std::uint16_t psd = 0;
+  std::uint16_t other = 0;  // another of its factors, or the same again
 };
 
 /// A column of a group, found by its control.
@@ -59,7 +65,7 @@ struct RigHeader {
   std::uint32_t lod_count = 0, joint_count = 0, blend_shape_count = 0, animated_map_count = 0;
   /// The control vector: raw | corrective | network | RBF pose.
   std::uint32_t raw_count = 0, gui_count = 0, psd_count = 0, control_count = 0;
-  std::uint32_t list_count = 0, tallest_group = 0;  // sizes of scratch
+  std::uint32_t list_count = 0;  // columns of all groups
   EulerConvention euler;
 };
 
@@ -75,11 +81,11 @@ struct RigArrays {
 
   // A corrective without correctives among its factors is watched by the factor that watches the
   // fewest: while that rests at 0 so does the corrective, and nobody looks. Per LOD a row of
-  // control_count + 1 begins into watched: indices into psds.
+  // control_count + 1 begins into watched.
   A<Psd> psds;  // ascending output
   A<std::uint16_t> psd_factors;
   A<std::uint32_t> watch_begins;
-  A<std::uint16_t> watched;
+  A<Watch> watched;
   // The others per LOD, factors before what uses them: chained[chained_begins[lod] ...].
   A<std::uint32_t> chained_begins;
   A<std::uint16_t> chained;
@@ -88,7 +94,12 @@ struct RigArrays {
   A<std::uint32_t> joint_group_lods;  // [groups, LODs]: rows
   A<float> joint_values;              // one of these two is empty
   A<std::uint16_t> joint_halves;
-  A<std::uint16_t> joint_outputs;
+  A<std::uint16_t> joint_outputs;  // of the rows of all groups, one after the other
+  // Where those rows go, per LOD: for each 16 joint attributes a piece, and extra pieces for what
+  // does not follow each other in the rows (extra_begins[lod] ...).
+  A<simd::Piece> joint_pieces;
+  A<std::uint32_t> extra_begins;
+  A<simd::Piece> extra_pieces;
   A<std::uint32_t> joint_column_begins;  // [controls + 1]
   A<JointColumn> joint_columns;          // by control, then by group
   A<std::uint16_t> joints_written;       // by any group at any LOD, ascending
@@ -109,7 +120,8 @@ void for_each_array(R& r, F f) {
   f(r.psds), f(r.psd_factors), f(r.watch_begins), f(r.watched);
   f(r.chained_begins), f(r.chained);
   f(r.joint_groups), f(r.joint_group_lods), f(r.joint_values), f(r.joint_halves);
-  f(r.joint_outputs), f(r.joint_column_begins), f(r.joint_columns), f(r.joints_written);
+  f(r.joint_outputs), f(r.joint_pieces), f(r.extra_begins), f(r.extra_pieces);
+  f(r.joint_column_begins), f(r.joint_columns), f(r.joints_written);
   f(r.quaternion_joints), f(r.quaternion_terms);
   f(r.shape_inputs), f(r.shape_outputs), f(r.shape_lods), f(r.map_rows), f(r.map_lods);
 }
