@@ -112,14 +112,18 @@ void compile_neutral(const dna::Dna& dna, RigData& out) {
   }
 }
 
-// In tiles: both sides are read and written by whole cache lines.
-void transpose(const float* from, std::size_t rows, std::size_t columns, float* to) {
+// In tiles: both sides are read and written by whole cache lines. Column c goes to
+// to[offsets[c] ...], where it is kept.
+void transpose(const float* from, std::size_t rows, std::span<const std::uint32_t> offsets,
+               float* to) {
   constexpr std::size_t kTile = 16;
+  const std::size_t columns = offsets.size();
   for (std::size_t r0 = 0; r0 < rows; r0 += kTile) {
     for (std::size_t c0 = 0; c0 < columns; c0 += kTile) {
       const std::size_t r1 = std::min(rows, r0 + kTile), c1 = std::min(columns, c0 + kTile);
       for (std::size_t c = c0; c < c1; ++c) {
-        for (std::size_t r = r0; r < r1; ++r) to[c * rows + r] = from[r * columns + c];
+        if (offsets[c] == kNobody) continue;
+        for (std::size_t r = r0; r < r1; ++r) to[offsets[c] + r] = from[r * columns + c];
       }
     }
   }
@@ -146,63 +150,89 @@ Status compile_joint_group(const dna::JointGroup& g, const std::string& where, R
   }
   const auto rows = add_lods(g, where, out);
   if (!rows) return core::Unexpected{rows.error()};
-  const std::size_t columns = g.input_indices.size();
   rig::JointGroup group;
   group.row_count = *rows;
-  if (out.joint_values.size() + std::size_t{*rows} * columns > UINT32_MAX - simd::kWidest) {
-    return fail(ErrorCode::kLimitExceeded, where + ".values",
-                "the matrices of all groups hold more values than an index of 32 bits reaches");
-  }
-  group.values_begin = static_cast<std::uint32_t>(out.joint_values.size());
   group.rows_begin = static_cast<std::uint32_t>(out.joint_outputs.size());
-  out.joint_values.resize(out.joint_values.size() + *rows * columns);
-  transpose(g.values.data(), *rows, columns, out.joint_values.data() + group.values_begin);
   out.joint_outputs.insert(out.joint_outputs.end(), g.output_indices.begin(),
                            g.output_indices.begin() + *rows);
   out.joint_groups.push_back(group);
   return ok();
 }
 
-// The lowest row in which a column has a value: at LODs with fewer rows it does nothing.
-std::uint32_t first_row_with_value(const RigData& r, const rig::JointGroup& g, std::size_t column) {
-  const float* values = r.joint_values.data() + g.values_begin + column * g.row_count;
-  return static_cast<std::uint32_t>(
-      std::find_if(values, values + g.row_count, [](float v) { return v != 0.0f; }) - values);
+// The lowest row in which each column has a value: at LODs with fewer rows it does nothing.
+std::vector<std::uint32_t> first_rows_with_values(const dna::JointGroup& g, std::uint32_t rows) {
+  const std::size_t columns = g.input_indices.size();
+  std::vector<std::uint32_t> first(columns, rows);
+  std::size_t missing = columns;
+  for (std::uint32_t r = 0; r < rows && missing > 0; ++r) {
+    const float* row = g.values.data() + r * columns;
+    for (std::size_t c = 0; c < columns; ++c) {
+      if (first[c] < rows || row[c] == 0.0f) continue;
+      first[c] = r;
+      --missing;
+    }
+  }
+  return first;
 }
 
 // [LOD][control]: something reads it there.
 using Used = std::vector<std::vector<bool>>;
 
-// Finds columns by their control; those without any value are left out.
-void index_columns(const dna::Dna& dna, RigData& out, Used& used) {
-  struct Entry {
-    std::uint16_t control;
-    rig::JointColumn column;
-  };
-  std::vector<Entry> entries;
+struct ColumnEntry {
+  std::uint16_t control;
+  std::uint32_t group, column;
+};
+
+// The columns that have any value, by control and group: what a control drives lies together.
+std::vector<ColumnEntry> list_columns(const dna::Dna& dna, RigData& out, Used& used) {
+  std::vector<ColumnEntry> entries;
   for (std::uint32_t i = 0; i < out.joint_groups.size(); ++i) {
     rig::JointGroup& g = out.joint_groups[i];
-    const Array<std::uint16_t>& inputs = dna.behavior.joint_groups[i].input_indices;
+    const dna::JointGroup& source = dna.behavior.joint_groups[i];
+    const std::vector<std::uint32_t> first = first_rows_with_values(source, g.row_count);
     g.columns_begin = out.list_count;
-    for (std::uint32_t c = 0; c < inputs.size(); ++c) {
-      const std::uint32_t row = first_row_with_value(out, g, c);
-      if (row == g.row_count) continue;
+    for (std::uint32_t c = 0; c < first.size(); ++c) {
+      if (first[c] == g.row_count) continue;
       ++g.column_count;
-      entries.push_back({inputs[c], {g.values_begin + c * g.row_count, i}});
+      const std::uint16_t control = source.input_indices[c];
+      entries.push_back({control, i, c});
       for (std::uint32_t l = 0; l < out.lod_count; ++l) {
-        if (out.joint_group_lods[i * out.lod_count + l] > row) used[l][inputs[c]] = true;
+        if (out.joint_group_lods[i * out.lod_count + l] > first[c]) used[l][control] = true;
       }
     }
     out.list_count += g.column_count;
   }
-  std::ranges::stable_sort(entries, {}, &Entry::control);
+  std::ranges::stable_sort(entries, {}, &ColumnEntry::control);
+  return entries;
+}
+
+Status compile_columns(const dna::Dna& dna, RigData& out, Used& used) {
+  const std::vector<ColumnEntry> entries = list_columns(dna, out, used);
+  std::vector<std::vector<std::uint32_t>> offsets;
+  for (const dna::JointGroup& g : dna.behavior.joint_groups) {
+    offsets.emplace_back(g.input_indices.size(), kNobody);
+  }
+  std::uint64_t end = 0;
   out.joint_column_begins.assign(out.control_count + std::size_t{1}, 0);
-  for (const Entry& e : entries) {
+  for (const ColumnEntry& e : entries) {
+    const auto offset = static_cast<std::uint32_t>(end);
+    offsets[e.group][e.column] = offset;
+    out.joint_columns.push_back({offset, e.group});
     ++out.joint_column_begins[e.control + std::size_t{1}];
-    out.joint_columns.push_back(e.column);
+    end += out.joint_groups[e.group].row_count;
+    if (end > UINT32_MAX - simd::kWidest) {
+      return fail(ErrorCode::kLimitExceeded, "behavior.joint_groups",
+                  "the matrices of all groups hold more values than an index of 32 bits reaches");
+    }
   }
   std::partial_sum(out.joint_column_begins.begin(), out.joint_column_begins.end(),
                    out.joint_column_begins.begin());
+  out.joint_values.resize(static_cast<std::size_t>(end) + simd::kWidest);  // kernels read on
+  for (std::size_t i = 0; i < offsets.size(); ++i) {
+    transpose(dna.behavior.joint_groups[i].values.data(), out.joint_groups[i].row_count, offsets[i],
+              out.joint_values.data());
+  }
+  return ok();
 }
 
 // Which row each joint attribute takes at a LOD; the last group that writes it wins.
@@ -311,15 +341,11 @@ Status compile_joint_groups(const dna::Dna& dna, RigData& out) {
   const auto& groups = dna.behavior.joint_groups;
   const std::vector<bool> flags = quaternion_joint_flags(dna);
   out.euler = euler_convention(dna);
-  std::size_t values = 0;
-  for (const dna::JointGroup& g : groups) values += g.values.size();
-  out.joint_values.reserve(values + simd::kWidest);
   for (std::size_t i = 0; i < groups.size(); ++i) {
     const std::string where = "behavior.joint_groups[" + std::to_string(i) + "]";
     if (Status s = compile_joint_group(groups[i], where, out); !s) return s;
     compile_quaternion_joints(groups[i], static_cast<std::uint32_t>(i), flags, out);
   }
-  out.joint_values.resize(out.joint_values.size() + simd::kWidest);  // kernels read on
   compile_pieces(out);
   list_joints_written(out);
   return ok();
@@ -520,7 +546,7 @@ Result<rig::Rig> compile(const dna::Dna& dna, const CompileOptions& options) {
   if (Status s = compile_channels_and_maps(dna, out); !s) return std::move(s).propagate();
   if (Status s = compile_psds(dna, out); !s) return std::move(s).propagate();
   Used used(out.lod_count, std::vector<bool>(out.control_count, false));
-  index_columns(dna, out, used);
+  if (Status s = compile_columns(dna, out, used); !s) return std::move(s).propagate();
   mark_channels_and_maps(out, used);
   schedule_psds(used, out);
   if (options.precision == Precision::kFloat16) {

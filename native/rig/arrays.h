@@ -28,10 +28,10 @@ struct Psd {
 };
 
 /// A dense matrix from controls to joint attributes, stored by columns of row_count values without
-/// padding.
+/// padding; what a control drives in all groups lies together.
 struct JointGroup {
-  std::uint32_t values_begin = 0, row_count = 0, column_count = 0;
-  std::uint32_t rows_begin = 0;     // its rows among those of all groups
+  std::uint32_t row_count = 0, column_count = 0;  // columns without any value do not count
+  std::uint32_t rows_begin = 0;                   // its rows among those of all groups
   std::uint32_t columns_begin = 0;  // where its list of active columns begins: a sum of counts
 };
 

@@ -78,6 +78,8 @@ class Correctives {
   float* controls_;
 };
 
+constexpr std::size_t kAhead = 2;
+
 // The columns of each group that are not at rest. By ascending control, so that sums have one
 // order.
 void list_columns(const Rig& rig, Workspace& work, const float* controls) noexcept {
@@ -95,9 +97,27 @@ void list_columns(const Rig& rig, Workspace& work, const float* controls) noexce
   }
 }
 
+// Asks for the columns of a group while the group before is summed: they lie all over the matrices,
+// where the hardware does not see them coming.
+void prefetch_columns(const Rig& rig, std::uint32_t lod, const Workspace& work,
+                      std::size_t i) noexcept {
+  if (i >= rig.joint_groups.size()) return;
+  const JointGroup& g = rig.joint_groups[i];
+  const std::size_t size = rig.is_half() ? 2 : 4;
+  const std::size_t bytes = rig.joint_group_lods[i * rig.lod_count + lod] * size;
+  const auto* values = rig.is_half() ? reinterpret_cast<const char*>(rig.joint_halves.data())
+                                     : reinterpret_cast<const char*>(rig.joint_values.data());
+  for (std::uint32_t c = g.columns_begin; c < work.column_ends[i]; ++c) {
+    const char* column = values + work.columns[c].offset * size;
+    for (std::size_t at = 0; at < bytes; at += 64) simd::prefetch(column + at);
+  }
+}
+
 void joints(const Rig& rig, std::uint32_t lod, Workspace& work, const PoseView& pose) noexcept {
   list_columns(rig, work, pose.controls);
+  for (std::size_t i = 0; i < kAhead; ++i) prefetch_columns(rig, lod, work, i);
   for (std::size_t i = 0; i < rig.joint_groups.size(); ++i) {
+    prefetch_columns(rig, lod, work, i + kAhead);
     const JointGroup& g = rig.joint_groups[i];
     const std::uint32_t rows = rig.joint_group_lods[i * rig.lod_count + lod];
     if (rows == 0) continue;

@@ -5,6 +5,10 @@
 #include <cstddef>
 #include <cstdint>
 
+#if defined(_MSC_VER) && !defined(__clang__)
+#include <intrin.h>
+#endif
+
 namespace risorius::simd {
 
 /// The widest vector. Results are rounded up to it, and a matrix needs as many readable values
@@ -16,6 +20,19 @@ inline constexpr std::size_t rounded_up(std::size_t rows) {
 }
 /// Frames that a batch kernel takes at once.
 inline constexpr std::size_t kFrames = 8;
+
+/// Asks for a cache line that will be read soon.
+inline void prefetch(const void* address) {
+#if defined(_MSC_VER) && !defined(__clang__)
+#if defined(_M_X64)
+  _mm_prefetch(static_cast<const char*>(address), _MM_HINT_T0);
+#elif defined(_M_ARM64)
+  __prefetch(address);
+#endif
+#else
+  __builtin_prefetch(address);
+#endif
+}
 
 /// A column of a matrix and what it is multiplied by.
 struct Column {
