@@ -86,7 +86,7 @@ py::array evaluate_morph(const rig::Morph& morph, const py::object& weights, con
   return to;
 }
 
-py::array_t<float> copied(const std::vector<float>& values, std::vector<py::ssize_t> shape) {
+py::array_t<float> copied(std::span<const float> values, std::vector<py::ssize_t> shape) {
   py::array_t<float> out(std::move(shape));
   std::copy(values.begin(), values.end(), out.mutable_data());
   return out;
@@ -100,8 +100,13 @@ PoseArrays to_arrays(const rig::Rig& rig, const rig::Pose& pose) {
           copied(pose.controls, {size(pose.controls)})};
 }
 
-RigPtr make_rig(const dna::Dna& dna, const std::optional<std::string>& simd) {
+RigPtr make_rig(const dna::Dna& dna, const std::string& precision,
+                const std::optional<std::string>& simd) {
   compile::CompileOptions options;
+  if (precision != "float32" && precision != "float16") {
+    throw py::value_error("precision: float32 or float16 was expected, found " + precision);
+  }
+  if (precision == "float16") options.precision = compile::Precision::kFloat16;
   if (simd) {
     options.kernels = simd::find_kernels(simd->c_str());
     if (options.kernels == nullptr) {
@@ -133,21 +138,17 @@ PoseArrays evaluate_batch(const rig::Rig& rig, const py::object& raw, std::uint3
                  FloatArray({n, columns(rig.blend_shape_count)}),
                  FloatArray({n, columns(rig.animated_map_count)}),
                  FloatArray({n, columns(rig.control_count)})};
-  float* targets[] = {out.joints.mutable_data(), out.blend_shapes.mutable_data(),
-                      out.animated_maps.mutable_data(), out.controls.mutable_data()};
+  const rig::PoseView all{out.joints.mutable_data(), out.blend_shapes.mutable_data(),
+                          out.animated_maps.mutable_data(), out.controls.mutable_data()};
   const float* rows = in.data();
   py::gil_scoped_release released;
   core::parallel_for(static_cast<std::size_t>(n), threads, [&](std::size_t begin, std::size_t end) {
-    rig::Workspace work = rig::make_workspace(rig);
-    rig::Pose pose = rig::make_pose(rig);
-    for (std::size_t i = begin; i < end; ++i) {
-      rig::evaluate(rig, rows + i * rig.raw_count, lod, settle, work, pose);
-      const std::vector<float>* parts[] = {&pose.joints, &pose.blend_shapes, &pose.animated_maps,
-                                           &pose.controls};
-      for (int p = 0; p < 4; ++p) {
-        std::copy(parts[p]->begin(), parts[p]->end(), targets[p] + i * parts[p]->size());
-      }
-    }
+    rig::Workspace work = rig::make_batch_workspace(rig);
+    const rig::PoseView part{all.joints + begin * rig.joint_count * 9,
+                             all.blend_shapes + begin * rig.blend_shape_count,
+                             all.animated_maps + begin * rig.animated_map_count,
+                             all.controls + begin * rig.control_count};
+    rig::evaluate_frames(rig, rows + begin * rig.raw_count, end - begin, lod, settle, work, part);
   });
   return out;
 }
@@ -155,20 +156,22 @@ PoseArrays evaluate_batch(const rig::Rig& rig, const py::object& raw, std::uint3
 void bind_rig_class(py::module_& m) {
   py::class_<rig::Rig, std::shared_ptr<rig::Rig>>(
       m, "Rig", "A compiled face: turns raw controls into a Pose. Immutable, shared freely.")
-      .def(py::init([](const dna::Dna& dna, const std::optional<std::string>& simd) {
-             return std::const_pointer_cast<rig::Rig>(make_rig(dna, simd));
+      .def(py::init([](const dna::Dna& dna, const std::string& precision,
+                       const std::optional<std::string>& simd) {
+             return std::const_pointer_cast<rig::Rig>(make_rig(dna, precision, simd));
            }),
-           py::arg("dna"), py::kw_only(), py::arg("simd") = py::none())
+           py::arg("dna"), py::kw_only(), py::arg("precision") = "float32",
+           py::arg("simd") = py::none())
       .def_property_readonly("raw_control_names",
                              [](const rig::Rig& r) {
                                py::list out;
-                               for (const auto& n : r.raw_control_names) out.append(to_python(n));
+                               for (const auto& n : r.raw_control_names()) out.append(to_python(n));
                                return out;
                              })
       .def_property_readonly("gui_control_names",
                              [](const rig::Rig& r) {
                                py::list out;
-                               for (const auto& n : r.gui_control_names) out.append(to_python(n));
+                               for (const auto& n : r.gui_control_names()) out.append(to_python(n));
                                return out;
                              })
       .def_readonly("joint_count", &rig::Rig::joint_count)
@@ -176,7 +179,7 @@ void bind_rig_class(py::module_& m) {
       .def_readonly("animated_map_count", &rig::Rig::animated_map_count)
       .def_readonly("lod_count", &rig::Rig::lod_count)
       .def_readonly("control_count", &rig::Rig::control_count)
-      .def_readonly("ignored_layers", &rig::Rig::ignored_layers)
+      .def_property_readonly("ignored_layers", &rig::Rig::ignored_layers)
       .def_property_readonly("memory_bytes", &rig::Rig::memory_bytes)
       .def_property_readonly("simd", [](const rig::Rig& r) { return r.kernels->name; })
       .def_property_readonly("neutral_joints",
@@ -193,7 +196,7 @@ void bind_rig_class(py::module_& m) {
       .def(
           "gui_to_raw",
           [](const rig::Rig& r, const py::object& gui) {
-            const FloatArray in = vector_argument(gui, "gui", r.gui_control_names.size());
+            const FloatArray in = vector_argument(gui, "gui", r.gui_count);
             py::array_t<float> raw(static_cast<py::ssize_t>(r.raw_count));
             rig::gui_to_raw(r, in.data(), raw.mutable_data());
             return raw;

@@ -12,12 +12,16 @@
 
 namespace risorius::compile {
 
+enum class Precision { kFloat32, kFloat16 };
+
 struct CompileOptions {
-  const simd::Kernels* kernels = nullptr;  // nullptr: the best that this CPU has
+  const simd::Kernels* kernels = nullptr;     // nullptr: the best that this CPU has
+  Precision precision = Precision::kFloat32;  // of the joint matrices
 };
 
 /// Compiles the behavior of a face. The result keeps nothing of the Dna.
-/// Fails: kInvalidIndex, kInvalidLength, kInvalidValue with the field: a Dna may have been edited.
+/// Fails: kInvalidIndex, kInvalidLength, kInvalidValue with the field: a Dna may have been edited;
+///        kInvalidValue for a joint value beyond 65504 in float16.
 /// From:  dna-format 12; joint matrices by columns, so that inactive columns cost nothing
 core::Result<rig::Rig> compile(const dna::Dna& dna, const CompileOptions& options = {});
 

@@ -4,83 +4,60 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/aligned.h"
-#include "rig/quaternion.h"
+#include "core/result.h"
+#include "rig/arrays.h"
 #include "simd/kernels.h"
 
 namespace risorius::rig {
 
-/// One row of a conditional table: from <= in <= to gives out += slope * in + cut.
-struct ConditionalRow {
-  std::uint16_t input = 0, output = 0;
-  float from = 0, to = 0, slope = 0, cut = 0;  // from <= to
-  std::uint32_t run_end = 0;                   // first row after the run of equal (input, output)
-};
-
-struct ConditionalTable {
-  std::vector<ConditionalRow> rows;
-  std::vector<std::uint32_t> lod_row_counts;  // empty: all rows at every LOD
-};
-
-/// A corrective: min(1, weight * product of its factors, each clamped to [0, 1]).
-struct Psd {
-  std::uint16_t output = 0;  // control index
-  float weight = 1;
-  std::uint32_t factors_begin = 0, factors_end = 0;
-};
-
-/// A dense matrix from controls to joint attributes, stored by columns: the value of row r and
-/// column c is values[values_begin + c * stride + r]; rows beyond row_count are zero.
-struct JointGroup {
-  std::uint32_t values_begin = 0, stride = 0;
-  std::uint32_t inputs_begin = 0, column_count = 0;
-  std::uint32_t outputs_begin = 0, row_count = 0;
-  std::uint32_t lods_begin = 0;  // lod_count row counts in joint_group_lods
-};
-
-/// One joint of one group whose rotation is a product of quaternions, one per column: column c
-/// turns it by a blend of identity and quaternions[quaternions_begin + c].
-struct QuaternionJoint {
-  std::uint32_t joint = 0, group = 0;
-  std::uint32_t first_row = 0;  // its first rotation row: a LOD with fewer rows leaves it out
-  std::uint32_t quaternions_begin = 0;
-};
-
-struct Rig {
-  std::vector<std::string> raw_control_names, gui_control_names;
-  std::uint32_t lod_count = 0, joint_count = 0, blend_shape_count = 0, animated_map_count = 0;
-  std::uint32_t raw_count = 0, control_count = 0;  // controls: raw, corrective, network, RBF pose
-  std::vector<float> neutral_joints;               // [joints, 9], scale 1
-
-  ConditionalTable gui_to_raw;
-  std::vector<Psd> psds;                                        // ascending output
-  std::vector<std::uint16_t> psd_factors;                       // control indices
-  std::vector<std::vector<std::uint32_t>> psds_by_lod;          // ascending
-  std::vector<std::vector<std::uint32_t>> settled_psds_by_lod;  // factors before what uses them
-
-  std::vector<JointGroup> joint_groups;
-  core::AlignedVector<float> joint_values;
-  std::vector<std::uint16_t> joint_inputs, joint_outputs;
-  std::vector<std::uint32_t> joint_group_lods;
-  std::uint32_t widest_group = 0, tallest_group = 0;  // scratch sizes
-  std::vector<std::uint16_t> joints_written;          // by any group at any LOD, ascending
-
-  std::vector<QuaternionJoint> quaternion_joints;
-  std::vector<Quaternion> quaternions;
-  EulerConvention euler;
-
-  std::vector<std::uint16_t> shape_inputs, shape_outputs;
-  std::vector<std::uint32_t> shape_lod_row_counts;
-  ConditionalTable animated_maps;
-
-  std::vector<std::string> ignored_layers;  // behavior in the file that is not evaluated
+/// Views into one block of bytes that any number of Rigs may share.
+class Rig : public RigHeader, public RigArrays<View> {
+ public:
   const simd::Kernels* kernels = nullptr;
 
-  std::size_t memory_bytes() const;
+  std::vector<std::string> raw_control_names() const { return texts(0, raw_count); }
+  std::vector<std::string> gui_control_names() const { return texts(raw_count, gui_count); }
+  /// Behavior in the file that is not evaluated.
+  std::vector<std::string> ignored_layers() const {
+    return texts(raw_count + gui_count, text_ends.size() - raw_count - gui_count);
+  }
+  bool is_half() const { return !joint_halves.empty(); }
+  /// The whole Rig as bytes: a header with version and hash, then the arrays. Written to a file it
+  /// is a cache, for machines of the same byte order.
+  std::span<const std::uint8_t> block() const { return block_; }
+  std::size_t memory_bytes() const { return sizeof(Rig) + block_.size(); }
+
+ private:
+  friend struct BlockReader;
+  std::vector<std::string> texts(std::size_t first, std::size_t count) const;
+  std::span<const std::uint8_t> block_;
+  std::shared_ptr<const void> owner_;
 };
+
+enum class BlockCheck {
+  kHeader,  // version, sizes and places of the arrays: for bytes that this process wrote
+  kFull,    // the hash, and every index against its space: for bytes from anywhere
+};
+
+/// In: data that compile() made. Fails: kLimitExceeded (more than 4 GiB of matrices).
+core::Result<Rig> make_rig(const RigData& data, const simd::Kernels& kernels);
+
+/// A Rig from the bytes of Rig::block(). Copies nothing: they stay where owner keeps them.
+/// In:    bytes  aligned to 64
+/// Fails: kInvalidValue, kInvalidIndex (bytes that are no Rig of this version and machine),
+///        kInvalidArgument (alignment)
+core::Result<Rig> open_rig(std::span<const std::uint8_t> bytes, std::shared_ptr<const void> owner,
+                           BlockCheck check, const simd::Kernels& kernels);
+
+/// Puts the hash of a block's bytes into its header. In: at least a header's size.
+void seal_block(std::span<std::uint8_t> bytes);
 
 /// The output of one evaluation. Joint values are deltas from neutral in the file's units and axes:
 /// tx ty tz rx ry rz sx sy sz; a scale of 0 is no scale.
@@ -91,16 +68,38 @@ struct Pose {
   std::vector<float> controls;       // [controls]
 };
 
+/// Where a pose is written.
+struct PoseView {
+  float* joints = nullptr;
+  float* blend_shapes = nullptr;
+  float* animated_maps = nullptr;
+  float* controls = nullptr;
+};
+inline PoseView view(Pose& pose) {
+  return {pose.joints.data(), pose.blend_shapes.data(), pose.animated_maps.data(),
+          pose.controls.data()};
+}
+
 /// Scratch memory of one thread.
 struct Workspace {
-  std::vector<std::uint32_t> columns;
-  std::vector<float> weights;
-  core::AlignedVector<float> rows;
-  std::vector<float> factors;
+  std::vector<std::uint16_t> active;  // controls that are not 0, ascending
+  std::size_t active_count = 0;
+  std::vector<std::uint64_t> psd_bits;     // correctives that are not 0
+  std::vector<std::uint32_t> column_ends;  // [groups]: where the next active column goes
+  std::vector<simd::Column> columns;       // by group, at its columns_begin
+  core::AlignedVector<float> rows;         // of all groups
+  std::vector<float> last_controls;
+  // Of a batch: [kFrames] of each.
+  std::vector<std::uint64_t> union_bits;      // controls that any frame uses; 0 between calls
+  std::vector<float> frame_weights;           // [controls, kFrames]; 0 between calls
+  std::vector<std::uint32_t> column_offsets;  // as columns
+  std::vector<float> column_weights;          // [.., kFrames]
 };
 
 Pose make_pose(const Rig& rig);
 Workspace make_workspace(const Rig& rig);
+/// For evaluate_frames as well.
+Workspace make_batch_workspace(const Rig& rig);
 
 /// Raw controls from GUI controls by the conditional table; results are clamped to [0, 1], inputs
 /// outside every row's range give nothing.
@@ -112,13 +111,24 @@ void gui_to_raw(const Rig& rig, const float* gui, float* raw) noexcept;
 ///               that have it as a column, its shapes, maps and correctives, and nothing else
 ///       lod     clamped to the last LOD
 ///       settle  true: correctives of correctives are evaluated in the order of their dependency,
-///       so
-///               that the pose is a function of raw alone; false: they read 0, as on the
+///               so that the pose is a function of raw alone; false: they read 0, as on the
 ///               reference's first call
 /// Out:  pose    every field overwritten
 /// From: RigLogic; dna-format 12.1, 12.2, 12.5, 12.6
 void evaluate(const Rig& rig, const float* raw, std::uint32_t lod, bool settle, Workspace& work,
-              Pose& pose) noexcept;
+              const PoseView& pose) noexcept;
+inline void evaluate(const Rig& rig, const float* raw, std::uint32_t lod, bool settle,
+                     Workspace& work, Pose& pose) noexcept {
+  evaluate(rig, raw, lod, settle, work, view(pose));
+}
+
+/// The same for count frames or faces, as a small product of matrices that reads each value of the
+/// rig once for several of them. Frame n has the bits of evaluate alone.
+/// In:  raw   float32[count, R]
+///      work  of make_batch_workspace
+/// Out: pose  the first frame; the others follow, [count, ...] each
+void evaluate_frames(const Rig& rig, const float* raw, std::size_t count, std::uint32_t lod,
+                     bool settle, Workspace& work, const PoseView& pose) noexcept;
 
 /// One face through time, with the reference's latency: a corrective reads the correctives of the
 /// previous evaluation.
@@ -133,6 +143,7 @@ class Instance {
  private:
   const Rig* rig_;
   std::uint32_t lod_ = 0;
+  bool at_rest_ = false;  // the pose is what raw, still in its controls, gives
   Workspace work_;
   Pose pose_;
 };

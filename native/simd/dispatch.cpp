@@ -1,22 +1,41 @@
 // SPDX-License-Identifier: MIT
+#include <array>
 #include <cstdlib>
-#include <cstring>
+#include <string>
+#include <string_view>
 
 #include "simd/kernels.h"
 
 namespace risorius::simd {
 
-const Kernels* find_kernels(const char* name) {
-  if (name == nullptr || *name == '\0') name = std::getenv("RISORIUS_SIMD");
-  if (name == nullptr || *name == '\0') {
-    const Kernels* best = avx2_kernels();
-    return best != nullptr ? best : &scalar_kernels();
-  }
-  if (std::strcmp(name, "scalar") == 0) return &scalar_kernels();
-  if (std::strcmp(name, "avx2") == 0) return avx2_kernels();
-  return nullptr;
+namespace {
+
+// The best last.
+std::array<const Kernels*, 5> tables() {
+  return {&scalar_kernels(), sse4_kernels(), neon_kernels(), avx2_kernels(), avx512_kernels()};
 }
 
-const char* available_kernels() { return avx2_kernels() != nullptr ? "scalar, avx2" : "scalar"; }
+}  // namespace
+
+const Kernels* find_kernels(const char* name) {
+  if (name == nullptr || *name == '\0') name = std::getenv("RISORIUS_SIMD");
+  const std::string_view wanted = name == nullptr ? "" : name;
+  const Kernels* found = nullptr;
+  for (const Kernels* table : tables()) {
+    if (table != nullptr && (wanted.empty() || wanted == table->name)) found = table;
+  }
+  return found;
+}
+
+const char* available_kernels() {
+  static const std::string names = [] {
+    std::string text;
+    for (const Kernels* table : tables()) {
+      if (table != nullptr) text += (text.empty() ? "" : ", ") + std::string(table->name);
+    }
+    return text;
+  }();
+  return names.c_str();
+}
 
 }  // namespace risorius::simd

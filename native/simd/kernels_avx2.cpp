@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Nothing but kernels: functions carry the target attribute one by one, because a file compiled
-// with -mavx2 could give the linker an inline standard function that older CPUs cannot run.
+#include <array>
+#include <bit>
+
 #include "simd/cpu.h"
 #include "simd/kernels.h"
 
@@ -8,72 +9,66 @@
 #include <immintrin.h>
 
 #if defined(_MSC_VER) && !defined(__clang__)
-#define RISORIUS_TARGET_AVX2
+#define RISORIUS_TARGET
 #else
-#define RISORIUS_TARGET_AVX2 __attribute__((target("avx2,fma")))
+#define RISORIUS_TARGET __attribute__((target("avx2,fma,f16c")))
 #endif
+#include "simd/kernels_inline.h"
 
 namespace risorius::simd {
 
 namespace {
 
-// Eight registers of eight rows hide the latency of the fused multiply-add.
-RISORIUS_TARGET_AVX2 void block_64(const float* values, std::size_t stride,
-                                   const std::uint32_t* columns, const float* weights,
-                                   std::size_t n, float* out) {
-  __m256 a0 = _mm256_setzero_ps(), a1 = a0, a2 = a0, a3 = a0, a4 = a0, a5 = a0, a6 = a0, a7 = a0;
-  for (std::size_t i = 0; i < n; ++i) {
-    const float* c = values + columns[i] * stride;
-    const __m256 w = _mm256_broadcast_ss(weights + i);
-    a0 = _mm256_fmadd_ps(w, _mm256_loadu_ps(c), a0);
-    a1 = _mm256_fmadd_ps(w, _mm256_loadu_ps(c + 8), a1);
-    a2 = _mm256_fmadd_ps(w, _mm256_loadu_ps(c + 16), a2);
-    a3 = _mm256_fmadd_ps(w, _mm256_loadu_ps(c + 24), a3);
-    a4 = _mm256_fmadd_ps(w, _mm256_loadu_ps(c + 32), a4);
-    a5 = _mm256_fmadd_ps(w, _mm256_loadu_ps(c + 40), a5);
-    a6 = _mm256_fmadd_ps(w, _mm256_loadu_ps(c + 48), a6);
-    a7 = _mm256_fmadd_ps(w, _mm256_loadu_ps(c + 56), a7);
+// For each mask of eight places: which of the values in sequence each takes.
+constexpr auto kExpandOrders = [] {
+  std::array<std::array<std::uint8_t, 8>, 256> orders{};
+  for (std::size_t mask = 0; mask < 256; ++mask) {
+    std::uint8_t next = 0;
+    for (std::size_t p = 0; p < 8; ++p) {
+      if (((mask >> p) & 1u) != 0) orders[mask][p] = next++;
+    }
   }
-  _mm256_storeu_ps(out, a0);
-  _mm256_storeu_ps(out + 8, a1);
-  _mm256_storeu_ps(out + 16, a2);
-  _mm256_storeu_ps(out + 24, a3);
-  _mm256_storeu_ps(out + 32, a4);
-  _mm256_storeu_ps(out + 40, a5);
-  _mm256_storeu_ps(out + 48, a6);
-  _mm256_storeu_ps(out + 56, a7);
-}
+  return orders;
+}();
 
-RISORIUS_TARGET_AVX2 void block_8(const float* values, std::size_t stride,
-                                  const std::uint32_t* columns, const float* weights, std::size_t n,
-                                  float* out) {
-  __m256 even = _mm256_setzero_ps(), odd = even;
-  std::size_t i = 0;
-  for (; i + 1 < n; i += 2) {
-    even = _mm256_fmadd_ps(_mm256_broadcast_ss(weights + i),
-                           _mm256_loadu_ps(values + columns[i] * stride), even);
-    odd = _mm256_fmadd_ps(_mm256_broadcast_ss(weights + i + 1),
-                          _mm256_loadu_ps(values + columns[i + 1] * stride), odd);
+struct V {
+  using Reg = __m256;
+  static constexpr std::size_t kLanes = 8, kBlocks = 12, kBatchBlocks = 3;
+  static constexpr int kBatchFrames = 4;
+  RISORIUS_INLINE static Reg zero() { return _mm256_setzero_ps(); }
+  RISORIUS_INLINE static Reg set(float v) { return _mm256_set1_ps(v); }
+  RISORIUS_INLINE static Reg load(const float* p) { return _mm256_loadu_ps(p); }
+  RISORIUS_INLINE static Reg load(const std::uint16_t* p) {
+    return _mm256_cvtph_ps(_mm_loadu_si128(reinterpret_cast<const __m128i*>(p)));
   }
-  if (i < n) {
-    even = _mm256_fmadd_ps(_mm256_broadcast_ss(weights + i),
-                           _mm256_loadu_ps(values + columns[i] * stride), even);
+  RISORIUS_INLINE static void store(float* p, Reg v) { _mm256_storeu_ps(p, v); }
+  RISORIUS_INLINE static Reg madd(Reg a, Reg b, Reg sum) { return _mm256_fmadd_ps(a, b, sum); }
+  RISORIUS_INLINE static void expand_8(const float* from, std::uint32_t mask, float* to) {
+    const __m128i order =
+        _mm_loadl_epi64(reinterpret_cast<const __m128i*>(kExpandOrders[mask].data()));
+    const __m256i bits = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+    const __m256i taken =
+        _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(static_cast<int>(mask)), bits), bits);
+    const __m256 values = _mm256_permutevar8x32_ps(load(from), _mm256_cvtepu8_epi32(order));
+    store(to, _mm256_and_ps(values, _mm256_castsi256_ps(taken)));
   }
-  _mm256_storeu_ps(out, _mm256_add_ps(even, odd));
-}
-
-void weighted_columns(const float* values, std::size_t stride, const std::uint32_t* columns,
-                      const float* weights, std::size_t n, float* out, std::size_t rows) {
-  std::size_t r = 0;
-  for (; r + 64 <= rows; r += 64) block_64(values + r, stride, columns, weights, n, out + r);
-  for (; r < rows; r += 8) block_8(values + r, stride, columns, weights, n, out + r);
-}
+  RISORIUS_INLINE static void expand(const float* from, std::uint32_t mask, float* to) {
+    expand_8(from, mask & 0xFFu, to);
+    expand_8(from + std::popcount(mask & 0xFFu), mask >> 8, to + 8);
+  }
+};
 
 }  // namespace
 
+}  // namespace risorius::simd
+
+#include "simd/kernels_body.h"
+
+namespace risorius::simd {
+
 const Kernels* avx2_kernels() {
-  static constexpr Kernels kernels{"avx2", weighted_columns};
-  static const bool supported = cpu_has_avx2_fma();
+  static constexpr Kernels kernels = make_kernels("avx2");
+  static const bool supported = cpu_has_avx2();
   return supported ? &kernels : nullptr;
 }
 

@@ -20,6 +20,7 @@
 #include <malloc.h>
 #endif
 
+#include "bench/machine.h"
 #include "core/source.h"
 #include "dna/io.h"
 
@@ -208,18 +209,10 @@ double median(std::vector<double> values) {
   return values.empty() ? 0.0 : values[values.size() / 2];
 }
 
-std::string cpu_model() {
-  std::ifstream info("/proc/cpuinfo");
-  for (std::string line; std::getline(info, line);) {
-    const std::size_t colon = line.find(": ");
-    if (line.starts_with("model name") && colon != std::string::npos) return line.substr(colon + 2);
-  }
-  return "unknown CPU";
-}
-
 void Bench::print() {
   const double plain = median(rows_.front()->ms);
-  std::printf("\n%s, %s, commit %s\n\n", cpu_model().c_str(), RISORIUS_COMPILER, RISORIUS_COMMIT);
+  std::printf("\n%s, %s, commit %s\n\n", bench::processor().c_str(), bench::compiler(),
+              bench::commit());
   std::printf("%-30s %9s %8s %12s %12s %9s\n", "what", "ms", "MB/s", "bytes read", "bytes kept",
               "of plain");
   for (const auto& row : rows_) {

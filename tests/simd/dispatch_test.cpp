@@ -3,6 +3,7 @@
 
 #include <cstdlib>
 #include <string>
+#include <vector>
 
 #include "simd/cpu.h"
 #include "simd/kernels.h"
@@ -35,6 +36,9 @@ class Environment {
 TEST(SimdDispatch, NameChoosesTheTable) {
   EXPECT_EQ(find_kernels("scalar"), &scalar_kernels());
   EXPECT_EQ(find_kernels("avx2"), avx2_kernels());
+  EXPECT_EQ(find_kernels("avx512"), avx512_kernels());
+  EXPECT_EQ(find_kernels("sse4"), sse4_kernels());
+  EXPECT_EQ(find_kernels("neon"), neon_kernels());
   EXPECT_EQ(find_kernels("avx9"), nullptr);
   EXPECT_EQ(find_kernels("AVX2"), nullptr);
 }
@@ -51,15 +55,28 @@ TEST(SimdDispatch, UnknownNameInTheEnvironmentIsAnError) {
   EXPECT_EQ(find_kernels(nullptr), nullptr);
 }
 
+std::vector<std::string> names_by_the_cpu() {
+  std::vector<std::string> names{"scalar"};
+  if (cpu_has_sse4()) names.push_back("sse4");
+#if defined(__aarch64__) || defined(_M_ARM64)
+  names.push_back("neon");
+#endif
+  if (cpu_has_avx2()) names.push_back("avx2");
+  if (cpu_has_avx512()) names.push_back("avx512");
+  return names;
+}
+
 TEST(SimdDispatch, BestOfTheCpuByDefault) {
   const Environment none("");
   const Kernels* best = find_kernels(nullptr);
   ASSERT_NE(best, nullptr);
-  EXPECT_STREQ(best->name, cpu_has_avx2_fma() ? "avx2" : "scalar");
+  EXPECT_EQ(best->name, names_by_the_cpu().back());
 }
 
 TEST(SimdDispatch, ListsWhatTheCpuHas) {
-  EXPECT_EQ(std::string(available_kernels()), cpu_has_avx2_fma() ? "scalar, avx2" : "scalar");
+  std::string list;
+  for (const std::string& name : names_by_the_cpu()) list += (list.empty() ? "" : ", ") + name;
+  EXPECT_EQ(available_kernels(), list);
 }
 
 }  // namespace

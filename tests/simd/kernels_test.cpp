@@ -9,9 +9,10 @@
 #include <limits>
 #include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
-#include "core/aligned.h"
+#include "simd/half.h"
 
 namespace risorius::simd {
 
@@ -19,15 +20,23 @@ const Kernels& scalar_kernels_unoptimised();
 
 namespace {
 
+// Columns without padding; kernels may read a vector past the last one.
+template <class T>
 struct Matrix {
-  std::size_t stride, columns;
-  core::AlignedVector<float> values;
+  std::size_t rows, columns;
+  std::vector<T> values;
 };
 
-Matrix random_matrix(std::size_t stride, std::size_t columns, std::mt19937& random) {
+Matrix<float> random_matrix(std::size_t rows, std::size_t columns, std::mt19937& random) {
   std::uniform_real_distribution<float> any(-4.0f, 4.0f);
-  Matrix m{stride, columns, core::AlignedVector<float>(stride * columns + 1)};
+  Matrix<float> m{rows, columns, std::vector<float>(rows * columns + kWidest)};
   for (float& v : m.values) v = any(random);
+  return m;
+}
+
+Matrix<std::uint16_t> halves(const Matrix<float>& from) {
+  Matrix<std::uint16_t> m{from.rows, from.columns, {}};
+  for (const float v : from.values) m.values.push_back(to_half(v));
   return m;
 }
 
@@ -38,45 +47,105 @@ std::vector<float> random_weights(std::size_t n, std::mt19937& random) {
   return weights;
 }
 
-std::vector<std::uint32_t> every_second(std::size_t n) {
-  std::vector<std::uint32_t> columns(n + 1);
-  for (std::size_t i = 0; i < n; ++i) columns[i] = static_cast<std::uint32_t>(2 * i);
+std::vector<std::uint32_t> every_second(std::size_t n, std::size_t rows) {
+  std::vector<std::uint32_t> offsets(n + 1);
+  for (std::size_t i = 0; i < n; ++i) offsets[i] = static_cast<std::uint32_t>(2 * i * rows);
+  return offsets;
+}
+
+std::vector<Column> columns_of(const std::vector<std::uint32_t>& offsets, const float* weights,
+                               std::size_t n, std::size_t step = 1) {
+  std::vector<Column> columns;
+  for (std::size_t i = 0; i < n; ++i) columns.push_back({offsets[i], weights[i * step]});
   return columns;
 }
 
 std::vector<std::string> all_kernels() {
-  std::vector<std::string> all{"scalar"};
-  if (avx2_kernels() != nullptr) all.push_back("avx2");
+  std::vector<std::string> all;
+  for (const Kernels* k :
+       {&scalar_kernels(), sse4_kernels(), avx2_kernels(), avx512_kernels(), neon_kernels()}) {
+    if (k != nullptr) all.push_back(k->name);
+  }
   return all;
 }
+
+double value(float v) { return v; }
+double value(std::uint16_t v) { return from_half(v); }
+
+// A sum of n products, rounded in any order, fused or not, errs by at most n * eps * sum|w v| to
+// first order; one more eps covers the second order at these n.
+template <class T>
+void expect_sums(const Matrix<T>& m, const std::vector<std::uint32_t>& offsets,
+                 const float* weights, std::size_t step, std::size_t n, const float* out) {
+  const double eps = std::numeric_limits<float>::epsilon();
+  for (std::size_t r = 0; r < m.rows; ++r) {
+    double sum = 0, size = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+      const double term = double{weights[i * step]} * value(m.values[offsets[i] + r]);
+      sum += term;
+      size += std::fabs(term);
+    }
+    const double bound = static_cast<double>(n + 1) * eps * size;
+    ASSERT_LE(std::fabs(double{out[r]} - sum), bound) << "row " << r << " of " << m.rows;
+  }
+}
+
+constexpr std::size_t kRows[] = {1, 3, 4, 5, 7, 8, 9, 15, 16, 17, 47, 48, 49, 95, 96, 97, 200};
+constexpr std::size_t kColumns[] = {0, 1, 2, 7, 8, 9, 100};
 
 class SimdKernels : public testing::TestWithParam<std::string> {
  protected:
   const Kernels& kernels_ = *find_kernels(GetParam().c_str());
 };
 
-// A sum of n products, rounded in any order, fused or not, errs by at most n * eps * sum|w v| to
-// first order; one more eps covers the second order at these n.
 TEST_P(SimdKernels, SumWithinTheRoundingOfItsTerms) {
   std::mt19937 random(1);
-  const double eps = std::numeric_limits<float>::epsilon();
-  for (const std::size_t rows : {8u, 16u, 56u, 64u, 72u, 128u, 136u, 200u}) {
-    for (const std::size_t n : {0u, 1u, 2u, 7u, 8u, 9u, 16u, 100u}) {
-      const Matrix m = random_matrix(rows + 8, 2 * n, random);
+  for (const std::size_t rows : kRows) {
+    for (const std::size_t n : kColumns) {
+      const Matrix<float> m = random_matrix(rows, 2 * n, random);
+      const Matrix<std::uint16_t> half = halves(m);
       const std::vector<float> weights = random_weights(n, random);
-      const std::vector<std::uint32_t> columns = every_second(n);
-      core::AlignedVector<float> out(rows, 1e30f);
-      kernels_.weighted_columns(m.values.data(), m.stride, columns.data(), weights.data(), n,
-                                out.data(), rows);
-      for (std::size_t r = 0; r < rows; ++r) {
-        double sum = 0, size = 0;
-        for (std::size_t i = 0; i < n; ++i) {
-          const double term = double{weights[i]} * double{m.values[columns[i] * m.stride + r]};
-          sum += term;
-          size += std::fabs(term);
+      const std::vector<std::uint32_t> offsets = every_second(n, rows);
+      std::vector<float> out(rounded_up(rows), 1e30f);
+      kernels_.columns(m.values.data(), columns_of(offsets, weights.data(), n).data(), n,
+                       out.data(), rows);
+      expect_sums(m, offsets, weights.data(), 1, n, out.data());
+      kernels_.half_columns(half.values.data(), columns_of(offsets, weights.data(), n).data(), n,
+                            out.data(), rows);
+      expect_sums(half, offsets, weights.data(), 1, n, out.data());
+    }
+  }
+}
+
+TEST_P(SimdKernels, AFrameOfABatchHasTheBitsOfTheFrameAlone) {
+  std::mt19937 random(5);
+  for (const std::size_t rows : kRows) {
+    const std::size_t n = 13, stride = rounded_up(rows);
+    const Matrix<float> m = random_matrix(rows, 2 * n, random);
+    const Matrix<std::uint16_t> half = halves(m);
+    const std::vector<float> weights = random_weights(n * kFrames, random);
+    const std::vector<std::uint32_t> offsets = every_second(n, rows);
+    std::vector<float> batch(stride * kFrames), alone(stride);
+    for (const bool is_half : {false, true}) {
+      if (is_half) {
+        kernels_.batch_half_columns(half.values.data(), offsets.data(), weights.data(), n,
+                                    batch.data(), stride, rows);
+      } else {
+        kernels_.batch_columns(m.values.data(), offsets.data(), weights.data(), n, batch.data(),
+                               stride, rows);
+      }
+      for (std::size_t f = 0; f < kFrames; ++f) {
+        const std::vector<Column> one = columns_of(offsets, weights.data() + f, n, kFrames);
+        if (is_half) {
+          kernels_.half_columns(half.values.data(), one.data(), n, alone.data(), rows);
+        } else {
+          kernels_.columns(m.values.data(), one.data(), n, alone.data(), rows);
         }
-        const double bound = static_cast<double>(n + 1) * eps * size;
-        ASSERT_LE(std::fabs(double{out[r]} - sum), bound) << "row " << r << " of " << rows;
+        for (std::size_t r = 0; r < rows; ++r) {
+          ASSERT_EQ(std::bit_cast<std::uint32_t>(batch[f * stride + r]),
+                    std::bit_cast<std::uint32_t>(alone[r]))
+              << "frame " << f << " row " << r;
+        }
       }
     }
   }
@@ -84,46 +153,119 @@ TEST_P(SimdKernels, SumWithinTheRoundingOfItsTerms) {
 
 TEST_P(SimdKernels, ReadOnlyTheActiveColumns) {
   std::mt19937 random(2);
-  Matrix m = random_matrix(72, 20, random);
+  Matrix<float> m = random_matrix(64, 20, random);  // whole vectors: no surplus is read
   for (std::size_t c = 1; c < m.columns; c += 2) {
-    for (std::size_t r = 0; r < m.stride; ++r) m.values[c * m.stride + r] = std::nanf("");
+    for (std::size_t r = 0; r < m.rows; ++r) m.values[c * m.rows + r] = std::nanf("");
   }
   const std::vector<float> weights = random_weights(10, random);
-  const std::vector<std::uint32_t> columns = every_second(10);
-  core::AlignedVector<float> out(72);
-  kernels_.weighted_columns(m.values.data(), m.stride, columns.data(), weights.data(), 10,
-                            out.data(), 72);
+  const std::vector<std::uint32_t> offsets = every_second(10, m.rows);
+  std::vector<float> out(64);
+  kernels_.columns(m.values.data(), columns_of(offsets, weights.data(), 10).data(), 10, out.data(),
+                   64);
   for (const float v : out) ASSERT_FALSE(std::isnan(v));
 }
 
-TEST_P(SimdKernels, WriteOnlyTheirRows) {
+TEST_P(SimdKernels, PlaceByTheBitsOfThePieces) {
+  std::mt19937 random(8);
+  std::vector<float> from(4000 + kPlaces);
+  for (std::size_t i = 0; i < from.size(); ++i) from[i] = static_cast<float>(i + 1);
+  std::vector<Piece> pieces{{0, 0, 0}, {7, 0xFFFF, 0}, {3, 1, 0}, {9, 0x8000, 0}};
+  for (int i = 0; i < 300; ++i) {
+    pieces.push_back(
+        {static_cast<std::uint32_t>(random() % 3984), static_cast<std::uint16_t>(random()), 0});
+  }
+  std::vector<float> to(pieces.size() * kPlaces + 1, 7.0f);
+  kernels_.place(pieces.data(), pieces.size(), from.data(), to.data());
+  for (std::size_t i = 0; i < pieces.size(); ++i) {
+    std::uint32_t next = pieces[i].from;
+    for (std::size_t p = 0; p < kPlaces; ++p) {
+      const bool taken = (pieces[i].mask >> p & 1) != 0;
+      ASSERT_EQ(to[i * kPlaces + p], taken ? from[next++] : 0.0f) << i << " place " << p;
+    }
+  }
+  EXPECT_EQ(to.back(), 7.0f);
+}
+
+TEST_P(SimdKernels, WriteNoFurtherThanTheWidestVector) {
   std::mt19937 random(3);
-  const Matrix m = random_matrix(128, 6, random);
-  const std::vector<float> weights = random_weights(3, random);
-  const std::vector<std::uint32_t> columns = every_second(3);
-  for (const std::size_t rows : {8u, 64u, 72u}) {
-    core::AlignedVector<float> out(128, 7.0f);
-    kernels_.weighted_columns(m.values.data(), m.stride, columns.data(), weights.data(), 3,
-                              out.data(), rows);
-    for (std::size_t r = rows; r < out.size(); ++r) ASSERT_EQ(out[r], 7.0f) << rows;
+  for (const std::size_t rows : kRows) {
+    const Matrix<float> m = random_matrix(rows, 6, random);
+    const std::vector<float> weights = random_weights(3, random);
+    const std::vector<std::uint32_t> offsets = every_second(3, rows);
+    std::vector<float> out(rounded_up(rows) + 64, 7.0f);
+    kernels_.columns(m.values.data(), columns_of(offsets, weights.data(), 3).data(), 3, out.data(),
+                     rows);
+    for (std::size_t r = rounded_up(rows); r < out.size(); ++r) ASSERT_EQ(out[r], 7.0f) << rows;
   }
 }
 
 INSTANTIATE_TEST_SUITE_P(Every, SimdKernels, testing::ValuesIn(all_kernels()),
                          [](const auto& about) { return about.param; });
 
-TEST(ScalarKernels, SameBitsAtEveryOptimisation) {
+void expect_bits(const Kernels& a, const Kernels& b) {
   std::mt19937 random(4);
-  const Matrix m = random_matrix(200, 200, random);
+  const Matrix<float> m = random_matrix(200, 200, random);
+  const Matrix<std::uint16_t> half = halves(m);
   const std::vector<float> weights = random_weights(100, random);
-  const std::vector<std::uint32_t> columns = every_second(100);
-  std::vector<float> fast(200), slow(200);
-  scalar_kernels().weighted_columns(m.values.data(), m.stride, columns.data(), weights.data(), 100,
-                                    fast.data(), 200);
-  scalar_kernels_unoptimised().weighted_columns(m.values.data(), m.stride, columns.data(),
-                                                weights.data(), 100, slow.data(), 200);
-  for (std::size_t r = 0; r < fast.size(); ++r) {
-    ASSERT_EQ(std::bit_cast<std::uint32_t>(fast[r]), std::bit_cast<std::uint32_t>(slow[r])) << r;
+  const std::vector<std::uint32_t> offsets = every_second(100, 200);
+  std::vector<float> first(rounded_up(200)), second(rounded_up(200));
+  for (const bool is_half : {false, true}) {
+    for (const auto& [kernels, out] : {std::pair(&a, &first), std::pair(&b, &second)}) {
+      if (is_half) {
+        kernels->half_columns(half.values.data(), columns_of(offsets, weights.data(), 100).data(),
+                              100, out->data(), 200);
+      } else {
+        kernels->columns(m.values.data(), columns_of(offsets, weights.data(), 100).data(), 100,
+                         out->data(), 200);
+      }
+    }
+    for (std::size_t r = 0; r < 200; ++r) {
+      ASSERT_EQ(std::bit_cast<std::uint32_t>(first[r]), std::bit_cast<std::uint32_t>(second[r]));
+    }
+  }
+}
+
+TEST(ScalarKernels, SameBitsAtEveryOptimisation) {
+  expect_bits(scalar_kernels(), scalar_kernels_unoptimised());
+}
+
+TEST(ScalarKernels, SameBitsAsSse4) {
+  if (sse4_kernels() == nullptr) GTEST_SKIP() << "this CPU has no SSE4";
+  expect_bits(scalar_kernels(), *sse4_kernels());
+}
+
+TEST(Half, EveryFiniteHalfSurvivesTheWayThroughAFloat) {
+  for (std::uint32_t bits = 0; bits < 0x10000; ++bits) {
+    if ((bits & 0x7C00u) == 0x7C00u) continue;
+    const auto half = static_cast<std::uint16_t>(bits);
+    ASSERT_EQ(to_half(from_half(half)), half);
+  }
+}
+
+// The value of a half by its definition: sign, exponent, fraction.
+TEST(Half, HasTheValueOfItsFields) {
+  for (std::uint32_t bits = 0; bits < 0x8000; ++bits) {
+    const int exponent = static_cast<int>(bits >> 10);
+    if (exponent == 31) continue;
+    const double fraction = static_cast<double>(bits & 0x3FFu) / 1024.0;
+    const double expected =
+        exponent == 0 ? std::ldexp(fraction, -14) : std::ldexp(1.0 + fraction, exponent - 15);
+    ASSERT_EQ(double{from_half(static_cast<std::uint16_t>(bits))}, expected) << bits;
+  }
+}
+
+TEST(Half, RoundsToTheNearest) {
+  std::mt19937 random(6);
+  std::uniform_real_distribution<float> exponent(-26.0f, 15.9f);
+  for (int i = 0; i < 100000; ++i) {
+    const float v = std::exp2(exponent(random)) * (i % 2 == 0 ? 1.0f : -1.0f);
+    const std::uint16_t half = to_half(v);
+    const double error = std::fabs(double{from_half(half)} - double{v});
+    for (const int step : {-1, 1}) {
+      const int near = half + step;
+      if ((near & 0x7FFF) >= 0x7C00 || (near & 0x8000) != (half & 0x8000) || near < 0) continue;
+      ASSERT_LE(error, std::fabs(double{from_half(static_cast<std::uint16_t>(near))} - double{v}));
+    }
   }
 }
 

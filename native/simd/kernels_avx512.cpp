@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: MIT
+#include "simd/cpu.h"
+#include "simd/kernels.h"
+
+#if defined(__x86_64__) || defined(_M_X64)
+#include <immintrin.h>
+
+#if defined(_MSC_VER) && !defined(__clang__)
+#define RISORIUS_TARGET
+#else
+#define RISORIUS_TARGET __attribute__((target("avx512f,avx512bw,avx512dq,avx512vl,fma,f16c")))
+#endif
+#include "simd/kernels_inline.h"
+
+namespace risorius::simd {
+
+namespace {
+
+struct V {
+  using Reg = __m512;
+  static constexpr std::size_t kLanes = 16, kBlocks = 12, kBatchBlocks = 3;
+  static constexpr int kBatchFrames = 8;
+  RISORIUS_INLINE static Reg zero() { return _mm512_setzero_ps(); }
+  RISORIUS_INLINE static Reg set(float v) { return _mm512_set1_ps(v); }
+  RISORIUS_INLINE static Reg load(const float* p) { return _mm512_loadu_ps(p); }
+  RISORIUS_INLINE static Reg load(const std::uint16_t* p) {
+    // With a mask: gcc 12 takes the plain one for a read of something unset.
+    return _mm512_maskz_cvtph_ps(0xFFFF, _mm256_loadu_si256(reinterpret_cast<const __m256i*>(p)));
+  }
+  RISORIUS_INLINE static void store(float* p, Reg v) { _mm512_storeu_ps(p, v); }
+  RISORIUS_INLINE static Reg madd(Reg a, Reg b, Reg sum) { return _mm512_fmadd_ps(a, b, sum); }
+  RISORIUS_INLINE static void expand(const float* from, std::uint32_t mask, float* to) {
+    store(to, _mm512_maskz_expand_ps(static_cast<__mmask16>(mask), load(from)));
+  }
+};
+
+}  // namespace
+
+}  // namespace risorius::simd
+
+#include "simd/kernels_body.h"
+
+namespace risorius::simd {
+
+const Kernels* avx512_kernels() {
+  static constexpr Kernels kernels = make_kernels("avx512");
+  static const bool supported = cpu_has_avx512();
+  return supported ? &kernels : nullptr;
+}
+
+}  // namespace risorius::simd
+
+#else
+
+namespace risorius::simd {
+
+const Kernels* avx512_kernels() { return nullptr; }
+
+}  // namespace risorius::simd
+
+#endif

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: MIT
+// The kernels over a vector type V, for the file of each instruction set. The file defines
+// RISORIUS_TARGET (the functions' target attribute: a file compiled with -mavx2 could give the
+// linker an inline standard function that older CPUs cannot run) and V with
+//   Reg, kLanes, zero(), set(float), load(const float*), load(const uint16_t*), store(float*, Reg),
+//   madd(a, b, sum), expand(from, mask, to) (kernels.h, place), and kBlocks, kBatchBlocks:
+//   registers of rows at once; kBatchFrames.
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+
+#include "simd/kernels.h"
+
+namespace risorius::simd {
+
+namespace {
+
+// kCount registers of rows of one frame.
+template <int kCount, class T>
+RISORIUS_TARGET void block(const T* values, const Column* columns, std::size_t n, float* out) {
+  V::Reg sums[kCount];
+  for (int b = 0; b < kCount; ++b) sums[b] = V::zero();
+  for (std::size_t i = 0; i < n; ++i) {
+    const T* column = values + columns[i].offset;
+    const V::Reg weight = V::set(columns[i].weight);
+    for (int b = 0; b < kCount; ++b) {
+      sums[b] = V::madd(weight, V::load(column + b * V::kLanes), sums[b]);
+    }
+  }
+  for (int b = 0; b < kCount; ++b) V::store(out + b * V::kLanes, sums[b]);
+}
+
+// kCount registers of rows of V::kBatchFrames frames: each value read serves them all.
+template <int kCount, class T>
+RISORIUS_TARGET void batch_block(const T* values, const std::uint32_t* offsets,
+                                 const float* weights, std::size_t n, float* out,
+                                 std::size_t stride) {
+  V::Reg sums[V::kBatchFrames][kCount];
+  for (int f = 0; f < V::kBatchFrames; ++f) {
+    for (int b = 0; b < kCount; ++b) sums[f][b] = V::zero();
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    const T* column = values + offsets[i];
+    V::Reg rows[kCount];
+    for (int b = 0; b < kCount; ++b) rows[b] = V::load(column + b * V::kLanes);
+    for (int f = 0; f < V::kBatchFrames; ++f) {
+      const V::Reg weight = V::set(weights[i * kFrames + static_cast<std::size_t>(f)]);
+      for (int b = 0; b < kCount; ++b) sums[f][b] = V::madd(weight, rows[b], sums[f][b]);
+    }
+  }
+  for (int f = 0; f < V::kBatchFrames; ++f) {
+    for (int b = 0; b < kCount; ++b) {
+      V::store(out + static_cast<std::size_t>(f) * stride + b * V::kLanes, sums[f][b]);
+    }
+  }
+}
+
+template <class T, int... kCounts>
+constexpr auto block_table(std::integer_sequence<int, kCounts...>) {
+  return std::array{&block<kCounts + 1, T>...};
+}
+template <class T, int... kCounts>
+constexpr auto batch_block_table(std::integer_sequence<int, kCounts...>) {
+  return std::array{&batch_block<kCounts + 1, T>...};
+}
+
+// Calls f(first register, registers) for as few and as equal blocks as there must be.
+template <class F>
+void for_blocks(std::size_t rows, std::size_t most, F f) {
+  const std::size_t all = (rows + V::kLanes - 1) / V::kLanes, blocks = (all + most - 1) / most;
+  for (std::size_t b = 0, at = 0; b < blocks; ++b) {
+    const std::size_t count = (all - at) / (blocks - b);
+    f(at, count);
+    at += count;
+  }
+}
+
+template <class T>
+void columns(const T* values, const Column* list, std::size_t n, float* out, std::size_t rows) {
+  static constexpr auto kTable =
+      block_table<T>(std::make_integer_sequence<int, static_cast<int>(V::kBlocks)>{});
+  for_blocks(rows, V::kBlocks, [&](std::size_t at, std::size_t count) {
+    kTable[count - 1](values + at * V::kLanes, list, n, out + at * V::kLanes);
+  });
+}
+
+template <class T>
+void batch_columns(const T* values, const std::uint32_t* offsets, const float* weights,
+                   std::size_t n, float* out, std::size_t stride, std::size_t rows) {
+  static constexpr auto kTable =
+      batch_block_table<T>(std::make_integer_sequence<int, static_cast<int>(V::kBatchBlocks)>{});
+  for (std::size_t f = 0; f < kFrames; f += V::kBatchFrames) {
+    for_blocks(rows, V::kBatchBlocks, [&](std::size_t at, std::size_t count) {
+      kTable[count - 1](values + at * V::kLanes, offsets, weights + f, n,
+                        out + f * stride + at * V::kLanes, stride);
+    });
+  }
+}
+
+RISORIUS_TARGET void place(const Piece* pieces, std::size_t n, const float* from, float* to) {
+  for (std::size_t i = 0; i < n; ++i) {
+    V::expand(from + pieces[i].from, pieces[i].mask, to + i * kPlaces);
+  }
+}
+
+constexpr Kernels make_kernels(const char* name) {
+  return {name,
+          columns<float>,
+          columns<std::uint16_t>,
+          batch_columns<float>,
+          batch_columns<std::uint16_t>,
+          place};
+}
+
+}  // namespace
+
+}  // namespace risorius::simd

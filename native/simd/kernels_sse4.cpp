@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: MIT
+#include <array>
+#include <bit>
+
+#include "simd/cpu.h"
+#include "simd/kernels.h"
+
+#if defined(__x86_64__) || defined(_M_X64)
+#include <immintrin.h>
+
+#if defined(_MSC_VER) && !defined(__clang__)
+#define RISORIUS_TARGET
+#else
+#define RISORIUS_TARGET __attribute__((target("sse4.1")))
+#endif
+#include "simd/kernels_inline.h"
+
+namespace risorius::simd {
+
+namespace {
+
+// For each mask of four places the bytes that each takes; of none, 0.
+constexpr auto kExpandBytes = [] {
+  std::array<std::array<std::uint8_t, 16>, 16> orders{};
+  for (std::size_t mask = 0; mask < 16; ++mask) {
+    std::uint8_t next = 0;
+    for (std::size_t p = 0; p < 4; ++p) {
+      const bool taken = ((mask >> p) & 1u) != 0;
+      for (std::size_t b = 0; b < 4; ++b) {
+        orders[mask][4 * p + b] = taken ? static_cast<std::uint8_t>(next + b) : std::uint8_t{0x80};
+      }
+      if (taken) next = static_cast<std::uint8_t>(next + 4);
+    }
+  }
+  return orders;
+}();
+
+// Products and sums are rounded one by one, as in the scalar path.
+struct V {
+  using Reg = __m128;
+  static constexpr std::size_t kLanes = 4, kBlocks = 12, kBatchBlocks = 3;
+  static constexpr int kBatchFrames = 4;
+  RISORIUS_INLINE static Reg zero() { return _mm_setzero_ps(); }
+  RISORIUS_INLINE static Reg set(float v) { return _mm_set1_ps(v); }
+  RISORIUS_INLINE static Reg load(const float* p) { return _mm_loadu_ps(p); }
+  RISORIUS_INLINE static Reg load(const std::uint16_t* p) {  // from_half of half.h
+    const __m128i half = _mm_cvtepu16_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p)));
+    const __m128i bits = _mm_slli_epi32(_mm_and_si128(half, _mm_set1_epi32(0x7FFF)), 13);
+    const __m128 magnitude = _mm_mul_ps(_mm_castsi128_ps(bits), _mm_set1_ps(0x1p112f));
+    const __m128i sign = _mm_slli_epi32(_mm_and_si128(half, _mm_set1_epi32(0x8000)), 16);
+    return _mm_or_ps(magnitude, _mm_castsi128_ps(sign));
+  }
+  RISORIUS_INLINE static void store(float* p, Reg v) { _mm_storeu_ps(p, v); }
+  RISORIUS_INLINE static Reg madd(Reg a, Reg b, Reg sum) {
+    return _mm_add_ps(sum, _mm_mul_ps(a, b));
+  }
+  RISORIUS_INLINE static void expand(const float* from, std::uint32_t mask, float* to) {
+    for (int q = 0; q < 4; ++q, mask >>= 4) {
+      const __m128i order =
+          _mm_loadu_si128(reinterpret_cast<const __m128i*>(kExpandBytes[mask & 15u].data()));
+      store(to + 4 * q, _mm_castsi128_ps(_mm_shuffle_epi8(_mm_castps_si128(load(from)), order)));
+      from += std::popcount(mask & 15u);
+    }
+  }
+};
+
+}  // namespace
+
+}  // namespace risorius::simd
+
+#include "simd/kernels_body.h"
+
+namespace risorius::simd {
+
+const Kernels* sse4_kernels() {
+  static constexpr Kernels kernels = make_kernels("sse4");
+  static const bool supported = cpu_has_sse4();
+  return supported ? &kernels : nullptr;
+}
+
+}  // namespace risorius::simd
+
+#else
+
+namespace risorius::simd {
+
+const Kernels* sse4_kernels() { return nullptr; }
+
+}  // namespace risorius::simd
+
+#endif

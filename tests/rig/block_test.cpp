@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: MIT
+// A compiled face as bytes: whatever is done to them, they are a face or an error.
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <random>
+
+#include "support/face.h"
+
+namespace risorius::rig {
+namespace {
+
+using namespace testing_support;
+using Bytes = core::AlignedVector<std::uint8_t>;
+
+dna::Dna face_with_everything() {
+  dna::Dna dna = make_face(3, 2, 4, 2);
+  dna.definition.gui_control_names = names("gui", 2);
+  dna.behavior.gui_to_raw.input_indices = {0, 1};
+  dna.behavior.gui_to_raw.output_indices = {0, 2};
+  for (auto* values : {&dna.behavior.gui_to_raw.from_values, &dna.behavior.gui_to_raw.cut_values}) {
+    *values = {0.0f, 0.0f};
+  }
+  for (auto* values : {&dna.behavior.gui_to_raw.to_values, &dna.behavior.gui_to_raw.slope_values}) {
+    *values = {1.0f, 1.0f};
+  }
+  dna.behavior.psds.rows = {3, 3, 4};
+  dna.behavior.psds.columns = {0, 1, 3};
+  dna.behavior.psds.values = {1.0f, 1.0f, 0.5f};
+  dna.behavior.joint_groups = std::vector{make_probe({0, 3, 4})};
+  dna.joint_behavior_metadata.joint_representations =
+      std::vector<dna::JointRepresentation>(4, dna::JointRepresentation{0, 1, 0});
+  return dna;
+}
+
+Bytes bytes_of(const Rig& rig) { return Bytes(rig.block().begin(), rig.block().end()); }
+
+core::Result<Rig> opened(const Bytes& bytes, BlockCheck check) {
+  return open_rig(bytes, nullptr, check, simd::scalar_kernels());
+}
+
+TEST(Block, EvaluatesAsTheRigThatItCameFrom) {
+  const Rig rig = must_compile(face_with_everything());
+  const Bytes bytes = bytes_of(rig);
+  for (const BlockCheck check : {BlockCheck::kHeader, BlockCheck::kFull}) {
+    const auto again = open_rig(bytes, nullptr, check, *rig.kernels);
+    ASSERT_TRUE(again.has_value()) << again.error().describe();
+    EXPECT_EQ(again->raw_control_names(), rig.raw_control_names());
+    EXPECT_EQ(again->gui_control_names(), rig.gui_control_names());
+    for (const std::vector<float>& raw : {std::vector{0.5f, 0.25f, 1.0f}, {0.0f, 0.0f, 0.0f}}) {
+      EXPECT_EQ(evaluate_once(*again, raw).joints, evaluate_once(rig, raw).joints);
+      EXPECT_EQ(evaluate_once(*again, raw).controls, evaluate_once(rig, raw).controls);
+    }
+  }
+}
+
+TEST(Block, EveryPrefixIsRefused) {
+  const Bytes whole = bytes_of(must_compile(face_with_everything()));
+  for (std::size_t size = 0; size < whole.size(); ++size) {
+    const Bytes cut(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size));
+    for (const BlockCheck check : {BlockCheck::kHeader, BlockCheck::kFull}) {
+      ASSERT_FALSE(opened(cut, check).has_value()) << size;
+    }
+  }
+}
+
+TEST(Block, EveryChangedByteIsFoundByTheFullCheck) {
+  const Bytes whole = bytes_of(must_compile(face_with_everything()));
+  for (std::size_t at = 0; at < whole.size(); ++at) {
+    for (const int change : {0x01, 0x80, 0xFF}) {
+      Bytes changed = whole;
+      changed[at] = static_cast<std::uint8_t>(changed[at] ^ change);
+      ASSERT_FALSE(opened(changed, BlockCheck::kFull).has_value()) << at;
+    }
+  }
+}
+
+// With its hash put right, what was changed must be found by the check of indices or do no harm.
+TEST(Block, ChangedBytesUnderARightHashDoNoHarm) {
+  const Bytes whole = bytes_of(must_compile(face_with_everything()));
+  int refused = 0;
+  for (std::size_t at = 0; at < whole.size(); ++at) {
+    for (const int value : {0x00, 0x01, 0x7F, 0xFF}) {
+      Bytes changed = whole;
+      changed[at] = static_cast<std::uint8_t>(value);
+      seal_block(changed);
+      const auto rig = opened(changed, BlockCheck::kFull);
+      if (!rig) {
+        ++refused;
+        continue;
+      }
+      Workspace work = make_batch_workspace(*rig);
+      Pose pose = make_pose(*rig);
+      const std::vector<float> raw(rig->raw_count, 1.0f), gui(rig->gui_count, 1.0f);
+      std::vector<float> out(rig->raw_count);
+      for (std::uint32_t lod = 0; lod <= rig->lod_count; ++lod) {
+        evaluate(*rig, raw.data(), lod, true, work, pose);
+        evaluate_frames(*rig, raw.data(), 1, lod, false, work, view(pose));
+      }
+      gui_to_raw(*rig, gui.data(), out.data());
+      (void)rig->raw_control_names();
+    }
+  }
+  EXPECT_GT(refused, 500);
+}
+
+TEST(Block, BytesThatAreNotAlignedAreRefused) {
+  const Bytes whole = bytes_of(must_compile(face_with_everything()));
+  Bytes shifted(whole.size() + 1);
+  std::copy(whole.begin(), whole.end(), shifted.begin() + 1);
+  const auto rig =
+      open_rig(std::span(shifted).subspan(1), nullptr, BlockCheck::kHeader, simd::scalar_kernels());
+  ASSERT_FALSE(rig.has_value());
+  EXPECT_EQ(rig.error().code, core::ErrorCode::kInvalidArgument);
+}
+
+}  // namespace
+}  // namespace risorius::rig
