@@ -798,7 +798,9 @@ class Instance:
 class Rig:
     """A compiled face: turns raw controls into a Pose. Immutable, shared freely."""
 
-    def __init__(self, dna: Dna, *, simd: str | None = None) -> None: ...
+    def __init__(
+        self, dna: Dna, *, precision: str = "float32", simd: str | None = None
+    ) -> None: ...
     @property
     def raw_control_names(self) -> list[str]: ...
     @property
