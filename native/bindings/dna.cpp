@@ -12,11 +12,6 @@ using dna::Dna;
 constexpr std::array<const char*, 6> kArchetypes{"asian",    "black", "caucasian",
                                                  "hispanic", "alien", "other"};
 constexpr std::array<const char*, 3> kGenders{"male", "female", "other"};
-constexpr std::array<const char*, 2> kTranslationUnits{"cm", "m"};
-constexpr std::array<const char*, 2> kRotationUnits{"degrees", "radians"};
-constexpr std::array<const char*, 6> kDirections{"left", "right", "up", "down", "front", "back"};
-constexpr std::array<const char*, 6> kSequences{"xyz", "xzy", "yxz", "yzx", "zxy", "zyx"};
-constexpr std::array<const char*, 2> kWindings{"ccw", "cw"};
 
 void bind_structs(py::module_& m) {
   py::class_<dna::LodMapping, std::shared_ptr<dna::LodMapping>>(

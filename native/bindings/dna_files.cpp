@@ -3,6 +3,7 @@
 #include "bindings/fields.h"
 #include "core/file_write.h"
 #include "core/source.h"
+#include "dna/coordinates.h"
 #include "dna/io.h"
 #include "dna/json.h"
 
@@ -168,6 +169,54 @@ void bind_layers(DnaClass& c) {
       "Ids of the file's layers in its order.");
 }
 
+// A word of the format; "#17", which a property may show, is no place to convert to.
+template <class Number, std::size_t kCount>
+std::optional<Number> choice_argument(const std::array<const char*, kCount>& words,
+                                      const std::optional<std::string>& text, const char* name) {
+  if (!text) return std::nullopt;
+  return value_of_word<Number>(words, text->starts_with('#') ? "'" + *text + "'" : *text, name);
+}
+
+template <class T>
+void require_three(const std::vector<T>& values, const char* name) {
+  if (values.size() == 3) return;
+  throw py::value_error(std::string(name) + ": x, y and z were expected, found " +
+                        std::to_string(values.size()) + " values");
+}
+
+using Words = std::optional<std::vector<std::string>>;
+using Word = std::optional<std::string>;
+using Signs = std::optional<std::vector<std::int32_t>>;
+
+std::shared_ptr<Dna> convert(const Dna& self, const Words& axes, const Word& rotation_sequence,
+                             const Signs& rotation_signs, const Word& face_winding_order,
+                             const Word& translation_unit, const Word& rotation_unit) {
+  dna::CoordinateTarget t;
+  if (axes) {
+    require_three(*axes, "axes");
+    const auto axis = [&](std::size_t i) {
+      return *choice_argument<std::uint16_t>(kDirections, (*axes)[i], "axes");
+    };
+    t.axes = dna::CoordinateSystem{axis(0), axis(1), axis(2)};
+  }
+  if (rotation_signs) {
+    require_three(*rotation_signs, "rotation_signs");
+    t.rotation_signs = {(*rotation_signs)[0], (*rotation_signs)[1], (*rotation_signs)[2]};
+  }
+  t.rotation_sequence =
+      choice_argument<std::uint32_t>(kSequences, rotation_sequence, "rotation_sequence");
+  t.face_winding_order =
+      choice_argument<std::uint8_t>(kWindings, face_winding_order, "face_winding_order");
+  t.translation_unit =
+      choice_argument<std::uint16_t>(kTranslationUnits, translation_unit, "translation_unit");
+  t.rotation_unit = choice_argument<std::uint16_t>(kRotationUnits, rotation_unit, "rotation_unit");
+  std::vector<dna::Warning> warnings;
+  auto out = std::make_shared<Dna>(
+      unwrap(unlocked([&] { return dna::convert_coordinates(self, t, warnings); })));
+  emit(warnings);
+  return out;
+}
+
 void bind_changes(DnaClass& c) {
   c.def_property_readonly("warnings", [](const Dna& s) { return describe(s.warnings); });
   c.def(
@@ -187,6 +236,16 @@ void bind_changes(DnaClass& c) {
       },
       py::arg("lods"),
       "A copy with (max_lod, min_lod) or [lod, ...] only; every index counts in what is left.");
+  c.def("convert", &convert, py::kw_only(), py::arg("axes") = py::none(),
+        py::arg("rotation_sequence") = py::none(), py::arg("rotation_signs") = py::none(),
+        py::arg("face_winding_order") = py::none(), py::arg("translation_unit") = py::none(),
+        py::arg("rotation_unit") = py::none(),
+        "A copy in another coordinate system or other units, e.g. axes=('right', 'front', 'up'), "
+        "rotation_sequence='xyz', rotation_signs=(1, 1, 1), face_winding_order='ccw', "
+        "translation_unit='m', rotation_unit='radians'; what is not given stays. Raw controls that "
+        "carry a rotation are meant in the new axes. What the format cannot say there is a "
+        "UserWarning. Raises ValueError for values that make no sense, DnaError where the file's "
+        "own do not.");
   c.def("__reduce__", [](const py::object& self) {
     return py::make_tuple(py::module_::import("risorius").attr("load"),
                           py::make_tuple(self.attr("to_bytes")()));
@@ -249,6 +308,14 @@ void bind_dna_files(py::module_& m, DnaClass& c) {
   bind_writing(c);
   bind_layers(c);
   bind_changes(c);
+  m.def(
+      "write_file",
+      [](const std::filesystem::path& path, const py::bytes& bytes) {
+        const std::string_view view = bytes;
+        const std::span data{reinterpret_cast<const std::uint8_t*>(view.data()), view.size()};
+        unwrap(unlocked([&] { return core::write_file_atomically(path, data); }));
+      },
+      "Writes any bytes as Dna.save does: the old file is whole until the new one is.");
   m.def("parse_bytes", [](const py::bytes& bytes, const dna::ParseOptions& options) {
     core::SpanSource source = source_of(bytes);
     return parse(source, options, "");

@@ -118,6 +118,14 @@ void parts(Class& c, const char* name, Get get) {
       });
 }
 
+// The words of what says how numbers are meant.
+inline constexpr std::array<const char*, 2> kTranslationUnits{"cm", "m"};
+inline constexpr std::array<const char*, 2> kRotationUnits{"degrees", "radians"};
+inline constexpr std::array<const char*, 6> kDirections{"left", "right", "up",
+                                                        "down", "front", "back"};
+inline constexpr std::array<const char*, 6> kSequences{"xyz", "xzy", "yxz", "yzx", "zxy", "zyx"};
+inline constexpr std::array<const char*, 2> kWindings{"ccw", "cw"};
+
 // Enumerations read as words; a number that the format does not know reads as "#17".
 template <std::size_t kCount>
 std::string word(const std::array<const char*, kCount>& words, std::uint32_t value) {

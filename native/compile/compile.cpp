@@ -29,6 +29,8 @@ using detail::check_controls;
 using detail::Used;
 using rig::RigData;
 
+constexpr std::uint32_t kNobody = UINT32_MAX;
+
 void add_text(std::string_view text, RigData& out) {
   out.text.insert(out.text.end(), text.begin(), text.end());
   out.text_ends.push_back(static_cast<std::uint32_t>(out.text.size()));
@@ -136,14 +138,18 @@ void compile_neutral(const dna::Dna& dna, RigData& out) {
   }
 }
 
-// In tiles: both sides are read and written by whole cache lines.
-void transpose(const float* from, std::size_t rows, std::size_t columns, float* to) {
+// In tiles: both sides are read and written by whole cache lines. Column c goes to
+// to[offsets[c] ...], where it is kept.
+void transpose(const float* from, std::size_t rows, std::span<const std::uint32_t> offsets,
+               float* to) {
   constexpr std::size_t kTile = 16;
+  const std::size_t columns = offsets.size();
   for (std::size_t r0 = 0; r0 < rows; r0 += kTile) {
     for (std::size_t c0 = 0; c0 < columns; c0 += kTile) {
       const std::size_t r1 = std::min(rows, r0 + kTile), c1 = std::min(columns, c0 + kTile);
       for (std::size_t c = c0; c < c1; ++c) {
-        for (std::size_t r = r0; r < r1; ++r) to[c * rows + r] = from[r * columns + c];
+        if (offsets[c] == kNobody) continue;
+        for (std::size_t r = r0; r < r1; ++r) to[offsets[c] + r] = from[r * columns + c];
       }
     }
   }
@@ -170,72 +176,125 @@ Status compile_joint_group(const dna::JointGroup& g, const std::string& where, R
   }
   const auto rows = add_lods(g, where, out);
   if (!rows) return core::Unexpected{rows.error()};
-  const std::size_t columns = g.input_indices.size();
   rig::JointGroup group;
   group.row_count = *rows;
-  if (out.joint_values.size() + std::size_t{*rows} * columns > UINT32_MAX - simd::kWidest) {
-    return fail(ErrorCode::kLimitExceeded, where + ".values",
-                "the matrices of all groups hold more values than an index of 32 bits reaches");
-  }
-  group.values_begin = static_cast<std::uint32_t>(out.joint_values.size());
-  group.outputs_begin = static_cast<std::uint32_t>(out.joint_outputs.size());
-  out.joint_values.resize(out.joint_values.size() + *rows * columns);
-  transpose(g.values.data(), *rows, columns, out.joint_values.data() + group.values_begin);
+  group.rows_begin = static_cast<std::uint32_t>(out.joint_outputs.size());
   out.joint_outputs.insert(out.joint_outputs.end(), g.output_indices.begin(),
                            g.output_indices.begin() + *rows);
-  out.tallest_group = std::max(out.tallest_group, *rows);
   out.joint_groups.push_back(group);
   return ok();
 }
 
-// The lowest row in which a column has a value: at LODs with fewer rows it does nothing.
-std::uint32_t first_row_with_value(const RigData& r, const rig::JointGroup& g, std::size_t column) {
-  const float* values = r.joint_values.data() + g.values_begin + column * g.row_count;
-  return static_cast<std::uint32_t>(
-      std::find_if(values, values + g.row_count, [](float v) { return v != 0.0f; }) - values);
+// The lowest row in which each column has a value: at LODs with fewer rows it does nothing.
+std::vector<std::uint32_t> first_rows_with_values(const dna::JointGroup& g, std::uint32_t rows) {
+  const std::size_t columns = g.input_indices.size();
+  std::vector<std::uint32_t> first(columns, rows);
+  std::size_t missing = columns;
+  for (std::uint32_t r = 0; r < rows && missing > 0; ++r) {
+    const float* row = g.values.data() + r * columns;
+    for (std::size_t c = 0; c < columns; ++c) {
+      if (first[c] < rows || row[c] == 0.0f) continue;
+      first[c] = r;
+      --missing;
+    }
+  }
+  return first;
 }
 
-// Finds columns by their control; those without any value are left out.
-void index_columns(const dna::Dna& dna, RigData& out, Used& used) {
-  struct Entry {
-    std::uint16_t control;
-    rig::JointColumn column;
-  };
-  std::vector<Entry> entries;
+struct ColumnEntry {
+  std::uint16_t control;
+  std::uint32_t group, column;
+};
+
+// The columns that have any value, by control and group: what a control drives lies together.
+std::vector<ColumnEntry> list_columns(const dna::Dna& dna, RigData& out, Used& used) {
+  std::vector<ColumnEntry> entries;
   for (std::uint32_t i = 0; i < out.joint_groups.size(); ++i) {
     rig::JointGroup& g = out.joint_groups[i];
-    const Array<std::uint16_t>& inputs = dna.behavior.joint_groups[i].input_indices;
+    const dna::JointGroup& source = dna.behavior.joint_groups[i];
+    const std::vector<std::uint32_t> first = first_rows_with_values(source, g.row_count);
     g.columns_begin = out.list_count;
-    for (std::uint32_t c = 0; c < inputs.size(); ++c) {
-      const std::uint32_t row = first_row_with_value(out, g, c);
-      if (row == g.row_count) continue;
+    for (std::uint32_t c = 0; c < first.size(); ++c) {
+      if (first[c] == g.row_count) continue;
       ++g.column_count;
-      entries.push_back({inputs[c], {g.values_begin + c * g.row_count, i}});
+      const std::uint16_t control = source.input_indices[c];
+      entries.push_back({control, i, c});
       for (std::uint32_t l = 0; l < out.lod_count; ++l) {
-        if (out.joint_group_lods[i * out.lod_count + l] > row) used[l][inputs[c]] = true;
+        if (out.joint_group_lods[i * out.lod_count + l] > first[c]) used[l][control] = true;
       }
     }
     out.list_count += g.column_count;
   }
-  std::ranges::stable_sort(entries, {}, &Entry::control);
+  std::ranges::stable_sort(entries, {}, &ColumnEntry::control);
+  return entries;
+}
+
+Status compile_columns(const dna::Dna& dna, RigData& out, Used& used) {
+  const std::vector<ColumnEntry> entries = list_columns(dna, out, used);
+  std::vector<std::vector<std::uint32_t>> offsets;
+  for (const dna::JointGroup& g : dna.behavior.joint_groups) {
+    offsets.emplace_back(g.input_indices.size(), kNobody);
+  }
+  std::uint64_t end = 0;
   out.joint_column_begins.assign(out.control_count + std::size_t{1}, 0);
-  for (const Entry& e : entries) {
+  for (const ColumnEntry& e : entries) {
+    const auto offset = static_cast<std::uint32_t>(end);
+    offsets[e.group][e.column] = offset;
+    out.joint_columns.push_back({offset, e.group});
     ++out.joint_column_begins[e.control + std::size_t{1}];
-    out.joint_columns.push_back(e.column);
+    end += out.joint_groups[e.group].row_count;
+    if (end > UINT32_MAX - simd::kWidest) {
+      return fail(ErrorCode::kLimitExceeded, "behavior.joint_groups",
+                  "the matrices of all groups hold more values than an index of 32 bits reaches");
+    }
   }
   std::partial_sum(out.joint_column_begins.begin(), out.joint_column_begins.end(),
                    out.joint_column_begins.begin());
+  out.joint_values.resize(static_cast<std::size_t>(end) + simd::kWidest);  // kernels read on
+  for (std::size_t i = 0; i < offsets.size(); ++i) {
+    transpose(dna.behavior.joint_groups[i].values.data(), out.joint_groups[i].row_count, offsets[i],
+              out.joint_values.data());
+  }
+  return ok();
 }
 
-// A group at rest need not write its zeros, unless another group wrote there before.
-void mark_shared_rows(RigData& out) {
-  std::vector<bool> written(std::size_t{out.joint_count} * 9, false);
-  for (rig::JointGroup& g : out.joint_groups) {
-    for (std::uint32_t r = 0; r < g.row_count; ++r) {
-      const std::uint16_t row = out.joint_outputs[g.outputs_begin + r];
-      if (written[row]) g.writes_always = 1;
-      written[row] = true;
+// Which row each joint attribute takes at a LOD; the last group that writes it wins.
+std::vector<std::uint32_t> rows_by_attribute(const RigData& r, std::uint32_t lod) {
+  std::vector<std::uint32_t> rows(std::size_t{r.joint_count} * r.joint_stride, kNobody);
+  for (std::size_t i = 0; i < r.joint_groups.size(); ++i) {
+    const rig::JointGroup& g = r.joint_groups[i];
+    for (std::uint32_t row = 0; row < r.joint_group_lods[i * r.lod_count + lod]; ++row) {
+      rows[r.joint_outputs[g.rows_begin + row]] = g.rows_begin + row;
     }
+  }
+  return rows;
+}
+
+// The rows that one block of attributes takes, as pieces of rows that follow each other.
+std::vector<simd::Piece> pieces_of(std::span<const std::uint32_t> rows, std::size_t block) {
+  std::vector<simd::Piece> pieces;
+  std::uint32_t next = kNobody;
+  for (std::size_t p = 0; p < rows.size(); ++p) {
+    if (rows[p] == kNobody) continue;
+    if (rows[p] != next) pieces.push_back({rows[p], 0, static_cast<std::uint16_t>(block)});
+    pieces.back().mask = static_cast<std::uint16_t>(pieces.back().mask | (1u << p));
+    next = rows[p] + 1;
+  }
+  if (pieces.empty()) pieces.push_back({0, 0, static_cast<std::uint16_t>(block)});
+  return pieces;
+}
+
+void compile_pieces(RigData& out) {
+  out.extra_begins.push_back(0);
+  for (std::uint32_t lod = 0; lod < out.lod_count; ++lod) {
+    const std::vector<std::uint32_t> rows = rows_by_attribute(out, lod);
+    for (std::size_t at = 0; at < rows.size(); at += simd::kPlaces) {
+      const std::size_t count = std::min(simd::kPlaces, rows.size() - at);
+      const auto pieces = pieces_of(std::span(rows).subspan(at, count), at / simd::kPlaces);
+      out.joint_pieces.push_back(pieces[0]);
+      out.extra_pieces.insert(out.extra_pieces.end(), pieces.begin() + 1, pieces.end());
+    }
+    out.extra_begins.push_back(static_cast<std::uint32_t>(out.extra_pieces.size()));
   }
 }
 
@@ -265,15 +324,10 @@ Status widen_joint_rows(RigData& out) {
 
 Status compile_joint_groups(const dna::Dna& dna, RigData& out) {
   const auto& groups = dna.behavior.joint_groups;
-  std::size_t values = 0;
-  for (const dna::JointGroup& g : groups) values += g.values.size();
-  out.joint_values.reserve(values + simd::kWidest);
   for (std::size_t i = 0; i < groups.size(); ++i) {
     const std::string where = "behavior.joint_groups[" + std::to_string(i) + "]";
     if (Status s = compile_joint_group(groups[i], where, out); !s) return s;
   }
-  out.joint_values.resize(out.joint_values.size() + simd::kWidest);  // kernels read on
-  mark_shared_rows(out);
   return ok();
 }
 
@@ -388,13 +442,14 @@ Result<RigData> compile_parts(const dna::Dna& dna, const CompileOptions& options
   if (Status s = compile_channels_and_maps(dna, out); !s) return std::move(s).propagate();
   if (Status s = compile_psds(dna, out); !s) return std::move(s).propagate();
   list_joints_written(out);
-  index_columns(dna, out, used);
+  if (Status s = compile_columns(dna, out, used); !s) return std::move(s).propagate();
   mark_channels_and_maps(out, used);
   detail::mark_ml_joints(out, used);
   detail::schedule(used, lods, out);
   if (out.joint_stride == 10) {
     if (Status s = widen_joint_rows(out); !s) return std::move(s).propagate();
   }
+  compile_pieces(out);
   if (options.precision == Precision::kFloat16) {
     if (Status s = narrow(out); !s) return std::move(s).propagate();
   }

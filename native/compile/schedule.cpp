@@ -205,12 +205,20 @@ std::vector<std::uint32_t> choose_watchers(const RigData& r, const Graph& g,
   return watchers;
 }
 
+std::uint16_t another_factor(const RigData& r, const rig::Psd& p, std::uint32_t watcher) {
+  for (std::uint32_t f = p.factors_begin; f < p.factors_begin + p.factor_count; ++f) {
+    if (r.psd_factors[f] != watcher) return r.psd_factors[f];
+  }
+  return static_cast<std::uint16_t>(watcher);
+}
+
 void add_watched(const std::vector<bool>& used, const std::vector<std::uint32_t>& watchers,
                  RigData& r) {
-  std::vector<std::vector<std::uint16_t>> watched(r.control_count);
+  std::vector<std::vector<rig::Watch>> watched(r.control_count);
   for (std::uint32_t p = 0; p < r.psds.size(); ++p) {
     if (!used[r.psds[p].output] || watchers[p] == rig::kNone) continue;
-    watched[watchers[p]].push_back(static_cast<std::uint16_t>(p));
+    watched[watchers[p]].push_back(
+        {static_cast<std::uint16_t>(p), another_factor(r, r.psds[p], watchers[p])});
   }
   for (const auto& list : watched) {
     r.watch_begins.push_back(static_cast<std::uint32_t>(r.watched.size()));

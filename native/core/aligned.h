@@ -3,6 +3,8 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <memory>
 #include <new>
 #include <vector>
 
@@ -24,6 +26,10 @@ struct AlignedAllocator {
   void deallocate(T* p, std::size_t) { ::operator delete(p, std::align_val_t(kAlignment)); }
   bool operator==(const AlignedAllocator&) const { return true; }
 };
+
+/// Zeroed memory for what is read at random: in large pages where it is large and the system has
+/// them, so that finding it costs no more than reading it. nullptr: there is none.
+std::shared_ptr<std::uint8_t> allocate_pages(std::size_t size);
 
 template <class T>
 using AlignedVector = std::vector<T, AlignedAllocator<T>>;

@@ -24,6 +24,7 @@ class Buffer {
   explicit Buffer(std::size_t n) { resize(n); }
 
   std::size_t size() const { return size_; }
+  std::size_t capacity() const { return capacity_; }
   T* data() { return data_.get(); }
   T& operator[](std::size_t i) { return data_.get()[i]; }
 

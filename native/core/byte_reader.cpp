@@ -12,37 +12,64 @@ namespace {
 constexpr std::size_t kFirstRead = 512;
 constexpr std::size_t kWindowBytes = 64 * 1024;  // stays in the cache between kernel and swap
 
-std::uint16_t big_endian(std::uint16_t v) {
+// Numbers from the file's byte order. What passes over every byte of a file should be as wide as
+// the machine: the functions below exist twice, compiled for any x86-64 and for AVX2.
+#if defined(__x86_64__) && defined(__GNUC__)
+#define RISORIUS_INLINE inline __attribute__((always_inline))
+#define RISORIUS_TARGET_AVX2 __attribute__((target("avx2")))
+const bool kHasAvx2 = __builtin_cpu_supports("avx2") != 0;
+#else
+#define RISORIUS_INLINE inline
+#define RISORIUS_TARGET_AVX2
+constexpr bool kHasAvx2 = false;
+#endif
+
+RISORIUS_INLINE std::uint16_t big_endian(std::uint16_t v) {
   if constexpr (std::endian::native == std::endian::big) return v;
   return static_cast<std::uint16_t>((v >> 8) | (v << 8));
 }
 
-std::uint32_t big_endian(std::uint32_t v) {
+RISORIUS_INLINE std::uint32_t big_endian(std::uint32_t v) {
   if constexpr (std::endian::native == std::endian::big) return v;
   return (v >> 24) | ((v >> 8) & 0xFF00u) | ((v << 8) & 0xFF0000u) | (v << 24);
 }
 
-template <class Word, class T>
-void to_native(const std::uint8_t* from, T* to, std::size_t n) {
+struct NothingSeen {
+  template <class Word>
+  RISORIUS_INLINE void see(Word) {}
+};
+struct Largest {
+  std::uint32_t value = 0;
+  RISORIUS_INLINE void see(std::uint32_t v) { value = v > value ? v : value; }
+};
+// Bit 31 is set when an exponent is all ones: infinite or no number.
+struct Exponents {
+  std::uint32_t carries = 0;
+  RISORIUS_INLINE void see(std::uint32_t v) { carries |= (v & 0x7FFFFFFFu) + 0x00800000u; }
+};
+
+template <class Word, class T, class Seen>
+RISORIUS_INLINE Seen to_native_inline(const std::uint8_t* from, T* to, std::size_t n) {
+  Seen seen;
   for (std::size_t i = 0; i < n; ++i) {
     Word v;
     std::memcpy(&v, from + sizeof(Word) * i, sizeof(Word));
     v = big_endian(v);
     std::memcpy(to + i, &v, sizeof(Word));
-  }
-}
-
-// As to_native. Out: bit 31 is set when an exponent is all ones (infinite or no number).
-std::uint32_t to_native_floats(const std::uint8_t* from, float* to, std::size_t n) {
-  std::uint32_t seen = 0;
-  for (std::size_t i = 0; i < n; ++i) {
-    std::uint32_t v;
-    std::memcpy(&v, from + 4 * i, 4);
-    v = big_endian(v);
-    std::memcpy(to + i, &v, 4);
-    seen |= (v & 0x7FFFFFFFu) + 0x00800000u;
+    seen.see(v);
   }
   return seen;
+}
+
+template <class Word, class T, class Seen>
+RISORIUS_TARGET_AVX2 Seen to_native_avx2(const std::uint8_t* from, T* to, std::size_t n) {
+  return to_native_inline<Word, T, Seen>(from, to, n);
+}
+
+template <class Word, class Seen, class T>
+Seen to_native(const std::uint8_t* from, T* to, std::size_t n) {
+  return kHasAvx2 ? to_native_avx2<Word, T, Seen>(from, to, n)
+                  : to_native_inline<Word, T, Seen>(from, to, n);
 }
 
 }  // namespace
@@ -142,6 +169,11 @@ bool ByteReader::refill(std::size_t n, std::uint64_t wanted) {
 
 template <std::size_t kSize, class Take>
 bool ByteReader::for_runs(std::size_t n, const Take& take) {
+  if (n <= static_cast<std::size_t>(ready_ - at_) / kSize) {
+    take(at_, n);
+    at_ += n * kSize;
+    return true;
+  }
   if (!check_left(std::uint64_t{n} * kSize)) return false;
   while (n > 0) {
     const std::size_t run = std::min(n, static_cast<std::size_t>(ready_ - at_) / kSize);
@@ -173,6 +205,13 @@ std::uint32_t ByteReader::count_slowly(std::uint32_t element_size) {
     return 0;
   }
   return n;
+}
+
+std::optional<std::uint16_t> ByteReader::peek_u16(std::uint64_t offset) {
+  std::uint8_t bytes[2];
+  if (failed() || offset < position() || end_ < 2 || offset > end_ - 2) return std::nullopt;
+  if (source_->read(offset, bytes) != 2) return std::nullopt;
+  return load<std::uint16_t>(bytes);
 }
 
 std::string ByteReader::str() {
@@ -212,63 +251,43 @@ void ByteReader::skip(std::uint64_t size) {
 }
 
 void ByteReader::read_f32(float* out, std::size_t n, bool* all_finite) {
-  std::uint32_t seen = 0;
+  Exponents seen;
   for_runs<4>(n, [&](const std::uint8_t* from, std::size_t run) {
-    seen |= to_native_floats(from, out, run);
+    seen.carries |= to_native<std::uint32_t, Exponents>(from, out, run).carries;
     out += run;
   });
-  if (all_finite != nullptr && (seen >> 31) != 0) *all_finite = false;
+  if (all_finite != nullptr && (seen.carries >> 31) != 0) *all_finite = false;
 }
 void ByteReader::read_u16(std::uint16_t* out, std::size_t n) {
   for_runs<2>(n, [&](const std::uint8_t* from, std::size_t run) {
-    to_native<std::uint16_t>(from, out, run);
+    to_native<std::uint16_t, NothingSeen>(from, out, run);
     out += run;
   });
 }
-void ByteReader::read_u32(std::uint32_t* out, std::size_t n) {
+void ByteReader::read_u32(std::uint32_t* out, std::size_t n, std::uint32_t* largest) {
+  Largest seen;
   for_runs<4>(n, [&](const std::uint8_t* from, std::size_t run) {
-    to_native<std::uint32_t>(from, out, run);
+    seen.see(to_native<std::uint32_t, Largest>(from, out, run).value);
     out += run;
   });
-}
-
-std::uint32_t ByteReader::append_f32_list(Buffer<float>& to, bool* all_finite) {
-  const std::uint32_t n = count(4);
-  const std::size_t begin = to.size();
-  to.resize(begin + n);
-  read_f32(to.data() + begin, n, all_finite);
-  return failed() ? 0 : n;
-}
-std::uint32_t ByteReader::append_u16_list(Buffer<std::uint16_t>& to) {
-  const std::uint32_t n = count(2);
-  const std::size_t begin = to.size();
-  to.resize(begin + n);
-  read_u16(to.data() + begin, n);
-  return failed() ? 0 : n;
-}
-std::uint32_t ByteReader::append_u32_list(Buffer<std::uint32_t>& to) {
-  const std::uint32_t n = count(4);
-  const std::size_t begin = to.size();
-  to.resize(begin + n);
-  read_u32(to.data() + begin, n);
-  return failed() ? 0 : n;
+  if (largest != nullptr) *largest = std::max(*largest, seen.value);
 }
 
 Array<float> ByteReader::f32_list(bool* all_finite) {
-  Buffer<float> values;
-  append_f32_list(values, all_finite);
+  Buffer<float> values(count(4));
+  read_f32(values.data(), values.size(), all_finite);
   if (failed()) return {};
   return values;
 }
 Array<std::uint16_t> ByteReader::u16_list() {
-  Buffer<std::uint16_t> values;
-  append_u16_list(values);
+  Buffer<std::uint16_t> values(count(2));
+  read_u16(values.data(), values.size());
   if (failed()) return {};
   return values;
 }
-Array<std::uint32_t> ByteReader::u32_list() {
-  Buffer<std::uint32_t> values;
-  append_u32_list(values);
+Array<std::uint32_t> ByteReader::u32_list(std::uint32_t* largest) {
+  Buffer<std::uint32_t> values(count(4));
+  read_u32(values.data(), values.size(), largest);
   if (failed()) return {};
   return values;
 }

@@ -44,6 +44,8 @@ class ByteReader {
 
   /// Restricts reading to [offset, offset + size). Fails when that is outside the source.
   bool enter(std::uint64_t offset, std::uint64_t size);
+  /// The window begins small again, as after a jump: little of what comes next may be wanted.
+  void read_small() { next_read_ = 0; }
 
   std::uint8_t u8() { return number<std::uint8_t>(); }
   std::uint16_t u16() { return number<std::uint16_t>(); }
@@ -60,22 +62,21 @@ class ByteReader {
     }
     return count_slowly(element_size);
   }
+  /// The number at offset, if it lies between here and end(). Reading goes on where it was.
+  std::optional<std::uint16_t> peek_u16(std::uint64_t offset);
   std::string str();
   std::vector<std::uint8_t> bytes(std::uint64_t size);
   void skip(std::uint64_t size);
   /// all_finite   becomes false when a value is infinite or no number; is never made true
   Array<float> f32_list(bool* all_finite = nullptr);
   Array<std::uint16_t> u16_list();
-  Array<std::uint32_t> u32_list();
-  /// A list, count and values, behind what `to` has. Out: its count; 0 after a failure.
-  std::uint32_t append_f32_list(Buffer<float>& to, bool* all_finite = nullptr);
-  std::uint32_t append_u16_list(Buffer<std::uint16_t>& to);
-  std::uint32_t append_u32_list(Buffer<std::uint32_t>& to);
+  /// largest      grows to the largest value
+  Array<std::uint32_t> u32_list(std::uint32_t* largest = nullptr);
   /// Reads n values without a count, straight into out. In: n already checked by count(). What is
   /// in out after a failure is not defined.
   void read_f32(float* out, std::size_t n, bool* all_finite = nullptr);
   void read_u16(std::uint16_t* out, std::size_t n);
-  void read_u32(std::uint32_t* out, std::size_t n);
+  void read_u32(std::uint32_t* out, std::size_t n, std::uint32_t* largest = nullptr);
 
   /// Field path of what is being read, for errors: push on entry, pop on exit (see Field).
   std::string where() const;

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Row vectors throughout: v' = v C and R' = transpose(C) R C, where C is a signed permutation.
 #include "dna/coordinates.h"
 
 #include <algorithm>
-#include <cmath>
-#include <numbers>
+#include <map>
 #include <string>
 #include <utility>
 
+#include "dna/change_of_basis.h"
 #include "dna/io.h"
 
 namespace risorius::dna {
@@ -19,8 +18,11 @@ using core::ErrorCode;
 using core::fail;
 using core::ok;
 using core::Status;
-using Vec3 = std::array<double, 3>;
-using Matrix = std::array<Vec3, 3>;
+using detail::Basis;
+using detail::Rotation;
+using detail::System;
+using detail::Vec3;
+using Warnings = std::vector<Warning>;
 
 std::string item(const std::string& where, std::size_t i) {
   return where + "[" + std::to_string(i) + "]";
@@ -31,90 +33,75 @@ float rounded(double v) { return static_cast<float>(v + 0.0); }
 
 // ---- what to convert from and to
 
-struct System {
-  CoordinateSystem axes;
-  DescriptorExt ext;
-  std::uint16_t translation_unit = 0, rotation_unit = 0;
-};
-
 System system_of(const Dna& dna) {
   const Descriptor& d = dna.descriptor;
   return {d.coordinate_system, dna.descriptor_ext, d.translation_unit, d.rotation_unit};
 }
 
-System system_of(const CoordinateTarget& target, const System& source) {
-  System s;
-  s.axes = target.axes.value_or(source.axes);
-  s.ext.rotation_sequence = target.rotation_sequence.value_or(source.ext.rotation_sequence);
-  s.ext.rotation_sign = target.rotation_sign.value_or(source.ext.rotation_sign);
-  s.ext.face_winding_order = target.face_winding_order.value_or(source.ext.face_winding_order);
-  s.translation_unit = target.translation_unit.value_or(source.translation_unit);
-  s.rotation_unit = target.rotation_unit.value_or(source.rotation_unit);
+System system_of(const CoordinateTarget& target, System s) {
+  s.axes = target.axes.value_or(s.axes);
+  s.ext.rotation_sequence = target.rotation_sequence.value_or(s.ext.rotation_sequence);
+  s.ext.rotation_sign = target.rotation_signs.value_or(s.ext.rotation_sign);
+  s.ext.face_winding_order = target.face_winding_order.value_or(s.ext.face_winding_order);
+  s.translation_unit = target.translation_unit.value_or(s.translation_unit);
+  s.rotation_unit = target.rotation_unit.value_or(s.rotation_unit);
   return s;
 }
 
-bool spans_space(const CoordinateSystem& a) {
-  const std::uint16_t x = a.x_axis / 2, y = a.y_axis / 2, z = a.z_axis / 2;
-  return x < 3 && y < 3 && z < 3 && x != y && y != z && x != z;
-}
-
-// The layer that a field lies in is named only for the file's own system.
-Status check_system(const System& s, ErrorCode code, const std::string& descriptor,
-                    const std::string& ext, const std::string& axes) {
-  const auto unknown = [&](const std::string& where, std::uint32_t value) {
-    return fail(code, where, "the value " + std::to_string(value) + " is not known");
-  };
-  if (!spans_space(s.axes)) return fail(code, descriptor + axes, "the axes do not span space");
-  if (s.ext.rotation_sequence > 5) {
-    return unknown(ext + "rotation_sequence", s.ext.rotation_sequence);
+// Errors name a field of the file, or an argument.
+Status check_system(const System& s, bool of_file) {
+  const ErrorCode code = of_file ? ErrorCode::kInvalidValue : ErrorCode::kInvalidArgument;
+  const std::string d = of_file ? "descriptor." : "", e = of_file ? "descriptor_ext." : "";
+  if (!detail::spans_space(s.axes)) {
+    return fail(code, of_file ? "descriptor.coordinate_system" : "axes",
+                "the axes do not span space");
   }
   for (const std::int32_t sign : s.ext.rotation_sign) {
     if (sign == 1 || sign == -1) continue;
-    return fail(code, ext + "rotation_sign",
+    return fail(code, of_file ? "descriptor_ext.rotation_sign" : "rotation_signs",
                 "a sign is " + std::to_string(sign) + ", 1 or -1 was expected");
   }
-  if (s.ext.face_winding_order > 1) {
-    return unknown(ext + "face_winding_order", s.ext.face_winding_order);
+  struct Choice {
+    std::string where;
+    std::uint32_t value, limit;
+  };
+  for (const Choice& c : {Choice{e + "rotation_sequence", s.ext.rotation_sequence, 6},
+                          Choice{e + "face_winding_order", s.ext.face_winding_order, 2},
+                          Choice{d + "translation_unit", s.translation_unit, 2},
+                          Choice{d + "rotation_unit", s.rotation_unit, 2}}) {
+    if (c.value < c.limit) continue;
+    return fail(code, c.where, "the value " + std::to_string(c.value) + " is not known");
   }
-  if (s.translation_unit > 1) return unknown(descriptor + "translation_unit", s.translation_unit);
-  if (s.rotation_unit > 1) return unknown(descriptor + "rotation_unit", s.rotation_unit);
   return ok();
 }
 
-// ---- vectors
+struct Conversion {
+  Conversion(const System& from, const System& target)
+      : source(from), basis(from.axes, target.axes), rotation(from, target, basis) {
+    if (source.translation_unit != target.translation_unit) {
+      unit = target.translation_unit == 0 ? 100.0 : 0.01;
+    }
+    const bool mirrored = basis.determinant < 0;
+    const bool rewound = source.ext.face_winding_order != target.ext.face_winding_order;
+    reverses_faces = mirrored != rewound;
+  }
 
-// The matrix C: component i of the source becomes component to[i], times sign[i].
-struct Basis {
-  std::array<std::size_t, 3> to{0, 1, 2};
-  Vec3 sign{1, 1, 1};
-  double determinant = 1;
-
-  bool keeps_places() const { return to == std::array<std::size_t, 3>{0, 1, 2}; }
-  bool identity() const { return keeps_places() && sign == Vec3{1, 1, 1}; }
-  Vec3 operator()(const Vec3& v) const {
-    Vec3 out{};
-    for (std::size_t i = 0; i < 3; ++i) out[to[i]] = sign[i] * v[i];
+  bool keeps_positions() const { return basis.identity() && unit == 1; }
+  bool keeps_rotations() const { return rotation.identity(); }
+  Vec3 position(const Vec3& v) const {
+    Vec3 out = basis(v);
+    for (double& c : out) c *= unit;
     return out;
   }
+
+  System source;
+  Basis basis;
+  Rotation rotation;
+  double unit = 1;
+  bool reverses_faces = false;
 };
 
-// In: axes that span space.
-Basis basis_between(const CoordinateSystem& source, const CoordinateSystem& target) {
-  constexpr std::array<double, 6> kSign{-1, 1, 1, -1, 1, -1};  // of left right up down front back
-  const std::array<std::uint16_t, 3> from{source.x_axis, source.y_axis, source.z_axis};
-  const std::array<std::uint16_t, 3> into{target.x_axis, target.y_axis, target.z_axis};
-  Basis b;
-  for (std::size_t i = 0; i < 3; ++i) {
-    for (std::size_t j = 0; j < 3; ++j) {
-      if (from[i] / 2 != into[j] / 2) continue;
-      b.to[i] = j;
-      b.sign[i] = kSign[from[i]] * kSign[into[j]];
-    }
-  }
-  const bool cyclic = b.to[1] == (b.to[0] + 1) % 3;
-  b.determinant = (cyclic ? 1.0 : -1.0) * b.sign[0] * b.sign[1] * b.sign[2];
-  return b;
-}
+// ---- definition and geometry
 
 template <class Convert>
 Vec3Array mapped(const Vec3Array& vectors, const Convert& convert) {
@@ -127,143 +114,12 @@ Vec3Array mapped(const Vec3Array& vectors, const Convert& convert) {
   return {Array<float>(std::move(out))};
 }
 
-// ---- rotations
-
-constexpr double kDegree = std::numbers::pi / 180;
-
-// The order in which the angles' rotations are applied.
-std::array<std::size_t, 3> axis_order(std::uint32_t sequence) {
-  constexpr std::array<std::array<std::size_t, 3>, 6> kOrders{
-      {{0, 1, 2}, {0, 2, 1}, {1, 0, 2}, {1, 2, 0}, {2, 0, 1}, {2, 1, 0}}};
-  return kOrders[sequence];
-}
-
-// R times the rotation about one axis.
-void rotate(Matrix& r, std::size_t axis, double angle) {
-  const double c = std::cos(angle), s = std::sin(angle);
-  const std::size_t u = (axis + 1) % 3, v = (axis + 2) % 3;
-  for (Vec3& row : r) {
-    const double a = row[u], b = row[v];
-    row[u] = a * c - b * s;
-    row[v] = a * s + b * c;
-  }
-}
-
-// The angles of R = Ri Rj Rk. The middle one comes from both its sine and its cosine: asin alone
-// would lose half of the digits near the pole.
-Vec3 angles_of(const Matrix& r, const std::array<std::size_t, 3>& order) {
-  const auto [i, j, k] = order;
-  const double parity = j == (i + 1) % 3 ? 1.0 : -1.0;
-  const double cosine = std::hypot(r[i][i], r[i][j]);
-  Vec3 out{};
-  out[j] = std::atan2(-parity * r[i][k], cosine);
-  // Below this the outer angles are noise (1e-16 / 1e-9 is a float's rounding); only their sum or
-  // difference is known, and the first gets it.
-  if (cosine < 1e-9) {
-    out[i] = std::atan2(-parity * r[k][j], r[j][j]);
-  } else {
-    out[i] = std::atan2(parity * r[j][k], r[k][k]);
-    out[k] = std::atan2(parity * r[i][j], r[i][i]);
-  }
-  // What cos(90 degrees) in double leaves of a zero; a row of a matrix would live on by it.
-  for (double& angle : out) {
-    if (std::abs(angle) < 1e-14) angle = 0;
-  }
-  return out;
-}
-
-// Stored angles to stored angles.
-class Rotation {
- public:
-  Rotation(const System& source, const System& target, const Basis& basis)
-      : basis_(basis),
-        from_(axis_order(source.ext.rotation_sequence)),
-        into_(axis_order(target.ext.rotation_sequence)) {
-    const double in = source.rotation_unit == 0 ? kDegree : 1.0;
-    const double out = target.rotation_unit == 0 ? kDegree : 1.0;
-    if (in != out) unit_ = in / out;
-    for (std::size_t i = 0; i < 3; ++i) {
-      const std::size_t j = basis.to[i];
-      same_order_ = same_order_ && basis.to[from_[i]] == into_[i];
-      to_radians_[i] = in * source.ext.rotation_sign[i];
-      from_radians_[j] = target.ext.rotation_sign[j] / out;
-      per_axis_[i] = basis.determinant * basis.sign[i] * source.ext.rotation_sign[i] *
-                     target.ext.rotation_sign[j] * unit_;
-    }
-  }
-
-  /// Angles change places, signs and unit, but do not mix.
-  bool same_order() const { return same_order_; }
-  bool identity() const {
-    return same_order_ && basis_.keeps_places() && per_axis_ == Vec3{1, 1, 1};
-  }
-  double unit() const { return unit_; }
-  const Vec3& per_axis() const { return per_axis_; }
-
-  Vec3 operator()(const Vec3& stored) const {
-    Vec3 out{};
-    if (same_order_ || std::ranges::count(stored, 0.0) >= 2) {
-      for (std::size_t i = 0; i < 3; ++i) out[basis_.to[i]] = per_axis_[i] * stored[i];
-      return out;
-    }
-    Matrix r{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}, converted{};
-    for (const std::size_t axis : from_) rotate(r, axis, to_radians_[axis] * stored[axis]);
-    for (std::size_t i = 0; i < 3; ++i) {
-      for (std::size_t j = 0; j < 3; ++j) {
-        converted[basis_.to[i]][basis_.to[j]] = basis_.sign[i] * basis_.sign[j] * r[i][j];
-      }
-    }
-    out = angles_of(converted, into_);
-    for (std::size_t i = 0; i < 3; ++i) out[i] *= from_radians_[i];
-    return out;
-  }
-
- private:
-  Basis basis_;
-  std::array<std::size_t, 3> from_, into_;
-  bool same_order_ = true;
-  double unit_ = 1;
-  Vec3 to_radians_{}, from_radians_{}, per_axis_{};
-};
-
-struct Conversion {
-  Conversion(const System& source, const System& target)
-      : basis(basis_between(source.axes, target.axes)), rotation(source, target, basis) {
-    if (source.translation_unit != target.translation_unit) {
-      unit = target.translation_unit == 0 ? 100.0 : 0.01;
-    }
-    const bool flipped = basis.determinant < 0;
-    const bool changed = source.ext.face_winding_order != target.ext.face_winding_order;
-    reverse_faces = flipped != changed;
-  }
-
-  bool keeps_positions() const { return basis.identity() && unit == 1; }
-  Vec3 position(const Vec3& v) const {
-    Vec3 out = basis(v);
-    for (double& c : out) c *= unit;
-    return out;
-  }
-  // Scale deltas change places only: growing along an axis is growing along its opposite.
-  Vec3 scale(const Vec3& v) const {
-    Vec3 out{};
-    for (std::size_t i = 0; i < 3; ++i) out[basis.to[i]] = v[i];
-    return out;
-  }
-
-  Basis basis;
-  double unit = 1;
-  Rotation rotation;
-  bool reverse_faces = false;
-};
-
-// ---- definition and geometry
-
 void convert_definition(const Conversion& c, Definition& d) {
   const auto position = [&](const Vec3& v) { return c.position(v); };
   if (!c.keeps_positions()) {
     d.neutral_joint_translations = mapped(d.neutral_joint_translations, position);
   }
-  if (!c.rotation.identity()) {
+  if (!c.keeps_rotations()) {
     d.neutral_joint_rotations = mapped(d.neutral_joint_rotations, c.rotation);
   }
 }
@@ -278,7 +134,7 @@ void reverse_faces(Mesh& m) {
 
 void convert_mesh(const Conversion& c, Mesh& m) {
   const auto position = [&](const Vec3& v) { return c.position(v); };
-  if (c.reverse_faces) reverse_faces(m);
+  if (c.reverses_faces) reverse_faces(m);
   if (!c.basis.identity()) m.normals = mapped(m.normals, c.basis);
   if (c.keeps_positions()) return;
   m.positions = mapped(m.positions, position);
@@ -291,171 +147,212 @@ void convert_mesh(const Conversion& c, Mesh& m) {
 
 constexpr std::size_t kAttributes = 9;  // tx ty tz rx ry rz sx sy sz
 
-// The rows of a group by joint, in the order in which the joints first appear.
-struct RowsByJoint {
+bool is_rotation(std::size_t output) { return output % kAttributes / 3 == 1; }
+
+// The rotation rows that a group has for one joint.
+struct RotationRows {
   static constexpr std::size_t kNone = static_cast<std::size_t>(-1);
-  struct Block {
-    std::size_t joint = 0;
-    std::array<std::size_t, kAttributes> rows{};
-  };
-  std::vector<Block> blocks;
-  std::vector<std::size_t> joints_before;  // [rows + 1] how many blocks the rows before it touch
+  std::array<std::size_t, 3> rows{kNone, kNone, kNone};  // by axis
+  std::size_t first = 0, last = 0;
 };
 
-// Rows that no LOD uses are left out: in a block they would come alive.
-std::size_t used_rows(const JointGroup& g) {
-  if (g.lods.empty()) return g.output_indices.size();
-  return std::min<std::size_t>(*std::ranges::max_element(g.lods), g.output_indices.size());
-}
-
-RowsByJoint rows_by_joint(const JointGroup& g, std::size_t joint_count) {
-  RowsByJoint out;
-  std::vector<std::size_t> block_of(joint_count, RowsByJoint::kNone);
-  const std::size_t rows = used_rows(g);
-  out.joints_before.push_back(0);
-  for (std::size_t r = 0; r < rows; ++r) {
-    const std::size_t joint = g.output_indices[r] / kAttributes;
-    if (block_of[joint] == RowsByJoint::kNone) {
-      block_of[joint] = out.blocks.size();
-      out.blocks.push_back({joint, {}});
-      out.blocks.back().rows.fill(RowsByJoint::kNone);
-    }
-    // Of two rows with one output the last wins, as in the evaluation.
-    out.blocks[block_of[joint]].rows[g.output_indices[r] % kAttributes] = r;
-    out.joints_before.push_back(out.blocks.size());
+// By joint. Of two rows with one output the last wins, as in the evaluation.
+std::map<std::size_t, RotationRows> rotation_rows(const JointGroup& g, std::size_t row_count) {
+  std::map<std::size_t, RotationRows> out;
+  for (std::size_t r = 0; r < row_count; ++r) {
+    const std::size_t output = g.output_indices[r];
+    if (!is_rotation(output)) continue;
+    RotationRows& joint =
+        out.try_emplace(output / kAttributes, RotationRows{.first = r}).first->second;
+    joint.rows[output % 3] = r;
+    joint.last = r;
   }
   return out;
 }
 
-// One joint's block, [9, columns].
-void convert_block(const Conversion& c, const JointGroup& g, const RowsByJoint::Block& block,
-                   std::vector<float>& out) {
-  const std::size_t columns = g.input_indices.size();
-  for (std::size_t col = 0; col < columns; ++col) {
-    std::array<Vec3, 3> pose{};  // translation, rotation, scale
-    for (std::size_t a = 0; a < kAttributes; ++a) {
-      const std::size_t row = block.rows[a];
-      if (row != RowsByJoint::kNone) pose[a / 3][a % 3] = g.values[row * columns + col];
-    }
-    pose = {c.position(pose[0]), c.rotation(pose[1]), c.scale(pose[2])};
-    for (std::size_t a = 0; a < kAttributes; ++a) {
-      out[a * columns + col] = rounded(pose[a / 3][a % 3]);
-    }
+// Rows that no LOD uses would come alive beside those that one does.
+std::size_t used_rows(const JointGroup& g) {
+  return g.lods.empty() ? g.output_indices.size() : *std::ranges::max_element(g.lods);
+}
+
+// A group in the making.
+struct Rows {
+  std::vector<std::size_t> outputs;
+  std::vector<float> values;
+};
+
+// One row becomes one row: translations, scales, and angles whose order stays.
+void move_row(const Conversion& c, const JointGroup& g, std::size_t row, Rows& out) {
+  const std::size_t columns = g.input_indices.size(), output = g.output_indices[row];
+  const std::size_t kind = output % kAttributes / 3, axis = output % 3;
+  double factor = 1;  // of scales: growing along an axis is growing along its opposite
+  if (kind == 0) factor = c.basis.sign[axis] * c.unit;
+  if (kind == 1) factor = c.rotation.factor(axis);
+  out.outputs.push_back(output - axis + c.basis.to[axis]);
+  for (const float v : g.values.span().subspan(row * columns, columns)) {
+    out.values.push_back(factor == 1 ? v : rounded(factor * v));
   }
 }
 
-void drop_zero_columns(std::vector<std::uint16_t>& inputs, std::vector<float>& values) {
-  const std::size_t columns = inputs.size();
-  std::vector<bool> used(columns, false);
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    if (values[i] != 0) used[i % columns] = true;
-  }
-  if (std::ranges::find(used, false) == used.end()) return;
-  std::size_t kept_inputs = 0, kept_values = 0;
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    if (used[i % columns]) values[kept_values++] = values[i];
-  }
+// Three rows become three, less those of zeros.
+void mix_rows(const Conversion& c, const JointGroup& g, const RotationRows& joint, Rows& out) {
+  const std::size_t columns = g.input_indices.size();
+  const std::size_t output = g.output_indices[joint.first], rx = output - output % 3;
+  std::vector<float> block(3 * columns);
   for (std::size_t col = 0; col < columns; ++col) {
-    if (used[col]) inputs[kept_inputs++] = inputs[col];
+    Vec3 angles{};
+    for (std::size_t a = 0; a < 3; ++a) {
+      if (joint.rows[a] != RotationRows::kNone) angles[a] = g.values[joint.rows[a] * columns + col];
+    }
+    angles = c.rotation(angles);
+    for (std::size_t a = 0; a < 3; ++a) block[a * columns + col] = rounded(angles[a]);
   }
-  values.resize(kept_values);
-  inputs.resize(kept_inputs);
+  for (std::size_t a = 0; a < 3; ++a) {
+    const auto row = block.begin() + static_cast<std::ptrdiff_t>(a * columns);
+    const auto end = row + static_cast<std::ptrdiff_t>(columns);
+    if (std::all_of(row, end, [](float v) { return v == 0; })) continue;
+    out.outputs.push_back(rx + a);
+    out.values.insert(out.values.end(), row, end);
+  }
 }
 
-void regroup(const Conversion& c, std::size_t joint_count, JointGroup& g) {
-  const RowsByJoint by_joint = rows_by_joint(g, joint_count);
-  const std::size_t columns = g.input_indices.size();
-  std::vector<float> block(kAttributes * columns), values;
-  std::vector<std::uint16_t> inputs(g.input_indices.begin(), g.input_indices.end());
-  std::vector<std::uint16_t> outputs, lods, rows_of_joints{0};
-  for (const RowsByJoint::Block& b : by_joint.blocks) {
-    convert_block(c, g, b, block);
-    for (std::size_t a = 0; a < kAttributes; ++a) {
-      const float* row = block.data() + a * columns;
-      if (std::all_of(row, row + columns, [](float v) { return v == 0; })) continue;
-      outputs.push_back(static_cast<std::uint16_t>(b.joint * kAttributes + a));
-      values.insert(values.end(), row, row + columns);
+Status take_rows(const std::string& where, Rows rows, JointGroup& g) {
+  constexpr std::size_t kMost = 0xFFFF;
+  if (!g.lods.empty() && rows.outputs.size() > kMost) {
+    return fail(ErrorCode::kInvalidValue, where, "more rows than the format can count");
+  }
+  std::vector<std::uint16_t> outputs;
+  for (const std::size_t output : rows.outputs) {
+    if (output > kMost) {
+      return fail(ErrorCode::kInvalidValue, where + ".output_indices",
+                  "joint " + std::to_string(output / kAttributes) +
+                      " is the format's last one and has no row for another axis");
     }
-    rows_of_joints.push_back(static_cast<std::uint16_t>(outputs.size()));
+    outputs.push_back(static_cast<std::uint16_t>(output));
   }
-  for (const std::uint16_t rows : g.lods) {
-    lods.push_back(rows_of_joints[by_joint.joints_before[rows]]);
-  }
-  drop_zero_columns(inputs, values);
-  g.lods = std::move(lods);
-  g.input_indices = std::move(inputs);
   g.output_indices = std::move(outputs);
-  g.values = std::move(values);
+  g.values = std::move(rows.values);
+  return ok();
 }
 
-// No value changes its row: the rows stay where they are.
-void scale_rows(const Conversion& c, JointGroup& g) {
-  const std::size_t columns = g.input_indices.size();
-  std::vector<float> values(g.values.begin(), g.values.end());
-  for (std::size_t r = 0; r < g.output_indices.size(); ++r) {
-    const std::size_t attribute = g.output_indices[r] % kAttributes, axis = attribute % 3;
-    double factor = 1;
-    if (attribute < 3) factor = c.basis.sign[axis] * c.unit;
-    if (attribute / 3 == 1) factor = c.rotation.per_axis()[axis];
-    if (factor == 1) continue;
-    for (std::size_t i = r * columns; i < (r + 1) * columns; ++i) {
-      values[i] = rounded(factor * values[i]);
+Status convert_group(const Conversion& c, const std::string& where, JointGroup& g) {
+  const bool mixes = !c.rotation.same_order();
+  const std::size_t row_count = mixes ? used_rows(g) : g.output_indices.size();
+  const auto joints = mixes ? rotation_rows(g, row_count) : std::map<std::size_t, RotationRows>{};
+  Rows rows;
+  std::vector<std::size_t> rows_before{0};
+  for (std::size_t r = 0; r < row_count; ++r) {
+    const std::size_t output = g.output_indices[r];
+    if (!mixes || !is_rotation(output)) {
+      move_row(c, g, r, rows);
+    } else if (const RotationRows& joint = joints.at(output / kAttributes); joint.first == r) {
+      mix_rows(c, g, joint, rows);
+    }
+    rows_before.push_back(rows.outputs.size());
+  }
+  std::vector<std::uint16_t> lods;
+  for (const std::uint16_t n : g.lods) lods.push_back(static_cast<std::uint16_t>(rows_before[n]));
+  if (Status taken = take_rows(where, std::move(rows), g); !taken) return taken;
+  g.lods = std::move(lods);
+  return ok();
+}
+
+// Whether a LOD cuts through the rotation rows of a joint.
+bool cuts_rotation(const JointGroup& g) {
+  for (const auto& [joint, rows] : rotation_rows(g, used_rows(g))) {
+    for (const std::uint16_t n : g.lods) {
+      if (rows.first < n && n <= rows.last) return true;
     }
   }
-  g.values = std::move(values);
+  return false;
 }
 
-// A joint's rotation can only be converted as a whole.
-void warn_of_split_rotations(const Behavior& b, std::size_t joint_count,
-                             std::vector<Warning>& warnings) {
-  constexpr std::size_t kNone = static_cast<std::size_t>(-1);
-  std::vector<std::size_t> group_of(joint_count, kNone);
-  for (std::size_t i = 0; i < b.joint_groups.size(); ++i) {
-    for (const std::uint16_t output : b.joint_groups[i].output_indices) {
-      const std::size_t joint = output / kAttributes;
-      if (output % kAttributes / 3 != 1) continue;
-      if (group_of[joint] == kNone) group_of[joint] = i;
-      if (group_of[joint] == i) continue;
-      warnings.push_back({item("behavior.joint_groups", i) + ".output_indices",
-                          "group " + std::to_string(group_of[joint]) + " rotates joint " +
-                              std::to_string(joint) +
-                              " as well: each part was converted as a rotation of its own"});
-      return;
+// What is known of a joint's rotation across the groups.
+struct Turns {
+  bool driven = false, split = false;
+  std::size_t group = 0;
+  std::array<bool, 3> about{};  // in neutral or by a group
+};
+
+std::vector<Turns> turns_of(const Dna& dna) {
+  const Definition& d = dna.definition;
+  std::vector<Turns> out(d.joint_names.size());
+  for (std::size_t j = 0; j < out.size(); ++j) {
+    for (std::size_t a = 0; a < 3; ++a) out[j].about[a] = d.neutral_joint_rotations.at(j, a) != 0;
+  }
+  for (std::size_t i = 0; i < dna.behavior.joint_groups.size(); ++i) {
+    for (const std::uint16_t output : dna.behavior.joint_groups[i].output_indices) {
+      if (!is_rotation(output)) continue;
+      Turns& joint = out[output / kAttributes];
+      joint.split = joint.split || (joint.driven && joint.group != i);
+      joint.driven = true;
+      joint.group = i;
+      joint.about[output % 3] = true;
     }
+  }
+  return out;
+}
+
+// Angles add up to one rotation in one order of axes and to another in another.
+void warn_of_mixed_rotations(const Dna& dna, Warnings& warnings) {
+  const auto& metadata = dna.joint_behavior_metadata.joint_representations;
+  const std::string where = "behavior.joint_groups";
+  const std::vector<Turns> joints = turns_of(dna);
+  std::size_t split = 0, approximate = 0;
+  for (std::size_t j = 0; j < joints.size(); ++j) {
+    const bool quaternion = j < metadata.size() && metadata[j].rotation == 1;
+    const bool several = std::ranges::count(joints[j].about, true) > 1;
+    if (joints[j].split) ++split;
+    if (joints[j].driven && several && !quaternion) ++approximate;
+  }
+  if (approximate > 0) {
+    warnings.push_back({where, std::to_string(approximate) +
+                                   " joints turn about several axes: each column is converted as a "
+                                   "rotation of its own, and sums of them in the new order of axes "
+                                   "are approximate"});
+  }
+  if (split > 0) {
+    warnings.push_back({where, std::to_string(split) +
+                                   " joints are turned by several groups: where two of them write "
+                                   "one angle now, the later one wins"});
+  }
+  for (std::size_t i = 0; i < dna.behavior.joint_groups.size(); ++i) {
+    if (!cuts_rotation(dna.behavior.joint_groups[i])) continue;
+    warnings.push_back({item(where, i) + ".lods",
+                        "a LOD that used some of a joint's rotation rows now uses all of them"});
   }
 }
 
-void convert_joint_groups(const Conversion& c, std::size_t joint_count, Behavior& b,
-                          std::vector<Warning>& warnings) {
-  if (c.keeps_positions() && c.rotation.identity()) return;
-  if (!c.rotation.same_order()) warn_of_split_rotations(b, joint_count, warnings);
-  const bool in_place = c.basis.keeps_places() && c.rotation.same_order();
-  for (JointGroup& g : b.joint_groups) {
-    if (in_place) {
-      scale_rows(c, g);
-    } else {
-      regroup(c, joint_count, g);
-    }
+Status convert_joint_groups(const Conversion& c, Dna& dna) {
+  if (c.keeps_positions() && c.keeps_rotations()) return ok();
+  for (std::size_t i = 0; i < dna.behavior.joint_groups.size(); ++i) {
+    Status converted =
+        convert_group(c, item("behavior.joint_groups", i), dna.behavior.joint_groups[i]);
+    if (!converted) return converted;
   }
+  return ok();
 }
 
-// ---- RBF solvers
+// ---- rotations that controls carry
 
-// Whether the inputs of a solver are quaternions. All distances but the Euclidean one say so; there
-// the names do, as everywhere in the format.
+bool is_w(const std::vector<std::string>& raw_control_names, std::size_t control) {
+  if (control >= raw_control_names.size()) return false;
+  const std::string& name = raw_control_names[control];
+  return name.ends_with(".w") || name.ends_with(".qw");
+}
+
+// All distances but the Euclidean one are of quaternions; there the names tell, as everywhere in
+// the format.
 bool takes_quaternions(const RbfSolver& s, const std::vector<std::string>& raw_control_names) {
   if (s.raw_control_indices.size() % 4 != 0) return false;
   if (s.distance_method != 0) return true;
   for (std::size_t i = 3; i < s.raw_control_indices.size(); i += 4) {
-    const std::size_t control = s.raw_control_indices[i];
-    if (control >= raw_control_names.size()) return false;
-    const std::string& name = raw_control_names[control];
-    if (!name.ends_with(".w") && !name.ends_with(".qw")) return false;
+    if (!is_w(raw_control_names, s.raw_control_indices[i])) return false;
   }
   return true;
 }
 
-// The axis of a quaternion turns with the basis, and a mirrored basis turns the other way.
+// The axis of a quaternion turns with the basis, and in a mirror it turns the other way.
 Array<float> converted_quaternions(const Basis& basis, const Array<float>& values) {
   std::vector<float> out(values.begin(), values.end());
   for (std::size_t i = 0; i + 3 < out.size(); i += 4) {
@@ -465,67 +362,96 @@ Array<float> converted_quaternions(const Basis& basis, const Array<float>& value
   return out;
 }
 
-void convert_rbf(const Conversion& c, Dna& dna, std::vector<Warning>& warnings) {
-  enum : std::uint16_t { kSwingAngle = 2, kTwistAngle = 3 };
-  bool warned = false;
-  for (std::size_t i = 0; i < dna.rbf_behavior.solvers.size(); ++i) {
-    RbfSolver& s = dna.rbf_behavior.solvers[i];
+// A twist about an axis is one about its opposite.
+void convert_axis(const Basis& basis, std::uint16_t& axis) {
+  if (axis < 3) axis = static_cast<std::uint16_t>(basis.to[axis]);
+}
+
+void convert_control_rotations(const Conversion& c, Dna& dna) {
+  for (RbfSolver& s : dna.rbf_behavior.solvers) {
     // The evaluation reads the radius in the rotation unit, whatever the distance.
     if (c.rotation.unit() != 1) s.radius = rounded(c.rotation.unit() * s.radius);
+    convert_axis(c.basis, s.twist_axis);
     if (c.basis.identity() || !takes_quaternions(s, dna.definition.raw_control_names)) continue;
     s.raw_control_values = converted_quaternions(c.basis, s.raw_control_values);
-    const bool has_axis = s.distance_method == kSwingAngle || s.distance_method == kTwistAngle;
-    if (warned || !has_axis || s.twist_axis > 2 || c.basis.to[s.twist_axis] == s.twist_axis) {
-      continue;
+  }
+  for (TwistSwingSetup& s : dna.twist_swing_behavior.twists) convert_axis(c.basis, s.twist_axis);
+  for (TwistSwingSetup& s : dna.twist_swing_behavior.swings) convert_axis(c.basis, s.twist_axis);
+}
+
+// Tables and networks take the components of a rotation one by one, which no basis survives.
+void warn_of_components(const Dna& dna, Warnings& warnings) {
+  const auto check = [&](const char* where, const auto& controls) {
+    for (const auto control : controls) {
+      if (!is_w(dna.definition.raw_control_names, control)) continue;
+      warnings.push_back({where, "control " + dna.definition.raw_control_names[control] +
+                                     " is part of a rotation, which is read in the old axes"});
+      return true;
     }
-    warnings.push_back({item("rbf_behavior.solvers", i) + ".twist_axis",
-                        "twist axes are not converted, as in the reference"});
-    warned = true;
+    return false;
+  };
+  check("behavior.psds.columns", dna.behavior.psds.columns);
+  for (const JointGroup& g : dna.behavior.joint_groups) {
+    if (check("behavior.joint_groups", g.input_indices)) break;
+  }
+  check("behavior.blend_shape_channels", dna.behavior.blend_shape_channels.input_indices);
+  check("behavior.animated_maps", dna.behavior.animated_maps.conditionals.input_indices);
+  for (const NeuralNetwork& n : dna.machine_learned_behavior.neural_networks) {
+    if (check("machine_learned_behavior.neural_networks", n.input_indices)) break;
   }
 }
 
-// ---- what cannot be converted
+// ---- networks that move joints
 
-void warn_of_networks(const Conversion& c, const MlJoints& joints, std::vector<Warning>& warnings) {
-  const std::string where = "machine_learned_behavior_ext.joints";
+// Their numbers stay; keys 3 to 9 name the system that they are meant in.
+void name_ml_system(const System& source, MlJoints& joints) {
+  constexpr std::uint16_t kFirst = 3, kLast = 9;
+  const auto& keys = joints.parameter_keys;
+  const auto named = [&](std::uint16_t key) { return std::ranges::find(keys, key) != keys.end(); };
+  bool whole = true;
+  for (std::uint16_t key = kFirst; key <= kLast; ++key) whole = whole && named(key);
+  if (whole) return;
+  std::vector<std::uint16_t> new_keys, values;
+  for (std::size_t i = 0; i < keys.size(); ++i) {
+    if (keys[i] >= kFirst && keys[i] <= kLast) continue;
+    new_keys.push_back(keys[i]);
+    values.push_back(joints.parameter_values[i]);
+  }
+  const auto& signs = source.ext.rotation_sign;
+  const auto sign = [&](std::size_t i) {
+    return static_cast<std::uint16_t>(signs[i] == 1 ? 1 : 0);
+  };
+  for (std::uint16_t key = kFirst; key <= kLast; ++key) new_keys.push_back(key);
+  values.insert(values.end(),
+                {source.axes.x_axis, source.axes.y_axis, source.axes.z_axis, sign(0), sign(1),
+                 sign(2), static_cast<std::uint16_t>(source.ext.rotation_sequence)});
+  joints.parameter_keys = std::move(new_keys);
+  joints.parameter_values = std::move(values);
+}
+
+void convert_ml_joints(const Conversion& c, const System& target, MlJoints& joints,
+                       Warnings& warnings) {
+  if (joints.output_indices.empty()) return;
+  const bool same_axes = c.source.axes == target.axes &&
+                         c.source.ext.rotation_sequence == target.ext.rotation_sequence &&
+                         c.source.ext.rotation_sign == target.ext.rotation_sign;
+  if (!same_axes) name_ml_system(c.source, joints);
   const std::uint16_t stride = ml_joint_stride(joints);
-  bool translations = false, angles = false, rotations = false;
+  bool translations = false, angles = false;
   for (const std::uint16_t output : joints.output_indices) {
     const std::size_t attribute = output % stride;
     translations = translations || attribute < 3;
-    rotations = rotations || (attribute >= 3 && attribute < stride - 3u);
+    angles = angles || (stride == kAttributes && is_rotation(output));
   }
-  angles = rotations && stride == kAttributes;
   if ((c.unit != 1 && translations) || (c.rotation.unit() != 1 && angles)) {
-    warnings.push_back({where, "networks move joints in the old unit: not converted"});
-  }
-  std::array<bool, 10> keys{};
-  for (const std::uint16_t key : joints.parameter_keys) {
-    if (key < keys.size()) keys[key] = true;
-  }
-  const bool has_system = std::all_of(keys.begin() + 3, keys.end(), [](bool k) { return k; });
-  const bool moves = !c.basis.identity() && (translations || rotations);
-  if (!has_system && (moves || (angles && !c.rotation.identity()))) {
-    warnings.push_back({where + ".parameter_keys",
-                        "networks move joints in axes that the file does not name: not converted"});
+    warnings.push_back({"machine_learned_behavior_ext.joints",
+                        "networks move joints in the old unit: not converted"});
   }
 }
 
-void warn_of_setups(const Conversion& c, const Dna& dna, std::vector<Warning>& warnings) {
-  const TwistSwingBehavior& b = dna.twist_swing_behavior;
-  const auto moved = [&](const TwistSwingSetup& s) {
-    return s.twist_axis < 3 && c.basis.to[s.twist_axis] != s.twist_axis;
-  };
-  const std::string message = "twist axes are not converted, as in the reference";
-  if (std::ranges::any_of(b.twists, moved)) {
-    warnings.push_back({"twist_swing_behavior.twists", message});
-  }
-  if (std::ranges::any_of(b.swings, moved)) {
-    warnings.push_back({"twist_swing_behavior.swings", message});
-  }
-}
+// ---- the whole
 
-void warn_of_unknown_layers(const Dna& dna, std::vector<Warning>& warnings) {
+void warn_of_unknown_layers(const Dna& dna, Warnings& warnings) {
   for (const UnknownLayer& layer : dna.unknown_layers) {
     warnings.push_back({"unknown_layers", "layer " + std::string(layer.id.data(), layer.id.size()) +
                                               " is not known: kept as it is"});
@@ -544,27 +470,23 @@ void set_system(const System& target, Dna& dna) {
 }  // namespace
 
 core::Result<Dna> convert_coordinates(const Dna& dna, const CoordinateTarget& target,
-                                      std::vector<Warning>& warnings) {
-  std::vector<Warning> unused;
+                                      Warnings& warnings) {
+  Warnings unused;
   if (Status valid = validate(dna, unused); !valid) return std::move(valid).propagate();
   const System source = system_of(dna), wanted = system_of(target, source);
-  if (Status good = check_system(source, ErrorCode::kInvalidValue, "descriptor.", "descriptor_ext.",
-                                 "coordinate_system");
-      !good) {
-    return std::move(good).propagate();
-  }
-  if (Status good = check_system(wanted, ErrorCode::kInvalidArgument, "", "", "axes"); !good) {
-    return std::move(good).propagate();
-  }
-  const Conversion c(source, wanted);
+  if (Status good = check_system(source, true); !good) return std::move(good).propagate();
+  if (Status good = check_system(wanted, false); !good) return std::move(good).propagate();
   Dna out = dna;
+  if (source == wanted) return out;
+  const Conversion c(source, wanted);
+  if (!c.rotation.same_order()) warn_of_mixed_rotations(dna, warnings);
+  if (!c.basis.identity()) warn_of_components(dna, warnings);
+  if (!c.keeps_positions() || !c.keeps_rotations()) warn_of_unknown_layers(dna, warnings);
   convert_definition(c, out.definition);
-  convert_joint_groups(c, out.definition.joint_names.size(), out.behavior, warnings);
+  if (Status done = convert_joint_groups(c, out); !done) return std::move(done).propagate();
   for (Mesh& mesh : out.geometry.meshes) convert_mesh(c, mesh);
-  convert_rbf(c, out, warnings);
-  warn_of_networks(c, out.machine_learned_behavior_ext.joints, warnings);
-  warn_of_setups(c, out, warnings);
-  if (!c.keeps_positions() || !c.rotation.identity()) warn_of_unknown_layers(out, warnings);
+  convert_control_rotations(c, out);
+  convert_ml_joints(c, wanted, out.machine_learned_behavior_ext.joints, warnings);
   set_system(wanted, out);
   return out;
 }

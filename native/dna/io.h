@@ -81,8 +81,16 @@ core::Result<std::vector<std::uint8_t>> write(const Dna& dna, const WriteOptions
 
 namespace detail {
 
+/// What was seen while the numbers were read and need not be looked for again.
+struct Known {
+  bool finite = false;          // every element of every Array<float>
+  bool vertex_indices = false;  // those of blend shape targets are below their mesh's vertex count
+};
+
 /// validate, but every error and not only the first.
-std::vector<Finding> find_all(const Dna& dna);
+std::vector<Finding> find_all(const Dna& dna, Known known = {});
+
+core::Status validate(const Dna& dna, Known known, std::vector<Warning>& warnings);
 
 }  // namespace detail
 }  // namespace risorius::dna

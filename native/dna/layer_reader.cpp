@@ -5,7 +5,7 @@
 
 namespace risorius::dna::detail {
 
-using core::Array;
+using core::Buffer;
 using core::ErrorCode;
 using core::Field;
 using core::List;
@@ -21,8 +21,8 @@ PlanarArray<kPlanes> LayerReader::planes() {
                std::to_string(n) + " vectors need more bytes than are left");
   }
   if (r_.failed()) return {};
-  std::vector<float> values(std::size_t{n} * kPlanes);
-  r_.read_f32(values.data(), n);
+  Buffer<float> values(std::size_t{n} * kPlanes);
+  r_.read_f32(values.data(), n, &known.finite);
   for (std::size_t p = 1; p < kPlanes && !r_.failed(); ++p) {
     const std::uint64_t at = r_.position();
     const std::uint32_t m = r_.count(4);
@@ -31,10 +31,10 @@ PlanarArray<kPlanes> LayerReader::planes() {
                  "coordinate list " + std::to_string(p) + " has " + std::to_string(m) +
                      " values, the first has " + std::to_string(n));
     }
-    if (!r_.failed()) r_.read_f32(values.data() + p * n, n);
+    if (!r_.failed()) r_.read_f32(values.data() + p * n, n, &known.finite);
   }
   if (r_.failed()) return {};
-  return {Array<float>(std::move(values))};
+  return {std::move(values)};
 }
 
 template PlanarArray<2> LayerReader::planes<2>();
@@ -72,6 +72,7 @@ void LayerReader::sized(Name name, List<T>& v, const LodMapping* mapping) {
     Field item(r_, name.dna, i);
     const std::uint64_t at = r_.position();
     note(at);
+    if (plan != nullptr) r_.enter(at, std::min<std::uint64_t>(4, r_.left()));  // nothing behind it
     const std::uint32_t mark = r_.u32();
     if (r_.failed()) break;
     const bool is_size = mesh_sizes || !std::is_same_v<T, Mesh>;
@@ -109,7 +110,7 @@ void LayerReader::matrix(Name name, JointGroup& g) {
   Field field(r_, name.dna);
   note(r_.position(), 4);
   if (plan == nullptr) {
-    g.values = r_.f32_list();
+    g.values = r_.f32_list(&known.finite);
     return;
   }
   const std::uint64_t at = r_.position();
@@ -121,34 +122,44 @@ void LayerReader::matrix(Name name, JointGroup& g) {
                    std::to_string(columns));
   }
   if (r_.failed()) return;
-  std::vector<float> values(cut_rows(*plan, g) * columns);
-  r_.read_f32(values.data(), values.size());
+  Buffer<float> values(cut_rows(*plan, g) * columns);
+  r_.read_f32(values.data(), values.size(), &known.finite);
   r_.skip(std::uint64_t{4} * (n - values.size()));
-  g.values = std::move(values);
+  if (!r_.failed()) g.values = std::move(values);
 }
 
-// Lists of lists become one flat list and offsets: no allocation per face or vertex. A first pass
-// counts, so that both are allocated once.
+namespace {
+
+// Makes room for `more` values of element i of n, and for those of all n when they go on like this;
+// never for more than the file has bytes for.
+template <class T>
+void extend(Buffer<T>& values, std::size_t more, std::uint32_t i, std::uint32_t n,
+            std::uint64_t bytes_left) {
+  const std::uint64_t size = values.size() + more;
+  if (size > values.capacity()) {
+    const std::uint64_t likely = std::max(size * n / (i + 1), size + size / 4);
+    values.reserve(static_cast<std::size_t>(std::min(likely, size + bytes_left / sizeof(T))));
+  }
+  values.resize(static_cast<std::size_t>(size));
+}
+
+}  // namespace
+
+// Lists of lists become one flat list and offsets: no allocation per face or vertex.
 void LayerReader::faces(Mesh& m) {
   Field field(r_, "faces");
   note(r_.position());
   const std::uint32_t n = r_.count(4);
   if (n == 0) return;
-  const std::uint64_t begin = r_.position();
-  std::size_t total = 0;
+  Buffer<std::uint32_t> offsets(std::size_t{n} + 1), layouts;
+  offsets[0] = 0;
   for (std::uint32_t i = 0; i < n && !r_.failed(); ++i) {
     const std::uint32_t corners = r_.count(4);
-    r_.skip(std::uint64_t{4} * corners);
-    total += corners;
-  }
-  if (r_.failed()) return;
-  r_.enter(begin, r_.end() - begin);
-  std::vector<std::uint32_t> offsets(std::size_t{n} + 1), layouts(total);
-  for (std::uint32_t i = 0; i < n; ++i) {
-    const std::uint32_t corners = r_.count(4);
+    extend(layouts, corners, i, n, r_.left());
     r_.read_u32(layouts.data() + offsets[i], corners);
     offsets[i + 1] = offsets[i] + corners;
   }
+  if (r_.failed()) return;
   m.face_offsets = std::move(offsets);
   m.face_layouts = std::move(layouts);
 }
@@ -158,51 +169,66 @@ void LayerReader::skin(Mesh& m) {
   note(r_.position());
   const std::uint32_t n = r_.count(8);
   if (n == 0) return;
-  const std::uint64_t begin = r_.position();
-  std::size_t total = 0;
+  Buffer<std::uint32_t> offsets(std::size_t{n} + 1);
+  Buffer<float> weights;
+  Buffer<std::uint16_t> joints;
+  offsets[0] = 0;
   for (std::uint32_t i = 0; i < n && !r_.failed(); ++i) {
     const std::uint64_t at = r_.position();
-    const std::uint32_t weights = r_.count(4);
-    r_.skip(std::uint64_t{4} * weights);
-    const std::uint32_t joints = r_.count(2);
-    r_.skip(std::uint64_t{2} * joints);
-    total += weights;
-    if (weights != joints && !r_.failed()) {
+    const std::uint32_t begin = offsets[i], influences = r_.count(4);
+    extend(weights, influences, i, n, r_.left());
+    r_.read_f32(weights.data() + begin, influences, &known.finite);
+    const std::uint32_t joint_count = r_.count(2);
+    if (influences != joint_count && !r_.failed()) {
       Field item(r_, "", i);
-      r_.fail_at(
-          at, ErrorCode::kInvalidLength,
-          std::to_string(weights) + " weights, but " + std::to_string(joints) + " joint indices");
+      r_.fail_at(at, ErrorCode::kInvalidLength,
+                 std::to_string(influences) + " weights, but " + std::to_string(joint_count) +
+                     " joint indices");
     }
+    if (r_.failed()) return;
+    extend(joints, influences, i, n, r_.left());
+    r_.read_u16(joints.data() + begin, influences);
+    std::size_t kept = influences;
+    if (plan != nullptr) kept = cut_vertex(weights.data() + begin, joints.data() + begin, kept);
+    weights.resize(begin + kept);
+    joints.resize(begin + kept);
+    offsets[i + 1] = static_cast<std::uint32_t>(begin + kept);
   }
   if (r_.failed()) return;
-  r_.enter(begin, r_.end() - begin);
-  std::vector<std::uint32_t> offsets(std::size_t{n} + 1);
-  std::vector<float> weights(total);
-  std::vector<std::uint16_t> joints(total);
-  for (std::uint32_t i = 0; i < n; ++i) {
-    const std::uint32_t influences = r_.count(4);
-    r_.read_f32(weights.data() + offsets[i], influences);
-    r_.count(2);
-    r_.read_u16(joints.data() + offsets[i], influences);
-    offsets[i + 1] = offsets[i] + influences;
-  }
   m.skin_offsets = std::move(offsets);
   m.skin_weights = std::move(weights);
   m.skin_joint_indices = std::move(joints);
 }
 
-// The channel's number comes last: a target is walked before it is known to be wanted.
+// The influences that stay of a vertex that was just read.
+std::size_t LayerReader::cut_vertex(float* weights, std::uint16_t* joints, std::size_t n) {
+  for (std::size_t i = 0; i < n; ++i) {
+    if (joints[i] < plan->joints.size() || r_.failed()) continue;
+    r_.fail_at(r_.position() - 2 * (n - i), ErrorCode::kInvalidIndex,
+               "joint index " + std::to_string(joints[i]) + ", but there are " +
+                   std::to_string(plan->joints.size()) + " joints");
+  }
+  return r_.failed() ? 0 : cut_influences(*plan, weights, joints, n, &known.finite);
+}
+
+// A channel that is not there is read, so that the check of indices names it.
+bool LayerReader::channel_is_wanted(std::uint16_t channel) const {
+  const IndexMap& channels = plan->blend_shape_channels;
+  return channel >= channels.size() || channels.keeps(channel);
+}
+
+// The channel's number comes last: one look at where it is if the lists are as long as the first
+// says, and when it is not wanted a walk over them, as they really are.
 bool LayerReader::target_is_wanted() {
-  if (plan == nullptr) return true;
   const std::uint64_t begin = r_.position();
+  const auto go_back = [&] { return r_.enter(begin, r_.end() - begin); };
+  const std::uint64_t n = r_.count(4);
+  const std::optional<std::uint16_t> likely = r_.peek_u16(begin + 16 + 16 * n);
+  go_back();
+  if (likely && channel_is_wanted(*likely)) return true;
   for (int l = 0; l < 4; ++l) r_.skip(std::uint64_t{4} * r_.count(4));
   const std::uint16_t channel = r_.u16();
-  if (r_.failed()) return false;
-  // A channel that is not there is read, so that the check of indices names it.
-  const IndexMap& channels = plan->blend_shape_channels;
-  const bool wanted = channel >= channels.size() || channels.keeps(channel);
-  if (wanted) r_.enter(begin, r_.end() - begin);
-  return wanted;
+  return !r_.failed() && channel_is_wanted(channel) && go_back();
 }
 
 void LayerReader::targets(Mesh& m) {
@@ -213,7 +239,7 @@ void LayerReader::targets(Mesh& m) {
   if (plan == nullptr) targets.reserve(n);
   for (std::uint32_t i = 0; i < n && !r_.failed(); ++i) {
     Field item(r_, "", i);
-    if (!target_is_wanted()) continue;
+    if (plan != nullptr && !target_is_wanted()) continue;
     const std::uint64_t at = r_.position();
     BlendShapeTarget& t = targets.emplace_back();
     describe(*this, t);
@@ -222,14 +248,21 @@ void LayerReader::targets(Mesh& m) {
                  std::to_string(t.deltas.count()) + " deltas, but " +
                      std::to_string(t.vertex_indices.size()) + " vertex indices");
     }
+    if (!t.vertex_indices.empty() && largest_ >= m.positions.count()) known.vertex_indices = false;
   }
   m.blend_shape_targets = std::move(targets);
+}
+
+void LayerReader::add_place(const Place& place) {
+  std::string where = r_.where();
+  if (!places->only.empty() && !places->only.starts_with(where)) return;
+  places->fields.emplace(std::move(where), place);
 }
 
 std::optional<std::uint64_t> find_place(const Places& places, std::string where) {
   std::optional<std::size_t> index;  // the first one that had to be cut off
   while (!where.empty()) {
-    if (const auto at = places.find(where); at != places.end()) {
+    if (const auto at = places.fields.find(where); at != places.fields.end()) {
       const Place& p = at->second;
       if (!index || p.element_size == 0) return p.offset;
       const std::uint64_t counts = p.plane == 0 ? 1 : 1 + *index / p.plane;

@@ -10,6 +10,7 @@
 
 #include "core/byte_reader.h"
 #include "dna/empty_size.h"
+#include "dna/io.h"
 #include "dna/lods.h"
 #include "dna/schema.h"
 
@@ -21,7 +22,12 @@ struct Place {
   std::uint32_t element_size = 0;  // 0: not a list of numbers
   std::uint32_t plane = 0;         // numbers in each plane of vectors, 0: no planes
 };
-using Places = std::map<std::string, Place>;
+
+/// Every field's place, or those that a message about the field `only` may need.
+struct Places {
+  std::map<std::string, Place> fields;
+  std::string only;
+};
 
 class LayerReader {
  public:
@@ -30,6 +36,7 @@ class LayerReader {
   const LodPlan* plan = nullptr;
   const MachineLearnedBehaviorExt* operations = nullptr;  // read before the networks they name
   Places* places = nullptr;
+  Known known{true, true};  // about what was read so far
 
   explicit LayerReader(core::ByteReader& reader) : r_(reader) {}
 
@@ -62,10 +69,11 @@ class LayerReader {
     numbers(name, 2, [&] { v = r_.u16_list(); });
   }
   void field(Name name, core::Array<std::uint32_t>& v) {
-    numbers(name, 4, [&] { v = r_.u32_list(); });
+    largest_ = 0;
+    numbers(name, 4, [&] { v = r_.u32_list(&largest_); });
   }
   void field(Name name, core::Array<float>& v) {
-    numbers(name, 4, [&] { v = r_.f32_list(); });
+    numbers(name, 4, [&] { v = r_.f32_list(&known.finite); });
   }
   template <std::size_t kPlanes>
   void field(Name name, core::PlanarArray<kPlanes>& v) {
@@ -113,8 +121,9 @@ class LayerReader {
     read();
   }
   void note(std::uint64_t at, std::uint32_t element_size = 0, std::uint32_t plane = 0) {
-    if (places != nullptr) places->insert({r_.where(), {at, element_size, plane}});
+    if (places != nullptr) add_place({at, element_size, plane});
   }
+  void add_place(const Place& place);
 
   // Elements of lists.
   void element(std::string& v) { v = r_.str(); }
@@ -157,8 +166,11 @@ class LayerReader {
   template <class T>
   std::vector<bool> wanted(const core::List<T>*, const LodMapping* mapping, std::size_t n) const;
   bool target_is_wanted();
+  bool channel_is_wanted(std::uint16_t channel) const;
+  std::size_t cut_vertex(float* weights, std::uint16_t* joints, std::size_t n);
 
   core::ByteReader& r_;
+  std::uint32_t largest_ = 0;  // number in the uint32 list that was read last
 };
 
 /// Where an error about `where` (a field of validate) lies in the file.

@@ -2,8 +2,10 @@
 #include "dna/lods.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "dna/io.h"
+#include "dna/where.h"
 
 namespace risorius::dna {
 
@@ -12,6 +14,7 @@ namespace detail {
 namespace {
 
 using core::Array;
+using core::Buffer;
 using core::ErrorCode;
 using core::fail;
 using core::List;
@@ -23,9 +26,9 @@ using Indices = std::vector<std::uint16_t>;
 // Looks indices up in their maps and remembers the first that is outside its space.
 class Lookup {
  public:
-  bool keeps(const IndexMap& map, std::size_t index, const std::string& where, const char* space) {
+  bool keeps(const IndexMap& map, std::size_t index, const Where& where, const char* space) {
     if (index >= map.size() && !error_) {
-      error_ = core::Error{ErrorCode::kInvalidIndex, std::nullopt, where,
+      error_ = core::Error{ErrorCode::kInvalidIndex, std::nullopt, where.text(),
                            "index " + std::to_string(index) + ", but there are " +
                                std::to_string(map.size()) + " " + space};
     }
@@ -37,16 +40,14 @@ class Lookup {
   std::optional<core::Error> error_;
 };
 
-std::string item(const std::string& where, std::size_t i) {
-  return where + "[" + std::to_string(i) + "]";
-}
-
 template <class T>
 Array<T> select(const Array<T>& values, const std::vector<bool>& keep) {
-  std::vector<T> out;
+  Buffer<T> out(values.size());
+  std::size_t n = 0;
   for (std::size_t i = 0; i < values.size() && i < keep.size(); ++i) {
-    if (keep[i]) out.push_back(values[i]);
+    if (keep[i]) out[n++] = values[i];
   }
+  out.resize(n);
   return out;
 }
 
@@ -70,13 +71,29 @@ void select(std::vector<T>& list, const std::vector<bool>& keep) {
 
 template <std::size_t kPlanes>
 PlanarArray<kPlanes> select(const PlanarArray<kPlanes>& array, const std::vector<bool>& keep) {
-  std::vector<float> out;
+  Buffer<float> out(array.values.size());
+  std::size_t n = 0;
   for (std::size_t p = 0; p < kPlanes; ++p) {
     for (std::size_t i = 0; i < array.count(); ++i) {
-      if (keep[i]) out.push_back(array.at(i, p));
+      if (keep[i]) out[n++] = array.at(i, p);
     }
   }
-  return {Array<float>(std::move(out))};
+  out.resize(n);
+  return {std::move(out)};
+}
+
+Array<float> select_rows(const Array<float>& values, std::size_t columns,
+                         const std::vector<bool>& keep) {
+  Buffer<float> out(values.size());
+  std::size_t n = 0;
+  for (std::size_t r = 0; r < keep.size(); ++r) {
+    if (!keep[r]) continue;
+    const float* row = values.data() + r * columns;
+    std::copy(row, row + columns, out.data() + n);
+    n += columns;
+  }
+  out.resize(n);
+  return out;
 }
 
 std::vector<bool> kept_of(const IndexMap& map) {
@@ -123,14 +140,6 @@ LodMapping cut_mapping(const LodPlan& plan, const LodMapping& mapping, const Ind
   return out;
 }
 
-// A root for vertices that lost all their joints: the first joint that is its own parent.
-std::uint16_t root_joint(const Definition& d) {
-  for (std::size_t j = 0; j < d.joint_parents.size(); ++j) {
-    if (d.joint_parents[j] == j) return static_cast<std::uint16_t>(j);
-  }
-  return 0;
-}
-
 void apply_to_definition(const LodPlan& plan, Definition& d) {
   const std::vector<bool> joints = kept_of(plan.joints);
   const std::vector<bool> channels = kept_of(plan.blend_shape_channels);
@@ -172,8 +181,7 @@ void drop_rows(const std::vector<bool>& keep, Array<std::uint16_t>& lods) {
   lods = std::move(out);
 }
 
-void apply_to_joint_group(const LodPlan& plan, const std::string& where, Lookup& lookup,
-                          JointGroup& g) {
+void apply_to_joint_group(const LodPlan& plan, const Where& where, Lookup& lookup, JointGroup& g) {
   const std::size_t columns = g.input_indices.size();
   const std::size_t rows = g.output_indices.size();
   if (rows == 0) {
@@ -182,46 +190,46 @@ void apply_to_joint_group(const LodPlan& plan, const std::string& where, Lookup&
   }
   std::vector<bool> keep(rows);
   Indices outputs, joints;
-  std::vector<float> values;
-  values.reserve(rows * columns);
+  outputs.reserve(rows);
+  joints.reserve(g.joint_indices.size());
   for (std::size_t r = 0; r < rows; ++r) {
     const std::uint16_t joint = g.output_indices[r] / 9, attribute = g.output_indices[r] % 9;
-    keep[r] = lookup.keeps(plan.joints, joint, item(where + ".output_indices", r), "joints");
+    keep[r] = lookup.keeps(plan.joints, joint, (where + ".output_indices")[r], "joints");
     if (!keep[r]) continue;
     outputs.push_back(static_cast<std::uint16_t>(plan.joints[joint] * 9 + attribute));
-    const float* row = g.values.data() + r * columns;
-    values.insert(values.end(), row, row + columns);
   }
   for (std::size_t i = 0; i < g.joint_indices.size(); ++i) {
     const std::uint16_t joint = g.joint_indices[i];
-    if (lookup.keeps(plan.joints, joint, item(where + ".joint_indices", i), "joints")) {
+    if (lookup.keeps(plan.joints, joint, (where + ".joint_indices")[i], "joints")) {
       joints.push_back(plan.joints[joint]);
     }
   }
-  if (std::ranges::find(keep, false) != keep.end()) drop_rows(keep, g.lods);
+  if (outputs.size() < rows) drop_rows(keep, g.lods);
+  if (outputs.size() * columns < g.values.size()) {
+    g.values = select_rows(g.values, columns, keep);
+  }
   g.output_indices = std::move(outputs);
-  g.values = std::move(values);
   g.joint_indices = std::move(joints);
 }
 
 // Entries in order of LOD, each with an output index: the first lods[0] stay, without those whose
 // output is gone.
 std::vector<bool> kept_entries(const LodPlan& plan, const IndexMap& map,
-                               const Array<std::uint16_t>& outputs, const std::string& where,
+                               const Array<std::uint16_t>& outputs, const Where& where,
                                const char* space, Lookup& lookup, Array<std::uint16_t>& lods) {
   lods = cut_lods(plan, lods);
   std::vector<bool> keep(outputs.size(), false);
   const std::size_t n = lods.empty() ? 0 : std::min<std::size_t>(lods[0], outputs.size());
   for (std::size_t i = 0; i < n; ++i) {
-    keep[i] = lookup.keeps(map, outputs[i], item(where, i), space);
+    keep[i] = lookup.keeps(map, outputs[i], where[i], space);
   }
   drop_rows(keep, lods);
   return keep;
 }
 
 Array<std::uint16_t> renumber(const IndexMap& map, const Array<std::uint16_t>& indices) {
-  Indices out;
-  for (const std::uint16_t i : indices) out.push_back(map[i]);
+  Buffer<std::uint16_t> out(indices.size());
+  for (std::size_t i = 0; i < indices.size(); ++i) out[i] = map[indices[i]];
   return out;
 }
 
@@ -235,10 +243,10 @@ void apply_to_conditionals(const std::vector<bool>& keep, const IndexMap& output
   t.cut_values = select(t.cut_values, keep);
 }
 
-void apply_to_behavior(const LodPlan& plan, bool groups_are_cut, Lookup& lookup, Behavior& b) {
+void apply_to_behavior(const LodPlan& plan, bool cut_while_reading, Lookup& lookup, Behavior& b) {
   for (std::size_t i = 0; i < b.joint_groups.size(); ++i) {
-    if (!groups_are_cut) cut_rows(plan, b.joint_groups[i]);
-    apply_to_joint_group(plan, item("behavior.joint_groups", i), lookup, b.joint_groups[i]);
+    if (!cut_while_reading) cut_rows(plan, b.joint_groups[i]);
+    apply_to_joint_group(plan, Where("behavior.joint_groups")[i], lookup, b.joint_groups[i]);
   }
   if (b.joint_row_count > 0) {
     b.joint_row_count = static_cast<std::uint16_t>(9 * plan.joints.kept());
@@ -256,53 +264,34 @@ void apply_to_behavior(const LodPlan& plan, bool groups_are_cut, Lookup& lookup,
   apply_to_conditionals(keep, plan.animated_maps, maps);
 }
 
-// Influences of dropped joints go, the others of the vertex grow to the same sum.
-void apply_to_skin(const LodPlan& plan, std::uint16_t root, const std::string& where,
-                   Lookup& lookup, Mesh& m) {
-  bool all = true;
-  for (std::size_t i = 0; i < m.skin_joint_indices.size(); ++i) {
-    all &= lookup.keeps(plan.joints, m.skin_joint_indices[i],
-                        item(where + ".skin_joint_indices", i), "joints");
-  }
-  if (all) {
-    m.skin_joint_indices = renumber(plan.joints, m.skin_joint_indices);
-    return;
-  }
-  std::vector<std::uint32_t> offsets{0};
-  std::vector<float> weights;
-  Indices joints;
+void apply_to_skin(const LodPlan& plan, Mesh& m) {
+  Buffer<std::uint32_t> offsets(m.skin_offsets.size());
+  Buffer<float> weights(m.skin_weights.size());
+  Buffer<std::uint16_t> joints(m.skin_joint_indices.size());
+  std::size_t size = 0;
+  bool unused = true;
   for (std::size_t v = 0; v + 1 < m.skin_offsets.size(); ++v) {
-    float removed = 0.0f;
-    const std::size_t begin = weights.size();
-    for (std::uint32_t i = m.skin_offsets[v]; i < m.skin_offsets[v + 1]; ++i) {
-      const std::uint16_t joint = m.skin_joint_indices[i];
-      if (!plan.joints.keeps(joint)) {
-        removed += m.skin_weights[i];
-        continue;
-      }
-      weights.push_back(m.skin_weights[i]);
-      joints.push_back(plan.joints[joint]);
-    }
-    if (begin == weights.size() && m.skin_offsets[v + 1] > m.skin_offsets[v]) {
-      weights.push_back(1.0f);
-      joints.push_back(root);
-    } else if (removed > 0.0f && removed < 1.0f) {
-      const float grow = 1.0f / (1.0f - removed);
-      for (std::size_t i = begin; i < weights.size(); ++i) weights[i] *= grow;
-    }
-    offsets.push_back(static_cast<std::uint32_t>(weights.size()));
+    const std::size_t begin = m.skin_offsets[v], end = m.skin_offsets[v + 1];
+    offsets[v] = static_cast<std::uint32_t>(size);
+    std::copy(m.skin_weights.data() + begin, m.skin_weights.data() + end, weights.data() + size);
+    std::copy(m.skin_joint_indices.data() + begin, m.skin_joint_indices.data() + end,
+              joints.data() + size);
+    size += cut_influences(plan, weights.data() + size, joints.data() + size, end - begin, &unused);
   }
+  if (offsets.size() > 0) offsets[offsets.size() - 1] = static_cast<std::uint32_t>(size);
+  weights.resize(size);
+  joints.resize(size);
   m.skin_offsets = std::move(offsets);
   m.skin_weights = std::move(weights);
   m.skin_joint_indices = std::move(joints);
 }
 
-void apply_to_targets(const LodPlan& plan, const std::string& where, Lookup& lookup, Mesh& m) {
+void apply_to_targets(const LodPlan& plan, const Where& where, Lookup& lookup, Mesh& m) {
   std::vector<bool> keep(m.blend_shape_targets.size());
   for (std::size_t t = 0; t < keep.size(); ++t) {
     std::uint16_t& channel = m.blend_shape_targets[t].blend_shape_channel_index;
     keep[t] = lookup.keeps(plan.blend_shape_channels, channel,
-                           item(where + ".blend_shape_targets", t) + ".blend_shape_channel_index",
+                           (where + ".blend_shape_targets")[t] + ".blend_shape_channel_index",
                            "channels");
     if (keep[t]) channel = plan.blend_shape_channels[channel];
   }
@@ -377,7 +366,7 @@ void apply_to_operations(const LodPlan& plan, std::size_t lod_count, Lookup& loo
         type.lod_operation_mappings[s] = cut_mapping(plan, mapping, maps.back());
       }
     }
-    const std::string where = item("machine_learned_behavior_ext.types", t) + ".operations";
+    const Where where = Where("machine_learned_behavior_ext.types")[t] + ".operations";
     for (std::size_t s = 0; s < type.operations.size(); ++s) {
       for (MlOperation& op : type.operations[s]) {
         cut_row_table(plan, lod_count, op);
@@ -405,7 +394,7 @@ void apply_to_ml_joints(const LodPlan& plan, Lookup& lookup, MlJoints& joints) {
   const std::size_t n = std::min(joints.input_indices.size(), joints.output_indices.size());
   for (std::size_t i = 0; i < n; ++i) {
     const std::uint16_t joint = joints.output_indices[i] / stride;
-    const std::string where = item("machine_learned_behavior_ext.joints.output_indices", i);
+    const Where where = Where("machine_learned_behavior_ext.joints.output_indices")[i];
     if (!lookup.keeps(plan.joints, joint, where, "joints")) continue;
     inputs.push_back(joints.input_indices[i]);
     outputs.push_back(static_cast<std::uint16_t>(plan.joints[joint] * stride +
@@ -415,7 +404,7 @@ void apply_to_ml_joints(const LodPlan& plan, Lookup& lookup, MlJoints& joints) {
   joints.output_indices = std::move(outputs);
 }
 
-void apply_to_setups(const LodPlan& plan, const std::string& where, Lookup& lookup,
+void apply_to_setups(const LodPlan& plan, const Where& where, Lookup& lookup,
                      List<TwistSwingSetup>& setups) {
   std::vector<bool> keep(setups.size());
   for (std::size_t s = 0; s < setups.size(); ++s) {
@@ -423,7 +412,7 @@ void apply_to_setups(const LodPlan& plan, const std::string& where, Lookup& look
     std::vector<bool> outputs(setup.output_joint_indices.size());
     for (std::size_t i = 0; i < outputs.size(); ++i) {
       outputs[i] = lookup.keeps(plan.joints, setup.output_joint_indices[i],
-                                item(item(where, s) + ".output_joint_indices", i), "joints");
+                                (where[s] + ".output_joint_indices")[i], "joints");
     }
     setup.blend_weights = select(setup.blend_weights, outputs);
     setup.output_joint_indices = renumber(plan.joints, select(setup.output_joint_indices, outputs));
@@ -455,6 +444,13 @@ void mark(const LodPlan& plan, const LodMapping& mapping, std::vector<bool>& kee
   }
 }
 
+std::uint16_t first_root(const IndexMap& joints, const Definition& d) {
+  for (std::size_t j = 0; j < joints.size(); ++j) {
+    if (joints.keeps(j) && d.joint_parents[j] == j) return joints[j];
+  }
+  return 0;
+}
+
 std::vector<bool> kept_joints(const LodPlan& plan, const Definition& d) {
   std::vector<bool> keep = needed(plan, d.lod_joint_mapping, d.joint_names.size());
   LodPlan finest;
@@ -482,7 +478,7 @@ Status drop_channels(const LodPlan& plan, std::vector<bool> entries, Dna& dna) {
   s.input_indices = select(s.input_indices, entries);
   s.output_indices = renumber(plan.blend_shape_channels, select(s.output_indices, entries));
   for (std::size_t i = 0; i < dna.geometry.meshes.size(); ++i) {
-    apply_to_targets(plan, item("geometry.meshes", i), lookup, dna.geometry.meshes[i]);
+    apply_to_targets(plan, Where("geometry.meshes")[i], lookup, dna.geometry.meshes[i]);
   }
   apply_to_definition(plan, dna.definition);
   return std::move(lookup).status();
@@ -517,6 +513,33 @@ void add_networks_of_operations(const LodPlan& plan, const MachineLearnedBehavio
   }
 }
 
+std::size_t cut_influences(const LodPlan& plan, float* weights, std::uint16_t* joints,
+                           std::size_t n, bool* finite) {
+  std::size_t kept = 0;
+  float removed = 0.0f;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (!plan.joints.keeps(joints[i])) {
+      removed += weights[i];
+      continue;
+    }
+    weights[kept] = weights[i];
+    joints[kept++] = plan.joints[joints[i]];
+  }
+  if (kept == 0 && n > 0) {
+    weights[0] = 1.0f;
+    joints[0] = plan.root;
+    return 1;
+  }
+  if (removed > 0.0f && removed < 1.0f) {
+    const float grow = 1.0f / (1.0f - removed);
+    for (std::size_t i = 0; i < kept; ++i) {
+      weights[i] *= grow;
+      if (!std::isfinite(weights[i])) *finite = false;
+    }
+  }
+  return kept;
+}
+
 std::size_t cut_rows(const LodPlan& plan, JointGroup& group) {
   group.lods = cut_lods(plan, group.lods);
   std::size_t rows = 0;
@@ -549,6 +572,7 @@ Result<std::optional<LodPlan>> plan_lods(const Descriptor& descriptor, const Def
                     ")");
   }
   plan.joints = IndexMap(kept_joints(plan, definition));
+  plan.root = first_root(plan.joints, definition);
   plan.blend_shape_channels = IndexMap(needed(plan, definition.lod_blend_shape_mapping,
                                               definition.blend_shape_channel_names.size()));
   plan.animated_maps = IndexMap(
@@ -557,19 +581,18 @@ Result<std::optional<LodPlan>> plan_lods(const Descriptor& descriptor, const Def
   return std::optional<LodPlan>(std::move(plan));
 }
 
-Status apply(const LodPlan& plan, bool groups_are_cut, Dna& dna) {
+Status apply(const LodPlan& plan, bool cut_while_reading, Dna& dna) {
   Lookup lookup;
   const std::size_t lod_count = dna.descriptor.lod_count;
   dna.descriptor.max_lod = static_cast<std::uint16_t>(dna.descriptor.max_lod + plan.lods[0]);
   dna.descriptor.lod_count = static_cast<std::uint16_t>(plan.lods.size());
-  apply_to_behavior(plan, groups_are_cut, lookup, dna.behavior);
+  apply_to_behavior(plan, cut_while_reading, lookup, dna.behavior);
   apply_to_extensions(plan, lod_count, lookup, dna);
   apply_to_definition(plan, dna.definition);
-  const std::uint16_t root = root_joint(dna.definition);
   for (std::size_t i = 0; i < dna.geometry.meshes.size(); ++i) {
     if (!plan.meshes.keeps(i)) continue;
-    const std::string where = item("geometry.meshes", i);
-    apply_to_skin(plan, root, where, lookup, dna.geometry.meshes[i]);
+    const Where where = Where("geometry.meshes")[i];
+    if (!cut_while_reading) apply_to_skin(plan, dna.geometry.meshes[i]);
     apply_to_targets(plan, where, lookup, dna.geometry.meshes[i]);
   }
   select(dna.geometry.meshes, kept_of(plan.meshes));

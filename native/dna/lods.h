@@ -52,6 +52,7 @@ class IndexMap {
 struct LodPlan {
   std::vector<std::uint16_t> lods;  // ascending, each once
   IndexMap joints, blend_shape_channels, animated_maps, meshes;
+  std::uint16_t root = 0;  // new index of the first root, for vertices that lost all their joints
 };
 
 /// Nothing when the selection keeps every LOD. In: a definition that validate accepts.
@@ -69,11 +70,18 @@ void add_networks_of_operations(const LodPlan& plan, const MachineLearnedBehavio
 /// Leading rows that the finest kept LOD uses. Out: lods and output_indices cut to the plan.
 std::size_t cut_rows(const LodPlan& plan, JointGroup& group);
 
+/// Renumbers a vertex's joints. Influences of dropped ones go, the others grow to the same sum.
+/// In: joints that are in the plan. Out: how many are left; finite becomes false when one grew
+/// beyond all numbers.
+std::size_t cut_influences(const LodPlan& plan, float* weights, std::uint16_t* joints,
+                           std::size_t n, bool* finite);
+
 /// Takes out the channels that the plan drops, and the entries that are not kept.
 core::Status drop_channels(const LodPlan& plan, std::vector<bool> entries, Dna& dna);
 
-/// Applies the plan to everything; groups_are_cut says that cut_rows was called while reading.
-core::Status apply(const LodPlan& plan, bool groups_are_cut, Dna& dna);
+/// Applies the plan to everything; cut_while_reading says that cut_rows and cut_influences were
+/// called for everything.
+core::Status apply(const LodPlan& plan, bool cut_while_reading, Dna& dna);
 
 }  // namespace detail
 }  // namespace risorius::dna

@@ -93,6 +93,7 @@ class Parser {
     }
     return std::move(dna_);
   }
+  detail::Known known() const { return layer_.known; }
 
  private:
   using Body = void (Parser::*)();
@@ -103,6 +104,7 @@ class Parser {
     if (r_.failed() || error_) return false;
     {
       Field field(r_, name);
+      r_.read_small();
       if (r_.enter(offset, size)) body();
     }
     if (!r_.failed()) return true;
@@ -144,9 +146,16 @@ class Parser {
       for (std::uint32_t& offset : offsets) offset = r_.u32();
     }
     std::vector<std::pair<std::uint64_t, std::uint64_t>> ranges{{0, r_.position()}};
+    // A section ends where another begins: reading ahead does not touch one that is not wanted.
+    const auto end_of = [&](std::uint64_t begin) {
+      std::uint64_t end = std::max(begin, file_end);
+      for (const std::uint64_t other : offsets) {
+        if (other > begin) end = std::min(end, other);
+      }
+      return end;
+    };
     const auto section = [&](int i, const char* name, auto body) {
-      const std::uint64_t size = offsets[i] <= file_end ? file_end - offsets[i] : 0;
-      const bool good = read(name, offsets[i], size, body);
+      const bool good = read(name, offsets[i], end_of(offsets[i]) - offsets[i], body);
       ranges.emplace_back(offsets[i], r_.position());
       return good;
     };
@@ -307,15 +316,21 @@ class Parser {
     if (has_winding) layer_.field("face_winding_order", dna_.descriptor_ext.face_winding_order);
   }
 
-  // The control space counts what layers name that were not asked for.
+  // The control space counts what layers name that were not asked for: only their counts are read.
   void count_unread_controls() {
     const auto names = [&](const char* id, bool loaded, std::uint32_t& count) {
       const IndexEntry* e = loaded ? nullptr : find(id);
-      if (e != nullptr && e->size >= 4) read(id, e->offset, e->size, [&] { count = r_.count(4); });
+      if (e == nullptr || e->size < 4) return;
+      read(id, e->offset, 4, [&] {
+        count = r_.u32();
+        if (count <= (e->size - 4) / 4) return;
+        r_.fail_at(e->offset, ErrorCode::kInvalidCount,
+                   std::to_string(count) + " names need more bytes than the layer has");
+      });
     };
     const IndexEntry* bhvr = options_.behavior ? nullptr : find("bhvr");
     if (bhvr != nullptr) {
-      read("behavior", bhvr->offset, bhvr->size,
+      read("behavior", bhvr->offset, std::min(bhvr->size, 2u),
            [&] { layer_.field("psd_count", dna_.behavior.psd_count); });
       dna_.unread_controls.psd = std::exchange(dna_.behavior.psd_count, std::uint16_t{0});
     }
@@ -365,10 +380,18 @@ class Parser {
   std::optional<Error> error_;
 };
 
+Result<Dna> run_parser(core::Source& source, const ParseOptions& options, detail::Known& known) {
+  Parser parser(source, options, nullptr, nullptr);
+  Result<Dna> dna = parser.run();
+  known = parser.known();
+  return dna;
+}
+
 // The same bytes once more, this time noting where each field lies: the price of an error.
 Error with_offset(core::Source& source, const ParseOptions& options, Error error) {
   if (error.offset || error.code == ErrorCode::kInvalidArgument) return error;
   detail::Places places;
+  places.only = error.where;
   static_cast<void>(Parser(source, options, &places, nullptr).run());
   error.offset = detail::find_place(places, error.where);
   return error;
@@ -377,12 +400,14 @@ Error with_offset(core::Source& source, const ParseOptions& options, Error error
 }  // namespace
 
 Result<Dna> parse(core::Source& source, const ParseOptions& options) {
-  Result<Dna> dna = Parser(source, options, nullptr, nullptr).run();
+  detail::Known known;
+  Result<Dna> dna = run_parser(source, options, known);
   if (!dna) return core::Unexpected{with_offset(source, options, dna.error())};
-  if (Status valid = validate(*dna, dna->warnings); !valid) {
+  if (Status valid = detail::validate(*dna, known, dna->warnings); !valid) {
     // With a LOD filter the field's number counts what was kept, the file's bytes do not.
     if (!options.lods.everything()) return std::move(valid).propagate();
-    return core::Unexpected{with_offset(source, options, valid.error())};
+    dna = std::move(valid).propagate();  // what was read goes before it is read again
+    return core::Unexpected{with_offset(source, options, dna.error())};
   }
   if (!options.unreferenced_blend_shapes && options.definition) {
     return remove_unreferenced_blend_shapes(*dna);

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "dna/io.h"
+#include "dna/where.h"
 
 namespace risorius::dna {
 
@@ -15,12 +16,9 @@ using core::ErrorCode;
 using core::List;
 using core::ok;
 using core::Status;
+using detail::Where;
 
 constexpr std::size_t kMostFindings = 1000;  // a broken file repeats itself
-
-std::string item(const std::string& where, std::size_t i) {
-  return where + "[" + std::to_string(i) + "]";
-}
 
 // One bit per number, without a branch: this passes over every float of a file.
 bool all_finite(const Array<float>& values) {
@@ -42,17 +40,18 @@ T largest(const Array<T>& values) {
 // Collects what is wrong and what is odd, one finding per list.
 class Checker {
  public:
+  explicit Checker(detail::Known known) : known_(known) {}
   std::vector<Finding> take() { return std::move(findings_); }
-  bool failed() const { return errors_ > 0; }
+  const detail::Known& known() const { return known_; }
 
-  void error(ErrorCode code, std::string where, std::string message) {
+  void error(ErrorCode code, const Where& where, std::string message) {
     ++errors_;
-    add(true, code, std::move(where), std::move(message));
+    add(true, code, where, std::move(message));
   }
-  void warn(std::string where, std::string message) {
-    add(false, ErrorCode::kInvalidValue, std::move(where), std::move(message));
+  void warn(const Where& where, std::string message) {
+    add(false, ErrorCode::kInvalidValue, where, std::move(message));
   }
-  bool same_length(const std::string& where, const char* a, std::size_t na, const char* b,
+  bool same_length(const Where& where, const char* a, std::size_t na, const char* b,
                    std::size_t nb) {
     if (na == nb) return true;
     error(ErrorCode::kInvalidLength, where,
@@ -60,8 +59,7 @@ class Checker {
     return false;
   }
   template <class T>
-  void below(const std::string& where, const Array<T>& indices, std::size_t limit,
-             const char* space) {
+  void below(const Where& where, const Array<T>& indices, std::size_t limit, const char* space) {
     if (indices.empty() || largest(indices) < limit) return;
     std::size_t first = 0, more = 0;
     for (std::size_t i = indices.size(); i-- > 0;) {
@@ -69,34 +67,34 @@ class Checker {
       first = i;
       ++more;
     }
-    error(ErrorCode::kInvalidIndex, item(where, first),
+    error(ErrorCode::kInvalidIndex, where[first],
           "index " + std::to_string(indices[first]) + ", but there are " + std::to_string(limit) +
               " " + space + and_more(more - 1));
   }
-  void index(const std::string& where, std::size_t value, std::size_t limit, const char* space) {
+  void index(const Where& where, std::size_t value, std::size_t limit, const char* space) {
     if (value < limit) return;
     error(ErrorCode::kInvalidIndex, where,
           "index " + std::to_string(value) + ", but there are " + std::to_string(limit) + " " +
               space);
   }
-  void finite(const std::string& where, const Array<float>& values) {
-    if (all_finite(values)) return;
+  void finite(const Where& where, const Array<float>& values) {
+    if (known_.finite || all_finite(values)) return;
     std::size_t first = 0, more = 0;
     for (std::size_t i = values.size(); i-- > 0;) {
       if (std::isfinite(values[i])) continue;
       first = i;
       ++more;
     }
-    warn(item(where, first), "not a finite number" + and_more(more - 1));
+    warn(where[first], "not a finite number" + and_more(more - 1));
   }
-  void row_counts(const std::string& where, const Array<std::uint16_t>& lods, std::size_t rows,
+  void row_counts(const Where& where, const Array<std::uint16_t>& lods, std::size_t rows,
                   std::size_t lod_count) {
     for (std::size_t l = 0; l < lods.size(); ++l) {
       if (lods[l] > rows) {
-        error(ErrorCode::kInvalidValue, item(where + ".lods", l),
+        error(ErrorCode::kInvalidValue, (where + ".lods")[l],
               std::to_string(lods[l]) + " rows, but the table has " + std::to_string(rows));
       } else if (l > 0 && lods[l] > lods[l - 1]) {
-        warn(item(where + ".lods", l), "more rows than the LOD before it");
+        warn((where + ".lods")[l], "more rows than the LOD before it");
       }
     }
     if (rows > 0 && lods.size() != lod_count) {
@@ -104,18 +102,18 @@ class Checker {
                                 std::to_string(lod_count) + " LODs");
     }
   }
-  void lod_mapping(const std::string& where, const LodMapping& m, std::size_t limit,
-                   const char* space, std::size_t lod_count) {
+  void lod_mapping(const Where& where, const LodMapping& m, std::size_t limit, const char* space,
+                   std::size_t lod_count) {
     below(where + ".lods", m.lods, m.rows.size(), "index lists");
     for (std::size_t i = 0; i < m.rows.size(); ++i) {
-      below(item(where + ".indices", i), m.rows[i], limit, space);
+      below((where + ".indices")[i], m.rows[i], limit, space);
     }
     if (!m.lods.empty() && m.lods.size() != lod_count) {
       warn(where + ".lods", std::to_string(m.lods.size()) + " entries, but there are " +
                                 std::to_string(lod_count) + " LODs");
     }
   }
-  void choice(const std::string& where, std::uint32_t value, std::uint32_t limit) {
+  void choice(const Where& where, std::uint32_t value, std::uint32_t limit) {
     if (value >= limit) warn(where, "the value " + std::to_string(value) + " is not known");
   }
 
@@ -123,11 +121,12 @@ class Checker {
   static std::string and_more(std::size_t n) {
     return n == 0 ? "" : " (and " + std::to_string(n) + " more in this list)";
   }
-  void add(bool is_error, ErrorCode code, std::string where, std::string message) {
+  void add(bool is_error, ErrorCode code, const Where& where, std::string message) {
     if (findings_.size() >= kMostFindings && !(is_error && errors_ == 1)) return;
-    findings_.push_back({is_error, {code, std::nullopt, std::move(where), std::move(message)}});
+    findings_.push_back({is_error, {code, std::nullopt, where.text(), std::move(message)}});
   }
 
+  detail::Known known_;
   std::vector<Finding> findings_;
   std::size_t errors_ = 0;
 };
@@ -149,7 +148,8 @@ void check_descriptor(Checker& c, const Dna& dna) {
   c.choice("descriptor_ext.face_winding_order", ext.face_winding_order, 2);
   for (std::size_t i = 0; i < 3; ++i) {
     if (ext.rotation_sign[i] == 1 || ext.rotation_sign[i] == -1) continue;
-    c.warn(std::string("descriptor_ext.rotation_sign.") + "xyz"[i],
+    constexpr const char* kAxes[] = {".x", ".y", ".z"};
+    c.warn(Where("descriptor_ext.rotation_sign") + kAxes[i],
            "the sign is " + std::to_string(ext.rotation_sign[i]) + ", 1 or -1 was expected");
   }
   const CoordinateSystem& a = d.coordinate_system;
@@ -169,7 +169,7 @@ void check_hierarchy(Checker& c, const Array<std::uint16_t>& parents) {
       path.push_back(at);
       at = parents[at];
       if (path.size() <= parents.size()) continue;
-      c.error(ErrorCode::kInvalidValue, item("definition.joint_parents", j),
+      c.error(ErrorCode::kInvalidValue, Where("definition.joint_parents")[j],
               "the joint hierarchy has a cycle");
       return;
     }
@@ -188,12 +188,12 @@ void check_definition(Checker& c, const Dna& dna) {
   c.lod_mapping("definition.lod_animated_map_mapping", d.lod_animated_map_mapping,
                 d.animated_map_names.size(), "animated maps", lods);
   c.lod_mapping("definition.lod_mesh_mapping", d.lod_mesh_mapping, meshes, "meshes", lods);
-  const std::string pairs = "definition.mesh_blend_shape_channel_mapping";
+  const Where pairs = "definition.mesh_blend_shape_channel_mapping";
   c.same_length(pairs, "meshes", d.mesh_blend_shape_channel_mapping_from.size(), "channels",
                 d.mesh_blend_shape_channel_mapping_to.size());
   c.below(pairs + ".from", d.mesh_blend_shape_channel_mapping_from, meshes, "meshes");
   c.below(pairs + ".to", d.mesh_blend_shape_channel_mapping_to, channels, "blend shape channels");
-  const std::string parents = "definition.joint_parents";
+  const Where parents = "definition.joint_parents";
   const bool whole =
       c.same_length(parents, "joint names", joints, "parents", d.joint_parents.size());
   c.same_length("definition.neutral_joint_translations", "joint names", joints, "translations",
@@ -210,9 +210,8 @@ void check_definition(Checker& c, const Dna& dna) {
 
 // ---- behavior
 
-void check_conditionals(Checker& c, const std::string& where, const Conditionals& t,
-                        std::size_t inputs, const char* input_space, std::size_t outputs,
-                        const char* output_space) {
+void check_conditionals(Checker& c, const Where& where, const Conditionals& t, std::size_t inputs,
+                        const char* input_space, std::size_t outputs, const char* output_space) {
   const std::size_t rows = t.input_indices.size();
   c.same_length(where, "inputs", rows, "outputs", t.output_indices.size());
   c.same_length(where, "inputs", rows, "from values", t.from_values.size());
@@ -227,7 +226,7 @@ void check_conditionals(Checker& c, const std::string& where, const Conditionals
   c.finite(where + ".cut_values", t.cut_values);
 }
 
-void check_joint_group(Checker& c, const std::string& where, const JointGroup& g, const Dna& dna) {
+void check_joint_group(Checker& c, const Where& where, const JointGroup& g, const Dna& dna) {
   const std::size_t joints = dna.definition.joint_names.size();
   if (g.values.size() != g.output_indices.size() * g.input_indices.size()) {
     c.error(ErrorCode::kInvalidLength, where + ".values",
@@ -255,10 +254,10 @@ void check_behavior(Checker& c, const Dna& dna) {
   c.below("behavior.psds.columns", b.psds.columns, controls, "controls");
   c.finite("behavior.psds.values", b.psds.values);
   for (std::size_t i = 0; i < b.joint_groups.size(); ++i) {
-    check_joint_group(c, item("behavior.joint_groups", i), b.joint_groups[i], dna);
+    check_joint_group(c, Where("behavior.joint_groups")[i], b.joint_groups[i], dna);
   }
   const BlendShapeChannels& s = b.blend_shape_channels;
-  const std::string shapes = "behavior.blend_shape_channels", maps = "behavior.animated_maps";
+  const Where shapes = "behavior.blend_shape_channels", maps = "behavior.animated_maps";
   c.same_length(shapes, "inputs", s.input_indices.size(), "outputs", s.output_indices.size());
   c.below(shapes + ".input_indices", s.input_indices, controls, "controls");
   c.below(shapes + ".output_indices", s.output_indices, d.blend_shape_channel_names.size(),
@@ -272,7 +271,7 @@ void check_behavior(Checker& c, const Dna& dna) {
 
 // ---- geometry
 
-void check_offsets(Checker& c, const std::string& where, const Array<std::uint32_t>& offsets,
+void check_offsets(Checker& c, const Where& where, const Array<std::uint32_t>& offsets,
                    std::size_t items) {
   if (offsets.empty()) {
     if (items > 0) c.error(ErrorCode::kInvalidLength, where, "values without offsets");
@@ -286,21 +285,23 @@ void check_offsets(Checker& c, const std::string& where, const Array<std::uint32
   }
 }
 
-void check_targets(Checker& c, const std::string& where, const Dna& dna, const Mesh& m) {
+void check_targets(Checker& c, const Where& where, const Dna& dna, const Mesh& m) {
   const std::size_t channels = dna.definition.blend_shape_channel_names.size();
   for (std::size_t t = 0; t < m.blend_shape_targets.size(); ++t) {
     const BlendShapeTarget& target = m.blend_shape_targets[t];
-    const std::string at = item(where + ".blend_shape_targets", t);
+    const Where at = (where + ".blend_shape_targets")[t];
     c.same_length(at, "deltas", target.deltas.count(), "vertex indices",
                   target.vertex_indices.size());
-    c.below(at + ".vertex_indices", target.vertex_indices, m.positions.count(), "vertices");
+    if (!c.known().vertex_indices) {
+      c.below(at + ".vertex_indices", target.vertex_indices, m.positions.count(), "vertices");
+    }
     c.index(at + ".blend_shape_channel_index", target.blend_shape_channel_index, channels,
             "blend shape channels");
     c.finite(at + ".deltas", target.deltas.values);
   }
 }
 
-void check_mesh(Checker& c, const std::string& where, const Dna& dna, const Mesh& m) {
+void check_mesh(Checker& c, const Where& where, const Dna& dna, const Mesh& m) {
   const std::size_t vertices = m.positions.count();
   const std::size_t layouts = m.layout_positions.size();
   c.same_length(where, "layout positions", layouts, "layout texture coordinates",
@@ -312,7 +313,7 @@ void check_mesh(Checker& c, const std::string& where, const Dna& dna, const Mesh
   c.below(where + ".layout_normals", m.layout_normals, m.normals.count(), "normals");
   check_offsets(c, where + ".faces", m.face_offsets, m.face_layouts.size());
   c.below(where + ".face_layouts", m.face_layouts, layouts, "layouts");
-  const std::string skin = where + ".skin_weights";
+  const Where skin = where + ".skin_weights";
   check_offsets(c, skin, m.skin_offsets, m.skin_weights.size());
   c.same_length(skin, "weights", m.skin_weights.size(), "joint indices",
                 m.skin_joint_indices.size());
@@ -331,7 +332,7 @@ void check_mesh(Checker& c, const std::string& where, const Dna& dna, const Mesh
 void check_geometry(Checker& c, const Dna& dna) {
   const List<Mesh>& meshes = dna.geometry.meshes;
   for (std::size_t i = 0; i < meshes.size(); ++i) {
-    check_mesh(c, item("geometry.meshes", i), dna, meshes[i]);
+    check_mesh(c, Where("geometry.meshes")[i], dna, meshes[i]);
   }
   const std::size_t names = dna.definition.mesh_names.size();
   if (!meshes.empty() && meshes.size() != names) {
@@ -342,13 +343,12 @@ void check_geometry(Checker& c, const Dna& dna) {
 
 // ---- networks
 
-void check_network(Checker& c, const std::string& where, const NeuralNetwork& n,
-                   std::size_t controls) {
+void check_network(Checker& c, const Where& where, const NeuralNetwork& n, std::size_t controls) {
   c.below(where + ".output_indices", n.output_indices, controls, "controls");
   c.below(where + ".input_indices", n.input_indices, controls, "controls");
   for (std::size_t l = 0; l < n.layers.size(); ++l) {
     const NeuralNetworkLayer& layer = n.layers[l];
-    const std::string at = item(where + ".layers", l);
+    const Where at = (where + ".layers")[l];
     const std::size_t outputs = layer.biases.size(), weights = layer.weights.size();
     const bool rows = outputs == 0 ? weights == 0 : weights % outputs == 0;
     if (!rows || (l > 0 && weights != outputs * n.layers[l - 1].biases.size())) {
@@ -368,7 +368,7 @@ void check_network(Checker& c, const std::string& where, const NeuralNetwork& n,
 
 void check_networks(Checker& c, const Dna& dna) {
   const MachineLearnedBehavior& ml = dna.machine_learned_behavior;
-  const std::string where = "machine_learned_behavior";
+  const Where where = "machine_learned_behavior";
   const std::size_t count = ml.neural_networks.size(), controls = control_counts(dna).total();
   c.lod_mapping(where + ".lod_neural_network_mapping", ml.lod_neural_network_mapping, count,
                 "networks", dna.descriptor.lod_count);
@@ -376,21 +376,21 @@ void check_networks(Checker& c, const Dna& dna) {
                 "with region networks", ml.region_network_indices.size());
   for (std::size_t m = 0; m < ml.region_network_indices.size(); ++m) {
     const auto& regions = ml.region_network_indices[m];
-    const std::string at = item(where + ".region_network_indices", m);
+    const Where at = (where + ".region_network_indices")[m];
     if (m < ml.region_names.size()) {
       c.same_length(at, "region names", ml.region_names[m].size(), "regions", regions.size());
     }
     for (std::size_t r = 0; r < regions.size(); ++r) {
-      c.below(item(at, r), regions[r], count, "networks");
+      c.below(at[r], regions[r], count, "networks");
     }
   }
   for (std::size_t i = 0; i < count; ++i) {
-    check_network(c, item(where + ".neural_networks", i), ml.neural_networks[i], controls);
+    check_network(c, (where + ".neural_networks")[i], ml.neural_networks[i], controls);
   }
 }
 
-void check_operation(Checker& c, const std::string& where, const MlOperation& op,
-                     const MlType& type, const Dna& dna) {
+void check_operation(Checker& c, const Where& where, const MlOperation& op, const MlType& type,
+                     const Dna& dna) {
   const auto& sets = op.operation_set_dependency_indices;
   const auto& operations = op.operation_dependency_indices;
   const bool pairs = c.same_length(where, "set dependencies", sets.size(), "operation dependencies",
@@ -399,7 +399,7 @@ void check_operation(Checker& c, const std::string& where, const MlOperation& op
           "operation sets");
   for (std::size_t i = 0; pairs && i < sets.size(); ++i) {
     if (sets[i] >= type.operations.size()) continue;
-    c.index(item(where + ".operation_dependency_indices", i), operations[i],
+    c.index((where + ".operation_dependency_indices")[i], operations[i],
             type.operations[sets[i]].size(), "operations in that set");
   }
   c.choice(where + ".operation_type", op.operation_type, 5);
@@ -414,7 +414,7 @@ void check_operation(Checker& c, const std::string& where, const MlOperation& op
 
 void check_ml_joints(Checker& c, const Dna& dna) {
   const MlJoints& j = dna.machine_learned_behavior_ext.joints;
-  const std::string where = "machine_learned_behavior_ext.joints";
+  const Where where = "machine_learned_behavior_ext.joints";
   c.same_length(where, "parameter keys", j.parameter_keys.size(), "parameter values",
                 j.parameter_values.size());
   c.same_length(where, "inputs", j.input_indices.size(), "outputs", j.output_indices.size());
@@ -427,17 +427,16 @@ void check_operations(Checker& c, const Dna& dna) {
   const auto& types = dna.machine_learned_behavior_ext.types;
   for (std::size_t t = 0; t < types.size(); ++t) {
     const MlType& type = types[t];
-    const std::string where = item("machine_learned_behavior_ext.types", t);
+    const Where where = Where("machine_learned_behavior_ext.types")[t];
     c.same_length(where, "LOD mappings", type.lod_operation_mappings.size(), "operation sets",
                   type.operations.size());
     for (std::size_t s = 0; s < type.operations.size(); ++s) {
       if (s < type.lod_operation_mappings.size()) {
-        c.lod_mapping(item(where + ".lod_operation_mappings", s), type.lod_operation_mappings[s],
+        c.lod_mapping((where + ".lod_operation_mappings")[s], type.lod_operation_mappings[s],
                       type.operations[s].size(), "operations", dna.descriptor.lod_count);
       }
       for (std::size_t i = 0; i < type.operations[s].size(); ++i) {
-        check_operation(c, item(item(where + ".operations", s), i), type.operations[s][i], type,
-                        dna);
+        check_operation(c, ((where + ".operations")[s])[i], type.operations[s][i], type, dna);
       }
     }
   }
@@ -446,7 +445,7 @@ void check_operations(Checker& c, const Dna& dna) {
 
 // ---- RBF poses, joint metadata, twist and swing
 
-void check_solver(Checker& c, const std::string& where, const RbfSolver& s, const Dna& dna) {
+void check_solver(Checker& c, const Where& where, const RbfSolver& s, const Dna& dna) {
   c.below(where + ".raw_control_indices", s.raw_control_indices, control_counts(dna).total(),
           "controls");
   c.below(where + ".pose_indices", s.pose_indices, dna.rbf_behavior.poses.size(), "poses");
@@ -472,15 +471,15 @@ void check_rbf(Checker& c, const Dna& dna) {
   c.lod_mapping("rbf_behavior.lod_solver_mapping", rbf.lod_solver_mapping, rbf.solvers.size(),
                 "solvers", dna.descriptor.lod_count);
   for (std::size_t i = 0; i < rbf.solvers.size(); ++i) {
-    check_solver(c, item("rbf_behavior.solvers", i), rbf.solvers[i], dna);
+    check_solver(c, Where("rbf_behavior.solvers")[i], rbf.solvers[i], dna);
   }
   for (std::size_t i = 0; i < rbf.poses.size(); ++i) {
     if (std::isfinite(rbf.poses[i].scale)) continue;
-    c.warn(item("rbf_behavior.poses", i) + ".scale", "not a finite number");
+    c.warn(Where("rbf_behavior.poses")[i] + ".scale", "not a finite number");
   }
   const auto& poses = dna.rbf_behavior_ext.poses;
   for (std::size_t i = 0; i < poses.size(); ++i) {
-    const std::string where = item("rbf_behavior_ext.poses", i);
+    const Where where = Where("rbf_behavior_ext.poses")[i];
     c.below(where + ".input_control_indices", poses[i].input_control_indices, controls, "controls");
     c.below(where + ".output_control_indices", poses[i].output_control_indices, controls,
             "controls");
@@ -497,7 +496,7 @@ void check_rbf(Checker& c, const Dna& dna) {
 
 void check_joint_metadata(Checker& c, const Dna& dna) {
   const auto& entries = dna.joint_behavior_metadata.joint_representations;
-  const std::string where = "joint_behavior_metadata.joint_representations";
+  const Where where = "joint_behavior_metadata.joint_representations";
   const std::size_t joints = dna.definition.joint_names.size();
   if (!entries.empty() && entries.size() != joints) {
     c.warn(where, std::to_string(entries.size()) + " entries, but there are " +
@@ -505,17 +504,17 @@ void check_joint_metadata(Checker& c, const Dna& dna) {
   }
   for (std::size_t i = 0; i < entries.size(); ++i) {
     if (entries[i].translation < 1 && entries[i].rotation < 2 && entries[i].scale < 1) continue;
-    c.choice(item(where, i) + ".translation", entries[i].translation, 1);
-    c.choice(item(where, i) + ".rotation", entries[i].rotation, 2);
-    c.choice(item(where, i) + ".scale", entries[i].scale, 1);
+    c.choice(where[i] + ".translation", entries[i].translation, 1);
+    c.choice(where[i] + ".rotation", entries[i].rotation, 2);
+    c.choice(where[i] + ".scale", entries[i].scale, 1);
   }
 }
 
-void check_setups(Checker& c, const std::string& name, const List<TwistSwingSetup>& setups,
+void check_setups(Checker& c, const Where& name, const List<TwistSwingSetup>& setups,
                   const Dna& dna) {
   for (std::size_t i = 0; i < setups.size(); ++i) {
     const TwistSwingSetup& s = setups[i];
-    const std::string where = item(name, i);
+    const Where where = name[i];
     c.same_length(where, "output joints", s.output_joint_indices.size(), "weights",
                   s.blend_weights.size());
     c.below(where + ".output_joint_indices", s.output_joint_indices,
@@ -555,8 +554,8 @@ std::uint16_t ml_joint_stride(const MlJoints& joints) {
   return 9;
 }
 
-std::vector<Finding> detail::find_all(const Dna& dna) {
-  Checker c;
+std::vector<Finding> detail::find_all(const Dna& dna, Known known) {
+  Checker c(known);
   check_descriptor(c, dna);
   check_definition(c, dna);
   // Without a definition there are no spaces to check against: a descriptor-only load.
@@ -571,8 +570,8 @@ std::vector<Finding> detail::find_all(const Dna& dna) {
   return c.take();
 }
 
-Status validate(const Dna& dna, std::vector<Warning>& warnings) {
-  std::vector<Finding> findings = detail::find_all(dna);
+Status detail::validate(const Dna& dna, Known known, std::vector<Warning>& warnings) {
+  std::vector<Finding> findings = find_all(dna, known);
   for (Finding& f : findings) {
     if (f.is_error) return core::Unexpected{std::move(f.error)};
   }
@@ -580,6 +579,10 @@ Status validate(const Dna& dna, std::vector<Warning>& warnings) {
     warnings.push_back({std::move(f.error.where), std::move(f.error.message), std::nullopt});
   }
   return ok();
+}
+
+Status validate(const Dna& dna, std::vector<Warning>& warnings) {
+  return detail::validate(dna, {}, warnings);
 }
 
 }  // namespace risorius::dna

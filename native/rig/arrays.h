@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "rig/quaternion.h"
+#include "simd/kernels.h"
 
 namespace risorius::rig {
 
@@ -27,12 +28,17 @@ struct Psd {
 };
 
 /// A dense matrix from controls to joint attributes, stored by columns of row_count values without
-/// padding.
+/// padding; what a control drives in all groups lies together.
 struct JointGroup {
-  std::uint32_t values_begin = 0, row_count = 0, column_count = 0;
-  std::uint32_t outputs_begin = 0;  // row_count indices into the joint attributes
+  std::uint32_t row_count = 0, column_count = 0;  // columns without any value do not count
+  std::uint32_t rows_begin = 0;                   // its rows among those of all groups
   std::uint32_t columns_begin = 0;  // where its list of active columns begins: a sum of counts
-  std::uint32_t writes_always = 0;  // 1: an earlier group writes some of its rows, which it resets
+};
+
+/// A corrective, found by a factor that watches it.
+struct Watch {
+  std::uint16_t psd = 0;
+  std::uint16_t other = 0;  // another of its factors, or the same again
 };
 
 /// A column of a group, found by its control.
@@ -155,7 +161,7 @@ struct RigHeader {
   std::uint32_t lod_count = 0, joint_count = 0, blend_shape_count = 0, animated_map_count = 0;
   /// The control vector: raw | corrective | network | RBF pose.
   std::uint32_t raw_count = 0, gui_count = 0, psd_count = 0, control_count = 0;
-  std::uint32_t list_count = 0, tallest_group = 0;  // sizes of scratch
+  std::uint32_t list_count = 0;  // columns of all groups
   std::uint32_t operation_values = 0, widest_layer = 0, solver_inputs = 0, solver_poses = 0;
   std::uint32_t mask_count = 0;    // regions of networks
   std::uint32_t joint_stride = 9;  // 9 with Euler angles, 10 with quaternions
@@ -182,11 +188,11 @@ struct RigArrays {
 
   // A corrective whose factors are there before any corrective is watched by the factor that
   // watches the fewest: while that rests at 0 so does the corrective, and nobody looks. Per LOD a
-  // row of control_count + 1 begins into watched: indices into psds.
+  // row of control_count + 1 begins into watched.
   A<Psd> psds;  // ascending output
   A<std::uint16_t> psd_factors;
   A<std::uint32_t> watch_begins;
-  A<std::uint16_t> watched;
+  A<Watch> watched;
   // What watches nothing, per LOD and list: steps[step_begins[lod * kStepLists + list] ...].
   A<std::uint32_t> step_begins;
   A<std::uint32_t> steps;
@@ -195,7 +201,12 @@ struct RigArrays {
   A<std::uint32_t> joint_group_lods;  // [groups, LODs]: rows
   A<float> joint_values;              // one of these two is empty
   A<std::uint16_t> joint_halves;
-  A<std::uint16_t> joint_outputs;
+  A<std::uint16_t> joint_outputs;  // of the rows of all groups, one after the other
+  // Where those rows go, per LOD: for each 16 joint attributes a piece, and extra pieces for what
+  // does not follow each other in the rows (extra_begins[lod] ...).
+  A<simd::Piece> joint_pieces;
+  A<std::uint32_t> extra_begins;
+  A<simd::Piece> extra_pieces;
   A<std::uint32_t> joint_column_begins;  // [controls + 1]
   A<JointColumn> joint_columns;          // by control, then by group
   A<std::uint16_t> joints_written;       // by any group at any LOD, ascending
@@ -240,7 +251,8 @@ constexpr void for_each_array(R& r, F f) {
   f(r.psds), f(r.psd_factors), f(r.watch_begins), f(r.watched);
   f(r.step_begins), f(r.steps);
   f(r.joint_groups), f(r.joint_group_lods), f(r.joint_values), f(r.joint_halves);
-  f(r.joint_outputs), f(r.joint_column_begins), f(r.joint_columns), f(r.joints_written);
+  f(r.joint_outputs), f(r.joint_pieces), f(r.extra_begins), f(r.extra_pieces);
+  f(r.joint_column_begins), f(r.joint_columns), f(r.joints_written);
   f(r.quaternion_joints), f(r.quaternion_columns), f(r.quaternion_terms);
   f(r.quaternion_column_begins), f(r.quaternion_column_list), f(r.euler_joints);
   f(r.rbf_solvers), f(r.rbf_inputs), f(r.rbf_targets), f(r.rbf_inverses);

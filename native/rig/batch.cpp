@@ -24,27 +24,27 @@ class Block {
       : rig_(rig), work_(work), first_(first), count_(count) {}
 
   void joints(std::uint32_t lod) noexcept {
-    const std::size_t size = std::size_t{rig_.joint_count} * rig_.joint_stride;
-    std::fill(first_.joints, first_.joints + count_ * size, 0.0f);
     list_columns();
-    const std::size_t stride = simd::rounded_up(rig_.tallest_group);
+    const std::size_t stride = detail::rows_size(rig_);
     for (std::size_t i = 0; i < rig_.joint_groups.size(); ++i) {
       const JointGroup& g = rig_.joint_groups[i];
       const std::uint32_t rows = rig_.joint_group_lods[i * rig_.lod_count + lod];
-      const std::uint32_t columns = work_.column_counts[i];
-      if (rows == 0 || (columns == 0 && g.writes_always == 0)) continue;
+      if (rows == 0) continue;
+      const std::uint32_t columns = work_.column_ends[i] - g.columns_begin;
       const std::uint32_t* offsets = work_.column_offsets.data() + g.columns_begin;
       const float* weights = work_.column_weights.data() + std::size_t{g.columns_begin} * kFrames;
+      float* out = work_.rows.data() + g.rows_begin;
       if (rig_.is_half()) {
-        rig_.kernels->batch_half_columns(rig_.joint_halves.data(), offsets, weights, columns,
-                                         work_.rows.data(), stride, rows);
+        rig_.kernels->batch_half_columns(rig_.joint_halves.data(), offsets, weights, columns, out,
+                                         stride, rows);
       } else {
-        rig_.kernels->batch_columns(rig_.joint_values.data(), offsets, weights, columns,
-                                    work_.rows.data(), stride, rows);
+        rig_.kernels->batch_columns(rig_.joint_values.data(), offsets, weights, columns, out,
+                                    stride, rows);
       }
-      for (std::size_t f = 0; f < count_; ++f) {
-        detail::scatter(rig_, g, rows, work_.rows.data() + f * stride, first_.joints + f * size);
-      }
+    }
+    for (std::size_t f = 0; f < count_; ++f) {
+      detail::place_rows(rig_, lod, work_.rows.data() + f * stride,
+                         first_.joints + f * rig_.joint_count * rig_.joint_stride);
     }
   }
 
@@ -61,7 +61,9 @@ class Block {
  private:
   // As for one frame, of every control that any of the frames uses. Leaves the weights clear.
   void list_columns() noexcept {
-    std::fill(work_.column_counts.begin(), work_.column_counts.end(), 0u);
+    for (std::size_t i = 0; i < rig_.joint_groups.size(); ++i) {
+      work_.column_ends[i] = rig_.joint_groups[i].columns_begin;
+    }
     for (std::size_t word = 0; word < work_.union_bits.size(); ++word) {
       for (std::uint64_t bits = work_.union_bits[word]; bits != 0; bits &= bits - 1) {
         const auto control = word * 64 + static_cast<std::size_t>(std::countr_zero(bits));
@@ -76,8 +78,7 @@ class Block {
     for (std::uint32_t i = rig_.joint_column_begins[control];
          i < rig_.joint_column_begins[control + 1]; ++i) {
       const JointColumn column = rig_.joint_columns[i];
-      const std::size_t at =
-          rig_.joint_groups[column.group].columns_begin + work_.column_counts[column.group]++;
+      const std::size_t at = work_.column_ends[column.group]++;
       work_.column_offsets[at] = column.offset;
       std::copy(weights, weights + kFrames, work_.column_weights.data() + at * kFrames);
     }
@@ -108,8 +109,9 @@ void evaluate_block(const Rig& rig, const float* raw, std::size_t count, std::ui
 
 Workspace make_batch_workspace(const Rig& rig) {
   Workspace work = make_workspace(rig);
+  work.column_offsets.resize(rig.list_count);
   work.column_weights.resize(std::size_t{rig.list_count} * kFrames);
-  work.rows.resize(simd::rounded_up(rig.tallest_group) * kFrames);
+  work.rows.resize(detail::rows_size(rig) * kFrames);
   work.frame_weights.resize(std::size_t{rig.control_count} * kFrames);
   work.union_bits.resize((std::size_t{rig.control_count} + 63) / 64);
   return work;

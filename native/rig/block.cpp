@@ -142,17 +142,18 @@ Result<Rig> make_rig(const RigData& data, const simd::Kernels& kernels) {
     size = aligned(size + array.size() * sizeof(array[0]));
   });
   h.size = size;
-  auto block = std::make_shared<core::AlignedVector<std::uint8_t>>(size);
+  const std::shared_ptr<std::uint8_t> block = core::allocate_pages(size);
+  if (block == nullptr) return fail(ErrorCode::kLimitExceeded, "rig", "no memory");
+  const std::span<std::uint8_t> bytes(block.get(), size);
   i = 0;
   for_each_array(data, [&](const auto& array) {
-    const std::size_t bytes = array.size() * sizeof(array[0]);
-    if (bytes > 0) std::memcpy(block->data() + h.places[i].offset, array.data(), bytes);
+    const std::size_t length = array.size() * sizeof(array[0]);
+    if (length > 0) std::memcpy(bytes.data() + h.places[i].offset, array.data(), length);
     ++i;
   });
-  std::memcpy(block->data(), &h, sizeof(h));
-  seal_block(*block);
-  const std::span<const std::uint8_t> bytes(*block);
-  return open_rig(bytes, std::move(block), BlockCheck::kHeader, kernels);
+  std::memcpy(bytes.data(), &h, sizeof(h));
+  seal_block(bytes);
+  return open_rig(bytes, block, BlockCheck::kHeader, kernels);
 }
 
 }  // namespace risorius::rig

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Every index of a block of bytes against what it counts in.
 #include <algorithm>
+#include <bit>
 
 #include "rig/rig.h"
 #include "rig/stages.h"
@@ -75,9 +76,10 @@ void check_sizes(const Rig& r, IndexCheck& c) {
 void check_correctives(const Rig& r, IndexCheck& c) {
   c.below("psd_factors", r.psd_factors, r.control_count);
   c.begins("watch_begins", r.watch_begins, r.watched.size());
-  c.below("watched", r.watched, r.psds.size());
+  c.below("watched", r.watched, r.psds.size(), [](const Watch& w) { return w.psd; });
+  c.below("watched", r.watched, r.control_count, [](const Watch& w) { return w.other; });
   if (!c.status()) return;
-  for (const std::uint16_t p : r.watched) c.demand("watched", r.psds[p].output >= r.raw_count);
+  for (const Watch& w : r.watched) c.demand("watched", r.psds[w.psd].output >= r.raw_count);
   std::uint32_t next = 0;  // ascending, so that no more are active than there are controls
   for (const Psd& p : r.psds) {
     c.demand("psds", p.output >= next);
@@ -101,20 +103,36 @@ void check_groups(const Rig& r, IndexCheck& c) {
     c.demand("joint_columns", end <= values);
   }
   std::uint64_t lists = 0;
-  std::uint32_t tallest = 0;
   for (std::size_t i = 0; i < columns.size(); ++i) {
     const JointGroup& g = r.joint_groups[i];
     c.demand("joint_groups",
              g.columns_begin == lists && columns[i] == g.column_count &&
-                 g.row_count <= r.tallest_group &&
-                 std::uint64_t{g.outputs_begin} + g.row_count <= r.joint_outputs.size());
+                 std::uint64_t{g.rows_begin} + g.row_count <= r.joint_outputs.size());
     lists += g.column_count;
-    tallest = std::max(tallest, g.row_count);
     for (std::uint32_t l = 0; l < r.lod_count; ++l) {
       c.demand("joint_group_lods", r.joint_group_lods[i * r.lod_count + l] <= g.row_count);
     }
   }
-  c.demand("header", lists == r.list_count && tallest == r.tallest_group);
+  c.demand("header", lists == r.list_count);
+}
+
+void check_pieces(const Rig& r, IndexCheck& c) {
+  const std::uint64_t places = std::uint64_t{r.joint_count} * r.joint_stride;
+  const std::uint64_t blocks = (places + simd::kPlaces - 1) / simd::kPlaces;
+  const std::uint32_t last = places % simd::kPlaces == 0 ? 0xFFFFu : (1u << (places % 16)) - 1u;
+  c.demand("joint_pieces", r.joint_pieces.size() == blocks * r.lod_count);
+  c.demand("extra_begins", r.extra_begins.size() == r.lod_count + std::size_t{1});
+  c.begins("extra_begins", r.extra_begins, r.extra_pieces.size());
+  for (const auto& [where, pieces] :
+       {std::pair{"joint_pieces", r.joint_pieces}, std::pair{"extra_pieces", r.extra_pieces}}) {
+    for (const simd::Piece& p : pieces) {
+      const auto taken = static_cast<std::uint64_t>(std::popcount(p.mask));
+      c.demand(where, p.from + taken <= r.joint_outputs.size());
+    }
+  }
+  for (const simd::Piece& p : r.extra_pieces) {
+    c.demand("extra_pieces", p.block < blocks && (p.block + 1u < blocks || (p.mask & ~last) == 0));
+  }
 }
 
 bool inside(std::uint64_t begin, std::uint64_t count, std::size_t size) {
@@ -273,6 +291,7 @@ Status detail::check_everything(const Rig& r) {
   if (Status sizes = c.status(); !sizes) return sizes;
   check_correctives(r, c);
   check_groups(r, c);
+  check_pieces(r, c);
   check_steps(r, c);
   check_quaternions(r, c);
   check_solvers(r, c);

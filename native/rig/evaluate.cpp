@@ -53,8 +53,9 @@ class Correctives {
         rig_.watch_begins.data() + std::size_t{lod} * (rig_.control_count + 1);
     for (const std::uint16_t control : active) {
       for (std::uint32_t i = begins[control]; i < begins[control + 1]; ++i) {
-        const std::uint32_t p = rig_.watched[i];
-        set(p, corrective(rig_, rig_.psds[p], controls_));
+        const Watch watch = rig_.watched[i];
+        if (controls_[watch.other] <= 0.0f) continue;  // clamped, this factor is 0
+        set(watch.psd, corrective(rig_, rig_.psds[watch.psd], controls_));
       }
     }
   }
@@ -81,43 +82,61 @@ class Correctives {
   float* controls_;
 };
 
+constexpr std::size_t kAhead = 2;
+
 // The columns of each group that are not at rest. By ascending control, so that sums have one
 // order.
 void list_columns(const Rig& rig, Workspace& work, const float* controls) noexcept {
-  std::fill(work.column_counts.begin(), work.column_counts.end(), 0u);
+  for (std::size_t i = 0; i < rig.joint_groups.size(); ++i) {
+    work.column_ends[i] = rig.joint_groups[i].columns_begin;
+  }
   for (std::size_t a = 0; a < work.active_count; ++a) {
     const std::uint16_t control = work.active[a];
     const float v = controls[control];
     for (std::uint32_t i = rig.joint_column_begins[control];
          i < rig.joint_column_begins[control + 1]; ++i) {
       const JointColumn column = rig.joint_columns[i];
-      const std::uint32_t at =
-          rig.joint_groups[column.group].columns_begin + work.column_counts[column.group]++;
-      work.column_offsets[at] = column.offset;
-      work.column_weights[at] = v;
+      work.columns[work.column_ends[column.group]++] = {column.offset, v};
     }
   }
 }
 
+// Asks for the columns of a group while the group before is summed: they lie all over the matrices,
+// where the hardware does not see them coming.
+void prefetch_columns(const Rig& rig, std::uint32_t lod, const Workspace& work,
+                      std::size_t i) noexcept {
+  if (i >= rig.joint_groups.size()) return;
+  const JointGroup& g = rig.joint_groups[i];
+  const std::size_t size = rig.is_half() ? 2 : 4;
+  const std::size_t bytes = rig.joint_group_lods[i * rig.lod_count + lod] * size;
+  const auto* values = rig.is_half() ? reinterpret_cast<const char*>(rig.joint_halves.data())
+                                     : reinterpret_cast<const char*>(rig.joint_values.data());
+  for (std::uint32_t c = g.columns_begin; c < work.column_ends[i]; ++c) {
+    const char* column = values + work.columns[c].offset * size;
+    for (std::size_t at = 0; at < bytes; at += 64) simd::prefetch(column + at);
+  }
+}
+
 void joints(const Rig& rig, std::uint32_t lod, Workspace& work, const PoseView& pose) noexcept {
-  std::fill(pose.joints, pose.joints + std::size_t{rig.joint_count} * rig.joint_stride, 0.0f);
   list_columns(rig, work, pose.controls);
+  for (std::size_t i = 0; i < kAhead; ++i) prefetch_columns(rig, lod, work, i);
   for (std::size_t i = 0; i < rig.joint_groups.size(); ++i) {
+    prefetch_columns(rig, lod, work, i + kAhead);
     const JointGroup& g = rig.joint_groups[i];
     const std::uint32_t rows = rig.joint_group_lods[i * rig.lod_count + lod];
-    const std::uint32_t count = work.column_counts[i];
-    if (rows == 0 || (count == 0 && g.writes_always == 0)) continue;
-    const std::uint32_t* offsets = work.column_offsets.data() + g.columns_begin;
-    const float* weights = work.column_weights.data() + g.columns_begin;
-    if (rig.is_half()) {
-      rig.kernels->half_columns(rig.joint_halves.data(), offsets, weights, count, work.rows.data(),
-                                rows);
+    if (rows == 0) continue;
+    const simd::Column* columns = work.columns.data() + g.columns_begin;
+    const std::uint32_t count = work.column_ends[i] - g.columns_begin;
+    float* out = work.rows.data() + g.rows_begin;
+    if (count == 0) {
+      std::fill(out, out + rows, 0.0f);
+    } else if (rig.is_half()) {
+      rig.kernels->half_columns(rig.joint_halves.data(), columns, count, out, rows);
     } else {
-      rig.kernels->columns(rig.joint_values.data(), offsets, weights, count, work.rows.data(),
-                           rows);
+      rig.kernels->columns(rig.joint_values.data(), columns, count, out, rows);
     }
-    detail::scatter(rig, g, rows, work.rows.data(), pose.joints);
   }
+  detail::place_rows(rig, lod, work.rows.data(), pose.joints);
 }
 
 // Controls that are not at rest, without the correctives.
@@ -210,6 +229,28 @@ void begin(const Rig& rig, const float* raw, std::uint32_t lod, bool settle, Wor
   }
 }
 
+// Extra pieces add to places that the first ones left at 0.
+void place_rows(const Rig& rig, std::uint32_t lod, const float* rows, float* joints) noexcept {
+  const std::size_t places = std::size_t{rig.joint_count} * rig.joint_stride,
+                    whole = places / simd::kPlaces;
+  const std::size_t blocks = (places + simd::kPlaces - 1) / simd::kPlaces;
+  const simd::Piece* pieces = rig.joint_pieces.data() + lod * blocks;
+  rig.kernels->place(pieces, whole, rows, joints);
+  if (whole < blocks) {
+    float last[simd::kPlaces];
+    rig.kernels->place(pieces + whole, 1, rows, last);
+    std::copy(last, last + places % simd::kPlaces, joints + whole * simd::kPlaces);
+  }
+  for (std::uint32_t i = rig.extra_begins[lod]; i < rig.extra_begins[lod + 1]; ++i) {
+    const simd::Piece& piece = rig.extra_pieces[i];
+    const float* next = rows + piece.from;
+    float* to = joints + std::size_t{piece.block} * simd::kPlaces;
+    for (std::uint32_t bits = piece.mask; bits != 0; bits &= bits - 1) {
+      to[std::countr_zero(bits)] = *next++;
+    }
+  }
+}
+
 void channels_and_maps(const Rig& rig, std::uint32_t lod, const PoseView& pose) noexcept {
   std::fill(pose.blend_shapes, pose.blend_shapes + rig.blend_shape_count, 0.0f);
   const std::uint32_t shapes = rig.shape_lods.empty() ? 0 : rig.shape_lods[lod];
@@ -242,10 +283,9 @@ Workspace make_workspace(const Rig& rig) {
   Workspace work;
   work.active.resize(std::size_t{rig.control_count} + 1);  // one is written past the last
   work.psd_bits.resize((rig.psds.size() + 63) / 64);
-  work.column_counts.resize(rig.joint_groups.size());
-  work.column_offsets.resize(rig.list_count);
-  work.column_weights.resize(rig.list_count);
-  work.rows.resize(simd::rounded_up(rig.tallest_group));
+  work.column_ends.resize(rig.joint_groups.size());
+  work.columns.resize(rig.list_count);
+  work.rows.resize(detail::rows_size(rig));
   work.last_controls.resize(rig.control_count);
   work.products.resize(rig.quaternion_joints.size());
   work.quaternion_bits.resize((rig.quaternion_columns.size() + 63) / 64);
@@ -253,8 +293,7 @@ Workspace make_workspace(const Rig& rig) {
   work.masks.assign(rig.mask_count, 1.0f);
   work.operation_values.resize(rig.operation_values);
   for (auto& layer : work.layers) layer.resize(simd::rounded_up(rig.widest_layer));
-  work.layer_offsets.resize(std::size_t{rig.widest_layer} + 1);
-  work.layer_weights.resize(std::size_t{rig.widest_layer} + 1);
+  work.layer_columns.resize(std::size_t{rig.widest_layer} + 1);
   return work;
 }
 

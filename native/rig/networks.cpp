@@ -38,15 +38,13 @@ void run_layer(const Rig& rig, const MlLayer& layer, std::uint32_t rows, const f
                std::uint32_t inputs, Workspace& work, float* out) noexcept {
   std::size_t n = 0;
   const auto add = [&](std::uint32_t column, float weight) {
-    work.layer_offsets[n] = layer.weights_begin + column * layer.rows;
-    work.layer_weights[n++] = weight;
+    work.layer_columns[n++] = {layer.weights_begin + column * layer.rows, weight};
   };
   add(0, 1.0f);
   for (std::uint32_t i = 0; i < std::min(inputs, layer.columns); ++i) {
     if (in[i] != 0.0f) add(i + 1, in[i]);
   }
-  rig.kernels->columns(rig.ml_weights.data(), work.layer_offsets.data(), work.layer_weights.data(),
-                       n, out, rows);
+  rig.kernels->columns(rig.ml_weights.data(), work.layer_columns.data(), n, out, rows);
   activate(layer, out, rows);
 }
 

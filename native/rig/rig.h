@@ -88,21 +88,22 @@ inline PoseView view(Pose& pose) {
 struct Workspace {
   std::vector<std::uint16_t> active;  // controls that are not 0, ascending
   std::size_t active_count = 0;
-  std::vector<std::uint64_t> psd_bits;        // correctives that are not 0
-  std::vector<std::uint32_t> column_counts;   // [groups]: how many of the two below are filled
-  std::vector<std::uint32_t> column_offsets;  // by group, at its columns_begin
-  std::vector<float> column_weights;          // [.., 1 or kFrames]
-  core::AlignedVector<float> rows;            // [1 or kFrames, tallest group]
+  std::vector<std::uint64_t> psd_bits;     // correctives that are not 0
+  std::vector<std::uint32_t> column_ends;  // [groups]: where the next active column goes
+  std::vector<simd::Column> columns;       // by group, at its columns_begin
+  core::AlignedVector<float> rows;         // of all groups
   std::vector<float> last_controls;
   std::vector<Quaternion> products;            // [quaternion joints]
   std::vector<std::uint64_t> quaternion_bits;  // columns that are not at rest; 0 between calls
   std::vector<double> solver;                  // a solver's inputs, then two rows of its poses
   std::vector<float> masks;                    // [regions]; 0: its networks rest
   core::AlignedVector<float> operation_values, layers[2];
-  std::vector<std::uint32_t> layer_offsets;
-  std::vector<float> layer_weights;
-  std::vector<float> frame_weights;       // [controls, kFrames]: a batch's; 0 between calls
-  std::vector<std::uint64_t> union_bits;  // controls that any of its frames uses; 0 as well
+  std::vector<simd::Column> layer_columns;
+  // Of a batch: [kFrames] of each.
+  std::vector<std::uint64_t> union_bits;      // controls that any frame uses; 0 between calls
+  std::vector<float> frame_weights;           // [controls, kFrames]; 0 between calls
+  std::vector<std::uint32_t> column_offsets;  // as columns
+  std::vector<float> column_weights;          // [.., kFrames]
 };
 
 Pose make_pose(const Rig& rig);

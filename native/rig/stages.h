@@ -51,11 +51,11 @@ inline void store_rotation(const Rig& rig, const Quaternion& q, float* to) noexc
   for (std::size_t a = 0; a < 3; ++a) to[a] = angles[a];
 }
 
-/// Rows of a group to their places.
-inline void scatter(const Rig& rig, const JointGroup& g, std::uint32_t rows, const float* from,
-                    float* joints) noexcept {
-  const std::uint16_t* outputs = rig.joint_outputs.data() + g.outputs_begin;
-  for (std::uint32_t r = 0; r < rows; ++r) joints[outputs[r]] = from[r];
+/// The rows of all groups to the joint attributes, every one of which is written.
+void place_rows(const Rig& rig, std::uint32_t lod, const float* rows, float* joints) noexcept;
+/// Scratch for the rows of all groups: kernels write and read up to a vector too far.
+inline std::size_t rows_size(const Rig& rig) {
+  return simd::rounded_up(rig.joint_outputs.size()) + simd::kWidest;
 }
 
 }  // namespace risorius::rig::detail

@@ -5,6 +5,10 @@
 #include <cstddef>
 #include <cstdint>
 
+#if defined(_MSC_VER) && !defined(__clang__)
+#include <intrin.h>
+#endif
+
 namespace risorius::simd {
 
 /// The widest vector. Results are rounded up to it, and a matrix needs as many readable values
@@ -17,26 +21,56 @@ inline constexpr std::size_t rounded_up(std::size_t rows) {
 /// Frames that a batch kernel takes at once.
 inline constexpr std::size_t kFrames = 8;
 
+/// Asks for a cache line that will be read soon.
+inline void prefetch(const void* address) {
+#if defined(_MSC_VER) && !defined(__clang__)
+#if defined(_M_X64)
+  _mm_prefetch(static_cast<const char*>(address), _MM_HINT_T0);
+#elif defined(_M_ARM64)
+  __prefetch(address);
+#endif
+#else
+  __builtin_prefetch(address);
+#endif
+}
+
+/// A column of a matrix and what it is multiplied by.
+struct Column {
+  std::uint32_t offset = 0;  // of its first value
+  float weight = 0;
+};
+
+/// Sixteen places: those whose bit is set take the values from `from` on, one after the other.
+struct Piece {
+  std::uint32_t from = 0;
+  std::uint16_t mask = 0;
+  std::uint16_t block = 0;  // of the places; of an extra piece only
+};
+inline constexpr std::size_t kPlaces = 16;
+
 /// All sums are taken in the order of the columns, so that a frame of a batch has the bits of the
 /// frame alone.
 struct Kernels {
   const char* name;
 
-  /// out[r] = sum over i of weights[i] * values[offsets[i] + r].
-  /// In:   values   of all matrices; column i is values[offsets[i]] and up
-  ///       n        columns; weights their control values
+  /// out[r] = sum over i of columns[i].weight * values[columns[i].offset + r].
+  /// In:   values   of all matrices
+  ///       n        columns
   /// Out:  out      float32[rounded_up(rows)], overwritten; beyond rows anything
-  void (*columns)(const float* values, const std::uint32_t* offsets, const float* weights,
-                  std::size_t n, float* out, std::size_t rows);
+  void (*columns)(const float* values, const Column* columns, std::size_t n, float* out,
+                  std::size_t rows);
   /// The same from IEEE half floats, none of them infinite.
-  void (*half_columns)(const std::uint16_t* values, const std::uint32_t* offsets,
-                       const float* weights, std::size_t n, float* out, std::size_t rows);
+  void (*half_columns)(const std::uint16_t* values, const Column* columns, std::size_t n,
+                       float* out, std::size_t rows);
   /// The same for kFrames frames: weights float32[n, kFrames], frame f at out + f * stride.
   void (*batch_columns)(const float* values, const std::uint32_t* offsets, const float* weights,
                         std::size_t n, float* out, std::size_t stride, std::size_t rows);
   void (*batch_half_columns)(const std::uint16_t* values, const std::uint32_t* offsets,
                              const float* weights, std::size_t n, float* out, std::size_t stride,
                              std::size_t rows);
+  /// Fills n blocks of kPlaces with their pieces, other places with 0.
+  /// In: from  kPlaces values may be read from any piece's first on
+  void (*place)(const Piece* pieces, std::size_t n, const float* from, float* to);
 };
 
 /// No fused operations and a fixed order of sums: the same bits on every machine.

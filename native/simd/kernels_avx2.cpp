@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: MIT
+#include <array>
+#include <bit>
+
 #include "simd/cpu.h"
 #include "simd/kernels.h"
 
@@ -16,6 +19,18 @@ namespace risorius::simd {
 
 namespace {
 
+// For each mask of eight places: which of the values in sequence each takes.
+constexpr auto kExpandOrders = [] {
+  std::array<std::array<std::uint8_t, 8>, 256> orders{};
+  for (std::size_t mask = 0; mask < 256; ++mask) {
+    std::uint8_t next = 0;
+    for (std::size_t p = 0; p < 8; ++p) {
+      if (((mask >> p) & 1u) != 0) orders[mask][p] = next++;
+    }
+  }
+  return orders;
+}();
+
 struct V {
   using Reg = __m256;
   static constexpr std::size_t kLanes = 8, kBlocks = 12, kBatchBlocks = 3;
@@ -28,6 +43,19 @@ struct V {
   }
   RISORIUS_INLINE static void store(float* p, Reg v) { _mm256_storeu_ps(p, v); }
   RISORIUS_INLINE static Reg madd(Reg a, Reg b, Reg sum) { return _mm256_fmadd_ps(a, b, sum); }
+  RISORIUS_INLINE static void expand_8(const float* from, std::uint32_t mask, float* to) {
+    const __m128i order =
+        _mm_loadl_epi64(reinterpret_cast<const __m128i*>(kExpandOrders[mask].data()));
+    const __m256i bits = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+    const __m256i taken =
+        _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(static_cast<int>(mask)), bits), bits);
+    const __m256 values = _mm256_permutevar8x32_ps(load(from), _mm256_cvtepu8_epi32(order));
+    store(to, _mm256_and_ps(values, _mm256_castsi256_ps(taken)));
+  }
+  RISORIUS_INLINE static void expand(const float* from, std::uint32_t mask, float* to) {
+    expand_8(from, mask & 0xFFu, to);
+    expand_8(from + std::popcount(mask & 0xFFu), mask >> 8, to + 8);
+  }
 };
 
 }  // namespace

@@ -3,7 +3,8 @@
 // RISORIUS_TARGET (the functions' target attribute: a file compiled with -mavx2 could give the
 // linker an inline standard function that older CPUs cannot run) and V with
 //   Reg, kLanes, zero(), set(float), load(const float*), load(const uint16_t*), store(float*, Reg),
-//   madd(a, b, sum), and kBlocks, kBatchBlocks: registers of rows at once; kBatchFrames.
+//   madd(a, b, sum), expand(from, mask, to) (kernels.h, place), and kBlocks, kBatchBlocks:
+//   registers of rows at once; kBatchFrames.
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -17,13 +18,12 @@ namespace {
 
 // kCount registers of rows of one frame.
 template <int kCount, class T>
-RISORIUS_TARGET void block(const T* values, const std::uint32_t* offsets, const float* weights,
-                           std::size_t n, float* out) {
+RISORIUS_TARGET void block(const T* values, const Column* columns, std::size_t n, float* out) {
   V::Reg sums[kCount];
   for (int b = 0; b < kCount; ++b) sums[b] = V::zero();
   for (std::size_t i = 0; i < n; ++i) {
-    const T* column = values + offsets[i];
-    const V::Reg weight = V::set(weights[i]);
+    const T* column = values + columns[i].offset;
+    const V::Reg weight = V::set(columns[i].weight);
     for (int b = 0; b < kCount; ++b) {
       sums[b] = V::madd(weight, V::load(column + b * V::kLanes), sums[b]);
     }
@@ -77,12 +77,11 @@ void for_blocks(std::size_t rows, std::size_t most, F f) {
 }
 
 template <class T>
-void columns(const T* values, const std::uint32_t* offsets, const float* weights, std::size_t n,
-             float* out, std::size_t rows) {
+void columns(const T* values, const Column* list, std::size_t n, float* out, std::size_t rows) {
   static constexpr auto kTable =
       block_table<T>(std::make_integer_sequence<int, static_cast<int>(V::kBlocks)>{});
   for_blocks(rows, V::kBlocks, [&](std::size_t at, std::size_t count) {
-    kTable[count - 1](values + at * V::kLanes, offsets, weights, n, out + at * V::kLanes);
+    kTable[count - 1](values + at * V::kLanes, list, n, out + at * V::kLanes);
   });
 }
 
@@ -99,9 +98,19 @@ void batch_columns(const T* values, const std::uint32_t* offsets, const float* w
   }
 }
 
+RISORIUS_TARGET void place(const Piece* pieces, std::size_t n, const float* from, float* to) {
+  for (std::size_t i = 0; i < n; ++i) {
+    V::expand(from + pieces[i].from, pieces[i].mask, to + i * kPlaces);
+  }
+}
+
 constexpr Kernels make_kernels(const char* name) {
-  return {name, columns<float>, columns<std::uint16_t>, batch_columns<float>,
-          batch_columns<std::uint16_t>};
+  return {name,
+          columns<float>,
+          columns<std::uint16_t>,
+          batch_columns<float>,
+          batch_columns<std::uint16_t>,
+          place};
 }
 
 }  // namespace

@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: MIT
+#include <array>
+#include <bit>
+
 #include "simd/kernels.h"
 
 #if defined(__aarch64__) || defined(_M_ARM64)
@@ -10,6 +13,22 @@
 namespace risorius::simd {
 
 namespace {
+
+// For each mask of four places the bytes that each takes; of none, 0.
+constexpr auto kExpandBytes = [] {
+  std::array<std::array<std::uint8_t, 16>, 16> orders{};
+  for (std::size_t mask = 0; mask < 16; ++mask) {
+    std::uint8_t next = 0;
+    for (std::size_t p = 0; p < 4; ++p) {
+      const bool taken = ((mask >> p) & 1u) != 0;
+      for (std::size_t b = 0; b < 4; ++b) {
+        orders[mask][4 * p + b] = taken ? static_cast<std::uint8_t>(next + b) : std::uint8_t{0x80};
+      }
+      if (taken) next = static_cast<std::uint8_t>(next + 4);
+    }
+  }
+  return orders;
+}();
 
 struct V {
   using Reg = float32x4_t;
@@ -23,6 +42,13 @@ struct V {
   }
   RISORIUS_INLINE static void store(float* p, Reg v) { vst1q_f32(p, v); }
   RISORIUS_INLINE static Reg madd(Reg a, Reg b, Reg sum) { return vfmaq_f32(sum, a, b); }
+  RISORIUS_INLINE static void expand(const float* from, std::uint32_t mask, float* to) {
+    for (int q = 0; q < 4; ++q, mask >>= 4) {
+      const uint8x16_t order = vld1q_u8(kExpandBytes[mask & 15u].data());
+      store(to + 4 * q, vreinterpretq_f32_u8(vqtbl1q_u8(vreinterpretq_u8_f32(load(from)), order)));
+      from += std::popcount(mask & 15u);
+    }
+  }
 };
 
 }  // namespace

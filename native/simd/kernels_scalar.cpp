@@ -10,12 +10,11 @@ float widened(float v) { return v; }
 float widened(std::uint16_t v) { return from_half(v); }
 
 template <class T>
-void columns(const T* values, const std::uint32_t* offsets, const float* weights, std::size_t n,
-             float* out, std::size_t rows) {
+void columns(const T* values, const Column* list, std::size_t n, float* out, std::size_t rows) {
   for (std::size_t r = 0; r < rows; ++r) out[r] = 0.0f;
   for (std::size_t i = 0; i < n; ++i) {
-    const T* column = values + offsets[i];
-    for (std::size_t r = 0; r < rows; ++r) out[r] += weights[i] * widened(column[r]);
+    const T* column = values + list[i].offset;
+    for (std::size_t r = 0; r < rows; ++r) out[r] += list[i].weight * widened(column[r]);
   }
 }
 
@@ -33,11 +32,26 @@ void batch_columns(const T* values, const std::uint32_t* offsets, const float* w
   }
 }
 
+void place(const Piece* pieces, std::size_t n, const float* from, float* to) {
+  for (std::size_t i = 0; i < n; ++i, to += kPlaces) {
+    const float* next = from + pieces[i].from;
+    for (std::size_t p = 0; p < kPlaces; ++p) {
+      const bool taken = ((pieces[i].mask >> p) & 1u) != 0;
+      to[p] = taken ? *next : 0.0f;
+      next += taken ? 1 : 0;
+    }
+  }
+}
+
 }  // namespace
 
 const Kernels& scalar_kernels() {
-  static constexpr Kernels kernels{"scalar", columns<float>, columns<std::uint16_t>,
-                                   batch_columns<float>, batch_columns<std::uint16_t>};
+  static constexpr Kernels kernels{"scalar",
+                                   columns<float>,
+                                   columns<std::uint16_t>,
+                                   batch_columns<float>,
+                                   batch_columns<std::uint16_t>,
+                                   place};
   return kernels;
 }
 

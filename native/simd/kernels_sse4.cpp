@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: MIT
+#include <array>
+#include <bit>
+
 #include "simd/cpu.h"
 #include "simd/kernels.h"
 
@@ -15,6 +18,22 @@
 namespace risorius::simd {
 
 namespace {
+
+// For each mask of four places the bytes that each takes; of none, 0.
+constexpr auto kExpandBytes = [] {
+  std::array<std::array<std::uint8_t, 16>, 16> orders{};
+  for (std::size_t mask = 0; mask < 16; ++mask) {
+    std::uint8_t next = 0;
+    for (std::size_t p = 0; p < 4; ++p) {
+      const bool taken = ((mask >> p) & 1u) != 0;
+      for (std::size_t b = 0; b < 4; ++b) {
+        orders[mask][4 * p + b] = taken ? static_cast<std::uint8_t>(next + b) : std::uint8_t{0x80};
+      }
+      if (taken) next = static_cast<std::uint8_t>(next + 4);
+    }
+  }
+  return orders;
+}();
 
 // Products and sums are rounded one by one, as in the scalar path.
 struct V {
@@ -34,6 +53,14 @@ struct V {
   RISORIUS_INLINE static void store(float* p, Reg v) { _mm_storeu_ps(p, v); }
   RISORIUS_INLINE static Reg madd(Reg a, Reg b, Reg sum) {
     return _mm_add_ps(sum, _mm_mul_ps(a, b));
+  }
+  RISORIUS_INLINE static void expand(const float* from, std::uint32_t mask, float* to) {
+    for (int q = 0; q < 4; ++q, mask >>= 4) {
+      const __m128i order =
+          _mm_loadu_si128(reinterpret_cast<const __m128i*>(kExpandBytes[mask & 15u].data()));
+      store(to + 4 * q, _mm_castsi128_ps(_mm_shuffle_epi8(_mm_castps_si128(load(from)), order)));
+      from += std::popcount(mask & 15u);
+    }
   }
 };
 

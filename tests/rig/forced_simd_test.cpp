@@ -16,8 +16,7 @@ dna::Dna one_group() {
 
 int calls = 0;
 
-void spy(const float*, const std::uint32_t*, const float*, std::size_t, float* out,
-         std::size_t rows) {
+void spy(const float*, const simd::Column*, std::size_t, float* out, std::size_t rows) {
   ++calls;
   for (std::size_t r = 0; r < rows; ++r) out[r] = 42.0f;
 }

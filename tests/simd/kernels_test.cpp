@@ -53,6 +53,13 @@ std::vector<std::uint32_t> every_second(std::size_t n, std::size_t rows) {
   return offsets;
 }
 
+std::vector<Column> columns_of(const std::vector<std::uint32_t>& offsets, const float* weights,
+                               std::size_t n, std::size_t step = 1) {
+  std::vector<Column> columns;
+  for (std::size_t i = 0; i < n; ++i) columns.push_back({offsets[i], weights[i * step]});
+  return columns;
+}
+
 std::vector<std::string> all_kernels() {
   std::vector<std::string> all;
   for (const Kernels* k :
@@ -100,10 +107,11 @@ TEST_P(SimdKernels, SumWithinTheRoundingOfItsTerms) {
       const std::vector<float> weights = random_weights(n, random);
       const std::vector<std::uint32_t> offsets = every_second(n, rows);
       std::vector<float> out(rounded_up(rows), 1e30f);
-      kernels_.columns(m.values.data(), offsets.data(), weights.data(), n, out.data(), rows);
+      kernels_.columns(m.values.data(), columns_of(offsets, weights.data(), n).data(), n,
+                       out.data(), rows);
       expect_sums(m, offsets, weights.data(), 1, n, out.data());
-      kernels_.half_columns(half.values.data(), offsets.data(), weights.data(), n, out.data(),
-                            rows);
+      kernels_.half_columns(half.values.data(), columns_of(offsets, weights.data(), n).data(), n,
+                            out.data(), rows);
       expect_sums(half, offsets, weights.data(), 1, n, out.data());
     }
   }
@@ -117,7 +125,7 @@ TEST_P(SimdKernels, AFrameOfABatchHasTheBitsOfTheFrameAlone) {
     const Matrix<std::uint16_t> half = halves(m);
     const std::vector<float> weights = random_weights(n * kFrames, random);
     const std::vector<std::uint32_t> offsets = every_second(n, rows);
-    std::vector<float> batch(stride * kFrames), alone(stride), one(n);
+    std::vector<float> batch(stride * kFrames), alone(stride);
     for (const bool is_half : {false, true}) {
       if (is_half) {
         kernels_.batch_half_columns(half.values.data(), offsets.data(), weights.data(), n,
@@ -127,12 +135,11 @@ TEST_P(SimdKernels, AFrameOfABatchHasTheBitsOfTheFrameAlone) {
                                stride, rows);
       }
       for (std::size_t f = 0; f < kFrames; ++f) {
-        for (std::size_t i = 0; i < n; ++i) one[i] = weights[i * kFrames + f];
+        const std::vector<Column> one = columns_of(offsets, weights.data() + f, n, kFrames);
         if (is_half) {
-          kernels_.half_columns(half.values.data(), offsets.data(), one.data(), n, alone.data(),
-                                rows);
+          kernels_.half_columns(half.values.data(), one.data(), n, alone.data(), rows);
         } else {
-          kernels_.columns(m.values.data(), offsets.data(), one.data(), n, alone.data(), rows);
+          kernels_.columns(m.values.data(), one.data(), n, alone.data(), rows);
         }
         for (std::size_t r = 0; r < rows; ++r) {
           ASSERT_EQ(std::bit_cast<std::uint32_t>(batch[f * stride + r]),
@@ -153,8 +160,30 @@ TEST_P(SimdKernels, ReadOnlyTheActiveColumns) {
   const std::vector<float> weights = random_weights(10, random);
   const std::vector<std::uint32_t> offsets = every_second(10, m.rows);
   std::vector<float> out(64);
-  kernels_.columns(m.values.data(), offsets.data(), weights.data(), 10, out.data(), 64);
+  kernels_.columns(m.values.data(), columns_of(offsets, weights.data(), 10).data(), 10, out.data(),
+                   64);
   for (const float v : out) ASSERT_FALSE(std::isnan(v));
+}
+
+TEST_P(SimdKernels, PlaceByTheBitsOfThePieces) {
+  std::mt19937 random(8);
+  std::vector<float> from(4000 + kPlaces);
+  for (std::size_t i = 0; i < from.size(); ++i) from[i] = static_cast<float>(i + 1);
+  std::vector<Piece> pieces{{0, 0, 0}, {7, 0xFFFF, 0}, {3, 1, 0}, {9, 0x8000, 0}};
+  for (int i = 0; i < 300; ++i) {
+    pieces.push_back(
+        {static_cast<std::uint32_t>(random() % 3984), static_cast<std::uint16_t>(random()), 0});
+  }
+  std::vector<float> to(pieces.size() * kPlaces + 1, 7.0f);
+  kernels_.place(pieces.data(), pieces.size(), from.data(), to.data());
+  for (std::size_t i = 0; i < pieces.size(); ++i) {
+    std::uint32_t next = pieces[i].from;
+    for (std::size_t p = 0; p < kPlaces; ++p) {
+      const bool taken = (pieces[i].mask >> p & 1) != 0;
+      ASSERT_EQ(to[i * kPlaces + p], taken ? from[next++] : 0.0f) << i << " place " << p;
+    }
+  }
+  EXPECT_EQ(to.back(), 7.0f);
 }
 
 TEST_P(SimdKernels, WriteNoFurtherThanTheWidestVector) {
@@ -164,7 +193,8 @@ TEST_P(SimdKernels, WriteNoFurtherThanTheWidestVector) {
     const std::vector<float> weights = random_weights(3, random);
     const std::vector<std::uint32_t> offsets = every_second(3, rows);
     std::vector<float> out(rounded_up(rows) + 64, 7.0f);
-    kernels_.columns(m.values.data(), offsets.data(), weights.data(), 3, out.data(), rows);
+    kernels_.columns(m.values.data(), columns_of(offsets, weights.data(), 3).data(), 3, out.data(),
+                     rows);
     for (std::size_t r = rounded_up(rows); r < out.size(); ++r) ASSERT_EQ(out[r], 7.0f) << rows;
   }
 }
@@ -182,10 +212,11 @@ void expect_bits(const Kernels& a, const Kernels& b) {
   for (const bool is_half : {false, true}) {
     for (const auto& [kernels, out] : {std::pair(&a, &first), std::pair(&b, &second)}) {
       if (is_half) {
-        kernels->half_columns(half.values.data(), offsets.data(), weights.data(), 100, out->data(),
-                              200);
+        kernels->half_columns(half.values.data(), columns_of(offsets, weights.data(), 100).data(),
+                              100, out->data(), 200);
       } else {
-        kernels->columns(m.values.data(), offsets.data(), weights.data(), 100, out->data(), 200);
+        kernels->columns(m.values.data(), columns_of(offsets, weights.data(), 100).data(), 100,
+                         out->data(), 200);
       }
     }
     for (std::size_t r = 0; r < 200; ++r) {

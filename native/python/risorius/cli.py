@@ -4,27 +4,32 @@
 from __future__ import annotations
 
 import argparse
+import io
 import sys
 from collections.abc import Sequence
 
 from . import DnaError, __version__
+from .commands import check, convert, info, plot, sample
 from .commands import eval as evaluate
-from .commands import info, plot, sample
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command. Args: the arguments, else those of the process. Returns: the exit code."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # names need not be text that a terminal can show
+            stream.reconfigure(errors="backslashreplace")
     parser = argparse.ArgumentParser(prog="risorius", description="Face rigs from DNA files.")
     parser.add_argument("--version", action="version", version=__version__)
     subparsers = parser.add_subparsers(dest="command", required=True)
-    for command in (info, evaluate, sample, plot):
+    for command in (info, check, convert, evaluate, sample, plot):
         command.add_parser(subparsers)
     args, rest = parser.parse_known_args(arguments)
     # argparse ends a list of operands at the first option: FILE --json NAME=1.
-    if any(text.startswith("-") for text in rest) or (rest and not hasattr(args, "controls")):
+    operands: list[str] | None = getattr(args, "controls", getattr(args, "files", None))
+    if any(text.startswith("-") for text in rest) or (rest and operands is None):
         parser.error(f"unrecognized arguments: {' '.join(rest)}")
-    if rest:
-        args.controls += rest
+    if operands is not None:
+        operands += rest
     try:
         return int(args.func(args))
     except DnaError as error:

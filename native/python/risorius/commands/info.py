@@ -1,20 +1,30 @@
 # SPDX-License-Identifier: MIT
-"""risorius info: what is inside a DNA file."""
+"""risorius info: what is inside a DNA file, and what differs between two."""
 
 from __future__ import annotations
 
 import argparse
 import json
+import sys
 from collections import Counter
 from pathlib import Path
 from typing import Any
 
 import risorius
 
+from . import diff
+
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    info = subparsers.add_parser("info", help="what is inside a DNA file")
-    info.add_argument("file", type=Path)
+    info = subparsers.add_parser(
+        "info",
+        help="what is inside a DNA file, or differs between two",
+        description="What is inside a file. With --diff, what differs between two (.dna or "
+        ".json), in words; the exit code is then that of diff: 0 the same, 1 different, 2 trouble.",
+    )
+    info.add_argument("file", type=Path, nargs="?")
+    info.add_argument("--diff", nargs=2, metavar=("A", "B"), help="what differs between two files")
+    info.add_argument("--all", action="store_true", help="with --diff: do not shorten lists")
     info.add_argument("--json", action="store_true", help="for a program")
     info.set_defaults(func=run)
 
@@ -133,6 +143,11 @@ def page(facts: dict[str, Any]) -> str:
 
 
 def run(args: argparse.Namespace) -> int:
+    if (args.file is None) == (args.diff is None) or (args.all and not args.diff):
+        print("risorius: info: either FILE or --diff A B [--all] was expected", file=sys.stderr)
+        return 2
+    if args.diff:
+        return diff.run(*args.diff, everything=args.all, as_json=args.json)
     facts = describe(risorius.load(args.file))
     print(json.dumps(facts, indent=2) if args.json else page(facts))
     return 0

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -93,7 +94,7 @@ def regrouped(dna: risorius.Dna, regions: Sequence[str]) -> tuple[Cells, list[Bl
     return _joined(parts, (top, width)), blocks
 
 
-def _joined(parts: Sequence[tuple[Ints, ...]], shape: tuple[int, int]) -> Cells:
+def _joined(parts: Sequence[tuple[npt.NDArray[Any], ...]], shape: tuple[int, int]) -> Cells:
     empty = np.zeros(0, np.int64)
     rows, columns, groups = (
         np.concatenate([empty, *(part[i] for part in parts)]).astype(np.int64) for i in range(3)

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: MIT
+#include "core/aligned.h"
+
+#include <cstring>
+
+#ifdef __linux__
+#include <sys/mman.h>
+#endif
+
+namespace risorius::core {
+
+std::shared_ptr<std::uint8_t> allocate_pages(std::size_t size) {
+  constexpr std::size_t kLarge = std::size_t{2} << 20;
+  const std::size_t alignment = size >= kLarge ? kLarge : 64;
+  void* memory = ::operator new(size, std::align_val_t(alignment), std::nothrow);
+  if (memory == nullptr) return nullptr;
+#if defined(__linux__) && defined(MADV_HUGEPAGE)
+  if (alignment == kLarge) madvise(memory, size, MADV_HUGEPAGE);  // a wish
+#endif
+  std::memset(memory, 0, size);
+  const auto release = [alignment](std::uint8_t* p) {
+    ::operator delete(p, std::align_val_t(alignment));
+  };
+  return std::shared_ptr<std::uint8_t>(static_cast<std::uint8_t*>(memory), release);
+}
+
+}  // namespace risorius::core

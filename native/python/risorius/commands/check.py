@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: MIT
+"""risorius check: everything that is wrong or odd in some files."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from typing import Any
+
+import risorius
+
+from .files import InputError, counted, from_json, summary
+
+_DESCRIPTION = """\
+Prints a line for everything that is wrong (an error: the file is refused) or odd (a warning) in
+each file, with its byte and its field, and one line about the file as a whole. A file whose name
+ends in .json is read as JSON. Exit code 1 if a file has an error."""
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = subparsers.add_parser(
+        "check", help="what is wrong or odd in files", description=_DESCRIPTION
+    )
+    parser.add_argument("files", nargs="+", metavar="FILE")
+    parser.add_argument("--json", action="store_true", help="for a program")
+    parser.add_argument("--strict", action="store_true", help="a warning fails like an error")
+    parser.set_defaults(func=run)
+
+
+def _error(name: str, error: Exception, code: str = "io_read") -> risorius.Finding:
+    """An error that ended the reading; its text without the file's name, which stands before."""
+    text = str(error).removeprefix(f"{name}: ")
+    where, offset = getattr(error, "where", ""), getattr(error, "offset", None)
+    text = text.removesuffix(f" (byte {offset})").removesuffix(f" [{where}]")
+    return risorius.Finding(True, getattr(error, "code", code), where, offset, text)
+
+
+def check_json(name: str) -> tuple[risorius.Dna | None, list[risorius.Finding]]:
+    """The Dna of a JSON file, if it is one, and what is wrong or odd in it."""
+    try:
+        dna = from_json(name)
+    except InputError as error:
+        cause = error.__cause__
+        return None, [_error(name, cause if isinstance(cause, risorius.DnaError) else error)]
+    found = []
+    for text in dna.validate():
+        where, _, message = text.partition(": ")
+        found.append(risorius.Finding(False, "invalid_value", where, None, message))
+    return dna, found
+
+
+def check_dna(name: str) -> tuple[risorius.Dna | None, list[risorius.Finding]]:
+    """The Dna's definition, if it can be read, and what is wrong or odd in the file."""
+    try:
+        found = risorius.check(name)
+        if any(finding.is_error for finding in found):
+            return None, found
+        return risorius.load(name, layers="definition"), found
+    except risorius.DnaError as error:
+        return None, [_error(name, error)]
+
+
+def examine(name: str, strict: bool) -> dict[str, Any]:
+    """Everything that the command prints of one file, as plain values."""
+    dna, found = (check_json if name.lower().endswith(".json") else check_dna)(name)
+    errors = sum(finding.is_error for finding in found)
+    return {
+        "file": name,
+        "ok": not (found if strict else errors),
+        "errors": errors,
+        "warnings": len(found) - errors,
+        "contents": None if dna is None else summary(dna),
+        "findings": [finding._asdict() for finding in found],
+    }
+
+
+def lines(facts: dict[str, Any]) -> list[str]:
+    """The facts about one file for a person, as a compiler prints them."""
+    out = []
+    for finding in facts["findings"]:
+        place = [facts["file"]]
+        if finding["offset"] is not None:
+            place.append(f"byte {finding['offset']}")
+        if finding["where"]:
+            place.append(finding["where"])
+        place.append("error" if finding["is_error"] else "warning")
+        out.append(": ".join([*place, finding["message"]]))
+    words = [facts["contents"]] if facts["contents"] else []
+    if facts["errors"]:
+        words.append(counted(facts["errors"], "error"))
+    if facts["warnings"]:
+        words.append(counted(facts["warnings"], "warning"))
+    out.append(f"{'ok' if facts['ok'] else 'bad'}: {facts['file']} ({', '.join(words)})")
+    return out
+
+
+def run(args: argparse.Namespace) -> int:
+    everything = []
+    for name in args.files:
+        facts = examine(name, args.strict)
+        everything.append(facts)
+        if not args.json:
+            print("\n".join(lines(facts)), flush=True)
+    bad = sum(not facts["ok"] for facts in everything)
+    if args.json:
+        print(json.dumps({"ok": bad == 0, "files": everything}, indent=2))
+    elif len(everything) > 1:
+        print(f"{counted(len(everything), 'file')}: {len(everything) - bad} ok, {bad} bad")
+    return 1 if bad else 0

@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: MIT
+"""What the commands that read .dna and .json alike have in common."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import risorius
+
+KINDS = ("dna", "json")
+
+
+class InputError(Exception):
+    """Input that cannot be used: one line that names the file and the place.
+
+    offset: byte offset, where it is known and no DnaError is the cause.
+    """
+
+    offset: int | None = None
+
+
+class CommandLineError(Exception):
+    """What was typed makes no sense."""
+
+
+def label(name: str, standard: str = "<stdin>") -> str:
+    """A file's name as messages show it."""
+    return standard if name == "-" else name
+
+
+def kind_of(name: str, asked: str | None, option: str) -> str:
+    """ "dna" or "json": as asked, else by the suffix.
+
+    Raises:
+        CommandLineError: neither says it.
+    """
+    suffix = Path(name).suffix.lower().removeprefix(".")
+    if kind := asked or (suffix if suffix in KINDS else None):
+        return kind
+    raise CommandLineError(f"{name}: a name ending in .dna or .json was expected, or {option}")
+
+
+def read_bytes(name: str) -> bytes:
+    """A file's bytes, or those of the standard input for "-".
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    try:
+        return sys.stdin.buffer.read() if name == "-" else Path(name).read_bytes()
+    except OSError as error:
+        raise InputError(f"{label(name)}: cannot read it: {error.strerror}") from error
+
+
+def from_json(name: str) -> risorius.Dna:
+    """A Dna from a file of JSON.
+
+    Raises:
+        InputError: not UTF-8, not JSON, not a Dna; with the place.
+    """
+    try:
+        return risorius.Dna.from_json(read_bytes(name).decode())
+    except UnicodeDecodeError as error:
+        found = error.object[error.start]
+        bad = InputError(f"{label(name)}: not JSON: {found:#04x} is not UTF-8 (byte {error.start})")
+        bad.offset = error.start
+        raise bad from error
+    except risorius.DnaError as error:
+        raise InputError(f"{label(name)}: {error}") from error
+
+
+def read(name: str, kind: str) -> risorius.Dna:
+    """A whole Dna from a file of that kind, or from the standard input for "-".
+
+    Raises:
+        InputError: it cannot be used.
+    """
+    if kind == "json":
+        return from_json(name)
+    try:
+        return risorius.load(read_bytes(name) if name == "-" else name)
+    except risorius.DnaError as error:
+        # load(path) has named the file already.
+        raise InputError(f"{label(name)}: {error}" if name == "-" else str(error)) from error
+
+
+def summary(dna: risorius.Dna) -> str:
+    """Version and sizes, e.g. "2.4, 8 LODs, 870 joints"."""
+    return (
+        f"{dna.generation}.{dna.version}, {counted(dna.lod_count, 'LOD')}, "
+        f"{counted(len(dna.joint_names), 'joint')}"
+    )
+
+
+def counted(number: int, noun: str) -> str:
+    """E.g. "1 joint", "1,203 joints"."""
+    return f"{number:,} {noun}{'' if number == 1 else 's'}"

@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: MIT
+"""Two rigs, the numbers that their elements have in common, and the report."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+import risorius
+
+from . import amounts
+from .amounts import Floats
+from .names import correctives, joint_pairs, padded
+from .pairs import Bools, Ints, integers, pair_in_place, pair_names, pair_sets
+from .report import Report
+from .spaces import Space, chain
+
+ATTRIBUTES = ("tx", "ty", "tz", "rx", "ry", "rz", "sx", "sy", "sz")
+QUATERNION_ATTRIBUTES = ("tx", "ty", "tz", "qx", "qy", "qz", "qw", "sx", "sy", "sz")
+
+
+class Comparison:
+    """What the modules of the layers share.
+
+    exact: whether numbers must have the same bits; not so after a conversion, which rounds.
+    """
+
+    def __init__(self, a: risorius.Dna, b: risorius.Dna, report: Report, exact: bool = True):
+        self.a, self.b, self.report, self.exact = a, b, report, exact
+        self.meshes_a, self.meshes_b = a.meshes, b.meshes
+
+    # ---- numbers
+
+    def changed(self, a: Floats, b: Floats) -> Bools:
+        """Where two arrays of one shape differ."""
+        different = amounts.differs(a, b)
+        return different if self.exact else different & ~amounts.near(a, b)
+
+    def by(self, a: Floats, b: Floats, kind: str = "number") -> str:
+        """By how much: "by up to 0.3 mm". kind: length, angle or number."""
+        amount = amounts.largest(a, b)
+        return amounts.by(amount, self.measure(amount, kind), a.size > 1)
+
+    def distance(self, a: Floats, b: Floats) -> str:
+        """By how far points float32[n, 3] moved: "by up to 0.3 mm"."""
+        with np.errstate(invalid="ignore", over="ignore"):
+            apart = np.linalg.norm(a.astype(np.float64) - b, axis=1)
+        apart = float(np.max(np.where(np.isnan(apart), np.inf, apart), initial=0.0))
+        return amounts.by(apart, self.measure(apart, "length"), len(a) > 1)
+
+    def measure(self, amount: float, kind: str) -> str:
+        if kind == "length":
+            return amounts.length(amount, self.a.translation_unit)
+        if kind == "angle":
+            return amounts.angle(amount, self.a.rotation_unit)
+        return f"{amount:.3g}"
+
+    # ---- index spaces
+
+    def _named(self, noun: str, a: Sequence[str], b: Sequence[str]) -> Space:
+        return Space(noun, a, b, pair_in_place(pair_names(a, b), len(a), len(b)))
+
+    @cached_property
+    def gui(self) -> Space:
+        return self._named("GUI control", self.a.gui_control_names, self.b.gui_control_names)
+
+    @cached_property
+    def raw(self) -> Space:
+        return self._named("raw control", self.a.raw_control_names, self.b.raw_control_names)
+
+    @cached_property
+    def channels(self) -> Space:
+        a, b = self.a.blend_shape_channel_names, self.b.blend_shape_channel_names
+        return self._named("channel", a, b)
+
+    @cached_property
+    def maps(self) -> Space:
+        return self._named("animated map", self.a.animated_map_names, self.b.animated_map_names)
+
+    @cached_property
+    def meshes(self) -> Space:
+        a = padded(self.a.mesh_names, len(self.meshes_a))
+        return self._named("mesh", a, padded(self.b.mesh_names, len(self.meshes_b)))
+
+    @cached_property
+    def joints(self) -> Space:
+        pairs = joint_pairs(self.a, self.b)
+        return Space("joint", self.a.joint_names, self.b.joint_names, pairs)
+
+    @cached_property
+    def ml(self) -> Space:
+        a, b = self.a.machine_learned_behavior, self.b.machine_learned_behavior
+        return self._named("network control", a.ml_control_names, b.ml_control_names)
+
+    @cached_property
+    def pose_controls(self) -> Space:
+        # A file of 2.4 has no layer rbfe: its poses are controls of their own.
+        names = [
+            dna.rbf_behavior_ext.pose_control_names or [p.name for p in dna.rbf_behavior.poses]
+            for dna in (self.a, self.b)
+        ]
+        return self._named("pose control", *names)
+
+    @cached_property
+    def poses(self) -> Space:
+        names = [
+            padded([pose.name for pose in dna.rbf_behavior.poses], len(dna.rbf_behavior_ext.poses))
+            for dna in (self.a, self.b)
+        ]
+        return self._named("pose", *names)
+
+    @cached_property
+    def solvers(self) -> Space:
+        names = [[s.name for s in dna.rbf_behavior.solvers] for dna in (self.a, self.b)]
+        return self._named("solver", *names)
+
+    @cached_property
+    def psds(self) -> Space:
+        """Correctives are known by what they multiply."""
+        names_a, names_b = (
+            correctives(dna, which, self.raw, self.ml, self.pose_controls)
+            for dna, which in ((self.a, "a"), (self.b, "b"))
+        )
+        return self._named("corrective", names_a, names_b)
+
+    @cached_property
+    def controls(self) -> Space:
+        return chain("control", [self.raw, self.psds, self.ml, self.pose_controls])
+
+    @cached_property
+    def networks(self) -> Space:
+        """Networks are known by the controls that they write."""
+        a = self.a.machine_learned_behavior.neural_networks
+        b = self.b.machine_learned_behavior.neural_networks
+        pairs = pair_sets(
+            [self.controls.in_a(network.output_indices) for network in a],
+            [self.controls.in_b(network.output_indices) for network in b],
+        )
+        return Space("network", [""] * len(a), [""] * len(b), pairs)
+
+    def rows_in_a(self, outputs: npt.ArrayLike, stride: int = 9) -> Ints:
+        """Numbers of joint attributes, joint number * stride + attribute."""
+        joint, attribute = np.divmod(integers(outputs), stride)
+        return self.joints.in_a(joint) * stride + attribute
+
+    def rows_in_b(self, outputs: npt.ArrayLike, stride: int = 9) -> Ints:
+        joint, attribute = np.divmod(integers(outputs), stride)
+        return self.joints.in_b(joint) * stride + attribute
+
+    def row_labels(self, numbers: Ints, stride: int = 9) -> list[str]:
+        """E.g. "FACIAL_C_Jaw.tx"."""
+        names = ATTRIBUTES if stride == 9 else QUATERNION_ATTRIBUTES
+        joint, attribute = np.divmod(numbers, stride)
+        return [
+            f"{name}.{names[i]}"
+            for name, i in zip(self.joints.labels(joint), attribute.tolist(), strict=True)
+        ]

@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: MIT
+"""Which element of one list is which element of another."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Ints = npt.NDArray[np.int64]
+Bools = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """Positions in two lists.
+
+    a, b: int64[pairs], where the same thing stands in each, in the order of A.
+    only_a, only_b: int64, what has no partner.
+    """
+
+    a: Ints
+    b: Ints
+    only_a: Ints
+    only_b: Ints
+
+    @property
+    def whole(self) -> bool:
+        """Whether everything has a partner."""
+        return len(self.only_a) == len(self.only_b) == 0
+
+    @property
+    def reordered(self) -> bool:
+        """Whether the partners stand in another order; an insertion alone is none."""
+        return bool(np.any(np.diff(self.b) < 0))
+
+    @property
+    def identical(self) -> bool:
+        """Whether both lists are the same."""
+        return self.whole and not self.reordered
+
+
+def integers(values: npt.ArrayLike) -> Ints:
+    return np.asarray(values, np.int64).reshape(-1)
+
+
+def pair(a: Ints, b: Ints) -> Pairs:
+    """Pairs equal numbers: of numbers that repeat the first with the first, and so on.
+
+    Args:
+        a, b: int64[n], int64[m].
+    """
+    none = np.zeros(0, np.int64)
+    if len(a) == len(b) and np.array_equal(a, b):
+        same = np.arange(len(a))
+        return Pairs(same, same, none, none)
+    keys, repeats = together((a, b)), np.concatenate([occurrence(a), occurrence(b)])
+    keys = keys * (int(np.max(repeats, initial=0)) + 1) + repeats
+    _, at_a, at_b = np.intersect1d(
+        keys[: len(a)], keys[len(a) :], assume_unique=True, return_indices=True
+    )
+    order = np.argsort(at_a)
+    at_a, at_b = at_a[order].astype(np.int64), at_b[order].astype(np.int64)
+    return Pairs(at_a, at_b, _rest(at_a, len(a)), _rest(at_b, len(b)))
+
+
+def _rest(taken: Ints, count: int) -> Ints:
+    left = np.ones(count, np.bool_)
+    left[taken] = False
+    return np.flatnonzero(left)
+
+
+def occurrence(keys: Ints) -> Ints:
+    """int64[n]: how often each key stood before."""
+    order = np.argsort(keys, kind="stable")
+    run = keys[order]
+    first = np.ones(len(keys), np.bool_)
+    first[1:] = run[1:] != run[:-1]
+    starts = np.maximum.accumulate(np.where(first, np.arange(len(keys)), 0))
+    out = np.empty(len(keys), np.int64)
+    out[order] = np.arange(len(keys)) - starts
+    return out
+
+
+def together(parts: Sequence[Ints]) -> Ints:
+    """All keys as small numbers, equal ones equal, part after part."""
+    _, small = np.unique(np.concatenate(parts), return_inverse=True)
+    return small.reshape(-1).astype(np.int64)
+
+
+def pair_rows(a: Sequence[Ints], b: Sequence[Ints]) -> Pairs:
+    """As pair, for rows of several numbers given column by column."""
+    if all(len(x) == len(y) and np.array_equal(x, y) for x, y in zip(a, b, strict=True)):
+        return pair(np.arange(len(a[0])), np.arange(len(b[0])))
+    keys = np.zeros(len(a[0]) + len(b[0]), np.int64)
+    for x, y in zip(a, b, strict=True):
+        small = together((x, y))
+        keys = together((keys * (int(np.max(small, initial=0)) + 1) + small,))
+    return pair(keys[: len(a[0])], keys[len(a[0]) :])
+
+
+def pair_names(a: Sequence[str], b: Sequence[str]) -> Pairs:
+    """As pair, for texts."""
+    number: dict[str, int] = {}
+    numbered = [integers([number.setdefault(name, len(number)) for name in x]) for x in (a, b)]
+    return pair(*numbered)
+
+
+def with_renamed(pairs: Pairs, extra_a: Ints, extra_b: Ints) -> Pairs:
+    """Pairs with further ones: extra_a[i] is extra_b[i]."""
+    a, b = np.concatenate([pairs.a, extra_a]), np.concatenate([pairs.b, extra_b])
+    order = np.argsort(a)
+    return Pairs(
+        a[order], b[order], np.setdiff1d(pairs.only_a, extra_a), np.setdiff1d(pairs.only_b, extra_b)
+    )
+
+
+def pair_in_place(pairs: Pairs, count_a: int, count_b: int) -> Pairs:
+    """What has no partner of its name and stands at the same place in equally long lists."""
+    if count_a != count_b:
+        return pairs
+    both = np.intersect1d(pairs.only_a, pairs.only_b)
+    return with_renamed(pairs, both, both)
+
+
+def pair_sets(a: Sequence[Ints], b: Sequence[Ints]) -> Pairs:
+    """Pairs sets that have no name: equal ones, then those with most in common, then by place.
+
+    Args:
+        a, b: the keys that each set holds.
+    """
+    exact = pair_names([_name(keys) for keys in a], [_name(keys) for keys in b])
+    votes = _votes(a, b, exact)
+    found_a: list[int] = []
+    found_b: list[int] = []
+    for _, i, j in sorted(votes, key=lambda vote: (-vote[0], vote[1], vote[2])):
+        if i not in found_a and j not in found_b:
+            found_a.append(i)
+            found_b.append(j)
+    paired = with_renamed(exact, integers(found_a), integers(found_b))
+    both = np.intersect1d(paired.only_a, paired.only_b)
+    return with_renamed(paired, both, both)
+
+
+def _name(keys: Ints) -> str:
+    return np.sort(keys).tobytes().hex()
+
+
+def _votes(a: Sequence[Ints], b: Sequence[Ints], exact: Pairs) -> list[tuple[int, int, int]]:
+    owner: dict[int, list[int]] = {}
+    for j in exact.only_b.tolist():
+        for key in np.unique(b[j]).tolist():
+            owner.setdefault(key, []).append(j)
+    votes: list[tuple[int, int, int]] = []
+    for i in exact.only_a.tolist():
+        count: dict[int, int] = {}
+        for key in np.unique(a[i]).tolist():
+            for j in owner.get(key, ()):
+                count[j] = count.get(j, 0) + 1
+        votes += [(n, i, j) for j, n in count.items()]
+    return votes

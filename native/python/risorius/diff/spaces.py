@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: MIT
+"""Index spaces of two rigs as one: what is the same has one number, wherever it stands."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from .pairs import Ints, Pairs, integers
+from .report import plural
+
+_OUTSIDE = 1 << 40  # numbers of indices that no list holds
+
+
+class Space:
+    """The elements of two lists under common numbers.
+
+    noun: what an element is, e.g. "joint".
+    names: by number; first those of A, then those of B.
+    a, b: int64, the number of each element.
+    pairs: which is which.
+    """
+
+    def __init__(self, noun: str, names_a: Sequence[str], names_b: Sequence[str], pairs: Pairs):
+        self.noun, self.plural = noun, plural(noun)
+        self.pairs = pairs
+        self.names = [*names_a, *names_b]
+        self.a = np.arange(len(names_a))
+        self.b = len(names_a) + np.arange(len(names_b))
+        self.b[pairs.b] = pairs.a
+
+    def in_a(self, indices: npt.ArrayLike) -> Ints:
+        """The numbers of indices of A."""
+        return _look_up(self.a, integers(indices))
+
+    def in_b(self, indices: npt.ArrayLike) -> Ints:
+        """The numbers of indices of B."""
+        return _look_up(self.b, integers(indices))
+
+    def label(self, number: int) -> str:
+        """The name of an element for people."""
+        if number >= _OUTSIDE:
+            return f"{self.noun} {number - _OUTSIDE}"
+        place = number if number < len(self.a) else number - len(self.a)
+        return self.names[number] or f"{self.noun} {place}"
+
+    def labels(self, numbers: Ints) -> list[str]:
+        return [self.label(number) for number in numbers.tolist()]
+
+
+def _look_up(numbers: Ints, indices: Ints) -> Ints:
+    inside = indices < len(numbers)
+    if inside.all():
+        return numbers[indices]
+    out = indices + _OUTSIDE
+    out[inside] = numbers[indices[inside]]
+    return out
+
+
+def chain(noun: str, parts: Sequence[Space]) -> Space:
+    """Several spaces after one another, as the controls are: raw, corrective, network, RBF pose."""
+    first_a = np.cumsum([0] + [len(part.a) for part in parts])
+    first_b = np.cumsum([0] + [len(part.b) for part in parts])
+    pairs = Pairs(
+        *(
+            np.concatenate(
+                [
+                    getattr(part.pairs, name) + first[i]
+                    for i, part in enumerate(parts)
+                    for first in [first_a if name.endswith("a") else first_b]
+                ]
+            )
+            for name in ("a", "b", "only_a", "only_b")
+        )
+    )
+    names_a = [part.label(n) for part in parts for n in part.a.tolist()]
+    names_b = [part.label(n) for part in parts for n in part.b.tolist()]
+    return Space(noun, names_a, names_b, pairs)

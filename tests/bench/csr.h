@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: MIT
+// What the evaluator is compared with: a whole evaluation by the shortest scalar code, joints as a
+// plain compressed sparse row matrix.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "dna/dna.h"
+
+namespace risorius::bench {
+
+/// The matrix of all joint groups, a row per joint attribute.
+struct Csr {
+  std::vector<std::uint32_t> begins;  // [rows + 1]
+  std::vector<std::uint16_t> columns;
+  std::vector<float> values;
+
+  void multiply(const float* controls, float* out) const;
+};
+
+class Baseline {
+ public:
+  Baseline(const dna::Dna& dna, std::uint32_t lod);
+  /// All stages for the raw controls of one frame.
+  void evaluate(const float* raw);
+  const Csr& matrix() const { return matrix_; }
+  const std::vector<float>& joints() const { return joints_; }
+
+ private:
+  const dna::Dna& dna_;
+  std::uint32_t lod_;
+  Csr matrix_;
+  std::vector<float> controls_, joints_, shapes_, maps_;
+};
+
+}  // namespace risorius::bench

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: MIT
+// What a benchmark ran on.
+#pragma once
+
+#include <fstream>
+#include <string>
+
+namespace risorius::bench {
+
+inline std::string processor() {
+  std::ifstream info("/proc/cpuinfo");
+  for (std::string line; std::getline(info, line);) {
+    if (line.starts_with("model name")) return line.substr(line.find(':') + 2);
+  }
+  return "unknown CPU";
+}
+
+inline const char* compiler() { return RISORIUS_COMPILER; }
+inline const char* commit() { return RISORIUS_COMMIT; }
+
+}  // namespace risorius::bench

@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: MIT
+// What a load takes from the heap, at most and for good.
+#include <cstdio>
+#include <filesystem>
+
+#include "support/head.h"
+#include "support/heap.h"
+
+namespace risorius::dna {
+namespace {
+
+using namespace testing_support;
+
+struct Load {
+  const char* name;
+  ParseOptions options;
+};
+
+std::vector<Load> loads() {
+  ParseOptions behavior, plain_geometry, one_lod, coarse;
+  behavior.geometry = behavior.machine_learned_behavior = behavior.rbf_behavior = false;
+  behavior.joint_behavior_metadata = behavior.twist_swing_behavior = behavior.unknown_layers =
+      false;
+  plain_geometry = behavior;
+  plain_geometry.behavior = plain_geometry.blend_shapes = false;
+  plain_geometry.geometry = true;
+  one_lod.lods.lods = {0};
+  coarse.lods.lods = {1};
+  return {{"full", {}},
+          {"behavior", behavior},
+          {"geometry without blend shapes", plain_geometry},
+          {"LOD 0", one_lod},
+          {"LOD 1", coarse}};
+}
+
+void expect_little_more_than_is_kept(core::Source& source, const ParseOptions& options) {
+  const HeapCount heap;
+  const auto dna = parse(source, options);
+  const std::size_t peak = heap.peak(), kept = heap.kept();
+  ASSERT_TRUE(dna.has_value()) << dna.error().describe();
+  EXPECT_GT(kept, 500'000u);  // else the reader's window would be what is measured
+  EXPECT_LE(static_cast<double>(peak), 1.3 * static_cast<double>(kept));
+}
+
+TEST(Memory, TheCounterSeesTheHeap) {
+  const HeapCount heap;
+  {
+    const std::vector<char> a(100'000), b(50'000);
+    EXPECT_GE(heap.kept(), 150'000u);
+  }
+  EXPECT_GE(heap.peak(), 150'000u);
+  EXPECT_LE(heap.peak(), 151'000u);
+  EXPECT_LE(heap.kept(), 100u);
+}
+
+TEST(Memory, OfALoadIsLittleMoreThanWhatItKeeps) {
+  const std::filesystem::path path =
+      std::filesystem::temp_directory_path() / "risorius_memory_test.dna";
+  for (const std::uint16_t minor : {std::uint16_t{8}, std::uint16_t{1}}) {
+    const Bytes bytes = write_head(make_head({.vertices = 12000}), minor);
+    {
+      std::FILE* file = std::fopen(path.string().c_str(), "wb");
+      ASSERT_NE(file, nullptr);
+      EXPECT_EQ(std::fwrite(bytes.data(), 1, bytes.size(), file), bytes.size());
+      std::fclose(file);
+    }
+    for (const Load& load : loads()) {
+      SCOPED_TRACE(std::string(load.name) + ", 2." + std::to_string(minor));
+      core::SpanSource memory(bytes);
+      expect_little_more_than_is_kept(memory, load.options);
+      auto file = core::open_file(path);
+      ASSERT_TRUE(file.has_value());
+      expect_little_more_than_is_kept(**file, load.options);
+    }
+  }
+  std::filesystem::remove(path);
+}
+
+// An empty element takes up to 11 times its bytes in the file (a setup of twists; a list of lists
+// 9). The error's text and the path to its field are small.
+constexpr std::size_t kTimesTheBytes = 12, kBeside = 16 * 1024;
+
+std::size_t peak_of(const Bytes& bytes, bool* good = nullptr) {
+  core::SpanSource source(bytes);
+  const HeapCount heap;
+  const bool read = parse(source).has_value();
+  if (good != nullptr) *good = read;
+  return heap.peak();
+}
+
+void patch(Bytes& bytes, std::size_t at, std::uint32_t value) {
+  for (std::size_t i = 0; i < 4; ++i)
+    bytes[at + i] = static_cast<std::uint8_t>(value >> (24 - 8 * i));
+}
+
+TEST(Memory, AFileThatAnnouncesMuchGetsLittle) {
+  for (const std::uint16_t minor : {std::uint16_t{8}, std::uint16_t{1}}) {
+    const Bytes good = write_head(make_head(tiny_head()), minor);
+    ASSERT_LT(good.size(), 10'000u);
+    std::size_t worst = 0, refused = 0;
+    for (std::size_t at = 7; at + 4 <= good.size(); ++at) {
+      for (const std::uint32_t value : {0x7FFFFFFFu, 0xFFFFu, 0xFFu}) {
+        Bytes bytes = good;
+        patch(bytes, at, value);
+        bool read = false;
+        worst = std::max(worst, peak_of(bytes, &read));
+        refused += read ? 0 : 1;
+      }
+    }
+    EXPECT_LE(worst, kTimesTheBytes * good.size() + kBeside);
+    EXPECT_GT(refused, good.size());  // the patches did hit counts
+  }
+}
+
+TEST(Memory, ManyEmptyElementsTakeAFewTimesTheirBytes) {
+  using Fill = void (*)(Dna&, std::size_t);
+  const Fill fills[] = {
+      [](Dna& d, std::size_t n) { d.definition.raw_control_names.resize(n); },
+      [](Dna& d, std::size_t n) { d.descriptor.metadata.resize(n); },
+      [](Dna& d, std::size_t n) { d.definition.lod_joint_mapping.rows.resize(n); },
+      [](Dna& d, std::size_t n) { d.behavior.joint_groups = std::vector<JointGroup>(n); },
+      [](Dna& d, std::size_t n) { d.geometry.meshes = std::vector<Mesh>(n); },
+      [](Dna& d, std::size_t n) {
+        d.definition.blend_shape_channel_names = {"shape"};
+        d.definition.mesh_names = {"mesh"};
+        d.geometry.meshes = std::vector<Mesh>(1);
+        d.geometry.meshes[0].blend_shape_targets = std::vector<BlendShapeTarget>(n);
+      },
+      [](Dna& d, std::size_t n) {
+        d.machine_learned_behavior.neural_networks = std::vector<NeuralNetwork>(n);
+      },
+      [](Dna& d, std::size_t n) {
+        d.machine_learned_behavior.region_names.resize(n);
+        d.machine_learned_behavior.region_network_indices.resize(n);
+      },
+      [](Dna& d, std::size_t n) {
+        std::vector<MlType> types(1);
+        types[0].lod_operation_mappings.resize(n);
+        types[0].operations = std::vector<List<MlOperation>>(n);
+        d.machine_learned_behavior_ext.types = std::move(types);
+      },
+      [](Dna& d, std::size_t n) { d.rbf_behavior.solvers = std::vector<RbfSolver>(n); },
+      [](Dna& d, std::size_t n) { d.rbf_behavior_ext.poses = std::vector<RbfPoseControls>(n); },
+      [](Dna& d, std::size_t n) {
+        d.twist_swing_behavior.twists = std::vector<TwistSwingSetup>(n);
+      }};
+  for (const Fill& fill : fills) {
+    Dna dna;
+    fill(dna, 5000);
+    const Bytes bytes = write_head(dna, 8);
+    bool read = false;
+    const std::size_t peak = peak_of(bytes, &read);
+    EXPECT_TRUE(read) << &fill - fills;
+    EXPECT_LE(peak, kTimesTheBytes * bytes.size() + kBeside) << &fill - fills;
+  }
+}
+
+}  // namespace
+}  // namespace risorius::dna
