@@ -793,14 +793,40 @@ class Instance:
     def lod(self) -> int: ...
     @lod.setter
     def lod(self, value: _Int) -> None: ...
+    @property
+    def masks(self) -> _F32:
+        """float32, one per region of each mesh; at 0 the region's networks rest. A copy."""
+    @masks.setter
+    def masks(self, value: npt.ArrayLike) -> None: ...
     def evaluate(self, raw: npt.ArrayLike, /) -> Pose: ...
 
 class Rig:
     """A compiled face: turns raw controls into a Pose. Immutable, shared freely."""
 
     def __init__(
-        self, dna: Dna, *, precision: str = "float32", simd: str | None = None
+        self,
+        dna: Dna,
+        *,
+        precision: str = "float32",
+        rotation: str = "euler",
+        simd: str | None = None,
     ) -> None: ...
+    @staticmethod
+    def from_bytes(
+        bytes: bytes | bytearray | memoryview, trusted: bool = False, simd: str | None = None
+    ) -> Rig:
+        """A Rig from what to_bytes or block gave, of this version and byte order."""
+    def to_bytes(self) -> bytes:
+        """The compiled face as bytes, a cache for from_bytes."""
+    def block(self) -> memoryview:
+        """The same without a copy."""
+    @property
+    def rotation(self) -> str: ...
+    @property
+    def initial_raw_controls(self) -> _F32:
+        """float32[R]: 0, but 1 for the w of each rotation that solvers and setups read."""
+    def raw_to_gui(self, raw: npt.ArrayLike) -> _F32:
+        """float32[R] -> float32[G], where the table can be reversed."""
     @property
     def raw_control_names(self) -> list[str]: ...
     @property
