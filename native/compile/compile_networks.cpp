@@ -29,7 +29,8 @@ dna::MlType synthesized(const dna::MachineLearnedBehavior& ml) {
   dna::MlType type;
   type.lod_operation_mappings.assign(3, ml.lod_neural_network_mapping);
   std::vector<dna::MlOperation> gathers, networks, scatters;
-  for (std::uint16_t i = 0; i < ml.neural_networks.size(); ++i) {
+  const std::size_t count = std::min<std::size_t>(ml.neural_networks.size(), 65535);  // 16 bits
+  for (std::uint16_t i = 0; i < count; ++i) {
     const dna::NeuralNetwork& n = ml.neural_networks[i];
     dna::MlOperation gather, network, scatter;
     gather.operation_type = MlOperation::kGather;

@@ -123,16 +123,23 @@ void add_pose(const dna::Dna& dna, std::uint16_t index, RigData& out) {
   out.rbf_poses.push_back(pose);
 }
 
-Status check_solver(const dna::RbfSolver& s, const std::string& where) {
-  const std::size_t n = s.pose_indices.size();
+// Work of compiling a solver: a file of a few bytes must not take minutes.
+double cost_of(const dna::RbfSolver& s) {
+  const auto n = static_cast<double>(s.pose_indices.size());
+  const auto inputs = static_cast<double>(s.raw_control_indices.size()) + 1;
+  return (s.automatic_radius == 0 ? n * n * inputs : 0) + (s.solver_type == 1 ? n * n * n : 0);
+}
+
+Status check_solver(const dna::RbfSolver& s, const std::string& where, double& cost) {
   if (s.distance_method != rig::kEuclidean && s.raw_control_indices.size() % 4 != 0) {
     return fail(ErrorCode::kInvalidLength, where + ".raw_control_indices",
                 std::to_string(s.raw_control_indices.size()) +
                     " controls, but a distance of rotations needs four for each");
   }
-  if (s.solver_type == 1 && n > 4096) {
+  cost += cost_of(s);
+  if (cost > 2e9) {
     return fail(ErrorCode::kLimitExceeded, where + ".pose_indices",
-                std::to_string(n) + " poses to interpolate; at most 4096 are supported");
+                "the solvers' matrices are larger than any face needs");
   }
   return ok();
 }
@@ -146,8 +153,8 @@ void add_solver(const dna::Dna& dna, const dna::RbfSolver& source, RigData& out)
   s.pose_count = count_of(source.pose_indices);
   s.distance = source.distance_method;
   s.function = source.function_type;
-  s.axis = source.twist_axis;
-  s.always_normalize = source.normalize_method;
+  s.axis = source.twist_axis < 3 ? source.twist_axis : 0;
+  s.always_normalize = source.normalize_method == 1 ? 1 : 0;
   for (const std::uint16_t i : source.raw_control_indices) out.rbf_inputs.push_back(i);
   for (const std::uint16_t p : source.pose_indices) add_pose(dna, p, out);
   add_targets(source, s, out);
@@ -170,9 +177,10 @@ std::vector<std::uint32_t> detail::listed(const dna::LodMapping& mapping, std::u
 
 Status detail::compile_solvers(const dna::Dna& dna, RigData& out, StepLods& lods) {
   const auto& solvers = dna.rbf_behavior.solvers;
+  double cost = 0;
   for (std::size_t i = 0; i < solvers.size(); ++i) {
     const std::string where = "rbf_behavior.solvers[" + std::to_string(i) + "]";
-    if (Status s = check_solver(solvers[i], where); !s) return s;
+    if (Status s = check_solver(solvers[i], where, cost); !s) return s;
     add_solver(dna, solvers[i], out);
   }
   for (std::uint32_t lod = 0; lod < out.lod_count; ++lod) {

@@ -38,6 +38,12 @@ void sine_and_cosine(const Lanes& x, Lanes& sines, Lanes& cosines) noexcept {
 
 // Angles too large for the reduction, infinities and NaN.
 void repair(const Lanes& x, Lanes& sines, Lanes& cosines) noexcept {
+  constexpr std::uint32_t kLimit = 0x46000000u;  // the bits of 8192
+  std::uint32_t beyond = 0;
+  for (std::size_t l = 0; l < kLanes; ++l) {
+    beyond |= (std::bit_cast<std::uint32_t>(x[l]) & 0x7FFFFFFFu) > kLimit ? 1u : 0u;
+  }
+  if (beyond == 0) return;
   for (std::size_t l = 0; l < kLanes; ++l) {
     if (std::fabs(x[l]) <= 8192.0f) continue;
     sines[l] = std::sin(x[l]);

@@ -14,10 +14,11 @@ namespace {
 
 double square(double v) { return v * v; }
 
+// No rotation at all (0 0 0 0) has neither twist nor swing: NaN, and no pose is near.
 void twist_only(double* q, std::uint32_t axis) noexcept {
   const double length = std::sqrt(square(q[axis]) + square(q[3]));
-  for (std::uint32_t i = 0; i < 3; ++i) q[i] = i == axis && length > 0 ? q[i] / length : 0.0;
-  q[3] = length > 0 ? q[3] / length : 0.0;
+  for (std::uint32_t i = 0; i < 3; ++i) q[i] = i == axis ? q[i] / length : 0.0;
+  q[3] /= length;
 }
 
 // What remains of a rotation when its twist is taken off. Half a turn has none to take.
@@ -27,7 +28,7 @@ void swing_only(double* q, std::uint32_t axis) noexcept {
   const double a = q[u], b = q[v], length = -std::sqrt(square(t) + square(w));
   q[axis] = 0;
   q[3] = length;
-  if (length == 0) return;
+  if (length == 0 && (a != 0 || b != 0)) return;
   q[u] = (w * a - t * b) / length;
   q[v] = (w * b + t * a) / length;
 }
@@ -133,7 +134,7 @@ void detail::run_solver(const Rig& rig, std::uint32_t index, Workspace& work,
   const double ratio = normalize ? 1.0 / sum : 1.0;
   for (std::size_t p = 0; p < poses.size(); ++p) {
     const auto value = static_cast<float>(values[p] * ratio * static_cast<double>(poses[p].scale));
-    if (value <= s.threshold) continue;
+    if (!(value > s.threshold)) continue;  // NaN is no pose either, as in the reference
     write_pose(rig, poses[p], value, controls);
   }
 }

@@ -112,6 +112,46 @@ TEST(Compile, NamesTheLayersThatAreNotEvaluated) {
   EXPECT_EQ(must_compile(dna).ignored_layers(), std::vector<std::string>{"new1"});
 }
 
+TEST(Compile, ChoicesThatTheFormatDoesNotKnowStayInsideTheRig) {
+  dna::Dna dna = good_face();
+  dna::RbfSolver solver;
+  solver.raw_control_indices = {0, 1, 0, 1};
+  solver.pose_indices = {0};
+  solver.raw_control_values = {0.0f, 0.0f, 0.0f, 1.0f};
+  solver.twist_axis = solver.function_type = solver.solver_type = solver.normalize_method = 9;
+  std::vector<dna::RbfSolver> solvers;
+  for (const std::uint16_t method : std::vector<std::uint16_t>{0, 1, 2, 3, 9}) {
+    solver.distance_method = method;
+    solvers.push_back(solver);
+  }
+  dna.rbf_behavior.solvers = solvers;
+  dna.rbf_behavior.poses = std::vector{dna::RbfPose{"p", 1.0f}};
+  dna.rbf_behavior.lod_solver_mapping.lods = {0, 0};
+  dna.rbf_behavior.lod_solver_mapping.rows = {{0, 1, 2, 3, 4}};
+  dna::TwistSwingSetup setup;
+  setup.output_joint_indices = {0};
+  setup.blend_weights = {1.0f};
+  setup.input_control_indices = {0, 0, 0, 0};
+  setup.twist_axis = 9;
+  dna.twist_swing_behavior.swings = std::vector{setup};
+  const rig::Rig rig = must_compile(dna);
+  for (const rig::RbfSolver& s : rig.rbf_solvers) EXPECT_LT(s.axis, 3u);
+  EXPECT_LT(rig.twist_swings[0].axis, 3u);
+  EXPECT_TRUE(rig::open_rig(rig.block(), nullptr, rig::BlockCheck::kFull, *rig.kernels));
+}
+
+TEST(Compile, SolversBeyondAnyFaceAreRefused) {
+  dna::Dna dna = good_face();
+  dna::RbfSolver solver;
+  solver.pose_indices = std::vector<std::uint16_t>(2000, 0);
+  solver.solver_type = 1;
+  dna.rbf_behavior.solvers = std::vector{solver};
+  dna.rbf_behavior.poses = std::vector{dna::RbfPose{"p", 1.0f}};
+  const auto rig = compile(dna);
+  ASSERT_FALSE(rig.has_value());
+  EXPECT_EQ(rig.error().code, core::ErrorCode::kLimitExceeded);
+}
+
 TEST(Compile, ControlsOfNetworksAndPosesFollowTheCorrectives) {
   dna::Dna dna = good_face();
   dna.machine_learned_behavior.ml_control_names = {"m0", "m1"};

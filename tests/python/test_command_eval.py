@@ -80,9 +80,17 @@ def test_bad_input_is_exit_code_1(tmp_path, capsys):
     assert capsys.readouterr().out == ""
 
 
-def test_layers_that_are_not_evaluated_are_named(capsys):
+def test_every_layer_of_the_newest_version_is_evaluated(capsys):
     assert main(["eval", str(GOLDEN / "tiny_v28.dna")]) == 0
-    assert "rbfb" in capsys.readouterr().err
+    assert "not evaluated" not in capsys.readouterr().err
+
+
+def test_layers_that_are_not_evaluated_are_named(capsys, tmp_path):
+    data = bytearray((GOLDEN / "tiny_v28.dna").read_bytes())
+    data[data.index(b"rbfb") : data.index(b"rbfb") + 4] = b"new1"
+    (tmp_path / "new.dna").write_bytes(data)
+    assert main(["eval", str(tmp_path / "new.dna")]) in (0, 1)
+    assert "new1" in capsys.readouterr().err
 
 
 def test_options_may_stand_among_the_controls(capsys):
