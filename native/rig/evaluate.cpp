@@ -84,7 +84,7 @@ void quaternion_joints(const Rig& rig, std::uint32_t lod, Pose& pose) noexcept {
                          product);
     }
     const std::array<float, 3> angles = to_euler(rig.euler, product);
-    std::copy(angles.begin(), angles.end(), pose.joints.begin() + std::size_t{q.joint} * 9 + 3);
+    std::copy(angles.begin(), angles.end(), pose.joints.data() + std::size_t{q.joint} * 9 + 3);
   }
 }
 
