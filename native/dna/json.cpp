@@ -501,12 +501,7 @@ class Reader {
 
   template <class Each>
   void elements(const Json& json, Each each) {
-    if (!json.is_array()) return error("an array was expected");
-    if (json.size() > limits_.max_count) {
-      return error(std::to_string(json.size()) + " elements, the limit is " +
-                       std::to_string(limits_.max_count),
-                   ErrorCode::kLimitExceeded);
-    }
+    if (!is_list(json)) return;
     std::size_t i = 0;
     for (const Json& item : json) {
       if (failed()) return;
@@ -517,10 +512,20 @@ class Reader {
   }
 
  private:
+  bool is_list(const Json& json) {
+    if (!json.is_array()) {
+      error("an array was expected");
+    } else if (json.size() > limits_.max_count) {
+      error(std::to_string(json.size()) + " elements, the limit is " +
+                std::to_string(limits_.max_count),
+            ErrorCode::kLimitExceeded);
+    }
+    return !failed();
+  }
   // Numbers come by the million: no path is kept for each until one is wrong.
   template <class T>
   void append(const Json& json, std::vector<T>& out) {
-    if (!json.is_array()) return error("an array of numbers was expected");
+    if (!is_list(json)) return;
     out.reserve(out.size() + json.size());
     std::size_t i = 0;
     for (const Json& item : json) {
@@ -637,7 +642,8 @@ Result<Json> parse_text(std::string_view text) {
     }
     return Json::parse(text);
   } catch (const RepeatedMember& member) {
-    return fail(ErrorCode::kInvalidValue, member.name, "an object has this member twice");
+    return fail(ErrorCode::kInvalidValue, member.name.empty() ? "\"\"" : member.name,
+                "an object has this member twice");
   } catch (const Json::parse_error& e) {
     return fail(ErrorCode::kNotDna, "", "not JSON: the text cannot be read on from here",
                 e.byte == 0 ? 0 : e.byte - 1);

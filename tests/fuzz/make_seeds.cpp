@@ -7,6 +7,7 @@
 #include <iterator>
 
 #include "dna/json.h"
+#include "dna/layers.h"
 #include "support/full_face.h"
 #include "support/promises.h"
 
@@ -16,7 +17,7 @@ using risorius::promises::Bytes;
 namespace dna = risorius::dna;
 namespace fs = std::filesystem;
 
-constexpr std::size_t kLargestSeed = 8192;
+constexpr std::size_t kLargestSeed = 4400;  // larger ones make every run slow
 constexpr std::size_t kOptions = risorius::promises::kOptionBytes;
 
 // What a target expects before the file; several of them make several seeds.
@@ -77,22 +78,24 @@ Bytes written(const dna::Dna& face, std::uint16_t minor) {
   return *dna::write(face, {minor, false}, warnings);
 }
 
-// The same face without one layer after the other: what is left is small.
+// Each layer alone, and with the one that it extends: what is small is tried most often.
 void add_parts(Seeds& seeds) {
-  dna::Dna face = risorius::testing_support::make_full_face();
-  face.unknown_layers = {{{'n', 'e', 'w', '!'}, 0x10000, {1, 2, 3}}};
+  const dna::Dna face = risorius::testing_support::make_full_face();
+  for (const dna::detail::KnownLayer& wanted : dna::detail::kLayers) {
+    dna::Dna part = face;
+    dna::detail::for_each_layer(part, [&](std::string_view id, const char*, auto& layer) {
+      const bool extends = wanted.id[3] == 'e' && id.substr(0, 2) == std::string_view(wanted.id, 2);
+      if (id != "desc" && id != "defn" && id != wanted.id && !extends) layer = {};
+    });
+    // The other layers still count their controls.
+    part.behavior.psd_count = face.behavior.psd_count;
+    part.machine_learned_behavior.ml_control_names = face.machine_learned_behavior.ml_control_names;
+    seeds.add(std::string("only-") + wanted.id, written(part, 8));
+  }
+  dna::Dna unknown;
+  unknown.unknown_layers = {{{'n', 'e', 'w', '!'}, 0x10000, {1, 2, 3}}};
   std::vector<dna::Warning> warnings;
-  seeds.add("unknown", *dna::write(face, {8, true}, warnings));
-  face.unknown_layers.clear();
-  face.geometry = {};
-  seeds.add("no-geometry", written(face, 8));
-  face.behavior = {};
-  face.machine_learned_behavior = {};
-  face.machine_learned_behavior_ext = {};
-  face.rbf_behavior = {};
-  face.rbf_behavior_ext = {};
-  face.twist_swing_behavior = {};
-  seeds.add("definition", written(face, 8));
+  seeds.add("unknown", *dna::write(unknown, {8, true}, warnings));
 }
 
 Bytes read_file(const fs::path& path) {

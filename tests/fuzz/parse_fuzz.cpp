@@ -6,7 +6,9 @@ namespace promises = risorius::promises;
 using risorius::fuzz::demand;
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  std::vector<risorius::dna::Dna> read;
-  demand(promises::reading({data, size}, read));
+  const auto dna = promises::parse({data, size});
+  demand(promises::reading({data, size}, dna));
+  // Reads the file up to four times.
+  if (size % 4 == 0) demand(promises::checking({data, size}, dna.has_value()));
   return 0;
 }

@@ -20,9 +20,11 @@ using View = std::span<const std::uint8_t>;
 
 core::Result<dna::Dna> parse(View bytes, const dna::ParseOptions& options = {});
 
-/// An error has a field and an offset inside the file; check finds an error exactly when parse
-/// fails. Out: the Dna, when there is one.
-std::string reading(View bytes, std::vector<dna::Dna>& out);
+/// A Dna, or an error with a field and an offset inside the file.
+std::string reading(View bytes, const core::Result<dna::Dna>& dna);
+
+/// check finds an error exactly when parse fails, and places all that it finds.
+std::string checking(View bytes, bool is_good);
 
 /// What is written for a version is read again and written as it was.
 std::string rewriting(const dna::Dna& dna, std::uint16_t minor);
@@ -47,7 +49,8 @@ std::string filtering(View bytes);
 /// The result can be written, and converting it once more changes nothing.
 std::string conversion(const dna::Dna& dna, View options);
 
-/// Everything above, for tests; conversion and filtering with a few options.
-std::string everything(View bytes);
+/// All of the above, for tests: written for its own version and for one of 2.1 to 2.8, evaluated,
+/// filtered and converted with one choice; turn makes the choices.
+std::string everything(View bytes, std::size_t turn);
 
 }  // namespace risorius::promises
