@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-# Sourced by demo.sh and test.sh: tools, a private venv, the wheel and the extension's zip.
+# Sourced by demo.sh, test.sh and fuzz.sh: tools, a private venv, the wheel and the extension's zip.
 # Sets: project, venv, python, step "text" (says what begins and how long the last step took).
 
 project=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
@@ -20,11 +20,11 @@ step() {
   return 0
 }
 
-install_packages() {
+install_packages() { # install_packages [MORE...]: what every build needs, and more
   local missing=()
   for package in python3-venv python3-dev g++ cmake ninja-build ccache libgtest-dev libgmock-dev \
     nlohmann-json3-dev ffmpeg libxrender1 libxi6 libxkbcommon0 libsm6 libgl1 libegl1 libxxf86vm1 \
-    libxfixes3; do
+    libxfixes3 "$@"; do
     dpkg-query -W -f='${Status}' "$package" 2>/dev/null | grep -q 'ok installed' ||
       missing+=("$package")
   done

@@ -30,7 +30,12 @@ note_pytest() {
 check() { # check NAME COMMAND...: a tool that passes or fails as a whole
   local name=$1
   shift
-  if "$@"; then note "$name" 1 0; else note "$name" 0 1; fi
+  if "$@"; then
+    note "$name" 1 0
+  else
+    note "$name" 0 1
+    return 1
+  fi
 }
 logs="$project/build/logs"
 mkdir -p "$logs"
@@ -41,14 +46,32 @@ step "extension" && build_extension || exit 1
 
 step "GoogleTest"
 cd "$project"
-cmake --preset dev -DCMAKE_CXX_COMPILER_LAUNCHER=ccache -DPython_EXECUTABLE="$python" \
-  -DRISORIUS_BUILD_BINDINGS=OFF > "$logs/cmake.log" 2>&1 &&
-  cmake --build --preset dev -j"$(nproc)" > "$logs/build.log" 2>&1 || tail -n 30 "$logs/build.log"
-ctest --preset dev -j"$(nproc)" > "$logs/ctest.log" 2>&1
-tail -n 25 "$logs/ctest.log"
-total=$(grep -oE 'out of [0-9]+' "$logs/ctest.log" | tail -n 1 | grep -oE '[0-9]+' || echo 0)
-bad=$(grep -oE '[0-9]+ tests failed' "$logs/ctest.log" | grep -oE '^[0-9]+' || echo 0)
-note "GoogleTest" $((total - bad)) "$bad"
+google_tests() { # google_tests NAME PRESET [CMAKE OPTION...]
+  local name=$1 preset=$2 total bad
+  shift 2
+  cmake --preset "$preset" -DCMAKE_CXX_COMPILER_LAUNCHER=ccache -DRISORIUS_BUILD_BINDINGS=OFF "$@" \
+    > "$logs/cmake-$preset.log" 2>&1 &&
+    cmake --build --preset "$preset" -j"$(nproc)" > "$logs/build-$preset.log" 2>&1 ||
+    { tail -n 30 "$logs/build-$preset.log" && note "$name: does not build" 0 1 && return; }
+  ctest --preset "$preset" -j"$(nproc)" > "$logs/ctest-$preset.log" 2>&1
+  tail -n 25 "$logs/ctest-$preset.log"
+  total=$(grep -oE 'out of [0-9]+' "$logs/ctest-$preset.log" | tail -n 1 | grep -oE '[0-9]+' || echo 0)
+  bad=$(grep -oE '[0-9]+ tests failed' "$logs/ctest-$preset.log" | grep -oE '^[0-9]+' || echo 0)
+  note "$name" $((total - bad)) "$bad"
+}
+google_tests "GoogleTest" dev -DPython_EXECUTABLE="$python"
+step "GoogleTest with sanitizers"
+ASAN_OPTIONS=detect_leaks=1 google_tests "GoogleTest, ASan, UBSan, leaks" asan-ubsan
+
+step "fuzz targets, 30 s each"
+"$project/packaging/fuzz.sh" --each 30 > "$logs/fuzz.log" 2>&1 && fuzz_exit=0 || fuzz_exit=$?
+# A row: target, executions, each second, coverage, corpus, finds.
+rows=$(grep -E '^[a-z_]+ +[0-9]+ +[0-9]+ +[0-9]+/' "$logs/fuzz.log")
+while read -r target executions _ _ _ finds; do
+  [ -n "$target" ] || continue
+  note "fuzz $target, $executions runs" $((finds == 0)) $((finds > 0))
+done <<< "$rows"
+check "fuzz.sh" [ "$fuzz_exit" -eq 0 ] || tail -n 15 "$logs/fuzz.log"
 
 step "style"
 check "ruff check" "$venv/bin/ruff" check native addon tests blender_tests packaging

@@ -124,7 +124,7 @@ void ByteReader::move_to(std::uint64_t offset) {
 bool ByteReader::enter(std::uint64_t offset, std::uint64_t size) {
   if (failed()) return false;
   if (offset > source_->size() || size > source_->size() - offset) {
-    fail_at(offset, ErrorCode::kTruncated,
+    fail_at(std::min(offset, source_->size()), ErrorCode::kTruncated,
             "the file ends at byte " + std::to_string(source_->size()) + ", but " +
                 std::to_string(size) + " bytes were announced from byte " + std::to_string(offset));
     return false;

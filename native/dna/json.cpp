@@ -24,8 +24,25 @@ using core::Result;
 using detail::describe;
 using detail::describe_setup;
 using detail::Name;
+
+struct RepeatedMember {
+  std::string name;
+};
+
+// An object that does not let a later member replace an earlier one: readers would differ in which
+// of them they take.
+template <class Key, class Value, class Less, class Allocator>
+struct UniqueMap : std::map<Key, Value, Less, Allocator> {
+  using std::map<Key, Value, Less, Allocator>::map;
+  Value& operator[](const Key& key) {
+    const auto [at, added] = this->try_emplace(key);
+    if (!added) throw RepeatedMember{key};
+    return at->second;
+  }
+};
+
 // float as the type of numbers: read once, rounded once.
-using Json = nlohmann::basic_json<std::map, std::vector, std::string, bool, std::int64_t,
+using Json = nlohmann::basic_json<UniqueMap, std::vector, std::string, bool, std::int64_t,
                                   std::uint64_t, float>;
 
 constexpr const char* kAxes3[] = {"xs", "ys", "zs"};
@@ -297,7 +314,9 @@ class Reader {
       if (!where.empty() && part[0] != '[') where += '.';
       where += part;
     }
-    error_ = core::Error{code, std::nullopt, where, message};
+    std::optional<std::uint64_t> offset;
+    if (where.empty()) offset = 0;  // the text as a whole
+    error_ = core::Error{code, offset, where, message};
   }
 
   // Runs body with `json` as the object whose members fields are; every member must be used.
@@ -308,7 +327,7 @@ class Reader {
     std::set<std::string> outer_used = std::exchange(used_, {"signature", "size", "offset"});
     body();
     for (const auto& member : json.items()) {
-      if (used_.count(member.key()) != 0) continue;
+      if (used_.count(member.key()) > 0) continue;
       path_.push_back(member.key());
       error("this member is not known");
       path_.pop_back();
@@ -482,12 +501,7 @@ class Reader {
 
   template <class Each>
   void elements(const Json& json, Each each) {
-    if (!json.is_array()) return error("an array was expected");
-    if (json.size() > limits_.max_count) {
-      return error(std::to_string(json.size()) + " elements, the limit is " +
-                       std::to_string(limits_.max_count),
-                   ErrorCode::kLimitExceeded);
-    }
+    if (!is_list(json)) return;
     std::size_t i = 0;
     for (const Json& item : json) {
       if (failed()) return;
@@ -498,10 +512,20 @@ class Reader {
   }
 
  private:
+  bool is_list(const Json& json) {
+    if (!json.is_array()) {
+      error("an array was expected");
+    } else if (json.size() > limits_.max_count) {
+      error(std::to_string(json.size()) + " elements, the limit is " +
+                std::to_string(limits_.max_count),
+            ErrorCode::kLimitExceeded);
+    }
+    return !failed();
+  }
   // Numbers come by the million: no path is kept for each until one is wrong.
   template <class T>
   void append(const Json& json, std::vector<T>& out) {
-    if (!json.is_array()) return error("an array of numbers was expected");
+    if (!is_list(json)) return;
     out.reserve(out.size() + json.size());
     std::size_t i = 0;
     for (const Json& item : json) {
@@ -547,14 +571,15 @@ void read_index_entry(Reader& r, Dna& dna) {
 void read_layers(Reader& r, Dna& dna) {
   r.member("version", [&](const Json& json) {
     r.object(json, [&] {
-      r.field("generation", dna.generation);
+      r.member("generation", [&](const Json& number) {
+        r.read(number, dna.generation);
+        if (dna.generation == 2) return;
+        r.error("generation 2 was expected, found " + std::to_string(dna.generation),
+                ErrorCode::kUnsupportedGeneration);
+      });
       r.field("version", dna.version);
     });
   });
-  if (dna.generation != 2) {
-    return r.error("generation 2 was expected, found " + std::to_string(dna.generation),
-                   ErrorCode::kUnsupportedGeneration);
-  }
   if (r.has("index")) {
     r.member("index", [&](const Json& json) {
       r.object(json, [&] {
@@ -580,9 +605,9 @@ void read_layers(Reader& r, Dna& dna) {
   });
 }
 
-// The deepest level of a text, before anything is built from it.
-std::size_t nesting(std::string_view text) {
-  std::size_t depth = 0, deepest = 0;
+// Where a text goes deeper than so many levels, before anything is built from it.
+std::optional<std::size_t> find_too_deep(std::string_view text, std::size_t limit) {
+  std::size_t depth = 0;
   bool in_text = false;
   for (std::size_t i = 0; i < text.size(); ++i) {
     const char c = text[i];
@@ -592,12 +617,42 @@ std::size_t nesting(std::string_view text) {
     } else if (c == '"') {
       in_text = true;
     } else if (c == '[' || c == '{') {
-      deepest = std::max(deepest, ++depth);
+      if (++depth > limit) return i;
     } else if ((c == ']' || c == '}') && depth > 0) {
       --depth;
     }
   }
-  return deepest;
+  return std::nullopt;
+}
+
+// The library's exception for a number beyond every float quotes it, but does not say where it is.
+std::optional<std::uint64_t> find_quoted(std::string_view text, std::string_view message) {
+  const std::size_t begin = message.find('\''), end = message.rfind('\'');
+  if (begin == end) return std::nullopt;
+  const std::size_t at = text.find(message.substr(begin + 1, end - begin - 1));
+  return at == std::string_view::npos ? std::nullopt : std::optional<std::uint64_t>(at);
+}
+
+Result<Json> parse_text(std::string_view text) {
+  try {
+    // The library takes a zero byte for the end.
+    const std::size_t zero = text.find('\0');
+    if (zero != std::string_view::npos) {
+      return fail(ErrorCode::kNotDna, "", "not JSON: the text has a zero byte", zero);
+    }
+    return Json::parse(text);
+  } catch (const RepeatedMember& member) {
+    return fail(ErrorCode::kInvalidValue, member.name.empty() ? "\"\"" : member.name,
+                "an object has this member twice");
+  } catch (const Json::parse_error& e) {
+    return fail(ErrorCode::kNotDna, "", "not JSON: the text cannot be read on from here",
+                e.byte == 0 ? 0 : e.byte - 1);
+  } catch (const Json::exception& e) {
+    const std::string message = e.what();
+    return fail(ErrorCode::kInvalidValue, "",
+                "a number is beyond every float: " + message.substr(message.rfind(' ') + 1),
+                find_quoted(text, message));
+  }
 }
 
 }  // namespace
@@ -634,28 +689,21 @@ Result<Dna> from_json(std::string_view text, const Limits& limits) {
   if (text.size() > limits.max_bytes) {
     return fail(ErrorCode::kLimitExceeded, "",
                 "the text has " + std::to_string(text.size()) + " bytes, the limit is " +
-                    std::to_string(limits.max_bytes));
+                    std::to_string(limits.max_bytes),
+                0);
   }
-  if (const std::size_t deepest = nesting(text); deepest > limits.max_nesting) {
-    return fail(ErrorCode::kLimitExceeded, "",
-                std::to_string(deepest) + " levels of nesting, the limit is " +
-                    std::to_string(limits.max_nesting));
+  if (const auto at = find_too_deep(text, limits.max_nesting)) {
+    return fail(
+        ErrorCode::kLimitExceeded, "",
+        "the levels of nesting pass the limit of " + std::to_string(limits.max_nesting) + " here",
+        *at);
   }
-  Json json;
-  try {
-    json = Json::parse(text);
-  } catch (const Json::parse_error& e) {
-    return fail(ErrorCode::kNotDna, "", "not JSON: the text cannot be read on from here",
-                e.byte == 0 ? 0 : e.byte - 1);
-  } catch (const Json::exception& e) {
-    const std::string text_of_it = e.what();
-    return fail(ErrorCode::kInvalidValue, "",
-                "a number is beyond every float: " + text_of_it.substr(text_of_it.rfind(' ') + 1));
-  }
+  Result<Json> json = parse_text(text);
+  if (!json) return std::move(json).propagate();
   Dna dna;
   dna.descriptor.coordinate_system = {0, 0, 0};  // as in a file without this layer
   Reader r(limits);
-  r.object(json, [&] { read_layers(r, dna); });
+  r.object(*json, [&] { read_layers(r, dna); });
   if (r.failed()) return r.take_error();
   if (core::Status valid = validate(dna, dna.warnings); !valid) return std::move(valid).propagate();
   return dna;

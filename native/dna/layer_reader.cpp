@@ -64,6 +64,7 @@ void LayerReader::sized(Name name, List<T>& v, const LodMapping* mapping) {
   std::uint32_t n = 0;
   {
     Field field(r_, name.dna);
+    note(r_.position());
     n = r_.count(4 + empty_size<T>());
   }
   items.resize(r_.failed() ? 0 : n);
@@ -98,9 +99,11 @@ template void LayerReader::sized(Name, List<RbfSolver>&, const LodMapping*);
 
 void LayerReader::setups(Name name, List<TwistSwingSetup>& v, bool twist) {
   Field field(r_, name.dna);
+  note(r_.position());
   std::vector<TwistSwingSetup> items(r_.count(empty_size<TwistSwingSetup>()));
   for (std::size_t i = 0; i < items.size() && !r_.failed(); ++i) {
     Field item(r_, "", static_cast<std::int64_t>(i));
+    note(r_.position());
     describe_setup(*this, items[i], twist);
   }
   v = std::move(items);
@@ -234,6 +237,7 @@ bool LayerReader::target_is_wanted() {
 void LayerReader::targets(Mesh& m) {
   if (!blend_shapes) return;
   Field field(r_, "blend_shape_targets");
+  note(r_.position());
   const std::uint32_t n = r_.count(empty_size<BlendShapeTarget>());
   std::vector<BlendShapeTarget> targets;
   if (plan == nullptr) targets.reserve(n);
@@ -241,6 +245,7 @@ void LayerReader::targets(Mesh& m) {
     Field item(r_, "", i);
     if (plan != nullptr && !target_is_wanted()) continue;
     const std::uint64_t at = r_.position();
+    note(at);
     BlendShapeTarget& t = targets.emplace_back();
     describe(*this, t);
     if (t.deltas.count() != t.vertex_indices.size() && !r_.failed()) {
@@ -253,16 +258,12 @@ void LayerReader::targets(Mesh& m) {
   m.blend_shape_targets = std::move(targets);
 }
 
-void LayerReader::add_place(const Place& place) {
-  std::string where = r_.where();
-  if (!places->only.empty() && !places->only.starts_with(where)) return;
-  places->fields.emplace(std::move(where), place);
-}
+void LayerReader::add_place(const Place& place) { places->note(r_.where(), place); }
 
-std::optional<std::uint64_t> find_place(const Places& places, std::string where) {
+std::optional<std::uint64_t> Places::find(std::string where) const {
   std::optional<std::size_t> index;  // the first one that had to be cut off
   while (!where.empty()) {
-    if (const auto at = places.fields.find(where); at != places.fields.end()) {
+    if (const auto at = places_.find(where); at != places_.end()) {
       const Place& p = at->second;
       if (!index || p.element_size == 0) return p.offset;
       const std::uint64_t counts = p.plane == 0 ? 1 : 1 + *index / p.plane;

@@ -4,6 +4,7 @@
 
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -23,10 +24,21 @@ struct Place {
   std::uint32_t plane = 0;         // numbers in each plane of vectors, 0: no planes
 };
 
-/// Every field's place, or those that a message about the field `only` may need.
-struct Places {
-  std::map<std::string, Place> fields;
-  std::string only;
+/// Notes only the fields that findings name, and what holds them: a place for each of a large
+/// file's fields would take many times its bytes.
+class Places {
+ public:
+  explicit Places(std::set<std::string> fields) : fields_(std::move(fields)) {}
+  void note(const std::string& where, const Place& place) {
+    const auto at = fields_.lower_bound(where);
+    if (at != fields_.end() && at->starts_with(where)) places_.insert({where, place});
+  }
+  /// Where an error about `where` (a field of validate) lies in the file.
+  std::optional<std::uint64_t> find(std::string where) const;
+
+ private:
+  std::set<std::string> fields_;
+  std::map<std::string, Place> places_;
 };
 
 class LayerReader {
@@ -44,6 +56,7 @@ class LayerReader {
   void group(Name name, Body body) {
     if (*name.dna == '\0') return body();
     core::Field field(r_, name.dna);
+    note(r_.position());
     body();
   }
 
@@ -85,11 +98,13 @@ class LayerReader {
   template <class T>
   void field(Name name, std::vector<T>& v) {
     core::Field field(r_, name.dna);
+    note(r_.position());
     list(v);
   }
   template <class T>
   void field(Name name, core::List<T>& v) {
     core::Field field(r_, name.dna);
+    note(r_.position());
     list(v);
   }
   template <class T>
@@ -106,8 +121,13 @@ class LayerReader {
   void faces(Mesh& m);
   void skin(Mesh& m);
   void targets(Mesh& m);
+  /// Remembers where the field that is being read begins.
+  void note(std::uint64_t at, std::uint32_t element_size = 0, std::uint32_t plane = 0) {
+    if (places != nullptr) add_place({at, element_size, plane});
+  }
 
  private:
+  void add_place(const Place& place);
   template <class T, class Read>
   void scalar(Name name, T& v, Read read) {
     core::Field field(r_, name.dna);
@@ -120,10 +140,6 @@ class LayerReader {
     note(r_.position(), element_size);
     read();
   }
-  void note(std::uint64_t at, std::uint32_t element_size = 0, std::uint32_t plane = 0) {
-    if (places != nullptr) add_place({at, element_size, plane});
-  }
-  void add_place(const Place& place);
 
   // Elements of lists.
   void element(std::string& v) { v = r_.str(); }
@@ -172,8 +188,5 @@ class LayerReader {
   core::ByteReader& r_;
   std::uint32_t largest_ = 0;  // number in the uint32 list that was read last
 };
-
-/// Where an error about `where` (a field of validate) lies in the file.
-std::optional<std::uint64_t> find_place(const Places& places, std::string where);
 
 }  // namespace risorius::dna::detail

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cstring>
 #include <iterator>
+#include <set>
 #include <utility>
 
 #include "core/byte_reader.h"
@@ -21,6 +22,8 @@ using core::Field;
 using core::Result;
 using core::Status;
 using detail::LayerReader;
+
+constexpr std::uint64_t kIndexOffset = 7;  // behind signature and version
 
 struct IndexEntry {
   detail::LayerId id{};
@@ -69,7 +72,7 @@ class Parser {
  public:
   Parser(core::Source& source, const ParseOptions& options, detail::Places* places,
          std::vector<Finding>* findings)
-      : r_(source), layer_(r_), options_(options), findings_(findings) {
+      : file_size_(source.size()), r_(source), layer_(r_), options_(options), findings_(findings) {
     r_.set_max_count(options.limits.max_count);
     layer_.blend_shapes = options.blend_shapes;
     layer_.places = places;
@@ -105,6 +108,7 @@ class Parser {
     {
       Field field(r_, name);
       r_.read_small();
+      layer_.note(std::min(offset, file_size_));
       if (r_.enter(offset, size)) body();
     }
     if (!r_.failed()) return true;
@@ -169,6 +173,9 @@ class Parser {
       section(4, "behavior", [&] { detail::describe_joints(layer_, b); });
       section(5, "behavior", [&] { layer_.field("blend_shape_channels", b.blend_shape_channels); });
       section(6, "behavior", [&] { layer_.field("animated_maps", b.animated_maps); });
+    } else if (options_.definition) {
+      section(3, "behavior", [&] { layer_.field("psd_count", b.psd_count); });
+      dna_.unread_controls.psd = std::exchange(b.psd_count, std::uint16_t{0});
     }
     if (options_.geometry) {
       section(7, "geometry", describe_into(dna_.geometry));
@@ -261,7 +268,7 @@ class Parser {
     for (const std::size_t i : order) {
       const IndexEntry& e = entries_[i];
       if (e.offset < taken) {
-        refuse({ErrorCode::kInvalidValue, 11 + 16 * std::uint64_t{i},
+        refuse({ErrorCode::kInvalidValue, kIndexOffset + 4 + 16 * std::uint64_t{i},
                 "index[" + std::to_string(i) + "]",
                 "layer " + e.name() + " begins at byte " + std::to_string(e.offset) + ", but " +
                     owner + " ends at byte " + std::to_string(taken)});
@@ -299,7 +306,11 @@ class Parser {
   template <class Read>
   bool known(const char* id, const char* name, bool wanted, Read body) {
     const IndexEntry* e = wanted ? find(id) : nullptr;
-    if (e == nullptr) return true;
+    if (e == nullptr) {
+      Field field(r_, name);
+      layer_.note(kIndexOffset);  // which does not list it
+      return true;
+    }
     return read(name, e->offset, e->size, [&] {
       body();
       if (!r_.failed() && r_.left() > 0) {
@@ -370,6 +381,7 @@ class Parser {
     }
   }
 
+  std::uint64_t file_size_;
   ByteReader r_;
   LayerReader layer_;
   const ParseOptions& options_;
@@ -390,11 +402,25 @@ Result<Dna> run_parser(core::Source& source, const ParseOptions& options, detail
 // The same bytes once more, this time noting where each field lies: the price of an error.
 Error with_offset(core::Source& source, const ParseOptions& options, Error error) {
   if (error.offset || error.code == ErrorCode::kInvalidArgument) return error;
-  detail::Places places;
-  places.only = error.where;
+  detail::Places places({error.where});
   static_cast<void>(Parser(source, options, &places, nullptr).run());
-  error.offset = detail::find_place(places, error.where);
+  error.offset = places.find(error.where);
   return error;
+}
+
+void add_offsets(core::Source& source, const ParseOptions& options,
+                 std::vector<Finding>& findings) {
+  std::set<std::string> fields;
+  for (const Finding& f : findings) {
+    if (!f.error.offset) fields.insert(f.error.where);
+  }
+  if (fields.empty()) return;
+  detail::Places places(std::move(fields));
+  std::vector<Finding> found_before;
+  static_cast<void>(Parser(source, options, &places, &found_before).run());
+  for (Finding& f : findings) {
+    if (!f.error.offset) f.error.offset = places.find(f.error.where);
+  }
 }
 
 }  // namespace
@@ -419,8 +445,7 @@ std::vector<Finding> check(core::Source& source, const Limits& limits) {
   ParseOptions options;
   options.limits = limits;
   std::vector<Finding> findings;
-  detail::Places places;
-  Result<Dna> dna = Parser(source, options, &places, &findings).run();
+  Result<Dna> dna = Parser(source, options, nullptr, &findings).run();
   if (!dna) {
     findings.push_back({true, dna.error()});
     return findings;
@@ -432,9 +457,9 @@ std::vector<Finding> check(core::Source& source, const Limits& limits) {
   const bool whole = std::ranges::none_of(findings, &Finding::is_error);
   for (Finding& f : detail::find_all(*dna)) {
     if (!whole && f.error.code != ErrorCode::kInvalidValue) continue;
-    if (!f.error.offset) f.error.offset = detail::find_place(places, f.error.where);
     findings.push_back(std::move(f));
   }
+  add_offsets(source, options, findings);
   std::ranges::stable_sort(findings, {},
                            [](const Finding& f) { return f.error.offset.value_or(UINT64_MAX); });
   return findings;

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: MIT
+// What the fuzz targets found (tests/data/fuzz, by number), and what was wrong with it.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "dna/json.h"
+#include "support/files.h"
+#include "support/promises.h"
+
+namespace risorius {
+namespace {
+
+using promises::Bytes;
+
+Bytes find(const std::string& name) {
+  const Bytes bytes = testing_support::read_file(testing_support::data_folder() / "fuzz" / name);
+  EXPECT_FALSE(bytes.empty()) << name;
+  return bytes;
+}
+
+std::vector<dna::Finding> checked(const Bytes& bytes) {
+  core::SpanSource source(bytes);
+  return dna::check(source);
+}
+
+// Finds that have this field, each with a place in the file.
+std::size_t placed(const std::vector<dna::Finding>& findings, const std::string& where,
+                   std::size_t file_size) {
+  return static_cast<std::size_t>(std::ranges::count_if(findings, [&](const dna::Finding& f) {
+    return f.error.where == where && f.error.offset.value_or(file_size + 1) <= file_size;
+  }));
+}
+
+core::Error json_error(const std::string& name) {
+  const Bytes text = find(name);
+  const auto dna = dna::from_json({reinterpret_cast<const char*>(text.data()), text.size()});
+  EXPECT_FALSE(dna.has_value());
+  return dna ? core::Error{} : dna.error();
+}
+
+// A 2.1 load without the behavior forgot that its correctives have places in the control space.
+TEST(FuzzFind001, CountsTheCorrectivesThatA21LoadLeavesOut) {
+  dna::ParseOptions options;
+  options.behavior = false;
+  const auto dna = promises::parse(find("001-correctives-not-loaded.dna"), options);
+  ASSERT_TRUE(dna.has_value()) << dna.error().describe();
+  EXPECT_EQ(dna->unread_controls.psd, 1u);
+}
+
+// The offset was the one that the index announced, behind the file's end.
+TEST(FuzzFind002, PlacesALayerBeyondTheEndInTheFile) {
+  const Bytes bytes = find("002-layer-beyond-the-end.dna");
+  EXPECT_EQ(placed(checked(bytes), "rbf_behavior", bytes.size()), 1u);
+}
+
+// Messages about a list as a whole had no offset.
+TEST(FuzzFind003, PlacesAListAsAWhole) {
+  const Bytes bytes = find("003-joint-metadata-too-short.dna");
+  const std::string where = "joint_behavior_metadata.joint_representations";
+  EXPECT_EQ(placed(checked(bytes), where, bytes.size()), 1u);
+}
+
+// Nor had those about a layer that is not in the file: they lie in the index, which does not list
+// it.
+TEST(FuzzFind004, PlacesAMissingLayerInTheIndex) {
+  const auto findings = checked(find("004-no-descriptor.dna"));
+  const auto axes = std::ranges::find_if(findings, [](const dna::Finding& f) {
+    return f.error.where == "descriptor.coordinate_system";
+  });
+  ASSERT_NE(axes, findings.end());
+  EXPECT_EQ(axes->error.offset, 7u);
+}
+
+TEST(FuzzFind005, PlacesALayerThatCouldNotBeReadInTheFile) {
+  const Bytes bytes = find("005-descriptor-beyond-the-end.dna");
+  const auto findings = checked(bytes);
+  EXPECT_EQ(placed(findings, "descriptor.coordinate_system", bytes.size()), 1u);
+  EXPECT_EQ(promises::checking(bytes, promises::parse(bytes).has_value()), "");
+}
+
+// Neither field nor offset.
+TEST(FuzzFind006, NamesAnUnknownMemberAtTheRoot) {
+  EXPECT_EQ(json_error("006-unknown-member-at-the-root.json").where, "mleh1.0");
+}
+
+// The second member replaced the first without a word; then, neither field nor offset.
+TEST(FuzzFind007, RefusesAMemberWithoutANameTwice) {
+  const core::Error error = json_error("007-member-without-a-name-twice.json");
+  EXPECT_EQ(error.code, core::ErrorCode::kInvalidValue);
+  EXPECT_EQ(error.where, "\"\"");
+}
+
+// All behind the zero byte was passed over.
+TEST(FuzzFind008, RefusesATextWithAZeroByte) {
+  const core::Error error = json_error("008-zero-byte.json");
+  EXPECT_EQ(error.code, core::ErrorCode::kNotDna);
+  EXPECT_EQ(error.offset, 44u);
+}
+
+TEST(FuzzFinds, KeepEveryPromise) {
+  std::size_t turn = 0;
+  for (const auto& path : testing_support::dna_files(testing_support::data_folder() / "fuzz")) {
+    EXPECT_EQ(promises::everything(testing_support::read_file(path), turn++), "")
+        << path.filename();
+  }
+  EXPECT_GE(turn, 5u);
+}
+
+}  // namespace
+}  // namespace risorius

@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: MIT
+// Whatever parses is converted to the system that the first 8 bytes choose.
+#include "fuzz/promise.h"
+
+namespace promises = risorius::promises;
+using risorius::fuzz::demand;
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  if (size < promises::kOptionBytes) return 0;
+  const promises::View bytes{data, size};
+  const auto dna = promises::parse(bytes.subspan(promises::kOptionBytes));
+  if (dna) demand(promises::conversion(*dna, bytes));
+  return 0;
+}

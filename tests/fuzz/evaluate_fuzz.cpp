@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: MIT
+// Whatever parses is compiled and evaluated; the first 4 bytes seed the controls.
+#include "fuzz/promise.h"
+
+namespace promises = risorius::promises;
+using risorius::fuzz::demand;
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  if (size < 4) return 0;
+  const auto dna = promises::parse({data + 4, size - 4});
+  if (!dna) return 0;
+  std::uint32_t seed = 0;
+  for (int i = 0; i < 4; ++i) seed = seed << 8 | data[i];
+  demand(promises::evaluation(*dna, seed));
+  return 0;
+}

@@ -1,0 +1,11 @@
+// SPDX-License-Identifier: MIT
+// The first 8 bytes choose layers, LODs, limits and the kind of source; the rest is the file.
+#include "fuzz/promise.h"
+
+namespace promises = risorius::promises;
+using risorius::fuzz::demand;
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  demand(promises::filtering({data, size}));
+  return 0;
+}

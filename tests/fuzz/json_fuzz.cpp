@@ -1,0 +1,11 @@
+// SPDX-License-Identifier: MIT
+// Any text: what from_json accepts survives to_json and back.
+#include "fuzz/promise.h"
+
+namespace promises = risorius::promises;
+using risorius::fuzz::demand;
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  demand(promises::json_text({reinterpret_cast<const char*>(data), size}));
+  return 0;
+}

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: MIT
+// make_seeds FOLDER FILE.dna ...: the first inputs of each fuzz target, in FOLDER/<target>: faces
+// of every version made here, and the given files, as far as they are small.
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <iterator>
+
+#include "dna/json.h"
+#include "dna/layers.h"
+#include "support/full_face.h"
+#include "support/promises.h"
+
+namespace {
+
+using risorius::promises::Bytes;
+namespace dna = risorius::dna;
+namespace fs = std::filesystem;
+
+constexpr std::size_t kLargestSeed = 4400;  // larger ones make every run slow
+constexpr std::size_t kOptions = risorius::promises::kOptionBytes;
+
+// What a target expects before the file; several of them make several seeds.
+const std::vector<Bytes> kFilters{{0, 0, 0, 0, 0, 0, 0, 0},       {0, 0x20, 1, 0, 0, 0, 0, 0},
+                                  {0, 0x80, 0, 0, 0, 0, 0, 0},    {0x1D, 0x83, 1, 0, 0, 0, 0, 0},
+                                  {0, 0x14, 0, 0, 200, 20, 9, 0}, {0, 0x0C, 0, 0, 0, 0, 0, 3}};
+const std::vector<Bytes> kTargets{
+    {0, 0, 0, 0, 0, 0, 0, 0}, {0x3F, 19, 4, 2, 1, 1, 1, 0}, {0x02, 0, 5, 0, 0, 0, 0, 0}};
+const std::vector<Bytes> kControls{{0, 0, 0, 2}, {0, 0, 0, 3}};
+
+std::string without_spaces(const std::string& json) {
+  std::string out;
+  bool in_text = false;
+  for (std::size_t i = 0; i < json.size(); ++i) {
+    if (json[i] == '"' && (i == 0 || json[i - 1] != '\\')) in_text = !in_text;
+    if (in_text || (json[i] != ' ' && json[i] != '\n')) out += json[i];
+  }
+  return out;
+}
+
+class Seeds {
+ public:
+  explicit Seeds(fs::path folder) : folder_(std::move(folder)) {}
+
+  void add(const std::string& name, const Bytes& file) {
+    put("parse", name, {}, file);
+    put("round_trip", name, {}, file);
+    put_each("filter", name, kFilters, file);
+    put_each("coordinates", name, kTargets, file);
+    put_each("evaluate", name, kControls, file);
+    const auto read = risorius::promises::parse(file);
+    if (!read) return;
+    const std::string json = without_spaces(*dna::to_json(*read));
+    put("json", name, {}, {json.begin(), json.end()});
+  }
+
+ private:
+  void put_each(const std::string& target, const std::string& name,
+                const std::vector<Bytes>& options, const Bytes& file) {
+    for (std::size_t i = 0; i < options.size(); ++i) {
+      put(target, name + "-" + std::to_string(i), options[i], file);
+    }
+  }
+  void put(const std::string& target, const std::string& name, Bytes bytes, const Bytes& file) {
+    bytes.insert(bytes.end(), file.begin(), file.end());
+    if (bytes.size() > kLargestSeed + kOptions) return;
+    fs::create_directories(folder_ / target);
+    std::ofstream out(folder_ / target / name, std::ios::binary);
+    out.write(reinterpret_cast<const char*>(bytes.data()),
+              static_cast<std::streamsize>(bytes.size()));
+  }
+
+  fs::path folder_;
+};
+
+Bytes written(const dna::Dna& face, std::uint16_t minor) {
+  std::vector<dna::Warning> warnings;
+  return *dna::write(face, {minor, false}, warnings);
+}
+
+// Each layer alone, and with the one that it extends: what is small is tried most often.
+void add_parts(Seeds& seeds) {
+  const dna::Dna face = risorius::testing_support::make_full_face();
+  for (const dna::detail::KnownLayer& wanted : dna::detail::kLayers) {
+    dna::Dna part = face;
+    dna::detail::for_each_layer(part, [&](std::string_view id, const char*, auto& layer) {
+      const bool extends = wanted.id[3] == 'e' && id.substr(0, 2) == std::string_view(wanted.id, 2);
+      if (id != "desc" && id != "defn" && id != wanted.id && !extends) layer = {};
+    });
+    // The other layers still count their controls.
+    part.behavior.psd_count = face.behavior.psd_count;
+    part.machine_learned_behavior.ml_control_names = face.machine_learned_behavior.ml_control_names;
+    seeds.add(std::string("only-") + wanted.id, written(part, 8));
+  }
+  dna::Dna unknown;
+  unknown.unknown_layers = {{{'n', 'e', 'w', '!'}, 0x10000, {1, 2, 3}}};
+  std::vector<dna::Warning> warnings;
+  seeds.add("unknown", *dna::write(unknown, {8, true}, warnings));
+}
+
+Bytes read_file(const fs::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc < 2) {
+    std::cerr << "make_seeds FOLDER FILE.dna ...\n";
+    return 2;
+  }
+  Seeds seeds(argv[1]);
+  const dna::Dna face = risorius::testing_support::make_full_face();
+  for (std::uint16_t minor = 1; minor <= 8; ++minor) {
+    const std::string version = "2." + std::to_string(minor);
+    seeds.add("full-" + version, written(face, minor));
+    seeds.add("empty-" + version, written({}, minor));
+  }
+  add_parts(seeds);
+  for (int i = 2; i < argc; ++i) {
+    const fs::path path = argv[i];
+    seeds.add(path.stem().string(), read_file(path));
+  }
+}

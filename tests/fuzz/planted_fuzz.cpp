@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: MIT
+// A target with a mistake in it: says of every second DNA file that it is good. What runs the
+// targets is seen to fail with it.
+#include "fuzz/promise.h"
+
+namespace promises = risorius::promises;
+using risorius::fuzz::demand;
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const auto dna = promises::parse({data, size});
+  if (!dna && dna.error().code != risorius::core::ErrorCode::kNotDna && size % 2 == 0) {
+    demand("planted");
+  }
+  return 0;
+}

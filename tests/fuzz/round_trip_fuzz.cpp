@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: MIT
+// Whatever parses is written, read and written again for its own version, and for one that the last
+// byte chooses or through JSON.
+#include "fuzz/promise.h"
+
+namespace promises = risorius::promises;
+using risorius::fuzz::demand;
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const auto dna = promises::parse({data, size});
+  if (!dna) return 0;
+  const std::uint8_t choice = data[size - 1];
+  demand(choice & 8 ? promises::json(*dna)
+                    : promises::rewriting(*dna, static_cast<std::uint16_t>(1 + choice % 8)));
+  if (dna->version >= 1 && dna->version <= 8) demand(promises::rewriting(*dna, dna->version));
+  return 0;
+}

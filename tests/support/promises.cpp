@@ -1,0 +1,487 @@
+// SPDX-License-Identifier: MIT
+#include "support/promises.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <utility>
+
+#include "compile/compile.h"
+#include "core/source.h"
+#include "dna/json.h"
+
+namespace risorius::promises {
+
+namespace {
+
+using core::ErrorCode;
+using core::Result;
+using dna::Dna;
+using dna::ParseOptions;
+
+const std::string kKept;
+
+Result<Bytes> write(const Dna& dna, std::uint16_t minor = 8) {
+  std::vector<dna::Warning> warnings;
+  return dna::write(dna, {minor, true}, warnings);
+}
+
+std::string broken(const std::string& promise, const core::Error& error) {
+  return promise + ": " + error.describe();
+}
+
+// ---- sources that are not memory
+
+// A file as parse sees it: piece by piece. From the given read on, every byte is another one.
+class PieceSource final : public core::Source {
+ public:
+  PieceSource(View bytes, std::size_t honest_reads) : bytes_(bytes), honest_(honest_reads) {}
+  std::uint64_t size() const override { return bytes_.size(); }
+  std::size_t read(std::uint64_t offset, std::span<std::uint8_t> out) override {
+    core::SpanSource memory(bytes_);
+    const std::size_t n = memory.read(offset, out);
+    if (reads_++ < honest_) return n;
+    for (std::size_t i = 0; i < n; ++i) out[i] = static_cast<std::uint8_t>(out[i] + 1);
+    return n;
+  }
+
+ private:
+  View bytes_;
+  std::size_t honest_, reads_ = 0;
+};
+
+// ---- errors
+
+std::string placed(const core::Error& e, std::size_t size) {
+  if (e.code == ErrorCode::kInvalidArgument) return kKept;
+  if (e.where.empty()) return broken("an error has a field", e);
+  if (!e.offset) return broken("an error has an offset", e);
+  if (*e.offset > size) return broken("an error lies in the file", e);
+  return kKept;
+}
+
+// ---- evaluation
+
+class Random {
+ public:
+  explicit Random(std::uint32_t seed) : state_(seed * 2654435761u + 1) {}
+  std::uint32_t next() {
+    state_ ^= state_ << 13;
+    state_ ^= state_ >> 17;
+    return state_ ^= state_ << 5;
+  }
+  float moderate() { return static_cast<float>(next() % 4097) / 1024.0f - 2.0f; }
+  float any() {
+    constexpr float kInfinity = std::numeric_limits<float>::infinity();
+    constexpr std::array<float, 8> kOdd{0,      -0.0f,     1e30f,      -3e38f,
+                                        1e-42f, kInfinity, -kInfinity, NAN};
+    return next() % 2 == 0 ? moderate() : kOdd[next() % kOdd.size()];
+  }
+
+ private:
+  std::uint32_t state_;
+};
+
+void widen(float& most, const core::Array<float>& values) {
+  for (const float v : values) {
+    if (!(std::abs(v) <= most)) most = std::isnan(v) ? HUGE_VALF : std::abs(v);
+  }
+}
+
+void widen(float& most, const dna::Conditionals& t) {
+  for (const auto* list : {&t.from_values, &t.to_values, &t.slope_values, &t.cut_values}) {
+    widen(most, *list);
+  }
+}
+
+float largest_joint_value(const Dna& dna) {
+  float most = 0;
+  for (const dna::JointGroup& g : dna.behavior.joint_groups) widen(most, g.values);
+  return most;
+}
+
+// Weights of one corrective multiply each other: beyond 1 they may overflow.
+bool is_moderate(const Dna& dna) {
+  float weights = 0, rows = 0;
+  widen(weights, dna.behavior.psds.values);
+  widen(rows, dna.behavior.gui_to_raw);
+  widen(rows, dna.behavior.animated_maps.conditionals);
+  return weights <= 1 && rows <= 1000 && largest_joint_value(dna) <= 1000;
+}
+
+bool all_finite(const std::vector<float>& values) {
+  return std::ranges::all_of(values, [](float v) { return std::isfinite(v); });
+}
+
+bool all_finite(const rig::Pose& p) {
+  return all_finite(p.joints) && all_finite(p.blend_shapes) && all_finite(p.animated_maps) &&
+         all_finite(p.controls);
+}
+
+bool same_bits(const std::vector<float>& a, const std::vector<float>& b) {
+  return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), 4 * a.size()) == 0);
+}
+
+// n products of a value and a control, each sum rounded once: n * n * eps * |value| * |control|
+// bounds what another order or a fused operation can change. Controls are below 2.
+float joint_tolerance(const Dna& dna, const rig::Rig& rig) {
+  const float n = static_cast<float>(rig.widest_group) + 1;
+  constexpr float kEpsilon = std::numeric_limits<float>::epsilon();
+  return 2 * n * n * kEpsilon * 2 * largest_joint_value(dna) + 1e-37f;
+}
+
+struct Evaluated {
+  rig::Rig rig;
+  std::vector<rig::Pose> poses;  // by LOD
+};
+
+std::string evaluate_on(const Dna& dna, const simd::Kernels& kernels, const std::vector<float>& raw,
+                        std::vector<Evaluated>& out) {
+  compile::CompileOptions options;
+  options.kernels = &kernels;
+  Result<rig::Rig> rig = compile::compile(dna, options);
+  if (!rig) return rig.error().where.empty() ? broken("an error has a field", rig.error()) : kKept;
+  Evaluated all{std::move(*rig), {}};
+  rig::Workspace work = rig::make_workspace(all.rig);
+  rig::Pose pose = rig::make_pose(all.rig);
+  for (std::uint32_t lod = 0; lod <= all.rig.lod_count; ++lod) {
+    rig::Instance instance(all.rig);
+    instance.set_lod(lod);
+    const rig::Pose& first = instance.evaluate(raw.data());
+    rig::evaluate(all.rig, raw.data(), lod, false, work, pose);
+    if (all.rig.lod_count > 0 && !same_bits(first.joints, pose.joints)) {
+      return "an instance begins as evaluate without settling";
+    }
+    instance.evaluate(raw.data());
+    rig::evaluate(all.rig, raw.data(), lod, true, work, pose);
+    all.poses.push_back(pose);
+  }
+  out.push_back(std::move(all));
+  return kKept;
+}
+
+std::string compare(const Dna& dna, const std::vector<Evaluated>& evaluated) {
+  for (std::size_t i = 1; i < evaluated.size(); ++i) {
+    const float tolerance = joint_tolerance(dna, evaluated[0].rig);
+    for (std::size_t lod = 0; lod < evaluated[0].poses.size(); ++lod) {
+      const rig::Pose &a = evaluated[0].poses[lod], &b = evaluated[i].poses[lod];
+      for (std::size_t j = 0; j < a.joints.size(); ++j) {
+        if (std::abs(a.joints[j] - b.joints[j]) <= tolerance) continue;
+        return "instruction sets agree: " + std::to_string(a.joints[j]) + " and " +
+               std::to_string(b.joints[j]) + " at " + std::to_string(j);
+      }
+      if (!same_bits(a.controls, b.controls)) return "instruction sets agree about controls";
+    }
+  }
+  return kKept;
+}
+
+std::string gui(const Dna& dna, const rig::Rig& rig, Random& random, bool moderate) {
+  std::vector<float> in(dna.definition.gui_control_names.size()), out(rig.raw_count, NAN);
+  for (float& v : in) v = moderate ? random.moderate() : random.any();
+  rig::gui_to_raw(rig, in.data(), out.data());
+  return moderate && !all_finite(out) ? "moderate GUI controls give finite controls" : kKept;
+}
+
+std::string morphs(const Dna& dna, Random& random) {
+  std::vector<float> weights(dna.definition.blend_shape_channel_names.size());
+  for (float& w : weights) w = random.any();
+  for (std::size_t i = 0; i < dna.geometry.meshes.size(); ++i) {
+    const auto morph = compile::compile_morph(dna, i, {1, 0, 0, 0, 1, 0, 0, 0, 1});
+    if (!morph) return broken("a mesh compiles", morph.error());
+    std::vector<float> vertices(std::size_t{morph->vertex_count} * 3);
+    rig::evaluate_morph(*morph, weights.data(), nullptr, vertices.data());
+  }
+  return kKept;
+}
+
+// ---- filters
+
+struct Filter {
+  ParseOptions options;
+  bool in_pieces = false, lying = false;
+};
+
+dna::LodSelection selection(View o) {
+  dna::LodSelection s;
+  switch (o[1] >> 5) {
+    case 1:
+      s.max_lod = o[2];
+      break;
+    case 2:
+      s.min_lod = o[2];
+      break;
+    case 3:
+      s.max_lod = o[2] & 3;
+      s.min_lod = o[2] >> 4;
+      break;
+    case 4:
+      s.lods = {o[2]};
+      break;
+    case 5:
+      s.lods = {std::uint16_t(o[2] & 3), std::uint16_t(o[2] >> 4)};
+      break;
+    default:
+      break;
+  }
+  return s;
+}
+
+Filter filter_of(View o) {
+  Filter f;
+  ParseOptions& p = f.options;
+  const auto on = [&](int bit) { return (o[0] >> bit & 1) == 0; };
+  p.behavior = on(0);
+  p.geometry = on(1);
+  p.blend_shapes = on(2);
+  p.machine_learned_behavior = on(3);
+  p.rbf_behavior = on(4);
+  p.joint_behavior_metadata = on(5);
+  p.twist_swing_behavior = on(6);
+  p.definition = on(7);
+  p.unknown_layers = (o[1] & 1) == 0;
+  p.unreferenced_blend_shapes = (o[1] & 2) == 0;
+  f.in_pieces = (o[1] & 4) != 0;
+  f.lying = (o[1] & 8) != 0;
+  if ((o[1] & 16) != 0) {
+    p.limits.max_bytes = std::uint64_t{64} * o[4];
+    p.limits.max_layers = o[5];
+    p.limits.max_count = std::uint32_t{4} * o[6];
+  }
+  p.lods = selection(o);
+  return f;
+}
+
+Result<Dna> parse_as(View bytes, const Filter& f, std::size_t honest_reads) {
+  if (!f.in_pieces) return parse(bytes, f.options);
+  PieceSource source(bytes, f.lying ? honest_reads : SIZE_MAX);
+  return dna::parse(source, f.options);
+}
+
+// What parse leaves out, left out afterwards.
+Dna without_layers(Dna dna, const ParseOptions& o) {
+  const dna::ControlCounts controls = dna::control_counts(dna);
+  const bool no_layer = !o.definition;
+  if (no_layer) dna.definition = {};
+  if (!o.behavior) {
+    dna.unread_controls.psd = no_layer ? 0 : controls.psd;
+    dna.behavior = {};
+  }
+  if (!o.machine_learned_behavior) {
+    dna.unread_controls.ml = no_layer ? 0 : controls.ml;
+    dna.machine_learned_behavior = {};
+    dna.machine_learned_behavior_ext = {};
+  }
+  if (!o.rbf_behavior) {
+    dna.unread_controls.rbf_pose = no_layer ? 0 : controls.rbf_pose;
+    dna.rbf_behavior = {};
+    dna.rbf_behavior_ext = {};
+  }
+  if (!o.geometry) dna.geometry = {};
+  for (dna::Mesh& m : dna.geometry.meshes) {
+    if (!o.blend_shapes) m.blend_shape_targets = {};
+  }
+  if (!o.joint_behavior_metadata) dna.joint_behavior_metadata = {};
+  if (!o.twist_swing_behavior) dna.twist_swing_behavior = {};
+  if (!o.unknown_layers) {
+    dna.unknown_layers.clear();
+    std::erase(dna.index_order, "");
+  }
+  return dna;
+}
+
+// Layers that need one that is left out are the caller's mistake: nothing is promised but safety.
+bool is_comparable(const ParseOptions& o) {
+  const bool some = o.behavior || o.geometry || o.machine_learned_behavior || o.rbf_behavior ||
+                    o.joint_behavior_metadata || o.twist_swing_behavior;
+  return (o.definition || !some) && (o.behavior || !o.rbf_behavior);
+}
+
+// Networks, poses and setups that need controls which were not loaded make no file.
+bool lacks_controls(const Dna& dna, const core::Error& error) {
+  return error.code == ErrorCode::kInvalidArgument &&
+         !(dna.unread_controls == dna::UnreadControls{});
+}
+
+std::string compare_filtered(const Dna& full, const ParseOptions& o, const Result<Dna>& filtered) {
+  Result<Dna> expected = dna::filter_lods(full, o.lods);
+  if (expected) expected = without_layers(std::move(*expected), o);
+  if (expected && !o.unreferenced_blend_shapes && o.definition) {
+    expected = dna::remove_unreferenced_blend_shapes(*expected);
+  }
+  if (!expected) {
+    if (!filtered && filtered.error().code == expected.error().code) return kKept;
+    return broken("a filtered load fails as the filter does", expected.error());
+  }
+  if (!filtered) return broken("a part of a file that is good is good", filtered.error());
+  // As JSON: writing closes the gaps of controls that were not loaded.
+  const Result<std::string> a = dna::to_json(*expected), b = dna::to_json(*filtered);
+  if (!a) return broken("what was filtered is whole", a.error());
+  if (!b) return broken("what was loaded filtered is whole", b.error());
+  if (*a != *b) return "a filtered load is the full load, filtered";
+  if (!(expected->unread_controls == filtered->unread_controls)) {
+    return "a filtered load counts the controls that it leaves out";
+  }
+  return kKept;
+}
+
+// ---- coordinates
+
+dna::CoordinateSystem axes(std::uint8_t choice) {
+  if (choice >= 240) return {choice, 2, 4};
+  constexpr std::uint16_t kOrders[6][3] = {{0, 2, 4}, {0, 4, 2}, {2, 0, 4},
+                                           {2, 4, 0}, {4, 0, 2}, {4, 2, 0}};
+  const auto& order = kOrders[choice / 8 % 6];
+  const auto turned = [&](int i) {
+    return static_cast<std::uint16_t>(order[i] + (choice >> i & 1));
+  };
+  return {turned(0), turned(1), turned(2)};
+}
+
+dna::CoordinateTarget target_of(View o) {
+  dna::CoordinateTarget t;
+  const auto has = [&](int bit) { return (o[0] >> bit & 1) != 0; };
+  const auto sign = [&](int bit) { return (o[3] >> bit & 1) != 0 ? -1 : 1; };
+  if (has(0)) t.axes = axes(o[1]);
+  if (has(1)) t.rotation_sequence = o[2] % 7;
+  if (has(2)) t.rotation_signs = {sign(0), sign(1), sign(2)};
+  if (has(3)) t.face_winding_order = static_cast<std::uint8_t>(o[4] % 3);
+  if (has(4)) t.translation_unit = static_cast<std::uint16_t>(o[5] % 3);
+  if (has(5)) t.rotation_unit = static_cast<std::uint16_t>(o[6] % 3);
+  return t;
+}
+
+}  // namespace
+
+Result<Dna> parse(View bytes, const ParseOptions& options) {
+  core::SpanSource source(bytes);
+  return dna::parse(source, options);
+}
+
+std::string reading(View bytes, const Result<Dna>& dna) {
+  return dna ? kKept : placed(dna.error(), bytes.size());
+}
+
+std::string checking(View bytes, bool is_good) {
+  core::SpanSource source(bytes);
+  bool wrong = false;
+  for (const dna::Finding& f : dna::check(source)) {
+    wrong = wrong || f.is_error;
+    if (std::string place = placed(f.error, bytes.size()); !place.empty()) return "check: " + place;
+  }
+  if (wrong != is_good) return kKept;
+  return wrong ? "check finds no error in a file that can be read" : "check finds what parse finds";
+}
+
+std::string rewriting(const Dna& dna, std::uint16_t minor) {
+  const Result<Bytes> first = write(dna, minor);
+  if (!first) return broken("what was read can be written", first.error());
+  const Result<Dna> again = parse(*first);
+  if (!again) return broken("what was written can be read", again.error());
+  const Result<Bytes> second = write(*again, minor);
+  if (!second) return broken("what was read again can be written", second.error());
+  return *first == *second ? kKept : "what was read is written as it was";
+}
+
+std::string json(const Dna& dna) {
+  const Result<std::string> text = dna::to_json(dna);
+  if (!text) return broken("what was read becomes JSON", text.error());
+  const Result<Dna> again = dna::from_json(*text);
+  if (!again) return broken("JSON that was written can be read", again.error());
+  const Result<std::string> twice = dna::to_json(*again);
+  if (!twice || *twice != *text) return "JSON that was read is written as it was";
+  const Result<Bytes> bytes = write(dna), through_json = write(*again);
+  if (!bytes || !through_json || *bytes != *through_json) return "JSON loses nothing";
+  return kKept;
+}
+
+std::string json_text(std::string_view text) {
+  const Result<Dna> dna = dna::from_json(text);
+  if (!dna) {
+    const core::Error& e = dna.error();
+    return e.where.empty() && !e.offset ? broken("an error has a field or an offset", e) : kKept;
+  }
+  if (std::string b = json(*dna); !b.empty()) return b;
+  return rewriting(*dna, 8);
+}
+
+std::string evaluation(const Dna& dna, std::uint32_t seed) {
+  Random random(seed);
+  const bool moderate = seed % 2 == 0;
+  std::vector<float> raw(dna.definition.raw_control_names.size());
+  for (float& v : raw) v = moderate ? random.moderate() : random.any();
+  std::vector<Evaluated> evaluated;
+  for (const simd::Kernels* kernels : {&simd::scalar_kernels(), simd::find_kernels("avx2")}) {
+    if (kernels == nullptr) continue;
+    if (std::string b = evaluate_on(dna, *kernels, raw, evaluated); !b.empty()) return b;
+  }
+  if (!evaluated.empty()) {
+    const bool tame = moderate && is_moderate(dna);
+    if (std::string b = gui(dna, evaluated[0].rig, random, tame); !b.empty()) return b;
+    for (const Evaluated& e : evaluated) {
+      const bool finite = std::ranges::all_of(e.poses, [](const auto& p) { return all_finite(p); });
+      if (tame && !finite) return "moderate numbers give finite poses";
+    }
+    if (std::string b = tame ? compare(dna, evaluated) : kKept; !b.empty()) return b;
+  }
+  return morphs(dna, random);
+}
+
+std::string filtering(View bytes) {
+  if (bytes.size() < kOptionBytes) return kKept;
+  const Filter f = filter_of(bytes);
+  const std::size_t honest_reads = bytes[7];
+  const View file = bytes.subspan(kOptionBytes);
+  const Result<Dna> filtered = parse_as(file, f, honest_reads);
+  if (filtered) {
+    const Result<Bytes> written = write(*filtered);
+    if (!written && !lacks_controls(*filtered, written.error())) {
+      return broken("what was loaded filtered can be written", written.error());
+    }
+  }
+  const bool limited = !filtered && filtered.error().code == ErrorCode::kLimitExceeded;
+  if (f.lying || limited || !is_comparable(f.options)) return kKept;
+  const Result<Dna> full = parse(file);
+  return full ? compare_filtered(*full, f.options, filtered) : kKept;
+}
+
+std::string conversion(const Dna& dna, View options) {
+  std::vector<dna::Warning> warnings;
+  const auto same = dna::convert_coordinates(dna, {}, warnings);
+  const Result<Bytes> before = write(dna), unchanged = same ? write(*same) : before;
+  if (!unchanged || *before != *unchanged) return "a target equal to the source changes no bit";
+  const dna::CoordinateTarget target = target_of(options);
+  const auto converted = dna::convert_coordinates(dna, target, warnings);
+  if (!converted) {
+    const core::Error& e = converted.error();
+    return e.where.empty() ? broken("an error has a field", e) : kKept;
+  }
+  const Result<Bytes> once = write(*converted);
+  if (!once) return broken("what was converted can be written", once.error());
+  const auto again = dna::convert_coordinates(*converted, target, warnings);
+  if (!again) return broken("what was converted can be converted", again.error());
+  const Result<Bytes> twice = write(*again);
+  return twice && *twice == *once ? kKept : "converting again changes nothing";
+}
+
+std::string everything(View bytes, std::size_t turn) {
+  const Result<Dna> read = parse(bytes);
+  if (std::string b = checking(bytes, read.has_value()); !b.empty()) return b;
+  if (!read) return reading(bytes, read);
+  const Dna& dna = *read;
+  const std::uint16_t own = dna.version >= 1 && dna.version <= 8 ? dna.version : std::uint16_t{8};
+  for (const std::uint16_t minor : {own, static_cast<std::uint16_t>(1 + turn % 8)}) {
+    if (std::string b = rewriting(dna, minor); !b.empty()) return b;
+  }
+  if (std::string b = json(dna); !b.empty()) return b;
+  if (std::string b = evaluation(dna, static_cast<std::uint32_t>(turn)); !b.empty()) return b;
+  const Bytes turned{0x3F, static_cast<std::uint8_t>(turn), 4, 2, 1, 1, 1, 0};
+  if (std::string b = conversion(dna, turned); !b.empty()) return b;
+  Bytes filtered{0, 0x80, static_cast<std::uint8_t>(turn % 2), 0, 0, 0, 0, 0};
+  filtered.insert(filtered.end(), bytes.begin(), bytes.end());
+  return filtering(filtered);
+}
+
+}  // namespace risorius::promises
