@@ -174,7 +174,7 @@ class Parser {
       section(5, "behavior", [&] { layer_.field("blend_shape_channels", b.blend_shape_channels); });
       section(6, "behavior", [&] { layer_.field("animated_maps", b.animated_maps); });
     } else if (options_.definition) {
-      section(3, "behavior", [&] { layer_.field("psd_count", b.psd_count); });
+      read("behavior", offsets[3], 2, [&] { layer_.field("psd_count", b.psd_count); });
       dna_.unread_controls.psd = std::exchange(b.psd_count, std::uint16_t{0});
     }
     if (options_.geometry) {

@@ -193,7 +193,7 @@ bool contains(const std::vector<std::string>& names, const std::string& name) {
 // layer rbfb are controls where rbfe is empty, and their number lies behind the solvers.
 bool counts_controls(const File& file, const std::string& layer) {
   const bool in_rbfb = layer == "rbfb" && file.layers.at("rbfe").size() == 8;
-  return layer == "bhvr" || layer == "mlbh" || layer == "rbfe" || in_rbfb;
+  return layer == "bhvr" || layer == "controls" || layer == "mlbh" || layer == "rbfe" || in_rbfb;
 }
 
 void expect_only_asked_layers(const File& file, const Load& load) {

@@ -127,7 +127,9 @@ bool same_bits(const std::vector<float>& a, const std::vector<float>& b) {
 // n products of a value and a control, each sum rounded once: n * n * eps * |value| * |control|
 // bounds what another order or a fused operation can change. Controls are below 2.
 float joint_tolerance(const Dna& dna, const rig::Rig& rig) {
-  const float n = static_cast<float>(rig.widest_group) + 1;
+  std::uint32_t widest = 0;
+  for (const rig::JointGroup& g : rig.joint_groups) widest = std::max(widest, g.column_count);
+  const float n = static_cast<float>(widest) + 1;
   constexpr float kEpsilon = std::numeric_limits<float>::epsilon();
   return 2 * n * n * kEpsilon * 2 * largest_joint_value(dna) + 1e-37f;
 }
@@ -160,6 +162,12 @@ std::string evaluate_on(const Dna& dna, const simd::Kernels& kernels, const std:
   }
   out.push_back(std::move(all));
   return kKept;
+}
+
+// Exponentials and quotients magnify what the order of a sum changes, without a bound for any file.
+bool is_linear(const rig::Rig& rig) {
+  return rig.ml_operations.empty() && rig.rbf_solvers.empty() && rig.quaternion_joints.empty() &&
+         rig.twist_swings.empty();
 }
 
 std::string compare(const Dna& dna, const std::vector<Evaluated>& evaluated) {
@@ -413,12 +421,14 @@ std::string evaluation(const Dna& dna, std::uint32_t seed) {
   std::vector<float> raw(dna.definition.raw_control_names.size());
   for (float& v : raw) v = moderate ? random.moderate() : random.any();
   std::vector<Evaluated> evaluated;
-  for (const simd::Kernels* kernels : {&simd::scalar_kernels(), simd::find_kernels("avx2")}) {
+  for (const simd::Kernels* kernels :
+       {&simd::scalar_kernels(), simd::sse4_kernels(), simd::avx2_kernels(), simd::avx512_kernels(),
+        simd::neon_kernels()}) {
     if (kernels == nullptr) continue;
     if (std::string b = evaluate_on(dna, *kernels, raw, evaluated); !b.empty()) return b;
   }
   if (!evaluated.empty()) {
-    const bool tame = moderate && is_moderate(dna);
+    const bool tame = moderate && is_moderate(dna) && is_linear(evaluated[0].rig);
     if (std::string b = gui(dna, evaluated[0].rig, random, tame); !b.empty()) return b;
     for (const Evaluated& e : evaluated) {
       const bool finite = std::ranges::all_of(e.poses, [](const auto& p) { return all_finite(p); });
