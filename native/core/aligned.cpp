@@ -12,8 +12,7 @@ namespace risorius::core {
 std::shared_ptr<std::uint8_t> allocate_pages(std::size_t size) {
   constexpr std::size_t kLarge = std::size_t{2} << 20;
   const std::size_t alignment = size >= kLarge ? kLarge : 64;
-  void* memory = ::operator new(size, std::align_val_t(alignment), std::nothrow);
-  if (memory == nullptr) return nullptr;
+  void* memory = ::operator new(size, std::align_val_t(alignment));
 #if defined(__linux__) && defined(MADV_HUGEPAGE)
   if (alignment == kLarge) madvise(memory, size, MADV_HUGEPAGE);  // a wish
 #endif

@@ -28,7 +28,7 @@ struct AlignedAllocator {
 };
 
 /// Zeroed memory for what is read at random: in large pages where it is large and the system has
-/// them, so that finding it costs no more than reading it. nullptr: there is none.
+/// them, so that finding it costs no more than reading it.
 std::shared_ptr<std::uint8_t> allocate_pages(std::size_t size);
 
 template <class T>

@@ -143,7 +143,6 @@ Result<Rig> make_rig(const RigData& data, const simd::Kernels& kernels) {
   });
   h.size = size;
   const std::shared_ptr<std::uint8_t> block = core::allocate_pages(size);
-  if (block == nullptr) return fail(ErrorCode::kLimitExceeded, "rig", "no memory");
   const std::span<std::uint8_t> bytes(block.get(), size);
   i = 0;
   for_each_array(data, [&](const auto& array) {
