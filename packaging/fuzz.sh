@@ -6,7 +6,7 @@
 set -uo pipefail
 source "$(dirname "$0")/setup.sh"
 
-targets=(parse filter round_trip json evaluate coordinates)
+targets=(parse filter round_trip json evaluate coordinates rig)
 programs="$project/build/fuzz/tests/fuzz"
 corpora="$project/build/fuzz-corpus"
 finds="$project/build/fuzz-finds"
@@ -30,7 +30,7 @@ build_targets() {
 # ones take a fourth of the time, and a find is run again anyway.
 run_target() {
   local longest=4400
-  [ "$1" = json ] && longest=8192
+  case $1 in json) longest=8192 ;; rig) longest=14000 ;; esac
   mkdir -p "$corpora/$1" "$corpora/seeds/$1"
   ASAN_OPTIONS=malloc_context_size=4:quarantine_size_mb=32 nice -n 10 "$programs/$1_fuzz" \
     -max_total_time="$2" -timeout=5 -rss_limit_mb=2048 -max_len=$longest -print_final_stats=1 \
@@ -79,7 +79,7 @@ cat << END
 Finds lie in $finds; the last lines of $logs/<target>.log say what broke.
 Make one small, keep it, and name it in a test:
   $programs/<target>_fuzz -minimize_crash=1 -runs=100000 -exact_artifact_path=small FIND
-  cut what the target takes for options off its beginning (8 bytes: filter, coordinates; 4: evaluate)
+  cut what the target takes for options off its beginning (8 bytes: filter, coordinates; 4: evaluate, rig)
   cp small tests/data/fuzz/NNN-short-name.dna       # the next number
   and a TEST of that name in tests/dna/regressions_test.cpp
 END

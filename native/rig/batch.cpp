@@ -109,8 +109,9 @@ void evaluate_block(const Rig& rig, const float* raw, std::size_t count, std::ui
 
 Workspace make_batch_workspace(const Rig& rig) {
   Workspace work = make_workspace(rig);
-  work.column_offsets.resize(rig.list_count);
-  work.column_weights.resize(std::size_t{rig.list_count} * kFrames);
+  // One more: kernels begin at a pointer even where there is nothing to read.
+  work.column_offsets.resize(rig.list_count + std::size_t{1});
+  work.column_weights.resize((rig.list_count + std::size_t{1}) * kFrames);
   work.rows.resize(detail::rows_size(rig) * kFrames);
   work.frame_weights.resize(std::size_t{rig.control_count} * kFrames);
   work.union_bits.resize((std::size_t{rig.control_count} + 63) / 64);

@@ -98,13 +98,20 @@ TEST(FuzzFind008, RefusesATextWithAZeroByte) {
   EXPECT_EQ(error.offset, 44u);
 }
 
+// Rows, and no column with a value: a batch stepped from a null pointer, though it read nothing.
+TEST(FuzzFind009, EvaluatesRowsWithoutColumnsInBatches) {
+  const auto dna = promises::parse(find("009-no-column-with-a-value.dna"));
+  ASSERT_TRUE(dna.has_value()) << dna.error().describe();
+  for (std::uint32_t seed = 0; seed < 32; ++seed) EXPECT_EQ(promises::evaluation(*dna, seed), "");
+}
+
 TEST(FuzzFinds, KeepEveryPromise) {
   std::size_t turn = 0;
   for (const auto& path : testing_support::dna_files(testing_support::data_folder() / "fuzz")) {
     EXPECT_EQ(promises::everything(testing_support::read_file(path), turn++), "")
         << path.filename();
   }
-  EXPECT_GE(turn, 5u);
+  EXPECT_GE(turn, 6u);
 }
 
 }  // namespace

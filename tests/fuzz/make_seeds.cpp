@@ -6,6 +6,7 @@
 #include <iostream>
 #include <iterator>
 
+#include "compile/compile.h"
 #include "dna/json.h"
 #include "dna/layers.h"
 #include "support/full_face.h"
@@ -52,9 +53,21 @@ class Seeds {
     if (!read) return;
     const std::string json = without_spaces(*dna::to_json(*read));
     put("json", name, {}, {json.begin(), json.end()});
+    add_rig(name, *read);
   }
 
  private:
+  void add_rig(const std::string& name, const dna::Dna& face) {
+    risorius::compile::CompileOptions options;
+    for (const bool quaternions : {false, true}) {
+      if (quaternions) options.rotation = risorius::compile::Rotation::kQuaternion;
+      if (quaternions) options.precision = risorius::compile::Precision::kFloat16;
+      const auto rig = risorius::compile::compile(face, options);
+      if (!rig) continue;
+      put("rig", name + (quaternions ? "-1" : "-0"), kControls[0],
+          {rig->block().begin(), rig->block().end()});
+    }
+  }
   void put_each(const std::string& target, const std::string& name,
                 const std::vector<Bytes>& options, const Bytes& file) {
     for (std::size_t i = 0; i < options.size(); ++i) {
@@ -63,7 +76,8 @@ class Seeds {
   }
   void put(const std::string& target, const std::string& name, Bytes bytes, const Bytes& file) {
     bytes.insert(bytes.end(), file.begin(), file.end());
-    if (bytes.size() > kLargestSeed + kOptions) return;
+    // Blocks of rigs are padded.
+    if (bytes.size() > (target == "rig" ? 4 : 1) * (kLargestSeed + kOptions)) return;
     fs::create_directories(folder_ / target);
     std::ofstream out(folder_ / target / name, std::ios::binary);
     out.write(reinterpret_cast<const char*>(bytes.data()),

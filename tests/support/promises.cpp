@@ -3,12 +3,14 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <limits>
 #include <utility>
 
 #include "compile/compile.h"
+#include "core/aligned.h"
 #include "core/source.h"
 #include "dna/json.h"
 
@@ -102,13 +104,52 @@ float largest_joint_value(const Dna& dna) {
   return most;
 }
 
+// A tenfold of a hundredfold at each of four layers stays far below the largest float.
+bool has_moderate_networks(const Dna& dna) {
+  float most = 0;
+  std::size_t layers = 0;
+  for (const dna::NeuralNetwork& n : dna.machine_learned_behavior.neural_networks) {
+    for (const dna::NeuralNetworkLayer& l : n.layers) {
+      ++layers;
+      for (const auto* list : {&l.biases, &l.weights, &l.activation_parameters}) widen(most, *list);
+    }
+  }
+  constexpr std::uint16_t kWeightedSum = 4;  // its weights are bits of floats
+  for (const dna::MlType& type : dna.machine_learned_behavior_ext.types) {
+    for (const auto& set : type.operations) {
+      for (const auto& op : set) layers += op.operation_type == kWeightedSum ? 5 : 0;
+    }
+  }
+  return most <= 10 && layers <= 4;
+}
+
+bool has_moderate_solvers(const Dna& dna) {
+  float most = 0;
+  for (const dna::RbfSolver& s : dna.rbf_behavior.solvers) {
+    widen(most, s.raw_control_values);
+    widen(most, core::Array<float>{s.radius, s.weight_threshold});
+  }
+  for (const dna::RbfPose& p : dna.rbf_behavior.poses) widen(most, core::Array<float>{p.scale});
+  std::size_t factors = 0;
+  for (const dna::RbfPoseControls& p : dna.rbf_behavior_ext.poses) {
+    widen(most, p.output_control_weights);
+    factors += p.input_control_indices.size();
+  }
+  return most <= 1000 && factors <= 4;
+}
+
 // Weights of one corrective multiply each other: beyond 1 they may overflow.
 bool is_moderate(const Dna& dna) {
   float weights = 0, rows = 0;
   widen(weights, dna.behavior.psds.values);
   widen(rows, dna.behavior.gui_to_raw);
   widen(rows, dna.behavior.animated_maps.conditionals);
-  return weights <= 1 && rows <= 1000 && largest_joint_value(dna) <= 1000;
+  widen(rows, dna.definition.neutral_joint_rotations.values);
+  for (const auto* setups : {&dna.twist_swing_behavior.twists, &dna.twist_swing_behavior.swings}) {
+    for (const dna::TwistSwingSetup& s : *setups) widen(rows, s.blend_weights);
+  }
+  return weights <= 1 && rows <= 1000 && largest_joint_value(dna) <= 1000 &&
+         has_moderate_networks(dna) && has_moderate_solvers(dna);
 }
 
 bool all_finite(const std::vector<float>& values) {
@@ -120,77 +161,151 @@ bool all_finite(const rig::Pose& p) {
          all_finite(p.controls);
 }
 
-bool same_bits(const std::vector<float>& a, const std::vector<float>& b) {
-  return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), 4 * a.size()) == 0);
+// The same bits, or both no number.
+bool same(const float* a, const std::vector<float>& b) {
+  for (std::size_t i = 0; i < b.size(); ++i) {
+    const bool equal = std::bit_cast<std::uint32_t>(a[i]) == std::bit_cast<std::uint32_t>(b[i]);
+    if (!equal && !(std::isnan(a[i]) && std::isnan(b[i]))) return false;
+  }
+  return true;
 }
 
-// n products of a value and a control, each sum rounded once: n * n * eps * |value| * |control|
-// bounds what another order or a fused operation can change. Controls are below 2.
+bool same(const rig::Pose& a, const rig::Pose& b) {
+  return same(a.joints.data(), b.joints) && same(a.blend_shapes.data(), b.blend_shapes) &&
+         same(a.animated_maps.data(), b.animated_maps) && same(a.controls.data(), b.controls);
+}
+
+// n products of a value and a control, each sum rounded once: 2 n eps * sum |value * control|
+// bounds what another order or a fused operation can change. Controls are below 2 where this is
+// asked.
 float joint_tolerance(const Dna& dna, const rig::Rig& rig) {
-  std::uint32_t widest = 0;
-  for (const rig::JointGroup& g : rig.joint_groups) widest = std::max(widest, g.column_count);
-  const float n = static_cast<float>(widest) + 1;
+  const float n = static_cast<float>(rig.control_count) + 1;
   constexpr float kEpsilon = std::numeric_limits<float>::epsilon();
   return 2 * n * n * kEpsilon * 2 * largest_joint_value(dna) + 1e-37f;
 }
 
+// ---- one Rig
+
+using Controls = std::vector<float>;
+
+rig::Pose pose_of(const rig::Rig& rig, const Controls& raw, std::uint32_t lod, bool settle) {
+  rig::Workspace work = rig::make_workspace(rig);
+  rig::Pose pose = rig::make_pose(rig);
+  rig::evaluate(rig, raw.data(), lod, settle, work, pose);
+  return pose;
+}
+
+// Frame n of a batch against the frame alone, the last one with other controls.
+std::string batch(const rig::Rig& rig, const Controls& raw, std::uint32_t lod, bool settle) {
+  constexpr std::size_t kCount = simd::kFrames + 3;
+  Controls frames;
+  for (std::size_t f = 0; f < kCount; ++f) frames.insert(frames.end(), raw.begin(), raw.end());
+  Controls last(raw);
+  for (float& v : last) v = 0.5f * v;
+  std::copy(last.begin(), last.end(), frames.end() - std::ptrdiff_t(last.size()));
+  rig::Pose all = rig::make_pose(rig);
+  for (auto* list : {&all.joints, &all.blend_shapes, &all.animated_maps, &all.controls}) {
+    list->resize(list->size() * kCount);
+  }
+  rig::Workspace work = rig::make_batch_workspace(rig);
+  rig::evaluate_frames(rig, frames.data(), kCount, lod, settle, work, rig::view(all));
+  for (const std::size_t f : {std::size_t{0}, kCount - 1}) {
+    const rig::Pose alone = pose_of(rig, f == 0 ? raw : last, lod, settle);
+    const auto frame = [&](const Controls& list, const Controls& one) {
+      return same(list.data() + f * one.size(), one);
+    };
+    if (!frame(all.joints, alone.joints) || !frame(all.blend_shapes, alone.blend_shapes) ||
+        !frame(all.animated_maps, alone.animated_maps) || !frame(all.controls, alone.controls)) {
+      return "a frame of a batch has the bits of the frame alone";
+    }
+  }
+  return kKept;
+}
+
+std::string instance(const rig::Rig& rig, const Controls& raw, std::uint32_t lod) {
+  rig::Instance face(rig);
+  face.set_lod(lod);
+  const rig::Pose first = face.evaluate(raw.data());
+  if (rig.lod_count > 0 && !same(first, pose_of(rig, raw, lod, false))) {
+    return "an instance begins as evaluate without settling";
+  }
+  for (std::size_t i = 0; i < face.masks().size(); i += 2) face.set_mask(i, 0.0f);
+  face.evaluate(raw.data());
+  return kKept;
+}
+
+// Every way of evaluating, at every LOD. Out: the settled poses.
+std::string evaluate_rig(const rig::Rig& rig, const Controls& raw, std::vector<rig::Pose>& poses) {
+  for (std::uint32_t lod = 0; lod <= std::min(rig.lod_count, 3u); ++lod) {
+    poses.push_back(pose_of(rig, raw, lod, true));
+    if (std::string b = batch(rig, raw, lod, lod % 2 == 0); !b.empty()) return b;
+    if (std::string b = instance(rig, raw, lod); !b.empty()) return b;
+  }
+  if (rig.lod_count > 4) poses.push_back(pose_of(rig, raw, rig.lod_count - 1, true));
+  return kKept;
+}
+
+// A Rig's bytes are a Rig for others as well.
+std::string reopened(const rig::Rig& rig, const Controls& raw, const rig::Pose& expected) {
+  const auto owner = core::allocate_pages(rig.block().size());
+  std::ranges::copy(rig.block(), owner.get());
+  const auto again =
+      rig::open_rig({owner.get(), rig.block().size()}, owner, rig::BlockCheck::kFull, *rig.kernels);
+  if (!again) return broken("a compiled rig passes its own check", again.error());
+  return same(pose_of(*again, raw, 0, true), expected) ? kKept : "a rig is its bytes";
+}
+
 struct Evaluated {
   rig::Rig rig;
-  std::vector<rig::Pose> poses;  // by LOD
+  std::vector<rig::Pose> poses;
 };
 
-std::string evaluate_on(const Dna& dna, const simd::Kernels& kernels, const std::vector<float>& raw,
+std::string evaluate_on(const Dna& dna, const compile::CompileOptions& options, const Controls& raw,
                         std::vector<Evaluated>& out) {
-  compile::CompileOptions options;
-  options.kernels = &kernels;
   Result<rig::Rig> rig = compile::compile(dna, options);
   if (!rig) return rig.error().where.empty() ? broken("an error has a field", rig.error()) : kKept;
   Evaluated all{std::move(*rig), {}};
-  rig::Workspace work = rig::make_workspace(all.rig);
-  rig::Pose pose = rig::make_pose(all.rig);
-  for (std::uint32_t lod = 0; lod <= all.rig.lod_count; ++lod) {
-    rig::Instance instance(all.rig);
-    instance.set_lod(lod);
-    const rig::Pose& first = instance.evaluate(raw.data());
-    rig::evaluate(all.rig, raw.data(), lod, false, work, pose);
-    if (all.rig.lod_count > 0 && !same_bits(first.joints, pose.joints)) {
-      return "an instance begins as evaluate without settling";
-    }
-    instance.evaluate(raw.data());
-    rig::evaluate(all.rig, raw.data(), lod, true, work, pose);
-    all.poses.push_back(pose);
-  }
+  if (std::string b = evaluate_rig(all.rig, raw, all.poses); !b.empty()) return b;
+  if (std::string b = reopened(all.rig, raw, all.poses[0]); !b.empty()) return b;
   out.push_back(std::move(all));
   return kKept;
 }
 
-// Exponentials and quotients magnify what the order of a sum changes, without a bound for any file.
-bool is_linear(const rig::Rig& rig) {
-  return rig.ml_operations.empty() && rig.rbf_solvers.empty() && rig.quaternion_joints.empty() &&
-         rig.twist_swings.empty();
+// Scalar, and one of the others that this CPU has.
+std::array<const simd::Kernels*, 2> two_kernels(std::uint32_t choice) {
+  std::vector<const simd::Kernels*> others;
+  for (const char* name : {"sse4", "avx2", "avx512", "neon"}) {
+    if (const simd::Kernels* k = simd::find_kernels(name)) others.push_back(k);
+  }
+  if (others.empty()) return {&simd::scalar_kernels(), nullptr};
+  return {&simd::scalar_kernels(), others[choice % others.size()]};
 }
 
-std::string compare(const Dna& dna, const std::vector<Evaluated>& evaluated) {
-  for (std::size_t i = 1; i < evaluated.size(); ++i) {
-    const float tolerance = joint_tolerance(dna, evaluated[0].rig);
-    for (std::size_t lod = 0; lod < evaluated[0].poses.size(); ++lod) {
-      const rig::Pose &a = evaluated[0].poses[lod], &b = evaluated[i].poses[lod];
-      for (std::size_t j = 0; j < a.joints.size(); ++j) {
-        if (std::abs(a.joints[j] - b.joints[j]) <= tolerance) continue;
-        return "instruction sets agree: " + std::to_string(a.joints[j]) + " and " +
-               std::to_string(b.joints[j]) + " at " + std::to_string(j);
-      }
-      if (!same_bits(a.controls, b.controls)) return "instruction sets agree about controls";
+// Where a control's last bits differ a table may take another row: only equal controls compare.
+std::string compare(const Dna& dna, const Evaluated& a, const Evaluated& b, bool tame) {
+  const float tolerance = joint_tolerance(dna, a.rig);
+  const bool exact = std::string_view(b.rig.kernels->name) == "sse4";
+  for (std::size_t i = 0; i < a.poses.size(); ++i) {
+    const rig::Pose &p = a.poses[i], &q = b.poses[i];
+    if (exact && !same(p, q)) return "SSE4 has the bits of the scalar path";
+    if (!tame || !same(p.controls.data(), q.controls)) continue;
+    const bool small = std::ranges::all_of(p.controls, [](float v) { return std::abs(v) <= 2; });
+    for (std::size_t j = 0; small && j < p.joints.size(); ++j) {
+      if (std::abs(p.joints[j] - q.joints[j]) <= tolerance) continue;
+      return "instruction sets agree: " + std::to_string(p.joints[j]) + " and " +
+             std::to_string(q.joints[j]) + " at " + std::to_string(j);
     }
   }
   return kKept;
 }
 
-std::string gui(const Dna& dna, const rig::Rig& rig, Random& random, bool moderate) {
-  std::vector<float> in(dna.definition.gui_control_names.size()), out(rig.raw_count, NAN);
+std::string gui(const rig::Rig& rig, Random& random, bool moderate) {
+  Controls in(rig.gui_count), out(rig.raw_count, NAN);
   for (float& v : in) v = moderate ? random.moderate() : random.any();
   rig::gui_to_raw(rig, in.data(), out.data());
-  return moderate && !all_finite(out) ? "moderate GUI controls give finite controls" : kKept;
+  if (moderate && !all_finite(out)) return "moderate GUI controls give finite controls";
+  rig::raw_to_gui(rig, out.data(), in.data());
+  return kKept;
 }
 
 std::string morphs(const Dna& dna, Random& random) {
@@ -271,19 +386,19 @@ Result<Dna> parse_as(View bytes, const Filter& f, std::size_t honest_reads) {
 // What parse leaves out, left out afterwards.
 Dna without_layers(Dna dna, const ParseOptions& o) {
   const dna::ControlCounts controls = dna::control_counts(dna);
-  const bool no_layer = !o.definition;
-  if (no_layer) dna.definition = {};
+  const bool uncounted = !o.definition;
+  if (!o.definition) dna.definition = {};
   if (!o.behavior) {
-    dna.unread_controls.psd = no_layer ? 0 : controls.psd;
+    dna.unread_controls.psd = uncounted ? 0 : controls.psd;
     dna.behavior = {};
   }
   if (!o.machine_learned_behavior) {
-    dna.unread_controls.ml = no_layer ? 0 : controls.ml;
+    dna.unread_controls.ml = uncounted ? 0 : controls.ml;
     dna.machine_learned_behavior = {};
     dna.machine_learned_behavior_ext = {};
   }
   if (!o.rbf_behavior) {
-    dna.unread_controls.rbf_pose = no_layer ? 0 : controls.rbf_pose;
+    dna.unread_controls.rbf_pose = uncounted ? 0 : controls.rbf_pose;
     dna.rbf_behavior = {};
     dna.rbf_behavior_ext = {};
   }
@@ -418,25 +533,49 @@ std::string json_text(std::string_view text) {
 std::string evaluation(const Dna& dna, std::uint32_t seed) {
   Random random(seed);
   const bool moderate = seed % 2 == 0;
-  std::vector<float> raw(dna.definition.raw_control_names.size());
+  Controls raw(dna.definition.raw_control_names.size());
   for (float& v : raw) v = moderate ? random.moderate() : random.any();
+  compile::CompileOptions options;
+  if ((seed & 2) != 0) options.rotation = compile::Rotation::kQuaternion;
+  if ((seed & 4) != 0) options.precision = compile::Precision::kFloat16;
   std::vector<Evaluated> evaluated;
-  for (const simd::Kernels* kernels :
-       {&simd::scalar_kernels(), simd::sse4_kernels(), simd::avx2_kernels(), simd::avx512_kernels(),
-        simd::neon_kernels()}) {
+  for (const simd::Kernels* kernels : two_kernels(seed / 8)) {
     if (kernels == nullptr) continue;
-    if (std::string b = evaluate_on(dna, *kernels, raw, evaluated); !b.empty()) return b;
+    options.kernels = kernels;
+    if (std::string b = evaluate_on(dna, options, raw, evaluated); !b.empty()) return b;
   }
-  if (!evaluated.empty()) {
-    const bool tame = moderate && is_moderate(dna) && is_linear(evaluated[0].rig);
-    if (std::string b = gui(dna, evaluated[0].rig, random, tame); !b.empty()) return b;
-    for (const Evaluated& e : evaluated) {
-      const bool finite = std::ranges::all_of(e.poses, [](const auto& p) { return all_finite(p); });
-      if (tame && !finite) return "moderate numbers give finite poses";
-    }
-    if (std::string b = tame ? compare(dna, evaluated) : kKept; !b.empty()) return b;
+  if (evaluated.empty()) return morphs(dna, random);
+  const bool tame = moderate && is_moderate(dna);
+  for (const Evaluated& e : evaluated) {
+    const bool finite = std::ranges::all_of(e.poses, [](const auto& p) { return all_finite(p); });
+    if (tame && !finite) return "moderate numbers give finite poses";
   }
+  if (evaluated.size() == 2) {
+    if (std::string b = compare(dna, evaluated[0], evaluated[1], tame); !b.empty()) return b;
+  }
+  if (std::string b = gui(evaluated[0].rig, random, tame); !b.empty()) return b;
   return morphs(dna, random);
+}
+
+std::string opening(View bytes, std::uint32_t seed) {
+  const auto owner = core::allocate_pages(std::max<std::size_t>(bytes.size(), 1));
+  std::ranges::copy(bytes, owner.get());
+  const std::span<std::uint8_t> block(owner.get(), bytes.size());
+  const auto kernels = two_kernels(seed / 2);
+  const simd::Kernels* used = seed % 2 == 0 || kernels[1] == nullptr ? kernels[0] : kernels[1];
+  if (!rig::open_rig(block, owner, rig::BlockCheck::kHeader, *used)) return kKept;
+  rig::seal_block(block);
+  const auto rig = rig::open_rig(block, owner, rig::BlockCheck::kFull, *used);
+  if (!rig) return rig.error().where.empty() ? broken("an error has a field", rig.error()) : kKept;
+  Random random(seed);
+  Controls raw(rig->raw_count);
+  for (float& v : raw) v = random.any();
+  std::vector<rig::Pose> poses;
+  if (std::string b = evaluate_rig(*rig, raw, poses); !b.empty()) return b;
+  rig->raw_control_names();
+  rig->gui_control_names();
+  rig->ignored_layers();
+  return gui(*rig, random, false);
 }
 
 std::string filtering(View bytes) {

@@ -35,10 +35,14 @@ std::string json(const dna::Dna& dna);
 /// Text that from_json accepts becomes the same JSON twice, and a file.
 std::string json_text(std::string_view text);
 
-/// Compiles and evaluates with controls drawn from seed, at every LOD, on every instruction set:
-/// results are finite where the file's numbers and the controls are moderate, and the instruction
-/// sets agree.
+/// Compiles and evaluates in every way, with controls, options and a second instruction set drawn
+/// from seed: results are finite where the file's numbers and the controls are moderate, the
+/// instruction sets agree, a frame of a batch is the frame alone, and the bytes of the rig are one.
 std::string evaluation(const dna::Dna& dna, std::uint32_t seed);
+
+/// Bytes that say that they are a compiled rig: open_rig refuses them, or they can be evaluated.
+/// Their hash is put right first.
+std::string opening(View bytes, std::uint32_t seed);
 
 /// Options as the first 8 bytes say; the rest is the file.
 inline constexpr std::size_t kOptionBytes = 8;

@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: MIT
+// Bytes of a compiled rig, as they may come from a cache: what the check accepts can be evaluated.
+// The first 4 bytes seed the controls.
+#include "fuzz/promise.h"
+
+namespace promises = risorius::promises;
+using risorius::fuzz::demand;
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  if (size < 4) return 0;
+  std::uint32_t seed = 0;
+  for (int i = 0; i < 4; ++i) seed = seed << 8 | data[i];
+  demand(promises::opening({data + 4, size - 4}, seed));
+  return 0;
+}
