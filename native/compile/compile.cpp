@@ -430,6 +430,10 @@ void compile_frame(const dna::Dna& dna, RigData& out) {
 Result<RigData> compile_parts(const dna::Dna& dna, const CompileOptions& options) {
   RigData out;
   out.joint_stride = options.rotation == Rotation::kQuaternion ? 10 : 9;
+  if (const std::uint32_t controls = dna::control_counts(dna).total(); controls > 65536) {
+    return fail(ErrorCode::kLimitExceeded, "behavior.psd_count",
+                std::to_string(controls) + " controls, the format's indices reach 65536");
+  }
   compile_frame(dna, out);
   detail::StepLods lods;
   Used used(out.lod_count, std::vector<bool>(out.control_count, false));

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "compile/compile.h"
 #include "dna/json.h"
 #include "support/files.h"
 #include "support/promises.h"
@@ -103,6 +104,15 @@ TEST(FuzzFind009, EvaluatesRowsWithoutColumnsInBatches) {
   const auto dna = promises::parse(find("009-no-column-with-a-value.dna"));
   ASSERT_TRUE(dna.has_value()) << dna.error().describe();
   for (std::uint32_t seed = 0; seed < 32; ++seed) EXPECT_EQ(promises::evaluation(*dna, seed), "");
+}
+
+TEST(FuzzFind010, RefusesToCompileMoreControlsThanIndicesReach) {
+  const auto dna = promises::parse(find("010-more-controls-than-indices.dna"));
+  ASSERT_TRUE(dna.has_value()) << dna.error().describe();
+  const auto rig = compile::compile(*dna);
+  ASSERT_FALSE(rig.has_value());
+  EXPECT_EQ(rig.error().code, core::ErrorCode::kLimitExceeded);
+  EXPECT_EQ(promises::evaluation(*dna, 0), "");
 }
 
 TEST(FuzzFinds, KeepEveryPromise) {

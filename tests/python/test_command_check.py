@@ -118,7 +118,7 @@ def test_json_files_are_checked_too(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("data", "place"), [(b'{"a": \xff}', "byte 6: "), (b"{", "byte 1: "), (b"[]", "")]
+    ("data", "place"), [(b'{"a": \xff}', "byte 6: "), (b"{", "byte 1: "), (b"[]", "byte 0: ")]
 )
 def test_what_is_not_json_is_an_error_with_its_byte(data, place, tmp_path):
     path = tmp_path / "bad.json"
@@ -160,7 +160,7 @@ WRONG = {  # file: place and kind of what is said of it
     "signature_2": "byte 0: signature: error",
     "version_3_8": "byte 3: version: error",
     "count_descname_7fffffff": "byte 187: descriptor.name: error",
-    "index_bhvr_offset_past_eof": "byte 2147483632: behavior: error",
+    "index_bhvr_offset_past_eof": "byte 4330: behavior: error: the file ends",
     "psd_values_empty": "behavior.psds: error",
     "am_in_ge": "behavior.animated_maps.input_indices[0]: error: index 7000",
     "desc_archetype_99": "byte 195: descriptor.archetype: warning",

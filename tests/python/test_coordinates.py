@@ -141,16 +141,24 @@ def test_faces_turn_with_handedness_and_winding(name):
 
 
 def raw_controls(dna, rng):
-    return rng.uniform(-0.2, 1.2, len(dna.raw_control_names)).astype(np.float32)
+    """Random, but rotations at rest: converted files mean them in the new axes."""
+    raw = rng.uniform(-0.2, 1.2, len(dna.raw_control_names)).astype(np.float32)
+    for i, name in enumerate(dna.raw_control_names):
+        if name[-2:] in (".x", ".y", ".z", ".w"):
+            raw[i] = name.endswith(".w")
+    return raw
 
 
 def assert_pose_maps(dna, converted, raw, lod):
-    """World matrices of the posed joints; everything that is no joint bit for bit."""
+    """World matrices of the posed joints; what is no joint bit for bit, but for what solvers do."""
     source, target = oracle.system_of(dna), oracle.system_of(converted)
     before = risorius.Rig(dna).evaluate(raw, lod=lod)
     after = risorius.Rig(converted).evaluate(raw, lod=lod)
     for field in ("blend_shapes", "animated_maps", "controls"):
-        assert np.array_equal(getattr(before, field), getattr(after, field)), field
+        tolerance = 1e-5 if dna.rbf_behavior.solvers else 0  # dot products in another order
+        assert np.abs(getattr(before, field) - getattr(after, field)).max(initial=0) <= tolerance, (
+            field
+        )
     world = oracle.world_matrices(dna, before.joints)
     expected = oracle.mapped_world(source, target, world)
     result = oracle.world_matrices(converted, after.joints)
@@ -163,6 +171,9 @@ def assert_pose_maps(dna, converted, raw, lod):
 def test_every_pose_maps_where_the_order_of_rotation_stays(name):
     dna = load(name)
     dna.joint_behavior_metadata.joint_representations = np.zeros((0, 3), np.uint16)
+    for solver in dna.rbf_behavior.solvers:
+        solver.solver_type = 0  # of two equal targets interpolation has no answer
+        solver.distance_method = 1  # of whole rotations
     rng = np.random.default_rng(5)
     for target in keeping_order(oracle.system_of(dna), 6, 6):
         converted, found = caught(dna, **target.arguments())
