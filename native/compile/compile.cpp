@@ -26,6 +26,7 @@ using core::ok;
 using core::Result;
 using core::Status;
 using detail::check_controls;
+using detail::Groups;
 using detail::Used;
 using rig::RigData;
 
@@ -170,6 +171,19 @@ core::Result<std::uint32_t> add_lods(const dna::JointGroup& g, const std::string
   return rows;
 }
 
+// Groups that coarser LODs have come first.
+Groups list_groups(const dna::Dna& dna) {
+  const auto levels = [](const dna::JointGroup* g) {
+    std::size_t n = g->lods.size();
+    while (n > 0 && g->lods[n - 1] == 0) --n;
+    return n;
+  };
+  Groups groups;
+  for (const dna::JointGroup& g : dna.behavior.joint_groups) groups.push_back(&g);
+  std::ranges::stable_sort(groups, std::greater{}, levels);
+  return groups;
+}
+
 Status compile_joint_group(const dna::JointGroup& g, const std::string& where, RigData& out) {
   if (Status s = check_controls(g.input_indices, out.control_count, where + ".input_indices"); !s) {
     return s;
@@ -207,13 +221,12 @@ struct ColumnEntry {
 };
 
 // The columns that have any value, by control and group: what a control drives lies together.
-std::vector<ColumnEntry> list_columns(const dna::Dna& dna, RigData& out, Used& used) {
+std::vector<ColumnEntry> list_columns(const Groups& groups, RigData& out, Used& used) {
   std::vector<ColumnEntry> entries;
   for (std::uint32_t i = 0; i < out.joint_groups.size(); ++i) {
     rig::JointGroup& g = out.joint_groups[i];
-    const dna::JointGroup& source = dna.behavior.joint_groups[i];
+    const dna::JointGroup& source = *groups[i];
     const std::vector<std::uint32_t> first = first_rows_with_values(source, g.row_count);
-    g.columns_begin = out.list_count;
     for (std::uint32_t c = 0; c < first.size(); ++c) {
       if (first[c] == g.row_count) continue;
       ++g.column_count;
@@ -223,18 +236,15 @@ std::vector<ColumnEntry> list_columns(const dna::Dna& dna, RigData& out, Used& u
         if (out.joint_group_lods[i * out.lod_count + l] > first[c]) used[l][control] = true;
       }
     }
-    out.list_count += g.column_count;
   }
   std::ranges::stable_sort(entries, {}, &ColumnEntry::control);
   return entries;
 }
 
-Status compile_columns(const dna::Dna& dna, RigData& out, Used& used) {
-  const std::vector<ColumnEntry> entries = list_columns(dna, out, used);
+Status compile_columns(const Groups& groups, RigData& out, Used& used) {
+  const std::vector<ColumnEntry> entries = list_columns(groups, out, used);
   std::vector<std::vector<std::uint32_t>> offsets;
-  for (const dna::JointGroup& g : dna.behavior.joint_groups) {
-    offsets.emplace_back(g.input_indices.size(), kNobody);
-  }
+  for (const dna::JointGroup* g : groups) offsets.emplace_back(g->input_indices.size(), kNobody);
   std::uint64_t end = 0;
   out.joint_column_begins.assign(out.control_count + std::size_t{1}, 0);
   for (const ColumnEntry& e : entries) {
@@ -252,16 +262,18 @@ Status compile_columns(const dna::Dna& dna, RigData& out, Used& used) {
                    out.joint_column_begins.begin());
   out.joint_values.resize(static_cast<std::size_t>(end) + simd::kWidest);  // kernels read on
   for (std::size_t i = 0; i < offsets.size(); ++i) {
-    transpose(dna.behavior.joint_groups[i].values.data(), out.joint_groups[i].row_count, offsets[i],
+    transpose(groups[i]->values.data(), out.joint_groups[i].row_count, offsets[i],
               out.joint_values.data());
   }
   return ok();
 }
 
 // Which row each joint attribute takes at a LOD; the last group that writes it wins.
-std::vector<std::uint32_t> rows_by_attribute(const RigData& r, std::uint32_t lod) {
+std::vector<std::uint32_t> rows_by_attribute(const RigData& r,
+                                             std::span<const std::uint32_t> file_order,
+                                             std::uint32_t lod) {
   std::vector<std::uint32_t> rows(std::size_t{r.joint_count} * r.joint_stride, kNobody);
-  for (std::size_t i = 0; i < r.joint_groups.size(); ++i) {
+  for (const std::size_t i : file_order) {
     const rig::JointGroup& g = r.joint_groups[i];
     for (std::uint32_t row = 0; row < r.joint_group_lods[i * r.lod_count + lod]; ++row) {
       rows[r.joint_outputs[g.rows_begin + row]] = g.rows_begin + row;
@@ -284,10 +296,13 @@ std::vector<simd::Piece> pieces_of(std::span<const std::uint32_t> rows, std::siz
   return pieces;
 }
 
-void compile_pieces(RigData& out) {
+void compile_pieces(const Groups& groups, RigData& out) {
+  std::vector<std::uint32_t> file_order(groups.size());
+  std::iota(file_order.begin(), file_order.end(), 0u);
+  std::ranges::sort(file_order, {}, [&](std::uint32_t i) { return groups[i]; });
   out.extra_begins.push_back(0);
   for (std::uint32_t lod = 0; lod < out.lod_count; ++lod) {
-    const std::vector<std::uint32_t> rows = rows_by_attribute(out, lod);
+    const std::vector<std::uint32_t> rows = rows_by_attribute(out, file_order, lod);
     for (std::size_t at = 0; at < rows.size(); at += simd::kPlaces) {
       const std::size_t count = std::min(simd::kPlaces, rows.size() - at);
       const auto pieces = pieces_of(std::span(rows).subspan(at, count), at / simd::kPlaces);
@@ -322,11 +337,16 @@ Status widen_joint_rows(RigData& out) {
   return ok();
 }
 
-Status compile_joint_groups(const dna::Dna& dna, RigData& out) {
-  const auto& groups = dna.behavior.joint_groups;
-  for (std::size_t i = 0; i < groups.size(); ++i) {
+Status compile_joint_groups(const dna::Dna& dna, const Groups& groups, RigData& out) {
+  for (const dna::JointGroup* g : groups) {
+    const auto i = g - &dna.behavior.joint_groups[0];
     const std::string where = "behavior.joint_groups[" + std::to_string(i) + "]";
-    if (Status s = compile_joint_group(groups[i], where, out); !s) return s;
+    if (Status s = compile_joint_group(*g, where, out); !s) return s;
+  }
+  for (std::uint32_t l = 0; l < out.lod_count; ++l) {
+    std::size_t live = groups.size();
+    while (live > 0 && out.joint_group_lods[(live - 1) * out.lod_count + l] == 0) --live;
+    out.live_groups.push_back(static_cast<std::uint32_t>(live));
   }
   return ok();
 }
@@ -437,8 +457,9 @@ Result<RigData> compile_parts(const dna::Dna& dna, const CompileOptions& options
   compile_frame(dna, out);
   detail::StepLods lods;
   Used used(out.lod_count, std::vector<bool>(out.control_count, false));
-  if (Status s = compile_joint_groups(dna, out); !s) return std::move(s).propagate();
-  detail::compile_quaternion_joints(dna, out);
+  const Groups groups = list_groups(dna);
+  if (Status s = compile_joint_groups(dna, groups, out); !s) return std::move(s).propagate();
+  detail::compile_quaternion_joints(dna, groups, out);
   if (Status s = detail::compile_solvers(dna, out, lods); !s) return std::move(s).propagate();
   if (Status s = detail::compile_networks(dna, out, lods); !s) return std::move(s).propagate();
   if (Status s = detail::compile_ml_joints(dna, out); !s) return std::move(s).propagate();
@@ -446,14 +467,14 @@ Result<RigData> compile_parts(const dna::Dna& dna, const CompileOptions& options
   if (Status s = compile_channels_and_maps(dna, out); !s) return std::move(s).propagate();
   if (Status s = compile_psds(dna, out); !s) return std::move(s).propagate();
   list_joints_written(out);
-  if (Status s = compile_columns(dna, out, used); !s) return std::move(s).propagate();
+  if (Status s = compile_columns(groups, out, used); !s) return std::move(s).propagate();
   mark_channels_and_maps(out, used);
   detail::mark_ml_joints(out, used);
   detail::schedule(used, lods, out);
   if (out.joint_stride == 10) {
     if (Status s = widen_joint_rows(out); !s) return std::move(s).propagate();
   }
-  compile_pieces(out);
+  compile_pieces(groups, out);
   if (options.precision == Precision::kFloat16) {
     if (Status s = narrow(out); !s) return std::move(s).propagate();
   }

@@ -2,6 +2,7 @@
 // Joints that the file's joint metadata declares quaternions. From: dna-format 12.5
 #include <algorithm>
 #include <array>
+#include <functional>
 #include <map>
 #include <numeric>
 
@@ -57,13 +58,34 @@ void add_column(const dna::JointGroup& g, std::size_t c, const std::vector<Rotat
   if (column.terms_end > column.terms_begin) out.quaternion_columns.push_back(column);
 }
 
+// One more than the last LOD that has any of the rows.
+std::uint32_t levels_of(const RotationRows& rows, const RigData& out, std::uint32_t group) {
+  const std::uint32_t first = *std::ranges::min_element(rows);
+  std::uint32_t levels = out.lod_count;
+  while (levels > 0 && out.joint_group_lods[group * out.lod_count + levels - 1] <= first) --levels;
+  return levels;
+}
+
+// In: levels  per joint, 0 where no Euler angles turn it
+void list_euler_joints(const std::vector<std::uint32_t>& levels, RigData& out) {
+  for (std::uint32_t j = 0; j < out.joint_count && out.joint_stride == 10; ++j) {
+    if (levels[j] > 0) out.euler_joints.push_back(static_cast<std::uint16_t>(j));
+  }
+  std::ranges::stable_sort(out.euler_joints, std::greater{}, [&](auto j) { return levels[j]; });
+  for (std::uint32_t l = 0; l < out.lod_count; ++l) {
+    const auto count =
+        std::ranges::count_if(out.euler_joints, [&](auto j) { return levels[j] > l; });
+    out.euler_joint_lods.push_back(static_cast<std::uint32_t>(count));
+  }
+}
+
 void add_group(const dna::JointGroup& g, std::uint32_t index, const std::vector<bool>& flags,
-               std::vector<bool>& euler, RigData& out) {
+               std::vector<std::uint32_t>& euler, RigData& out) {
   const auto first_slot = static_cast<std::uint32_t>(out.quaternion_joints.size());
   std::vector<RotationRows> turned;
   for (const auto& [joint, rows] : rotation_rows(g, out.joint_groups[index].row_count)) {
     if (!flags[joint]) {
-      euler[joint] = true;
+      euler[joint] = std::max(euler[joint], levels_of(rows, out, index));
       continue;
     }
     out.quaternion_joints.push_back({joint, index, *std::ranges::min_element(rows)});
@@ -91,15 +113,11 @@ rig::EulerConvention detail::euler_convention(const dna::Dna& dna) {
   return c;
 }
 
-void detail::compile_quaternion_joints(const dna::Dna& dna, RigData& out) {
+void detail::compile_quaternion_joints(const dna::Dna& dna, const Groups& groups, RigData& out) {
   const std::vector<bool> flags = quaternion_joint_flags(dna);
-  std::vector<bool> euler(flags.size(), false);
-  for (std::uint32_t i = 0; i < out.joint_groups.size(); ++i) {
-    add_group(dna.behavior.joint_groups[i], i, flags, euler, out);
-  }
-  for (std::uint32_t j = 0; j < out.joint_count && out.joint_stride == 10; ++j) {
-    if (euler[j]) out.euler_joints.push_back(static_cast<std::uint16_t>(j));
-  }
+  std::vector<std::uint32_t> euler(flags.size(), 0);
+  for (std::uint32_t i = 0; i < groups.size(); ++i) add_group(*groups[i], i, flags, euler, out);
+  list_euler_joints(euler, out);
   if (out.quaternion_joints.empty()) return;
   std::vector<std::uint32_t>& list = out.quaternion_column_list;
   list.resize(out.quaternion_columns.size());

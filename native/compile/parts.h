@@ -20,6 +20,9 @@ using rig::RigData;
 /// [LOD][control]: an output reads it there.
 using Used = std::vector<std::vector<bool>>;
 
+/// The joint groups of a file in the order of the Rig.
+using Groups = std::vector<const dna::JointGroup*>;
+
 /// [LOD]: the operations and the solvers that run there, in the order of the file.
 struct StepLods {
   std::vector<std::vector<std::uint32_t>> operations, solvers;
@@ -37,7 +40,7 @@ std::vector<std::uint32_t> listed(const dna::LodMapping& mapping, std::uint32_t 
 
 rig::EulerConvention euler_convention(const dna::Dna& dna);
 /// After the joint groups.
-void compile_quaternion_joints(const dna::Dna& dna, RigData& out);
+void compile_quaternion_joints(const dna::Dna& dna, const Groups& groups, RigData& out);
 Status compile_solvers(const dna::Dna& dna, RigData& out, StepLods& lods);
 Status compile_networks(const dna::Dna& dna, RigData& out, StepLods& lods);
 Status compile_ml_joints(const dna::Dna& dna, RigData& out);

@@ -232,6 +232,30 @@ void add_list(const Graph& g, const std::vector<std::uint32_t>& nodes, RigData& 
   r.step_begins.push_back(static_cast<std::uint32_t>(r.steps.size()));
 }
 
+// Correctives in the order in which their watchers look.
+void sort_correctives(RigData& r) {
+  std::vector<std::uint32_t> number(r.psds.size(), rig::kNone);
+  std::vector<rig::Psd> psds;
+  std::vector<std::uint16_t> all_factors;
+  const auto add = [&](std::uint32_t p) {
+    if (number[p] != rig::kNone) return;
+    number[p] = static_cast<std::uint32_t>(psds.size());
+    psds.push_back(r.psds[p]);
+    const auto list = factors(r, r.psds[p]);
+    psds.back().factors_begin = static_cast<std::uint32_t>(all_factors.size());
+    all_factors.insert(all_factors.end(), list.begin(), list.end());
+  };
+  for (const rig::Watch& w : r.watched) add(w.psd);
+  for (std::uint32_t p = 0; p < r.psds.size(); ++p) add(p);
+  r.psds = std::move(psds);
+  r.psd_factors = std::move(all_factors);
+  for (rig::Watch& w : r.watched) w.psd = static_cast<std::uint16_t>(number[w.psd]);
+  for (std::uint32_t& step : r.steps) {
+    if (rig::step_kind(step) != StepKind::kPsd) continue;
+    step = rig::make_step(StepKind::kPsd, number[rig::step_index(step)]);
+  }
+}
+
 }  // namespace
 
 void detail::schedule(const Used& used, const StepLods& lods, RigData& r) {
@@ -256,6 +280,7 @@ void detail::schedule(const Used& used, const StepLods& lods, RigData& r) {
     add_list(g, order.cyclic, r);
     add_list(g, reference, r);
   }
+  sort_correctives(r);
 }
 
 }  // namespace risorius::compile

@@ -32,7 +32,6 @@ struct Psd {
 struct JointGroup {
   std::uint32_t row_count = 0, column_count = 0;  // columns without any value do not count
   std::uint32_t rows_begin = 0;                   // its rows among those of all groups
-  std::uint32_t columns_begin = 0;  // where its list of active columns begins: a sum of counts
 };
 
 /// A corrective, found by a factor that watches it.
@@ -161,7 +160,6 @@ struct RigHeader {
   std::uint32_t lod_count = 0, joint_count = 0, blend_shape_count = 0, animated_map_count = 0;
   /// The control vector: raw | corrective | network | RBF pose.
   std::uint32_t raw_count = 0, gui_count = 0, psd_count = 0, control_count = 0;
-  std::uint32_t list_count = 0;  // columns of all groups
   std::uint32_t operation_values = 0, widest_layer = 0, solver_inputs = 0, solver_poses = 0;
   std::uint32_t mask_count = 0;    // regions of networks
   std::uint32_t joint_stride = 9;  // 9 with Euler angles, 10 with quaternions
@@ -189,7 +187,7 @@ struct RigArrays {
   // A corrective whose factors are there before any corrective is watched by the factor that
   // watches the fewest: while that rests at 0 so does the corrective, and nobody looks. Per LOD a
   // row of control_count + 1 begins into watched.
-  A<Psd> psds;  // ascending output
+  A<Psd> psds;  // by watcher, so that what one look needs lies together; each output once
   A<std::uint16_t> psd_factors;
   A<std::uint32_t> watch_begins;
   A<Watch> watched;
@@ -197,7 +195,9 @@ struct RigArrays {
   A<std::uint32_t> step_begins;
   A<std::uint32_t> steps;
 
+  // Groups that coarser LODs have come first: a LOD needs the first live_groups[lod] only.
   A<JointGroup> joint_groups;
+  A<std::uint32_t> live_groups;       // [LODs]
   A<std::uint32_t> joint_group_lods;  // [groups, LODs]: rows
   A<float> joint_values;              // one of these two is empty
   A<std::uint16_t> joint_halves;
@@ -216,7 +216,9 @@ struct RigArrays {
   A<QuaternionTerm> quaternion_terms;
   A<std::uint32_t> quaternion_column_begins;  // [controls + 1], or empty
   A<std::uint32_t> quaternion_column_list;    // in quaternion_columns, by control
-  A<std::uint16_t> euler_joints;  // with quaternions as output: joints turned by Euler angles
+  // With quaternions as output: joints turned by Euler angles, those of coarser LODs first.
+  A<std::uint16_t> euler_joints;
+  A<std::uint32_t> euler_joint_lods;  // [LODs]: how many of them
 
   A<RbfSolver> rbf_solvers;
   A<std::uint16_t> rbf_inputs;  // controls
@@ -250,11 +252,12 @@ constexpr void for_each_array(R& r, F f) {
   f(r.gui_rows), f(r.gui_ranges), f(r.gui_range_rows);
   f(r.psds), f(r.psd_factors), f(r.watch_begins), f(r.watched);
   f(r.step_begins), f(r.steps);
-  f(r.joint_groups), f(r.joint_group_lods), f(r.joint_values), f(r.joint_halves);
+  f(r.joint_groups), f(r.live_groups), f(r.joint_group_lods), f(r.joint_values), f(r.joint_halves);
   f(r.joint_outputs), f(r.joint_pieces), f(r.extra_begins), f(r.extra_pieces);
   f(r.joint_column_begins), f(r.joint_columns), f(r.joints_written);
   f(r.quaternion_joints), f(r.quaternion_columns), f(r.quaternion_terms);
   f(r.quaternion_column_begins), f(r.quaternion_column_list), f(r.euler_joints);
+  f(r.euler_joint_lods);
   f(r.rbf_solvers), f(r.rbf_inputs), f(r.rbf_targets), f(r.rbf_inverses);
   f(r.rbf_poses), f(r.rbf_pose_inputs), f(r.rbf_outputs);
   f(r.ml_operations), f(r.ml_segments), f(r.ml_controls), f(r.ml_layers), f(r.ml_layer_rows);

@@ -24,16 +24,16 @@ class Block {
       : rig_(rig), work_(work), first_(first), count_(count) {}
 
   void joints(std::uint32_t lod) noexcept {
-    list_columns();
+    list_columns(rig_.live_groups[lod]);
     const std::size_t stride = detail::rows_size(rig_);
-    for (std::size_t i = 0; i < rig_.joint_groups.size(); ++i) {
-      const JointGroup& g = rig_.joint_groups[i];
+    for (std::size_t i = 0; i < rig_.live_groups[lod]; ++i) {
       const std::uint32_t rows = rig_.joint_group_lods[i * rig_.lod_count + lod];
       if (rows == 0) continue;
-      const std::uint32_t columns = work_.column_ends[i] - g.columns_begin;
-      const std::uint32_t* offsets = work_.column_offsets.data() + g.columns_begin;
-      const float* weights = work_.column_weights.data() + std::size_t{g.columns_begin} * kFrames;
-      float* out = work_.rows.data() + g.rows_begin;
+      const std::size_t begin = work_.column_begins[i];
+      const std::size_t columns = work_.column_begins[i + 1] - begin;
+      const std::uint32_t* offsets = work_.column_offsets.data() + begin;
+      const float* weights = work_.column_weights.data() + begin * kFrames;
+      float* out = work_.rows.data() + rig_.joint_groups[i].rows_begin;
       if (rig_.is_half()) {
         rig_.kernels->batch_half_columns(rig_.joint_halves.data(), offsets, weights, columns, out,
                                          stride, rows);
@@ -60,28 +60,31 @@ class Block {
 
  private:
   // As for one frame, of every control that any of the frames uses. Leaves the weights clear.
-  void list_columns() noexcept {
-    for (std::size_t i = 0; i < rig_.joint_groups.size(); ++i) {
-      work_.column_ends[i] = rig_.joint_groups[i].columns_begin;
+  void list_columns(std::uint32_t live) noexcept {
+    const std::size_t n = list_union();
+    const std::span active(work_.active.data(), n);
+    detail::count_columns(rig_, live, active, work_.column_begins.data());
+    std::uint32_t* next = work_.column_begins.data() + 1;
+    for (const std::uint16_t control : active) {
+      float* weights = work_.frame_weights.data() + std::size_t{control} * kFrames;
+      detail::for_columns(rig_, control, live, [&](const JointColumn& column) {
+        const std::size_t at = next[column.group]++;
+        work_.column_offsets[at] = column.offset;
+        std::copy(weights, weights + kFrames, work_.column_weights.data() + at * kFrames);
+      });
+      std::fill(weights, weights + kFrames, 0.0f);
     }
+  }
+  std::size_t list_union() noexcept {
+    std::size_t n = 0;
     for (std::size_t word = 0; word < work_.union_bits.size(); ++word) {
       for (std::uint64_t bits = work_.union_bits[word]; bits != 0; bits &= bits - 1) {
-        const auto control = word * 64 + static_cast<std::size_t>(std::countr_zero(bits));
-        float* weights = work_.frame_weights.data() + control * kFrames;
-        list_columns_of(control, weights);
-        std::fill(weights, weights + kFrames, 0.0f);
+        work_.active[n++] = static_cast<std::uint16_t>(
+            word * 64 + static_cast<std::size_t>(std::countr_zero(bits)));
       }
       work_.union_bits[word] = 0;
     }
-  }
-  void list_columns_of(std::size_t control, const float* weights) noexcept {
-    for (std::uint32_t i = rig_.joint_column_begins[control];
-         i < rig_.joint_column_begins[control + 1]; ++i) {
-      const JointColumn column = rig_.joint_columns[i];
-      const std::size_t at = work_.column_ends[column.group]++;
-      work_.column_offsets[at] = column.offset;
-      std::copy(weights, weights + kFrames, work_.column_weights.data() + at * kFrames);
-    }
+    return n;
   }
 
   const Rig& rig_;
@@ -110,8 +113,8 @@ void evaluate_block(const Rig& rig, const float* raw, std::size_t count, std::ui
 Workspace make_batch_workspace(const Rig& rig) {
   Workspace work = make_workspace(rig);
   // One more: kernels begin at a pointer even where there is nothing to read.
-  work.column_offsets.resize(rig.list_count + std::size_t{1});
-  work.column_weights.resize((rig.list_count + std::size_t{1}) * kFrames);
+  work.column_offsets.resize(rig.joint_columns.size() + 1);
+  work.column_weights.resize((rig.joint_columns.size() + 1) * kFrames);
   work.rows.resize(detail::rows_size(rig) * kFrames);
   work.frame_weights.resize(std::size_t{rig.control_count} * kFrames);
   work.union_bits.resize((std::size_t{rig.control_count} + 63) / 64);

@@ -2,6 +2,7 @@
 // Every index of a block of bytes against what it counts in.
 #include <algorithm>
 #include <bit>
+#include <utility>
 
 #include "rig/rig.h"
 #include "rig/stages.h"
@@ -64,6 +65,8 @@ void check_sizes(const Rig& r, IndexCheck& c) {
   c.demand("watch_begins", r.watch_begins.size() == lods * (r.control_count + 1));
   c.demand("step_begins", r.step_begins.size() == lods * kStepLists + 1);
   c.demand("joint_group_lods", r.joint_group_lods.size() == lods * r.joint_groups.size());
+  c.demand("live_groups", r.live_groups.size() == lods);
+  c.demand("euler_joint_lods", r.euler_joint_lods.size() == lods);
   c.demand("joint_values", r.joint_values.empty() || r.joint_halves.empty());
   c.demand("joint_column_begins", r.joint_column_begins.size() == r.control_count + std::size_t{1});
   c.demand("shape_outputs", r.shape_outputs.size() == r.shape_inputs.size());
@@ -80,10 +83,15 @@ void check_correctives(const Rig& r, IndexCheck& c) {
   c.below("watched", r.watched, r.control_count, [](const Watch& w) { return w.other; });
   if (!c.status()) return;
   for (const Watch& w : r.watched) c.demand("watched", r.psds[w.psd].output >= r.raw_count);
-  std::uint32_t next = 0;  // ascending, so that no more are active than there are controls
+  // Each once at a LOD, so that no more are candidates than there are.
+  std::vector<std::uint32_t> seen(r.psds.size(), kNone);
+  for (std::uint32_t l = 0; l < r.lod_count; ++l) {
+    const std::uint32_t* begins = r.watch_begins.data() + std::size_t{l} * (r.control_count + 1);
+    for (std::uint32_t i = begins[0]; i < begins[r.control_count]; ++i) {
+      c.demand("watched", std::exchange(seen[r.watched[i].psd], l) != l);
+    }
+  }
   for (const Psd& p : r.psds) {
-    c.demand("psds", p.output >= next);
-    next = p.output + 1u;
     c.demand("psds", p.output < r.raw_count + r.psd_count &&
                          std::uint64_t{p.factors_begin} + p.factor_count <= r.psd_factors.size());
   }
@@ -102,18 +110,17 @@ void check_groups(const Rig& r, IndexCheck& c) {
         column.offset + simd::rounded_up(r.joint_groups[column.group].row_count);
     c.demand("joint_columns", end <= values);
   }
-  std::uint64_t lists = 0;
   for (std::size_t i = 0; i < columns.size(); ++i) {
     const JointGroup& g = r.joint_groups[i];
     c.demand("joint_groups",
-             g.columns_begin == lists && columns[i] == g.column_count &&
+             columns[i] == g.column_count &&
                  std::uint64_t{g.rows_begin} + g.row_count <= r.joint_outputs.size());
-    lists += g.column_count;
     for (std::uint32_t l = 0; l < r.lod_count; ++l) {
       c.demand("joint_group_lods", r.joint_group_lods[i * r.lod_count + l] <= g.row_count);
     }
   }
-  c.demand("header", lists == r.list_count);
+  const auto most = [](std::uint32_t v) { return v; };
+  c.below("live_groups", r.live_groups, r.joint_groups.size() + 1, most);
 }
 
 void check_pieces(const Rig& r, IndexCheck& c) {
@@ -184,6 +191,7 @@ void check_quaternions(const Rig& r, IndexCheck& c) {
   c.begins("quaternion_column_begins", r.quaternion_column_begins, r.quaternion_column_list.size());
   c.below("quaternion_column_list", r.quaternion_column_list, r.quaternion_columns.size(), same);
   c.below("euler_joints", r.euler_joints, r.joint_count);
+  c.below("euler_joint_lods", r.euler_joint_lods, r.euler_joints.size() + 1, same);
 }
 
 void check_solvers(const Rig& r, IndexCheck& c) {

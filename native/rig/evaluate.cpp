@@ -51,29 +51,35 @@ class Correctives {
   void watched(std::uint32_t lod, std::span<const std::uint16_t> active) noexcept {
     const std::uint32_t* begins =
         rig_.watch_begins.data() + std::size_t{lod} * (rig_.control_count + 1);
+    std::uint16_t* candidates = work_.candidates.data();
+    std::size_t n = 0;
     for (const std::uint16_t control : active) {
       for (std::uint32_t i = begins[control]; i < begins[control + 1]; ++i) {
-        const Watch watch = rig_.watched[i];
-        if (controls_[watch.other] <= 0.0f) continue;  // clamped, this factor is 0
-        set(watch.psd, corrective(rig_, rig_.psds[watch.psd], controls_));
+        candidates[n] = rig_.watched[i].psd;
+        n += controls_[rig_.watched[i].other] > 0.0f ? 1 : 0;  // clamped, another factor is 0
       }
+    }
+    for (std::size_t i = 0; i < n; ++i) {
+      const Psd& psd = rig_.psds[candidates[i]];
+      set(psd.output, corrective(rig_, psd, controls_));
     }
   }
   // In: from  what they read. The output may be a raw control, which is active by itself.
   void one(std::uint32_t p, const float* from) noexcept {
-    const std::uint16_t output = rig_.psds[p].output;
-    const float value = corrective(rig_, rig_.psds[p], from);
-    if (output < rig_.raw_count) {
-      controls_[output] = value;
+    const Psd& psd = rig_.psds[p];
+    const float value = corrective(rig_, psd, from);
+    if (psd.output < rig_.raw_count) {
+      controls_[psd.output] = value;
     } else {
-      set(p, value);
+      set(psd.output, value);
     }
   }
 
  private:
-  void set(std::uint32_t p, float value) noexcept {
+  void set(std::uint32_t output, float value) noexcept {
     if (value == 0.0f) return;
-    controls_[rig_.psds[p].output] = value;
+    controls_[output] = value;
+    const std::uint32_t p = output - rig_.raw_count;
     work_.psd_bits[p / 64] |= std::uint64_t{1} << (p % 64);
   }
 
@@ -82,52 +88,49 @@ class Correctives {
   float* controls_;
 };
 
-constexpr std::size_t kAhead = 2;
-
 // The columns of each group that are not at rest. By ascending control, so that sums have one
 // order.
-void list_columns(const Rig& rig, Workspace& work, const float* controls) noexcept {
-  for (std::size_t i = 0; i < rig.joint_groups.size(); ++i) {
-    work.column_ends[i] = rig.joint_groups[i].columns_begin;
-  }
-  for (std::size_t a = 0; a < work.active_count; ++a) {
-    const std::uint16_t control = work.active[a];
+void list_columns(const Rig& rig, std::uint32_t lod, Workspace& work,
+                  const float* controls) noexcept {
+  const std::uint32_t live = rig.live_groups[lod];
+  const std::span active(work.active.data(), work.active_count);
+  detail::count_columns(rig, live, active, work.column_begins.data());
+  std::uint32_t* next = work.column_begins.data() + 1;
+  for (const std::uint16_t control : active) {
     const float v = controls[control];
-    for (std::uint32_t i = rig.joint_column_begins[control];
-         i < rig.joint_column_begins[control + 1]; ++i) {
-      const JointColumn column = rig.joint_columns[i];
-      work.columns[work.column_ends[column.group]++] = {column.offset, v};
-    }
+    detail::for_columns(rig, control, live, [&](const JointColumn& column) {
+      work.columns[next[column.group]++] = {column.offset, v};
+    });
   }
 }
+
+constexpr std::size_t kAhead = 2;
 
 // Asks for the columns of a group while the group before is summed: they lie all over the matrices,
 // where the hardware does not see them coming.
 void prefetch_columns(const Rig& rig, std::uint32_t lod, const Workspace& work,
                       std::size_t i) noexcept {
-  if (i >= rig.joint_groups.size()) return;
-  const JointGroup& g = rig.joint_groups[i];
+  if (i >= rig.live_groups[lod]) return;
   const std::size_t size = rig.is_half() ? 2 : 4;
   const std::size_t bytes = rig.joint_group_lods[i * rig.lod_count + lod] * size;
   const auto* values = rig.is_half() ? reinterpret_cast<const char*>(rig.joint_halves.data())
                                      : reinterpret_cast<const char*>(rig.joint_values.data());
-  for (std::uint32_t c = g.columns_begin; c < work.column_ends[i]; ++c) {
+  for (std::uint32_t c = work.column_begins[i]; c < work.column_begins[i + 1]; ++c) {
     const char* column = values + work.columns[c].offset * size;
     for (std::size_t at = 0; at < bytes; at += 64) simd::prefetch(column + at);
   }
 }
 
 void joints(const Rig& rig, std::uint32_t lod, Workspace& work, const PoseView& pose) noexcept {
-  list_columns(rig, work, pose.controls);
+  list_columns(rig, lod, work, pose.controls);
   for (std::size_t i = 0; i < kAhead; ++i) prefetch_columns(rig, lod, work, i);
-  for (std::size_t i = 0; i < rig.joint_groups.size(); ++i) {
+  for (std::size_t i = 0; i < rig.live_groups[lod]; ++i) {
     prefetch_columns(rig, lod, work, i + kAhead);
-    const JointGroup& g = rig.joint_groups[i];
     const std::uint32_t rows = rig.joint_group_lods[i * rig.lod_count + lod];
     if (rows == 0) continue;
-    const simd::Column* columns = work.columns.data() + g.columns_begin;
-    const std::uint32_t count = work.column_ends[i] - g.columns_begin;
-    float* out = work.rows.data() + g.rows_begin;
+    const simd::Column* columns = work.columns.data() + work.column_begins[i];
+    const std::uint32_t count = work.column_begins[i + 1] - work.column_begins[i];
+    float* out = work.rows.data() + rig.joint_groups[i].rows_begin;
     if (count == 0) {
       std::fill(out, out + rows, 0.0f);
     } else if (rig.is_half()) {
@@ -140,9 +143,11 @@ void joints(const Rig& rig, std::uint32_t lod, Workspace& work, const PoseView& 
 }
 
 // Controls that are not at rest, without the correctives.
-std::size_t list_sources(const Rig& rig, const float* controls, std::uint16_t* active) noexcept {
-  const std::size_t n = append_active(controls, 0, rig.raw_count, active);
-  return n + append_active(controls, rig.raw_count + rig.psd_count, rig.control_count, active + n);
+std::size_t list_sources(const Rig& rig, const float* controls, Workspace& work) noexcept {
+  const std::size_t n = append_active(controls, 0, rig.raw_count, work.active.data());
+  work.raw_active = n;
+  return n + append_active(controls, rig.raw_count + rig.psd_count, rig.control_count,
+                           work.active.data() + n);
 }
 
 // The correctives that a control watches; the others are left at 0.
@@ -150,18 +155,19 @@ void start_correctives(const Rig& rig, std::uint32_t lod, Workspace& work,
                        float* controls) noexcept {
   std::fill(controls + rig.raw_count, controls + rig.raw_count + rig.psd_count, 0.0f);
   std::fill(work.psd_bits.begin(), work.psd_bits.end(), 0u);
-  const std::size_t n = list_sources(rig, controls, work.active.data());
+  const std::size_t n = list_sources(rig, controls, work);
   Correctives(rig, work, controls).watched(lod, {work.active.data(), n});
 }
 
-// In ascending order: raw, correctives, networks and poses.
-void list_active(const Rig& rig, Workspace& work, const float* controls) noexcept {
+// In ascending order: raw, correctives, networks and poses. In: as list_sources left it, but for
+// later steps.
+void list_active(const Rig& rig, bool had_steps, Workspace& work, const float* controls) noexcept {
   std::uint16_t* active = work.active.data();
-  std::size_t n = append_active(controls, 0, rig.raw_count, active);
+  std::size_t n = had_steps ? append_active(controls, 0, rig.raw_count, active) : work.raw_active;
   for (std::size_t word = 0; word < work.psd_bits.size(); ++word) {
     for (std::uint64_t bits = work.psd_bits[word]; bits != 0; bits &= bits - 1) {
       const auto p = word * 64 + static_cast<std::size_t>(std::countr_zero(bits));
-      active[n++] = rig.psds[p].output;
+      active[n++] = static_cast<std::uint16_t>(rig.raw_count + p);
     }
   }
   n += append_active(controls, rig.raw_count + rig.psd_count, rig.control_count, active + n);
@@ -171,6 +177,15 @@ void list_active(const Rig& rig, Workspace& work, const float* controls) noexcep
 }  // namespace
 
 namespace detail {
+
+void count_columns(const Rig& rig, std::uint32_t live, std::span<const std::uint16_t> active,
+                   std::uint32_t* begins) noexcept {
+  std::fill(begins, begins + live + 2, 0u);
+  for (const std::uint16_t control : active) {
+    for_columns(rig, control, live, [&](const JointColumn& column) { ++begins[column.group + 2]; });
+  }
+  for (std::uint32_t i = 2; i < live + 2; ++i) begins[i] += begins[i - 1];
+}
 
 std::uint32_t clamp_lod(const Rig& rig, std::uint32_t lod) noexcept {
   return rig.lod_count == 0 ? 0 : std::min(lod, rig.lod_count - 1);
@@ -197,7 +212,7 @@ void settled_controls(const Rig& rig, std::uint32_t lod, Workspace& work,
       run(rig, step, lod, work, controls);
     }
   }
-  list_active(rig, work, controls);
+  list_active(rig, !rig.steps_of(lod, kChained).empty(), work, controls);
 }
 
 void latent_controls(const Rig& rig, std::uint32_t lod, Workspace& work, float* controls) noexcept {
@@ -214,14 +229,15 @@ void latent_controls(const Rig& rig, std::uint32_t lod, Workspace& work, float* 
       if (step_kind(step) == StepKind::kPsd) all.one(step_index(step), work.last_controls.data());
     }
   }
-  list_active(rig, work, controls);
+  list_active(rig, !rig.steps.empty(), work, controls);
 }
 
 void begin(const Rig& rig, const float* raw, std::uint32_t lod, bool settle, Workspace& work,
            float* controls) noexcept {
+  // What is settled does not read a corrective before it is set.
+  const std::uint32_t rest = rig.raw_count + (settle ? rig.psd_count : 0);
   std::copy(raw, raw + rig.raw_count, controls);
-  std::copy(rig.initial_controls.begin() + rig.raw_count, rig.initial_controls.end(),
-            controls + rig.raw_count);
+  std::copy(rig.initial_controls.begin() + rest, rig.initial_controls.end(), controls + rest);
   if (settle) {
     settled_controls(rig, lod, work, controls);
   } else {
@@ -241,14 +257,9 @@ void place_rows(const Rig& rig, std::uint32_t lod, const float* rows, float* joi
     rig.kernels->place(pieces + whole, 1, rows, last);
     std::copy(last, last + places % simd::kPlaces, joints + whole * simd::kPlaces);
   }
-  for (std::uint32_t i = rig.extra_begins[lod]; i < rig.extra_begins[lod + 1]; ++i) {
-    const simd::Piece& piece = rig.extra_pieces[i];
-    const float* next = rows + piece.from;
-    float* to = joints + std::size_t{piece.block} * simd::kPlaces;
-    for (std::uint32_t bits = piece.mask; bits != 0; bits &= bits - 1) {
-      to[std::countr_zero(bits)] = *next++;
-    }
-  }
+  const std::uint32_t extra = rig.extra_begins[lod];
+  rig.kernels->place_more(rig.extra_pieces.data() + extra, rig.extra_begins[lod + 1] - extra, rows,
+                          joints);
 }
 
 void channels_and_maps(const Rig& rig, std::uint32_t lod, const PoseView& pose) noexcept {
@@ -282,9 +293,10 @@ Pose make_pose(const Rig& rig) {
 Workspace make_workspace(const Rig& rig) {
   Workspace work;
   work.active.resize(std::size_t{rig.control_count} + 1);  // one is written past the last
-  work.psd_bits.resize((rig.psds.size() + 63) / 64);
-  work.column_ends.resize(rig.joint_groups.size());
-  work.columns.resize(rig.list_count);
+  work.candidates.resize(rig.psds.size() + 1);
+  work.psd_bits.resize((std::size_t{rig.psd_count} + 63) / 64);
+  work.column_begins.resize(rig.joint_groups.size() + 2);
+  work.columns.resize(rig.joint_columns.size());
   work.rows.resize(detail::rows_size(rig));
   work.last_controls.resize(rig.control_count);
   work.products.resize(rig.quaternion_joints.size());
@@ -314,7 +326,7 @@ void rest(const Rig& rig, const float* raw, const PoseView& pose) noexcept {
   std::copy(rig.initial_controls.begin() + rig.raw_count, rig.initial_controls.end(),
             pose.controls + rig.raw_count);
   std::fill(pose.joints, pose.joints + std::size_t{rig.joint_count} * rig.joint_stride, 0.0f);
-  if (rig.joint_stride == 10) detail::euler_joints(rig, pose.joints);
+  if (rig.joint_stride == 10) detail::euler_joints(rig, 0, pose.joints);
   std::fill(pose.blend_shapes, pose.blend_shapes + rig.blend_shape_count, 0.0f);
   std::fill(pose.animated_maps, pose.animated_maps + rig.animated_map_count, 0.0f);
 }

@@ -88,10 +88,12 @@ inline PoseView view(Pose& pose) {
 struct Workspace {
   std::vector<std::uint16_t> active;  // controls that are not 0, ascending
   std::size_t active_count = 0;
-  std::vector<std::uint64_t> psd_bits;     // correctives that are not 0
-  std::vector<std::uint32_t> column_ends;  // [groups]: where the next active column goes
-  std::vector<simd::Column> columns;       // by group, at its columns_begin
-  core::AlignedVector<float> rows;         // of all groups
+  std::size_t raw_active = 0;                // how many of them are raw
+  std::vector<std::uint16_t> candidates;     // correctives that may not be 0
+  std::vector<std::uint64_t> psd_bits;       // correctives that are not 0, by output
+  std::vector<std::uint32_t> column_begins;  // [groups + 1], in columns
+  std::vector<simd::Column> columns;         // active, by group
+  core::AlignedVector<float> rows;           // of all groups
   std::vector<float> last_controls;
   std::vector<Quaternion> products;            // [quaternion joints]
   std::vector<std::uint64_t> quaternion_bits;  // columns that are not at rest; 0 between calls

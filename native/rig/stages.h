@@ -31,12 +31,28 @@ void outputs(const Rig& rig, std::uint32_t lod, Workspace& work, const PoseView&
 /// The parts of outputs that a batch has in common with it. rotations: what comes after the joint
 /// groups, in this order.
 void rotations(const Rig& rig, std::uint32_t lod, Workspace& work, const PoseView& pose) noexcept;
-void euler_joints(const Rig& rig, float* joints) noexcept;
+void euler_joints(const Rig& rig, std::uint32_t lod, float* joints) noexcept;
 void quaternion_joints(const Rig& rig, std::uint32_t lod, Workspace& work,
                        const PoseView& pose) noexcept;
 void twist_and_swing(const Rig& rig, const PoseView& pose) noexcept;
 void ml_joints(const Rig& rig, std::uint32_t lod, const PoseView& pose) noexcept;
 void channels_and_maps(const Rig& rig, std::uint32_t lod, const PoseView& pose) noexcept;
+
+/// Calls f with each column of a control in groups below live.
+template <class F>
+void for_columns(const Rig& rig, std::size_t control, std::uint32_t live, F f) noexcept {
+  const std::uint32_t end = rig.joint_column_begins[control + 1];
+  for (std::uint32_t i = rig.joint_column_begins[control]; i < end; ++i) {
+    const JointColumn& column = rig.joint_columns[i];
+    if (column.group >= live) break;
+    f(column);
+  }
+}
+/// Where each group's list of active columns begins, one entry late: as a list is filled its next
+/// place is begins[group + 1], which ends as the begin of the list after it.
+/// Out: begins  [live + 2]
+void count_columns(const Rig& rig, std::uint32_t live, std::span<const std::uint16_t> active,
+                   std::uint32_t* begins) noexcept;
 
 /// Where a joint's rotation begins; what of it is written as the output's form.
 inline float* rotation_of(const Rig& rig, float* joints, std::uint32_t joint) noexcept {

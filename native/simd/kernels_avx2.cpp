@@ -43,18 +43,27 @@ struct V {
   }
   RISORIUS_INLINE static void store(float* p, Reg v) { _mm256_storeu_ps(p, v); }
   RISORIUS_INLINE static Reg madd(Reg a, Reg b, Reg sum) { return _mm256_fmadd_ps(a, b, sum); }
-  RISORIUS_INLINE static void expand_8(const float* from, std::uint32_t mask, float* to) {
+  RISORIUS_INLINE static __m256i taken(std::uint32_t mask) {
+    const __m256i bits = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+    return _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(static_cast<int>(mask)), bits),
+                              bits);
+  }
+  RISORIUS_INLINE static __m256 spread(const float* from, std::uint32_t mask) {
     const __m128i order =
         _mm_loadl_epi64(reinterpret_cast<const __m128i*>(kExpandOrders[mask].data()));
-    const __m256i bits = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
-    const __m256i taken =
-        _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(static_cast<int>(mask)), bits), bits);
-    const __m256 values = _mm256_permutevar8x32_ps(load(from), _mm256_cvtepu8_epi32(order));
-    store(to, _mm256_and_ps(values, _mm256_castsi256_ps(taken)));
+    return _mm256_permutevar8x32_ps(load(from), _mm256_cvtepu8_epi32(order));
+  }
+  RISORIUS_INLINE static void expand_8(const float* from, std::uint32_t mask, float* to) {
+    store(to, _mm256_and_ps(spread(from, mask), _mm256_castsi256_ps(taken(mask))));
   }
   RISORIUS_INLINE static void expand(const float* from, std::uint32_t mask, float* to) {
     expand_8(from, mask & 0xFFu, to);
     expand_8(from + std::popcount(mask & 0xFFu), mask >> 8, to + 8);
+  }
+  RISORIUS_INLINE static void expand_more(const float* from, std::uint32_t mask, float* to) {
+    const std::uint32_t low = mask & 0xFFu, high = mask >> 8;
+    _mm256_maskstore_ps(to, taken(low), spread(from, low));
+    _mm256_maskstore_ps(to + 8, taken(high), spread(from + std::popcount(low), high));
   }
 };
 

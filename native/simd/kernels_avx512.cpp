@@ -32,6 +32,10 @@ struct V {
   RISORIUS_INLINE static void expand(const float* from, std::uint32_t mask, float* to) {
     store(to, _mm512_maskz_expand_ps(static_cast<__mmask16>(mask), load(from)));
   }
+  RISORIUS_INLINE static void expand_more(const float* from, std::uint32_t mask, float* to) {
+    const auto places = static_cast<__mmask16>(mask);
+    _mm512_mask_storeu_ps(to, places, _mm512_maskz_expand_ps(places, load(from)));
+  }
 };
 
 }  // namespace

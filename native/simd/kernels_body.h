@@ -3,14 +3,15 @@
 // RISORIUS_TARGET (the functions' target attribute: a file compiled with -mavx2 could give the
 // linker an inline standard function that older CPUs cannot run) and V with
 //   Reg, kLanes, zero(), set(float), load(const float*), load(const uint16_t*), store(float*, Reg),
-//   madd(a, b, sum), expand(from, mask, to) (kernels.h, place), and kBlocks, kBatchBlocks:
-//   registers of rows at once; kBatchFrames.
+//   madd(a, b, sum), expand(from, mask, to) and expand_more (kernels.h, place), and kBlocks,
+//   kBatchBlocks: registers of rows at once; kBatchFrames.
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <utility>
 
 #include "simd/kernels.h"
+#include "simd/rotations_body.h"
 
 namespace risorius::simd {
 
@@ -104,13 +105,21 @@ RISORIUS_TARGET void place(const Piece* pieces, std::size_t n, const float* from
   }
 }
 
+RISORIUS_TARGET void place_more(const Piece* pieces, std::size_t n, const float* from, float* to) {
+  for (std::size_t i = 0; i < n; ++i) {
+    V::expand_more(from + pieces[i].from, pieces[i].mask, to + pieces[i].block * kPlaces);
+  }
+}
+
 constexpr Kernels make_kernels(const char* name) {
   return {name,
           columns<float>,
           columns<std::uint16_t>,
           batch_columns<float>,
           batch_columns<std::uint16_t>,
-          place};
+          place,
+          place_more,
+          quaternions};
 }
 
 }  // namespace

@@ -2,6 +2,10 @@
 #include "simd/half.h"
 #include "simd/kernels.h"
 
+#define RISORIUS_TARGET
+#include "simd/kernels_inline.h"
+#include "simd/rotations_body.h"
+
 namespace risorius::simd {
 
 namespace {
@@ -43,6 +47,12 @@ void place(const Piece* pieces, std::size_t n, const float* from, float* to) {
   }
 }
 
+void place_more(const Piece* pieces, std::size_t n, const float* from, float* to) {
+  for (std::size_t i = 0; i < n; ++i) {
+    place_bits(from + pieces[i].from, pieces[i].mask, to + pieces[i].block * kPlaces);
+  }
+}
+
 }  // namespace
 
 const Kernels& scalar_kernels() {
@@ -51,7 +61,9 @@ const Kernels& scalar_kernels() {
                                    columns<std::uint16_t>,
                                    batch_columns<float>,
                                    batch_columns<std::uint16_t>,
-                                   place};
+                                   place,
+                                   place_more,
+                                   quaternions};
   return kernels;
 }
 

@@ -62,6 +62,9 @@ struct V {
       from += std::popcount(mask & 15u);
     }
   }
+  RISORIUS_INLINE static void expand_more(const float* from, std::uint32_t mask, float* to) {
+    place_bits(from, mask, to);
+  }
 };
 
 }  // namespace

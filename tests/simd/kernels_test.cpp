@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <limits>
@@ -184,6 +186,90 @@ TEST_P(SimdKernels, PlaceByTheBitsOfThePieces) {
     }
   }
   EXPECT_EQ(to.back(), 7.0f);
+}
+
+TEST_P(SimdKernels, PlaceMoreWithoutTouchingOtherPlaces) {
+  std::mt19937 random(9);
+  std::vector<float> from(400 + kPlaces);
+  for (std::size_t i = 0; i < from.size(); ++i) from[i] = static_cast<float>(i + 1);
+  for (int i = 0; i < 200; ++i) {
+    // Ends with the last place that the mask names: behind it begins what is not ours.
+    const auto mask = static_cast<std::uint16_t>(1 + random() % 0xFFFF);
+    const Piece piece{static_cast<std::uint32_t>(random() % 400), mask, 2};
+    std::vector<float> to(2 * kPlaces + static_cast<std::size_t>(std::bit_width(mask)), 7.0f);
+    kernels_.place_more(&piece, 1, from.data(), to.data());
+    std::uint32_t next = piece.from;
+    for (std::size_t p = 0; p < to.size(); ++p) {
+      const bool taken = p >= 2 * kPlaces && (mask >> (p - 2 * kPlaces) & 1) != 0;
+      ASSERT_EQ(to[p], taken ? from[next++] : 7.0f) << "place " << p << " mask " << mask;
+    }
+  }
+}
+
+struct Turn {
+  std::array<std::uint8_t, 3> order;
+  float parity;
+};
+
+// The product of three turns about axes, in double precision.
+std::array<double, 4> product_of_turns(const Turn& turn, const float* angles) {
+  std::array<double, 4> q{0, 0, 0, 1};
+  for (const std::uint8_t axis : turn.order) {
+    const double half = 0.5 * double{angles[axis]};
+    std::array<double, 4> step{0, 0, 0, std::cos(half)};
+    step[axis] = std::sin(half);
+    const auto& [ax, ay, az, aw] = step;
+    const auto [bx, by, bz, bw] = q;
+    q = {aw * bx + ax * bw + ay * bz - az * by, aw * by - ax * bz + ay * bw + az * bx,
+         aw * bz + ax * by - ay * bx + az * bw, aw * bw - ax * bx - ay * by - az * bz};
+  }
+  return q;
+}
+
+TEST_P(SimdKernels, TurnEulerAnglesIntoQuaternions) {
+  const Turn turns[] = {{{0, 1, 2}, 1},  {{1, 2, 0}, 1},  {{2, 0, 1}, 1},
+                        {{0, 2, 1}, -1}, {{2, 1, 0}, -1}, {{1, 0, 2}, -1}};
+  std::mt19937 random(10);
+  std::uniform_real_distribution<float> angle(-20.0f, 20.0f);
+  for (const Turn& turn : turns) {
+    for (const std::size_t count : {0u, 1u, 15u, 16u, 17u, 40u}) {
+      std::vector<float> rotations(10 * 41, 7.0f);
+      std::vector<std::uint16_t> which;
+      for (std::size_t i = 0; i < count; ++i) which.push_back(static_cast<std::uint16_t>(40 - i));
+      for (const std::uint16_t i : which) {
+        for (std::size_t a = 0; a < 3; ++a) rotations[i * 10 + a] = angle(random);
+      }
+      if (count > 2) rotations[which[1] * 10] = 30000.0f;  // beyond the fast reduction
+      const std::vector<float> angles = rotations;
+      EulerTurns e;
+      std::ranges::copy(turn.order, e.order);
+      e.parity = turn.parity;
+      kernels_.quaternions(e, which.data(), count, rotations.data(), 10);
+      for (const std::uint16_t i : which) {
+        const std::array<double, 4> expected = product_of_turns(turn, angles.data() + i * 10);
+        for (std::size_t k = 0; k < 4; ++k) {
+          ASSERT_NEAR(double{rotations[i * 10u + k]}, expected[k], 4e-7) << i << " part " << k;
+        }
+      }
+      for (std::size_t r = 0; r < rotations.size(); ++r) {
+        const bool ours = r % 10 < 4 && r / 10 > 40 - count;
+        if (!ours) {
+          ASSERT_EQ(rotations[r], 7.0f) << r;
+        }
+      }
+    }
+  }
+}
+
+TEST_P(SimdKernels, ANaNTurnsOnlyItsOwnRotation) {
+  std::vector<float> rotations(10 * 3, 0.25f);
+  rotations[10] = std::nanf("");
+  const std::uint16_t which[] = {0, 1, 2};
+  kernels_.quaternions({}, which, 3, rotations.data(), 10);
+  EXPECT_TRUE(std::isnan(rotations[10]));
+  for (const std::size_t r : {0u, 1u, 2u, 3u, 20u, 21u, 22u, 23u}) {
+    EXPECT_FALSE(std::isnan(rotations[r])) << r;
+  }
 }
 
 TEST_P(SimdKernels, WriteNoFurtherThanTheWidestVector) {
