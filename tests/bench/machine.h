@@ -15,7 +15,7 @@ inline std::string processor() {
   return "unknown CPU";
 }
 
-inline const char* compiler() { return RISORIUS_COMPILER; }
-inline const char* commit() { return RISORIUS_COMMIT; }
+const char* compiler();
+const char* commit();
 
 }  // namespace risorius::bench

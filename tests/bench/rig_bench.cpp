@@ -1,26 +1,24 @@
 // SPDX-License-Identifier: MIT
 // The evaluator against a scalar CSR matrix:
-//   rig_bench FILE.dna [FRAMES20.f32 FRAMES60.f32 FRAMES_ALL.f32] [Google Benchmark's options]
-// Frames are little-endian float32[frames, raw controls]; without files their like is made: a part
-// of the raw controls is active, each frame has other values, and every second frame another
-// control takes one's place.
+//   rig_bench FILE.dna [FRAMES20.f32 FRAMES60.f32 FRAMES_ALL.f32] [--sweep] [options of the
+//   library]
+// Frames are little-endian float32[frames, raw controls]; without files their like is made.
+// --sweep measures how cost grows instead, and prints a row per point: what, x, us, us of csr.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <cstring>
-#include <ctime>
-#include <fstream>
 #include <functional>
 #include <map>
 #include <memory>
-#include <random>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "bench/clocks.h"
 #include "bench/csr.h"
+#include "bench/frames.h"
 #include "bench/machine.h"
 #include "compile/compile.h"
 #include "core/source.h"
@@ -29,265 +27,236 @@
 namespace {
 
 using namespace risorius;
+using bench::Frames;
 
-struct Frames {
-  std::size_t count = 0;
-  std::vector<float> values;  // [count, raw]
+// A row of the table: what it is measured against, and what was asked of it.
+struct Line {
+  const char *name, *base, *asked;
 };
+constexpr Line kLines[] = {{"csr, 20 active", "", ""},
+                           {"csr, 60 active", "", ""},
+                           {"csr, all active", "", ""},
+                           {"one face, 20 active", "csr, 20 active", "60"},
+                           {"one face, 60 active", "csr, 60 active", "40"},
+                           {"one face, all active", "csr, all active", ""},
+                           {"float16, 20 active", "csr, 20 active", ""},
+                           {"float16, 60 active", "csr, 60 active", ""},
+                           {"float16, all active", "csr, all active", ""},
+                           {"quaternions, 60 active", "csr, 60 active", "30"},
+                           {"csr, LOD 4, 60 active", "", ""},
+                           {"LOD 4, 60 active", "csr, LOD 4, 60 active", ""},
+                           {"csr, cold, 60 active", "", ""},
+                           {"cold, 60 active", "csr, cold, 60 active", "25"},
+                           {"float16, cold, 60 active", "csr, cold, 60 active", ""},
+                           {"crowd of 64, 20 active", "csr, 20 active", ""},
+                           {"crowd of 64, 60 active", "csr, 60 active", "100"},
+                           {"crowd of 64, all active", "csr, all active", ""},
+                           {"clip of 1000, 60 active", "csr, 60 active", "100"},
+                           {"clip, two cores, 60 active", "csr, 60 active", ""},
+                           {"no change", "", ""},
+                           {"LOD switched and evaluated", "", ""},
+                           {"compile", "", ""},
+                           {"open a block, header checked", "", ""},
+                           {"open a block, all checked", "", ""}};
 
-Frames make_frames(std::size_t raw, std::size_t active) {
-  constexpr std::size_t kCount = 1024;
-  std::mt19937 random(7);
-  std::uniform_real_distribution<float> value(0.05f, 1.0f);
-  std::vector<std::size_t> order(raw);
-  for (std::size_t i = 0; i < raw; ++i) order[i] = i;
-  std::ranges::shuffle(order, random);
-  Frames frames{kCount, std::vector<float>(kCount * raw, 0.0f)};
-  for (std::size_t f = 0; f < kCount; ++f) {
-    if (active < raw && f % 2 == 1) {
-      std::swap(order[random() % active], order[active + random() % (raw - active)]);
-    }
-    for (std::size_t i = 0; i < active; ++i) frames.values[f * raw + order[i]] = value(random);
+std::shared_ptr<rig::Rig> compiled(const dna::Dna& dna,
+                                   compile::Precision precision = compile::Precision::kFloat32,
+                                   compile::Rotation rotation = compile::Rotation::kEuler) {
+  compile::CompileOptions options;
+  options.precision = precision;
+  options.rotation = rotation;
+  auto rig = compile::compile(dna, options);
+  if (!rig) {
+    std::fprintf(stderr, "rig_bench: %s\n", rig.error().describe().c_str());
+    std::exit(1);
   }
-  return frames;
+  return std::make_shared<rig::Rig>(std::move(rig).value());
 }
 
-Frames read_frames(const char* path, std::size_t raw) {
-  std::ifstream file(path, std::ios::binary | std::ios::ate);
-  const auto size = static_cast<std::size_t>(file.tellg());
-  Frames frames{size / (4 * raw), std::vector<float>(size / 4)};
-  file.seekg(0);
-  file.read(reinterpret_cast<char*>(frames.values.data()), static_cast<std::streamsize>(size));
-  return frames;
+using Step = std::function<void(const float*)>;
+
+Step one_face(std::shared_ptr<const rig::Rig> rig, std::uint32_t lod) {
+  auto work = std::make_shared<rig::Workspace>(rig::make_workspace(*rig));
+  auto pose = std::make_shared<rig::Pose>(rig::make_pose(*rig));
+  return [rig, lod, work, pose](const float* raw) {
+    rig::evaluate(*rig, raw, lod, true, *work, *pose);
+    benchmark::DoNotOptimize(pose->joints.data());
+  };
+}
+Step csr(const dna::Dna& dna, std::uint32_t lod) {
+  auto base = std::make_shared<bench::Baseline>(dna, lod);
+  return [base](const float* raw) { base->evaluate(raw); };
 }
 
-// Of this thread where the system counts it: another program on the machine costs then less.
-double now() {
-#ifdef CLOCK_THREAD_CPUTIME_ID
-  timespec t;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + static_cast<double>(t.tv_nsec) * 1e-9;
-#else
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-#endif
+// Never the same frame twice in a row.
+void add(const std::string& name, Step step, const Frames& frames) {
+  benchmark::RegisterBenchmark(name.c_str(), [&frames, step](benchmark::State& state) {
+    std::size_t f = 0;
+    for (auto _ : state) {
+      step(frames.at(f));
+      f = (f + 1) % frames.count;
+    }
+  });
 }
 
-double seconds_of(const std::function<void()>& f) {
-  const double start = now();
-  f();
-  return now() - start;
+void add_cold(const std::string& name, Step step, const Frames& frames) {
+  auto* b = benchmark::RegisterBenchmark(name.c_str(), [&frames, step](benchmark::State& state) {
+    std::size_t f = 0;
+    for (auto _ : state) {
+      bench::empty_caches();
+      state.SetIterationTime(bench::wall_seconds_of([&] { step(frames.at(f)); }));
+      f = (f + 1) % frames.count;
+    }
+  });
+  b->UseManualTime()->Iterations(1)->Repetitions(61);
 }
 
-// Reads more than every cache holds.
-void empty_caches() {
-  static std::vector<std::uint64_t> memory((std::size_t{256} << 20) / 8, 1);
-  for (std::size_t i = 0; i < memory.size(); i += 8) ++memory[i];
-  benchmark::ClobberMemory();
+// Many frames or faces at once, in as many threads. By the clock on the wall.
+void add_batch(const std::string& name, std::shared_ptr<const rig::Rig> rig, const Frames& frames,
+               std::size_t count, std::size_t threads) {
+  auto* b = benchmark::RegisterBenchmark(name.c_str(), [=, &frames](benchmark::State& state) {
+    const std::size_t n = std::min(count, frames.count);
+    const std::size_t sizes[4] = {std::size_t{rig->joint_count} * rig->joint_stride,
+                                  rig->blend_shape_count, rig->animated_map_count,
+                                  rig->control_count};
+    std::vector<float> out[4];
+    for (int i = 0; i < 4; ++i) out[i].resize(n * sizes[i]);
+    std::vector<rig::Workspace> work(threads, rig::make_batch_workspace(*rig));
+    const auto part = [&](std::size_t t) {
+      const std::size_t begin = n * t / threads, end = n * (t + 1) / threads;
+      rig::evaluate_frames(*rig, frames.at(begin), end - begin, 0, true, work[t],
+                           {out[0].data() + begin * sizes[0], out[1].data() + begin * sizes[1],
+                            out[2].data() + begin * sizes[2], out[3].data() + begin * sizes[3]});
+    };
+    for (auto _ : state) {
+      const double seconds = bench::wall_seconds_of([&] {
+        std::vector<std::thread> others;
+        for (std::size_t t = 1; t < threads; ++t) others.emplace_back(part, t);
+        part(0);
+        for (std::thread& other : others) other.join();
+      });
+      state.SetIterationTime(seconds / static_cast<double>(n));
+    }
+  });
+  b->UseManualTime()->Iterations(static_cast<benchmark::IterationCount>(4000 / count + 1));
 }
+
+// The least that any evaluation of everything has to do.
+template <class T>
+void add_read(const char* name, std::span<const T> values) {
+  benchmark::RegisterBenchmark(name, [values](benchmark::State& state) {
+    for (auto _ : state) {
+      std::uint64_t sums[16] = {};
+      const auto* words = reinterpret_cast<const std::uint64_t*>(values.data());
+      const std::size_t n = values.size_bytes() / 8;
+      for (std::size_t i = 0; i + 16 <= n; i += 16) {
+        for (std::size_t l = 0; l < 16; ++l) sums[l] += words[i + l];
+      }
+      benchmark::DoNotOptimize(sums);
+    }
+  });
+}
+
+std::size_t kept_coefficients(const rig::Rig& rig, std::uint32_t lod) {
+  std::size_t n = 0;
+  for (std::size_t i = 0; i < rig.joint_groups.size(); ++i) {
+    n += std::size_t{rig.joint_group_lods[i * rig.lod_count + lod]} *
+         rig.joint_groups[i].column_count;
+  }
+  return n;
+}
+
+using Medians = std::map<std::string, double>;  // ns
 
 class Suite {
  public:
-  Suite(const dna::Dna& dna, std::vector<Frames> frames) : dna_(dna), frames_(std::move(frames)) {
-    rig_ = compiled(compile::Precision::kFloat32);
-    half_ = compiled(compile::Precision::kFloat16);
-    base_ = std::make_unique<bench::Baseline>(dna, 0);
+  Suite(const dna::Dna& dna, const std::vector<Frames>& frames) : dna_(dna), frames_(frames) {
+    rig_ = compiled(dna);
+    half_ = compiled(dna, compile::Precision::kFloat16);
     coarse_ = std::min<std::uint32_t>(4, rig_->lod_count - 1);
-    coarse_base_ = std::make_unique<bench::Baseline>(dna, coarse_);
   }
 
   void add_all() {
     static const char* const kActive[] = {"20 active", "60 active", "all active"};
     for (std::size_t a = 0; a < 3; ++a) {
-      add(
-          std::string("csr, ") + kActive[a], [this, a](const float* raw) { base_->evaluate(raw); },
-          a);
-      add(std::string("float32, ") + kActive[a], one(*rig_, 0), a);
-      add(std::string("float16, ") + kActive[a], one(*half_, 0), a);
+      const std::string active = kActive[a];
+      add("csr, " + active, csr(dna_, 0), frames_[a]);
+      add("one face, " + active, one_face(rig_, 0), frames_[a]);
+      add("float16, " + active, one_face(half_, 0), frames_[a]);
+      add_batch("crowd of 64, " + active, rig_, frames_[a], 64, 1);
     }
-    add("csr, LOD 4, 60 active", [this](const float* raw) { coarse_base_->evaluate(raw); }, 1);
-    add("float32, LOD 4, 60 active", one(*rig_, coarse_), 1);
-    add("csr, cold, 60 active", [this](const float* raw) { base_->evaluate(raw); }, 1, true);
-    add("float32, cold, 60 active", one(*rig_, 0), 1, true);
-    add_reads();
-    add_batches();
-    add_instance();
-    add_switch();
+    const Frames& some = frames_[1];
+    add("quaternions, 60 active",
+        one_face(compiled(dna_, compile::Precision::kFloat32, compile::Rotation::kQuaternion), 0),
+        some);
+    add("csr, LOD 4, 60 active", csr(dna_, coarse_), some);
+    add("LOD 4, 60 active", one_face(rig_, coarse_), some);
+    add_cold("csr, cold, 60 active", csr(dna_, 0), some);
+    add_cold("cold, 60 active", one_face(rig_, 0), some);
+    add_cold("float16, cold, 60 active", one_face(half_, 0), some);
+    add_batch("clip of 1000, 60 active", rig_, some, 1000, 1);
+    add_batch("clip, two cores, 60 active", rig_, some, 1000, 2);
+    add_read("read float32", rig_->joint_values);
+    add_read("read float16", half_->joint_halves);
+    add_instance(some);
     add_making();
   }
 
-  void print(const std::map<std::string, double>& ns) const {
+  void print(const Medians& ns) const {
     const auto at = [&](const std::string& name) {
       const auto found = ns.find(name);
       return found == ns.end() ? 0.0 : found->second;
     };
-    std::printf("\n%s, %s, commit %s, %s kernels\n", bench::processor().c_str(), bench::compiler(),
+    const bench::Baseline base(dna_, 0);
+    const auto coefficients = static_cast<double>(base.matrix().values.size());
+    const std::size_t values = rig_->joint_values.size() - simd::kWidest;
+    std::printf("%s, %s, commit %s, %s kernels\n", bench::processor().c_str(), bench::compiler(),
                 bench::commit(), rig_->kernels->name);
-    const double coefficients = static_cast<double>(base_->matrix().values.size());
-    std::printf("%zu values in the matrices, %.0f of them not 0; csr takes %.2f ns each\n\n",
-                rig_->joint_values.size() - simd::kWidest, coefficients,
-                at("csr, all active") / coefficients);
-    std::printf("%-36s %10s %12s\n", "what", "us", "times csr");
-    for (const auto& [name, base] : kRatios) {
-      if (ns.count(name) == 0) continue;
-      std::printf("%-36s %10.3f", name, at(name) / 1e3);
-      if (at(base) > 0) std::printf(" %12.1f", at(base) / at(name));
+    std::printf("%zu coefficients, %.0f of them not 0 (padding: none); csr takes %.2f ns each\n\n",
+                values, coefficients, at("csr, all active") / coefficients);
+    std::printf("%-30s %11s %10s %8s\n", "", "us", "times csr", "asked");
+    for (const Line& line : kLines) {
+      if (at(line.name) == 0) continue;
+      std::printf("%-30s %11.3f", line.name, at(line.name) / 1e3);
+      if (at(line.base) > 0) std::printf(" %10.1f %8s", at(line.base) / at(line.name), line.asked);
       std::puts("");
     }
     std::printf(
-        "\nall active against a plain read of the values: float32 %.2f, float16 %.2f times\n",
-        at("float32, all active") / at("read float32"),
+        "\nall active, times a plain read of the values (asked: at most 1.25 and 1.5):\n"
+        "  float32 %.2f, float16 %.2f\n",
+        at("one face, all active") / at("read float32"),
         at("float16, all active") / at("read float16"));
-    std::printf("two cores: %.2f times one\n",
-                at("batch, 60 active") / at("batch on two cores, 60 active"));
-    std::printf("bytes: float32 %zu, float16 %zu; values alone %zu\n", rig_->memory_bytes(),
-                half_->memory_bytes(), (rig_->joint_values.size() - simd::kWidest) * 4);
+    std::printf("LOD 4 has %.2f of the coefficients and takes %.2f of the time\n",
+                static_cast<double>(kept_coefficients(*rig_, coarse_)) /
+                    static_cast<double>(kept_coefficients(*rig_, 0)),
+                at("LOD 4, 60 active") / at("one face, 60 active"));
+    std::printf("two cores: %.2f times one (asked: 1.8)\n",
+                at("clip of 1000, 60 active") / at("clip, two cores, 60 active"));
+    std::printf("bytes: float32 %zu, float16 %zu; the values alone %zu\n", rig_->memory_bytes(),
+                half_->memory_bytes(), values * 4);
   }
 
  private:
-  static constexpr std::size_t kCrowd = 64;
-  using Step = std::function<void(const float*)>;
-  static constexpr std::pair<const char*, const char*> kRatios[] = {
-      {"csr, 20 active", ""},
-      {"csr, 60 active", ""},
-      {"csr, all active", ""},
-      {"float32, 20 active", "csr, 20 active"},
-      {"float32, 60 active", "csr, 60 active"},
-      {"float32, all active", "csr, all active"},
-      {"float16, 20 active", "csr, 20 active"},
-      {"float16, 60 active", "csr, 60 active"},
-      {"float16, all active", "csr, all active"},
-      {"csr, LOD 4, 60 active", ""},
-      {"float32, LOD 4, 60 active", "csr, LOD 4, 60 active"},
-      {"csr, cold, 60 active", ""},
-      {"float32, cold, 60 active", "csr, cold, 60 active"},
-      {"batch, 20 active", "csr, 20 active"},
-      {"batch, 60 active", "csr, 60 active"},
-      {"batch, all active", "csr, all active"},
-      {"batch on two cores, 60 active", "csr, 60 active"},
-      {"no change", ""},
-      {"LOD switched and evaluated", ""},
-      {"compile", ""},
-      {"open a block, header checked", ""},
-      {"open a block, all checked", ""}};
-
-  std::shared_ptr<rig::Rig> compiled(compile::Precision precision) const {
-    compile::CompileOptions options;
-    options.precision = precision;
-    auto rig = compile::compile(dna_, options);
-    if (!rig) {
-      std::fprintf(stderr, "rig_bench: %s\n", rig.error().describe().c_str());
-      std::exit(1);
-    }
-    return std::make_shared<rig::Rig>(std::move(rig).value());
-  }
-
-  Step one(const rig::Rig& rig, std::uint32_t lod) const {
-    auto work = std::make_shared<rig::Workspace>(rig::make_workspace(rig));
-    auto pose = std::make_shared<rig::Pose>(rig::make_pose(rig));
-    return [&rig, lod, work, pose](const float* raw) {
-      rig::evaluate(rig, raw, lod, true, *work, *pose);
-      benchmark::DoNotOptimize(pose->joints.data());
-    };
-  }
-
-  void add(const std::string& name, Step step, std::size_t active, bool cold = false) {
-    auto* b = benchmark::RegisterBenchmark(
-        name.c_str(), [this, step, active, cold](benchmark::State& state) {
-          const Frames& frames = frames_[active];
+  void add_instance(const Frames& frames) {
+    benchmark::RegisterBenchmark("no change", [this, &frames](benchmark::State& state) {
+      rig::Instance face(*rig_);
+      for (auto _ : state) benchmark::DoNotOptimize(face.evaluate(frames.at(0)).joints.data());
+    });
+    benchmark::RegisterBenchmark(
+        "LOD switched and evaluated", [this, &frames](benchmark::State& state) {
+          rig::Instance face(*rig_);
+          std::uint32_t lod = 0;
           std::size_t f = 0;
           for (auto _ : state) {
-            if (cold) empty_caches();
-            const float* raw = frames.values.data() + f * rig_->raw_count;
-            if (cold) {
-              state.SetIterationTime(seconds_of([&] { step(raw); }));
-            } else {
-              step(raw);
-            }
+            face.set_lod(lod ^= 1u);
+            benchmark::DoNotOptimize(face.evaluate(frames.at(f)).joints.data());
             f = (f + 1) % frames.count;
           }
         });
-    if (cold) b->UseManualTime()->Iterations(20);
-  }
-
-  // The least that any evaluation of everything has to do.
-  template <class T>
-  void add_read(const char* name, std::span<const T> values) {
-    benchmark::RegisterBenchmark(name, [values](benchmark::State& state) {
-      for (auto _ : state) {
-        std::uint64_t sums[16] = {};
-        const auto* words = reinterpret_cast<const std::uint64_t*>(values.data());
-        const std::size_t n = values.size_bytes() / 8;
-        for (std::size_t i = 0; i + 16 <= n; i += 16) {
-          for (std::size_t l = 0; l < 16; ++l) sums[l] += words[i + l];
-        }
-        benchmark::DoNotOptimize(sums);
-      }
-    });
-  }
-  void add_reads() {
-    add_read("read float32", rig_->joint_values);
-    add_read("read float16", half_->joint_halves);
-  }
-
-  void add_batches() {
-    static const char* const kNames[] = {"batch, 20 active", "batch, 60 active",
-                                         "batch, all active"};
-    for (std::size_t a = 0; a < 3; ++a) add_batch(kNames[a], a, 1);
-    add_batch("batch on two cores, 60 active", 1, 2);
-  }
-  void add_batch(const char* name, std::size_t active, std::size_t threads) {
-    per_frame_[name] = static_cast<double>(std::min<std::size_t>(kCrowd, frames_[active].count));
-    auto* b = benchmark::RegisterBenchmark(name, [this, active, threads](benchmark::State& state) {
-      const Frames& frames = frames_[active];
-      const std::size_t count = std::min<std::size_t>(kCrowd, frames.count);
-      std::vector<float> out[4];
-      const std::size_t sizes[4] = {std::size_t{rig_->joint_count} * 9, rig_->blend_shape_count,
-                                    rig_->animated_map_count, rig_->control_count};
-      for (int i = 0; i < 4; ++i) out[i].resize(count * sizes[i]);
-      std::vector<rig::Workspace> work(threads, rig::make_batch_workspace(*rig_));
-      const auto part = [&](std::size_t t) {
-        const std::size_t begin = count * t / threads, end = count * (t + 1) / threads;
-        rig::evaluate_frames(*rig_, frames.values.data() + begin * rig_->raw_count, end - begin, 0,
-                             true, work[t],
-                             {out[0].data() + begin * sizes[0], out[1].data() + begin * sizes[1],
-                              out[2].data() + begin * sizes[2], out[3].data() + begin * sizes[3]});
-      };
-      for (auto _ : state) {
-        state.SetIterationTime(seconds_of([&] {
-          std::vector<std::thread> others;
-          for (std::size_t t = 1; t < threads; ++t) others.emplace_back(part, t);
-          part(0);
-          for (std::thread& other : others) other.join();
-        }));
-      }
-    });
-    b->UseManualTime();
-  }
-
-  void add_instance() {
-    benchmark::RegisterBenchmark("no change", [this](benchmark::State& state) {
-      rig::Instance face(*rig_);
-      for (auto _ : state) {
-        benchmark::DoNotOptimize(face.evaluate(frames_[1].values.data()).joints.data());
-      }
-    });
-  }
-  void add_switch() {
-    benchmark::RegisterBenchmark("LOD switched and evaluated", [this](benchmark::State& state) {
-      rig::Instance face(*rig_);
-      std::uint32_t lod = 0;
-      std::size_t f = 0;
-      for (auto _ : state) {
-        face.set_lod(lod ^= 1u);
-        const float* raw = frames_[1].values.data() + f * rig_->raw_count;
-        benchmark::DoNotOptimize(face.evaluate(raw).joints.data());
-        f = (f + 1) % frames_[1].count;
-      }
-    });
   }
   void add_making() {
     benchmark::RegisterBenchmark("compile", [this](benchmark::State& state) {
-      for (auto _ : state) benchmark::DoNotOptimize(compiled(compile::Precision::kFloat32));
+      for (auto _ : state) benchmark::DoNotOptimize(compiled(dna_));
     });
     for (const bool full : {false, true}) {
       benchmark::RegisterBenchmark(
@@ -303,68 +272,148 @@ class Suite {
     }
   }
 
- public:
-  std::map<std::string, double> per_frame_;  // how many frames one iteration of it has
-
- private:
   const dna::Dna& dna_;
-  std::vector<Frames> frames_;
+  const std::vector<Frames>& frames_;
   std::shared_ptr<rig::Rig> rig_, half_;
-  std::unique_ptr<bench::Baseline> base_, coarse_base_;
   std::uint32_t coarse_ = 0;
 };
 
+// How cost grows: each point as "what/x" beside "csr what/x".
+class Sweep {
+ public:
+  Sweep(const dna::Dna& dna, const Frames& frames) : dna_(dna), frames_(frames) {
+    rig_ = compiled(dna);
+  }
+
+  void add_all() {
+    const std::size_t raw = rig_->raw_count;
+    for (std::size_t n = 1; n < raw; n += std::max<std::size_t>(1, n / 2)) add_active(n);
+    add_active(raw);
+    for (std::uint32_t lod = 0; lod < rig_->lod_count; ++lod) {
+      pair("LOD", kept_coefficients(*rig_, lod), one_face(rig_, lod), csr(dna_, lod), frames_);
+    }
+    for (std::size_t n = dna_.behavior.joint_groups.size(); n > 0; n /= 2) add_groups(n);
+    for (const std::size_t n : {1u, 2u, 4u, 8u, 16u, 64u, 256u, 1000u}) {
+      add_batch("faces/" + std::to_string(n), rig_, frames_, n, 1);
+    }
+    for (std::size_t n = 1; n <= std::max(1u, std::thread::hardware_concurrency()); ++n) {
+      add_batch("cores/" + std::to_string(n), rig_, frames_, 1000, n);
+    }
+  }
+
+  void print(const Medians& ns) const {
+    std::printf("# %s, %s, commit %s, %s kernels\nwhat,x,us,csr\n", bench::processor().c_str(),
+                bench::compiler(), bench::commit(), rig_->kernels->name);
+    for (const auto& [name, time] : ns) {
+      if (name.starts_with("csr ")) continue;
+      const std::size_t slash = name.find('/');
+      const auto base = ns.find("csr " + name);
+      std::printf("%s,%s,%.4f,", name.substr(0, slash).c_str(), name.substr(slash + 1).c_str(),
+                  time / 1e3);
+      if (base != ns.end()) std::printf("%.4f", base->second / 1e3);
+      std::puts("");
+    }
+  }
+
+ private:
+  void pair(const std::string& what, std::size_t x, Step ours, Step base, const Frames& frames) {
+    const std::string name = what + "/" + std::to_string(x);
+    add(name, std::move(ours), frames);
+    add("csr " + name, std::move(base), frames);
+  }
+  void add_active(std::size_t n) {
+    made_.push_back(std::make_unique<Frames>(bench::make_frames(rig_->raw_count, n)));
+    pair("active controls", n, one_face(rig_, 0), csr(dna_, 0), *made_.back());
+  }
+  // The same face with some of its joint groups only.
+  void add_groups(std::size_t n) {
+    smaller_.push_back(std::make_unique<dna::Dna>(dna_));
+    auto& groups = smaller_.back()->behavior.joint_groups;
+    groups = std::vector<dna::JointGroup>(groups.begin(),
+                                          groups.begin() + static_cast<std::ptrdiff_t>(n));
+    auto rig = compiled(*smaller_.back());
+    const std::size_t joints = rig->joints_written.size();
+    pair("joints", joints, one_face(std::move(rig), 0), csr(*smaller_.back(), 0), frames_);
+  }
+
+  const dna::Dna& dna_;
+  const Frames& frames_;
+  std::shared_ptr<rig::Rig> rig_;
+  std::vector<std::unique_ptr<Frames>> made_;
+  std::vector<std::unique_ptr<dna::Dna>> smaller_;
+};
+
 // Keeps the medians.
-class Medians : public benchmark::ConsoleReporter {
+class Reporter : public benchmark::ConsoleReporter {
  public:
   void ReportRuns(const std::vector<Run>& runs) override {
     for (const Run& run : runs) {
       if (run.run_type == Run::RT_Aggregate && run.aggregate_name == "median") {
-        std::string name = run.run_name.function_name;
         const bool manual = run.run_name.time_type == "manual_time";
-        ns[name] = manual ? run.GetAdjustedRealTime() : run.GetAdjustedCPUTime();
+        ns[run.run_name.function_name] =
+            manual ? run.GetAdjustedRealTime() : run.GetAdjustedCPUTime();
+      } else if (run.run_type == Run::RT_Iteration && run.repetition_index == 0) {
+        std::fprintf(stderr, "\r%-50s", run.run_name.function_name.c_str());
       }
     }
   }
-  std::map<std::string, double> ns;
+  void Finalize() override { std::fprintf(stderr, "\r%50s\r", ""); }
+  bool ReportContext(const Context&) override { return true; }
+  Medians ns;
 };
+
+core::Result<dna::Dna> read(const char* path) {
+  auto source = core::open_file(path);
+  if (!source) return core::Unexpected{source.error()};
+  return dna::parse(**source);
+}
 
 }  // namespace
 
 int main(int argc, char** argv) {
   if (argc < 2) {
-    std::fputs("usage: rig_bench FILE.dna [FRAMES20 FRAMES60 FRAMES_ALL] [options]\n", stderr);
+    std::fputs("usage: rig_bench FILE.dna [FRAMES20 FRAMES60 FRAMES_ALL] [--sweep] [options]\n",
+               stderr);
     return 2;
   }
-  auto source = core::open_file(argv[1]);
-  const auto dna =
-      source ? dna::parse(**source) : core::Result<dna::Dna>(core::Unexpected{source.error()});
+  const auto dna = read(argv[1]);
   if (!dna) {
     std::fprintf(stderr, "rig_bench: %s\n", dna.error().describe().c_str());
     return 1;
   }
   const std::size_t raw = dna->definition.raw_control_names.size();
+  if (raw == 0 || dna->descriptor.lod_count == 0) {
+    std::fprintf(stderr, "rig_bench: %s: a face with controls and LODs was expected\n", argv[1]);
+    return 1;
+  }
   const bool files = argc >= 5 && argv[2][0] != '-';
   std::vector<Frames> frames;
   for (std::size_t a = 0; a < 3; ++a) {
     const std::size_t active[] = {std::min<std::size_t>(20, raw), std::min<std::size_t>(60, raw),
                                   raw};
-    frames.push_back(files ? read_frames(argv[2 + a], raw) : make_frames(raw, active[a]));
+    auto list = files ? bench::read_frames(argv[2 + a], raw) : bench::make_frames(raw, active[a]);
+    if (list.count == 0) {
+      std::fprintf(stderr, "rig_bench: %s: frames of %zu float32 were expected\n", argv[2 + a],
+                   raw);
+      return 1;
+    }
+    frames.push_back(std::move(list));
   }
-  Suite suite(*dna, std::move(frames));
-  suite.add_all();
+  const int first = files ? 5 : 2;
+  const bool sweep = argc > first && std::strcmp(argv[first], "--sweep") == 0;
   std::string repetitions = "--benchmark_repetitions=9",
               mixed = "--benchmark_enable_random_interleaving=true",
               time = "--benchmark_min_time=0.05";
   std::vector<char*> arguments{argv[0], repetitions.data(), mixed.data(), time.data()};
-  for (int i = files ? 5 : 2; i < argc; ++i) arguments.push_back(argv[i]);
+  for (int i = first + (sweep ? 1 : 0); i < argc; ++i) arguments.push_back(argv[i]);
   int count = static_cast<int>(arguments.size());
   benchmark::Initialize(&count, arguments.data());
-  Medians medians;
-  benchmark::RunSpecifiedBenchmarks(&medians);
-  for (const auto& [name, per] : suite.per_frame_) {
-    if (medians.ns.count(name) != 0) medians.ns[name] /= per;
-  }
-  suite.print(medians.ns);
+  if (benchmark::ReportUnrecognizedArguments(count, arguments.data())) return 2;
+  Suite suite(*dna, frames);
+  Sweep growth(*dna, frames[1]);
+  sweep ? growth.add_all() : suite.add_all();
+  Reporter reporter;
+  benchmark::RunSpecifiedBenchmarks(&reporter);
+  sweep ? growth.print(reporter.ns) : suite.print(reporter.ns);
   return 0;
 }

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: MIT
+// What the benchmark library does not measure by itself.
+#pragma once
+
+#include <benchmark/benchmark.h>
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace risorius::bench {
+
+template <class F>
+double wall_seconds_of(F f) {
+  const auto start = std::chrono::steady_clock::now();
+  f();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// Touches 256 MB, more than every cache holds.
+inline void empty_caches() {
+  static std::vector<std::uint64_t> memory((std::size_t{256} << 20) / 8, 1);
+  for (std::size_t i = 0; i < memory.size(); i += 8) ++memory[i];
+  benchmark::ClobberMemory();
+}
+
+}  // namespace risorius::bench
