@@ -229,10 +229,22 @@ def test_gui_controls_are_named_with_their_interval():
 
 def test_names_that_run_out_are_numbers():
     dna = risorius.load(GOLDEN / "tiny_v28.dna", layers="behavior")
-    dna.joint_names = [""] * len(dna.joint_names)
+    for names in ("joint", "raw_control", "blend_shape_channel", "animated_map"):
+        field = f"{names}_names"
+        setattr(dna, field, [""] * len(getattr(dna, field)))
     rig = risorius.Rig(dna)
-    text = page(explain(dna, rig, np.full(len(rig.raw_control_names), 0.5, np.float32)))
-    assert "corrective" in text
+    raw = np.full(len(rig.raw_control_names), 0.5, np.float32)
+    facts = check_sums(dna, rig, raw, 0)
+    text = page(facts)
+    for list_name, word in (
+        ("joints", "joint"),
+        ("raw_controls", "control"),
+        ("blend_shapes", "channel"),
+        ("animated_maps", "map"),
+    ):
+        first = facts[list_name][0]
+        assert first["name"] == f"{word} {first['index']}"
+        assert first["name"] in text
 
 
 def test_quaternions_and_controls_that_are_not_finite_are_refused():

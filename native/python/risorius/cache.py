@@ -72,7 +72,7 @@ def compile_cached(
 
 
 def _key(data: bytes, precision: str, rotation: str) -> str:
-    what = hashlib.blake2b(data, digest_size=20)
+    what = hashlib.sha256(data)  # CPUs have instructions for it: twice as fast as blake2b
     about = (risorius.__version__, rig_block_version(), sys.byteorder, precision, rotation)
     what.update(repr(about).encode())
     return what.hexdigest() + ".rig"

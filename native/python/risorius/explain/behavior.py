@@ -11,7 +11,7 @@ import numpy as np
 
 import risorius
 
-from .control_names import ControlNames
+from .control_names import ControlNames, named
 from .rotation import Doubles
 
 Facts = dict[str, Any]
@@ -57,7 +57,9 @@ def explain_raw(
             "value": float(raw[i]),
             "is_outside_0_1": not 0 <= raw[i] <= 1,
             "from_gui": [
-                {"name": gui_names[g], "index": g} | row for g, row in hits.get(i, []) if gui[g]
+                {"name": named(gui_names, g, "GUI control"), "index": g} | row
+                for g, row in hits.get(i, [])
+                if row["gives"]
             ]
             if gui is not None
             else [],
@@ -230,7 +232,7 @@ def explain_setups(dna: risorius.Dna, controls: Doubles, names: ControlNames) ->
                         {"name": names.name(i), "value": float(controls[i])} for i in inputs
                     ],
                     "joints": [
-                        {"name": dna.joint_names[j], "index": j, "weight": float(w)}
+                        {"name": named(dna.joint_names, j, "joint"), "index": j, "weight": float(w)}
                         for j, w in joints
                     ],
                 }
@@ -268,7 +270,7 @@ def explain_shapes(
     )
     rows = [
         {
-            "name": dna.blend_shape_channel_names[i],
+            "name": named(dna.blend_shape_channel_names, i, "channel"),
             "index": i,
             "value": float(values[i]),
             "by": {"name": names.name(by[i]), "index": by[i], "value": float(controls[by[i]])},
@@ -291,7 +293,7 @@ def explain_maps(
     hits = table_hits(table, _count(dna.animated_maps, lod), controls)
     rows = [
         {
-            "name": dna.animated_map_names[i],
+            "name": named(dna.animated_map_names, i, "map"),
             "index": i,
             "value": float(values[i]),
             "at_rest": float(at_rest[i]),

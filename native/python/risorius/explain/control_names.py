@@ -78,6 +78,11 @@ def _sides_as_one(
     return out
 
 
+def named(names: Sequence[str], index: int, kind: str) -> str:
+    """The name where the file has one, else e.g. "joint 7"."""
+    return (names[index] if index < len(names) else "") or f"{kind} {index}"
+
+
 class ControlNames:
     """Names of the control vector raw | corrective | network | RBF pose of a file."""
 
@@ -103,11 +108,11 @@ class ControlNames:
         ]
 
     def name(self, index: int) -> str:
-        return self.names[index] if index < len(self.names) else f"control {index}"
+        return named(self.names, index, "control")
 
     def short(self, index: int) -> str:
         """The part behind the last point where that says which one it is."""
-        return self._short[index] if index < len(self._short) else f"control {index}"
+        return named(self._short, index, "control")
 
     def kind(self, index: int) -> str:
         if index < self.psd_begin:

@@ -10,7 +10,7 @@ import numpy as np
 
 import risorius
 
-from .control_names import ControlNames
+from .control_names import ControlNames, named
 from .rotation import Convention, Doubles, angle_degrees, product
 
 # Key of a contribution: a control's index, or what moves a joint by several controls at once.
@@ -250,7 +250,7 @@ def _joint(
     turned = convention.quaternion(neutral + values[3:6])
     by = [_part(key, v, measure, whole, names) for key, v in parts.items() if v.any()]
     return {
-        "name": dna.joint_names[joint] if joint < len(dna.joint_names) else f"joint {joint}",
+        "name": named(dna.joint_names, joint, "joint"),
         "index": joint,
         "distance": float(np.linalg.norm(values[:3])),
         "degrees": angle_degrees(convention.quaternion(neutral), turned),
