@@ -173,7 +173,7 @@ def test_the_parts_of_a_joint_made_by_hand():
     assert by[0]["share"] == pytest.approx(1.5 * 2 / whole)
     assert by[2]["share"] == pytest.approx((0.5 * 2 + lever**2) / whole)
     assert by[4]["share"] == pytest.approx(0.25 / whole)
-    coarse = explain(dna, rig, [0.5, 0, 0.5, 0], lod=1)
+    coarse = check_sums(dna, rig, np.array([0.5, 0, 0.5, 0], np.float32), 1)
     (joint,) = coarse["joints"]
     assert joint["values"] == [2, 0, 0, 0, 0, 0, 0, 0, 0]
     assert {part["control"]: part["share"] for part in joint["by"]} == {0: 0.75, 2: 0.25}
@@ -225,6 +225,42 @@ def test_gui_controls_are_named_with_their_interval():
         for g in row["from_gui"]:
             assert g["name"] == rig.gui_control_names[2]
             assert g["from"] <= 0.5 <= g["to"]
+
+
+def test_of_a_run_only_the_first_interval_that_holds_counts():
+    dna = hand_made()
+    maps = dna.animated_maps.__copy__()
+    table = maps.conditionals.__copy__()
+    table.input_indices, table.output_indices = [0, 0, 2, 0], [1, 1, 1, 1]
+    table.from_values, table.to_values = [0.75, 0, 0, 1], [1, 1, 1, 0]
+    table.slope_values, table.cut_values = [1, 0.25, 0.5, 0.5], [0, 0.125, 0, 0]
+    maps.conditionals, maps.lods = table, [4, 4]
+    dna.animated_maps = maps
+    rig = risorius.Rig(dna)
+    for value, slopes in ((0.5, [0.25, 0.5, 0.5]), (0.875, [1, 0.5, 0.5])):
+        (row,) = explain(dna, rig, [value, 0, 0.25, 0])["animated_maps"]
+        assert [by["slope"] for by in row["by"]] == slopes
+        assert row["by"][-1]["from"] == 0  # bounds that are given the wrong way round
+        gives = sum(by["gives"] for by in row["by"])
+        assert row["value"] == pytest.approx(min(1, gives))
+        assert row["at_rest"] == 0.125
+
+
+def test_distances_of_rotations_are_in_degrees():
+    dna = risorius.load(GOLDEN / "tiny_v28.dna")
+    rig = risorius.Rig(dna)
+    facts = explain(dna, rig, rig.initial_raw_controls)
+    solver = dna.rbf_behavior.solvers[0]
+    assert solver.distance_method == 1
+    x = rig.initial_raw_controls[solver.raw_control_indices].astype(float)
+    expected = {}
+    for pose, target in zip(
+        solver.pose_indices.tolist(), solver.raw_control_values.reshape(-1, 4), strict=True
+    ):
+        expected[pose] = np.degrees(2 * np.arccos(min(1, abs(float(target @ x)))))
+    assert max(expected.values()) > 10
+    found = {p["index"]: p["distance"] for p in facts["solvers"][0]["poses"]}
+    assert found == pytest.approx(expected, abs=1e-2)
 
 
 def test_names_that_run_out_are_numbers():
@@ -344,3 +380,9 @@ def test_rotations_of_the_file_rest_at_their_identity(capsys):
     ones = np.flatnonzero(rig.initial_raw_controls).tolist()
     assert ones
     assert given == dict.fromkeys(ones, 1.0)
+    dna = risorius.load(GOLDEN / "twistswing.dna")
+    beside = set(ones) - set(dna.gui_to_raw.output_indices.tolist())
+    assert beside
+    assert main(["eval", str(GOLDEN / "twistswing.dna"), "--gui", "--json"]) == 0
+    given = {r["index"]: r["value"] for r in json.loads(capsys.readouterr().out)["raw_controls"]}
+    assert {i: given.get(i) for i in beside} == dict.fromkeys(beside, 1.0)
