@@ -7,6 +7,7 @@
 #include "bindings/arrays.h"
 #include "compile/compile.h"
 #include "core/parallel_for.h"
+#include "rig/file.h"
 #include "rig/morph.h"
 
 namespace risorius::bindings {
@@ -172,8 +173,70 @@ py::memoryview block_of(const py::object& self) {
   return py::memoryview(view);
 }
 
-PoseArrays evaluate(const rig::Rig& rig, const py::object& raw, std::uint32_t lod, bool settle) {
+void save_rig(const rig::Rig& rig, const std::filesystem::path& path) {
+  const auto write = [&] {
+    const py::gil_scoped_release released;
+    return rig::save_rig(rig, path);
+  };
+  unwrap(write());
+}
+
+std::shared_ptr<rig::Rig> load_rig(const std::filesystem::path& path, std::optional<bool> trusted,
+                                   const std::optional<std::string>& simd, bool mapped) {
+  const simd::Kernels& kernels = kernels_argument(simd);
+  rig::Trust trust = rig::Trust::kOwner;
+  if (trusted) trust = *trusted ? rig::Trust::kCaller : rig::Trust::kNobody;
+  const auto open = [&] {
+    const py::gil_scoped_release released;
+    return rig::open_rig_file(path, trust, mapped ? core::ReadBy::kMap : core::ReadBy::kCopy,
+                              kernels);
+  };
+  return std::make_shared<rig::Rig>(unwrap(open()));
+}
+
+// float32[R] or float32[N, R].
+FloatArray frames_argument(const rig::Rig& rig, const py::object& raw) {
+  FloatArray in = FloatArray::ensure(raw);
+  if (!in) throw py::value_error("raw: an array of numbers was expected");
+  const py::ssize_t n = in.ndim();
+  if ((n != 1 && n != 2) || static_cast<std::size_t>(in.shape(n - 1)) != rig.raw_count) {
+    const std::string count = std::to_string(rig.raw_count);
+    shape_error("raw", "(" + count + ",) or (n, " + count + ")", in);
+  }
+  return in;
+}
+
+// [(frame, name, value)]
+py::list find_non_finite(const rig::Rig& rig, const py::object& raw) {
+  const FloatArray in = frames_argument(rig, raw);
+  const auto frames = static_cast<std::size_t>(in.ndim() == 1 ? 1 : in.shape(0));
+  const std::vector<std::string> names = rig.raw_control_names();
+  py::list out;
+  for (const rig::NonFinite& f : rig::find_non_finite(rig, in.data(), frames)) {
+    out.append(py::make_tuple(f.frame, to_python(names[f.control]), f.value));
+  }
+  return out;
+}
+
+// (distances, weights) of a solver's poses.
+py::tuple solver_poses(const rig::Rig& rig, std::uint32_t index, const py::object& controls) {
+  if (index >= rig.rbf_solvers.size()) {
+    throw py::index_error("index: a solver below " + std::to_string(rig.rbf_solvers.size()) +
+                          " was expected, found " + std::to_string(index));
+  }
+  const FloatArray in = vector_argument(controls, "controls", rig.control_count);
+  const auto poses = static_cast<py::ssize_t>(rig.rbf_solvers[index].pose_count);
+  py::array_t<double> distances(poses);
+  py::array_t<float> weights(poses);
+  rig::Workspace work = rig::make_workspace(rig);
+  rig::solver_poses(rig, index, in.data(), work, distances.mutable_data(), weights.mutable_data());
+  return py::make_tuple(distances, weights);
+}
+
+PoseArrays evaluate(const rig::Rig& rig, const py::object& raw, std::uint32_t lod, bool settle,
+                    bool check) {
   const FloatArray in = vector_argument(raw, "raw", rig.raw_count);
+  if (check) unwrap(rig::check_finite(rig, in.data(), 1));
   rig::Workspace work = rig::make_workspace(rig);
   rig::Pose pose = rig::make_pose(rig);
   rig::evaluate(rig, in.data(), lod, settle, work, pose);
@@ -181,13 +244,14 @@ PoseArrays evaluate(const rig::Rig& rig, const py::object& raw, std::uint32_t lo
 }
 
 PoseArrays evaluate_batch(const rig::Rig& rig, const py::object& raw, std::uint32_t lod,
-                          std::size_t threads, bool settle) {
+                          std::size_t threads, bool settle, bool check) {
   const FloatArray in = FloatArray::ensure(raw);
   if (!in || in.ndim() != 2 || static_cast<std::size_t>(in.shape(1)) != rig.raw_count) {
     if (!in) throw py::value_error("raw: an array of numbers was expected");
     shape_error("raw", "(n, " + std::to_string(rig.raw_count) + ")", in);
   }
   const auto n = in.shape(0);
+  if (check) unwrap(rig::check_finite(rig, in.data(), static_cast<std::size_t>(n)));
   const auto columns = [](std::uint32_t v) { return static_cast<py::ssize_t>(v); };
   PoseArrays out{FloatArray({n, columns(rig.joint_count), stride_of(rig)}),
                  FloatArray({n, columns(rig.blend_shape_count)}),
@@ -224,6 +288,17 @@ void bind_rig_class(py::module_& m) {
             return py::bytes(reinterpret_cast<const char*>(r.block().data()), r.block().size());
           },
           "The compiled face as bytes, a cache for from_bytes.")
+      .def("save", &save_rig, py::arg("path"),
+           "Writes to_bytes() to a file, a cache for load; an old file is whole until the new one "
+           "is.")
+      .def_static("load", &load_rig, py::arg("path"), py::arg("trusted") = py::none(),
+                  py::arg("simd") = py::none(), py::kw_only(), py::arg("mapped") = false,
+                  "A Rig from a file of save, of this version and byte order. Its hash and every "
+                  "index are checked, unless the file is this user's and nobody else may write it "
+                  "(never so on Windows), or trusted says True; False checks always: give it for "
+                  "what was downloaded or unpacked, which is the user's as well. mapped uses the "
+                  "pages of a trusted file in place: at once, but the file may only be replaced "
+                  "as a whole and not be written to or cut while the Rig lives. Raises DnaError.")
       .def("block", &block_of, "The same without a copy: a read-only memoryview of uint8.")
       .def_property_readonly("raw_control_names",
                              [](const rig::Rig& r) {
@@ -287,10 +362,20 @@ void bind_rig_class(py::module_& m) {
           },
           py::arg("raw"), "float32[R] -> float32[G], where the table can be reversed")
       .def("evaluate", &evaluate, py::arg("raw"), py::arg("lod") = 0, py::arg("settle") = true,
-           "float32[R] -> Pose; a function of raw alone when settle is true.")
+           py::arg("check") = false,
+           "float32[R] -> Pose; a function of raw alone when settle is true. Values outside [0, 1] "
+           "are taken as they are: joints and shapes go on, correctives clamp their factors, maps "
+           "rest outside their intervals. NaN or infinity spoils what its control drives and "
+           "nothing else, and no later pose; with check it is a DnaError that names the control.")
       .def("evaluate_batch", &evaluate_batch, py::arg("raw"), py::arg("lod") = 0,
-           py::arg("threads") = 0, py::arg("settle") = true,
-           "float32[N, R] -> Pose whose fields have a leading N; threads 0 is all cores.")
+           py::arg("threads") = 0, py::arg("settle") = true, py::arg("check") = false,
+           "float32[N, R] -> Pose whose fields have a leading N; threads 0 is all cores. "
+           "check names the first frame and control that is not finite.")
+      .def("find_non_finite", &find_non_finite, py::arg("raw"),
+           "float32[R] or float32[N, R] -> [(frame, name, value)] of all that is NaN or infinite.")
+      .def("solver_poses", &solver_poses, py::arg("index"), py::arg("controls"),
+           "Of an RBF solver and a Pose's controls: (float64[poses] distances from its inputs, in "
+           "radians where they are angles; float32[poses] weights, 0 below the threshold).")
       .def("instance",
            [](const std::shared_ptr<rig::Rig>& r) { return PyInstance{r, rig::Instance(*r)}; });
 }
@@ -351,12 +436,18 @@ void bind_rig(py::module_& m) {
           },
           "float32, one per region of each mesh, mesh after mesh; at 0 the region's networks rest. "
           "A copy: assign all of it.")
-      .def("evaluate", [](PyInstance& s, const py::object& raw) {
-        const FloatArray in = vector_argument(raw, "raw", s.rig->raw_count);
-        return to_arrays(*s.rig, s.instance.evaluate(in.data()));
-      });
+      .def(
+          "evaluate",
+          [](PyInstance& s, const py::object& raw, bool check) {
+            const FloatArray in = vector_argument(raw, "raw", s.rig->raw_count);
+            if (check) unwrap(rig::check_finite(*s.rig, in.data(), 1));
+            return to_arrays(*s.rig, s.instance.evaluate(in.data()));
+          },
+          py::arg("raw"), py::arg("check") = false,
+          "float32[R] -> Pose; check is a DnaError for what is not finite, and no frame then.");
   bind_rig_class(m);
   bind_morph(m);
+  m.def("rig_block_version", &rig::block_version, "Of Rig.to_bytes; others are refused.");
   m.def("available_simd", [] { return std::string(simd::available_kernels()); });
 }
 

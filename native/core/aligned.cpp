@@ -9,14 +9,14 @@
 
 namespace risorius::core {
 
-std::shared_ptr<std::uint8_t> allocate_pages(std::size_t size) {
+std::shared_ptr<std::uint8_t> allocate_pages(std::size_t size, Fill fill) {
   constexpr std::size_t kLarge = std::size_t{2} << 20;
   const std::size_t alignment = size >= kLarge ? kLarge : 64;
   void* memory = ::operator new(size, std::align_val_t(alignment));
 #if defined(__linux__) && defined(MADV_HUGEPAGE)
   if (alignment == kLarge) madvise(memory, size, MADV_HUGEPAGE);  // a wish
 #endif
-  std::memset(memory, 0, size);
+  if (fill == Fill::kZero) std::memset(memory, 0, size);
   const auto release = [alignment](std::uint8_t* p) {
     ::operator delete(p, std::align_val_t(alignment));
   };

@@ -27,9 +27,10 @@ struct AlignedAllocator {
   bool operator==(const AlignedAllocator&) const { return true; }
 };
 
-/// Zeroed memory for what is read at random: in large pages where it is large and the system has
-/// them, so that finding it costs no more than reading it.
-std::shared_ptr<std::uint8_t> allocate_pages(std::size_t size);
+/// Memory for what is read at random: in large pages where it is large and the system has them, so
+/// that finding it costs no more than reading it.
+enum class Fill { kZero, kNothing };
+std::shared_ptr<std::uint8_t> allocate_pages(std::size_t size, Fill fill = Fill::kZero);
 
 template <class T>
 using AlignedVector = std::vector<T, AlignedAllocator<T>>;

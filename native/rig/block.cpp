@@ -66,16 +66,28 @@ Status damaged(const std::string& where, const std::string& message) {
   return fail(ErrorCode::kInvalidValue, "rig." + where, message);
 }
 
+std::string number(std::uint64_t n) { return std::to_string(n); }
+
 Status check_header(std::span<const std::uint8_t> bytes, const BlockHeader& h) {
-  if (std::memcmp(h.magic, kMagic, sizeof(kMagic)) != 0) {
-    return damaged("magic", "these bytes are no compiled face of this version");
+  constexpr std::size_t kName = sizeof(kMagic) - 1;
+  if (std::memcmp(h.magic, kMagic, kName) != 0) {
+    return damaged("magic", "these bytes are no compiled face");
   }
-  if (h.byte_order != kByteOrder || h.header_size != sizeof(BlockHeader)) {
-    return damaged("byte_order", "compiled on a machine of another kind");
+  if (h.magic[kName] != kMagic[kName]) {
+    return damaged("magic", "a compiled face of version " +
+                                number(static_cast<std::uint8_t>(h.magic[kName])) + ", version " +
+                                number(kMagic[kName]) + " was expected");
+  }
+  if (h.byte_order != kByteOrder) {
+    return damaged("byte_order", "compiled on a machine of another byte order");
+  }
+  if (h.header_size != sizeof(BlockHeader)) {
+    return damaged("header_size", "a header of " + number(h.header_size) + " bytes, one of " +
+                                      number(sizeof(BlockHeader)) + " was expected");
   }
   if (h.size != bytes.size()) {
-    return damaged("size", std::to_string(h.size) + " bytes were expected, there are " +
-                               std::to_string(bytes.size()));
+    return damaged("size",
+                   number(h.size) + " bytes were expected, there are " + number(bytes.size()));
   }
   return core::ok();
 }
@@ -85,7 +97,11 @@ Status check_header(std::span<const std::uint8_t> bytes, const BlockHeader& h) {
 struct BlockReader {
   static Result<Rig> read(std::span<const std::uint8_t> bytes, std::shared_ptr<const void> owner) {
     BlockHeader h;
-    if (bytes.size() < sizeof(h)) return fail(ErrorCode::kInvalidValue, "rig.size", "no header");
+    if (bytes.size() < sizeof(h)) {
+      return fail(
+          ErrorCode::kInvalidValue, "rig.size",
+          number(bytes.size()) + " bytes, a header of " + number(sizeof(h)) + " was expected");
+    }
     std::memcpy(&h, bytes.data(), sizeof(h));
     if (Status s = check_header(bytes, h); !s) return std::move(s).propagate();
     Rig rig;
@@ -106,6 +122,8 @@ struct BlockReader {
     return rig;
   }
 };
+
+std::uint32_t block_version() { return static_cast<std::uint32_t>(kMagic[sizeof(kMagic) - 1]); }
 
 Result<Rig> open_rig(std::span<const std::uint8_t> bytes, std::shared_ptr<const void> owner,
                      BlockCheck check, const simd::Kernels& kernels) {

@@ -21,6 +21,7 @@ inline Quaternion multiply(const Quaternion& a, const Quaternion& b) {  // Hamil
 /// How a file spells Euler angles: axes in the order of rotation, sign per axis, radians per unit.
 struct EulerConvention {
   std::array<std::uint8_t, 3> order{0, 1, 2};
+  std::uint8_t zero = 0;  // in a block every byte is said, so that equal faces are equal bytes
   std::array<float, 3> signs{1, 1, 1};
   float radians_per_unit = 1;
 };

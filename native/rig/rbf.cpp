@@ -79,6 +79,24 @@ double pose_values(const Rig& rig, const RbfSolver& s, const double* inputs, dou
   return sum;
 }
 
+void gather_inputs(const Rig& rig, const RbfSolver& s, const float* controls,
+                   double* inputs) noexcept {
+  for (std::uint32_t i = 0; i < s.input_count; ++i) {
+    inputs[i] = static_cast<double>(controls[rig.rbf_inputs[s.inputs_begin + i]]);
+  }
+  convert_rbf_inputs(s.distance, s.axis, inputs, s.input_count);
+}
+
+// Beside which a pose's value is multiplied so that they sum to 1.
+double ratio_of(const RbfSolver& s, double sum) noexcept {
+  const bool normalize = sum > 1.0 || (s.always_normalize != 0 && sum != 0.0);
+  return normalize ? 1.0 / sum : 1.0;
+}
+
+float weight_of(const RbfPose& pose, double value, double ratio) noexcept {
+  return static_cast<float>(value * ratio * static_cast<double>(pose.scale));
+}
+
 void write_pose(const Rig& rig, const RbfPose& pose, float value, float* controls) noexcept {
   for (std::uint32_t i = 0; i < pose.input_count; ++i) {
     value *= controls[rig.rbf_pose_inputs[pose.inputs_begin + i]];
@@ -120,22 +138,33 @@ void detail::run_solver(const Rig& rig, std::uint32_t index, Workspace& work,
   const std::span<const RbfPose> poses = rig.rbf_poses.subspan(s.poses_begin, s.pose_count);
   double* inputs = work.solver.data();
   double *near = inputs + rig.solver_inputs, *values = near + rig.solver_poses;
-  for (std::uint32_t i = 0; i < s.input_count; ++i) {
-    inputs[i] = static_cast<double>(controls[rig.rbf_inputs[s.inputs_begin + i]]);
-  }
-  convert_rbf_inputs(s.distance, s.axis, inputs, s.input_count);
+  gather_inputs(rig, s, controls, inputs);
   for (const RbfPose& pose : poses) {
     for (std::uint32_t i = 0; i < pose.output_count; ++i) {
       controls[rig.rbf_outputs[pose.outputs_begin + i].control] = 0.0f;
     }
   }
-  const double sum = pose_values(rig, s, inputs, near, values);
-  const bool normalize = sum > 1.0 || (s.always_normalize != 0 && sum != 0.0);
-  const double ratio = normalize ? 1.0 / sum : 1.0;
+  const double ratio = ratio_of(s, pose_values(rig, s, inputs, near, values));
   for (std::size_t p = 0; p < poses.size(); ++p) {
-    const auto value = static_cast<float>(values[p] * ratio * static_cast<double>(poses[p].scale));
+    const float value = weight_of(poses[p], values[p], ratio);
     if (!(value > s.threshold)) continue;  // NaN is no pose either, as in the reference
     write_pose(rig, poses[p], value, controls);
+  }
+}
+
+void solver_poses(const Rig& rig, std::uint32_t index, const float* controls, Workspace& work,
+                  double* distances, float* weights) noexcept {
+  const RbfSolver& s = rig.rbf_solvers[index];
+  double* inputs = work.solver.data();
+  double *near = inputs + rig.solver_inputs, *values = near + rig.solver_poses;
+  gather_inputs(rig, s, controls, inputs);
+  const double ratio = ratio_of(s, pose_values(rig, s, inputs, near, values));
+  for (std::uint32_t p = 0; p < s.pose_count; ++p) {
+    const double* target =
+        rig.rbf_targets.data() + s.targets_begin + std::size_t{p} * s.input_count;
+    distances[p] = rbf_distance(s.distance, inputs, target, s.input_count);
+    const float value = weight_of(rig.rbf_poses[s.poses_begin + p], values[p], ratio);
+    weights[p] = value > s.threshold ? value : 0.0f;
   }
 }
 

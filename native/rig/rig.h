@@ -60,6 +60,9 @@ core::Result<Rig> make_rig(const RigData& data, const simd::Kernels& kernels);
 core::Result<Rig> open_rig(std::span<const std::uint8_t> bytes, std::shared_ptr<const void> owner,
                            BlockCheck check, const simd::Kernels& kernels);
 
+/// Blocks of other versions are refused.
+std::uint32_t block_version();
+
 /// Puts the hash of a block's bytes into its header. In: at least a header's size.
 void seal_block(std::span<std::uint8_t> bytes);
 
@@ -125,8 +128,12 @@ void gui_to_raw(const Rig& rig, const float* gui, float* raw) noexcept;
 void raw_to_gui(const Rig& rig, const float* raw, float* gui) noexcept;
 
 /// Turns raw controls into a pose. Allocates nothing.
-/// In:   raw     float32[R], not clamped here; NaN or infinity spoils every row of the joint groups
-///               that have it as a column, its shapes, maps and correctives, and nothing else
+/// In:   raw     float32[R]. Any value is taken. Outside [0, 1] nothing is clamped: joints and
+/// shapes
+///               follow beyond, correctives clamp the factors that they multiply, maps rest outside
+///               their intervals. NaN or infinity spoils every row of the joint groups that have it
+///               as a column, its shapes, maps, correctives, networks and setups, and nothing else;
+///               check_finite finds it
 ///       lod     clamped to the last LOD
 ///       settle  true: networks, solvers and correctives are evaluated in the order of their
 ///               dependency, so that the pose is a function of raw alone; false: networks, then
@@ -148,6 +155,34 @@ inline void evaluate(const Rig& rig, const float* raw, std::uint32_t lod, bool s
 /// Out: pose  the first frame; the others follow, [count, ...] each
 void evaluate_frames(const Rig& rig, const float* raw, std::size_t count, std::uint32_t lod,
                      bool settle, Workspace& work, const PoseView& pose) noexcept;
+
+/// How near a solver's inputs are to each of its poses. For people who ask why; evaluate() does the
+/// same on its way.
+/// In:  index     below the number of solvers
+///      controls  float32[controls] of an evaluated pose
+///      work      of make_workspace
+/// Out: distances, weights  [poses of the solver]: distances in radians where they are angles;
+///      weights as they are written, 0 for what is not above the threshold
+void solver_poses(const Rig& rig, std::uint32_t index, const float* controls, Workspace& work,
+                  double* distances, float* weights) noexcept;
+
+/// A raw control that is NaN or infinite.
+struct NonFinite {
+  std::size_t frame = 0;
+  std::uint32_t control = 0;
+  float value = 0;
+};
+
+/// The raw controls that are NaN or infinite, frame after frame. evaluate() does not look: see
+/// there for what such a control spoils. In:   raw   float32[count, R]
+///       most  of them that are returned
+/// Cost: one pass over raw; allocates only where something is found.
+std::vector<NonFinite> find_non_finite(const Rig& rig, const float* raw, std::size_t count,
+                                       std::size_t most = SIZE_MAX);
+
+/// Fails: kInvalidValue, naming the first control that is not finite, its frame and its value, and
+/// how many there are.
+core::Status check_finite(const Rig& rig, const float* raw, std::size_t count);
 
 /// One face through time, with the reference's latency: networks, then solvers, then correctives
 /// are evaluated, and each reads what comes after it as the previous evaluation left it.

@@ -56,7 +56,8 @@ def test_gui_controls_go_through_the_table(capsys):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["jawOpen=1"], JAW),
+        (["jawOpn=1"], JAW),
+        (["brow=1"], "any of"),
         ([JAW], "NAME=VALUE"),
         ([f"{JAW}=wide"], "wide"),
         ([f"{JAW}=nan"], "nan"),

@@ -97,6 +97,24 @@ TEST(Block, EvaluatesAsTheRigThatItCameFrom) {
   }
 }
 
+// Compiled on a stack and a heap full of other things each time: no byte is left to chance.
+TEST(Block, EqualFacesAreEqualBytes) {
+  const auto dirty = [](int value) {
+    volatile unsigned char stack[65536];
+    for (auto& byte : stack) byte = static_cast<unsigned char>(value);
+    std::vector<Bytes> heap;
+    for (std::size_t size = 16; size < 65536; size *= 2) {
+      heap.emplace_back(size, static_cast<std::uint8_t>(value));
+    }
+  };
+  for (const dna::Dna& dna : {face_with_everything(), face_that_learns()}) {
+    dirty(0xAA);
+    const Bytes first = bytes_of(must_compile(dna));
+    dirty(0x55);
+    EXPECT_EQ(first, bytes_of(must_compile(dna)));
+  }
+}
+
 TEST(Block, EveryPrefixIsRefused) {
   const Bytes whole = bytes_of(must_compile(face_with_everything()));
   for (std::size_t size = 0; size < whole.size(); ++size) {
@@ -140,6 +158,11 @@ int damage_each_byte(const Bytes& whole) {
       }
       Instance face(*rig);
       (void)face.evaluate(raw.data());
+      std::vector<double> distances(rig->solver_poses);
+      std::vector<float> weights(rig->solver_poses);
+      for (std::uint32_t i = 0; i < rig->rbf_solvers.size(); ++i) {
+        solver_poses(*rig, i, pose.controls.data(), work, distances.data(), weights.data());
+      }
       gui_to_raw(*rig, gui.data(), out.data());
       std::vector<float> back(rig->gui_count);
       raw_to_gui(*rig, raw.data(), back.data());

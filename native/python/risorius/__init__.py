@@ -82,6 +82,7 @@ __all__ = [
     "TwistSwingBehavior",
     "TwistSwingSetup",
     "check",
+    "compile_cached",
     "load",
 ]
 
@@ -187,3 +188,6 @@ def check(source: str | os.PathLike[str] | bytes, *, limits: Limits | None = Non
     else:
         found = check_file(os.fspath(source), limits)
     return [Finding(*finding) for finding in found]
+
+
+from .cache import compile_cached  # noqa: E402  (it uses load)

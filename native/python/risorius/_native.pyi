@@ -798,7 +798,8 @@ class Instance:
         """float32, one per region of each mesh; at 0 the region's networks rest. A copy."""
     @masks.setter
     def masks(self, value: npt.ArrayLike) -> None: ...
-    def evaluate(self, raw: npt.ArrayLike, /) -> Pose: ...
+    def evaluate(self, raw: npt.ArrayLike, check: bool = False) -> Pose:
+        """float32[R] -> Pose; check is a DnaError for what is not finite, and no frame then."""
 
 class Rig:
     """A compiled face: turns raw controls into a Pose. Immutable, shared freely."""
@@ -818,6 +819,22 @@ class Rig:
         """A Rig from what to_bytes or block gave, of this version and byte order."""
     def to_bytes(self) -> bytes:
         """The compiled face as bytes, a cache for from_bytes."""
+    def save(self, path: _Path) -> None:
+        """Writes to_bytes() to a file; an old file is whole until the new one is."""
+    @staticmethod
+    def load(
+        path: _Path,
+        trusted: bool | None = None,
+        simd: str | None = None,
+        *,
+        mapped: bool = False,
+    ) -> Rig:
+        """A Rig from a file of save, of this version and byte order. Its hash and every index are
+        checked, unless the file is this user's and nobody else may write it (never so on Windows),
+        or trusted says True; False checks always: give it for what was downloaded or unpacked,
+        which is the user's as well. mapped uses the pages of a trusted file in place: at once, but
+        the file may only be replaced as a whole and not be written to or cut while the Rig lives.
+        """
     def block(self) -> memoryview:
         """The same without a copy."""
     @property
@@ -853,12 +870,33 @@ class Rig:
     def joint_indices_written(self) -> _U16: ...
     def gui_to_raw(self, gui: npt.ArrayLike) -> _F32:
         """float32[G] -> float32[R] in [0, 1]"""
-    def evaluate(self, raw: npt.ArrayLike, lod: _Int = 0, settle: bool = True) -> Pose:
-        """float32[R] -> Pose; a function of raw alone when settle is true."""
-    def evaluate_batch(
-        self, raw: npt.ArrayLike, lod: _Int = 0, threads: _Int = 0, settle: bool = True
+    def evaluate(
+        self, raw: npt.ArrayLike, lod: _Int = 0, settle: bool = True, check: bool = False
     ) -> Pose:
-        """float32[N, R] -> Pose whose fields have a leading N; threads 0 is all cores."""
+        """float32[R] -> Pose; a function of raw alone when settle is true. Values outside [0, 1]
+        are taken as they are: joints and shapes go on, correctives clamp their factors, maps rest
+        outside their intervals. NaN or infinity spoils what its control drives and nothing else,
+        and no later pose; with check it is a DnaError that names the control.
+        """
+    def evaluate_batch(
+        self,
+        raw: npt.ArrayLike,
+        lod: _Int = 0,
+        threads: _Int = 0,
+        settle: bool = True,
+        check: bool = False,
+    ) -> Pose:
+        """float32[N, R] -> Pose whose fields have a leading N; threads 0 is all cores. check names
+        the first frame and control that is not finite.
+        """
+    def find_non_finite(self, raw: npt.ArrayLike) -> list[tuple[int, str, float]]:
+        """float32[R] or float32[N, R] -> (frame, name, value) of all that is NaN or infinite."""
+    def solver_poses(
+        self, index: _Int, controls: npt.ArrayLike
+    ) -> tuple[npt.NDArray[np.float64], _F32]:
+        """Of an RBF solver and a Pose's controls: distances from its inputs, in radians where they
+        are angles, and weights of its poses, 0 below the threshold.
+        """
     def instance(self) -> Instance: ...
 
 class Morph:
@@ -880,5 +918,8 @@ class Morph:
         out: _F32 | None = None,
     ) -> _F32:
         """float32[B] -> float32[V, 3]: base + sum of weight * delta."""
+
+def rig_block_version() -> int:
+    """Of Rig.to_bytes; others are refused."""
 
 def available_simd() -> str: ...

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import argparse
-import difflib
 import json
 import math
 import sys
@@ -15,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 import risorius
+from risorius import explain
 
 ATTRIBUTES = ("tx", "ty", "tz", "rx", "ry", "rz", "sx", "sy", "sz")
 Floats = npt.NDArray[np.float32]
@@ -29,48 +29,79 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "eval",
         help="the pose that some control values give",
         description="Prints every joint, blend shape channel and animated map that is not at rest. "
-        "Joint values are deltas from neutral in the file's units and axes; scale 0 is no scale.",
+        "Joint values are deltas from neutral in the file's units and axes; scale 0 is no scale. "
+        "A value may lie outside 0..1: raw controls are not clamped, correctives clamp what they "
+        "multiply, GUI controls outside every interval of their table give nothing.",
     )
     parser.add_argument("file", type=Path)
-    parser.add_argument("controls", nargs="*", metavar="NAME=VALUE", help="the rest is 0")
+    parser.add_argument(
+        "controls",
+        nargs="*",
+        metavar="NAME=VALUE",
+        help="the rest is at rest; a part of a name or an ARKit name will do if it can mean "
+        "one control (or its left and right) only",
+    )
+    parser.add_argument(
+        "--explain",
+        action="store_true",
+        help="in words: which correctives, solvers and networks are at work, which joints move "
+        "most, and which control has which part in it",
+    )
+    parser.add_argument(
+        "--top", type=int, default=10, metavar="N", help="lines of each list of --explain (10)"
+    )
     parser.add_argument("--gui", action="store_true", help="the names are of GUI controls")
     parser.add_argument("--lod", type=int, default=0, metavar="N", help="0 is the finest (default)")
     parser.add_argument("--json", action="store_true", help="for a program")
     parser.set_defaults(func=run)
 
 
-def parse_controls(texts: list[str], names: list[str]) -> Floats:
-    """Control values from NAME=VALUE texts.
+def parse_controls(texts: list[str], names: list[str], rest: Floats) -> Floats:
+    """Control values from NAME=VALUE texts; what a part of a name was taken for goes to stderr.
 
     Args:
         texts: as typed; a later one of the same name wins.
         names: of all controls.
+        rest: float32[names], the values of the others.
 
     Returns:
         float32[names].
 
     Raises:
-        CommandLineError: a text of another form, an unknown name, not a finite number.
+        CommandLineError: a text of another form, a name that means no control or several, not a
+            finite number.
     """
     index = {name: i for i, name in enumerate(names)}
-    values = np.zeros(len(names), np.float32)
+    values = rest.copy()
     for text in texts:
         name, equals, number = text.rpartition("=")
         if not equals:
             raise CommandLineError(f"NAME=VALUE was expected, found {text!r}")
-        if name not in index:
-            near = [n for n in names if n.rpartition(".")[2] == name]
-            near = near or difflib.get_close_matches(name, names, 3, 0.5)
-            hint = f"; near it: {', '.join(near)}" if near else ""
-            raise CommandLineError(f"there is no control {name!r}{hint}")
+        try:
+            meaning = explain.find_controls(name, names)
+        except explain.UnknownControlError as error:
+            raise CommandLineError(str(error)) from None
         try:
             value = float(number)
         except ValueError:
             value = math.nan
         if not math.isfinite(value) or abs(value) > np.finfo(np.float32).max:
             raise CommandLineError(f"{name}: a number was expected, found {number!r}")
-        values[index[name]] = value
+        for control, factor in meaning.controls.items():
+            values[index[control]] = value * factor
+        if not meaning.is_exact:
+            taken = ", ".join(f"{c}={value * f:g}" for c, f in meaning.controls.items())
+            print(f"risorius: {text} was taken for {taken}", file=sys.stderr)
     return values
+
+
+def raw_of_gui(dna: risorius.Dna, rig: risorius.Rig, gui: Floats) -> Floats:
+    """Raw controls of GUI controls; what the table does not write is at rest."""
+    raw = rig.gui_to_raw(gui)
+    beside = np.ones(len(raw), bool)
+    beside[dna.gui_to_raw.output_indices] = False
+    raw[beside] = rig.initial_raw_controls[beside]
+    return raw
 
 
 def active(values: Floats, names: list[str], first: int = 0) -> list[dict[str, Any]]:
@@ -140,16 +171,28 @@ def run(args: argparse.Namespace) -> int:
     try:
         if not 0 <= args.lod < max(1, rig.lod_count):
             raise CommandLineError(f"--lod: 0 to {max(1, rig.lod_count) - 1} was expected")
-        names = rig.gui_control_names if args.gui else rig.raw_control_names
-        values = parse_controls(args.controls, names)
+        if args.top < 0:
+            raise CommandLineError("--top: 0 or more was expected")
+        gui = None
+        if args.gui:
+            names = rig.gui_control_names
+            gui = parse_controls(args.controls, names, np.zeros(len(names), np.float32))
+            raw = raw_of_gui(dna, rig, gui)
+        else:
+            raw = parse_controls(args.controls, rig.raw_control_names, rig.initial_raw_controls)
     except CommandLineError as error:
         print(f"risorius: {error}", file=sys.stderr)
         return 2
-    facts = describe(dna, rig, rig.gui_to_raw(values) if args.gui else values, args.lod)
     if rig.ignored_layers:
         print(
             f"risorius: not evaluated by this version: {', '.join(rig.ignored_layers)}",
             file=sys.stderr,
         )
-    print(json.dumps(facts, indent=2) if args.json else page(facts))
+    if args.explain:
+        facts = explain.explain(dna, rig, raw, lod=args.lod, gui=gui)
+        text = explain.page(facts, args.top)
+    else:
+        facts = describe(dna, rig, raw, args.lod)
+        text = page(facts)
+    print(json.dumps(facts, indent=2) if args.json else text)
     return 0

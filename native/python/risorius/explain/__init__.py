@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: MIT
+"""Why a face looks as it does: what fires, what moves, and which control has which part in it.
+
+facts = explain(dna, rig, raw)     # plain values, as JSON has them
+print(page(facts))                 # in words
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+import risorius
+
+from .behavior import (
+    explain_correctives,
+    explain_maps,
+    explain_networks,
+    explain_raw,
+    explain_setups,
+    explain_shapes,
+)
+from .control_names import ControlNames, Meaning, UnknownControlError, find_controls
+from .joints import bone_length, explain_joints
+from .solvers import explain_solvers
+from .words import page
+
+__all__ = ["Meaning", "UnknownControlError", "explain", "find_controls", "page"]
+
+
+def explain(
+    dna: risorius.Dna,
+    rig: risorius.Rig,
+    raw: npt.ArrayLike,
+    *,
+    lod: int = 0,
+    gui: npt.ArrayLike | None = None,
+) -> dict[str, Any]:
+    """Everything about one settled pose, as plain values.
+
+    Args:
+        dna: what rig was compiled from.
+        rig: with Euler angles.
+        raw: float32[R], finite.
+        lod: 0 is the finest.
+        gui: float32[G] that gave raw, if they did.
+
+    Returns:
+        A dict that json.dumps takes. Every list begins with what matters most. Contributions of
+        joints add up to the joint's pose.
+
+    Raises:
+        ValueError: a rig with quaternions, controls that are not finite.
+    """
+    if rig.rotation != "euler":
+        raise ValueError("explain: a rig with rotation='euler' was expected")
+    values = np.asarray(raw, np.float32)
+    if not np.isfinite(values).all():
+        raise ValueError("explain: raw controls that are finite were expected")
+    pose = rig.evaluate(values, lod=lod)
+    names = ControlNames(dna)
+    controls = np.asarray(pose.controls, float)
+    rest = np.asarray(rig.initial_raw_controls, float)
+    maps_at_rest = rig.evaluate(rig.initial_raw_controls, lod=lod).animated_maps
+    handles = None if gui is None else np.asarray(gui, float)
+    return {
+        "lod": lod,
+        "translation_unit": dna.translation_unit,
+        "bone_length": bone_length(dna),
+        "joint_count": rig.joint_count,
+        "raw_controls": explain_raw(dna, controls[: len(values)], rest, handles, names),
+        "correctives": explain_correctives(dna, controls, lod, names),
+        "solvers": explain_solvers(dna, rig, controls, lod, names),
+        "networks": explain_networks(dna, controls, lod, names),
+        "twists_and_swings": explain_setups(dna, controls, names),
+        "joints": explain_joints(dna, pose, lod, names),
+        "blend_shapes": explain_shapes(
+            dna, np.asarray(pose.blend_shapes, float), controls, lod, names
+        ),
+        "animated_maps": explain_maps(
+            dna,
+            np.asarray(pose.animated_maps, float),
+            np.asarray(maps_at_rest, float),
+            controls,
+            lod,
+            names,
+        ),
+        "ignored_layers": rig.ignored_layers,
+    }

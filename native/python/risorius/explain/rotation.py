@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: MIT
+"""Rotations in double precision. Quaternions are (x, y, z, w); see CONVENTIONS.md."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+import risorius
+
+Doubles = npt.NDArray[np.float64]
+
+
+class Convention:
+    """Order, signs and unit of Euler angles."""
+
+    def __init__(self, sequence: str, signs: tuple[int, ...], unit: str) -> None:
+        self.order = ["xyz".index(axis) for axis in sequence]
+        self.signs = np.array(signs, float)
+        self.radians = 1.0 if unit == "radians" else math.pi / 180
+
+    @classmethod
+    def of(cls, dna: risorius.Dna) -> Convention:
+        return cls(dna.rotation_sequence, dna.rotation_signs, dna.rotation_unit)
+
+    def quaternion(self, angles: Doubles) -> Doubles:
+        """float64[3] in the file's unit -> float64[4]"""
+        q = np.array([0.0, 0.0, 0.0, 1.0])
+        half = np.asarray(angles, float) * self.signs * self.radians / 2
+        for axis in self.order:
+            step = np.zeros(4)
+            step[axis], step[3] = math.sin(half[axis]), math.cos(half[axis])
+            q = product(step, q)
+        return q
+
+    def angles(self, q: Doubles) -> Doubles:
+        """float64[4] -> float64[3] in the file's unit; at the pole the last angle is 0."""
+        m = _matrix(q)
+        i, j, k = self.order
+        parity = 1 if j == (i + 1) % 3 else -1
+        sine = -parity * m[i, k]
+        out = np.zeros(3)
+        out[j] = math.asin(min(1.0, max(-1.0, sine)))
+        if abs(sine) < 1 - 1e-12:
+            out[i] = math.atan2(parity * m[j, k], m[k, k])
+            out[k] = math.atan2(parity * m[i, j], m[i, i])
+        else:
+            out[i] = math.atan2(-parity * m[k, j], m[j, j])
+        return out * self.signs / self.radians
+
+
+def product(a: Doubles, b: Doubles) -> Doubles:
+    """a * b turns by b first."""
+    v = a[3] * b[:3] + b[3] * a[:3] + np.cross(a[:3], b[:3])
+    return np.array([*v, a[3] * b[3] - a[:3] @ b[:3]])
+
+
+def angle_degrees(a: Doubles, b: Doubles) -> float:
+    """How far the one rotation is from the other, 0 to 180."""
+    apart = product(a * [-1, -1, -1, 1], b)
+    return math.degrees(2 * math.atan2(float(np.linalg.norm(apart[:3])), abs(float(apart[3]))))
+
+
+def _matrix(q: Doubles) -> Doubles:
+    """Rows are the images of the axes."""
+    x, y, z, w = q / np.linalg.norm(q)
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return (np.eye(3) + 2 * w * cross + 2 * cross @ cross).T

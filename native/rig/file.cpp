@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: MIT
+#include "rig/file.h"
+
+#include "core/file_write.h"
+
+namespace risorius::rig {
+
+core::Status save_rig(const Rig& rig, const std::filesystem::path& path) {
+  return core::write_file_atomically(path, rig.block());
+}
+
+core::Result<Rig> open_rig_file(const std::filesystem::path& path, Trust trust, core::ReadBy by,
+                                const simd::Kernels& kernels) {
+  if (trust == Trust::kNobody) by = core::ReadBy::kCopy;
+  auto file = core::read_file(path, by);
+  const auto trusted = [&] {
+    return trust == Trust::kCaller || (trust == Trust::kOwner && file->is_own);
+  };
+  if (file && by == core::ReadBy::kMap && !trusted()) file = core::read_file(path);
+  if (!file) return std::move(file).propagate();
+  const BlockCheck check = trusted() ? BlockCheck::kHeader : BlockCheck::kFull;
+  auto rig = open_rig(file->bytes, file->owner, check, kernels);
+  if (rig) return rig;
+  core::Error error = rig.error();
+  error.message = path.string() + ": " + error.message;
+  return core::Unexpected{std::move(error)};
+}
+
+}  // namespace risorius::rig

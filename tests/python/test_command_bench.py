@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: MIT
+"""risorius bench through the front door. What it measures is not judged here."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import risorius
+from risorius import cli
+from risorius.commands import bench
+
+MEDIUM = Path(__file__).parents[1] / "data" / "golden" / "medium.dna"
+
+
+@pytest.fixture
+def quick() -> None:
+    if bench.program() is None:
+        pytest.fail("the wheel under test was built without Google Benchmark")
+
+
+def number_of(text: str, name: str) -> float:
+    line = next(line for line in text.splitlines() if line.startswith(name))
+    return float(line[len(name) :].split()[0])
+
+
+@pytest.mark.usefixtures("quick")
+def test_the_table_has_every_row_that_was_asked_for(capfd: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["bench", str(MEDIUM), "--quick"]) == 0
+    text = capfd.readouterr().out
+    for row in (
+        "one face, 20 active",
+        "one face, 60 active",
+        "one face, all active",
+        "quaternions, 60 active",
+        "LOD 4, 60 active",
+        "cold, 60 active",
+        "crowd of 64, 60 active",
+        "clip of 1000, 60 active",
+        "clip, two cores, 60 active",
+        "no change",
+        "compile",
+    ):
+        assert number_of(text, row.ljust(30)) > 0, row
+    assert "commit " in text
+    assert "times a plain read" in text
+
+
+@pytest.mark.usefixtures("quick")
+def test_a_sweep_is_csv(capfd: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["bench", str(MEDIUM), "--quick", "--sweep"]) == 0
+    comment, header, *rows = capfd.readouterr().out.splitlines()
+    assert comment.startswith("# ")
+    assert header == "what,x,us,csr"
+    whats = {row.split(",")[0] for row in rows}
+    assert whats == {"active controls", "LOD", "joints", "faces", "cores"}
+    assert all(float(row.split(",")[2]) > 0 for row in rows)
+
+
+@pytest.mark.usefixtures("quick")
+def test_frames_of_ones_own(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    raw = len(risorius.load(MEDIUM).raw_control_names)
+    good = {name: np.ones((4, raw), np.float32) for name in bench.FRAMES}
+    np.savez(tmp_path / "good.npz", **good)
+    arguments = ["bench", str(MEDIUM), "--quick", "--frames"]
+    assert cli.main([*arguments, str(tmp_path / "good.npz")]) == 0
+    np.savez(tmp_path / "narrow.npz", **{**good, "active_60": np.ones((4, raw - 1), np.float32)})
+    (tmp_path / "none.npz").write_bytes(b"nothing")
+    for name, expected in (("narrow.npz", "active_60"), ("none.npz", ""), ("absent.npz", "absent")):
+        capfd.readouterr()
+        assert cli.main([*arguments, str(tmp_path / name)]) == 1
+        captured = capfd.readouterr()
+        assert captured.out == ""
+        assert captured.err.startswith("risorius: ")
+        assert expected in captured.err
+
+
+@pytest.mark.usefixtures("quick")
+def test_bad_files_are_sentences(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "bad.dna").write_bytes(b"DNA?")
+    assert cli.main(["bench", str(tmp_path / "bad.dna")]) == 1
+    assert "bad.dna" in capfd.readouterr().err
+
+
+def test_a_wheel_without_it_says_so(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(bench, "program", lambda: None)
+    assert cli.main(["bench", str(MEDIUM)]) == 1
+    assert "Google Benchmark" in capsys.readouterr().err
