@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-# Sourced by demo.sh, test.sh and fuzz.sh: tools, a private venv, the wheel and the extension's zip.
-# Sets: project, venv, python, step "text" (says what begins and how long the last step took).
+# Sourced by demo.sh, test.sh, fuzz.sh and cross.sh: tools, a private venv, the wheel and the
+# extension's zip. Sets: project, venv, python, step "text" (says what begins and how long the last
+# step took).
 
 project=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 venv="$project/.venv"

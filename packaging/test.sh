@@ -62,6 +62,15 @@ google_tests() { # google_tests NAME PRESET [CMAKE OPTION...]
 google_tests "GoogleTest" dev -DPython_EXECUTABLE="$python"
 step "GoogleTest with sanitizers"
 ASAN_OPTIONS=detect_leaks=1 google_tests "GoogleTest, ASan, UBSan, leaks" asan-ubsan
+step "one Rig under eight threads"
+google_tests "thread sanitizer, one Rig" tsan
+
+step "other compilers, systems and processors"
+"$project/packaging/cross.sh" > "$logs/cross.log" 2>&1 && cross_exit=0 || cross_exit=$?
+while IFS=$'\t' read -r _ name good bad; do
+  note "$name" "$good" "$bad"
+done < <(grep -P '^row\t' "$logs/cross.log")
+check "cross.sh" [ "$cross_exit" -eq 0 ] || tail -n 40 "$logs/cross.log"
 
 step "fuzz targets, 30 s each"
 "$project/packaging/fuzz.sh" --each 30 > "$logs/fuzz.log" 2>&1 && fuzz_exit=0 || fuzz_exit=$?

@@ -153,11 +153,12 @@ def test_a_face_through_time_has_the_reference_latency(name, simd):
         check_pose(dna, pose, expected, bounds, f"{name} step {number}")
 
 
+@pytest.mark.parametrize("simd", SIMD)
 @pytest.mark.parametrize(("name", "tag", "lods"), FILTERED)
-def test_what_the_reference_loads_filtered_is_our_lod_by_name(name, tag, lods):
+def test_what_the_reference_loads_filtered_is_our_lod_by_name(name, tag, lods, simd):
     """A filter keeps the joints of its LODs in order: rows are compared joint by joint."""
     dna = risorius.load(GOLDEN / f"{name}.dna")
-    rig = risorius.Rig(dna)
+    rig = risorius.Rig(dna, simd=simd)
     golden = Golden(GOLDEN, name, f".{tag}")
     kept = len(golden.about["record"]) and dict(golden.about["record"])["joints"] // 9
     listed = set().union(*(set(dna.lod_joint_mapping[lod].tolist()) for lod in lods))

@@ -2,9 +2,13 @@
 // Evaluation takes no memory. The counter sees every operator new of this executable.
 #include <atomic>
 #include <cstdlib>
+#include <limits>
 #include <new>
+#include <ostream>
+#include <type_traits>
 
 #include "support/face.h"
+#include "support/full_face.h"
 
 namespace {
 std::atomic<long> allocations{0};
@@ -50,30 +54,131 @@ TEST(Allocation, CounterSeesAnAllocation) {
   EXPECT_GT(allocations, before);
 }
 
-TEST(Allocation, EvaluateTakesNoMemory) {
-  dna::Dna dna = make_face(3, 2, 4);
-  dna.definition.blend_shape_channel_names = names("shape", 1);
-  dna.behavior.psds.rows = {3, 4};
-  dna.behavior.psds.columns = {0, 3};
-  dna.behavior.psds.values = {1.0f, 1.0f};
-  dna.behavior.joint_groups = std::vector{make_probe({0, 1, 2, 3, 4})};
-  dna.behavior.blend_shape_channels.lods = {1, 1};
-  dna.behavior.blend_shape_channels.input_indices = {4};
-  dna.behavior.blend_shape_channels.output_indices = {0};
-  const Rig rig = must_compile(dna);
-  Workspace work = make_workspace(rig);
-  Pose pose = make_pose(rig);
-  Instance face(rig);
-  const float raw[3] = {0.5f, 0.25f, 1.0f};
+// What must not throw says so: a stray exception would end the program, and none is written.
+template <class F, class... Args>
+constexpr bool never_throws = std::is_nothrow_invocable_v<F, Args...>;
+using Evaluate = void (*)(const Rig&, const float*, std::uint32_t, bool, Workspace&,
+                          const PoseView&) noexcept;
+using EvaluatePose = void (*)(const Rig&, const float*, std::uint32_t, bool, Workspace&,
+                              Pose&) noexcept;
+// A pointer to a noexcept function takes no other.
+constexpr Evaluate kEvaluate = &evaluate;
+constexpr EvaluatePose kEvaluatePose = &evaluate;
+static_assert(never_throws<decltype(kEvaluate), const Rig&, const float*, std::uint32_t, bool,
+                           Workspace&, const PoseView&>);
+static_assert(never_throws<decltype(kEvaluatePose), const Rig&, const float*, std::uint32_t, bool,
+                           Workspace&, Pose&>);
+static_assert(never_throws<decltype(evaluate_frames), const Rig&, const float*, std::size_t,
+                           std::uint32_t, bool, Workspace&, const PoseView&>);
+static_assert(never_throws<decltype(gui_to_raw), const Rig&, const float*, float*>);
+static_assert(never_throws<decltype(raw_to_gui), const Rig&, const float*, float*>);
+static_assert(never_throws<decltype(&Instance::evaluate), Instance&, const float*>);
+static_assert(never_throws<decltype(&Instance::set_lod), Instance&, std::uint32_t>);
+static_assert(never_throws<decltype(&Instance::set_mask), Instance&, std::size_t, float>);
+
+// A face with something of everything that is evaluated; the networks by operations or in a list.
+struct Kind {
+  const char* name;
+  bool operations;
+  compile::Rotation rotation;
+  compile::Precision precision;
+};
+void PrintTo(const Kind& kind, std::ostream* out) { *out << kind.name; }
+constexpr Kind kKinds[] = {
+    {"Euler", true, compile::Rotation::kEuler, compile::Precision::kFloat32},
+    {"Quaternion", true, compile::Rotation::kQuaternion, compile::Precision::kFloat32},
+    {"HalfEuler", false, compile::Rotation::kEuler, compile::Precision::kFloat16},
+    {"HalfQuaternion", false, compile::Rotation::kQuaternion, compile::Precision::kFloat16},
+};
+
+Rig full_rig(const Kind& kind) {
+  dna::Dna dna = make_full_face();
+  if (!kind.operations) dna.machine_learned_behavior_ext = {};
+  compile::CompileOptions options;
+  options.rotation = kind.rotation;
+  options.precision = kind.precision;
+  core::Result<Rig> rig = compile::compile(dna, options);
+  if (!rig) {
+    ADD_FAILURE() << rig.error().describe();
+    std::abort();
+  }
+  return std::move(rig).value();
+}
+
+constexpr std::size_t kFilm = 2 * simd::kFrames + 3;  // whole blocks and the rest of one
+
+// [kFilm, 5]: at rest, usual, out of range, no numbers, and usual again.
+std::vector<float> film() {
+  constexpr float kInf = std::numeric_limits<float>::infinity();
+  const float frames[][5] = {{0, 0, 0, 0, 1},
+                             {0.5f, 0.6f, 0, 0, 0.8f},
+                             {-3, 2, 2, 2, 2},
+                             {std::numeric_limits<float>::quiet_NaN(), 0, 0, 0, 0},
+                             {kInf, -kInf, 0, 1e38f, 1},
+                             {1, 0, 0.6f, 0, 0.8f}};
+  std::vector<float> out;
+  for (std::size_t n = 0; n < kFilm; ++n) out.insert(out.end(), frames[n % 6], frames[n % 6] + 5);
+  return out;
+}
+
+class EveryKind : public testing::TestWithParam<Kind> {
+ protected:
+  const Rig rig_ = full_rig(GetParam());
+  const std::vector<float> film_ = film();
+};
+
+TEST_P(EveryKind, EvaluateTakesNoMemory) {
+  Workspace work = make_workspace(rig_);
+  Pose pose = make_pose(rig_);
   const long before = allocations;
-  for (std::uint32_t lod = 0; lod < 3; ++lod) {
-    evaluate(rig, raw, lod, true, work, pose);
-    evaluate(rig, raw, lod, false, work, pose);
-    face.set_lod(lod);
-    (void)face.evaluate(raw);
+  for (std::size_t n = 0; n < kFilm; ++n) {
+    for (const std::uint32_t lod : {0u, 1u, 99u}) {
+      evaluate(rig_, film_.data() + 5 * n, lod, true, work, pose);
+      evaluate(rig_, film_.data() + 5 * n, lod, false, work, pose);
+    }
   }
   EXPECT_EQ(allocations, before);
 }
+
+TEST_P(EveryKind, ABatchTakesNoMemory) {
+  Workspace work = make_batch_workspace(rig_);
+  std::vector<float> joints(kFilm * rig_.joint_count * rig_.joint_stride),
+      shapes(kFilm * rig_.blend_shape_count), maps(kFilm * rig_.animated_map_count),
+      controls(kFilm * rig_.control_count);
+  const PoseView first{joints.data(), shapes.data(), maps.data(), controls.data()};
+  const long before = allocations;
+  for (const std::size_t count : {std::size_t{0}, std::size_t{1}, simd::kFrames, kFilm}) {
+    evaluate_frames(rig_, film_.data(), count, 0, true, work, first);
+    evaluate_frames(rig_, film_.data(), count, 1, false, work, first);
+  }
+  EXPECT_EQ(allocations, before);
+}
+
+TEST_P(EveryKind, AFaceThatChangesItsLodAndMasksTakesNoMemory) {
+  Instance face(rig_);
+  ASSERT_FALSE(face.masks().empty());
+  const long before = allocations;
+  for (std::size_t n = 0; n < kFilm; ++n) {
+    face.set_lod(static_cast<std::uint32_t>(n % 3));
+    face.set_mask(0, static_cast<float>(n / 2 % 2));
+    (void)face.evaluate(film_.data() + 5 * n);
+    (void)face.evaluate(film_.data() + 5 * n);
+  }
+  EXPECT_EQ(allocations, before);
+}
+
+TEST_P(EveryKind, TablesTakeNoMemory) {
+  std::vector<float> raw(rig_.raw_count), gui(rig_.gui_count);
+  const long before = allocations;
+  for (std::size_t n = 0; n < kFilm; ++n) {
+    raw_to_gui(rig_, film_.data() + 5 * n, gui.data());
+    gui_to_raw(rig_, gui.data(), raw.data());
+  }
+  EXPECT_EQ(allocations, before);
+}
+
+INSTANTIATE_TEST_SUITE_P(Allocation, EveryKind, testing::ValuesIn(kKinds),
+                         [](const auto& kind) { return kind.param.name; });
 
 }  // namespace
 }  // namespace risorius::rig

@@ -1,0 +1,165 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
+# cross.sh: native/ for systems and processors that this machine is not. Libraries for macOS and
+# Windows; programs for aarch64 Linux, whose GoogleTests an emulator runs with each instruction set;
+# the bits of the scalar path between compilers, optimisation and processors. Warnings are errors.
+# Prints rows `row<TAB>name<TAB>passed<TAB>failed`; exit code 0 only if nothing failed.
+set -uo pipefail
+source "$(dirname "$0")/setup.sh"
+
+out="$project/build/cross"
+logs="$project/build/logs/cross"
+prefix="$out/prefix" # packages that only have headers, and GoogleTest for aarch64
+tools="$out/tools"
+jobs=$(nproc)
+# Quick ones: the hostile bytes of hostile_test take minutes here and mean the same everywhere.
+programs=(simd_test rig_test compile_test dna_test dna_partial_test threads_test)
+failed=0
+
+row() { # row NAME PASSED FAILED; no test at all is a failure
+  local bad=$3
+  if [ $(($2 + $3)) -eq 0 ]; then bad=1; fi
+  [ "$bad" -eq 0 ] || failed=1
+  printf 'row\t%s\t%d\t%d\n' "$1" "$2" "$bad"
+}
+works() { # works NAME LOG COMMAND...: one row
+  local name=$1 log="$logs/$2.log"
+  shift 2
+  if "$@" > "$log" 2>&1; then
+    row "$name" 1 0
+  else
+    tail -n 30 "$log"
+    row "$name" 0 1
+    return 1
+  fi
+}
+
+get_zig() {
+  local stamp
+  stamp="$out/venv/.$(sha256sum "$project/packaging/cross/requirements.txt" | cut -c1-16)"
+  [ -e "$stamp" ] && return 0
+  python3 -m venv "$out/venv" &&
+    "$out/venv/bin/python" -m pip install -q -r "$project/packaging/cross/requirements.txt" &&
+    touch "$stamp"
+}
+# CMake and ccache want a compiler to be one program.
+wrap_zig() {
+  local zig name
+  zig=$("$out/venv/bin/python" -c \
+    'import pathlib, ziglang; print(pathlib.Path(ziglang.__file__).with_name("zig"))') || return 1
+  mkdir -p "$tools"
+  for name in ar ranlib rc; do
+    printf '#!/bin/sh\nexec "%s" %s "$@"\n' "$zig" $name > "$tools/$name"
+  done
+  for name in x86_64-macos aarch64-macos x86_64-windows-gnu; do
+    printf '#!/bin/sh\nexec "%s" c++ -target %s "$@"\n' "$zig" $name > "$tools/$name-c++"
+  done
+  chmod +x "$tools"/*
+  export CCACHE_COMPILERCHECK="string:$("$zig" version)"
+}
+gather_packages() {
+  mkdir -p "$prefix/include" "$prefix/lib" "$prefix/share/cmake" &&
+    cp -rT /usr/include/nlohmann "$prefix/include/nlohmann" &&
+    cp -rT /usr/share/cmake/nlohmann_json "$prefix/share/cmake/nlohmann_json" &&
+    cp -rT "$google/include/gtest" "$prefix/include/gtest"
+}
+google=/usr/src/googletest/googletest
+build_google_test() {
+  local name
+  for name in gtest gtest_main; do
+    local source=$name
+    [ $name = gtest ] && source=gtest-all
+    ccache aarch64-linux-gnu-g++ -std=c++20 -O1 -I"$prefix/include" -I$google \
+      -c "$google/src/$source.cc" -o "$out/$name.o" &&
+      rm -f "$prefix/lib/lib$name.a" && ar qc "$prefix/lib/lib$name.a" "$out/$name.o" || return 1
+  done
+}
+
+configure() { # configure TARGET FLAGS [OPTION...]
+  local target=$1 flags=$2
+  shift 2
+  cmake -S "$project" -B "$out/$target" -G Ninja --toolchain "$project/packaging/cross/toolchain.cmake" \
+    -DRISORIUS_TARGET="$target" -DRISORIUS_TOOLS="$tools" -DRISORIUS_PREFIX="$prefix" \
+    -DRISORIUS_BUILD_BINDINGS=OFF -DRISORIUS_WARNINGS_AS_ERRORS=ON -DCMAKE_BUILD_TYPE=None \
+    -DCMAKE_CXX_FLAGS="$flags" -DCMAKE_CXX_COMPILER_LAUNCHER=ccache "$@"
+}
+# Warnings need no optimisation; zig's own checks of undefined behavior would only take time.
+build_libraries() { # build_libraries TARGET
+  configure "$1" "-O0 -fno-sanitize=undefined" && CCACHE_COMPILERTYPE=clang cmake --build "$out/$1" -j"$jobs"
+}
+build_programs() {
+  build_google_test &&
+    configure aarch64-linux-gnu "-O1 -Wno-psabi" -DRISORIUS_BUILD_TESTS=ON &&
+    cmake --build "$out/aarch64-linux-gnu" -j"$jobs" --target "${programs[@]}" scalar_bits
+}
+run_programs() {
+  local log="$logs/ctest.log" total bad neon
+  # What was not built has a placeholder for a test; patching every byte takes a minute here.
+  ctest --test-dir "$out/aarch64-linux-gnu" -j"$jobs" -E 'NOT_BUILT|EveryPatchedByte' \
+    --output-on-failure > "$log" 2>&1
+  total=$(grep -oE 'out of [0-9]+' "$log" | grep -oE '[0-9]+' || echo 0)
+  bad=$(grep -oE '[0-9]+ tests failed' "$log" | grep -oE '^[0-9]+' || echo 0)
+  [ "$bad" -eq 0 ] || tail -n 40 "$log"
+  row "GoogleTest, aarch64 in qemu" $((total - bad)) "$bad"
+  # The forced one ran: the test fails unless the rig says that it is NEON.
+  neon=$(grep -cE 'neon\.ForcedSimd\.EnvironmentReachesTheRig \.+ +Passed' "$log")
+  row "NEON was executed" "$neon" 0
+}
+
+# scalar_bits NAME COMPILER FLAGS...: the program of tests/rig whose arithmetic is compiled so; the
+# rest of it comes from the preset dev.
+scalar_bits() {
+  local folder="$out/bits-$1" compiler=$2 file
+  shift 2
+  mkdir -p "$folder"
+  for file in "$project"/native/{rig,simd}/*.cpp "$project"/native/compile/compile.cpp \
+    "$project"/tests/rig/scalar_bits.cpp; do
+    echo "$file"
+  done | xargs -P "$jobs" -I{} sh -c '
+    folder=$1; file=$2; shift 2
+    ccache "$@" -c "$file" -o "$folder/$(basename "$file" .cpp).o"' \
+    sh "$folder" {} "$compiler" -std=c++20 -ffp-contract=off -I"$project/native" "$@" &&
+    "$compiler" "$folder"/*.o $dev/librisorius_{compile,rig,simd,dna,core}.a -pthread -o "$folder/program" &&
+    "$folder/program" > "$folder/hash"
+}
+dev="$project/build/dev/native"
+build_dev() {
+  (cd "$project" && cmake --preset dev -DCMAKE_CXX_COMPILER_LAUNCHER=ccache \
+    -DRISORIUS_BUILD_BINDINGS=OFF && cmake --build --preset dev -j"$jobs" --target risorius_compile)
+}
+same_bits() {
+  local way wanted hash
+  scalar_bits gcc-O0 g++ -O0 && scalar_bits gcc-O3 g++ -O3 -march=x86-64-v3 &&
+    scalar_bits clang-O2 clang++-14 -O2 -march=x86-64-v3 && "$emulator" "$aarch64" > "$out/bits-aarch64" ||
+    return 1
+  wanted=$(cat "$out/bits-gcc-O0/hash")
+  for way in gcc-O3/hash clang-O2/hash aarch64; do
+    hash=$(cat "$out/bits-$way")
+    echo "$way $hash, gcc-O0 $wanted"
+    [ -n "$hash" ] && [ "$hash" = "$wanted" ] || return 1
+  done
+}
+emulator=qemu-aarch64
+aarch64="$out/aarch64-linux-gnu/tests/rig/scalar_bits"
+# Fused operations must be found out, or the equality above means nothing.
+other_bits() {
+  scalar_bits fused g++ -O2 -mfma -ffp-contract=fast &&
+    ! cmp "$out/bits-fused/hash" "$out/bits-gcc-O0/hash"
+}
+
+mkdir -p "$out" "$logs"
+step "tools" && install_packages clang-14 googletest g++-aarch64-linux-gnu qemu-user && get_zig &&
+  wrap_zig && gather_packages || exit 1
+for target in x86_64-windows-gnu x86_64-macos aarch64-macos; do
+  step "$target"
+  works "libraries, $target" "$target" build_libraries $target
+done
+unset CCACHE_COMPILERCHECK
+step "aarch64-linux-gnu"
+works "GoogleTest for aarch64 builds" aarch64 build_programs && step "emulator" && run_programs
+step "scalar bits"
+works "scalar library" dev build_dev
+works "scalar bits: gcc -O0 -O3, clang, aarch64" bits same_bits
+works "scalar bits differ when fused" fused other_bits
+step ""
+[ $failed -eq 0 ]

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: MIT
+// One Rig under eight threads gives each what it gives one alone. Preset `tsan` looks at the same
+// tests with the thread sanitizer.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <thread>
+
+#include "core/parallel_for.h"
+#include "support/face.h"
+#include "support/full_face.h"
+
+namespace risorius::rig {
+namespace {
+
+using compile::CompileOptions;
+
+constexpr std::size_t kThreads = 8, kTurns = 40, kFramesEach = 11;
+
+// Two ways: linear and halves, quaternions and float32.
+std::vector<CompileOptions> ways() {
+  CompileOptions halves, quaternions;
+  halves.precision = compile::Precision::kFloat16;
+  quaternions.rotation = compile::Rotation::kQuaternion;
+  return {halves, quaternions};
+}
+
+Rig full_rig(const CompileOptions& options) {
+  core::Result<Rig> rig = compile::compile(testing_support::make_full_face(), options);
+  if (!rig) std::abort();
+  return std::move(rig).value();
+}
+
+// Frame n of a film: a jaw and a turning quaternion.
+std::vector<float> frame(std::size_t n) {
+  const float jaw = static_cast<float>(n % 5) / 4.0f;
+  const float side = static_cast<float>(n % 3) * 0.48f;  // 0, 0.48, 0.96
+  const float w = n % 3 == 0 ? 1.0f : (n % 3 == 1 ? 0.8772684f : 0.28f);
+  return {jaw, 0.0f, side, 0.0f, w};
+}
+
+bool same(const Pose& a, const Pose& b) {
+  return a.joints == b.joints && a.blend_shapes == b.blend_shapes &&
+         a.animated_maps == b.animated_maps && a.controls == b.controls;
+}
+
+// Runs body(thread) on all threads, which begin together.
+template <class Body>
+void together(const Body& body) {
+  std::atomic<std::size_t> waiting{kThreads};
+  std::vector<std::jthread> threads;
+  for (std::size_t t = 0; t < kThreads; ++t) {
+    threads.emplace_back([&body, &waiting, t] {
+      for (--waiting; waiting != 0;) std::this_thread::yield();
+      body(t);
+    });
+  }
+}
+
+TEST(OneRig, GivesEveryWorkspaceWhatItGivesOneAlone) {
+  for (const CompileOptions& way : ways()) {
+    const Rig rig = full_rig(way);
+    std::vector<Pose> wanted;
+    for (std::size_t n = 0; n < kTurns; ++n) {
+      wanted.push_back(
+          testing_support::evaluate_once(rig, frame(n), static_cast<std::uint32_t>(n % 2)));
+    }
+    EXPECT_FALSE(same(wanted[0], wanted[2]));
+    std::atomic<int> wrong{0};
+    together([&](std::size_t t) {
+      Workspace work = make_workspace(rig);
+      Pose pose = make_pose(rig);
+      for (std::size_t turn = 0; turn < kTurns; ++turn) {
+        const std::size_t n = (turn + 5 * t) % kTurns;
+        evaluate(rig, frame(n).data(), static_cast<std::uint32_t>(n % 2), true, work, pose);
+        wrong += same(pose, wanted[n]) ? 0 : 1;
+      }
+    });
+    EXPECT_EQ(wrong, 0);
+  }
+}
+
+TEST(OneRig, GivesEveryInstanceItsOwnPast) {
+  for (const CompileOptions& way : ways()) {
+    const Rig rig = full_rig(way);
+    // The last pose of a face that saw the frames from `first` on, alone and among others.
+    const auto film = [&rig](std::size_t first) {
+      Instance face(rig);
+      face.set_mask(0, static_cast<float>(first % 2));
+      for (std::size_t n = first; n < first + kTurns; ++n) {
+        face.set_lod(n / 8 % 2);
+        (void)face.evaluate(frame(n).data());
+      }
+      return face.evaluate(frame(first).data());
+    };
+    std::vector<Pose> wanted;
+    for (std::size_t t = 0; t < kThreads; ++t) wanted.push_back(film(t));
+    std::atomic<int> wrong{0};
+    together([&](std::size_t t) { wrong += same(film(t), wanted[t]) ? 0 : 1; });
+    EXPECT_EQ(wrong, 0);
+  }
+}
+
+TEST(OneRig, GivesABatchOnEightThreadsTheFramesAlone) {
+  for (const CompileOptions& way : ways()) {
+    const Rig rig = full_rig(way);
+    constexpr std::size_t kCount = kThreads * kFramesEach;
+    std::vector<float> raw, joints(kCount * rig.joint_count * rig.joint_stride),
+        shapes(kCount * rig.blend_shape_count), maps(kCount * rig.animated_map_count),
+        controls(kCount * rig.control_count);
+    for (std::size_t n = 0; n < kCount; ++n) {
+      const std::vector<float> values = frame(n);
+      raw.insert(raw.end(), values.begin(), values.end());
+    }
+    core::parallel_for(kCount, kThreads, [&](std::size_t begin, std::size_t end) {
+      Workspace work = make_batch_workspace(rig);
+      const PoseView first{joints.data() + begin * rig.joint_count * rig.joint_stride,
+                           shapes.data() + begin * rig.blend_shape_count,
+                           maps.data() + begin * rig.animated_map_count,
+                           controls.data() + begin * rig.control_count};
+      evaluate_frames(rig, raw.data() + begin * rig.raw_count, end - begin, 0, true, work, first);
+    });
+    for (std::size_t n = 0; n < kCount; ++n) {
+      const Pose alone = testing_support::evaluate_once(rig, frame(n));
+      const float* row = joints.data() + n * alone.joints.size();
+      EXPECT_TRUE(std::equal(alone.joints.begin(), alone.joints.end(), row)) << n;
+      row = controls.data() + n * alone.controls.size();
+      EXPECT_TRUE(std::equal(alone.controls.begin(), alone.controls.end(), row)) << n;
+    }
+  }
+}
+
+TEST(OneRig, MayBeLetGoByThreadsInAnyOrder) {
+  std::atomic<int> wrong{0};
+  {
+    const Rig rig = full_rig({});
+    const Pose wanted = testing_support::evaluate_once(rig, frame(1));
+    together([&, rig](std::size_t) {
+      for (std::size_t turn = 0; turn < kTurns; ++turn) {
+        const Rig mine = rig;
+        wrong += same(testing_support::evaluate_once(mine, frame(1)), wanted) ? 0 : 1;
+      }
+    });
+  }
+  EXPECT_EQ(wrong, 0);
+}
+
+}  // namespace
+}  // namespace risorius::rig
