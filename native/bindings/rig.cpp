@@ -291,13 +291,14 @@ void bind_rig_class(py::module_& m) {
       .def("save", &save_rig, py::arg("path"),
            "Writes to_bytes() to a file, a cache for load; an old file is whole until the new one "
            "is.")
-      .def_static("load", &load_rig, py::arg("path"), py::arg("trusted") = py::none(),
+      .def_static("load", &load_rig, py::arg("path"), py::arg("trusted") = false,
                   py::arg("simd") = py::none(), py::kw_only(), py::arg("mapped") = false,
                   "A Rig from a file of save, of this version and byte order. Its hash and every "
-                  "index are checked, unless the file is this user's and nobody else may write it "
-                  "(never so on Windows), or trusted says True; False checks always: give it for "
-                  "what was downloaded or unpacked, which is the user's as well. mapped uses the "
-                  "pages of a trusted file in place: at once, but the file may only be replaced "
+                  "index are checked, unless trusted is True, or None and the file is this user's "
+                  "and nobody else may write it (never so on Windows): what was downloaded or "
+                  "unpacked is so as well, therefore None is for folders that only this program "
+                  "fills. mapped uses the pages of a trusted file in place: at once, but the file "
+                  "may only be replaced "
                   "as a whole and not be written to or cut while the Rig lives. Raises DnaError.")
       .def("block", &block_of, "The same without a copy: a read-only memoryview of uint8.")
       .def_property_readonly("raw_control_names",

@@ -824,15 +824,15 @@ class Rig:
     @staticmethod
     def load(
         path: _Path,
-        trusted: bool | None = None,
+        trusted: bool | None = False,
         simd: str | None = None,
         *,
         mapped: bool = False,
     ) -> Rig:
         """A Rig from a file of save, of this version and byte order. Its hash and every index are
-        checked, unless the file is this user's and nobody else may write it (never so on Windows),
-        or trusted says True; False checks always: give it for what was downloaded or unpacked,
-        which is the user's as well. mapped uses the pages of a trusted file in place: at once, but
+        checked, unless trusted is True, or None and the file is this user's and nobody else may
+        write it (never so on Windows): what was downloaded or unpacked is so as well, therefore
+        None is for folders that only this program fills. mapped uses the pages of a trusted file in place: at once, but
         the file may only be replaced as a whole and not be written to or cut while the Rig lives.
         """
     def block(self) -> memoryview:

@@ -59,7 +59,7 @@ def compile_cached(
     file = Path(cache_dir) if cache_dir is not None else cache_folder()
     file /= _key(data, precision, rotation)
     with contextlib.suppress(DnaError):
-        return Rig.load(file, simd=simd)
+        return Rig.load(file, trusted=None, simd=simd)
     try:
         dna = risorius.load(data)
     except DnaError:
