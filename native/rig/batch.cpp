@@ -11,6 +11,9 @@ namespace {
 
 using simd::kFrames;
 
+// A block takes the time of three to four frames, however few it has.
+constexpr std::size_t kFewest = 4;
+
 PoseView frame_of(const Rig& rig, const PoseView& first, std::size_t n) {
   return {first.joints + n * rig.joint_count * rig.joint_stride,
           first.blend_shapes + n * rig.blend_shape_count,
@@ -127,7 +130,7 @@ void evaluate_frames(const Rig& rig, const float* raw, std::size_t count, std::u
   for (std::size_t n = 0; n < count; n += kFrames) {
     const PoseView first = frame_of(rig, pose, n);
     const float* from = raw + n * rig.raw_count;
-    if (rig.lod_count == 0 || count - n == 1) {
+    if (rig.lod_count == 0 || count - n < kFewest) {
       for (std::size_t f = 0; f < std::min(kFrames, count - n); ++f) {
         evaluate(rig, from + f * rig.raw_count, level, settle, work, frame_of(rig, first, f));
       }

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: MIT
+"""Draws what `risorius bench FILE --sweep` printed: plot_growth.py GROWTH.csv OUT.png"""
+
+from __future__ import annotations
+
+import csv
+import sys
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+from matplotlib import pyplot as plt
+from matplotlib.ticker import NullFormatter
+
+PANELS = {
+    "active controls": ("active raw controls", "us"),
+    "joints": ("joints that the matrices move", "us"),
+    "LOD": ("coefficients that the LOD keeps", "us"),
+    "faces": ("faces or frames at once", "us each"),
+    "cores": ("cores, clip of 1,000 frames", "us each"),
+}
+OURS, CSR = "#0b6e8f", "#b3541e"
+
+
+def read(path: Path) -> tuple[str, dict[str, list[tuple[float, float, float | None]]]]:
+    """The first line's text, and per panel its points: x, us, us of csr or None; by x."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    points: dict[str, list[tuple[float, float, float | None]]] = {name: [] for name in PANELS}
+    for row in csv.DictReader(lines[1:]):
+        base = float(row["csr"]) if row["csr"] else None
+        points[row["what"]].append((float(row["x"]), float(row["us"]), base))
+    return lines[0].removeprefix("# "), {name: sorted(p) for name, p in points.items()}
+
+
+def draw(about: str, points: dict[str, list[tuple[float, float, float | None]]], out: Path) -> None:
+    figure, axes = plt.subplots(1, len(PANELS), figsize=(15, 3.9), layout="constrained")
+    for axis, (name, (x_label, y_label)) in zip(axes, PANELS.items(), strict=True):
+        xs, ours, bases = zip(*points[name], strict=True)
+        if any(b is not None for b in bases):
+            axis.loglog(xs, bases, "o-", color=CSR, ms=3, lw=1, label="scalar CSR")
+        axis.loglog(xs, ours, "o-", color=OURS, ms=4, lw=1.5, label="Risorius")
+        axis.set_xlabel(x_label)
+        axis.set_ylabel(y_label)
+        axis.grid(which="major", lw=0.5, color="#dddddd")
+        axis.xaxis.set_minor_formatter(NullFormatter())
+        for side in ("top", "right"):
+            axis.spines[side].set_visible(False)
+        if len(xs) < 4:
+            axis.set_xticks(xs, [f"{x:g}" for x in xs])
+            axis.minorticks_off()
+    # One scale of time, so that the panels can be compared.
+    low = min(axis.get_ylim()[0] for axis in axes)
+    high = max(axis.get_ylim()[1] for axis in axes)
+    for axis in axes:
+        axis.set_ylim(low, high)
+    axes[0].legend(frameon=False, loc="center left", fontsize=9)
+    figure.suptitle(about, fontsize=9, color="#666666")
+    figure.savefig(out, dpi=110)
+
+
+if __name__ == "__main__":
+    draw(*read(Path(sys.argv[1])), Path(sys.argv[2]))
