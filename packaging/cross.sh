@@ -83,9 +83,11 @@ configure() { # configure TARGET FLAGS [OPTION...]
     -DRISORIUS_BUILD_BINDINGS=OFF -DRISORIUS_WARNINGS_AS_ERRORS=ON -DCMAKE_BUILD_TYPE=None \
     -DCMAKE_CXX_FLAGS="$flags" -DCMAKE_CXX_COMPILER_LAUNCHER=ccache "$@"
 }
-# Warnings need no optimisation; zig's own checks of undefined behavior would only take time.
+# Warnings need no optimisation, and zig's own checks of undefined behavior would only take time. -c
+# reaches the program that tells CMake what the compiler is: to link it takes minutes.
 build_libraries() { # build_libraries TARGET
-  configure "$1" "-O0 -fno-sanitize=undefined" && CCACHE_COMPILERTYPE=clang cmake --build "$out/$1" -j"$jobs"
+  configure "$1" "-c -O0 -fno-sanitize=undefined" &&
+    CCACHE_COMPILERTYPE=clang cmake --build "$out/$1" -j"$jobs"
 }
 build_programs() {
   build_google_test &&
