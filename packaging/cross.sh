@@ -83,9 +83,11 @@ configure() { # configure TARGET FLAGS [OPTION...]
     -DRISORIUS_BUILD_BINDINGS=OFF -DRISORIUS_WARNINGS_AS_ERRORS=ON -DCMAKE_BUILD_TYPE=None \
     -DCMAKE_CXX_FLAGS="$flags" -DCMAKE_CXX_COMPILER_LAUNCHER=ccache "$@"
 }
-# Warnings need no optimisation; zig's own checks of undefined behavior would only take time.
+# Warnings need no optimisation, and zig's own checks of undefined behavior would only take time. -c
+# reaches the program that tells CMake what the compiler is: to link it takes minutes.
 build_libraries() { # build_libraries TARGET
-  configure "$1" "-O0 -fno-sanitize=undefined" && CCACHE_COMPILERTYPE=clang cmake --build "$out/$1" -j"$jobs"
+  configure "$1" "-c -O0 -fno-sanitize=undefined" &&
+    CCACHE_COMPILERTYPE=clang cmake --build "$out/$1" -j"$jobs"
 }
 build_programs() {
   build_google_test &&
@@ -106,20 +108,20 @@ run_programs() {
   row "NEON was executed" "$neon" 0
 }
 
-# scalar_bits NAME COMPILER FLAGS...: the program of tests/rig whose arithmetic is compiled so; the
-# rest of it comes from the preset dev.
+# scalar_bits NAME COMPILER FLAGS...: the program of tests/rig with the arithmetic of `sources`
+# compiled so; the rest of it comes from the preset dev.
+sources=("$project"/native/rig/*.cpp "$project"/native/simd/kernels_scalar.cpp
+  "$project"/native/compile/compile.cpp "$project"/tests/rig/scalar_bits.cpp)
 scalar_bits() {
-  local folder="$out/bits-$1" compiler=$2 file
+  local folder="$out/bits-$1" compiler=$2
   shift 2
-  mkdir -p "$folder"
-  for file in "$project"/native/{rig,simd}/*.cpp "$project"/native/compile/compile.cpp \
-    "$project"/tests/rig/scalar_bits.cpp; do
-    echo "$file"
-  done | xargs -P "$jobs" -I{} sh -c '
+  rm -rf "$folder" && mkdir -p "$folder"
+  printf '%s\n' "${sources[@]}" | xargs -P "$jobs" -I{} sh -c '
     folder=$1; file=$2; shift 2
     ccache "$@" -c "$file" -o "$folder/$(basename "$file" .cpp).o"' \
     sh "$folder" {} "$compiler" -std=c++20 -ffp-contract=off -I"$project/native" "$@" &&
-    "$compiler" "$folder"/*.o $dev/librisorius_{compile,rig,simd,dna,core}.a -pthread -o "$folder/program" &&
+    "$compiler" "$folder"/*.o $dev/librisorius_{compile,rig,simd,dna,core}.a -pthread \
+      -o "$folder/program" &&
     "$folder/program" > "$folder/hash"
 }
 dev="$project/build/dev/native"
@@ -143,6 +145,7 @@ emulator=qemu-aarch64
 aarch64="$out/aarch64-linux-gnu/tests/rig/scalar_bits"
 # Fused operations must be found out, or the equality above means nothing.
 other_bits() {
+  sources=("$project"/native/simd/kernels_scalar.cpp "$project"/tests/rig/scalar_bits.cpp)
   scalar_bits fused g++ -O2 -mfma -ffp-contract=fast &&
     ! cmp "$out/bits-fused/hash" "$out/bits-gcc-O0/hash"
 }

@@ -20,7 +20,7 @@ else()
   set(CMAKE_RANLIB ${RISORIUS_TOOLS}/ranlib)
   set(CMAKE_OSX_SYSROOT "")
   set(CMAKE_INSTALL_NAME_TOOL /bin/false)  # CMake wants one; nothing is installed
-  # The first link for a target compiles its C and C++ libraries: a minute or two.
+  # The first link for a target compiles its C and C++ libraries.
   set(CMAKE_TRY_COMPILE_TARGET_TYPE STATIC_LIBRARY)
 endif()
 # Nothing of the machine that compiles: its headers are of another system.

@@ -164,9 +164,9 @@ def test_no_number_spoils_what_it_drives_and_nothing_else(name, simd, rotation):
     rig = risorius.Rig(dna, rotation=rotation, simd=simd)
     rng = np.random.default_rng(9)
     sure = untouched = 0
-    for control in range(0, len(dna.raw_control_names), 1 + len(dna.raw_control_names) // 12):
+    for control in range(0, len(dna.raw_control_names), 1 + len(dna.raw_control_names) // 24):
         for lod, bad in ((0, np.nan), (rig.lod_count - 1, np.inf), (0, -np.inf)):
             counts = check(dna, rig, random_raw(rng, dna), lod, control, bad)
             sure, untouched = sure + counts[0], untouched + counts[1]
     assert untouched > 0
-    assert sure > 0 or name == "twistswing"  # whose controls only turn joints
+    assert sure > 0
