@@ -15,9 +15,10 @@ namespace risorius::edit::detail {
 
 namespace {
 
-// What an active column costs beside its rows, in rows: a cache line and the loop's begin. Of 4 to
-// 64 all give nearly the same groups on a full-scale face, 0 a group for each joint.
-constexpr std::int64_t kColumnOverhead = 16;
+// What an active column costs beside its rows, in rows: about the loop's begin and the lanes that
+// its last rows leave idle. A full-scale face has the same groups with anything from 8 to 64; with
+// 0 each joint would have a group of its own.
+constexpr std::int64_t kColumnOverhead = 8;
 constexpr std::int64_t kMostRows = 65535;  // that a LOD of a group can count
 
 struct Cluster {
