@@ -106,9 +106,8 @@ def _indices(dna: Dna, regions: Regions) -> list[list[int]]:
         for joint in joints:
             if isinstance(joint, str) and joint not in known:
                 raise ValueError(f"{region}: there is no joint {joint!r}")
-            index = known[joint] if isinstance(joint, str) else [joint]
-            if not all(0 <= i <= 0xFFFF for i in index):
+            if not isinstance(joint, str) and not 0 <= joint < len(dna.joint_names):
                 raise ValueError(f"{region}: there is no joint {joint!r}")
-            found += index
+            found += known[joint] if isinstance(joint, str) else [joint]
         out.append(found)
     return out
