@@ -129,9 +129,9 @@ def read_regions(name: str) -> edit.Regions:
         raise InputError(f"{label(name)}: {error}") from error
     if isinstance(found, dict) and list(found) == ["regions"]:
         found = found["regions"]
-    named = found.items() if isinstance(found, dict) else enumerate(found or [])
     if not isinstance(found, dict | list) or not found:
         raise InputError(f"{label(name)}: a list of joints for each region was expected")
+    named = found.items() if isinstance(found, dict) else enumerate(found)
     for region, joints in named:
         if not isinstance(joints, list) or not all(
             isinstance(joint, str | int) and not isinstance(joint, bool) for joint in joints
