@@ -91,13 +91,17 @@ std::vector<std::vector<std::uint16_t>> list_regions(const detail::Regions& regi
 detail::Regions settle(const dna::Dna& dna, const RegroupOptions& options,
                        std::vector<detail::Unit>& units, std::uint64_t& removed) {
   const detail::Effects effects(dna, options.threshold);
+  const auto clean = [&] {
+    detail::find_layers(dna, units);
+    detail::remove_zero_rows(units);
+  };
   const auto remove = [&](const detail::Regions& regions) {
     const auto n = detail::remove_outliers(dna, regions, effects, options.foreign_share, units);
-    if (n > 0) detail::remove_zero_rows(units);
+    if (n > 0) clean();
     removed += n;
     return n;
   };
-  detail::remove_zero_rows(units);
+  clean();
   for (int pass = 0;; ++pass) {
     const bool last = pass == kMostPasses || effects.nothing_is_small();
     std::uint64_t n = 0;

@@ -72,14 +72,11 @@ void add_group(const dna::Dna& dna, std::uint32_t index, const std::vector<bool>
                std::vector<Unit>& out) {
   const dna::JointGroup& g = dna.behavior.joint_groups[index];
   const std::uint32_t lod_count = dna.descriptor.lod_count;
-  const std::size_t used = std::min<std::size_t>(g.lods.size(), lod_count);
-  const bool nests = std::is_sorted(g.lods.begin(), g.lods.begin() + used, std::greater<>());
   std::map<std::uint32_t, std::size_t> turned;  // joint -> unit
   const auto new_unit = [&](std::uint32_t joint) -> Unit& {
     Unit& unit = out.emplace_back();
     unit.joint = joint;
     unit.is_quaternion = quaternions[joint];
-    unit.chain = nests ? 0 : index + 1;
     return unit;
   };
   for (std::uint32_t r = 0; r < g.output_indices.size(); ++r) {
@@ -96,6 +93,35 @@ void add_group(const dna::Dna& dna, std::uint32_t index, const std::vector<bool>
     (added ? new_unit(joint) : out[at->second]).rows.push_back(row);
   }
   for (const auto& [joint, unit] : turned) take_rotation(g, index, out[unit]);
+}
+
+// LODs that a row is used at, finest first.
+std::vector<bool> lods_of(const dna::Dna& dna, const Row& row) {
+  std::vector<bool> out(dna.descriptor.lod_count);
+  const auto& lods = dna.behavior.joint_groups[row.group].lods;
+  for (std::size_t l = 0; l < out.size(); ++l) out[l] = lods[l] > row.row;
+  return out;
+}
+
+// LODs nest in each other where each row is used up to some LOD. Units whose rows skip a LOD can
+// only stand with units whose rows skip the same ones.
+void find_chains(const dna::Dna& dna, std::vector<Unit>& units) {
+  std::map<std::vector<std::vector<bool>>, std::vector<Unit*>> chains;
+  for (Unit& unit : units) {
+    std::vector<std::vector<bool>> sets;
+    bool skips = false;
+    for (const Row& row : unit.rows) {
+      sets.push_back(lods_of(dna, row));
+      skips |= !std::ranges::is_sorted(sets.back(), std::greater<>());
+    }
+    std::ranges::sort(sets);
+    if (skips) chains[std::move(sets)].push_back(&unit);
+  }
+  std::uint32_t chain = 0;
+  for (const auto& [sets, members] : chains) {
+    ++chain;
+    for (Unit* unit : members) unit->chain = chain;
+  }
 }
 
 // What a unit writes: an attribute, or the rotation of a quaternion joint.
@@ -129,8 +155,8 @@ bool is_hidden(const dna::Dna& dna, const Unit& unit, const std::vector<const Un
   return true;
 }
 
-// The last writer of a row is in layer 0 and layers are written from the highest to 0. Units that
-// are hidden at every LOD go, unless they keep a corrective in use.
+}  // namespace
+
 void find_layers(const dna::Dna& dna, std::vector<Unit>& units) {
   const std::vector<bool> watched = watched_correctives(dna);
   std::map<std::uint32_t, std::vector<std::size_t>> writers;
@@ -152,16 +178,14 @@ void find_layers(const dna::Dna& dna, std::vector<Unit>& units) {
   std::erase_if(units, [&](const Unit&) { return gone[i++]; });
 }
 
-}  // namespace
-
 std::vector<Unit> list_units(const dna::Dna& dna) {
   std::vector<Unit> units;
   const std::vector<bool> quaternions = quaternion_joints(dna);
   for (std::uint32_t i = 0; i < dna.behavior.joint_groups.size(); ++i) {
     add_group(dna, i, quaternions, units);
   }
-  find_layers(dna, units);
   std::ranges::stable_sort(units, {}, &Unit::joint);
+  find_chains(dna, units);
   return units;
 }
 

@@ -36,10 +36,14 @@ struct Unit {
   bool is_zero() const { return columns.empty(); }
 };
 
-/// Every row that matters at some LOD, by joint. Columns with no value are gone, a control that a
-/// group names twice is there once (but for quaternions).
-/// In: a Dna that compile accepts.
+/// Every row that some LOD uses, by joint and then in the order of the file. Columns with no value
+/// are gone, a control that a group names twice is there once (but for quaternions). In: a Dna that
+/// compile accepts.
 std::vector<Unit> list_units(const dna::Dna& dna);
+
+/// The last writer of a row is in layer 0, the one before it in layer 1; the higher is written
+/// first. Units that others hide at every LOD go, unless they keep a corrective in use.
+void find_layers(const dna::Dna& dna, std::vector<Unit>& units);
 
 /// How much a coefficient does while its control is 1, against the threshold: below 1 is small.
 class Effects {
@@ -72,7 +76,7 @@ Regions find_regions(const dna::Dna& dna, const std::vector<Unit>& units, const 
 std::uint64_t remove_outliers(const dna::Dna& dna, const Regions& regions, const Effects& effects,
                               double foreign_share, std::vector<Unit>& units);
 
-/// Rows of zeros go where the joint has another row.
+/// Rows of zeros go where the joint has another row. After find_layers.
 void remove_zero_rows(std::vector<Unit>& units);
 
 /// Fails: kLimitExceeded
