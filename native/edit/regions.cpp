@@ -19,6 +19,9 @@ namespace {
 // its last rows leave idle. A full-scale face has the same groups with anything from 8 to 64; with
 // 0 each joint would have a group of its own.
 constexpr std::int64_t kColumnOverhead = 8;
+// Joints whose controls have little in common would make a heap of tiny groups, and a group costs
+// about fifty rows more for each column than the lanes: not more than one for fourteen joints.
+constexpr std::size_t kJointsOfGroup = 14, kFewGroups = 16;
 constexpr std::int64_t kMostRows = 65535;  // that a LOD of a group can count
 
 struct Cluster {
@@ -47,7 +50,7 @@ struct Merge {
   std::uint32_t with = 0;
   auto operator<=>(const Merge&) const = default;
 };
-constexpr Merge kNoMerge{0, std::numeric_limits<double>::infinity(), UINT32_MAX};
+constexpr Merge kNoMerge{std::numeric_limits<std::int64_t>::max(), 0.0, UINT32_MAX};
 
 Merge merge_of(const Cluster& a, const Cluster& b, std::uint32_t with) {
   if (a.rows + b.rows > kMostRows) return kNoMerge;
@@ -72,15 +75,15 @@ void join(Cluster& a, Cluster& b) {
   b = {};
 }
 
-// Merges the best pair as long as that makes the whole smaller. Each cluster knows its best partner
-// among those after it.
+// Merges the best pair as long as that makes the whole smaller or there are too many. Each cluster
+// knows its best partner among those after it.
 class Clustering {
  public:
   explicit Clustering(std::vector<Cluster>& clusters)
-      : clusters_(clusters), best_(clusters.size(), kNoMerge) {
+      : clusters_(clusters), best_(clusters.size(), kNoMerge), count_(clusters.size()) {
+    const std::size_t most = std::max(kFewGroups, clusters.size() / kJointsOfGroup);
     for (std::uint32_t i = 0; i < clusters.size(); ++i) search(i);
-    while (step()) {
-    }
+    while (step(count_ > most)) --count_;
   }
 
  private:
@@ -91,9 +94,10 @@ class Clustering {
       if (!is_gone(j)) best_[i] = std::min(best_[i], merge_of(clusters_[i], clusters_[j], j));
     }
   }
-  bool step() {
+  bool step(bool too_many) {
     const auto found = std::ranges::min_element(best_);
-    if (found == best_.end() || found->change >= 0) return false;
+    if (found == best_.end() || found->with == kNoMerge.with) return false;
+    if (found->change >= 0 && !too_many) return false;
     const auto i = static_cast<std::uint32_t>(found - best_.begin());
     const std::uint32_t j = found->with;
     join(clusters_[i], clusters_[j]);
@@ -112,6 +116,7 @@ class Clustering {
 
   std::vector<Cluster>& clusters_;
   std::vector<Merge> best_;
+  std::size_t count_;
 };
 
 // The strongest effect of each control on a joint.

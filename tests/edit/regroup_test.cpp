@@ -107,8 +107,14 @@ dna::Dna with_outliers(float small, float large) {
   return dna;
 }
 
-TEST(Regroup, TakesOutWhatIsSmallAndForeign) {
+RegroupOptions in_one_region() {
   RegroupOptions options;
+  options.regions = {{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11}};
+  return options;
+}
+
+TEST(Regroup, TakesOutWhatIsSmallAndForeign) {
+  RegroupOptions options = in_one_region();
   options.threshold.translation_mm = 0.5;
   const Regrouped out = must_regroup(with_outliers(0.049f, 0.051f), options);  // cm
   EXPECT_EQ(out.report.removed, 1u);
@@ -135,10 +141,9 @@ TEST(Regroup, NamesThePoseWhereAJointMovedMost) {
   dna.definition.neutral_joint_translations.values = places;
   dna.behavior.joint_groups =
       std::vector{dna.behavior.joint_groups[0], make_group({1, 1}, {1}, {5}, {1.0f})};
-  RegroupOptions options;
+  RegroupOptions options = in_one_region();
   options.threshold.rotation_degrees = 2.0;
   options.combinations = 0;
-  options.regions = {{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11}};
   const Changes changes = must_regroup(dna, options).report.changes;
   EXPECT_NEAR(changes.rotation_degrees.value, 1.0, 1e-6);
   EXPECT_EQ(changes.rotation_degrees.joint, "joint0");
@@ -151,7 +156,7 @@ TEST(Regroup, NamesThePoseWhereAJointMovedMost) {
 TEST(Regroup, ThresholdsCountInTheFilesUnits) {
   dna::Dna dna = with_outliers(0.00049f, 0.00051f);
   dna.descriptor.translation_unit = 1;  // metres
-  RegroupOptions options;
+  RegroupOptions options = in_one_region();
   options.threshold.translation_mm = 0.5;
   EXPECT_EQ(must_regroup(dna, options).report.removed, 1u);
 }
@@ -185,6 +190,15 @@ TEST(Regroup, TheLastWriterOfARowStillWins) {
   expect_same_function(dna, out.dna, {0.5f, 0.25f});
 }
 
+TEST(Regroup, TheLastGroupThatTurnsAQuaternionJointStillWins) {
+  dna::Dna dna = make_face(2, 0, 1);
+  dna.behavior.joint_groups =
+      std::vector{make_group({2, 2}, {0}, {3, 4}, {30, 40}), make_group({1, 0}, {1}, {5}, {50})};
+  dna.joint_behavior_metadata.joint_representations =
+      std::vector{dna::JointRepresentation{0, 1, 0}};
+  expect_same_function(dna, must_regroup(dna).dna, {0.5f, 0.25f});
+}
+
 TEST(Regroup, LodsThatDoNotNestStay) {
   dna::Dna dna = make_face(2, 0, 2, 3);
   dna.behavior.joint_groups = std::vector{make_group({1, 2, 0}, {0}, {0, 1}, {1, 2}),
@@ -202,9 +216,8 @@ TEST(Regroup, ACorrectiveThatAnotherReadsStaysInUse) {
   dna.behavior.joint_groups =
       std::vector{dna.behavior.joint_groups[0], make_group({1, 0}, {2}, {1}, {0.001f}),
                   make_group({1, 1}, {3}, {2}, {5.0f})};
-  RegroupOptions options;
+  RegroupOptions options = in_one_region();
   options.threshold.translation_mm = 1.0;
-  options.regions = {{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11}};
   const Regrouped out = must_regroup(dna, options);
   EXPECT_EQ(out.report.removed, 0u);
   expect_same_function(dna, out.dna, {0.5f, 0.25f});
