@@ -561,6 +561,53 @@ def test_bad_regions_write_nothing(text, words, tmp_path):
     assert not (tmp_path / "out.dna").exists()
 
 
+def test_standard_input_and_output():
+    data = (GOLDEN / "medium.dna").read_bytes()
+    done = subprocess.run(
+        [sys.executable, "-m", "risorius", "edit", "regroup", "-", "-"],
+        input=data,
+        capture_output=True,
+        check=False,
+    )
+    assert done.returncode == 0
+    assert b"coefficients stored" in done.stderr
+    assert done.stdout == edit.regroup(risorius.load(data), timed=0)[0].to_bytes()
+
+
+def test_names_say_what_the_files_are(tmp_path):
+    done = command(GOLDEN / "core.dna", tmp_path / "out.txt")
+    assert done.returncode == 2
+    assert "a name ending in .dna or .json was expected, or -" in done.stderr
+
+
+@pytest.mark.parametrize("minor", range(1, 9))
+def test_the_version_stays(minor, tmp_path):
+    face, out = tmp_path / "face.dna", tmp_path / "out.dna"
+    risorius.load(GOLDEN / "medium.dna").save(face, version=f"2.{minor}", unknown_layers="ignore")
+    assert main(["edit", "regroup", str(face), str(out)]) == 0
+    assert risorius.load(out).version == minor
+
+
+def test_values_that_are_no_numbers_stay():
+    dna, *_ = face_of_regions(0)
+    group = dna.joint_groups[0]
+    values = group.values.copy()
+    values[[3, 700], [1, 2]] = np.nan, np.inf
+    group.values = values.ravel()
+    out, report = edit.regroup(dna, threshold=1e9, foreign_share=1, timed=0)
+    left = np.concatenate([g.values.ravel() for g in out.joint_groups])
+    left = left[left != 0]
+    assert np.isnan(left).sum() == np.isinf(left).sum() == 1
+    assert len(left) == 2 == report.after.nonzero
+
+
+def test_a_face_without_behavior_stays_one():
+    dna = risorius.load(GOLDEN / "medium.dna", layers="definition")
+    out, report = edit.regroup(dna, timed=0)
+    assert report.after.groups == report.before.groups == 0
+    assert out.to_bytes() == dna.to_bytes()
+
+
 def test_the_input_is_replaced_only_by_force(tmp_path):
     face = tmp_path / "face.dna"
     data = (GOLDEN / "medium.dna").read_bytes()

@@ -22,8 +22,8 @@ _DESCRIPTION = """\
 Joints that the same controls drive come together in dense joint groups, whatever the groups of
 INPUT are, and small coefficients that a control has among joints foreign to it are taken out.
 Prints what that changed: sizes, the largest change of any joint with every raw control at 1 and in
-random combinations, the time of an evaluation. .dna or .json by the suffix, "-" is the standard
-input or output. OUTPUT may be there already and is replaced as a whole or, after an error, not at
+random combinations, the time of an evaluation. .dna or .json by the suffix, "-" is a .dna on the
+standard input or output. OUTPUT may be there already and is replaced as a whole or, after an error, not at
 all."""
 _CHANGES = {
     "translation_mm": ("a joint against its parent", "mm"),
@@ -214,7 +214,9 @@ def _require_plot() -> None:
 def _regroup(args: argparse.Namespace) -> None:
     threshold = parse_threshold(args.threshold)
     complain(args)
-    kinds = kind_of(args.input, None, "a copy of such a name"), kind_of(args.output, None, "so")
+    kinds = [
+        kind_of(name, "dna" if name == "-" else None, "-") for name in (args.input, args.output)
+    ]
     if args.plot is not None:
         _require_plot()
     regions = None if args.regions is None else read_regions(args.regions)
