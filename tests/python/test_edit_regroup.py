@@ -592,7 +592,7 @@ def test_values_that_are_no_numbers_stay():
     dna, *_ = face_of_regions(0)
     group = dna.joint_groups[0]
     values = group.values.copy()
-    values[[3, 700], [1, 2]] = np.nan, np.inf
+    values[[3, 600], [1, 2]] = np.nan, np.inf
     group.values = values.ravel()
     out, report = edit.regroup(dna, threshold=1e9, foreign_share=1, timed=0)
     left = np.concatenate([g.values.ravel() for g in out.joint_groups])

@@ -22,9 +22,9 @@ _DESCRIPTION = """\
 Joints that the same controls drive come together in dense joint groups, whatever the groups of
 INPUT are, and small coefficients that a control has among joints foreign to it are taken out.
 Prints what that changed: sizes, the largest change of any joint with every raw control at 1 and in
-random combinations, the time of an evaluation. .dna or .json by the suffix, "-" is a .dna on the
-standard input or output. OUTPUT may be there already and is replaced as a whole or, after an error, not at
-all."""
+random combinations, the time of an evaluation.
+.dna or .json by the suffix, "-" is a .dna on the standard input or output. OUTPUT may be there
+already and is replaced as a whole or, after an error, not at all."""
 _CHANGES = {
     "translation_mm": ("a joint against its parent", "mm"),
     "rotation_degrees": ("a joint's rotation", "degrees"),
