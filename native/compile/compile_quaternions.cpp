@@ -116,7 +116,11 @@ rig::EulerConvention detail::euler_convention(const dna::Dna& dna) {
 void detail::compile_quaternion_joints(const dna::Dna& dna, const Groups& groups, RigData& out) {
   const std::vector<bool> flags = quaternion_joint_flags(dna);
   std::vector<std::uint32_t> euler(flags.size(), 0);
-  for (std::uint32_t i = 0; i < groups.size(); ++i) add_group(*groups[i], i, flags, euler, out);
+  // In the order of the file: the last group that turns a joint wins.
+  std::vector<std::uint32_t> file_order(groups.size());
+  std::iota(file_order.begin(), file_order.end(), 0u);
+  std::ranges::sort(file_order, {}, [&](std::uint32_t i) { return groups[i]; });
+  for (const std::uint32_t i : file_order) add_group(*groups[i], i, flags, euler, out);
   list_euler_joints(euler, out);
   if (out.quaternion_joints.empty()) return;
   std::vector<std::uint32_t>& list = out.quaternion_column_list;
