@@ -7,6 +7,7 @@
 namespace risorius::bindings {
 
 void bind_dna(py::module_& m);
+void bind_edit(py::module_& m);
 void bind_rig(py::module_& m);
 
 namespace {
@@ -40,4 +41,5 @@ PYBIND11_MODULE(_native, m) {
   m.attr("DnaError") = pybind11::handle(risorius::bindings::dna_error_type);
   risorius::bindings::bind_dna(m);
   risorius::bindings::bind_rig(m);
+  risorius::bindings::bind_edit(m);
 }

@@ -58,12 +58,22 @@ void add_column(const dna::JointGroup& g, std::size_t c, const std::vector<Rotat
   if (column.terms_end > column.terms_begin) out.quaternion_columns.push_back(column);
 }
 
-// One more than the last LOD that has any of the rows.
-std::uint32_t levels_of(const RotationRows& rows, const RigData& out, std::uint32_t group) {
-  const std::uint32_t first = *std::ranges::min_element(rows);
+// One more than the last LOD that has the row.
+std::uint32_t levels_of(std::uint32_t row, const RigData& out, std::uint32_t group) {
   std::uint32_t levels = out.lod_count;
-  while (levels > 0 && out.joint_group_lods[group * out.lod_count + levels - 1] <= first) --levels;
+  while (levels > 0 && out.joint_group_lods[group * out.lod_count + levels - 1] <= row) --levels;
   return levels;
+}
+
+// Every row counts, also those that a later one for the same angle hides at finer LODs.
+void count_euler_levels(const dna::JointGroup& g, std::uint32_t index,
+                        const std::vector<bool>& flags, const RigData& out,
+                        std::vector<std::uint32_t>& euler) {
+  for (std::uint32_t r = 0; r < out.joint_groups[index].row_count; ++r) {
+    const std::uint32_t joint = g.output_indices[r] / 9u, attribute = g.output_indices[r] % 9u;
+    if (attribute < 3 || attribute > 5 || flags[joint]) continue;
+    euler[joint] = std::max(euler[joint], levels_of(r, out, index));
+  }
 }
 
 // In: levels  per joint, 0 where no Euler angles turn it
@@ -80,14 +90,11 @@ void list_euler_joints(const std::vector<std::uint32_t>& levels, RigData& out) {
 }
 
 void add_group(const dna::JointGroup& g, std::uint32_t index, const std::vector<bool>& flags,
-               std::vector<std::uint32_t>& euler, RigData& out) {
+               RigData& out) {
   const auto first_slot = static_cast<std::uint32_t>(out.quaternion_joints.size());
   std::vector<RotationRows> turned;
   for (const auto& [joint, rows] : rotation_rows(g, out.joint_groups[index].row_count)) {
-    if (!flags[joint]) {
-      euler[joint] = std::max(euler[joint], levels_of(rows, out, index));
-      continue;
-    }
+    if (!flags[joint]) continue;
     out.quaternion_joints.push_back({joint, index, *std::ranges::min_element(rows)});
     turned.push_back(rows);
   }
@@ -116,7 +123,14 @@ rig::EulerConvention detail::euler_convention(const dna::Dna& dna) {
 void detail::compile_quaternion_joints(const dna::Dna& dna, const Groups& groups, RigData& out) {
   const std::vector<bool> flags = quaternion_joint_flags(dna);
   std::vector<std::uint32_t> euler(flags.size(), 0);
-  for (std::uint32_t i = 0; i < groups.size(); ++i) add_group(*groups[i], i, flags, euler, out);
+  // In the order of the file: the last group that turns a joint wins.
+  std::vector<std::uint32_t> file_order(groups.size());
+  std::iota(file_order.begin(), file_order.end(), 0u);
+  std::ranges::sort(file_order, {}, [&](std::uint32_t i) { return groups[i]; });
+  for (const std::uint32_t i : file_order) {
+    count_euler_levels(*groups[i], i, flags, out, euler);
+    add_group(*groups[i], i, flags, out);
+  }
   list_euler_joints(euler, out);
   if (out.quaternion_joints.empty()) return;
   std::vector<std::uint32_t>& list = out.quaternion_column_list;

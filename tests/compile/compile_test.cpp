@@ -184,6 +184,33 @@ TEST(Compile, ColumnsHaveNoPadding) {
   EXPECT_EQ(reinterpret_cast<std::uintptr_t>(rig.joint_values.data()) % 64, 0u);
 }
 
+TEST(Compile, TheLastGroupThatTurnsAQuaternionJointWinsWhateverItsLods) {
+  const dna::JointGroup first = make_group({1, 0}, {0}, {3}, {30});
+  const dna::JointGroup last = make_group({1, 1}, {0}, {4}, {40});
+  dna::Dna both = make_face(1, 0, 1), one = both;
+  both.behavior.joint_groups = std::vector{first, last};
+  one.behavior.joint_groups = std::vector{last};
+  for (dna::Dna* dna : {&both, &one}) {
+    dna->joint_behavior_metadata.joint_representations =
+        std::vector{dna::JointRepresentation{0, 1, 0}};
+  }
+  EXPECT_EQ(evaluate_once(must_compile(both), {1.0f}).joints,
+            evaluate_once(must_compile(one), {1.0f}).joints);
+}
+
+// LOD 1 has only the first of two rows for one angle; it is an angle there and no part of a
+// quaternion.
+TEST(Compile, AnAngleWrittenTwiceIsTurnedAtEveryLod) {
+  dna::Dna dna = make_face(1, 0, 1);
+  dna.behavior.joint_groups = std::vector{make_group({2, 1}, {0}, {3, 3}, {60, 90})};
+  CompileOptions options;
+  options.rotation = Rotation::kQuaternion;
+  const auto rig = compile(dna, options);
+  ASSERT_TRUE(rig);
+  EXPECT_NEAR(evaluate_once(rig.value(), {1.0f}, 0).joints[3], 0.70710678f, 1e-6f);
+  EXPECT_NEAR(evaluate_once(rig.value(), {1.0f}, 1).joints[3], 0.5f, 1e-6f);
+}
+
 // 60,000 correctives, each reading the next: the order must not cost their square.
 TEST(Compile, LongChainOfCorrectivesCompilesInTime) {
   constexpr std::uint16_t n = 60000;

@@ -10,10 +10,10 @@ from pathlib import Path
 NATIVE = {
     "core": set(),
     "dna": {"core"},
-    "edit": {"core", "dna"},
     "simd": {"core"},
     "rig": {"core", "simd"},
     "compile": {"core", "dna", "simd", "rig"},
+    "edit": {"core", "dna", "simd", "rig", "compile"},
     "author": {"core", "dna", "edit", "simd", "rig", "compile"},
     "clip": {"core"},
 }

@@ -923,3 +923,75 @@ def rig_block_version() -> int:
     """Of Rig.to_bytes; others are refused."""
 
 def available_simd() -> str: ...
+
+class GroupSizes:
+    """Joint groups, their rows, coefficients stored (zeros too), not zero."""
+
+    @property
+    def groups(self) -> int: ...
+    @property
+    def rows(self) -> int: ...
+    @property
+    def coefficients(self) -> int: ...
+    @property
+    def nonzero(self) -> int: ...
+
+class LargestChange:
+    """The largest difference of one kind; joint is "" if there is none."""
+
+    @property
+    def value(self) -> float: ...
+    @property
+    def joint(self) -> str: ...
+    @property
+    def expression(self) -> str: ...
+    @property
+    def lod(self) -> int: ...
+
+class RegroupReport:
+    """What regroup did."""
+
+    @property
+    def before(self) -> GroupSizes: ...
+    @property
+    def after(self) -> GroupSizes: ...
+    @property
+    def regions(self) -> list[list[int]]: ...
+    @property
+    def removed(self) -> int: ...
+    @property
+    def microseconds_before(self) -> float: ...
+    @property
+    def microseconds_after(self) -> float: ...
+    @property
+    def translation_mm(self) -> LargestChange:
+        """Of a joint against its parent."""
+    @property
+    def rotation_degrees(self) -> LargestChange:
+        """Of a joint against its parent."""
+    @property
+    def scale(self) -> LargestChange:
+        """Of a joint, 1 is its size."""
+    @property
+    def position_mm(self) -> LargestChange:
+        """Of a joint in the face."""
+    @property
+    def expressions(self) -> int:
+        """Raw controls that were tried one by one."""
+    @property
+    def combinations(self) -> int:
+        """Random poses that were tried."""
+
+def regroup(
+    dna: Dna,
+    *,
+    regions: Sequence[Sequence[_Int]],
+    translation_mm: float,
+    rotation_degrees: float,
+    scale: float,
+    foreign_share: float,
+    combinations: _Int,
+    seed: _Int,
+    timed: _Int,
+) -> tuple[Dna, RegroupReport]:
+    """(Dna, RegroupReport): see risorius.edit.regroup."""

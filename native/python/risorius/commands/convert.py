@@ -111,7 +111,7 @@ def _say(text: str) -> None:
 
 
 @contextlib.contextmanager
-def _warnings_as_lines(name: str) -> Iterator[None]:
+def warnings_as_lines(name: str) -> Iterator[None]:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         yield
@@ -216,7 +216,7 @@ def run(args: argparse.Namespace) -> int:
         args.output_kind = kind_of(args.output, args.output_kind, "--to")
         complain(args)
         source = read(args.input, args.input_kind)
-        with _warnings_as_lines(label(args.input)):
+        with warnings_as_lines(label(args.input)):
             dna, data = convert(source, args)
         if args.output_kind == "json":
             data = json_text(dna, args.indent)

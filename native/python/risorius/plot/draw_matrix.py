@@ -119,7 +119,7 @@ def _draw_regrouped(axes: Axes, facts: Facts, pixels: tuple[int, int]) -> None:
     heading(
         axes,
         "By joint group: dense",
-        f"{facts.stored:,} stored in {len(blocks)} groups, "
+        f"{facts.stored:,} stored in {len(blocks)} group{'' if len(blocks) == 1 else 's'}, "
         f"{facts.nonzero / facts.stored:.0%} not zero",
     )
     axes.set_xlabel("controls that the group reads", labelpad=6)

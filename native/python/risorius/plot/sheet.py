@@ -27,26 +27,24 @@ def render(facts: Facts, lod: int, dpi: int) -> bytes:
     with settings():
         figure = Figure(figsize=(WIDTH, HEAD + UPPER + LOWER), dpi=dpi, facecolor="white")
         FigureCanvasAgg(figure)
-        head, upper, lower = _split(figure, rows=[HEAD, UPPER, LOWER])
+        head, upper, lower = split(figure, rows=[HEAD, UPPER, LOWER])
         _draw_head(head, facts)
         widths = [LEFT, WIDTH - LEFT]
-        face, matrix = _split(upper, columns=widths)
-        lods, sizes = _split(lower, columns=widths)
+        face, matrix = split(upper, columns=widths)
+        lods, sizes = split(lower, columns=widths)
         right = WIDTH - LEFT
-        draw_face.draw(_panel(face, words.FACE, words.face(lod), LEFT, UPPER), facts, lod, dpi)
-        draw_matrix.draw(
-            _panel(matrix, words.MATRIX, words.matrix(facts), right, UPPER), facts, dpi
-        )
-        draw_lods.draw(_panel(lods, words.LODS, words.lods(), LEFT, LOWER), facts)
+        draw_face.draw(panel(face, words.FACE, words.face(lod), LEFT, UPPER), facts, lod, dpi)
+        draw_matrix.draw(panel(matrix, words.MATRIX, words.matrix(facts), right, UPPER), facts, dpi)
+        draw_lods.draw(panel(lods, words.LODS, words.lods(), LEFT, LOWER), facts)
         draw_sizes.draw(
-            _panel(sizes, words.SIZES, words.sizes(facts), right, LOWER), facts, with_counts=True
+            panel(sizes, words.SIZES, words.sizes(facts), right, LOWER), facts, with_counts=True
         )
         out = io.BytesIO()
         figure.savefig(out, format="png", facecolor="white", metadata={"Software": "risorius"})
         return out.getvalue()
 
 
-def _split(
+def split(
     figure: FigureBase, rows: Sequence[float] = (1,), columns: Sequence[float] = (1,)
 ) -> list[SubFigure]:
     """Parts of a figure from top to bottom, or from left to right."""
@@ -78,12 +76,12 @@ def _draw_head(figure: SubFigure, facts: Facts) -> None:
         )
 
 
-def _panel(figure: SubFigure, title: str, caption: str, width: float, height: float) -> Canvas:
+def panel(figure: SubFigure, title: str, caption: str, width: float, height: float) -> Canvas:
     """A heading with its caption over a place to draw in. Sizes in inches."""
     edge = _EDGE / width
     lines = textwrap.wrap(caption, round(width * 13))
     top = 0.68 + 0.19 * len(lines)
-    head, rest = _split(figure, rows=[top, height - top])
+    head, rest = split(figure, rows=[top, height - top])
     rule = head.add_axes((edge, 0.95, 1 - 2 * edge, 0.001))
     rule.set_axis_off()
     rule.axhline(0, color=RULE, linewidth=1.2, clip_on=False)

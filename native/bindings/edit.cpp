@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: MIT
+// Dna -> Dna operations.
+#include "bindings/fields.h"
+#include "edit/regroup.h"
+
+namespace risorius::bindings {
+
+namespace {
+
+using edit::GroupSizes;
+using edit::LargestChange;
+using edit::RegroupReport;
+using JointLists = std::vector<std::vector<std::uint16_t>>;
+
+py::tuple regroup(const dna::Dna& dna, const JointLists& regions, double translation_mm,
+                  double rotation_degrees, double scale, double foreign_share,
+                  std::uint32_t combinations, std::uint64_t seed, std::uint32_t timed) {
+  const edit::RegroupOptions options{
+      regions, {translation_mm, rotation_degrees, scale}, foreign_share, combinations, seed, timed};
+  auto result = [&] {
+    const py::gil_scoped_release released;
+    return edit::regroup(dna, options);
+  }();
+  edit::Regrouped out = unwrap(std::move(result));
+  return py::make_tuple(std::make_shared<dna::Dna>(std::move(out.dna)), std::move(out.report));
+}
+
+template <class Change>
+void change(py::class_<RegroupReport>& c, const char* name, Change member, const char* doc) {
+  c.def_property_readonly(
+      name, [member](const RegroupReport& r) { return r.changes.*member; }, doc);
+}
+
+void bind_report(py::module_& m) {
+  py::class_<GroupSizes>(m, "GroupSizes",
+                         "Joint groups, their rows, coefficients stored (zeros too), not zero.")
+      .def_readonly("groups", &GroupSizes::groups)
+      .def_readonly("rows", &GroupSizes::rows)
+      .def_readonly("coefficients", &GroupSizes::coefficients)
+      .def_readonly("nonzero", &GroupSizes::nonzero);
+  py::class_<LargestChange>(m, "LargestChange",
+                            "The largest difference of one kind; joint is \"\" if there is none.")
+      .def_readonly("value", &LargestChange::value)
+      .def_property_readonly("joint", [](const LargestChange& s) { return to_python(s.joint); })
+      .def_property_readonly("expression",
+                             [](const LargestChange& s) { return to_python(s.expression); })
+      .def_readonly("lod", &LargestChange::lod);
+  py::class_<RegroupReport> report(m, "RegroupReport", "What regroup did.");
+  report.def_readonly("before", &RegroupReport::before)
+      .def_readonly("after", &RegroupReport::after)
+      .def_readonly("regions", &RegroupReport::regions)
+      .def_readonly("removed", &RegroupReport::removed)
+      .def_readonly("microseconds_before", &RegroupReport::microseconds_before)
+      .def_readonly("microseconds_after", &RegroupReport::microseconds_after);
+  using edit::Changes;
+  change(report, "translation_mm", &Changes::translation_mm, "Of a joint against its parent.");
+  change(report, "rotation_degrees", &Changes::rotation_degrees, "Of a joint against its parent.");
+  change(report, "scale", &Changes::scale, "Of a joint, 1 is its size.");
+  change(report, "position_mm", &Changes::position_mm, "Of a joint in the face.");
+  change(report, "expressions", &Changes::expressions, "Raw controls that were tried one by one.");
+  change(report, "combinations", &Changes::combinations, "Random poses that were tried.");
+}
+
+}  // namespace
+
+void bind_edit(py::module_& m) {
+  bind_report(m);
+  m.def("regroup", &regroup, py::arg("dna"), py::kw_only(), py::arg("regions"),
+        py::arg("translation_mm"), py::arg("rotation_degrees"), py::arg("scale"),
+        py::arg("foreign_share"), py::arg("combinations"), py::arg("seed"), py::arg("timed"),
+        "(Dna, RegroupReport): see risorius.edit.regroup.");
+}
+
+}  // namespace risorius::bindings
