@@ -87,8 +87,9 @@ inline PoseView view(Pose& pose) {
           pose.controls.data()};
 }
 
-/// Scratch memory of one thread.
-struct Workspace {
+/// Scratch memory of one thread; alone in its cache lines, so that threads side by side do not wait
+/// for each other.
+struct alignas(128) Workspace {
   std::vector<std::uint16_t> active;  // controls that are not 0, ascending
   std::size_t active_count = 0;
   std::size_t raw_active = 0;                // how many of them are raw

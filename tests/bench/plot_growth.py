@@ -18,7 +18,7 @@ PANELS = {
     "joints": ("joints that the matrices move", "us"),
     "LOD": ("coefficients that the LOD keeps", "us"),
     "faces": ("faces or frames at once", "us each"),
-    "cores": ("cores, clip of 1,000 frames", "us each"),
+    "cores": ("cores, 64 faces on each", "us each"),
 }
 OURS, CSR = "#0b6e8f", "#b3541e"
 
