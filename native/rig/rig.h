@@ -92,6 +92,7 @@ inline PoseView view(Pose& pose) {
 struct alignas(128) Workspace {
   std::vector<std::uint16_t> active;  // controls that are not 0, ascending
   std::size_t active_count = 0;
+  std::uint32_t touched = 0;                 // nothing: keeps reads that only fetch
   std::size_t raw_active = 0;                // how many of them are raw
   std::vector<std::uint16_t> candidates;     // correctives that may not be 0
   std::vector<std::uint64_t> psd_bits;       // correctives that are not 0, by output
