@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import risorius
 from support import oracle, scene
-from support.faces import CONTROLS, EYE, HEAD, JOINTS
+from support.faces import CONTROLS, EYE, HEAD, JOINTS, UNOWNED, small_face
 
 
 def test_controls_are_floats_with_limits(dna_file):
@@ -165,3 +165,26 @@ def test_users_own_shape_key_stays_on_top(dna_file):
     moved = scene.evaluated(head) - oracle.vertices(dna, 0, pose)
     assert np.linalg.norm(moved[3]) > 0.04
     assert np.abs(np.delete(moved, 3, axis=0)).max() < 1e-5
+
+
+def test_a_rotation_rests_at_no_turn_and_reset_returns_to_it(tmp_path):
+    dna = small_face()
+    turn = ["turn.x", "turn.y", "turn.z", "turn.w"]
+    dna.raw_control_names = [*CONTROLS[:7], *turn]
+    dna.twist_swing_behavior.twists = [
+        risorius.TwistSwingSetup(
+            input_control_indices=[7, 8, 9, 10], output_joint_indices=[UNOWNED], blend_weights=[1.0]
+        )
+    ]
+    dna.save(str(tmp_path / "turn.dna"))
+    rig = scene.load(tmp_path / "turn.dna")
+    bone = scene.face(rig)
+    assert [bone[name] for name in turn] == [0.0, 0.0, 0.0, 1.0]
+    for name, default in zip(turn, (0.0, 0.0, 0.0, 1.0), strict=True):
+        words = bone.id_properties_ui(name).as_dict()
+        assert (words["min"], words["max"], words["default"]) == (-1.0, 1.0, default)
+    bone["turn.x"], bone["turn.w"], bone[CONTROLS[0]] = -0.6, 0.8, 0.5
+    bpy.context.view_layer.objects.active = rig
+    assert bpy.ops.risorius.reset() == {"FINISHED"}
+    assert [bone[name] for name in turn] == [0.0, 0.0, 0.0, 1.0]
+    assert bone[CONTROLS[0]] == 0.0

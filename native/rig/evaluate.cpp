@@ -56,7 +56,7 @@ class Correctives {
     for (const std::uint16_t control : active) {
       for (std::uint32_t i = begins[control]; i < begins[control + 1]; ++i) {
         candidates[n] = rig_.watched[i].psd;
-        n += controls_[rig_.watched[i].other] > 0.0f ? 1 : 0;  // clamped, another factor is 0
+        n += controls_[rig_.watched[i].other] <= 0.0f ? 0 : 1;  // clamped, another factor is 0
       }
     }
     for (std::size_t i = 0; i < n; ++i) {

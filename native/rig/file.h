@@ -26,8 +26,7 @@ enum class Trust {
 core::Status save_rig(const Rig& rig, const std::filesystem::path& path);
 
 /// A Rig from a file of save_rig. Messages begin with the path.
-/// In:    by  kMap opens a large file at once where its bytes are trusted; others are always
-/// copied,
+/// In:    by  kMap opens a large file at once where its bytes are trusted; others are copied,
 ///            since whoever can write to a mapped file can change it after the check
 /// Fails: kIoOpen, kIoRead, and as open_rig
 core::Result<Rig> open_rig_file(const std::filesystem::path& path, Trust trust, core::ReadBy by,

@@ -130,12 +130,11 @@ void gui_to_raw(const Rig& rig, const float* gui, float* raw) noexcept;
 void raw_to_gui(const Rig& rig, const float* raw, float* gui) noexcept;
 
 /// Turns raw controls into a pose. Allocates nothing.
-/// In:   raw     float32[R]. Any value is taken. Outside [0, 1] nothing is clamped: joints and
-/// shapes
-///               follow beyond, correctives clamp the factors that they multiply, maps rest outside
-///               their intervals. NaN or infinity spoils every row of the joint groups that have it
-///               as a column, its shapes, maps, correctives, networks and setups, and nothing else;
-///               check_finite finds it
+/// In:   raw     float32[R]. Any value is taken. Outside [0, 1] joints and shapes follow beyond,
+///               correctives clamp their factors, maps rest outside their intervals. NaN or
+///               infinity spoils every row of the joint groups that have it as a column, its
+///               shapes, maps, networks, setups and the correctives of which no other factor is 0,
+///               and nothing else; check_finite finds it
 ///       lod     clamped to the last LOD
 ///       settle  true: networks, solvers and correctives are evaluated in the order of their
 ///               dependency, so that the pose is a function of raw alone; false: networks, then
@@ -176,7 +175,8 @@ struct NonFinite {
 };
 
 /// The raw controls that are NaN or infinite, frame after frame. evaluate() does not look: see
-/// there for what such a control spoils. In:   raw   float32[count, R]
+/// there for what such a control spoils.
+/// In:   raw   float32[count, R]
 ///       most  of them that are returned
 /// Cost: one pass over raw; allocates only where something is found.
 std::vector<NonFinite> find_non_finite(const Rig& rig, const float* raw, std::size_t count,

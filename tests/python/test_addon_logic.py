@@ -271,3 +271,12 @@ class TestPlans:
         for mesh in plan.meshes:
             source = dna.meshes[mesh.index]
             np.testing.assert_allclose(mesh.positions[:, 2], source.positions[:, 1] * 0.01, 1e-5)
+
+
+def test_sliders_of_a_rotation_reach_below_0_and_rest_at_no_turn():
+    raw_names = ["CTRL.jawOpen", "neck.x", "neck.y", "neck.z", "neck.w", "other.x"]
+    plain, *turn, other = plans.plan_controls(raw_names, [0, 0, 0, 0, 1])
+    assert [(c.rest, c.lowest) for c in (plain, other)] == [(0.0, 0.0)] * 2
+    assert [c.rest for c in turn] == [0.0, 0.0, 0.0, 1.0]
+    assert [c.lowest for c in turn] == [-1.0] * 4
+    assert all((c.rest, c.lowest) == (0.0, 0.0) for c in plans.plan_controls(raw_names))

@@ -108,7 +108,11 @@ TEST(EvaluateCorrectives, RawControlsKeepTheirUnclampedValue) {
 }
 
 TEST(EvaluateCorrectives, NanFactorSpoilsTheCorrective) {
-  EXPECT_TRUE(std::isnan(evaluate_once(corrective_rig({0, 1}, {1, 1}), {kNan, 1.0f}).controls[2]));
+  const Rig rig = corrective_rig({0, 1}, {1, 1});  // whichever of the two watches it
+  EXPECT_TRUE(std::isnan(evaluate_once(rig, {kNan, 1.0f}).controls[2]));
+  EXPECT_TRUE(std::isnan(evaluate_once(rig, {1.0f, kNan}).controls[2]));
+  EXPECT_EQ(evaluate_once(rig, {0.0f, kNan}).controls[2], 0.0f);
+  EXPECT_EQ(evaluate_once(rig, {kNan, 0.0f}).controls[2], 0.0f);
 }
 
 // Correctives 1, 2, 3 of one raw control, each half of the one that it reads; entries interleaved.

@@ -101,6 +101,8 @@ class ControlPlan:
     label: str
     region: str
     description: str
+    rest: float = 0.0
+    lowest: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -177,7 +179,11 @@ def find_anchors(joint_names: Sequence[str]) -> Anchors:
 
 
 def plan_character(
-    dna: Any, fallback_name: str, lods: Sequence[int] = (0,), unit_scale: float = 1.0
+    dna: Any,
+    fallback_name: str,
+    lods: Sequence[int] = (0,),
+    unit_scale: float = 1.0,
+    rests: Sequence[float] = (),
 ) -> CharacterPlan:
     """Describe the character of a file.
 
@@ -186,6 +192,7 @@ def plan_character(
         fallback_name: used where the file bears no name.
         lods: levels of detail whose meshes are built.
         unit_scale: metres per Blender unit.
+        rests: raw controls at rest, see plan_controls.
 
     Returns:
         The plan; nothing in it refers to `dna`.
@@ -212,7 +219,7 @@ def plan_character(
         space=space,
         armature=_plan_armature(dna, space),
         meshes=meshes,
-        controls=plan_controls(dna.raw_control_names),
+        controls=plan_controls(dna.raw_control_names, rests),
         map_labels=names.unique_labels(dna.animated_map_names),
         channel_count=len(dna.blend_shape_channel_names),
         anchors=find_anchors(dna.joint_names),
@@ -235,11 +242,28 @@ def _mesh_lods(dna: Any) -> list[tuple[int, ...]]:
     return [tuple(level) for level in levels]
 
 
-def plan_controls(raw_names: Sequence[str]) -> list[ControlPlan]:
-    """The sliders of a file's raw controls, in index order."""
+def plan_controls(raw_names: Sequence[str], rests: Sequence[float] = ()) -> list[ControlPlan]:
+    """The sliders of a file's raw controls, in index order.
+
+    Args:
+        raw_names: of all of them.
+        rests: their values at rest, 0 where it ends. A 1 is the w of a quaternion that the file's
+            solvers read: all parts of that quaternion reach from -1 to 1.
+    """
     labels = names.unique_labels(raw_names)
+    values = [float(r) for r in rests] + [0.0] * (len(raw_names) - len(rests))
+    turning = {
+        name.rpartition(".")[0] for name, rest in zip(raw_names, values, strict=True) if rest
+    }
     return [
-        ControlPlan(i, labels[i], regions.region_of(name), f"{regions.title(name)} ({name})")
+        ControlPlan(
+            i,
+            labels[i],
+            regions.region_of(name),
+            f"{regions.title(name)} ({name})",
+            values[i],
+            -1.0 if name.rpartition(".")[0] in turning else 0.0,
+        )
         for i, name in enumerate(raw_names)
     ]
 

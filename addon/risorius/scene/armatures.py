@@ -144,21 +144,22 @@ def control_places(plan):
 def add_properties(bone, controls, maximum=1.0):
     """Give a pose bone the float property of each ControlPlan: limits, default, words."""
     for control in controls:
-        bone[control.label] = 0.0
-        describe_property(bone, control.label, control.description, maximum)
+        bone[control.label] = control.rest
+        describe_property(bone, control, maximum)
 
 
-def describe_property(bone, name, description, maximum):
-    """Set limits, default and description of one control property."""
+def describe_property(bone, control, maximum):
+    """Set limits, default and words of one control property. Args: control  its ControlPlan."""
+    name = control.label
     bone.id_properties_ui(name).update(
-        min=0.0,
+        min=control.lowest,
         max=maximum,
-        soft_min=0.0,
+        soft_min=control.lowest,
         soft_max=1.0,
-        default=0.0,
+        default=control.rest,
         step=1.0,
         precision=3,
-        description=description,
+        description=control.description,
     )
     bone.property_overridable_library_set(f'["{bpy.utils.escape_identifier(name)}"]', True)
 

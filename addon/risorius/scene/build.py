@@ -51,7 +51,8 @@ def import_file(context, path, options, progress=lambda _share: None):
     content = Path(path).read_bytes()
     progress(0.15)
     unit = context.scene.unit_settings.scale_length
-    plan = plans.plan_character(dna, Path(path).stem, options.lods, unit)
+    rests = risorius.Rig(dna).initial_raw_controls
+    plan = plans.plan_character(dna, Path(path).stem, options.lods, unit, rests)
     plan = replace(plan, name=names.unique_labels([plan.name], bpy.data.collections.keys())[0])
     progress(0.25)
     made = []
@@ -205,7 +206,7 @@ def replace_character(old, new):
     live = runtime.of(new)
     face = controls.pose.bones[parts.FACE]
     maximum = 1.5 if controls.get(parts.OVERDRIVE) else 1.0
-    for control in plans.plan_controls(live.dna.raw_control_names):
+    for control in plans.plan_controls(live.dna.raw_control_names, live.rests):
         if control.label not in face:
             armatures.add_properties(face, [control], maximum)
     collection = next((c for c in bpy.data.collections if new.name in c.objects), None)

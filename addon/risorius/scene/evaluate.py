@@ -8,8 +8,8 @@ are stale while an animation renders) and written to the originals, in bulk.
 import numpy as np
 
 from .. import native
+from ..logic import plans
 from ..logic import space as spaces
-from ..logic.plans import LIVE_KEY
 from . import armatures, meshes, parts, runtime
 
 _AHEAD = np.array([0.0, -1.0, 0.0])
@@ -85,7 +85,8 @@ def read_inputs(seen, live, maximum=1.0):
     """
     bones = seen.pose.bones
     face = bones[parts.FACE]
-    raw = np.array([face.get(label, 0.0) for label in live.labels], np.float32)
+    rests = live.rests
+    raw = np.array([face.get(label, rests[i]) for i, label in enumerate(live.labels)], np.float32)
     np.nan_to_num(raw, copy=False, nan=0.0, posinf=0.0, neginf=0.0)
     turns = {}
     for name in ("neck", "head"):
@@ -200,7 +201,7 @@ def _write_values(rig, pose):
 def _write_shape(item, live, weights, force):
     """Write the sum of all channels to the live key of a mesh, where it has one."""
     key = item.data.shape_keys
-    block = key.key_blocks.get(LIVE_KEY) if key else None
+    block = key.key_blocks.get(plans.LIVE_KEY) if key else None
     if block is None or item.mode == "EDIT":
         return
     morph = live.morph(item[parts.MESH])
@@ -224,10 +225,14 @@ def mend_types(rig):
     live = runtime.of(rig)
     if face is None or live is None:
         return
-    for label in live.labels:
-        value = face.get(label)
-        if isinstance(value, int):
-            maximum = _maximum(parts.controls_of(rig))
-            del face[label]
-            face[label] = float(value)
-            armatures.describe_property(face, label, label, maximum)
+    wrong = [i for i, label in enumerate(live.labels) if isinstance(face.get(label), int)]
+    if not wrong:
+        return
+    controls = plans.plan_controls(live.dna.raw_control_names, live.rests)
+    maximum = _maximum(parts.controls_of(rig))
+    for i in wrong:
+        label = live.labels[i]
+        value = float(face[label])
+        del face[label]
+        face[label] = value
+        armatures.describe_property(face, controls[i], maximum)

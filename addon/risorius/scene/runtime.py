@@ -24,6 +24,7 @@ class Runtime:
     Attributes:
         dna: the file; rig: its risorius.Rig; space: its Space.
         labels: property names of the raw controls, by index.
+        rests: their values at rest.
         joints: JointSpace of the joints that the evaluator owns.
         rest: float64[J, 4, 4] neutral joints.
         anchors: joints of neck, head and eyes.
@@ -35,6 +36,7 @@ class Runtime:
     rig: object
     space: object
     labels: list
+    rests: list
     joints: object
     rest: object
     anchors: object
@@ -97,6 +99,7 @@ def _compile(content, unit):
         rig=rig,
         space=space,
         labels=names.unique_labels(dna.raw_control_names),
+        rests=[float(rest) for rest in rig.initial_raw_controls],
         joints=make_joint_space(space, dna.neutral_joint_rotations, sorted(owned)),
         rest=rest,
         anchors=anchors,
@@ -131,7 +134,7 @@ def _response(runtime, control, side, horizontal):
     joint = runtime.anchors.eyes.get(side)
     if joint is None:
         return DEFAULT_EYE_ANGLE
-    raw = np.zeros(len(runtime.labels), np.float32)
+    raw = np.array(runtime.rests, np.float32)
     raw[control] = 1.0
     delta = runtime.rig.evaluate(raw).joints[joint, 3:6]
     neutral = np.asarray(runtime.dna.neutral_joint_rotations, np.float64)[joint]

@@ -38,7 +38,7 @@ class _FaceOperator:
 
 
 class RISORIUS_OT_reset(_FaceOperator, bpy.types.Operator):
-    """Set controls to 0 and the head, neck and eye bones straight"""
+    """Set controls to rest and the head, neck and eye bones straight"""
 
     bl_idname = "risorius.reset"
     bl_label = "Reset"
@@ -50,8 +50,10 @@ class RISORIUS_OT_reset(_FaceOperator, bpy.types.Operator):
     def execute(self, context):
         rig = parts.active_rig(context)
         controls, face = parts.controls_of(rig), parts.face_bone(rig)
+        live = runtime.of(rig)
+        rests = dict(zip(live.labels, live.rests, strict=True)) if live else {}
         for label in _labels(rig, self.region):
-            face[label] = 0.0
+            face[label] = rests[label]
         if not self.region:
             for bone in controls.pose.bones:
                 bone.matrix_basis.identity()
