@@ -16,7 +16,17 @@ from typing import Any
 import risorius
 
 from .. import _native
-from .files import KINDS, CommandLineError, InputError, counted, kind_of, label, read, summary
+from .files import (
+    KINDS,
+    CommandLineError,
+    InputError,
+    counted,
+    kind_of,
+    label,
+    read,
+    refuse_same_file,
+    summary,
+)
 
 _NEWEST = 8
 _DESCRIPTION = """\
@@ -96,14 +106,8 @@ def complain(args: argparse.Namespace) -> None:
         raise CommandLineError("--indent: only JSON is indented")
     if args.indent is not None and not 0 <= args.indent <= 8:
         raise CommandLineError(f"--indent: 0 to 8 was expected, found {args.indent}")
-    if "-" in (args.input, args.output) or args.force:
-        return
-    try:
-        same = os.path.samefile(args.input, args.output)
-    except OSError:  # one of them is not there
-        return
-    if same:
-        raise CommandLineError(f"{args.output}: OUTPUT is INPUT itself; --force replaces it")
+    if not args.force:
+        refuse_same_file(args.input, args.output)
 
 
 def _say(text: str) -> None:

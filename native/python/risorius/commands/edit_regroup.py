@@ -6,7 +6,6 @@ from __future__ import annotations
 import argparse
 import json
 import math
-import os
 import sys
 import tomllib
 from pathlib import Path
@@ -16,7 +15,17 @@ import risorius
 
 from .. import edit
 from .convert import json_text, version_of, warnings_as_lines, write
-from .files import CommandLineError, InputError, counted, kind_of, label, read, read_bytes, summary
+from .files import (
+    CommandLineError,
+    InputError,
+    counted,
+    kind_of,
+    label,
+    read,
+    read_bytes,
+    refuse_same_file,
+    summary,
+)
 
 _DESCRIPTION = """\
 Joints that the same controls drive come together in dense joint groups, whatever the groups of
@@ -104,14 +113,8 @@ def complain(args: argparse.Namespace) -> None:
         raise CommandLineError(f"--seed: a number from 0 was expected, found {args.seed}")
     if not 0 <= args.foreign_share <= 1:
         raise CommandLineError(f"--foreign-share: 0 to 1 was expected, found {args.foreign_share}")
-    if args.force or "-" in (args.input, args.output):
-        return
-    try:
-        same = os.path.samefile(args.input, args.output)
-    except OSError:  # one of them is not there
-        return
-    if same:
-        raise CommandLineError(f"{args.output}: OUTPUT is INPUT itself; --force replaces it")
+    if not args.force:
+        refuse_same_file(args.input, args.output)
 
 
 def read_regions(name: str) -> edit.Regions:

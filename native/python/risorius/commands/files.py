@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 
@@ -39,6 +40,22 @@ def kind_of(name: str, asked: str | None, option: str) -> str:
     if kind := asked or (suffix if suffix in KINDS else None):
         return kind
     raise CommandLineError(f"{name}: a name ending in .dna or .json was expected, or {option}")
+
+
+def refuse_same_file(source: str, target: str) -> None:
+    """Names of one file, by whatever path; "-" is none.
+
+    Raises:
+        CommandLineError: they are.
+    """
+    if "-" in (source, target):
+        return
+    try:
+        same = os.path.samefile(source, target)
+    except OSError:  # one of them is not there
+        return
+    if same:
+        raise CommandLineError(f"{target}: OUTPUT is INPUT itself; --force replaces it")
 
 
 def read_bytes(name: str) -> bytes:
