@@ -42,6 +42,7 @@ namespace detail {
 
 void euler_joints(const Rig& rig, std::uint32_t lod, float* joints) noexcept {
   for (std::uint32_t j = 0; j < rig.joint_count; ++j) rotation_of(rig, joints, j)[3] = 1.0f;
+  if (rig.euler_joints.empty()) return;  // there may be no joint at all, and no place for one
   const EulerConvention& c = rig.euler;
   simd::EulerTurns turns;
   for (std::size_t a = 0; a < 3; ++a) {

@@ -263,6 +263,18 @@ TEST(Evaluate, EmptyFaceGivesAnEmptyPose) {
   EXPECT_TRUE(pose.controls.empty());
 }
 
+// Found by the evaluate and rig fuzz targets: a step from the null pointer of no joints.
+TEST(Evaluate, EmptyFaceHasNoQuaternions) {
+  compile::CompileOptions options;
+  options.rotation = compile::Rotation::kQuaternion;
+  const core::Result<Rig> rig = compile::compile(make_face(1, 0, 0), options);
+  ASSERT_TRUE(rig);
+  EXPECT_TRUE(evaluate_once(*rig, {1.0f}).joints.empty());
+  Instance face(*rig);
+  const float raw = 1.0f;
+  EXPECT_TRUE(face.evaluate(&raw).joints.empty());
+}
+
 TEST(Evaluate, FaceWithoutLodsRests) {
   const Rig rig = must_compile(make_face(1, 1, 2, 0));
   const Pose pose = evaluate_once(rig, {1.0f});
