@@ -30,8 +30,6 @@ using detail::Groups;
 using detail::Used;
 using rig::RigData;
 
-constexpr std::uint32_t kNobody = UINT32_MAX;
-
 void add_text(std::string_view text, RigData& out) {
   out.text.insert(out.text.end(), text.begin(), text.end());
   out.text_ends.push_back(static_cast<std::uint32_t>(out.text.size()));
@@ -149,7 +147,7 @@ void transpose(const float* from, std::size_t rows, std::span<const std::uint32_
     for (std::size_t c0 = 0; c0 < columns; c0 += kTile) {
       const std::size_t r1 = std::min(rows, r0 + kTile), c1 = std::min(columns, c0 + kTile);
       for (std::size_t c = c0; c < c1; ++c) {
-        if (offsets[c] == kNobody) continue;
+        if (offsets[c] == rig::kNone) continue;
         for (std::size_t r = r0; r < r1; ++r) to[offsets[c] + r] = from[r * columns + c];
       }
     }
@@ -244,7 +242,7 @@ std::vector<ColumnEntry> list_columns(const Groups& groups, RigData& out, Used& 
 Status compile_columns(const Groups& groups, RigData& out, Used& used) {
   const std::vector<ColumnEntry> entries = list_columns(groups, out, used);
   std::vector<std::vector<std::uint32_t>> offsets;
-  for (const dna::JointGroup* g : groups) offsets.emplace_back(g->input_indices.size(), kNobody);
+  for (const dna::JointGroup* g : groups) offsets.emplace_back(g->input_indices.size(), rig::kNone);
   std::uint64_t end = 0;
   out.joint_column_begins.assign(out.control_count + std::size_t{1}, 0);
   for (const ColumnEntry& e : entries) {
@@ -272,7 +270,7 @@ Status compile_columns(const Groups& groups, RigData& out, Used& used) {
 std::vector<std::uint32_t> rows_by_attribute(const RigData& r,
                                              std::span<const std::uint32_t> file_order,
                                              std::uint32_t lod) {
-  std::vector<std::uint32_t> rows(std::size_t{r.joint_count} * r.joint_stride, kNobody);
+  std::vector<std::uint32_t> rows(std::size_t{r.joint_count} * r.joint_stride, rig::kNone);
   for (const std::size_t i : file_order) {
     const rig::JointGroup& g = r.joint_groups[i];
     for (std::uint32_t row = 0; row < r.joint_group_lods[i * r.lod_count + lod]; ++row) {
@@ -285,9 +283,9 @@ std::vector<std::uint32_t> rows_by_attribute(const RigData& r,
 // The rows that one block of attributes takes, as pieces of rows that follow each other.
 std::vector<simd::Piece> pieces_of(std::span<const std::uint32_t> rows, std::size_t block) {
   std::vector<simd::Piece> pieces;
-  std::uint32_t next = kNobody;
+  std::uint32_t next = rig::kNone;
   for (std::size_t p = 0; p < rows.size(); ++p) {
-    if (rows[p] == kNobody) continue;
+    if (rows[p] == rig::kNone) continue;
     if (rows[p] != next) pieces.push_back({rows[p], 0, static_cast<std::uint16_t>(block)});
     pieces.back().mask = static_cast<std::uint16_t>(pieces.back().mask | (1u << p));
     next = rows[p] + 1;

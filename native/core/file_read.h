@@ -27,9 +27,8 @@ enum class ReadBy {
   kMap,
 };
 
-/// Fails: kIoOpen, kIoRead with the system's reason, what is no plain file, a file that is cut
-/// while
-///        it is read.
+/// Fails: kIoOpen, kIoRead (the system's reason; what is no plain file; a file that is cut while it
+///        is read)
 Result<FileBytes> read_file(const std::filesystem::path& path, ReadBy by = ReadBy::kCopy);
 
 }  // namespace risorius::core
