@@ -44,8 +44,8 @@ make_system() { # make_system SUITE ROOT
 install_blender() { # install_blender SUITE ROOT
   local more=
   [ -x "$2/usr/bin/blender" ] && return 0
-  # sid's Blender needs cattrs for its asset libraries and does not say so.
-  [ "$1" = sid ] && more=python3-cattr
+  # sid's Blender needs these for its extensions and asset libraries and does not say so.
+  [ "$1" = sid ] && more="python3-cattr python3-requests"
   # A mirror that is a dated snapshot calls itself out of date.
   chroot "$2" sh -ec "export DEBIAN_FRONTEND=noninteractive
     apt-get -o Acquire::Check-Valid-Until=false update -qq

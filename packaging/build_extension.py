@@ -41,6 +41,14 @@ def platform_of(wheel: Path) -> str:
     raise SystemExit(f"{wheel.name}: no Blender platform for {tag}")
 
 
+def python_of(wheel: Path) -> tuple[int, int]:
+    """The Python that a wheel is made for, e.g. (3, 11)."""
+    found = re.match(r"cp(\d)(\d+)$", wheel.stem.split("-")[2])
+    if not found:
+        raise SystemExit(f"{wheel.name}: no Python version in its name")
+    return int(found.group(1)), int(found.group(2))
+
+
 def build(wheels: list[Path], out: Path) -> Path:
     """Write the zip. Raises SystemExit with a sentence when something does not fit together."""
     text = (ADDON / "blender_manifest.toml").read_text(encoding="utf-8")
@@ -48,7 +56,9 @@ def build(wheels: list[Path], out: Path) -> Path:
     for wheel in wheels:
         if wheel.name.split("-")[1] != version:
             raise SystemExit(f"{wheel.name} is not version {version}, the add-on is")
-    names = ", ".join(f'"./wheels/{w.name}"' for w in sorted(wheels))
+    # Blender takes the wheels of its own Python, but 4.2.0 took all and kept the last: 3.11 is last.
+    ordered = sorted(wheels, key=lambda w: (*python_of(w), w.name), reverse=True)
+    names = ", ".join(f'"./wheels/{w.name}"' for w in ordered)
     platforms = ", ".join(f'"{p}"' for p in sorted({platform_of(w) for w in wheels}))
     head, mark, tail = text.partition("\n[permissions]")
     text = f"{head}\nplatforms = [{platforms}]\nwheels = [{names}]\n{mark}{tail}"
