@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files that are broken, and files that are well formed but mean harm."""
+"""Files that are broken, and files that are well formed but odd.
+
+Indices that lead out of their lists, joints in a circle and huge counts are among the broken ones:
+the writer of the library refuses to make them, so they come as edited bytes.
+"""
 
 from pathlib import Path
 
@@ -190,9 +194,7 @@ ODD = {
     "meshes without vertices": _empty,
     "meshes without faces": _no_faces,
     "meshes without skin": _no_skin,
-    "no controls": lambda f: _set(f, joint_groups=[], raw_control_names=[]),
     "thousands of joints": _many_joints,
-    "32 levels": lambda f: _set(f, lod_count=32),
     "one vertex at each end of the world": lambda f: _set(
         f, 0, positions=_with(f.meshes[0].positions, [[1e30, -1e30, 1e30]], np.s_[:1])
     ),
@@ -200,10 +202,7 @@ ODD = {
 
 
 def odd_face(name):
-    """A small face with one odd thing, or None where the writer already refuses it."""
+    """The bytes of a small face with one odd thing."""
     face = small_face()
     ODD[name](face)
-    try:
-        return face.to_bytes()
-    except ValueError:
-        return None
+    return face.to_bytes()

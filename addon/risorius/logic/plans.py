@@ -225,7 +225,11 @@ def plan_character(
         anchors=find_anchors(dna.joint_names),
         lod_count=max(1, int(dna.lod_count)),
         textures=_plan_textures(dna),
-        origin={k: v for k, v in dna.metadata.items() if not k.startswith("texture:")},
+        origin={
+            k: names.printable(v, 10_000)
+            for k, v in dna.metadata.items()
+            if not k.startswith("texture:")
+        },
         size=float(np.max(np.ptp(points, axis=0))) if len(points) else 1.0,
     )
 
@@ -260,7 +264,7 @@ def plan_controls(raw_names: Sequence[str], rests: Sequence[float] = ()) -> list
             i,
             labels[i],
             regions.region_of(name),
-            f"{regions.title(name)} ({name})",
+            names.printable(f"{regions.title(name)} ({name})"),
             values[i],
             -1.0 if name.rpartition(".")[0] in turning else 0.0,
         )
