@@ -139,11 +139,12 @@ def _texture_folder(path):
 
 def _add_shapes(plan, dna, rig, built, mode):
     labels = channel_labels(dna)
+    total = sum(len(m.channels) for m in plan.meshes)
     for item, mesh_plan in zip(built, plan.meshes, strict=True):
         count = len(mesh_plan.channels)
         chosen = mode
         if mode == "AUTO":
-            chosen = meshes.automatic_mode(count, len(mesh_plan.positions))
+            chosen = meshes.automatic_mode(count, len(mesh_plan.positions), total)
         meshes.set_mode(
             item, rig, dna.meshes[mesh_plan.index], plan.space.delta_matrix, labels, chosen
         )
@@ -181,12 +182,14 @@ def lods_of(rig):
 def change_mode(rig, mode):
     """Switch the meshes of a character to LIVE or KEYS shapes; AUTO chooses by size."""
     live = runtime.of(rig)
-    for item in parts.meshes_of(rig):
+    items = parts.meshes_of(rig)
+    total = sum(len(live.dna.meshes[i[parts.MESH]].blend_shape_targets) for i in items)
+    for item in items:
         dna_mesh = live.dna.meshes[item[parts.MESH]]
         chosen = mode
         if mode == "AUTO":
             chosen = meshes.automatic_mode(
-                len(dna_mesh.blend_shape_targets), len(dna_mesh.positions)
+                len(dna_mesh.blend_shape_targets), len(dna_mesh.positions), total
             )
         labels = channel_labels(live.dna)
         meshes.set_mode(item, rig, dna_mesh, live.space.delta_matrix, labels, chosen)
