@@ -9,7 +9,7 @@ from time import perf_counter
 
 from .. import native
 from ..logic import plans
-from . import armatures, bones, inputs, meshes, parts, runtime, timing
+from . import armatures, bones, inputs, lods, meshes, parts, place, runtime, timing
 
 
 def evaluate_all(depsgraph, force=False):
@@ -43,7 +43,8 @@ def evaluate(rig, depsgraph, force=False):
     times = [perf_counter()]
     seen = controls.evaluated_get(depsgraph)
     raw, turns = inputs.read_inputs(seen, live, _maximum(controls))
-    lod = min(max(int(rig.get(parts.LOD, 0)), 0), max(live.rig.lod_count - 1, 0))
+    place.follow(rig, seen)
+    lod = min(max(lods.choose(rig, seen, depsgraph), 0), max(live.rig.lod_count - 1, 0))
     state = (raw.tobytes(), lod, *((name, *turn) for name, turn in turns.items()))
     if not force and not _changed(rig, "inputs", state):
         return False

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..logic.plans import AUTO_KEYS, AUTO_LIMIT, LIVE_KEY
 from . import parts
+from .armatures import lock_place
 
 _DRIVEN = re.compile(r'^\["channels"\]\[(\d+)\]$')
 
@@ -49,6 +50,7 @@ def build_mesh(plan, mesh_plan, rig, made, normals=True):
     modifier = item.modifiers.new("Armature", "ARMATURE")
     modifier.object = rig
     item.parent = rig
+    lock_place(item)
     item[parts.RIG] = rig
     item[parts.MESH] = mesh_plan.index
     item[parts.LODS] = list(mesh_plan.lods)
