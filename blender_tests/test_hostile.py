@@ -89,7 +89,7 @@ def _golden(name):
 def test_hundreds_of_mutations_leave_scene_and_memory_as_they_were(source, tmp_path, capsys):
     whole = small_face().to_bytes() if source == "small face" else _golden("ml")
     cuts = list(hostile.cut_short(whole, 60))
-    files = cuts + list(hostile.with_flipped_bytes(whole, 100, SEED))
+    files = cuts + list(hostile.with_flipped_bytes(whole, 250, SEED))
     random.Random(SEED).shuffle(files)
     taken, before = 0, 0
     for number, content in enumerate(files):

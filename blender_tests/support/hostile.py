@@ -84,6 +84,18 @@ def _numbers(face, value):
     face.meshes = meshes
 
 
+def _surface(face, value):
+    """Numbers that only the look depends on."""
+    for mesh in range(len(face.meshes)):
+        normals, uvs = face.meshes[mesh].normals, face.meshes[mesh].texture_coordinates
+        _set(
+            face,
+            mesh,
+            normals=_with(normals, value, np.s_[::3]),
+            texture_coordinates=_with(uvs, value, np.s_[::4]),
+        )
+
+
 def _neutral(face, value):
     _set(
         face,
@@ -110,16 +122,18 @@ def _flat_faces(face):
         _set(face, mesh, face_layouts=layouts, face_offsets=np.array([0, 1, 3, 7, 10], np.uint32))
 
 
-def _empty(face):
+def _empty(face, which=(0, 1, 2)):
     none = {"layout_positions": 0, "layout_normals": 0, "layout_texture_coordinates": 0}
     none |= {"face_layouts": 0, "skin_weights": 0, "skin_joint_indices": 0}
-    for mesh in range(len(face.meshes)):
+    for mesh in which:
         values = {n: np.zeros(0, getattr(face.meshes[mesh], n).dtype) for n in none}
         values |= {n: np.zeros((0, 3), np.float32) for n in ("positions", "normals")}
         values["texture_coordinates"] = np.zeros((0, 2), np.float32)
         values |= {n: np.zeros(1, np.uint32) for n in ("face_offsets", "skin_offsets")}
         _set(face, mesh, blend_shape_targets=[], **values)
-    face.mesh_blend_shape_channel_mapping = []
+    face.mesh_blend_shape_channel_mapping = [
+        pair for pair in face.mesh_blend_shape_channel_mapping.tolist() if pair[0] not in which
+    ]
 
 
 def _no_faces(face):
@@ -171,6 +185,7 @@ ODD = {
     "nan everywhere": lambda f: _numbers(f, np.nan),
     "infinite numbers": lambda f: _numbers(f, np.inf),
     "numbers of 1e38": lambda f: _numbers(f, 1e38),
+    "nan in normals and UVs": lambda f: _surface(f, np.nan),
     "negative numbers": lambda f: _numbers(f, -1.0),
     "joints at nan": lambda f: _neutral(f, np.nan),
     "joints at infinity": lambda f: _neutral(f, np.inf),
@@ -192,6 +207,7 @@ ODD = {
     "names of data blocks": lambda f: _named(f, "Basis"),
     "faces without area": _flat_faces,
     "meshes without vertices": _empty,
+    "one mesh without vertices": lambda f: _empty(f, (1,)),
     "meshes without faces": _no_faces,
     "meshes without skin": _no_skin,
     "thousands of joints": _many_joints,
