@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 
 
-class RISORIUS_TEST_probe(bpy.types.RenderEngine):
+class Probe(bpy.types.RenderEngine):
     """Reads the dependency graph of the render, also between frames as for motion blur."""
 
     bl_idname = "RISORIUS_TEST_PROBE"
@@ -47,18 +47,18 @@ def _vertices(item):
 @contextmanager
 def rendering(setup, between=()):
     """Make a scene render with the probe; gives what it saw, which grows with each render."""
-    bpy.utils.register_class(RISORIUS_TEST_probe)
+    bpy.utils.register_class(Probe)
     before = setup.render.engine
-    RISORIUS_TEST_probe.seen = {}
-    RISORIUS_TEST_probe.between = tuple(between)
-    setup.render.engine = RISORIUS_TEST_probe.bl_idname
+    Probe.seen = {}
+    Probe.between = tuple(between)
+    setup.render.engine = Probe.bl_idname
     setup.render.resolution_x = setup.render.resolution_y = 8
     if setup.camera is None:
         camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
         setup.collection.objects.link(camera)
         setup.camera = camera
     try:
-        yield RISORIUS_TEST_probe.seen
+        yield Probe.seen
     finally:
         setup.render.engine = before
-        bpy.utils.unregister_class(RISORIUS_TEST_probe)
+        bpy.utils.unregister_class(Probe)
