@@ -42,7 +42,7 @@ def evaluate(rig, depsgraph, force=False):
         return False
     times = [perf_counter()]
     seen = controls.evaluated_get(depsgraph)
-    raw, turns = inputs.read_inputs(seen, live, _maximum(controls))
+    raw, turns = inputs.read_inputs(seen, live, depsgraph, _maximum(controls))
     place.follow(rig, seen)
     lod = min(max(lods.choose(rig, seen, depsgraph), 0), max(live.rig.lod_count - 1, 0))
     state = (raw.tobytes(), lod, *((name, *turn) for name, turn in turns.items()))

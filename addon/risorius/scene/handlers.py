@@ -5,7 +5,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from .. import native
-from . import copies, evaluate, lods, parts, runtime, timing
+from . import copies, evaluate, lods, parts, place, runtime, timing
 
 _state = {"objects": -1, "busy": False}
 
@@ -59,21 +59,28 @@ def _notice_copies():
 
 
 def _edited(depsgraph):
-    """The characters whose control armature, or the camera that they look at, was updated."""
-    found = []
+    """The characters that the updates concern: by their controls, their body or the camera."""
+    armatures, camera_moved = set(), False
     camera = depsgraph.scene.camera
     for update in depsgraph.updates:
         item = update.id.original
-        if camera is not None and item == camera.original:
-            found += [r for r in parts.rigs() if lods.by_distance(r) and r not in found]
         if isinstance(item, bpy.types.Armature):
             runtime.forget_outputs()
-        if not isinstance(item, bpy.types.Object) or item.type != "ARMATURE":
-            continue
-        rig = item.get(parts.RIG)
-        if isinstance(rig, bpy.types.Object) and rig not in found:
-            found += [r for r in parts.rigs() if r.get(parts.CONTROLS) == item]
-    return found
+        elif isinstance(item, bpy.types.Object):
+            if item.type == "ARMATURE":
+                armatures.add(item)
+            camera_moved |= camera is not None and item == camera.original
+    return [rig for rig in parts.rigs() if _concerned(rig, armatures, camera_moved)]
+
+
+def _concerned(rig, armatures, camera_moved):
+    controls = parts.controls_of(rig)
+    hold = place.body_of(controls) if controls is not None else None
+    return (
+        controls in armatures
+        or (hold is not None and hold.target in armatures)
+        or (camera_moved and lods.by_distance(rig))
+    )
 
 
 @persistent

@@ -182,7 +182,7 @@ class RISORIUS_PT_options(_FacePanel, bpy.types.Panel):
         rig = parts.active_rig(context)
         on = bool(parts.controls_of(rig).get(parts.OVERDRIVE))
         layout.operator("risorius.set_overdrive", depress=on).enable = not on
-        attached = place.is_attached(parts.controls_of(rig))
+        attached = place.body_of(parts.controls_of(rig))
         body = "risorius.detach_body" if attached else "risorius.attach_body"
         layout.operator(body, icon="ARMATURE_DATA")
         layout.operator("risorius.separate", icon="UNLINKED")
