@@ -58,11 +58,14 @@ def import_file(context, path, options, progress=lambda _share: None):
     made = []
     try:
         rig, warnings = _build(context, plan, dna, content, path, options, made, progress)
+        live = runtime.of(rig)
+        if live is None:
+            raise plans.PlanError("The file cannot be evaluated.")
+        layers = plans.layer_warnings(live.rig.ignored_layers)
     except BaseException:
         _remove(made)
         raise
-    live = runtime.of(rig)
-    return rig, [*dna.warnings, *warnings, *plans.layer_warnings(live.rig.ignored_layers)]
+    return rig, [*dna.warnings, *warnings, *layers]
 
 
 def _build(context, plan, dna, content, path, options, made, progress):

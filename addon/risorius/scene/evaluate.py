@@ -88,7 +88,10 @@ def _write_shape(item, live, weights, force):
     block = key.key_blocks.get(plans.LIVE_KEY) if key else None
     if block is None or item.mode == "EDIT":
         return
-    morph = live.morph(item[parts.MESH])
+    index = item.get(parts.MESH, -1)
+    if not 0 <= index < len(live.dna.meshes):
+        return  # the data in the .blend is another file's
+    morph = live.morph(index)
     if morph.vertex_count != len(block.points):
         return  # the user changed the topology
     if parts.REAL in key:

@@ -54,6 +54,7 @@ def _notice_copies():
     count = len(bpy.data.objects)
     if count != _state["objects"]:
         _state["objects"] = count
+        runtime.forget_unused(parts.rigs())
         for sentence in copies.separate_all():
             print(f"Risorius: {sentence}")
 

@@ -8,6 +8,7 @@ import bpy
 from bpy_extras.io_utils import ImportHelper
 
 from .. import native
+from ..logic import names
 from ..logic.plans import PlanError
 from ..logic.space import SpaceError
 from ..scene import build, lods, parts
@@ -21,8 +22,8 @@ MODES = (
 
 def explain(path, error):
     """One sentence for what is wrong with a file."""
-    text = str(error).strip().rstrip(".")
-    name = Path(path).name
+    text = names.printable(str(error)).strip().rstrip(".")
+    name = names.printable(Path(path).name)
     return f"{text}." if name in text else f"{name}: {text}."
 
 
@@ -63,7 +64,7 @@ def import_character(operator, context, path, options):
         operator.report({"ERROR"}, explain(path, error))
         return {"CANCELLED"}
     for warning in warnings[:5]:
-        operator.report({"WARNING"}, str(warning))
+        operator.report({"WARNING"}, names.printable(str(warning)))
     if len(warnings) > 5:
         operator.report({"WARNING"}, f"and {len(warnings) - 5} more warnings")
     count = len(parts.meshes_of(rig))
