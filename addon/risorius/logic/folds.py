@@ -60,7 +60,7 @@ def find_frame(
     if not 0.15 * size[0] < unit < 0.8 * size[0]:
         unit = 0.36 * float(size[0])
         eyes = []
-    if len(eyes):
+    if eyes:
         eye = np.mean(np.asarray(eyes, float), axis=0)
         origin = np.array([middle[0], eye[1], eye[2]])
     else:

@@ -155,17 +155,31 @@ class Graph:
 
     def tidy(self):
         """Lay the nodes out in columns by their distance from the output."""
-        column = {self.output: 0}
-        todo = [self.output]
-        while todo:
-            node = todo.pop()
-            for socket in node.inputs:
-                for link in socket.links:
-                    if column.get(link.from_node, -1) < column[node] + 1:
-                        column[link.from_node] = column[node] + 1
-                        todo.append(link.from_node)
+        column = {}
+        for node in reversed(self._sources_first()):
+            place = column.setdefault(node, 0)
+            for source in _sources(node):
+                column[source] = max(column.get(source, 0), place + 1)
         rows = {}
         for node in self.tree.nodes:
             place = column.get(node, 1)
             node.location = (400 - 240 * place, 300 - 220 * rows.get(place, 0))
             rows[place] = rows.get(place, 0) + 1
+
+    def _sources_first(self):
+        """Nodes that reach the output, each after all those that feed it."""
+        order, seen, stack = [], {self.output}, [(self.output, iter(_sources(self.output)))]
+        while stack:
+            node, rest = stack[-1]
+            source = next((s for s in rest if s not in seen), None)
+            if source is None:
+                order.append(node)
+                stack.pop()
+            else:
+                seen.add(source)
+                stack.append((source, iter(_sources(source))))
+        return order
+
+
+def _sources(node):
+    return [link.from_node for socket in node.inputs for link in socket.links]

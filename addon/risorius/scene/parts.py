@@ -9,6 +9,7 @@ DNA = "risorius_dna"  # on the deforming armature: the Text that holds the file
 LOD = "risorius_lod"  # on the deforming armature: the level that is shown
 UNIT = "risorius_unit"  # on the deforming armature: metres per Blender unit at import
 SOURCE = "risorius_source"  # on the deforming armature: the path it came from
+TEXTURES = "risorius_textures"  # on the deforming armature: words on which textures were found
 OVERDRIVE = "risorius_overdrive"  # on the control armature: hard maximum is 1.5
 MESH_PREFIX = "risorius_mesh_"  # + number, on the deforming armature: a mesh
 MESH = "dna_mesh"  # on a mesh object: its number in the DNA
