@@ -7,7 +7,7 @@ from pathlib import Path
 import bpy
 
 from .. import native
-from ..logic import names, plans
+from ..logic import names, plans, textures
 from . import armatures, lods, materials, meshes, parts, runtime, storage
 
 
@@ -20,7 +20,9 @@ class BuildOptions:
         mode: LIVE, KEYS or AUTO.
         normals: keep the file's normals.
         materials: build materials.
-        textures: load the textures that the file names.
+        textures: load the textures that lie beside the file.
+        texture_folder: looked into first; empty for none.
+        simple_materials: without subsurface, relief and animated maps.
     """
 
     lods: tuple[int, ...] = (0,)
@@ -28,6 +30,8 @@ class BuildOptions:
     normals: bool = True
     materials: bool = True
     textures: bool = True
+    texture_folder: str = ""
+    simple_materials: bool = False
 
 
 def import_file(context, path, options, progress=lambda _share: None):
@@ -91,10 +95,10 @@ def _build(context, plan, dna, content, path, options, made, progress):
         workshop.objects.link(item)
     settle(context, rig, controls)
     if options.materials:
-        folder = _texture_folder(path) if options.textures else None
-        by_base, warnings = materials.build_materials(plan, rig, made, folder)
-        for item, mesh_plan in zip(built, plan.meshes, strict=True):
-            item.data.materials.append(by_base[mesh_plan.base])
+        found = _find_textures(plan, path, options)
+        simple = options.simple_materials
+        warnings = materials.build_materials(plan, rig, built, made, found, simple)
+        rig[parts.TEXTURES] = found.summary()
     progress(0.8)
     _add_shapes(plan, dna, rig, built, options.mode)
     for item in built:
@@ -137,9 +141,13 @@ def _source(path):
         return str(path)
 
 
-def _texture_folder(path):
-    path = Path(path)
-    return path.with_name(f"{path.stem}_textures")
+def _find_textures(plan, path, options):
+    """The textures beside the file and in the chosen folder; none where none are wanted."""
+    if not options.textures:
+        return textures.TexturePlan()
+    chosen = bpy.path.abspath(options.texture_folder) if options.texture_folder else ""
+    folders = textures.folders_of(Path(path), chosen)
+    return textures.find(plan.textures, [(m.base, m.kind) for m in plan.meshes], folders)
 
 
 def _add_shapes(plan, dna, rig, built, mode):

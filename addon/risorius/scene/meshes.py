@@ -46,7 +46,6 @@ def build_mesh(plan, mesh_plan, rig, made, normals=True):
         layer.uv.foreach_set("vector", mesh_plan.uvs.ravel())
     if normals and mesh_plan.normals is not None:
         mesh.normals_split_custom_set(mesh_plan.normals)
-    _add_center_distance(mesh, mesh_plan)
     modifier = item.modifiers.new("Armature", "ARMATURE")
     modifier.object = rig
     item.parent = rig
@@ -76,28 +75,6 @@ def _add_weights(item, mesh_plan, labels):
         edit.to_mesh(item.data)
     finally:
         edit.free()
-
-
-def _add_center_distance(mesh, mesh_plan):
-    """For eyes an attribute `iris`: distance from the axis of its eye, 0 at the pupil, 1 at the
-    rim of the ball, 2 behind; for materials that have no texture."""
-    if mesh_plan.kind != "eyes" or not len(mesh_plan.positions):
-        return
-    points = mesh_plan.positions.astype(np.float64)
-    middle = (points[:, 0].min() + points[:, 0].max()) / 2
-    wide = np.ptp(points[:, 0]) > 1.6 * np.ptp(points[:, 2])
-    sides = points[:, 0] > middle if wide else np.ones(len(points), bool)
-    values = np.full(len(points), 2.0, np.float32)
-    for side in (sides, ~sides):
-        if not side.any():
-            continue
-        own = points[side]
-        center = (own.min(axis=0) + own.max(axis=0)) / 2
-        radius = max(float(np.ptp(own[:, 2])) / 2, 1e-9)
-        distance = np.hypot(own[:, 0] - center[0], own[:, 2] - center[2]) / radius
-        values[side] = np.where(own[:, 1] < center[1], distance, 2.0)
-    attribute = mesh.attributes.new("iris", "FLOAT", "POINT")
-    attribute.data.foreach_set("value", values)
 
 
 def automatic_mode(target_count, vertex_count, all_targets):

@@ -13,6 +13,7 @@ LOD_DISTANCES = "risorius_lod_distances"  # on the same: where level n gives way
 FOLLOW = "risorius_follow"  # on the same: its place is that of the control armature
 UNIT = "risorius_unit"  # on the deforming armature: metres per Blender unit at import
 SOURCE = "risorius_source"  # on the deforming armature: the path it came from
+TEXTURES = "risorius_textures"  # on the deforming armature: words on which textures were found
 OVERDRIVE = "risorius_overdrive"  # on the control armature: hard maximum is 1.5
 BODY_NECK = "risorius_body_neck"  # on the control armature: bones of the body, a line each
 BODY_HEAD = "risorius_body_head"  # the same for the head
