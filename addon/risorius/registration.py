@@ -5,9 +5,14 @@ import bpy
 
 from . import native
 from .scene import handlers
-from .ui import import_operators, operators, panels
+from .ui import import_operators, life_operators, operators, panels
 
-CLASSES = (*import_operators.CLASSES, *operators.CLASSES, *panels.CLASSES)
+CLASSES = (
+    *import_operators.CLASSES,
+    *operators.CLASSES,
+    *life_operators.CLASSES,
+    *panels.CLASSES,
+)
 
 
 def _search_property():

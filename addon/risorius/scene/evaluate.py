@@ -8,9 +8,8 @@ are stale while an animation renders) and written to the originals, in bulk.
 import numpy as np
 
 from .. import native
-from ..logic import plans
 from ..logic import space as spaces
-from . import armatures, meshes, parts, runtime
+from . import heal, meshes, parts, runtime
 
 _AHEAD = np.array([0.0, -1.0, 0.0])
 
@@ -44,13 +43,16 @@ def evaluate(rig, depsgraph, force=False):
     if live is None:
         return False
     seen = controls.evaluated_get(depsgraph)
+    if not seen.is_evaluated and not rig.evaluated_get(depsgraph).is_evaluated:
+        return False  # it is not in this scene
     raw, turns = read_inputs(seen, live, _maximum(controls))
     lod = min(max(int(rig.get(parts.LOD, 0)), 0), max(live.rig.lod_count - 1, 0))
     state = (raw.tobytes(), lod, *(t.tobytes() for t in turns.values()))
     if not force and not _changed(rig, "inputs", state):
         return False
     pose = live.rig.evaluate(raw, lod)
-    _write_bones(rig, live, pose.joints, turns, depsgraph)
+    if not _write_bones(rig, live, pose.joints, turns, depsgraph):
+        return False  # refused: channels and maps shall not move without the bones
     _write_values(rig, pose)
     for item in parts.meshes_of(rig):
         if lod in list(item.get(parts.LODS, [lod])):
@@ -135,7 +137,11 @@ def _add_look(seen, live, raw, maximum):
 
 
 def _write_bones(rig, live, deltas, turns, depsgraph):
-    """Write the joints that the evaluator owns; all others keep what the user gave them."""
+    """Write the joints that the evaluator owns; all others keep what the user gave them.
+
+    Returns:
+        Whether Blender took them: it refuses bulk writes to overrides without a word.
+    """
     location, rotation, scale = live.joints.bone_channels(deltas)
     _add_turns(live, rotation, turns)
     bones = rig.pose.bones
@@ -150,12 +156,40 @@ def _write_bones(rig, live, deltas, turns, depsgraph):
         # A bulk write that leaves out their animated values would undo them.
         channels += [("rotation_euler", 3, None)]
     source = seen if len(seen) == len(bones) else bones
+    taken = True
     for name, width, values in channels:
         flat = np.empty(len(bones) * width, np.float32)
         source.foreach_get(name, flat)
         if values is not None:
             flat.reshape(-1, width)[where] = values[rows]
         bones.foreach_set(name, flat)
+        if rig.override_library:
+            taken &= _is_there(bones, name, flat)
+    _note_refusal(rig, taken)
+    return taken
+
+
+def _is_there(values, name, wanted):
+    got = np.empty_like(wanted)
+    values.foreach_get(name, got)
+    return np.array_equal(got, wanted)
+
+
+def _note_refusal(item, taken):
+    key = ("refused", item.session_uid)
+    if taken:
+        runtime.outputs.pop(key, None)
+    else:
+        runtime.outputs[key] = True
+
+
+def refused(rig):
+    """Objects of a character, an override, that Blender lets nobody write to."""
+    return [
+        item
+        for item in (rig, *parts.meshes_of(rig))
+        if ("refused", item.session_uid) in runtime.outputs
+    ]
 
 
 def _bone_rows(rig, live):
@@ -201,7 +235,7 @@ def _write_values(rig, pose):
 def _write_shape(item, live, weights, force):
     """Write the sum of all channels to the live key of a mesh, where it has one."""
     key = item.data.shape_keys
-    block = key.key_blocks.get(plans.LIVE_KEY) if key else None
+    block = heal.live_block(key) if key else None
     if block is None or item.mode == "EDIT":
         return
     morph = live.morph(item[parts.MESH])
@@ -215,24 +249,7 @@ def _write_shape(item, live, weights, force):
     basis = meshes.points_of(key.reference_key)
     points = morph.evaluate(weights, base=basis)
     block.points.foreach_set("co", points.ravel())
+    if item.data.library or item.data.override_library:
+        _note_refusal(item, _is_there(block.points, "co", points.ravel()))
     key.update_tag()
     item.data.update_tag()
-
-
-def mend_types(rig):
-    """Turn controls that a script made integers back to float properties."""
-    face = parts.face_bone(rig)
-    live = runtime.of(rig)
-    if face is None or live is None:
-        return
-    wrong = [i for i, label in enumerate(live.labels) if isinstance(face.get(label), int)]
-    if not wrong:
-        return
-    controls = plans.plan_controls(live.dna.raw_control_names, live.rests)
-    maximum = _maximum(parts.controls_of(rig))
-    for i in wrong:
-        label = live.labels[i]
-        value = float(face[label])
-        del face[label]
-        face[label] = value
-        armatures.describe_property(face, controls[i], maximum)

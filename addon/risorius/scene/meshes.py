@@ -49,9 +49,11 @@ def build_mesh(plan, mesh_plan, rig, made, normals=True):
     modifier = item.modifiers.new("Armature", "ARMATURE")
     modifier.object = rig
     item.parent = rig
-    item[parts.RIG] = rig
+    parts.point(item, parts.RIG, rig)
     item[parts.MESH] = mesh_plan.index
     item[parts.LODS] = list(mesh_plan.lods)
+    item[parts.MODE] = "KEYS"
+    item.property_overridable_library_set(f'["{parts.MODE}"]', True)
     return item
 
 
