@@ -148,7 +148,7 @@ def _skins(rig):
 
 
 @pytest.mark.parametrize("shapes", ["DRIVEN", "LOCAL"])
-def test_edit_of_the_library_reaches_the_override(library, dna_file, tmp_path, shapes):
+def test_edit_of_the_library_reaches_the_override(library, dna_file, tmp_path, shapes, mode):
     path = library[0]
     _link(path)
     rig = _override(shapes)
@@ -158,8 +158,10 @@ def test_edit_of_the_library_reaches_the_override(library, dna_file, tmp_path, s
     rig = _rigs()[0]
     _plays(rig, dna_file)
     _moves(rig, dna_file, mouthCornerPullL=0.2)
-    for material in _skins(rig):
-        assert tuple(material.diffuse_color)[:2] == pytest.approx((0.1, 0.9))
+    local = [not m.override_library and not m.library for m in _skins(rig)]
+    assert local == [shapes == "LOCAL" or mode == "LIVE", False]
+    for material, own in zip(_skins(rig), local, strict=True):
+        assert own or tuple(material.diffuse_color)[:2] == pytest.approx((0.1, 0.9))
     bpy.data.libraries[0].reload()
     bpy.context.view_layer.update()
     _plays(_rigs()[0], dna_file)

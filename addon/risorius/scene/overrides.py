@@ -86,13 +86,13 @@ def own_shapes(rig, local_meshes):
     Returns:
         Sentences for a report.
     """
-    done = []
+    done, owned = [], {}
     for item in parts.meshes_of(rig):
         key = item.data.shape_keys
         live = key is not None and LIVE_KEY in key.key_blocks
         if not is_locked(item) or not (live or local_meshes):
             continue
-        _localize(item)
+        _localize(item, owned)
         if live and not local_meshes:
             done.append(f"{item.name} has a live key: its mesh was copied into this file.")
     copies.separate(rig)
@@ -107,9 +107,10 @@ def is_locked(item):
 
 def unlock_shapes(rig):
     """Copy all meshes whose shapes are locked into this file, before their mode is switched."""
+    owned = {}
     locked = [item for item in parts.meshes_of(rig) if is_locked(item)]
     for item in locked:
-        _localize(item)
+        _localize(item, owned)
     if locked:
         copies.separate(rig)
     return bool(locked)
@@ -125,11 +126,24 @@ def trouble(rig):
     return f"Blender's override of {', '.join(names)} cannot be written: the face stands still."
 
 
-def _localize(item):
-    own = item.data.copy()
-    if own.override_library is not None:
-        own = own.make_local(clear_liboverride=True)
-    item.data = own
+def _localize(item, owned):
+    """A mesh of this file, with its own copies of those materials that are overrides.
+
+    Without the mesh they would stand outside the override's hierarchy, and Blender would delete
+    them when the library changes. Args: owned  override material's name -> copy, filled here.
+    """
+    item.data = _local_copy(item.data)
+    for index, material in enumerate(item.data.materials):
+        if material is None or material.override_library is None:
+            continue
+        if material.name not in owned:
+            owned[material.name] = _local_copy(material)
+        item.data.materials[index] = owned[material.name]
+
+
+def _local_copy(item):
+    own = item.copy()
+    return own.make_local(clear_liboverride=True) if own.override_library is not None else own
 
 
 def _overrides(item, linked):
