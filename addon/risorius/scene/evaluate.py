@@ -9,7 +9,7 @@ import numpy as np
 
 from .. import native
 from ..logic import space as spaces
-from . import heal, meshes, parts, runtime
+from . import meshes, parts, runtime
 
 _AHEAD = np.array([0.0, -1.0, 0.0])
 
@@ -235,7 +235,7 @@ def _write_values(rig, pose):
 def _write_shape(item, live, weights, force):
     """Write the sum of all channels to the live key of a mesh, where it has one."""
     key = item.data.shape_keys
-    block = heal.live_block(key) if key else None
+    block = meshes.live_block(item)
     if block is None or item.mode == "EDIT":
         return
     morph = live.morph(item[parts.MESH])

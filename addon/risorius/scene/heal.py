@@ -2,14 +2,14 @@
 """What a rename or a deletion took away: mended where that is safe, said in words where not.
 
 Objects, meshes, materials, collections, actions and joints' bones may have any name. The names
-of the control bones, of the sliders and of the live key are a contract with actions, pose
+of the control bones, of the sliders are a contract with actions, pose
 assets and scripts, so they are given back.
 """
 
 import bpy
 
 from ..logic import plans
-from . import armatures, parts, runtime
+from . import armatures, meshes, parts, runtime
 
 
 def heal(rig):
@@ -70,19 +70,6 @@ def _sliders(rig):
     return done
 
 
-def live_block(key):
-    """The key that holds the sum of all channels, also where it was renamed; or None."""
-    block = key.key_blocks.get(plans.LIVE_KEY)
-    place = key.get(parts.LIVE_PLACE)
-    if block is None and place is not None and key.library is None:
-        block = next((b for b in key.key_blocks if b.frame == place), None)
-        if block is not None:
-            block.name = plans.LIVE_KEY
-    if block is not None and place != block.frame and key.library is None:
-        key[parts.LIVE_PLACE] = block.frame
-    return block
-
-
 def missing(item):
     """What the character that an object belongs to has lost.
 
@@ -112,7 +99,7 @@ def missing(item):
         found.append(f"{', '.join(out)}: deleted from the scene, still in the file.")
     for mesh in parts.meshes_of(rig):
         key = mesh.data.shape_keys
-        if mesh.get(parts.MODE) == "LIVE" and key is not None and live_block(key) is None:
+        if mesh.get(parts.MODE) == "LIVE" and key is not None and not meshes.live_block(mesh):
             found.append(f"{mesh.name} has lost its key {plans.LIVE_KEY}: choose Live again.")
     return found
 

@@ -11,6 +11,7 @@ from ..logic.plans import AUTO_LIMIT, LIVE_KEY
 from . import parts
 
 _DRIVEN = re.compile(r'^\["channels"\]\[(\d+)\]$')
+_LIVE_MARK = "KEY_BSPLINE"
 
 
 def build_mesh(plan, mesh_plan, rig, made, normals=True):
@@ -118,6 +119,21 @@ def real_channels(item):
     return found
 
 
+def live_block(item):
+    """The key that bears the channel sum, also after it was renamed; None without one.
+
+    It is marked by its interpolation, which has no meaning for relative keys and survives
+    renames, reordering, copies and files; the name is only the short way to it.
+    """
+    key = item.data.shape_keys
+    if key is None:
+        return None
+    block = key.key_blocks.get(LIVE_KEY)
+    if block is None and item.get(parts.MODE) == "LIVE":
+        block = next((b for b in key.key_blocks if b.interpolation == _LIVE_MARK), None)
+    return block
+
+
 def set_mode(item, rig, dna_mesh, matrix, labels, mode):
     """Bring a mesh's shapes into LIVE or KEYS mode; the same vertices in both.
 
@@ -179,7 +195,7 @@ def _to_keys(item, rig, deltas, labels):
         np.add.at(points, indices, moved)
         block.points.foreach_set("co", points.ravel())
         drive_key(key, block, rig, channel)
-    live = key.key_blocks.get(LIVE_KEY)
+    live = live_block(item)
     if live is not None:
         item.shape_key_remove(live)
     if parts.REAL in key:
@@ -204,9 +220,10 @@ def _to_live(item, deltas):
             kept.append(channel)
     if kept:
         key[parts.REAL] = kept
-    if key.key_blocks.get(LIVE_KEY) is None:
+    if live_block(item) is None:
         block = item.shape_key_add(name=LIVE_KEY, from_mix=False)
         block.value = 1.0
+        block.interpolation = _LIVE_MARK
 
 
 def drive_key(key, block, rig, channel):

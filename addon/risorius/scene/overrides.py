@@ -8,8 +8,7 @@ keys, which drivers move without any write, or meshes of this file.
 
 import bpy
 
-from ..logic.plans import LIVE_KEY
-from . import copies, evaluate, parts, runtime
+from . import copies, evaluate, meshes, parts, runtime
 
 
 def linked_rig(context):
@@ -88,8 +87,7 @@ def own_shapes(rig, local_meshes):
     """
     done, owned = [], {}
     for item in parts.meshes_of(rig):
-        key = item.data.shape_keys
-        live = key is not None and LIVE_KEY in key.key_blocks
+        live = meshes.live_block(item) is not None
         if not is_locked(item) or not (live or local_meshes):
             continue
         _localize(item, owned)

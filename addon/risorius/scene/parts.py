@@ -21,7 +21,6 @@ CHANNELS = "channels"  # on the deforming armature: values of the channels
 FACE = "face"  # the bone of the control armature that bears the controls
 PART = "risorius_part"  # on the control armature's bones: what each is, whatever its name
 PULL = "risorius_pull"  # on the deforming armature: its driver keeps the controls evaluated
-LIVE_PLACE = "risorius_live_place"  # on a Key: where the live key stands, whatever its name
 
 
 def rigs():
