@@ -5,12 +5,13 @@ import bpy
 
 from . import native
 from .scene import handlers
-from .ui import import_operators, life_operators, operators, panels
+from .ui import import_operators, life_operators, operators, overlay, panels, scene_operators
 
 CLASSES = (
     *import_operators.CLASSES,
     *operators.CLASSES,
     *life_operators.CLASSES,
+    *scene_operators.CLASSES,
     *panels.CLASSES,
 )
 
@@ -28,6 +29,7 @@ def register():
     for cls in CLASSES:
         bpy.utils.register_class(cls)
     bpy.types.WindowManager.risorius_search = _search_property()
+    bpy.types.WindowManager.risorius_show_timing = overlay.show_property()
     bpy.types.TOPBAR_MT_file_import.append(import_operators.draw_import)
     bpy.types.VIEW3D_MT_add.append(import_operators.draw_add)
     trouble = native.problem()
@@ -47,8 +49,10 @@ def unregister():
     if bpy.app.timers.is_registered(_refresh_once):
         bpy.app.timers.unregister(_refresh_once)
     handlers.unregister()
+    overlay.stop()
     bpy.types.VIEW3D_MT_add.remove(import_operators.draw_add)
     bpy.types.TOPBAR_MT_file_import.remove(import_operators.draw_import)
+    del bpy.types.WindowManager.risorius_show_timing
     del bpy.types.WindowManager.risorius_search
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

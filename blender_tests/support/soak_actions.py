@@ -16,7 +16,7 @@ LIMIT = 6  # characters beyond which none is added
 CONTROLS = [c for c in faces.CONTROLS if c.startswith("CTRL") and len(c) < 60]
 
 
-class Wrong(AssertionError):
+class WrongFaceError(AssertionError):
     """A face that is not what its controls say, or a driver that does not work."""
 
 
@@ -121,7 +121,7 @@ class World:
     def lod(self):
         rig = self._rig()
         self._activate(rig)
-        levels = scene.submodule("scene.build").lods_of(rig)
+        levels = scene.submodule("scene.lods").built(rig)
         bpy.ops.risorius.set_lod(lod=self.random.choice(levels))
 
     def shape_mode(self):
@@ -189,7 +189,7 @@ class World:
         bpy.ops.object.duplicate(linked=self.random.random() < 0.3)
         layer.update()
         for rig in self.rigs():  # levels that were hidden are hidden again
-            scene.submodule("scene.build").show_lod(rig, rig["risorius_lod"])
+            scene.submodule("scene.lods").show(rig)
         layer.update()
 
     def delete(self):
@@ -338,20 +338,20 @@ class World:
             The largest error, of a mesh's size.
 
         Raises:
-            Wrong: names what is wrong and by how much.
+            WrongFaceError: names what is wrong and by how much.
         """
         bad, _ = scene.invalid_drivers()
         if bad:
-            raise Wrong(f"invalid drivers: {bad[:5]}")
+            raise WrongFaceError(f"invalid drivers: {bad[:5]}")
         rigs = self.rigs()
         if not rigs:
-            raise Wrong("no character is left")
+            raise WrongFaceError("no character is left")
         worst = 0.0
         for rig in rigs:
             error, where = self._error(rig)
             worst = max(worst, error)
             if not error < scene.TOLERANCE:
-                raise Wrong(f"{rig.name}: {where} is off by {error:.3g} of its size")
+                raise WrongFaceError(f"{rig.name}: {where} is off by {error:.3g} of its size")
         return worst
 
     def _error(self, rig):

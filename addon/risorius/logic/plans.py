@@ -15,6 +15,7 @@ from .space import Float, Space, make_space, world_matrices
 
 LIVE_KEY = "<channel sum>"
 AUTO_LIMIT = 2_000_000  # keys x vertices of a mesh, above which real keys cost too much a frame
+AUTO_KEYS = 200  # real keys of a character: each driver costs Blender some 3 us a frame
 _LAYER_WORDS = {
     "mlbh": "neural network behaviour",
     "mlbe": "neural network behaviour",

@@ -67,11 +67,17 @@ def build_rig(context, plan, made, workshop):
     for joint, label in enumerate(armature.labels):
         data.bones[label][parts.JOINT] = joint
     data.display_type = "STICK"
+    # Bones that are not shown, and an object that is: so Select All and Duplicate take it along.
+    shelf = data.collections.new("Joints")
+    for bone in data.bones:
+        shelf.assign(bone)
+    shelf.is_visible = False
+    # It follows the control armature (place.py); moved together with it, it would go twice as far.
+    lock_place(rig)
     rig[parts.MAPS] = [0.0] * max(1, len(plan.map_labels))
     rig[parts.CHANNELS] = [0.0] * max(1, plan.channel_count)
     rig[parts.PULL] = 0.0
-    rig[parts.LOD] = 0
-    for name in (*LIVE_PROPERTIES, parts.LOD):
+    for name in LIVE_PROPERTIES:
         rig.property_overridable_library_set(f'["{name}"]', True)
     return rig
 
@@ -102,6 +108,12 @@ def pull_controls(rig, controls):
     for variable in curve.driver.variables:
         if variable.targets[0].id != controls:
             variable.targets[0].id = controls
+
+
+def lock_place(item):
+    """Let the user's hand not move an object by accident."""
+    item.lock_location = item.lock_rotation = item.lock_scale = (True, True, True)
+    item.lock_rotation_w = True
 
 
 def build_controls(context, plan, made, workshop):

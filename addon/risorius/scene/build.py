@@ -8,7 +8,7 @@ import bpy
 
 from .. import native
 from ..logic import names, plans
-from . import armatures, materials, meshes, parts, runtime, storage
+from . import armatures, lods, materials, meshes, parts, runtime, storage
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ def _build(context, plan, dna, content, path, options, made, progress):
         made.append(item.data.shape_keys)
     progress(0.95)
     _into_place(context, plan, workshop, rig, controls)
-    show_lod(rig, _first(plan))
+    lods.show(rig, _first(plan))
     return rig, warnings
 
 
@@ -119,6 +119,11 @@ def _connect(context, plan, rig, controls, text, path):
     parts.point(rig, parts.CONTROLS, controls)
     parts.point(rig, parts.DNA, text)
     rig[parts.UNIT] = context.scene.unit_settings.scale_length
+    rig[parts.LOD] = 0
+    rig[parts.LOD_RENDER] = lods.SAME
+    rig[parts.FOLLOW] = True
+    for key in (parts.LOD, parts.LOD_RENDER, parts.FOLLOW):
+        rig.property_overridable_library_set(f'["{key}"]', True)
     rig[parts.SOURCE] = _source(path)
     for key, value in plan.origin.items():
         controls.data[names.cut(f"dna_{key}")] = value
@@ -139,11 +144,12 @@ def _texture_folder(path):
 
 def _add_shapes(plan, dna, rig, built, mode):
     labels = channel_labels(dna)
+    total = sum(len(m.channels) for m in plan.meshes)
     for item, mesh_plan in zip(built, plan.meshes, strict=True):
         count = len(mesh_plan.channels)
         chosen = mode
         if mode == "AUTO":
-            chosen = meshes.automatic_mode(count, len(mesh_plan.positions))
+            chosen = meshes.automatic_mode(count, len(mesh_plan.positions), total)
         meshes.set_mode(
             item, rig, dna.meshes[mesh_plan.index], plan.space.delta_matrix, labels, chosen
         )
@@ -155,38 +161,25 @@ def channel_labels(dna):
 
 
 def _into_place(context, plan, workshop, rig, controls):
-    """Name the collection; select the controls, hide the deforming bones."""
+    """Name the collection; select the controls."""
     workshop.name = plan.name
-    rig.hide_set(True, view_layer=context.view_layer)
     for item in context.view_layer.objects:
         item.select_set(False, view_layer=context.view_layer)
     controls.select_set(True, view_layer=context.view_layer)
     context.view_layer.objects.active = controls
 
 
-def show_lod(rig, lod):
-    """Show the meshes of one level, in viewport and render, and evaluate that level."""
-    rig[parts.LOD] = int(lod)
-    for item in parts.meshes_of(rig):
-        hidden = int(lod) not in list(item.get(parts.LODS, [lod]))
-        item.hide_viewport = item.hide_render = hidden
-    rig.update_tag()
-
-
-def lods_of(rig):
-    """The levels that a character has meshes for, in order."""
-    return sorted({int(v) for m in parts.meshes_of(rig) for v in m.get(parts.LODS, [])})
-
-
 def change_mode(rig, mode):
     """Switch the meshes of a character to LIVE or KEYS shapes; AUTO chooses by size."""
     live = runtime.of(rig)
-    for item in parts.meshes_of(rig):
+    items = parts.meshes_of(rig)
+    total = sum(len(live.dna.meshes[i[parts.MESH]].blend_shape_targets) for i in items)
+    for item in items:
         dna_mesh = live.dna.meshes[item[parts.MESH]]
         chosen = mode
         if mode == "AUTO":
             chosen = meshes.automatic_mode(
-                len(dna_mesh.blend_shape_targets), len(dna_mesh.positions)
+                len(dna_mesh.blend_shape_targets), len(dna_mesh.positions), total
             )
         labels = channel_labels(live.dna)
         meshes.set_mode(item, rig, dna_mesh, live.space.delta_matrix, labels, chosen)

@@ -7,8 +7,9 @@ import bmesh
 import bpy
 import numpy as np
 
-from ..logic.plans import AUTO_LIMIT, LIVE_KEY
+from ..logic.plans import AUTO_KEYS, AUTO_LIMIT, LIVE_KEY
 from . import parts
+from .armatures import lock_place
 
 _DRIVEN = re.compile(r'^\["channels"\]\[(\d+)\]$')
 _LIVE_MARK = "KEY_BSPLINE"
@@ -50,6 +51,7 @@ def build_mesh(plan, mesh_plan, rig, made, normals=True):
     modifier = item.modifiers.new("Armature", "ARMATURE")
     modifier.object = rig
     item.parent = rig
+    lock_place(item)
     parts.point(item, parts.RIG, rig)
     item[parts.MESH] = mesh_plan.index
     item[parts.LODS] = list(mesh_plan.lods)
@@ -101,9 +103,15 @@ def _add_center_distance(mesh, mesh_plan):
     attribute.data.foreach_set("value", values)
 
 
-def automatic_mode(target_count, vertex_count):
-    """KEYS where real keys are cheap enough each frame, else LIVE."""
-    return "KEYS" if target_count * vertex_count < AUTO_LIMIT else "LIVE"
+def automatic_mode(target_count, vertex_count, all_targets):
+    """KEYS where real keys are cheap enough each frame, else LIVE.
+
+    Args:
+        target_count, vertex_count: of the mesh.
+        all_targets: of all meshes of the character.
+    """
+    few = target_count * vertex_count < AUTO_LIMIT and all_targets <= AUTO_KEYS
+    return "KEYS" if few else "LIVE"
 
 
 def real_channels(item):

@@ -11,7 +11,7 @@ import numpy as np
 
 from .. import native
 from ..logic import names, plans
-from ..logic.space import SpaceError, make_joint_space, world_matrices, yaw_pitch
+from ..logic.space import SpaceError, world_matrices, yaw_pitch
 from . import parts, storage
 
 DEFAULT_EYE_ANGLE = np.radians(30.0)
@@ -25,7 +25,7 @@ class Runtime:
         dna: the file; rig: its risorius.Rig; space: its Space.
         labels: property names of the raw controls, by index.
         rests: their values at rest.
-        joints: JointSpace of the joints that the evaluator owns.
+        owned: the joints that the evaluator writes.
         rest: float64[J, 4, 4] neutral joints.
         anchors: joints of neck, head and eyes.
         look: control name -> yaw or pitch (radians) that a value of 1 gives; by side.
@@ -37,7 +37,7 @@ class Runtime:
     space: object
     labels: list
     rests: list
-    joints: object
+    owned: frozenset
     rest: object
     anchors: object
     look: dict
@@ -50,6 +50,19 @@ class Runtime:
                 self.dna, mesh_index, matrix=self.space.delta_matrix
             )
         return self.morphs[mesh_index]
+
+    def bone_space(self, joints):
+        """The native conversion of poses for bones that stand for these joints."""
+        space = self.space
+        return native.module().BoneSpace(
+            self.dna.neutral_joint_rotations,
+            joints,
+            axes=space.axes,
+            scale=space.scale,
+            radians=space.radians,
+            sequence=space.sequence,
+            signs=space.signs,
+        )
 
 
 _cache = {}
@@ -100,7 +113,7 @@ def _compile(content, unit):
         space=space,
         labels=names.unique_labels(dna.raw_control_names),
         rests=[float(rest) for rest in rig.initial_raw_controls],
-        joints=make_joint_space(space, dna.neutral_joint_rotations, sorted(owned)),
+        owned=frozenset(owned),
         rest=rest,
         anchors=anchors,
         look={},

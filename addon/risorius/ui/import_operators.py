@@ -10,7 +10,7 @@ from bpy_extras.io_utils import ImportHelper
 from .. import native
 from ..logic.plans import PlanError
 from ..logic.space import SpaceError
-from ..scene import build, parts
+from ..scene import build, lods, parts
 
 MODES = (
     ("AUTO", "Automatic", "Real shape keys where a mesh has few, else the live sum"),
@@ -218,7 +218,7 @@ class RISORIUS_OT_reload(bpy.types.Operator):
     def execute(self, context):
         old = parts.active_rig(context)
         path = bpy.path.abspath(old[parts.SOURCE])
-        levels = tuple(build.lods_of(old)) or (0,)
+        levels = tuple(lods.built(old)) or (0,)
         modes = {m.get(parts.MODE) for m in parts.meshes_of(old)}
         mode = modes.pop() if len(modes) == 1 else "AUTO"
         controls = parts.controls_of(old)

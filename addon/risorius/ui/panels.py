@@ -7,7 +7,7 @@ import bpy
 
 from .. import native
 from ..logic import plans, regions
-from ..scene import build, parts, runtime
+from ..scene import lods, parts, place, runtime
 from . import life_operators
 
 _ICONS = {
@@ -78,14 +78,27 @@ def _draw_start(layout):
 
 
 def _draw_detail(layout, rig):
-    levels = build.lods_of(rig)
+    levels = lods.built(rig)
     if len(levels) < 2:
         return
-    row = layout.row(align=True)
-    row.label(text="Detail")
-    for level in levels:
-        current = level == rig.get(parts.LOD, 0)
-        row.operator("risorius.set_lod", text=str(level), depress=current).lod = level
+    column = layout.column(align=True)
+    auto = lods.by_distance(rig)
+    for target, text, shown in (
+        ("VIEWPORT", "Viewport", lods.viewport_level(rig)),
+        ("RENDER", "Render", lods.render_level(rig)),
+    ):
+        row = column.row(align=True)
+        row.active = not auto
+        row.label(text=text)
+        for level in levels:
+            button = row.operator("risorius.set_lod", text=str(level), depress=level == shown)
+            button.lod, button.target = level, target
+    column.operator("risorius.set_lod_by_distance", depress=auto).enable = not auto
+    if auto:
+        for level in range(min(len(rig[parts.LOD_DISTANCES]), levels[-1])):
+            column.prop(
+                rig, f'["{parts.LOD_DISTANCES}"]', index=level, text=f"{level} to {level + 1} at"
+            )
 
 
 def _draw_shapes(layout, rig):
@@ -171,8 +184,12 @@ class RISORIUS_PT_options(_FacePanel, bpy.types.Panel):
         rig = parts.active_rig(context)
         on = bool(parts.controls_of(rig).get(parts.OVERDRIVE))
         layout.operator("risorius.set_overdrive", depress=on).enable = not on
+        attached = place.body_of(parts.controls_of(rig))
+        body = "risorius.detach_body" if attached else "risorius.attach_body"
+        layout.operator(body, icon="ARMATURE_DATA")
         layout.operator("risorius.separate", icon="UNLINKED")
         layout.operator("risorius.reload", icon="FILE_REFRESH")
+        layout.prop(context.window_manager, "risorius_show_timing")
         live = runtime.of(rig)
         if live is not None:
             column = layout.column(align=True)
