@@ -5,11 +5,12 @@ import bpy
 
 from . import native
 from .scene import handlers
-from .ui import import_operators, operators, overlay, panels, scene_operators
+from .ui import import_operators, life_operators, operators, overlay, panels, scene_operators
 
 CLASSES = (
     *import_operators.CLASSES,
     *operators.CLASSES,
+    *life_operators.CLASSES,
     *scene_operators.CLASSES,
     *panels.CLASSES,
 )

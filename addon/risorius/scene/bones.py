@@ -40,6 +40,9 @@ def write(rig, live, deltas, turns, depsgraph):
         deltas: float32[J, 9] of a Pose.
         turns: "neck" and "head" -> Quaternion in the armature's axes, added on top.
         depsgraph: where the animated values of all other bones are read.
+
+    Returns:
+        Whether Blender took them: it refuses bulk writes to overrides without a word.
     """
     bones = rig.pose.bones
     writer = _writer(rig, live)
@@ -52,7 +55,7 @@ def write(rig, live, deltas, turns, depsgraph):
     if writer.buffers is None:
         for name, values in owned.items():
             bones.foreach_set(name, values.ravel())
-        return
+        return _taken(rig, {n: v.ravel() for n, v in owned.items()})
     # A bulk write that leaves out the animated values of the others would undo them.
     seen = rig.evaluated_get(depsgraph).pose.bones
     source = seen if len(seen) == writer.count else bones
@@ -61,6 +64,20 @@ def write(rig, live, deltas, turns, depsgraph):
         if name in owned:
             flat.reshape(-1, _WIDTHS[name])[writer.where] = owned[name]
         bones.foreach_set(name, flat)
+    return _taken(rig, writer.buffers)
+
+
+def _taken(rig, written):
+    if not rig.override_library:
+        return True
+    return all(is_there(rig.pose.bones, name, flat) for name, flat in written.items())
+
+
+def is_there(values, name, wanted):
+    """Whether a bulk read gives what was written. Args: values  a collection of properties."""
+    got = np.empty_like(wanted)
+    values.foreach_get(name, got)
+    return np.array_equal(got, wanted)
 
 
 def _writer(rig, live):

@@ -84,7 +84,7 @@ def _build(context, plan, dna, content, path, options, made, progress):
     built = []
     for number, mesh_plan in enumerate(plan.meshes):
         item = meshes.build_mesh(plan, mesh_plan, rig, made, options.normals)
-        rig[f"{parts.MESH_PREFIX}{number:03d}"] = item
+        parts.point(rig, f"{parts.MESH_PREFIX}{number:03d}", item)
         built.append(item)
         progress(0.4 + 0.3 * (number + 1) / len(plan.meshes))
     warnings = []
@@ -94,6 +94,7 @@ def _build(context, plan, dna, content, path, options, made, progress):
     for item in objects:
         workshop.objects.link(item)
     settle(context, rig, controls)
+    armatures.pull_controls(rig, controls)
     if options.materials:
         found = _find_textures(plan, path, options)
         simple = options.simple_materials
@@ -121,13 +122,15 @@ def settle(context, *items):
 
 
 def _connect(context, plan, rig, controls, text, path):
-    controls[parts.RIG] = rig
-    rig[parts.CONTROLS] = controls
-    rig[parts.DNA] = text
+    parts.point(controls, parts.RIG, rig)
+    parts.point(rig, parts.CONTROLS, controls)
+    parts.point(rig, parts.DNA, text)
     rig[parts.UNIT] = context.scene.unit_settings.scale_length
     rig[parts.LOD] = 0
     rig[parts.LOD_RENDER] = lods.SAME
     rig[parts.FOLLOW] = True
+    for key in (parts.LOD, parts.LOD_RENDER, parts.FOLLOW):
+        rig.property_overridable_library_set(f'["{key}"]', True)
     rig[parts.SOURCE] = _source(path)
     for key, value in plan.origin.items():
         controls.data[names.cut(f"dna_{key}")] = value
@@ -214,6 +217,7 @@ def replace_character(old, new):
     names_now = (new.name.removesuffix("_rig"), old.name.removesuffix("_rig"))
     new[parts.CONTROLS] = controls
     controls[parts.RIG] = new
+    armatures.pull_controls(new, controls)
     old[parts.CONTROLS] = spare
     spare[parts.RIG] = old
     for home in controls.users_collection:

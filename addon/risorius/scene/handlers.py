@@ -5,7 +5,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from .. import native
-from . import copies, evaluate, lods, parts, place, runtime, timing
+from . import copies, evaluate, heal, lods, parts, place, runtime, timing
 
 _state = {"objects": -1, "busy": False}
 
@@ -44,7 +44,7 @@ def _updated(_scene, depsgraph):
         if edited:
             timing.begin()
         for rig in edited:
-            evaluate.mend_types(rig)
+            heal.heal(rig)
             evaluate.evaluate(rig, depsgraph)
     finally:
         _state["busy"] = False
@@ -67,6 +67,7 @@ def _edited(depsgraph):
         item = update.id.original
         if isinstance(item, bpy.types.Armature):
             runtime.forget_outputs()
+            heal.heal_all()
         elif isinstance(item, bpy.types.Object):
             if item.type == "ARMATURE":
                 armatures.add(item)
@@ -89,6 +90,9 @@ def _restored(*_arguments):
     """After load, undo and redo: what was written before says nothing about what is there."""
     runtime.forget_outputs()
     _state["objects"] = -1
+    if native.problem():
+        return
+    heal.heal_all()
     refresh()
     # The evaluated copies may not have caught up yet: look once more when they have.
     runtime.forget_outputs()
@@ -100,20 +104,20 @@ def _restored(*_arguments):
 
 @persistent
 def _before_save(*_arguments):
+    if native.problem():
+        return
     copies.separate_all()
+    heal.remove_dead()
 
 
 def refresh():
-    """Bring all characters of the current scene up to their controls now."""
-    if native.problem():
+    """Bring all characters up to their controls now, each in the scenes that it is in."""
+    if native.problem() or not parts.rigs():
         return
     for scene in bpy.data.scenes:
-        layers = scene.view_layers
-        if parts.rigs() and len(layers):
-            depsgraph = layers[0].depsgraph
-            if depsgraph is not None:
-                evaluate.evaluate_all(depsgraph)
-                break
+        for layer in scene.view_layers:
+            if layer.depsgraph is not None:
+                evaluate.evaluate_all(layer.depsgraph)
 
 
 _HANDLERS = (

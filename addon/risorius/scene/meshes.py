@@ -12,6 +12,7 @@ from . import parts
 from .armatures import lock_place
 
 _DRIVEN = re.compile(r'^\["channels"\]\[(\d+)\]$')
+_LIVE_MARK = "KEY_BSPLINE"
 
 
 def build_mesh(plan, mesh_plan, rig, made, normals=True):
@@ -50,9 +51,11 @@ def build_mesh(plan, mesh_plan, rig, made, normals=True):
     modifier.object = rig
     item.parent = rig
     lock_place(item)
-    item[parts.RIG] = rig
+    parts.point(item, parts.RIG, rig)
     item[parts.MESH] = mesh_plan.index
     item[parts.LODS] = list(mesh_plan.lods)
+    item[parts.MODE] = "KEYS"
+    item.property_overridable_library_set(f'["{parts.MODE}"]', True)
     return item
 
 
@@ -99,6 +102,21 @@ def real_channels(item):
             if match and name:
                 found[bpy.utils.unescape_identifier(name.group(1))] = int(match.group(1))
     return found
+
+
+def live_block(item):
+    """The key that bears the channel sum, also after it was renamed; None without one.
+
+    It is marked by its interpolation, which has no meaning for relative keys and survives
+    renames, reordering, copies and files; the name is only the short way to it.
+    """
+    key = item.data.shape_keys
+    if key is None:
+        return None
+    block = key.key_blocks.get(LIVE_KEY)
+    if block is None and item.get(parts.MODE) == "LIVE":
+        block = next((b for b in key.key_blocks if b.interpolation == _LIVE_MARK), None)
+    return block
 
 
 def set_mode(item, rig, dna_mesh, matrix, labels, mode):
@@ -162,7 +180,7 @@ def _to_keys(item, rig, deltas, labels):
         np.add.at(points, indices, moved)
         block.points.foreach_set("co", points.ravel())
         drive_key(key, block, rig, channel)
-    live = key.key_blocks.get(LIVE_KEY)
+    live = live_block(item)
     if live is not None:
         item.shape_key_remove(live)
     if parts.REAL in key:
@@ -187,9 +205,10 @@ def _to_live(item, deltas):
             kept.append(channel)
     if kept:
         key[parts.REAL] = kept
-    if key.key_blocks.get(LIVE_KEY) is None:
+    if live_block(item) is None:
         block = item.shape_key_add(name=LIVE_KEY, from_mix=False)
         block.value = 1.0
+        block.interpolation = _LIVE_MARK
 
 
 def drive_key(key, block, rig, channel):

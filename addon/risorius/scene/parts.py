@@ -27,16 +27,32 @@ REAL = "risorius_real"  # on a Key: channels that are real keys although the mes
 MAPS = "maps"  # on the deforming armature: values of the animated maps
 CHANNELS = "channels"  # on the deforming armature: values of the channels
 FACE = "face"  # the bone of the control armature that bears the controls
+PART = "risorius_part"  # on the control armature's bones: what each is, whatever its name
+PULL = "risorius_pull"  # on the deforming armature: its driver keeps the controls evaluated
 
 
 def rigs():
-    """The deforming armatures of all characters of this file."""
-    return [o for o in bpy.data.objects if o.type == "ARMATURE" and _object(o, CONTROLS)]
+    """The deforming armatures of all characters of this file; linked ones are not written."""
+    return [o for o in bpy.data.objects if o.library is None and is_rig(o)]
+
+
+def is_rig(item):
+    """Whether an object is the deforming armature of a character."""
+    return item.type == "ARMATURE" and _object(item, CONTROLS) is not None
 
 
 def _object(owner, key):
     value = owner.get(key)
     return value if isinstance(value, bpy.types.Object) else None
+
+
+def point(owner, key, item):
+    """Let a custom property point to another part, also on overrides of linked characters.
+
+    Blender gives a pointer of an override back to the library at load unless it is marked so.
+    """
+    owner[key] = item
+    owner.property_overridable_library_set(f'["{key}"]', True)
 
 
 def controls_of(rig):
@@ -51,10 +67,10 @@ def rig_of(item):
     """The deforming armature of the character that an object belongs to, or None."""
     if item is None:
         return None
-    if item.type == "ARMATURE" and _object(item, CONTROLS):
+    if is_rig(item):
         return item
     rig = _object(item, RIG)
-    return rig if rig is not None and _object(rig, CONTROLS) else None
+    return rig if rig is not None and is_rig(rig) else None
 
 
 def meshes_of(rig):
@@ -69,12 +85,16 @@ def meshes_of(rig):
 
 
 def active_rig(context):
-    """The character of the active object, else the only one of the scene, else None."""
+    """The character of the active object, else the only one of the scene, else None.
+
+    Never a linked one: nothing on it can be changed.
+    """
     rig = rig_of(context.object)
     if rig is None:
-        there = [r for r in rigs() if r.name in context.scene.objects]
+        # A linked object may have the same name: identity tells them apart.
+        there = [r for r in rigs() if context.scene in r.users_scene]
         rig = there[0] if len(there) == 1 else None
-    return rig
+    return rig if rig is not None and rig.library is None else None
 
 
 def face_bone(rig):

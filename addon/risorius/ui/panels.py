@@ -8,6 +8,7 @@ import bpy
 from .. import native
 from ..logic import plans, regions
 from ..scene import lods, parts, place, runtime
+from . import life_operators
 
 _ICONS = {
     "brow": "MOD_CURVE",
@@ -50,6 +51,8 @@ class RISORIUS_PT_character(_FacePanel, bpy.types.Panel):
         if trouble:
             _write(layout, trouble, "ERROR")
             return
+        if life_operators.draw_trouble(layout, context):
+            return
         rig = parts.active_rig(context)
         if rig is None:
             _draw_start(layout)
@@ -57,8 +60,7 @@ class RISORIUS_PT_character(_FacePanel, bpy.types.Panel):
         live = runtime.of(rig)
         controls = parts.controls_of(rig)
         if live is None or controls is None:
-            _write(layout, "This face has lost its data or its control armature.", "ERROR")
-            return
+            return  # said above
         layout.label(text=rig.name.removesuffix("_rig"), icon="USER")
         _draw_detail(layout, rig)
         _draw_shapes(layout, rig)
