@@ -8,7 +8,7 @@ are stale while an animation renders) and written to the originals, in bulk.
 from time import perf_counter
 
 from .. import native
-from . import bones, inputs, lods, meshes, parts, place, runtime, timing
+from . import inputs, lods, meshes, parts, place, posing, runtime, timing
 
 
 def evaluate_all(depsgraph, force=False):
@@ -52,7 +52,7 @@ def evaluate(rig, depsgraph, force=False):
     times.append(perf_counter())
     pose = live.rig.evaluate(raw, lod)
     times.append(perf_counter())
-    taken = bones.write(rig, live, pose.joints, turns, depsgraph)
+    taken = posing.write(rig, live, pose.joints, turns, depsgraph)
     note_refusal(rig, taken)
     if not taken:
         return False  # channels and maps shall not move without the bones
@@ -125,6 +125,6 @@ def _write_shape(item, live, weights, force):
     points = morph.evaluate(weights, base=basis)
     block.points.foreach_set("co", points.ravel())
     if item.data.library or item.data.override_library:
-        note_refusal(item, bones.is_there(block.points, "co", points.ravel()))
+        note_refusal(item, posing.is_there(block.points, "co", points.ravel()))
     key.update_tag()
     item.data.update_tag()
