@@ -5,9 +5,10 @@ import bpy
 
 from . import native
 from .scene import handlers
-from .ui import import_operators, life_operators, operators, overlay, panels, scene_operators
+from .ui import about, import_operators, life_operators, operators, overlay, panels, scene_operators
 
 CLASSES = (
+    *about.CLASSES,
     *import_operators.CLASSES,
     *operators.CLASSES,
     *life_operators.CLASSES,

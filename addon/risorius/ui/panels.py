@@ -189,7 +189,11 @@ class RISORIUS_PT_options(_FacePanel, bpy.types.Panel):
         layout.operator(body, icon="ARMATURE_DATA")
         layout.operator("risorius.separate", icon="UNLINKED")
         layout.operator("risorius.reload", icon="FILE_REFRESH")
+        layout.operator("risorius.describe", icon="INFO")
         layout.prop(context.window_manager, "risorius_show_timing")
+        render = context.scene.render
+        if not render.use_lock_interface:
+            layout.prop(render, "use_lock_interface", text="Lock Interface in Renders")
         live = runtime.of(rig)
         if live is not None:
             column = layout.column(align=True)
