@@ -97,7 +97,8 @@ def stage(items, size=32, engine="CYCLES", samples=4):
     if engine == "CYCLES":
         setup.cycles.samples, setup.cycles.device = samples, "CPU"
         setup.cycles.use_denoising = False
-        setup.cycles.seed = 3
+        setup.cycles.seed, setup.cycles.max_bounces = 3, 4
+        setup.cycles.diffuse_bounces = setup.cycles.glossy_bounces = 0
     else:
         setup.eevee.taa_render_samples = samples
     setup.render.resolution_x = setup.render.resolution_y = size
@@ -114,7 +115,7 @@ def stage(items, size=32, engine="CYCLES", samples=4):
     camera.rotation_euler = (np.pi / 2, 0, 0)
     setup.collection.objects.link(camera)
     setup.camera = camera
-    for name, turn, power in (("key", (0.9, 0.0, 0.5), 3.0), ("fill", (1.2, 0.0, -0.7), 1.0)):
+    for name, turn, power in (("key", (0.9, 0.0, 0.5), 4.0), ("fill", (1.2, 0.0, -0.7), 1.0)):
         sun = bpy.data.objects.new(name, bpy.data.lights.new(name, "SUN"))
         sun.data.energy = power
         sun.rotation_euler = turn

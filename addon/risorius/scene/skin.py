@@ -117,7 +117,8 @@ class Skin:
         kind, name = mask
         if kind == "own":
             use = self.look.uses[name]
-            picture = graph.image(self.look.image(f"map:{use.label}", data=True), label=use.label)
+            mask = self.look.image(f"map:{use.label}", data=True)
+            picture = graph.image(mask, label=use.label, clamp=True)
             return graph.math("MULTIPLY", members[0][1], picture.outputs["Color"])
         if kind == "atlas":
             amount = graph.total([v for _, v in members])
@@ -138,8 +139,10 @@ class Skin:
         column, row, channel, side = self.look.places[region]
         cache = self.__dict__.setdefault("_tiles", {})
         if (column, row) not in cache:
-            graph = self.graph
-            small = graph.vector("SCALE", graph.uv())
+            graph, rim = self.graph, 0.5 / textures.TILE  # no neighbour's tile at the edges
+            inside = graph.vector("MAXIMUM", graph.uv(), (rim, rim, 0.0))
+            inside = graph.vector("MINIMUM", inside, (1 - rim, 1 - rim, 0.0))
+            small = graph.vector("SCALE", inside)
             small.node.inputs["Scale"].default_value = 1 / side
             place = graph.vector("ADD", small, (column / side, row / side, 0.0))
             picture = graph.image(self.look.atlas, place, "Wrinkle masks")
