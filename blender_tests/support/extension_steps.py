@@ -52,6 +52,18 @@ def _manager():
         addon_utils.enable("bl_pkg", default_set=True)
 
 
+def _read_preferences(step):
+    """As a module Blender starts with factory settings; before 4.5 it dies when it shall read the
+    user's, so what is installed is enabled by hand there."""
+    if bpy.app.version >= (4, 5, 0):
+        bpy.ops.wm.read_userpref()
+    elif step in ("use", "disable", "remove"):
+        import addon_utils
+
+        addon_utils.extensions_refresh()
+        addon_utils.enable(MODULE, default_set=True)
+
+
 def install(package):
     """As a user does it: Preferences, Install from Disk."""
     _manager()
@@ -110,7 +122,7 @@ if __name__ == "__main__":
     try:
         step, *arguments = sys.argv[sys.argv.index("--") + 1 :]
         if not bpy.app.binary_path:
-            bpy.ops.wm.read_userpref()  # as a module Blender starts with factory settings
+            _read_preferences(step)
         print("RESULT " + json.dumps(STEPS[step](*arguments)))
         code = 0
     except BaseException:  # noqa: BLE001  printed, and the exit code says it

@@ -19,13 +19,14 @@ _AREA_WORDS = (
     ("lips", ("lip", "purse", "pucker", "mouth", "funnel")),
 )
 AREAS = ("forehead", "glabella", "eye", "nose", "smile", "lips", "chin", "neck")
-# How the folds of an area run: lines along x, lines along z, around a point, or dimples.
+# How the folds of an area run: lines along x, lines along z, rays from the
+# eye, an arc around the mouth, or dimples.
 FOLDS = {
     "forehead": "level",
     "glabella": "upright",
-    "eye": "round",
+    "eye": "rays",
     "nose": "level",
-    "smile": "round",
+    "smile": "arc",
     "lips": "upright",
     "chin": "dimples",
     "neck": "level",

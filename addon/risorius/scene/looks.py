@@ -8,7 +8,7 @@ TEETH = "risorius_teeth"  # mesh attribute: place along the arch in teeth, heigh
 _SCLERA, _SCLERA_RIM, _VEIN = (0.72, 0.66, 0.62), (0.56, 0.39, 0.34), (0.48, 0.14, 0.11)
 _PUPIL, _IRIS_IN, _IRIS_OUT = (0.002, 0.002, 0.002), (0.19, 0.10, 0.045), (0.055, 0.066, 0.05)
 _LIMBUS = (0.022, 0.022, 0.02)
-_ENAMEL, _ENAMEL_ROOT, _GAP = (0.66, 0.59, 0.47), (0.56, 0.43, 0.27), (0.16, 0.10, 0.06)
+_ENAMEL, _ENAMEL_ROOT, _GAP = (0.74, 0.66, 0.53), (0.62, 0.47, 0.29), (0.26, 0.15, 0.09)
 _GUM, _GUM_DARK = (0.44, 0.14, 0.12), (0.28, 0.065, 0.06)
 _TONGUE, _TONGUE_DARK = (0.45, 0.15, 0.14), (0.30, 0.065, 0.065)
 _LASH, _LASH_TIP = (0.010, 0.006, 0.004), (0.045, 0.026, 0.016)
@@ -50,9 +50,9 @@ def eyes(graph, look):
     hollow = graph.ramp(away, (0.0, (0.0, 0.0, 0.0)), (0.46, (1.0, 1.0, 1.0)))
     bumpy = graph.noise(graph.rest_points(look.extent), 26.0 / look.unit, detail=3.0)
     height = graph.math("MULTIPLY_ADD", bumpy, 0.06, hollow)
-    rough = graph.ramp(away, (0.42, (0.45, 0.45, 0.45)), (0.56, (0.30, 0.30, 0.30)))
-    graph.set(Base_Color=color, Roughness=rough, Specular_Ior_Level=0.3)
-    graph.set(Coat_Weight=1.0, Coat_Roughness=_film(graph, look, 0.015, 0.05), Coat_Ior=1.376)
+    rough = graph.ramp(away, (0.42, (0.45, 0.45, 0.45)), (0.56, (0.16, 0.16, 0.16)))
+    graph.set(Base_Color=color, Roughness=rough, Specular_Ior_Level=0.4)
+    graph.set(Coat_Weight=1.0, Coat_Roughness=_film(graph, look, 0.01, 0.04), Coat_Ior=1.5)
     if not look.simple:
         relief = graph.bump(height, look.unit * 0.045, _textured_normal(graph, look), 0.55)
         graph.set(Normal=relief, Subsurface_Weight=0.25, Subsurface_Scale=look.unit * 0.02)
@@ -113,9 +113,9 @@ def teeth(graph, look):
         if look.vertices < _COARSE:
             # |sin| falls to 0 between two teeth; narrower at the gum, as crowns are.
             round_ = graph.math("ABSOLUTE", graph.math("SINE", place))
-            gap = graph.ramp(round_, (0.0, (1.0,) * 3), (0.24, (0.0,) * 3))
+            gap = graph.ramp(round_, (0.0, (1.0,) * 3), (0.16, (0.0,) * 3))
             color = graph.mix(graph.math("MULTIPLY", gap, 0.8), color, _GAP)
-            arch = graph.math("POWER", round_, 0.6)
+            arch = graph.math("POWER", round_, 0.45)
             scallop = graph.math("MULTIPLY_ADD", arch, -0.17, away)
             gum = graph.ramp(scallop, (0.60, (0.0,) * 3), (0.64, (1.0,) * 3))
             pink = graph.ramp(graph.noise(points, 20.0 / look.unit), (0.3, _GUM_DARK), (0.7, _GUM))
@@ -182,7 +182,7 @@ def _strands(graph, look):
     """Noise drawn out along the hairs."""
     where = graph.uv() if look.has_uvs else graph.rest_points(look.extent)
     reach = 1.0 if look.has_uvs else 1.0 / look.unit
-    stretched = graph.vector("MULTIPLY", where, (70 * reach, 5 * reach, 70 * reach))
+    stretched = graph.vector("MULTIPLY", where, (110 * reach, 0.6 * reach, 110 * reach))
     return graph.noise(stretched, 4.0, detail=2.0)
 
 

@@ -137,10 +137,12 @@ class Graph:
         """The UV map's coordinates."""
         return self.node("TexCoord").outputs["UV"]
 
-    def image(self, image, vector=None, label=""):
+    def image(self, image, vector=None, label="", clamp=False):
         """An image texture node."""
         node = self.node("TexImage", label)
         node.image = image
+        if clamp:
+            node.extension = "EXTEND"  # repeated, its far edge would mix into the near one
         self.put(vector, node.inputs["Vector"])
         return node
 

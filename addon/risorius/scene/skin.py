@@ -11,9 +11,11 @@ FOLDS = "risorius_folds"  # mesh attribute: x, height, curve of the folds
 _FRAME = "Animated maps"
 _TONE, _DARK, _RED = (0.56, 0.31, 0.22), (0.45, 0.21, 0.145), (0.50, 0.19, 0.14)
 _FLUSH = (1.0, 0.42, 0.38)
-_CREASE = (0.62, 0.38, 0.33)
+_CREASE = (0.60, 0.40, 0.36)
 # Radians for each eye distance: how close the folds lie.
-_PITCH = {"level": 19.0, "upright": 26.0, "round": 24.0, "dimples": 30.0}
+_PITCH = {"level": 19.0, "upright": 24.0, "rays": 20.0, "arc": 6.0}
+_FLUSH_SHARE = 0.22  # of an area's map: without a painted mask a blush must stay faint
+_FOLD_DEPTH = {"level": 0.45, "upright": 0.45, "rays": 0.35, "arc": 1.8, "dimples": 0.6}
 
 
 class Skin:
@@ -77,7 +79,7 @@ class Skin:
                 groups.setdefault(target, []).append((use.side, value))
         sums = {}
         for (bucket, mask), members in groups.items():
-            sums.setdefault(bucket, []).append(self._masked(mask, members))
+            sums.setdefault(bucket, []).append(self._masked(bucket, mask, members))
         for bucket, amounts in sums.items():
             self._file(bucket, amounts)
 
@@ -109,21 +111,21 @@ class Skin:
         plain_driver(driver, self.look.rig, f'["{parts.MAPS}"][{use.index}]')
         return value.outputs[0]
 
-    def _masked(self, mask, members):
+    def _masked(self, bucket, mask, members):
         """The sum of some maps' values, each side on its own half, times their mask."""
         graph = self.graph
         kind, name = mask
         if kind == "own":
             use = self.look.uses[name]
-            picture = graph.image(self.look.image(f"map:{use.label}", data=True), label=use.label)
+            mask = self.look.image(f"map:{use.label}", data=True)
+            picture = graph.image(mask, label=use.label, clamp=True)
             return graph.math("MULTIPLY", members[0][1], picture.outputs["Color"])
         if kind == "atlas":
             amount = graph.total([v for _, v in members])
             return graph.math("MULTIPLY", amount, self._atlas_channel(name))
-        amount = self._sided(members)
-        if name == "all":
-            return graph.math("MULTIPLY", amount, 1.0)
-        return graph.math("MULTIPLY", amount, self.areas[name])
+        share = _FLUSH_SHARE if bucket[0] == "flush" else 1.0
+        amount = graph.math("MULTIPLY", self._sided(members), share)
+        return amount if name == "all" else graph.math("MULTIPLY", amount, self.areas[name])
 
     def _sided(self, members):
         left = [v for side, v in members if side != "R"]
@@ -137,8 +139,10 @@ class Skin:
         column, row, channel, side = self.look.places[region]
         cache = self.__dict__.setdefault("_tiles", {})
         if (column, row) not in cache:
-            graph = self.graph
-            small = graph.vector("SCALE", graph.uv())
+            graph, rim = self.graph, 0.5 / textures.TILE  # no neighbour's tile at the edges
+            inside = graph.vector("MAXIMUM", graph.uv(), (rim, rim, 0.0))
+            inside = graph.vector("MINIMUM", inside, (1 - rim, 1 - rim, 0.0))
+            small = graph.vector("SCALE", inside)
             small.node.inputs["Scale"].default_value = 1 / side
             place = graph.vector("ADD", small, (column / side, row / side, 0.0))
             picture = graph.image(self.look.atlas, place, "Wrinkle masks")
@@ -228,8 +232,9 @@ class Skin:
                 cells = graph.cells(self.points, 9.0 / self.look.unit)
                 self.folds[kind] = graph.math("MINIMUM", cells, 1.0)
                 continue
-            along = {"level": z, "upright": x, "round": curve}[kind]
-            bent = graph.math("MULTIPLY_ADD", wander, 0.16, along)
+            along = {"level": z, "upright": x, "rays": curve, "arc": curve}[kind]
+            sway = 0.03 if kind == "arc" else 0.13
+            bent = graph.math("MULTIPLY_ADD", wander, sway, along)
             wave = graph.math("SINE", graph.math("MULTIPLY", bent, _PITCH[kind]))
             self.folds[kind] = graph.math("ABSOLUTE", wave)
         return self.folds
@@ -239,9 +244,9 @@ class Skin:
         graph = self.graph
         deep = []
         for kind, ridge in self._ridges().items():
-            sharp = graph.math("POWER", graph.math("SUBTRACT", 1.0, ridge), 3.0)
+            sharp = graph.math("POWER", graph.math("SUBTRACT", 1.0, ridge), 5.0)
             deep.append(graph.math("MULTIPLY", sharp, self.bumps[kind]))
-        return graph.math("MULTIPLY", graph.total(deep), 0.8, clamp=True) if deep else None
+        return graph.math("MULTIPLY", graph.total(deep), 0.42, clamp=True) if deep else None
 
     def _normal(self):
         graph, look = self.graph, self.look
@@ -249,8 +254,11 @@ class Skin:
         pores = graph.cells(self.points, 48.0 / look.unit)
         grain = graph.noise(self.points, 22.0 / look.unit, detail=3.0, roughness=0.65)
         skin = graph.math("MULTIPLY_ADD", pores, 0.30, graph.math("MULTIPLY", grain, 0.42))
-        normal = graph.bump(skin, look.unit * 0.010, normal, 0.16 if normal else 0.42)
-        folds = [graph.math("MULTIPLY", r, self.bumps[k]) for k, r in self._ridges().items()]
+        normal = graph.bump(skin, look.unit * 0.010, normal, 0.16 if normal else 0.5)
+        folds = []
+        for kind, ridge in self._ridges().items():
+            deep = graph.math("MULTIPLY", self.bumps[kind], _FOLD_DEPTH[kind])
+            folds.append(graph.math("MULTIPLY", ridge, deep))
         if folds:
             normal = graph.bump(graph.total(folds), look.unit * 0.030, normal)
             normal.node.label = "Wrinkles"

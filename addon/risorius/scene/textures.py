@@ -29,34 +29,19 @@ def set_color_space(image, data):
         data: numbers, such as normals or masks, that no colour management may touch.
     """
     settings = image.colorspace_settings
-    if data:
-        settings.is_data = True  # takes the configuration's own role for data
-    elif image.is_float and image.file_format in {"OPEN_EXR", "OPEN_EXR_MULTILAYER", "HDR"}:
+    if not data and image.is_float:
         return  # linear, as Blender assumes by the configuration's role for floats
-    if data and settings.is_data:
-        return
-    for name in DATA_SPACES if data else COLOR_SPACES:
+    known = [item.identifier for item in settings.bl_rna.properties["name"].enum_items]
+    words = ("raw", "non-col", "data") if data else ("srgb",)
+    alike = [n for n in known if any(w in n.lower() for w in words)]
+    for name in (*(DATA_SPACES if data else COLOR_SPACES), *alike):
         try:
             settings.name = name
         except TypeError:  # an enum without that name: another configuration
             continue
-        if settings.is_data == data:
-            return
-    _by_likeness(settings, data)
-
-
-def _by_likeness(settings, data):
-    """Any space whose name says enough; otherwise what the configuration gives to a file stays."""
-    items = settings.bl_rna.properties["name"].enum_items
-    words = ("raw", "data", "non-col") if data else ("srgb",)
-    for item in items:
-        if any(w in item.identifier.lower() for w in words):
-            try:
-                settings.name = item.identifier
-            except TypeError:
-                continue
-            if settings.is_data == data:
-                return
+        return
+    if data:
+        settings.is_data = True  # at least the configuration's own role for data
 
 
 class Images:
