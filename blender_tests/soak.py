@@ -14,6 +14,7 @@ The log is build/logs/soak-SEED.log.
 import argparse
 import collections
 import ctypes
+import faulthandler
 import gc
 import json
 import os
@@ -272,6 +273,7 @@ def child(options):
     import bpy  # noqa: F401  its C output must go to the file too
 
     output = Output(folder / "output")
+    faulthandler.enable()
     prepare(folder)
     from support.soak_actions import WEIGHTS, World
 

@@ -64,7 +64,7 @@ def _own_mesh(item):
     if item.data.users < 2 or item.data.shape_keys is None:
         return []
     users = [o for o in bpy.data.objects if o.data == item.data]
-    if len(users) < 2 or users[0] == item or item.library or item.override_library:
+    if len(users) < 2 or users[0] == item or item.library or item.data.library:
         return []
     item.data = item.data.copy()
     return [f"{item.name} was given a mesh of its own: two faces cannot share live shapes."]

@@ -43,6 +43,8 @@ def evaluate(rig, depsgraph, force=False):
     seen = controls.evaluated_get(depsgraph)
     if not seen.is_evaluated and not rig.evaluated_get(depsgraph).is_evaluated:
         return False  # it is not in this scene
+    if parts.FACE not in seen.pose.bones:
+        return False  # renamed a moment ago, and not evaluated since
     raw, turns = inputs.read_inputs(seen, live, depsgraph, _maximum(controls))
     place.follow(rig, seen)
     lod = min(max(lods.choose(rig, seen, depsgraph), 0), max(live.rig.lod_count - 1, 0))

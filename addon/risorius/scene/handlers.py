@@ -44,10 +44,20 @@ def _updated(_scene, depsgraph):
         if edited:
             timing.begin()
         for rig in edited:
-            heal.heal(rig)
+            if _mend(rig):
+                continue  # the evaluated copy knows of it only after the next update
             evaluate.evaluate(rig, depsgraph)
     finally:
         _state["busy"] = False
+
+
+def _mend(rig):
+    done = heal.heal(rig)
+    for sentence in done:
+        print(f"Risorius: {sentence}")
+    if done:
+        parts.controls_of(rig).update_tag()
+    return bool(done)
 
 
 def _notice_copies():
