@@ -5,9 +5,9 @@ import bpy
 
 from . import native
 from .scene import handlers
-from .ui import import_operators, operators, panels
+from .ui import import_operators, operators, panels, shape_test
 
-CLASSES = (*import_operators.CLASSES, *operators.CLASSES, *panels.CLASSES)
+CLASSES = (*import_operators.CLASSES, *operators.CLASSES, *panels.CLASSES, *shape_test.CLASSES)
 
 
 def _search_property():
@@ -23,6 +23,7 @@ def register():
     for cls in CLASSES:
         bpy.utils.register_class(cls)
     bpy.types.WindowManager.risorius_search = _search_property()
+    bpy.types.WindowManager.risorius_test = shape_test.weight_property()
     bpy.types.TOPBAR_MT_file_import.append(import_operators.draw_import)
     bpy.types.VIEW3D_MT_add.append(import_operators.draw_add)
     trouble = native.problem()
@@ -44,6 +45,7 @@ def unregister():
     handlers.unregister()
     bpy.types.VIEW3D_MT_add.remove(import_operators.draw_add)
     bpy.types.TOPBAR_MT_file_import.remove(import_operators.draw_import)
+    del bpy.types.WindowManager.risorius_test
     del bpy.types.WindowManager.risorius_search
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

@@ -144,9 +144,7 @@ def _add_shapes(plan, dna, rig, built, mode):
         chosen = mode
         if mode == "AUTO":
             chosen = meshes.automatic_mode(count, len(mesh_plan.positions))
-        meshes.set_mode(
-            item, rig, dna.meshes[mesh_plan.index], plan.space.delta_matrix, labels, chosen
-        )
+        meshes.set_mode(item, rig, dna.meshes[mesh_plan.index], plan.space, labels, chosen)
 
 
 def channel_labels(dna):
@@ -179,8 +177,13 @@ def lods_of(rig):
 
 
 def change_mode(rig, mode):
-    """Switch the meshes of a character to LIVE or KEYS shapes; AUTO chooses by size."""
+    """Switch the meshes of a character to LIVE or KEYS shapes; AUTO chooses by size.
+
+    Returns:
+        Sentences on meshes that could not be switched.
+    """
     live = runtime.of(rig)
+    trouble = []
     for item in parts.meshes_of(rig):
         dna_mesh = live.dna.meshes[item[parts.MESH]]
         chosen = mode
@@ -189,8 +192,12 @@ def change_mode(rig, mode):
                 len(dna_mesh.blend_shape_targets), len(dna_mesh.positions)
             )
         labels = channel_labels(live.dna)
-        meshes.set_mode(item, rig, dna_mesh, live.space.delta_matrix, labels, chosen)
+        if not meshes.set_mode(item, rig, dna_mesh, live.space, labels, chosen):
+            trouble.append(
+                f"{item.name} has not as many vertices as in its file: its shapes stay as they are."
+            )
     runtime.forget_outputs()
+    return trouble
 
 
 def replace_character(old, new):

@@ -5,7 +5,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from .. import native
-from . import copies, evaluate, parts, runtime
+from . import copies, evaluate, parts, runtime, testing
 
 _state = {"objects": -1, "busy": False}
 
@@ -71,6 +71,13 @@ def _restored(*_arguments):
 @persistent
 def _before_save(*_arguments):
     copies.separate_all()
+    _end_tests()
+
+
+@persistent
+def _end_tests(*_arguments):
+    if testing.clear_all():
+        refresh()
 
 
 def refresh():
@@ -93,6 +100,7 @@ _HANDLERS = (
     ("undo_post", _restored),
     ("redo_post", _restored),
     ("save_pre", _before_save),
+    ("render_init", _end_tests),
 )
 
 

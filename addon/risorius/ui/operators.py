@@ -135,7 +135,8 @@ class RISORIUS_OT_set_shape_mode(_FaceOperator, bpy.types.Operator):
         if any(item.mode == "EDIT" for item in parts.meshes_of(rig)):
             self.report({"ERROR"}, "Leave edit mode first.")
             return {"CANCELLED"}
-        build.change_mode(rig, self.mode)
+        for sentence in build.change_mode(rig, self.mode):
+            self.report({"WARNING"}, sentence)
         rig.update_tag()
         context.view_layer.update()
         evaluate.evaluate(rig, context.evaluated_depsgraph_get(), force=True)
