@@ -5,9 +5,15 @@ import bpy
 
 from . import native
 from .scene import handlers
-from .ui import import_operators, operators, panels, shape_test
+from .ui import file_operators, import_operators, operators, panels, shape_test
 
-CLASSES = (*import_operators.CLASSES, *operators.CLASSES, *panels.CLASSES, *shape_test.CLASSES)
+CLASSES = (
+    *import_operators.CLASSES,
+    *file_operators.CLASSES,
+    *operators.CLASSES,
+    *panels.CLASSES,
+    *shape_test.CLASSES,
+)
 
 
 def _search_property():
