@@ -277,10 +277,12 @@ def other_face(**options):
     """A newer file of the small face: everything has another number, some is gone, some new."""
     dna = renumbered(
         small_face(**options),
-        joints=[0, "new_joint", 5, 1, 2, 4, 3],
+        joints=[0, "new_joint", 1, 2, 5, 4, 3],
         controls=[9, 1, "CTRL_expressions.tongueUp", 0, 2, 7, 6, 5, 4, 8],
         channels=[5, "new_shape", 1, 0, 2],
         maps=[1, "new_map", 0],
     )
-    dna.neutral_joint_translations[3] += [0.5, 1.0, 0.0]
+    offsets = dna.neutral_joint_translations.copy()
+    offsets[2] += [0.5, 1.0, 0.0]  # the neck
+    dna.neutral_joint_translations = offsets
     return dna

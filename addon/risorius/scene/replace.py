@@ -164,7 +164,9 @@ def _take_properties(change, fresh):
         text.name = label
     del fresh[parts.DNA]
     for name in armatures.LIVE_PROPERTIES:
-        rig[name] = [0.0] * len(fresh[name])
+        if len(rig[name]) != len(fresh[name]):
+            del rig[name]  # an overridable array keeps its length
+            rig[name] = [0.0] * len(fresh[name])
         rig.property_overridable_library_set(f'["{name}"]', True)
     levels = sorted({lod for mesh in change.new.meshes for lod in mesh.lods})
     if rig.get(parts.LOD, 0) not in levels:
