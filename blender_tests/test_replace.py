@@ -25,8 +25,8 @@ def _replace(path):
     assert bpy.ops.risorius.replace_dna(filepath=str(path)) == {"FINISHED"}
 
 
-def _report():
-    return bpy.data.texts["Small replace report"].as_string()
+def _report(name="Small"):
+    return bpy.data.texts[f"{name} replace report"].as_string()
 
 
 def _right(rig, path, seed=5):
@@ -240,8 +240,8 @@ def test_a_face_with_other_topology(mode, dna_file, tmp_path):
     keys["own"].value = 0.0
     rig.location.x = 0.0
     rig.pose.bones["user_joint"].location.x = 0.0
-    rig.pose.bones["user_joint"].constraints.clear()
-    head.constraints.clear()
+    for owner in (rig.pose.bones["user_joint"], head):
+        owner.constraints.remove(owner.constraints[0])
     _right(rig, path)
 
 
@@ -358,11 +358,11 @@ def test_an_edited_joint_stays_edited(dna_file, other_file):
 
     moved = local(rig)
     _replace(other_file)
-    np.testing.assert_allclose(local(rig), moved, atol=2e-6)
+    np.testing.assert_allclose(local(rig), moved, atol=1e-5)  # a roll angle in float32
     assert np.abs(local(rig) - local(clean)).max() > 0.004
     head = np.array(rig.data.bones["head"].matrix_local)
     np.testing.assert_allclose(head, np.array(clean.data.bones["head"].matrix_local), atol=1e-6)
-    assert "Your edit of the joint FACIAL_L_Eye was carried over" in _report()
+    assert "Your edit of the joint FACIAL_L_Eye was carried over" in _report("Small.001")
 
 
 def test_drivers_of_users_follow_names_not_numbers(mode, dna_file, other_file):
@@ -385,7 +385,6 @@ def test_drivers_of_users_follow_names_not_numbers(mode, dna_file, other_file):
     assert seen
     assert ": what it drove reads 0 now" in _report()
     _replace(_save(small_face(), other_file.parent, "back.dna"))
-    scene.face(rig)["x" * 63] = 0.0
     paths = [c.driver.variables[0].targets[0].data_path for c in lamp.animation_data.drivers]
     assert paths == ['["channels"][0]', '["maps"][0]', '["channels"][3]']
 

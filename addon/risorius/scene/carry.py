@@ -8,6 +8,7 @@ from ..logic import edits
 
 # Attributes that a build makes itself, and Blender's own.
 _OURS = {"position", "UVMap", "iris", "custom_normal", "material_index"}
+_SHADING = {"sharp_edge", "sharp_face"}
 _FIELDS = {
     "FLOAT": ("value", 1, np.float32),
     "INT": ("value", 1, np.int32),
@@ -85,14 +86,14 @@ def own_attributes(mesh):
     and the names of the others."""
     kept, other = [], []
     for layer in mesh.attributes:
-        if layer.name in _OURS or layer.name.startswith(".") or layer.is_internal:
+        if layer.name in _OURS | _SHADING or layer.name.startswith(".") or layer.is_internal:
             continue
         if layer.data_type in _FIELDS and layer.domain in {"POINT", "CORNER", "FACE"}:
             field, width, kind = _FIELDS[layer.data_type]
             flat = np.empty(len(layer.data) * width, kind)
             layer.data.foreach_get(field, flat)
             kept.append((layer.name, layer.data_type, layer.domain, flat.reshape(-1, width)))
-        elif layer.name not in {"sharp_edge", "sharp_face"}:
+        else:
             other.append(layer.name)
     return kept, other
 

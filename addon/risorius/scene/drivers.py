@@ -9,7 +9,7 @@ from ..logic import names
 from . import parts
 
 _ENTRY = re.compile(r'^\["(channels|maps)"\]\[(\d+)\]$')
-_GONE = re.compile(r'^\["gone (channels|maps): (.*)"\]$')
+_GONE = re.compile(r'^\["(gone (channels|maps): .*)"\]$')
 
 
 def owners():
@@ -65,13 +65,15 @@ class Entries:
         entry, gone = _ENTRY.match(path), _GONE.match(path)
         if entry and int(entry.group(2)) < len(labels[entry.group(1)][0]):
             return entry.group(1), labels[entry.group(1)][0][int(entry.group(2))]
-        if gone:
-            return gone.group(1), bpy.utils.unescape_identifier(gone.group(2))
+        if gone:  # perhaps it is back
+            array, key = gone.group(2), bpy.utils.unescape_identifier(gone.group(1))
+            back = next((x for x in labels[array][1] if _gone_key(array, x) == key), None)
+            return (array, back) if back is not None else None
         return None
 
     def _stand_in(self, array, label):
         """A property of value 0 in place of what is gone, so that drivers stay valid."""
-        key = names.cut(f"gone {array}: {label}")
+        key = _gone_key(array, label)
         self._rig[key] = 0.0
         if label not in self.gone:
             self.gone.append(label)
@@ -81,6 +83,10 @@ class Entries:
         """Point the drivers at their new places; what they read must have been evaluated."""
         for target, path in self._moves:
             target.data_path = path
+
+
+def _gone_key(array, label):
+    return names.cut(f"gone {array}: {label}")
 
 
 def curves_of(action):
