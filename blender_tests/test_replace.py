@@ -176,7 +176,7 @@ def _still_decorated(rig):
     assert "paint" in head.data.color_attributes
     assert [m.name for m in head.data.materials] == ["Small_head", "own"]
     assert (head["note"], head.constraints[0].type) == ("mine", "LIMIT_SCALE")
-    assert head.data.shape_keys.key_blocks["own"].value == 0.5
+    assert head.data.shape_keys.key_blocks["own"].value == pytest.approx(0.5)
     hat = bpy.data.objects["hat"]
     assert (hat.parent, hat.parent_bone) == (rig, "head")
     bone = rig.pose.bones["user_joint"]

@@ -31,6 +31,7 @@ def register():
     bpy.types.WindowManager.risorius_search = _search_property()
     bpy.types.WindowManager.risorius_test = shape_test.weight_property()
     bpy.types.TOPBAR_MT_file_import.append(import_operators.draw_import)
+    bpy.types.TOPBAR_MT_file_export.append(file_operators.draw_export)
     bpy.types.VIEW3D_MT_add.append(import_operators.draw_add)
     trouble = native.problem()
     if trouble:
@@ -50,6 +51,7 @@ def unregister():
         bpy.app.timers.unregister(_refresh_once)
     handlers.unregister()
     bpy.types.VIEW3D_MT_add.remove(import_operators.draw_add)
+    bpy.types.TOPBAR_MT_file_export.remove(file_operators.draw_export)
     bpy.types.TOPBAR_MT_file_import.remove(import_operators.draw_import)
     del bpy.types.WindowManager.risorius_test
     del bpy.types.WindowManager.risorius_search

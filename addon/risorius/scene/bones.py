@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Joints of one file become joints of another in the same armature; edits of joints are found."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
@@ -15,10 +15,17 @@ _EPS = float(np.finfo(np.float32).eps)
 
 @dataclass(frozen=True)
 class JointEdit:
-    """How a user moved a joint's rest: parent-relative matrices float64[4, 4], Blender units."""
+    """How a user moved a joint's rest.
+
+    Attributes:
+        before, after: parent-relative matrices float64[4, 4], Blender units.
+        moved, turned: which of both it was.
+    """
 
     before: object
     after: object
+    moved: bool
+    turned: bool
 
     @property
     def change(self):
@@ -82,13 +89,14 @@ def joint_edits(context, rig, plan):
             continue
         before = _relative(wanted, joint, above)
         after = _relative(present, joint, above)
-        edit = JointEdit(before, after)
         shortest = min(plan.armature.lengths[j] for j in (joint, above) if j >= 0)
         turn = 16 * _EPS * (reach + shortest) / shortest
-        moved = 8 * _EPS * reach
+        move = 8 * _EPS * reach
         if above >= 0:
-            moved += turn * float(np.linalg.norm(before[:3, 3]))
-        if edit.distance > moved or edit.angle > turn:
+            move += turn * float(np.linalg.norm(before[:3, 3]))
+        edit = JointEdit(before, after, False, False)
+        edit = replace(edit, moved=edit.distance > move, turned=edit.angle > turn)
+        if edit.moved or edit.turned:
             found[joint] = edit
     return found
 

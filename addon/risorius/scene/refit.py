@@ -107,7 +107,7 @@ def _refit(change, item, old, new, fresh):
     known = len(mesh.vertices) == len(old.positions)
     same = has_faces_of(mesh, old) and has_faces_of(mesh, new)
     counted = known and len(old.positions) == len(new.positions)
-    shape = read_shape(change, item, old, known)
+    shape = read_shape(change.before, item, old, known)
     if same:
         bearer = carry.SameVertices()
         _refit_weights(change, item, old, new)
@@ -141,11 +141,11 @@ class _Nothing:
         return [min(i, self._count - 1) for i in indices]
 
 
-def read_shape(change, item, old, known):
+def read_shape(live, item, old, known):
     """What the user made of a mesh's positions, told from what the old file gives.
 
     Args:
-        change: replace.Change, or what has its `before`.
+        live: Runtime of the old file.
         item: mesh object.
         old: its MeshPlan in the old file.
         known: whether it still has as many vertices as in the file.
@@ -158,16 +158,16 @@ def read_shape(change, item, old, known):
     key = item.data.shape_keys
     if key is None:
         return shape
-    dna_mesh = change.before.dna.meshes[old.index]
-    deltas = meshes.deltas_by_channel(dna_mesh, change.before.space.delta_matrix)
+    dna_mesh = live.dna.meshes[old.index]
+    deltas = meshes.deltas_by_channel(dna_mesh, live.space.delta_matrix)
     shape.channels = meshes.real_channels(item)
-    live = meshes.live_block(item)
+    summed = meshes.live_block(item)
     for block in key.key_blocks:
         shape.keys[block.name] = meshes.points_of(block)
         shape.relative[block.name] = block.relative_key.name
         channel = shape.channels.get(block.name)
         if channel is None:
-            if block not in (live, key.reference_key):
+            if block not in (summed, key.reference_key):
                 shape.own.append(block.name)
         elif known:
             nothing = (np.zeros(0, np.int64), np.zeros((0, 3), np.float32))
@@ -222,7 +222,7 @@ def _leave(change, item, old):
     known = old is not None and len(item.data.vertices) == len(old.positions)
     things = ["it"]
     if old is not None:
-        shape = read_shape(change, item, old, known)
+        shape = read_shape(change.before, item, old, known)
         things = _things(change, item, old, shape, known)
     things += [m.name for m in item.modifiers if m.type != "ARMATURE"]
     things += [c.name for c in (*item.constraints, *item.children)]

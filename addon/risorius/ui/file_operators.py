@@ -4,12 +4,12 @@
 from pathlib import Path
 
 import bpy
-from bpy_extras.io_utils import ImportHelper
+from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from .. import native
 from ..logic.plans import PlanError
 from ..logic.space import SpaceError
-from ..scene import evaluate, parts, replace
+from ..scene import evaluate, export, parts, replace
 from .import_operators import explain, shown_progress, usable
 
 
@@ -99,4 +99,64 @@ class RISORIUS_OT_reload(bpy.types.Operator):
         return _replace(self, context, path)
 
 
-CLASSES = (RISORIUS_OT_replace_dna, RISORIUS_OT_reload)
+class RISORIUS_OT_export_dna(bpy.types.Operator, ExportHelper):
+    """Write this face's DNA file: byte for byte as imported, with your edits of shape keys,
+    neutral vertices, joints and weights"""
+
+    bl_idname = "risorius.export_dna"
+    bl_label = "Export DNA"
+    bl_options = {"PRESET"}
+
+    filename_ext = ".dna"
+    filter_glob: bpy.props.StringProperty(default="*.dna", options={"HIDDEN"})
+    use_shapes: bpy.props.BoolProperty(
+        name="Shape Keys",
+        description="Write edited shapes of the file; keys of your own are never written",
+        default=True,
+    )
+    use_neutral: bpy.props.BoolProperty(
+        name="Neutral Mesh", description="Write vertices moved in the basis", default=True
+    )
+    use_joints: bpy.props.BoolProperty(
+        name="Neutral Joints",
+        description="Write joints moved or turned in the rig's edit mode",
+        default=True,
+    )
+    use_weights: bpy.props.BoolProperty(
+        name="Weights", description="Write painted skin weights", default=True
+    )
+
+    @classmethod
+    def poll(cls, context):
+        return has_face(cls, context)
+
+    def invoke(self, context, event):
+        if not self.filepath:
+            self.filepath = parts.active_rig(context).name.removesuffix("_rig") + ".dna"
+        return ExportHelper.invoke(self, context, event)
+
+    def execute(self, context):
+        rig = parts.active_rig(context)
+        options = export.ExportOptions(
+            self.use_shapes, self.use_neutral, self.use_joints, self.use_weights
+        )
+        try:
+            content, sentences = export.export(context, rig, options)
+            export.write(self.filepath, content)
+        except export.ExportError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        except (native.dna_error(), OSError) as error:
+            self.report({"ERROR"}, explain(self.filepath, error))
+            return {"CANCELLED"}
+        report_all(self, sentences)
+        self.report({"INFO"}, f"{Path(self.filepath).name}: {len(content):,} bytes")
+        return {"FINISHED"}
+
+
+def draw_export(self, _context):
+    """Entry of File > Export."""
+    self.layout.operator(RISORIUS_OT_export_dna.bl_idname, text="MetaHuman DNA (.dna)")
+
+
+CLASSES = (RISORIUS_OT_replace_dna, RISORIUS_OT_reload, RISORIUS_OT_export_dna)

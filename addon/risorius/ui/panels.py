@@ -172,6 +172,7 @@ class RISORIUS_PT_options(_FacePanel, bpy.types.Panel):
         layout.operator("risorius.separate", icon="UNLINKED")
         layout.operator("risorius.reload", icon="FILE_REFRESH")
         layout.operator("risorius.replace_dna", icon="FILEBROWSER")
+        layout.operator("risorius.export_dna", icon="EXPORT")
         live = runtime.of(rig)
         if live is not None:
             column = layout.column(align=True)
