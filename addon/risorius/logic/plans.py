@@ -249,6 +249,12 @@ def _mesh_lods(dna: Any) -> list[tuple[int, ...]]:
     return [tuple(level) for level in levels]
 
 
+def existing_lods(dna: Any, wanted: Sequence[int]) -> tuple[int, ...]:
+    """Those levels of `wanted` that have meshes in a file, else its finest one."""
+    there = sorted({level for levels in _mesh_lods(dna) for level in levels})
+    return tuple(level for level in wanted if level in there) or tuple(there[:1])
+
+
 def plan_controls(raw_names: Sequence[str], rests: Sequence[float] = ()) -> list[ControlPlan]:
     """The sliders of a file's raw controls, in index order.
 

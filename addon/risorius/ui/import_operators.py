@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators that bring faces in: from a file, the sample, and again from its source."""
+"""Operators that bring faces in: from a file, and the sample."""
 
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,7 +11,7 @@ from .. import native
 from ..logic import names
 from ..logic.plans import PlanError
 from ..logic.space import SpaceError
-from ..scene import build, lods, parts
+from ..scene import build, parts
 
 MODES = (
     ("AUTO", "Automatic", "Real shape keys where a mesh has few, else the live sum"),
@@ -36,7 +36,7 @@ def usable(cls):
 
 
 @contextmanager
-def _progress(context):
+def shown_progress(context):
     manager = context.window_manager
     manager.progress_begin(0, 100)
     try:
@@ -58,7 +58,7 @@ def import_character(operator, context, path, options):
         What `execute` returns.
     """
     try:
-        with _progress(context) as progress:
+        with shown_progress(context) as progress:
             rig, warnings = build.import_file(context, path, options, progress)
     except (native.dna_error(), PlanError, SpaceError, OSError) as error:
         operator.report({"ERROR"}, explain(path, error))
@@ -216,45 +216,6 @@ def _build_sample(path, folder):
     return ""
 
 
-class RISORIUS_OT_reload(bpy.types.Operator):
-    """Build the active face anew from its source file; its controls and their keys stay"""
-
-    bl_idname = "risorius.reload"
-    bl_label = "Reload from Source"
-    bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context):
-        if not usable(cls):
-            return False
-        rig = parts.active_rig(context)
-        if rig is None:
-            cls.poll_message_set("Select a face first.")
-            return False
-        path = bpy.path.abspath(rig.get(parts.SOURCE, ""))
-        if not path or not Path(path).is_file():
-            cls.poll_message_set("The source file is not there any more.")
-            return False
-        return True
-
-    def execute(self, context):
-        old = parts.active_rig(context)
-        path = bpy.path.abspath(old[parts.SOURCE])
-        levels = tuple(lods.built(old)) or (0,)
-        modes = {m.get(parts.MODE) for m in parts.meshes_of(old)}
-        mode = modes.pop() if len(modes) == 1 else "AUTO"
-        controls = parts.controls_of(old)
-        result = import_character(self, context, path, build.BuildOptions(levels, mode))
-        if result != {"FINISHED"}:
-            return result
-        build.replace_character(old, parts.rig_of(context.view_layer.objects.active))
-        context.view_layer.objects.active = controls
-        controls.select_set(True, view_layer=context.view_layer)
-        controls.update_tag()
-        context.view_layer.update()
-        return {"FINISHED"}
-
-
 def draw_import(self, _context):
     """Entry of File > Import."""
     self.layout.operator(RISORIUS_OT_import_dna.bl_idname, text="MetaHuman DNA (.dna)")
@@ -269,5 +230,4 @@ CLASSES = (
     RISORIUS_OT_import_dna,
     RISORIUS_FH_dna,
     RISORIUS_OT_add_character,
-    RISORIUS_OT_reload,
 )

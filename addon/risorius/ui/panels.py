@@ -194,6 +194,8 @@ class RISORIUS_PT_options(_FacePanel, bpy.types.Panel):
         render = context.scene.render
         if not render.use_lock_interface:
             layout.prop(render, "use_lock_interface", text="Lock Interface in Renders")
+        layout.operator("risorius.replace_dna", icon="FILEBROWSER")
+        layout.operator("risorius.export_dna", icon="EXPORT")
         live = runtime.of(rig)
         if live is not None:
             column = layout.column(align=True)
