@@ -527,7 +527,9 @@ void bind_rig(py::module_& m) {
   bind_morph(m);
   bind_bone_space(m);
   m.def("rig_block_version", &rig::block_version, "Of Rig.to_bytes; others are refused.");
-  m.def("available_simd", [] { return std::string(simd::available_kernels()); });
+  m.def(
+      "available_simd", [] { return std::string(simd::available_kernels()); },
+      "The instruction sets that this processor has, as simd= takes them, apart by blanks.");
 }
 
 }  // namespace risorius::bindings

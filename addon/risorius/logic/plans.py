@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import names, regions
+from . import names, regions, textures
 from .space import Float, Space, make_space, world_matrices
 
 LIVE_KEY = "<channel sum>"
@@ -227,7 +227,7 @@ def plan_character(
         channel_count=len(dna.blend_shape_channel_names),
         anchors=find_anchors(dna.joint_names),
         lod_count=max(1, int(dna.lod_count)),
-        textures=_plan_textures(dna),
+        textures=textures.from_metadata(dna.metadata),
         origin={
             k: names.printable(v, 10_000)
             for k, v in dna.metadata.items()
@@ -247,6 +247,12 @@ def _mesh_lods(dna: Any) -> list[tuple[int, ...]]:
     if not any(levels):
         levels = [[0] for _ in range(count)]
     return [tuple(level) for level in levels]
+
+
+def existing_lods(dna: Any, wanted: Sequence[int]) -> tuple[int, ...]:
+    """Those levels of `wanted` that have meshes in a file, else its finest one."""
+    there = sorted({level for levels in _mesh_lods(dna) for level in levels})
+    return tuple(level for level in wanted if level in there) or tuple(there[:1])
 
 
 def plan_controls(raw_names: Sequence[str], rests: Sequence[float] = ()) -> list[ControlPlan]:
@@ -273,16 +279,6 @@ def plan_controls(raw_names: Sequence[str], rests: Sequence[float] = ()) -> list
         )
         for i, name in enumerate(raw_names)
     ]
-
-
-def _plan_textures(dna: Any) -> dict[tuple[str, str], str]:
-    """(mesh base, "color" or "map:<animated map>") -> file name, from the metadata."""
-    found: dict[tuple[str, str], str] = {}
-    for key, value in dna.metadata.items():
-        words = key.split(":", 2)
-        if len(words) == 3 and words[0] == "texture":
-            found.setdefault((names.without_lod(words[1]), words[2]), value)
-    return found
 
 
 def _plan_armature(dna: Any, space: Space) -> ArmaturePlan:

@@ -8,8 +8,7 @@ are stale while an animation renders) and written to the originals, in bulk.
 from time import perf_counter
 
 from .. import native
-from ..logic import plans
-from . import armatures, bones, inputs, lods, meshes, parts, place, runtime, timing
+from . import inputs, lods, meshes, parts, place, posing, runtime, testing, timing
 
 
 def evaluate_all(depsgraph, force=False):
@@ -42,16 +41,25 @@ def evaluate(rig, depsgraph, force=False):
         return False
     times = [perf_counter()]
     seen = controls.evaluated_get(depsgraph)
-    raw, turns = inputs.read_inputs(seen, live, _maximum(controls))
+    if not seen.is_evaluated and not rig.evaluated_get(depsgraph).is_evaluated:
+        return False  # it is not in this scene
+    if parts.FACE not in seen.pose.bones:
+        return False  # renamed a moment ago, and not evaluated since
+    raw, turns = inputs.read_inputs(seen, live, depsgraph, _maximum(controls))
     place.follow(rig, seen)
     lod = min(max(lods.choose(rig, seen, depsgraph), 0), max(live.rig.lod_count - 1, 0))
-    state = (raw.tobytes(), lod, *((name, *turn) for name, turn in turns.items()))
-    if not force and not _changed(rig, "inputs", state):
+    test = testing.override(rig, raw, depsgraph.scene)
+    state = (raw.tobytes(), lod, test, *((name, *turn) for name, turn in turns.items()))
+    if not _changed(rig, "inputs", state) and not force:
         return False
     times.append(perf_counter())
     pose = live.rig.evaluate(raw, lod)
+    testing.apply(test, pose.blend_shapes)
     times.append(perf_counter())
-    bones.write(rig, live, pose.joints, turns, depsgraph)
+    taken = posing.write(rig, live, pose.joints, turns, depsgraph)
+    note_refusal(rig, taken)
+    if not taken:
+        return False  # channels and maps shall not move without the bones
     _write_values(rig, pose)
     times.append(perf_counter())
     for item in parts.meshes_of(rig):
@@ -75,6 +83,24 @@ def _maximum(controls):
     return 1.5 if controls.get(parts.OVERDRIVE) else 1.0
 
 
+def note_refusal(item, taken):
+    """Note whether Blender took what was written to an object: it refuses without a word."""
+    key = ("refused", item.session_uid)
+    if taken:
+        runtime.outputs.pop(key, None)
+    else:
+        runtime.outputs[key] = True
+
+
+def refused(rig):
+    """Objects of a character, an override, that Blender lets nobody write to."""
+    return [
+        item
+        for item in (rig, *parts.meshes_of(rig))
+        if ("refused", item.session_uid) in runtime.outputs
+    ]
+
+
 def _write_values(rig, pose):
     """Write channels and maps to the array properties that drivers read."""
     for name, values in ((parts.MAPS, pose.animated_maps), (parts.CHANNELS, pose.blend_shapes)):
@@ -85,7 +111,7 @@ def _write_values(rig, pose):
 def _write_shape(item, live, weights, force):
     """Write the sum of all channels to the live key of a mesh, where it has one."""
     key = item.data.shape_keys
-    block = key.key_blocks.get(plans.LIVE_KEY) if key else None
+    block = meshes.live_block(item)
     if block is None or item.mode == "EDIT":
         return
     index = item.get(parts.MESH, -1)
@@ -102,24 +128,7 @@ def _write_shape(item, live, weights, force):
     basis = meshes.points_of(key.reference_key)
     points = morph.evaluate(weights, base=basis)
     block.points.foreach_set("co", points.ravel())
+    if item.data.library or item.data.override_library:
+        note_refusal(item, posing.is_there(block.points, "co", points.ravel()))
     key.update_tag()
     item.data.update_tag()
-
-
-def mend_types(rig):
-    """Turn controls that a script made integers back to float properties."""
-    face = parts.face_bone(rig)
-    live = runtime.of(rig)
-    if face is None or live is None:
-        return
-    wrong = [i for i, label in enumerate(live.labels) if isinstance(face.get(label), int)]
-    if not wrong:
-        return
-    controls = plans.plan_controls(live.dna.raw_control_names, live.rests)
-    maximum = _maximum(parts.controls_of(rig))
-    for i in wrong:
-        label = live.labels[i]
-        value = float(face[label])
-        del face[label]
-        face[label] = value
-        armatures.describe_property(face, controls[i], maximum)

@@ -5,7 +5,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from .. import native
-from . import copies, evaluate, lods, parts, runtime, timing
+from . import copies, evaluate, heal, lods, parts, place, runtime, testing, timing
 
 _state = {"objects": -1, "busy": False}
 
@@ -44,10 +44,20 @@ def _updated(_scene, depsgraph):
         if edited:
             timing.begin()
         for rig in edited:
-            evaluate.mend_types(rig)
+            if _mend(rig):
+                continue  # the evaluated copy knows of it only after the next update
             evaluate.evaluate(rig, depsgraph)
     finally:
         _state["busy"] = False
+
+
+def _mend(rig):
+    done = heal.heal(rig)
+    for sentence in done:
+        print(f"Risorius: {sentence}")
+    if done:
+        parts.controls_of(rig).update_tag()
+    return bool(done)
 
 
 def _notice_copies():
@@ -60,21 +70,29 @@ def _notice_copies():
 
 
 def _edited(depsgraph):
-    """The characters whose control armature, or the camera that they look at, was updated."""
-    found = []
+    """The characters that the updates concern: by their controls, their body or the camera."""
+    armatures, camera_moved = set(), False
     camera = depsgraph.scene.camera
     for update in depsgraph.updates:
         item = update.id.original
-        if camera is not None and item == camera.original:
-            found += [r for r in parts.rigs() if lods.by_distance(r) and r not in found]
         if isinstance(item, bpy.types.Armature):
             runtime.forget_outputs()
-        if not isinstance(item, bpy.types.Object) or item.type != "ARMATURE":
-            continue
-        rig = item.get(parts.RIG)
-        if isinstance(rig, bpy.types.Object) and rig not in found:
-            found += [r for r in parts.rigs() if r.get(parts.CONTROLS) == item]
-    return found
+            heal.heal_all()
+        elif isinstance(item, bpy.types.Object):
+            if item.type == "ARMATURE":
+                armatures.add(item)
+            camera_moved |= camera is not None and item == camera.original
+    return [rig for rig in parts.rigs() if _concerned(rig, armatures, camera_moved)]
+
+
+def _concerned(rig, armatures, camera_moved):
+    controls = parts.controls_of(rig)
+    hold = place.body_of(controls) if controls is not None else None
+    return (
+        controls in armatures
+        or (hold is not None and hold.target in armatures)
+        or (camera_moved and lods.by_distance(rig))
+    )
 
 
 @persistent
@@ -82,6 +100,9 @@ def _restored(*_arguments):
     """After load, undo and redo: what was written before says nothing about what is there."""
     runtime.forget_outputs()
     _state["objects"] = -1
+    if native.problem():
+        return
+    heal.heal_all()
     refresh()
     # The evaluated copies may not have caught up yet: look once more when they have.
     runtime.forget_outputs()
@@ -93,20 +114,27 @@ def _restored(*_arguments):
 
 @persistent
 def _before_save(*_arguments):
+    if native.problem():
+        return
     copies.separate_all()
+    heal.remove_dead()
+    _end_tests()
+
+
+@persistent
+def _end_tests(*_arguments):
+    if testing.clear_all():
+        refresh()
 
 
 def refresh():
-    """Bring all characters of the current scene up to their controls now."""
-    if native.problem():
+    """Bring all characters up to their controls now, each in the scenes that it is in."""
+    if native.problem() or not parts.rigs():
         return
     for scene in bpy.data.scenes:
-        layers = scene.view_layers
-        if parts.rigs() and len(layers):
-            depsgraph = layers[0].depsgraph
-            if depsgraph is not None:
-                evaluate.evaluate_all(depsgraph)
-                break
+        for layer in scene.view_layers:
+            if layer.depsgraph is not None:
+                evaluate.evaluate_all(layer.depsgraph)
 
 
 _HANDLERS = (
@@ -117,6 +145,7 @@ _HANDLERS = (
     ("undo_post", _restored),
     ("redo_post", _restored),
     ("save_pre", _before_save),
+    ("render_init", _end_tests),
     ("render_complete", _render_ended),
     ("render_cancel", _render_ended),
 )

@@ -6,18 +6,19 @@ import math
 import numpy as np
 from mathutils import Matrix, Quaternion, Vector
 
-from . import parts
+from . import parts, place
 
 _STRAIGHT = Matrix.Identity(4)
 _AHEAD = Vector((0.0, -1.0, 0.0))
 
 
-def read_inputs(seen, live, maximum=1.0):
+def read_inputs(seen, live, depsgraph, maximum=1.0):
     """Read the sliders and bones of an evaluated control armature.
 
     Args:
         seen: the evaluated control armature object.
         live: the character's Runtime.
+        depsgraph: where the body's bones are read, if the face hangs on one.
         maximum: what the look controls are clamped to after the eye bones are added.
 
     Returns:
@@ -30,40 +31,42 @@ def read_inputs(seen, live, maximum=1.0):
     raw = np.array([values.get(label, rests[i]) for i, label in enumerate(live.labels)], np.float32)
     if not np.isfinite(raw).all():
         np.nan_to_num(raw, copy=False, nan=0.0, posinf=0.0, neginf=0.0)
-    turns = {}
+    turns = place.body_turns(seen.original, depsgraph)
     for name in ("neck", "head"):
         turn = _turn(seen, bones.get(name))
         if turn is not None:
-            turns[name] = turn
+            turns[name] = turns[name] @ turn if name in turns else turn
     _add_look(seen, live, raw, maximum)
     return raw, turns
 
 
-def _local(seen, bone):
-    """A bone's own transform after its constraints, relative to its rest; None where it rests."""
-    if bone is None or (not bone.constraints and bone.matrix_basis == _STRAIGHT):
-        return None
-    return seen.convert_space(
-        pose_bone=bone, matrix=bone.matrix, from_space="POSE", to_space="LOCAL"
-    )
+def _rests(bone):
+    return bone is None or (not bone.constraints and bone.matrix_basis == _STRAIGHT)
 
 
 def _turn(seen, bone):
     """A bone's own rotation in the armature's axes, or None where it is straight."""
-    local = _local(seen, bone)
-    if local is None:
+    if _rests(bone):
         return None
-    rest = bone.bone.matrix_local.to_quaternion()
-    turn = rest @ local.to_quaternion() @ rest.inverted()
+    turn = place.own_turn(seen, bone)
     return turn if turn.angle else None
+
+
+def _moved(seen, target):
+    """How far the eyes' target was moved, in the armature's axes."""
+    if _rests(target):
+        return Vector()
+    local = seen.convert_space(
+        pose_bone=target, matrix=target.matrix, from_space="POSE", to_space="LOCAL"
+    )
+    return target.bone.matrix_local.to_3x3() @ local.translation
 
 
 def _add_look(seen, live, raw, maximum):
     """Add what the eye bones and their target ask for to the look controls."""
     bones = seen.pose.bones
     target = bones.get("eyes")
-    local = _local(seen, target)
-    moved = target.bone.matrix_local.to_3x3() @ local.translation if local else Vector()
+    moved = _moved(seen, target)
     for side, controls in live.look.items():
         bone = bones.get(f"eye_{side}")
         turn = _turn(seen, bone)

@@ -110,3 +110,5 @@ def _hide(rig, level, flag):
             setattr(item, flag, hidden)
         if item.get(written) != hidden:
             item[written] = hidden
+            # An override would give it back at load, and take its own flag for the user's.
+            item.property_overridable_library_set(f'["{written}"]', True)

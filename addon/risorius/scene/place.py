@@ -7,6 +7,7 @@ Neither is the other's parent: a parent's edit would make Blender deform the mes
 import re
 
 import numpy as np
+from mathutils import Quaternion
 
 from . import parts
 
@@ -79,27 +80,67 @@ def attach(controls, body, base, neck="", head="", fit="MOVE"):
     # As the body rests: a body that is posed at this moment carries the face along.
     rest = body.matrix_world @ body.data.bones[base].matrix_local
     hold.inverse_matrix = rest.inverted_safe()
-    turning = [("head", head)] if head else []
-    turning += [("neck", name) for name in _neck_chain(body, neck, head)]
-    for own, theirs in turning:
-        bone = controls.pose.bones.get(own)
-        if bone is None or theirs == base:
-            continue
-        turn = bone.constraints.new("COPY_ROTATION")
-        turn.name = CONSTRAINT
-        turn.target, turn.subtarget = body, theirs
-        turn.mix_mode = "BEFORE"  # the animator's own turns of the face stay on top
-        turn.owner_space, turn.target_space = "LOCAL", "LOCAL_OWNER_ORIENT"
+    hold.set_inverse_pending = False
+    controls[parts.BODY_NECK] = "\n".join(_neck_chain(body, base, neck, head))
+    controls[parts.BODY_HEAD] = head if head != base else ""
     controls.update_tag()
 
 
-def _neck_chain(body, neck, head):
-    """The bones from below the head down to the neck bone: a body may have several."""
+def _neck_chain(body, base, neck, head):
+    """The bones from the neck bone up to below the head: a body may have several."""
     if not neck:
         return []
     bone = body.data.bones.get(head)
     above = [b.name for b in bone.parent_recursive] if bone is not None else []
-    return above[: above.index(neck) + 1] if neck in above else [neck]
+    chain = above[: above.index(neck) + 1][::-1] if neck in above else [neck]
+    return [name for name in chain if name != base]
+
+
+def body_of(controls):
+    """The constraint by which a face hangs on a body, or None."""
+    hold = controls.constraints.get(CONSTRAINT)
+    return hold if hold is not None and hold.type == "CHILD_OF" and hold.target else None
+
+
+def body_turns(controls, depsgraph):
+    """What a body's bones ask of the face's own neck and head, beyond what the base does.
+
+    Constraints between bones copy local rotations as if both armatures stood alike; bodies from
+    other programs are turned and scaled objects.
+
+    Args:
+        controls: the control armature, the original.
+        depsgraph: the evaluated dependency graph.
+
+    Returns:
+        "neck" and "head" -> Quaternion in the control armature's axes, without straight ones.
+    """
+    hold = body_of(controls)
+    rest = hold.target.data.bones.get(hold.subtarget) if hold is not None else None
+    if rest is None or hold.mute:
+        return {}
+    seen = hold.target.evaluated_get(depsgraph)
+    # From the control armature's space to the body's while the body rests.
+    axes = (rest.matrix_local @ hold.inverse_matrix @ controls.matrix_basis).to_quaternion()
+    turns = {}
+    for own, key in (("neck", parts.BODY_NECK), ("head", parts.BODY_HEAD)):
+        total = Quaternion()
+        for name in controls.get(key, "").split("\n"):
+            bone = seen.pose.bones.get(name)
+            if bone is not None:
+                total = total @ own_turn(seen, bone)
+        if total.angle:
+            turns[own] = axes.inverted() @ total @ axes
+    return turns
+
+
+def own_turn(seen, bone):
+    """A bone's own rotation after its constraints, in the axes of its armature."""
+    local = seen.convert_space(
+        pose_bone=bone, matrix=bone.matrix, from_space="POSE", to_space="LOCAL"
+    )
+    rest = bone.bone.matrix_local.to_quaternion()
+    return rest @ local.to_quaternion() @ rest.inverted()
 
 
 def _fit(controls, body, neck, head, scale):
@@ -131,18 +172,13 @@ def _fit(controls, body, neck, head, scale):
 
 def detach(controls):
     """Take a face off its body; it stays where it stands."""
-    holds = [c for c in controls.constraints if c.name.startswith(CONSTRAINT)]
+    holds = [c for c in controls.constraints if c.name == CONSTRAINT]
     if holds:
         where = controls.matrix_world.copy()
         for hold in holds:
             controls.constraints.remove(hold)
         controls.matrix_world = where
-    for bone in controls.pose.bones:
-        for turn in [c for c in bone.constraints if c.name.startswith(CONSTRAINT)]:
-            bone.constraints.remove(turn)
+    for key in (parts.BODY_NECK, parts.BODY_HEAD):
+        if key in controls:
+            del controls[key]
     controls.update_tag()
-
-
-def is_attached(controls):
-    """Whether the face hangs on a body."""
-    return any(c.name.startswith(CONSTRAINT) for c in controls.constraints)

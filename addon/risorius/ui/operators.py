@@ -4,7 +4,7 @@
 import bpy
 
 from ..logic import regions
-from ..scene import armatures, build, copies, evaluate, parts, runtime
+from ..scene import armatures, build, copies, evaluate, overrides, parts, runtime
 from .import_operators import MODES, usable
 
 
@@ -115,7 +115,10 @@ class RISORIUS_OT_set_shape_mode(FaceOperator, bpy.types.Operator):
         if any(item.mode == "EDIT" for item in parts.meshes_of(rig)):
             self.report({"ERROR"}, "Leave edit mode first.")
             return {"CANCELLED"}
-        build.change_mode(rig, self.mode)
+        if overrides.unlock_shapes(rig):
+            self.report({"INFO"}, "The linked meshes were copied into this file.")
+        for sentence in build.change_mode(rig, self.mode):
+            self.report({"WARNING"}, sentence)
         rig.update_tag()
         context.view_layer.update()
         evaluate.evaluate(rig, context.evaluated_depsgraph_get(), force=True)

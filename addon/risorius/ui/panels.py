@@ -8,6 +8,7 @@ import bpy
 from .. import native
 from ..logic import plans, regions
 from ..scene import lods, parts, place, runtime
+from . import life_operators
 
 _ICONS = {
     "brow": "MOD_CURVE",
@@ -50,6 +51,8 @@ class RISORIUS_PT_character(_FacePanel, bpy.types.Panel):
         if trouble:
             _write(layout, trouble, "ERROR")
             return
+        if life_operators.draw_trouble(layout, context):
+            return
         rig = parts.active_rig(context)
         if rig is None:
             _draw_start(layout)
@@ -57,8 +60,7 @@ class RISORIUS_PT_character(_FacePanel, bpy.types.Panel):
         live = runtime.of(rig)
         controls = parts.controls_of(rig)
         if live is None or controls is None:
-            _write(layout, "This face has lost its data or its control armature.", "ERROR")
-            return
+            return  # said above
         layout.label(text=rig.name.removesuffix("_rig"), icon="USER")
         _draw_detail(layout, rig)
         _draw_shapes(layout, rig)
@@ -182,12 +184,18 @@ class RISORIUS_PT_options(_FacePanel, bpy.types.Panel):
         rig = parts.active_rig(context)
         on = bool(parts.controls_of(rig).get(parts.OVERDRIVE))
         layout.operator("risorius.set_overdrive", depress=on).enable = not on
-        attached = place.is_attached(parts.controls_of(rig))
+        attached = place.body_of(parts.controls_of(rig))
         body = "risorius.detach_body" if attached else "risorius.attach_body"
         layout.operator(body, icon="ARMATURE_DATA")
         layout.operator("risorius.separate", icon="UNLINKED")
         layout.operator("risorius.reload", icon="FILE_REFRESH")
+        layout.operator("risorius.describe", icon="INFO")
         layout.prop(context.window_manager, "risorius_show_timing")
+        render = context.scene.render
+        if not render.use_lock_interface:
+            layout.prop(render, "use_lock_interface", text="Lock Interface in Renders")
+        layout.operator("risorius.replace_dna", icon="FILEBROWSER")
+        layout.operator("risorius.export_dna", icon="EXPORT")
         live = runtime.of(rig)
         if live is not None:
             column = layout.column(align=True)
