@@ -11,9 +11,9 @@ a report is missing.
 from __future__ import annotations
 
 import sys
-import xml.etree.ElementTree as ElementTree
 from collections import Counter, defaultdict
 from pathlib import Path
+from xml.etree import ElementTree
 
 PASSED, FAILED, NOT_RUN = "passed", "failed", "not run"
 _OUTCOMES = {"failure": FAILED, "error": FAILED, "skipped": NOT_RUN}
