@@ -48,15 +48,6 @@ def _use(active):
     bpy.context.scene.frame_set(1)
 
 
-def _undone(dna_file):
-    bpy.ops.ed.undo_push(message="ruin")
-    while not [o for o in bpy.data.objects if o.get("risorius_controls")] or any(
-        not v for v in scene.meshes(_rig()).values()
-    ):
-        assert bpy.ops.ed.undo() == {"FINISHED"}
-    _right(dna_file)
-
-
 def _rig():
     return next(o for o in bpy.data.objects if o.get("risorius_controls"))
 
@@ -94,9 +85,6 @@ def test_without_a_mesh(rig, dna_file):
     bpy.data.objects.remove(scene.meshes(rig)[1])
     _use(controls)
     assert "1 of the meshes were deleted" in _said(controls)
-    raw = np.zeros(11, np.float32)
-    wanted = scene.raw_of(rig, dna_file)
-    assert not np.array_equal(raw, wanted) or True
     bpy.ops.ed.undo_push(message="ruin")
     bpy.ops.ed.undo()
     _right(dna_file)
