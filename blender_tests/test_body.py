@@ -108,6 +108,20 @@ def test_head_and_neck_of_a_body_of_any_name_and_scale(dna_file, names, scale, t
     assert wanted.angle > 0.3
 
 
+def test_a_body_that_is_posed_when_it_is_attached_carries_the_face_along(dna_file):
+    rig = scene.load(dna_file)
+    rest = scene.snapshot(rig)
+    body = _body(NAMES["rigify"])
+    body.pose.bones["chest"].matrix_basis = Matrix.Translation((0.3, 0, 0))
+    scene.update(body)
+    _attach(rig, body, fit="NONE")
+    bpy.context.view_layer.update()
+    rest_base = body.matrix_world @ body.data.bones["chest"].matrix_local
+    motion = _world(body, "chest") @ rest_base.inverted()
+    np.testing.assert_allclose(scene.snapshot(rig), _moved(rest, motion), atol=1e-5)
+    assert motion.translation.length == pytest.approx(0.3)
+
+
 def test_the_face_stays_when_it_is_detached(dna_file):
     rig = scene.load(dna_file)
     body = _body(NAMES["rigify"])

@@ -375,7 +375,12 @@ void bind_rig_class(py::module_& m) {
       .def_readonly("animated_map_count", &rig::Rig::animated_map_count)
       .def_readonly("lod_count", &rig::Rig::lod_count)
       .def_readonly("control_count", &rig::Rig::control_count)
-      .def_property_readonly("ignored_layers", &rig::Rig::ignored_layers)
+      .def_property_readonly("ignored_layers",
+                             [](const rig::Rig& r) {
+                               py::list out;
+                               for (const auto& id : r.ignored_layers()) out.append(to_python(id));
+                               return out;
+                             })
       .def_property_readonly("memory_bytes", &rig::Rig::memory_bytes)
       .def_property_readonly("simd", [](const rig::Rig& r) { return r.kernels->name; })
       .def_property_readonly("neutral_joints",
@@ -522,7 +527,9 @@ void bind_rig(py::module_& m) {
   bind_morph(m);
   bind_bone_space(m);
   m.def("rig_block_version", &rig::block_version, "Of Rig.to_bytes; others are refused.");
-  m.def("available_simd", [] { return std::string(simd::available_kernels()); });
+  m.def(
+      "available_simd", [] { return std::string(simd::available_kernels()); },
+      "The instruction sets that this processor has, as simd= takes them, apart by blanks.");
 }
 
 }  // namespace risorius::bindings

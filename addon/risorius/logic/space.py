@@ -67,6 +67,22 @@ class Space:
         )
         return self.axes @ matrices @ self.axes.T
 
+    def file_points(self, values: NDArray[np.float32] | Float) -> Float:
+        """The inverse of `points`: [n, 3] Blender units to file units."""
+        return np.asarray(values, np.float64) @ self.axes / self.scale
+
+    def file_rotations(self, matrices: Float, near: Float) -> Float:
+        """The inverse of `rotations`: float64[n, 3, 3] to Euler angles of the file, [n, 3].
+
+        Args:
+            matrices: rotations in Blender's axes.
+            near: float64[n, 3] file angles; of all angles that mean the same rotation those
+                nearest to these are returned.
+        """
+        turned = self.axes.T @ matrices @ self.axes
+        units = self.radians * self.signs
+        return euler_angles(turned, self.sequence, np.asarray(near, np.float64) * units) / units
+
     @property
     def delta_matrix(self) -> NDArray[np.float32]:
         """float32[3, 3] that takes a shape delta of the file to Blender units."""
@@ -144,6 +160,42 @@ def euler_matrices(angles: Float, sequence: Sequence[int]) -> Float:
         turn[:, following, last] = -sine
         result = turn @ result
     return np.ascontiguousarray(result)
+
+
+def euler_angles(matrices: Float, sequence: Sequence[int], near: Float) -> Float:
+    """Angles whose `euler_matrices` are these; the inverse of that function.
+
+    Args:
+        matrices: float64[n, 3, 3] rotations for column vectors.
+        sequence: three axis numbers; sequence[0] is applied first.
+        near: float64[n, 3] radians; the solution nearest to them is chosen.
+
+    Returns:
+        float64[n, 3] radians about x, y and z.
+    """
+    i, j, k = sequence
+    sign = 1.0 if (j - i) % 3 == 1 else -1.0  # even or odd order of axes
+    m = matrices
+    flat = np.hypot(m[:, i, i], m[:, j, i])  # the cosine of the middle angle
+    result = np.empty((len(m), 3))
+    for n in range(len(m)):
+        middle = np.arctan2(-sign * m[n, k, i], flat[n])
+        if flat[n] > 1e-7:
+            first = np.arctan2(sign * m[n, k, j], m[n, k, k])
+            last = np.arctan2(sign * m[n, j, i], m[n, i, i])
+        else:  # the first and last axis coincide: keep the first angle, the last takes the rest
+            first = near[n, i]
+            known = np.zeros((1, 3))
+            known[0, i], known[0, j] = first, middle
+            turn = m[n] @ euler_matrices(known, sequence)[0].T
+            last = np.arctan2(sign * turn[j, i], turn[i, i])
+        angles = np.empty(3)
+        angles[[i, j, k]] = first, middle, last
+        other = np.empty(3)
+        other[[i, j, k]] = first + np.pi, np.pi - middle, last + np.pi
+        choices = [near[n] + (a - near[n] + np.pi) % (2 * np.pi) - np.pi for a in (angles, other)]
+        result[n] = min(choices, key=lambda a: float(np.sum(np.abs(a - near[n]))))
+    return result
 
 
 def world_matrices(rotations: Float, offsets: Float, parents: NDArray[np.uint16]) -> Float:

@@ -37,6 +37,39 @@ def _edit_bones(context, item, collection):
             collection.objects.unlink(item)
 
 
+@contextmanager
+def edit_armature(context, data):
+    """The edit bones of an armature that is in use, whether its objects are hidden or not."""
+    workshop = bpy.data.collections.new("bones")
+    item = bpy.data.objects.new("bones", data)
+    context.scene.collection.children.link(workshop)
+    try:
+        with _edit_bones(context, item, workshop) as edit_bones:
+            yield edit_bones
+    finally:
+        bpy.data.batch_remove([item, workshop])
+
+
+@contextmanager
+def kept_selection(context):
+    """Restore the active object, its mode and the selection after building beside them."""
+    layer = context.view_layer
+    active = layer.objects.active
+    mode = active.mode if active is not None else "OBJECT"
+    selected = [o for o in layer.objects if o.select_get(view_layer=layer)]
+    try:
+        yield
+    finally:
+        layer.update()  # the list still has places of removed objects
+        there = {o for o in layer.objects if o is not None}
+        for item in there:
+            item.select_set(item in selected, view_layer=layer)
+        layer.objects.active = active if active in there else None
+        if active in there and active.mode != mode:
+            with context.temp_override(active_object=active, object=active):
+                bpy.ops.object.mode_set(mode=mode)
+
+
 def build_rig(context, plan, made, workshop):
     """Build the deforming armature in its neutral pose.
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import bpy
 
 from .. import native
-from ..logic import names, plans
+from ..logic import names, plans, textures
 from . import armatures, lods, materials, meshes, parts, runtime, storage
 
 
@@ -20,7 +20,11 @@ class BuildOptions:
         mode: LIVE, KEYS or AUTO.
         normals: keep the file's normals.
         materials: build materials.
-        textures: load the textures that the file names.
+        textures: load the textures that lie beside the file.
+        texture_folder: looked into first; empty for none.
+        simple_materials: without subsurface, relief and animated maps.
+        unit: metres per Blender unit; None takes the scene's.
+        nearest_lods: where the file has none of the levels, build its finest instead.
     """
 
     lods: tuple[int, ...] = (0,)
@@ -28,6 +32,10 @@ class BuildOptions:
     normals: bool = True
     materials: bool = True
     textures: bool = True
+    texture_folder: str = ""
+    simple_materials: bool = False
+    unit: float | None = None
+    nearest_lods: bool = False
 
 
 def import_file(context, path, options, progress=lambda _share: None):
@@ -50,7 +58,9 @@ def import_file(context, path, options, progress=lambda _share: None):
     dna = risorius.load(str(path))
     content = Path(path).read_bytes()
     progress(0.15)
-    unit = context.scene.unit_settings.scale_length
+    unit = options.unit or context.scene.unit_settings.scale_length
+    if options.nearest_lods:
+        options = replace(options, lods=plans.existing_lods(dna, options.lods))
     rests = risorius.Rig(dna).initial_raw_controls
     plan = plans.plan_character(dna, Path(path).stem, options.lods, unit, rests)
     plan = replace(plan, name=names.unique_labels([plan.name], bpy.data.collections.keys())[0])
@@ -58,11 +68,14 @@ def import_file(context, path, options, progress=lambda _share: None):
     made = []
     try:
         rig, warnings = _build(context, plan, dna, content, path, options, made, progress)
+        live = runtime.of(rig)
+        if live is None:
+            raise plans.PlanError("The file cannot be evaluated.")
+        layers = plans.layer_warnings(live.rig.ignored_layers)
     except BaseException:
         _remove(made)
         raise
-    live = runtime.of(rig)
-    return rig, [*dna.warnings, *warnings, *plans.layer_warnings(live.rig.ignored_layers)]
+    return rig, [*dna.warnings, *warnings, *layers]
 
 
 def _build(context, plan, dna, content, path, options, made, progress):
@@ -72,7 +85,8 @@ def _build(context, plan, dna, content, path, options, made, progress):
     context.scene.collection.children.link(workshop)
     rig = armatures.build_rig(context, plan, made, workshop)
     controls = armatures.build_controls(context, plan, made, workshop)
-    _connect(context, plan, rig, controls, text, path)
+    unit = options.unit or context.scene.unit_settings.scale_length
+    _connect(plan, rig, controls, text, path, unit)
     progress(0.4)
     built = []
     for number, mesh_plan in enumerate(plan.meshes):
@@ -89,10 +103,10 @@ def _build(context, plan, dna, content, path, options, made, progress):
     settle(context, rig, controls)
     armatures.pull_controls(rig, controls)
     if options.materials:
-        folder = _texture_folder(path) if options.textures else None
-        by_base, warnings = materials.build_materials(plan, rig, made, folder)
-        for item, mesh_plan in zip(built, plan.meshes, strict=True):
-            item.data.materials.append(by_base[mesh_plan.base])
+        found = _find_textures(plan, path, options)
+        simple = options.simple_materials
+        warnings = materials.build_materials(plan, rig, built, made, found, simple)
+        rig[parts.TEXTURES] = found.summary()
     progress(0.8)
     _add_shapes(plan, dna, rig, built, options.mode)
     for item in built:
@@ -114,11 +128,11 @@ def settle(context, *items):
     context.view_layer.update()
 
 
-def _connect(context, plan, rig, controls, text, path):
+def _connect(plan, rig, controls, text, path, unit):
     parts.point(controls, parts.RIG, rig)
     parts.point(rig, parts.CONTROLS, controls)
     parts.point(rig, parts.DNA, text)
-    rig[parts.UNIT] = context.scene.unit_settings.scale_length
+    rig[parts.UNIT] = unit
     rig[parts.LOD] = 0
     rig[parts.LOD_RENDER] = lods.SAME
     rig[parts.FOLLOW] = True
@@ -137,9 +151,13 @@ def _source(path):
         return str(path)
 
 
-def _texture_folder(path):
-    path = Path(path)
-    return path.with_name(f"{path.stem}_textures")
+def _find_textures(plan, path, options):
+    """The textures beside the file and in the chosen folder; none where none are wanted."""
+    if not options.textures:
+        return textures.TexturePlan()
+    chosen = bpy.path.abspath(options.texture_folder) if options.texture_folder else ""
+    folders = textures.folders_of(Path(path), chosen)
+    return textures.find(plan.textures, [(m.base, m.kind) for m in plan.meshes], folders)
 
 
 def _add_shapes(plan, dna, rig, built, mode):
@@ -150,9 +168,7 @@ def _add_shapes(plan, dna, rig, built, mode):
         chosen = mode
         if mode == "AUTO":
             chosen = meshes.automatic_mode(count, len(mesh_plan.positions), total)
-        meshes.set_mode(
-            item, rig, dna.meshes[mesh_plan.index], plan.space.delta_matrix, labels, chosen
-        )
+        meshes.set_mode(item, rig, dna.meshes[mesh_plan.index], plan.space, labels, chosen)
 
 
 def channel_labels(dna):
@@ -170,8 +186,13 @@ def _into_place(context, plan, workshop, rig, controls):
 
 
 def change_mode(rig, mode):
-    """Switch the meshes of a character to LIVE or KEYS shapes; AUTO chooses by size."""
+    """Switch the meshes of a character to LIVE or KEYS shapes; AUTO chooses by size.
+
+    Returns:
+        Sentences on meshes that could not be switched.
+    """
     live = runtime.of(rig)
+    trouble = []
     items = parts.meshes_of(rig)
     total = sum(len(live.dna.meshes[i[parts.MESH]].blend_shape_targets) for i in items)
     for item in items:
@@ -182,50 +203,12 @@ def change_mode(rig, mode):
                 len(dna_mesh.blend_shape_targets), len(dna_mesh.positions), total
             )
         labels = channel_labels(live.dna)
-        meshes.set_mode(item, rig, dna_mesh, live.space.delta_matrix, labels, chosen)
+        if not meshes.set_mode(item, rig, dna_mesh, live.space, labels, chosen):
+            trouble.append(
+                f"{item.name} has not as many vertices as in its file: its shapes stay as they are."
+            )
     runtime.forget_outputs()
-
-
-def replace_character(old, new):
-    """Let a newly built character take the place of an old one, under its controls.
-
-    The old control armature stays, with its values, keys, NLA and whatever points to it.
-
-    Args:
-        old: deforming armature of the character that leaves.
-        new: deforming armature of the one that was built.
-    """
-    controls, spare = parts.controls_of(old), parts.controls_of(new)
-    live = runtime.of(new)
-    face = controls.pose.bones[parts.FACE]
-    maximum = 1.5 if controls.get(parts.OVERDRIVE) else 1.0
-    for control in plans.plan_controls(live.dna.raw_control_names, live.rests):
-        if control.label not in face:
-            armatures.add_properties(face, [control], maximum)
-    collection = next((c for c in bpy.data.collections if new.name in c.objects), None)
-    names_now = (new.name.removesuffix("_rig"), old.name.removesuffix("_rig"))
-    new[parts.CONTROLS] = controls
-    controls[parts.RIG] = new
-    armatures.pull_controls(new, controls)
-    old[parts.CONTROLS] = spare
-    spare[parts.RIG] = old
-    for home in controls.users_collection:
-        home.objects.unlink(controls)
-    if collection is not None:
-        collection.objects.link(controls)
-    remove(old)
-    _rename(new, collection, *names_now)
-    runtime.forget_outputs()
-
-
-def _rename(rig, collection, before, after):
-    """Give the parts of a character another first part of their names."""
-    items = parts.meshes_of(rig)
-    held = [rig, rig.data, rig.get(parts.DNA), collection, *items, *(i.data for i in items)]
-    held += [m for i in items for m in i.data.materials]
-    for item in dict.fromkeys(h for h in held if h is not None):
-        if item.name.startswith(before):
-            item.name = after + item.name[len(before) :]
+    return trouble
 
 
 def remove(rig):

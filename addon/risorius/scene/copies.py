@@ -91,6 +91,13 @@ def _own_key_drivers(item, rig):
         runtime.forget_outputs()
 
 
+def retarget_materials(item, rig):
+    """Let the animated maps of a mesh's materials follow another rig."""
+    for slot in item.material_slots:
+        if slot.material is not None:
+            _retarget(materials.map_drivers(slot.material), rig)
+
+
 def _own_materials(item, rig, copied):
     for slot in item.material_slots:
         material = slot.material

@@ -8,7 +8,7 @@ are stale while an animation renders) and written to the originals, in bulk.
 from time import perf_counter
 
 from .. import native
-from . import bones, inputs, lods, meshes, parts, place, runtime, timing
+from . import inputs, lods, meshes, parts, place, posing, runtime, testing, timing
 
 
 def evaluate_all(depsgraph, force=False):
@@ -48,13 +48,15 @@ def evaluate(rig, depsgraph, force=False):
     raw, turns = inputs.read_inputs(seen, live, depsgraph, _maximum(controls))
     place.follow(rig, seen)
     lod = min(max(lods.choose(rig, seen, depsgraph), 0), max(live.rig.lod_count - 1, 0))
-    state = (raw.tobytes(), lod, *((name, *turn) for name, turn in turns.items()))
-    if not force and not _changed(rig, "inputs", state):
+    test = testing.override(rig, raw, depsgraph.scene)
+    state = (raw.tobytes(), lod, test, *((name, *turn) for name, turn in turns.items()))
+    if not _changed(rig, "inputs", state) and not force:
         return False
     times.append(perf_counter())
     pose = live.rig.evaluate(raw, lod)
+    testing.apply(test, pose.blend_shapes)
     times.append(perf_counter())
-    taken = bones.write(rig, live, pose.joints, turns, depsgraph)
+    taken = posing.write(rig, live, pose.joints, turns, depsgraph)
     note_refusal(rig, taken)
     if not taken:
         return False  # channels and maps shall not move without the bones
@@ -112,7 +114,10 @@ def _write_shape(item, live, weights, force):
     block = meshes.live_block(item)
     if block is None or item.mode == "EDIT":
         return
-    morph = live.morph(item[parts.MESH])
+    index = item.get(parts.MESH, -1)
+    if not 0 <= index < len(live.dna.meshes):
+        return  # the data in the .blend is another file's
+    morph = live.morph(index)
     if morph.vertex_count != len(block.points):
         return  # the user changed the topology
     if parts.REAL in key:
@@ -124,6 +129,6 @@ def _write_shape(item, live, weights, force):
     points = morph.evaluate(weights, base=basis)
     block.points.foreach_set("co", points.ravel())
     if item.data.library or item.data.override_library:
-        note_refusal(item, bones.is_there(block.points, "co", points.ravel()))
+        note_refusal(item, posing.is_there(block.points, "co", points.ravel()))
     key.update_tag()
     item.data.update_tag()

@@ -5,7 +5,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from .. import native
-from . import copies, evaluate, heal, lods, parts, place, runtime, timing
+from . import copies, evaluate, heal, lods, parts, place, runtime, testing, timing
 
 _state = {"objects": -1, "busy": False}
 
@@ -64,6 +64,7 @@ def _notice_copies():
     count = len(bpy.data.objects)
     if count != _state["objects"]:
         _state["objects"] = count
+        runtime.forget_unused(parts.rigs())
         for sentence in copies.separate_all():
             print(f"Risorius: {sentence}")
 
@@ -126,6 +127,13 @@ def _before_save(*_arguments):
         return
     copies.separate_all()
     heal.remove_dead()
+    _end_tests()
+
+
+@persistent
+def _end_tests(*_arguments):
+    if testing.clear_all():
+        refresh()
 
 
 def refresh():
@@ -146,6 +154,7 @@ _HANDLERS = (
     ("undo_post", _restored),
     ("redo_post", _restored),
     ("save_pre", _before_save),
+    ("render_init", _end_tests),
     ("render_complete", _render_ended),
     ("render_cancel", _render_ended),
 )

@@ -90,7 +90,13 @@ def missing(item):
     elif parts.FACE not in controls.pose.bones:
         found.append(f"{controls.name} has lost its bone {parts.FACE}, which bears the sliders.")
     if not runtime.of(rig):
-        found.append("The text that holds the DNA was deleted; undo brings it back.")
+        text = rig.get(parts.DNA)
+        what = (
+            f"what {text.name} holds is no DNA file any more"
+            if isinstance(text, bpy.types.Text)
+            else "the text that holds the DNA was deleted"
+        )
+        found.append(f"This face has lost its data: {what}; undo brings it back.")
     gone = [k for k in rig.keys() if k.startswith(parts.MESH_PREFIX) and not rig[k]]  # noqa: SIM118
     if gone:
         found.append(f"{len(gone)} of the meshes were deleted.")

@@ -80,6 +80,7 @@ def attach(controls, body, base, neck="", head="", fit="MOVE"):
     # As the body rests: a body that is posed at this moment carries the face along.
     rest = body.matrix_world @ body.data.bones[base].matrix_local
     hold.inverse_matrix = rest.inverted_safe()
+    hold.set_inverse_pending = False
     controls[parts.BODY_NECK] = "\n".join(_neck_chain(body, base, neck, head))
     controls[parts.BODY_HEAD] = head if head != base else ""
     controls.update_tag()

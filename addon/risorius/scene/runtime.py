@@ -4,7 +4,6 @@
 Holds no Blender object: it is found anew, or rebuilt, after load, undo, append and enable.
 """
 
-import zlib
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -82,15 +81,31 @@ def of(rig):
     digest = storage.content_hash(text)
     if not digest:
         return None
-    key = (digest, float(rig.get(parts.UNIT, 1.0)))
+    key = (digest, _unit(rig))
     if key not in _cache:
         try:
             _cache[key] = _compile(storage.content(text), key[1])
-        except (native.dna_error(), SpaceError, zlib.error, KeyError) as error:
+        except (native.dna_error(), SpaceError, ValueError, LookupError) as error:
             # Said once, not at every frame; the panel says that the data is lost.
-            print(f"Risorius: the data of {rig.name} cannot be read: {error}")
+            words = names.printable(str(error)).rstrip(".")
+            print(f"Risorius: the data of {rig.name} cannot be read: {words}.")
             _cache[key] = None
     return _cache[key]
+
+
+def _unit(rig):
+    """Metres per Blender unit at import."""
+    unit = rig.get(parts.UNIT)
+    usable = isinstance(unit, int | float) and np.isfinite(unit) and unit > 0
+    return float(unit) if usable else 1.0
+
+
+def forget_unused(rigs):
+    """Drop compiled data of characters that are gone. Args: rigs  those that are there."""
+    used = {storage.content_hash(rig.get(parts.DNA)) for rig in rigs}
+    for key in [k for k in _cache if k[0] not in used]:
+        del _cache[key]
+    outputs.clear()
 
 
 def _compile(content, unit):

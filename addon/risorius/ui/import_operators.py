@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators that bring faces in: from a file, the sample, and again from its source."""
+"""Operators that bring faces in: from a file, and the sample."""
 
 from contextlib import contextmanager
 from pathlib import Path
@@ -8,9 +8,10 @@ import bpy
 from bpy_extras.io_utils import ImportHelper
 
 from .. import native
+from ..logic import names
 from ..logic.plans import PlanError
 from ..logic.space import SpaceError
-from ..scene import build, lods, parts
+from ..scene import build, parts
 
 MODES = (
     ("AUTO", "Automatic", "Real shape keys where a mesh has few, else the live sum"),
@@ -21,8 +22,8 @@ MODES = (
 
 def explain(path, error):
     """One sentence for what is wrong with a file."""
-    text = str(error).strip().rstrip(".")
-    name = Path(path).name
+    text = names.printable(str(error)).strip().rstrip(".")
+    name = names.printable(Path(path).name)
     return f"{text}." if name in text else f"{name}: {text}."
 
 
@@ -35,7 +36,7 @@ def usable(cls):
 
 
 @contextmanager
-def _progress(context):
+def shown_progress(context):
     manager = context.window_manager
     manager.progress_begin(0, 100)
     try:
@@ -57,16 +58,19 @@ def import_character(operator, context, path, options):
         What `execute` returns.
     """
     try:
-        with _progress(context) as progress:
+        with shown_progress(context) as progress:
             rig, warnings = build.import_file(context, path, options, progress)
     except (native.dna_error(), PlanError, SpaceError, OSError) as error:
         operator.report({"ERROR"}, explain(path, error))
         return {"CANCELLED"}
     for warning in warnings[:5]:
-        operator.report({"WARNING"}, str(warning))
+        operator.report({"WARNING"}, names.printable(str(warning)))
     if len(warnings) > 5:
         operator.report({"WARNING"}, f"and {len(warnings) - 5} more warnings")
     count = len(parts.meshes_of(rig))
+    found = rig.get(parts.TEXTURES, "")
+    if found:
+        operator.report({"INFO"}, f"Textures of {found}")
     operator.report({"INFO"}, f"{Path(path).name}: {count} meshes, ready to move")
     return {"FINISHED"}
 
@@ -100,6 +104,16 @@ class RISORIUS_OT_import_dna(bpy.types.Operator, ImportHelper):
         description="Load the textures that lie beside the file, and pack them",
         default=True,
     )
+    texture_folder: bpy.props.StringProperty(
+        name="Texture Folder",
+        description="Where the textures lie, by MetaHuman's names; empty: beside the file",
+        subtype="DIR_PATH",
+    )
+    use_simple_materials: bpy.props.BoolProperty(
+        name="Simple Materials",
+        description="Cheap to draw: no subsurface, no pores, no wrinkles or flush",
+        default=False,
+    )
 
     @classmethod
     def poll(cls, context):
@@ -112,6 +126,8 @@ class RISORIUS_OT_import_dna(bpy.types.Operator, ImportHelper):
             normals=self.use_normals,
             materials=self.use_materials,
             textures=self.use_materials and self.use_textures,
+            texture_folder=self.texture_folder,
+            simple_materials=self.use_simple_materials,
         )
         return import_character(self, context, self.filepath, options)
 
@@ -135,6 +151,12 @@ class RISORIUS_OT_import_dna(bpy.types.Operator, ImportHelper):
         row = column.row()
         row.active = self.use_materials
         row.prop(self, "use_textures")
+        row = column.row()
+        row.active = self.use_materials
+        row.prop(self, "use_simple_materials")
+        row = layout.row()
+        row.active = self.use_materials and self.use_textures
+        row.prop(self, "texture_folder")
 
 
 class RISORIUS_FH_dna(bpy.types.FileHandler):
@@ -194,45 +216,6 @@ def _build_sample(path, folder):
     return ""
 
 
-class RISORIUS_OT_reload(bpy.types.Operator):
-    """Build the active face anew from its source file; its controls and their keys stay"""
-
-    bl_idname = "risorius.reload"
-    bl_label = "Reload from Source"
-    bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context):
-        if not usable(cls):
-            return False
-        rig = parts.active_rig(context)
-        if rig is None:
-            cls.poll_message_set("Select a face first.")
-            return False
-        path = bpy.path.abspath(rig.get(parts.SOURCE, ""))
-        if not path or not Path(path).is_file():
-            cls.poll_message_set("The source file is not there any more.")
-            return False
-        return True
-
-    def execute(self, context):
-        old = parts.active_rig(context)
-        path = bpy.path.abspath(old[parts.SOURCE])
-        levels = tuple(lods.built(old)) or (0,)
-        modes = {m.get(parts.MODE) for m in parts.meshes_of(old)}
-        mode = modes.pop() if len(modes) == 1 else "AUTO"
-        controls = parts.controls_of(old)
-        result = import_character(self, context, path, build.BuildOptions(levels, mode))
-        if result != {"FINISHED"}:
-            return result
-        build.replace_character(old, parts.rig_of(context.view_layer.objects.active))
-        context.view_layer.objects.active = controls
-        controls.select_set(True, view_layer=context.view_layer)
-        controls.update_tag()
-        context.view_layer.update()
-        return {"FINISHED"}
-
-
 def draw_import(self, _context):
     """Entry of File > Import."""
     self.layout.operator(RISORIUS_OT_import_dna.bl_idname, text="MetaHuman DNA (.dna)")
@@ -247,5 +230,4 @@ CLASSES = (
     RISORIUS_OT_import_dna,
     RISORIUS_FH_dna,
     RISORIUS_OT_add_character,
-    RISORIUS_OT_reload,
 )

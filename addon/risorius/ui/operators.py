@@ -120,7 +120,8 @@ class RISORIUS_OT_set_shape_mode(FaceOperator, bpy.types.Operator):
             return {"CANCELLED"}
         if overrides.unlock_shapes(rig):
             self.report({"INFO"}, "The linked meshes were copied into this file.")
-        build.change_mode(rig, self.mode)
+        for sentence in build.change_mode(rig, self.mode):
+            self.report({"WARNING"}, sentence)
         rig.update_tag()
         context.view_layer.update()
         evaluate.evaluate(rig, context.evaluated_depsgraph_get(), force=True)

@@ -939,7 +939,8 @@ class BoneSpace:
 def rig_block_version() -> int:
     """Of Rig.to_bytes; others are refused."""
 
-def available_simd() -> str: ...
+def available_simd() -> str:
+    """The instruction sets that this processor has, as `simd=` takes them, apart by blanks."""
 
 class GroupSizes:
     """Joint groups, their rows, coefficients stored (zeros too), not zero."""
