@@ -5,12 +5,25 @@ import bpy
 
 from . import native
 from .scene import handlers
-from .ui import file_operators, import_operators, operators, panels, shape_test
+from .ui import (
+    about,
+    file_operators,
+    import_operators,
+    life_operators,
+    operators,
+    overlay,
+    panels,
+    scene_operators,
+    shape_test,
+)
 
 CLASSES = (
+    *about.CLASSES,
     *import_operators.CLASSES,
     *file_operators.CLASSES,
     *operators.CLASSES,
+    *life_operators.CLASSES,
+    *scene_operators.CLASSES,
     *panels.CLASSES,
     *shape_test.CLASSES,
 )
@@ -30,6 +43,7 @@ def register():
         bpy.utils.register_class(cls)
     bpy.types.WindowManager.risorius_search = _search_property()
     bpy.types.WindowManager.risorius_test = shape_test.weight_property()
+    bpy.types.WindowManager.risorius_show_timing = overlay.show_property()
     bpy.types.TOPBAR_MT_file_import.append(import_operators.draw_import)
     bpy.types.TOPBAR_MT_file_export.append(file_operators.draw_export)
     bpy.types.VIEW3D_MT_add.append(import_operators.draw_add)
@@ -50,9 +64,11 @@ def unregister():
     if bpy.app.timers.is_registered(_refresh_once):
         bpy.app.timers.unregister(_refresh_once)
     handlers.unregister()
+    overlay.stop()
     bpy.types.VIEW3D_MT_add.remove(import_operators.draw_add)
     bpy.types.TOPBAR_MT_file_export.remove(file_operators.draw_export)
     bpy.types.TOPBAR_MT_file_import.remove(import_operators.draw_import)
+    del bpy.types.WindowManager.risorius_show_timing
     del bpy.types.WindowManager.risorius_test
     del bpy.types.WindowManager.risorius_search
     for cls in reversed(CLASSES):

@@ -11,6 +11,7 @@ from mathutils import Matrix, Vector
 from ..logic import regions
 from . import parts
 
+SHELF = "Joints"  # the bone collection of the deforming bones, not shown
 LIVE_PROPERTIES = (parts.MAPS, parts.CHANNELS)
 
 
@@ -100,11 +101,53 @@ def build_rig(context, plan, made, workshop):
     for joint, label in enumerate(armature.labels):
         data.bones[label][parts.JOINT] = joint
     data.display_type = "STICK"
+    # Bones that are not shown, and an object that is: so Select All and Duplicate take it along.
+    shelf = data.collections.new(SHELF)
+    for bone in data.bones:
+        shelf.assign(bone)
+    shelf.is_visible = False
+    # It follows the control armature (place.py); moved together with it, it would go twice as far.
+    lock_place(rig)
     rig[parts.MAPS] = [0.0] * max(1, len(plan.map_labels))
     rig[parts.CHANNELS] = [0.0] * max(1, plan.channel_count)
+    rig[parts.PULL] = 0.0
     for name in LIVE_PROPERTIES:
         rig.property_overridable_library_set(f'["{name}"]', True)
     return rig
+
+
+def pull_controls(rig, controls):
+    """Let Blender evaluate the controls wherever the rig is, also where they are hidden.
+
+    Without a dependency Blender leaves out what is hidden in viewport or render, and the face
+    would stand still there. The drivers read the bones, because Blender evaluates only those
+    components of a hidden object that something visible depends on.
+
+    Args:
+        rig: the deforming armature.
+        controls: the control armature; its evaluated copy has its bones already.
+    """
+    data = rig.animation_data
+    path = f'["{parts.PULL}"]'
+    curve = data.drivers.find(path) if data else None
+    if curve is None:
+        curve = rig.driver_add(path)
+        curve.driver.type = "SUM"
+        for bone in controls.pose.bones:
+            variable = curve.driver.variables.new()
+            variable.type = "TRANSFORMS"
+            target = variable.targets[0]
+            target.id, target.bone_target = controls, bone.name
+            target.transform_type, target.transform_space = "SCALE_X", "LOCAL_SPACE"
+    for variable in curve.driver.variables:
+        if variable.targets[0].id != controls:
+            variable.targets[0].id = controls
+
+
+def lock_place(item):
+    """Let the user's hand not move an object by accident."""
+    item.lock_location = item.lock_rotation = item.lock_scale = (True, True, True)
+    item.lock_rotation_w = True
 
 
 def build_controls(context, plan, made, workshop):
@@ -131,6 +174,7 @@ def build_controls(context, plan, made, workshop):
                 edit_bones[name].parent = edit_bones[parent]
     circle = _circle(made, plan.name)
     for name in places:
+        data.bones[name][parts.PART] = name
         bone = controls.pose.bones[name]
         bone.custom_shape = circle
         bone.use_custom_shape_bone_size = True
@@ -142,6 +186,8 @@ def build_controls(context, plan, made, workshop):
         _shape(bone, name)
     data.bones.active = data.bones[parts.FACE]
     controls.show_in_front = True
+    controls[parts.OVERDRIVE] = False
+    controls.property_overridable_library_set(f'["{parts.OVERDRIVE}"]', True)
     add_properties(controls.pose.bones[parts.FACE], plan.controls)
     return controls
 

@@ -141,6 +141,10 @@ def replace_joints(context, change):
     else:
         change.new_bones = [kept[k] for k in range(len(new.labels))]
     _number(rig, change.new_bones, moved)
+    shelf = rig.data.collections.get(armatures.SHELF)
+    for joint, name in enumerate(change.new_bones):
+        if joint not in kept and shelf is not None:
+            shelf.assign(rig.data.bones[name])
     _release(change, moved)
     for label in (old.labels[j] for j in gone.values() if j < len(old.labels)):
         change.report.append(f"The joint {label} is gone.")
@@ -252,9 +256,9 @@ def _number(rig, names, moved):
 
 def _release(change, moved):
     """Joints that the new file no longer moves go back to rest: nobody else holds them."""
-    owned = {int(j) for j in change.after.joints.joints}
-    for joint in change.before.joints.joints:
-        there = moved[int(joint)]
+    owned = change.after.owned
+    for joint in change.before.owned:
+        there = moved[joint]
         if there >= 0 and there not in owned:
             change.rig.pose.bones[change.new_bones[there]].matrix_basis.identity()
 

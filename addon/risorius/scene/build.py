@@ -7,8 +7,8 @@ from pathlib import Path
 import bpy
 
 from .. import native
-from ..logic import names, plans
-from . import armatures, materials, meshes, parts, runtime, storage
+from ..logic import names, plans, textures
+from . import armatures, lods, materials, meshes, parts, runtime, storage
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,9 @@ class BuildOptions:
         mode: LIVE, KEYS or AUTO.
         normals: keep the file's normals.
         materials: build materials.
-        textures: load the textures that the file names.
+        textures: load the textures that lie beside the file.
+        texture_folder: looked into first; empty for none.
+        simple_materials: without subsurface, relief and animated maps.
         unit: metres per Blender unit; None takes the scene's.
         nearest_lods: where the file has none of the levels, build its finest instead.
     """
@@ -30,6 +32,8 @@ class BuildOptions:
     normals: bool = True
     materials: bool = True
     textures: bool = True
+    texture_folder: str = ""
+    simple_materials: bool = False
     unit: float | None = None
     nearest_lods: bool = False
 
@@ -64,11 +68,14 @@ def import_file(context, path, options, progress=lambda _share: None):
     made = []
     try:
         rig, warnings = _build(context, plan, dna, content, path, options, made, progress)
+        live = runtime.of(rig)
+        if live is None:
+            raise plans.PlanError("The file cannot be evaluated.")
+        layers = plans.layer_warnings(live.rig.ignored_layers)
     except BaseException:
         _remove(made)
         raise
-    live = runtime.of(rig)
-    return rig, [*dna.warnings, *warnings, *plans.layer_warnings(live.rig.ignored_layers)]
+    return rig, [*dna.warnings, *warnings, *layers]
 
 
 def _build(context, plan, dna, content, path, options, made, progress):
@@ -84,7 +91,7 @@ def _build(context, plan, dna, content, path, options, made, progress):
     built = []
     for number, mesh_plan in enumerate(plan.meshes):
         item = meshes.build_mesh(plan, mesh_plan, rig, made, options.normals)
-        rig[f"{parts.MESH_PREFIX}{number:03d}"] = item
+        parts.point(rig, f"{parts.MESH_PREFIX}{number:03d}", item)
         built.append(item)
         progress(0.4 + 0.3 * (number + 1) / len(plan.meshes))
     warnings = []
@@ -94,18 +101,19 @@ def _build(context, plan, dna, content, path, options, made, progress):
     for item in objects:
         workshop.objects.link(item)
     settle(context, rig, controls)
+    armatures.pull_controls(rig, controls)
     if options.materials:
-        folder = _texture_folder(path) if options.textures else None
-        by_base, warnings = materials.build_materials(plan, rig, made, folder)
-        for item, mesh_plan in zip(built, plan.meshes, strict=True):
-            item.data.materials.append(by_base[mesh_plan.base])
+        found = _find_textures(plan, path, options)
+        simple = options.simple_materials
+        warnings = materials.build_materials(plan, rig, built, made, found, simple)
+        rig[parts.TEXTURES] = found.summary()
     progress(0.8)
     _add_shapes(plan, dna, rig, built, options.mode)
     for item in built:
         made.append(item.data.shape_keys)
     progress(0.95)
     _into_place(context, plan, workshop, rig, controls)
-    show_lod(rig, _first(plan))
+    lods.show(rig, _first(plan))
     return rig, warnings
 
 
@@ -121,11 +129,15 @@ def settle(context, *items):
 
 
 def _connect(plan, rig, controls, text, path, unit):
-    controls[parts.RIG] = rig
-    rig[parts.CONTROLS] = controls
-    rig[parts.DNA] = text
+    parts.point(controls, parts.RIG, rig)
+    parts.point(rig, parts.CONTROLS, controls)
+    parts.point(rig, parts.DNA, text)
     rig[parts.UNIT] = unit
     rig[parts.LOD] = 0
+    rig[parts.LOD_RENDER] = lods.SAME
+    rig[parts.FOLLOW] = True
+    for key in (parts.LOD, parts.LOD_RENDER, parts.FOLLOW):
+        rig.property_overridable_library_set(f'["{key}"]', True)
     rig[parts.SOURCE] = _source(path)
     for key, value in plan.origin.items():
         controls.data[names.cut(f"dna_{key}")] = value
@@ -139,18 +151,23 @@ def _source(path):
         return str(path)
 
 
-def _texture_folder(path):
-    path = Path(path)
-    return path.with_name(f"{path.stem}_textures")
+def _find_textures(plan, path, options):
+    """The textures beside the file and in the chosen folder; none where none are wanted."""
+    if not options.textures:
+        return textures.TexturePlan()
+    chosen = bpy.path.abspath(options.texture_folder) if options.texture_folder else ""
+    folders = textures.folders_of(Path(path), chosen)
+    return textures.find(plan.textures, [(m.base, m.kind) for m in plan.meshes], folders)
 
 
 def _add_shapes(plan, dna, rig, built, mode):
     labels = channel_labels(dna)
+    total = sum(len(m.channels) for m in plan.meshes)
     for item, mesh_plan in zip(built, plan.meshes, strict=True):
         count = len(mesh_plan.channels)
         chosen = mode
         if mode == "AUTO":
-            chosen = meshes.automatic_mode(count, len(mesh_plan.positions))
+            chosen = meshes.automatic_mode(count, len(mesh_plan.positions), total)
         meshes.set_mode(item, rig, dna.meshes[mesh_plan.index], plan.space, labels, chosen)
 
 
@@ -160,27 +177,12 @@ def channel_labels(dna):
 
 
 def _into_place(context, plan, workshop, rig, controls):
-    """Name the collection; select the controls, hide the deforming bones."""
+    """Name the collection; select the controls."""
     workshop.name = plan.name
-    rig.hide_set(True, view_layer=context.view_layer)
     for item in context.view_layer.objects:
         item.select_set(False, view_layer=context.view_layer)
     controls.select_set(True, view_layer=context.view_layer)
     context.view_layer.objects.active = controls
-
-
-def show_lod(rig, lod):
-    """Show the meshes of one level, in viewport and render, and evaluate that level."""
-    rig[parts.LOD] = int(lod)
-    for item in parts.meshes_of(rig):
-        hidden = int(lod) not in list(item.get(parts.LODS, [lod]))
-        item.hide_viewport = item.hide_render = hidden
-    rig.update_tag()
-
-
-def lods_of(rig):
-    """The levels that a character has meshes for, in order."""
-    return sorted({int(v) for m in parts.meshes_of(rig) for v in m.get(parts.LODS, [])})
 
 
 def change_mode(rig, mode):
@@ -191,12 +193,14 @@ def change_mode(rig, mode):
     """
     live = runtime.of(rig)
     trouble = []
-    for item in parts.meshes_of(rig):
+    items = parts.meshes_of(rig)
+    total = sum(len(live.dna.meshes[i[parts.MESH]].blend_shape_targets) for i in items)
+    for item in items:
         dna_mesh = live.dna.meshes[item[parts.MESH]]
         chosen = mode
         if mode == "AUTO":
             chosen = meshes.automatic_mode(
-                len(dna_mesh.blend_shape_targets), len(dna_mesh.positions)
+                len(dna_mesh.blend_shape_targets), len(dna_mesh.positions), total
             )
         labels = channel_labels(live.dna)
         if not meshes.set_mode(item, rig, dna_mesh, live.space, labels, chosen):

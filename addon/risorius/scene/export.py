@@ -12,7 +12,7 @@ import numpy as np
 
 from .. import native
 from ..logic import edits, plans
-from . import armatures, bones, build, parts, refit, runtime, storage, weights
+from . import armatures, bones, lods, parts, refit, runtime, storage, weights
 
 
 class ExportError(ValueError):
@@ -50,7 +50,7 @@ def export(context, rig, options=None):
         raise ExportError(f"{rig.name} has lost the data of its file.")
     content = storage.content(rig[parts.DNA])
     unit = float(rig.get(parts.UNIT, 1.0))
-    levels = tuple(build.lods_of(rig)) or (0,)
+    levels = tuple(lods.built(rig)) or (0,)
     plan = plans.plan_character(live.dna, rig.name, levels, unit, live.rests)
     written = native.module().load(content)  # the Runtime's own must stay as it is
     job = _Job(rig, live, plan, written, unit)

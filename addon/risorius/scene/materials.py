@@ -1,225 +1,226 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """One material per kind of mesh; animated maps as driven inputs of its nodes."""
 
-from pathlib import Path
+from dataclasses import dataclass, field
+from typing import Any
 
 import bpy
+import numpy as np
 
-from . import parts
-from .meshes import plain_driver
+from ..logic import folds, maps, textures
+from . import looks, nodes, skin
+from .textures import Images
 
-# Diffuse colour, roughness, specular level, subsurface weight: linear values from the look of
-# the thing, used where the file brings no texture.
-_LOOKS = {
-    "skin": ((0.62, 0.36, 0.27, 1.0), 0.5, 0.35, 0.12),
-    "eyes": ((0.75, 0.70, 0.66, 1.0), 0.06, 0.6, 0.02),
-    "teeth": ((0.72, 0.66, 0.55, 1.0), 0.25, 0.5, 0.1),
-    "tongue": ((0.45, 0.12, 0.11, 1.0), 0.35, 0.5, 0.15),
-    "gum": ((0.50, 0.17, 0.15, 1.0), 0.3, 0.5, 0.15),
-    "lashes": ((0.012, 0.008, 0.006, 1.0), 0.6, 0.2, 0.0),
-    "wet": ((1.0, 1.0, 1.0, 1.0), 0.05, 0.5, 0.0),
+# What the solid view shows.
+_VIEW_COLORS = {
+    "skin": (0.62, 0.36, 0.27, 1.0),
+    "eyes": (0.75, 0.70, 0.66, 1.0),
+    "teeth": (0.72, 0.66, 0.55, 1.0),
+    "tongue": (0.45, 0.12, 0.11, 1.0),
+    "gum": (0.50, 0.17, 0.15, 1.0),
+    "lashes": (0.03, 0.02, 0.015, 1.0),
+    "wet": (1.0, 1.0, 1.0, 0.15),
 }
-_MAP_PREFIX = "risorius_map_"
-_FRAME = "Animated maps"
+_WIDE = 1.6  # a mesh wider than this times its height holds both eyes
 
 
-def build_materials(plan, rig, made, folder=None):
-    """Build the materials of a character, one per mesh base.
+@dataclass
+class Look:
+    """What the builder of one material knows.
+
+    Attributes:
+        kind: as in MeshPlan.
+        base: mesh name without LOD.
+        rig: the deforming armature, whose `maps` array drives the map values.
+        extent: float64[3] size of the mesh in Blender units.
+        unit: distance of the eyes, in Blender units: the measure of all patterns.
+        vertices: of the finest mesh.
+        has_uvs: whether it has a UV map.
+        simple: leave out subsurface, relief and maps.
+        uses: what the animated maps do.
+        areas: areas of a face that this mesh has.
+        found: textures.TexturePlan.
+        images: loads them.
+        atlas, places: image with the wrinkle masks, and where in it each region's is.
+        offsets: role -> whether that wrinkle map holds differences; filled when asked.
+    """
+
+    kind: str
+    base: str
+    rig: Any
+    extent: Any
+    unit: float
+    vertices: int
+    has_uvs: bool
+    simple: bool
+    uses: list
+    areas: set
+    found: textures.TexturePlan
+    images: Images
+    atlas: Any = None
+    places: dict = field(default_factory=dict)
+    offsets: dict = field(default_factory=dict)
+
+    def image(self, role, data=False):
+        """The image of a role, or None."""
+        return self.images.load(self.found.of(self.base, role), data)
+
+    def is_offset(self, role):
+        """Whether the wrinkle map of this role holds differences about 0.5."""
+        if role not in self.offsets:
+            self.offsets[role] = skin.offsets_in(self.found.of(self.base, role))
+        return self.offsets[role]
+
+
+def build_materials(plan, rig, built, made, found=None, simple=False):
+    """Build the materials of a character, one per mesh base, and put them on its meshes.
 
     Args:
         plan: the CharacterPlan.
         rig: the deforming armature, whose `maps` array drives the map values.
+        built: mesh objects, in the order of the plan's meshes.
         made: list that every new datablock is put on.
-        folder: where the textures named by the metadata lie; None leaves them out.
+        found: logic.textures.TexturePlan; None for no textures.
+        simple: build the cheap variant: no subsurface, relief or maps.
 
     Returns:
-        Mesh base -> material, and a list of sentences about textures that were not found.
+        Sentences about textures that are missing or cannot be read.
     """
-    loader = _Images(folder, made)
-    materials = {}
-    for mesh in plan.meshes:
-        if mesh.base not in materials:
-            materials[mesh.base] = _build(plan, mesh, rig, made, loader)
-    return materials, loader.missing
+    found = found if found is not None else textures.TexturePlan()
+    images = Images(made)
+    frame = _face_frame(plan)
+    uses = maps.uses_of(plan.map_labels)
+    by_base = {}
+    for mesh, item in zip(plan.meshes, built, strict=True):
+        areas = _add_attributes(item.data, mesh, frame)
+        if mesh.base not in by_base:
+            look = _look(plan, mesh, rig, frame, uses, areas, found, images, simple)
+            by_base[mesh.base] = _build(plan, look, made)
+        item.data.materials.append(by_base[mesh.base])
+    return [*found.missing, *images.broken]
 
 
-class _Images:
-    """Loads each image file once and packs it into the .blend."""
-
-    def __init__(self, folder, made):
-        self.folder, self.made = folder, made
-        self.missing = []
-        self._loaded = {}
-
-    def load(self, name, data=False):
-        """The image of a file name, or None where there is none."""
-        if self.folder is None or not name:
-            return None
-        path = Path(self.folder) / name
-        if path.name != name or not path.is_file():
-            sentence = f"The texture {name} was not found beside the file."
-            if sentence not in self.missing:
-                self.missing.append(sentence)
-            return None
-        if name not in self._loaded:
-            image = bpy.data.images.load(str(path), check_existing=False)
-            self.made.append(image)
-            if data:
-                image.colorspace_settings.is_data = True
-            image.pack()
-            self._loaded[name] = image
-        return self._loaded[name]
+def _look(plan, mesh, rig, frame, uses, areas, found, images, simple):
+    same = [m for m in plan.meshes if m.base == mesh.base]
+    extent = np.ptp(mesh.positions, axis=0) if len(mesh.positions) else np.ones(3)
+    look = Look(
+        kind=mesh.kind,
+        base=mesh.base,
+        rig=rig,
+        extent=np.maximum(extent, 1e-6),
+        unit=frame.unit if frame else plan.size * 0.2,
+        vertices=max(len(m.positions) for m in same),
+        has_uvs=mesh.uvs is not None,
+        simple=simple,
+        uses=uses,
+        areas=areas,
+        found=found,
+        images=images,
+    )
+    if mesh.kind == "skin" and areas and found.masks and not simple:
+        wanted = {u.region for u in uses} & set(found.masks)
+        masks = {r: found.masks[r] for r in sorted(wanted)}
+        look.atlas, look.places = images.atlas(f"{plan.name}_masks", masks)
+    return look
 
 
-def _build(plan, mesh, rig, made, images):
-    material = bpy.data.materials.new(f"{plan.name}_{mesh.base}")
+def _build(plan, look, made):
+    material = bpy.data.materials.new(f"{plan.name}_{look.base}")
     made.append(material)
-    color, roughness, specular, subsurface = _LOOKS[mesh.kind]
-    material.diffuse_color = color
-    if material.node_tree is None:  # 5.0 always has one and warns about the switch
-        material.use_nodes = True
-    tree = material.node_tree
-    shader = next(n for n in tree.nodes if n.type == "BSDF_PRINCIPLED")
-    inputs = shader.inputs
-    inputs["Base Color"].default_value = color
-    inputs["Roughness"].default_value = roughness
-    inputs["Specular IOR Level"].default_value = specular
-    inputs["Subsurface Weight"].default_value = subsurface
-    inputs["Subsurface Radius"].default_value = (1.0, 0.3, 0.16)
-    inputs["Subsurface Scale"].default_value = plan.size * 0.03
-    image = images.load(plan.textures.get((mesh.base, "color")))
-    if image is not None:
-        socket = _image_node(tree, image, (-900, 300))
+    material.diffuse_color = _VIEW_COLORS[look.kind]
+    graph = nodes.Graph(material)
+    if look.kind == "skin":
+        skin.Skin(graph, look).build()
     else:
-        socket = _procedural(tree, mesh, color)
-    if mesh.kind == "skin" and plan.map_labels:
-        socket = _add_maps(tree, plan, mesh, rig, socket, color, images)
-    if socket is not None:
-        tree.links.new(socket, inputs["Base Color"])
-    alpha = images.load(plan.textures.get((mesh.base, "alpha")), data=True)
-    if alpha is not None:
-        tree.links.new(_image_node(tree, alpha, (-900, -500)), inputs["Alpha"])
-    _finish(material, tree, shader, mesh, image)
+        looks.build(graph, look)
+    graph.tidy()
     return material
 
 
-def _image_node(tree, image, location):
-    node = tree.nodes.new("ShaderNodeTexImage")
-    node.image = image
-    node.location = location
-    return node.outputs["Color"]
+# --- mesh attributes that materials read -----------------------------------------------------
 
 
-def _procedural(tree, mesh, color):
-    """A colour where no texture is: blotches on skin, an iris in eyes; None leaves it plain."""
-    if mesh.kind == "skin":
-        noise = tree.nodes.new("ShaderNodeTexNoise")
-        noise.inputs["Scale"].default_value = 9.0
-        noise.inputs["Detail"].default_value = 6.0
-        noise.location = (-1100, 300)
-        coordinates = tree.nodes.new("ShaderNodeTexCoord")
-        coordinates.location = (-1300, 300)
-        tree.links.new(coordinates.outputs["Generated"], noise.inputs["Vector"])
-        dark = tuple(c * s for c, s in zip(color[:3], (0.86, 0.74, 0.72), strict=True))
-        return _ramp(tree, noise.outputs["Fac"], [(0.35, (*dark, 1.0)), (0.65, color)])
-    if mesh.kind == "eyes":
-        distance = tree.nodes.new("ShaderNodeAttribute")
-        distance.attribute_name = "iris"
-        distance.location = (-1100, 300)
-        stops = [
-            (0.0, (0.002, 0.002, 0.002, 1.0)),
-            (0.15, (0.002, 0.002, 0.002, 1.0)),
-            (0.18, (0.10, 0.055, 0.03, 1.0)),
-            (0.40, (0.16, 0.09, 0.05, 1.0)),
-            (0.46, (0.03, 0.02, 0.018, 1.0)),
-            (0.52, color),
-        ]
-        return _ramp(tree, distance.outputs["Fac"], stops)
-    return None
+def _face_frame(plan):
+    """The FaceFrame, or None where no skin is among the meshes."""
+    skins = [m for m in plan.meshes if m.kind == "skin" and len(m.positions)]
+    heads = [m for m in skins if "head" in m.base.lower() or "face" in m.base.lower()]
+    if not skins:
+        return None
+    rest = plan.armature.rest
+    eyes = [rest[j][:3, 3] for j in plan.anchors.eyes.values()]
+    teeth = next((m for m in plan.meshes if m.kind == "teeth" and len(m.positions)), None)
+    mouth = None
+    if teeth is not None:
+        mouth = (teeth.positions.min(axis=0) + teeth.positions.max(axis=0)) / 2
+    return folds.find_frame(eyes, (heads or skins)[0].positions, mouth)
 
 
-def _ramp(tree, socket, stops):
-    node = tree.nodes.new("ShaderNodeValToRGB")
-    node.location = (-800, 300)
-    elements = node.color_ramp.elements
-    while len(elements) < len(stops):
-        elements.new(1.0)
-    for element, (position, color) in zip(elements, stops, strict=True):
-        element.position, element.color = position, color
-    tree.links.new(socket, node.inputs["Fac"])
-    return node.outputs["Color"]
+def _add_attributes(mesh, plan, frame):
+    """Write what the material of this kind reads; returns the areas that a skin has."""
+    if not len(plan.positions):
+        return set()
+    if plan.kind == "eyes":
+        _add(mesh, looks.EYES, _eye_coordinates(plan.positions))
+    elif plan.kind == "teeth":
+        unit = frame.unit if frame else float(np.ptp(plan.positions[:, 0]))
+        _add(mesh, looks.TEETH, _tooth_coordinates(plan.positions, unit))
+    elif plan.kind == "skin" and frame is not None:
+        return _add_areas(mesh, plan.positions, frame)
+    return set()
 
 
-def _add_maps(tree, plan, mesh, rig, socket, color, images):
-    """A driven value node per animated map; those with a mask tint the colour.
+def _add(mesh, name, values):
+    attribute = mesh.attributes.new(name, "FLOAT_VECTOR", "POINT")
+    attribute.data.foreach_set("vector", np.ascontiguousarray(values, np.float32).ravel())
 
-    Returns:
-        The colour socket after all tints.
-    """
-    frame = tree.nodes.new("NodeFrame")
-    frame.label = frame.name = _FRAME
-    x = -500
-    for index, label in enumerate(plan.map_labels):
-        value = tree.nodes.new("ShaderNodeValue")
-        value.name, value.label = f"{_MAP_PREFIX}{index:03d}", label
-        value.parent = frame
-        value.location = (-1100 + 180 * (index % 8), -300 - 110 * (index // 8))
-        path = f'nodes["{value.name}"].outputs[0].default_value'
-        plain_driver(tree.driver_add(path), rig, f'["{parts.MAPS}"][{index}]')
-        mask = images.load(plan.textures.get((mesh.base, f"map:{label}")), data=True)
-        if mask is None:
+
+def _add_areas(mesh, points, frame):
+    masks = folds.area_masks(points, frame)
+    there = {area for area, mask in masks.items() if float(mask.max()) > 0.3}
+    if not there:
+        return there
+    columns = [masks[a] for a in maps.AREAS] + [folds.left_share(points, frame)]
+    for number, name in enumerate(skin.AREAS):
+        _add(mesh, name, np.stack(columns[3 * number : 3 * number + 3], axis=1))
+    _add(mesh, skin.FOLDS, folds.fold_coordinates(points, frame))
+    return there
+
+
+def _eye_coordinates(points):
+    """float64[V, 3]: x and height from the eye's axis over its radius; 1 on its front half."""
+    points = points.astype(np.float64)
+    middle = (points[:, 0].min() + points[:, 0].max()) / 2
+    wide = np.ptp(points[:, 0]) > _WIDE * np.ptp(points[:, 2])
+    left = points[:, 0] > middle if wide else np.ones(len(points), bool)
+    values = np.zeros((len(points), 3))
+    for side in (left, ~left):
+        if not side.any():
             continue
-        if socket is None:
-            plain = tree.nodes.new("ShaderNodeRGB")
-            plain.outputs[0].default_value = color
-            socket = plain.outputs[0]
-        factor = tree.nodes.new("ShaderNodeMath")
-        factor.operation = "MULTIPLY"
-        factor.location = (x, -60)
-        tree.links.new(_image_node(tree, mask, (x - 300, -60)), factor.inputs[0])
-        tree.links.new(value.outputs[0], factor.inputs[1])
-        socket = _tint(tree, socket, factor.outputs[0], x + 180)
-        x += 260
-    return socket
+        own = points[side]
+        center = (own.min(axis=0) + own.max(axis=0)) / 2
+        radius = max(float(np.ptp(own[:, 2])) / 2, 1e-9)
+        values[side, 0] = (own[:, 0] - center[0]) / radius
+        values[side, 1] = (own[:, 2] - center[2]) / radius
+        values[side, 2] = own[:, 1] < center[1]
+    return values
 
 
-def _tint(tree, socket, factor, x):
-    """Redden a colour by a factor: what blood under the skin does."""
-    mix = tree.nodes.new("ShaderNodeMix")
-    mix.data_type, mix.blend_type = "RGBA", "MULTIPLY"
-    mix.location = (x, 300)
-    tree.links.new(factor, mix.inputs[0])
-    tree.links.new(socket, mix.inputs[6])
-    mix.inputs[7].default_value = (1.0, 0.42, 0.38, 1.0)
-    return mix.outputs[2]
-
-
-def _finish(material, tree, shader, mesh, image):
-    """What only one kind has: the eye's clear coat, transparency of lashes and wet films."""
-    inputs = shader.inputs
-    if mesh.kind in ("eyes", "teeth", "tongue"):
-        inputs["Coat Weight"].default_value = 1.0 if mesh.kind == "eyes" else 0.4
-        inputs["Coat Roughness"].default_value = 0.03 if mesh.kind == "eyes" else 0.12
-    if mesh.kind == "lashes":
-        if not inputs["Alpha"].is_linked and image is not None and image.channels == 4:
-            node = next(n for n in tree.nodes if n.type == "TEX_IMAGE" and n.image == image)
-            tree.links.new(node.outputs["Alpha"], inputs["Alpha"])
-        _surface(material)
-    elif mesh.kind == "wet":
-        inputs["Alpha"].default_value = 0.04
-        inputs["Coat Weight"].default_value = 1.0
-        _surface(material)
-
-
-def _surface(material):
-    """Let EEVEE blend it: the property was renamed in 4.2 and the old one left with 5.0."""
-    if hasattr(material, "surface_render_method"):
-        material.surface_render_method = "DITHERED"
+def _tooth_coordinates(points, unit):
+    """float64[V, 3]: pi for each tooth along the arch, height from the bite over its reach, 0."""
+    points = points.astype(np.float64)
+    low, high = points.min(axis=0), points.max(axis=0)
+    half = max((high[0] - low[0]) / 2, 1e-9)
+    across = (points[:, 0] - (low[0] + high[0]) / 2) / half
+    # Along a half circle: the length of the arch, not its width, carries the teeth.
+    along = np.arcsin(np.clip(across, -1, 1)) * half
+    width = 0.125 * unit  # an upper front tooth is about an eighth of the eyes' distance
+    height = (points[:, 2] - (low[2] + high[2]) / 2) / max((high[2] - low[2]) / 2, 1e-9)
+    return np.stack([np.pi * along / width, height, np.zeros(len(points))], axis=1)
 
 
 def map_drivers(material):
     """The driver curves of the animated maps of a material, with their map index."""
     data = material.node_tree.animation_data if material and material.node_tree else None
     for curve in data.drivers if data else ():
-        if _MAP_PREFIX in curve.data_path:
+        if skin.MAP_PREFIX in curve.data_path:
             yield curve

@@ -8,8 +8,9 @@ import bpy
 import numpy as np
 
 from ..logic import edits
-from ..logic.plans import AUTO_LIMIT, LIVE_KEY
+from ..logic.plans import AUTO_KEYS, AUTO_LIMIT, LIVE_KEY
 from . import parts
+from .armatures import lock_place
 
 _DRIVEN = re.compile(r'^\["channels"\]\[(\d+)\]$')
 _KEY_VALUE = re.compile(r'^key_blocks\["(.*)"\]\.value$')
@@ -48,13 +49,15 @@ def build_mesh(plan, mesh_plan, rig, made, normals=True):
         layer.uv.foreach_set("vector", mesh_plan.uvs.ravel())
     if normals and mesh_plan.normals is not None:
         mesh.normals_split_custom_set(mesh_plan.normals)
-    _add_center_distance(mesh, mesh_plan)
     modifier = item.modifiers.new("Armature", "ARMATURE")
     modifier.object = rig
     item.parent = rig
-    item[parts.RIG] = rig
+    lock_place(item)
+    parts.point(item, parts.RIG, rig)
     item[parts.MESH] = mesh_plan.index
     item[parts.LODS] = list(mesh_plan.lods)
+    item[parts.MODE] = "KEYS"
+    item.property_overridable_library_set(f'["{parts.MODE}"]', True)
     return item
 
 
@@ -79,31 +82,15 @@ def _add_weights(item, mesh_plan, labels):
         edit.free()
 
 
-def _add_center_distance(mesh, mesh_plan):
-    """For eyes an attribute `iris`: distance from the axis of its eye, 0 at the pupil, 1 at the
-    rim of the ball, 2 behind; for materials that have no texture."""
-    if mesh_plan.kind != "eyes" or not len(mesh_plan.positions):
-        return
-    points = mesh_plan.positions.astype(np.float64)
-    middle = (points[:, 0].min() + points[:, 0].max()) / 2
-    wide = np.ptp(points[:, 0]) > 1.6 * np.ptp(points[:, 2])
-    sides = points[:, 0] > middle if wide else np.ones(len(points), bool)
-    values = np.full(len(points), 2.0, np.float32)
-    for side in (sides, ~sides):
-        if not side.any():
-            continue
-        own = points[side]
-        center = (own.min(axis=0) + own.max(axis=0)) / 2
-        radius = max(float(np.ptp(own[:, 2])) / 2, 1e-9)
-        distance = np.hypot(own[:, 0] - center[0], own[:, 2] - center[2]) / radius
-        values[side] = np.where(own[:, 1] < center[1], distance, 2.0)
-    attribute = mesh.attributes.new("iris", "FLOAT", "POINT")
-    attribute.data.foreach_set("value", values)
+def automatic_mode(target_count, vertex_count, all_targets):
+    """KEYS where real keys are cheap enough each frame, else LIVE.
 
-
-def automatic_mode(target_count, vertex_count):
-    """KEYS where real keys are cheap enough each frame, else LIVE."""
-    return "KEYS" if target_count * vertex_count < AUTO_LIMIT else "LIVE"
+    Args:
+        target_count, vertex_count: of the mesh.
+        all_targets: of all meshes of the character.
+    """
+    few = target_count * vertex_count < AUTO_LIMIT and all_targets <= AUTO_KEYS
+    return "KEYS" if few else "LIVE"
 
 
 def real_channels(item):

@@ -61,7 +61,7 @@ def replace_meshes(change, fresh_meshes):
         if item.data not in done:
             _refit(change, item, old, new, fresh_meshes[there])
             done.append(item.data)
-        _relabel(change, item, new)
+        _relabel(item, new)
         kept.add(there)
     return kept
 
@@ -76,12 +76,10 @@ def _objects(rig):
     ]
 
 
-def _relabel(change, item, new):
+def _relabel(item, new):
     item[parts.MESH] = new.index
     if list(item.get(parts.LODS, [])) != list(new.lods):
         item[parts.LODS] = list(new.lods)
-        hidden = change.rig.get(parts.LOD, 0) not in new.lods
-        item.hide_viewport = item.hide_render = hidden
 
 
 def _faces_of(mesh):
@@ -275,7 +273,7 @@ def _masks(item):
 
 
 def _refit_corners(change, item, old, new, fresh):
-    """UVs, normals and the eyes' attribute, where the files differ."""
+    """UVs, normals and the materials' attributes, where the files differ."""
     mesh = item.data
     layer = mesh.uv_layers.get("UVMap")
     if new.uvs is not None and not _equal(old.uvs, new.uvs):
@@ -288,7 +286,7 @@ def _refit_corners(change, item, old, new, fresh):
         else:
             change.report.append(f"{item.name} keeps your UV map; the file has another now.")
     if not _equal(old.positions, new.positions):
-        _copy_iris(mesh, fresh.data)
+        _copy_attributes(mesh, fresh.data)
     if _equal(old.normals, new.normals) and _equal(old.positions, new.positions):
         return
     if mesh.has_custom_normals and new.normals is not None:
@@ -299,13 +297,15 @@ def _equal(a, b):
     return (a is None and b is None) or (a is not None and b is not None and np.array_equal(a, b))
 
 
-def _copy_iris(mesh, source):
-    theirs, ours = source.attributes.get("iris"), mesh.attributes.get("iris")
-    if theirs is None or ours is None:
-        return
-    flat = np.empty(len(theirs.data), np.float32)
-    theirs.data.foreach_get("value", flat)
-    ours.data.foreach_set("value", flat)
+def _copy_attributes(mesh, source):
+    """What materials read of the places of a face's parts."""
+    for theirs in source.attributes:
+        ours = mesh.attributes.get(theirs.name)
+        if ours is None or not theirs.name.startswith(carry.OUR_PREFIX):
+            continue
+        flat = np.empty(len(theirs.data) * 3, np.float32)
+        theirs.data.foreach_get("vector", flat)
+        ours.data.foreach_set("vector", flat)
 
 
 def _rebuild(change, item, new, fresh, surface, bearer):

@@ -12,7 +12,7 @@ from pathlib import Path
 import bpy
 
 from ..logic import edits, names, plans
-from . import armatures, bones, build, copies, drivers, parts, refit, runtime
+from . import armatures, bones, build, copies, drivers, lods, parts, refit, runtime
 
 
 class ReplaceError(ValueError):
@@ -71,13 +71,13 @@ def replace_file(context, rig, path, progress=lambda _share: None):
     with armatures.kept_selection(context):
         before = runtime.of(rig)
         unit = float(rig.get(parts.UNIT, 1.0))
-        levels = tuple(build.lods_of(rig)) or (0,)
+        levels = tuple(lods.built(rig)) or (0,)
         old = plans.plan_character(before.dna, rig.name, levels, unit, before.rests)
         fresh, warnings = build.import_file(
             context, path, _options(rig, levels, unit), lambda share: progress(share * 0.7)
         )
         after = runtime.of(fresh)
-        now = tuple(build.lods_of(fresh))
+        now = tuple(lods.built(fresh))
         new = plans.plan_character(after.dna, rig.name, now, unit, after.rests)
         change = Change(rig, before, after, old, new, report=list(warnings))
         _exchange(context, change, fresh)
@@ -124,6 +124,7 @@ def _exchange(context, change, fresh):
         _adopt(change, fresh, fresh_meshes[index])
     refit.finish_shapes(change)
     _number_meshes(rig)
+    lods.show(rig)
     _controls(context, change)
     build.remove(fresh)
     runtime.forget_outputs()
@@ -156,7 +157,7 @@ def _take_properties(change, fresh):
     rig, controls = change.rig, parts.controls_of(change.rig)
     text, former = fresh[parts.DNA], rig[parts.DNA]
     label = former.name
-    rig[parts.DNA] = text
+    parts.point(rig, parts.DNA, text)
     rig[parts.SOURCE] = fresh[parts.SOURCE]
     if not any(r.get(parts.DNA) == former for r in parts.rigs()):
         bpy.data.texts.remove(former)
@@ -169,8 +170,11 @@ def _take_properties(change, fresh):
             rig[name] = [0.0] * len(fresh[name])
         rig.property_overridable_library_set(f'["{name}"]', True)
     levels = sorted({lod for mesh in change.new.meshes for lod in mesh.lods})
-    if rig.get(parts.LOD, 0) not in levels:
-        rig[parts.LOD] = levels[0]
+    for key in (parts.LOD, parts.LOD_RENDER):
+        if rig.get(key, lods.SAME) not in (*levels, lods.SAME):
+            rig[key] = levels[0]
+    # Bones, channels and maps have other numbers now: nothing that was written before counts.
+    runtime.forget_outputs()
     for key in change.old.origin:
         controls.data.pop(names.cut(f"dna_{key}"), None)
     for key, value in change.new.origin.items():
@@ -187,8 +191,8 @@ def _adopt(change, fresh, item):
         return
     for key in [k for k in fresh.keys() if fresh[k] == item]:  # noqa: SIM118  no dict
         del fresh[key]
-    item[parts.RIG] = rig
-    rig[f"{parts.MESH_PREFIX}new{item[parts.MESH]:03d}"] = item
+    parts.point(item, parts.RIG, rig)
+    parts.point(rig, f"{parts.MESH_PREFIX}new{item[parts.MESH]:03d}", item)
     item.parent = rig
     for modifier in item.modifiers:
         if modifier.type == "ARMATURE":
@@ -202,8 +206,6 @@ def _adopt(change, fresh, item):
     item.name = item.data.name = f"{rig.name.removesuffix('_rig')}_{label}"
     copies.retarget_materials(item, rig)
     _share_materials(change, item)
-    hidden = rig.get(parts.LOD, 0) not in list(item[parts.LODS])
-    item.hide_viewport = item.hide_render = hidden
     change.report.append(f"The mesh {label} is new.")
 
 
@@ -226,7 +228,7 @@ def _number_meshes(rig):
     for key in [k for k in rig.keys() if k.startswith(parts.MESH_PREFIX)]:  # noqa: SIM118
         del rig[key]
     for number, item in enumerate(there):
-        rig[f"{parts.MESH_PREFIX}{number:03d}"] = item
+        parts.point(rig, f"{parts.MESH_PREFIX}{number:03d}", item)
 
 
 def _controls(context, change):

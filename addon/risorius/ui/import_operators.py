@@ -8,6 +8,7 @@ import bpy
 from bpy_extras.io_utils import ImportHelper
 
 from .. import native
+from ..logic import names
 from ..logic.plans import PlanError
 from ..logic.space import SpaceError
 from ..scene import build, parts
@@ -21,8 +22,8 @@ MODES = (
 
 def explain(path, error):
     """One sentence for what is wrong with a file."""
-    text = str(error).strip().rstrip(".")
-    name = Path(path).name
+    text = names.printable(str(error)).strip().rstrip(".")
+    name = names.printable(Path(path).name)
     return f"{text}." if name in text else f"{name}: {text}."
 
 
@@ -63,10 +64,13 @@ def import_character(operator, context, path, options):
         operator.report({"ERROR"}, explain(path, error))
         return {"CANCELLED"}
     for warning in warnings[:5]:
-        operator.report({"WARNING"}, str(warning))
+        operator.report({"WARNING"}, names.printable(str(warning)))
     if len(warnings) > 5:
         operator.report({"WARNING"}, f"and {len(warnings) - 5} more warnings")
     count = len(parts.meshes_of(rig))
+    found = rig.get(parts.TEXTURES, "")
+    if found:
+        operator.report({"INFO"}, f"Textures of {found}")
     operator.report({"INFO"}, f"{Path(path).name}: {count} meshes, ready to move")
     return {"FINISHED"}
 
@@ -100,6 +104,16 @@ class RISORIUS_OT_import_dna(bpy.types.Operator, ImportHelper):
         description="Load the textures that lie beside the file, and pack them",
         default=True,
     )
+    texture_folder: bpy.props.StringProperty(
+        name="Texture Folder",
+        description="Where the textures lie, by MetaHuman's names; empty: beside the file",
+        subtype="DIR_PATH",
+    )
+    use_simple_materials: bpy.props.BoolProperty(
+        name="Simple Materials",
+        description="Cheap to draw: no subsurface, no pores, no wrinkles or flush",
+        default=False,
+    )
 
     @classmethod
     def poll(cls, context):
@@ -112,6 +126,8 @@ class RISORIUS_OT_import_dna(bpy.types.Operator, ImportHelper):
             normals=self.use_normals,
             materials=self.use_materials,
             textures=self.use_materials and self.use_textures,
+            texture_folder=self.texture_folder,
+            simple_materials=self.use_simple_materials,
         )
         return import_character(self, context, self.filepath, options)
 
@@ -135,6 +151,12 @@ class RISORIUS_OT_import_dna(bpy.types.Operator, ImportHelper):
         row = column.row()
         row.active = self.use_materials
         row.prop(self, "use_textures")
+        row = column.row()
+        row.active = self.use_materials
+        row.prop(self, "use_simple_materials")
+        row = layout.row()
+        row.active = self.use_materials and self.use_textures
+        row.prop(self, "texture_folder")
 
 
 class RISORIUS_FH_dna(bpy.types.FileHandler):

@@ -1,0 +1,235 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Eyes, teeth, tongue, gums, lashes and wet films: each varies over its surface, without maps."""
+
+EYES = "risorius_eye"  # mesh attribute: x and height over the eye's radius, 1 on the front half
+TEETH = "risorius_teeth"  # mesh attribute: place along the arch in teeth, height from the bite
+
+# Linear colours, from the look of the thing.
+_SCLERA, _SCLERA_RIM, _VEIN = (0.72, 0.66, 0.62), (0.56, 0.39, 0.34), (0.48, 0.14, 0.11)
+_PUPIL, _IRIS_IN, _IRIS_OUT = (0.002, 0.002, 0.002), (0.19, 0.10, 0.045), (0.055, 0.066, 0.05)
+_LIMBUS = (0.022, 0.022, 0.02)
+_ENAMEL, _ENAMEL_ROOT, _GAP = (0.74, 0.66, 0.53), (0.62, 0.47, 0.29), (0.26, 0.15, 0.09)
+_GUM, _GUM_DARK = (0.44, 0.14, 0.12), (0.28, 0.065, 0.06)
+_TONGUE, _TONGUE_DARK = (0.45, 0.15, 0.14), (0.30, 0.065, 0.065)
+_LASH, _LASH_TIP = (0.010, 0.006, 0.004), (0.045, 0.026, 0.016)
+_COARSE = 1500  # vertices: a mesh of teeth with fewer has no single teeth
+
+
+def build(graph, look):
+    """Fill the tree of a material by the kind of its mesh."""
+    _KINDS[look.kind](graph, look)
+
+
+def _textured_normal(graph, look):
+    image = look.image("normal", data=True)
+    if image is None:
+        return None
+    node = graph.node("NormalMap")
+    graph.put(graph.image(image, label="Normal").outputs["Color"], node.inputs["Color"])
+    return node.outputs["Normal"]
+
+
+def eyes(graph, look):
+    """Sclera with veins, a hollow iris, a pupil; the cornea is the clear coat over them.
+
+    The coat keeps the smooth normal of the ball while the iris below has its own, so that its
+    highlight is round and the iris is lit from the far side, as refraction does.
+    """
+    x, z, front = graph.split(graph.attribute(EYES))
+    flat = graph.node("CombineXYZ")
+    for value, socket in zip((x, z), flat.inputs, strict=False):
+        graph.put(value, socket)
+    radius = graph.vector("LENGTH", flat.outputs[0])
+    behind = graph.math("SUBTRACT", 1.0, front)
+    away = graph.math("ADD", radius, graph.math("MULTIPLY", behind, 2.0))
+    picture = look.image("color")
+    if picture is not None:
+        color = graph.image(picture, label="Colour").outputs["Color"]
+    else:
+        color = _iris_and_sclera(graph, look, flat.outputs[0], away)
+    hollow = graph.ramp(away, (0.0, (0.0, 0.0, 0.0)), (0.46, (1.0, 1.0, 1.0)))
+    bumpy = graph.noise(graph.rest_points(look.extent), 26.0 / look.unit, detail=3.0)
+    height = graph.math("MULTIPLY_ADD", bumpy, 0.06, hollow)
+    rough = graph.ramp(away, (0.42, (0.45, 0.45, 0.45)), (0.56, (0.16, 0.16, 0.16)))
+    graph.set(Base_Color=color, Roughness=rough, Specular_Ior_Level=0.4)
+    graph.set(Coat_Weight=1.0, Coat_Roughness=_film(graph, look, 0.01, 0.04), Coat_Ior=1.5)
+    if not look.simple:
+        relief = graph.bump(height, look.unit * 0.045, _textured_normal(graph, look), 0.55)
+        graph.set(Normal=relief, Subsurface_Weight=0.25, Subsurface_Scale=look.unit * 0.02)
+        graph.set(Subsurface_Radius=(1.0, 0.55, 0.4))
+
+
+def _iris_and_sclera(graph, look, flat, away):
+    turned = graph.vector("NORMALIZE", flat)
+    fibres = graph.noise(turned, 9.0, detail=5.0, roughness=0.75)
+    iris = graph.mix(
+        graph.math("MULTIPLY_ADD", away, 3.2, graph.math("MULTIPLY", fibres, 0.9), clamp=True),
+        _IRIS_IN,
+        _IRIS_OUT,
+    )
+    dark = graph.math("MULTIPLY", graph.math("POWER", fibres, 2.0), 2.4)
+    lines = graph.math("MULTIPLY_ADD", dark, 0.9, 0.35)
+    iris = graph.mix(1.0, iris, _gray(graph, lines), blend="MULTIPLY")
+    edge = graph.ramp(away, (0.145, (0.0,) * 3), (0.165, (1.0,) * 3))
+    iris = graph.mix(edge, _PUPIL, iris)
+    rim = graph.ramp(away, (0.37, (0.0,) * 3), (0.455, (1.0,) * 3))
+    iris = graph.mix(rim, iris, _LIMBUS)
+    white = graph.ramp(away, (0.50, _SCLERA), (1.0, _SCLERA_RIM))
+    points = graph.rest_points(look.extent)
+    vein = graph.cells(points, 9.0 / look.unit, "DISTANCE_TO_EDGE")
+    thin = graph.ramp(vein, (0.0, (0.55,) * 3), (0.05, (0.0,) * 3))
+    patchy = graph.noise(points, 5.0 / look.unit)
+    amount = graph.math("MULTIPLY", thin, graph.math("MULTIPLY", patchy, away), clamp=True)
+    white = graph.mix(amount, white, _VEIN)
+    outside = graph.ramp(away, (0.455, (0.0,) * 3), (0.51, (1.0,) * 3))
+    return graph.mix(outside, iris, white)
+
+
+def _gray(graph, value):
+    node = graph.node("CombineColor")
+    for socket in node.inputs:
+        graph.put(value, socket)
+    return node.outputs[0]
+
+
+def _film(graph, look, low, high):
+    """Uneven wetness: a roughness between two values."""
+    uneven = graph.noise(graph.rest_points(look.extent), 14.0 / look.unit, detail=3.0)
+    return graph.math("MULTIPLY_ADD", uneven, high - low, low)
+
+
+def teeth(graph, look):
+    """Enamel that yellows towards the gum, single teeth where the mesh has none, gums above."""
+    picture = look.image("color")
+    points = graph.rest_points(look.extent)
+    place, height, _ = graph.split(graph.attribute(TEETH))
+    away = graph.math("ABSOLUTE", height)
+    normal = _textured_normal(graph, look)
+    if picture is not None:
+        color = graph.image(picture, label="Colour").outputs["Color"]
+    else:
+        stain = graph.math("MULTIPLY_ADD", graph.noise(points, 16.0 / look.unit), 0.5, away)
+        color = graph.ramp(stain, (0.35, _ENAMEL), (1.0, _ENAMEL_ROOT))
+        if look.vertices < _COARSE:
+            # |sin| falls to 0 between two teeth; narrower at the gum, as crowns are.
+            round_ = graph.math("ABSOLUTE", graph.math("SINE", place))
+            gap = graph.ramp(round_, (0.0, (1.0,) * 3), (0.16, (0.0,) * 3))
+            color = graph.mix(graph.math("MULTIPLY", gap, 0.8), color, _GAP)
+            arch = graph.math("POWER", round_, 0.45)
+            scallop = graph.math("MULTIPLY_ADD", arch, -0.17, away)
+            gum = graph.ramp(scallop, (0.60, (0.0,) * 3), (0.64, (1.0,) * 3))
+            pink = graph.ramp(graph.noise(points, 20.0 / look.unit), (0.3, _GUM_DARK), (0.7, _GUM))
+            color = graph.mix(gum, color, pink)
+            relief = graph.math("MULTIPLY_ADD", gum, 0.25, arch)
+            if not look.simple:
+                normal = graph.bump(relief, look.unit * 0.05, normal, 0.8)
+    graph.set(Base_Color=color, Roughness=_film(graph, look, 0.18, 0.42))
+    graph.set(Coat_Weight=0.35, Coat_Roughness=0.12, Specular_Ior_Level=0.5)
+    if not look.simple:
+        graph.set(Subsurface_Weight=0.35, Subsurface_Scale=look.unit * 0.02)
+        graph.set(Subsurface_Radius=(1.0, 0.8, 0.6), Normal=normal)
+
+
+def tongue(graph, look):
+    """Papillae, and a wet coat that breaks on them."""
+    _flesh(graph, look, (_TONGUE_DARK, _TONGUE), 46.0)
+
+
+def gum(graph, look):
+    """Wet, mottled flesh: gums, caruncles, cartilage."""
+    _flesh(graph, look, (_GUM_DARK, _GUM), 26.0)
+
+
+def _flesh(graph, look, tones, grain):
+    points = graph.rest_points(look.extent)
+    picture = look.image("color")
+    mottled = graph.noise(points, 6.0 / look.unit, detail=5.0, roughness=0.6)
+    color = graph.ramp(mottled, (0.3, tones[0]), (0.7, tones[1]))
+    if picture is not None:
+        color = graph.image(picture, label="Colour").outputs["Color"]
+    graph.set(Base_Color=color, Roughness=_film(graph, look, 0.32, 0.55))
+    graph.set(Coat_Weight=0.5, Coat_Roughness=0.16, Specular_Ior_Level=0.45)
+    if look.simple:
+        return
+    relief = graph.cells(points, grain / look.unit)
+    graph.set(
+        Normal=graph.bump(relief, look.unit * 0.012, _textured_normal(graph, look), 0.6),
+        Subsurface_Weight=0.8,
+        Subsurface_Scale=look.unit * 0.03,
+        Subsurface_Radius=(1.0, 0.3, 0.25),
+    )
+
+
+def lashes(graph, look):
+    """Hairs on cards: by an alpha or colour texture, else strands across the UV map."""
+    picture, mask = look.image("color"), look.image("alpha", data=True)
+    strands = _strands(graph, look)
+    color = graph.ramp(strands, (0.35, _LASH), (0.85, _LASH_TIP))
+    alpha = graph.ramp(strands, (0.47, (0.0,) * 3), (0.56, (1.0,) * 3))
+    if mask is not None:
+        alpha = graph.image(mask, label="Alpha").outputs["Color"]
+    elif picture is not None:
+        node = graph.image(picture, label="Colour")
+        # A picture without alpha shows its hairs dark or light on a plain ground: strands stay.
+        alpha = node.outputs["Alpha"] if picture.channels == 4 else alpha
+        color = node.outputs["Color"] if picture.channels == 4 else color
+    graph.set(Base_Color=color, Alpha=alpha, Roughness=_film(graph, look, 0.4, 0.6))
+    graph.set(Specular_Ior_Level=0.25)
+    _transparent(graph.material, "DITHERED")
+
+
+def _strands(graph, look):
+    """Noise drawn out along the hairs."""
+    where = graph.uv() if look.has_uvs else graph.rest_points(look.extent)
+    reach = 1.0 if look.has_uvs else 1.0 / look.unit
+    stretched = graph.vector("MULTIPLY", where, (110 * reach, 0.6 * reach, 110 * reach))
+    return graph.noise(stretched, 4.0, detail=2.0)
+
+
+def wet(graph, look):
+    """A film one looks through: clear, with the reflection that water has at each angle.
+
+    Transparent instead of refracting, because a refracting shell keeps light from the eye under
+    it in both engines; what bends here is only the reflection.
+    """
+    points = graph.rest_points(look.extent)
+    ripples = graph.noise(points, 18.0 / look.unit, detail=3.0)
+    normal = graph.bump(ripples, look.unit * 0.006, None, 0.25)
+    gloss = graph.node("BsdfGlossy")
+    gloss.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
+    graph.put(_film(graph, look, 0.02, 0.10), gloss.inputs["Roughness"])
+    graph.put(normal, gloss.inputs["Normal"])
+    fresnel = graph.node("Fresnel")
+    fresnel.inputs["IOR"].default_value = 1.336
+    graph.put(normal, fresnel.inputs["Normal"])
+    # From behind there is no air above the film, and its far side must not mirror.
+    facing = graph.math("SUBTRACT", 1.0, graph.node("NewGeometry").outputs["Backfacing"])
+    amount = graph.math("MULTIPLY", fresnel.outputs[0], facing)
+    clear = graph.node("BsdfTransparent")
+    tint = graph.ramp(ripples, (0.3, (0.985, 0.975, 0.97)), (0.7, (1.0, 1.0, 1.0)))
+    graph.put(tint, clear.inputs["Color"])
+    both = graph.node("MixShader")
+    graph.put(amount, both.inputs[0])
+    graph.put(clear.outputs[0], both.inputs[1])
+    graph.put(gloss.outputs[0], both.inputs[2])
+    graph.put(both.outputs[0], graph.output.inputs["Surface"])
+    graph.tree.nodes.remove(graph.shader)
+    _transparent(graph.material, "BLENDED")
+
+
+def _transparent(material, method):
+    """How EEVEE lets things through; shadows pass the clear parts."""
+    material.surface_render_method = method
+    material.use_transparency_overlap = False
+    if hasattr(material, "use_transparent_shadow"):
+        material.use_transparent_shadow = True
+
+
+_KINDS = {
+    "eyes": eyes,
+    "teeth": teeth,
+    "tongue": tongue,
+    "gum": gum,
+    "lashes": lashes,
+    "wet": wet,
+}

@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Images: loaded once, packed, and read in the colour space that their role asks for."""
+
+import bpy
+import numpy as np
+
+# Names of one and the same space in the configurations that people use: Blender's own, ACES 1,
+# ACES CG and studio configurations, Filmic ones. The first that the running one knows is taken.
+COLOR_SPACES = (
+    "sRGB",
+    "sRGB - Texture",
+    "Utility - sRGB - Texture",
+    "sRGB Encoded Rec.709 (sRGB)",
+    "srgb_texture",
+    "srgb_tx",
+    "Input - Generic - sRGB - Texture",
+    "Utility - Curve - sRGB",
+    "sRGB OETF",
+)
+DATA_SPACES = ("Non-Color", "Raw", "Utility - Raw", "raw", "Generic Data", "Non-Colour Data")
+TILE = 512  # pixels of one tile of the mask atlas, each side
+
+
+def set_color_space(image, data):
+    """Say whether an image holds colours or numbers; no name of a space needs to exist.
+
+    Args:
+        image: a loaded image.
+        data: numbers, such as normals or masks, that no colour management may touch.
+    """
+    settings = image.colorspace_settings
+    if not data and image.is_float:
+        return  # linear, as Blender assumes by the configuration's role for floats
+    known = [item.identifier for item in settings.bl_rna.properties["name"].enum_items]
+    words = ("raw", "non-col", "data") if data else ("srgb",)
+    alike = [n for n in known if any(w in n.lower() for w in words)]
+    for name in (*(DATA_SPACES if data else COLOR_SPACES), *alike):
+        try:
+            settings.name = name
+        except TypeError:  # an enum without that name: another configuration
+            continue
+        return
+    if data:
+        settings.is_data = True  # at least the configuration's own role for data
+
+
+class Images:
+    """Loads each file once for each role and packs it into the .blend."""
+
+    def __init__(self, made):
+        self.made = made
+        self.broken = []
+        self._loaded = {}
+
+    def load(self, path, data=False):
+        """The image of a file, or None where there is none or it cannot be read."""
+        if path is None:
+            return None
+        key = (str(path), data)
+        if key not in self._loaded:
+            self._loaded[key] = self._read(path, data)
+        return self._loaded[key]
+
+    def _read(self, path, data):
+        try:
+            image = bpy.data.images.load(str(path), check_existing=False)
+        except RuntimeError:
+            self._complain(path)
+            return None
+        self.made.append(image)
+        set_color_space(image, data)
+        if not image.size[0]:  # read lazily: a file of another kind shows itself only now
+            self._complain(path)
+            self.made.remove(image)
+            bpy.data.images.remove(image)
+            return None
+        image.pack()
+        return image
+
+    def _complain(self, path):
+        sentence = f"The texture {path.name} cannot be read."
+        if sentence not in self.broken:
+            self.broken.append(sentence)
+
+    def atlas(self, name, masks):
+        """One image with the masks of many regions, three to a tile: an engine has few samplers.
+
+        Args:
+            name: of the image.
+            masks: region -> textures.Mask.
+
+        Returns:
+            The image or None, and region -> (column, row, channel, tiles in a row).
+        """
+        held = {r: m for r, m in masks.items() if m.path.is_file()}
+        if not held:
+            return None, {}
+        side = int(np.ceil(np.sqrt(np.ceil(len(held) / 3))))
+        pixels = np.zeros((side * TILE, side * TILE, 4), np.float32)
+        pixels[..., 3] = 1.0
+        places = {}
+        for path in dict.fromkeys(m.path for m in held.values()):
+            source = _small_copy(path)
+            for region, mask in held.items() if source is not None else ():
+                if mask.path == path:
+                    number, channel = divmod(len(places), 3)
+                    row, column = divmod(number, side)
+                    tile = pixels[row * TILE :, column * TILE :]
+                    tile[:TILE, :TILE, channel] = source[..., mask.channel]
+                    places[region] = (column, row, channel, side)
+        if not places:
+            return None, {}
+        image = bpy.data.images.new(name, side * TILE, side * TILE, alpha=False)
+        self.made.append(image)
+        set_color_space(image, True)
+        image.pixels.foreach_set(pixels.ravel())
+        image.update()
+        image.pack()
+        return image, places
+
+
+def _small_copy(path):
+    """float32[TILE, TILE, 4] of a file's stored numbers, or None where it cannot be read."""
+    try:
+        image = bpy.data.images.load(str(path), check_existing=False)
+    except RuntimeError:
+        return None
+    try:
+        set_color_space(image, True)
+        image.alpha_mode = "CHANNEL_PACKED"  # the alpha is a mask like the others
+        if not image.size[0]:
+            return None
+        image.scale(TILE, TILE)
+        flat = np.empty(TILE * TILE * 4, np.float32)
+        image.pixels.foreach_get(flat)
+        return flat.reshape(TILE, TILE, 4)
+    finally:
+        bpy.data.images.remove(image)
+
+
+def mean_of(path):
+    """float32[4] mean of a file's stored numbers; used to tell offsets from whole maps."""
+    small = _small_copy(path)
+    return None if small is None else small.mean(axis=(0, 1))

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Runs a few lines in a Blender of their own: for other environments, and for what may crash."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import bpy
+
+HERE = Path(__file__).resolve().parents[1]
+_START = """
+import os, sys, traceback
+sys.path.insert(0, {here!r})
+sys.path += {path!r}
+def main():
+    import bpy, addon_utils
+    from pathlib import Path
+    import conftest
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    if not os.environ.get("RISORIUS_TEST_INSTALLED"):
+        user = Path(os.environ["RISORIUS_TEST_USER"])
+        conftest._repository(user / "extensions" / "user_default" / "risorius")
+    assert addon_utils.enable(conftest.MODULE) is not None
+    from support import scene
+{body}
+code = 1
+try:
+    main()
+    code = 0
+except BaseException:
+    traceback.print_exc()
+sys.stdout.flush()
+sys.stderr.flush()
+os._exit(code)
+"""
+
+
+def run(tmp_path, body, timeout=300, **environment):
+    """Run lines of Python with `bpy` and `scene` at hand.
+
+    Args:
+        tmp_path: folder for the script.
+        body: the lines.
+        timeout: seconds.
+        environment: variables to set.
+
+    Returns:
+        Exit code and all that was printed.
+    """
+    script = tmp_path / "child.py"
+    indented = "\n".join(f"    {line}" for line in body.splitlines())
+    path = [p for p in os.environ.get("RISORIUS_TEST_PATH", "").split(os.pathsep) if p]
+    script.write_text(_START.format(here=str(HERE), path=path, body=indented), encoding="utf-8")
+    program = [sys.executable, str(script)]
+    if bpy.app.binary_path:
+        program = [bpy.app.binary_path, "-b", "--factory-startup", "-noaudio"]
+        program += ["--python-exit-code", "1", "--python", str(script)]
+    done = subprocess.run(
+        program,
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        timeout=timeout,
+        check=False,
+    )
+    return done.returncode, done.stdout + done.stderr
