@@ -251,10 +251,10 @@ class Skin:
     def _normal(self):
         graph, look = self.graph, self.look
         normal = self._normal_map()
-        pores = graph.cells(self.points, 48.0 / look.unit)
-        grain = graph.noise(self.points, 22.0 / look.unit, detail=3.0, roughness=0.65)
-        skin = graph.math("MULTIPLY_ADD", pores, 0.30, graph.math("MULTIPLY", grain, 0.42))
-        normal = graph.bump(skin, look.unit * 0.010, normal, 0.16 if normal else 0.5)
+        pores = graph.cells(self.points, 75.0 / look.unit)
+        grain = graph.noise(self.points, 34.0 / look.unit, detail=3.0, roughness=0.65)
+        skin = graph.math("MULTIPLY_ADD", pores, 0.35, graph.math("MULTIPLY", grain, 0.35))
+        normal = graph.bump(skin, look.unit * 0.0055, normal, 0.16 if normal else 0.5)
         folds = []
         for kind, ridge in self._ridges().items():
             deep = graph.math("MULTIPLY", self.bumps[kind], _FOLD_DEPTH[kind])
