@@ -34,7 +34,7 @@ REGIONS = (
 )
 SMILE = {
     "mouthCornerPull": 0.9,
-    "eyeCheekRaise": 0.6,
+    "eyeCheekRaise": 0.35,
     "mouthUpperLipRaise": 0.35,
     "jawOpen": 0.25,
     "eyeSquintInner": 0.3,
@@ -139,7 +139,7 @@ class Stage:
         if kind == "face":
             return
         middle = vector((0.0, self.eye.y, self.eye.z + 0.25 * self.unit))
-        aim, away, lens = (self.eye, (0.3, -6.0, 0.1), 120) if kind == "eye" else (
+        aim, away, lens = (self.eye, (0.3, -4.2, 0.1), 150) if kind == "eye" else (
             middle, (0.8, -10.0, 0.3), 90)  # fmt: skip
         camera.location = aim + vector(away) * self.unit
         camera.data.lens = lens

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import importlib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -191,7 +192,7 @@ class TestFolds:
     eyes = (np.array([0.03, -0.06, 1.6]), np.array([-0.03, -0.06, 1.6]))
     head = np.array([[-0.09, -0.10, 1.47], [0.09, 0.10, 1.72]])
 
-    def frame(self) -> object:
+    def frame(self) -> Any:
         return folds.find_frame(self.eyes, self.head, np.array([0.0, -0.08, 1.53]))
 
     def test_the_frame_follows_the_eyes(self) -> None:

@@ -11,7 +11,7 @@ FOLDS = "risorius_folds"  # mesh attribute: x, height, curve of the folds
 _FRAME = "Animated maps"
 _TONE, _DARK, _RED = (0.56, 0.31, 0.22), (0.45, 0.21, 0.145), (0.50, 0.19, 0.14)
 _FLUSH = (1.0, 0.42, 0.38)
-_CREASE = (0.60, 0.40, 0.36)
+_CREASE = (0.66, 0.49, 0.45)
 # Radians for each eye distance: how close the folds lie.
 _PITCH = {"level": 19.0, "upright": 24.0, "rays": 20.0, "arc": 6.0}
 _FLUSH_SHARE = 0.22  # of an area's map: without a painted mask a blush must stay faint
