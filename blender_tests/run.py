@@ -54,7 +54,7 @@ def main() -> int:
             sys.path.append(folder)
     if options.extension is not None:
         _install(options.extension)
-        os.environ["RISORIUS_TEST_INSTALLED"] = "1"
+        os.environ["RISORIUS_TEST_INSTALLED"] = str(options.extension.resolve())
     import pytest
 
     named = [a for a in rest if Path(a.split("::")[0]).exists()]

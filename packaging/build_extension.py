@@ -41,6 +41,18 @@ def platform_of(wheel: Path) -> str:
     raise SystemExit(f"{wheel.name}: no Blender platform for {tag}")
 
 
+def name_inside(wheel: Path) -> str:
+    """The wheel's file name in the zip: with a build number, unless it is for Python 3.11.
+
+    Blender takes the wheels of its own Python. Only 4.2.0, which is Python 3.11, looked at the
+    platform alone and then kept the wheel whose name sorts last: a number sorts before `cp311`.
+    """
+    parts = wheel.name.split("-")
+    if len(parts) == 5 and parts[2] != "cp311":
+        parts.insert(2, "1")
+    return "-".join(parts)
+
+
 def build(wheels: list[Path], out: Path) -> Path:
     """Write the zip. Raises SystemExit with a sentence when something does not fit together."""
     text = (ADDON / "blender_manifest.toml").read_text(encoding="utf-8")
@@ -48,7 +60,7 @@ def build(wheels: list[Path], out: Path) -> Path:
     for wheel in wheels:
         if wheel.name.split("-")[1] != version:
             raise SystemExit(f"{wheel.name} is not version {version}, the add-on is")
-    names = ", ".join(f'"./wheels/{w.name}"' for w in sorted(wheels))
+    names = ", ".join(f'"./wheels/{name_inside(w)}"' for w in sorted(wheels))
     platforms = ", ".join(f'"{p}"' for p in sorted({platform_of(w) for w in wheels}))
     head, mark, tail = text.partition("\n[permissions]")
     text = f"{head}\nplatforms = [{platforms}]\nwheels = [{names}]\n{mark}{tail}"
@@ -61,7 +73,7 @@ def build(wheels: list[Path], out: Path) -> Path:
         (root / "blender_manifest.toml").write_text(text, encoding="utf-8")
         (root / "wheels").mkdir()
         for wheel in wheels:
-            shutil.copy(wheel, root / "wheels")
+            shutil.copy(wheel, root / "wheels" / name_inside(wheel))
         with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
             for path in sorted(root.rglob("*")):
                 if path.is_file():

@@ -3,6 +3,7 @@
 
 import re
 import sys
+from functools import cache
 from pathlib import Path
 
 try:
@@ -16,6 +17,7 @@ else:
 _HERE = Path(__file__).parent
 
 
+@cache
 def addon_version() -> str:
     """The version of the add-on, from its manifest."""
     text = (_HERE / "blender_manifest.toml").read_text(encoding="utf-8")

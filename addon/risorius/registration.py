@@ -5,9 +5,28 @@ import bpy
 
 from . import native
 from .scene import handlers
-from .ui import import_operators, operators, panels
+from .ui import (
+    about,
+    file_operators,
+    import_operators,
+    life_operators,
+    operators,
+    overlay,
+    panels,
+    scene_operators,
+    shape_test,
+)
 
-CLASSES = (*import_operators.CLASSES, *operators.CLASSES, *panels.CLASSES)
+CLASSES = (
+    *about.CLASSES,
+    *import_operators.CLASSES,
+    *file_operators.CLASSES,
+    *operators.CLASSES,
+    *life_operators.CLASSES,
+    *scene_operators.CLASSES,
+    *panels.CLASSES,
+    *shape_test.CLASSES,
+)
 
 
 def _search_property():
@@ -23,7 +42,10 @@ def register():
     for cls in CLASSES:
         bpy.utils.register_class(cls)
     bpy.types.WindowManager.risorius_search = _search_property()
+    bpy.types.WindowManager.risorius_show_timing = overlay.show_property()
+    bpy.types.WindowManager.risorius_test = shape_test.weight_property()
     bpy.types.TOPBAR_MT_file_import.append(import_operators.draw_import)
+    bpy.types.TOPBAR_MT_file_export.append(file_operators.draw_export)
     bpy.types.VIEW3D_MT_add.append(import_operators.draw_add)
     trouble = native.problem()
     if trouble:
@@ -42,8 +64,12 @@ def unregister():
     if bpy.app.timers.is_registered(_refresh_once):
         bpy.app.timers.unregister(_refresh_once)
     handlers.unregister()
+    overlay.stop()
     bpy.types.VIEW3D_MT_add.remove(import_operators.draw_add)
+    bpy.types.TOPBAR_MT_file_export.remove(file_operators.draw_export)
     bpy.types.TOPBAR_MT_file_import.remove(import_operators.draw_import)
+    del bpy.types.WindowManager.risorius_show_timing
+    del bpy.types.WindowManager.risorius_test
     del bpy.types.WindowManager.risorius_search
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

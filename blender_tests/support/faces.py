@@ -75,6 +75,7 @@ def small_face(
     rotation_signs=(1, 1, 1),
     rotation_unit="degrees",
     translation_unit="cm",
+    head_grid=(12, 14),
 ):
     """A DNA with every kind of thing that the add-on builds; the same at every call."""
     random = np.random.default_rng(7)
@@ -109,7 +110,7 @@ def small_face(
     _behave(dna, random, angle)
     center = np.array([0.0, 158.0, 2.0])
     dna.meshes = [
-        _mesh(random, (12, 14), 10.0, center, (1, 2, 3, 4, 5), range(CHANNELS)),
+        _mesh(random, head_grid, 10.0, center, (1, 2, 3, 4, 5), range(CHANNELS)),
         _mesh(random, (5, 5), 3.0, center + np.array([0.0, -3.0, 5.0]), (3,), (0,)),
         _mesh(random, (6, 7), 10.0, center, (2, 3), range(CHANNELS)),
     ]
@@ -163,3 +164,125 @@ def _behave(dna, random, angle):
             cut_values=[0.0, 0.0],
         ),
     )
+
+
+def renumbered(dna, joints=None, controls=None, channels=None, maps=None):
+    """The same face with other index spaces, in place.
+
+    Args:
+        dna: a small_face.
+        joints, controls, channels, maps: the new order: old numbers, or names of new ones; what is
+            left out goes, with everything that belongs to it. None changes nothing.
+
+    Returns:
+        The same Dna.
+    """
+    if channels is not None:
+        _renumber_channels(dna, channels)
+    if maps is not None:
+        dna.animated_map_names, where = _order(dna.animated_map_names, maps)
+        conditionals = dna.animated_maps.conditionals
+        _keep_rows(conditionals, "output_indices", where)
+        dna.animated_maps.lods = [len(conditionals.output_indices)] * 2
+        dna.lod_animated_map_mapping = [list(range(len(maps)))] * 2
+    if controls is not None:
+        _renumber_controls(dna, controls)
+    if joints is not None:
+        _renumber_joints(dna, joints)
+    return dna
+
+
+def _order(names, order):
+    """New names, and the new number of each old one (-1: gone)."""
+    where = np.full(len(names), -1)
+    for new, old in enumerate(order):
+        if not isinstance(old, str):
+            where[old] = new
+    return [old if isinstance(old, str) else names[old] for old in order], where
+
+
+def _keep_rows(conditionals, field, where):
+    moved = where[getattr(conditionals, field)]
+    kept = moved >= 0
+    fields = ("input_indices", "output_indices", "from_values", "to_values")
+    columns = {f: getattr(conditionals, f)[kept] for f in (*fields, "slope_values", "cut_values")}
+    for name, values in columns.items():
+        setattr(conditionals, name, moved[kept] if name == field else values)
+
+
+def _renumber_channels(dna, order):
+    dna.blend_shape_channel_names, where = _order(dna.blend_shape_channel_names, order)
+    for mesh in dna.meshes:
+        targets = []
+        for target in mesh.blend_shape_targets:
+            there = int(where[target.blend_shape_channel_index])
+            if there >= 0:
+                target.blend_shape_channel_index = there
+                targets.append(target)
+        mesh.blend_shape_targets = targets
+    rows = dna.blend_shape_channels
+    moved = where[rows.output_indices]
+    kept, coarse = moved >= 0, moved[: rows.lods[1]] >= 0
+    rows.input_indices, rows.output_indices = rows.input_indices[kept], moved[kept]
+    rows.lods = [int(kept.sum()), int(coarse.sum())]
+    dna.lod_blend_shape_mapping = [list(range(len(order)))] * 2
+    dna.mesh_blend_shape_channel_mapping = [
+        (m, t.blend_shape_channel_index)
+        for m, mesh in enumerate(dna.meshes)
+        for t in mesh.blend_shape_targets
+    ]
+
+
+def _renumber_controls(dna, order):
+    """Controls that something listens to may move but must not go, browDownL and later may."""
+    count = len(dna.raw_control_names)
+    dna.raw_control_names, where = _order(dna.raw_control_names, order)
+    where = np.append(where, len(order))  # the one corrective comes after the controls
+    _keep_rows(dna.animated_maps.conditionals, "input_indices", where)
+    dna.animated_maps.lods = [len(dna.animated_maps.conditionals.input_indices)] * 2
+    dna.gui_to_raw.output_indices = where[dna.gui_to_raw.output_indices]
+    for group in dna.joint_groups:
+        group.input_indices = where[group.input_indices]
+    rows = dna.blend_shape_channels
+    moved = where[rows.input_indices]
+    kept, coarse = moved >= 0, moved[: rows.lods[1]] >= 0
+    rows.input_indices, rows.output_indices = moved[kept], rows.output_indices[kept]
+    rows.lods = [int(kept.sum()), int(coarse.sum())]
+    dna.psds.rows, dna.psds.columns = where[dna.psds.rows], where[dna.psds.columns]
+    dna.joint_column_count += len(order) - count
+
+
+def _renumber_joints(dna, order):
+    """Joints that are new hang under the first; those that skin or move something must stay."""
+    offsets, angles = dna.neutral_joint_translations, dna.neutral_joint_rotations
+    parents = dna.joint_parents
+    dna.joint_names, where = _order(dna.joint_names, order)
+    rows = [0 if isinstance(o, str) else o for o in order]
+    new = np.array([isinstance(o, str) for o in order])
+    first = int(where[0])
+    dna.joint_parents = np.where(new, first, where[parents[rows]]).astype(np.uint16)
+    dna.neutral_joint_translations = np.where(new[:, None], [[1.0, 5.0, 3.0]], offsets[rows])
+    dna.neutral_joint_rotations = np.where(new[:, None], 0.0, angles[rows])
+    for mesh in dna.meshes:
+        mesh.skin_joint_indices = where[mesh.skin_joint_indices]
+    for group in dna.joint_groups:
+        outputs = group.output_indices
+        group.output_indices = where[outputs // 9] * 9 + outputs % 9
+        group.joint_indices = where[group.joint_indices]
+    dna.lod_joint_mapping = [list(range(len(order)))] * 2
+    dna.joint_row_count = 9 * len(order)
+
+
+def other_face(**options):
+    """A newer file of the small face: everything has another number, some is gone, some new."""
+    dna = renumbered(
+        small_face(**options),
+        joints=[0, "new_joint", 1, 2, 5, 4, 3],
+        controls=[9, 1, "CTRL_expressions.tongueUp", 0, 2, 7, 6, 5, 4, 8],
+        channels=[5, "new_shape", 1, 0, 2],
+        maps=[1, "new_map", 0],
+    )
+    offsets = dna.neutral_joint_translations.copy()
+    offsets[2] += [0.5, 1.0, 0.0]  # the neck
+    dna.neutral_joint_translations = offsets
+    return dna

@@ -90,6 +90,15 @@ def error_against_oracle(rig, path, raw, lod=0, unit_scale=1.0):
     return worst
 
 
+def curves(item):
+    """The F-curves of an object's own action, in Blender with slots and without."""
+    data = item.animation_data
+    if hasattr(data, "action_slot"):
+        bags = (s.channelbag(data.action_slot) for s in data.action.layers[0].strips)
+        return [c for bag in bags if bag for c in bag.fcurves]
+    return list(data.action.fcurves)
+
+
 def snapshot(rig):
     """Vertices of all meshes of a character, joined."""
     return np.concatenate([evaluated(m) for _, m in sorted(meshes(rig).items())])

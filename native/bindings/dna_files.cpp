@@ -45,8 +45,10 @@ bool preserves(const std::string& policy) {
 
 void emit(const std::vector<dna::Warning>& warnings) {
   for (const dna::Warning& w : warnings) {
-    const std::string text = w.where + ": " + w.message;
-    if (PyErr_WarnEx(PyExc_UserWarning, text.c_str(), 2) != 0) throw py::error_already_set();
+    const py::str text = to_python(w.where + ": " + w.message);
+    if (PyErr_WarnFormat(PyExc_UserWarning, 2, "%U", text.ptr()) != 0) {
+      throw py::error_already_set();
+    }
   }
 }
 

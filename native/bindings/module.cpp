@@ -18,11 +18,11 @@ PyObject* dna_error_type = nullptr;
 
 void throw_error(const core::Error& error, const std::string& file) {
   const std::string text = (file.empty() ? "" : file + ": ") + error.describe();
-  py::object instance = py::reinterpret_borrow<py::object>(dna_error_type)(text);
+  py::object instance = py::reinterpret_borrow<py::object>(dna_error_type)(to_python(text));
   instance.attr("code") = core::to_string(error.code);
   instance.attr("offset") =
       error.offset ? py::object(py::int_(*error.offset)) : py::object(py::none());
-  instance.attr("where") = error.where;
+  instance.attr("where") = to_python(error.where);
   PyErr_SetObject(dna_error_type, instance.ptr());
   throw py::error_already_set();
 }

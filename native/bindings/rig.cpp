@@ -3,10 +3,12 @@
 
 #include <bit>
 #include <functional>
+#include <set>
 
 #include "bindings/arrays.h"
 #include "compile/compile.h"
 #include "core/parallel_for.h"
+#include "rig/bone_space.h"
 #include "rig/file.h"
 #include "rig/morph.h"
 
@@ -85,6 +87,61 @@ py::array evaluate_morph(const rig::Morph& morph, const py::object& weights, con
   py::array_t<float> to = output_argument(out, vertices, start);
   rig::evaluate_morph(morph, w.data(), start, to.mutable_data());
   return to;
+}
+
+rig::SpaceConvention space_argument(const py::object& axes, float scale, float radians,
+                                    const std::array<int, 3>& sequence,
+                                    const std::array<float, 3>& signs) {
+  rig::SpaceConvention convention;
+  const FloatArray rows = matrix_argument(axes, "axes", 3);
+  std::copy(rows.data(), rows.data() + 9, convention.axes.begin());
+  convention.scale = scale;
+  if (std::set<int>(sequence.begin(), sequence.end()) != std::set<int>{0, 1, 2}) {
+    throw py::value_error("sequence: the numbers 0, 1 and 2 in some order were expected");
+  }
+  for (std::size_t i = 0; i < 3; ++i) {
+    convention.euler.order[i] = static_cast<std::uint8_t>(sequence[i]);
+  }
+  convention.euler.signs = signs;
+  convention.euler.radians_per_unit = radians;
+  return convention;
+}
+
+std::shared_ptr<rig::BoneSpace> make_bone_space(const py::object& neutral_rotations,
+                                                const std::vector<std::uint32_t>& bones,
+                                                const py::object& axes, float scale, float radians,
+                                                const std::array<int, 3>& sequence,
+                                                const std::array<float, 3>& signs) {
+  const FloatArray neutral = FloatArray::ensure(neutral_rotations);
+  if (!neutral || neutral.ndim() != 2 || neutral.shape(1) != 3) {
+    throw py::value_error("neutral_rotations: an array of shape (joints, 3) was expected");
+  }
+  const auto joints = static_cast<std::uint32_t>(neutral.shape(0));
+  for (const std::uint32_t joint : bones) {
+    if (joint >= joints) {
+      throw py::value_error("bones: joint " + std::to_string(joint) + " of " +
+                            std::to_string(joints));
+    }
+  }
+  const rig::SpaceConvention convention = space_argument(axes, scale, radians, sequence, signs);
+  return std::make_shared<rig::BoneSpace>(
+      rig::make_bone_space(convention, neutral.data(), joints, bones));
+}
+
+py::tuple evaluate_bones(const rig::BoneSpace& space, const py::object& joints) {
+  const FloatArray deltas = FloatArray::ensure(joints);
+  if (!deltas || deltas.ndim() != 2 || deltas.shape(0) != space.joint_count ||
+      deltas.shape(1) != 9) {
+    throw py::value_error("joints: an array of shape (" + std::to_string(space.joint_count) +
+                          ", 9) was expected");
+  }
+  const auto count = static_cast<py::ssize_t>(space.bones.size());
+  py::array_t<float> location({count, py::ssize_t{3}});
+  py::array_t<float> rotation({count, py::ssize_t{4}});
+  py::array_t<float> scale({count, py::ssize_t{3}});
+  rig::evaluate_bones(space, deltas.data(), location.mutable_data(), rotation.mutable_data(),
+                      scale.mutable_data());
+  return py::make_tuple(location, rotation, scale);
 }
 
 py::array_t<float> copied(std::span<const float> values, std::vector<py::ssize_t> shape) {
@@ -318,7 +375,12 @@ void bind_rig_class(py::module_& m) {
       .def_readonly("animated_map_count", &rig::Rig::animated_map_count)
       .def_readonly("lod_count", &rig::Rig::lod_count)
       .def_readonly("control_count", &rig::Rig::control_count)
-      .def_property_readonly("ignored_layers", &rig::Rig::ignored_layers)
+      .def_property_readonly("ignored_layers",
+                             [](const rig::Rig& r) {
+                               py::list out;
+                               for (const auto& id : r.ignored_layers()) out.append(to_python(id));
+                               return out;
+                             })
       .def_property_readonly("memory_bytes", &rig::Rig::memory_bytes)
       .def_property_readonly("simd", [](const rig::Rig& r) { return r.kernels->name; })
       .def_property_readonly("neutral_joints",
@@ -406,6 +468,21 @@ void bind_morph(py::module_& m) {
            "float32[B] -> float32[V, 3]: base + sum of weight * delta.");
 }
 
+void bind_bone_space(py::module_& m) {
+  py::class_<rig::BoneSpace, std::shared_ptr<rig::BoneSpace>>(
+      m, "BoneSpace",
+      "Poses of joints to what another program keeps on bones that rest in the neutral pose, in "
+      "axes and units of its own.")
+      .def(py::init(&make_bone_space), py::arg("neutral_rotations"), py::arg("bones"),
+           py::kw_only(), py::arg("axes"), py::arg("scale") = 1.0f, py::arg("radians") = 1.0f,
+           py::arg("sequence") = std::array<int, 3>{0, 1, 2},
+           py::arg("signs") = std::array<float, 3>{1, 1, 1},
+           "neutral_rotations float32[J, 3]; bones: the joint of each; v' = scale * axes @ v; "
+           "radians per unit of angle; sequence: axes in the order of rotation; signs of angles.")
+      .def("evaluate", &evaluate_bones, py::arg("joints"),
+           "float32[J, 9] of a Pose -> (location[n, 3], rotation[n, 4] w x y z, scale[n, 3]).");
+}
+
 }  // namespace
 
 void bind_rig(py::module_& m) {
@@ -448,8 +525,11 @@ void bind_rig(py::module_& m) {
           "float32[R] -> Pose; check is a DnaError for what is not finite, and no frame then.");
   bind_rig_class(m);
   bind_morph(m);
+  bind_bone_space(m);
   m.def("rig_block_version", &rig::block_version, "Of Rig.to_bytes; others are refused.");
-  m.def("available_simd", [] { return std::string(simd::available_kernels()); });
+  m.def(
+      "available_simd", [] { return std::string(simd::available_kernels()); },
+      "The instruction sets that this processor has, as simd= takes them, apart by blanks.");
 }
 
 }  // namespace risorius::bindings

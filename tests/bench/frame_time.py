@@ -1,13 +1,20 @@
 # SPDX-License-Identifier: MIT
-"""Time per frame of a face in Blender, against writing every value from Python.
+"""Time per frame of faces in Blender, against the plain way, in one run.
 
-    python tests/bench/frame_time.py FILE.dna [FILE.dna ...] [--frames N]
+    python tests/bench/frame_time.py FULL.dna [--sample SAMPLE.dna] --extension ZIP [--frames N]
 
-Runs inside the bpy module with the add-on's zip installed:  --extension build/dist/risorius-*.zip
-For each file a character is imported at LOD 0, 60 of its controls are animated, and the scene is
-stepped frame by frame. "add-on" is frame_set with the add-on's handler; "originals" writes the same
-pose to every bone and every real shape key by a Python loop after frame_set, without drivers, as a
-script would; "curves only" is frame_set with nothing following the controls. Drawing is not in it.
+Runs inside the bpy module or an executable (blender -b --python ... --), with the add-on's zip
+installed. FULL.dna is a file of real size (tests/fullscale/generate.py): 60 of its controls change
+at every frame, keyed in an action that is an NLA strip, with a second strip added on top. Each way
+is `scene.frame_set` with the whole dependency graph; drawing is not in it.
+
+    add-on, LIVE / KEYS / AUTO   the add-on, in each way of keeping shapes
+    plain way                    a handler that evaluates the same rig natively and writes all bones
+                                 and all key values to the originals, in bulk; real keys, no drivers
+    plain way, loops             the same, written one by one
+    curves only                  nothing follows the controls
+
+With --sample ten of these characters stand in one scene at their lowest level of detail.
 """
 
 from __future__ import annotations
@@ -31,6 +38,7 @@ import addon_utils  # noqa: E402 isort: skip
 import install_extension  # noqa: E402
 
 ANIMATED = 60
+ROUNDS = 3
 
 
 def machine():
@@ -49,97 +57,175 @@ def machine():
     return f"{cpu}; Blender {bpy.app.version_string}; Python {platform.python_version()}; {commit}"
 
 
-def import_face(path, mode, package):
+def empty_scene(package):
+    """An empty file with the add-on in it."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     addon_utils.enable(package, default_set=True)
+
+
+def import_face(path, mode, lods=(0,)):
+    """Returns the control armature, the rig and the seconds that the import took."""
+    before = set(bpy.data.objects)
     begin = time.perf_counter()
-    bpy.ops.risorius.import_dna(filepath=str(path), shape_mode=mode)
+    chosen = tuple(i in lods for i in range(8))
+    bpy.ops.risorius.import_dna(filepath=str(path), shape_mode=mode, lods=chosen)
     seconds = time.perf_counter() - begin
-    controls = next(o for o in bpy.data.objects if o.name.endswith("_controls"))
-    return controls, controls["risorius_rig"], seconds
+    rig = next(o for o in bpy.data.objects if o not in before and "risorius_controls" in o)
+    return rig["risorius_controls"], rig, seconds
 
 
 def animate(controls, frames):
-    """Key every n-th control so that ANIMATED of them change at every frame."""
+    """Key every n-th control so that ANIMATED of them change at every frame; two NLA strips."""
     face = controls.pose.bones["face"]
     names = [n for n in list(face.keys()) if isinstance(face[n], float)]
-    for number, name in enumerate(names[:: max(1, len(names) // ANIMATED)][:ANIMATED]):
-        path = f'["{bpy.utils.escape_identifier(name)}"]'
-        for frame, value in ((1, 0.1), (frames // 2, 0.2 + number / 100), (frames + 1, 0.1)):
-            face[name] = value
-            face.keyframe_insert(path, frame=frame)
+    data = controls.animation_data_create()
+    for blend, scale in (("REPLACE", 1.0), ("ADD", 0.05)):
+        for number, name in enumerate(names[:: max(1, len(names) // ANIMATED)][:ANIMATED]):
+            path = f'["{bpy.utils.escape_identifier(name)}"]'
+            keys = ((1, 0.1), (frames // 2, 0.2 + number / 100), (frames + 1, 0.1))
+            for frame, value in keys:
+                face[name] = value * scale
+                face.keyframe_insert(path, frame=frame)
+        action = data.action
+        slot = getattr(data, "action_slot", None)
+        strip = data.nla_tracks.new().strips.new(blend, 1, action)
+        if slot is not None:
+            strip.action_slot = slot
+        strip.blend_type = blend
+        data.action = None
 
 
-def step(frames, then=lambda: None):
-    """Median and fastest time in ms of one frame."""
+def step(frames):
+    """All times in ms of one frame."""
     scene = bpy.context.scene
     for frame in (1, 2, 3):
         scene.frame_set(frame)
     times = []
+    for _ in range(ROUNDS):
+        for frame in range(2, frames + 1):
+            begin = time.perf_counter()
+            scene.frame_set(frame)
+            times.append((time.perf_counter() - begin) * 1000)
+    return times
+
+
+def own_time(package, frames):
+    """Median ms of the add-on's own stages over one pass, as its overlay counts them."""
+    timing = sys.modules[f"{package}.scene.timing"]
+    stages = []
     for frame in range(2, frames + 1):
-        begin = time.perf_counter()
-        scene.frame_set(frame)
-        then()
-        times.append((time.perf_counter() - begin) * 1000)
-    return statistics.median(times), min(times)
+        bpy.context.scene.frame_set(frame)
+        stages.append(dict(timing.frames[-1].stages))
+    return {name: statistics.median(s[name] for s in stages) for name in stages[0]}
 
 
-def write_originals(rig):
-    """What a script without the add-on does each frame: every bone, every key, in a loop."""
-    bones = list(rig.pose.bones)
-    keys = [
-        block
-        for item in bpy.data.objects
-        if item.type == "MESH" and item.data.shape_keys
-        for block in item.data.shape_keys.key_blocks[1:]
-    ]
+def plain_way(controls, rig, path, loops):
+    """Replace the add-on by a handler that writes everything to the originals."""
+    import numpy as np
+    import risorius
+
+    dna = risorius.load(str(path))
+    compiled = risorius.Rig(dna)
+    live = sys.modules["bl_ext.user_default.risorius.scene.runtime"].of(rig)
+    bones = live.bone_space([b.bone["dna_joint"] for b in rig.pose.bones])
+    labels = list(live.labels)
+    bpy.ops.preferences.addon_disable(module="bl_ext.user_default.risorius")
+    keys = []
     for item in bpy.data.objects:
         if item.type == "MESH" and item.data.shape_keys:
-            item.data.shape_keys.animation_data_clear()
-    state = {"frame": 0}
+            key = item.data.shape_keys
+            order = [c.driver.variables[0].targets[0].data_path for c in key.animation_data.drivers]
+            channel = [int(p.rsplit("[", 1)[1][:-1]) for p in order]
+            key.animation_data_clear()
+            keys.append((key, channel, np.zeros(len(key.key_blocks), np.float32)))
+    channels = ("location", "rotation_quaternion", "scale")
 
-    def write():
-        state["frame"] += 1
-        shift = (state["frame"] % 7) * 1e-4
-        for bone in bones:
-            place = bone.location
-            bone.location = (place[0] + shift, place[1], place[2])
-            bone.rotation_quaternion = (1, shift, 0, 0)
-            bone.scale = (1, 1, 1)
-        for number, block in enumerate(keys):
-            block.value = shift * 100 if number % 10 == 0 else 0.0
-        bpy.context.view_layer.update()
+    def write(_scene, depsgraph):
+        face = controls.evaluated_get(depsgraph).pose.bones["face"]
+        values = dict(face.items())
+        pose = compiled.evaluate(np.array([values[n] for n in labels], np.float32))
+        for name, flat in zip(channels, bones.evaluate(pose.joints), strict=True):
+            if loops:
+                for bone, value in zip(rig.pose.bones, flat.tolist(), strict=True):
+                    setattr(bone, name, value)
+            else:
+                rig.pose.bones.foreach_set(name, flat.ravel())
+        rig.update_tag(refresh={"OBJECT"})
+        for key, channel, flat in keys:
+            flat[1:] = pose.blend_shapes[channel]
+            if loops:
+                for block, value in zip(key.key_blocks, flat.tolist(), strict=True):
+                    block.value = value
+            else:
+                key.key_blocks.foreach_set("value", flat)
+            key.update_tag()
 
-    return write, len(bones), len(keys)
+    bpy.app.handlers.frame_change_post.append(write)
+    return len(bones.evaluate(compiled.evaluate(np.zeros(len(labels), np.float32)).joints[:])[0])
 
 
-def measure(path, package, frames):
-    """One row of the table per way, for one file."""
-    rows = []
-    for mode in ("LIVE", "KEYS"):
-        controls, _, seconds = import_face(path, mode, package)
+def row(way, times, note, base=None):
+    """One line of the table."""
+    middle = statistics.median(times)
+    ratio = f"{base / middle:.1f}" if base else ""
+    print(
+        f"| {way} | {middle:.1f} | {min(times):.1f} | {1000 / middle:.0f} | {ratio} | {note} |",
+        flush=True,
+    )
+    return middle
+
+
+def measure_full(path, package, frames):
+    """The full-scale scene, each way. The plain way comes first: the others are told by it."""
+    print("| way | median ms | min ms | fps | times the plain way | |\n|---|---|---|---|---|---|")
+    base = None
+    for loops in (False, True):
+        empty_scene(package)
+        controls, rig, _ = import_face(path, "KEYS")
         animate(controls, frames)
-        rows.append((f"add-on, {mode}", *step(frames), f"import {seconds:.1f} s"))
+        count = plain_way(controls, rig, path, loops)
+        times = step(frames)
+        base = base or statistics.median(times)
+        row("plain way" + (", loops" if loops else ""), times, f"{count} bones", base)
+    for mode in ("LIVE", "KEYS", "AUTO"):
+        empty_scene(package)
+        controls, rig, seconds = import_face(path, mode)
+        animate(controls, frames)
+        times = step(frames)
+        stages = own_time(package, frames)
+        words = ", ".join(f"{name} {ms:.2f}" for name, ms in stages.items())
+        note = f"import {seconds:.1f} s; own {sum(stages.values()):.2f} ms: {words}"
+        row(f"add-on, {mode}", times, note, base)
     bpy.ops.preferences.addon_disable(module=package)
-    rig = controls["risorius_rig"]
-    write, bones, keys = write_originals(rig)
-    rows.append(("curves only", *step(frames), ""))
-    rows.append(("originals", *step(frames, write), f"{bones} bones, {keys} keys"))
-    return rows
+    row("curves only", step(frames), "", base)
+
+
+def measure_crowd(path, package, frames, count=10):
+    """Several characters at their lowest level of detail."""
+    empty_scene(package)
+    for _ in range(count):
+        controls, rig, _ = import_face(path, "AUTO", lods=range(8))
+        animate(controls, frames)
+        lowest = max(max(m["dna_lods"]) for m in rig.children if "dna_lods" in m)
+        bpy.context.view_layer.objects.active = controls
+        bpy.ops.risorius.set_lod(lod=lowest)
+    times = step(frames)
+    stages = own_time(package, frames)
+    row(f"{count} x {path.stem}, LOD {lowest}", times, f"own {sum(stages.values()):.2f} ms")
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("files", nargs="+", type=Path)
+    parser.add_argument("full", type=Path)
+    parser.add_argument("--sample", type=Path)
     parser.add_argument("--extension", type=Path, required=True)
-    parser.add_argument("--frames", type=int, default=60)
+    parser.add_argument("--frames", type=int, default=40)
     args = parser.parse_args(install_extension.arguments())
     package = install_extension.install(args.extension)
     print(machine())
-    print("| file | way | median ms | min ms | |\n|---|---|---|---|---|")
-    for path in args.files:
-        for way, median, best, note in measure(path, package, args.frames):
-            print(f"| {path.stem} | {way} | {median:.1f} | {best:.1f} | {note} |", flush=True)
+    measure_full(args.full, package, args.frames)
+    if args.sample:
+        measure_crowd(args.sample, package, args.frames)
 
 
 if __name__ == "__main__":

@@ -186,49 +186,56 @@ class TestSpace:
         np.testing.assert_allclose(matrix @ made.points(point[None])[0], direct, atol=1e-12)
         assert np.linalg.det(matrix) == pytest.approx(1.0)
 
-    def test_quaternions_of_random_and_half_turn_matrices(self) -> None:
-        random = np.random.default_rng(3)
-        angles = np.concatenate([random.uniform(-np.pi, np.pi, (200, 3)), np.eye(3) * np.pi])
-        matrices = space.euler_matrices(angles, (0, 1, 2))
-        for matrix, q in zip(matrices, space.quaternions(matrices), strict=True):
-            assert q[0] >= 0
-            np.testing.assert_allclose(space.quaternion_matrix(q), matrix, atol=1e-12)
-
-    def test_product_and_fraction(self) -> None:
-        a, b = space.quaternions(
-            space.euler_matrices(np.array([[0.3, 1, 2], [1, 0, -1]]), (0, 1, 2))
-        )
-        np.testing.assert_allclose(
-            space.quaternion_matrix(space.quaternion_product(a, b)),
-            space.quaternion_matrix(a) @ space.quaternion_matrix(b),
-            atol=1e-12,
-        )
-        half = space.quaternion_fraction(a, 0.5)
-        np.testing.assert_allclose(space.quaternion_product(half, half), a, atol=1e-12)
-
-    def test_bone_channels_rebuild_the_posed_joint(self) -> None:
-        made = _space(coordinate_system=("left", "up", "front"))
+    @pytest.mark.parametrize("sequence", ["xyz", "xzy", "yxz", "yzx", "zxy", "zyx"])
+    @pytest.mark.parametrize("axes", [("right", "up", "front"), ("left", "up", "front")])
+    def test_the_native_bones_rebuild_the_posed_joint(
+        self, axes: tuple[str, str, str], sequence: str
+    ) -> None:
+        made = _space(coordinate_system=axes, rotation_sequence=sequence, rotation_signs=(1, -1, 1))
         random = np.random.default_rng(5)
-        neutral = random.uniform(-90, 90, (4, 3)).astype(np.float32)
-        deltas = random.uniform(-1, 1, (4, 9)).astype(np.float32)
-        deltas[:, 3:6] *= 60
-        joints = space.make_joint_space(made, neutral, [1, 3])
-        location, rotation, scale = joints.bone_channels(deltas)
-        for row, joint in enumerate((1, 3)):
+        neutral = random.uniform(-170, 170, (40, 3)).astype(np.float32)
+        deltas = random.uniform(-1, 1, (40, 9)).astype(np.float32)
+        deltas[:, 3:6] *= 170
+        bones = [1, 3, *range(39, 3, -1)]
+        native = risorius.BoneSpace(
+            neutral,
+            bones,
+            axes=made.axes,
+            scale=made.scale,
+            radians=made.radians,
+            sequence=made.sequence,
+            signs=made.signs,
+        )
+        for joint, place, turn, size in zip(bones, *native.evaluate(deltas), strict=True):
             rest = made.rotations(neutral[joint : joint + 1])[0]
             wanted = made.rotations((neutral + deltas[:, 3:6])[joint : joint + 1])[0]
-            found = rest @ space.quaternion_matrix(rotation[row])
-            np.testing.assert_allclose(found, wanted, atol=1e-6)
-            np.testing.assert_allclose(
-                rest @ location[row], made.points(deltas[joint : joint + 1, :3])[0], atol=1e-9
-            )
-            np.testing.assert_allclose(scale[row] - 1, np.abs(made.axes) @ deltas[joint, 6:9])
+            assert turn[0] >= 0
+            np.testing.assert_allclose(rest @ _matrix(turn), wanted, atol=2e-6)
+            moved = made.points(deltas[joint : joint + 1, :3])[0]
+            np.testing.assert_allclose(rest @ place, moved, atol=2e-8)
+            np.testing.assert_allclose(size - 1, np.abs(made.axes) @ deltas[joint, 6:9], atol=2e-7)
+
+    def test_the_native_bones_refuse_what_does_not_fit(self) -> None:
+        neutral, axes = np.zeros((2, 3), np.float32), np.eye(3)
+        with pytest.raises(ValueError, match="joint 2 of 2"):
+            risorius.BoneSpace(neutral, [2], axes=axes)
+        with pytest.raises(ValueError, match="sequence"):
+            risorius.BoneSpace(neutral, [1], axes=axes, sequence=(0, 0, 1))
+        with pytest.raises(ValueError, match=r"\(2, 9\)"):
+            risorius.BoneSpace(neutral, [1], axes=axes).evaluate(np.zeros((2, 10), np.float32))
 
     def test_parents_may_stand_after_their_children(self) -> None:
         offsets = np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1]])
         turn = np.broadcast_to(np.eye(3), (3, 3, 3))
         world = space.world_matrices(turn, offsets, np.array([1, 2, 2], np.uint16))
         np.testing.assert_allclose(world[0][:3, 3], [1, 1, 1])
+
+
+def _matrix(q: Any) -> Any:
+    """A quaternion w x y z as the matrix that turns v into q v q*."""
+    w, v = float(q[0]), np.asarray(q[1:], np.float64)
+    cross = np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
+    return np.eye(3) + 2 * w * cross + 2 * cross @ cross
 
 
 class TestPlans:

@@ -54,3 +54,12 @@ def without_lod(mesh_name: str) -> str:
     if len(kept) > 1 and kept[-1].lower() == "mesh":
         kept.pop()
     return "_".join(kept) or mesh_name
+
+
+def printable(text: str, limit: int = 400) -> str:
+    """A text of a file as it may be shown: one line, and what cannot be printed as `?`.
+
+    A zero byte would end the text where Blender shows it.
+    """
+    shown = "".join(c if c.isprintable() else " " if c.isspace() else "?" for c in text)
+    return shown if len(shown) <= limit else f"{shown[: limit - 3]}..."

@@ -15,6 +15,7 @@ from .space import Float, Space, make_space, world_matrices
 
 LIVE_KEY = "<channel sum>"
 AUTO_LIMIT = 2_000_000  # keys x vertices of a mesh, above which real keys cost too much a frame
+AUTO_KEYS = 200  # real keys of a character: each driver costs Blender some 3 us a frame
 _LAYER_WORDS = {
     "mlbh": "neural network behaviour",
     "mlbe": "neural network behaviour",
@@ -214,6 +215,8 @@ def plan_character(
     channel_labels = names.unique_labels(dna.blend_shape_channel_names, ["Basis", LIVE_KEY])
     meshes = [_plan_mesh(dna, i, labels[i], wanted[i], space, channel_labels) for i in chosen]
     points = np.concatenate([m.positions for m in meshes])
+    if not len(points):
+        raise PlanError("The chosen meshes have no vertices, so there is no face to build.")
     return CharacterPlan(
         name=names.cut(dna.name or fallback_name or "Face", 40),
         space=space,
@@ -225,8 +228,12 @@ def plan_character(
         anchors=find_anchors(dna.joint_names),
         lod_count=max(1, int(dna.lod_count)),
         textures=textures.from_metadata(dna.metadata),
-        origin={k: v for k, v in dna.metadata.items() if not k.startswith("texture:")},
-        size=float(np.max(np.ptp(points, axis=0))) if len(points) else 1.0,
+        origin={
+            k: names.printable(v, 10_000)
+            for k, v in dna.metadata.items()
+            if not k.startswith("texture:")
+        },
+        size=float(np.max(np.ptp(points, axis=0))),
     )
 
 
@@ -240,6 +247,12 @@ def _mesh_lods(dna: Any) -> list[tuple[int, ...]]:
     if not any(levels):
         levels = [[0] for _ in range(count)]
     return [tuple(level) for level in levels]
+
+
+def existing_lods(dna: Any, wanted: Sequence[int]) -> tuple[int, ...]:
+    """Those levels of `wanted` that have meshes in a file, else its finest one."""
+    there = sorted({level for levels in _mesh_lods(dna) for level in levels})
+    return tuple(level for level in wanted if level in there) or tuple(there[:1])
 
 
 def plan_controls(raw_names: Sequence[str], rests: Sequence[float] = ()) -> list[ControlPlan]:
@@ -260,7 +273,7 @@ def plan_controls(raw_names: Sequence[str], rests: Sequence[float] = ()) -> list
             i,
             labels[i],
             regions.region_of(name),
-            f"{regions.title(name)} ({name})",
+            names.printable(f"{regions.title(name)} ({name})"),
             values[i],
             -1.0 if name.rpartition(".")[0] in turning else 0.0,
         )
@@ -276,6 +289,8 @@ def _plan_armature(dna: Any, space: Space) -> ArmaturePlan:
         raise PlanError("The file's joint names, parents and neutral pose differ in length.")
     if parents.max(initial=0) >= count:
         raise PlanError("The file names a parent joint that does not exist.")
+    _check_finite(offsets, "neutral joint translations")
+    _check_finite(angles, "neutral joint rotations")
     order = _parents_first(parents.tolist())
     rest = world_matrices(space.rotations(angles), space.points(offsets), parents)
     heads = rest[:, :3, 3]
@@ -315,6 +330,11 @@ def _check(indices: NDArray[Any], limit: int, what: str) -> None:
         raise PlanError(f"The file's {what} leads to number {int(indices.max())} of {limit}.")
 
 
+def _check_finite(values: NDArray[Any], what: str) -> None:
+    if not np.isfinite(values).all():
+        raise PlanError(f"The file's {what} are not all finite numbers.")
+
+
 def _plan_mesh(
     dna: Any,
     index: int,
@@ -325,6 +345,10 @@ def _plan_mesh(
 ) -> MeshPlan:
     mesh = dna.meshes[index]
     name = dna.mesh_names[index]
+    _check_finite(mesh.positions, f"positions of mesh {name}")
+    _check_finite(mesh.skin_weights, f"skin weights of mesh {name}")
+    for target in mesh.blend_shape_targets:
+        _check_finite(target.deltas, f"shapes of mesh {name}")
     layouts = np.asarray(mesh.layout_positions, np.int64)
     vertex_count = len(mesh.positions)
     _check(layouts, vertex_count, f"layout of mesh {name}")
@@ -389,4 +413,5 @@ def _corner_values(
     indices = np.asarray(layout, np.int64)[corners]
     if int(indices.max()) >= len(values):
         return None
-    return np.ascontiguousarray(np.asarray(values)[indices], np.float32)
+    found = np.ascontiguousarray(np.asarray(values)[indices], np.float32)
+    return np.nan_to_num(found, copy=False, nan=0.0, posinf=0.0, neginf=0.0)

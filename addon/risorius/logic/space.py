@@ -60,16 +60,28 @@ class Space:
         """Convert normals, [n, 3], length kept."""
         return np.asarray(values, np.float64) @ self.axes.T
 
-    def scales(self, values: NDArray[np.float32] | Float) -> Float:
-        """Convert scale deltas, [n, 3]: axes are exchanged, signs kept."""
-        return np.asarray(values, np.float64) @ np.abs(self.axes).T
-
     def rotations(self, angles: NDArray[np.float32] | Float) -> Float:
         """Convert Euler angles of the file, [n, 3], to rotation matrices float64[n, 3, 3]."""
         matrices = euler_matrices(
             np.asarray(angles, np.float64) * self.radians * self.signs, self.sequence
         )
         return self.axes @ matrices @ self.axes.T
+
+    def file_points(self, values: NDArray[np.float32] | Float) -> Float:
+        """The inverse of `points`: [n, 3] Blender units to file units."""
+        return np.asarray(values, np.float64) @ self.axes / self.scale
+
+    def file_rotations(self, matrices: Float, near: Float) -> Float:
+        """The inverse of `rotations`: float64[n, 3, 3] to Euler angles of the file, [n, 3].
+
+        Args:
+            matrices: rotations in Blender's axes.
+            near: float64[n, 3] file angles; of all angles that mean the same rotation those
+                nearest to these are returned.
+        """
+        turned = self.axes.T @ matrices @ self.axes
+        units = self.radians * self.signs
+        return euler_angles(turned, self.sequence, np.asarray(near, np.float64) * units) / units
 
     @property
     def delta_matrix(self) -> NDArray[np.float32]:
@@ -150,32 +162,40 @@ def euler_matrices(angles: Float, sequence: Sequence[int]) -> Float:
     return np.ascontiguousarray(result)
 
 
-def quaternions(matrices: Float) -> Float:
-    """Rotation matrices float64[n, 3, 3] to unit quaternions float64[n, 4] (w x y z), w >= 0.
+def euler_angles(matrices: Float, sequence: Sequence[int], near: Float) -> Float:
+    """Angles whose `euler_matrices` are these; the inverse of that function.
 
-    The largest of the four components is computed from the diagonal and the others from it,
-    so that no row divides by a small number.
+    Args:
+        matrices: float64[n, 3, 3] rotations for column vectors.
+        sequence: three axis numbers; sequence[0] is applied first.
+        near: float64[n, 3] radians; the solution nearest to them is chosen.
+
+    Returns:
+        float64[n, 3] radians about x, y and z.
     """
+    i, j, k = sequence
+    sign = 1.0 if (j - i) % 3 == 1 else -1.0  # even or odd order of axes
     m = matrices
-    xx, yy, zz = m[:, 0, 0], m[:, 1, 1], m[:, 2, 2]
-    squares = np.stack(
-        [1 + xx + yy + zz, 1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz], axis=1
-    )
-    a, b, c = m[:, 2, 1] - m[:, 1, 2], m[:, 0, 2] - m[:, 2, 0], m[:, 1, 0] - m[:, 0, 1]
-    d, e, f = m[:, 1, 0] + m[:, 0, 1], m[:, 0, 2] + m[:, 2, 0], m[:, 2, 1] + m[:, 1, 2]
-    s = squares
-    rows = np.stack(
-        [
-            np.stack([s[:, 0], a, b, c], axis=1),
-            np.stack([a, s[:, 1], d, e], axis=1),
-            np.stack([b, d, s[:, 2], f], axis=1),
-            np.stack([c, e, f, s[:, 3]], axis=1),
-        ],
-        axis=1,
-    )
-    result = rows[np.arange(len(m)), np.argmax(squares, axis=1)]
-    result = result / np.linalg.norm(result, axis=1, keepdims=True)
-    return np.where(result[:, :1] < 0, -result, result)
+    flat = np.hypot(m[:, i, i], m[:, j, i])  # the cosine of the middle angle
+    result = np.empty((len(m), 3))
+    for n in range(len(m)):
+        middle = np.arctan2(-sign * m[n, k, i], flat[n])
+        if flat[n] > 1e-7:
+            first = np.arctan2(sign * m[n, k, j], m[n, k, k])
+            last = np.arctan2(sign * m[n, j, i], m[n, i, i])
+        else:  # the first and last axis coincide: keep the first angle, the last takes the rest
+            first = near[n, i]
+            known = np.zeros((1, 3))
+            known[0, i], known[0, j] = first, middle
+            turn = m[n] @ euler_matrices(known, sequence)[0].T
+            last = np.arctan2(sign * turn[j, i], turn[i, i])
+        angles = np.empty(3)
+        angles[[i, j, k]] = first, middle, last
+        other = np.empty(3)
+        other[[i, j, k]] = first + np.pi, np.pi - middle, last + np.pi
+        choices = [near[n] + (a - near[n] + np.pi) % (2 * np.pi) - np.pi for a in (angles, other)]
+        result[n] = min(choices, key=lambda a: float(np.sum(np.abs(a - near[n]))))
+    return result
 
 
 def world_matrices(rotations: Float, offsets: Float, parents: NDArray[np.uint16]) -> Float:
@@ -207,87 +227,6 @@ def world_matrices(rotations: Float, offsets: Float, parents: NDArray[np.uint16]
             world[link] = local[link] if parent == link else world[parent] @ local[link]
             done[link] = True
     return world
-
-
-@dataclass(frozen=True)
-class JointSpace:
-    """Turns pose deltas of chosen joints into what Blender keeps on a pose bone.
-
-    Attributes:
-        space: the file's Space.
-        joints: int64[n] the joints that are turned.
-        neutral_angles: float64[n, 3] file units.
-        neutral_inverse: float64[n, 3, 3] inverse of the neutral rotation in Blender's axes.
-    """
-
-    space: Space
-    joints: NDArray[np.int64]
-    neutral_angles: Float
-    neutral_inverse: Float
-
-    def bone_channels(self, deltas: NDArray[np.float32]) -> tuple[Float, Float, Float]:
-        """Pose deltas to bone channels.
-
-        The bone's basis is R(n)^-1 T(dt) R(n + dr) S(1 + ds): the neutral is the rest pose.
-
-        Args:
-            deltas: float32[J, 9] of all joints: tx ty tz rx ry rz sx sy sz, file units.
-
-        Returns:
-            location[n, 3], rotation quaternion[n, 4] (w x y z), scale[n, 3].
-        """
-        own = deltas[self.joints].astype(np.float64)
-        location = np.einsum("nij,nj->ni", self.neutral_inverse, self.space.points(own[:, :3]))
-        turned = self.space.rotations(self.neutral_angles + own[:, 3:6])
-        rotation = quaternions(self.neutral_inverse @ turned)
-        return location, rotation, 1.0 + self.space.scales(own[:, 6:9])
-
-
-def make_joint_space(
-    space: Space, neutral_angles: NDArray[np.float32], joints: Sequence[int]
-) -> JointSpace:
-    """Prepare the conversion of the chosen joints, see JointSpace.
-
-    Args:
-        space: the file's Space.
-        neutral_angles: float32[J, 3] of all joints, file units.
-        joints: indices of the joints to convert.
-    """
-    chosen = np.asarray(joints, np.int64)
-    angles = np.asarray(neutral_angles, np.float64).reshape(-1, 3)[chosen]
-    return JointSpace(space, chosen, angles, space.rotations(angles).transpose(0, 2, 1).copy())
-
-
-def quaternion_product(a: Float, b: Float) -> Float:
-    """Hamilton product of quaternions (w x y z): b is applied first."""
-    w, v = a[..., :1], a[..., 1:]
-    x, u = b[..., :1], b[..., 1:]
-    return np.concatenate(
-        [w * x - np.sum(v * u, axis=-1, keepdims=True), w * u + x * v + np.cross(v, u)], axis=-1
-    )
-
-
-def quaternion_matrix(q: Float) -> Float:
-    """Unit quaternion (w x y z) to float64[3, 3]."""
-    w, x, y, z = np.asarray(q, np.float64) / np.linalg.norm(q)
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
-
-
-def quaternion_fraction(q: Float, fraction: float) -> Float:
-    """The rotation q (w x y z) by only a part of its angle, the short way."""
-    q = np.asarray(q, np.float64) / np.linalg.norm(q)
-    q = -q if q[0] < 0 else q
-    length = float(np.linalg.norm(q[1:]))
-    if length < 1e-12:
-        return np.array([1.0, 0.0, 0.0, 0.0])
-    angle = np.arctan2(length, q[0]) * fraction
-    return np.concatenate([[np.cos(angle)], q[1:] / length * np.sin(angle)])
 
 
 def yaw_pitch(direction: Float) -> tuple[float, float]:

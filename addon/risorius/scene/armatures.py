@@ -37,6 +37,39 @@ def _edit_bones(context, item, collection):
             collection.objects.unlink(item)
 
 
+@contextmanager
+def edit_armature(context, data):
+    """The edit bones of an armature that is in use, whether its objects are hidden or not."""
+    workshop = bpy.data.collections.new("bones")
+    item = bpy.data.objects.new("bones", data)
+    context.scene.collection.children.link(workshop)
+    try:
+        with _edit_bones(context, item, workshop) as edit_bones:
+            yield edit_bones
+    finally:
+        bpy.data.batch_remove([item, workshop])
+
+
+@contextmanager
+def kept_selection(context):
+    """Restore the active object, its mode and the selection after building beside them."""
+    layer = context.view_layer
+    active = layer.objects.active
+    mode = active.mode if active is not None else "OBJECT"
+    selected = [o for o in layer.objects if o.select_get(view_layer=layer)]
+    try:
+        yield
+    finally:
+        layer.update()  # the list still has places of removed objects
+        there = {o for o in layer.objects if o is not None}
+        for item in there:
+            item.select_set(item in selected, view_layer=layer)
+        layer.objects.active = active if active in there else None
+        if active in there and active.mode != mode:
+            with context.temp_override(active_object=active, object=active):
+                bpy.ops.object.mode_set(mode=mode)
+
+
 def build_rig(context, plan, made, workshop):
     """Build the deforming armature in its neutral pose.
 
@@ -67,11 +100,53 @@ def build_rig(context, plan, made, workshop):
     for joint, label in enumerate(armature.labels):
         data.bones[label][parts.JOINT] = joint
     data.display_type = "STICK"
+    # Bones that are not shown, and an object that is: so Select All and Duplicate take it along.
+    shelf = data.collections.new("Joints")
+    for bone in data.bones:
+        shelf.assign(bone)
+    shelf.is_visible = False
+    # It follows the control armature (place.py); moved together with it, it would go twice as far.
+    lock_place(rig)
     rig[parts.MAPS] = [0.0] * max(1, len(plan.map_labels))
     rig[parts.CHANNELS] = [0.0] * max(1, plan.channel_count)
+    rig[parts.PULL] = 0.0
     for name in LIVE_PROPERTIES:
         rig.property_overridable_library_set(f'["{name}"]', True)
     return rig
+
+
+def pull_controls(rig, controls):
+    """Let Blender evaluate the controls wherever the rig is, also where they are hidden.
+
+    Without a dependency Blender leaves out what is hidden in viewport or render, and the face
+    would stand still there. The drivers read the bones, because Blender evaluates only those
+    components of a hidden object that something visible depends on.
+
+    Args:
+        rig: the deforming armature.
+        controls: the control armature; its evaluated copy has its bones already.
+    """
+    data = rig.animation_data
+    path = f'["{parts.PULL}"]'
+    curve = data.drivers.find(path) if data else None
+    if curve is None:
+        curve = rig.driver_add(path)
+        curve.driver.type = "SUM"
+        for bone in controls.pose.bones:
+            variable = curve.driver.variables.new()
+            variable.type = "TRANSFORMS"
+            target = variable.targets[0]
+            target.id, target.bone_target = controls, bone.name
+            target.transform_type, target.transform_space = "SCALE_X", "LOCAL_SPACE"
+    for variable in curve.driver.variables:
+        if variable.targets[0].id != controls:
+            variable.targets[0].id = controls
+
+
+def lock_place(item):
+    """Let the user's hand not move an object by accident."""
+    item.lock_location = item.lock_rotation = item.lock_scale = (True, True, True)
+    item.lock_rotation_w = True
 
 
 def build_controls(context, plan, made, workshop):
@@ -98,6 +173,7 @@ def build_controls(context, plan, made, workshop):
                 edit_bones[name].parent = edit_bones[parent]
     circle = _circle(made, plan.name)
     for name in places:
+        data.bones[name][parts.PART] = name
         bone = controls.pose.bones[name]
         bone.custom_shape = circle
         bone.use_custom_shape_bone_size = True
@@ -109,6 +185,8 @@ def build_controls(context, plan, made, workshop):
         _shape(bone, name)
     data.bones.active = data.bones[parts.FACE]
     controls.show_in_front = True
+    controls[parts.OVERDRIVE] = False
+    controls.property_overridable_library_set(f'["{parts.OVERDRIVE}"]', True)
     add_properties(controls.pose.bones[parts.FACE], plan.controls)
     return controls
 

@@ -8,7 +8,7 @@ import bpy
 
 from .. import native
 from ..logic import names, plans, textures
-from . import armatures, materials, meshes, parts, runtime, storage
+from . import armatures, lods, materials, meshes, parts, runtime, storage
 
 
 @dataclass(frozen=True)
@@ -23,6 +23,8 @@ class BuildOptions:
         textures: load the textures that lie beside the file.
         texture_folder: looked into first; empty for none.
         simple_materials: without subsurface, relief and animated maps.
+        unit: metres per Blender unit; None takes the scene's.
+        nearest_lods: where the file has none of the levels, build its finest instead.
     """
 
     lods: tuple[int, ...] = (0,)
@@ -32,6 +34,8 @@ class BuildOptions:
     textures: bool = True
     texture_folder: str = ""
     simple_materials: bool = False
+    unit: float | None = None
+    nearest_lods: bool = False
 
 
 def import_file(context, path, options, progress=lambda _share: None):
@@ -54,7 +58,9 @@ def import_file(context, path, options, progress=lambda _share: None):
     dna = risorius.load(str(path))
     content = Path(path).read_bytes()
     progress(0.15)
-    unit = context.scene.unit_settings.scale_length
+    unit = options.unit or context.scene.unit_settings.scale_length
+    if options.nearest_lods:
+        options = replace(options, lods=plans.existing_lods(dna, options.lods))
     rests = risorius.Rig(dna).initial_raw_controls
     plan = plans.plan_character(dna, Path(path).stem, options.lods, unit, rests)
     plan = replace(plan, name=names.unique_labels([plan.name], bpy.data.collections.keys())[0])
@@ -62,11 +68,14 @@ def import_file(context, path, options, progress=lambda _share: None):
     made = []
     try:
         rig, warnings = _build(context, plan, dna, content, path, options, made, progress)
+        live = runtime.of(rig)
+        if live is None:
+            raise plans.PlanError("The file cannot be evaluated.")
+        layers = plans.layer_warnings(live.rig.ignored_layers)
     except BaseException:
         _remove(made)
         raise
-    live = runtime.of(rig)
-    return rig, [*dna.warnings, *warnings, *plans.layer_warnings(live.rig.ignored_layers)]
+    return rig, [*dna.warnings, *warnings, *layers]
 
 
 def _build(context, plan, dna, content, path, options, made, progress):
@@ -76,12 +85,13 @@ def _build(context, plan, dna, content, path, options, made, progress):
     context.scene.collection.children.link(workshop)
     rig = armatures.build_rig(context, plan, made, workshop)
     controls = armatures.build_controls(context, plan, made, workshop)
-    _connect(context, plan, rig, controls, text, path)
+    unit = options.unit or context.scene.unit_settings.scale_length
+    _connect(plan, rig, controls, text, path, unit)
     progress(0.4)
     built = []
     for number, mesh_plan in enumerate(plan.meshes):
         item = meshes.build_mesh(plan, mesh_plan, rig, made, options.normals)
-        rig[f"{parts.MESH_PREFIX}{number:03d}"] = item
+        parts.point(rig, f"{parts.MESH_PREFIX}{number:03d}", item)
         built.append(item)
         progress(0.4 + 0.3 * (number + 1) / len(plan.meshes))
     warnings = []
@@ -91,6 +101,7 @@ def _build(context, plan, dna, content, path, options, made, progress):
     for item in objects:
         workshop.objects.link(item)
     settle(context, rig, controls)
+    armatures.pull_controls(rig, controls)
     if options.materials:
         found = _find_textures(plan, path, options)
         simple = options.simple_materials
@@ -102,7 +113,7 @@ def _build(context, plan, dna, content, path, options, made, progress):
         made.append(item.data.shape_keys)
     progress(0.95)
     _into_place(context, plan, workshop, rig, controls)
-    show_lod(rig, _first(plan))
+    lods.show(rig, _first(plan))
     return rig, warnings
 
 
@@ -117,12 +128,16 @@ def settle(context, *items):
     context.view_layer.update()
 
 
-def _connect(context, plan, rig, controls, text, path):
-    controls[parts.RIG] = rig
-    rig[parts.CONTROLS] = controls
-    rig[parts.DNA] = text
-    rig[parts.UNIT] = context.scene.unit_settings.scale_length
+def _connect(plan, rig, controls, text, path, unit):
+    parts.point(controls, parts.RIG, rig)
+    parts.point(rig, parts.CONTROLS, controls)
+    parts.point(rig, parts.DNA, text)
+    rig[parts.UNIT] = unit
     rig[parts.LOD] = 0
+    rig[parts.LOD_RENDER] = lods.SAME
+    rig[parts.FOLLOW] = True
+    for key in (parts.LOD, parts.LOD_RENDER, parts.FOLLOW):
+        rig.property_overridable_library_set(f'["{key}"]', True)
     rig[parts.SOURCE] = _source(path)
     for key, value in plan.origin.items():
         controls.data[names.cut(f"dna_{key}")] = value
@@ -147,14 +162,13 @@ def _find_textures(plan, path, options):
 
 def _add_shapes(plan, dna, rig, built, mode):
     labels = channel_labels(dna)
+    total = sum(len(m.channels) for m in plan.meshes)
     for item, mesh_plan in zip(built, plan.meshes, strict=True):
         count = len(mesh_plan.channels)
         chosen = mode
         if mode == "AUTO":
-            chosen = meshes.automatic_mode(count, len(mesh_plan.positions))
-        meshes.set_mode(
-            item, rig, dna.meshes[mesh_plan.index], plan.space.delta_matrix, labels, chosen
-        )
+            chosen = meshes.automatic_mode(count, len(mesh_plan.positions), total)
+        meshes.set_mode(item, rig, dna.meshes[mesh_plan.index], plan.space, labels, chosen)
 
 
 def channel_labels(dna):
@@ -163,83 +177,38 @@ def channel_labels(dna):
 
 
 def _into_place(context, plan, workshop, rig, controls):
-    """Name the collection; select the controls, hide the deforming bones."""
+    """Name the collection; select the controls."""
     workshop.name = plan.name
-    rig.hide_set(True, view_layer=context.view_layer)
     for item in context.view_layer.objects:
         item.select_set(False, view_layer=context.view_layer)
     controls.select_set(True, view_layer=context.view_layer)
     context.view_layer.objects.active = controls
 
 
-def show_lod(rig, lod):
-    """Show the meshes of one level, in viewport and render, and evaluate that level."""
-    rig[parts.LOD] = int(lod)
-    for item in parts.meshes_of(rig):
-        hidden = int(lod) not in list(item.get(parts.LODS, [lod]))
-        item.hide_viewport = item.hide_render = hidden
-    rig.update_tag()
-
-
-def lods_of(rig):
-    """The levels that a character has meshes for, in order."""
-    return sorted({int(v) for m in parts.meshes_of(rig) for v in m.get(parts.LODS, [])})
-
-
 def change_mode(rig, mode):
-    """Switch the meshes of a character to LIVE or KEYS shapes; AUTO chooses by size."""
+    """Switch the meshes of a character to LIVE or KEYS shapes; AUTO chooses by size.
+
+    Returns:
+        Sentences on meshes that could not be switched.
+    """
     live = runtime.of(rig)
-    for item in parts.meshes_of(rig):
+    trouble = []
+    items = parts.meshes_of(rig)
+    total = sum(len(live.dna.meshes[i[parts.MESH]].blend_shape_targets) for i in items)
+    for item in items:
         dna_mesh = live.dna.meshes[item[parts.MESH]]
         chosen = mode
         if mode == "AUTO":
             chosen = meshes.automatic_mode(
-                len(dna_mesh.blend_shape_targets), len(dna_mesh.positions)
+                len(dna_mesh.blend_shape_targets), len(dna_mesh.positions), total
             )
         labels = channel_labels(live.dna)
-        meshes.set_mode(item, rig, dna_mesh, live.space.delta_matrix, labels, chosen)
+        if not meshes.set_mode(item, rig, dna_mesh, live.space, labels, chosen):
+            trouble.append(
+                f"{item.name} has not as many vertices as in its file: its shapes stay as they are."
+            )
     runtime.forget_outputs()
-
-
-def replace_character(old, new):
-    """Let a newly built character take the place of an old one, under its controls.
-
-    The old control armature stays, with its values, keys, NLA and whatever points to it.
-
-    Args:
-        old: deforming armature of the character that leaves.
-        new: deforming armature of the one that was built.
-    """
-    controls, spare = parts.controls_of(old), parts.controls_of(new)
-    live = runtime.of(new)
-    face = controls.pose.bones[parts.FACE]
-    maximum = 1.5 if controls.get(parts.OVERDRIVE) else 1.0
-    for control in plans.plan_controls(live.dna.raw_control_names, live.rests):
-        if control.label not in face:
-            armatures.add_properties(face, [control], maximum)
-    collection = next((c for c in bpy.data.collections if new.name in c.objects), None)
-    names_now = (new.name.removesuffix("_rig"), old.name.removesuffix("_rig"))
-    new[parts.CONTROLS] = controls
-    controls[parts.RIG] = new
-    old[parts.CONTROLS] = spare
-    spare[parts.RIG] = old
-    for home in controls.users_collection:
-        home.objects.unlink(controls)
-    if collection is not None:
-        collection.objects.link(controls)
-    remove(old)
-    _rename(new, collection, *names_now)
-    runtime.forget_outputs()
-
-
-def _rename(rig, collection, before, after):
-    """Give the parts of a character another first part of their names."""
-    items = parts.meshes_of(rig)
-    held = [rig, rig.data, rig.get(parts.DNA), collection, *items, *(i.data for i in items)]
-    held += [m for i in items for m in i.data.materials]
-    for item in dict.fromkeys(h for h in held if h is not None):
-        if item.name.startswith(before):
-            item.name = after + item.name[len(before) :]
+    return trouble
 
 
 def remove(rig):

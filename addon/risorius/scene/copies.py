@@ -3,7 +3,7 @@
 
 import bpy
 
-from . import materials, meshes, parts, runtime
+from . import armatures, materials, meshes, parts, runtime
 
 
 def separate_all():
@@ -33,6 +33,8 @@ def separate(rig):
         other = controls.get(parts.RIG)
         if isinstance(other, bpy.types.Object) and other.get(parts.CONTROLS) == controls:
             done.append(f"{rig.name} follows the controls of {other.name}.")
+    if controls is not None and parts.PULL in rig and not rig.override_library:
+        armatures.pull_controls(rig, controls)
     copied = {}
     for item in _meshes_pointing_at(rig):
         done += _own_mesh(item)
@@ -62,7 +64,7 @@ def _own_mesh(item):
     if item.data.users < 2 or item.data.shape_keys is None:
         return []
     users = [o for o in bpy.data.objects if o.data == item.data]
-    if len(users) < 2 or users[0] == item or item.library or item.override_library:
+    if len(users) < 2 or users[0] == item or item.library or item.data.library:
         return []
     item.data = item.data.copy()
     return [f"{item.name} was given a mesh of its own: two faces cannot share live shapes."]
@@ -87,6 +89,13 @@ def _own_key_drivers(item, rig):
     paths = {f'key_blocks["{bpy.utils.escape_identifier(n)}"].value' for n in names}
     if _retarget([c for c in key.animation_data.drivers if c.data_path in paths], rig):
         runtime.forget_outputs()
+
+
+def retarget_materials(item, rig):
+    """Let the animated maps of a mesh's materials follow another rig."""
+    for slot in item.material_slots:
+        if slot.material is not None:
+            _retarget(materials.map_drivers(slot.material), rig)
 
 
 def _own_materials(item, rig, copied):

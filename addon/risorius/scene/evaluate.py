@@ -5,14 +5,10 @@ Values are read from the evaluated objects of the depsgraph that is passed in (t
 are stale while an animation renders) and written to the originals, in bulk.
 """
 
-import numpy as np
+from time import perf_counter
 
 from .. import native
-from ..logic import plans
-from ..logic import space as spaces
-from . import armatures, meshes, parts, runtime
-
-_AHEAD = np.array([0.0, -1.0, 0.0])
+from . import inputs, lods, meshes, parts, place, posing, runtime, testing, timing
 
 
 def evaluate_all(depsgraph, force=False):
@@ -43,19 +39,35 @@ def evaluate(rig, depsgraph, force=False):
     live = runtime.of(rig) if controls is not None else None
     if live is None:
         return False
+    times = [perf_counter()]
     seen = controls.evaluated_get(depsgraph)
-    raw, turns = read_inputs(seen, live, _maximum(controls))
-    lod = min(max(int(rig.get(parts.LOD, 0)), 0), max(live.rig.lod_count - 1, 0))
-    state = (raw.tobytes(), lod, *(t.tobytes() for t in turns.values()))
-    if not force and not _changed(rig, "inputs", state):
+    if not seen.is_evaluated and not rig.evaluated_get(depsgraph).is_evaluated:
+        return False  # it is not in this scene
+    if parts.FACE not in seen.pose.bones:
+        return False  # renamed a moment ago, and not evaluated since
+    raw, turns = inputs.read_inputs(seen, live, depsgraph, _maximum(controls))
+    place.follow(rig, seen)
+    lod = min(max(lods.choose(rig, seen, depsgraph), 0), max(live.rig.lod_count - 1, 0))
+    test = testing.override(rig, raw, depsgraph.scene)
+    state = (raw.tobytes(), lod, test, *((name, *turn) for name, turn in turns.items()))
+    if not _changed(rig, "inputs", state) and not force:
         return False
+    times.append(perf_counter())
     pose = live.rig.evaluate(raw, lod)
-    _write_bones(rig, live, pose.joints, turns, depsgraph)
+    testing.apply(test, pose.blend_shapes)
+    times.append(perf_counter())
+    taken = posing.write(rig, live, pose.joints, turns, depsgraph)
+    note_refusal(rig, taken)
+    if not taken:
+        return False  # channels and maps shall not move without the bones
     _write_values(rig, pose)
+    times.append(perf_counter())
     for item in parts.meshes_of(rig):
         if lod in list(item.get(parts.LODS, [lod])):
             _write_shape(item, live, pose.blend_shapes, force)
     rig.update_tag(refresh={"OBJECT"})
+    times.append(perf_counter())
+    timing.add(times)
     return True
 
 
@@ -71,124 +83,22 @@ def _maximum(controls):
     return 1.5 if controls.get(parts.OVERDRIVE) else 1.0
 
 
-def read_inputs(seen, live, maximum=1.0):
-    """Read the sliders and bones of an evaluated control armature.
-
-    Args:
-        seen: the evaluated control armature object.
-        live: the character's Runtime.
-        maximum: what the look controls are clamped to after the eye bones are added.
-
-    Returns:
-        float32[R] raw controls, and joint turns: "neck" and "head" -> float64[4] quaternion
-        (w x y z) in the armature's axes.
-    """
-    bones = seen.pose.bones
-    face = bones[parts.FACE]
-    rests = live.rests
-    raw = np.array([face.get(label, rests[i]) for i, label in enumerate(live.labels)], np.float32)
-    np.nan_to_num(raw, copy=False, nan=0.0, posinf=0.0, neginf=0.0)
-    turns = {}
-    for name in ("neck", "head"):
-        bone = bones.get(name)
-        turns[name] = _turn(seen, bone) if bone else np.array([1.0, 0.0, 0.0, 0.0])
-    _add_look(seen, live, raw, maximum)
-    return raw, turns
+def note_refusal(item, taken):
+    """Note whether Blender took what was written to an object: it refuses without a word."""
+    key = ("refused", item.session_uid)
+    if taken:
+        runtime.outputs.pop(key, None)
+    else:
+        runtime.outputs[key] = True
 
 
-def _local(seen, bone):
-    """A bone's own transform after its constraints, relative to its rest."""
-    return seen.convert_space(
-        pose_bone=bone, matrix=bone.matrix, from_space="POSE", to_space="LOCAL"
-    )
-
-
-def _turn(seen, bone):
-    """A bone's own rotation in the armature's axes, quaternion (w x y z)."""
-    rest = bone.bone.matrix_local.to_quaternion()
-    turned = rest @ _local(seen, bone).to_quaternion() @ rest.inverted()
-    return np.array(turned[:])
-
-
-def _add_look(seen, live, raw, maximum):
-    """Add what the eye bones and their target ask for to the look controls."""
-    bones = seen.pose.bones
-    target = bones.get("eyes")
-    moved = np.zeros(3)
-    if target is not None:
-        rest = target.bone.matrix_local.to_3x3()
-        moved = np.array((rest @ _local(seen, target).translation)[:])
-    for side, controls in live.look.items():
-        bone = bones.get(f"eye_{side}")
-        yaw = pitch = 0.0
-        if target is not None and bone is not None and np.any(np.abs(moved) > 1e-9):
-            start = np.array((target.bone.head_local - bone.bone.head_local)[:])
-            before, after = spaces.yaw_pitch(start), spaces.yaw_pitch(start + moved)
-            yaw, pitch = after[0] - before[0], after[1] - before[1]
-        if bone is not None:
-            own = spaces.yaw_pitch(spaces.quaternion_matrix(_turn(seen, bone)) @ _AHEAD)
-            yaw, pitch = yaw + own[0], pitch + own[1]
-        for index, yaw_at_one, pitch_at_one in controls:
-            asked = yaw / yaw_at_one if yaw_at_one else pitch / pitch_at_one
-            if asked > 1e-6:
-                raw[index] = min(raw[index] + asked, max(maximum, raw[index]))
-
-
-def _write_bones(rig, live, deltas, turns, depsgraph):
-    """Write the joints that the evaluator owns; all others keep what the user gave them."""
-    location, rotation, scale = live.joints.bone_channels(deltas)
-    _add_turns(live, rotation, turns)
-    bones = rig.pose.bones
-    where, rows, mine = _bone_rows(rig, live)
-    seen = rig.evaluated_get(depsgraph).pose.bones
-    channels = [
-        ("location", 3, location),
-        ("rotation_quaternion", 4, rotation),
-        ("scale", 3, scale),
+def refused(rig):
+    """Objects of a character, an override, that Blender lets nobody write to."""
+    return [
+        item
+        for item in (rig, *parts.meshes_of(rig))
+        if ("refused", item.session_uid) in runtime.outputs
     ]
-    if not mine.all():
-        # A bulk write that leaves out their animated values would undo them.
-        channels += [("rotation_euler", 3, None)]
-    source = seen if len(seen) == len(bones) else bones
-    for name, width, values in channels:
-        flat = np.empty(len(bones) * width, np.float32)
-        source.foreach_get(name, flat)
-        if values is not None:
-            flat.reshape(-1, width)[where] = values[rows]
-        bones.foreach_set(name, flat)
-
-
-def _bone_rows(rig, live):
-    """Which pose bones are owned: their positions, the row of each, a mask of all bones."""
-    key = ("bones", rig.session_uid)
-    kept = runtime.outputs.get(key)
-    count = len(rig.pose.bones)
-    if kept is None or len(kept[2]) != count:
-        row_of = {int(joint): row for row, joint in enumerate(live.joints.joints)}
-        pairs = [
-            (i, row_of[joint])
-            for i, joint in enumerate(b.bone.get(parts.JOINT, -1) for b in rig.pose.bones)
-            if joint in row_of
-        ]
-        where = np.array([p[0] for p in pairs], np.int64)
-        mine = np.zeros(count, bool)
-        mine[where] = True
-        kept = runtime.outputs[key] = (where, np.array([p[1] for p in pairs], np.int64), mine)
-    return kept
-
-
-def _add_turns(live, rotation, turns):
-    """Add the head and neck bones' rotations on top of the evaluator's result, in place."""
-    anchors = live.anchors
-    shares = [(joint, turns["neck"], 1.0 / len(anchors.neck)) for joint in anchors.neck]
-    if anchors.head is not None:
-        shares.append((anchors.head, turns["head"], 1.0))
-    for joint, turn, share in shares:
-        row = int(np.searchsorted(live.joints.joints, joint))
-        part = spaces.quaternion_fraction(turn, share)
-        rest = live.rest[joint][:3, :3]
-        inner = spaces.quaternions((rest.T @ spaces.quaternion_matrix(part) @ rest)[None])[0]
-        rotation[row] = spaces.quaternion_product(inner, rotation[row])
 
 
 def _write_values(rig, pose):
@@ -201,10 +111,13 @@ def _write_values(rig, pose):
 def _write_shape(item, live, weights, force):
     """Write the sum of all channels to the live key of a mesh, where it has one."""
     key = item.data.shape_keys
-    block = key.key_blocks.get(plans.LIVE_KEY) if key else None
+    block = meshes.live_block(item)
     if block is None or item.mode == "EDIT":
         return
-    morph = live.morph(item[parts.MESH])
+    index = item.get(parts.MESH, -1)
+    if not 0 <= index < len(live.dna.meshes):
+        return  # the data in the .blend is another file's
+    morph = live.morph(index)
     if morph.vertex_count != len(block.points):
         return  # the user changed the topology
     if parts.REAL in key:
@@ -215,24 +128,7 @@ def _write_shape(item, live, weights, force):
     basis = meshes.points_of(key.reference_key)
     points = morph.evaluate(weights, base=basis)
     block.points.foreach_set("co", points.ravel())
+    if item.data.library or item.data.override_library:
+        note_refusal(item, posing.is_there(block.points, "co", points.ravel()))
     key.update_tag()
     item.data.update_tag()
-
-
-def mend_types(rig):
-    """Turn controls that a script made integers back to float properties."""
-    face = parts.face_bone(rig)
-    live = runtime.of(rig)
-    if face is None or live is None:
-        return
-    wrong = [i for i, label in enumerate(live.labels) if isinstance(face.get(label), int)]
-    if not wrong:
-        return
-    controls = plans.plan_controls(live.dna.raw_control_names, live.rests)
-    maximum = _maximum(parts.controls_of(rig))
-    for i in wrong:
-        label = live.labels[i]
-        value = float(face[label])
-        del face[label]
-        face[label] = value
-        armatures.describe_property(face, controls[i], maximum)

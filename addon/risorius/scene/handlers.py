@@ -5,53 +5,94 @@ import bpy
 from bpy.app.handlers import persistent
 
 from .. import native
-from . import copies, evaluate, parts, runtime
+from . import copies, evaluate, heal, lods, parts, place, runtime, testing, timing
 
 _state = {"objects": -1, "busy": False}
 
 
 @persistent
+def _frame_changes(*_arguments):
+    timing.begin()
+
+
+@persistent
 def _frame_changed(_scene, depsgraph=None):
     if depsgraph is not None:
+        timing.animated()
         evaluate.evaluate_all(depsgraph)
+
+
+@persistent
+def _render_ended(*_arguments):
+    """The viewport shows its own level of detail again."""
+    for rig in parts.rigs():
+        if lods.by_distance(rig) or lods.render_level(rig) != lods.viewport_level(rig):
+            runtime.forget_outputs()
+            parts.controls_of(rig).update_tag()
 
 
 @persistent
 def _updated(_scene, depsgraph):
     """React to edits of control armatures; writes here tag the rig only, so it ends at once."""
-    if _state["busy"] or native.problem():
+    # While a render runs beside the interface, only its own frames are written.
+    if _state["busy"] or bpy.app.is_job_running("RENDER") or native.problem():
         return
     _state["busy"] = True
     try:
         _notice_copies()
-        for rig in _edited(depsgraph):
-            evaluate.mend_types(rig)
+        edited = _edited(depsgraph)
+        if edited:
+            timing.begin()
+        for rig in edited:
+            if _mend(rig):
+                continue  # the evaluated copy knows of it only after the next update
             evaluate.evaluate(rig, depsgraph)
     finally:
         _state["busy"] = False
+
+
+def _mend(rig):
+    done = heal.heal(rig)
+    for sentence in done:
+        print(f"Risorius: {sentence}")
+    if done:
+        parts.controls_of(rig).update_tag()
+    return bool(done)
 
 
 def _notice_copies():
     count = len(bpy.data.objects)
     if count != _state["objects"]:
         _state["objects"] = count
+        runtime.forget_unused(parts.rigs())
         for sentence in copies.separate_all():
             print(f"Risorius: {sentence}")
 
 
 def _edited(depsgraph):
-    """The characters whose control armature is among the updates."""
-    found = []
+    """The characters that the updates concern: by their controls, their body or the camera."""
+    armatures, camera_moved = set(), False
+    camera = depsgraph.scene.camera
     for update in depsgraph.updates:
         item = update.id.original
         if isinstance(item, bpy.types.Armature):
             runtime.forget_outputs()
-        if not isinstance(item, bpy.types.Object) or item.type != "ARMATURE":
-            continue
-        rig = item.get(parts.RIG)
-        if isinstance(rig, bpy.types.Object) and rig not in found:
-            found += [r for r in parts.rigs() if r.get(parts.CONTROLS) == item]
-    return found
+            heal.heal_all()
+        elif isinstance(item, bpy.types.Object):
+            if item.type == "ARMATURE":
+                armatures.add(item)
+            camera_moved |= camera is not None and item == camera.original
+    return [rig for rig in parts.rigs() if _concerned(rig, armatures, camera_moved)]
+
+
+def _concerned(rig, armatures, camera_moved):
+    controls = parts.controls_of(rig)
+    hold = place.body_of(controls) if controls is not None else None
+    return (
+        controls in armatures
+        or (hold is not None and hold.target in armatures)
+        or (camera_moved and lods.by_distance(rig))
+    )
 
 
 @persistent
@@ -59,6 +100,9 @@ def _restored(*_arguments):
     """After load, undo and redo: what was written before says nothing about what is there."""
     runtime.forget_outputs()
     _state["objects"] = -1
+    if native.problem():
+        return
+    heal.heal_all()
     refresh()
     # The evaluated copies may not have caught up yet: look once more when they have.
     runtime.forget_outputs()
@@ -70,35 +114,46 @@ def _restored(*_arguments):
 
 @persistent
 def _before_save(*_arguments):
+    if native.problem():
+        return
     copies.separate_all()
+    heal.remove_dead()
+    _end_tests()
+
+
+@persistent
+def _end_tests(*_arguments):
+    if testing.clear_all():
+        refresh()
 
 
 def refresh():
-    """Bring all characters of the current scene up to their controls now."""
-    if native.problem():
+    """Bring all characters up to their controls now, each in the scenes that it is in."""
+    if native.problem() or not parts.rigs():
         return
     for scene in bpy.data.scenes:
-        layers = scene.view_layers
-        if parts.rigs() and len(layers):
-            depsgraph = layers[0].depsgraph
-            if depsgraph is not None:
-                evaluate.evaluate_all(depsgraph)
-                break
+        for layer in scene.view_layers:
+            if layer.depsgraph is not None:
+                evaluate.evaluate_all(layer.depsgraph)
 
 
 _HANDLERS = (
+    ("frame_change_pre", _frame_changes),
     ("frame_change_post", _frame_changed),
     ("depsgraph_update_post", _updated),
     ("load_post", _restored),
     ("undo_post", _restored),
     ("redo_post", _restored),
     ("save_pre", _before_save),
+    ("render_init", _end_tests),
+    ("render_complete", _render_ended),
+    ("render_cancel", _render_ended),
 )
 
 
 def register():
     """Add the handlers, and bring up what is already there."""
-    _state["objects"] = -1
+    _state.update(objects=-1, busy=False)
     for name, handler in _HANDLERS:
         present = getattr(bpy.app.handlers, name)
         if handler not in present:

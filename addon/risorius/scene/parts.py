@@ -6,30 +6,57 @@ import bpy
 RIG = "risorius_rig"  # on meshes and control armature: the deforming armature
 CONTROLS = "risorius_controls"  # on the deforming armature: the control armature
 DNA = "risorius_dna"  # on the deforming armature: the Text that holds the file
-LOD = "risorius_lod"  # on the deforming armature: the level that is shown
+LOD = "risorius_lod"  # on the deforming armature: the level that the viewport shows
+LOD_RENDER = "risorius_lod_render"  # on the same: that of renders, -1 for the viewport's
+LOD_BY_DISTANCE = "risorius_lod_by_distance"  # on the same: the camera's distance chooses
+LOD_DISTANCES = "risorius_lod_distances"  # on the same: where level n gives way to n + 1
+FOLLOW = "risorius_follow"  # on the same: its place is that of the control armature
 UNIT = "risorius_unit"  # on the deforming armature: metres per Blender unit at import
 SOURCE = "risorius_source"  # on the deforming armature: the path it came from
 TEXTURES = "risorius_textures"  # on the deforming armature: words on which textures were found
 OVERDRIVE = "risorius_overdrive"  # on the control armature: hard maximum is 1.5
+BODY_NECK = "risorius_body_neck"  # on the control armature: bones of the body, a line each
+BODY_HEAD = "risorius_body_head"  # the same for the head
 MESH_PREFIX = "risorius_mesh_"  # + number, on the deforming armature: a mesh
 MESH = "dna_mesh"  # on a mesh object: its number in the DNA
 LODS = "dna_lods"  # on a mesh object: the levels that show it
 JOINT = "dna_joint"  # on a bone: its number in the DNA
+HIDDEN_PREFIX = "risorius_"  # + flag, on a mesh: what was last written to the flag
 MODE = "risorius_mode"  # on a mesh object: LIVE or KEYS
 REAL = "risorius_real"  # on a Key: channels that are real keys although the mesh is LIVE
+KEY_NAMES = "risorius_key_names"  # on a Key in LIVE mode: names that the user gave to our keys
+KEY_ORDER = "risorius_key_order"  # on a Key in LIVE mode: their order, as channels
+CHANNEL_VARIABLE = "risorius_channel"  # name of the driver variable of our keys
+TEST = "risorius_test"  # on the deforming armature: a channel's test override, see testing.py
 MAPS = "maps"  # on the deforming armature: values of the animated maps
 CHANNELS = "channels"  # on the deforming armature: values of the channels
 FACE = "face"  # the bone of the control armature that bears the controls
+PART = "risorius_part"  # on the control armature's bones: what each is, whatever its name
+PULL = "risorius_pull"  # on the deforming armature: its driver keeps the controls evaluated
 
 
 def rigs():
-    """The deforming armatures of all characters of this file."""
-    return [o for o in bpy.data.objects if o.type == "ARMATURE" and _object(o, CONTROLS)]
+    """The deforming armatures of all characters of this file; linked ones are not written."""
+    return [o for o in bpy.data.objects if o.library is None and is_rig(o)]
+
+
+def is_rig(item):
+    """Whether an object is the deforming armature of a character."""
+    return item.type == "ARMATURE" and _object(item, CONTROLS) is not None
 
 
 def _object(owner, key):
     value = owner.get(key)
     return value if isinstance(value, bpy.types.Object) else None
+
+
+def point(owner, key, item):
+    """Let a custom property point to another part, also on overrides of linked characters.
+
+    Blender gives a pointer of an override back to the library at load unless it is marked so.
+    """
+    owner[key] = item
+    owner.property_overridable_library_set(f'["{key}"]', True)
 
 
 def controls_of(rig):
@@ -44,10 +71,10 @@ def rig_of(item):
     """The deforming armature of the character that an object belongs to, or None."""
     if item is None:
         return None
-    if item.type == "ARMATURE" and _object(item, CONTROLS):
+    if is_rig(item):
         return item
     rig = _object(item, RIG)
-    return rig if rig is not None and _object(rig, CONTROLS) else None
+    return rig if rig is not None and is_rig(rig) else None
 
 
 def meshes_of(rig):
@@ -62,12 +89,16 @@ def meshes_of(rig):
 
 
 def active_rig(context):
-    """The character of the active object, else the only one of the scene, else None."""
+    """The character of the active object, else the only one of the scene, else None.
+
+    Never a linked one: nothing on it can be changed.
+    """
     rig = rig_of(context.object)
     if rig is None:
-        there = [r for r in rigs() if r.name in context.scene.objects]
+        # A linked object may have the same name: identity tells them apart.
+        there = [r for r in rigs() if context.scene in r.users_scene]
         rig = there[0] if len(there) == 1 else None
-    return rig
+    return rig if rig is not None and rig.library is None else None
 
 
 def face_bone(rig):

@@ -4,14 +4,13 @@
 Holds no Blender object: it is found anew, or rebuilt, after load, undo, append and enable.
 """
 
-import zlib
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from .. import native
 from ..logic import names, plans
-from ..logic.space import SpaceError, make_joint_space, world_matrices, yaw_pitch
+from ..logic.space import SpaceError, world_matrices, yaw_pitch
 from . import parts, storage
 
 DEFAULT_EYE_ANGLE = np.radians(30.0)
@@ -25,7 +24,7 @@ class Runtime:
         dna: the file; rig: its risorius.Rig; space: its Space.
         labels: property names of the raw controls, by index.
         rests: their values at rest.
-        joints: JointSpace of the joints that the evaluator owns.
+        owned: the joints that the evaluator writes.
         rest: float64[J, 4, 4] neutral joints.
         anchors: joints of neck, head and eyes.
         look: control name -> yaw or pitch (radians) that a value of 1 gives; by side.
@@ -37,7 +36,7 @@ class Runtime:
     space: object
     labels: list
     rests: list
-    joints: object
+    owned: frozenset
     rest: object
     anchors: object
     look: dict
@@ -50,6 +49,19 @@ class Runtime:
                 self.dna, mesh_index, matrix=self.space.delta_matrix
             )
         return self.morphs[mesh_index]
+
+    def bone_space(self, joints):
+        """The native conversion of poses for bones that stand for these joints."""
+        space = self.space
+        return native.module().BoneSpace(
+            self.dna.neutral_joint_rotations,
+            joints,
+            axes=space.axes,
+            scale=space.scale,
+            radians=space.radians,
+            sequence=space.sequence,
+            signs=space.signs,
+        )
 
 
 _cache = {}
@@ -69,15 +81,31 @@ def of(rig):
     digest = storage.content_hash(text)
     if not digest:
         return None
-    key = (digest, float(rig.get(parts.UNIT, 1.0)))
+    key = (digest, _unit(rig))
     if key not in _cache:
         try:
             _cache[key] = _compile(storage.content(text), key[1])
-        except (native.dna_error(), SpaceError, zlib.error, KeyError) as error:
+        except (native.dna_error(), SpaceError, ValueError, LookupError) as error:
             # Said once, not at every frame; the panel says that the data is lost.
-            print(f"Risorius: the data of {rig.name} cannot be read: {error}")
+            words = names.printable(str(error)).rstrip(".")
+            print(f"Risorius: the data of {rig.name} cannot be read: {words}.")
             _cache[key] = None
     return _cache[key]
+
+
+def _unit(rig):
+    """Metres per Blender unit at import."""
+    unit = rig.get(parts.UNIT)
+    usable = isinstance(unit, int | float) and np.isfinite(unit) and unit > 0
+    return float(unit) if usable else 1.0
+
+
+def forget_unused(rigs):
+    """Drop compiled data of characters that are gone. Args: rigs  those that are there."""
+    used = {storage.content_hash(rig.get(parts.DNA)) for rig in rigs}
+    for key in [k for k in _cache if k[0] not in used]:
+        del _cache[key]
+    outputs.clear()
 
 
 def _compile(content, unit):
@@ -100,7 +128,7 @@ def _compile(content, unit):
         space=space,
         labels=names.unique_labels(dna.raw_control_names),
         rests=[float(rest) for rest in rig.initial_raw_controls],
-        joints=make_joint_space(space, dna.neutral_joint_rotations, sorted(owned)),
+        owned=frozenset(owned),
         rest=rest,
         anchors=anchors,
         look={},

@@ -11,6 +11,11 @@ import bpy
 
 _BYTES = "risorius_bytes"
 _HASH = "risorius_hash"
+_MOST_BYTES = 1 << 32
+
+
+class ContentError(ValueError):
+    """What a Text holds is not the DNA file that was put there; the text goes on after a colon."""
 
 
 def store(name, content, made):
@@ -37,10 +42,28 @@ def store(name, content, made):
 
 
 def content_hash(text):
-    """The hash of what a Text holds; empty where it holds no DNA."""
-    return text.get(_HASH, "") if text is not None else ""
+    """The hash of what a Text holds; empty where it holds no DNA or is no Text at all."""
+    digest = text.get(_HASH) if isinstance(text, bpy.types.Text) else None
+    return digest if isinstance(digest, str) else ""
 
 
 def content(text):
-    """The bytes of the DNA file that a Text holds."""
-    return zlib.decompress(text[_BYTES])
+    """The bytes of the DNA file that a Text holds.
+
+    Raises:
+        ContentError: they were tampered with or damaged.
+    """
+    packed = text.get(_BYTES)
+    if not isinstance(packed, bytes):
+        raise ContentError("the Text holds no bytes of a DNA file")
+    try:
+        # Not all at once: a few kilobytes of zeros would unfold to any size.
+        unpacking = zlib.decompressobj()
+        content = unpacking.decompress(packed, _MOST_BYTES)
+    except zlib.error as error:
+        raise ContentError("its bytes cannot be unpacked") from error
+    if not unpacking.eof:
+        raise ContentError("its bytes end too early, or unpack to more than a DNA file can be")
+    if hashlib.sha256(content).hexdigest() != content_hash(text):
+        raise ContentError("its bytes are not those that were imported")
+    return content

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators that bring faces in: from a file, the sample, and again from its source."""
+"""Operators that bring faces in: from a file, and the sample."""
 
 from contextlib import contextmanager
 from pathlib import Path
@@ -8,6 +8,7 @@ import bpy
 from bpy_extras.io_utils import ImportHelper
 
 from .. import native
+from ..logic import names
 from ..logic.plans import PlanError
 from ..logic.space import SpaceError
 from ..scene import build, parts
@@ -21,8 +22,8 @@ MODES = (
 
 def explain(path, error):
     """One sentence for what is wrong with a file."""
-    text = str(error).strip().rstrip(".")
-    name = Path(path).name
+    text = names.printable(str(error)).strip().rstrip(".")
+    name = names.printable(Path(path).name)
     return f"{text}." if name in text else f"{name}: {text}."
 
 
@@ -35,7 +36,7 @@ def usable(cls):
 
 
 @contextmanager
-def _progress(context):
+def shown_progress(context):
     manager = context.window_manager
     manager.progress_begin(0, 100)
     try:
@@ -57,13 +58,13 @@ def import_character(operator, context, path, options):
         What `execute` returns.
     """
     try:
-        with _progress(context) as progress:
+        with shown_progress(context) as progress:
             rig, warnings = build.import_file(context, path, options, progress)
     except (native.dna_error(), PlanError, SpaceError, OSError) as error:
         operator.report({"ERROR"}, explain(path, error))
         return {"CANCELLED"}
     for warning in warnings[:5]:
-        operator.report({"WARNING"}, str(warning))
+        operator.report({"WARNING"}, names.printable(str(warning)))
     if len(warnings) > 5:
         operator.report({"WARNING"}, f"and {len(warnings) - 5} more warnings")
     count = len(parts.meshes_of(rig))
@@ -215,45 +216,6 @@ def _build_sample(path, folder):
     return ""
 
 
-class RISORIUS_OT_reload(bpy.types.Operator):
-    """Build the active face anew from its source file; its controls and their keys stay"""
-
-    bl_idname = "risorius.reload"
-    bl_label = "Reload from Source"
-    bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context):
-        if not usable(cls):
-            return False
-        rig = parts.active_rig(context)
-        if rig is None:
-            cls.poll_message_set("Select a face first.")
-            return False
-        path = bpy.path.abspath(rig.get(parts.SOURCE, ""))
-        if not path or not Path(path).is_file():
-            cls.poll_message_set("The source file is not there any more.")
-            return False
-        return True
-
-    def execute(self, context):
-        old = parts.active_rig(context)
-        path = bpy.path.abspath(old[parts.SOURCE])
-        levels = tuple(build.lods_of(old)) or (0,)
-        modes = {m.get(parts.MODE) for m in parts.meshes_of(old)}
-        mode = modes.pop() if len(modes) == 1 else "AUTO"
-        controls = parts.controls_of(old)
-        result = import_character(self, context, path, build.BuildOptions(levels, mode))
-        if result != {"FINISHED"}:
-            return result
-        build.replace_character(old, parts.rig_of(context.view_layer.objects.active))
-        context.view_layer.objects.active = controls
-        controls.select_set(True, view_layer=context.view_layer)
-        controls.update_tag()
-        context.view_layer.update()
-        return {"FINISHED"}
-
-
 def draw_import(self, _context):
     """Entry of File > Import."""
     self.layout.operator(RISORIUS_OT_import_dna.bl_idname, text="MetaHuman DNA (.dna)")
@@ -268,5 +230,4 @@ CLASSES = (
     RISORIUS_OT_import_dna,
     RISORIUS_FH_dna,
     RISORIUS_OT_add_character,
-    RISORIUS_OT_reload,
 )

@@ -4,11 +4,11 @@
 import bpy
 
 from ..logic import regions
-from ..scene import armatures, build, copies, evaluate, parts, runtime
+from ..scene import armatures, build, copies, evaluate, overrides, parts, runtime
 from .import_operators import MODES, usable
 
 
-def _has_face(cls, context):
+def has_face(cls, context):
     """Poll: whether there is a face to work on; says why when there is not."""
     if not usable(cls):
         return False
@@ -29,15 +29,17 @@ def _labels(rig, region=""):
     ]
 
 
-class _FaceOperator:
+class FaceOperator:
+    """What all operators on a face share."""
+
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
     def poll(cls, context):
-        return _has_face(cls, context)
+        return has_face(cls, context)
 
 
-class RISORIUS_OT_reset(_FaceOperator, bpy.types.Operator):
+class RISORIUS_OT_reset(FaceOperator, bpy.types.Operator):
     """Set controls to rest and the head, neck and eye bones straight"""
 
     bl_idname = "risorius.reset"
@@ -62,7 +64,7 @@ class RISORIUS_OT_reset(_FaceOperator, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class RISORIUS_OT_key(_FaceOperator, bpy.types.Operator):
+class RISORIUS_OT_key(FaceOperator, bpy.types.Operator):
     """Insert keyframes on the controls at the current frame"""
 
     bl_idname = "risorius.key"
@@ -98,29 +100,7 @@ class RISORIUS_OT_key(_FaceOperator, bpy.types.Operator):
             controls.pose.bones["eyes"].keyframe_insert("location", frame=frame, group="eyes")
 
 
-class RISORIUS_OT_set_lod(_FaceOperator, bpy.types.Operator):
-    """Show the meshes of one level of detail, in the viewport and in renders"""
-
-    bl_idname = "risorius.set_lod"
-    bl_label = "Level of Detail"
-
-    lod: bpy.props.IntProperty(
-        name="Level", description="0 is the finest", min=0, max=31, options={"SKIP_SAVE"}
-    )
-
-    def execute(self, context):
-        rig = parts.active_rig(context)
-        if self.lod not in build.lods_of(rig):
-            self.report({"ERROR"}, f"Level {self.lod} was not built for this face.")
-            return {"CANCELLED"}
-        build.show_lod(rig, self.lod)
-        context.view_layer.update()
-        evaluate.evaluate(rig, context.evaluated_depsgraph_get(), force=True)
-        context.view_layer.update()
-        return {"FINISHED"}
-
-
-class RISORIUS_OT_set_shape_mode(_FaceOperator, bpy.types.Operator):
+class RISORIUS_OT_set_shape_mode(FaceOperator, bpy.types.Operator):
     """Switch between the live sum and real shape keys; edited keys are kept"""
 
     bl_idname = "risorius.set_shape_mode"
@@ -135,7 +115,10 @@ class RISORIUS_OT_set_shape_mode(_FaceOperator, bpy.types.Operator):
         if any(item.mode == "EDIT" for item in parts.meshes_of(rig)):
             self.report({"ERROR"}, "Leave edit mode first.")
             return {"CANCELLED"}
-        build.change_mode(rig, self.mode)
+        if overrides.unlock_shapes(rig):
+            self.report({"INFO"}, "The linked meshes were copied into this file.")
+        for sentence in build.change_mode(rig, self.mode):
+            self.report({"WARNING"}, sentence)
         rig.update_tag()
         context.view_layer.update()
         evaluate.evaluate(rig, context.evaluated_depsgraph_get(), force=True)
@@ -143,7 +126,7 @@ class RISORIUS_OT_set_shape_mode(_FaceOperator, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class RISORIUS_OT_set_overdrive(_FaceOperator, bpy.types.Operator):
+class RISORIUS_OT_set_overdrive(FaceOperator, bpy.types.Operator):
     """Let the controls of this face go up to 1.5"""
 
     bl_idname = "risorius.set_overdrive"
@@ -164,7 +147,7 @@ class RISORIUS_OT_set_overdrive(_FaceOperator, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class RISORIUS_OT_separate(_FaceOperator, bpy.types.Operator):
+class RISORIUS_OT_separate(FaceOperator, bpy.types.Operator):
     """Give a copied face materials, shapes and drivers of its own"""
 
     bl_idname = "risorius.separate"
@@ -180,7 +163,6 @@ class RISORIUS_OT_separate(_FaceOperator, bpy.types.Operator):
 CLASSES = (
     RISORIUS_OT_reset,
     RISORIUS_OT_key,
-    RISORIUS_OT_set_lod,
     RISORIUS_OT_set_shape_mode,
     RISORIUS_OT_set_overdrive,
     RISORIUS_OT_separate,

@@ -7,7 +7,8 @@ import bpy
 
 from .. import native
 from ..logic import plans, regions
-from ..scene import build, parts, runtime
+from ..scene import lods, parts, place, runtime
+from . import life_operators
 
 _ICONS = {
     "brow": "MOD_CURVE",
@@ -50,6 +51,8 @@ class RISORIUS_PT_character(_FacePanel, bpy.types.Panel):
         if trouble:
             _write(layout, trouble, "ERROR")
             return
+        if life_operators.draw_trouble(layout, context):
+            return
         rig = parts.active_rig(context)
         if rig is None:
             _draw_start(layout)
@@ -57,8 +60,7 @@ class RISORIUS_PT_character(_FacePanel, bpy.types.Panel):
         live = runtime.of(rig)
         controls = parts.controls_of(rig)
         if live is None or controls is None:
-            _write(layout, "This face has lost its data or its control armature.", "ERROR")
-            return
+            return  # said above
         layout.label(text=rig.name.removesuffix("_rig"), icon="USER")
         _draw_detail(layout, rig)
         _draw_shapes(layout, rig)
@@ -76,14 +78,27 @@ def _draw_start(layout):
 
 
 def _draw_detail(layout, rig):
-    levels = build.lods_of(rig)
+    levels = lods.built(rig)
     if len(levels) < 2:
         return
-    row = layout.row(align=True)
-    row.label(text="Detail")
-    for level in levels:
-        current = level == rig.get(parts.LOD, 0)
-        row.operator("risorius.set_lod", text=str(level), depress=current).lod = level
+    column = layout.column(align=True)
+    auto = lods.by_distance(rig)
+    for target, text, shown in (
+        ("VIEWPORT", "Viewport", lods.viewport_level(rig)),
+        ("RENDER", "Render", lods.render_level(rig)),
+    ):
+        row = column.row(align=True)
+        row.active = not auto
+        row.label(text=text)
+        for level in levels:
+            button = row.operator("risorius.set_lod", text=str(level), depress=level == shown)
+            button.lod, button.target = level, target
+    column.operator("risorius.set_lod_by_distance", depress=auto).enable = not auto
+    if auto:
+        for level in range(min(len(rig[parts.LOD_DISTANCES]), levels[-1])):
+            column.prop(
+                rig, f'["{parts.LOD_DISTANCES}"]', index=level, text=f"{level} to {level + 1} at"
+            )
 
 
 def _draw_shapes(layout, rig):
@@ -169,8 +184,18 @@ class RISORIUS_PT_options(_FacePanel, bpy.types.Panel):
         rig = parts.active_rig(context)
         on = bool(parts.controls_of(rig).get(parts.OVERDRIVE))
         layout.operator("risorius.set_overdrive", depress=on).enable = not on
+        attached = place.body_of(parts.controls_of(rig))
+        body = "risorius.detach_body" if attached else "risorius.attach_body"
+        layout.operator(body, icon="ARMATURE_DATA")
         layout.operator("risorius.separate", icon="UNLINKED")
         layout.operator("risorius.reload", icon="FILE_REFRESH")
+        layout.operator("risorius.describe", icon="INFO")
+        layout.prop(context.window_manager, "risorius_show_timing")
+        render = context.scene.render
+        if not render.use_lock_interface:
+            layout.prop(render, "use_lock_interface", text="Lock Interface in Renders")
+        layout.operator("risorius.replace_dna", icon="FILEBROWSER")
+        layout.operator("risorius.export_dna", icon="EXPORT")
         live = runtime.of(rig)
         if live is not None:
             column = layout.column(align=True)

@@ -919,10 +919,28 @@ class Morph:
     ) -> _F32:
         """float32[B] -> float32[V, 3]: base + sum of weight * delta."""
 
+class BoneSpace:
+    """Poses of joints to what another program keeps on bones in axes and units of its own."""
+
+    def __init__(
+        self,
+        neutral_rotations: npt.ArrayLike,
+        bones: Sequence[int],
+        *,
+        axes: npt.ArrayLike,
+        scale: _Float = 1.0,
+        radians: _Float = 1.0,
+        sequence: Sequence[int] = (0, 1, 2),
+        signs: Sequence[float] = (1.0, 1.0, 1.0),
+    ) -> None: ...
+    def evaluate(self, joints: npt.ArrayLike) -> tuple[_F32, _F32, _F32]:
+        """float32[J, 9] of a Pose -> (location[n, 3], rotation[n, 4] w x y z, scale[n, 3])."""
+
 def rig_block_version() -> int:
     """Of Rig.to_bytes; others are refused."""
 
-def available_simd() -> str: ...
+def available_simd() -> str:
+    """The instruction sets that this processor has, as `simd=` takes them, apart by blanks."""
 
 class GroupSizes:
     """Joint groups, their rows, coefficients stored (zeros too), not zero."""

@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a user changed, told from what an import gave; and how it is carried elsewhere.
+
+Nothing here guesses: a number counts as edited where it differs from what importing the original
+file gives, bit for bit. Only where Blender itself moved a shape key along with the basis is the
+rounding of those two float32 additions allowed for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+Float32 = NDArray[np.float32]
+Mask = NDArray[np.bool_]
+
+
+def changed(present: Float32, imported: Float32) -> Mask:
+    """Which coordinates of positions differ from the imported ones, bool[V, 3]."""
+    return np.asarray(present != imported)
+
+
+def shaped(basis: Float32, indices: NDArray[Any], deltas: Float32) -> Float32:
+    """Coordinates of a shape key as the import makes them: the basis plus sparse deltas."""
+    points = basis.copy()
+    np.add.at(points, indices, deltas)
+    return points
+
+
+def key_edits(
+    basis: Float32, points: Float32, imported_basis: Float32, wanted: Float32
+) -> tuple[Mask, Float]:
+    """What was edited in a shape key.
+
+    Args:
+        basis: float32[V, 3] the basis as it is now.
+        points: float32[V, 3] the key as it is now.
+        imported_basis: float32[V, 3] the basis that the import gave.
+        wanted: float32[V, 3] `shaped(basis, ...)` of the key's channel.
+
+    Returns:
+        bool[V], and float64[V, 3]: how far the key's delta is from the channel's; 0 elsewhere.
+    """
+    differs = points != wanted
+    # An edit of the basis moves a key by the same offset, in float32: the old sum, the offset and
+    # the new sum are each rounded to half a unit in the last place.
+    largest = np.maximum(np.maximum(np.abs(basis), np.abs(imported_basis)), np.abs(points))
+    rounding = 2.0 * np.spacing(largest)
+    moved_along = (basis != imported_basis) & (np.abs(points - wanted) <= rounding)
+    mask = np.any(differs & ~moved_along, axis=1)
+    difference = np.zeros(points.shape)
+    difference[mask] = points[mask].astype(np.float64) - wanted[mask]
+    return mask, difference
+
+
+def index_map(old: Sequence[str], new: Sequence[str]) -> list[int]:
+    """For each old label its place among the new ones, -1 where it is gone."""
+    where = {label: i for i, label in enumerate(new)}
+    return [where.get(label, -1) for label in old]
+
+
+def barycentric(points: Float, corners: Float) -> Float:
+    """Weights of a triangle's corners at points of its plane.
+
+    Args:
+        points: float64[n, 3].
+        corners: float64[n, 3, 3] a triangle for each point.
+
+    Returns:
+        float64[n, 3], each row at least 0 and of sum 1; a triangle without area gives thirds.
+    """
+    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    p = points - corners[:, 0]
+    aa, ab, bb = (np.sum(x * y, axis=1) for x, y in ((a, a), (a, b), (b, b)))
+    ap, bp = np.sum(a * p, axis=1), np.sum(b * p, axis=1)
+    area = aa * bb - ab * ab
+    safe = np.where(area > 0, area, 1.0)
+    v, w = (bb * ap - ab * bp) / safe, (aa * bp - ab * ap) / safe
+    weights = np.clip(np.stack([1 - v - w, v, w], axis=1), 0.0, None)
+    total = weights.sum(axis=1, keepdims=True)
+    good = (area > 0)[:, None] & (total > 0)
+    return np.where(good, weights / np.where(total > 0, total, 1.0), 1 / 3)
+
+
+def sizes(moves: Float, unit: float) -> tuple[int, float, float]:
+    """Number, largest and mean length of moves.
+
+    Args:
+        moves: float64[n, 3] Blender units.
+        unit: metres per Blender unit.
+
+    Returns:
+        n, largest and mean in millimetres; 0 where there are none.
+    """
+    if not len(moves):
+        return 0, 0.0, 0.0
+    lengths = np.linalg.norm(moves, axis=1) * unit * 1000.0
+    return len(moves), float(lengths.max()), float(lengths.mean())
+
+
+def replace_totals(
+    targets: Sequence[tuple[NDArray[np.uint32], Float32]],
+    vertices: NDArray[np.int64],
+    totals: Float32,
+) -> list[tuple[NDArray[np.uint32], Float32]]:
+    """Sparse targets of one channel whose sum at some vertices is what is asked for.
+
+    Args:
+        targets: (vertex indices, deltas float32[K, 3]) of each target, at least one.
+        vertices: int64[n] ascending, where the sum changes.
+        totals: float32[n, 3] the new sums there.
+
+    Returns:
+        The targets, every other delta as it was; vertices that none has join the first.
+    """
+    row_of = {int(v): row for row, v in enumerate(vertices)}
+    placed: set[int] = set()
+    result = []
+    for indices, deltas in targets:
+        written = deltas.copy()
+        for place, vertex in enumerate(indices.tolist()):
+            if vertex in row_of:
+                # What stands more than once is written once: the sum is what counts.
+                written[place] = 0.0 if vertex in placed else totals[row_of[vertex]]
+                placed.add(vertex)
+        result.append((indices, written))
+    missing = np.array([v for v in vertices.tolist() if v not in placed], np.int64)
+    if len(missing):
+        indices, deltas = result[0]
+        added = totals[[row_of[int(v)] for v in missing]]
+        joined = np.concatenate([indices, missing.astype(indices.dtype)])
+        rows = np.concatenate([deltas, added])
+        if np.all(indices[1:] > indices[:-1]):  # a file that keeps them in order stays so
+            order = np.argsort(joined, kind="stable")
+            joined, rows = joined[order], rows[order]
+        result[0] = (joined, rows)
+    return result

@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the animator asks for: sliders, head, neck and eye bones of the control armature."""
+
+import math
+
+import numpy as np
+from mathutils import Matrix, Quaternion, Vector
+
+from . import parts, place
+
+_STRAIGHT = Matrix.Identity(4)
+_AHEAD = Vector((0.0, -1.0, 0.0))
+
+
+def read_inputs(seen, live, depsgraph, maximum=1.0):
+    """Read the sliders and bones of an evaluated control armature.
+
+    Args:
+        seen: the evaluated control armature object.
+        live: the character's Runtime.
+        depsgraph: where the body's bones are read, if the face hangs on one.
+        maximum: what the look controls are clamped to after the eye bones are added.
+
+    Returns:
+        float32[R] raw controls, and joint turns: "neck" and "head" -> Quaternion in the
+        armature's axes, without those that are straight.
+    """
+    bones = seen.pose.bones
+    values = dict(bones[parts.FACE].items())
+    rests = live.rests
+    raw = np.array([values.get(label, rests[i]) for i, label in enumerate(live.labels)], np.float32)
+    if not np.isfinite(raw).all():
+        np.nan_to_num(raw, copy=False, nan=0.0, posinf=0.0, neginf=0.0)
+    turns = place.body_turns(seen.original, depsgraph)
+    for name in ("neck", "head"):
+        turn = _turn(seen, bones.get(name))
+        if turn is not None:
+            turns[name] = turns[name] @ turn if name in turns else turn
+    _add_look(seen, live, raw, maximum)
+    return raw, turns
+
+
+def _rests(bone):
+    return bone is None or (not bone.constraints and bone.matrix_basis == _STRAIGHT)
+
+
+def _turn(seen, bone):
+    """A bone's own rotation in the armature's axes, or None where it is straight."""
+    if _rests(bone):
+        return None
+    turn = place.own_turn(seen, bone)
+    return turn if turn.angle else None
+
+
+def _moved(seen, target):
+    """How far the eyes' target was moved, in the armature's axes."""
+    if _rests(target):
+        return Vector()
+    local = seen.convert_space(
+        pose_bone=target, matrix=target.matrix, from_space="POSE", to_space="LOCAL"
+    )
+    return target.bone.matrix_local.to_3x3() @ local.translation
+
+
+def _add_look(seen, live, raw, maximum):
+    """Add what the eye bones and their target ask for to the look controls."""
+    bones = seen.pose.bones
+    target = bones.get("eyes")
+    moved = _moved(seen, target)
+    for side, controls in live.look.items():
+        bone = bones.get(f"eye_{side}")
+        turn = _turn(seen, bone)
+        if bone is None or (turn is None and not moved.length_squared > 1e-18):
+            continue
+        start = target.bone.head_local - bone.bone.head_local if target else _AHEAD
+        before, after = _yaw_pitch(start), _yaw_pitch(start + moved)
+        own = _yaw_pitch((turn or Quaternion()) @ _AHEAD)
+        yaw, pitch = after[0] - before[0] + own[0], after[1] - before[1] + own[1]
+        for index, yaw_at_one, pitch_at_one in controls:
+            asked = yaw / yaw_at_one if yaw_at_one else pitch / pitch_at_one
+            if asked > 1e-6:
+                raw[index] = min(raw[index] + asked, max(maximum, raw[index]))
+
+
+def _yaw_pitch(direction):
+    """Angles of a direction from straight ahead (-y): yaw to the face's left (+x), pitch up."""
+    x, y, z = direction
+    return math.atan2(x, -y), math.atan2(z, math.hypot(x, y))

@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How long each stage of a frame takes, for the overlay and for benchmarks."""
+
+from collections import deque
+from itertools import pairwise
+from statistics import median
+from time import perf_counter
+
+STAGES = ("controls", "rig", "bones", "shapes")
+_KEPT = 30  # frames that the overlay shows the median of
+
+
+class Frame:
+    """Milliseconds of one frame: of our stages, and of what Blender does around them."""
+
+    def __init__(self):
+        self.begin = self.ended = perf_counter()
+        self.stages = dict.fromkeys(STAGES, 0.0)
+        self.animation = self.deform = self.drawing = 0.0
+        self.characters = 0
+
+    @property
+    def ours(self):
+        """The add-on's own time."""
+        return sum(self.stages.values())
+
+
+frames = deque([Frame()], maxlen=_KEPT)
+_drawing = [0.0]
+
+
+def begin():
+    """A frame change, or an edit of a control, begins."""
+    frames.append(Frame())
+
+
+def animated():
+    """Blender has evaluated curves, strips and drivers."""
+    frames[-1].animation = _since(frames[-1].begin)
+
+
+def add(times):
+    """One character was brought up. Args: times  perf_counter at the stages' ends, five."""
+    for name, start, end in zip(STAGES, times[:-1], times[1:], strict=True):
+        frames[-1].stages[name] += (end - start) * 1000
+    frames[-1].characters += 1
+    frames[-1].ended = times[-1]
+
+
+def drawing_begins():
+    """Blender has evaluated what was written, and begins to draw a view."""
+    _drawing[0] = perf_counter()
+    if not frames[-1].deform:
+        frames[-1].deform = _since(frames[-1].ended)
+
+
+def drawing_ends():
+    """Blender has told the graphics card what to draw."""
+    frames[-1].drawing = _since(_drawing[0])
+
+
+def _since(moment):
+    return (perf_counter() - moment) * 1000
+
+
+def lines():
+    """What the overlay shows: medians of the last frames, in ms."""
+    seen = [f for f in frames if f.characters]
+    if not seen:
+        return ["Risorius: no frame yet"]
+    middle = {s: median(f.stages[s] for f in seen) for s in STAGES}
+    apart = [b.begin - a.begin for a, b in pairwise(seen)]
+    rate = f"   {1 / median(apart):.0f} fps" if apart and median(apart) > 0 else ""
+    return [
+        f"Risorius, {seen[-1].characters} characters{rate}",
+        f"Blender: curves, strips, drivers  {median(f.animation for f in seen):.2f} ms",
+        *(f"{stage}  {ms:.2f} ms" for stage, ms in middle.items()),
+        f"Blender: bones, skin, shapes  {median(f.deform for f in seen):.2f} ms",
+        f"Blender: drawing  {median(f.drawing for f in seen):.2f} ms",
+    ]

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Skin weights of a mesh object, read and written in bulk."""
+
+import bmesh
+import numpy as np
+
+
+def file_pairs(mesh_plan, labels):
+    """The weights that a file gives: {bone name: {vertex: weight}}, repeated ones summed.
+
+    Args:
+        mesh_plan: MeshPlan.
+        labels: bone name by joint.
+    """
+    counts = np.diff(mesh_plan.skin_offsets)
+    vertices = np.repeat(np.arange(len(counts)), counts).tolist()
+    result = {}
+    joints, weights = mesh_plan.skin_joints.tolist(), mesh_plan.skin_weights.tolist()
+    for vertex, joint, weight in zip(vertices, joints, weights, strict=True):
+        group = result.setdefault(labels[joint], {})
+        group[vertex] = float(np.float32(group[vertex] + weight)) if vertex in group else weight
+    return result
+
+
+def read(item):
+    """The weights of a mesh object: {vertex group name: {vertex: weight}}."""
+    names = [g.name for g in item.vertex_groups]
+    result = {name: {} for name in names}
+    for vertex in item.data.vertices:
+        for element in vertex.groups:
+            if element.group < len(names):
+                result[names[element.group]][vertex.index] = element.weight
+    return result
+
+
+def write(item, groups):
+    """Make these the weights of the named groups; other groups keep theirs.
+
+    Args:
+        item: mesh object, in object mode.
+        groups: {vertex group name: {vertex: weight}}; missing groups are made.
+    """
+    there = item.vertex_groups
+    index_of = {n: (there.get(n) or there.new(name=n)).index for n in groups}
+    edit = bmesh.new()
+    try:
+        edit.from_mesh(item.data)
+        layer = edit.verts.layers.deform.verify()
+        held = [vertex[layer] for vertex in edit.verts]
+        ours = set(index_of.values())
+        for weights in held:
+            for index in [i for i in weights.keys() if i in ours]:  # noqa: SIM118  no dict
+                del weights[index]
+        for name, values in groups.items():
+            index = index_of[name]
+            for vertex, weight in values.items():
+                held[vertex][index] = weight
+        edit.to_mesh(item.data)
+    finally:
+        edit.free()
+
+
+def edited_vertices(present, wanted):
+    """The vertices at which weights differ from those of the file.
+
+    Args:
+        present: {group: {vertex: weight}} of the object.
+        wanted: the same of the file; only its groups are compared.
+    """
+    edited = set()
+    for name, values in wanted.items():
+        have = present.get(name, {})
+        edited.update(v for v in values.keys() ^ have.keys())
+        edited.update(v for v in values.keys() & have.keys() if values[v] != have[v])
+    return edited

@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators and words for faces that are linked from other files or have lost parts."""
+
+import textwrap
+
+import bpy
+
+from ..scene import evaluate, heal, overrides, parts
+from .import_operators import usable
+
+SHAPES = (
+    ("DRIVEN", "Driven Keys", "The library's shape keys, moved by drivers: follows its edits"),
+    ("LOCAL", "Local Meshes", "Meshes copied into this file: live sum and edits are possible"),
+)
+
+
+def _broken_override(context):
+    rig = parts.active_rig(context)
+    return rig if rig is not None and rig.override_library and overrides.trouble(rig) else None
+
+
+class RISORIUS_OT_make_override(bpy.types.Operator):
+    """Make a linked face, or an override of one that stands still, ready to animate"""
+
+    bl_idname = "risorius.make_override"
+    bl_label = "Make Override"
+    bl_options = {"REGISTER", "UNDO"}
+
+    shapes: bpy.props.EnumProperty(
+        name="Shapes", description="How its shapes are moved", items=SHAPES
+    )
+
+    @classmethod
+    def poll(cls, context):
+        if not usable(cls):
+            return False
+        if overrides.linked_rig(context) is None and _broken_override(context) is None:
+            cls.poll_message_set("Select a linked face first.")
+            return False
+        return True
+
+    def execute(self, context):
+        local = self.shapes == "LOCAL"
+        rig = _broken_override(context)
+        try:
+            if rig is not None:
+                done = overrides.repair(context, rig, local)
+            else:
+                rig, done = overrides.make_override(context, overrides.linked_rig(context), local)
+        except RuntimeError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        rig.update_tag()
+        context.view_layer.update()
+        evaluate.evaluate(rig, context.evaluated_depsgraph_get(), force=True)
+        context.view_layer.update()
+        for sentence in done:
+            self.report({"INFO"}, sentence)
+        left = overrides.trouble(rig)
+        if left:
+            self.report({"WARNING"}, left)
+        return {"FINISHED"}
+
+
+class RISORIUS_OT_bring_back(bpy.types.Operator):
+    """Put deleted parts of the active face, which are still in the file, back into the scene"""
+
+    bl_idname = "risorius.bring_back"
+    bl_label = "Bring Back Deleted Parts"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        return usable(cls) and context.object is not None
+
+    def execute(self, context):
+        back = heal.bring_back(context.object, context.scene)
+        if not back:
+            self.report({"ERROR"}, "No deleted part of this face is in the file.")
+            return {"CANCELLED"}
+        context.view_layer.update()
+        self.report({"INFO"}, f"Brought back: {', '.join(o.name for o in back)}")
+        return {"FINISHED"}
+
+
+def draw_trouble(layout, context):
+    """Words and buttons for what keeps the active face from moving.
+
+    Returns:
+        Whether the panel need not say anything more.
+    """
+    if overrides.linked_rig(context) is not None:
+        _say(layout, "Linked: make an override to animate.", "LINKED")
+        layout.operator_menu_enum(RISORIUS_OT_make_override.bl_idname, "shapes")
+        return True
+    rig = _broken_override(context)
+    if rig is not None:
+        _say(layout, overrides.trouble(rig), "ERROR")
+        layout.operator(RISORIUS_OT_make_override.bl_idname, text="Repair Override")
+    lost = heal.missing(context.object or parts.active_rig(context))
+    for sentence in lost:
+        _say(layout, sentence, "ERROR")
+    if any("still in the file" in sentence for sentence in lost):
+        layout.operator(RISORIUS_OT_bring_back.bl_idname)
+    return bool(lost) and parts.active_rig(context) is None
+
+
+def _say(layout, text, icon):
+    column = layout.column(align=True)
+    column.scale_y = 0.8
+    for number, line in enumerate(textwrap.wrap(text, 38)):
+        column.label(text=line, icon=icon if number == 0 else "BLANK1")
+
+
+CLASSES = (RISORIUS_OT_make_override, RISORIUS_OT_bring_back)

@@ -1,0 +1,317 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Thousands of random user actions on three characters, from a printed seed.
+
+    python blender_tests/soak.py [--actions 10000] [--seed N] [--characters 3] [--until K]
+    python blender_tests/soak.py --blender /path/to/blender ...
+
+A parent process starts Blender (or the bpy module of this Python), kills it when it hangs, and
+names the action and the seed when it dies. Fails on an exception, also one that a handler only
+prints; on a face or a driver that is wrong; on memory or datablocks that grow with time.
+`--until K --check 1` replays a run up to an action and looks at every face after each.
+The log is build/logs/soak-SEED.log.
+"""
+
+import argparse
+import collections
+import ctypes
+import faulthandler
+import gc
+import json
+import os
+import random
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+import traceback
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+MODULE = "bl_ext.user_default.risorius"
+MAX_GROWTH = 0.03  # of the memory in use, over the second half of the run
+RENDERS_PER_ACTION = 1.0  # seconds that an action may take in the mean before it counts as hung
+
+
+def arguments(given):
+    """The command line, as a namespace."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0], allow_abbrev=False)
+    parser.add_argument("--actions", type=int, default=10_000)
+    parser.add_argument("--seed", type=int, default=None)
+    parser.add_argument("--characters", type=int, default=3)
+    parser.add_argument("--until", type=int, default=None, help="stop after this action")
+    parser.add_argument("--check", type=int, default=250, help="look at all faces every N actions")
+    parser.add_argument("--blender", default=None, help="an executable; else the bpy module")
+    parser.add_argument("--log", type=Path, default=None)
+    parser.add_argument("--timeout", type=float, default=None, help="seconds")
+    parser.add_argument("--child", type=Path, default=None, help=argparse.SUPPRESS)
+    return parser.parse_args(given)
+
+
+# -- parent ---------------------------------------------------------------------------------
+
+
+def command(options, folder):
+    """The child's command line."""
+    rest = [
+        "--child", str(folder), "--actions", str(options.actions), "--seed", str(options.seed),
+        "--characters", str(options.characters), "--check", str(options.check),
+    ]  # fmt: skip
+    if options.until is not None:
+        rest += ["--until", str(options.until)]
+    if options.blender is None:
+        return [sys.executable, str(HERE / "soak.py"), *rest]
+    flags = ["-b", "--factory-startup", "-noaudio", "--python-exit-code", "1"]
+    return [options.blender, *flags, "--python", str(HERE / "soak.py"), "--", *rest]
+
+
+def parent(options):
+    """Run the child to its end or its death, and write the log. Returns the exit code."""
+    if options.seed is None:
+        options.seed = random.SystemRandom().randrange(10**6)
+    print(f"seed {options.seed}, {options.actions} actions", flush=True)
+    log = options.log or HERE.parent / "build" / "logs" / f"soak-{options.seed}.log"
+    log.parent.mkdir(parents=True, exist_ok=True)
+    folder = Path(tempfile.mkdtemp(prefix="risorius-soak-"))
+    environment = dict(os.environ, BLENDER_USER_RESOURCES=str(folder / "user"))
+    environment["RISORIUS_TEST_USER"] = str(folder / "user")
+    begin = time.monotonic()
+    limit = options.timeout or 120 + options.actions * RENDERS_PER_ACTION
+    try:
+        code = subprocess.run(
+            command(options, folder), env=environment, timeout=limit, check=False
+        ).returncode
+        ending = "" if code == 0 else f"the child ended with exit code {code}"
+    except subprocess.TimeoutExpired:
+        ending = f"the child was killed after {limit:.0f} s"
+    text, failed = report(options, folder, ending, time.monotonic() - begin)
+    log.write_text(text, encoding="utf-8")
+    print(text, end="")
+    print(f"log: {log}")
+    shutil.rmtree(folder, ignore_errors=True)
+    return int(failed)
+
+
+def report(options, folder, ending, seconds):
+    """The log's text, and whether the run failed."""
+    result = {}
+    if (folder / "result.json").is_file():
+        result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
+    errors = list(result.get("errors", []))
+    journal = folder / "journal"
+    done = journal.read_text(encoding="utf-8").splitlines() if journal.is_file() else []
+    if not result.get("finished"):
+        last = done[-1] if done else "before the first action"
+        errors.append(f"{ending or 'the child left no result'}; last action: {last}")
+        errors.append((folder / "output").read_text(encoding="utf-8", errors="replace")[-4000:])
+    lines = [
+        f"soak: seed {options.seed}, {len(done)} of {options.actions} actions, "
+        f"{options.characters} characters, {seconds:.0f} s",
+        f"Blender {result.get('version', 'unknown')}",
+        "actions: " + ", ".join(f"{k} {v}" for k, v in sorted(result.get("counts", {}).items())),
+        f"faces checked: {result.get('checks', 0)} times; worst error of a mesh's size: "
+        f"{result.get('worst', 0.0):.2g}",
+    ]
+    for name, row in result.get("samples", {}).items():
+        lines.append(f"{name}: {' '.join(str(v) for v in row)}")
+    lines += [f"growth over the second half: {g}" for g in result.get("growth", [])]
+    lines.append(f"errors: {len(errors)}")
+    if errors:
+        lines.append("the last actions: " + ", ".join(done[-30:]))
+    lines += errors
+    return "\n".join(lines) + "\n", bool(errors)
+
+
+# -- child ----------------------------------------------------------------------------------
+
+
+class Output:
+    """Everything that this process prints, at the level of file descriptors, in one file."""
+
+    def __init__(self, path):
+        self.path, self.read = path, 0
+        target = os.open(path, os.O_CREAT | os.O_WRONLY | os.O_APPEND)
+        sys.stdout.flush()
+        sys.stderr.flush()
+        for descriptor in (1, 2):
+            os.dup2(target, descriptor)
+
+    def news(self):
+        """What was printed since the last call."""
+        sys.stdout.flush()
+        sys.stderr.flush()
+        ctypes.CDLL(None).fflush(None)
+        with self.path.open("rb") as file:
+            file.seek(self.read)
+            new = file.read()
+        self.read += len(new)
+        return new.decode("utf-8", "replace")
+
+
+def memory():
+    """Resident memory in MiB, after what is free was given back."""
+    gc.collect()
+    libc = ctypes.CDLL(None)
+    if hasattr(libc, "malloc_trim"):
+        libc.malloc_trim(0)
+    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
+
+
+def growth(values):
+    """Fitted growth over the second half of a row of samples, in the unit of the samples."""
+    half = values[len(values) // 2 :]
+    if len(half) < 4:
+        return 0.0
+    middle = (len(half) - 1) / 2
+    mean = sum(half) / len(half)
+    slope = sum((i - middle) * (v - mean) for i, v in enumerate(half))
+    slope /= sum((i - middle) ** 2 for i in range(len(half)))
+    return slope * (len(half) - 1)
+
+
+def prepare(folder):
+    """Install the add-on from the tree into the throw-away user folder."""
+    import addon_utils
+    import bpy
+
+    target = folder / "user" / "extensions" / "user_default" / "risorius"
+    ignored = shutil.ignore_patterns("__pycache__", "wheels")
+    shutil.copytree(HERE.parent / "addon" / "risorius", target, ignore=ignored)
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    repos = bpy.context.preferences.extensions.repos
+    repository = next((r for r in repos if r.module == "user_default"), None)
+    repository = repository or repos.new(name="User Default", module="user_default")
+    repository.use_custom_directory = True
+    repository.custom_directory = str(target.parent)
+    addon_utils.extensions_refresh(ensure_wheels=False)
+    assert addon_utils.enable(MODULE) is not None
+
+
+class Run:
+    """The actions of one child, and what was seen."""
+
+    def __init__(self, options, world, output):
+        self.options, self.world, self.output = options, world, output
+        self.counts, self.errors = collections.Counter(), []
+        self.samples = collections.defaultdict(list)
+        self.checks, self.worst, self.finished = 0, 0.0, False
+
+    def act(self, number, kind):
+        """One action; whatever it prints or raises is looked at."""
+        from support.soak_actions import NOT_PUSHED
+
+        self.world.random = random.Random(f"{self.options.seed} {number}")
+        try:
+            getattr(self.world, kind)()
+            if kind not in NOT_PUSHED:
+                self.world._push(kind)
+        except Exception:  # noqa: BLE001  reported with the action's number
+            self.fail(number, kind, traceback.format_exc())
+        self.counts[kind] += 1
+        if number % self.options.check == 0:
+            self.check(number, kind)
+        printed = self.output.news()
+        if "Traceback" in printed:
+            self.fail(number, kind, printed[-3000:])
+
+    def check(self, number, kind):
+        """All faces against the oracle."""
+        self.checks += 1
+        try:
+            self.worst = max(self.worst, self.world.check())
+        except Exception:  # noqa: BLE001  reported with the action's number
+            self.fail(number, kind, traceback.format_exc())
+
+    def fail(self, number, kind, text):
+        """Note an error."""
+        self.errors.append(f"action {number} ({kind}): {text}")
+
+    def sample(self, number):
+        """Memory and datablocks in a freshly loaded file."""
+        from support import scene
+
+        self.world.random = random.Random(f"{self.options.seed} calm {number}")
+        self.world.calm()
+        counts = scene.counts()
+        self.samples["at action"].append(number)
+        self.samples["memory in MiB"].append(round(memory(), 1))
+        kinds = ("objects", "meshes", "materials", "texts", "actions", "armatures", "collections")
+        for name in kinds:
+            self.samples[name].append(counts[name])
+
+    def judge(self):
+        """Sentences on growth; too much of it is an error."""
+        found = []
+        for name, row in self.samples.items():
+            if name == "at action" or len(row) < 8:
+                continue
+            grown = growth(row)
+            found.append(f"{name} {grown:+.2f} of {row[-1]}")
+            if grown > max(MAX_GROWTH * row[-1], 1.0 if name != "memory in MiB" else 6.0):
+                self.errors.append(f"{name} grew by {grown:.2f} over the second half: {row}")
+        return found
+
+    def result(self):
+        """What the parent reads."""
+        import bpy
+
+        return {
+            "version": bpy.app.version_string, "counts": self.counts, "errors": self.errors,
+            "samples": self.samples, "checks": self.checks, "worst": self.worst,
+            "finished": self.finished, "growth": self.judge(),
+        }  # fmt: skip
+
+
+def child(options):
+    """Do the actions in this Blender; the result goes to a file."""
+    folder = options.child
+    for place in os.environ.get("RISORIUS_TEST_PATH", "").split(os.pathsep):
+        if place:
+            sys.path.append(place)
+    sys.path.insert(0, str(HERE))
+    import bpy  # noqa: F401  its C output must go to the file too
+
+    output = Output(folder / "output")
+    faulthandler.enable()
+    prepare(folder)
+    from support.soak_actions import WEIGHTS, World
+
+    run = Run(options, World(folder, options.seed, options.characters), output)
+    kinds, weights = list(WEIGHTS), list(WEIGHTS.values())
+    chosen = random.Random(options.seed).choices(kinds, weights, k=options.actions)
+    last = options.until or options.actions
+    every = max(10, options.actions // 40)
+    with (folder / "journal").open("w", encoding="utf-8") as journal:
+        run.world.begin()
+        for number, kind in enumerate(chosen[:last], 1):
+            journal.write(f"{number} {kind}\n")
+            journal.flush()
+            run.act(number, kind)
+            if len(run.errors) >= 5:
+                break
+            if number % every == 0:
+                run.sample(number)
+        else:
+            run.check(last, "end")
+    run.finished = True
+    (folder / "result.json").write_text(json.dumps(run.result()), encoding="utf-8")
+    return int(bool(run.errors))
+
+
+def main():
+    """Parent, or child where the parent says so."""
+    given = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else sys.argv[1:]
+    options = arguments(given)
+    return child(options) if options.child is not None else parent(options)
+
+
+if __name__ == "__main__":
+    code = 1
+    try:
+        code = main()
+    except Exception:  # noqa: BLE001  printed, and the exit code says it
+        traceback.print_exc()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)  # Blender as a module sometimes hangs in its destructors

@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One step in the life of an installed extension, in a Blender process of its own.
+
+    blender -b --python extension_steps.py -- STEP [ARGUMENTS]
+    python extension_steps.py -- STEP [ARGUMENTS]
+
+Prints what it found as one line of JSON after `RESULT `; an exception ends it with code 1.
+"""
+
+import json
+import os
+import sys
+import traceback
+from pathlib import Path
+
+import bpy
+
+MODULE = "bl_ext.user_default.risorius"
+
+
+def _of_ours():
+    """Everything of the add-on that this process can see."""
+    handlers = [
+        name
+        for name in dir(bpy.app.handlers)
+        for handler in _list(getattr(bpy.app.handlers, name))
+        if "risorius" in getattr(handler, "__module__", "")
+    ]
+    return {
+        "preferences": [a.module for a in bpy.context.preferences.addons if "risorius" in a.module],
+        "handlers": sorted(handlers),
+        "classes": sorted(n for n in dir(bpy.types) if n.startswith("RISORIUS_")),
+        "operators": sorted(dir(bpy.ops.risorius)),
+        "properties": [n for n in dir(bpy.types.WindowManager) if "risorius" in n],
+        "menus": sum(
+            "risorius" in getattr(draw, "__module__", "")
+            for menu in (bpy.types.TOPBAR_MT_file_import, bpy.types.VIEW3D_MT_add)
+            for draw in getattr(menu.draw, "_draw_funcs", ())
+        ),
+    }
+
+
+def _list(value):
+    return value if isinstance(value, list) else []
+
+
+def _manager():
+    """The part of Blender that installs extensions; as a module it starts without."""
+    import addon_utils
+
+    if "bl_pkg" not in bpy.context.preferences.addons:
+        addon_utils.enable("bl_pkg", default_set=True)
+
+
+def _read_preferences(step):
+    """As a module Blender starts with factory settings; before 4.5 it dies when it shall read the
+    user's, so what is installed is enabled by hand there."""
+    if bpy.app.version >= (4, 5, 0):
+        bpy.ops.wm.read_userpref()
+    elif step in ("use", "disable", "remove"):
+        import addon_utils
+
+        addon_utils.extensions_refresh()
+        addon_utils.enable(MODULE, default_set=True)
+
+
+def install(package):
+    """As a user does it: Preferences, Install from Disk."""
+    _manager()
+    bpy.ops.extensions.package_install_files(
+        filepath=package, repo="user_default", enable_on_install=True
+    )
+    bpy.ops.wm.save_userpref()
+    return _of_ours()
+
+
+def use(path):
+    """Import a face, move it, save the scene beside the file."""
+    assert bpy.ops.risorius.import_dna(filepath=path) == {"FINISHED"}
+    rig = next(o for o in bpy.data.objects if "risorius_controls" in o)
+    bone = rig["risorius_controls"].pose.bones["face"]
+    before = [tuple(b.location) for b in rig.pose.bones]
+    bone["CTRL_expressions.jawOpen"] = 1.0
+    rig["risorius_controls"].update_tag()
+    bpy.context.view_layer.update()
+    moved = [tuple(b.location) for b in rig.pose.bones] != before
+    bpy.ops.wm.save_as_mainfile(filepath=str(Path(path).with_suffix(".blend")))
+    import risorius
+
+    return {**_of_ours(), "moved": moved, "wheel": risorius.__file__}
+
+
+def disable(_nothing=""):
+    """As a user does it: the check box in the preferences."""
+    bpy.ops.preferences.addon_disable(module=MODULE)
+    bpy.ops.wm.save_userpref()
+    return _of_ours()
+
+
+def look(blend):
+    """Open a scene with a face and play it, without the add-on."""
+    bpy.ops.wm.open_mainfile(filepath=blend)
+    bpy.context.scene.frame_set(3)
+    rig = next(o for o in bpy.data.objects if "risorius_controls" in o)
+    return {**_of_ours(), "meshes": len([o for o in bpy.data.objects if o.parent == rig])}
+
+
+def remove(_nothing=""):
+    """As a user does it: Uninstall."""
+    _manager()
+    names = [r.module for r in bpy.context.preferences.extensions.repos]
+    bpy.ops.extensions.package_uninstall(repo_index=names.index("user_default"), pkg_id="risorius")
+    bpy.ops.wm.save_userpref()
+    return _of_ours()
+
+
+STEPS = {"install": install, "use": use, "disable": disable, "look": look, "remove": remove}
+
+
+if __name__ == "__main__":
+    code = 1
+    try:
+        step, *arguments = sys.argv[sys.argv.index("--") + 1 :]
+        if not bpy.app.binary_path:
+            _read_preferences(step)
+        print("RESULT " + json.dumps(STEPS[step](*arguments)))
+        code = 0
+    except BaseException:  # noqa: BLE001  printed, and the exit code says it
+        traceback.print_exc()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)

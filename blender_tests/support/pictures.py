@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Small renders and their pixels."""
+
+import bpy
+import numpy as np
+
+
+def small_render(camera, size=32):
+    """Cycles, one sample, no denoising; a sun. Returns the scene."""
+    setup = bpy.context.scene
+    setup.render.engine = "CYCLES"
+    setup.cycles.samples, setup.cycles.device = 1, "CPU"
+    setup.cycles.use_denoising = False
+    setup.render.resolution_x = setup.render.resolution_y = size
+    setup.render.image_settings.file_format = "PNG"
+    setup.camera = camera
+    sun = bpy.data.objects.new("sun", bpy.data.lights.new("sun", "SUN"))
+    sun.rotation_euler = (0.9, 0, 0.4)
+    setup.collection.objects.link(sun)
+    return setup
+
+
+def pixels(path):
+    """RGBA values of an image file, flat."""
+    image = bpy.data.images.load(str(path))
+    values = np.array(image.pixels[:])
+    bpy.data.images.remove(image)
+    return values
+
+
+def render(path):
+    """Render the current frame to a file. Returns its pixels."""
+    bpy.context.scene.render.filepath = str(path)
+    bpy.ops.render.render(write_still=True)
+    return pixels(path)

@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A render engine that draws nothing and writes down the vertices that it was given to render."""
+
+from contextlib import contextmanager
+
+import bpy
+import numpy as np
+
+
+class Probe(bpy.types.RenderEngine):
+    """Reads the dependency graph of the render, also between frames as for motion blur."""
+
+    bl_idname = "RISORIUS_TEST_PROBE"
+    bl_label = "Probe"
+    bl_use_preview = False
+
+    seen = {}  # frame -> {mesh index: float64[V, 3] in world space}
+    between = ()  # offsets from each frame that are looked at as well
+
+    def render(self, depsgraph):
+        frame = depsgraph.scene_eval.frame_current
+        self._look(depsgraph, float(frame))
+        for offset in self.between:
+            time = frame + offset
+            self.frame_set(int(np.floor(time)), subframe=time - np.floor(time))
+            self._look(depsgraph, time)
+        if self.between:
+            self.frame_set(frame, subframe=0.0)
+            self._look(depsgraph, frame + 1e-9)
+
+    def _look(self, depsgraph, time):
+        found = type(self).seen.setdefault(time, {})
+        for item in depsgraph.objects:
+            if item.type == "MESH" and "dna_mesh" in item:
+                found[item["dna_mesh"]] = _vertices(item)
+
+
+def _vertices(item):
+    mesh = item.to_mesh()
+    flat = np.empty(len(mesh.vertices) * 3, np.float32)
+    mesh.vertices.foreach_get("co", flat)
+    item.to_mesh_clear()
+    world = np.array(item.matrix_world)
+    return flat.reshape(-1, 3).astype(np.float64) @ world[:3, :3].T + world[:3, 3]
+
+
+@contextmanager
+def rendering(setup, between=()):
+    """Make a scene render with the probe; gives what it saw, which grows with each render."""
+    bpy.utils.register_class(Probe)
+    before = setup.render.engine
+    Probe.seen = {}
+    Probe.between = tuple(between)
+    setup.render.engine = Probe.bl_idname
+    setup.render.resolution_x = setup.render.resolution_y = 8
+    if setup.camera is None:
+        camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
+        setup.collection.objects.link(camera)
+        setup.camera = camera
+    try:
+        yield Probe.seen
+    finally:
+        setup.render.engine = before
+        bpy.utils.unregister_class(Probe)

@@ -1,0 +1,400 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a user may do to faces, one random action at a time, and what must hold after it."""
+
+import hashlib
+import random
+import string
+
+import addon_utils
+import bpy
+import numpy as np
+import risorius
+
+from . import faces, oracle, scene
+
+LIMIT = 6  # characters beyond which none is added
+CONTROLS = [c for c in faces.CONTROLS if c.startswith("CTRL") and len(c) < 60]
+
+
+class WrongFaceError(AssertionError):
+    """A face that is not what its controls say, or a driver that does not work."""
+
+
+class World:
+    """Random actions on the open file. Holds no Blender object: all are found anew."""
+
+    def __init__(self, folder, seed, characters):
+        self.folder, self.seed, self.characters = folder, seed, characters
+        self.blend = folder / "soak.blend"
+        self.library = folder / "library.blend"
+        self.random = random.Random(seed)
+        self.sources, self._oracles = [], {}
+        for number, axes in enumerate((("right", "up", "front"), ("left", "up", "back"))):
+            path = folder / f"Face{number}.dna"
+            faces.small_face(name=f"Face{number}", axes=axes).save(str(path))
+            self.sources.append(path)
+            dna = risorius.load(str(path))
+            digest = hashlib.sha256(path.read_bytes()).hexdigest()
+            self._oracles[digest] = (dna, risorius.Rig(dna), {})
+
+    # -- the file ---------------------------------------------------------------------------
+
+    def begin(self):
+        """An empty file with undo, one library with a character, and the first characters."""
+        self._enable()
+        bpy.ops.wm.read_homefile(use_empty=True)
+        self._import("LIVE" if self.random.random() < 0.5 else "KEYS")
+        bpy.ops.wm.save_as_mainfile(filepath=str(self.library))
+        bpy.ops.wm.read_homefile(use_empty=True)
+        while len(self.rigs()) < self.characters:
+            self._import("AUTO")
+        self._settings()
+        bpy.ops.ed.undo_push(message="begin")
+        bpy.ops.wm.save_as_mainfile(filepath=str(self.blend))
+
+    @staticmethod
+    def _settings():
+        edit = bpy.context.preferences.edit
+        edit.use_global_undo, edit.undo_steps = True, 24
+        setup = bpy.context.scene
+        setup.render.engine = "CYCLES"
+        setup.cycles.samples, setup.cycles.device = 1, "CPU"
+        setup.cycles.use_denoising = False
+        setup.render.resolution_x = setup.render.resolution_y = 16
+
+    @staticmethod
+    def rigs():
+        """Deforming armatures that are in the scene, linked ones left out; by name."""
+        inside = bpy.context.scene.objects
+        found = [o for o in inside if o.library is None and o.get("risorius_controls")]
+        return sorted(found, key=lambda o: o.name)
+
+    def _rig(self):
+        return self.random.choice(self.rigs())
+
+    @staticmethod
+    def _objects(rig):
+        held = [rig, rig["risorius_controls"], *scene.meshes(rig).values()]
+        return [o for o in held if o is not None]
+
+    def _activate(self, rig):
+        bpy.context.view_layer.objects.active = rig["risorius_controls"]
+
+    def _push(self, message):
+        bpy.ops.ed.undo_push(message=message)
+
+    # -- what a user does -------------------------------------------------------------------
+
+    def slider(self):
+        rig = self._rig()
+        for name in self.random.sample(CONTROLS, self.random.randint(1, 3)):
+            scene.face(rig)[name] = self.random.choice((0.0, 1.0, self.random.random()))
+        scene.update(rig["risorius_controls"])
+
+    def key(self):
+        self._activate(self._rig())
+        bpy.ops.risorius.key(region=self.random.choice(("", "mouth", "jaw")))
+
+    def unkey(self):
+        self._rig()["risorius_controls"].animation_data_clear()
+
+    def frame(self):
+        bpy.context.scene.frame_set(
+            self.random.randint(1, 30), subframe=self.random.choice((0.0, 0.0, 0.5))
+        )
+
+    def select(self):
+        items = list(bpy.context.view_layer.objects)
+        for item in self.random.sample(items, min(3, len(items))):
+            item.select_set(self.random.random() < 0.7)
+        bpy.context.view_layer.objects.active = self.random.choice(items)
+        bpy.context.view_layer.update()
+
+    def reset(self):
+        self._activate(self._rig())
+        bpy.ops.risorius.reset(region=self.random.choice(("", "mouth")))
+
+    def overdrive(self):
+        self._activate(self._rig())
+        bpy.ops.risorius.set_overdrive(enable=self.random.random() < 0.5)
+
+    def lod(self):
+        rig = self._rig()
+        self._activate(rig)
+        levels = scene.submodule("scene.lods").built(rig)
+        bpy.ops.risorius.set_lod(lod=self.random.choice(levels))
+
+    def shape_mode(self):
+        self._activate(self._rig())
+        bpy.ops.risorius.set_shape_mode(mode=self.random.choice(("LIVE", "KEYS", "AUTO")))
+
+    def own_key(self):
+        item = self.random.choice(list(scene.meshes(self._rig()).values()))
+        if not (item.data.library or item.data.override_library):
+            block = item.shape_key_add(name="mine", from_mix=False)
+            block.value = 0.0
+            bpy.context.view_layer.update()
+
+    def drop_own_key(self):
+        for item in scene.meshes(self._rig()).values():
+            key = item.data.shape_keys
+            locked = item.data.library or item.data.override_library
+            for block in list(key.key_blocks) if key and not locked else ():
+                if block.name.startswith("mine"):
+                    item.shape_key_remove(block)
+
+    def rename(self):
+        rig = self._rig()
+        controls = rig["risorius_controls"]
+        mesh = self.random.choice(list(scene.meshes(rig).values()))
+        held = [rig, controls, mesh, *rig.users_collection, rig["risorius_dna"]]
+        held += [m for m in mesh.data.materials if m]
+        for bones in (rig.data.bones, controls.data.bones):
+            if rig.data.library is None:
+                held.append(self.random.choice(list(bones)))
+        key = mesh.data.shape_keys
+        if key and not (mesh.data.library or mesh.data.override_library):
+            held.append(self.random.choice(list(key.key_blocks)[1:]))
+        letters = string.ascii_letters + "äß漢. \"'\\]"
+        words = "".join(self.random.choices(letters, k=self.random.randint(1, 70)))
+        item = self.random.choice([h for h in held if not getattr(h, "library", None)])
+        item.name = words
+        bpy.context.view_layer.update()
+
+    def hide(self):
+        controls = self._rig()["risorius_controls"]
+        controls.hide_viewport = self.random.random() < 0.5
+        controls.hide_render = self.random.random() < 0.5
+        bpy.context.view_layer.update()
+
+    def exclude(self):
+        layers = list(bpy.context.view_layer.layer_collection.children)
+        if layers:
+            number = self.random.randrange(len(layers))
+            layers[number].exclude = True
+            bpy.context.scene.frame_set(self.random.randint(1, 30))
+            bpy.context.view_layer.layer_collection.children[number].exclude = False
+            bpy.context.view_layer.update()
+
+    def duplicate(self):
+        if len(self.rigs()) >= LIMIT:
+            return
+        layer = bpy.context.view_layer
+        for item in layer.objects:
+            item.select_set(False)
+        for item in self._objects(self._rig()):
+            item.hide_set(False)
+            item.hide_viewport = False
+            item.select_set(True)
+        bpy.ops.object.duplicate(linked=self.random.random() < 0.3)
+        layer.update()
+        for rig in self.rigs():  # levels that were hidden are hidden again
+            scene.submodule("scene.lods").show(rig)
+        layer.update()
+
+    def delete(self):
+        if len(self.rigs()) > 1:
+            self._delete(self._rig())
+
+    def _delete(self, rig):
+        """As a user does, or with its data at once, or the whole collection."""
+        objects = self._objects(rig)
+        if self.random.random() < 0.5:
+            with bpy.context.temp_override(selected_objects=objects, active_object=rig):
+                bpy.ops.object.delete()
+        else:
+            bpy.data.batch_remove(objects)
+        bpy.context.view_layer.update()
+
+    def delete_part(self):
+        """A part goes, frames pass, undo brings it back."""
+        self._push("whole")
+        item = self.random.choice(self._objects(self._rig()))
+        bpy.data.objects.remove(item)
+        bpy.context.view_layer.update()
+        self.frame()
+        self._push("ruin")
+        bpy.ops.ed.undo()
+        bpy.context.view_layer.update()  # the step that follows makes the ruin unreachable
+
+    def _import(self, mode=None):
+        path = self.random.choice(self.sources)
+        bpy.ops.risorius.import_dna(
+            filepath=str(path),
+            shape_mode=mode or self.random.choice(("LIVE", "KEYS", "AUTO")),
+            lods=(True, True, *(False,) * 6),
+        )
+
+    def import_dna(self):
+        if len(self.rigs()) < LIMIT:
+            self._import()
+
+    def reload(self):
+        rig = self._rig()
+        if not rig.override_library:
+            self._activate(rig)
+            bpy.ops.risorius.reload()
+
+    def append(self):
+        if len(self.rigs()) >= LIMIT:
+            return
+        with bpy.data.libraries.load(str(self.library)) as (source, target):
+            target.collections = [c for c in source.collections if c.startswith("Face")]
+        bpy.context.scene.collection.children.link(target.collections[0])
+        bpy.context.view_layer.update()
+
+    def override(self):
+        if len(self.rigs()) >= LIMIT:
+            return
+        with bpy.data.libraries.load(str(self.library), link=True) as (source, target):
+            target.collections = [c for c in source.collections if c.startswith("Face")]
+        item = bpy.data.objects.new("instance", None)
+        item.instance_type, item.instance_collection = "COLLECTION", target.collections[0]
+        bpy.context.scene.collection.objects.link(item)
+        bpy.context.view_layer.objects.active = item
+        bpy.context.view_layer.update()
+        bpy.ops.risorius.make_override(shapes=self.random.choice(("DRIVEN", "LOCAL")))
+
+    def separate(self):
+        self._activate(self._rig())
+        bpy.ops.risorius.separate()
+
+    def undo(self):
+        for _ in range(self.random.randint(1, 6)):
+            if not bpy.ops.ed.undo.poll() or bpy.ops.ed.undo() != {"FINISHED"}:
+                break
+        bpy.context.view_layer.update()
+
+    def redo(self):
+        for _ in range(self.random.randint(1, 6)):
+            if not bpy.ops.ed.redo.poll() or bpy.ops.ed.redo() != {"FINISHED"}:
+                break
+        bpy.context.view_layer.update()
+
+    def save(self):
+        bpy.ops.wm.save_as_mainfile(filepath=str(self.blend))
+
+    def save_and_load(self):
+        self.save()
+        bpy.ops.wm.open_mainfile(filepath=str(self.blend))
+        self._settings()
+        self._push("loaded")
+
+    def revert(self):
+        """Back to what was saved last, whatever was done since."""
+        bpy.ops.wm.open_mainfile(filepath=str(self.blend))
+        self._settings()
+        self._push("reverted")
+
+    def purge(self):
+        bpy.ops.outliner.orphans_purge(do_recursive=True)
+
+    def other_scene(self):
+        """Another scene is open for a while: once empty, once with the same characters."""
+        here = bpy.context.window.scene
+        there = bpy.data.scenes.new("there")
+        if self.random.random() < 0.5:
+            for child in here.collection.children:
+                there.collection.children.link(child)
+        bpy.context.window.scene = there
+        there.frame_set(self.random.randint(1, 30))
+        bpy.context.view_layer.update()
+        bpy.context.window.scene = here
+        bpy.data.scenes.remove(there)
+        here.frame_set(here.frame_current)
+        bpy.context.view_layer.update()
+
+    def render(self):
+        setup = bpy.context.scene
+        if setup.camera is None:
+            camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
+            camera.location, camera.rotation_euler = (0, -0.6, 1.58), (np.pi / 2, 0, 0)
+            setup.collection.objects.link(camera)
+            setup.camera = camera
+        setup.frame_start = self.random.randint(1, 20)
+        setup.frame_end = setup.frame_start + 1
+        setup.render.filepath = str(self.folder / "frame_")
+        bpy.ops.render.render(animation=self.random.random() < 0.5)
+
+    @staticmethod
+    def _enable():
+        assert addon_utils.enable(scene.MODULE) is not None
+
+    def disable_and_enable(self):
+        addon_utils.disable(scene.MODULE)
+        try:
+            self.slider()
+            self.frame()
+        finally:
+            self._enable()
+        bpy.context.scene.frame_set(bpy.context.scene.frame_current)
+
+    # -- what must hold ---------------------------------------------------------------------
+
+    def check(self):
+        """Every face of the scene against the oracle, and every driver.
+
+        Returns:
+            The largest error, of a mesh's size.
+
+        Raises:
+            WrongFaceError: names what is wrong and by how much.
+        """
+        bad, _ = scene.invalid_drivers()
+        if bad:
+            raise WrongFaceError(f"invalid drivers: {bad[:5]}")
+        rigs = self.rigs()
+        if not rigs:
+            raise WrongFaceError("no character is left")
+        worst = 0.0
+        for rig in rigs:
+            error, where = self._error(rig)
+            worst = max(worst, error)
+            if not error < scene.TOLERANCE:
+                raise WrongFaceError(f"{rig.name}: {where} is off by {error:.3g} of its size")
+        return worst
+
+    def _error(self, rig):
+        """Largest distance to the oracle over the mesh's size, and the mesh's name."""
+        dna, evaluator, _ = self._oracles[rig["risorius_dna"]["risorius_hash"]]
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        bone = rig["risorius_controls"].evaluated_get(depsgraph).pose.bones["face"]
+        labels = scene.submodule("logic.names").unique_labels(dna.raw_control_names)
+        raw = np.array([float(bone[n]) for n in labels], np.float32)
+        lod = int(rig["risorius_lod"])
+        pose = evaluator.evaluate(raw, lod)
+        worst = (0.0, "")
+        place = np.array(rig.matrix_world)
+        for index, item in scene.meshes(rig).items():
+            if lod not in list(item["dna_lods"]) or item.hide_viewport:
+                continue
+            wanted = oracle.vertices(dna, index, pose) @ place[:3, :3].T + place[:3, 3]
+            size = np.ptp(wanted, axis=0).max()
+            error = float(np.abs(scene.evaluated(item) - wanted).max() / size)
+            worst = max(worst, (error, item.name))
+        return worst
+
+    def calm(self):
+        """As many characters as at the start, in a file freshly loaded: for samples."""
+        while len(self.rigs()) > self.characters:
+            self._delete(self.rigs()[-1])
+        while len(self.rigs()) < self.characters:
+            self._import("LIVE")
+        for rig in self.rigs():
+            rig["risorius_controls"].animation_data_clear()
+        bpy.data.batch_remove([c for c in bpy.data.collections if not c.all_objects])
+        self.save_and_load()
+        self.purge()
+        self.save_and_load()
+
+
+# Action -> how often; those that change the file are undo steps.
+WEIGHTS = {
+    "slider": 300, "frame": 130, "key": 60, "undo": 80, "redo": 50, "select": 60, "lod": 50,
+    "shape_mode": 40, "reset": 20, "overdrive": 20, "own_key": 20, "drop_own_key": 20,
+    "rename": 40, "hide": 20, "exclude": 10, "duplicate": 25, "delete": 40, "delete_part": 10,
+    "import_dna": 12, "reload": 12, "append": 12, "override": 12, "separate": 5, "save": 10,
+    "save_and_load": 12, "revert": 5, "purge": 5, "other_scene": 10, "render": 6, "unkey": 15,
+    "disable_and_enable": 10,
+}  # fmt: skip
+NOT_PUSHED = {"undo", "redo", "save", "save_and_load", "revert"}

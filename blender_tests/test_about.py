@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The self-test, the list of what a face is made of, and reactions in every mode."""
+
+import bpy
+import numpy as np
+import pytest
+from support import scene
+
+
+def test_the_self_test_says_that_the_module_works(monkeypatch):
+    about = scene.submodule("ui.about")
+    works, text = about.self_test()
+    assert works
+    assert "works" in text
+    assert "Python 3." in text
+
+    class Wrong:
+        def __init__(self, *_args, **_kwargs):
+            pass
+
+        def evaluate(self, _deltas):
+            return np.zeros((1, 3)), None, None
+
+    monkeypatch.setattr(scene.submodule("native")._risorius, "BoneSpace", Wrong)
+    works, text = about.self_test()
+    assert not works
+    assert "wrong numbers" in text
+
+
+def test_what_a_face_is_made_of(mode, dna_file):
+    rig = scene.load(dna_file, mode)
+    lines = scene.submodule("ui.about").describe(rig)
+    assert "11 controls, 7 joints" in lines[0]
+    head = next(line for line in lines if "Small_head" in line)
+    real = 6 if mode == "KEYS" else 0
+    assert f"168 vertices, 6 channels move it, {real} of them as real keys" in head
+    assert bpy.ops.risorius.describe() == {"FINISHED"}
+
+
+@pytest.mark.parametrize(
+    ("item", "state"),
+    [("controls", "POSE"), ("rig", "POSE"), ("mesh", "WEIGHT_PAINT"), ("other", "EDIT")],
+)
+def test_a_slider_moves_the_face_in_every_mode(mode, dna_file, item, state):
+    rig = scene.load(dna_file, mode)
+    bpy.ops.mesh.primitive_cube_add()
+    chosen = {
+        "controls": scene.controls(rig),
+        "rig": rig,
+        "mesh": scene.meshes(rig)[0],
+        "other": bpy.context.object,
+    }[item]
+    bpy.context.view_layer.objects.active = chosen
+    bpy.ops.object.mode_set(mode=state)
+    scene.set_controls(rig, jawOpen=0.7, mouthCornerPullL=0.3)
+    raw = scene.raw_of(rig, dna_file)
+    assert scene.error_against_oracle(rig, dna_file, raw) < scene.TOLERANCE
+    bpy.ops.object.mode_set(mode="OBJECT")

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The life of the extension's zip: validated, installed, used, disabled, removed.
+
+Each step is a Blender process of its own with one user folder of its own. Programs are asked by
+their own `--command extension`; the bpy module has none, so there it is the operators that the
+preferences call, and the command line that Blender brings along for validation. The tests build
+on each other, in this order.
+"""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import bpy
+import pytest
+from support.faces import small_face
+
+PACKAGE = os.environ.get("RISORIUS_TEST_INSTALLED", "")
+STEPS = Path(__file__).resolve().parent / "support" / "extension_steps.py"
+PROGRAM = bpy.app.binary_path if "bpy" not in Path(bpy.app.binary_path).name else ""
+
+pytestmark = pytest.mark.skipif(not PACKAGE, reason="needs --extension ZIP")
+
+
+@pytest.fixture(scope="module")
+def home(tmp_path_factory):
+    """The user folder of all steps, and a face beside it."""
+    folder = tmp_path_factory.mktemp("user")
+    small_face().save(str(folder.parent / "small.dna"))
+    return folder
+
+
+def _run(home, *command):
+    settings = os.environ | {"BLENDER_USER_RESOURCES": str(home)}
+    settings.pop("PYTHONPATH", None)
+    done = subprocess.run(
+        [str(c) for c in command],
+        env=settings,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "Traceback" not in done.stdout + done.stderr, done.stdout + done.stderr
+    return done.stdout
+
+
+def _step(home, step, *arguments):
+    if PROGRAM:
+        start = [PROGRAM, "-b", "-noaudio", "--python-exit-code", "1", "--python", STEPS]
+    else:
+        start = [sys.executable, STEPS]
+    said = _run(home, *start, "--", step, *arguments)
+    line = next(s for s in said.splitlines() if s.startswith("RESULT "))
+    return json.loads(line.removeprefix("RESULT "))
+
+
+def _command(home, *arguments):
+    return _run(home, PROGRAM, "--command", "extension", *arguments)
+
+
+def _files_of_ours(home):
+    return sorted(
+        str(path.relative_to(home))
+        for path in home.rglob("*")
+        if "risorius" in path.name.lower() and "__pycache__" not in path.parts
+    )
+
+
+NOTHING = {
+    "preferences": [],
+    "handlers": [],
+    "classes": [],
+    "operators": [],
+    "properties": [],
+    "menus": 0,
+}
+
+
+def test_the_package_is_valid(home):
+    if PROGRAM:
+        said = _command(home, "validate", PACKAGE)
+    else:
+        scripts = Path(bpy.utils.system_resource("SCRIPTS"))
+        tool = scripts / "addons_core" / "bl_pkg" / "cli" / "blender_ext.py"
+        said = _run(home, sys.executable, tool, "validate", PACKAGE)
+    assert "Success" in said
+
+
+def test_it_is_installed_and_enabled(home):
+    if PROGRAM:
+        said = _command(home, "install-file", "-r", "user_default", "-e", PACKAGE)
+        assert 'Installed "risorius"' in said
+        assert "risorius" in _command(home, "list")
+    else:
+        assert _step(home, "install", PACKAGE)["preferences"] == ["bl_ext.user_default.risorius"]
+    assert any(name.endswith("user_default/risorius") for name in _files_of_ours(home))
+
+
+def test_it_is_there_in_the_next_process(home):
+    found = _step(home, "use", home.parent / "small.dna")
+    assert found["preferences"] == ["bl_ext.user_default.risorius"]
+    assert found["moved"]
+    assert "frame_change_post" in found["handlers"]
+    assert "import_dna" in found["operators"]
+    assert found["menus"] == 2
+    assert str(home) in found["wheel"]
+
+
+def test_disabled_nothing_of_it_runs_and_the_face_is_kept(home):
+    assert _step(home, "disable") == NOTHING
+    found = _step(home, "look", home.parent / "small.blend")
+    assert found.pop("meshes") == 2
+    assert found == NOTHING
+
+
+def test_removed_nothing_of_it_is_left(home):
+    if PROGRAM:
+        _command(home, "remove", "risorius")
+    else:
+        assert _step(home, "remove") == NOTHING
+    found = _step(home, "look", home.parent / "small.blend")
+    found.pop("meshes")
+    assert found == NOTHING
+    assert _files_of_ours(home) == []

@@ -1,0 +1,276 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hostile files through the front door: a sentence, and the scene and the memory as before."""
+
+import gc
+import hashlib
+import random
+import zlib
+from pathlib import Path
+from types import SimpleNamespace
+
+import bpy
+import pytest
+from support import hostile, scene
+from support.faces import small_face
+
+SEED = 20261121
+QUICK = {"shape_mode": "LIVE", "use_materials": False}
+
+
+def _one_sentence(text, path):
+    """What is said names the file, in one printable sentence."""
+    assert "Traceback" not in text, text
+    assert Path(path).name in text, text
+    assert text.isprintable(), text
+    assert text.endswith("."), text
+    assert ". " not in text, text
+    assert len(text) < 500, text
+
+
+def _take_out():
+    """Remove what was imported."""
+    build, parts = scene.submodule("scene.build"), scene.submodule("scene.parts")
+    for rig in parts.rigs():
+        build.remove(rig)
+
+
+def _offer(path, **options):
+    """Import a file that may be refused; returns whether it was taken, and nothing is left."""
+    before = scene.counts()
+    try:
+        bpy.ops.risorius.import_dna(filepath=str(path), **(options or QUICK))
+        taken = True
+    except RuntimeError as error:
+        _one_sentence(str(error).removeprefix("Error: ").strip(), path)
+        assert scene.counts() == before
+        taken = False
+    _take_out()
+    assert scene.counts() == before
+    assert bpy.context.mode == "OBJECT"
+    return taken
+
+
+def _offer_bytes(folder, name, content, **options):
+    path = folder / f"{name}.dna"
+    path.write_bytes(content)
+    taken = _offer(path, **options)
+    path.unlink()
+    return taken
+
+
+def _resident():
+    """Memory that this process holds, in bytes."""
+    gc.collect()
+    pages = Path("/proc/self/statm").read_text(encoding="ascii").split()[1]
+    return int(pages) * 4096
+
+
+def test_what_the_fuzzers_found(capsys):
+    for path in hostile.found_by_fuzzing():
+        _offer(path)
+    assert "Traceback" not in capsys.readouterr().err
+
+
+def test_files_that_are_broken_on_purpose(tmp_path, capsys):
+    refused = 0
+    for name, content, must_refuse in hostile.broken_on_purpose():
+        taken = _offer_bytes(tmp_path, name, content)
+        assert not (taken and must_refuse), name
+        refused += not taken
+    assert refused > 200
+    assert "Traceback" not in capsys.readouterr().err
+
+
+def _golden(name):
+    return (hostile.DATA / "golden" / f"{name}.dna").read_bytes()
+
+
+@pytest.mark.parametrize("source", ["small face", "face with networks"])
+def test_hundreds_of_mutations_leave_scene_and_memory_as_they_were(source, tmp_path, capsys):
+    whole = small_face().to_bytes() if source == "small face" else _golden("ml")
+    cuts = list(hostile.cut_short(whole, 60))
+    files = cuts + list(hostile.with_flipped_bytes(whole, 250, SEED))
+    random.Random(SEED).shuffle(files)
+    taken, before = 0, 0
+    for number, content in enumerate(files):
+        if number == len(files) // 2:
+            before = _resident()
+        taken += _offer_bytes(tmp_path, f"mutation_{number}", content)
+    grown = _resident() - before
+    with capsys.disabled():
+        print(f"\n{source}, seed {SEED}: {len(files)} files, {taken} taken, {grown // 1024} KB")
+    assert 0 < taken < len(files) - len(cuts)
+    assert grown < 4 << 20
+    assert "Traceback" not in capsys.readouterr().err
+
+
+def test_a_large_file_that_is_refused_again_and_again_costs_no_memory(tmp_path):
+    content = _golden("medium")[:-3000]
+    before = 0
+    for number in range(80):
+        if number == 40:
+            before = _resident()
+        assert not _offer_bytes(tmp_path, f"large_{number}", content)
+    assert _resident() - before < len(content) * 8
+
+
+def test_a_face_that_left_is_not_kept(tmp_path):
+    content = small_face().to_bytes()
+    runtime = scene.submodule("scene.runtime")
+    for number in range(12):
+        path = tmp_path / "left.dna"
+        path.write_bytes(content.replace(b"Small", b"Sma%02d" % number))
+        scene.load(path)
+        _take_out()
+        bpy.context.view_layer.update()
+    assert len(runtime._cache) <= 2
+    assert len(runtime.outputs) <= 20
+
+
+class _Layout:
+    """Stands in for a panel's layout: takes everything, and looks up what would be shown."""
+
+    def __init__(self):
+        self.said = []
+
+    def label(self, text="", **_options):
+        self.said.append(text)
+
+    def prop(self, owner, path, **_options):
+        owner.path_resolve(path)
+
+    def panel(self, *_arguments, **_options):
+        return self, self
+
+    def operator(self, *_arguments, **_options):
+        return SimpleNamespace()
+
+    def __getattr__(self, _name):
+        return lambda *_arguments, **_options: self
+
+
+def _draw_panels():
+    """Draw every panel of the sidebar; returns the words that were shown."""
+    said = []
+    for panel in scene.submodule("ui.panels").CLASSES:
+        if getattr(panel, "poll", lambda _context: True)(bpy.context):
+            layout = _Layout()
+            panel.draw(SimpleNamespace(layout=layout), bpy.context)
+            said += layout.said
+    return " ".join(said)
+
+
+@pytest.mark.parametrize("name", hostile.ODD)
+def test_odd_but_well_formed_files(name, mode, tmp_path, capsys):
+    path = tmp_path / "odd.dna"
+    path.write_bytes(hostile.odd_face(name))
+    before = scene.counts()
+    try:
+        bpy.ops.risorius.import_dna(filepath=str(path), shape_mode=mode, lods=(True,) * 8)
+    except RuntimeError as error:
+        _one_sentence(str(error).removeprefix("Error: ").strip(), path)
+    else:
+        rig = scene.submodule("scene.parts").rigs()[0]
+        bone = scene.face(rig)
+        for label in scene.submodule("scene.runtime").of(rig).labels:
+            bone[label] = 0.7
+        scene.update(scene.controls(rig))
+        for frame in (2, 3):
+            bpy.context.scene.frame_set(frame)
+        _draw_panels()
+        bpy.ops.risorius.set_shape_mode(mode="KEYS" if mode == "LIVE" else "LIVE")
+        bpy.ops.risorius.key()
+        bpy.ops.risorius.reset()
+        for action in list(bpy.data.actions):
+            bpy.data.actions.remove(action)
+        _take_out()
+    assert scene.counts() == before
+    said = capsys.readouterr()
+    assert "Traceback" not in said.err + said.out
+
+
+def _tamper(text, how):
+    packed = text["risorius_bytes"]
+    other = small_face(name="Other")
+    other.meshes = other.meshes[:1]
+    other.mesh_names, other.lod_mesh_mapping = ["head"], [[0], [0]]
+    other.mesh_blend_shape_channel_mapping = []
+    whole = other.to_bytes()
+    values = {
+        "no stream at all": {"risorius_bytes": b"\0\1\2 no stream"},
+        "cut short": {"risorius_bytes": packed[: len(packed) // 2]},
+        "one byte flipped": {
+            "risorius_bytes": packed[:900] + bytes([packed[900] ^ 1]) + packed[901:]
+        },
+        "another hash": {"risorius_hash": "0" * 64},
+        "another file under the old hash": {"risorius_bytes": zlib.compress(whole)},
+        "another file with its hash": {
+            "risorius_bytes": zlib.compress(whole),
+            "risorius_hash": hashlib.sha256(whole).hexdigest(),
+        },
+        "a number for the bytes": {"risorius_bytes": 5},
+        "words for the bytes": {"risorius_bytes": "words"},
+        "a number for the hash": {"risorius_hash": 5},
+    }[how]
+    for name, value in values.items():
+        del text[name]
+        text[name] = value
+
+
+@pytest.mark.parametrize(
+    "how",
+    [
+        "no stream at all",
+        "cut short",
+        "one byte flipped",
+        "another hash",
+        "another file under the old hash",
+        "another file with its hash",
+        "a number for the bytes",
+        "words for the bytes",
+        "a number for the hash",
+        "no text",
+        "words for the text",
+    ],
+)
+def test_a_blend_whose_dna_was_tampered_with(how, dna_file, mode, tmp_path, capsys):
+    rig = scene.load(dna_file, mode)
+    if how == "no text":
+        del rig["risorius_dna"]
+    elif how == "words for the text":
+        del rig["risorius_dna"]
+        rig["risorius_dna"] = "words"
+    else:
+        _tamper(rig["risorius_dna"], how)
+    blend = str(tmp_path / "tampered.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=blend)
+    scene.submodule("scene.runtime").forget()
+    bpy.ops.wm.open_mainfile(filepath=blend)
+    rig = bpy.data.objects["Small_rig"]
+    bpy.context.view_layer.objects.active = rig
+    for frame in (2, 3, 4):
+        bpy.context.scene.frame_set(frame)
+    scene.face(rig)["CTRL_expressions.jawOpen"] = 1.0
+    scene.update(scene.controls(rig))
+    shown = _draw_panels()
+    said = capsys.readouterr()
+    assert "Traceback" not in said.err + said.out
+    if how == "another file with its hash":
+        return  # a face of its own, only not this one
+    assert "has lost its data" in shown
+    if how.startswith(("no text", "words for the text", "a number for the hash")):
+        return
+    lines = [s for s in said.out.splitlines() if "cannot be read" in s]
+    assert len(lines) == 1
+    assert "Small_rig" in lines[0]
+    assert lines[0].endswith(".")
+
+
+def test_a_small_stream_that_unfolds_without_end(dna_file, monkeypatch, capsys):
+    storage = scene.submodule("scene.storage")
+    monkeypatch.setattr(storage, "_MOST_BYTES", 1 << 20)
+    rig = scene.load(dna_file)
+    rig["risorius_dna"]["risorius_bytes"] = zlib.compress(bytes(64 << 20))
+    scene.submodule("scene.runtime").forget()
+    bpy.context.scene.frame_set(2)
+    assert "more than a DNA file can be" in capsys.readouterr().out

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: MIT
+// BoneSpace: poses of a file's joints to what another program keeps on its bones.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "rig/quaternion.h"
+
+namespace risorius::rig {
+
+/// How the numbers of a file become those of another space: v' = scale * axes * v.
+struct SpaceConvention {
+  EulerConvention euler;
+  std::array<float, 9> axes{1, 0, 0, 0, 1, 0, 0, 0, 1};  // rows; orthonormal, may mirror
+  float scale = 1;
+};
+
+/// A bone rests in its joint's neutral pose, so it keeps R(n)^-1 T(dt) R(n + dr) S(1 + ds) of a
+/// pose's deltas, in the other space's axes.
+struct BoneSpace {
+  struct Bone {
+    std::uint32_t joint;
+    std::array<float, 3> neutral_angles;  // in the file's unit
+    Quaternion neutral_inverse;           // in the other space
+    std::array<float, 9> place;           // takes a translation of the file to the bone
+  };
+  SpaceConvention convention;
+  std::uint32_t joint_count = 0;
+  std::vector<Bone> bones;
+};
+
+/// In:  neutral_rotations float32[joint_count, 3], the file's unit; bones: the joint of each,
+///      below joint_count
+BoneSpace make_bone_space(const SpaceConvention& convention, const float* neutral_rotations,
+                          std::uint32_t joint_count, const std::vector<std::uint32_t>& bones);
+
+/// In:  joints   float32[joint_count, 9]: tx ty tz rx ry rz sx sy sz deltas of a Pose, file units
+/// Out: location float32[bones, 3]; rotation float32[bones, 4], unit quaternions w x y z, w >= 0;
+///      scale float32[bones, 3]
+void evaluate_bones(const BoneSpace& space, const float* joints, float* location, float* rotation,
+                    float* scale) noexcept;
+
+}  // namespace risorius::rig
