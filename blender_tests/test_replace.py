@@ -529,6 +529,7 @@ def test_the_mode_and_selection_stay(dna_file, other_file):
     assert bpy.context.view_layer.objects.active == scene.controls(rig)
     assert bpy.context.mode == "POSE"
     assert not rig.data.collections["Joints"].is_visible
+    assert rig.data.collections["Joints"].bones["new_joint"]
 
 
 def test_edit_mode_is_refused(dna_file, other_file):

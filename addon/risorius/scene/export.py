@@ -151,7 +151,7 @@ class _Job:
     def _shape(self, dna_mesh, shape, key, difference):
         """Only the edited vertices' deltas are written."""
         vertices = np.flatnonzero(np.any(difference != 0, axis=1))
-        base = shape.points if shape.relative[key] == key else shape.keys[shape.relative[key]]
+        base = shape.keys[shape.relative[key]]
         delta = shape.keys[key][vertices].astype(np.float64) - base[vertices]
         totals = self._space.file_points(delta).astype(np.float32)
         channel = shape.channels[key]

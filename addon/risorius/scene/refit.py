@@ -61,7 +61,7 @@ def replace_meshes(change, fresh_meshes):
         if item.data not in done:
             _refit(change, item, old, new, fresh_meshes[there])
             done.append(item.data)
-        _relabel(change, item, new)
+        _relabel(item, new)
         kept.add(there)
     return kept
 
@@ -76,7 +76,7 @@ def _objects(rig):
     ]
 
 
-def _relabel(change, item, new):
+def _relabel(item, new):
     item[parts.MESH] = new.index
     if list(item.get(parts.LODS, [])) != list(new.lods):
         item[parts.LODS] = list(new.lods)
@@ -273,7 +273,7 @@ def _masks(item):
 
 
 def _refit_corners(change, item, old, new, fresh):
-    """UVs, normals and what materials read, where the files differ."""
+    """UVs, normals and the materials' attributes, where the files differ."""
     mesh = item.data
     layer = mesh.uv_layers.get("UVMap")
     if new.uvs is not None and not _equal(old.uvs, new.uvs):
@@ -286,7 +286,7 @@ def _refit_corners(change, item, old, new, fresh):
         else:
             change.report.append(f"{item.name} keeps your UV map; the file has another now.")
     if not _equal(old.positions, new.positions):
-        _copy_ours(mesh, fresh.data)
+        _copy_attributes(mesh, fresh.data)
     if _equal(old.normals, new.normals) and _equal(old.positions, new.positions):
         return
     if mesh.has_custom_normals and new.normals is not None:
@@ -297,9 +297,9 @@ def _equal(a, b):
     return (a is None and b is None) or (a is not None and b is not None and np.array_equal(a, b))
 
 
-def _copy_ours(mesh, source):
+def _copy_attributes(mesh, source):
     """The attributes that our materials read."""
-    for theirs in [a for a in source.attributes if a.name.startswith(carry.OURS)]:
+    for theirs in [a for a in source.attributes if a.name.startswith(carry.OUR_PREFIX)]:
         kind = (theirs.name, theirs.data_type, theirs.domain)
         ours = mesh.attributes.get(theirs.name) or mesh.attributes.new(*kind)
         flat = np.empty(len(theirs.data) * 3, np.float32)

@@ -124,6 +124,7 @@ def _exchange(context, change, fresh):
         _adopt(change, fresh, fresh_meshes[index])
     refit.finish_shapes(change)
     _number_meshes(rig)
+    lods.show(rig)
     _controls(context, change)
     build.remove(fresh)
     lods.show(rig)
@@ -157,7 +158,7 @@ def _take_properties(change, fresh):
     rig, controls = change.rig, parts.controls_of(change.rig)
     text, former = fresh[parts.DNA], rig[parts.DNA]
     label = former.name
-    rig[parts.DNA] = text
+    parts.point(rig, parts.DNA, text)
     rig[parts.SOURCE] = fresh[parts.SOURCE]
     if not any(r.get(parts.DNA) == former for r in parts.rigs()):
         bpy.data.texts.remove(former)
@@ -170,8 +171,11 @@ def _take_properties(change, fresh):
             rig[name] = [0.0] * len(fresh[name])
         rig.property_overridable_library_set(f'["{name}"]', True)
     levels = sorted({lod for mesh in change.new.meshes for lod in mesh.lods})
-    if rig.get(parts.LOD, 0) not in levels:
-        rig[parts.LOD] = levels[0]
+    for key in (parts.LOD, parts.LOD_RENDER):
+        if rig.get(key, lods.SAME) not in (*levels, lods.SAME):
+            rig[key] = levels[0]
+    # Bones, channels and maps have other numbers now: nothing that was written before counts.
+    runtime.forget_outputs()
     for key in change.old.origin:
         controls.data.pop(names.cut(f"dna_{key}"), None)
     for key, value in change.new.origin.items():
@@ -188,8 +192,8 @@ def _adopt(change, fresh, item):
         return
     for key in [k for k in fresh.keys() if fresh[k] == item]:  # noqa: SIM118  no dict
         del fresh[key]
-    item[parts.RIG] = rig
-    rig[f"{parts.MESH_PREFIX}new{item[parts.MESH]:03d}"] = item
+    parts.point(item, parts.RIG, rig)
+    parts.point(rig, f"{parts.MESH_PREFIX}new{item[parts.MESH]:03d}", item)
     item.parent = rig
     for modifier in item.modifiers:
         if modifier.type == "ARMATURE":
@@ -225,7 +229,7 @@ def _number_meshes(rig):
     for key in [k for k in rig.keys() if k.startswith(parts.MESH_PREFIX)]:  # noqa: SIM118
         del rig[key]
     for number, item in enumerate(there):
-        rig[f"{parts.MESH_PREFIX}{number:03d}"] = item
+        parts.point(rig, f"{parts.MESH_PREFIX}{number:03d}", item)
 
 
 def _controls(context, change):

@@ -84,8 +84,8 @@ def _draw_detail(layout, rig):
     column = layout.column(align=True)
     auto = lods.by_distance(rig)
     for target, text, shown in (
-        ("VIEWPORT", "Viewport", lods.viewport_level(rig)),
-        ("RENDER", "Render", lods.render_level(rig)),
+        ("VIEWPORT", "LOD, Viewport", lods.viewport_level(rig)),
+        ("RENDER", "LOD, Render", lods.render_level(rig)),
     ):
         row = column.row(align=True)
         row.active = not auto
@@ -97,7 +97,7 @@ def _draw_detail(layout, rig):
     if auto:
         for level in range(min(len(rig[parts.LOD_DISTANCES]), levels[-1])):
             column.prop(
-                rig, f'["{parts.LOD_DISTANCES}"]', index=level, text=f"{level} to {level + 1} at"
+                rig, f'["{parts.LOD_DISTANCES}"]', index=level, text=f"LOD {level + 1} from"
             )
 
 
