@@ -29,7 +29,8 @@ run() { # run NAME KEY COMMAND...: the tests in one Blender, with a user folder 
   shift 2
   rm -f "$logs/$key.xml"
   user=$(mktemp -d)
-  BLENDER_USER_RESOURCES="$user" timeout -s KILL 1800 "$@" --extension "$zip" \
+  # Freed memory is filled, so that what reads it dies here and not only now and then.
+  MALLOC_PERTURB_=165 BLENDER_USER_RESOURCES="$user" timeout -s KILL 1800 "$@" --extension "$zip" \
     --junitxml "$logs/$key.xml" "${arguments[@]}" > "$logs/$key.log" 2>&1
   local code=$?
   rm -rf "$user"
