@@ -109,7 +109,7 @@ def counts():
     return {
         p.identifier: len(getattr(bpy.data, p.identifier))
         for p in bpy.data.bl_rna.properties
-        if p.type == "COLLECTION"
+        if p.type == "COLLECTION" and p.identifier != "all_ids"  # since 5.2, all others together
     }
 
 

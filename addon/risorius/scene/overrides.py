@@ -130,6 +130,7 @@ def _localize(item, owned):
     Without the mesh they would stand outside the override's hierarchy, and Blender would delete
     them when the library changes. Args: owned  override material's name -> copy, filled here.
     """
+    left = [item.data, *item.data.materials]
     item.data = _local_copy(item.data)
     for index, material in enumerate(item.data.materials):
         if material is None or material.override_library is None:
@@ -137,6 +138,10 @@ def _localize(item, owned):
         if material.name not in owned:
             owned[material.name] = _local_copy(material)
         item.data.materials[index] = owned[material.name]
+    # 5.2 calls overrides that are saved without their hierarchy an error when the file is opened.
+    for old in dict.fromkeys(left):
+        if old is not None and old.override_library is not None and old.users == 0:
+            bpy.data.batch_remove([old])
 
 
 def _local_copy(item):
