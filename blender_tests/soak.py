@@ -228,17 +228,16 @@ class Run:
         self.errors.append(f"action {number} ({kind}): {text}")
 
     def sample(self, number):
-        """Memory and datablocks in a freshly loaded file."""
-        from support import scene
-
+        """Memory of a freshly loaded file, and datablocks that no character needs."""
         self.world.random = random.Random(f"{self.options.seed} calm {number}")
         self.world.calm()
-        counts = scene.counts()
+        counts = self.world.leftovers()
         self.samples["at action"].append(number)
         self.samples["memory in MiB"].append(round(memory(), 1))
         kinds = ("objects", "meshes", "materials", "texts", "actions", "armatures", "collections")
         for name in kinds:
-            self.samples[name].append(counts[name])
+            self.samples[f"{name} left"].append(counts[name])
+        self.samples["all left"].append(sum(counts.values()))
 
     def judge(self):
         """Sentences on growth; too much of it is an error."""
