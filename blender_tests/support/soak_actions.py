@@ -183,9 +183,12 @@ class World:
         layer = bpy.context.view_layer
         for item in layer.objects:
             item.select_set(False)
-        for item in self._objects(self._rig()):
-            item.hide_set(False)
+        objects = self._objects(self._rig())
+        for item in objects:
             item.hide_viewport = False
+        layer.update()  # what was hidden until now cannot be selected before
+        for item in objects:
+            item.hide_set(False)
             item.select_set(True)
         bpy.ops.object.duplicate(linked=self.random.random() < 0.3)
         layer.update()
@@ -200,10 +203,15 @@ class World:
     def _delete(self, rig):
         """As a user does, or with its data at once, or the whole collection."""
         objects = self._objects(rig)
+        controls = rig["risorius_controls"]
+        if any(r != rig and r["risorius_controls"] == controls for r in self.rigs()):
+            objects.remove(controls)
         if rig.override_library:
             # Blender makes objects anew that an override's collection has lost.
             root = rig.override_library.hierarchy_root
-            bpy.data.batch_remove([*objects, root] if root not in objects else objects)
+            # A copy of an override has the same root, and stands outside of it.
+            whole = isinstance(root, bpy.types.Collection) and rig in root.all_objects[:]
+            bpy.data.batch_remove([*objects, root] if whole else objects)
         elif self.random.random() < 0.5:
             with bpy.context.temp_override(selected_objects=objects, active_object=rig):
                 bpy.ops.object.delete()
