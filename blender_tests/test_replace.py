@@ -292,6 +292,8 @@ def test_an_edited_key_of_a_channel_that_is_gone_becomes_the_users(mode, dna_fil
     block = _keys(rig)["pull_l"]
     np.testing.assert_array_equal(_points(block), held)
     assert block.value == 0.0
+    drivers = scene.meshes(rig)[0].data.shape_keys.animation_data.drivers
+    assert 'key_blocks["pull_l"].value' not in [c.data_path for c in drivers]
     assert "your edited key stays" in _report()
     assert "jaw" in _keys(rig) or mode == "LIVE"
     _right(rig, path)
@@ -325,6 +327,7 @@ def test_renamed_bones_stay_renamed(mode, dna_file, other_file):
     assert "kiefer" in rig.data.bones
     assert "FACIAL_C_Jaw" not in rig.data.bones
     assert rig.data.bones["kiefer"]["dna_joint"] == 6
+    assert "keeps your weights" not in _report()
     _right(rig, other_file)
 
 
@@ -396,6 +399,60 @@ def test_renamed_keys_keep_their_channel(dna_file, other_file):
     assert "mein" in _keys(rig)
     assert "pull_r" not in _keys(rig)
     _right(rig, other_file)
+
+
+def test_names_given_to_keys_outlast_live_mode_and_another_file(dna_file, other_file):
+    rig = scene.load(dna_file, "KEYS")
+    _keys(rig)["pull_r"].name = "mein"
+    bpy.ops.risorius.set_shape_mode(mode="LIVE")
+    _replace(other_file)
+    assert [b.name for b in _keys(rig)] == ["Basis", "<channel sum>"]
+    bpy.ops.risorius.set_shape_mode(mode="KEYS")
+    assert "mein" in _keys(rig)
+    assert "pull_r" not in _keys(rig)
+    _right(rig, other_file)
+
+
+def _duplicate(rig, linked):
+    for item in (rig, scene.controls(rig), *scene.meshes(rig).values()):
+        item.select_set(True)
+    bpy.ops.object.duplicate(linked=linked)
+    bpy.context.view_layer.update()
+    return next(o for o in bpy.context.selected_objects if "risorius_controls" in o)
+
+
+@pytest.mark.parametrize("linked", [False, True])
+def test_only_one_of_two_copies_is_replaced(mode, dna_file, other_file, linked):
+    rig = scene.load(dna_file, mode)
+    copy = _duplicate(rig, linked)
+    bpy.context.view_layer.objects.active = scene.controls(copy)
+    _replace(other_file)
+    _right(copy, other_file)
+    _right(rig, dna_file)
+
+
+def test_a_file_without_the_level_that_was_built(mode, dna_file, tmp_path):
+    rig = scene.load(dna_file, mode, lods=(False, True) + (False,) * 6)
+    dna = small_face()
+    dna.lod_mesh_mapping = [[0, 1], []]
+    path = _save(dna, tmp_path)
+    _replace(path)
+    assert sorted(scene.meshes(rig)) == [0, 1]
+    assert not any(m.hide_render for m in scene.meshes(rig).values())
+    _right(rig, path)
+
+
+def test_a_failure_while_building_changes_nothing(mode, dna_file, other_file, monkeypatch):
+    rig = scene.load(dna_file, mode)
+    before = _whole(rig)
+
+    def fail(*_arguments):
+        raise MemoryError("planted")
+
+    monkeypatch.setattr(scene.submodule("scene.meshes"), "set_mode", fail)
+    with pytest.raises(RuntimeError, match="planted"):
+        bpy.ops.risorius.replace_dna(filepath=str(other_file))
+    assert _whole(rig) == before
 
 
 @pytest.mark.parametrize(

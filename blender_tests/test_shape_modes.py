@@ -101,6 +101,20 @@ def test_muted_keys_stay_muted(dna_file):
     assert _keys(rig)["jaw"].mute
 
 
+def test_an_edit_that_is_taken_back_is_summed_again(dna_file):
+    rig = scene.load(dna_file, "KEYS")
+    was = _keys(rig)["jaw"].points[5].co.x
+    _keys(rig)["jaw"].points[5].co.x += 0.01
+    _switch("LIVE")
+    assert "jaw" in _keys(rig)
+    _keys(rig)["jaw"].points[5].co.x = was
+    _switch("LIVE")
+    assert "jaw" not in _keys(rig)
+    scene.set_controls(rig, jawOpen=0.6)
+    raw = scene.raw_of(rig, dna_file)
+    assert scene.error_against_oracle(rig, dna_file, raw) < scene.TOLERANCE
+
+
 def test_the_order_of_keys_returns(dna_file):
     rig = scene.load(dna_file, "KEYS")
     head = _head(rig)

@@ -116,6 +116,7 @@ def _exchange(context, change, fresh):
     fresh_meshes = {m[parts.MESH]: m for m in parts.meshes_of(fresh)}
     kept = refit.replace_meshes(change, fresh_meshes)
     _take_properties(change, fresh)
+    _sliders(change)
     entries = drivers.Entries(rig, _array_labels(change))
     build.settle(context, rig, parts.controls_of(rig))
     entries.move()
@@ -125,7 +126,7 @@ def _exchange(context, change, fresh):
     refit.finish_shapes(change)
     _number_meshes(rig)
     lods.show(rig)
-    _controls(context, change)
+    bones.replace_control_places(context, change)
     build.remove(fresh)
     runtime.forget_outputs()
     for item in (rig, parts.controls_of(rig), *parts.meshes_of(rig)):
@@ -231,7 +232,7 @@ def _number_meshes(rig):
         parts.point(rig, f"{parts.MESH_PREFIX}{number:03d}", item)
 
 
-def _controls(context, change):
+def _sliders(change):
     """Sliders of the new file; those that are gone leave, unless something is keyed on them."""
     controls = parts.controls_of(change.rig)
     face = controls.pose.bones[parts.FACE]
@@ -259,7 +260,6 @@ def _controls(context, change):
         else:
             del face[label]
             change.report.append(f"The control {label} is gone.")
-    bones.replace_control_places(context, change)
 
 
 def _keep_report(change):
