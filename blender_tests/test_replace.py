@@ -215,6 +215,7 @@ def test_a_face_with_other_topology(mode, dna_file, tmp_path):
     pointer, key = head.data.as_pointer(), head.data.shape_keys.as_pointer()
     curve = head.data.shape_keys.driver_add('key_blocks["own"].value')
     curve.driver.expression = "0.5"
+    head.data.uv_layers.active = head.data.uv_layers["second"]
     spot = np.array(head.data.vertices[11].co)
     pinned = np.array(head.data.vertices[20].co)
     _replace(path)
@@ -222,6 +223,7 @@ def test_a_face_with_other_topology(mode, dna_file, tmp_path):
     assert (head.data.as_pointer(), head.data.shape_keys.as_pointer()) == (pointer, key)
     assert len(head.data.vertices) == 19 * 21
     keys = head.data.shape_keys.key_blocks
+    assert head.data.uv_layers.active.name == "second"
     moved = np.linalg.norm(_points(keys["own"]) - _points(keys["Basis"]), axis=1)
     place = _points(keys["Basis"])[np.argmax(moved)]
     assert 0.01 < moved.max() <= 0.0201
@@ -345,6 +347,30 @@ def test_own_bones_follow_their_joints(dna_file, other_file):
     assert rig.data.bones["tail"].parent.name == "user_joint"
     after = rig.data.bones["head"].matrix_local.inverted() @ rig.data.bones["horn"].matrix_local
     np.testing.assert_allclose(np.array(after), np.array(before), atol=2e-6)
+
+
+def test_joints_that_the_new_file_does_not_move_go_back_to_rest(dna_file, tmp_path):
+    dna = small_face()
+    dna.joint_groups = dna.joint_groups[:1]  # the eye's group is gone
+    path = _save(dna, tmp_path)
+    rig = scene.load(dna_file)
+    scene.set_controls(rig, eyeLookUpL=1.0, jawOpen=0.5)
+    bone = rig.pose.bones["FACIAL_L_Eye"]
+    assert bone.rotation_quaternion.angle > 0.1
+    _replace(path)
+    assert bone.rotation_quaternion.angle == 0.0
+    _right(rig, path)
+
+
+def test_a_control_that_is_gone_but_drives_something_stays(dna_file, other_file):
+    rig = scene.load(dna_file)
+    lamp = bpy.data.objects.new("lamp", bpy.data.lights.new("lamp", "POINT"))
+    bpy.context.scene.collection.objects.link(lamp)
+    variable = lamp.driver_add("location", 0).driver.variables.new()
+    variable.targets[0].id = scene.controls(rig)
+    variable.targets[0].data_path = f'pose.bones["face"]["{PREFIX}browDownL"]'
+    _replace(other_file)
+    assert f"{PREFIX}browDownL" in scene.face(rig)
 
 
 def test_an_edited_joint_stays_edited(dna_file, other_file):
@@ -487,7 +513,9 @@ def test_levels_of_detail(mode, dna_file, tmp_path):
     path = _save(dna, tmp_path)
     _replace(path)
     assert sorted(scene.meshes(rig)) == [0, 1, 2]
-    assert scene.meshes(rig)[1].name == "Small_tongue_lod0_mesh"
+    tongue = scene.meshes(rig)[1]
+    assert tongue.name == "Small_tongue_lod0_mesh"
+    assert (tongue.parent, tongue.modifiers[0].object, tongue["risorius_rig"]) == (rig,) * 3
     assert scene.meshes(rig)[1].users_collection == scene.meshes(rig)[0].users_collection
     assert "teeth_lod0_mesh" not in "".join(o.name for o in bpy.data.objects)
     assert "The mesh Small_teeth_lod0_mesh is gone." in _report()
