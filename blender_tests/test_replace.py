@@ -664,3 +664,31 @@ def test_two_faces_of_one_file_stay_two(mode, dna_file, other_file):
     np.testing.assert_array_equal(scene.snapshot(second), still)
     _right(first, other_file)
     _right(second, dna_file)
+
+
+def test_maps_of_materials_follow_names(tmp_path):
+    first = small_face()
+    first.animated_map_names = ["browsRaiseInnerL", "head_cm1_color_smile"]
+    second = renumbered(small_face(), maps=[1, "new_map", 0])
+    second.animated_map_names = ["head_cm1_color_smile", "new_map", "browsRaiseInnerL"]
+    rig = scene.load(_save(first, tmp_path, "first.dna"))
+    material = scene.meshes(rig)[0].data.materials[0]
+
+    def entries():
+        tree = material.node_tree
+        return {
+            tree.path_resolve(c.data_path.split(".")[0]).label: c.driver.variables[0]
+            .targets[0]
+            .data_path
+            for c in tree.animation_data.drivers
+        }
+
+    before = entries()
+    assert before
+    path = _save(second, tmp_path)
+    _replace(path)
+    assert scene.meshes(rig)[0].data.materials[0] == material
+    names = second.animated_map_names
+    assert entries() == {label: f'["maps"][{list(names).index(label)}]' for label in before}
+    assert entries() != before
+    _right(rig, path)
