@@ -56,3 +56,23 @@ def test_a_slider_moves_the_face_in_every_mode(mode, dna_file, item, state):
     raw = scene.raw_of(rig, dna_file)
     assert scene.error_against_oracle(rig, dna_file, raw) < scene.TOLERANCE
     bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def test_the_overlay_tells_the_stages_of_the_last_frames(dna_file):
+    timing = scene.submodule("scene.timing")
+    rigs = [scene.load(dna_file), scene.load(dna_file)]
+    timing.frames.clear()
+    timing.begin()
+    assert timing.lines() == ["Risorius: no frame yet"]
+    for rig in rigs:
+        face = scene.face(rig)
+        for frame, value in ((1, 0.0), (9, 1.0)):
+            face["CTRL_expressions.jawOpen"] = value
+            face.keyframe_insert('["CTRL_expressions.jawOpen"]', frame=frame)
+    for frame in range(2, 8):
+        bpy.context.scene.frame_set(frame)
+    lines = timing.lines()
+    assert lines[0].startswith("Risorius, faces: 2")
+    assert [line.split()[0] for line in lines[2:6]] == ["controls", "rig", "bones", "shapes"]
+    assert all(float(line.split()[1]) > 0 for line in lines[2:6])
+    assert bpy.context.window_manager.risorius_show_timing is False

@@ -184,6 +184,7 @@ def _still_decorated(rig):
     assert bone.location.x == pytest.approx(0.01)
     assert rig.pose.bones["head"]["note"] == 7
     assert scene.controls(rig).location.x == 2.0
+    assert rig.location.x == 2.0
     assert scene.meshes(rig)[1].hide_render
     return head
 
@@ -612,6 +613,7 @@ def test_the_mode_and_selection_stay(dna_file, other_file):
     _replace(other_file)
     assert bpy.context.view_layer.objects.active == scene.controls(rig)
     assert bpy.context.mode == "POSE"
+    assert not rig.data.collections["Joints"].is_visible
     assert rig.data.collections["Joints"].bones["new_joint"]
 
 

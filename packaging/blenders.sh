@@ -51,7 +51,7 @@ install_blender() { # install_blender SUITE ROOT
     apt-get -o Acquire::Check-Valid-Until=false update -qq
     apt-get install -y -qq --no-install-recommends blender python3-dev python3-numpy $more \
       python3-venv python3-pip python3-pytest g++ cmake ninja-build nlohmann-json3-dev \
-      ca-certificates xvfb imagemagick libgl1-mesa-dri"
+      ca-certificates xvfb imagemagick libgl1-mesa-dri libegl1 libegl-mesa0"
 }
 
 build_wheel_in() { # build_wheel_in ROOT: its build tools are plain Python, fetched where pip is set up

@@ -42,8 +42,8 @@ def register():
     for cls in CLASSES:
         bpy.utils.register_class(cls)
     bpy.types.WindowManager.risorius_search = _search_property()
-    bpy.types.WindowManager.risorius_test = shape_test.weight_property()
     bpy.types.WindowManager.risorius_show_timing = overlay.show_property()
+    bpy.types.WindowManager.risorius_test = shape_test.weight_property()
     bpy.types.TOPBAR_MT_file_import.append(import_operators.draw_import)
     bpy.types.TOPBAR_MT_file_export.append(file_operators.draw_export)
     bpy.types.VIEW3D_MT_add.append(import_operators.draw_add)

@@ -147,7 +147,8 @@ class World:
         rig = self._rig()
         controls = rig["risorius_controls"]
         mesh = self.random.choice(list(scene.meshes(rig).values()))
-        held = [rig, controls, mesh, *rig.users_collection, rig["risorius_dna"]]
+        homes = [c for c in bpy.data.collections if rig in c.objects[:]]
+        held = [rig, controls, mesh, *homes, rig["risorius_dna"]]
         held += [m for m in mesh.data.materials if m]
         for bones in (rig.data.bones, controls.data.bones):
             if rig.data.library is None:
@@ -199,7 +200,11 @@ class World:
     def _delete(self, rig):
         """As a user does, or with its data at once, or the whole collection."""
         objects = self._objects(rig)
-        if self.random.random() < 0.5:
+        if rig.override_library:
+            # Blender makes objects anew that an override's collection has lost.
+            root = rig.override_library.hierarchy_root
+            bpy.data.batch_remove([*objects, root] if root not in objects else objects)
+        elif self.random.random() < 0.5:
             with bpy.context.temp_override(selected_objects=objects, active_object=rig):
                 bpy.ops.object.delete()
         else:

@@ -96,6 +96,15 @@ def _concerned(rig, armatures, camera_moved):
 
 
 @persistent
+def _loaded(*_arguments):
+    """After load: Blender calls no update handler when it evaluates a file for the first time."""
+    layer = bpy.context.view_layer
+    if layer is not None and not native.problem() and parts.rigs():
+        layer.update()
+    _restored()
+
+
+@persistent
 def _restored(*_arguments):
     """After load, undo and redo: what was written before says nothing about what is there."""
     runtime.forget_outputs()
@@ -141,7 +150,7 @@ _HANDLERS = (
     ("frame_change_pre", _frame_changes),
     ("frame_change_post", _frame_changed),
     ("depsgraph_update_post", _updated),
-    ("load_post", _restored),
+    ("load_post", _loaded),
     ("undo_post", _restored),
     ("redo_post", _restored),
     ("save_pre", _before_save),

@@ -173,4 +173,6 @@ def _is_dead(rig):
     used = bpy.data.user_map(subset=held)
     owners = {u.as_pointer(): u for users in used.values() for u in users}
     strangers = [u for p, u in owners.items() if p not in ours]
-    return all(isinstance(u, (bpy.types.Material, bpy.types.Key)) for u in strangers)
+    # Scenes: not by a collection, which was looked at above.
+    lesser = (bpy.types.Material, bpy.types.Key, bpy.types.Scene)
+    return all(isinstance(u, lesser) for u in strangers)

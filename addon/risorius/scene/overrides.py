@@ -189,10 +189,8 @@ def _take_place(shown, rig, collection):
 
 
 def _show(context, rig):
-    """Select the controls and hide the deforming bones, as after an import."""
+    """Select the controls, as after an import."""
     layer, controls = context.view_layer, parts.controls_of(rig)
-    if rig.name in layer.objects:
-        rig.hide_set(True, view_layer=layer)
     for item in layer.objects:
         item.select_set(False, view_layer=layer)
     if controls is not None and controls.name in layer.objects:

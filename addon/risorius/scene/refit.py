@@ -301,11 +301,10 @@ def _equal(a, b):
 
 
 def _copy_attributes(mesh, source):
-    """What materials read of the places of a face's parts."""
-    for theirs in source.attributes:
-        ours = mesh.attributes.get(theirs.name)
-        if ours is None or not theirs.name.startswith(carry.OUR_PREFIX):
-            continue
+    """The attributes that our materials read."""
+    for theirs in [a for a in source.attributes if a.name.startswith(carry.OUR_PREFIX)]:
+        kind = (theirs.name, theirs.data_type, theirs.domain)
+        ours = mesh.attributes.get(theirs.name) or mesh.attributes.new(*kind)
         flat = np.empty(len(theirs.data) * 3, np.float32)
         theirs.data.foreach_get("vector", flat)
         ours.data.foreach_set("vector", flat)

@@ -128,6 +128,7 @@ def _exchange(context, change, fresh):
     lods.show(rig)
     bones.replace_control_places(context, change)
     build.remove(fresh)
+    lods.show(rig)
     runtime.forget_outputs()
     for item in (rig, parts.controls_of(rig), *parts.meshes_of(rig)):
         item.update_tag()

@@ -72,7 +72,7 @@ def lines():
     apart = [b.begin - a.begin for a, b in pairwise(seen)]
     rate = f"   {1 / median(apart):.0f} fps" if apart and median(apart) > 0 else ""
     return [
-        f"Risorius, {seen[-1].characters} characters{rate}",
+        f"Risorius, faces: {seen[-1].characters}{rate}",
         f"Blender: curves, strips, drivers  {median(f.animation for f in seen):.2f} ms",
         *(f"{stage}  {ms:.2f} ms" for stage, ms in middle.items()),
         f"Blender: bones, skin, shapes  {median(f.deform for f in seen):.2f} ms",

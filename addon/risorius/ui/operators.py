@@ -16,6 +16,9 @@ def has_face(cls, context):
     if rig is None or parts.controls_of(rig) is None:
         cls.poll_message_set("Select a face first.")
         return False
+    if runtime.of(rig) is None:
+        cls.poll_message_set("This face has lost the text that holds its DNA.")
+        return False
     return True
 
 

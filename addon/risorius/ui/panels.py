@@ -84,8 +84,8 @@ def _draw_detail(layout, rig):
     column = layout.column(align=True)
     auto = lods.by_distance(rig)
     for target, text, shown in (
-        ("VIEWPORT", "Viewport", lods.viewport_level(rig)),
-        ("RENDER", "Render", lods.render_level(rig)),
+        ("VIEWPORT", "LOD, Viewport", lods.viewport_level(rig)),
+        ("RENDER", "LOD, Render", lods.render_level(rig)),
     ):
         row = column.row(align=True)
         row.active = not auto
@@ -97,7 +97,7 @@ def _draw_detail(layout, rig):
     if auto:
         for level in range(min(len(rig[parts.LOD_DISTANCES]), levels[-1])):
             column.prop(
-                rig, f'["{parts.LOD_DISTANCES}"]', index=level, text=f"{level} to {level + 1} at"
+                rig, f'["{parts.LOD_DISTANCES}"]', index=level, text=f"LOD {level + 1} from"
             )
 
 
@@ -189,13 +189,13 @@ class RISORIUS_PT_options(_FacePanel, bpy.types.Panel):
         layout.operator(body, icon="ARMATURE_DATA")
         layout.operator("risorius.separate", icon="UNLINKED")
         layout.operator("risorius.reload", icon="FILE_REFRESH")
-        layout.operator("risorius.replace_dna", icon="FILEBROWSER")
-        layout.operator("risorius.export_dna", icon="EXPORT")
         layout.operator("risorius.describe", icon="INFO")
         layout.prop(context.window_manager, "risorius_show_timing")
         render = context.scene.render
         if not render.use_lock_interface:
             layout.prop(render, "use_lock_interface", text="Lock Interface in Renders")
+        layout.operator("risorius.replace_dna", icon="FILEBROWSER")
+        layout.operator("risorius.export_dna", icon="EXPORT")
         live = runtime.of(rig)
         if live is not None:
             column = layout.column(align=True)

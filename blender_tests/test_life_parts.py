@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Parts that were deleted: nothing is raised, the panel says what is missing, undo mends it."""
+
+import bpy
+import numpy as np
+import pytest
+from support import scene
+from support.layout import Recorder
+
+
+@pytest.fixture
+def rig(dna_file, mode):
+    """A posed character with an undo step behind it."""
+    bpy.context.preferences.edit.use_global_undo = True
+    made = scene.load(dna_file, mode)
+    scene.set_controls(made, jawOpen=0.8, mouthCornerPullL=0.5)
+    bpy.ops.ed.undo_push(message="whole")
+    return made
+
+
+def _said(active):
+    bpy.context.view_layer.objects.active = active
+    layout = Recorder()
+    panels = scene.submodule("ui.panels")
+    for panel in (panels.RISORIUS_PT_character, panels.RISORIUS_PT_controls):
+        if not hasattr(panel, "poll") or panel.poll(bpy.context):
+            panel.draw(_Drawn(layout), bpy.context)
+    return layout.text()
+
+
+class _Drawn:
+    def __init__(self, layout):
+        self.layout = layout
+
+
+def _use(active):
+    """Everything that runs by itself, and every operator that offers itself."""
+    bpy.context.view_layer.update()
+    for frame in (2, 3):
+        bpy.context.scene.frame_set(frame)
+    bpy.context.view_layer.objects.active = active
+    operators = scene.submodule("ui.operators").CLASSES
+    for cls in operators:
+        group, name = cls.bl_idname.split(".")
+        operator = getattr(getattr(bpy.ops, group), name)
+        if operator.poll():
+            operator()
+    bpy.context.scene.frame_set(1)
+
+
+def _rig():
+    return next(o for o in bpy.data.objects if o.get("risorius_controls"))
+
+
+def _right(dna_file):
+    rig = _rig()
+    scene.set_controls(rig, jawOpen=0.4)
+    raw = scene.raw_of(rig, dna_file)
+    assert scene.error_against_oracle(rig, dna_file, raw) < scene.TOLERANCE
+    assert not scene.invalid_drivers()[0]
+
+
+def test_without_its_controls(rig, dna_file):
+    bpy.data.objects.remove(scene.controls(rig))
+    _use(rig)
+    mesh = next(o for o in bpy.data.objects if "dna_mesh" in o)
+    assert "control armature was deleted" in _said(mesh)
+    bpy.ops.ed.undo_push(message="ruin")
+    bpy.ops.ed.undo()
+    _right(dna_file)
+
+
+def test_without_its_rig(rig, dna_file):
+    controls = scene.controls(rig)
+    bpy.data.objects.remove(rig)
+    _use(controls)
+    assert "deforming armature of this face was deleted" in _said(controls)
+    bpy.ops.ed.undo_push(message="ruin")
+    bpy.ops.ed.undo()
+    _right(dna_file)
+
+
+def test_without_a_mesh(rig, dna_file):
+    controls = scene.controls(rig)
+    bpy.data.objects.remove(scene.meshes(rig)[1])
+    _use(controls)
+    assert "1 of the meshes were deleted" in _said(controls)
+    bpy.ops.ed.undo_push(message="ruin")
+    bpy.ops.ed.undo()
+    _right(dna_file)
+
+
+def test_without_its_text(rig, dna_file):
+    controls = scene.controls(rig)
+    before = scene.snapshot(rig)
+    bpy.data.texts.remove(rig["risorius_dna"])
+    _use(controls)
+    assert "text that holds the DNA was deleted" in _said(controls)
+    np.testing.assert_array_equal(scene.snapshot(rig), before)
+    bpy.ops.ed.undo_push(message="ruin")
+    bpy.ops.ed.undo()
+    _right(dna_file)
+
+
+def test_without_its_live_key(dna_file):
+    rig = scene.load(dna_file, "LIVE")
+    item = scene.meshes(rig)[0]
+    item.shape_key_remove(item.data.shape_keys.key_blocks["<channel sum>"])
+    assert "has lost its key" in _said(scene.controls(rig))
+    assert bpy.ops.risorius.set_shape_mode(mode="LIVE") == {"FINISHED"}
+    assert "has lost its key" not in _said(scene.controls(rig))
+    _right(dna_file)
+
+
+def _delete(objects):
+    with bpy.context.temp_override(selected_objects=objects, active_object=objects[0]):
+        bpy.ops.object.delete()
+    bpy.context.view_layer.update()
+
+
+def test_deleted_parts_are_brought_back(rig, dna_file):
+    """Blender's Delete takes a part from the scene only: the others still point to it."""
+    _delete([scene.controls(rig)])
+    _use(rig)
+    assert "still in the file" in _said(rig)
+    assert bpy.ops.risorius.bring_back() == {"FINISHED"}
+    assert scene.controls(rig).name in bpy.context.scene.objects
+    _right(dna_file)
+
+
+def test_a_deleted_character_leaves_the_file(rig, dna_file, tmp_path):
+    other = scene.load(dna_file)
+    name = other.name
+    _delete([rig, scene.controls(rig), *scene.meshes(rig).values()])
+    assert rig.name in bpy.data.objects
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "one.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "one.blend"))
+    assert [o.name for o in bpy.data.objects if "risorius_controls" in o] == [name]
+    assert len(bpy.data.texts) == 1
+    _right(dna_file)
+
+
+def test_a_deleted_character_that_others_use_stays(rig, tmp_path):
+    empty = bpy.data.objects.new("hand", None)
+    bpy.context.scene.collection.objects.link(empty)
+    empty.constraints.new("COPY_LOCATION").target = rig
+    _delete([rig, scene.controls(rig), *scene.meshes(rig).values()])
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "held.blend"))
+    assert "risorius_controls" in rig
+
+
+def test_one_of_two_is_deleted(rig, dna_file):
+    other = scene.load(dna_file)
+    scene.set_controls(other, jawOpen=0.3)
+    before = scene.snapshot(other)
+    bpy.data.batch_remove([rig, scene.controls(rig), *scene.meshes(rig).values()])
+    bpy.context.view_layer.update()
+    np.testing.assert_array_equal(scene.snapshot(other), before)
+    _right(dna_file)
