@@ -10,7 +10,14 @@ import numpy as np
 from ..logic import edits
 from . import build, carry, meshes, parts, runtime, weights
 
-_BOUND = {"SURFACE_DEFORM", "MESH_DEFORM", "LAPLACIANDEFORM", "CORRECTIVE_SMOOTH", "MULTIRES"}
+_BOUND = {
+    "HOOK",
+    "SURFACE_DEFORM",
+    "MESH_DEFORM",
+    "LAPLACIANDEFORM",
+    "CORRECTIVE_SMOOTH",
+    "MULTIRES",
+}
 
 
 @dataclass
@@ -221,7 +228,7 @@ def _leave(change, item, old):
     """A mesh that the new file has not: away with it, unless it bears something of the user's."""
     label = item.name
     known = old is not None and len(item.data.vertices) == len(old.positions)
-    things = ["it"]
+    things = ["its unknown origin"]
     if old is not None:
         shape = read_shape(change.before, item, old, known)
         things = _things(change, item, old, shape, known)

@@ -70,7 +70,7 @@ def replace_file(context, rig, path, progress=lambda _share: None):
     _check(rig)
     with armatures.kept_selection(context):
         before = runtime.of(rig)
-        unit = float(rig.get(parts.UNIT, 1.0))
+        unit = runtime.unit_of(rig)
         levels = tuple(lods.built(rig)) or (0,)
         old = plans.plan_character(before.dna, rig.name, levels, unit, before.rests)
         fresh, warnings = build.import_file(
