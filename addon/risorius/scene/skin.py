@@ -125,7 +125,8 @@ class Skin:
             amount = graph.total([v for _, v in members])
             return graph.math("MULTIPLY", amount, self._atlas_channel(name))
         share = _FLUSH_SHARE if bucket[0] == "flush" else 1.0
-        amount = graph.math("MULTIPLY", self._sided(members), share)
+        amount = graph.math("MINIMUM", self._sided(members), 1.0)
+        amount = graph.math("MULTIPLY", amount, share)
         return amount if name == "all" else graph.math("MULTIPLY", amount, self.areas[name])
 
     def _sided(self, members):
