@@ -71,3 +71,11 @@ def dna_file(tmp_path):
     path = tmp_path / "small.dna"
     small_face().save(str(path))
     return path
+
+
+def pytest_terminal_summary(terminalreporter):
+    """What a longer run would have done as well."""
+    reasons = {report.longrepr[2] for report in terminalreporter.stats.get("skipped", [])}
+    for reason in sorted(r.removeprefix("Skipped: ") for r in reasons):
+        if reason.startswith("EXTRA NOT RUN"):
+            terminalreporter.write_line(reason)

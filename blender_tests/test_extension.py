@@ -125,4 +125,8 @@ def test_removed_nothing_of_it_is_left(home):
     found = _step(home, "look", home.parent / "small.blend")
     found.pop("meshes")
     assert found == NOTHING
-    assert _files_of_ours(home) == []
+    left = _files_of_ours(home)
+    if bpy.app.version == (4, 2, 0) and not PROGRAM:
+        # The first 4.2 as a module forgets the wheel that it unpacked, whatever the extension.
+        left = [name for name in left if ".local" not in name]
+    assert left == []

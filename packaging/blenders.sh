@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# Makes real Blender programs in chroots, for the version matrix: trixie's Blender 4.3.2 (Python
+# Makes real Blender programs in chroots, for packaging/matrix.sh: trixie's Blender 4.3.2 (Python
 # 3.13) and sid's, which moves (Blender 5.2.2 LTS with Python 3.14 when this was written).
 # Needs root and debootstrap on Debian; about 3 minutes and 1.5 GB each. Not part of the default
 # tests.
@@ -51,7 +51,7 @@ install_blender() { # install_blender SUITE ROOT
     apt-get -o Acquire::Check-Valid-Until=false update -qq
     apt-get install -y -qq --no-install-recommends blender python3-dev python3-numpy $more \
       python3-venv python3-pip python3-pytest g++ cmake ninja-build nlohmann-json3-dev \
-      ca-certificates xvfb imagemagick libgl1-mesa-dri"
+      ca-certificates xvfb imagemagick libgl1-mesa-dri libegl1 libegl-mesa0"
 }
 
 build_wheel_in() { # build_wheel_in ROOT: its build tools are plain Python, fetched where pip is set up

@@ -11,6 +11,7 @@ from mathutils import Matrix, Vector
 from ..logic import regions
 from . import parts
 
+SHELF = "Joints"  # the bone collection of the deforming bones, not shown
 LIVE_PROPERTIES = (parts.MAPS, parts.CHANNELS)
 
 
@@ -101,7 +102,7 @@ def build_rig(context, plan, made, workshop):
         data.bones[label][parts.JOINT] = joint
     data.display_type = "STICK"
     # Bones that are not shown, and an object that is: so Select All and Duplicate take it along.
-    shelf = data.collections.new("Joints")
+    shelf = data.collections.new(SHELF)
     for bone in data.bones:
         shelf.assign(bone)
     shelf.is_visible = False

@@ -141,6 +141,10 @@ def replace_joints(context, change):
     else:
         change.new_bones = [kept[k] for k in range(len(new.labels))]
     _number(rig, change.new_bones, moved)
+    shelf = rig.data.collections.get(armatures.SHELF)
+    for joint, name in enumerate(change.new_bones):
+        if joint not in kept and shelf is not None:
+            shelf.assign(rig.data.bones[name])
     _release(change, moved)
     for label in (old.labels[j] for j in gone.values() if j < len(old.labels)):
         change.report.append(f"The joint {label} is gone.")

@@ -7,9 +7,9 @@ from mathutils.bvhtree import BVHTree
 from ..logic import edits
 
 # Attributes that a build makes itself, and Blender's own.
-_BUILT = {"position", "UVMap", "custom_normal", "material_index"}
-OURS = "risorius_"  # first part of the names of attributes that our materials read
+_OURS = {"position", "UVMap", "custom_normal", "material_index"}
 _SHADING = {"sharp_edge", "sharp_face"}
+OUR_PREFIX = "risorius_"  # of attributes that materials read
 _FIELDS = {
     "FLOAT": ("value", 1, np.float32),
     "INT": ("value", 1, np.int32),
@@ -87,11 +87,8 @@ def own_attributes(mesh):
     and the names of the others."""
     kept, other = [], []
     for layer in mesh.attributes:
-        if (
-            layer.name in _BUILT | _SHADING
-            or layer.name.startswith((".", OURS))
-            or layer.is_internal
-        ):
+        internal = layer.is_internal or layer.name.startswith((".", OUR_PREFIX))
+        if internal or layer.name in _OURS | _SHADING:
             continue
         if layer.data_type in _FIELDS and layer.domain in {"POINT", "CORNER", "FACE"}:
             field, width, kind = _FIELDS[layer.data_type]

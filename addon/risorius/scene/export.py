@@ -49,7 +49,7 @@ def export(context, rig, options=None):
     if live is None:
         raise ExportError(f"{rig.name} has lost the data of its file.")
     content = storage.content(rig[parts.DNA])
-    unit = float(rig.get(parts.UNIT, 1.0))
+    unit = runtime.unit_of(rig)
     levels = tuple(lods.built(rig)) or (0,)
     plan = plans.plan_character(live.dna, rig.name, levels, unit, live.rests)
     written = native.module().load(content)  # the Runtime's own must stay as it is
@@ -151,7 +151,7 @@ class _Job:
     def _shape(self, dna_mesh, shape, key, difference):
         """Only the edited vertices' deltas are written."""
         vertices = np.flatnonzero(np.any(difference != 0, axis=1))
-        base = shape.points if shape.relative[key] == key else shape.keys[shape.relative[key]]
+        base = shape.keys[shape.relative[key]]
         delta = shape.keys[key][vertices].astype(np.float64) - base[vertices]
         totals = self._space.file_points(delta).astype(np.float32)
         channel = shape.channels[key]

@@ -129,13 +129,13 @@ def _before_save(*_arguments):
     if native.problem():
         return
     copies.separate_all()
-    heal.remove_dead()
     _end_tests()
+    heal.remove_dead()
 
 
 @persistent
 def _end_tests(*_arguments):
-    if testing.clear_all():
+    if not native.problem() and testing.clear_all():
         refresh()
 
 

@@ -165,7 +165,7 @@ def lashes(graph, look):
     picture, mask = look.image("color"), look.image("alpha", data=True)
     strands = _strands(graph, look)
     color = graph.ramp(strands, (0.35, _LASH), (0.85, _LASH_TIP))
-    alpha = graph.ramp(strands, (0.47, (0.0,) * 3), (0.56, (1.0,) * 3))
+    alpha = graph.ramp(strands, (0.53, (0.0,) * 3), (0.61, (1.0,) * 3))
     if mask is not None:
         alpha = graph.image(mask, label="Alpha").outputs["Color"]
     elif picture is not None:

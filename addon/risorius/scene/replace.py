@@ -70,7 +70,7 @@ def replace_file(context, rig, path, progress=lambda _share: None):
     _check(rig)
     with armatures.kept_selection(context):
         before = runtime.of(rig)
-        unit = float(rig.get(parts.UNIT, 1.0))
+        unit = runtime.unit_of(rig)
         levels = tuple(lods.built(rig)) or (0,)
         old = plans.plan_character(before.dna, rig.name, levels, unit, before.rests)
         fresh, warnings = build.import_file(
@@ -116,6 +116,7 @@ def _exchange(context, change, fresh):
     fresh_meshes = {m[parts.MESH]: m for m in parts.meshes_of(fresh)}
     kept = refit.replace_meshes(change, fresh_meshes)
     _take_properties(change, fresh)
+    _sliders(change)
     entries = drivers.Entries(rig, _array_labels(change))
     build.settle(context, rig, parts.controls_of(rig))
     entries.move()
@@ -124,7 +125,8 @@ def _exchange(context, change, fresh):
         _adopt(change, fresh, fresh_meshes[index])
     refit.finish_shapes(change)
     _number_meshes(rig)
-    _controls(context, change)
+    lods.show(rig)
+    bones.replace_control_places(context, change)
     build.remove(fresh)
     lods.show(rig)
     runtime.forget_outputs()
@@ -157,7 +159,7 @@ def _take_properties(change, fresh):
     rig, controls = change.rig, parts.controls_of(change.rig)
     text, former = fresh[parts.DNA], rig[parts.DNA]
     label = former.name
-    rig[parts.DNA] = text
+    parts.point(rig, parts.DNA, text)
     rig[parts.SOURCE] = fresh[parts.SOURCE]
     if not any(r.get(parts.DNA) == former for r in parts.rigs()):
         bpy.data.texts.remove(former)
@@ -170,8 +172,11 @@ def _take_properties(change, fresh):
             rig[name] = [0.0] * len(fresh[name])
         rig.property_overridable_library_set(f'["{name}"]', True)
     levels = sorted({lod for mesh in change.new.meshes for lod in mesh.lods})
-    if rig.get(parts.LOD, 0) not in levels:
-        rig[parts.LOD] = levels[0]
+    for key in (parts.LOD, parts.LOD_RENDER):
+        if rig.get(key, lods.SAME) not in (*levels, lods.SAME):
+            rig[key] = levels[0]
+    # Bones, channels and maps have other numbers now: nothing that was written before counts.
+    runtime.forget_outputs()
     for key in change.old.origin:
         controls.data.pop(names.cut(f"dna_{key}"), None)
     for key, value in change.new.origin.items():
@@ -188,8 +193,8 @@ def _adopt(change, fresh, item):
         return
     for key in [k for k in fresh.keys() if fresh[k] == item]:  # noqa: SIM118  no dict
         del fresh[key]
-    item[parts.RIG] = rig
-    rig[f"{parts.MESH_PREFIX}new{item[parts.MESH]:03d}"] = item
+    parts.point(item, parts.RIG, rig)
+    parts.point(rig, f"{parts.MESH_PREFIX}new{item[parts.MESH]:03d}", item)
     item.parent = rig
     for modifier in item.modifiers:
         if modifier.type == "ARMATURE":
@@ -225,10 +230,10 @@ def _number_meshes(rig):
     for key in [k for k in rig.keys() if k.startswith(parts.MESH_PREFIX)]:  # noqa: SIM118
         del rig[key]
     for number, item in enumerate(there):
-        rig[f"{parts.MESH_PREFIX}{number:03d}"] = item
+        parts.point(rig, f"{parts.MESH_PREFIX}{number:03d}", item)
 
 
-def _controls(context, change):
+def _sliders(change):
     """Sliders of the new file; those that are gone leave, unless something is keyed on them."""
     controls = parts.controls_of(change.rig)
     face = controls.pose.bones[parts.FACE]
@@ -256,7 +261,6 @@ def _controls(context, change):
         else:
             del face[label]
             change.report.append(f"The control {label} is gone.")
-    bones.replace_control_places(context, change)
 
 
 def _keep_report(change):

@@ -7,14 +7,15 @@ from .meshes import plain_driver
 
 MAP_PREFIX = "risorius_map_"
 AREAS = tuple(f"risorius_areas_{i}" for i in (1, 2, 3))  # mesh attributes: three areas each
-FOLDS = "risorius_folds"  # mesh attribute: x, height, curve of the folds
+FOLDS = "risorius_folds"  # mesh attribute: x, height, distance from the mouth
 _FRAME = "Animated maps"
 _TONE, _DARK, _RED = (0.56, 0.31, 0.22), (0.45, 0.21, 0.145), (0.50, 0.19, 0.14)
 _FLUSH = (1.0, 0.42, 0.38)
-_CREASE = (0.60, 0.40, 0.36)
+_CREASE = (0.66, 0.49, 0.45)
 # Radians for each eye distance: how close the folds lie.
 _PITCH = {"level": 19.0, "upright": 24.0, "rays": 20.0, "arc": 6.0}
 _FLUSH_SHARE = 0.22  # of an area's map: without a painted mask a blush must stay faint
+_PORE_DEPTH = 0.032
 _FOLD_DEPTH = {"level": 0.45, "upright": 0.45, "rays": 0.35, "arc": 1.8, "dimples": 0.6}
 
 
@@ -124,7 +125,8 @@ class Skin:
             amount = graph.total([v for _, v in members])
             return graph.math("MULTIPLY", amount, self._atlas_channel(name))
         share = _FLUSH_SHARE if bucket[0] == "flush" else 1.0
-        amount = graph.math("MULTIPLY", self._sided(members), share)
+        amount = graph.math("MINIMUM", self._sided(members), 1.0)
+        amount = graph.math("MULTIPLY", amount, share)
         return amount if name == "all" else graph.math("MULTIPLY", amount, self.areas[name])
 
     def _sided(self, members):
@@ -225,14 +227,19 @@ class Skin:
         self.folds = {}
         if not self.bumps:
             return self.folds
-        x, z, curve = graph.split(graph.attribute(FOLDS))
+        x, z, away = graph.split(graph.attribute(FOLDS))
         wander = graph.noise(self.points, 2.2 / self.look.unit, detail=3.0)
         for kind in self.bumps:
             if kind == "dimples" or not self.look.areas:
                 cells = graph.cells(self.points, 9.0 / self.look.unit)
                 self.folds[kind] = graph.math("MINIMUM", cells, 1.0)
                 continue
-            along = {"level": z, "upright": x, "rays": curve, "arc": curve}[kind]
+            if kind == "rays":  # from the outer half of the eye, like a crow's foot
+                aside = graph.math("SUBTRACT", graph.math("ABSOLUTE", x), 0.45)
+                turn = graph.math("ARCTAN2", z, graph.math("MAXIMUM", aside, 0.001))
+                along = graph.math("MULTIPLY", turn, 0.5)
+            else:
+                along = {"level": z, "upright": x, "arc": away}[kind]
             sway = 0.03 if kind == "arc" else 0.13
             bent = graph.math("MULTIPLY_ADD", wander, sway, along)
             wave = graph.math("SINE", graph.math("MULTIPLY", bent, _PITCH[kind]))
@@ -249,20 +256,17 @@ class Skin:
         return graph.math("MULTIPLY", graph.total(deep), 0.42, clamp=True) if deep else None
 
     def _normal(self):
+        """Pores and folds as one height field: engines work each one out three times."""
         graph, look = self.graph, self.look
         normal = self._normal_map()
-        pores = graph.cells(self.points, 48.0 / look.unit)
-        grain = graph.noise(self.points, 22.0 / look.unit, detail=3.0, roughness=0.65)
-        skin = graph.math("MULTIPLY_ADD", pores, 0.30, graph.math("MULTIPLY", grain, 0.42))
-        normal = graph.bump(skin, look.unit * 0.010, normal, 0.16 if normal else 0.5)
-        folds = []
+        pores = graph.cells(self.points, 75.0 / look.unit)
+        grain = graph.noise(self.points, 34.0 / look.unit, detail=2.0, roughness=0.65)
+        deep = _PORE_DEPTH * (0.35 if normal else 1.0)  # a texture has pores of its own
+        heights = [graph.math("MULTIPLY", graph.math("ADD", pores, grain), deep)]
         for kind, ridge in self._ridges().items():
-            deep = graph.math("MULTIPLY", self.bumps[kind], _FOLD_DEPTH[kind])
-            folds.append(graph.math("MULTIPLY", ridge, deep))
-        if folds:
-            normal = graph.bump(graph.total(folds), look.unit * 0.030, normal)
-            normal.node.label = "Wrinkles"
-        return normal
+            height = graph.math("MULTIPLY", self.bumps[kind], _FOLD_DEPTH[kind])
+            heights.append(graph.math("MULTIPLY", ridge, height))
+        return graph.bump(graph.total(heights), look.unit * 0.03, normal)
 
     def _normal_map(self):
         """The normal of the textures, wrinkle sets mixed in by their masks; None without."""

@@ -84,6 +84,11 @@ class RISORIUS_OT_import_dna(bpy.types.Operator, ImportHelper):
 
     filename_ext = ".dna"
     filter_glob: bpy.props.StringProperty(default="*.dna", options={"HIDDEN"})
+    # Several files, from the file browser or dropped together.
+    directory: bpy.props.StringProperty(subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})
+    files: bpy.props.CollectionProperty(
+        type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"}
+    )
     lods: bpy.props.BoolVectorProperty(
         name="Levels of Detail",
         description="Levels whose meshes are built; 0 is the finest",
@@ -129,10 +134,14 @@ class RISORIUS_OT_import_dna(bpy.types.Operator, ImportHelper):
             texture_folder=self.texture_folder,
             simple_materials=self.use_simple_materials,
         )
-        return import_character(self, context, self.filepath, options)
+        named = [str(Path(self.directory, item.name)) for item in self.files if item.name]
+        results = [
+            import_character(self, context, path, options) for path in named or [self.filepath]
+        ]
+        return {"FINISHED"} if {"FINISHED"} in results else {"CANCELLED"}
 
     def invoke(self, context, event):
-        if self.filepath:  # dropped onto the window
+        if self.filepath or self.files:  # dropped onto the window
             return self.execute(context)
         return ImportHelper.invoke(self, context, event)
 

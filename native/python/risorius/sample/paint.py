@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 HEAD_SIZE = 2048
 EYE_SIZE = 1024
 MASK_SIZE = 512
+LASH_SIZE = (4096, 256, 330)  # width, height, hairs over the strips' whole length
 
 
 def write_png(path: Path, image: Floats) -> None:
@@ -214,8 +215,9 @@ def paint_eye() -> Floats:
     around = np.arctan2(y, x)
     iris, pupil = 0.44, 0.165
     colour = np.ones((EYE_SIZE, EYE_SIZE, 3)) * np.array([0.90, 0.88, 0.85])
-    veins = smooth(0.7, 0.95, 1 - np.abs(noise(EYE_SIZE, 28, random)))
-    colour = blend(colour, (0.78, 0.42, 0.38), (0.1 + 0.3 * veins) * smooth(0.6, 1.2, angle))
+    blush = 0.5 + 0.5 * noise(EYE_SIZE, 9, random)
+    colour = blend(colour, (0.86, 0.66, 0.60), 0.4 * blush * smooth(0.6, 1.6, angle))
+    colour = blend(colour, (0.72, 0.30, 0.26), 0.5 * vessels(random, 0.13))
     fibres = np.zeros_like(angle)
     for count in (37, 61, 97, 149):
         fibres += np.sin(count * around + random.uniform(0, 6) + 3 * noise(EYE_SIZE, 24, random))
@@ -232,15 +234,43 @@ def paint_eye() -> Floats:
 
 
 def paint_lashes() -> Floats:
-    """Opacity of the lashes' strips: strands that taper from the lid (v = 0) to the tip."""
+    """Opacity of the lashes' strips: curved hairs that taper from the lid (v = 0) to the tip."""
     random = np.random.default_rng(5)
-    v, u = np.meshgrid(*[(np.arange(MASK_SIZE) + 0.5) / MASK_SIZE] * 2, indexing="ij")
-    count = 260
-    strand = u * count + 0.8 * v + 0.6 * noise(MASK_SIZE, 16, random)
-    length = random.uniform(0.55, 1.0, count + 8)[np.floor(strand).astype(int).clip(0, count + 7)]
-    across = np.abs(strand - np.floor(strand) - 0.5) * 2
-    width = 0.62 * (1 - v / length)
-    return np.asarray(1 - smooth(-0.12, 0.12, across - width))
+    width, height, count = LASH_SIZE
+    image = np.zeros((height, width))
+    v = (np.arange(height) + 0.5) / height
+    for number in range(count):
+        root = (number + random.uniform(0.1, 0.9)) / count * width
+        lean, bend = random.normal(0, 5), random.normal(0, 9)
+        length, thick = random.uniform(0.55, 1.0), random.uniform(2.0, 3.2)
+        middle = root + lean * v + bend * v**2
+        half = thick * np.sqrt(np.clip(1 - v / length, 0, 1))
+        low = int(max(0, middle.min() - 6))
+        x = np.arange(low, min(width, int(middle.max()) + 7)) + 0.5
+        hair = np.clip(half[:, None] - np.abs(x[None, :] - middle[:, None]) + 0.5, 0, 1)
+        part = image[:, low : low + len(x)]
+        np.maximum(part, hair, out=part)
+    return image
+
+
+def vessels(random: np.random.Generator, angle_limit: float) -> Floats:
+    """Fine blood vessels [EYE_SIZE, EYE_SIZE], 0 to 1: they wander in from behind and thin out."""
+    image = np.zeros((EYE_SIZE, EYE_SIZE))
+    for _ in range(90):
+        around, step = random.uniform(0, 2 * np.pi), 0.0
+        away, end = 0.5, random.uniform(angle_limit, 0.42)
+        while away > end:
+            step = 0.85 * step + random.normal(0, 0.004)
+            around += step / away
+            away -= 0.0012
+            x, y = ((0.5 + away * f(around)) * EYE_SIZE for f in (np.cos, np.sin))
+            i, j = int(y), int(x)
+            strength = min(1.0, (away - end) / 0.15) * 0.8
+            if 0 < i < EYE_SIZE - 1 and 0 < j < EYE_SIZE - 1:
+                for di, dj, share in ((0, 0, 1.0), (0, 1, x % 1), (1, 0, y % 1)):
+                    here = image[i + di, j + dj]
+                    image[i + di, j + dj] = max(here, strength * share)
+    return image
 
 
 def paint_textures(
