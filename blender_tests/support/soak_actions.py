@@ -447,7 +447,8 @@ WEIGHTS = {
     "shape_mode": 40, "reset": 20, "overdrive": 20, "own_key": 20, "drop_own_key": 20,
     "rename": 40, "hide": 20, "exclude": 10, "duplicate": 25, "delete": 40, "delete_part": 10,
     "import_dna": 12, "reload": 12, "replace": 8, "export": 8, "append": 12, "override": 12,
-    "separate": 5, "save": 10, "save_and_load": 12, "revert": 5, "purge": 5, "other_scene": 10, "render": 6, "unkey": 15,
+    "separate": 5, "save": 10, "save_and_load": 12, "revert": 5, "purge": 5, "other_scene": 10,
+    "render": 6, "unkey": 15,
     "disable_and_enable": 10,
 }  # fmt: skip
 NOT_PUSHED = {"undo", "redo", "save", "save_and_load", "revert"}
