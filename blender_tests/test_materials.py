@@ -326,6 +326,18 @@ def test_a_broken_texture_is_a_sentence(tmp_path):
     assert _materials(rig)["head"] is not None
 
 
+def test_a_very_large_texture_stays_outside(tmp_path, monkeypatch):
+    path = _save(tmp_path, small_face())
+    (tmp_path / "Maps").mkdir()
+    looks.write_image(tmp_path / "Maps" / "head_color_map.png", np.ones((4, 4, 3), np.float32))
+    monkeypatch.setattr(scene.submodule("scene.textures"), "PACK_LIMIT", 10)
+    build = scene.submodule("scene.build")
+    _rig, warnings = build.import_file(bpy.context, path, build.BuildOptions())
+    said = "The texture head_color_map.png is large and stays outside the .blend file."
+    assert said in warnings
+    assert bpy.data.images["head_color_map.png"].packed_file is None
+
+
 def test_a_name_from_the_file_never_leads_out_of_the_folder(tmp_path):
     folder = tmp_path / "in"
     folder.mkdir()
