@@ -274,3 +274,18 @@ def test_a_small_stream_that_unfolds_without_end(dna_file, monkeypatch, capsys):
     scene.submodule("scene.runtime").forget()
     bpy.context.scene.frame_set(2)
     assert "more than a DNA file can be" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("name", ["two\nlines", "é\U0001f600", "x" * 200, "a. b", "%s{0}\\", " "])
+def test_files_with_odd_names_of_their_own(name, tmp_path):
+    bad = tmp_path / f"{name}.dna"
+    bad.write_bytes(b"nothing of the kind")
+    with pytest.raises(RuntimeError) as caught:
+        bpy.ops.risorius.import_dna(filepath=str(bad))
+    text = str(caught.value).removeprefix("Error: ").strip()
+    assert "Traceback" not in text
+    assert text.isprintable()
+    assert bad.name.replace("\n", " ") in text
+    good = bad.with_name(f"{name}_good.dna")
+    small_face(name="").save(str(good))
+    assert scene.load(good).name.endswith("_rig")

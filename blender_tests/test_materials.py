@@ -260,7 +260,7 @@ rig = scene.load(folder / "face.dna")
 engine = "BLENDER_EEVEE_NEXT" if bpy.app.version < (5, 0) else "BLENDER_EEVEE"
 head, eye, film = (scene.meshes(rig)[i] for i in range(3))
 eye.hide_render = film.hide_render = True
-setup, _ = looks.stage([head], 32, engine, 4)
+setup, _ = looks.stage([head], 24, engine, 1)
 print("READY", flush=True)
 first = looks.render(setup, folder / "a.png")[..., :3]
 print("RENDERED", flush=True)
@@ -271,9 +271,9 @@ head.hide_render, eye.hide_render = True, False
 low = np.array(eye.bound_box).min(axis=0); high = np.array(eye.bound_box).max(axis=0)
 setup.camera.location = ((low[0] + high[0]) / 2, low[1] - 1, (low[2] + high[2]) / 2)
 setup.camera.data.ortho_scale = float(high[0] - low[0]) * 1.1
-bare = looks.render(setup, folder / "c.png")[6:26, 6:26, :3]
+bare = looks.render(setup, folder / "c.png")[5:19, 5:19, :3]
 film.hide_render = False
-covered = looks.render(setup, folder / "d.png")[6:26, 6:26, :3]
+covered = looks.render(setup, folder / "d.png")[5:19, 5:19, :3]
 print("IRIS", float(bare.mean(axis=2).std()), float(np.abs(covered - bare).mean()))
 """
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# Makes real Blender programs in chroots, for the version matrix: trixie's Blender 4.3.2 (Python
+# Makes real Blender programs in chroots, for packaging/matrix.sh: trixie's Blender 4.3.2 (Python
 # 3.13) and sid's, which moves (Blender 5.2.2 LTS with Python 3.14 when this was written).
 # Needs root and debootstrap on Debian; about 3 minutes and 1.5 GB each. Not part of the default
 # tests.

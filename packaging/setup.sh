@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-# Sourced by demo.sh, test.sh, fuzz.sh and cross.sh: tools, a private venv, the wheel and the
-# extension's zip. Sets: project, venv, python, step "text" (says what begins and how long the last
-# step took).
+# Sourced by demo.sh, test.sh, matrix.sh, fuzz.sh and cross.sh: tools, a private venv, the wheel and
+# the extension's zip. Sets: project, venv, python, step "text" (says what begins and how long the
+# last step took).
 
 project=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 venv="$project/.venv"
@@ -48,6 +48,20 @@ make_venv() {
   "$base" -m venv "$venv"
   "$python" -m pip install -q -r "$project/packaging/requirements.txt"
   touch "$stamp"
+}
+
+# bpy_venv VERSION [SECONDS]: prints the Python of a venv with this bpy and pytest; it is made
+# unless that takes longer. The project's own venv has the bpy of requirements.txt.
+bpy_venv() {
+  local folder="$project/build/venv-bpy-$1" pytest
+  grep -qx "bpy==$1" "$project/packaging/requirements.txt" && echo "$python" && return 0
+  pytest=$(grep '^pytest==' "$project/packaging/requirements.txt")
+  if [ ! -e "$folder/.made" ]; then
+    python3.11 -m venv "$folder" >&2 &&
+      timeout "${2:-600}" "$folder/bin/python" -m pip install -q "bpy==$1" "$pytest" >&2 &&
+      touch "$folder/.made" || return 1
+  fi
+  echo "$folder/bin/python"
 }
 
 build_wheel() {

@@ -387,10 +387,37 @@ class World:
             self._import("LIVE")
         for rig in self.rigs():
             rig["risorius_controls"].animation_data_clear()
+        self.purge_all()
+        self.save_and_load()
+        self.save_and_load()
+
+    def leftovers(self):
+        """Datablocks that stay when every character is deleted: none of them may grow in number.
+
+        The file is opened again after it.
+        """
+        for rig in self.rigs():
+            self._delete(rig)
+        self.purge_all()
+        bpy.ops.wm.save_as_mainfile(filepath=str(self.folder / "empty.blend"))  # drops the dead
+        self.purge_all()
+        # Linked data is not counted: parts that point to each other stay until the file is loaded.
+        kinds = [p for p in bpy.data.bl_rna.properties if p.type == "COLLECTION"]
+        local = {
+            p.identifier: [i for i in getattr(bpy.data, p.identifier) if not i.library]
+            for p in kinds
+            if p.identifier != "libraries"
+        }
+        counts = {name: len(found) for name, found in local.items()}
+        bpy.ops.wm.open_mainfile(filepath=str(self.blend))
+        self._settings()
+        self._push("sampled")
+        return counts
+
+    def purge_all(self):
+        """Empty collections, and all that nothing uses."""
         bpy.data.batch_remove([c for c in bpy.data.collections if not c.all_objects])
-        self.save_and_load()
         self.purge()
-        self.save_and_load()
 
 
 # Action -> how often; those that change the file are undo steps.

@@ -8,7 +8,7 @@ import bpy
 
 from .. import native
 from ..logic import names, plans, textures
-from . import armatures, lods, materials, meshes, parts, runtime, storage
+from . import armatures, compat, lods, materials, meshes, parts, runtime, storage
 
 
 @dataclass(frozen=True)
@@ -179,8 +179,7 @@ def channel_labels(dna):
 def _into_place(context, plan, workshop, rig, controls):
     """Name the collection; select the controls."""
     workshop.name = plan.name
-    for item in context.view_layer.objects:
-        item.select_set(False, view_layer=context.view_layer)
+    compat.deselect_all(context.view_layer)
     controls.select_set(True, view_layer=context.view_layer)
     context.view_layer.objects.active = controls
 

@@ -6,7 +6,7 @@ import re
 import bpy
 
 from ..logic import names
-from . import parts
+from . import compat, parts
 
 _ENTRY = re.compile(r'^\["(channels|maps)"\]\[(\d+)\]$')
 _GONE = re.compile(r'^\["(gone (channels|maps): .*)"\]$')
@@ -98,17 +98,6 @@ def _gone_key(array, label):
     return names.cut(f"gone {array}: {label}")
 
 
-def curves_of(action):
-    """The F-curves of an action, also of one with layers."""
-    if hasattr(action, "layers") and len(action.layers):
-        for layer in action.layers:
-            for strip in layer.strips:
-                for bag in getattr(strip, "channelbags", ()):
-                    yield from bag.fcurves
-    elif hasattr(action, "fcurves"):
-        yield from action.fcurves
-
-
 def used_controls(controls, labels):
     """Those control properties that an F-curve of any action or a driver uses.
 
@@ -120,7 +109,7 @@ def used_controls(controls, labels):
     used = {
         paths[curve.data_path]
         for action in bpy.data.actions
-        for curve in curves_of(action)
+        for curve in compat.curves_of(action)
         if curve.data_path in paths
     }
     data = controls.animation_data

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Short words for building node trees, the same for all versions of Blender."""
 
+from . import compat
+
 
 class Graph:
     """The tree of one material.
@@ -10,8 +12,7 @@ class Graph:
     """
 
     def __init__(self, material):
-        if material.node_tree is None:  # 5.0 always has one and warns about the switch
-            material.use_nodes = True
+        compat.make_node_tree(material)
         self.material, self.tree = material, material.node_tree
         self.shader = next(n for n in self.tree.nodes if n.type == "BSDF_PRINCIPLED")
         self.output = next(n for n in self.tree.nodes if n.type == "OUTPUT_MATERIAL")

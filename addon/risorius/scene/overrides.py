@@ -8,7 +8,7 @@ keys, which drivers move without any write, or meshes of this file.
 
 import bpy
 
-from . import copies, evaluate, meshes, parts, runtime
+from . import compat, copies, evaluate, meshes, parts, runtime
 
 
 def linked_rig(context):
@@ -191,8 +191,7 @@ def _take_place(shown, rig, collection):
 def _show(context, rig):
     """Select the controls, as after an import."""
     layer, controls = context.view_layer, parts.controls_of(rig)
-    for item in layer.objects:
-        item.select_set(False, view_layer=layer)
+    compat.deselect_all(layer)
     if controls is not None and controls.name in layer.objects:
         controls.select_set(True, view_layer=layer)
         layer.objects.active = controls

@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: MIT
+"""What the packaging scripts compute: names of wheels in the zip, and the version matrix."""
+
+import importlib.util
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+PACKAGING = Path(__file__).resolve().parents[2] / "packaging"
+
+
+def _script(name):
+    described = importlib.util.spec_from_file_location(name, PACKAGING / f"{name}.py")
+    module = importlib.util.module_from_spec(described)
+    sys.modules[name] = module
+    described.loader.exec_module(module)
+    return module
+
+
+def _report(path, *cases):
+    text = "".join(
+        f'<testcase classname="{group}" name="{name}">{inside}</testcase>'
+        for group, name, inside in cases
+    )
+    path.write_text(f"<testsuites><testsuite>{text}</testsuite></testsuites>", encoding="utf-8")
+    return path
+
+
+def test_the_wheel_for_3_11_has_the_name_that_sorts_last(tmp_path):
+    # Blender 4.2.0 takes all wheels of its platform and keeps the last name.
+    build = _script("build_extension")
+    version = build.manifest_version(
+        (build.ADDON / "blender_manifest.toml").read_text(encoding="utf-8")
+    )
+    wheels = [
+        tmp_path / f"risorius-{version}-{tag}-{tag}-linux_x86_64.whl"
+        for tag in ("cp311", "cp313", "cp314")
+    ]
+    for wheel in wheels:
+        wheel.write_bytes(b"")
+    with zipfile.ZipFile(build.build(wheels, tmp_path / "out")) as package:
+        inside = sorted(n for n in package.namelist() if n.endswith(".whl"))
+        manifest = package.read("blender_manifest.toml").decode()
+    assert len(inside) == 3
+    assert "-cp311-" in inside[-1]
+    assert all(f'"./{name}"' in manifest for name in inside)
+
+
+def test_the_table_counts_by_version_and_file(tmp_path):
+    matrix = _script("matrix_table")
+    one = _report(
+        tmp_path / "one.xml",
+        ("test_a", "x", ""),
+        ("test_a", "y", "<failure/>"),
+        ("test_b", "x", '<skipped message="why"/>'),
+    )
+    two = _report(tmp_path / "two.xml", ("test_a", "x", ""), ("test_a", "y", ""))
+    text = matrix.table({"1.0": matrix.read(one), "2.0": matrix.read(two)})
+    assert text.splitlines() == [
+        "| tests | 1.0 | 2.0 |",
+        "|---|---|---|",
+        "| a | 1, 1 failed | 2 |",
+        "| b | 0, 1 not run | - |",
+        "| **all** | **1, 1 failed, 1 not run** | **2** |",
+    ]
+
+
+@pytest.mark.parametrize(("inside", "code"), [("", 0), ("<failure/>", 1), ("<error/>", 1)])
+def test_the_exit_code_tells_of_failures(tmp_path, inside, code):
+    report = _report(tmp_path / "one.xml", ("test_a", "x", inside))
+    assert _script("matrix_table").main([f"1.0={report}"]) == code
+
+
+def test_a_blender_that_died_without_a_report_is_a_failure(tmp_path, capsys):
+    report = _report(tmp_path / "one.xml", ("test_a", "x", ""))
+    arguments = [f"1.0={report}", f"2.0={tmp_path / 'gone.xml'}"]
+    assert _script("matrix_table").main(arguments) == 1
+    assert "Failed: 2.0" in capsys.readouterr().out
