@@ -108,7 +108,7 @@ def test_keys_of_a_control_that_is_gone_stay(dna_file, other_file):
     scene.face(rig).keyframe_insert(f'["{PREFIX}browDownL"]', frame=1)
     action = scene.controls(rig).animation_data.action
     _replace(other_file)
-    curves = scene.submodule("scene.drivers").curves_of(action)
+    curves = scene.submodule("scene.compat").curves_of(action)
     assert path in [c.data_path for c in curves]
     assert f"{PREFIX}browDownL" in scene.face(rig)
     assert "browDownL is gone; its keys and drivers are kept" in _report()
