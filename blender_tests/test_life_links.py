@@ -282,3 +282,28 @@ def test_objects_linked_without_their_collection(library, dna_file):
     bpy.context.view_layer.update()
     rig = _override()
     _moves(rig, dna_file, jawOpen=0.4, mouthCornerPullL=0.8)
+
+
+@pytest.mark.parametrize("shapes", ["DRIVEN", "LOCAL"])
+def test_every_operator_does_its_work_on_an_override_or_says_why_not(library, dna_file, shapes):
+    _link(library[0])
+    rig = _override(shapes)
+    name = rig.name
+    for cls in scene.submodule("registration").CLASSES:
+        if not issubclass(cls, bpy.types.Operator) or cls.bl_idname in (
+            "risorius.add_character",  # would download
+            "risorius.import_dna",
+        ):
+            continue
+        rig = bpy.data.objects[name]
+        bpy.context.view_layer.objects.active = scene.controls(rig)
+        group, _, verb = cls.bl_idname.partition(".")
+        operator = getattr(getattr(bpy.ops, group), verb)
+        if not operator.poll():
+            continue
+        try:
+            operator()
+        except RuntimeError as error:
+            assert "Traceback" not in str(error), cls.bl_idname
+    rig = bpy.data.objects[name]
+    _moves(rig, dna_file, jawOpen=0.25, browDownL=0.5)
