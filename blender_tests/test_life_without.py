@@ -42,7 +42,7 @@ def _in_another_blender(blend, folder):
     script.write_text(_OTHER, encoding="utf-8")
     environment = dict(os.environ, BLENDER_USER_RESOURCES=str(folder / "nobody"))
     program = [sys.executable, str(script)]
-    if not bpy.app.module:  # Blender itself: sys.executable is its Python, without bpy
+    if bpy.app.binary_path:  # Blender itself: sys.executable is its Python, without bpy
         flags = ["-b", "--factory-startup", "-noaudio", "--python-exit-code", "1"]
         program = [bpy.app.binary_path, *flags, "--python", str(script), "--"]
     subprocess.run([*program, str(blend), str(out)], env=environment, check=True, timeout=120)
