@@ -4,7 +4,6 @@
 import bpy
 import numpy as np
 import pytest
-import risorius
 from support import child, looks, scene
 from support.faces import _mesh as fine_mesh
 from support.faces import small_face
@@ -326,6 +325,18 @@ def test_a_broken_texture_is_a_sentence(tmp_path):
     assert _materials(rig)["head"] is not None
 
 
+def test_a_very_large_texture_stays_outside(tmp_path, monkeypatch):
+    path = _save(tmp_path, small_face())
+    (tmp_path / "Maps").mkdir()
+    looks.write_image(tmp_path / "Maps" / "head_color_map.png", np.ones((4, 4, 3), np.float32))
+    monkeypatch.setattr(scene.submodule("scene.textures"), "PACK_LIMIT", 10)
+    build = scene.submodule("scene.build")
+    _rig, warnings = build.import_file(bpy.context, path, build.BuildOptions())
+    said = "The texture head_color_map.png is large and stays outside the .blend file."
+    assert said in warnings
+    assert bpy.data.images["head_color_map.png"].packed_file is None
+
+
 def test_a_name_from_the_file_never_leads_out_of_the_folder(tmp_path):
     folder = tmp_path / "in"
     folder.mkdir()
@@ -456,8 +467,8 @@ def _corner_normals(item):
     return {v: np.mean(n, axis=0) for v, n in found.items()}
 
 
-def test_duplicates_keep_their_own_maps(tmp_path):
-    """The materials of a copy read the maps of the copy; see scene/copies.py."""
+def test_map_drivers_are_plain_sums(tmp_path):
+    """What scene/copies.py gives to the maps of a duplicate; no Python expression."""
     rig = scene.load(_save(tmp_path, _mapped("head_wm2_normal.head_wm2_browsDown_L")))
     drivers = list(scene.submodule("scene.materials").map_drivers(_materials(rig)["head"]))
     assert len(drivers) == 2
@@ -466,4 +477,3 @@ def test_duplicates_keep_their_own_maps(tmp_path):
         '["maps"][0]',
         '["maps"][1]',
     }
-    assert risorius.load(str(tmp_path / "face.dna")).animated_map_names[0] == "other"

@@ -108,7 +108,7 @@ def test_keys_of_a_control_that_is_gone_stay(dna_file, other_file):
     scene.face(rig).keyframe_insert(f'["{PREFIX}browDownL"]', frame=1)
     action = scene.controls(rig).animation_data.action
     _replace(other_file)
-    curves = scene.submodule("scene.drivers").curves_of(action)
+    curves = scene.submodule("scene.compat").curves_of(action)
     assert path in [c.data_path for c in curves]
     assert f"{PREFIX}browDownL" in scene.face(rig)
     assert "browDownL is gone; its keys and drivers are kept" in _report()
@@ -694,3 +694,50 @@ def test_maps_of_materials_follow_names(tmp_path):
     assert entries() == {label: f'["maps"][{list(names).index(label)}]' for label in before}
     assert entries() != before
     _right(rig, path)
+
+
+def test_there_and_back_again_is_where_it_was(dna_file, other_file):
+    """Edits of what both files have outlast a replacement and its reversal."""
+    rig = scene.load(dna_file, "KEYS")
+    head = _decorate(rig)
+    _keys(rig)["pull_l"].points[5].co.x += 0.01
+    for block in _keys(rig):
+        block.points[40].co.y += 0.002
+    head.vertex_groups["head"].add([6], 0.75, "REPLACE")
+    before = {b.name: _points(b).copy() for b in _keys(rig)}
+    weights = {n: _weights(head, n) for n in ("mine", "head", "neck_01")}
+    rest = {b.name: np.array(b.matrix_local) for b in rig.data.bones}
+    sliders = {k for k in scene.face(rig).keys() if k.startswith(PREFIX)}  # noqa: SIM118
+    for path in (other_file, dna_file, other_file, dna_file):
+        _replace(path)
+    after = {b.name: _points(b) for b in _keys(rig)}
+    assert set(after) == set(before)
+    for name, points in before.items():
+        np.testing.assert_allclose(after[name], points, atol=3e-7, err_msg=name)
+    assert {n: _weights(head, n) for n in weights} == weights
+    assert {b.name for b in rig.data.bones} == set(rest)
+    for bone in rig.data.bones:
+        np.testing.assert_allclose(np.array(bone.matrix_local), rest[bone.name], atol=1e-5)
+    assert sliders == {k for k in scene.face(rig).keys() if k.startswith(PREFIX)}  # noqa: SIM118
+    _still_decorated(rig)
+    assert not [m for m in bpy.data.meshes if "before replace" in m.name]
+    bad, seen = scene.invalid_drivers()
+    assert not bad
+    assert seen
+
+
+def test_a_replaced_face_outlasts_the_file(mode, dna_file, other_file, tmp_path):
+    rig = scene.load(dna_file, mode)
+    _decorate(rig)
+    _replace(other_file)
+    scene.set_controls(rig, jawOpen=0.4)
+    before = scene.snapshot(rig)
+    blend = tmp_path / "scene.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+    content = other_file.read_bytes()
+    other_file.unlink()
+    bpy.ops.wm.open_mainfile(filepath=str(blend))
+    rig = bpy.data.objects["Small_rig"]
+    np.testing.assert_array_equal(scene.snapshot(rig), before)
+    assert scene.submodule("scene.storage").content(rig["risorius_dna"]) == content
+    _still_decorated(rig)

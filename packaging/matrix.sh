@@ -6,7 +6,7 @@
 # 4 minutes for each version. Exit code 0 only if all tests passed in all of them.
 #
 #   ./packaging/matrix.sh [PREFIX] [-- PYTEST ARGUMENTS]
-#       PREFIX as given to blenders.sh; BLENDER= names one more program
+#       PREFIX as given to blenders.sh; BLENDER= names one more program, BPY= other bpy versions
 set -uo pipefail
 prefix=/opt/risorius-blender
 if [ $# -gt 0 ] && [ "$1" != -- ]; then
@@ -40,7 +40,7 @@ run() { # run NAME KEY COMMAND...: the tests in one Blender, with a user folder 
 }
 arguments=("$@")
 
-for version in 4.2.0 4.2.23 4.5.15 5.0.1; do
+for version in ${BPY-4.2.0 4.2.23 4.5.15 5.0.1}; do
   if venv_python=$(bpy_venv "$version"); then
     run "bpy $version" "bpy-$version" "$venv_python" blender_tests/run.py --
   else

@@ -9,7 +9,7 @@ MAP_PREFIX = "risorius_map_"
 AREAS = tuple(f"risorius_areas_{i}" for i in (1, 2, 3))  # mesh attributes: three areas each
 FOLDS = "risorius_folds"  # mesh attribute: x, height, distance from the mouth
 _FRAME = "Animated maps"
-_TONE, _DARK, _RED = (0.56, 0.31, 0.22), (0.45, 0.21, 0.145), (0.50, 0.19, 0.14)
+_TONE, _DARK, _RED = (0.60, 0.35, 0.25), (0.50, 0.26, 0.18), (0.54, 0.22, 0.16)
 _FLUSH = (1.0, 0.42, 0.38)
 _CREASE = (0.66, 0.49, 0.45)
 # Radians for each eye distance: how close the folds lie.
