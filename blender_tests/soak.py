@@ -30,7 +30,7 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 MODULE = "bl_ext.user_default.risorius"
 MAX_GROWTH = 0.03  # of the memory in use, over the second half of the run
-RENDERS_PER_ACTION = 1.0  # seconds that an action may take in the mean before it counts as hung
+SECONDS_PER_ACTION = 1.0  # in the mean, before the child counts as hung
 
 
 def arguments(given):
@@ -76,7 +76,7 @@ def parent(options):
     environment = dict(os.environ, BLENDER_USER_RESOURCES=str(folder / "user"))
     environment["RISORIUS_TEST_USER"] = str(folder / "user")
     begin = time.monotonic()
-    limit = options.timeout or 120 + options.actions * RENDERS_PER_ACTION
+    limit = options.timeout or 120 + options.actions * SECONDS_PER_ACTION
     try:
         code = subprocess.run(
             command(options, folder), env=environment, timeout=limit, check=False
