@@ -74,5 +74,8 @@ def test_the_overlay_tells_the_stages_of_the_last_frames(dna_file):
     lines = timing.lines()
     assert lines[0].startswith("Risorius, faces: 2")
     assert [line.split()[0] for line in lines[2:6]] == ["controls", "rig", "bones", "shapes"]
-    assert all(ms > 0 for ms in timing.frames[-1].stages.values())
+    # Not the lines: a small face takes less than the hundredth of a millisecond that they show.
+    played = [frame for frame in timing.frames if frame.characters]
+    assert len(played) == 6
+    assert all(frame.stages[stage] > 0 for frame in played for stage in timing.STAGES)
     assert bpy.context.window_manager.risorius_show_timing is False
