@@ -30,7 +30,7 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 MODULE = "bl_ext.user_default.risorius"
 MAX_GROWTH = 0.03  # of the memory in use, over the second half of the run
-RENDERS_PER_ACTION = 1.0  # seconds that an action may take in the mean before it counts as hung
+SECONDS_PER_ACTION = 1.0  # in the mean, before the child counts as hung
 
 
 def arguments(given):
@@ -76,7 +76,7 @@ def parent(options):
     environment = dict(os.environ, BLENDER_USER_RESOURCES=str(folder / "user"))
     environment["RISORIUS_TEST_USER"] = str(folder / "user")
     begin = time.monotonic()
-    limit = options.timeout or 120 + options.actions * RENDERS_PER_ACTION
+    limit = options.timeout or 120 + options.actions * SECONDS_PER_ACTION
     try:
         code = subprocess.run(
             command(options, folder), env=environment, timeout=limit, check=False
@@ -203,6 +203,7 @@ class Run:
 
         self.world.random = random.Random(f"{self.options.seed} {number}")
         try:
+            plant(self.world, number)
             getattr(self.world, kind)()
             if kind not in NOT_PUSHED:
                 self.world._push(kind)
@@ -228,17 +229,16 @@ class Run:
         self.errors.append(f"action {number} ({kind}): {text}")
 
     def sample(self, number):
-        """Memory and datablocks in a freshly loaded file."""
-        from support import scene
-
+        """Memory of a freshly loaded file, and datablocks that no character needs."""
         self.world.random = random.Random(f"{self.options.seed} calm {number}")
         self.world.calm()
-        counts = scene.counts()
+        counts = self.world.leftovers()
         self.samples["at action"].append(number)
         self.samples["memory in MiB"].append(round(memory(), 1))
         kinds = ("objects", "meshes", "materials", "texts", "actions", "armatures", "collections")
         for name in kinds:
-            self.samples[name].append(counts[name])
+            self.samples[f"{name} left"].append(counts[name])
+        self.samples["all left"].append(sum(counts.values()))
 
     def judge(self):
         """Sentences on growth; too much of it is an error."""
@@ -261,6 +261,20 @@ class Run:
             "samples": self.samples, "checks": self.checks, "worst": self.worst,
             "finished": self.finished, "growth": self.judge(),
         }  # fmt: skip
+
+
+def plant(world, number):
+    """At the fifth action the trouble that RISORIUS_SOAK_PLANT asks for, to test the soak."""
+    kind = os.environ.get("RISORIUS_SOAK_PLANT") if number == 5 else None
+    if kind == "face":
+        block = world.rigs()[0]["risorius_mesh_000"].data.shape_keys.reference_key
+        block.points[0].co.x += 1.0
+    elif kind == "traceback":
+        print("Traceback (most recent call last):\nplanted traceback", file=sys.stderr)
+    elif kind == "death":
+        os.abort()
+    elif kind == "hang":
+        time.sleep(10_000)
 
 
 def child(options):

@@ -278,6 +278,15 @@ def test_other_topology_is_one_sentence(dna_file, tmp_path):
     assert out.read_bytes() == b"old"
 
 
+def test_edit_mode_is_refused(dna_file, tmp_path):
+    rig = scene.load(dna_file)
+    bpy.context.view_layer.objects.active = scene.meshes(rig)[0]
+    bpy.ops.object.mode_set(mode="EDIT")
+    with pytest.raises(RuntimeError, match="is in edit mode: leave that first"):
+        bpy.ops.risorius.export_dna(filepath=str(tmp_path / "out.dna"))
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
 def test_a_folder_that_cannot_be_written(dna_file, tmp_path):
     scene.load(dna_file)
     with pytest.raises(RuntimeError) as caught:

@@ -5,26 +5,10 @@ import bpy
 import numpy as np
 import pytest
 import risorius
-from support import scene
+from support import pictures, scene
+from support.animation import animate
 
 FRAMES = (1, 4, 7, 10)
-
-
-def _animate(rig, with_head=True):
-    """Keys on three controls and the head bone; returns the action's owner."""
-    controls, bone = scene.controls(rig), scene.face(rig)
-    for frame, jaw, pull, turn in ((1, 0.0, 1.0, 0.0), (5, 1.0, 0.2, 0.4), (10, 0.3, 0.6, -0.3)):
-        for end, value in (("jawOpen", jaw), ("mouthCornerPullL", pull), ("eyeLookUpL", jaw)):
-            name = f"CTRL_expressions.{end}"
-            bone[name] = value
-            bone.keyframe_insert(f'["{name}"]', frame=frame, group="Test")
-        head = controls.pose.bones["head"]
-        if not with_head:
-            continue
-        head.rotation_mode = "XYZ"
-        head.rotation_euler = (turn, 0, turn / 2)
-        head.keyframe_insert("rotation_euler", frame=frame)
-    return controls
 
 
 def _play(rig, frames):
@@ -43,7 +27,7 @@ def _curves(action):
 
 def test_playback_follows_the_curves(mode, dna_file):
     rig = scene.load(dna_file, mode)
-    controls = _animate(rig, with_head=False)
+    controls = animate(rig, with_head=False)
     for frame in FRAMES:
         bpy.context.scene.frame_set(frame)
         raw = np.zeros(len(risorius.load(str(dna_file)).raw_control_names), np.float32)
@@ -56,7 +40,7 @@ def test_playback_follows_the_curves(mode, dna_file):
 
 def test_backwards_equals_forwards(mode, dna_file):
     rig = scene.load(dna_file, mode)
-    _animate(rig)
+    animate(rig)
     forwards, backwards = _play(rig, FRAMES), _play(rig, reversed(FRAMES))
     for frame in FRAMES:
         np.testing.assert_array_equal(forwards[frame], backwards[frame])
@@ -65,7 +49,7 @@ def test_backwards_equals_forwards(mode, dna_file):
 
 def test_two_characters_do_not_disturb_each_other(mode, dna_file):
     first, second = scene.load(dna_file, mode), scene.load(dna_file, mode)
-    _animate(first)
+    animate(first)
     alone = scene.snapshot(second)
     played = _play(first, FRAMES)
     np.testing.assert_array_equal(scene.snapshot(second), alone)
@@ -76,7 +60,7 @@ def test_two_characters_do_not_disturb_each_other(mode, dna_file):
 
 def test_nla_strip_on_the_controls(mode, dna_file):
     rig = scene.load(dna_file, mode)
-    controls = _animate(rig)
+    controls = animate(rig)
     wanted = _play(rig, FRAMES)
     data = controls.animation_data
     action = data.action
@@ -107,7 +91,7 @@ def test_driver_on_a_control(mode, dna_file):
 
 def test_action_of_one_character_plays_on_another(mode, dna_file, tmp_path):
     rig = scene.load(dna_file, mode)
-    controls = _animate(rig)
+    controls = animate(rig)
     wanted = _play(rig, FRAMES)
     other = scene.load(dna_file, mode)
     data = scene.controls(other).animation_data_create()
@@ -121,7 +105,7 @@ def test_action_of_one_character_plays_on_another(mode, dna_file, tmp_path):
 
 def test_key_on_a_joint_of_the_users_survives(mode, dna_file):
     rig = scene.load(dna_file, mode)
-    _animate(rig)
+    animate(rig)
     bone = next(b for b in rig.pose.bones if b.bone["dna_joint"] == 5)
     euler = next(b for b in rig.pose.bones if b.bone["dna_joint"] == 6)
     euler.rotation_mode = "XYZ"
@@ -149,45 +133,26 @@ def test_what_the_user_poses_by_hand_survives_a_slider(dna_file):
 
 
 def _render_scene():
-    setup = bpy.context.scene
-    setup.render.engine = "CYCLES"
-    setup.cycles.samples, setup.cycles.device = 1, "CPU"
-    setup.cycles.use_denoising = False
-    setup.render.resolution_x = setup.render.resolution_y = 32
-    setup.render.image_settings.file_format = "PNG"
     camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
     camera.location, camera.rotation_euler = (0, -0.6, 1.58), (np.pi / 2, 0, 0)
-    setup.collection.objects.link(camera)
-    setup.camera = camera
-    sun = bpy.data.objects.new("sun", bpy.data.lights.new("sun", "SUN"))
-    sun.rotation_euler = (0.9, 0, 0.4)
-    setup.collection.objects.link(sun)
+    bpy.context.scene.collection.objects.link(camera)
+    setup = pictures.small_render(camera)
     setup.frame_start, setup.frame_end = 1, 10
     return setup
 
 
-def _pixels(path):
-    image = bpy.data.images.load(str(path))
-    values = np.array(image.pixels[:])
-    bpy.data.images.remove(image)
-    return values
-
-
 def test_rendered_animation_equals_single_frames(mode, dna_file, tmp_path):
     rig = scene.load(dna_file, mode)
-    _animate(rig)
+    animate(rig)
     setup = _render_scene()
     setup.frame_step = 3
     setup.render.filepath = str(tmp_path / "all_")
     bpy.ops.render.render(animation=True)
-    animated = {f: _pixels(tmp_path / f"all_{f:04d}.png") for f in FRAMES}
+    animated = {f: pictures.pixels(tmp_path / f"all_{f:04d}.png") for f in FRAMES}
     for frame in reversed(FRAMES):
         setup.frame_set(frame)
-        setup.render.filepath = str(tmp_path / f"one_{frame}.png")
-        bpy.ops.render.render(write_still=True)
-        np.testing.assert_allclose(
-            _pixels(tmp_path / f"one_{frame}.png"), animated[frame], atol=1.5 / 255
-        )
+        alone = pictures.render(tmp_path / f"one_{frame}.png")
+        np.testing.assert_allclose(alone, animated[frame], atol=1.5 / 255)
     assert np.abs(animated[1] - animated[4]).max() > 0.05
 
 

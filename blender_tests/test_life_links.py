@@ -254,3 +254,56 @@ def test_refused_live_key_is_noticed_and_repaired(library, dna_file, mode):
         assert bpy.ops.risorius.make_override() == {"FINISHED"}
     assert _said() == ""
     _moves(rig, dna_file, jawOpen=0.35, mouthCornerPullL=0.9)
+
+
+@pytest.mark.parametrize("linked", [False, True])
+def test_duplicate_of_an_override_is_independent(library, dna_file, linked):
+    _link(library[0])
+    rig = _override("LOCAL")
+    for item in bpy.context.view_layer.objects:
+        item.hide_set(False)
+        item.select_set(True)
+    bpy.ops.object.duplicate(linked=linked)
+    bpy.context.view_layer.update()
+    copy = next(r for r in _rigs() if r != rig)
+    still = scene.snapshot(rig)
+    _moves(copy, dna_file, jawOpen=0.1, browDownL=0.3)
+    np.testing.assert_array_equal(scene.snapshot(rig), still)
+    _moves(rig, dna_file, jawOpen=0.7)
+    assert _skins(rig)[0] != _skins(copy)[0]
+
+
+def test_objects_linked_without_their_collection(library, dna_file):
+    with bpy.data.libraries.load(str(library[0]), link=True) as (source, target):
+        target.objects = [n for n in source.objects if n.endswith(("rig", "controls", "mesh"))]
+    for item in target.objects:
+        bpy.context.scene.collection.objects.link(item)
+    bpy.context.view_layer.objects.active = bpy.context.scene.objects["Small_controls"]
+    bpy.context.view_layer.update()
+    rig = _override()
+    _moves(rig, dna_file, jawOpen=0.4, mouthCornerPullL=0.8)
+
+
+@pytest.mark.parametrize("shapes", ["DRIVEN", "LOCAL"])
+def test_every_operator_does_its_work_on_an_override_or_says_why_not(library, dna_file, shapes):
+    _link(library[0])
+    rig = _override(shapes)
+    name = rig.name
+    for cls in scene.submodule("registration").CLASSES:
+        if not issubclass(cls, bpy.types.Operator) or cls.bl_idname in (
+            "risorius.add_character",  # would download
+            "risorius.import_dna",
+        ):
+            continue
+        rig = bpy.data.objects[name]
+        bpy.context.view_layer.objects.active = scene.controls(rig)
+        group, _, verb = cls.bl_idname.partition(".")
+        operator = getattr(getattr(bpy.ops, group), verb)
+        if not operator.poll():
+            continue
+        try:
+            operator()
+        except RuntimeError as error:
+            assert "Traceback" not in str(error), cls.bl_idname
+    rig = bpy.data.objects[name]
+    _moves(rig, dna_file, jawOpen=0.25, browDownL=0.5)

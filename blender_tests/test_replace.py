@@ -216,6 +216,7 @@ def test_a_face_with_other_topology(mode, dna_file, tmp_path):
     pointer, key = head.data.as_pointer(), head.data.shape_keys.as_pointer()
     curve = head.data.shape_keys.driver_add('key_blocks["own"].value')
     curve.driver.expression = "0.5"
+    head.data.uv_layers.active = head.data.uv_layers["second"]
     spot = np.array(head.data.vertices[11].co)
     pinned = np.array(head.data.vertices[20].co)
     _replace(path)
@@ -223,6 +224,7 @@ def test_a_face_with_other_topology(mode, dna_file, tmp_path):
     assert (head.data.as_pointer(), head.data.shape_keys.as_pointer()) == (pointer, key)
     assert len(head.data.vertices) == 19 * 21
     keys = head.data.shape_keys.key_blocks
+    assert head.data.uv_layers.active.name == "second"
     moved = np.linalg.norm(_points(keys["own"]) - _points(keys["Basis"]), axis=1)
     place = _points(keys["Basis"])[np.argmax(moved)]
     assert 0.01 < moved.max() <= 0.0201
@@ -293,6 +295,8 @@ def test_an_edited_key_of_a_channel_that_is_gone_becomes_the_users(mode, dna_fil
     block = _keys(rig)["pull_l"]
     np.testing.assert_array_equal(_points(block), held)
     assert block.value == 0.0
+    drivers = scene.meshes(rig)[0].data.shape_keys.animation_data.drivers
+    assert 'key_blocks["pull_l"].value' not in [c.data_path for c in drivers]
     assert "your edited key stays" in _report()
     assert "jaw" in _keys(rig) or mode == "LIVE"
     _right(rig, path)
@@ -326,6 +330,7 @@ def test_renamed_bones_stay_renamed(mode, dna_file, other_file):
     assert "kiefer" in rig.data.bones
     assert "FACIAL_C_Jaw" not in rig.data.bones
     assert rig.data.bones["kiefer"]["dna_joint"] == 6
+    assert "keeps your weights" not in _report()
     _right(rig, other_file)
 
 
@@ -343,6 +348,30 @@ def test_own_bones_follow_their_joints(dna_file, other_file):
     assert rig.data.bones["tail"].parent.name == "user_joint"
     after = rig.data.bones["head"].matrix_local.inverted() @ rig.data.bones["horn"].matrix_local
     np.testing.assert_allclose(np.array(after), np.array(before), atol=2e-6)
+
+
+def test_joints_that_the_new_file_does_not_move_go_back_to_rest(dna_file, tmp_path):
+    dna = small_face()
+    dna.joint_groups = dna.joint_groups[:1]  # the eye's group is gone
+    path = _save(dna, tmp_path)
+    rig = scene.load(dna_file)
+    scene.set_controls(rig, eyeLookUpL=1.0, jawOpen=0.5)
+    bone = rig.pose.bones["FACIAL_L_Eye"]
+    assert bone.rotation_quaternion.angle > 0.1
+    _replace(path)
+    assert bone.rotation_quaternion.angle == 0.0
+    _right(rig, path)
+
+
+def test_a_control_that_is_gone_but_drives_something_stays(dna_file, other_file):
+    rig = scene.load(dna_file)
+    lamp = bpy.data.objects.new("lamp", bpy.data.lights.new("lamp", "POINT"))
+    bpy.context.scene.collection.objects.link(lamp)
+    variable = lamp.driver_add("location", 0).driver.variables.new()
+    variable.targets[0].id = scene.controls(rig)
+    variable.targets[0].data_path = f'pose.bones["face"]["{PREFIX}browDownL"]'
+    _replace(other_file)
+    assert f"{PREFIX}browDownL" in scene.face(rig)
 
 
 def test_an_edited_joint_stays_edited(dna_file, other_file):
@@ -399,6 +428,60 @@ def test_renamed_keys_keep_their_channel(dna_file, other_file):
     _right(rig, other_file)
 
 
+def test_names_given_to_keys_outlast_live_mode_and_another_file(dna_file, other_file):
+    rig = scene.load(dna_file, "KEYS")
+    _keys(rig)["pull_r"].name = "mein"
+    bpy.ops.risorius.set_shape_mode(mode="LIVE")
+    _replace(other_file)
+    assert [b.name for b in _keys(rig)] == ["Basis", "<channel sum>"]
+    bpy.ops.risorius.set_shape_mode(mode="KEYS")
+    assert "mein" in _keys(rig)
+    assert "pull_r" not in _keys(rig)
+    _right(rig, other_file)
+
+
+def _duplicate(rig, linked):
+    for item in (rig, scene.controls(rig), *scene.meshes(rig).values()):
+        item.select_set(True)
+    bpy.ops.object.duplicate(linked=linked)
+    bpy.context.view_layer.update()
+    return next(o for o in bpy.context.selected_objects if "risorius_controls" in o)
+
+
+@pytest.mark.parametrize("linked", [False, True])
+def test_only_one_of_two_copies_is_replaced(mode, dna_file, other_file, linked):
+    rig = scene.load(dna_file, mode)
+    copy = _duplicate(rig, linked)
+    bpy.context.view_layer.objects.active = scene.controls(copy)
+    _replace(other_file)
+    _right(copy, other_file)
+    _right(rig, dna_file)
+
+
+def test_a_file_without_the_level_that_was_built(mode, dna_file, tmp_path):
+    rig = scene.load(dna_file, mode, lods=(False, True) + (False,) * 6)
+    dna = small_face()
+    dna.lod_mesh_mapping = [[0, 1], []]
+    path = _save(dna, tmp_path)
+    _replace(path)
+    assert sorted(scene.meshes(rig)) == [0, 1]
+    assert not any(m.hide_render for m in scene.meshes(rig).values())
+    _right(rig, path)
+
+
+def test_a_failure_while_building_changes_nothing(mode, dna_file, other_file, monkeypatch):
+    rig = scene.load(dna_file, mode)
+    before = _whole(rig)
+
+    def fail(*_arguments):
+        raise MemoryError("planted")
+
+    monkeypatch.setattr(scene.submodule("scene.meshes"), "set_mode", fail)
+    with pytest.raises(RuntimeError, match="planted"):
+        bpy.ops.risorius.replace_dna(filepath=str(other_file))
+    assert _whole(rig) == before
+
+
 @pytest.mark.parametrize(
     "conventions",
     [
@@ -431,7 +514,9 @@ def test_levels_of_detail(mode, dna_file, tmp_path):
     path = _save(dna, tmp_path)
     _replace(path)
     assert sorted(scene.meshes(rig)) == [0, 1, 2]
-    assert scene.meshes(rig)[1].name == "Small_tongue_lod0_mesh"
+    tongue = scene.meshes(rig)[1]
+    assert tongue.name == "Small_tongue_lod0_mesh"
+    assert (tongue.parent, tongue.modifiers[0].object, tongue["risorius_rig"]) == (rig,) * 3
     assert scene.meshes(rig)[1].users_collection == scene.meshes(rig)[0].users_collection
     assert "teeth_lod0_mesh" not in "".join(o.name for o in bpy.data.objects)
     assert "The mesh Small_teeth_lod0_mesh is gone." in _report()
@@ -581,3 +666,78 @@ def test_two_faces_of_one_file_stay_two(mode, dna_file, other_file):
     np.testing.assert_array_equal(scene.snapshot(second), still)
     _right(first, other_file)
     _right(second, dna_file)
+
+
+def test_maps_of_materials_follow_names(tmp_path):
+    first = small_face()
+    first.animated_map_names = ["browsRaiseInnerL", "head_cm1_color_smile"]
+    second = renumbered(small_face(), maps=[1, "new_map", 0])
+    second.animated_map_names = ["head_cm1_color_smile", "new_map", "browsRaiseInnerL"]
+    rig = scene.load(_save(first, tmp_path, "first.dna"))
+    material = scene.meshes(rig)[0].data.materials[0]
+
+    def entries():
+        tree = material.node_tree
+        return {
+            tree.path_resolve(c.data_path.split(".")[0]).label: c.driver.variables[0]
+            .targets[0]
+            .data_path
+            for c in tree.animation_data.drivers
+        }
+
+    before = entries()
+    assert before
+    path = _save(second, tmp_path)
+    _replace(path)
+    assert scene.meshes(rig)[0].data.materials[0] == material
+    names = second.animated_map_names
+    assert entries() == {label: f'["maps"][{list(names).index(label)}]' for label in before}
+    assert entries() != before
+    _right(rig, path)
+
+
+def test_there_and_back_again_is_where_it_was(dna_file, other_file):
+    """Edits of what both files have outlast a replacement and its reversal."""
+    rig = scene.load(dna_file, "KEYS")
+    head = _decorate(rig)
+    _keys(rig)["pull_l"].points[5].co.x += 0.01
+    for block in _keys(rig):
+        block.points[40].co.y += 0.002
+    head.vertex_groups["head"].add([6], 0.75, "REPLACE")
+    before = {b.name: _points(b).copy() for b in _keys(rig)}
+    weights = {n: _weights(head, n) for n in ("mine", "head", "neck_01")}
+    rest = {b.name: np.array(b.matrix_local) for b in rig.data.bones}
+    sliders = {k for k in scene.face(rig).keys() if k.startswith(PREFIX)}  # noqa: SIM118
+    for path in (other_file, dna_file, other_file, dna_file):
+        _replace(path)
+    after = {b.name: _points(b) for b in _keys(rig)}
+    assert set(after) == set(before)
+    for name, points in before.items():
+        np.testing.assert_allclose(after[name], points, atol=3e-7, err_msg=name)
+    assert {n: _weights(head, n) for n in weights} == weights
+    assert {b.name for b in rig.data.bones} == set(rest)
+    for bone in rig.data.bones:
+        np.testing.assert_allclose(np.array(bone.matrix_local), rest[bone.name], atol=1e-5)
+    assert sliders == {k for k in scene.face(rig).keys() if k.startswith(PREFIX)}  # noqa: SIM118
+    _still_decorated(rig)
+    assert not [m for m in bpy.data.meshes if "before replace" in m.name]
+    bad, seen = scene.invalid_drivers()
+    assert not bad
+    assert seen
+
+
+def test_a_replaced_face_outlasts_the_file(mode, dna_file, other_file, tmp_path):
+    rig = scene.load(dna_file, mode)
+    _decorate(rig)
+    _replace(other_file)
+    scene.set_controls(rig, jawOpen=0.4)
+    before = scene.snapshot(rig)
+    blend = tmp_path / "scene.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+    content = other_file.read_bytes()
+    other_file.unlink()
+    bpy.ops.wm.open_mainfile(filepath=str(blend))
+    rig = bpy.data.objects["Small_rig"]
+    np.testing.assert_array_equal(scene.snapshot(rig), before)
+    assert scene.submodule("scene.storage").content(rig["risorius_dna"]) == content
+    _still_decorated(rig)

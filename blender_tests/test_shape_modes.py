@@ -101,6 +101,20 @@ def test_muted_keys_stay_muted(dna_file):
     assert _keys(rig)["jaw"].mute
 
 
+def test_an_edit_that_is_taken_back_is_summed_again(dna_file):
+    rig = scene.load(dna_file, "KEYS")
+    was = _keys(rig)["jaw"].points[5].co.x
+    _keys(rig)["jaw"].points[5].co.x += 0.01
+    _switch("LIVE")
+    assert "jaw" in _keys(rig)
+    _keys(rig)["jaw"].points[5].co.x = was
+    _switch("LIVE")
+    assert "jaw" not in _keys(rig)
+    scene.set_controls(rig, jawOpen=0.6)
+    raw = scene.raw_of(rig, dna_file)
+    assert scene.error_against_oracle(rig, dna_file, raw) < scene.TOLERANCE
+
+
 def test_the_order_of_keys_returns(dna_file):
     rig = scene.load(dna_file, "KEYS")
     head = _head(rig)
@@ -257,3 +271,27 @@ def test_override_ends_by_itself(mode, dna_file, tmp_path, end):
     assert scene.error_against_oracle(rig, dna_file, raw) < scene.TOLERANCE
     assert "risorius_test" not in rig
     assert bpy.context.window_manager.risorius_test == 0.0
+
+
+def test_the_panel_draws_with_and_without_a_test(dna_file):
+    from types import SimpleNamespace
+
+    from support.layout import Recorder
+
+    scene.load(dna_file)
+    panel = scene.submodule("ui.shape_test").RISORIUS_PT_shape_test
+    assert panel.poll(bpy.context)
+    for value, buttons in ((None, 1), (0.5, 2)):
+        if value is not None:
+            bpy.ops.risorius.test_channel(channel="1", value=value)
+        layout = Recorder()
+        panel.draw(SimpleNamespace(layout=layout), bpy.context)
+        assert layout.operators == ["risorius.test_channel"] * buttons
+
+
+def test_only_shapes_that_move_something_are_offered(dna_file):
+    rig = scene.load(dna_file)
+    items = scene.submodule("ui.shape_test")._channels(None, bpy.context)
+    assert [i[1] for i in items] == [b.name for b in _keys(rig)[1:]]
+    with pytest.raises(TypeError):
+        bpy.ops.risorius.test_channel(channel="17", value=1.0)

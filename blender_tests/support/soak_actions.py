@@ -183,9 +183,12 @@ class World:
         layer = bpy.context.view_layer
         for item in layer.objects:
             item.select_set(False)
-        for item in self._objects(self._rig()):
-            item.hide_set(False)
+        objects = self._objects(self._rig())
+        for item in objects:
             item.hide_viewport = False
+        layer.update()  # what was hidden until now cannot be selected before
+        for item in objects:
+            item.hide_set(False)
             item.select_set(True)
         bpy.ops.object.duplicate(linked=self.random.random() < 0.3)
         layer.update()
@@ -200,10 +203,15 @@ class World:
     def _delete(self, rig):
         """As a user does, or with its data at once, or the whole collection."""
         objects = self._objects(rig)
+        controls = rig["risorius_controls"]
+        if any(r != rig and r["risorius_controls"] == controls for r in self.rigs()):
+            objects.remove(controls)
         if rig.override_library:
             # Blender makes objects anew that an override's collection has lost.
             root = rig.override_library.hierarchy_root
-            bpy.data.batch_remove([*objects, root] if root not in objects else objects)
+            # A copy of an override has the same root, and stands outside of it.
+            whole = isinstance(root, bpy.types.Collection) and rig in root.all_objects[:]
+            bpy.data.batch_remove([*objects, root] if whole else objects)
         elif self.random.random() < 0.5:
             with bpy.context.temp_override(selected_objects=objects, active_object=rig):
                 bpy.ops.object.delete()
@@ -239,6 +247,17 @@ class World:
         if not rig.override_library:
             self._activate(rig)
             bpy.ops.risorius.reload()
+
+    def replace(self):
+        """The same file, or another with other axes and shapes."""
+        rig = self._rig()
+        if not rig.override_library:
+            self._activate(rig)
+            bpy.ops.risorius.replace_dna(filepath=str(self.random.choice(self.sources)))
+
+    def export(self):
+        self._activate(self._rig())
+        bpy.ops.risorius.export_dna(filepath=str(self.folder / "out.dna"))
 
     def append(self):
         if len(self.rigs()) >= LIMIT:
@@ -387,10 +406,39 @@ class World:
             self._import("LIVE")
         for rig in self.rigs():
             rig["risorius_controls"].animation_data_clear()
+        self.purge_all()
+        self.save_and_load()
+        self.save_and_load()
+
+    def leftovers(self):
+        """Datablocks that stay when every character is deleted: none of them may grow in number.
+
+        The file is opened again after it.
+        """
+        for rig in self.rigs():
+            self._delete(rig)
+        self.purge_all()
+        bpy.ops.wm.save_as_mainfile(filepath=str(self.folder / "empty.blend"))  # drops the dead
+        self.purge_all()
+        # Linked data is not counted: parts that point to each other stay until the file is loaded.
+        kinds = [p for p in bpy.data.bl_rna.properties if p.type == "COLLECTION"]
+        local = {
+            p.identifier: [i for i in getattr(bpy.data, p.identifier) if not i.library]
+            for p in kinds
+            if p.identifier != "libraries"
+        }
+        # Reports are Texts that the user may read, and keep.
+        local["texts"] = [t for t in local["texts"] if "risorius_bytes" in t]
+        counts = {name: len(found) for name, found in local.items()}
+        bpy.ops.wm.open_mainfile(filepath=str(self.blend))
+        self._settings()
+        self._push("sampled")
+        return counts
+
+    def purge_all(self):
+        """Empty collections, and all that nothing uses."""
         bpy.data.batch_remove([c for c in bpy.data.collections if not c.all_objects])
-        self.save_and_load()
         self.purge()
-        self.save_and_load()
 
 
 # Action -> how often; those that change the file are undo steps.
@@ -398,8 +446,9 @@ WEIGHTS = {
     "slider": 300, "frame": 130, "key": 60, "undo": 80, "redo": 50, "select": 60, "lod": 50,
     "shape_mode": 40, "reset": 20, "overdrive": 20, "own_key": 20, "drop_own_key": 20,
     "rename": 40, "hide": 20, "exclude": 10, "duplicate": 25, "delete": 40, "delete_part": 10,
-    "import_dna": 12, "reload": 12, "append": 12, "override": 12, "separate": 5, "save": 10,
-    "save_and_load": 12, "revert": 5, "purge": 5, "other_scene": 10, "render": 6, "unkey": 15,
+    "import_dna": 12, "reload": 12, "replace": 8, "export": 8, "append": 12, "override": 12,
+    "separate": 5, "save": 10, "save_and_load": 12, "revert": 5, "purge": 5, "other_scene": 10,
+    "render": 6, "unkey": 15,
     "disable_and_enable": 10,
 }  # fmt: skip
 NOT_PUSHED = {"undo", "redo", "save", "save_and_load", "revert"}

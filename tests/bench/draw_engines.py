@@ -128,8 +128,8 @@ class Stage:
         corners = [eye.matrix_world @ Vector(c) for c in eye.bound_box]
         self.eye = sum(corners, Vector()) / 8
         self.unit = 2 * abs(self.eye.x)
-        place = self.eye + Vector((-4.0, -9.0, 3.0)) * self.unit
-        demo.add_light("Catch", place, self.eye, 0.9, 0.8 * self.unit, (1, 1, 1))
+        place = self.eye + Vector((-1.8, -9.0, 0.9)) * self.unit
+        demo.add_light("Catch", place, self.eye, 0.35, 0.35 * self.unit, (1, 1, 1))
 
     def look(self, kind):
         """Place the camera."""

@@ -46,9 +46,11 @@ def key_edits(
         bool[V], and float64[V, 3]: how far the key's delta is from the channel's; 0 elsewhere.
     """
     differs = points != wanted
-    # An edit of the basis moves a key by the same offset, in float32: four sums, here and there,
-    # are each rounded to half a unit in the last place.
-    # That is two units of the largest number among them.
+    if not differs.any():
+        return np.zeros(len(points), np.bool_), np.zeros(points.shape)
+    # An edit of the basis moves a key by the same offset, in float32: four sums, here and
+    # there, are each rounded to half a unit in the last place: two units of the largest number
+    # among them.
     before = imported_basis + (wanted - basis)
     largest = np.max(np.abs([basis, imported_basis, points, wanted, before]), axis=0)
     rounding = 2.0 * np.spacing(largest)

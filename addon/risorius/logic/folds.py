@@ -106,17 +106,10 @@ def area_masks(points: NDArray[Any], frame: FaceFrame) -> dict[str, Float32]:
 
 
 def fold_coordinates(points: NDArray[Any], frame: FaceFrame) -> Float32:
-    """float32[V, 3]: x and height for straight folds, and a distance for round ones.
-
-    The third is, around an eye, the turn about it, and beside the mouth the distance from it.
-    """
+    """float32[V, 3]: x and height of face_coordinates, and the distance from the mouth."""
     local = face_coordinates(points, frame)
-    x, z = np.abs(local[:, 0]), local[:, 2]
-    turn = np.arctan2(z, np.maximum(x - 0.45, 1e-3)) * 0.5
-    away = np.hypot(x, (z + 1.0) * 0.8)
-    beside = _smooth((-0.25 - z) / 0.3)
-    curve = turn * (1 - beside) + away * beside
-    return np.stack([local[:, 0], z, curve], axis=1).astype(np.float32)
+    x, z = local[:, 0], local[:, 2]
+    return np.stack([x, z, np.hypot(x, (z + 1.0) * 0.8)], axis=1).astype(np.float32)
 
 
 def left_share(points: NDArray[Any], frame: FaceFrame) -> Float32:

@@ -10,6 +10,15 @@ from . import compat, parts
 
 _ENTRY = re.compile(r'^\["(channels|maps)"\]\[(\d+)\]$')
 _GONE = re.compile(r'^\["(gone (channels|maps): .*)"\]$')
+# What has a node tree of its own inside; a scene has one up to Blender 4.5.
+_WITH_NODES = (
+    bpy.types.Material,
+    bpy.types.World,
+    bpy.types.Light,
+    bpy.types.Scene,
+    bpy.types.Texture,
+    bpy.types.FreestyleLineStyle,
+)
 
 
 def owners():
@@ -21,9 +30,9 @@ def owners():
             if not isinstance(item, bpy.types.ID):
                 continue
             yield item
-            inner = isinstance(item, (bpy.types.Material, bpy.types.World, bpy.types.Light))
-            if inner and item.node_tree is not None:
-                yield item.node_tree
+            inner = getattr(item, "node_tree", None) if isinstance(item, _WITH_NODES) else None
+            if inner is not None:
+                yield inner
 
 
 def targets_at(item):

@@ -49,7 +49,7 @@ def export(context, rig, options=None):
     if live is None:
         raise ExportError(f"{rig.name} has lost the data of its file.")
     content = storage.content(rig[parts.DNA])
-    unit = float(rig.get(parts.UNIT, 1.0))
+    unit = runtime.unit_of(rig)
     levels = tuple(lods.built(rig)) or (0,)
     plan = plans.plan_character(live.dna, rig.name, levels, unit, live.rests)
     written = native.module().load(content)  # the Runtime's own must stay as it is

@@ -101,20 +101,23 @@ def _loaded(*_arguments):
     layer = bpy.context.view_layer
     if layer is not None and not native.problem() and parts.rigs():
         layer.update()
+        heal.heal_all()
+        runtime.forget_outputs()
+        refresh()
     _restored()
 
 
 @persistent
 def _restored(*_arguments):
-    """After load, undo and redo: what was written before says nothing about what is there."""
+    """After load, undo and redo: what was written before says nothing about what is there.
+
+    Nothing is read here: until the next update the pose bones of objects that undo brought back
+    point to bones that are no more, and Blender dies of a look at them.
+    """
     runtime.forget_outputs()
     _state["objects"] = -1
     if native.problem():
         return
-    heal.heal_all()
-    refresh()
-    # The evaluated copies may not have caught up yet: look once more when they have.
-    runtime.forget_outputs()
     for rig in parts.rigs():
         controls = parts.controls_of(rig)
         if controls is not None:

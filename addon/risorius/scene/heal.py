@@ -2,8 +2,8 @@
 """What a rename or a deletion took away: mended where that is safe, said in words where not.
 
 Objects, meshes, materials, collections, actions and joints' bones may have any name. The names
-of the control bones, of the sliders are a contract with actions, pose
-assets and scripts, so they are given back.
+of control bones and sliders are a contract with actions, pose assets and scripts, so they are
+given back.
 """
 
 import bpy

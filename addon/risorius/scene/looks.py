@@ -63,7 +63,7 @@ def _iris_and_sclera(graph, look, flat, away):
     turned = graph.vector("NORMALIZE", flat)
     fibres = graph.noise(turned, 9.0, detail=5.0, roughness=0.75)
     iris = graph.mix(
-        graph.math("MULTIPLY_ADD", away, 3.2, graph.math("MULTIPLY", fibres, 0.9), clamp=True),
+        graph.math("MULTIPLY_ADD", away, 4.0, graph.math("MULTIPLY_ADD", fibres, 0.6, -0.9)),
         _IRIS_IN,
         _IRIS_OUT,
     )

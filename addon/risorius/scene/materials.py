@@ -84,7 +84,7 @@ def build_materials(plan, rig, built, made, found=None, simple=False):
         simple: build the cheap variant: no subsurface, relief or maps.
 
     Returns:
-        Sentences about textures that are missing or cannot be read.
+        Sentences about textures that are missing, cannot be read or stay outside the .blend.
     """
     found = found if found is not None else textures.TexturePlan()
     images = Images(made)
@@ -97,7 +97,7 @@ def build_materials(plan, rig, built, made, found=None, simple=False):
             look = _look(plan, mesh, rig, frame, uses, areas, found, images, simple)
             by_base[mesh.base] = _build(plan, look, made)
         item.data.materials.append(by_base[mesh.base])
-    return [*found.missing, *images.broken]
+    return [*found.missing, *images.troubles]
 
 
 def _look(plan, mesh, rig, frame, uses, areas, found, images, simple):

@@ -89,7 +89,8 @@ def _writer(rig, live):
 
 
 def _make_writer(rig, live):
-    joints = [b.bone.get(parts.JOINT, -1) for b in rig.pose.bones]
+    kept = rig.data.bones  # by name: after undo PoseBone.bone may point into freed memory
+    joints = [kept[b.name].get(parts.JOINT, -1) if b.name in kept else -1 for b in rig.pose.bones]
     where = [i for i, joint in enumerate(joints) if joint in live.owned]
     row_of = {joints[i]: row for row, i in enumerate(where)}
     shares = [("neck", joint, 1.0 / len(live.anchors.neck)) for joint in live.anchors.neck]

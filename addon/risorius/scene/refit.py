@@ -10,7 +10,14 @@ import numpy as np
 from ..logic import edits
 from . import build, carry, meshes, parts, runtime, weights
 
-_BOUND = {"SURFACE_DEFORM", "MESH_DEFORM", "LAPLACIANDEFORM", "CORRECTIVE_SMOOTH", "MULTIRES"}
+_BOUND = {
+    "HOOK",
+    "SURFACE_DEFORM",
+    "MESH_DEFORM",
+    "LAPLACIANDEFORM",
+    "CORRECTIVE_SMOOTH",
+    "MULTIRES",
+}
 
 
 @dataclass
@@ -20,7 +27,7 @@ class Shape:
     Attributes:
         points: float32[V, 3] the basis.
         moved: float64[V, 3] the user's edit of the basis.
-        keys: key name -> float32[V, 3].
+        keys: key name -> float32[V, 3]; without those of ours that are as in the file.
         relative: key name -> name of the key it is relative to.
         channels: name of a key of ours -> its old channel.
         edits: name of an edited key of ours -> float64[V, 3].
@@ -160,8 +167,8 @@ def read_shape(live, item, old, known):
     deltas = meshes.deltas_by_channel(dna_mesh, live.space.delta_matrix)
     shape.channels = meshes.real_channels(item)
     summed = meshes.live_block(item)
+    bases = {block.relative_key.name for block in key.key_blocks}
     for block in key.key_blocks:
-        shape.keys[block.name] = meshes.points_of(block)
         shape.relative[block.name] = block.relative_key.name
         channel = shape.channels.get(block.name)
         if channel is None:
@@ -172,6 +179,9 @@ def read_shape(live, item, old, known):
             mask, difference = meshes.edits_of(block, old.positions, deltas.get(channel, nothing))
             if mask.any():
                 shape.edits[block.name] = difference
+        edited = block.name in shape.edits or block.vertex_group
+        if channel is None or edited or block.name in bases or not known:
+            shape.keys[block.name] = meshes.points_of(block)
     return shape
 
 
@@ -218,7 +228,7 @@ def _leave(change, item, old):
     """A mesh that the new file has not: away with it, unless it bears something of the user's."""
     label = item.name
     known = old is not None and len(item.data.vertices) == len(old.positions)
-    things = ["it"]
+    things = ["its unknown origin"]
     if old is not None:
         shape = read_shape(change.before, item, old, known)
         things = _things(change, item, old, shape, known)
@@ -352,9 +362,12 @@ def _refit_shape(change, item, shape, new, bearer):
         return
     _drop_gone_keys(change, item, shape, channel_map, deltas)
     done = {key.reference_key.name: basis}
+    bases = set(shape.relative.values())
     for block in key.key_blocks:
         points = _points(block.name, shape, done, deltas, channel_map, bearer)
         block.points.foreach_set("co", points.ravel())
+        if block.name not in bases:
+            del done[block.name]  # hundreds of keys would fill the memory
     _renumber(key, channel_map)
 
 

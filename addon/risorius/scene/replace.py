@@ -70,7 +70,7 @@ def replace_file(context, rig, path, progress=lambda _share: None):
     _check(rig)
     with armatures.kept_selection(context):
         before = runtime.of(rig)
-        unit = float(rig.get(parts.UNIT, 1.0))
+        unit = runtime.unit_of(rig)
         levels = tuple(lods.built(rig)) or (0,)
         old = plans.plan_character(before.dna, rig.name, levels, unit, before.rests)
         fresh, warnings = build.import_file(
@@ -116,6 +116,7 @@ def _exchange(context, change, fresh):
     fresh_meshes = {m[parts.MESH]: m for m in parts.meshes_of(fresh)}
     kept = refit.replace_meshes(change, fresh_meshes)
     _take_properties(change, fresh)
+    _sliders(change)
     entries = drivers.Entries(rig, _array_labels(change))
     build.settle(context, rig, parts.controls_of(rig))
     entries.move()
@@ -125,7 +126,7 @@ def _exchange(context, change, fresh):
     refit.finish_shapes(change)
     _number_meshes(rig)
     lods.show(rig)
-    _controls(context, change)
+    bones.replace_control_places(context, change)
     build.remove(fresh)
     lods.show(rig)
     runtime.forget_outputs()
@@ -232,7 +233,7 @@ def _number_meshes(rig):
         parts.point(rig, f"{parts.MESH_PREFIX}{number:03d}", item)
 
 
-def _controls(context, change):
+def _sliders(change):
     """Sliders of the new file; those that are gone leave, unless something is keyed on them."""
     controls = parts.controls_of(change.rig)
     face = controls.pose.bones[parts.FACE]
@@ -260,7 +261,6 @@ def _controls(context, change):
         else:
             del face[label]
             change.report.append(f"The control {label} is gone.")
-    bones.replace_control_places(context, change)
 
 
 def _keep_report(change):

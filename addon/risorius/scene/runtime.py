@@ -81,7 +81,7 @@ def of(rig):
     digest = storage.content_hash(text)
     if not digest:
         return None
-    key = (digest, _unit(rig))
+    key = (digest, unit_of(rig))
     if key not in _cache:
         try:
             _cache[key] = _compile(storage.content(text), key[1])
@@ -93,7 +93,7 @@ def of(rig):
     return _cache[key]
 
 
-def _unit(rig):
+def unit_of(rig):
     """Metres per Blender unit at import."""
     unit = rig.get(parts.UNIT)
     usable = isinstance(unit, int | float) and np.isfinite(unit) and unit > 0

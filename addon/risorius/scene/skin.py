@@ -7,9 +7,9 @@ from .meshes import plain_driver
 
 MAP_PREFIX = "risorius_map_"
 AREAS = tuple(f"risorius_areas_{i}" for i in (1, 2, 3))  # mesh attributes: three areas each
-FOLDS = "risorius_folds"  # mesh attribute: x, height, curve of the folds
+FOLDS = "risorius_folds"  # mesh attribute: x, height, distance from the mouth
 _FRAME = "Animated maps"
-_TONE, _DARK, _RED = (0.56, 0.31, 0.22), (0.45, 0.21, 0.145), (0.50, 0.19, 0.14)
+_TONE, _DARK, _RED = (0.60, 0.35, 0.25), (0.50, 0.26, 0.18), (0.54, 0.22, 0.16)
 _FLUSH = (1.0, 0.42, 0.38)
 _CREASE = (0.66, 0.49, 0.45)
 # Radians for each eye distance: how close the folds lie.
@@ -125,7 +125,8 @@ class Skin:
             amount = graph.total([v for _, v in members])
             return graph.math("MULTIPLY", amount, self._atlas_channel(name))
         share = _FLUSH_SHARE if bucket[0] == "flush" else 1.0
-        amount = graph.math("MULTIPLY", self._sided(members), share)
+        amount = graph.math("MINIMUM", self._sided(members), 1.0)
+        amount = graph.math("MULTIPLY", amount, share)
         return amount if name == "all" else graph.math("MULTIPLY", amount, self.areas[name])
 
     def _sided(self, members):
@@ -226,14 +227,19 @@ class Skin:
         self.folds = {}
         if not self.bumps:
             return self.folds
-        x, z, curve = graph.split(graph.attribute(FOLDS))
+        x, z, away = graph.split(graph.attribute(FOLDS))
         wander = graph.noise(self.points, 2.2 / self.look.unit, detail=3.0)
         for kind in self.bumps:
             if kind == "dimples" or not self.look.areas:
                 cells = graph.cells(self.points, 9.0 / self.look.unit)
                 self.folds[kind] = graph.math("MINIMUM", cells, 1.0)
                 continue
-            along = {"level": z, "upright": x, "rays": curve, "arc": curve}[kind]
+            if kind == "rays":  # from the outer half of the eye, like a crow's foot
+                aside = graph.math("SUBTRACT", graph.math("ABSOLUTE", x), 0.45)
+                turn = graph.math("ARCTAN2", z, graph.math("MAXIMUM", aside, 0.001))
+                along = graph.math("MULTIPLY", turn, 0.5)
+            else:
+                along = {"level": z, "upright": x, "arc": away}[kind]
             sway = 0.03 if kind == "arc" else 0.13
             bent = graph.math("MULTIPLY_ADD", wander, sway, along)
             wave = graph.math("SINE", graph.math("MULTIPLY", bent, _PITCH[kind]))

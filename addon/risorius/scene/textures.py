@@ -18,6 +18,7 @@ COLOR_SPACES = (
     "sRGB OETF",
 )
 DATA_SPACES = ("Non-Color", "Raw", "Utility - Raw", "raw", "Generic Data", "Non-Colour Data")
+PACK_LIMIT = 64 << 20  # bytes; larger files stay outside, or a .blend would grow to gigabytes
 TILE = 512  # pixels of one tile of the mask atlas, each side
 
 
@@ -45,11 +46,11 @@ def set_color_space(image, data):
 
 
 class Images:
-    """Loads each file once for each role and packs it into the .blend."""
+    """Loads each file once for each role and packs it into the .blend; `troubles` are sentences."""
 
     def __init__(self, made):
         self.made = made
-        self.broken = []
+        self.troubles = []
         self._loaded = {}
 
     def load(self, path, data=False):
@@ -65,22 +66,24 @@ class Images:
         try:
             image = bpy.data.images.load(str(path), check_existing=False)
         except RuntimeError:
-            self._complain(path)
+            self._complain(f"The texture {path.name} cannot be read.")
             return None
         self.made.append(image)
         set_color_space(image, data)
         if not image.size[0]:  # read lazily: a file of another kind shows itself only now
-            self._complain(path)
+            self._complain(f"The texture {path.name} cannot be read.")
             self.made.remove(image)
             bpy.data.images.remove(image)
             return None
-        image.pack()
+        if path.stat().st_size <= PACK_LIMIT:
+            image.pack()
+        else:
+            self._complain(f"The texture {path.name} is large and stays outside the .blend file.")
         return image
 
-    def _complain(self, path):
-        sentence = f"The texture {path.name} cannot be read."
-        if sentence not in self.broken:
-            self.broken.append(sentence)
+    def _complain(self, sentence):
+        if sentence not in self.troubles:
+            self.troubles.append(sentence)
 
     def atlas(self, name, masks):
         """One image with the masks of many regions, three to a tile: an engine has few samplers.

@@ -85,7 +85,8 @@ class RISORIUS_OT_reload(bpy.types.Operator):
     def invoke(self, context, _event):
         path = self._path(context)
         if not path or not Path(path).is_file():
-            return bpy.ops.risorius.replace_dna("INVOKE_DEFAULT")
+            bpy.ops.risorius.replace_dna("INVOKE_DEFAULT")
+            return {"CANCELLED"}  # the file selector does the work
         return self.execute(context)
 
     def execute(self, context):

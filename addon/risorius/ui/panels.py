@@ -26,10 +26,21 @@ _ICONS = {
 _OPEN = {"brow", "eye", "mouth", "jaw"}
 
 
-class _FacePanel:
+class FacePanel:
+    """What all panels of the tab share."""
+
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = "Face"
+
+
+class FaceOnlyPanel(FacePanel):
+    """A panel that is there only with a face."""
+
+    @classmethod
+    def poll(cls, context):
+        rig = None if native.problem() else parts.active_rig(context)
+        return rig is not None and parts.controls_of(rig) is not None
 
 
 def _write(layout, text, icon="NONE"):
@@ -40,7 +51,7 @@ def _write(layout, text, icon="NONE"):
         column.label(text=line, icon=icon if number == 0 else "BLANK1")
 
 
-class RISORIUS_PT_character(_FacePanel, bpy.types.Panel):
+class RISORIUS_PT_character(FacePanel, bpy.types.Panel):
     bl_idname = "RISORIUS_PT_character"
     bl_label = "Face"
     bl_order = 0
@@ -109,15 +120,10 @@ def _draw_shapes(layout, rig):
         row.operator("risorius.set_shape_mode", text=text, depress=mode in modes).mode = mode
 
 
-class RISORIUS_PT_controls(_FacePanel, bpy.types.Panel):
+class RISORIUS_PT_controls(FaceOnlyPanel, bpy.types.Panel):
     bl_idname = "RISORIUS_PT_controls"
     bl_label = "Controls"
     bl_order = 1
-
-    @classmethod
-    def poll(cls, context):
-        rig = None if native.problem() else parts.active_rig(context)
-        return rig is not None and parts.controls_of(rig) is not None
 
     def draw(self, context):
         layout = self.layout
@@ -169,15 +175,11 @@ def _draw_sliders(layout, face, names):
             row.prop(face, f'["{quoted}"]', text=text, slider=True)
 
 
-class RISORIUS_PT_options(_FacePanel, bpy.types.Panel):
+class RISORIUS_PT_options(FaceOnlyPanel, bpy.types.Panel):
     bl_idname = "RISORIUS_PT_options"
     bl_label = "Options"
     bl_order = 2
     bl_options = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context):
-        return RISORIUS_PT_controls.poll(context)
 
     def draw(self, context):
         layout = self.layout

@@ -3,9 +3,9 @@
 
 import bpy
 
-from .. import native
 from ..scene import build, evaluate, parts, runtime, testing
 from .import_operators import usable
+from .panels import FaceOnlyPanel
 
 _items = []  # Blender reads the strings later: they must stay alive
 
@@ -113,19 +113,11 @@ def weight_property():
     )
 
 
-class RISORIUS_PT_shape_test(bpy.types.Panel):
+class RISORIUS_PT_shape_test(FaceOnlyPanel, bpy.types.Panel):
     bl_idname = "RISORIUS_PT_shape_test"
     bl_label = "Test a Shape"
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "UI"
-    bl_category = "Face"
     bl_order = 3
     bl_options = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context):
-        rig = None if native.problem() else parts.active_rig(context)
-        return rig is not None and parts.controls_of(rig) is not None
 
     def draw(self, context):
         layout = self.layout
