@@ -26,9 +26,11 @@ def _frame_changed(_scene, depsgraph=None):
 def _render_ended(*_arguments):
     """The viewport shows its own level of detail again."""
     for rig in parts.rigs():
-        if lods.by_distance(rig) or lods.render_level(rig) != lods.viewport_level(rig):
+        controls = parts.controls_of(rig)
+        apart = lods.by_distance(rig) or lods.render_level(rig) != lods.viewport_level(rig)
+        if apart and controls is not None:
             runtime.forget_outputs()
-            parts.controls_of(rig).update_tag()
+            controls.update_tag()
 
 
 @persistent
