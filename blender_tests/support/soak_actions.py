@@ -124,6 +124,57 @@ class World:
         levels = scene.submodule("scene.lods").built(rig)
         bpy.ops.risorius.set_lod(lod=self.random.choice(levels))
 
+    def lod_by_distance(self):
+        camera = bpy.context.scene.camera
+        if camera is None:
+            camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
+            bpy.context.scene.collection.objects.link(camera)
+            bpy.context.scene.camera = camera
+        camera.location = (0.0, -self.random.choice((0.5, 1.0, 2.0, 4.0)), 1.6)
+        self._activate(self._rig())
+        bpy.ops.risorius.set_lod_by_distance(enable=self.random.random() < 0.5)
+
+    def place(self):
+        """Move, turn and scale the control armature."""
+        controls = self._rig()["risorius_controls"]
+        controls.location = [self.random.uniform(-1, 1) for _ in range(3)]
+        controls.rotation_euler = [self.random.uniform(-1, 1) for _ in range(3)]
+        controls.scale = [self.random.choice((1.0, 0.5, 2.0))] * 3
+        scene.update(controls)
+
+    def attach(self):
+        """Hang a face on a body, move the body, or take it off again."""
+        rig = self._rig()
+        self._activate(rig)
+        body = bpy.context.scene.objects.get("body") or self._body()
+        if rig["risorius_controls"].constraints and self.random.random() < 0.5:
+            bpy.ops.risorius.detach_body()
+        else:
+            bpy.ops.risorius.attach_body(body=body.name, base="base", fit="NONE")
+        body.pose.bones["base"].location = [self.random.uniform(-0.2, 0.2) for _ in range(3)]
+        scene.update(body)
+
+    def _body(self):
+        body = bpy.data.objects.new("body", bpy.data.armatures.new("body"))
+        bpy.context.scene.collection.objects.link(body)
+        active = bpy.context.view_layer.objects.active
+        bpy.context.view_layer.objects.active = body
+        bpy.ops.object.mode_set(mode="EDIT")
+        bone = body.data.edit_bones.new("base")
+        bone.tail = (0.0, 0.0, 1.0)
+        bpy.ops.object.mode_set(mode="OBJECT")
+        bpy.context.view_layer.objects.active = active
+        return body
+
+    def test_channel(self):
+        """Try a shape by hand; a change of the frame or of a control ends it, or the user does."""
+        self._activate(self._rig())
+        bpy.ops.risorius.test_channel(channel="1", value=self.random.random())
+        if self.random.random() < 0.5:
+            bpy.ops.risorius.test_channel(end=True)
+        else:
+            bpy.context.scene.frame_set(bpy.context.scene.frame_current + 1)
+
     def shape_mode(self):
         self._activate(self._rig())
         bpy.ops.risorius.set_shape_mode(mode=self.random.choice(("LIVE", "KEYS", "AUTO")))
@@ -387,8 +438,9 @@ class World:
         raw = np.array([float(bone[n]) for n in labels], np.float32)
         lod = int(rig["risorius_lod"])
         pose = evaluator.evaluate(raw, lod)
-        worst = (0.0, "")
         place = np.array(rig.matrix_world)
+        apart = np.abs(place - np.array(rig["risorius_controls"].matrix_world)).max()
+        worst = (float(apart), "its place")
         for index, item in scene.meshes(rig).items():
             if lod not in list(item["dna_lods"]) or item.hide_viewport:
                 continue
@@ -449,6 +501,6 @@ WEIGHTS = {
     "import_dna": 12, "reload": 12, "replace": 8, "export": 8, "append": 12, "override": 12,
     "separate": 5, "save": 10, "save_and_load": 12, "revert": 5, "purge": 5, "other_scene": 10,
     "render": 6, "unkey": 15,
-    "disable_and_enable": 10,
+    "disable_and_enable": 10, "lod_by_distance": 12, "place": 15, "attach": 12, "test_channel": 15,
 }  # fmt: skip
 NOT_PUSHED = {"undo", "redo", "save", "save_and_load", "revert"}
