@@ -49,6 +49,7 @@ class World:
         while len(self.rigs()) < self.characters:
             self._import("AUTO")
         self._settings()
+        self.render()  # what the engine keeps from its first picture on is no growth
         bpy.ops.ed.undo_push(message="begin")
         bpy.ops.wm.save_as_mainfile(filepath=str(self.blend))
 
@@ -73,8 +74,14 @@ class World:
         return self.random.choice(self.rigs())
 
     @staticmethod
-    def _objects(rig):
-        held = [rig, rig["risorius_controls"], *scene.meshes(rig).values()]
+    def _meshes(rig):
+        """DNA mesh index -> its own mesh: a copy of some parts points to another's meshes."""
+        held = [rig[k] for k in rig.keys() if k.startswith("risorius_mesh_")]  # noqa: SIM118
+        own = [m for m in held if m is not None and m.get("risorius_rig") == rig]
+        return {m["dna_mesh"]: m for m in own}
+
+    def _objects(self, rig):
+        held = [rig, rig["risorius_controls"], *self._meshes(rig).values()]
         return [o for o in held if o is not None]
 
     def _activate(self, rig):
@@ -180,14 +187,14 @@ class World:
         bpy.ops.risorius.set_shape_mode(mode=self.random.choice(("LIVE", "KEYS", "AUTO")))
 
     def own_key(self):
-        item = self.random.choice(list(scene.meshes(self._rig()).values()))
+        item = self.random.choice(list(self._meshes(self._rig()).values()))
         if not (item.data.library or item.data.override_library):
             block = item.shape_key_add(name="mine", from_mix=False)
             block.value = 0.0
             bpy.context.view_layer.update()
 
     def drop_own_key(self):
-        for item in scene.meshes(self._rig()).values():
+        for item in self._meshes(self._rig()).values():
             key = item.data.shape_keys
             locked = item.data.library or item.data.override_library
             for block in list(key.key_blocks) if key and not locked else ():
@@ -197,7 +204,7 @@ class World:
     def rename(self):
         rig = self._rig()
         controls = rig["risorius_controls"]
-        mesh = self.random.choice(list(scene.meshes(rig).values()))
+        mesh = self.random.choice(list(self._meshes(rig).values()))
         homes = [c for c in bpy.data.collections if rig in c.objects[:]]
         held = [rig, controls, mesh, *homes, rig["risorius_dna"]]
         held += [m for m in mesh.data.materials if m]
@@ -441,7 +448,7 @@ class World:
         place = np.array(rig.matrix_world)
         apart = np.abs(place - np.array(rig["risorius_controls"].matrix_world)).max()
         worst = (float(apart), "its place")
-        for index, item in scene.meshes(rig).items():
+        for index, item in self._meshes(rig).items():
             if lod not in list(item["dna_lods"]) or item.hide_viewport:
                 continue
             wanted = oracle.vertices(dna, index, pose) @ place[:3, :3].T + place[:3, 3]
