@@ -111,6 +111,8 @@ def report(options, folder, ending, seconds):
         "actions: " + ", ".join(f"{k} {v}" for k, v in sorted(result.get("counts", {}).items())),
         f"faces checked: {result.get('checks', 0)} times; worst error of a mesh's size: "
         f"{result.get('worst', 0.0):.2g}",
+        "overrides that Blender locked, said and repaired by the panel's button: "
+        f"{result.get('repaired', 0)}",
     ]
     for name, row in result.get("samples", {}).items():
         lines.append(f"{name}: {' '.join(str(v) for v in row)}")
@@ -259,7 +261,7 @@ class Run:
         return {
             "version": bpy.app.version_string, "counts": self.counts, "errors": self.errors,
             "samples": self.samples, "checks": self.checks, "worst": self.worst,
-            "finished": self.finished, "growth": self.judge(),
+            "finished": self.finished, "growth": self.judge(), "repaired": self.world.repaired,
         }  # fmt: skip
 
 
