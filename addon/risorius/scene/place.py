@@ -9,7 +9,7 @@ import re
 import numpy as np
 from mathutils import Quaternion
 
-from . import parts
+from . import parts, runtime
 
 CONSTRAINT = "Risorius Body"
 _NEAR = 1e-6  # of the largest number of the matrix: what decomposing in float32 leaves
@@ -25,7 +25,11 @@ def follow(rig, seen):
     if not rig.get(parts.FOLLOW) or rig.parent or rig.constraints:
         return
     wanted = np.array(seen.matrix_world)
-    if np.abs(np.array(rig.matrix_basis) - wanted).max() > _NEAR * np.abs(wanted).max():
+    key, state = ("place", rig.session_uid), wanted.tobytes()
+    near = np.abs(np.array(rig.matrix_basis) - wanted).max() <= _NEAR * np.abs(wanted).max()
+    # Also what is only a rounding away is written: a frame shall not keep the one before it.
+    if runtime.outputs.get(key) != state or not near:
+        runtime.outputs[key] = state
         rig.matrix_basis = seen.matrix_world
 
 
