@@ -191,13 +191,13 @@ class RISORIUS_PT_options(FaceOnlyPanel, bpy.types.Panel):
         layout.operator(body, icon="ARMATURE_DATA")
         layout.operator("risorius.separate", icon="UNLINKED")
         layout.operator("risorius.reload", icon="FILE_REFRESH")
+        layout.operator("risorius.replace_dna", icon="FILEBROWSER")
+        layout.operator("risorius.export_dna", icon="EXPORT")
         layout.operator("risorius.describe", icon="INFO")
         layout.prop(context.window_manager, "risorius_show_timing")
         render = context.scene.render
         if not render.use_lock_interface:
             layout.prop(render, "use_lock_interface", text="Lock Interface in Renders")
-        layout.operator("risorius.replace_dna", icon="FILEBROWSER")
-        layout.operator("risorius.export_dna", icon="EXPORT")
         live = runtime.of(rig)
         if live is not None:
             column = layout.column(align=True)
