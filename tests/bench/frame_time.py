@@ -161,7 +161,7 @@ def plain_way(controls, rig, path, loops):
             key.update_tag()
 
     bpy.app.handlers.frame_change_post.append(write)
-    return len(bones.evaluate(compiled.evaluate(np.zeros(len(labels), np.float32)).joints[:])[0])
+    return len(rig.pose.bones)
 
 
 def row(way, times, note, base=None):

@@ -59,6 +59,7 @@ def import_file(context, path, options, progress=lambda _share: None):
     content = Path(path).read_bytes()
     progress(0.15)
     unit = options.unit or context.scene.unit_settings.scale_length
+    options = replace(options, unit=unit)
     if options.nearest_lods:
         options = replace(options, lods=plans.existing_lods(dna, options.lods))
     rests = risorius.Rig(dna).initial_raw_controls
@@ -85,8 +86,7 @@ def _build(context, plan, dna, content, path, options, made, progress):
     context.scene.collection.children.link(workshop)
     rig = armatures.build_rig(context, plan, made, workshop)
     controls = armatures.build_controls(context, plan, made, workshop)
-    unit = options.unit or context.scene.unit_settings.scale_length
-    _connect(plan, rig, controls, text, path, unit)
+    _connect(plan, rig, controls, text, path, options.unit)
     progress(0.4)
     built = []
     for number, mesh_plan in enumerate(plan.meshes):

@@ -45,7 +45,7 @@ def evaluate(rig, depsgraph, force=False):
         return False  # it is not in this scene
     if parts.FACE not in seen.pose.bones:
         return False  # renamed a moment ago, and not evaluated since
-    raw, turns = inputs.read_inputs(seen, live, depsgraph, _maximum(controls))
+    raw, turns = inputs.read_inputs(seen, live, depsgraph, parts.maximum_of(controls))
     place.follow(rig, seen)
     lod = min(max(lods.choose(rig, seen, depsgraph), 0), max(live.rig.lod_count - 1, 0))
     test = testing.override(rig, raw, depsgraph.scene)
@@ -71,16 +71,19 @@ def evaluate(rig, depsgraph, force=False):
     return True
 
 
+def bring_up(context, rig):
+    """Show a change that an operator made: bring one character up and evaluate the scene."""
+    context.view_layer.update()
+    evaluate(rig, context.evaluated_depsgraph_get(), force=True)
+    context.view_layer.update()
+
+
 def _changed(item, what, state):
     key = (what, item.session_uid)
     if runtime.outputs.get(key) == state:
         return False
     runtime.outputs[key] = state
     return True
-
-
-def _maximum(controls):
-    return 1.5 if controls.get(parts.OVERDRIVE) else 1.0
 
 
 def note_refusal(item, taken):

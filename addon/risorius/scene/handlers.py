@@ -73,17 +73,19 @@ def _notice_copies():
 
 def _edited(depsgraph):
     """The characters that the updates concern: by their controls, their body or the camera."""
-    armatures, camera_moved = set(), False
+    armatures, bones_edited, camera_moved = set(), False, False
     camera = depsgraph.scene.camera
     for update in depsgraph.updates:
         item = update.id.original
         if isinstance(item, bpy.types.Armature):
-            runtime.forget_outputs()
-            heal.heal_all()
+            bones_edited = True
         elif isinstance(item, bpy.types.Object):
             if item.type == "ARMATURE":
                 armatures.add(item)
             camera_moved |= camera is not None and item == camera.original
+    if bones_edited:
+        runtime.forget_outputs()
+        heal.heal_all()
     return [rig for rig in parts.rigs() if _concerned(rig, armatures, camera_moved)]
 
 

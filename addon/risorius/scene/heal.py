@@ -57,7 +57,7 @@ def _sliders(rig):
     if not wrong:
         return []
     planned = plans.plan_controls(live.dna.raw_control_names, live.rests)
-    maximum = 1.5 if parts.controls_of(rig).get(parts.OVERDRIVE) else 1.0
+    maximum = parts.maximum_of(parts.controls_of(rig))
     done = []
     for i in wrong:
         label, held = live.labels[i], face.get(live.labels[i])
@@ -124,8 +124,7 @@ def outside(rig):
     """Parts of a character that are in no collection: Blender's Delete leaves them in the file,
     because the other parts point to them.
     """
-    held = [rig, rig.get(parts.CONTROLS), *parts.meshes_of(rig)]
-    return [o for o in held if isinstance(o, bpy.types.Object) and not o.users_collection]
+    return [o for o in parts.members_of(rig) if not o.users_collection]
 
 
 def bring_back(item, scene):
@@ -142,10 +141,10 @@ def bring_back(item, scene):
     if rig is None:
         return []
     lost = outside(rig)
-    homes = (rig, rig.get(parts.CONTROLS), *parts.meshes_of(rig))
-    home = next((o.users_collection[0] for o in homes if o and o.users_collection), None)
+    homes = [o.users_collection[0] for o in parts.members_of(rig) if o.users_collection]
+    home = homes[0] if homes else scene.collection
     for one in lost:
-        (home or scene.collection).objects.link(one)
+        home.objects.link(one)
     return lost
 
 
@@ -166,7 +165,7 @@ def remove_dead():
 
 
 def _is_dead(rig):
-    held = [o for o in (rig, rig.get(parts.CONTROLS), *parts.meshes_of(rig)) if o]
+    held = parts.members_of(rig)
     if any(o.users_collection or o.use_fake_user or o.library for o in held):
         return False
     ours = {o.as_pointer() for o in held}

@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the animator asks for: sliders, head, neck and eye bones of the control armature."""
 
-import math
-
 import numpy as np
 from mathutils import Matrix, Quaternion, Vector
 
+from ..logic.space import yaw_pitch
 from . import parts, place
 
 _STRAIGHT = Matrix.Identity(4)
@@ -73,16 +72,10 @@ def _add_look(seen, live, raw, maximum):
         if bone is None or (turn is None and not moved.length_squared > 1e-18):
             continue
         start = target.bone.head_local - bone.bone.head_local if target else _AHEAD
-        before, after = _yaw_pitch(start), _yaw_pitch(start + moved)
-        own = _yaw_pitch((turn or Quaternion()) @ _AHEAD)
+        before, after = yaw_pitch(start), yaw_pitch(start + moved)
+        own = yaw_pitch((turn or Quaternion()) @ _AHEAD)
         yaw, pitch = after[0] - before[0] + own[0], after[1] - before[1] + own[1]
         for index, yaw_at_one, pitch_at_one in controls:
             asked = yaw / yaw_at_one if yaw_at_one else pitch / pitch_at_one
             if asked > 1e-6:
                 raw[index] = min(raw[index] + asked, max(maximum, raw[index]))
-
-
-def _yaw_pitch(direction):
-    """Angles of a direction from straight ahead (-y): yaw to the face's left (+x), pitch up."""
-    x, y, z = direction
-    return math.atan2(x, -y), math.atan2(z, math.hypot(x, y))

@@ -77,6 +77,17 @@ def rig_of(item):
     return rig if rig is not None and is_rig(rig) else None
 
 
+def maximum_of(controls):
+    """The hard maximum of a character's sliders. Args: controls  its control armature."""
+    return 1.5 if controls.get(OVERDRIVE) else 1.0
+
+
+def members_of(rig):
+    """All objects of a character that are there: rig, controls, meshes; also of a ruin."""
+    held = (rig, _object(rig, CONTROLS), *meshes_of(rig))
+    return [item for item in held if item is not None]
+
+
 def meshes_of(rig):
     """The mesh objects of a character; what points to another character is not among them."""
     found = []

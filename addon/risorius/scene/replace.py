@@ -237,7 +237,7 @@ def _sliders(change):
     """Sliders of the new file; those that are gone leave, unless something is keyed on them."""
     controls = parts.controls_of(change.rig)
     face = controls.pose.bones[parts.FACE]
-    maximum = 1.5 if controls.get(parts.OVERDRIVE) else 1.0
+    maximum = parts.maximum_of(controls)
     old = {c.label: c for c in change.old.controls}
     new = {c.label: c for c in change.new.controls}
     for label, control in new.items():

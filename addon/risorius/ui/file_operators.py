@@ -42,8 +42,7 @@ def _replace(operator, context, path):
     except (native.dna_error(), PlanError, SpaceError, OSError) as error:
         operator.report({"ERROR"}, explain(path, error))
         return {"CANCELLED"}
-    evaluate.evaluate(rig, context.evaluated_depsgraph_get(), force=True)
-    context.view_layer.update()
+    evaluate.bring_up(context, rig)
     report_all(operator, sentences)
     operator.report({"INFO"}, f"{rig.name.removesuffix('_rig')} is now {Path(path).name}")
     return {"FINISHED"}

@@ -51,9 +51,7 @@ class RISORIUS_OT_make_override(bpy.types.Operator):
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         rig.update_tag()
-        context.view_layer.update()
-        evaluate.evaluate(rig, context.evaluated_depsgraph_get(), force=True)
-        context.view_layer.update()
+        evaluate.bring_up(context, rig)
         for sentence in done:
             self.report({"INFO"}, sentence)
         left = overrides.trouble(rig)

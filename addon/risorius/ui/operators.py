@@ -123,9 +123,7 @@ class RISORIUS_OT_set_shape_mode(FaceOperator, bpy.types.Operator):
         for sentence in build.change_mode(rig, self.mode):
             self.report({"WARNING"}, sentence)
         rig.update_tag()
-        context.view_layer.update()
-        evaluate.evaluate(rig, context.evaluated_depsgraph_get(), force=True)
-        context.view_layer.update()
+        evaluate.bring_up(context, rig)
         return {"FINISHED"}
 
 
@@ -141,7 +139,7 @@ class RISORIUS_OT_set_overdrive(FaceOperator, bpy.types.Operator):
         rig = parts.active_rig(context)
         controls, face = parts.controls_of(rig), parts.face_bone(rig)
         controls[parts.OVERDRIVE] = self.enable
-        maximum = 1.5 if self.enable else 1.0
+        maximum = parts.maximum_of(controls)
         for label in _labels(rig):
             face.id_properties_ui(label).update(max=maximum, soft_max=maximum)
             face[label] = min(float(face[label]), maximum)

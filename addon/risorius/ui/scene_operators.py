@@ -7,12 +7,6 @@ from ..scene import evaluate, lods, parts, place
 from .operators import FaceOperator
 
 
-def _bring_up(context, rig):
-    context.view_layer.update()
-    evaluate.evaluate(rig, context.evaluated_depsgraph_get(), force=True)
-    context.view_layer.update()
-
-
 class RISORIUS_OT_set_lod(FaceOperator, bpy.types.Operator):
     """Show the meshes of one level of detail"""
 
@@ -49,7 +43,7 @@ class RISORIUS_OT_set_lod(FaceOperator, bpy.types.Operator):
             lods.show(rig, render=self.lod)
         else:
             lods.show(rig, self.lod, lods.render_level(rig))
-        _bring_up(context, rig)
+        evaluate.bring_up(context, rig)
         return {"FINISHED"}
 
 
@@ -66,7 +60,7 @@ class RISORIUS_OT_set_lod_by_distance(FaceOperator, bpy.types.Operator):
         if self.enable and context.scene.camera is None:
             self.report({"WARNING"}, "The scene has no camera yet: the level stays as it is.")
         lods.follow_camera(rig, self.enable, _size(rig))
-        _bring_up(context, rig)
+        evaluate.bring_up(context, rig)
         return {"FINISHED"}
 
 
@@ -140,7 +134,7 @@ class RISORIUS_OT_attach_body(FaceOperator, bpy.types.Operator):
             self.report({"ERROR"}, f"'{body.name}' has {what}: choose the bones.")
             return {"CANCELLED"}
         place.attach(parts.controls_of(rig), body, base, neck, head, self.fit)
-        _bring_up(context, rig)
+        evaluate.bring_up(context, rig)
         self.report({"INFO"}, f"The face follows {body.name}: {base}, {neck}, {head}")
         return {"FINISHED"}
 
@@ -154,7 +148,7 @@ class RISORIUS_OT_detach_body(FaceOperator, bpy.types.Operator):
     def execute(self, context):
         rig = parts.active_rig(context)
         place.detach(parts.controls_of(rig))
-        _bring_up(context, rig)
+        evaluate.bring_up(context, rig)
         return {"FINISHED"}
 
 

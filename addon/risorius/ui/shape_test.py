@@ -16,8 +16,7 @@ def _test(context, rig, channel, value):
         testing.clear(rig)
     else:
         testing.set_override(rig, channel, value)
-    evaluate.evaluate(rig, context.evaluated_depsgraph_get(), force=True)
-    context.view_layer.update()
+    evaluate.bring_up(context, rig)
 
 
 def _channels(_operator, context):
