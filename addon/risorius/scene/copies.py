@@ -36,7 +36,7 @@ def separate(rig):
     if controls is not None and parts.PULL in rig and not rig.override_library:
         armatures.pull_controls(rig, controls)
     copied = {}
-    for item in _meshes_pointing_at(rig):
+    for item in parts.meshes_pointing_at(rig):
         done += _own_mesh(item)
         _own_key_drivers(item, rig)
         _own_materials(item, rig, copied)
@@ -46,17 +46,6 @@ def separate(rig):
     if copied:
         done.append(f"{rig.name} was given materials of its own.")
     return done
-
-
-def _meshes_pointing_at(rig):
-    """All mesh objects of this rig, also linked duplicates that the rig does not list."""
-    listed = parts.meshes_of(rig)
-    others = [
-        o
-        for o in bpy.data.objects
-        if o.type == "MESH" and o.get(parts.RIG) == rig and o not in listed
-    ]
-    return listed + others
 
 
 def _own_mesh(item):

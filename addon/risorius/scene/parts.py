@@ -99,6 +99,13 @@ def meshes_of(rig):
     return found
 
 
+def meshes_pointing_at(rig):
+    """All mesh objects of a character, also linked duplicates that it does not list."""
+    listed = meshes_of(rig)
+    others = [o for o in bpy.data.objects if o.type == "MESH" and o.get(RIG) == rig]
+    return listed + [o for o in others if o not in listed]
+
+
 def active_rig(context):
     """The character of the active object, else the only one of the scene, else None.
 

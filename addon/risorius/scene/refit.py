@@ -57,7 +57,7 @@ def replace_meshes(change, fresh_meshes):
     old_plans = {m.index: m for m in change.old.meshes}
     new_plans = {m.index: m for m in change.new.meshes}
     kept, done = set(), []
-    for item in _objects(change.rig):
+    for item in [m for m in parts.meshes_pointing_at(change.rig) if parts.MESH in m]:
         index = item[parts.MESH]
         old = old_plans.get(index)
         there = moved[index] if index < len(moved) else -1
@@ -71,16 +71,6 @@ def replace_meshes(change, fresh_meshes):
         _relabel(item, new)
         kept.add(there)
     return kept
-
-
-def _objects(rig):
-    """All mesh objects of a character, also copies that the rig does not list."""
-    listed = parts.meshes_of(rig)
-    return listed + [
-        o
-        for o in bpy.data.objects
-        if o.type == "MESH" and o.get(parts.RIG) == rig and parts.MESH in o and o not in listed
-    ]
 
 
 def _relabel(item, new):
