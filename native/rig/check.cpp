@@ -2,6 +2,7 @@
 // Every index of a block of bytes against what it counts in.
 #include <algorithm>
 #include <bit>
+#include <numeric>
 #include <utility>
 
 #include "rig/rig.h"
@@ -108,19 +109,45 @@ void check_groups(const Rig& r, IndexCheck& c) {
     ++columns[column.group];
     const std::uint64_t end =
         column.offset + simd::rounded_up(r.joint_groups[column.group].row_count);
-    c.demand("joint_columns", end <= values);
+    // A first value is read even of a column without rows.
+    c.demand("joint_columns", end <= values && column.offset < values);
   }
+  std::uint64_t rows = 0;
   for (std::size_t i = 0; i < columns.size(); ++i) {
     const JointGroup& g = r.joint_groups[i];
-    c.demand("joint_groups",
-             columns[i] == g.column_count &&
-                 std::uint64_t{g.rows_begin} + g.row_count <= r.joint_outputs.size());
+    // One after the other: a kernel writes whole registers, into the rows of the group that
+    // follows.
+    c.demand("joint_groups", columns[i] == g.column_count && g.rows_begin == rows);
+    rows += g.row_count;
     for (std::uint32_t l = 0; l < r.lod_count; ++l) {
       c.demand("joint_group_lods", r.joint_group_lods[i * r.lod_count + l] <= g.row_count);
     }
   }
+  c.demand("joint_groups", rows == r.joint_outputs.size());
   const auto most = [](std::uint32_t v) { return v; };
   c.below("live_groups", r.live_groups, r.joint_groups.size() + 1, most);
+}
+
+// What a LOD places must be what it computes: other rows are what an earlier frame left.
+void check_live_pieces(const Rig& r, std::uint32_t lod, IndexCheck& c) {
+  std::vector<std::uint32_t> live_before(r.joint_outputs.size() + 1);  // as a running count
+  for (std::uint32_t i = 0; i < r.live_groups[lod]; ++i) {
+    const std::uint32_t rows = r.joint_group_lods[std::size_t{i} * r.lod_count + lod];
+    for (std::uint32_t row = 0; row < rows; ++row) {
+      live_before[r.joint_groups[i].rows_begin + row + 1] = 1;
+    }
+  }
+  std::partial_sum(live_before.begin(), live_before.end(), live_before.begin());
+  const auto demand = [&](const char* where, View<simd::Piece> pieces) {
+    for (const simd::Piece& p : pieces) {
+      const auto taken = static_cast<std::uint32_t>(std::popcount(p.mask));
+      c.demand(where, live_before[p.from + taken] - live_before[p.from] == taken);
+    }
+  };
+  const std::size_t blocks = r.joint_pieces.size() / r.lod_count;
+  demand("joint_pieces", r.joint_pieces.subspan(lod * blocks, blocks));
+  const std::uint32_t* extra = r.extra_begins.data() + lod;
+  demand("extra_pieces", r.extra_pieces.subspan(extra[0], extra[1] - extra[0]));
 }
 
 void check_pieces(const Rig& r, IndexCheck& c) {
@@ -140,6 +167,7 @@ void check_pieces(const Rig& r, IndexCheck& c) {
   for (const simd::Piece& p : r.extra_pieces) {
     c.demand("extra_pieces", p.block < blocks && (p.block + 1u < blocks || (p.mask & ~last) == 0));
   }
+  for (std::uint32_t lod = 0; lod < r.lod_count && c.status(); ++lod) check_live_pieces(r, lod, c);
 }
 
 bool inside(std::uint64_t begin, std::uint64_t count, std::size_t size) {

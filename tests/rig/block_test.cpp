@@ -181,6 +181,36 @@ TEST(Block, ChangedBytesUnderARightHashDoNoHarm) {
   EXPECT_GT(refused, 500);
 }
 
+// The first element of one of a Rig's arrays, in a copy of its block.
+template <class T>
+T& first_of(Bytes& copy, const Rig& rig, std::span<const T> array) {
+  const auto at = reinterpret_cast<const std::uint8_t*>(array.data()) - rig.block().data();
+  return *reinterpret_cast<T*>(copy.data() + at);
+}
+
+std::string refused_field(Bytes& changed) {
+  seal_block(changed);
+  const auto rig = opened(changed, BlockCheck::kFull);
+  return rig ? "taken" : rig.error().where;
+}
+
+// Rows that a LOD places without having computed them would be those of an earlier frame.
+TEST(Block, RowsThatNothingComputesAreRefused) {
+  const Rig rig = must_compile(face_with_everything());
+  Bytes level = bytes_of(rig);
+  first_of(level, rig, std::span(rig.joint_group_lods)) -= 1;
+  EXPECT_EQ(refused_field(level), "rig.joint_pieces");
+}
+
+TEST(Block, RowsOfGroupsFollowEachOther) {
+  dna::Dna dna = face_with_everything();
+  dna.behavior.joint_groups = std::vector{make_probe({0}), make_probe({3, 4})};
+  const Rig rig = must_compile(dna);
+  Bytes rows = bytes_of(rig);
+  first_of(rows, rig, std::span(rig.joint_groups)).rows_begin = 1;
+  EXPECT_EQ(refused_field(rows), "rig.joint_groups");
+}
+
 TEST(Block, BytesThatAreNotAlignedAreRefused) {
   const Bytes whole = bytes_of(must_compile(face_with_everything()));
   Bytes shifted(whole.size() + 1);
