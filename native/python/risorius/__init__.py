@@ -49,6 +49,7 @@ from ._native import (
     parse_bytes,
     parse_file,
 )
+from .clip import Clip, Event
 
 __version__ = "0.1.0"
 __all__ = [
@@ -56,9 +57,11 @@ __all__ = [
     "BlendShapeChannels",
     "BlendShapeTarget",
     "BoneSpace",
+    "Clip",
     "Conditionals",
     "Dna",
     "DnaError",
+    "Event",
     "Finding",
     "Instance",
     "JointBehaviorMetadata",

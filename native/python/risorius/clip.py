@@ -1,0 +1,215 @@
+# SPDX-License-Identifier: MIT
+"""Control animation: named curves over time, for any character whose rig has controls so named."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float32]
+Times = npt.NDArray[np.float64]
+
+
+class Event(NamedTuple):
+    """Something that happens at a time of a clip: a word, a note, a reaction to fire."""
+
+    time: float
+    """Seconds, on the clip's own clock."""
+    name: str
+    duration: float = 0.0
+    """Seconds; 0 for a moment."""
+    value: str = ""
+
+
+class Clip:
+    """Curves of named controls.
+
+    A clip knows nothing of a rig: it plays on every character that has controls of its names, at
+    every LOD. It is a value: what changes a clip returns another one.
+
+    Attributes:
+        names: the controls, each once; as a DNA spells its raw controls, or anything else that a
+            curve may be named after.
+        curves: float32[controls, frames], contiguous and read-only. Bit for bit what was given:
+            NaN, -0 and denormals included.
+        rate: frames per second. Of a clip with times of its own it is what tools should offer.
+        start: seconds, the time of the first frame.
+        times: float64[frames] in seconds, strictly ascending, or None: frame i is then at
+            start + i / rate.
+        events: by ascending time.
+        metadata: what is worth knowing of the clip: its source, take, actor.
+    """
+
+    def __init__(
+        self,
+        names: Iterable[str],
+        curves: npt.ArrayLike,
+        rate: float = 60.0,
+        *,
+        start: float = 0.0,
+        times: npt.ArrayLike | None = None,
+        events: Iterable[Event] = (),
+        metadata: Mapping[str, str] | None = None,
+    ) -> None:
+        """Take a copy of what is given.
+
+        Raises:
+            ValueError: a name twice, another shape, a rate that is not above 0, times that do not
+                ascend; the sentence says which.
+        """
+        self.names: tuple[str, ...] = tuple(names)
+        self.curves: Floats = _frozen(np.array(curves, np.float32, order="C"))
+        self.rate = float(rate)
+        self.start = float(start)
+        self.times: Times | None = None
+        if times is not None:
+            self.times = _frozen(np.array(times, np.float64))
+        self.events: tuple[Event, ...] = tuple(sorted(events, key=lambda event: event.time))
+        self.metadata: dict[str, str] = dict(metadata or {})
+        self._index = {name: i for i, name in enumerate(self.names)}
+        self._check()
+        if self.times is not None and self.times.size:
+            self.start = float(self.times[0])
+
+    def _check(self) -> None:
+        if self.curves.ndim != 2 or self.curves.shape[0] != len(self.names):
+            raise ValueError(
+                f"curves of {len(self.names)} controls were expected as [controls, frames], found "
+                f"the shape {list(self.curves.shape)}"
+            )
+        if len(self._index) != len(self.names):
+            twice = next(n for i, n in enumerate(self.names) if self._index[n] != i)
+            raise ValueError(f"{twice}: a control may have one curve only, found two")
+        if not (np.isfinite(self.rate) and self.rate > 0.0):
+            raise ValueError(f"a rate above 0 frames per second was expected, found {self.rate}")
+        if not np.isfinite(self.start):
+            raise ValueError(f"a start in seconds was expected, found {self.start}")
+        if self.times is not None:
+            self._check_times(self.times)
+
+    def _check_times(self, times: Times) -> None:
+        if times.shape != (self.frame_count,):
+            raise ValueError(
+                f"{self.frame_count} times were expected, found the shape {list(times.shape)}"
+            )
+        if not np.isfinite(times).all():
+            raise ValueError(f"frame {int(np.argmin(np.isfinite(times)))}: its time is no number")
+        if (np.diff(times) <= 0.0).any():
+            frame = int(np.argmax(np.diff(times) <= 0.0)) + 1
+            raise ValueError(
+                f"frame {frame}: a time after {times[frame - 1]} s was expected, "
+                f"found {times[frame]} s"
+            )
+
+    def __repr__(self) -> str:
+        return (
+            f"Clip({len(self.names)} controls, {self.frame_count} frames, {self.rate:g} fps, "
+            f"{self.duration:.3f} s)"
+        )
+
+    @property
+    def frame_count(self) -> int:
+        return int(self.curves.shape[1])
+
+    @property
+    def duration(self) -> float:
+        """Seconds from the first frame to the last; 0 of a single frame."""
+        if self.frame_count < 2:
+            return 0.0
+        if self.times is not None:
+            return float(self.times[-1] - self.times[0])
+        return (self.frame_count - 1) / self.rate
+
+    def frame_times(self) -> Times:
+        """float64[frames], seconds."""
+        if self.times is not None:
+            return self.times
+        return self.start + np.arange(self.frame_count) / self.rate
+
+    def curve(self, name: str) -> Floats:
+        """float32[frames] of a control. Raises: KeyError."""
+        return self.curves[self._index[name]]
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._index
+
+    def sample(self, times: npt.ArrayLike) -> Floats:
+        """The curves at any times: straight lines between frames, held before and after.
+
+        Args:
+            times: seconds, [n], on the clip's own clock.
+
+        Returns:
+            float32[n, controls]. A time that is a frame's gives its very bits.
+        """
+        wanted = np.atleast_1d(np.asarray(times, np.float64))
+        count = self.frame_count
+        if count == 0:
+            return np.zeros((wanted.size, len(self.names)), np.float32)
+        if self.times is not None:
+            place = np.interp(wanted, self.times, np.arange(count, dtype=np.float64))
+        else:
+            place = np.clip((wanted - self.start) * self.rate, 0.0, count - 1.0)
+            near = np.rint(place)  # what the division lost: a frame's own time is that frame
+            place = np.where(np.abs(place - near) < 1e-9 * np.maximum(near, 1.0), near, place)
+        first = np.minimum(place.astype(np.int64), count - 1)
+        part = (place - first).astype(np.float32)[:, None]
+        here = self.curves[:, first].T
+        following = self.curves[:, np.minimum(first + 1, count - 1)].T
+        return np.where(part == 0.0, here, here + (following - here) * part)
+
+    def resampled(self, rate: float) -> Clip:
+        """The clip with frames `rate` a second, from its start to its end."""
+        count = int(np.floor(self.duration * rate + 1e-6)) + 1 if self.frame_count else 0
+        times = self.start + np.arange(count) / rate
+        return self.replaced(curves=self.sample(times).T, rate=rate, times=None)
+
+    def selected(self, names: Sequence[str]) -> Clip:
+        """The clip of these controls only, in this order. Raises: KeyError."""
+        rows = [self._index[name] for name in names]
+        return self.replaced(names=names, curves=self.curves[rows])
+
+    def replaced(self, **changes: object) -> Clip:
+        """The clip with other values for some of its attributes (names, curves, rate, start, times,
+        events, metadata)."""
+        values: dict[str, object] = {
+            "names": self.names,
+            "curves": self.curves,
+            "rate": self.rate,
+            "start": self.start,
+            "times": self.times,
+            "events": self.events,
+            "metadata": self.metadata,
+        }
+        unknown = set(changes) - set(values)
+        if unknown:
+            raise TypeError(f"a clip has no {sorted(unknown)[0]}")
+        return Clip(**{**values, **changes})  # type: ignore[arg-type]
+
+    def raw_controls(self, rig_names: Sequence[str]) -> tuple[Floats, list[str]]:
+        """What a rig is to be evaluated with.
+
+        Args:
+            rig_names: `Rig.raw_control_names`.
+
+        Returns:
+            float32[frames, rig_names], 0 where the clip has no curve, ready for
+            `Rig.evaluate_batch`; and the names of the clip that the rig does not have.
+        """
+        index = {name: i for i, name in enumerate(rig_names)}
+        raw = np.zeros((self.frame_count, len(rig_names)), np.float32)
+        unknown = []
+        for name, curve in zip(self.names, self.curves, strict=True):
+            if name in index:
+                raw[:, index[name]] = curve
+            else:
+                unknown.append(name)
+        return raw, unknown
+
+
+def _frozen(array: npt.NDArray) -> npt.NDArray:  # type: ignore[type-arg]
+    array.flags.writeable = False
+    return array
