@@ -339,6 +339,10 @@ core::Status Reader::read(std::uint64_t begin, std::uint64_t end,
     auto read = read_block(block, at, until, controls, out + done, static_cast<std::size_t>(count),
                            out_times == nullptr ? nullptr : out_times + done);
     if (!read) return read;
+    if (out_times != nullptr && done > 0 && out_times[done] <= out_times[done - 1]) {
+      return fail(ErrorCode::kInvalidValue, "blocks[" + std::to_string(block) + "].times",
+                  "times after those of the block before were expected", blocks_[block].offset);
+    }
     at = until;
   }
   return core::ok();
