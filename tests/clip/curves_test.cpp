@@ -22,10 +22,15 @@ Bytes encoded(const Clip& clip) {
 void expect_back(const Clip& clip, const Bytes& bytes) {
   const auto curves = EncodedCurves::open(bytes, clip.head.names.size(), clip.frame_count);
   ASSERT_TRUE(curves.has_value()) << curves.error().describe();
-  std::vector<float> out(clip.frame_count);
-  for (std::size_t i = clip.head.names.size(); i-- > 0;) {
-    ASSERT_TRUE(curves->decode(i, out.data()).has_value());
-    EXPECT_TRUE(same_bits(out, clip.curve(i))) << "control " << i;
+  std::vector<std::uint32_t> all(clip.head.names.size());
+  std::iota(all.begin(), all.end(), 0u);
+  std::vector<float> out(clip.curves.size());
+  ASSERT_TRUE(curves->decode(all, out.data(), clip.frame_count).has_value());
+  EXPECT_TRUE(same_bits(out, clip.curves));
+  for (const std::uint32_t i : all) {
+    ASSERT_TRUE(curves->decode({&i, 1}, out.data(), clip.frame_count).has_value());
+    EXPECT_TRUE(same_bits(std::span(out).first(clip.frame_count), clip.curve(i)))
+        << "control " << i;
   }
 }
 

@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <numeric>
 #include <random>
 #include <string>
 #include <vector>
@@ -98,7 +99,7 @@ inline void seal(Bytes& bytes) {
 /// and read again as it was, or a sentence with a part and an offset inside the file.
 inline std::string reading_clip(View bytes, clip::Ends ends) {
   clip::Limits limits;
-  limits.values = 1u << 18;
+  limits.values = 1u << 15;
   const auto read = clip::decode(bytes, ends, limits);
   if (!read) {
     const core::Error& error = read.error();
@@ -121,7 +122,16 @@ inline std::string reading_curves(View bytes, std::size_t controls, std::size_t 
   const auto curves = clip::EncodedCurves::open(bytes, controls, frames);
   if (!curves) return curves.error().message.empty() ? "an error that says nothing" : "";
   std::vector<float> out(frames);
-  for (std::size_t i = 0; i < controls; ++i) (void)curves->decode(i, out.data()).has_value();
+  std::size_t good = 0;
+  for (std::uint32_t i = 0; i < controls; ++i) {
+    good += curves->decode({&i, 1}, out.data(), frames).has_value();
+  }
+  std::vector<float> all_out(controls * frames);
+  std::vector<std::uint32_t> all(controls);
+  std::iota(all.begin(), all.end(), 0u);
+  if (curves->decode(all, all_out.data(), frames).has_value() != (good == controls)) {
+    return "curves together are not as they are alone";
+  }
   return "";
 }
 
@@ -137,10 +147,15 @@ inline std::string keeping_bits(View bytes, std::size_t controls) {
   if (encoded.size() > 1 + 4 * values.size()) return "curves that grew";
   const auto curves = clip::EncodedCurves::open(encoded, controls, frames);
   if (!curves) return "curves that cannot be read: " + curves.error().describe();
-  for (std::size_t i = 0; i < controls; ++i) {
-    if (!curves->decode(i, out.data())) return "a curve that cannot be read";
+  for (std::uint32_t i = 0; i < controls; ++i) {
+    if (!curves->decode({&i, 1}, out.data(), frames)) return "a curve that cannot be read";
     if (!same_bits(out, std::span(values).subspan(i * frames, frames))) return "other bits";
   }
+  std::vector<std::uint32_t> all(controls);
+  std::iota(all.begin(), all.end(), 0u);
+  std::vector<float> all_out(values.size());
+  if (!curves->decode(all, all_out.data(), frames)) return "curves that cannot be read";
+  if (!same_bits(all_out, values)) return "other bits of all";
   return "";
 }
 
