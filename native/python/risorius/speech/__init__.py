@@ -94,7 +94,9 @@ def animate(
     _check(rate, intensity)
     duration = len(heard.samples) / RATE
     times = np.arange(int(np.ceil((duration + _TAIL) * rate)) + 1) / rate
-    weights = articulation.viseme_weights(heard.phonemes, times)
+    # Silence around the sound, or the mouth would never come to rest after the last word.
+    rest = [Phoneme(-1.0, 0.0, "SIL"), *heard.phonemes, Phoneme(duration, duration + 1.0, "SIL")]
+    weights = articulation.viseme_weights(rest, times)
     curves = articulation.controls(weights, prosody.openness(heard.samples, times), intensity)
     if blinks:
         begins = gestures.blink_times(heard.phonemes, duration, seed)

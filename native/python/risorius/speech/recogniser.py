@@ -23,8 +23,15 @@ _NEEDS = (
     "speech is recognised by PocketSphinx, which is not installed: pip install risorius[speech]"
 )
 _PAD = 0.3  # of near silence around each piece: a decoder wants to hear where speech begins
-_LAG = 0.0  # seconds that the decoder's boundaries come early (negative: late)
+_LAG = 0.0128  # seconds from the begin of a frame to the middle of the 25.6 ms that it hears
 _PHONE_BEAMS = {"beam": 1e-20, "pbeam": 1e-20, "lw": 2.0}
+# Tried in turn: the way through the lattice of words that is the best is not always one on which
+# the phonemes, too, come to an end.
+_ALIGNERS: dict[str, dict[str, Any]] = {
+    "narrow": {},
+    "one way": {"bestpath": False},
+    "wide": {"bestpath": False, "beam": 1e-100, "wbeam": 1e-100, "pbeam": 1e-100},
+}
 
 
 class MissingError(ValueError):
@@ -51,47 +58,53 @@ class Recogniser:
         except ImportError as error:
             raise MissingError(_NEEDS) from error
         self._decoders: dict[str, Any] = {}
-        self._aligner: Any = None  # the decoder that found the words last
 
     def _decoder(self, kind: str) -> Any:
         if kind not in self._decoders:
-            options: dict[str, Any] = {"lm": None}
+            options: dict[str, Any] = {}
             if kind == "words":
-                options = {}
+                pass
             elif kind == "phones":
                 model = self._sphinx.get_model_path("en-us/en-us-phone.lm.bin")
                 options = {"lm": None, "allphone": model, **_PHONE_BEAMS}
-            elif kind == "align_all":  # no shortcut through the lattice, nothing pruned
-                options = {"lm": None, "bestpath": False, "beam": 1e-100, "wbeam": 1e-100,
-                           "pbeam": 1e-100}  # fmt: skip
+            else:
+                options = {"lm": None, **_ALIGNERS[kind]}
             self._decoders[kind] = self._sphinx.Decoder(loglevel="FATAL", samprate=RATE, **options)
         return self._decoders[kind]
 
     def pronunciation(self, word: str) -> list[str]:
         """Phonemes of a word: the dictionary's, else by rules."""
-        found = self._decoder("align").lookup_word(word)
+        found = self._decoder("narrow").lookup_word(word)
         return str(found).split() if found else letters.pronounce(word)
 
     def align_words(self, samples: Samples, words: Sequence[str]) -> list[Segment] | None:
         """The words at their times, silences in between; None if the voice does not say them."""
-        for kind in ("align", "align_all"):
-            decoder = self._decoder(kind)
-            for word in set(words):
-                if not decoder.lookup_word(word):
-                    decoder.add_word(word, " ".join(letters.pronounce(word)), True)
-            decoder.set_align_text(" ".join(words))
-            _decode(decoder, _pcm(samples))
-            found = _segments(decoder, len(samples))
-            if [s.word for s in found if s.word] == list(words):
-                self._aligner = decoder
+        for kind in _ALIGNERS:
+            found = self._word_pass(kind, samples, words)
+            if found is not None:
                 return found
         return None
 
     def align_phonemes(self, samples: Samples, words: Sequence[str]) -> list[Segment] | None:
         """The phonemes of the words at their times; None if the voice does not say them."""
-        if self.align_words(samples, words) is None:
-            return None
-        return _phone_pass(self._aligner, samples)
+        for kind in _ALIGNERS:
+            if self._word_pass(kind, samples, words) is not None:
+                found = _phone_pass(self._decoder(kind), samples)
+                if found is not None:
+                    return found
+        return None
+
+    def _word_pass(
+        self, kind: str, samples: Samples, words: Sequence[str]
+    ) -> list[Segment] | None:
+        decoder = self._decoder(kind)
+        for word in set(words):
+            if not decoder.lookup_word(word):
+                decoder.add_word(word, " ".join(letters.pronounce(word)), True)
+        decoder.set_align_text(" ".join(words))
+        _decode(decoder, _pcm(samples))
+        found = _segments(decoder, len(samples))
+        return found if [s.word for s in found if s.word] == list(words) else None
 
     def hear_words(self, samples: Samples) -> list[Segment] | None:
         """The phonemes of the words that a language model of English finds likeliest."""
@@ -101,7 +114,8 @@ class Recogniser:
         hypothesis = decoder.hyp()
         if hypothesis is None or not hypothesis.hypstr.strip():
             return None
-        return _phone_pass(decoder, samples)
+        words = [word.partition("(")[0] for word in hypothesis.hypstr.split()]
+        return _phone_pass(decoder, samples) or self.align_phonemes(samples, words)
 
     def hear_phonemes(self, samples: Samples) -> list[Segment]:
         """The likeliest phonemes, without a thought of words."""
