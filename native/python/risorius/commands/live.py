@@ -107,7 +107,9 @@ def _listen(receiver: Receiver, args: argparse.Namespace) -> None:
             if monotonic() - shown >= (0.25 if still else 2.0):
                 shown = monotonic()
                 line = words(receiver.status(args.subject))
-                print(f"\r{line:<78}" if still else line, end="" if still else "\n", file=sys.stderr)
+                print(
+                    f"\r{line:<78}" if still else line, end="" if still else "\n", file=sys.stderr
+                )
                 sys.stderr.flush()
     finally:
         for which, handler in before.items():
@@ -149,7 +151,7 @@ def save(clip: Clip, path: Path) -> None:
 
 
 def table(clip: Clip) -> str:
-    """A clip as a table: a row a frame, its time in seconds first, every float at full precision."""
+    """A clip as a table: a row a frame, its time in seconds first, all digits of every float."""
     lines = [",".join(["time", *clip.names])]
     for time, row in zip(clip.frame_times(), clip.curves.T, strict=True):
         lines.append(",".join([f"{time:.9f}", *(f"{value:.9g}" for value in row)]))

@@ -252,9 +252,9 @@ class Receiver:
                 # flood costs nothing of the time that the viewport needs.
                 self._counts["floods"] += 1
                 self._stop.wait(max(0.0, window + _WINDOW - monotonic()))
+        self._keep(self._decoder.flush(), monotonic())
 
     def _take_in(self, data: bytes, sender: str, now: float) -> None:
-        self._counts["packets"] += 1
         try:
             if self.source == "livelink":
                 packets = [livelink.decode(data)]
@@ -268,6 +268,7 @@ class Receiver:
             self._refuse(f"{type(error).__name__}: {error}")
         else:
             self._keep(packets, now)
+        self._counts["packets"] += 1
 
     def _refuse(self, reason: str) -> None:
         with self._lock:
