@@ -133,10 +133,13 @@ def test_midnight_and_a_clock_that_is_set():
     day = 24 * 3600 * 60
     steps = [v6(n % day, face()) for n in (day - 2, day - 1, day, day + 1)]
     steps += [v6(500_000 + n, face()) for n in range(3)]
+    steps += [v6(100 + n, face()) for n in range(3)]
     clip, status = record("livelink", *steps)
-    assert np.allclose(np.diff(clip.times[:4]), 1 / 60, atol=1e-6)
-    assert 0.0 < clip.times[4] - clip.times[3] < 1.0  # as they arrived
-    assert np.allclose(np.diff(clip.times[4:]), 1 / 60, atol=1e-6)
+    assert clip.frame_count == 10
+    for part in (clip.times[:4], clip.times[4:7], clip.times[7:]):
+        assert np.allclose(np.diff(part), 1 / 60, atol=1e-6)
+    for leap in (clip.times[4] - clip.times[3], clip.times[7] - clip.times[6]):
+        assert 0.0 < leap < 1.0  # as they arrived
     assert status.late == 0
 
 
@@ -179,6 +182,9 @@ def test_hostile_packets_are_counted_and_change_nothing():
     assert (status.frames, status.faceless) == (2, 1 + faceless(junk))
     assert status.refused == len(junk) - faceless(junk)
     assert status.reasons
+    assert not any("Error" in reason for reason, _ in status.reasons)  # all of them foreseen
+    with pytest.raises(LiveError, match="subject of 300 bytes"):
+        livelink.decode(packed(v6(1, face(), "x" * 300)))
 
 
 def faceless(junk):
@@ -214,13 +220,16 @@ def vmc(values, head=(0.0, 0.0, 0.0, 1.0)):
 def test_vmc_applies_a_whole_face_at_once():
     one = vmc({"A": 0.5, "Blink_L": 1.0}, (0.0, math.sin(0.2), 0.0, math.cos(0.2)))
     two = vmc({"A": 1.0, "Blink_L": 0.0, "unheardOf": 0.5})
-    # The first as a bundle, the second as single messages with a wait before its Apply.
+    # The first as a bundle, the second as single messages with a wait before its Apply, the third
+    # in two bundles.
     steps = [["bundle", one], *[["osc", *m] for m in two[:-1]], ["wait", 0.05], ["osc", *two[-1]]]
+    steps += [["bundle", one[:5]], ["bundle", one[5:]]]
     clip, status = record("osc", *steps)
-    assert status.frames == 2
-    assert np.allclose(clip.curve("CTRL_expressions.jawOpen"), [0.3, 0.6])
-    assert np.allclose(clip.curve("CTRL_expressions.eyeBlinkL"), [1.0, 0.0])
-    assert np.allclose(clip.curve("head.yaw"), [-0.4, 0.0], atol=1e-6)  # to the own right in Unity
+    assert status.frames == 3
+    assert np.allclose(clip.curve("CTRL_expressions.jawOpen"), [0.3, 0.6, 0.3])
+    assert np.allclose(clip.curve("CTRL_expressions.eyeBlinkL"), [1.0, 0.0, 1.0])
+    yaw = [-0.4, 0.0, -0.4]  # to the own right in Unity
+    assert np.allclose(clip.curve("head.yaw"), yaw, atol=1e-6)
     assert status.subjects == ("127.0.0.1",)
     plan = shaping.Plan(("A", "unheardOf"), risorius.arkit.mapping())
     assert plan.unmapped == ("unheardOf",)
@@ -280,6 +289,9 @@ def test_hostile_osc():
     assert clip.curve("CTRL_expressions.jawOpen")[-1] == 0.25
     # Of the junk only a message without values and one of an odd name are sound OSC.
     assert status.refused >= len(steps) - 4
+    for data, words in ((deep, "too deep"), (b"/x\0\0,q\0\0", "a message of OSC was expected")):
+        with pytest.raises(LiveError, match=words):
+            osc.Decoder().feed(data, "here")
 
 
 def test_names_without_end_are_refused():
@@ -317,9 +329,9 @@ def test_neutral_now_and_gains():
     assert values["CTRL_expressions.jawOpen"] == pytest.approx(2.0 * 0.16 / 0.8)
     assert values["head.yaw"] == pytest.approx(-0.2)
     assert values["CTRL_expressions.eyeBlinkL"] == 0.0
-    shaper.gains = {"jawOpen": 0.5}
+    shaper.gains = {"jawOpen": 0.25}
     got = shaper.apply(frame_of(jawOpen=1.0, head__yaw=0.3, eyeBlinkLeft=1.0))
-    assert got.values.tolist() == pytest.approx([1.0, 0.0, 1.0])  # clamped; 1 is still reached
+    assert got.values.tolist() == pytest.approx([0.5, 0.0, 1.0])  # clamped; 1 is still reached
 
 
 def test_eyes_look_where_only_their_bones_are_sent():
