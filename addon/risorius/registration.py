@@ -4,7 +4,7 @@
 import bpy
 
 from . import native
-from .scene import handlers
+from .scene import handlers, layer_props
 from .ui import (
     about,
     file_operators,
@@ -18,6 +18,7 @@ from .ui import (
 )
 
 CLASSES = (
+    *layer_props.CLASSES,
     *about.CLASSES,
     *import_operators.CLASSES,
     *file_operators.CLASSES,
@@ -41,6 +42,7 @@ def register():
     """Register classes, menus and handlers; without the native module only words."""
     for cls in CLASSES:
         bpy.utils.register_class(cls)
+    layer_props.register()
     bpy.types.WindowManager.risorius_search = _search_property()
     bpy.types.WindowManager.risorius_show_timing = overlay.show_property()
     bpy.types.WindowManager.risorius_test = shape_test.weight_property()
@@ -71,5 +73,6 @@ def unregister():
     del bpy.types.WindowManager.risorius_show_timing
     del bpy.types.WindowManager.risorius_test
     del bpy.types.WindowManager.risorius_search
+    layer_props.unregister()
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)
