@@ -16,7 +16,8 @@ from . import regions
 Float = NDArray[np.float64]
 COLLECTION = "risorius_layers"
 _PATH = re.compile(rf"^{COLLECTION}\[(\d+)\](.*)$")
-_LIMIT = 200_000  # samples of one source: an hour at 50 fps
+_LIMIT = 100_000  # samples of one source
+_NEAR = 1e-7  # frames
 
 
 def masked(controls: Iterable[str], chosen: Iterable[str], words: str = "") -> list[str]:
@@ -47,13 +48,15 @@ def masked(controls: Iterable[str], chosen: Iterable[str], words: str = "") -> l
 
 @dataclass(frozen=True)
 class Span:
-    """When a layer plays its source, in frames of the scene.
+    """When a layer plays its source, in frames of the scene and of the source.
 
     Attributes:
-        start: where the source's frame `first` is played.
+        start: where the scene shows the source's frame `first`, or `last` of a reversed one.
         first, last: of the source that are played.
         scale: how much longer than the source it is; 2 is half as fast.
-        repeat: how often; 0 for ever.
+        repeat: how often.
+        reverse: from last to first.
+        warp: float64[n] frames of the scene and of the source, instead of all that; or None.
     """
 
     start: float
@@ -61,49 +64,56 @@ class Span:
     last: float
     scale: float = 1.0
     repeat: float = 1.0
+    reverse: bool = False
+    warp: tuple[Float, Float] | None = None
 
     @property
     def period(self) -> float:
         """Frames of the scene that the source takes once."""
         return (self.last - self.first) * self.scale
 
-    @property
-    def end(self) -> float:
-        """Where it ends; infinite where it repeats for ever."""
-        return self.start + self.period * self.repeat if self.repeat > 0 else np.inf
+    def scene_range(self) -> tuple[float, float]:
+        """Frames of the scene in which it plays."""
+        if self.warp is not None:
+            return float(self.warp[0][0]), float(self.warp[0][-1])
+        return self.start, self.start + self.period * self.repeat
 
     def source(self, frames: Float) -> Float:
-        """The source's frames at frames of the scene, of the first time that it plays."""
-        return self.first + (np.asarray(frames, np.float64) - self.start) / self.scale
+        """The source's frames that are shown at frames of the scene."""
+        if self.warp is not None:
+            return np.interp(frames, *self.warp)
+        if not self.period > 0.0:
+            return np.full(len(frames), self.first)
+        gone = np.mod(frames - self.start, self.period) / self.scale
+        return self.last - gone if self.reverse else self.first + gone
 
 
 def sample_frames(span: Span, keys: Sequence[float], bent: bool) -> Float:
     """At which of its own frames a source is sampled so that straight lines between them are it.
 
-    Whole frames of the scene always are among them, so that they are exact at any time scale, and
-    all keys. A curve that bends between its keys is sampled four times as often.
+    What the scene shows at its whole frames is always exact. Curves that bend between their keys
+    are sampled four times as often, for subframes.
 
     Args:
         span: when it plays.
         keys: frames of all its keys.
-        bent: whether a curve has handles or a modifier.
+        bent: whether a curve has handles, steps or modifiers.
 
     Returns:
         float64[n], ascending; at least one.
     """
     first, last = span.first, span.last
-    inside = [k for k in keys if first <= k <= last]
     if not last > first:
         return np.array([first])
-    begin = span.start
-    step = 0.25 if bent else 1.0
-    count = int(min(np.ceil(span.period / step) + 2, _LIMIT))
-    scene = np.floor(begin) + np.arange(count) * step
-    grid = span.source(scene)
-    if not bent and inside and span.scale == 1.0:
-        grid = grid[:0]  # straight lines from key to key are all there is
-    every = np.concatenate([[first, last], inside, grid[(grid > first) & (grid < last)]])
-    return np.unique(every)
+    grid = np.array([k for k in keys if first < k < last])
+    if bent:
+        begin, end = span.scene_range()
+        count = int(min(max(end - np.floor(begin), 0.0) * 4, _LIMIT)) + 1
+        shown = span.source(np.floor(begin) + np.arange(count) * 0.25)
+        grid = np.concatenate([grid, shown[(shown > first) & (shown < last)]])
+    every = np.unique(np.concatenate([[first], grid, [last]]))
+    # What is a rounding apart is one: times must ascend.
+    return every[np.concatenate([[True], np.diff(every) > _NEAR])]
 
 
 def moved_path(path: str, order: Sequence[int]) -> str | None:

@@ -12,7 +12,7 @@ from .. import native
 from ..logic import clips
 from . import armatures, compat, parts, runtime
 
-_LINEAR = 1  # the number of the interpolation "LINEAR"
+LINEAR = 1  # the number of the interpolation "LINEAR"
 _ROTATIONS = {"QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle"}
 
 
@@ -124,7 +124,7 @@ def _add(bag, group, path, index, frames, values):
     points[:, 0], points[:, 1] = frames, values
     curve.keyframe_points.add(len(frames))
     curve.keyframe_points.foreach_set("co", points.ravel())
-    curve.keyframe_points.foreach_set("interpolation", np.full(len(frames), _LINEAR, np.int32))
+    curve.keyframe_points.foreach_set("interpolation", np.full(len(frames), LINEAR, np.int32))
     curve.update()
 
 
@@ -192,32 +192,29 @@ def add_strip(rig, action, name=""):
     return strip
 
 
-def clip_of_action(rig, action, frames, rate, names=None):
+def clip_of_action(controls, live, action, frames, rate):
     """Sample an action as a clip.
 
     Args:
-        rig: the character that would play it.
+        controls: the control armature that would play it.
+        live: the character's Runtime.
         action: the action.
         frames: float64[n], ascending, of the action's own clock.
         rate: frames per second of the scene; frame 0 is second 0 of the clip.
-        names: property names of the controls to take; None for all that it moves.
 
     Returns:
-        risorius.Clip with the names of the DNA's controls, and "head.yaw" and its like where it
-        turns the head bone.
+        risorius.Clip of the sliders that it moves, by their property names, and "head.yaw" and its
+        like where it turns the head bone. See dna_names.
     """
-    controls, live = parts.controls_of(rig), runtime.of(rig)
     frames = np.asarray(frames, np.float64)
     curves = {(c.data_path, c.array_index): c for c in compat.curves_for(action, controls)}
-    wanted = live.labels if names is None else names
     rows, found = [], []
-    for label in wanted:
+    for label in live.labels:
         curve = curves.get((parts.property_path(label), 0))
         if curve is not None:
             found.append(label)
             rows.append(sampled(curve, frames))
-    found = _dna_names(live, found)
-    head = _head_rows(controls, curves, frames) if names is None else None
+    head = _head_rows(controls, curves, frames)
     if head is not None:
         found += clips.HEAD
         rows += list(head)
@@ -230,12 +227,15 @@ def clip_of_action(rig, action, frames, rate, names=None):
     )
 
 
-def _dna_names(live, labels):
-    """The DNA's names of sliders; a slider keeps Blender's where the DNA has a name twice."""
+def dna_names(live, names):
+    """The names that other characters know: the DNA's instead of Blender's cut ones.
+
+    A slider keeps Blender's where the DNA has a name twice; what is no slider keeps its own.
+    """
     own = {}
     for label, name in zip(live.labels, live.dna.raw_control_names, strict=True):
         own[label] = label if name in own.values() else name
-    return [own[label] for label in labels]
+    return [own.get(name, name) for name in names]
 
 
 def sampled(curve, frames):
@@ -305,7 +305,7 @@ def clip_of_scene(context, rig, frames):
         scene.frame_set(before[0], subframe=before[1])
     rate = frame_rate(scene)
     rows = np.array(raw, np.float32).reshape(len(frames), len(live.labels)).T
-    names = _dna_names(live, live.labels)
+    names = dna_names(live, live.labels)
     turned = np.array(turns).reshape(-1, 4)
     if head is not None and (turned != [1.0, 0.0, 0.0, 0.0]).any():
         names = [*names, *clips.HEAD]

@@ -134,6 +134,13 @@ def register():
         setattr(bpy.types.Object, name, collection)
         index = bpy.props.IntProperty(options=set(), override=_OVERRIDE)
         setattr(bpy.types.Object, f"{name}_index", index)
+    bpy.types.Object.risorius_layer_rules = _still(
+        bpy.props.BoolProperty,
+        name="Exclude Opposites",
+        description="Where there are layers, controls that undo each other give way: closed lips "
+        "hold the jaw, a blink the wide lids",
+        default=True,
+    )
 
 
 def unregister():
@@ -141,3 +148,4 @@ def unregister():
     for name in (layers.COLLECTION, REACTIONS):
         delattr(bpy.types.Object, name)
         delattr(bpy.types.Object, f"{name}_index")
+    del bpy.types.Object.risorius_layer_rules

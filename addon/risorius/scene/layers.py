@@ -6,7 +6,7 @@ look at the settings and one native call, and nothing at all without layers. No 
 kept.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from mathutils import Quaternion
@@ -138,6 +138,7 @@ def compiled(controls, live, scene, maximum=1.0):
     made_of = (
         id(live),
         maximum,
+        controls.risorius_layer_rules,
         clips.frame_rate(scene),
         tuple(_settings(layer) for layer in of(controls)),
         tuple((r.name, r.frame, r.strength) for r in reactions_of(controls)),
@@ -171,9 +172,16 @@ def _compile(controls, live, scene, maximum, made_of):
             places.append(place)
         except (ValueError, LookupError) as error:
             problems[place] = str(error)
-    mixer = native.mixer(names, maximum, len(reactions_of(controls)))
+    mixer = native.module().Mixer(
+        names,
+        ranges={label: (0.0, maximum) for label in live.labels},
+        exclusives="default" if controls.risorius_layer_rules else None,
+        max_fired=max(len(reactions_of(controls)), 1),
+    )
     _fire(mixer, controls, rate, problems)
-    return Stack(made_of, mixer, made, places, (), problems)
+    stack = Stack(made_of, mixer, made, places, problems=problems)
+    stack.mixer.layers = made
+    return stack
 
 
 def _fire(mixer, controls, rate, problems):
@@ -185,13 +193,132 @@ def _fire(mixer, controls, rate, problems):
             problems[reaction.name] = str(error)
 
 
-def native_layer(controls, live, layer, rate, scene):
-    """A layer as risorius.Layer, at full weight."""
-    raise NotImplementedError
-
-
 def _set_weights(stack, weights):
-    raise NotImplementedError
+    """Give the layers the weights of this frame: cheap, their curves stay."""
+    stack.mixer.layers = tuple(
+        replace(layer, weight=min(max(weights[place], 0.0), 1.0))
+        for layer, place in zip(stack.layers, stack.places, strict=True)
+    )
+    stack.weights = weights
+
+
+def native_layer(controls, live, layer, rate, scene):
+    """A layer as risorius.Layer, at full weight.
+
+    Args:
+        controls: control armature.
+        live: the character's Runtime.
+        layer: its settings.
+        rate: frames per second.
+        scene: says how long idle life lasts that has no length.
+
+    Raises:
+        ValueError: it has nothing to play, or something that does not fit; the sentence says what.
+    """
+    source, times = _SOURCES[layer.kind](controls, live, layer, rate, scene)
+    allowed = set(logic.masked(live.labels, layer.regions, layer.controls))
+    allowed.update(_head_mask(layer))
+    names = [*live.labels, *clip_logic.HEAD]
+    return native.module().Layer(
+        source,
+        name=layer.name,
+        blend=_BLENDS[layer.blend],
+        mask=np.array([name in allowed for name in names], np.float32),
+        extend=layer.extend.lower(),
+        fade_in=layer.fade_in / rate,
+        fade_out=layer.fade_out / rate,
+        mute=layer.mute,
+        solo=layer.solo,
+        **times,
+    )
+
+
+def _head_mask(layer):
+    """The head turns with a layer that moves the neck's region, or everything."""
+    if layer.controls.strip() or (layer.regions and "NECK" not in layer.regions):
+        return ()
+    return clip_logic.HEAD
+
+
+def _still_times(layer, rate):
+    """A pose stands always, or for its length from its start on."""
+    if not layer.length:
+        return {}
+    return {"start": layer.start / rate, "end": (layer.start + layer.length) / rate}
+
+
+def _expression_source(_controls, live, layer, _rate, _scene):
+    pose = native.part("expressions").get(layer.expression).weights
+    return _for_face(live, pose), _still_times(layer, _rate)
+
+
+def _for_face(live, pose):
+    """A pose by the labels of this face's sliders; what it does not have is left out."""
+    sliders = clips.sliders_of(live)
+    return {sliders[name]: value for name, value in pose.items() if name in sliders}
+
+
+def _action_source(controls, live, layer, rate, _scene):
+    action = layer.action
+    if action is None:
+        raise ValueError("choose an action")
+    span = span_of(layer)
+    curves = compat.curves_for(action, controls)
+    keys = sorted({key.co[0] for curve in curves for key in curve.keyframe_points})
+    frames = logic.sample_frames(span, keys, any(_is_bent(curve) for curve in curves))
+    clip = clips.clip_of_action(controls, live, action, frames, rate)
+    if not clip.names:
+        raise ValueError(f"{action.name} has no keys of a control of this face")
+    if clip.frame_count < 2:
+        return clip, _still_times(layer, rate)
+    return clip, _span_times(span, rate)
+
+
+def _is_bent(curve):
+    """Whether a curve is anything else than straight lines from key to key."""
+    if len(curve.modifiers) or curve.extrapolation != "CONSTANT":
+        return True
+    count = len(curve.keyframe_points)
+    kinds = np.empty(count, np.int32)
+    curve.keyframe_points.foreach_get("interpolation", kinds)
+    return bool((kinds[: max(count - 1, 0)] != clips.LINEAR).any())
+
+
+def span_of(layer):
+    """When a layer with an action plays it."""
+    first, last = layer.action.frame_range
+    points = sorted((point.frame, point.source) for point in layer.warp)
+    warp = None
+    if len(points) > 1:
+        warp = tuple(np.array(column, np.float64) for column in zip(*points, strict=True))
+    return logic.Span(
+        layer.start,
+        min(first + layer.trim_start, last),
+        max(last - layer.trim_end, first + layer.trim_start),
+        layer.scale,
+        layer.repeat,
+        layer.reverse,
+        warp,
+    )
+
+
+def _span_times(span, rate):
+    if span.warp is not None:
+        return {"warp": (span.warp[0] / rate, span.warp[1] / rate)}
+    return {
+        "start": span.start / rate,
+        "clip_range": (span.first / rate, span.last / rate),
+        "scale": span.scale,
+        "repeat": span.repeat,
+        "reverse": span.reverse,
+    }
+
+
+def _idle_source(_controls, live, layer, rate, scene):
+    raise ValueError("idle life is not there")
+
+
+_SOURCES = {"ACTION": _action_source, "EXPRESSION": _expression_source, "IDLE": _idle_source}
 
 
 def add(controls, kind, name, **settings):
