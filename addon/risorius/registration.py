@@ -9,6 +9,7 @@ from .ui import (
     about,
     file_operators,
     import_operators,
+    layer_panel,
     life_operators,
     operators,
     overlay,
@@ -27,6 +28,7 @@ CLASSES = (
     *scene_operators.CLASSES,
     *panels.CLASSES,
     *shape_test.CLASSES,
+    *layer_panel.CLASSES,
 )
 
 

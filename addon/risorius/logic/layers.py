@@ -36,7 +36,7 @@ def masked(controls: Iterable[str], chosen: Iterable[str], words: str = "") -> l
     left_out = [p[1:] for p in patterns if p.startswith("-")]
     kept = []
     for control in controls:
-        if wanted and regions.region_of(control) not in wanted:
+        if wanted and _region(control) not in wanted:
             continue
         names = (control.lower(), regions.short_name(control).lower())
         if taken and not any(fnmatchcase(n, p) for n in names for p in taken):
@@ -44,6 +44,12 @@ def masked(controls: Iterable[str], chosen: Iterable[str], words: str = "") -> l
         if not any(fnmatchcase(n, p) for n in names for p in left_out):
             kept.append(control)
     return kept
+
+
+def _region(control: str) -> str:
+    """The region of a control; that of head.yaw stands before the dot."""
+    region = regions.region_of(control)
+    return region if region != "other" else regions.region_of(control.partition(".")[0])
 
 
 @dataclass(frozen=True)

@@ -31,11 +31,11 @@ def read_inputs(seen, live, depsgraph, maximum=1.0):
     if not np.isfinite(raw).all():
         np.nan_to_num(raw, copy=False, nan=0.0, posinf=0.0, neginf=0.0)
     turns = place.body_turns(seen.original, depsgraph)
-    for name in ("neck", "head"):
-        turn = _turn(seen, bones.get(name))
+    own = {name: _turn(seen, bones.get(name)) for name in ("neck", "head")}
+    raw, own["head"] = layers.mix(seen, live, raw, own["head"], depsgraph, maximum)
+    for name, turn in own.items():
         if turn is not None:
             turns[name] = turns[name] @ turn if name in turns else turn
-    raw = layers.mix(seen, live, raw, turns, depsgraph, maximum)
     _add_look(seen, live, raw, maximum)
     return raw, turns
 

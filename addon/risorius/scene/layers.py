@@ -14,7 +14,7 @@ from mathutils import Quaternion
 from .. import native
 from ..logic import clips as clip_logic
 from ..logic import layers as logic
-from . import clips, compat
+from . import clips, compat, parts
 
 _SETTINGS = (
     "kind",
@@ -34,6 +34,15 @@ _SETTINGS = (
     "fade_out",
     "mute",
     "solo",
+)
+_KEY_SETTINGS = (
+    "co",
+    "interpolation",
+    "easing",
+    "handle_left_type",
+    "handle_right_type",
+    "handle_left",
+    "handle_right",
 )
 _BLENDS = {"OVERRIDE": "override", "ADD": "additive", "MAXIMUM": "max"}
 _IDLE_SECONDS = 600.0  # before idle life without a length comes again
@@ -96,23 +105,23 @@ def plays(controls, actions):
     return any(layer.action in actions for layer in of(controls) if layer.action is not None)
 
 
-def mix(seen, live, raw, turns, depsgraph, maximum):
-    """Mix the layers of a character over its sliders.
+def mix(seen, live, raw, head, depsgraph, maximum):
+    """Mix the layers of a character over its sliders and its head bone.
 
     Args:
         seen: the evaluated control armature; its layers have the weights of this frame.
         live: the character's Runtime.
         raw: float32[R], the sliders.
-        turns: "head" -> Quaternion in the armature's axes; what layers turn is put on top.
+        head: Quaternion in the armature's axes by which the head bone is turned, or None.
         depsgraph: its scene gives the time.
         maximum: of the sliders.
 
     Returns:
-        float32[R]; turns is changed in place.
+        float32[R], and the head's turn.
     """
     controls = seen.original
     if not has_any(controls):
-        return raw
+        return raw, head
     scene = depsgraph.scene
     stack = compiled(controls, live, scene, maximum)
     weights = tuple(layer.weight for layer in of(seen))
@@ -120,17 +129,13 @@ def mix(seen, live, raw, turns, depsgraph, maximum):
         _set_weights(stack, weights)
     base = np.zeros(len(raw) + 3, np.float32)
     base[: len(raw)] = raw
-    time = scene.frame_current_final / clips.frame_rate(scene)
-    out = stack.mixer.evaluate(time, base)
-    _add_head(turns, out[len(raw) :])
-    return np.ascontiguousarray(out[: len(raw)])
-
-
-def _add_head(turns, angles):
-    if not angles.any():
-        return
-    turn = Quaternion(clip_logic.quaternions(angles[None].astype(np.float64))[0])
-    turns["head"] = turns["head"] @ turn if "head" in turns else turn
+    if head is not None:
+        base[len(raw) :] = clip_logic.angles_of(np.array(head))
+    out = stack.mixer.evaluate(scene.frame_current_final / clips.frame_rate(scene), base)
+    angles = out[len(raw) :]
+    if not np.array_equal(angles, base[len(raw) :]):
+        head = Quaternion(clip_logic.quaternions(angles[None].astype(np.float64))[0])
+    return np.ascontiguousarray(out[: len(raw)]), head
 
 
 def compiled(controls, live, scene, maximum=1.0):
@@ -216,8 +221,7 @@ def native_layer(controls, live, layer, rate, scene):
         ValueError: it has nothing to play, or something that does not fit; the sentence says what.
     """
     source, times = _SOURCES[layer.kind](controls, live, layer, rate, scene)
-    allowed = set(logic.masked(live.labels, layer.regions, layer.controls))
-    allowed.update(_head_mask(layer))
+    allowed = allowed_names(live, layer)
     names = [*live.labels, *clip_logic.HEAD]
     return native.module().Layer(
         source,
@@ -233,11 +237,10 @@ def native_layer(controls, live, layer, rate, scene):
     )
 
 
-def _head_mask(layer):
-    """The head turns with a layer that moves the neck's region, or everything."""
-    if layer.controls.strip() or (layer.regions and "NECK" not in layer.regions):
-        return ()
-    return clip_logic.HEAD
+def allowed_names(live, layer):
+    """What a layer may move: sliders, and the head's angles, which belong to the neck's region."""
+    regions = {region.lower() for region in layer.regions}
+    return set(logic.masked([*live.labels, *clip_logic.HEAD], regions, layer.controls))
 
 
 def _still_times(layer, rate):
@@ -284,9 +287,9 @@ def _is_bent(curve):
     return bool((kinds[: max(count - 1, 0)] != clips.LINEAR).any())
 
 
-def span_of(layer):
-    """When a layer with an action plays it."""
-    first, last = layer.action.frame_range
+def span_of(layer, action=None):
+    """When a layer plays its action, or another one instead."""
+    first, last = (action or layer.action).frame_range
     points = sorted((point.frame, point.source) for point in layer.warp)
     warp = None
     if len(points) > 1:
@@ -319,6 +322,45 @@ def _idle_source(_controls, live, layer, rate, scene):
 
 
 _SOURCES = {"ACTION": _action_source, "EXPRESSION": _expression_source, "IDLE": _idle_source}
+
+
+def problems(controls, live, scene):
+    """Sentences on layers that cannot be played, as last compiled."""
+    stack = compiled(controls, live, scene, parts.maximum_of(controls))
+    names = {place: layer.name for place, layer in enumerate(of(controls))}
+    return [f"{names.get(place, place)}: {words}." for place, words in stack.problems.items()]
+
+
+def known_reactions():
+    """Name -> what can be fired."""
+    return native.part("reactions").load_reactions()
+
+
+def fits(controls, action):
+    """Whether an action has keys of a slider of a character."""
+    path = parts.property_path("")[:-3]
+    return any(c.data_path.startswith(path) for c in compat.curves_for(action, controls))
+
+
+def add_warp_point(layer, frame):
+    """Pin what a layer with an action shows at a frame of the scene to that frame.
+
+    The first time its two ends are pinned too, so that nothing else changes.
+    """
+    span = span_of(layer)
+    shown = float(span.source(np.array([frame]))[0])
+    if not len(layer.warp):
+        begin, end = span.start, span.start + span.period
+        ends = (span.last, span.first) if span.reverse else (span.first, span.last)
+        for at, source in zip((begin, end), ends, strict=True):
+            _add_point(layer, at, source)
+    if all(abs(point.frame - frame) > 1e-3 for point in layer.warp):
+        _add_point(layer, frame, shown)
+
+
+def _add_point(layer, frame, source):
+    point = layer.warp.add()
+    point.frame, point.source = frame, source
 
 
 def add(controls, kind, name, **settings):
@@ -423,15 +465,16 @@ def _copy_curves(controls, before, after):
             continue
         for curve in [c for c in curves if c.data_path.startswith(before)]:
             copy = curves.new(after + curve.data_path[len(before) :], index=curve.array_index)
-            copy.keyframe_points.add(len(curve.keyframe_points))
-            for key, old in zip(copy.keyframe_points, curve.keyframe_points, strict=True):
-                key.co, key.interpolation = old.co, old.interpolation
-                key.handle_left_type, key.handle_right_type = (
-                    old.handle_left_type,
-                    old.handle_right_type,
-                )
-                key.handle_left, key.handle_right = old.handle_left, old.handle_right
-            copy.update()
+            copy_keys(curve, copy)
+
+
+def copy_keys(source, target):
+    """Give an F-curve without keys those of another."""
+    target.keyframe_points.add(len(source.keyframe_points))
+    for new, old in zip(target.keyframe_points, source.keyframe_points, strict=True):
+        for name in _KEY_SETTINGS:
+            setattr(new, name, getattr(old, name))
+    target.update()
 
 
 def fire(controls, name, frame, strength=1.0):
