@@ -189,3 +189,140 @@ def test_names_that_are_cut_or_stand_twice_find_their_sliders(rig):
         "twice": 0.25,
         "twice.001": 0.75,
     }
+
+
+SHAPES = ("jawOpen", "mouthSmileLeft", "browDownLeft", "eyeLookUpLeft")
+EXPECTED = (JAW, PULL, BROW, "CTRL_expressions.eyeLookUpL")
+
+
+@pytest.fixture
+def capture(tmp_path):
+    """Live Link Face's own form: 30 rows a second on a timecode of 60, a row dropped."""
+    names = ["JawOpen", "MouthSmileLeft", "BrowDownLeft", "EyeLookUpLeft", "TongueOut", "HeadYaw"]
+    lines = [",".join(["Timecode", "BlendShapeCount", *names, "Surprise"])]
+    for row in [0, 1, 2, 4, *range(5, 40)]:
+        frame = 56 + row * 2
+        stamp = f"12:21:{59 + frame // 60:02d}:{frame % 60:02d}.000".replace("12:21:60", "12:22:00")
+        stamp = stamp.replace("12:21:61", "12:22:01")
+        values = [row / 100, 0.5, 0.02 * row, 0.25, 0.0, row / 200, 0.7]
+        lines.append(",".join([stamp, "61", *(f"{v:.10f}" for v in values)]))
+    path = tmp_path / "take 1.csv"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+def _import(path, **options):
+    return bpy.ops.risorius.import_animation(filepath=str(path), start=1.0, **options)
+
+
+def test_a_capture_lands_on_the_face_at_its_timecodes(rig, capture):
+    bpy.context.scene.render.fps = 24
+    assert _import(capture) == {"FINISHED"}
+    action = scene.controls(rig).animation_data.action
+    assert action.name == "take 1"
+    jaw = next(c for c in _curves(action) if "jawOpen" in c.data_path)
+    frames = [k.co[0] for k in jaw.keyframe_points]
+    rows = np.array([0, 1, 2, 4, *range(5, 40)])
+    np.testing.assert_allclose(frames, 1 + rows / 30 * 24, atol=1e-4)
+    np.testing.assert_allclose([k.co[1] for k in jaw.keyframe_points], rows / 100, atol=1e-6)
+    report = action["risorius_report"]
+    assert "Surprise" in report
+    assert "tongueOut" in report
+    _played(rig, 25)
+    turn = scene.controls(rig).pose.bones["head"].matrix_basis.to_quaternion()
+    assert turn.angle == pytest.approx(30 / 200, abs=1e-3)
+
+
+def test_options_of_an_import(rig, capture):
+    render = bpy.context.scene.render
+    assert _import(capture, gain=0.5, gains=f"{JAW}=2", rate_mode="SCENE") == {"FINISHED"}
+    assert render.fps / render.fps_base == pytest.approx(30)
+    assert _played(rig, 11)[JAW] == pytest.approx(0.10, abs=1e-5)
+    assert _played(rig, 11)[PULL] == pytest.approx(0.25, abs=1e-5)
+    assert _import(capture, use_neutral=True, rate_mode="FRAMES") == {"FINISHED"}
+    assert _played(rig, 11)[PULL] == pytest.approx(0.0, abs=1e-6)
+    curve = next(c for c in _curves(bpy.data.actions["take 1.001"]) if "jawOpen" in c.data_path)
+    assert all(abs(k.co[0] - round(k.co[0])) < 1e-4 for k in curve.keyframe_points)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"gains": "jaw"}, "name=factor was expected, found jaw"),
+        ({"use_neutral": True, "neutral_first": 900}, "frames from 0"),
+        ({"mapping": "FILE", "mapping_file": "/nowhere.toml"}, "nowhere.toml"),
+    ],
+)
+def test_what_cannot_be_is_said_in_a_sentence(rig, capture, options, words):
+    with pytest.raises(RuntimeError, match=words):
+        _import(capture, **options)
+    assert not bpy.data.actions
+
+
+def test_a_file_that_is_none(rig, tmp_path):
+    path = tmp_path / "noise.csv"
+    path.write_bytes(b"\xff\x00 not a table")
+    with pytest.raises(RuntimeError, match=r"noise\.csv"):
+        _import(path)
+
+
+@pytest.mark.parametrize("target", ["STRIP", "LAYER"])
+def test_a_capture_as_a_strip_or_a_layer(rig, capture, target):
+    bpy.context.scene.render.fps = 30
+    scene.face(rig)[JAW] = 0.9
+    scene.controls(rig).risorius_layer_rules = False
+    assert _import(capture, target=target) == {"FINISHED"}
+    assert scene.controls(rig).animation_data is None or (
+        scene.controls(rig).animation_data.action is None
+    )
+    bpy.context.scene.frame_set(21)
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    live = scene.submodule("scene.runtime").of(rig)
+    seen = scene.controls(rig).evaluated_get(depsgraph)
+    raw, turns = scene.submodule("scene.inputs").read_inputs(seen, live, depsgraph)
+    assert raw[0] == pytest.approx(0.20, abs=1e-5)
+    assert turns["head"].angle == pytest.approx(0.1, abs=1e-5)
+
+
+def _arkit_rig():
+    """A mesh of another tool: ARKit's names as shape keys, one with a driver."""
+    mesh = bpy.data.meshes.new("Other")
+    mesh.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
+    item = bpy.data.objects.new("Other", mesh)
+    bpy.context.scene.collection.objects.link(item)
+    for name in ("Basis", *SHAPES, "hat"):
+        item.shape_key_add(name=name).value = 0.0
+    blocks = mesh.shape_keys.key_blocks
+    for frame in (1, 11, 21):
+        for number, name in enumerate(SHAPES):
+            blocks[name].value = (number + 1) * frame / 100
+            blocks[name].keyframe_insert("value", frame=frame)
+    blocks["hat"].value = 0.5
+    return item
+
+
+@pytest.mark.parametrize("as_strip", [False, True])
+def test_another_rigs_shape_keys_move_the_face(rig, as_strip):
+    item = _arkit_rig()
+    keys = item.data.shape_keys
+    bpy.context.scene.frame_end = 30
+    if as_strip:
+        data = keys.animation_data
+        action, data.action = data.action, None
+        strip = data.nla_tracks.new().strips.new("Take", 1, action)
+        if hasattr(strip, "action_slot"):
+            strip.action_slot = action.slots[0]
+        strip.influence, strip.use_animated_influence = 1.0, False
+    bpy.context.view_layer.update()
+    wanted = {}
+    for frame in (1, 6, 15, 21):
+        bpy.context.scene.frame_set(frame)
+        seen = keys.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        wanted[frame] = [seen.key_blocks[name].value for name in SHAPES]
+    bpy.context.view_layer.objects.active = scene.controls(rig)
+    done = bpy.ops.risorius.import_arkit_rig(source="Other", start=0.0)
+    assert done == {"FINISHED"}
+    for frame, values in wanted.items():
+        found = [_played(rig, frame)[name] for name in EXPECTED]
+        np.testing.assert_allclose(found, values, atol=1e-6)
+    assert "hat" in scene.controls(rig).animation_data.action["risorius_report"]

@@ -7,6 +7,7 @@ from . import native
 from .scene import handlers, layer_props
 from .ui import (
     about,
+    animation_operators,
     file_operators,
     import_operators,
     layer_panel,
@@ -28,6 +29,7 @@ CLASSES = (
     *scene_operators.CLASSES,
     *panels.CLASSES,
     *shape_test.CLASSES,
+    *animation_operators.CLASSES,
     *layer_panel.CLASSES,
 )
 
@@ -49,6 +51,7 @@ def register():
     bpy.types.WindowManager.risorius_show_timing = overlay.show_property()
     bpy.types.WindowManager.risorius_test = shape_test.weight_property()
     bpy.types.TOPBAR_MT_file_import.append(import_operators.draw_import)
+    bpy.types.TOPBAR_MT_file_import.append(animation_operators.draw_import)
     bpy.types.TOPBAR_MT_file_export.append(file_operators.draw_export)
     bpy.types.VIEW3D_MT_add.append(import_operators.draw_add)
     trouble = native.problem()
@@ -71,6 +74,7 @@ def unregister():
     overlay.stop()
     bpy.types.VIEW3D_MT_add.remove(import_operators.draw_add)
     bpy.types.TOPBAR_MT_file_export.remove(file_operators.draw_export)
+    bpy.types.TOPBAR_MT_file_import.remove(animation_operators.draw_import)
     bpy.types.TOPBAR_MT_file_import.remove(import_operators.draw_import)
     del bpy.types.WindowManager.risorius_show_timing
     del bpy.types.WindowManager.risorius_test
