@@ -8,6 +8,7 @@ from .scene import handlers, layer_props
 from .ui import (
     about,
     animation_operators,
+    animation_panel,
     file_operators,
     import_operators,
     layer_panel,
@@ -17,6 +18,7 @@ from .ui import (
     panels,
     scene_operators,
     shape_test,
+    speech_operators,
 )
 
 CLASSES = (
@@ -30,7 +32,9 @@ CLASSES = (
     *panels.CLASSES,
     *shape_test.CLASSES,
     *animation_operators.CLASSES,
+    *speech_operators.CLASSES,
     *layer_panel.CLASSES,
+    *animation_panel.CLASSES,
 )
 
 
