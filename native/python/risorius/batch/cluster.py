@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib
+import logging
 import uuid
 from collections import deque
 from collections.abc import Iterator, Sequence
@@ -41,7 +42,10 @@ class Cluster:
                 "--scheduler needs the package distributed: pip install 'risorius[cluster]'"
             ) from error
         self._work, self.address = work, address
+        # What it says of lost connections, with tracebacks, is our one sentence.
+        logging.getLogger("distributed").setLevel(logging.CRITICAL)
         try:
+            self._dask.comm.get_address_host_port(address)
             self._client: Any = self._dask.Client(
                 address, timeout=_CONNECT_SECONDS, set_as_default=False, name="risorius-batch"
             )
@@ -50,8 +54,14 @@ class Cluster:
         self._run = uuid.uuid4().hex[:8]
 
     def workers(self) -> dict[str, int]:
-        """Address of each worker -> jobs that it runs at a time."""
-        return dict(self._client.nthreads())
+        """Address of each worker -> jobs that it runs at a time. Raises: PoolError."""
+        try:
+            return dict(self._client.nthreads())
+        except (OSError, ValueError) as error:
+            raise self._gone() from error
+
+    def _gone(self) -> PoolError:
+        return PoolError(f"{self.address}: the scheduler has gone, or has cancelled the jobs")
 
     def results(self, jobs: Sequence[Job]) -> Iterator[Outcome]:
         """Outcomes as they come. Leaving it early takes back what has not begun.
@@ -97,7 +107,7 @@ class Cluster:
 
     def _outcome(self, future: Any, job: Job, suspects: list[Job]) -> Outcome | None:
         if future.status in ("cancelled", "lost"):
-            raise PoolError(f"{self.address}: the scheduler has gone, or has cancelled the jobs")
+            raise self._gone()
         error = future.exception()
         if isinstance(error, self._dask.scheduler.KilledWorker):
             suspects.append(job)
