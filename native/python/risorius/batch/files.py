@@ -7,11 +7,12 @@ import contextlib
 import hashlib
 import os
 import secrets
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import IO
 
 _PART = ".part"
+_TOKEN = 8
 
 
 @contextlib.contextmanager
@@ -26,7 +27,7 @@ def replacing(path: Path) -> Iterator[IO[bytes]]:
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     # A name of its own: the same job may still run on a worker that was given up for dead.
-    beside = path.with_name(f".{path.name}.{secrets.token_hex(4)}{_PART}")
+    beside = path.with_name(f".{path.name}.{secrets.token_hex(_TOKEN // 2)}{_PART}")
     try:
         with open(beside, "x+b") as file:
             yield file
@@ -52,15 +53,17 @@ def _sync_folder(folder: Path) -> None:
             os.close(handle)
 
 
-def remove_parts(path: Path) -> None:
-    """Delete what killed writers of a file left beside it."""
-    if not path.parent.is_dir():
-        return
-    before, size = f".{path.name}.", len(path.name) + 10 + len(_PART)
-    for name in os.listdir(path.parent):
-        if name.startswith(before) and name.endswith(_PART) and len(name) == size:
-            with contextlib.suppress(OSError):
-                path.with_name(name).unlink()
+def remove_parts(paths: Iterable[Path]) -> None:
+    """Delete what killed writers of these files left beside them."""
+    folders: dict[Path, set[str]] = {}
+    for path in paths:
+        folders.setdefault(path.parent, set()).add(path.name)
+    for folder, names in folders.items():
+        with contextlib.suppress(OSError):  # it is not there, or what is in it is in use
+            for entry in os.listdir(folder):
+                whole = entry[1:].removesuffix(_PART)[: -1 - _TOKEN]
+                if entry.endswith(_PART) and entry.startswith(".") and whole in names:
+                    (folder / entry).unlink()
 
 
 def digest(path: Path) -> str:

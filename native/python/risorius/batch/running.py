@@ -81,9 +81,8 @@ def run(plan: Plan, *, workers: int | None, scheduler: str | None, restart: bool
         journal.read()
     jobs = pending(plan, journal, report)
     journal.begin([job for job in plan.jobs if job.name in report.reused])
-    for job in jobs:
-        for _, path in job.outputs:
-            remove_parts(path)
+    outputs = [path for job in jobs for _, path in job.outputs]
+    remove_parts(outputs)
     progress = Progress(len(plan.jobs), "jobs")
     if report.reused:
         progress.say(f"{len(report.reused):,} of {len(plan.jobs):,} jobs are done already")
@@ -93,6 +92,7 @@ def run(plan: Plan, *, workers: int | None, scheduler: str | None, restart: bool
             _gather(results, jobs, report, journal, progress)
     finally:
         progress.close()
+        remove_parts(outputs)  # of workers that were killed
         report.seconds = time.monotonic() - started
         summary.write(plan, summary.rows(plan, report.outcomes, report.reused))
     return report
