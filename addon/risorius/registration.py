@@ -7,6 +7,8 @@ from . import native
 from .scene import handlers
 from .ui import (
     about,
+    bake_operators,
+    bake_panel,
     file_operators,
     import_operators,
     life_operators,
@@ -24,7 +26,9 @@ CLASSES = (
     *operators.CLASSES,
     *life_operators.CLASSES,
     *scene_operators.CLASSES,
+    *bake_operators.CLASSES,
     *panels.CLASSES,
+    *bake_panel.CLASSES,
     *shape_test.CLASSES,
 )
 
