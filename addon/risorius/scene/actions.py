@@ -12,6 +12,7 @@ from ..logic import curves as reduction
 BEFORE = "risorius_before"  # on what plays a baked action: what animated it before
 BAKED_ACTION = "risorius_baked_action"  # on an action that was baked: removed on the way back
 _LINEAR = 1
+_AT_ONCE = 1 << 21  # values that are reduced in one go
 
 
 @dataclass
@@ -73,18 +74,11 @@ def write(name, owner, frames, tracks, error, counts):
     action.frame_start, action.frame_end = float(frames[0]), float(frames[-1])
     bag, slot = _bag(action, owner)
     times = np.asarray(frames, np.float32)
-    for track in tracks:
-        values = np.ascontiguousarray(track.values, np.float32)
-        if track.now is not None and (values == _flat(track.now)).all():
-            continue
-        keep = reduction.reduce_keys(frames, values, error)
-        counts.error = max(counts.error, _error(frames, values, keep) if error > 0.0 else 0.0)
+    moving = [t for t in tracks if t.now is None or (t.values != _flat(t.now)).any()]
+    for track, values, keep in _reduced(frames, moving, error, counts):
         for column in range(values.shape[1]):
             curve = _new_curve(bag, track, track.first + column if track.indexed else 0)
             _fill(curve, times[keep[:, column]], values[keep[:, column], column])
-        counts.curves += values.shape[1]
-        counts.keys += int(keep.sum())
-        counts.all_keys += keep.size
     return action, slot
 
 
@@ -92,8 +86,26 @@ def _flat(value):
     return np.atleast_1d(np.asarray(value, np.float32))
 
 
-def _error(frames, values, keep):
-    return float(np.abs(reduction.rebuilt(frames, values, keep) - values).max(initial=0.0))
+def _reduced(frames, tracks, error, counts):
+    """Each track with its values and keys; many tracks are reduced at once."""
+    most = max(_AT_ONCE // len(frames), 16)  # columns
+    waiting, width = [], 0
+    for number, track in enumerate(tracks):
+        waiting.append(track)
+        width += track.values.shape[1]
+        if width < most and number + 1 < len(tracks):
+            continue
+        values = np.concatenate([t.values for t in waiting], axis=1, dtype=np.float32)
+        keep = reduction.reduce_keys(frames, values, error)
+        if error > 0.0:
+            off = np.abs(reduction.rebuilt(frames, values, keep) - values).max(initial=0.0)
+            counts.error = max(counts.error, float(off))
+        counts.curves += width
+        counts.keys += int(keep.sum())
+        counts.all_keys += keep.size
+        ends = np.cumsum([t.values.shape[1] for t in waiting])[:-1]
+        yield from zip(waiting, np.split(values, ends, 1), np.split(keep, ends, 1), strict=True)
+        waiting, width = [], 0
 
 
 def _bag(action, owner):
@@ -119,9 +131,11 @@ def _new_curve(bag, track, index):
 def _fill(curve, times, values):
     points = curve.keyframe_points
     points.add(len(times))
-    points.foreach_set("co", np.stack([times, values], axis=1).ravel())
+    places = np.stack([times, values], axis=1).ravel()
+    # Straight lines need no handles; computing them would cost most of the time.
+    for name in ("co", "handle_left", "handle_right"):
+        points.foreach_set(name, places)
     points.foreach_set("interpolation", np.full(len(times), _LINEAR, np.int32))
-    curve.update()
 
 
 def play(owner, action, slot, muted=(), strip=False):
