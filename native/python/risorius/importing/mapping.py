@@ -350,7 +350,7 @@ def _table(table: Table[str, Any], key: str, where: str) -> dict[str, Any]:
 
 
 def _row(key: str, value: object, prefix: str, where: str) -> Row:
-    """A row's controls in full: a name without a dot gets the prefix."""
+    """A row's controls in full: a name without a dot gets the prefix, # is L and R."""
     if isinstance(value, str):
         return _expression(value, f"rows.{key}", where)
     if not isinstance(value, dict):
@@ -361,7 +361,11 @@ def _row(key: str, value: object, prefix: str, where: str) -> Row:
     out = {}
     for control, weight in value.items():
         at = f"rows.{key}.{control}"
-        out[control if "." in control else prefix + control] = _number(weight, at, where)
+        full = control if "." in control else prefix + control
+        for side in "LR" if "#" in full else "":
+            out[full.replace("#", side)] = _number(weight, at, where)
+        if "#" not in full:
+            out[full] = _number(weight, at, where)
         if "*" in control and "*" not in key:
             raise MappingError(where, f"{at}: a * was expected in the curve's name too")
     if key.count("*") > 1:
