@@ -7,7 +7,7 @@ import tomllib
 
 import numpy as np
 import pytest
-from risorius import Clip, arkit, importing
+from risorius import Clip, arkit, expressions, importing
 from risorius.importing.mapping import Mapping, apply_rows, loose_name, parse_mapping
 
 RIG = "CTRL_expressions."
@@ -62,6 +62,24 @@ def test_bits_pass_where_nothing_is_to_be_done():
     found = apply_rows(importing.load_mapping("controls"), Clip(["CTRL_expressions_a"], bits))
     assert found.clip.names == ("CTRL_expressions.a",)
     assert found.clip.curves.view(np.uint32).tolist() == bits.view(np.uint32).tolist()
+
+
+def test_expressions_and_both_sides_in_a_row():
+    text = """
+        prefix = "CTRL_expressions."
+        [rows]
+        pp = "PP"
+        half = { "@PP" = 0.5, jawOpen = 0.25 }
+        smile = { "mouthCornerPull*" = 0.5, "mouthPress**" = 0.25 }
+    """
+    rows = parse_mapping(text, "m").rows
+    pose = expressions.get("PP").weights
+    assert rows["pp"] == dict(pose)
+    assert rows["half"] == {k: 0.5 * w + 0.25 * (k == RIG + "jawOpen") for k, w in pose.items()}
+    assert rows["smile"] == {
+        **{RIG + "mouthCornerPull" + side: 0.5 for side in "LR"},
+        **{RIG + "mouthPress" + quarter: 0.25 for quarter in ("UL", "UR", "DL", "DR")},
+    }
 
 
 def test_a_pattern_stands_for_many():
@@ -172,7 +190,11 @@ def test_check_names_what_a_rig_lacks():
         ("[rows]\na = 1", r"rows.a: .* was expected, found 1"),
         ("[rows]\na = { b = true }", "rows.a.b: a number was expected, found True"),
         ("[rows]\na = { b = nan }", "rows.a.b: a number was expected, found nan"),
-        ('[rows]\na = { "b*" = 1.0 }', r"rows.a.b\*: a \* was expected in the curve's name too"),
+        (
+            '[rows]\na = { "*b" = 1.0 }',
+            r"rows.a: a \* was expected at the end of a control, or in both",
+        ),
+        ('[rows]\na = "nosuch"', "rows.a.@nosuch: nosuch: an expression such as .* was expected"),
         ('[rows]\n"a*b*" = { c = 1.0 }', r"rows.a\*b\*: one \* at most was expected"),
         ("strip = 3", "strip: a list of names was expected"),
         ("[controls]\na = { gian = 1 }", "controls.a: gain, offset, curve were expected"),
