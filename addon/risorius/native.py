@@ -69,6 +69,18 @@ def sample_module():
     return sample
 
 
+def live_module():
+    """The module `risorius.live`, loaded only when capture is asked for.
+
+    Raises:
+        RuntimeError: the wheel is missing or of another version; the text says so.
+    """
+    module()
+    from risorius import live
+
+    return live
+
+
 def dna_error() -> type[Exception]:
     """The class of errors of bad files, or one that is never raised without the module."""
     return _risorius.DnaError if _risorius is not None else _Never

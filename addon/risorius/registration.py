@@ -4,12 +4,13 @@
 import bpy
 
 from . import native
-from .scene import handlers
+from .scene import handlers, live
 from .ui import (
     about,
     file_operators,
     import_operators,
     life_operators,
+    live_operators,
     operators,
     overlay,
     panels,
@@ -26,6 +27,7 @@ CLASSES = (
     *scene_operators.CLASSES,
     *panels.CLASSES,
     *shape_test.CLASSES,
+    *live_operators.CLASSES,
 )
 
 
@@ -43,6 +45,9 @@ def register():
         bpy.utils.register_class(cls)
     bpy.types.WindowManager.risorius_search = _search_property()
     bpy.types.WindowManager.risorius_show_timing = overlay.show_property()
+    bpy.types.WindowManager.risorius_live = bpy.props.PointerProperty(
+        type=live_operators.RISORIUS_PG_live
+    )
     bpy.types.WindowManager.risorius_test = shape_test.weight_property()
     bpy.types.TOPBAR_MT_file_import.append(import_operators.draw_import)
     bpy.types.TOPBAR_MT_file_export.append(file_operators.draw_export)
@@ -51,6 +56,7 @@ def register():
     if trouble:
         print(f"Risorius: {trouble}")
     handlers.register()
+    live.register()
     bpy.app.timers.register(_refresh_once, first_interval=0.0)
 
 
@@ -63,6 +69,7 @@ def unregister():
     """Undo `register` in reverse."""
     if bpy.app.timers.is_registered(_refresh_once):
         bpy.app.timers.unregister(_refresh_once)
+    live.unregister()
     handlers.unregister()
     overlay.stop()
     bpy.types.VIEW3D_MT_add.remove(import_operators.draw_add)
@@ -70,6 +77,7 @@ def unregister():
     bpy.types.TOPBAR_MT_file_import.remove(import_operators.draw_import)
     del bpy.types.WindowManager.risorius_show_timing
     del bpy.types.WindowManager.risorius_test
+    del bpy.types.WindowManager.risorius_live
     del bpy.types.WindowManager.risorius_search
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)
