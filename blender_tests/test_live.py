@@ -135,6 +135,7 @@ def test_a_recording_is_an_action(dna_file, port):
     rig = scene.load(dna_file)
     bpy.context.scene.render.fps = 24
     bpy.context.scene.frame_set(11)
+    scene.set_controls(rig, jawOpen=0.9)
     bpy.ops.risorius.live_start()
     assert bpy.ops.risorius.live_record() == {"FINISHED"}
     numbers = [0, 1, 2, 3, 9, 10]  # the phone was silent for a while
@@ -144,6 +145,9 @@ def test_a_recording_is_an_action(dna_file, port):
     live_value = scene.face(rig)[JAW_OPEN]
     assert bpy.ops.risorius.live_stop() == {"FINISHED"}
     assert live_value == pytest.approx(10 / 16.0)
+    bpy.context.view_layer.update()
+    seen = scene.controls(rig).evaluated_get(bpy.context.evaluated_depsgraph_get())
+    assert seen.pose.bones["face"][JAW_OPEN] == 0.0  # the recording's first, not the 0.9 of before
     curves = {c.data_path: c for c in scene.curves(scene.controls(rig)) if c.array_index == 0}
     jaw = curves[f'pose.bones["face"]["{JAW_OPEN}"]']
     keys = np.array([tuple(k.co) for k in jaw.keyframe_points])
@@ -249,6 +253,7 @@ def test_it_ends_with_the_face_the_file_and_the_addon(dna_file, port, tmp_path):
     assert listens(port)
     for item in scene.submodule("scene.parts").members_of(rig):
         bpy.data.objects.remove(item)
+    scene.load(dna_file)  # another face of the same name
     assert module._tick() is None
     assert not listens(port)
     assert "went away" in module.last_error()
@@ -298,7 +303,7 @@ def test_a_port_in_use_is_one_sentence(dna_file, port):
     scene.load(dna_file)
     with (
         risorius.live.Receiver("livelink", port),
-        pytest.raises(RuntimeError, match=f"Port {port} is in use"),
+        pytest.raises(RuntimeError, match=f"^Error: Port {port} is in use"),
     ):
         bpy.ops.risorius.live_start()
     assert bpy.ops.risorius.live_start() == {"FINISHED"}

@@ -311,7 +311,7 @@ def _rotate(bone, turn):
 
 
 def _put_back(session, controls):
-    """The values of before the capture; at once seen also where keys or strips say otherwise."""
+    """Write the values of before the capture."""
     bone = controls.pose.bones[parts.FACE]
     for slider, value in session.before.items():
         if slider in bone:
@@ -325,8 +325,6 @@ def _put_back(session, controls):
     session.before.clear()
     session.turn, session.sequence = None, 0
     controls.update_tag()
-    if controls.animation_data is not None:
-        controls.update_tag(refresh={"TIME"})
 
 
 def _redraw():
