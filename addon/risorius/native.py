@@ -4,6 +4,7 @@
 import re
 import sys
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 
 try:
@@ -69,16 +70,23 @@ def sample_module():
     return sample
 
 
-def live_module():
-    """The module `risorius.live`, loaded only when capture is asked for.
+def part(name: str):
+    """A module of the `risorius` package that is loaded only where it is used.
+
+    Args:
+        name: `importing`, `speech` and the like.
 
     Raises:
-        RuntimeError: the wheel is missing or of another version; the text says so.
+        RuntimeError: the wheel is missing, of another version, or has no such part; the text says
+            so.
     """
     module()
-    from risorius import live
-
-    return live
+    try:
+        return import_module(f"risorius.{name}")
+    except ModuleNotFoundError as error:
+        if error.name != f"risorius.{name}":
+            raise
+        raise RuntimeError(f"The native module has no {name}: install the add-on anew.") from error
 
 
 def dna_error() -> type[Exception]:

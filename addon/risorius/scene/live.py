@@ -15,7 +15,7 @@ from mathutils import Euler, Quaternion
 
 from .. import native
 from ..logic import names
-from . import parts, runtime
+from . import clips, parts, runtime
 
 INTERVAL = 1 / 60  # seconds; faster than a phone sends helps nobody
 _REDRAW = 0.25  # seconds between redraws of the status
@@ -113,7 +113,7 @@ def start(rig, settings):
     Raises:
         risorius.live.LiveError: the port cannot be had; python-osc is missing.
     """
-    live = native.live_module()
+    live = native.part("live")
     controls = parts.controls_of(rig)
     stop(controls)
     host = live.EVERYWHERE if settings.everywhere else live.THIS_MACHINE
@@ -205,8 +205,6 @@ def finish_take(session, rig, scene):
     Raises:
         clips.ClipError: nothing of it is for this face, or it is longer than Blender can play.
     """
-    from . import clips
-
     take, session.take = session.receiver.finish(session.take), None
     if not len(take):
         return None

@@ -125,7 +125,7 @@ class RISORIUS_OT_live_start(bpy.types.Operator):
     def execute(self, context):
         try:
             live.start(parts.active_rig(context), settings_of(context))
-        except native.live_module().LiveError as error:
+        except native.part("live").LiveError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         return {"FINISHED"}
