@@ -7,7 +7,7 @@ from .. import native
 from ..logic import names
 from ..scene import live, parts
 from .import_operators import usable
-from .panels import FaceOnlyPanel, _write
+from .panels import FaceOnlyPanel, write
 
 SOURCES = (
     ("livelink", "Live Link Face", "Epic's app for iPhones and iPads, in its ARKit mode"),
@@ -215,7 +215,7 @@ def _finish(operator, context, session):
 class RISORIUS_PT_live(FaceOnlyPanel, bpy.types.Panel):
     bl_idname = "RISORIUS_PT_live"
     bl_label = "Live Capture"
-    bl_order = 5
+    bl_order = 1
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
@@ -235,7 +235,7 @@ class RISORIUS_PT_live(FaceOnlyPanel, bpy.types.Panel):
         if session is None:
             layout.operator("risorius.live_start", icon="PLAY")
             if live.last_error():
-                _write(layout, live.last_error(), "ERROR")
+                write(layout, live.last_error(), "ERROR")
             return
         row = layout.row(align=True)
         row.operator("risorius.live_stop", icon="SNAP_FACE")
@@ -269,7 +269,7 @@ def _draw_status(layout, session):
         if count:
             column.label(text=f"{count} {what}", icon="ERROR")
     if status.reasons:
-        _write(layout, names.printable(status.reasons[0][0], 120))
+        write(layout, names.printable(status.reasons[0][0], 120))
     others = [s for s in status.subjects if s != status.subject]
     for name in others[:8]:
         layout.operator("risorius.live_subject", text=name, icon="USER").name = name
