@@ -299,13 +299,19 @@ def test_undo_does_not_end_it(dna_file, port):
     assert scene.error_against_oracle(rig, dna_file, raw(jawOpen=0.5)) < scene.TOLERANCE
 
 
-def test_a_port_in_use_is_one_sentence(dna_file, port):
+def test_what_cannot_start_is_one_sentence(dna_file, port):
     scene.load(dna_file)
     with (
         risorius.live.Receiver("livelink", port),
         pytest.raises(RuntimeError, match=f"^Error: Port {port} is in use"),
     ):
         bpy.ops.risorius.live_start()
+    assert bpy.ops.risorius.live_start() == {"FINISHED"}
+    bpy.ops.risorius.live_stop()
+    bpy.context.window_manager.risorius_live.mapping = str(dna_file.with_name("absent.toml"))
+    with pytest.raises(RuntimeError, match="^Error: .*absent.toml: cannot read it"):
+        bpy.ops.risorius.live_start()
+    bpy.context.window_manager.risorius_live.mapping = ""
     assert bpy.ops.risorius.live_start() == {"FINISHED"}
     for operator in ("live_neutral", "live_record", "live_stop"):
         assert getattr(bpy.ops.risorius, operator).poll()

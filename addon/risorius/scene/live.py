@@ -33,6 +33,7 @@ class Settings:
     Attributes:
         source: "livelink" or "osc"; port, everywhere: where to listen, to the network or not.
         subject: the phone; "" for the one heard first.
+        mapping: name or file of the mapping to controls.
         smoothing: 0 to 1; gain: on all units; head_gain: on the head's turn, 0 for none.
     """
 
@@ -43,6 +44,7 @@ class Settings:
     smoothing: float = 0.3
     gain: float = 1.0
     head_gain: float = 1.0
+    mapping: str = "arkit"
 
 
 @dataclass
@@ -112,8 +114,10 @@ def start(rig, settings):
 
     Raises:
         risorius.live.LiveError: the port cannot be had; python-osc is missing.
+        risorius.importing.MappingError: the mapping cannot be used.
     """
     live = native.part("live")
+    shaper = live.Shaper(settings.mapping)
     controls = parts.controls_of(rig)
     stop(controls)
     host = live.EVERYWHERE if settings.everywhere else live.THIS_MACHINE
@@ -122,7 +126,7 @@ def start(rig, settings):
         receiver = live.Receiver(settings.source, settings.port, host)
         receiver.start()
         _receivers[key] = receiver
-    session = Session(controls.session_uid, controls.name, key, live.Shaper(), settings.subject)
+    session = Session(controls.session_uid, controls.name, key, shaper, settings.subject)
     _sessions[session.uid] = session
     _last["error"] = ""
     apply_settings(session, settings)

@@ -49,6 +49,11 @@ class RISORIUS_PG_live(bpy.types.PropertyGroup):
         description="Whom to follow, by the name that the app sends; empty for the first heard",
         update=_changed,
     )
+    mapping: bpy.props.StringProperty(
+        name="Mapping",
+        description="File that says which controls a name moves; empty for ARKit's names and VRM's",
+        subtype="FILE_PATH",
+    )
     smoothing: bpy.props.FloatProperty(
         name="Smoothing",
         description="Hold a still face still; a recording keeps what was sent",
@@ -86,6 +91,7 @@ def settings_of(context):
         chosen.smoothing,
         chosen.gain,
         chosen.head_gain,
+        bpy.path.abspath(chosen.mapping) or "arkit",
     )
 
 
@@ -125,7 +131,7 @@ class RISORIUS_OT_live_start(bpy.types.Operator):
     def execute(self, context):
         try:
             live.start(parts.active_rig(context), settings_of(context))
-        except native.part("live").LiveError as error:
+        except (native.part("live").LiveError, native.part("importing").MappingError) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         return {"FINISHED"}
@@ -228,6 +234,7 @@ class RISORIUS_PT_live(FaceOnlyPanel, bpy.types.Panel):
         row = column.row(align=True)
         row.prop(chosen, "port")
         row.prop(chosen, "everywhere", text="", icon="URL")
+        column.prop(chosen, "mapping", text="")
         layout.prop(chosen, "subject", icon="USER", text="")
         column = layout.column(align=True)
         for name in ("smoothing", "gain", "head_gain"):
@@ -270,6 +277,9 @@ def _draw_status(layout, session):
             column.label(text=f"{count} {what}", icon="ERROR")
     if status.reasons:
         write(layout, names.printable(status.reasons[0][0], 120))
+    missed = session.shaper.unmapped
+    if missed:
+        write(layout, f"Not mapped: {names.printable(', '.join(missed), 120)}")
     others = [s for s in status.subjects if s != status.subject]
     for name in others[:8]:
         layout.operator("risorius.live_subject", text=name, icon="USER").name = name
