@@ -39,6 +39,8 @@ def _updated(_scene, depsgraph):
     # While a render runs beside the interface, only its own frames are written.
     if _state["busy"] or bpy.app.is_job_running("RENDER") or native.problem():
         return
+    if runtime.is_paused():
+        return
     _state["busy"] = True
     try:
         _notice_copies()

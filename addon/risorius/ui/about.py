@@ -81,6 +81,7 @@ class RISORIUS_OT_describe(FaceOperator, bpy.types.Operator):
 
     bl_idname = "risorius.describe"
     bl_label = "What Is in It"
+    baked_too = True
     bl_options = {"REGISTER"}
 
     def execute(self, context):

@@ -8,7 +8,7 @@ import bpy
 from .. import native
 from ..logic import plans, regions
 from ..scene import lods, parts, place, runtime
-from . import life_operators
+from . import bake_operators, life_operators
 
 _ICONS = {
     "brow": "MOD_CURVE",
@@ -73,6 +73,7 @@ class RISORIUS_PT_character(FacePanel, bpy.types.Panel):
         if live is None or controls is None:
             return  # said above
         layout.label(text=rig.name.removesuffix("_rig"), icon="USER")
+        bake_operators.draw_state(layout, rig, write)
         _draw_detail(layout, rig)
         _draw_shapes(layout, rig)
         row = layout.row(align=True)
