@@ -17,7 +17,7 @@ FRAMES = (1, 3, 5, 8, 10)
 ENDINGS = {"GLTF": "glb", "FBX": "fbx", "USD": "usdc", "ALEMBIC": "abc"}
 # Of the head's size, by what each file holds.
 NEAR = {
-    "ALEMBIC": 1e-6,  # the vertices themselves, float32
+    "ALEMBIC": 5e-6,  # the vertices themselves: a float32 at 1.6 m is 6e-7 of a head wide
     "GLTF": 2e-5,  # float32 joints at every frame, weights normalised anew, axes turned
     "FBX": 2e-5,  # the same, rotations as Euler angles in degrees
     # Joint scales are half floats: 2**-11 of the distance to the joint, for two joints in a row.
