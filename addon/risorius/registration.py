@@ -4,13 +4,16 @@
 import bpy
 
 from . import native
-from .scene import handlers
+from .scene import handlers, layer_props
 from .ui import (
     about,
+    animation_operators,
+    animation_panel,
     bake_operators,
     bake_panel,
     file_operators,
     import_operators,
+    layer_panel,
     life_operators,
     operators,
     overlay,
@@ -18,9 +21,11 @@ from .ui import (
     scene_operators,
     shape_test,
     ship_operators,
+    speech_operators,
 )
 
 CLASSES = (
+    *layer_props.CLASSES,
     *about.CLASSES,
     *import_operators.CLASSES,
     *file_operators.CLASSES,
@@ -32,6 +37,10 @@ CLASSES = (
     *panels.CLASSES,
     *bake_panel.CLASSES,
     *shape_test.CLASSES,
+    *animation_operators.CLASSES,
+    *speech_operators.CLASSES,
+    *layer_panel.CLASSES,
+    *animation_panel.CLASSES,
 )
 
 
@@ -47,10 +56,12 @@ def register():
     """Register classes, menus and handlers; without the native module only words."""
     for cls in CLASSES:
         bpy.utils.register_class(cls)
+    layer_props.register()
     bpy.types.WindowManager.risorius_search = _search_property()
     bpy.types.WindowManager.risorius_show_timing = overlay.show_property()
     bpy.types.WindowManager.risorius_test = shape_test.weight_property()
     bpy.types.TOPBAR_MT_file_import.append(import_operators.draw_import)
+    bpy.types.TOPBAR_MT_file_import.append(animation_operators.draw_import)
     bpy.types.TOPBAR_MT_file_export.append(file_operators.draw_export)
     bpy.types.VIEW3D_MT_add.append(import_operators.draw_add)
     trouble = native.problem()
@@ -73,9 +84,11 @@ def unregister():
     overlay.stop()
     bpy.types.VIEW3D_MT_add.remove(import_operators.draw_add)
     bpy.types.TOPBAR_MT_file_export.remove(file_operators.draw_export)
+    bpy.types.TOPBAR_MT_file_import.remove(animation_operators.draw_import)
     bpy.types.TOPBAR_MT_file_import.remove(import_operators.draw_import)
     del bpy.types.WindowManager.risorius_show_timing
     del bpy.types.WindowManager.risorius_test
     del bpy.types.WindowManager.risorius_search
+    layer_props.unregister()
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

@@ -8,6 +8,7 @@ namespace risorius::bindings {
 
 void bind_dna(py::module_& m);
 void bind_edit(py::module_& m);
+void bind_mixer(py::module_& m);
 void bind_rig(py::module_& m);
 
 namespace {
@@ -42,4 +43,5 @@ PYBIND11_MODULE(_native, m) {
   risorius::bindings::bind_dna(m);
   risorius::bindings::bind_rig(m);
   risorius::bindings::bind_edit(m);
+  risorius::bindings::bind_mixer(m);
 }

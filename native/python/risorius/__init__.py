@@ -50,6 +50,7 @@ from ._native import (
     parse_file,
 )
 from .clip import Clip, Event
+from .mixer import Layer, Mixer
 
 __version__ = "0.1.0"
 __all__ = [
@@ -66,11 +67,13 @@ __all__ = [
     "Instance",
     "JointBehaviorMetadata",
     "JointGroup",
+    "Layer",
     "Limits",
     "LodMapping",
     "MachineLearnedBehavior",
     "MachineLearnedBehaviorExt",
     "Mesh",
+    "Mixer",
     "MlJoints",
     "MlOperation",
     "MlType",
