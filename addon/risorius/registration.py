@@ -21,6 +21,7 @@ from .ui import (
     panels,
     scene_operators,
     shape_test,
+    ship_operators,
     speech_operators,
 )
 
@@ -33,6 +34,7 @@ CLASSES = (
     *life_operators.CLASSES,
     *scene_operators.CLASSES,
     *bake_operators.CLASSES,
+    *ship_operators.CLASSES,
     *panels.CLASSES,
     *bake_panel.CLASSES,
     *shape_test.CLASSES,
