@@ -51,6 +51,7 @@ from ._native import (
 )
 from .clip import Clip, Event
 from .clip_file import ClipError, ClipReader, ClipWriter
+from .mixer import Layer, Mixer
 
 __version__ = "0.1.0"
 __all__ = [
@@ -70,11 +71,13 @@ __all__ = [
     "Instance",
     "JointBehaviorMetadata",
     "JointGroup",
+    "Layer",
     "Limits",
     "LodMapping",
     "MachineLearnedBehavior",
     "MachineLearnedBehaviorExt",
     "Mesh",
+    "Mixer",
     "MlJoints",
     "MlOperation",
     "MlType",

@@ -1089,3 +1089,48 @@ def regroup(
     timed: _Int,
 ) -> tuple[Dna, RegroupReport]:
     """(Dna, RegroupReport): see risorius.edit.regroup."""
+
+class LayerCurves:
+    """The curves of a layer, made ready for a list of controls."""
+
+    def __init__(
+        self,
+        controls: Sequence[str],
+        names: Sequence[str],
+        values: npt.ArrayLike,
+        rate: _Float,
+        start: _Float,
+        times: npt.ArrayLike | None = None,
+        mask: npt.ArrayLike | None = None,
+    ) -> None: ...
+    @property
+    def frame_count(self) -> int: ...
+    @property
+    def range(self) -> tuple[float, float]:
+        """Seconds of the first and of the last frame."""
+
+class MixerCore:
+    """What risorius.Mixer evaluates with."""
+
+    def __init__(
+        self,
+        controls: Sequence[str],
+        low: npt.ArrayLike,
+        high: npt.ArrayLike,
+        max_fired: _Int,
+    ) -> None: ...
+    def set_layers(self, layers: Sequence[dict[str, Any]]) -> None: ...
+    def set_reactions(self, reactions: Sequence[Sequence[tuple[Any, ...]]]) -> None:
+        """Each a list of parts: controls, weights, delay, attack, hold, release."""
+    def set_rules(
+        self, yields: Sequence[tuple[Any, ...]], opposites: Sequence[tuple[int, int]]
+    ) -> None:
+        """Yields are by, of, measure, amount."""
+    def fire(self, reaction: _Int, time: _Float, strength: _Float) -> bool: ...
+    def clear_fired(self) -> None: ...
+    def evaluate(
+        self, time: _Float, base: npt.ArrayLike | None = None, out: _F32 | None = None
+    ) -> _F32: ...
+    def evaluate_batch(
+        self, times: npt.ArrayLike, base: npt.ArrayLike | None = None
+    ) -> _F32: ...
