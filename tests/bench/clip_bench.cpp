@@ -105,6 +105,16 @@ void evaluate(benchmark::State& state, const std::string& path) {
   }
 }
 
+struct Case {
+  const char* name;
+  void (*run)(benchmark::State&, const File&);
+};
+constexpr Case kCases[] = {{"encode", encode},
+                           {"decode", decode},
+                           {"one frame", one_frame},
+                           {"play", play},
+                           {"play, decoded", play_decoded}};
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -134,13 +144,10 @@ int main(int argc, char** argv) {
   for (const auto& file : files) {
     const std::string name = file->name.substr(file->name.find_last_of('/') + 1);
     const auto& one = *file;
-    for (const auto& [what, run] : {std::pair{"encode", encode},
-                                    {"decode", decode},
-                                    {"one frame", one_frame},
-                                    {"play", play},
-                                    {"play, decoded", play_decoded}}) {
-      benchmark::RegisterBenchmark((std::string(what) + ", " + name).c_str(),
-                                   [run = run, &one](benchmark::State& state) { run(state, one); });
+    for (const Case& made : kCases) {
+      benchmark::RegisterBenchmark(
+          (made.name + (", " + name)).c_str(),
+          [&made, &one](benchmark::State& state) { made.run(state, one); });
     }
   }
   std::printf("%s, %s, commit %s\n", bench::processor().c_str(), bench::compiler(),
