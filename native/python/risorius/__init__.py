@@ -10,6 +10,7 @@ import os
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
+from . import expressions
 from ._native import (
     AnimatedMaps,
     BlendShapeChannels,
@@ -50,6 +51,7 @@ from ._native import (
     parse_file,
 )
 from .clip import Clip, Event
+from .idle import Life, idle
 from .mixer import Layer, Mixer
 
 __version__ = "0.1.0"
@@ -68,6 +70,7 @@ __all__ = [
     "JointBehaviorMetadata",
     "JointGroup",
     "Layer",
+    "Life",
     "Limits",
     "LodMapping",
     "MachineLearnedBehavior",
@@ -93,6 +96,8 @@ __all__ = [
     "available_simd",
     "check",
     "compile_cached",
+    "expressions",
+    "idle",
     "load",
 ]
 

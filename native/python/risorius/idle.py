@@ -123,8 +123,8 @@ def idle(
         ValueError: a seed below 0, a duration or rate that is not above 0, a loop below 2 s.
 
     From:
-        Blinks: intervals spread log-normally (Cruz et al. 2011); lids fall in 55 to 85 ms and rise
-        in twice that time (Evinger, Manning & Sibony 1991). Saccades: duration 21 ms + 2.2 ms a
+        Blinks: intervals spread log-normally (Cruz et al. 2011); lids fall in 50 to 78 ms and rise
+        in more than twice that time (Evinger, Manning & Sibony 1991). Saccades: duration 21 ms + 2.2 ms a
         degree (Bahill, Clark & Stark 1975; Carpenter 1988), position of least jerk, sizes and
         directions about as in Eyes Alive (Lee, Badler & Badler 2002); large ones bring blinks
         (Evinger et al. 1994); small ones while fixating (Martinez-Conde et al. 2004). The upper lid
@@ -218,9 +218,9 @@ def make_blinks(
 
 
 def _blink(dice: _Dice, start: float) -> Blink:
-    close = dice.uniform(0.055, 0.085)
+    close = dice.uniform(0.05, 0.078)
     hold = dice.uniform(0.005, 0.03)
-    rise = close * dice.uniform(1.8, 2.3)
+    rise = close * dice.uniform(2.3, 2.8)
     whole = dice.uniform() < 0.8
     amount = dice.uniform(0.97, 1.0) if whole else dice.uniform(0.6, 0.95)
     return Blink(start, close, hold, rise, amount, dice.uniform(-0.006, 0.006))
