@@ -124,11 +124,11 @@ def idle(
 
     From:
         Blinks: intervals spread log-normally (Cruz et al. 2011); lids fall in 50 to 78 ms and rise
-        in more than twice that time (Evinger, Manning & Sibony 1991). Saccades: duration 21 ms + 2.2 ms a
-        degree (Bahill, Clark & Stark 1975; Carpenter 1988), position of least jerk, sizes and
-        directions about as in Eyes Alive (Lee, Badler & Badler 2002); large ones bring blinks
-        (Evinger et al. 1994); small ones while fixating (Martinez-Conde et al. 2004). The upper lid
-        follows the eye up and down (Becker & Fuchs 1988).
+        in more than twice that time (Evinger, Manning & Sibony 1991). Saccades: duration 21 ms and
+        2.2 ms a degree (Bahill, Clark & Stark 1975; Carpenter 1988), position of least jerk, sizes
+        and directions about as in Eyes Alive (Lee, Badler & Badler 2002); large ones bring blinks
+        (Evinger et al. 1994); small ones while fixating (Martinez-Conde et al. 2004). The upper
+        lid follows the eye up and down (Becker & Fuchs 1988).
     """
     life = life or Life()
     if seed < 0:
