@@ -51,6 +51,7 @@ from ._native import (
     parse_file,
 )
 from .clip import Clip, Event
+from .clip_file import ClipError, ClipReader, ClipWriter
 from .idle import Life, idle
 from .mixer import Layer, Mixer
 
@@ -61,6 +62,9 @@ __all__ = [
     "BlendShapeTarget",
     "BoneSpace",
     "Clip",
+    "ClipError",
+    "ClipReader",
+    "ClipWriter",
     "Conditionals",
     "Dna",
     "DnaError",

@@ -27,7 +27,7 @@ class ReactionPart:
     """Controls that go the same way in time; see Reaction."""
 
     weights: Mapping[str, float]
-    """By control, in [0, 1]: the share of the way to its upper limit."""
+    """By control, in [0, 1]: the share of the way to 1, or to its upper limit if that is less."""
     delay: float = 0.0
     """Seconds from the firing; so are the others."""
     attack: float = 0.1

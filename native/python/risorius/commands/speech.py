@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: MIT
+"""risorius speech: a voice as animation."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+from ..clip import Clip
+from ..speech import Heard, Phoneme, animate, listen
+from .files import InputError, read_bytes
+from .plot import write
+
+_KINDS = (".rzc", ".csv", ".json")
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = subparsers.add_parser(
+        "speech",
+        help="a voice as animation",
+        description="Moves a face to a voice: phonemes with their times, lips and jaw, blinks, "
+        "brows and nods. English. Much better with the text of what is said. "
+        "Needs risorius[speech].",
+    )
+    parser.add_argument("voice", type=Path, help="a WAV file, or what an ffmpeg on PATH can read")
+    parser.add_argument(
+        "-o", "--out", type=Path, required=True, metavar="OUT", help="clip.rzc, .csv or .json"
+    )
+    known = parser.add_mutually_exclusive_group()
+    known.add_argument("--text", help="what is said")
+    known.add_argument("--transcript", metavar="FILE", help="a text file of what is said")
+    parser.add_argument("--rate", type=float, default=60.0, metavar="FPS", help="(default 60)")
+    parser.add_argument(
+        "--intensity", type=float, default=1.0, metavar="X", help="of the shapes, 0 to 4"
+    )
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the blinks")
+    parser.add_argument("--no-blinks", action="store_true")
+    parser.add_argument("--no-accents", action="store_true", help="brows and head keep still")
+    parser.add_argument(
+        "--phonemes", type=Path, metavar="OUT.tsv", help="also write the phonemes with their times"
+    )
+    parser.add_argument("--json", action="store_true", help="report as JSON")
+    parser.set_defaults(func=run)
+
+
+def complaint(args: argparse.Namespace) -> str | None:
+    """What is wrong with the command line before the voice is listened to."""
+    if args.out.suffix.lower() not in _KINDS:
+        return f"-o: a name ending in .rzc, .csv or .json was expected, found {args.out.name!r}"
+    if not 1.0 <= args.rate <= 1000.0:
+        return f"--rate: 1 to 1000 was expected, found {args.rate:g}"
+    if not 0.0 <= args.intensity <= 4.0:
+        return f"--intensity: 0 to 4 was expected, found {args.intensity:g}"
+    if args.seed < 0:
+        return f"--seed: 0 or more was expected, found {args.seed}"
+    return None
+
+
+def run(args: argparse.Namespace) -> int:
+    if wrong := complaint(args):
+        print(f"risorius: {wrong}", file=sys.stderr)
+        return 2
+    try:
+        heard, clip = _spoken(args)
+        _save(clip, args.out)
+        if args.phonemes is not None:
+            write(args.phonemes, phoneme_table(heard.phonemes).encode())
+    except OSError as error:
+        print(f"risorius: {error}", file=sys.stderr)
+        return 1
+    except (InputError, ValueError) as error:
+        print(f"risorius: {error}", file=sys.stderr)
+        return 1
+    for note in heard.notes:
+        print(f"risorius: {args.voice}: {note}", file=sys.stderr)
+    print(json.dumps(_report(heard, clip), indent=1) if args.json else _summary(heard, clip, args))
+    return 0
+
+
+def _spoken(args: argparse.Namespace) -> tuple[Heard, Clip]:
+    """Raises: InputError, ValueError."""
+    said = args.text
+    if args.transcript is not None:
+        try:
+            said = read_bytes(args.transcript).decode("utf-8-sig")
+        except UnicodeDecodeError as error:
+            raise InputError(f"{args.transcript}: not UTF-8 (byte {error.start})") from error
+    shown = sys.stderr.isatty()
+
+    def progress(part: float) -> None:
+        print(f"\rlistening {part:4.0%}", end="\n" if part >= 1.0 else "", file=sys.stderr)
+
+    heard = listen(args.voice, said, progress=progress if shown else None)
+    clip = animate(
+        heard, rate=args.rate, seed=args.seed, intensity=args.intensity,
+        blinks=not args.no_blinks, accents=not args.no_accents,
+    )  # fmt: skip
+    metadata = {**clip.metadata, "source": args.voice.name}
+    if said is not None:
+        metadata["transcript"] = said
+    return heard, clip.replaced(metadata=metadata)
+
+
+def phoneme_table(found: list[Phoneme]) -> str:
+    """Tab separated: begin and end in seconds, phoneme, confidence, the word that begins."""
+    rows = ["begin\tend\tphoneme\tconfidence\tword"]
+    rows += [f"{p.begin:.3f}\t{p.end:.3f}\t{p.name}\t{p.confidence:.3f}\t{p.word}" for p in found]
+    return "\n".join(rows) + "\n"
+
+
+def _report(heard: Heard, clip: Clip) -> dict[str, object]:
+    return {
+        "speech": clip.metadata["speech"],
+        "seconds": round(clip.duration, 3),
+        "frames": clip.frame_count,
+        "rate": clip.rate,
+        "controls": len(clip.names),
+        "words": sum(event.name == "word" for event in clip.events),
+        "phonemes": sum(p.name != "SIL" for p in heard.phonemes),
+        "confidence": round(confidence(heard.phonemes), 3),
+        "notes": heard.notes,
+    }
+
+
+def confidence(found: list[Phoneme]) -> float:
+    """The mean over the time of all phonemes but silence; 0 of silence only."""
+    spoken = [p for p in found if p.name != "SIL"]
+    whole = sum(p.end - p.begin for p in spoken)
+    return sum(p.confidence * (p.end - p.begin) for p in spoken) / whole if whole else 0.0
+
+
+def _summary(heard: Heard, clip: Clip, args: argparse.Namespace) -> str:
+    report = _report(heard, clip)
+    return (
+        f"{args.out}: {report['frames']} frames at {clip.rate:g} fps, {report['controls']} "
+        f"controls; {report['words']} words, {report['phonemes']} phonemes {report['speech']}, "
+        f"confidence {report['confidence']:.0%}"
+    )
+
+
+def _save(clip: Clip, path: Path) -> None:
+    """Write a clip whole or not at all. Raises: OSError, ValueError."""
+    suffix = path.suffix.lower()
+    if suffix == ".csv":
+        write(path, _csv(clip).encode())
+    elif suffix == ".json":
+        write(path, _json(clip).encode())
+    else:
+        getattr(clip, "save")(path)  # noqa: B009
+
+
+def _csv(clip: Clip) -> str:
+    lines = [",".join(["time", *clip.names])]
+    for time, row in zip(clip.frame_times(), clip.curves.T, strict=True):
+        lines.append(",".join([f"{time:.9f}", *(f"{value:.9g}" for value in row)]))
+    return "\n".join(lines) + "\n"
+
+
+def _json(clip: Clip) -> str:
+    curves = {
+        name: [float(f"{value:.9g}") for value in curve]
+        for name, curve in zip(clip.names, clip.curves, strict=True)
+    }
+    document = {
+        "risorius_clip": 1, "rate": clip.rate, "start": clip.start, "frames": clip.frame_count,
+        "metadata": clip.metadata, "events": [event._asdict() for event in clip.events],
+        "curves": curves,
+    }  # fmt: skip
+    return json.dumps(document) + "\n"

@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: MIT
+"""Animation from a voice.
+
+sound file --listen--> phonemes with times --viseme_weights--> visemes --controls--> Clip
+
+    clip = risorius.speech.speak("voice.wav", "Hello, how are you?")
+"""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+
+from ..clip import Clip, Event
+from . import articulation, gestures, prosody
+from .audio import RATE, AudioError
+from .listening import Cancel, CancelledError, Heard, Progress, listen
+from .phones import Phoneme
+
+__all__ = ["AudioError", "CancelledError", "Heard", "Phoneme", "animate", "listen", "phonemes",
+           "speak"]  # fmt: skip
+
+_TAIL = 0.3  # seconds after the sound, in which the mouth comes to rest
+
+
+def phonemes(
+    path: str | os.PathLike[str],
+    transcript: str | None = None,
+    *,
+    progress: Progress | None = None,
+    cancel: Cancel | None = None,
+) -> list[Phoneme]:
+    """The phonemes of a voice with their times, in order and without gaps; pauses are SIL.
+
+    Args and raises: as speak.
+    """
+    return listen(path, transcript, progress=progress, cancel=cancel).phonemes
+
+
+def speak(
+    path: str | os.PathLike[str],
+    transcript: str | None = None,
+    *,
+    rate: float = 60.0,
+    seed: int = 0,
+    intensity: float = 1.0,
+    blinks: bool = True,
+    accents: bool = True,
+    progress: Progress | None = None,
+    cancel: Cancel | None = None,
+) -> Clip:
+    """A face that says what is heard in a sound file.
+
+    Args:
+        path: a WAV file, or anything that an ffmpeg on PATH can read.
+        transcript: what is said, in English, if that is known: the mouth is much better with it.
+        rate: frames per second of the clip.
+        seed: of the blinks. The same file and arguments always give the same clip.
+        intensity: scales the shapes of the mouth, the brows and the nods; lips close all the same.
+        blinks: whether to blink.
+        accents: whether brows and head follow what is stressed.
+        progress: called with 0 to 1 now and then.
+        cancel: asked now and then; true ends the work with CancelledError.
+
+    Returns:
+        A clip of raw controls and head.pitch, from the begin of the sound to 0.3 s after its end.
+        Its events are "word" and "phoneme", the value says which; metadata: source, transcript,
+        speech ("aligned" or "recognised"), notes where something went otherwise than asked.
+
+    Raises:
+        AudioError: the file cannot be used. ValueError: a transcript without English words, a rate
+            or an intensity out of range, or PocketSphinx is not installed. CancelledError.
+    """
+    _check(rate, intensity)
+    heard = listen(path, transcript, progress=progress, cancel=cancel)
+    clip = animate(heard, rate=rate, seed=seed, intensity=intensity, blinks=blinks, accents=accents)
+    metadata = {**clip.metadata, "source": os.path.basename(os.fspath(path))}
+    if transcript is not None:
+        metadata["transcript"] = transcript
+    return clip.replaced(metadata=metadata)
+
+
+def animate(
+    heard: Heard,
+    *,
+    rate: float = 60.0,
+    seed: int = 0,
+    intensity: float = 1.0,
+    blinks: bool = True,
+    accents: bool = True,
+) -> Clip:
+    """The clip of what was heard; arguments as of speak."""
+    _check(rate, intensity)
+    duration = len(heard.samples) / RATE
+    times = np.arange(int(np.ceil((duration + _TAIL) * rate)) + 1) / rate
+    # Silence around the sound, or the mouth would never come to rest after the last word.
+    rest = [Phoneme(-1.0, 0.0, "SIL"), *heard.phonemes, Phoneme(duration, duration + 1.0, "SIL")]
+    weights = articulation.viseme_weights(rest, times)
+    curves = articulation.controls(weights, prosody.openness(heard.samples, times), intensity)
+    if blinks:
+        begins = gestures.blink_times(heard.phonemes, duration, seed)
+        curves.update(gestures.blinks(times, begins))
+    if accents:
+        found = prosody.accents(heard.phonemes, heard.samples)
+        curves.update(gestures.accent_curves(times, found, intensity))
+    metadata = {"speech": "aligned" if heard.aligned else "recognised"}
+    if heard.notes:
+        metadata["notes"] = "; ".join(heard.notes)
+    return Clip(
+        curves, list(curves.values()), rate, events=_events(heard.phonemes), metadata=metadata
+    )
+
+
+def _check(rate: float, intensity: float) -> None:
+    if not 1.0 <= rate <= 1000.0:
+        raise ValueError(f"rate: 1 to 1000 frames per second were expected, found {rate:g}")
+    if not 0.0 <= intensity <= 4.0:
+        raise ValueError(f"intensity: 0 to 4 was expected, found {intensity:g}")
+
+
+def _events(found: list[Phoneme]) -> list[Event]:
+    events = [Event(p.begin, "phoneme", p.end - p.begin, p.name) for p in found]
+    for i, phone in enumerate(found):
+        if phone.word:
+            end = phone.end
+            for other in found[i + 1 :]:
+                if other.word or other.name == "SIL":
+                    break
+                end = other.end
+            events.append(Event(phone.begin, "word", end - phone.begin, phone.word))
+    return events

@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: MIT
+"""Co-articulation: phonemes with times to weights of visemes, and those to controls.
+
+Tongue and vowel shapes blend by dominance (Cohen and Massaro 1993): each phoneme pulls the mouth
+towards its shape with a strength that falls off before and after it, and what one sees is the mean
+of all, weighted by strength. Lips that must close or touch are laid over that as gates, because a
+mean never closes anything.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Sequence
+from functools import cache
+from importlib import resources
+
+import numpy as np
+import numpy.typing as npt
+
+from .phones import GLIDES, VISEMES, VOWEL_VISEMES, Phoneme, viseme_of
+
+Curves = npt.NDArray[np.float64]
+Times = npt.NDArray[np.float64]
+
+GATED = ("PP", "FF")
+"""Visemes of lips that close or touch: laid over the others."""
+
+# Viseme -> how strongly it pulls at the lips, and the seconds in which its pull falls to 1/e before
+# and after it. Sounds made by the tongue leave the lips to their neighbours; rounding is
+# anticipated furthest. What a gate closes leaves the shape beneath to the vowels around.
+_DOMINANCE = {
+    "sil": (0.8, 0.06, 0.08), "PP": (0.15, 0.05, 0.05), "FF": (0.15, 0.05, 0.05),
+    "TH": (0.6, 0.06, 0.05), "DD": (0.45, 0.05, 0.05), "kk": (0.35, 0.05, 0.05),
+    "CH": (1.0, 0.08, 0.06), "SS": (0.8, 0.06, 0.05), "nn": (0.45, 0.05, 0.05),
+    "RR": (0.8, 0.08, 0.06), "aa": (1.0, 0.07, 0.07), "E": (1.0, 0.07, 0.07),
+    "I": (1.0, 0.07, 0.07), "O": (1.2, 0.10, 0.07), "U": (1.3, 0.11, 0.07),
+}  # fmt: skip
+_REACH = 0.8  # seconds: beyond it a pull is nothing
+_GLIDE_PART = 0.55  # of a diphthong belongs to the vowel that it begins with
+
+_CLOSING, _OPENING = 0.08, 0.075  # seconds that lips take
+_QUICKEST = 0.035
+_SHORTEST_CLOSURE = 0.045  # seconds: shorter ones are not seen
+_SMOOTHING = 0.018  # seconds, standard deviation
+
+
+@cache
+def poses() -> dict[str, dict[str, float]]:
+    """Viseme -> {raw control name as a DNA spells it: weight in [0, 1]}."""
+    text = resources.files(__package__).joinpath("visemes.toml").read_text(encoding="utf-8")
+    table = tomllib.loads(text)
+    prefix = table["prefix"]
+    return {
+        name: {prefix + control: float(weight) for control, weight in row.items()}
+        for name, row in table["poses"].items()
+    }
+
+
+def viseme_weights(phonemes: Sequence[Phoneme], times: Times) -> Curves:
+    """How much of each viseme is in the mouth.
+
+    Args:
+        times: seconds, ascending in equal steps, [frames].
+
+    Returns:
+        float64[frames, 15] in the order of VISEMES: the gated ones as gates in [0, 1], the others
+        as parts of what the gates leave; each row sums to 1.
+    """
+    pull = np.zeros((len(times), len(VISEMES)))
+    for begin, end, viseme in _targets(phonemes):
+        strength, lead, lag = _DOMINANCE[viseme]
+        first, last = np.searchsorted(times, (begin - _REACH, end + _REACH))
+        t = times[first:last]
+        # Full strength in the middle of the sound, falling from there: a short sound pulls less.
+        middle, half = 0.5 * (begin + end), 0.25 * (end - begin)
+        away = np.where(t < middle, (middle - half - t) / lead, (t - middle - half) / lag)
+        pull[first:last, VISEMES.index(viseme)] += strength * np.exp(-np.clip(away, 0.0, None))
+    weights = _smoothed(pull / np.maximum(pull.sum(axis=1, keepdims=True), 1e-12), times)
+    gates = [gate(phonemes, name, times) for name in GATED]
+    gates[1] *= 1.0 - gates[0]  # closed lips do not touch the teeth
+    for name in GATED:
+        weights[:, VISEMES.index("sil")] += weights[:, VISEMES.index(name)]
+        weights[:, VISEMES.index(name)] = 0.0
+    weights /= np.maximum(weights.sum(axis=1, keepdims=True), 1e-12)
+    weights *= (1.0 - gates[0] - gates[1])[:, None]
+    for name, closed in zip(GATED, gates, strict=True):
+        weights[:, VISEMES.index(name)] = closed
+    return weights
+
+
+def _targets(phonemes: Sequence[Phoneme]) -> list[tuple[float, float, str]]:
+    """Begin, end and viseme of each shape on the way; diphthongs are two."""
+    found = []
+    for phone in phonemes:
+        if phone.name in GLIDES:
+            turn = phone.begin + _GLIDE_PART * (phone.end - phone.begin)
+            first, second = GLIDES[phone.name]
+            found += [(phone.begin, turn, first), (turn, phone.end, second)]
+        else:
+            found.append((phone.begin, phone.end, viseme_of(phone.name)))
+    return found
+
+
+def gate(phonemes: Sequence[Phoneme], viseme: str, times: Times) -> Curves:
+    """float64[frames] in [0, 1]: 1 while a sound of this viseme has the lips.
+
+    It is 1 for two frames at least, at any rate, so that no closure falls between frames.
+    """
+    closed = np.zeros(len(times))
+    step = float(times[1] - times[0]) if len(times) > 1 else 1.0
+    shortest = max(_SHORTEST_CLOSURE, 2.0 * step)
+    spans = []
+    for phone in phonemes:
+        if viseme_of(phone.name) == viseme:
+            missing = max(0.0, shortest - (phone.end - phone.begin))
+            spans.append((phone.begin - 0.7 * missing, phone.end + 0.3 * missing))
+    for i, (begin, end) in enumerate(spans):
+        # Between two closures, as in "my map", the lips are quicker: they do open.
+        before = begin - spans[i - 1][1] if i else 1.0
+        after = spans[i + 1][0] - end if i + 1 < len(spans) else 1.0
+        closing = float(np.clip(0.5 * before, _QUICKEST, _CLOSING))
+        opening = float(np.clip(0.5 * after, _QUICKEST, _OPENING))
+        first, last = np.searchsorted(times, (begin - closing, end + opening + step))
+        t = times[first:last]
+        rising = smooth_step((t - begin + closing) / closing)
+        falling = smooth_step((end + opening - t) / opening)
+        closed[first:last] = np.maximum(closed[first:last], np.minimum(rising, falling))
+    return closed
+
+
+def smooth_step(x: Curves) -> Curves:
+    """0 below 0, 1 above 1, and smooth in between."""
+    t = np.clip(x, 0.0, 1.0)
+    return t * t * (3.0 - 2.0 * t)
+
+
+def _smoothed(curves: Curves, times: Times) -> Curves:
+    """A Gaussian over time, which moves nothing to earlier or later; the ends are held."""
+    step = float(times[1] - times[0]) if len(times) > 1 else 1.0
+    sigma = _SMOOTHING / step
+    reach = int(np.ceil(3.0 * sigma))
+    kernel = np.exp(-0.5 * np.square(np.arange(-reach, reach + 1) / max(sigma, 1e-6)))
+    kernel /= kernel.sum()
+    padded = np.pad(curves, ((reach, reach), (0, 0)), mode="edge")
+    windows = np.lib.stride_tricks.sliding_window_view(padded, len(kernel), axis=0)
+    return np.asarray(windows @ kernel)
+
+
+def controls(weights: Curves, openness: Curves, intensity: float) -> dict[str, Curves]:
+    """Curves of raw controls.
+
+    Args:
+        weights: float64[frames, 15] as viseme_weights gives them.
+        openness: float64[frames], 1 where the voice is as loud as it mostly is: scales the jaw of
+            the vowels.
+        intensity: scales every shape but the closures.
+
+    Returns:
+        Raw control -> float64[frames] in [0, 1].
+    """
+    curves: dict[str, Curves] = {}
+    for column, viseme in enumerate(VISEMES):
+        scale = 1.0 if viseme in GATED else intensity
+        for name, weight in poses()[viseme].items():
+            part = weights[:, column] * weight * scale
+            if viseme in VOWEL_VISEMES and name.endswith(".jawOpen"):
+                part = part * openness
+            curves[name] = curves.get(name, np.zeros(len(weights))) + part
+    return {name: np.clip(curve, 0.0, 1.0) for name, curve in curves.items()}

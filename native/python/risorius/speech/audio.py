@@ -1,0 +1,227 @@
+# SPDX-License-Identifier: MIT
+"""Sound files as samples: WAV of any common kind, other formats through ffmpeg, and resampling."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import struct
+import subprocess
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+Samples = npt.NDArray[np.float32]
+
+RATE = 16000
+"""Samples a second of everything that listens here: what the acoustic model was trained on."""
+
+_LOWEST_RATE, _HIGHEST_RATE = 4000, 768000
+_MOST_CHANNELS = 64
+_MOST_BYTES = 2**31  # three hours of stereo at 48 kHz and 32 bit
+_PCM, _FLOAT, _EXTENSIBLE = 1, 3, 0xFFFE
+_LENGTH_UNKNOWN = (0, 0xFFFFFFFF)  # what programs that write to a pipe leave in the size fields
+
+
+class AudioError(ValueError):
+    """A sound file that cannot be used; the sentence names the file and says why."""
+
+
+class _Format(NamedTuple):
+    code: int
+    channels: int
+    rate: int
+    bits: int
+
+
+def read_audio(path: str | os.PathLike[str]) -> tuple[Samples, int]:
+    """A sound file as one channel.
+
+    Args:
+        path: a WAV file (8, 16, 24 or 32 bit integer, 32 or 64 bit float), or anything that an
+            ffmpeg on PATH can read.
+
+    Returns:
+        float32[samples], full scale is 1; and the samples a second. Several channels become their
+        mean, or the loudest of them where the mean cancels out.
+
+    Raises:
+        AudioError: it cannot be opened, is no sound, is damaged, or has no samples.
+    """
+    try:
+        if os.path.getsize(path) > _MOST_BYTES:
+            raise AudioError(f"{path}: larger than 2 GiB; cut it into parts")
+        data = Path(path).read_bytes()
+    except OSError as error:
+        raise AudioError(f"{path}: cannot read it: {error.strerror}") from error
+    if data[:4] != b"RIFF" or data[8:12] != b"WAVE":
+        data = _converted(path, "not a WAV file")
+    try:
+        return parse_wav(data)
+    except _OtherKindError as error:
+        data = _converted(path, str(error))
+    except AudioError as error:
+        raise AudioError(f"{path}: {error}") from error
+    try:
+        return parse_wav(data)
+    except AudioError as error:
+        raise AudioError(f"{path}: {error}") from error
+
+
+class _OtherKindError(AudioError):
+    """A sound WAV file of a kind that is ffmpeg's to read."""
+
+
+def parse_wav(data: bytes) -> tuple[Samples, int]:
+    """The samples of a WAV file's bytes, as read_audio gives them.
+
+    Raises:
+        AudioError: without the name of the file.
+    """
+    form: _Format | None = None
+    offset = 12
+    while offset + 8 <= len(data):
+        name, size = data[offset : offset + 4], struct.unpack_from("<I", data, offset + 4)[0]
+        begin = offset + 8
+        if name == b"data":
+            if form is None:
+                raise AudioError(f"byte {offset}: samples before the fmt chunk that describes them")
+            return _decode(_body(data, begin, size), form), form.rate
+        if begin + size > len(data):
+            raise AudioError(
+                f"byte {offset}: a chunk of {size} bytes is announced, {len(data) - begin} are left"
+            )
+        if name == b"fmt ":
+            form = _format(data[begin : begin + size], begin)
+        offset = begin + size + (size & 1)
+    raise AudioError("a WAV file without samples: no data chunk was found")
+
+
+def _body(data: bytes, begin: int, size: int) -> bytes:
+    if size in _LENGTH_UNKNOWN:
+        return data[begin:]
+    if begin + size > len(data):
+        raise AudioError(
+            f"cut short: {size} bytes of samples are announced, {len(data) - begin} are left"
+        )
+    return data[begin : begin + size]
+
+
+def _format(chunk: bytes, offset: int) -> _Format:
+    if len(chunk) < 16:
+        raise AudioError(f"byte {offset}: a fmt chunk of 16 bytes was expected, found {len(chunk)}")
+    code, channels, rate, _, block, bits = struct.unpack_from("<HHIIHH", chunk)
+    if code == _EXTENSIBLE and len(chunk) >= 26:
+        code = struct.unpack_from("<H", chunk, 24)[0]  # the first bytes of the sub-format's GUID
+    if not 1 <= channels <= _MOST_CHANNELS:
+        raise AudioError(
+            f"byte {offset + 2}: 1 to {_MOST_CHANNELS} channels were expected, found {channels}"
+        )
+    if not _LOWEST_RATE <= rate <= _HIGHEST_RATE:
+        raise AudioError(
+            f"byte {offset + 4}: {_LOWEST_RATE} to {_HIGHEST_RATE} samples a second were expected, "
+            f"found {rate}"
+        )
+    if (code, bits) not in {(_PCM, n) for n in (8, 16, 24, 32)} | {(_FLOAT, 32), (_FLOAT, 64)}:
+        raise _OtherKindError(f"a WAV file of format {code} with {bits} bits")
+    if block != channels * bits // 8:
+        raise AudioError(
+            f"byte {offset + 12}: {channels * bits // 8} bytes a sample of all channels were "
+            f"expected, found {block}"
+        )
+    return _Format(code, channels, rate, bits)
+
+
+def _decode(body: bytes, form: _Format) -> Samples:
+    count = len(body) // (form.channels * form.bits // 8)
+    if count == 0:
+        raise AudioError("a WAV file without samples: its data chunk is empty")
+    body = body[: count * form.channels * form.bits // 8]
+    if form.code == _FLOAT:
+        values = np.frombuffer(body, f"<f{form.bits // 8}").astype(np.float32)
+        if not np.isfinite(values).all():
+            place = int(np.argmin(np.isfinite(values))) // form.channels
+            raise AudioError(f"sample {place} is no finite number")
+    elif form.bits == 8:
+        values = (np.frombuffer(body, np.uint8).astype(np.float32) - 128.0) / 128.0
+    elif form.bits == 24:
+        wide = np.zeros((count * form.channels, 4), np.uint8)
+        wide[:, 1:] = np.frombuffer(body, np.uint8).reshape(-1, 3)
+        values = wide.view("<i4")[:, 0].astype(np.float32) / 2.0**31
+    else:
+        values = np.frombuffer(body, f"<i{form.bits // 8}").astype(np.float32)
+        values /= 2.0 ** (form.bits - 1)
+    return _one_channel(values.reshape(count, form.channels))
+
+
+def _one_channel(channels: Samples) -> Samples:
+    """float32[samples] of [samples, channels]."""
+    mean = channels.mean(axis=1, dtype=np.float32)
+    power = np.square(channels, dtype=np.float64).mean(axis=0)
+    # A microphone pair wired against each other cancels out, and with it the voice.
+    if np.square(mean, dtype=np.float64).mean() < 0.05 * power.max():
+        return np.ascontiguousarray(channels[:, int(np.argmax(power))])
+    return mean
+
+
+def _converted(path: str | os.PathLike[str], found: str) -> bytes:
+    """A file's sound as the bytes of a WAV file, by ffmpeg."""
+    program = shutil.which("ffmpeg")
+    if program is None:
+        raise AudioError(
+            f"{path}: {found}; other formats are read through ffmpeg, which is not on PATH"
+        )
+    # A file: prefix keeps a name from being read as an address or an option.
+    source = f"file:{os.path.abspath(path)}"
+    # fmt: off
+    done = subprocess.run(
+        [program, "-v", "error", "-nostdin", "-protocol_whitelist", "file", "-i", source, "-vn",
+         "-ac", "1", "-ar", str(RATE), "-c:a", "pcm_s16le", "-f", "wav", "-bitexact", "-"],
+        capture_output=True, check=False,
+    )
+    # fmt: on
+    if done.returncode != 0 or not done.stdout:
+        said = done.stderr.decode(errors="replace").strip().splitlines()
+        raise AudioError(f"{path}: {found}, and ffmpeg finds no sound in it: {(said or ['?'])[-1]}")
+    return done.stdout
+
+
+def resample(samples: Samples, source: int, target: int = RATE) -> Samples:
+    """Samples at another rate: a polyphase filter, a sinc in a Kaiser window (80 dB, flat to 91 %
+    of the lower of the two bands).
+
+    Args:
+        samples: float32[n] at `source` samples a second.
+
+    Returns:
+        float32[n * target / source], rounded up; sample i is at i / target seconds.
+    """
+    if source == target:
+        return samples
+    divisor = int(np.gcd(source, target))
+    up, down = target // divisor, source // divisor
+    count = -(-len(samples) * up // down)
+    band = 0.955 * min(1.0, target / source)  # of the source's own band
+    reach = int(np.ceil(56.0 / band))  # samples of the source on each side
+    padded = np.concatenate([np.zeros(reach, np.float32), samples, np.zeros(reach + 1, np.float32)])
+    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1)
+    result = np.empty(count, np.float32)
+    block = max(1, 2**21 // (2 * reach + 1))
+    for first in range(0, count, block):
+        place = np.arange(first, min(first + block, count), dtype=np.int64) * down
+        phases, which = np.unique(place % up, return_inverse=True)
+        bank = _kernel(phases / up, reach, band)
+        rows = windows[place // up]
+        result[first : first + len(place)] = np.einsum("nk,nk->n", rows, bank[which])
+    return result
+
+
+def _kernel(fractions: npt.NDArray[np.float64], reach: int, band: float) -> Samples:
+    """float32[fractions, 2 * reach + 1]: the weights of the samples around each place."""
+    distance = np.arange(-reach, reach + 1) - fractions[:, None]
+    inside = np.clip(1.0 - np.square(distance / (reach + 1.0)), 0.0, None)
+    window = np.i0(8.0 * np.sqrt(inside)) / np.i0(8.0)
+    weights = band * np.sinc(band * distance) * window
+    return (weights / weights.sum(axis=1, keepdims=True)).astype(np.float32)

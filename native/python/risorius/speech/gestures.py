@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: MIT
+"""What a face does besides its mouth while it speaks: blinks, brows, nods."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from .articulation import Curves, Times, smooth_step
+from .phones import Phoneme
+from .prosody import Accent
+
+_PREFIX = "CTRL_expressions."
+_USUAL_GAP, _GAP_SPREAD = 3.2, 0.45  # seconds between blinks, and the sigma of its logarithm
+_SHORTEST_GAP = 0.9
+_PULL = 1.2  # seconds by which a blink moves to a pause of the speech
+_LID_DOWN, _LID_CLOSED, _LID_UP = 0.08, 0.035, 0.17  # seconds
+_BROW = {"browRaiseInL": 0.32, "browRaiseInR": 0.32, "browRaiseOuterL": 0.4,
+         "browRaiseOuterR": 0.4}  # fmt: skip
+_NOD = 0.05  # radians down, of the strongest accent
+
+
+def bump(times: Times, begin: float, rise: float, hold: float, fall: float) -> Curves:
+    """0, smoothly up to 1, held, and smoothly back; times in seconds, begin of the rise."""
+    up = smooth_step((times - begin) / rise)
+    return np.minimum(up, smooth_step((begin + rise + hold + fall - times) / fall))
+
+
+def blink_times(phonemes: Sequence[Phoneme], duration: float, seed: int) -> list[float]:
+    """When lids begin to fall: at a natural rate, and where speech pauses if it does so near."""
+    random = np.random.default_rng(seed)
+    pauses = np.array([p.begin for p in phonemes if p.name == "SIL" and p.end - p.begin > 0.12])
+    found: list[float] = []
+    place = float(random.uniform(0.3, 2.0))
+    while place < duration - 0.1:
+        time = place
+        if pauses.size:
+            nearest = float(pauses[np.argmin(np.abs(pauses - place))])
+            if abs(nearest - place) < _PULL:
+                time = nearest + float(random.uniform(0.0, 0.06))
+        if not found or time - found[-1] >= _SHORTEST_GAP:
+            found.append(time)
+        place += float(np.clip(random.lognormal(np.log(_USUAL_GAP), _GAP_SPREAD), 1.2, 9.0))
+    return found
+
+
+def blinks(times: Times, begins: Sequence[float]) -> dict[str, Curves]:
+    """Curves of the lids."""
+    lids = np.zeros(len(times))
+    for begin in begins:
+        lids = np.maximum(lids, bump(times, begin, _LID_DOWN, _LID_CLOSED, _LID_UP))
+    return {f"{_PREFIX}eyeBlink{side}": lids for side in "LR"}
+
+
+def accent_curves(times: Times, found: Sequence[Accent], intensity: float) -> dict[str, Curves]:
+    """Brows that rise and a head that nods with what is stressed."""
+    brows, nod = np.zeros(len(times)), np.zeros(len(times))
+    for accent in found:
+        rise = bump(times, max(accent.time - 0.2, 0.0), 0.2, 0.08, 0.45)
+        fall = bump(times, max(accent.time - 0.15, 0.0), 0.2, 0.02, 0.4)
+        brows = np.maximum(brows, accent.strength * rise)
+        nod = np.maximum(nod, accent.strength * fall)
+    curves = {_PREFIX + name: np.clip(intensity * w * brows, 0, 1) for name, w in _BROW.items()}
+    return {**curves, "head.pitch": -_NOD * intensity * nod}

@@ -1,0 +1,234 @@
+# SPDX-License-Identifier: MIT
+"""A voice of any length as phonemes: cut at silences, aligned or recognised piece by piece."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from . import text, voting
+from .audio import RATE, Samples, read_audio, resample
+from .phones import Phoneme
+from .recogniser import Recogniser, Segment, agreement, to_phonemes
+
+Progress = Callable[[float], None]
+Cancel = Callable[[], bool]
+
+STEP = 0.01
+"""Seconds between two values of a loudness curve."""
+
+_PIECE = 12.0  # seconds that a piece has at least, if silences allow it
+_LONGEST_PIECE = 30.0  # a decoder's memory grows with it
+_PAUSE = 0.15  # seconds of silence that one may cut in
+_SHORTEST_SILENCE = 0.08  # seconds
+_SHORTEST_PHONEME = 0.03
+_STOPS = frozenset({"P", "B", "T", "D", "K", "G", "CH", "JH"})
+
+
+class CancelledError(Exception):
+    """The caller's cancel() said so."""
+
+
+class Heard(NamedTuple):
+    """What listening gave."""
+
+    phonemes: list[Phoneme]
+    """In order, without gaps from 0 to the end of the sound; pauses are SIL."""
+    samples: Samples
+    """float32[n] at audio.RATE."""
+    aligned: bool
+    """Whether the phonemes are those of the transcript."""
+    notes: list[str]
+    """Sentences for whoever reads the result: what went otherwise than asked."""
+
+
+def listen(
+    path: str | os.PathLike[str],
+    transcript: str | None = None,
+    *,
+    progress: Progress | None = None,
+    cancel: Cancel | None = None,
+) -> Heard:
+    """The phonemes of a sound file.
+
+    Args:
+        path: as audio.read_audio takes it.
+        transcript: what is said in it, in English, if that is known.
+        progress: called with 0 to 1 now and then.
+        cancel: asked now and then; true ends the work.
+
+    Raises:
+        AudioError: the file cannot be used. ValueError: a transcript without English words, or
+            PocketSphinx is not installed. CancelledError: cancel() was true.
+    """
+    words = None if transcript is None else text.words(transcript)
+    if words is not None and not words:
+        raise ValueError("the transcript has no English word: letters a to z were expected")
+    recogniser = Recogniser()
+    samples, rate = read_audio(path)
+    samples = resample(samples, rate)
+    tell = _reporter(progress, cancel)
+    tell(0.02)
+    notes: list[str] = []
+    found = None
+    if words is not None:
+        found = _aligned(recogniser, samples, words, tell)
+        if found is None:
+            notes.append("the transcript does not fit the voice: it was recognised without")
+    aligned = found is not None
+    if found is None:
+        found = _recognised(recogniser, samples, tell)
+    tell(1.0)
+    found = with_silences(found, loudness(samples))
+    return Heard(_filled(found, len(samples) / RATE), samples, aligned, notes)
+
+
+def _reporter(progress: Progress | None, cancel: Cancel | None) -> Progress:
+    def tell(part: float) -> None:
+        if cancel is not None and cancel():
+            raise CancelledError("listening was cancelled")
+        if progress is not None:
+            progress(part)
+
+    return tell
+
+
+def _aligned(
+    recogniser: Recogniser, samples: Samples, words: Sequence[str], tell: Progress
+) -> list[Phoneme] | None:
+    """The transcript's phonemes at their times, or None if it does not fit."""
+    segments = recogniser.align_words(samples, words)
+    if segments is None:
+        return None
+    found: list[Phoneme] = []
+    for begin, end, said in _word_pieces(segments, len(samples) / RATE):
+        tell(0.2 + 0.8 * begin * RATE / len(samples))
+        piece = samples[int(begin * RATE) : int(end * RATE)]
+        phones = recogniser.align_phonemes(piece, said)
+        heard = recogniser.hear_phonemes(piece)
+        if phones is None:
+            return None
+        found += to_phonemes(phones, agreement(phones, heard), begin)
+    return found
+
+
+def _word_pieces(
+    segments: Sequence[Segment], duration: float
+) -> Iterator[tuple[float, float, list[str]]]:
+    """Begin, end and words of each piece: cut in pauses, the whole time covered."""
+    begin = 0.0
+    said: list[str] = []
+    for segment in segments:
+        pause = not segment.word and segment.end - segment.begin >= _PAUSE
+        middle = 0.5 * (segment.begin + segment.end)
+        if pause and said and middle - begin >= _PIECE:
+            yield begin, middle, said
+            begin, said = middle, []
+        elif segment.word:
+            said.append(segment.word)
+    if said:
+        yield begin, duration, said
+
+
+def _recognised(recogniser: Recogniser, samples: Samples, tell: Progress) -> list[Phoneme]:
+    found: list[Phoneme] = []
+    for begin, end in pieces(loudness(samples)):
+        tell(0.02 + 0.98 * begin * RATE / len(samples))
+        piece = samples[int(begin * RATE) : int(end * RATE)]
+        for phone in voting.hear(recogniser, piece):
+            found.append(phone._replace(begin=phone.begin + begin, end=min(phone.end + begin, end)))
+    return found
+
+
+def loudness(samples: Samples) -> npt.NDArray[np.float64]:
+    """Decibels below full scale every STEP seconds, in windows of 25 ms; at least -100."""
+    hop = int(STEP * RATE)
+    count = max(1, -(-len(samples) // hop))
+    half = int(0.0125 * RATE)
+    power = np.concatenate([[0.0], np.cumsum(np.square(samples, dtype=np.float64))])
+    middle = np.arange(count) * hop + hop // 2
+    first = np.clip(middle - half, 0, len(samples))
+    last = np.clip(middle + half, 0, len(samples))
+    mean = (power[last] - power[first]) / np.maximum(last - first, 1)
+    return 10.0 * np.log10(np.maximum(mean, 1e-10))
+
+
+def speaking(levels: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
+    """Where the sound is loud enough to be speech: [levels]."""
+    floor, peak = np.quantile(levels, 0.05), np.quantile(levels, 0.98)
+    return levels > max(peak - 38.0, min(floor + 8.0, peak - 12.0))
+
+
+def pieces(levels: npt.NDArray[np.float64]) -> list[tuple[float, float]]:
+    """Begin and end in seconds of the pieces to decode on their own; together the whole sound."""
+    quiet = ~speaking(levels)
+    shortest, longest = int(_PIECE / STEP), int(_LONGEST_PIECE / STEP)
+    cuts = [0]
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], quiet.astype(np.int8), [0]])))
+    pauses = [(int(a), int(b)) for a, b in edges.reshape(-1, 2) if b - a >= _PAUSE / STEP]
+    for first, last in [*pauses, (len(levels), len(levels))]:
+        middle = (first + last) // 2
+        while middle - cuts[-1] > longest:  # no pause for too long: at the quietest moment
+            window = levels[cuts[-1] + shortest : cuts[-1] + longest]
+            cuts.append(cuts[-1] + shortest + int(np.argmin(window)))
+        if middle - cuts[-1] >= shortest and len(levels) - middle >= shortest // 4:
+            cuts.append(middle)
+    ends = [*cuts[1:], len(levels)]
+    return [(a * STEP, b * STEP) for a, b in zip(cuts, ends, strict=True)]
+
+
+def with_silences(found: Sequence[Phoneme], levels: npt.NDArray[np.float64]) -> list[Phoneme]:
+    """The phonemes without the pauses that a decoder counted to one of them.
+
+    Silence within a word is the closure of a stop, and stays it. A phoneme keeps 30 ms at least.
+    """
+    quiet = np.concatenate([[False], ~speaking(levels), [False]])
+    edges = np.flatnonzero(np.diff(quiet.astype(np.int8))).reshape(-1, 2) * STEP
+    phones = list(found)
+    for begin, end in edges:
+        if end - begin < _SHORTEST_SILENCE:
+            continue
+        inside = [i for i, p in enumerate(phones) if p.end > begin and p.begin < end]
+        if not inside or _is_closure(phones, inside[-1], float(begin)):
+            continue
+        place = float(begin)
+        for i in inside:
+            phone = phones[i]
+            if phone.name == "SIL":
+                continue
+            if phone.end > end and phone.begin > begin - _SHORTEST_PHONEME:
+                phones[i] = phone._replace(begin=min(float(end), phone.end - _SHORTEST_PHONEME))
+            else:
+                first = min(phone.begin, place)
+                place = max(place, first + _SHORTEST_PHONEME)
+                phones[i] = phone._replace(begin=first, end=min(place, phone.end))
+    return [phone for phone in phones if phone.end > phone.begin]
+
+
+def _is_closure(phones: Sequence[Phoneme], last: int, begin: float) -> bool:
+    """Whether a silence from `begin` on leads into the middle of a word."""
+    phone = phones[last]
+    return phone.name in _STOPS and not phone.word and phone.begin > begin - 0.05
+
+
+def _filled(found: Sequence[Phoneme], duration: float) -> list[Phoneme]:
+    """With silence wherever nothing is said, and neighbours of silence joined."""
+    whole: list[Phoneme] = []
+    place = 0.0
+    for phone in [*found, Phoneme(duration, duration, "SIL")]:
+        if phone.begin > place + 1e-6:
+            whole.append(Phoneme(place, phone.begin, "SIL"))
+        if phone.end > phone.begin:
+            whole.append(phone)
+        place = max(place, phone.end)
+    joined: list[Phoneme] = []
+    for phone in whole:
+        if joined and phone.name == "SIL" and joined[-1].name == "SIL":
+            joined[-1] = joined[-1]._replace(end=phone.end)
+        else:
+            joined.append(phone)
+    return joined

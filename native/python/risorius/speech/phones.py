@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: MIT
+"""Phonemes, and the viseme class that each one looks like."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+VISEMES = (
+    "sil", "PP", "FF", "TH", "DD", "kk", "CH", "SS", "nn", "RR", "aa", "E", "I", "O", "U",
+)  # fmt: skip
+"""The 15 classes: silence, nine of consonants, five of vowels."""
+
+VOWEL_VISEMES = frozenset({"aa", "E", "I", "O", "U"})
+
+
+class Phoneme(NamedTuple):
+    """A sound of speech, or silence, at its time."""
+
+    begin: float
+    """Seconds."""
+    end: float
+    name: str
+    """As in the CMU dictionary, without stress: AA, B, ... ZH; SIL for silence."""
+    confidence: float = 1.0
+    """0 to 1: the share of its time in which a second decoder, that knows of phonemes only, hears
+    the same viseme."""
+    word: str = ""
+    """The word that begins with it, where words are known; it ends before the next word or SIL."""
+
+
+# A diphthong is listed with its nucleus; GLIDES says where it goes.
+_CLASSES = {
+    "sil": "SIL", "PP": "P B M", "FF": "F V", "TH": "TH DH", "DD": "T D", "kk": "K G NG HH",
+    "CH": "CH JH SH ZH", "SS": "S Z", "nn": "N L", "RR": "R ER", "aa": "AA AE AH AY AW",
+    "E": "EH EY", "I": "IH IY Y", "O": "AO OW OY", "U": "UH UW W",
+}  # fmt: skip
+CLASS_OF = {phone: viseme for viseme, phones in _CLASSES.items() for phone in phones.split()}
+"""Phoneme -> viseme class; 39 phonemes and SIL."""
+
+GLIDES = {"AY": ("aa", "I"), "AW": ("aa", "U"), "EY": ("E", "I"), "OW": ("O", "U"),
+          "OY": ("O", "I")}  # fmt: skip
+"""Diphthong -> the viseme it begins with and the one it ends with."""
+
+
+def viseme_of(phone: str) -> str:
+    """The class of a phoneme; noises and whatever else is not speech look like silence."""
+    return CLASS_OF.get(phone, "sil")

@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: MIT
+"""Phonemes with their times: a known text aligned to a voice, or what is heard in it.
+
+The decoders are PocketSphinx's with the English model of its wheel. It counts in frames of 10 ms.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from . import letters
+from .audio import RATE, Samples
+from .phones import Phoneme, viseme_of
+
+FRAME = 0.01
+"""Seconds."""
+
+_NEEDS = (
+    "speech is recognised by PocketSphinx, which is not installed: pip install risorius[speech]"
+)
+_PAD = 0.3  # of near silence around each piece: a decoder wants to hear where speech begins
+_LAG = 0.0128  # seconds from the begin of a frame to the middle of the 25.6 ms that it hears
+_PHONE_OPTIONS: dict[str, Any] = {"beam": 1e-20, "pbeam": 1e-20, "lw": 1.0}
+# One pass with narrow beams: three quick hearings together are better than a thorough one.
+_WORD_OPTIONS: dict[str, Any] = {"fwdflat": False, "maxhmmpf": 3000, "beam": 1e-40, "wbeam": 1e-20}
+# Tried in turn: the way through the lattice of words that is the best is not always one on which
+# the phonemes, too, come to an end.
+_ALIGNERS: dict[str, dict[str, Any]] = {
+    "narrow": {},
+    "one way": {"bestpath": False},
+    "wide": {"bestpath": False, "beam": 1e-100, "wbeam": 1e-100, "pbeam": 1e-100},
+}
+
+
+class MissingError(ValueError):
+    """PocketSphinx is not installed; the sentence says how to get it."""
+
+
+class Segment(NamedTuple):
+    """A part of a decoder's result; times in seconds from the begin of the piece."""
+
+    begin: float
+    end: float
+    name: str
+    word: str
+    """The word, of a phoneme the word that begins with it; "" of anything else."""
+
+
+class Recogniser:
+    """Decoders, each made when it is first needed (the language model takes a second to load)."""
+
+    def __init__(self) -> None:
+        """Raises: MissingError."""
+        try:
+            self._sphinx: Any = importlib.import_module("pocketsphinx")
+        except ImportError as error:
+            raise MissingError(_NEEDS) from error
+        self._decoders: dict[str, Any] = {}
+
+    def _decoder(self, kind: str) -> Any:
+        if kind not in self._decoders:
+            if kind == "words":
+                options = _WORD_OPTIONS
+            elif kind == "phones":
+                model = self._sphinx.get_model_path("en-us/en-us-phone.lm.bin")
+                options = {"lm": None, "allphone": model, **_PHONE_OPTIONS}
+            else:
+                options = {"lm": None, **_ALIGNERS[kind]}
+            self._decoders[kind] = self._sphinx.Decoder(loglevel="FATAL", samprate=RATE, **options)
+        return self._decoders[kind]
+
+    def pronunciation(self, word: str) -> list[str]:
+        """Phonemes of a word: the dictionary's, else by rules."""
+        found = self._decoder("narrow").lookup_word(word)
+        return str(found).split() if found else letters.pronounce(word)
+
+    def align_words(self, samples: Samples, words: Sequence[str]) -> list[Segment] | None:
+        """The words at their times, silences in between; None if the voice does not say them."""
+        for kind in _ALIGNERS:
+            found = self._word_pass(kind, samples, words)
+            if found is not None:
+                return found
+        return None
+
+    def align_phonemes(self, samples: Samples, words: Sequence[str]) -> list[Segment] | None:
+        """The phonemes of the words at their times; None if the voice does not say them."""
+        for kind in _ALIGNERS:
+            if self._word_pass(kind, samples, words) is not None:
+                found = _phone_pass(self._decoder(kind), samples)
+                if found is not None:
+                    return found
+        return None
+
+    def _word_pass(self, kind: str, samples: Samples, words: Sequence[str]) -> list[Segment] | None:
+        decoder = self._decoder(kind)
+        for word in set(words):
+            if not decoder.lookup_word(word):
+                decoder.add_word(word, " ".join(letters.pronounce(word)), True)
+        decoder.set_align_text(" ".join(words))
+        _decode(decoder, _pcm(samples))
+        found = _segments(decoder, len(samples))
+        return found if [s.word for s in found if s.word] == list(words) else None
+
+    def hear_words(self, samples: Samples) -> list[Segment] | None:
+        """The phonemes of the words that a language model of English finds likeliest."""
+        decoder = self._decoder("words")
+        decoder.activate_search()
+        _decode(decoder, _pcm(samples))
+        hypothesis = decoder.hyp()
+        if hypothesis is None or not hypothesis.hypstr.strip():
+            return None
+        words = [word.partition("(")[0] for word in hypothesis.hypstr.split()]
+        return _phone_pass(decoder, samples) or self.align_phonemes(samples, words)
+
+    def hear_phonemes(self, samples: Samples) -> list[Segment]:
+        """The likeliest phonemes, without a thought of words."""
+        decoder = self._decoder("phones")
+        _decode(decoder, _pcm(samples))
+        return [s._replace(name=_phone(s.name), word="") for s in _segments(decoder, len(samples))]
+
+
+def _pcm(samples: Samples) -> bytes:
+    """16 bit samples between pads, as loud as the model is used to.
+
+    A little noise, always the same, covers silence that is exactly 0: its logarithm is no feature.
+    """
+    pad = np.zeros(int(_PAD * RATE), np.float32)
+    loud = float(np.quantile(np.abs(samples), 0.99)) if len(samples) else 0.0
+    wide = np.concatenate([pad, samples * min(0.3 / max(loud, 1e-4), 100.0), pad]) * 32767.0
+    wide += np.random.default_rng(1).normal(0.0, 3.0, len(wide))
+    return np.clip(wide, -32768.0, 32767.0).astype("<i2").tobytes()
+
+
+def _decode(decoder: Any, pcm: bytes) -> None:
+    decoder.start_utt()
+    decoder.process_raw(pcm, full_utt=True)
+    decoder.end_utt()
+
+
+def _phone_pass(decoder: Any, samples: Samples) -> list[Segment] | None:
+    """The second pass: where the phonemes are within the words that the first one found."""
+    try:
+        decoder.set_alignment()
+        _decode(decoder, _pcm(samples))
+        alignment = decoder.get_alignment()
+        if alignment is None:
+            return None
+        return [
+            _segment(phone.start, phone.start + phone.duration, _phone(phone.name),
+                     word.name if i == 0 else "", len(samples))
+            for word in alignment
+            for i, phone in enumerate(word)
+        ]  # fmt: skip
+    except RuntimeError:
+        return None
+
+
+def _segments(decoder: Any, count: int) -> list[Segment]:
+    # hyp() first: of a phoneme decoder it frees what a seg() made before it still points to.
+    if decoder.hyp() is None:
+        return []
+    found = decoder.seg() or ()
+    return [_segment(s.start_frame, s.end_frame + 1, s.word, s.word, count) for s in found]
+
+
+def _segment(first: int, last: int, name: str, word: str, count: int) -> Segment:
+    """Frames of padded sound as seconds of the sound itself."""
+    begin, end = (min(max(n * FRAME - _PAD + _LAG, 0.0), count / RATE) for n in (first, last))
+    spoken = "" if word[:1] in "<[+" or word == "SIL" else word.partition("(")[0]
+    return Segment(begin, end, name, spoken)
+
+
+def _phone(name: str) -> str:
+    """Without the mark of a noise: +SPN+ and its like are silence to the mouth."""
+    return "SIL" if name.startswith("+") or name.startswith("<") else name
+
+
+def agreement(segments: Sequence[Segment], other: Sequence[Segment]) -> list[float]:
+    """Of each segment the share of its time in which the other decoder hears the same viseme."""
+    shares = []
+    for one in segments:
+        same = sum(
+            max(0.0, min(one.end, two.end) - max(one.begin, two.begin))
+            for two in other
+            if viseme_of(one.name) == viseme_of(two.name)
+        )
+        shares.append(min(1.0, same / max(one.end - one.begin, 1e-6)))
+    return shares
+
+
+def to_phonemes(
+    segments: Sequence[Segment], shares: Sequence[float], offset: float
+) -> list[Phoneme]:
+    """Phonemes of a piece that begins at `offset` seconds; those without a duration left out."""
+    return [
+        Phoneme(s.begin + offset, s.end + offset, s.name, round(share, 3), s.word)
+        for s, share in zip(segments, shares, strict=True)
+        if s.end - s.begin > 1e-6
+    ]
