@@ -251,27 +251,16 @@ def _chosen(scene: Scene, stacks: dict[int, Node], take: str | None) -> Sequence
 
 def _curves(scene: Scene, stack: int, notes: list[str]) -> dict[str, Keys]:
     """Name -> keys of everything that a stack moves; 0 for what belongs to no stack."""
-    components: dict[int, list[tuple[str, Keys]]] = defaultdict(list)
-    for identity, node in scene.of_kind("AnimationCurve").items():
-        keys: Keys | None = None
-        for parent, way in scene.parents.get(identity, []):
-            owner = scene.objects.get(parent)
-            if owner is not None and owner.name == "AnimationCurveNode":
-                keys = keys or _keys(scene, node, notes)
-                components[parent].append((way, keys))
     out: dict[str, Keys] = {}
     bones = 0
     channels = {object_name(node) for node in scene.of_kind("Deformer").values()}
-    for identity, parts in components.items():
+    for identity, parts in _components(scene, notes).items():
         links = scene.parents.get(identity, [])
         if stack and not any(_in_stack(scene, parent, stack) for parent, way in links if not way):
             continue
-        for parent, way in links:
-            owner = scene.objects.get(parent)
-            if owner is None or not way:
-                continue
+        for owner, way in _owners(scene, links):
             if owner.name == "Geometry" and way in channels:
-                continue  # the percent of a blend shape once more, for older software
+                continue  # the percent of a blend shape once more, for other software
             named = _named(owner, way, parts)
             bones += not named
             for name, keys in named:
@@ -282,6 +271,24 @@ def _curves(scene: Scene, stack: int, notes: list[str]) -> dict[str, Keys]:
     if bones:
         notes.append(f"{bones} track(s) move nodes, not shapes or properties: left out")
     return {name: keys for name, keys in out.items() if keys.times.size}
+
+
+def _components(scene: Scene, notes: list[str]) -> dict[int, list[tuple[str, Keys]]]:
+    """Curve node -> (component, keys) of its curves: d|X, d|Y, d|Z, or one."""
+    out: dict[int, list[tuple[str, Keys]]] = defaultdict(list)
+    for identity, node in scene.of_kind("AnimationCurve").items():
+        keys: Keys | None = None
+        for parent, way in scene.parents.get(identity, []):
+            owner = scene.objects.get(parent)
+            if owner is not None and owner.name == "AnimationCurveNode":
+                keys = keys or _keys(scene, node, notes)
+                out[parent].append((way, keys))
+    return out
+
+
+def _owners(scene: Scene, links: Sequence[tuple[int, str]]) -> list[tuple[Node, str]]:
+    """Objects and the properties of theirs that something is connected to."""
+    return [(scene.objects[i], way) for i, way in links if way and i in scene.objects]
 
 
 def _in_stack(scene: Scene, layer: int, stack: int) -> bool:

@@ -212,11 +212,17 @@ def read(
         raise
     except ValueError as error:
         raise AnimationFileError(str(path), str(error)) from error
-    mapping = found.mapping or best_mapping(found.clip.names) or ""
+    mapping = found.mapping or best_mapping(_moving(found.clip)) or ""
     facts = {"source": file.name, "kind": found.kind, **found.clip.metadata}
     return Imported(
         found.clip.replaced(metadata=facts), found.kind, mapping, str(path), found.notes
     )
+
+
+def _moving(clip: Clip) -> list[str]:
+    """The curves that say something, or all."""
+    moving = [n for n, curve in zip(clip.names, clip.curves, strict=True) if curve.any()]
+    return moving or list(clip.names)
 
 
 def _read_kind(file: Path, data: bytes, options: Options) -> Take:
@@ -313,7 +319,7 @@ def import_curves(
         raise ValueError(f"{source}: curves with keys were expected, found none")
     times, rows = on_one_clock(list(keys.values()))
     clip = make_clip(list(keys), rows, times, metadata={"source": source, "kind": "curves"})
-    found = Imported(clip, "curves", best_mapping(clip.names) or "", source)
+    found = Imported(clip, "curves", best_mapping(_moving(clip)) or "", source)
     return found.apply(mapping, rig_names=rig_names, rig=rig, rotations=rotations)
 
 
