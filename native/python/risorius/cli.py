@@ -35,6 +35,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         live,
         batch,
     ):
+        command.add_parser(subparsers)
+    args, rest = parser.parse_known_args(arguments)
+    # argparse ends a list of operands at the first option: FILE --json NAME=1.
+    operands: list[str] | None = getattr(args, "controls", getattr(args, "files", None))
+    if any(text.startswith("-") for text in rest) or (rest and operands is None):
         parser.error(f"unrecognized arguments: {' '.join(rest)}")
     if operands is not None:
         operands += rest
