@@ -53,6 +53,18 @@ def test_does_what_is_asked_for_in_its_order(take, tmp_path):
     np.testing.assert_array_equal(clip.curves, want.curves)
 
 
+def test_a_clip_of_its_own_goes_in_and_out(take, tmp_path, capsys):
+    assert run("convert", take, "-o", tmp_path / "a.rzc") == 0
+    assert run("info", tmp_path / "a.rzc") == 0
+    assert "clip of Risorius, mapping controls" in capsys.readouterr().out
+    assert run("convert", tmp_path / "a.rzc", "-o", tmp_path / "b.json", "--mirror") == 0
+    direct, _ = importing.import_file(take)
+    want = importing.process.mirror(direct)
+    again = importing.read(tmp_path / "b.json").clip
+    assert again.names == want.names
+    np.testing.assert_array_equal(again.curves, want.curves)
+
+
 def test_reports_by_name_and_keeps_to_the_rig(take, tmp_path, capsys):
     out = tmp_path / "out.csv"
     assert run("convert", take, "-o", out, "--rig", GOLDEN / "core.dna", "--report") == 0

@@ -308,7 +308,7 @@ def test_cut_and_damaged_files_never_end_in_anything_but_a_sentence(tmp_path, na
     own = fbx.animation([prop("a", fbx.curve(1, [0, 1], [0, 1]))], version=7500)
     whole = own if name == "own.fbx" else (DATA / name).read_bytes()
     outcomes = {True: 0, False: 0}
-    for i in range(250):
+    for i in range(120):
         data = bytearray(whole)
         if i % 4 == 0:
             data = data[: int(rng.integers(30, len(data)))]
@@ -322,4 +322,4 @@ def test_cut_and_damaged_files_never_end_in_anything_but_a_sentence(tmp_path, na
         except importing.AnimationFileError as error:
             assert "\n" not in str(error)
             outcomes[False] += 1
-    assert outcomes[False] > 40
+    assert outcomes[False] > 20
