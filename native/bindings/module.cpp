@@ -6,8 +6,10 @@
 
 namespace risorius::bindings {
 
+void bind_clip(py::module_& m);
 void bind_dna(py::module_& m);
 void bind_edit(py::module_& m);
+void bind_mixer(py::module_& m);
 void bind_rig(py::module_& m);
 
 namespace {
@@ -42,4 +44,6 @@ PYBIND11_MODULE(_native, m) {
   risorius::bindings::bind_dna(m);
   risorius::bindings::bind_rig(m);
   risorius::bindings::bind_edit(m);
+  risorius::bindings::bind_mixer(m);
+  risorius::bindings::bind_clip(m);
 }

@@ -24,3 +24,10 @@ def require_extra(path: Path, what: str) -> Path:
 def pytest_terminal_summary(terminalreporter):
     for what in sorted(_not_run):
         terminalreporter.write_line(f"EXTRA NOT RUN (no data): {what}")
+
+
+@pytest.fixture(scope="session")
+def standard_controls():
+    """The raw controls of a standard face, as a DNA spells them."""
+    path = PROJECT / "tests" / "data" / "controls" / "standard_raw.txt"
+    return path.read_text(encoding="utf-8").split()

@@ -9,7 +9,7 @@ import pytest
 import risorius
 from conftest import _not_run
 from risorius.arkit import mapping
-from risorius.sample import build, expressions, polygons, source
+from risorius.sample import build, expressions, people, polygons, source
 
 ARKIT = """browDownLeft browDownRight browInnerUp browOuterUpLeft browOuterUpRight cheekPuff
 cheekSquintLeft cheekSquintRight eyeBlinkLeft eyeBlinkRight eyeLookDownLeft eyeLookDownRight
@@ -94,16 +94,16 @@ def test_a_rigid_motion_is_found_again():
 # ---- on the real data, where they can be had
 
 
-@pytest.fixture(scope="module")
-def sample():
-    """(source, dna, parts, shaped positions) of the real person."""
+@pytest.fixture(scope="module", params=sorted(people.PEOPLE))
+def sample(request):
+    """(source, dna, parts, shaped positions) of each real person."""
     try:
         path = source.fetch()
     except source.SourceError as error:
         _not_run.add("the sample's CC0 data")
         pytest.skip(f"extra not run: {error}")
     data = source.Source(path)
-    dna, parts, positions, _ = build.assemble(data, lambda _: None)
+    dna, parts, positions, _ = build.assemble(data, lambda _: None, people.PEOPLE[request.param])
     return data, dna, parts, positions
 
 

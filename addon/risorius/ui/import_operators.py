@@ -182,12 +182,18 @@ class RISORIUS_FH_dna(bpy.types.FileHandler):
 
 
 class RISORIUS_OT_add_character(bpy.types.Operator):
-    """Add the free sample face; its data (48 MB) is downloaded the first time"""
+    """Add a free sample face; its data (48 MB) is downloaded the first time"""
 
     bl_idname = "risorius.add_character"
     bl_label = "Face"
     bl_options = {"REGISTER", "UNDO"}
 
+    person: bpy.props.EnumProperty(
+        name="Person",
+        description="Who",
+        items=[("man", "Man", "A young man"), ("woman", "Woman", "A young woman")],
+        default="man",
+    )
     shape_mode: bpy.props.EnumProperty(
         name="Shapes", description="How blend shapes are kept", items=MODES, default="AUTO"
     )
@@ -198,9 +204,9 @@ class RISORIUS_OT_add_character(bpy.types.Operator):
 
     def execute(self, context):
         folder = Path(bpy.utils.extension_path_user(_package(), path="sample", create=True))
-        path = folder / f"face-{native.addon_version()}.dna"
+        path = folder / f"{self.person}-{native.addon_version()}.dna"
         if not path.is_file():
-            trouble = _build_sample(path, folder)
+            trouble = _build_sample(path, folder, self.person)
             if trouble:
                 self.report({"ERROR"}, trouble)
                 return {"CANCELLED"}
@@ -212,13 +218,18 @@ def _package():
     return __package__.rpartition(".")[0]
 
 
-def _build_sample(path, folder):
-    """Build the sample DNA; returns a sentence where it cannot be built."""
+def _build_sample(path, folder, person):
+    """Build a sample person's DNA; returns a sentence where it cannot be built."""
     sample = native.sample_module()
     wheels = sorted(folder.glob("*.whl"))
     online = bpy.app.online_access
     try:
-        sample.build_sample(path, data=wheels[0] if wheels else None, offline=not online)
+        sample.build_sample(
+            path,
+            person=sample.PEOPLE[person],
+            data=wheels[0] if wheels else None,
+            offline=not online,
+        )
     except (sample.SourceError, OSError) as error:
         advice = "" if online else " Allow online access in the preferences (System) first."
         return f"The sample face could not be built: {str(error).rstrip('.')}.{advice}"
@@ -232,7 +243,9 @@ def draw_import(self, _context):
 
 def draw_add(self, _context):
     """Entry of the 3D view's Add menu."""
-    self.layout.operator(RISORIUS_OT_add_character.bl_idname, text="Face", icon="USER")
+    self.layout.operator_menu_enum(
+        RISORIUS_OT_add_character.bl_idname, "person", text="Face", icon="USER"
+    )
 
 
 CLASSES = (

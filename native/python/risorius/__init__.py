@@ -50,6 +50,8 @@ from ._native import (
     parse_file,
 )
 from .clip import Clip, Event
+from .clip_file import ClipError, ClipReader, ClipWriter
+from .mixer import Layer, Mixer
 
 __version__ = "0.1.0"
 __all__ = [
@@ -58,6 +60,9 @@ __all__ = [
     "BlendShapeTarget",
     "BoneSpace",
     "Clip",
+    "ClipError",
+    "ClipReader",
+    "ClipWriter",
     "Conditionals",
     "Dna",
     "DnaError",
@@ -66,11 +71,13 @@ __all__ = [
     "Instance",
     "JointBehaviorMetadata",
     "JointGroup",
+    "Layer",
     "Limits",
     "LodMapping",
     "MachineLearnedBehavior",
     "MachineLearnedBehaviorExt",
     "Mesh",
+    "Mixer",
     "MlJoints",
     "MlOperation",
     "MlType",

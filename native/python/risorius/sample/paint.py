@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .people import Person
 from .polygons import Floats, Polygons
 
 if TYPE_CHECKING:
-    from .. import Dna
     from .build import Part
     from .expressions import Expression
 
@@ -172,7 +172,12 @@ def lip_mask(part: Part, p: Floats, place: Floats, units: dict[str, Expression])
 
 
 def paint_head(
-    part: Part, uvs: Floats, p: Floats, eye: Floats, units: dict[str, Expression]
+    person: Person,
+    part: Part,
+    uvs: Floats,
+    p: Floats,
+    eye: Floats,
+    units: dict[str, Expression],
 ) -> tuple[Floats, Floats]:
     """Skin colour [h, w, 3] and each texel's place [h, w, 3]; eye is the left eye's middle."""
     random = np.random.default_rng(7)
@@ -184,7 +189,7 @@ def paint_head(
     image, covered = bake(part.polygons, uvs, np.column_stack([p, lids]), HEAD_SIZE)
     place = image[:, :, :3]
     lips = lip_mask(part, p, place, units)
-    colour = np.ones((HEAD_SIZE, HEAD_SIZE, 3)) * np.array([0.79, 0.60, 0.50])
+    colour = np.ones((HEAD_SIZE, HEAD_SIZE, 3)) * np.array(person.skin)
     mottle = 0.5 * noise(HEAD_SIZE, 40, random) + 0.3 * noise(HEAD_SIZE, 150, random)
     colour += 0.018 * mottle[:, :, None] * np.array([0.6, 1.0, 1.0])
     pores = random.normal(0, 0.008, (HEAD_SIZE, HEAD_SIZE))
@@ -194,19 +199,19 @@ def paint_head(
     cheeks = np.exp(-(((x - 0.42) / 0.22) ** 2) - ((y + 0.4) / 0.2) ** 2) * (z > -0.35)
     nose = np.exp(-((x / 0.16) ** 2) - ((y + 0.42) / 0.16) ** 2) * (z > 0.1)
     ears = smooth(0.8, 0.9, x) * (np.abs(y + 0.15) < 0.5)
-    colour = blend(colour, (0.78, 0.46, 0.40), 0.4 * cheeks + 0.4 * nose + 0.35 * ears)
-    colour = blend(colour, (0.62, 0.42, 0.36), 0.35 * image[:, :, 3])
+    colour = blend(colour, person.flush, 0.4 * cheeks + 0.4 * nose + 0.35 * ears)
+    colour = blend(colour, person.lids, 0.35 * image[:, :, 3])
     beard = smooth(-0.62, -0.78, y) * smooth(-0.85, -0.55, z) * (1 - lips)
     beard *= smooth(-1.45, -1.2, y)
     speckle = 0.6 + 0.8 * random.random((HEAD_SIZE, HEAD_SIZE))
-    colour = blend(colour, (0.42, 0.33, 0.30), 0.16 * beard * speckle)
-    colour = blend(colour, (0.66, 0.38, 0.36), 0.8 * lips)
-    colour = blend(colour, (0.20, 0.15, 0.13), 0.62 * hair_mask(place, eye, random) * speckle)
-    colour = blend(colour, (0.13, 0.085, 0.06), 0.92 * brow_mask(place, eye, random))
+    colour = blend(colour, (0.42, 0.33, 0.30), person.beard * beard * speckle)
+    colour = blend(colour, person.lips, 0.8 * lips)
+    colour = blend(colour, person.hair, 0.62 * hair_mask(place, eye, random) * speckle)
+    colour = blend(colour, person.brows, 0.92 * brow_mask(place, eye, random))
     return bleed(np.clip(colour, 0, 1), covered), place
 
 
-def paint_eye() -> Floats:
+def paint_eye(person: Person) -> Floats:
     """Pupil, iris with fibres and a dark rim, sclera that is not white; the gaze in the middle."""
     random = np.random.default_rng(11)
     at = (np.arange(EYE_SIZE) + 0.5) / EYE_SIZE - 0.5
@@ -223,8 +228,8 @@ def paint_eye() -> Floats:
         fibres += np.sin(count * around + random.uniform(0, 6) + 3 * noise(EYE_SIZE, 24, random))
     shade = 0.5 + 0.14 * fibres
     depth = smooth(pupil, iris, angle)
-    base = np.array([0.42, 0.30, 0.16]) * (1 - depth)[:, :, None]
-    base = base + np.array([0.25, 0.29, 0.26]) * depth[:, :, None]
+    base = np.array(person.iris[0]) * (1 - depth)[:, :, None]
+    base = base + np.array(person.iris[1]) * depth[:, :, None]
     inside = (1 - smooth(iris - 0.02, iris + 0.025, angle))[:, :, None]
     colour = colour * (1 - inside) + base * (0.7 + 0.6 * shade[:, :, None]) * inside
     rim = np.exp(-(((angle - iris) / 0.045) ** 2))
@@ -274,7 +279,7 @@ def vessels(random: np.random.Generator, angle_limit: float) -> Floats:
 
 
 def paint_textures(
-    folder: Path, dna: Dna, positions: Floats, units: dict[str, Expression], parts: list[Part]
+    folder: Path, person: Person, positions: Floats, units: dict[str, Expression], parts: list[Part]
 ) -> dict[str, str]:
     """Write the textures.
 
@@ -289,9 +294,9 @@ def paint_textures(
     p = head.carry(positions)
     eye_parts = [part for part in parts if part.name.startswith("eyeLeft")]
     eye = eye_parts[0].carry(positions).mean(axis=0)
-    colour, place = paint_head(head, uvs, p, eye, units)
+    colour, place = paint_head(person, head, uvs, p, eye, units)
     write_png(folder / "head_color.png", colour)
-    write_png(folder / "eye_color.png", paint_eye())
+    write_png(folder / "eye_color.png", paint_eye(person))
     write_png(folder / "lash_alpha.png", paint_lashes())
     step = HEAD_SIZE // MASK_SIZE
     small = place[::step, ::step]

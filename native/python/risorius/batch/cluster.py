@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: MIT
+"""Jobs on an existing Dask cluster."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import logging
+import uuid
+from collections import deque
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from .jobs import Job
+from .outcome import Outcome
+from .pool import PoolError, Work
+
+_CONNECT_SECONDS = 10.0
+
+
+class Cluster:
+    """Runs jobs on the workers of a Dask scheduler.
+
+    Every worker must see the files by the same paths and have this version of Risorius. A job that
+    was running when its worker died goes to another one; Dask gives it up after the scheduler's
+    `distributed.scheduler.allowed-failures` (3) more deaths. What else was at that worker may be
+    taken for the cause; so a job that was given up is tried once more with nothing beside it.
+
+    Args:
+        address: e.g. tcp://10.0.0.5:8786.
+        work: a function that the workers can import, or a partial of one.
+
+    Raises:
+        PoolError: no `distributed` here, nobody at the address.
+    """
+
+    def __init__(self, address: str, work: Work) -> None:
+        try:
+            self._dask: Any = importlib.import_module("distributed")
+        except ImportError as error:
+            raise PoolError(
+                "--scheduler needs the package distributed: pip install 'risorius[cluster]'"
+            ) from error
+        self._work, self.address = work, address
+        # What it says of lost connections, with tracebacks, is our one sentence.
+        logging.getLogger("distributed").setLevel(logging.CRITICAL)
+        try:
+            self._dask.comm.get_address_host_port(address)
+            self._client: Any = self._dask.Client(
+                address, timeout=_CONNECT_SECONDS, set_as_default=False, name="risorius-batch"
+            )
+        except (OSError, ValueError, TypeError) as error:
+            raise PoolError(f"{address}: no Dask scheduler answers there: {error}") from error
+        self._run = uuid.uuid4().hex[:8]
+
+    def workers(self) -> dict[str, int]:
+        """Address of each worker -> jobs that it runs at a time. Raises: PoolError."""
+        try:
+            return dict(self._client.nthreads())
+        except (OSError, ValueError) as error:
+            raise self._gone() from error
+
+    def _gone(self) -> PoolError:
+        return PoolError(f"{self.address}: the scheduler has gone, or has cancelled the jobs")
+
+    def results(self, jobs: Sequence[Job]) -> Iterator[Outcome]:
+        """Outcomes as they come. Leaving it early takes back what has not begun.
+
+        Raises:
+            PoolError: the scheduler has gone.
+        """
+        suspects: list[Job] = []
+        try:
+            yield from self._all(deque(jobs), suspects)
+            for job in suspects:
+                again: list[Job] = []
+                yield from self._all(deque([job]), again)
+                for _ in again:
+                    yield Outcome(job.name, "given up: it ends every worker that it is given to")
+        finally:
+            with contextlib.suppress(Exception):  # the scheduler may be the reason to leave
+                self._client.close(timeout=_CONNECT_SECONDS)
+
+    def _all(self, waiting: deque[Job], suspects: list[Job]) -> Iterator[Outcome]:
+        """Run jobs, a few more at a time than there are workers for."""
+        running: dict[Any, Job] = {}
+        finished = self._dask.as_completed(loop=self._client.loop)
+        try:
+            while waiting or running:
+                room = 2 * sum(self.workers().values()) + 2 if waiting else 0
+                while waiting and len(running) < room:
+                    job = waiting.popleft()
+                    future = self._submit(job)
+                    running[future] = job
+                    finished.add(future)
+                future = next(finished)
+                job = running.pop(future)
+                if outcome := self._outcome(future, job, suspects):
+                    yield outcome
+        finally:
+            if running:
+                self._client.cancel(list(running))
+
+    def _submit(self, job: Job) -> Any:
+        key = f"risorius-{self._run}-{uuid.uuid4().hex[:8]}-{job.name}"
+        return self._client.submit(self._work, job, key=key, pure=False)
+
+    def _outcome(self, future: Any, job: Job, suspects: list[Job]) -> Outcome | None:
+        if future.status in ("cancelled", "lost"):
+            raise self._gone()
+        error = future.exception()
+        if isinstance(error, self._dask.scheduler.KilledWorker):
+            suspects.append(job)
+            return None
+        if error is not None:
+            return Outcome(job.name, f"{type(error).__name__}: {error}")
+        outcome = future.result()
+        assert isinstance(outcome, Outcome)
+        return outcome

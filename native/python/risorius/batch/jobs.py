@@ -1,0 +1,318 @@
+# SPDX-License-Identifier: MIT
+"""What is to be done: JOBS.toml read, checked and spelled out as a list of jobs."""
+
+from __future__ import annotations
+
+import glob
+import math
+import os
+import string
+import tomllib
+import unicodedata
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from .baking import DEFAULT_PARTS, KINDS
+from .face import PARTS
+
+FIELDS = ("clip", "character", "lod", "folder", "character_folder")
+DEFAULT_NAME = "{character}/lod{lod}/{folder}/{clip}"
+DEFAULT_SUMMARY = ("summary.csv", "summary.json")
+_TOP_KEYS = ("output", "summary", "jobs")
+_KEYS = (
+    "clips", "characters", "lods", "name", "write", "what", "rate", "frames", "quaternions",
+    "compress",
+)  # fmt: skip
+MAX_JOBS = 1_000_000
+
+
+class JobsError(ValueError):
+    """A JOBS.toml that cannot be used: file, field, what was found, what was expected."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """What changes the contents of an output."""
+
+    parts: tuple[str, ...] = DEFAULT_PARTS
+    rate: float | None = None
+    frames: tuple[int | None, int | None] = (None, None)
+    quaternions: bool = False
+    compress: bool = False
+
+
+@dataclass(frozen=True)
+class Job:
+    """A clip on a character at a LOD."""
+
+    name: str
+    """Of its outputs, below the output folder and without a suffix; no other job has it."""
+    clip: Path
+    character: Path
+    lod: int
+    outputs: tuple[tuple[str, Path], ...]
+    """Kind of file and where it goes; none where only the facts are wanted."""
+    options: Options
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A JOBS.toml spelled out."""
+
+    source: Path
+    output: Path
+    summary: tuple[Path, ...]
+    jobs: tuple[Job, ...]
+    """By table, character, clip and LOD: the same files give the same list."""
+
+    @property
+    def journal(self) -> Path:
+        return self.output / f".{self.source.stem}.journal"
+
+
+class _Found(NamedTuple):
+    path: Path
+    folder: str
+    """Below the part of the pattern that is no pattern, with slashes; "" for that part itself."""
+
+
+class _Table:
+    """A table of a TOML file, whose errors name the file and the field."""
+
+    def __init__(self, source: Path, where: str, values: dict[str, Any], keys: tuple[str, ...]):
+        self._source, self._where, self._values = source, where, values
+        for key in values:
+            if key not in keys:
+                raise self.error(key, f"one of the keys {', '.join(keys)} was expected")
+
+    def error(self, key: str, text: str) -> JobsError:
+        return JobsError(f"{self._source}: {self._where}{key}: {text}")
+
+    def take(self, key: str, expected: str, check: Callable[[Any], bool], default: Any) -> Any:
+        """A value; default is what stands for a missing one, None if there must be one."""
+        if key not in self._values:
+            if default is None:
+                raise self.error(key, f"{expected} was expected, found nothing")
+            return default
+        value = self._values[key]
+        if not check(value):
+            raise self.error(key, f"{expected} was expected, found {_shown(value)}")
+        return value
+
+    def texts(self, key: str, default: tuple[str, ...] | None) -> list[str]:
+        """A list of strings, or a string for a list of one."""
+        value = self.take(
+            key, "a string or a list of strings",
+            lambda v: isinstance(v, str) or _all_of(v, str), default,
+        )  # fmt: skip
+        out = [value] if isinstance(value, str) else list(value)
+        for text in out:
+            if "\0" in text or not text:
+                raise self.error(key, f"text was expected, found {_shown(text)}")
+            if out.count(text) > 1:
+                raise self.error(key, f"each once was expected, found {_shown(text)} twice")
+        return out
+
+    def choice(
+        self, key: str, choices: tuple[str, ...], default: tuple[str, ...]
+    ) -> tuple[str, ...]:
+        """Some of the choices, in their order."""
+        texts = self.texts(key, default)
+        for text in texts:
+            if text not in choices:
+                raise self.error(
+                    key, f"some of {', '.join(choices)} were expected, found {_shown(text)}"
+                )
+        return tuple(choice for choice in choices if choice in texts)
+
+    def flag(self, key: str) -> bool:
+        return bool(self.take(key, "true or false", lambda v: isinstance(v, bool), False))
+
+
+def _shown(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def _all_of(value: Any, kind: type) -> bool:
+    return isinstance(value, list) and all(type(item) is kind for item in value)
+
+
+def read_jobs(source: Path) -> Plan:
+    """Read a JOBS.toml and find its files.
+
+    Raises:
+        JobsError: it cannot be read, has a key or a value that it should not have, a pattern finds
+            nothing, two jobs would write one file.
+    """
+    try:
+        values = tomllib.loads(source.read_bytes().decode())
+    except OSError as error:
+        raise JobsError(f"{source}: cannot read it: {error.strerror}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise JobsError(f"{source}: not TOML: {error}") from error
+    except RecursionError as error:
+        raise JobsError(f"{source}: not TOML that is made for this: nested too deep") from error
+    top = _Table(source, "", values, _TOP_KEYS)
+    base = Path(os.path.abspath(source)).parent
+    output = base / top.take("output", "a folder", _is_name, None)
+    names = top.texts("summary", DEFAULT_SUMMARY)
+    summary = tuple(_inside(top, "summary", output, text) for text in names)
+    for path in summary:
+        if path.suffix not in (".csv", ".json"):
+            raise top.error(
+                "summary", f"names ending in .csv or .json were expected, found {path.name!r}"
+            )
+    tables = top.take("jobs", "one or more tables [[jobs]]", lambda v: _all_of(v, dict) and v, None)
+    jobs: list[Job] = []
+    for i, table in enumerate(tables):
+        jobs += _jobs_of(_Table(source, f"jobs[{i}].", table, _KEYS), base, output)
+        if len(jobs) > MAX_JOBS:
+            raise top.error("jobs", f"at most {MAX_JOBS:,} jobs were expected, found more")
+    plan = Plan(source, output, summary, tuple(jobs))
+    _refuse_collisions(plan)
+    return plan
+
+
+def _is_name(value: Any) -> bool:
+    return isinstance(value, str) and value != "" and "\0" not in value
+
+
+def _jobs_of(table: _Table, base: Path, output: Path) -> Iterator[Job]:
+    clips = _find(table, "clips", base)
+    characters = _find(table, "characters", base)
+    lods = table.take(
+        "lods", "a list of LODs (0 is the finest)",
+        lambda v: _all_of(v, int) and v and min(v) >= 0 and max(v) < 1 << 16, [0],
+    )  # fmt: skip
+    if len(set(lods)) != len(lods):
+        raise table.error("lods", f"each LOD once was expected, found {_shown(lods)}")
+    pattern = table.take("name", "a pattern", _is_name, DEFAULT_NAME)
+    _check_pattern(table, pattern)
+    kinds = table.choice("write", KINDS, ())
+    options = _options(table)
+    for character in characters:
+        for clip in clips:
+            for lod in lods:
+                name = _fill(pattern, clip, character, lod)
+                stem = _inside(table, "name", output, name)
+                outputs = tuple((kind, stem.with_name(f"{stem.name}.{kind}")) for kind in kinds)
+                name = stem.relative_to(output).as_posix()
+                yield Job(name, clip.path, character.path, lod, outputs, options)
+
+
+def _options(table: _Table) -> Options:
+    rate = table.take(
+        "rate", "frames per second above 0",
+        lambda v: type(v) in (int, float) and math.isfinite(v) and 0 < v <= 1e6, 0.0,
+    )  # fmt: skip
+    frames = table.take(
+        "frames", "[first, end] with first below end",
+        lambda v: _all_of(v, int) and len(v) == 2 and 0 <= v[0] < v[1] < 1 << 62, [],
+    )  # fmt: skip
+    parts = table.choice("what", PARTS, DEFAULT_PARTS)
+    if not parts:
+        raise table.error("what", f"some of {', '.join(PARTS)} were expected, found nothing")
+    return Options(
+        parts=parts,
+        rate=float(rate) or None,
+        frames=(frames[0], frames[1]) if frames else (None, None),
+        quaternions=table.flag("quaternions"),
+        compress=table.flag("compress"),
+    )
+
+
+def _find(table: _Table, key: str, base: Path) -> list[_Found]:
+    """The files of patterns, by path; a pattern that finds none is a mistake."""
+    out: dict[Path, tuple[_Found, str]] = {}
+    for pattern in table.texts(key, None):
+        root = _root(base, pattern)
+        found = _glob(base, pattern)
+        if not found:
+            raise table.error(key, f"files were expected, found none for {pattern!r}")
+        for path in found:
+            if path in out:
+                raise table.error(
+                    key,
+                    f"each file once was expected, found {path} by {out[path][1]!r} and "
+                    f"{pattern!r}",
+                )
+            folder = os.path.relpath(path.parent, root).replace(os.sep, "/")
+            out[path] = (_Found(path, "" if folder == "." else folder), pattern)
+    return [out[path][0] for path in sorted(out, key=lambda p: p.as_posix())]
+
+
+def _glob(base: Path, pattern: str) -> list[Path]:
+    found = (base / name for name in glob.glob(pattern, root_dir=base, recursive=True))
+    return [Path(os.path.abspath(path)) for path in found if path.is_file()]
+
+
+def _root(base: Path, pattern: str) -> Path:
+    """The folder of a pattern up to its first * or ?."""
+    root = base
+    for part in Path(pattern).parts[:-1]:
+        if glob.has_magic(part):
+            break
+        root /= part
+    return Path(os.path.abspath(root))
+
+
+def _check_pattern(table: _Table, pattern: str) -> None:
+    """Fields by their plain names only: a format string could reach into objects."""
+    expected = f"a pattern of {', '.join(f'{{{field}}}' for field in FIELDS)} was expected, "
+    try:
+        pieces = list(string.Formatter().parse(pattern))
+    except ValueError as error:
+        raise table.error("name", f"{expected}found {_shown(pattern)}: {error}") from None
+    for _, field, form, conversion in pieces:
+        if field is not None and (field not in FIELDS or form or conversion):
+            raise table.error("name", f"{expected}found {{{field}}} in {_shown(pattern)}")
+
+
+def _fill(pattern: str, clip: _Found, character: _Found, lod: int) -> str:
+    return pattern.format(
+        clip=clip.path.stem,
+        character=character.path.stem,
+        lod=lod,
+        folder=clip.folder,
+        character_folder=character.folder,
+    )
+
+
+def _inside(table: _Table, key: str, output: Path, name: str) -> Path:
+    """A path below the output folder. A field that is empty leaves no folder."""
+    parts = [part for part in name.replace("\\", "/").split("/") if part not in ("", ".")]
+    rooted = name.startswith(("/", "\\")) or (parts and ":" in parts[0] and os.name == "nt")
+    if not parts or ".." in parts or rooted:
+        raise table.error(
+            key, f"a name inside the output folder was expected, found {_shown(name)}"
+        )
+    return output.joinpath(*parts)
+
+
+def _refuse_collisions(plan: Plan) -> None:
+    """Each file is written by one job, and none that is read. Names that differ in case or in how
+    an accent is spelled are one file on some systems."""
+    taken = {_folded(path): "the summary" for path in plan.summary}
+    if len(taken) < len(plan.summary):
+        raise JobsError(f"{plan.source}: summary: different files were expected, found one twice")
+    taken[_folded(plan.source)] = "this file itself"
+    taken[_folded(plan.journal)] = "the journal"
+    inputs = {path for job in plan.jobs for path in (job.clip, job.character)}
+    taken |= {_folded(path): "an input" for path in inputs}
+    for job in plan.jobs:
+        paths = [path for _, path in job.outputs] or [plan.output / job.name]
+        for path in paths:
+            what = f"{job.clip.name} on {job.character.name} at LOD {job.lod}"
+            if other := taken.get(_folded(path)):
+                raise JobsError(
+                    f"{plan.source}: name: a file of its own was expected for each job, found "
+                    f"{path} for {what} and for {other}"
+                )
+            taken[_folded(path)] = what
+
+
+def _folded(path: Path) -> str:
+    return unicodedata.normalize("NFC", os.path.abspath(path)).casefold()

@@ -1,0 +1,191 @@
+# SPDX-License-Identifier: MIT
+"""Worker processes of this machine, of which any may die."""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import multiprocessing.connection
+import os
+import signal
+from collections import Counter, deque
+from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING
+
+from .jobs import Job
+from .outcome import Outcome
+
+if TYPE_CHECKING:
+    from multiprocessing.connection import Connection
+    from multiprocessing.context import SpawnProcess
+
+Work = Callable[[Job], Outcome]
+_READY = "ready"
+_STOP_SECONDS = 5.0
+
+
+class PoolError(RuntimeError):
+    """Workers that cannot be started, or a cluster that has gone."""
+
+
+def _serve(connection: Connection[object, object], work: Work) -> None:
+    """A worker's life: jobs in, outcomes out, until nobody is at the other end."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal's Ctrl-C is the parent's to handle
+    signal.signal(signal.SIGTERM, _leave)
+    with contextlib.suppress(EOFError, BrokenPipeError, ConnectionResetError):
+        connection.send(_READY)
+        while True:
+            job = connection.recv()
+            assert isinstance(job, Job)
+            try:
+                outcome = work(job)
+            except Exception as error:  # noqa: BLE001  one job's fault must not end the others
+                outcome = Outcome(job.name, f"{type(error).__name__}: {error}")
+            connection.send(outcome)
+
+
+def _leave(number: int, frame: object) -> None:
+    """As an exception, so that half a file is deleted on the way out."""
+    raise SystemExit(128 + number)
+
+
+class _Worker:
+    """A process and the job that it has."""
+
+    def __init__(self, work: Work) -> None:
+        context = multiprocessing.get_context("spawn")  # the same on every system
+        self.connection, theirs = context.Pipe()
+        self.process: SpawnProcess = context.Process(
+            target=_serve, args=(theirs, work), daemon=True
+        )
+        self.process.start()
+        theirs.close()
+        self.job: Job | None = None
+        self.ready = False
+        self.last: tuple[object, ...] = ()
+
+    def give(self, job: Job) -> None:
+        self.job = job
+        self.last = _face_of(job)
+        with contextlib.suppress(OSError):  # it has died: noticed by who waits for it
+            self.connection.send(job)
+
+    def end(self) -> str:
+        """Wait for a process that has died; how it did."""
+        self.process.join()
+        self.connection.close()
+        code = self.process.exitcode or 0
+        return f"signal {-code}" if code < 0 else f"exit code {code}"
+
+
+def _face_of(job: Job) -> tuple[object, ...]:
+    return (job.character, job.options.quaternions)
+
+
+class _Queue:
+    """Jobs by face, so that a worker stays with one as long as it can."""
+
+    def __init__(self, jobs: Sequence[Job]) -> None:
+        self._lines: dict[tuple[object, ...], deque[Job]] = {}
+        for job in jobs:
+            self.put(job)
+
+    def put(self, job: Job) -> None:
+        self._lines.setdefault(_face_of(job), deque()).append(job)
+
+    def take(self, last: tuple[object, ...]) -> Job | None:
+        """The next job of the face that the worker had last, else of the longest line."""
+        line = self._lines.get(last) or max(self._lines.values(), key=len, default=None)
+        return line.popleft() if line else None
+
+
+class Pool:
+    """Runs jobs in processes of this machine.
+
+    Args:
+        work: what a job is; a function that can be imported, or a partial of one.
+        workers: processes.
+        attempts: workers that a job may end before it is given up.
+    """
+
+    def __init__(self, work: Work, workers: int, attempts: int = 3) -> None:
+        self._work, self._count, self._attempts = work, workers, attempts
+        self._workers: list[_Worker] = []
+        self._deaths: Counter[str] = Counter()
+        self._false_starts = 0
+
+    def results(self, jobs: Sequence[Job]) -> Iterator[Outcome]:
+        """Outcomes as they come. Leaving it early, also by an exception, stops the workers.
+
+        Raises:
+            PoolError: no worker can be started.
+        """
+        queue, left = _Queue(jobs), len(jobs)
+        try:
+            self._workers = [_Worker(self._work) for _ in range(min(self._count, left))]
+            while left:
+                for outcome in self._step(queue):
+                    left -= 1
+                    yield outcome
+        finally:
+            self._stop()
+
+    def _step(self, queue: _Queue) -> Iterator[Outcome]:
+        """Wait until something happens, and see to it."""
+        places = {id(w.connection): w for w in self._workers}
+        ready = multiprocessing.connection.wait([w.connection for w in self._workers])
+        for connection in ready:
+            worker = places[id(connection)]
+            try:
+                message = worker.connection.recv()
+            except (EOFError, OSError):
+                yield from self._replace(worker, queue)
+                continue
+            if isinstance(message, Outcome):
+                tries = self._deaths[message.name] + 1
+                yield Outcome(**{**message.__dict__, "attempts": tries})
+            worker.ready = True
+            worker.job = None
+            self._feed(worker, queue)
+
+    def _feed(self, worker: _Worker, queue: _Queue) -> None:
+        if job := queue.take(worker.last):
+            worker.give(job)
+
+    def _replace(self, worker: _Worker, queue: _Queue) -> Iterator[Outcome]:
+        """Another worker for one that died, and what becomes of its job."""
+        how = worker.end()
+        self._workers.remove(worker)
+        self._false_starts = 0 if worker.ready else self._false_starts + 1
+        if self._false_starts > 2 * self._count:
+            raise PoolError(f"workers end before they have begun ({how})")
+        if job := worker.job:
+            self._deaths[job.name] += 1
+            if self._deaths[job.name] >= self._attempts:
+                count = self._deaths[job.name]
+                yield Outcome(
+                    job.name, f"given up: it has ended {count} workers ({how})", attempts=count
+                )
+            else:
+                queue.put(job)
+        self._workers.append(_Worker(self._work))
+
+    def _stop(self) -> None:
+        """End every worker; one that has a job deletes what it has written of it."""
+        for worker in self._workers:
+            worker.connection.close()
+            if worker.job is not None or not worker.ready:
+                worker.process.terminate()
+        for worker in self._workers:
+            worker.process.join(_STOP_SECONDS)
+            if worker.process.is_alive():
+                worker.process.kill()
+                worker.process.join()
+        self._workers = []
+
+
+def default_workers() -> int:
+    """The cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return max(1, len(os.sched_getaffinity(0)))
+    return os.cpu_count() or 1

@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: MIT
+"""A batch from its beginning to its end: what is done already, what comes in, what is told."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import time
+from collections.abc import Generator, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from . import summary
+from .cluster import Cluster
+from .files import remove_parts
+from .jobs import Job, Plan
+from .journal import Journal
+from .outcome import Outcome
+from .pool import Pool, default_workers
+from .progress import Progress, clock
+from .work import run_job
+
+
+@dataclass
+class Report:
+    """What became of a batch."""
+
+    plan: Plan
+    outcomes: dict[str, Outcome] = field(default_factory=dict)
+    reused: set[str] = field(default_factory=set)
+    seconds: float = 0.0
+    frames: int = 0
+
+    def failed(self) -> list[Outcome]:
+        """In the plan's order."""
+        out = [self.outcomes.get(job.name) for job in self.plan.jobs]
+        return [outcome for outcome in out if outcome and outcome.error]
+
+    def facts(self) -> dict[str, Any]:
+        """Plain values, for a program."""
+        failed = self.failed()
+        return {
+            "jobs": len(self.plan.jobs),
+            "done": len(self.outcomes) - len(self.reused) - len(failed),
+            "kept": len(self.reused),
+            "failed": [{"job": f.name, "error": f.error, "attempts": f.attempts} for f in failed],
+            "not_done": len(self.plan.jobs) - len(self.outcomes),
+            "frames": self.frames,
+            "seconds": self.seconds,
+            "summary": [str(path) for path in self.plan.summary],
+        }
+
+
+def pending(plan: Plan, journal: Journal, report: Report) -> list[Job]:
+    """The jobs that are to be done; the report takes those that are."""
+    out = []
+    for job in plan.jobs:
+        if outcome := journal.done(job):
+            report.outcomes[job.name] = outcome
+            report.reused.add(job.name)
+        else:
+            out.append(job)
+    return out
+
+
+def run(plan: Plan, *, workers: int | None, scheduler: str | None, restart: bool) -> Report:
+    """Do all jobs of a plan that are not done.
+
+    Args:
+        workers: processes; None for as many as there are cores.
+        scheduler: address of a Dask scheduler to use in their place.
+        restart: do everything again.
+
+    Raises:
+        PoolError: no worker can be started, the cluster cannot be reached or has gone.
+        OSError: the output folder cannot be written.
+        KeyboardInterrupt: the workers have been stopped, what is done is in the journal.
+    """
+    report, journal = Report(plan), Journal(plan.journal)
+    if not restart:
+        journal.read()
+    jobs = pending(plan, journal, report)
+    journal.begin([job for job in plan.jobs if job.name in report.reused])
+    outputs = [path for job in jobs for _, path in job.outputs]
+    remove_parts(outputs)
+    progress = Progress(len(plan.jobs), "jobs")
+    if report.reused:
+        progress.say(f"{len(report.reused):,} of {len(plan.jobs):,} jobs are done already")
+    started = time.monotonic()
+    try:
+        with contextlib.closing(_results(jobs, workers, scheduler, progress)) as results:
+            _gather(results, jobs, report, journal, progress)
+    finally:
+        progress.close()
+        remove_parts(outputs)  # of workers that were killed
+        report.seconds = time.monotonic() - started
+        summary.write(plan, summary.rows(plan, report.outcomes, report.reused))
+    return report
+
+
+def _results(
+    jobs: Sequence[Job], workers: int | None, scheduler: str | None, progress: Progress
+) -> Generator[Outcome, None, None]:
+    """Where the jobs are done."""
+    if not jobs:
+        return
+    if scheduler is None:
+        count = workers or default_workers()
+        threads = max(1, count // len(jobs))  # with fewer jobs than cores, a job gets several
+        yield from Pool(functools.partial(run_job, threads=threads), count).results(jobs)
+        return
+    cluster = Cluster(scheduler, run_job)
+    if not cluster.workers():
+        progress.say(f"{scheduler}: waiting for workers, there are none")
+    yield from cluster.results(jobs)
+
+
+def _gather(
+    results: Iterator[Outcome],
+    jobs: Sequence[Job],
+    report: Report,
+    journal: Journal,
+    progress: Progress,
+) -> None:
+    by_name = {job.name: job for job in jobs}
+    failed = 0
+    for outcome in results:
+        report.outcomes[outcome.name] = outcome
+        if outcome.error:
+            failed += 1
+            progress.say(f"{outcome.name}: {outcome.error}")
+        else:
+            journal.add(by_name[outcome.name], outcome)
+            report.frames += int(outcome.facts.get("frames", 0))
+        note = f"{failed:,} failed" if failed else ""
+        progress.update(len(report.outcomes), report.frames, note)
+
+
+def closing_line(report: Report) -> str:
+    """E.g. "120 jobs: 100 done, 19 kept, 1 failed; 36,000 frames in 0:12, 3,000 frames/s"."""
+    facts = report.facts()
+    words = [f"{facts['done']:,} done"]
+    words += [f"{facts['kept']:,} done before"] if facts["kept"] else []
+    words += [f"{len(facts['failed']):,} failed"] if facts["failed"] else []
+    words += [f"{facts['not_done']:,} not done"] if facts["not_done"] else []
+    speed = f"{report.frames / report.seconds:,.0f} frames/s" if report.seconds else ""
+    return (
+        f"{facts['jobs']:,} jobs: {', '.join(words)}; {report.frames:,} frames in "
+        f"{clock(report.seconds)}, {speed}"
+    )

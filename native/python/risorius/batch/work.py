@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: MIT
+"""What a worker does: one job after the other, with the faces and clips of the last ones kept."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import threading
+import time
+from collections import OrderedDict
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Generic, TypeVar
+
+import risorius
+from risorius._native import rig_block_version
+
+from .baking import bake
+from .clips import load_clip
+from .face import Face, load_face, prepared
+from .files import digest, sentence
+from .jobs import Job
+from .outcome import Outcome
+
+_FORMAT = 1  # of the outputs: another number makes all that is there out of date
+_Value = TypeVar("_Value")
+
+
+class Kept(Generic[_Value]):
+    """The last few things that were made from files, by the files' contents.
+
+    For threads: a cluster's worker runs several jobs at once. What two of them want at the same
+    time is made once.
+    """
+
+    def __init__(self, count: int) -> None:
+        self._count = count
+        self._lock = threading.Lock()
+        self._values: OrderedDict[object, _Value] = OrderedDict()
+
+    def get(self, key: object, make: Callable[[], _Value]) -> _Value:
+        with self._lock:
+            if key not in self._values:
+                self._values[key] = make()
+                while len(self._values) > self._count:
+                    self._values.popitem(last=False)
+            self._values.move_to_end(key)
+            return self._values[key]
+
+
+_faces: Kept[Face] = Kept(8)
+_clips: Kept[risorius.Clip] = Kept(4)
+_digests: Kept[str] = Kept(4096)
+
+
+def file_digest(path: Path) -> str:
+    """SHA-256 of a file, remembered while its size and time stay. Raises: OSError."""
+    about = path.stat()
+    return _digests.get((path, about.st_size, about.st_mtime_ns), lambda: digest(path))
+
+
+def stamp(job: Job) -> str:
+    """A hash of all that a job's outputs depend on: clip, DNA, LOD, options, version.
+
+    Raises:
+        OSError: a file cannot be read.
+    """
+    what = {
+        "format": _FORMAT,
+        "risorius": risorius.__version__,
+        "block": rig_block_version(),
+        "clip": file_digest(job.clip),
+        "character": file_digest(job.character),
+        "names": [job.clip.stem, job.character.stem],  # an .npz says them
+        "lod": job.lod,
+        "kinds": [kind for kind, _ in job.outputs],
+        "options": asdict(job.options),
+    }
+    return hashlib.sha256(json.dumps(what, sort_keys=True).encode()).hexdigest()
+
+
+def run_job(job: Job, threads: int = 1, version: str = risorius.__version__) -> Outcome:
+    """Do a job.
+
+    Args:
+        job: its paths must be there for whoever runs this.
+        threads: that may evaluate it.
+        version: of Risorius that gave it out.
+    """
+    if version != risorius.__version__:
+        return Outcome(
+            job.name,
+            f"a worker with risorius {version} was expected, found {risorius.__version__}",
+        )
+    try:
+        started = time.perf_counter()
+        made_from = stamp(job)
+        face = _faces.get(
+            (file_digest(job.character), job.character.stem, job.options.quaternions),
+            lambda: load_face(job.character, quaternions=job.options.quaternions),
+        )
+        clip = _clips.get((file_digest(job.clip), job.clip.name), lambda: load_clip(job.clip))
+        clip = prepared(clip, job.options.rate, job.options.frames)
+        loaded = time.perf_counter()
+        facts = bake(
+            clip, face, job.lod, dict(job.outputs), parts=job.options.parts,
+            compress=job.options.compress, threads=threads,
+        )  # fmt: skip
+    except (OSError, ValueError, MemoryError) as error:
+        return Outcome(job.name, sentence(error))
+    facts["load_seconds"] = loaded - started
+    facts["job_seconds"] = time.perf_counter() - started
+    return Outcome(job.name, stamp=made_from, facts=facts)

@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: MIT
+"""Baked animation as .npz and .csv, written as it is computed."""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import io
+import json
+import shutil
+import tempfile
+import zipfile
+from collections.abc import Iterable, Iterator, Sequence
+from typing import IO, Any
+
+import numpy as np
+import numpy.typing as npt
+
+import risorius
+
+from .face import FIELDS, Chunk, Face, Floats
+
+_SPOOL_BYTES = 32 << 20
+
+
+class NpzWriter:
+    """Arrays of every frame, of which one is written at once and the others wait beside it.
+
+    A zip archive takes one member at a time. The largest goes straight into it; what is too large
+    to wait in memory waits in a file that nobody else sees.
+    """
+
+    def __init__(
+        self,
+        file: IO[bytes],
+        beside: dict[str, npt.NDArray[Any]],
+        face: Face,
+        parts: Sequence[str],
+        compress: bool,
+    ) -> None:
+        """Args: beside: arrays that are not of frames, see about()."""
+        self._beside = beside
+        frames = len(beside["times"])
+        self._method = zipfile.ZIP_DEFLATED if compress else zipfile.ZIP_STORED
+        self._stack = contextlib.ExitStack()
+        self._zip = self._stack.enter_context(
+            zipfile.ZipFile(file, "w", self._method, compresslevel=1 if compress else None)
+        )
+        self._parts = sorted(parts, key=lambda part: -face.rest(part).size)
+        self._waiting: dict[str, IO[bytes]] = {}
+        for part in self._parts[1:]:
+            # Closed by the stack, however this ends.
+            spool = tempfile.SpooledTemporaryFile(_SPOOL_BYTES)  # noqa: SIM115
+            self._waiting[part] = self._stack.enter_context(spool)
+        self._shapes = {part: (frames, *face.rest(part).shape) for part in self._parts}
+        self._first = self._member(self._parts[0]) if self._parts else None
+
+    def __enter__(self) -> NpzWriter:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        if self._first is not None:
+            self._first.close()
+        self._stack.close()
+
+    def _member(self, part: str) -> IO[bytes]:
+        """The array of a part, opened behind its header."""
+        member = self._open(FIELDS[part])
+        about = {"descr": "<f4", "fortran_order": False, "shape": self._shapes[part]}
+        np.lib.format.write_array_header_1_0(member, about)  # type: ignore[no-untyped-call]
+        return member
+
+    def _open(self, name: str) -> IO[bytes]:
+        info = zipfile.ZipInfo(f"{name}.npy")  # of 1980: the same animation is the same bytes
+        info.compress_type = self._method
+        return self._zip.open(info, "w", force_zip64=True)
+
+    def add(self, chunk: Chunk) -> None:
+        for part in self._parts:
+            values = np.ascontiguousarray(getattr(chunk.pose, FIELDS[part]), "<f4")
+            file = self._waiting.get(part, self._first)
+            assert file is not None
+            file.write(values.data.cast("B") if values.size else b"")
+
+    def finish(self) -> None:
+        """Write what waits, and what is not of frames."""
+        if self._first is not None:
+            self._first.close()
+            self._first = None
+        for part, spool in self._waiting.items():
+            spool.seek(0)
+            with self._member(part) as member:
+                shutil.copyfileobj(spool, member, 1 << 20)
+        for name, array in self._beside.items():
+            with self._open(name) as member:
+                np.lib.format.write_array(  # type: ignore[no-untyped-call]
+                    member, array, allow_pickle=False
+                )
+
+
+def about(
+    clip: risorius.Clip, face: Face, lod: int, parts: Sequence[str]
+) -> dict[str, npt.NDArray[Any]]:
+    """What stands in an .npz beside the arrays of frames."""
+    out: dict[str, Any] = {
+        "times": clip.frame_times(),
+        "rate": clip.rate,
+        "lod": lod,
+        "character": face.name,
+        "translation_unit": face.translation_unit,
+        "rotation_unit": face.rotation_unit,
+        "event_times": np.array([e.time for e in clip.events], np.float64),
+        "event_durations": np.array([e.duration for e in clip.events], np.float64),
+        "event_names": np.array([e.name for e in clip.events], np.str_),
+        "event_values": np.array([e.value for e in clip.events], np.str_),
+        "metadata": json.dumps(clip.metadata, sort_keys=True),
+        "risorius": risorius.__version__,
+    }
+    labels = {
+        "joints": "joint_names",
+        "shapes": "blend_shape_names",
+        "maps": "animated_map_names",
+        "controls": "control_names",
+    }
+    for part in parts:
+        out[labels[part]] = np.array(face.names[part], np.str_)
+    if "joints" in parts:
+        out["joint_columns"] = np.array(face.columns, np.str_)
+        out["neutral_joints"] = face.rig.neutral_joints
+    return {name: np.asarray(value) for name, value in out.items()}
+
+
+def find_moving(face: Face, chunks: Iterable[Chunk], parts: Sequence[str]) -> dict[str, Any]:
+    """Part -> the flat indices of its numbers that are not at rest in some frame."""
+    rests = {part: face.rest(part) for part in parts}
+    moving = {part: np.zeros(rest.shape, bool) for part, rest in rests.items()}
+    for chunk in chunks:
+        for part in parts:
+            moving[part] |= (getattr(chunk.pose, FIELDS[part]) != rests[part]).any(axis=0)
+    return {part: np.flatnonzero(array) for part, array in moving.items()}
+
+
+class CsvWriter:
+    """A row a frame: its time and the numbers that move.
+
+    Args:
+        file: bytes.
+        times: float64[frames].
+        moving: as of find_moving.
+    """
+
+    def __init__(
+        self, file: IO[bytes], face: Face, times: npt.NDArray[np.float64], moving: dict[str, Any]
+    ) -> None:
+        self._text = io.TextIOWrapper(file, encoding="utf-8", newline="", write_through=True)
+        self._times, self._moving = times, moving
+        header = ["time"]
+        for part, indices in moving.items():
+            header += _headings(face, part, indices)
+        csv.writer(self._text, lineterminator="\n").writerow(header)
+        # Nine digits are enough to give back every float32, and a format is three times as fast as
+        # the shortest digits that would do.
+        self._row = ",%.9g" * (len(header) - 1) + "\n"
+
+    def add(self, chunk: Chunk) -> None:
+        self._text.writelines(self._rows(chunk))
+
+    def _rows(self, chunk: Chunk) -> Iterator[str]:
+        columns: list[Floats] = []
+        for part, indices in self._moving.items():
+            values = getattr(chunk.pose, FIELDS[part])
+            columns.append(values.reshape(len(values), -1)[:, indices])
+        rows = np.concatenate(columns, axis=1).tolist() if columns else []
+        for i, row in enumerate(rows):
+            yield f"{float(self._times[chunk.first + i])!r}{self._row % tuple(row)}"
+
+    def finish(self) -> None:
+        """Hand the file back, all written."""
+        self._text.detach()
+
+
+def _headings(face: Face, part: str, indices: npt.NDArray[np.intp]) -> list[str]:
+    """E.g. joint:FACIAL_C_Jaw.rx, shape:jaw_open, map:wrinkle, control:CTRL_expressions.jawOpen."""
+    names = face.names[part]
+    if part != "joints":
+        return [f"{part[:-1]}:{names[i]}" for i in indices]
+    columns = face.columns
+    return [f"joint:{names[i // len(columns)]}.{columns[i % len(columns)]}" for i in indices]

@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: MIT
+"""Expressions: named poses on the standard raw controls, data files that one can edit and share.
+
+The files beside this one hold six emotions, fifteen visemes and more; any file of their form can be
+loaded. A name that ends in * stands for both sides, in ** for the four lip quarters.
+"""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from ..reactions import named_weights, read_toml
+
+FILES = ("emotions.toml", "visemes.toml", "faces.toml")
+VISEMES = ("sil", "PP", "FF", "TH", "DD", "kk", "CH", "SS", "nn", "RR", "aa", "E", "I", "O", "U")
+
+
+@dataclass(frozen=True)
+class Expression:
+    """A named pose."""
+
+    name: str
+    label: str
+    group: str
+    """ "emotion", "viseme" or what else a file says; pose libraries sort by it."""
+    description: str
+    weights: Mapping[str, float]
+    """By raw control as a DNA spells it, in [0, 1]; the others are 0."""
+
+
+class Lack(NamedTuple):
+    """What a rig lacks of one expression."""
+
+    missing: tuple[str, ...]
+    """The controls that the rig does not have."""
+    share: float
+    """What it can show: the sum of the weights that are there over the sum of all, in [0, 1]."""
+
+
+def load(path: str | os.PathLike[str] | None = None) -> dict[str, Expression]:
+    """Expressions by name.
+
+    Args:
+        path: a TOML file; without it those that come with Risorius, in the order of FILES.
+
+    Raises:
+        ValueError: the file, the expression, what was found and what was expected. OSError.
+    """
+    if path is None:
+        return dict(_own())
+    return _parsed(read_toml(path), os.fspath(path))
+
+
+def get(name: str) -> Expression:
+    """One of Risorius' own. Raises: ValueError naming some that there are."""
+    own = _own()
+    if name not in own:
+        raise ValueError(f"{name}: an expression such as {', '.join(list(own)[:6])} was expected")
+    return own[name]
+
+
+def check(
+    rig_names: Iterable[str], expressions: Mapping[str, Expression] | None = None
+) -> dict[str, Lack]:
+    """What a rig lacks of expressions; those that it can show in full are not in it.
+
+    Args:
+        rig_names: Rig.raw_control_names.
+        expressions: by default load().
+    """
+    known = set(rig_names)
+    report = {}
+    for name, expression in (load() if expressions is None else expressions).items():
+        missing = tuple(control for control in expression.weights if control not in known)
+        if missing:
+            lost = sum(expression.weights[control] for control in missing)
+            report[name] = Lack(missing, 1.0 - lost / sum(expression.weights.values()))
+    return report
+
+
+def pose_vector(expression: str | Expression, rig_names: Sequence[str]) -> npt.NDArray[np.float32]:
+    """An expression as a rig takes it.
+
+    Args:
+        expression: a name of load(), or one of a file of yours.
+        rig_names: Rig.raw_control_names.
+
+    Returns:
+        float32[rig_names], 0 where the expression says nothing; what the rig lacks is left out.
+
+    Raises:
+        ValueError: no expression of that name.
+    """
+    if isinstance(expression, str):
+        expression = get(expression)
+    weights = expression.weights
+    return np.array([weights.get(name, 0.0) for name in rig_names], np.float32)
+
+
+@cache
+def _own() -> dict[str, Expression]:
+    out: dict[str, Expression] = {}
+    for file in FILES:
+        text = resources.files(__package__).joinpath(file).read_text(encoding="utf-8")
+        out |= _parsed(tomllib.loads(text), file)
+    return out
+
+
+def _parsed(table: dict[str, Any], where: str) -> dict[str, Expression]:
+    prefix, group = table.get("prefix", ""), table.get("group", "")
+    rows = table.get("expressions")
+    if not isinstance(rows, dict) or not isinstance(prefix, str) or not isinstance(group, str):
+        raise ValueError(f"{where}: a table of expressions was expected, found {sorted(table)}")
+    return {name: _expression(name, row, prefix, group, where) for name, row in rows.items()}
+
+
+def _expression(name: str, row: Any, prefix: str, group: str, where: str) -> Expression:
+    place = f"{where}: {name}"
+    if not isinstance(row, dict) or not isinstance(row.get("weights"), dict):
+        raise ValueError(f"{place}: a table with weights was expected, found {row!r}")
+    unknown = set(row) - {"label", "group", "description", "weights"}
+    if unknown:
+        raise ValueError(
+            f"{place}: label, group, description and weights were expected, "
+            f"found {sorted(unknown)[0]}"
+        )
+    return Expression(
+        name,
+        str(row.get("label", name)),
+        str(row.get("group", group)),
+        str(row.get("description", "")),
+        named_weights(row["weights"], prefix, place),
+    )

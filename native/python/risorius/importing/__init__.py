@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: MIT
+"""Animation of other software as clips of raw controls.
+
+file --read--> Imported (the file's own curves) --apply(mapping)--> Clip of raw controls, Report
+"""
+
+from __future__ import annotations
+
+from .errors import AnimationFileError
+from .mapping import (
+    Mapping,
+    MappingError,
+    best_mapping,
+    check,
+    load_mapping,
+    mapping_names,
+    mapping_text,
+)
+from .reading import KINDS, ROTATIONS, Imported, import_curves, import_file, read
+from .report import Report
+from .writing import csv_text, json_text, write_text
+
+__all__ = [
+    "KINDS",
+    "ROTATIONS",
+    "AnimationFileError",
+    "Imported",
+    "Mapping",
+    "MappingError",
+    "Report",
+    "best_mapping",
+    "check",
+    "csv_text",
+    "import_curves",
+    "import_file",
+    "json_text",
+    "load_mapping",
+    "mapping_names",
+    "mapping_text",
+    "read",
+    "write_text",
+]

@@ -1,0 +1,20 @@
+# SPDX-License-Identifier: MIT
+"""The one error of this package."""
+
+from __future__ import annotations
+
+
+class AnimationFileError(ValueError):
+    """A file of animation, or a mapping, that cannot be used; the sentence names file and place."""
+
+    def __init__(
+        self, name: str, message: str, *, line: int | None = None, column: int | str | None = None
+    ) -> None:
+        """Args: the file; one clause; line from 1; column from 1, or its header."""
+        self.name = name
+        self.line = line
+        self.column = column
+        place = "" if line is None else f", line {line}"
+        if column is not None:
+            place += f", column {column}"
+        super().__init__(f"{name}{place}: {message}")

@@ -1,0 +1,452 @@
+# SPDX-License-Identifier: MIT
+"""Mappings: which controls each curve of a file moves, as TOML that one can edit and share."""
+
+from __future__ import annotations
+
+import fnmatch
+import math
+import os
+import re
+import tomllib
+from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Mapping as Table
+from dataclasses import dataclass, field, replace
+from functools import cache
+from importlib import resources
+from importlib.resources.abc import Traversable
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from .. import arkit, expressions
+from ..clip import Clip
+from ..regions import expand_sides
+from .errors import AnimationFileError
+
+Doubles = npt.NDArray[np.float64]
+Row = dict[str, float]
+
+# Curves that are no raw controls of a rig: the head, and the eyes as angles; radians.
+ANGLES = ("head.yaw", "head.pitch", "head.roll", "eyeL.yaw", "eyeL.pitch", "eyeR.yaw", "eyeR.pitch")
+_KEYS = {
+    "name", "description", "base", "prefix", "strip", "matching", "gui", "ignore", "rows",
+    "controls", "metadata",
+}  # fmt: skip
+_SIDE = re.compile(r"(?:(?<=[a-z])(?=[LR]$)|(?<=[._\- ])(?=[LlRr]$))")
+
+
+class MappingError(AnimationFileError):
+    """A mapping that does not hold together."""
+
+
+@dataclass(frozen=True)
+class Adjustment:
+    """What is done to the curve of a control: offset + gain * curve(value).
+
+    Attributes:
+        points: (value, result) by ascending value, joined by straight lines, held outside; empty:
+            the value itself.
+    """
+
+    gain: float = 1.0
+    offset: float = 0.0
+    points: tuple[tuple[float, float], ...] = ()
+
+    def apply(self, values: Doubles) -> Doubles:
+        if self.points:
+            x, y = np.array(self.points).T
+            values = np.interp(values, x, y)
+        return self.offset + self.gain * values
+
+
+@dataclass(frozen=True)
+class Mapping:
+    """Rows of a mapping, with names in full.
+
+    Attributes:
+        name: of the file, without its suffix.
+        description: a sentence.
+        rows: curve of the source -> {control: weight}. A name with * stands for many; the * of its
+            control is what the * of the curve was. A row that is empty leaves the curve out.
+        controls: pattern of control names -> what is done to them; the last that fits counts.
+        strip: beginnings that curve names may have, and that say nothing.
+        is_loose: letter case, "_" and Left or L at the end make no difference.
+        is_gui: the controls are GUI controls, which a rig's own table turns into raw ones.
+        metadata: anything; it travels into the clip.
+    """
+
+    name: str
+    description: str = ""
+    rows: Table[str, Row] = field(default_factory=dict)
+    controls: Table[str, Adjustment] = field(default_factory=dict)
+    strip: tuple[str, ...] = ()
+    is_loose: bool = True
+    is_gui: bool = False
+    metadata: Table[str, str] = field(default_factory=dict)
+
+    def targets(self) -> tuple[str, ...]:
+        """All controls, in the order of the rows; with patterns as they are."""
+        return tuple(dict.fromkeys(control for row in self.rows.values() for control in row))
+
+    def finder(self) -> Callable[[str], tuple[str, Row] | None]:
+        """A function: curve of a source -> (row's name, {control: weight}), or None."""
+        exact = {loose_name(key) if self.is_loose else key: key for key in self.rows}
+        patterns = [key for key in self.rows if "*" in key]
+
+        def find(name: str) -> tuple[str, Row] | None:
+            for candidate in self._spellings(name):
+                if candidate in self.rows and "*" not in candidate:
+                    return candidate, self.rows[candidate]
+                key = exact.get(loose_name(candidate) if self.is_loose else candidate)
+                if key is not None and "*" not in key:
+                    return key, self.rows[key]
+                for pattern in patterns:
+                    part = _star(pattern, candidate)
+                    if part is not None:
+                        row = self.rows[pattern]
+                        return candidate, {k.replace("*", part): w for k, w in row.items()}
+            return None
+
+        return find
+
+    def _spellings(self, name: str) -> list[str]:
+        """A name as it is; then without a known beginning; then without a mesh's name before it."""
+        out = [name]
+        out += [name[len(p) :] for p in self.strip if name.lower().startswith(p.lower())]
+        if self.is_loose and "." in name and not name.startswith("CTRL_"):
+            out.append(name.rpartition(".")[2])
+        return [spelling for spelling in out if spelling]
+
+    def adjustment(self, control: str) -> Adjustment | None:
+        """What is done to a control, or None."""
+        last = None
+        for pattern, what in self.controls.items():
+            if fits(control, pattern):
+                last = what
+        return last
+
+
+@dataclass
+class Mapped:
+    """Curves after a mapping, and what became of each name."""
+
+    clip: Clip
+    mapped: dict[str, tuple[str, ...]]
+    unmapped: list[str]
+    ignored: list[str]
+    absent: list[str]
+    notes: list[str]
+
+
+def apply_rows(mapping: Mapping, clip: Clip) -> Mapped:
+    """The controls that a clip of a source's curves gives.
+
+    Curves that move one control are added up, weighted; then the control is adjusted. A curve that
+    is one control with weight 1, not adjusted, keeps its bits.
+    """
+    find = mapping.finder()
+    sums: dict[str, Doubles] = {}
+    out = Mapped(clip, {}, [], [], [], [])
+    used: dict[str, str] = {}
+    for name, curve in zip(clip.names, clip.curves, strict=True):
+        found = find(name)
+        if found is None:
+            out.unmapped.append(name)
+            continue
+        key, row = found
+        if key in used:
+            out.notes.append(f"{name} is {used[key]} again, left out")
+            out.ignored.append(name)
+            continue
+        used[key] = name
+        if not row:
+            out.ignored.append(name)
+            continue
+        out.mapped[name] = tuple(row)
+        for control, weight in row.items():
+            part = weight * curve.astype(np.float64)
+            sums[control] = sums[control] + part if control in sums else part
+    out.absent = [
+        key for key, row in mapping.rows.items() if key not in used and row and "*" not in key
+    ]
+    curves = np.zeros((len(sums), clip.frame_count), np.float32)
+    for i, (control, values) in enumerate(sums.items()):
+        what = mapping.adjustment(control)
+        curves[i] = values if what is None else what.apply(values)
+    out.clip = clip.replaced(
+        names=tuple(sums), curves=curves, metadata={**clip.metadata, **mapping.metadata}
+    )
+    return out
+
+
+def fits(control: str, pattern: str) -> bool:
+    """Whether a pattern with * and ? fits a control, its prefix written or not; case counts."""
+    short = control.partition(".")[2] if control.startswith("CTRL_expressions.") else control
+    return fnmatch.fnmatchcase(control, pattern) or fnmatch.fnmatchcase(short, pattern)
+
+
+def _star(pattern: str, name: str) -> str | None:
+    """What a pattern's * is in a name, or None if the pattern does not fit."""
+    before, _, after = pattern.partition("*")
+    if len(name) < len(before) + len(after) or not (
+        name.startswith(before) and name.endswith(after)
+    ):
+        return None
+    return name[len(before) : len(name) - len(after)]
+
+
+@cache
+def loose_name(name: str) -> str:
+    """A name without letter case and separators, its side as |l or |r at the end.
+
+    eyeBlinkLeft, EyeBlinkLeft, eyeBlink_L, eyeBlinkL and eye_blink_left are one name.
+    """
+    match = _SIDE.search(name)
+    side = ""
+    if match:
+        name, side = name[: match.start()], "|" + name[-1].lower()
+    plain = re.sub(r"[^a-z0-9*]", "", name.lower())
+    for word in ("left", "right"):
+        if not side and plain.endswith(word) and plain != word:
+            plain, side = plain[: -len(word)], "|" + word[0]
+    return plain + side
+
+
+def _folder() -> Traversable:
+    return resources.files(__package__).joinpath("mappings")
+
+
+def mapping_names() -> list[str]:
+    """Names of the mappings that come with Risorius."""
+    return sorted(
+        entry.name.removesuffix(".toml")
+        for entry in _folder().iterdir()
+        if entry.name.endswith(".toml")
+    )
+
+
+def mapping_text(name: str) -> str:
+    """The TOML of a mapping that comes with Risorius, to be saved and edited.
+
+    Raises:
+        MappingError: no such mapping.
+    """
+    if name not in mapping_names():
+        raise MappingError(name, f"one of {', '.join(mapping_names())} was expected")
+    return _folder().joinpath(name + ".toml").read_text(encoding="utf-8")
+
+
+def load_mapping(source: str | os.PathLike[str] | Mapping) -> Mapping:
+    """A mapping: one that comes with Risorius by its name, or a TOML file.
+
+    Raises:
+        MappingError: not there, no TOML, or rows that do not hold together; with the place.
+    """
+    if isinstance(source, Mapping):
+        return source
+    name = os.fspath(source)
+    if name in mapping_names():
+        return _built_in(name)
+    try:
+        text = Path(name).read_bytes().decode("utf-8-sig")
+    except OSError as error:
+        known = ", ".join(mapping_names())
+        raise MappingError(name, f"cannot read it: {error.strerror} (built in: {known})") from error
+    except UnicodeDecodeError as error:
+        raise MappingError(name, f"UTF-8 text was expected (byte {error.start})") from error
+    return parse_mapping(text, name, Path(name).stem)
+
+
+@cache
+def _built_in(name: str) -> Mapping:
+    return parse_mapping(mapping_text(name), f"mapping {name}", name)
+
+
+def parse_mapping(text: str, where: str, name: str = "") -> Mapping:
+    """A mapping from TOML.
+
+    Args:
+        text: TOML.
+        where: what messages name it.
+        name: the mapping's name, if it gives none.
+
+    Raises:
+        MappingError: see load_mapping.
+    """
+    try:
+        table = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise MappingError(where, f"no TOML: {error}") from error
+    unknown = sorted(set(table) - _KEYS)
+    if unknown:
+        raise MappingError(where, f"{unknown[0]}: one of {', '.join(sorted(_KEYS))} was expected")
+    mapping = _base(table, where)
+    prefix = _text(table, "prefix", where)
+    rows = {key: _row(key, row, prefix, where) for key, row in _table(table, "rows", where).items()}
+    rows |= {key: {} for key in _texts(table, "ignore", where)}
+    for key in mapping.rows:  # of the base: a row of its own replaces it, however it is spelled
+        if key not in rows and loose_name(key) in {loose_name(own) for own in rows}:
+            raise MappingError(where, f"rows: {key} is in the base with another spelling")
+    controls = {
+        key: _adjustment(key, value, where)
+        for key, value in _table(table, "controls", where).items()
+    }
+    metadata = {key: str(value) for key, value in _table(table, "metadata", where).items()}
+    return replace(
+        mapping,
+        name=_text(table, "name", where) or name,
+        description=_text(table, "description", where) or mapping.description,
+        rows={**mapping.rows, **rows},
+        controls={**mapping.controls, **controls},
+        strip=(*mapping.strip, *_texts(table, "strip", where)),
+        is_loose=_matching(table, mapping.is_loose, where),
+        is_gui=bool(table.get("gui", mapping.is_gui)),
+        metadata={**mapping.metadata, **metadata},
+    )
+
+
+def _base(table: Table[str, Any], where: str) -> Mapping:
+    """The mapping whose rows come first; "arkit units" are those of risorius/arkit.toml."""
+    base = _text(table, "base", where)
+    if not base:
+        return Mapping("")
+    if base == "arkit units":
+        return Mapping("", rows={unit: dict(row) for unit, row in arkit.mapping().items()})
+    if base not in mapping_names():
+        raise MappingError(
+            where, f"base: one of {', '.join(mapping_names())} was expected, found {base}"
+        )
+    return _built_in(base)
+
+
+def _matching(table: Table[str, Any], default: bool, where: str) -> bool:
+    value = table.get("matching", "loose" if default else "exact")
+    if value not in ("loose", "exact"):
+        raise MappingError(where, f"matching: loose or exact was expected, found {value!r}")
+    return bool(value == "loose")
+
+
+def _text(table: Table[str, Any], key: str, where: str) -> str:
+    value = table.get(key, "")
+    if not isinstance(value, str):
+        raise MappingError(where, f"{key}: text was expected, found {value!r}")
+    return value
+
+
+def _texts(table: Table[str, Any], key: str, where: str) -> list[str]:
+    value = table.get(key, [])
+    if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
+        raise MappingError(where, f"{key}: a list of names was expected, found {value!r}")
+    return value
+
+
+def _table(table: Table[str, Any], key: str, where: str) -> dict[str, Any]:
+    value = table.get(key, {})
+    if not isinstance(value, dict):
+        raise MappingError(where, f"{key}: a table was expected, found {value!r}")
+    return value
+
+
+def _row(key: str, value: object, prefix: str, where: str) -> Row:
+    """A row's controls in full.
+
+    "@PP" is the pose of the expression PP, weighted; a name that ends in * stands for both sides,
+    in ** for the four lip quarters, unless the row is a pattern itself; a name without a dot gets
+    the prefix.
+    """
+    if isinstance(value, str):
+        value = {"@" + value: 1.0}
+    if not isinstance(value, dict):
+        raise MappingError(
+            where,
+            f"rows.{key}: {{ control = weight }} or an expression was expected, found {value!r}",
+        )
+    if key.count("*") > 1:
+        raise MappingError(where, f"rows.{key}: one * at most was expected")
+    out: Row = {}
+    for control, given in value.items():
+        at = f"rows.{key}.{control}"
+        weight = _number(given, at, where)
+        if control.startswith("@"):
+            parts = _expression(control[1:], at, where)
+        else:
+            full = control if "." in control else prefix + control
+            parts = dict.fromkeys([full] if "*" in key else expand_sides(full), 1.0)
+        for name, part in parts.items():
+            out[name] = out.get(name, 0.0) + weight * part
+    if "*" not in key and any("*" in control for control in out):
+        raise MappingError(
+            where, f"rows.{key}: a * was expected at the end of a control, or in both"
+        )
+    return out
+
+
+def _expression(name: str, at: str, where: str) -> Table[str, float]:
+    """The pose of an expression by its name."""
+    try:
+        return expressions.get(name).weights
+    except ValueError as error:
+        raise MappingError(where, f"{at}: {error}") from error
+
+
+def _adjustment(key: str, value: object, where: str) -> Adjustment:
+    at = f"controls.{key}"
+    if not isinstance(value, dict) or set(value) - {"gain", "offset", "curve"}:
+        raise MappingError(where, f"{at}: gain, offset, curve were expected, found {value!r}")
+    points = value.get("curve", [])
+    good = isinstance(points, list) and all(isinstance(p, list) and len(p) == 2 for p in points)
+    if not good:
+        raise MappingError(where, f"{at}.curve: a list of [value, result] was expected")
+    pairs = tuple((_number(x, at, where), _number(y, at, where)) for x, y in points)
+    if len(pairs) == 1 or any(b[0] <= a[0] for a, b in pairwise(pairs)):
+        raise MappingError(where, f"{at}.curve: two or more ascending values were expected")
+    return Adjustment(
+        _number(value.get("gain", 1.0), f"{at}.gain", where),
+        _number(value.get("offset", 0.0), f"{at}.offset", where),
+        pairs,
+    )
+
+
+def _number(value: object, at: str, where: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise MappingError(where, f"{at}: a number was expected, found {value!r}")
+    return float(value)
+
+
+def check(mapping: Mapping, rig_names: Iterable[str]) -> list[str]:
+    """What of a mapping a rig does not have.
+
+    Args:
+        mapping: to be checked.
+        rig_names: raw controls of the rig; its GUI controls, if the mapping is of those.
+
+    Returns:
+        Sentences; none if all is well.
+    """
+    known = set(rig_names)
+    out = []
+    for key, row in mapping.rows.items():
+        missing = [c for c in row if "*" not in c and c not in known and c not in ANGLES]
+        out += [f"rows.{key}: the rig has no control {control}" for control in missing]
+    for pattern in mapping.controls:
+        if not any(fits(control, pattern) for control in (*known, *ANGLES)):
+            out.append(f"controls.{pattern}: fits no control of the rig")
+    return out
+
+
+def best_mapping(names: Sequence[str]) -> str | None:
+    """The built-in mapping that knows most of these curves; None if none knows any.
+
+    Of equals the one with fewer rows: it was made for less.
+    """
+    scores = []
+    for name in mapping_names():
+        mapping = _built_in(name)
+        find = mapping.finder()
+        hits = sum(1 for curve in names if find(curve) is not None)
+        if hits:
+            scores.append((-hits, len(mapping.rows), name))
+    return min(scores)[2] if scores else None

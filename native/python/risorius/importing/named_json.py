@@ -1,0 +1,410 @@
+# SPDX-License-Identifier: MIT
+"""JSON of named curves, in the shapes that software writes: by frame, by curve, or as keys."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..clip import Event
+from .errors import AnimationFileError
+from .keys import Keys, on_one_clock
+from .source import Take, keep_ascending, make_clip
+
+Doubles = npt.NDArray[np.float64]
+
+NAME_KEYS = (
+    "facsNames", "names", "blendShapeNames", "blendshapeNames", "blendshape_names", "shapeNames",
+    "curveNames", "controls", "channels",
+)  # fmt: skip
+MATRIX_KEYS = ("weightMat", "frames", "weights", "values", "data", "blendshapes", "blendShapes")
+RATE_KEYS = ("exportFps", "fps", "rate", "frameRate", "framerate", "frame_rate", "sampleRate")
+TIME_KEYS = ("time", "timeCode", "timecode", "timestamp", "t", "seconds")
+TIMES_KEYS = ("times", "timeCodes", "timecodes", "timestamps", "time")
+WEIGHT_KEYS = ("weights", "values", "blendShapes", "blendshapes", "curves", "shapes")
+KEYS_KEYS = ("Keys", "keys")
+CURVE_NAME_KEYS = ("CurveName", "Name", "name", "curveName")
+INNER_CURVE_KEYS = ("FloatCurve", "Curve", "curve", "floatCurve")
+DEEPEST = 64
+
+
+class Reader:
+    """One file; `rate` is what the caller says of its frames a second, or None."""
+
+    def __init__(self, name: str, rate: float | None) -> None:
+        self.name = name
+        self.rate = rate
+        self.notes: list[str] = []
+
+    def fail(self, message: str, place: str | None = None) -> AnimationFileError:
+        return AnimationFileError(self.name, f"{place}: {message}" if place else message)
+
+    def number(self, value: object, place: str) -> float:
+        """Raises: AnimationFileError: no finite number that a float32 holds."""
+        good = isinstance(value, int | float) and not isinstance(value, bool)
+        if isinstance(value, str):  # some write numbers as text
+            try:
+                value, good = float(value), True
+            except ValueError:
+                good = False
+        if good and math.isfinite(value) and abs(value) <= np.finfo(np.float32).max:  # type: ignore[arg-type]
+            return float(value)  # type: ignore[arg-type]
+        raise self.fail(f"a finite number was expected, found {str(value)[:40]}", place)
+
+    def numbers(self, values: object, place: str) -> list[float]:
+        if not isinstance(values, list):
+            raise self.fail(f"a list of numbers was expected, found {_kind(values)}", place)
+        return [self.number(value, f"{place}[{i}]") for i, value in enumerate(values)]
+
+    def strings(self, values: object, place: str) -> list[str]:
+        if not isinstance(values, list) or not all(isinstance(v, str) for v in values):
+            raise self.fail(f"a list of names was expected, found {_kind(values)}", place)
+        return values
+
+    def rate_of(self, *tables: object) -> float | None:
+        """Frames a second: as the caller says, else as the first of these tables does."""
+        if self.rate is not None:
+            return self.rate
+        for table in tables:
+            if isinstance(table, dict) and (key := _first(table, RATE_KEYS)):
+                rate = self.number(table[key], key)
+                if rate <= 0.0:
+                    raise self.fail(f"frames a second above 0 were expected, found {rate}", key)
+                return rate
+        return None
+
+    def times(self, given: object, count: int, rate: float | None, place: str) -> Doubles:
+        """Times of `count` frames: as given, else by the rate."""
+        if given is not None:
+            times = np.array(self.numbers(given, place))
+            if times.size != count:
+                raise self.fail(f"{count} times were expected, found {times.size}", place)
+            return times
+        if rate is None:
+            raise self.fail("nothing gives the time: give the rate in frames a second")
+        return np.arange(count) / rate
+
+    def take(
+        self, names: Sequence[str], rows: npt.ArrayLike, times: Doubles, rate: float | None = None
+    ) -> Take:
+        """From curves [controls, frames]."""
+        if len(set(names)) != len(names):
+            twice = next(name for name in names if list(names).count(name) > 1)
+            raise self.fail(f"{twice!r} was expected once, found it twice")
+        keep = keep_ascending(times, self.notes)
+        curves = np.asarray(rows, np.float64).reshape(len(names), times.size)[:, keep]
+        return Take(make_clip(names, curves, times[keep], rate=rate), "json", "", self.notes)
+
+
+def parse(text: str, name: str) -> object:
+    """Raises: AnimationFileError: no JSON, with line and column; nested too deeply."""
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError as error:
+        raise AnimationFileError(
+            name, f"not JSON: {error.msg}", line=error.lineno, column=error.colno
+        ) from error
+    except RecursionError as error:
+        raise AnimationFileError(name, "not JSON that can be read: nested too deeply") from error
+
+
+def read(document: object, name: str, rate: float | None = None) -> Take:
+    """Curves of a document, by the first shape that fits.
+
+    Args:
+        document: parsed JSON.
+        rate: frames a second, where the file does not say it; it wins if it does.
+
+    Raises:
+        AnimationFileError: none of the shapes, or one that does not hold together.
+    """
+    reader = Reader(name, rate)
+    for shape in (own_clip, matrix, frame_tables, curve_table, keyed_curves, lists_by_name):
+        take = shape(reader, document)
+        if take is not None:
+            return take
+    raise reader.fail(
+        "named curves were expected, found none: {names, frames}, {name: [values]}, a list of "
+        "frames with a time, or curves with keys"
+    )
+
+
+def own_clip(reader: Reader, document: object) -> Take | None:
+    """What `importing.write_json` writes."""
+    if not isinstance(document, dict) or "risorius_clip" not in document:
+        return None
+    curves = document.get("curves")
+    if not isinstance(curves, dict):
+        raise reader.fail("a table was expected", "curves")
+    count = document.get("frames")
+    if not isinstance(count, int) or count < 0:
+        raise reader.fail("a number of frames was expected", "frames")
+    rows = [reader.numbers(values, f"curves.{name}") for name, values in curves.items()]
+    for curve, row in zip(curves, rows, strict=True):
+        if len(row) != count:
+            raise reader.fail(f"{count} values were expected, found {len(row)}", f"curves.{curve}")
+    rate = reader.number(document.get("rate"), "rate")
+    if rate <= 0.0:
+        raise reader.fail(f"frames a second above 0 were expected, found {rate}", "rate")
+    start = reader.number(document.get("start", 0.0), "start")
+    given = document.get("times")
+    times = start + np.arange(count) / rate if given is None else None
+    if times is None:
+        times = reader.times(given, count, None, "times")
+    take = reader.take(list(curves), rows, times, rate)
+    take.clip = take.clip.replaced(
+        events=_own_events(reader, document.get("events", [])),
+        metadata={str(k): str(v) for k, v in dict(document.get("metadata", {})).items()},
+    )
+    return take
+
+
+def _own_events(reader: Reader, rows: object) -> list[Event]:
+    if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
+        raise reader.fail("a list of tables was expected", "events")
+    return [
+        Event(
+            reader.number(row.get("time"), f"events[{i}].time"),
+            str(row.get("name", "")),
+            reader.number(row.get("duration", 0.0), f"events[{i}].duration"),
+            str(row.get("value", "")),
+        )
+        for i, row in enumerate(rows)
+    ]
+
+
+def matrix(reader: Reader, document: object) -> Take | None:
+    """{names: [...], frames: [[...], ...]}, as Audio2Face exports {facsNames, weightMat}.
+
+    A frame may be a table with the values under "weights" and a time.
+    """
+    if not isinstance(document, dict):
+        return None
+    inner = document.get("metadata")
+    names_in = next(
+        (t for t in (document, inner) if isinstance(t, dict) and _first(t, NAME_KEYS)), None
+    )
+    key = next((k for k in MATRIX_KEYS if _is_rows(document.get(k))), None)
+    if names_in is None or key is None:
+        return None
+    names_key = _first(names_in, NAME_KEYS) or ""
+    names = reader.strings(names_in[names_key], names_key)
+    frames = document[key]
+    values, times = [], []
+    for i, frame in enumerate(frames):
+        place = f"{key}[{i}]"
+        if isinstance(frame, dict):
+            times.append(_frame_time(reader, frame, place))
+            at = _first(frame, WEIGHT_KEYS)
+            if at is None:
+                raise reader.fail(f"one of {', '.join(WEIGHT_KEYS)} was expected", place)
+            row = reader.numbers(frame[at], f"{place}.{at}")
+        else:
+            row = reader.numbers(frame, place)
+        if len(row) != len(names):
+            raise reader.fail(
+                f"{len(names)} values as in {names_key} were expected, found {len(row)}", place
+            )
+        values.append(row)
+    rate = reader.rate_of(document, inner)
+    at = _first(document, TIMES_KEYS)
+    given = document[at] if at and isinstance(document[at], list) else None
+    if given is None and times and None not in times:
+        given = times
+    clock = reader.times(given, len(values), rate, at or "time")
+    by_time = given is not None
+    return reader.take(
+        names, np.array(values).reshape(-1, len(names)).T, clock, None if by_time else rate
+    )
+
+
+def frame_tables(reader: Reader, document: object) -> Take | None:
+    """A list of frames {time, name: value, ...}, the values under a key of their own or not."""
+    frames: object = document
+    outer: dict[str, Any] = {}
+    if isinstance(document, dict):
+        outer = document
+        key = next((k for k in MATRIX_KEYS if _is_tables(document.get(k))), None)
+        frames = document[key] if key else None
+    if not _is_tables(frames) or not isinstance(frames, list):
+        return None
+    tables = [_weights(frame) for frame in frames]
+    names = list(dict.fromkeys(name for table in tables for name in table))
+    # Curves with keys, and rows of a curve table, are lists of tables too.
+    if not names or any(_first(frame, CURVE_NAME_KEYS) for frame in frames):
+        return None
+    times = [_frame_time(reader, frame, f"frame {i}") for i, frame in enumerate(frames)]
+    rate = reader.rate_of(outer, outer.get("metadata"))
+    if any(time is None for time in times):
+        clock = reader.times(None, len(frames), rate, "time")
+    else:
+        clock, rate = np.array(times, np.float64), None
+    columns = [_frame_column(reader, tables, curve, clock) for curve in names]
+    return reader.take(names, columns, clock, rate)
+
+
+def _weights(frame: Mapping[str, Any]) -> dict[str, Any]:
+    """name -> value of a frame."""
+    at = next((k for k in WEIGHT_KEYS if isinstance(frame.get(k), dict)), None)
+    table = frame[at] if at else frame
+    return {
+        key: value
+        for key, value in table.items()
+        if key not in TIME_KEYS and isinstance(value, int | float) and not isinstance(value, bool)
+    }
+
+
+def _frame_column(
+    reader: Reader, tables: Sequence[Mapping[str, Any]], curve: str, clock: Doubles
+) -> Doubles:
+    known = [i for i, table in enumerate(tables) if curve in table]
+    values = [reader.number(tables[i][curve], f"frame {i}, {curve}") for i in known]
+    if len(known) < len(tables):
+        reader.notes.append(f"{curve}: missing in {len(tables) - len(known)} frame(s), filled")
+    return np.interp(clock, clock[known], values)
+
+
+def _frame_time(reader: Reader, frame: Mapping[str, Any], place: str) -> float | None:
+    key = _first(frame, TIME_KEYS)
+    return None if key is None else reader.number(frame[key], f"{place}.{key}")
+
+
+def curve_table(reader: Reader, document: object) -> Take | None:
+    """Unreal's curve table: [{"Name": curve, "0": value, "0.033": value}, ...]."""
+    if not _is_tables(document) or not isinstance(document, list):
+        return None
+    curves = {}
+    for row in document:
+        name = row.get("Name")
+        others = {key: value for key, value in row.items() if key != "Name"}
+        if not isinstance(name, str) or not others or not all(map(_is_number, others)):
+            return None
+        times = np.array([float(key) for key in others])
+        values = [reader.number(value, f"{name}.{key}") for key, value in others.items()]
+        curves[name] = Keys(times, np.array(values))
+    return _keyed(reader, curves)
+
+
+def keyed_curves(reader: Reader, document: object) -> Take | None:
+    """Curves with keys {Time, Value}, wherever in the document they stand.
+
+    So an Unreal animation's FloatCurves are written, [{CurveName, FloatCurve: {Keys: [...]}}].
+    """
+    found: dict[str, Keys] = {}
+    is_cubic = False
+    for curve, keys in _find_curves(document, DEEPEST):
+        if curve in found:
+            reader.notes.append(f"{curve}: found twice, the first one is taken")
+            continue
+        place = f"{curve}.Keys"
+        times, values = [], []
+        for i, key in enumerate(keys):
+            row = {str(k).lower(): v for k, v in key.items()} if isinstance(key, dict) else {}
+            times.append(_key_number(reader, row, "time", f"{place}[{i}]"))
+            values.append(_key_number(reader, row, "value", f"{place}[{i}]"))
+            is_cubic |= "cubic" in str(row.get("interpmode", "")).lower()
+        found[curve] = Keys(np.array(times), np.array(values))
+    if not found:
+        return None
+    if is_cubic:
+        reader.notes.append("cubic keys are joined by straight lines")
+    return _keyed(reader, found)
+
+
+def _key_number(reader: Reader, row: Mapping[str, object], key: str, place: str) -> float:
+    if key not in row:
+        raise reader.fail(f"a key with {key} was expected", place)
+    return reader.number(row[key], f"{place}.{key}")
+
+
+def _find_curves(value: object, depth: int) -> list[tuple[str, list[Any]]]:
+    """(name, keys) of all curves inside a value."""
+    if depth == 0:
+        return []
+    if isinstance(value, list):
+        return [curve for item in value for curve in _find_curves(item, depth - 1)]
+    if not isinstance(value, dict):
+        return []
+    name = next((value[k] for k in CURVE_NAME_KEYS if isinstance(value.get(k), str)), None)
+    inner = next((value[k] for k in INNER_CURVE_KEYS if isinstance(value.get(k), dict)), value)
+    keys = next((inner[k] for k in KEYS_KEYS if isinstance(inner.get(k), list)), None)
+    if name is not None and keys:
+        return [(name, keys)]
+    return [curve for item in value.values() for curve in _find_curves(item, depth - 1)]
+
+
+def _keyed(reader: Reader, curves: dict[str, Keys]) -> Take:
+    for name, keys in curves.items():
+        if (np.diff(keys.times) <= 0.0).any():
+            raise reader.fail("key times that ascend were expected", name)
+    times, rows = on_one_clock(list(curves.values()))
+    return reader.take(list(curves), rows, times)
+
+
+def lists_by_name(reader: Reader, document: object) -> Take | None:
+    """{name: [values], ...}, or the same under "curves", with a rate or a list of times."""
+    if not isinstance(document, dict):
+        return None
+    inner = next((document[k] for k in WEIGHT_KEYS if isinstance(document.get(k), dict)), None)
+    table = inner or document
+    lists = {k: v for k, v in table.items() if k not in TIMES_KEYS and _is_list(v)}
+    if not lists:
+        return None
+    count = len(next(iter(lists.values())))
+    rows = [reader.numbers(values, name) for name, values in lists.items()]
+    for name, row in zip(lists, rows, strict=True):
+        if len(row) != count:
+            raise reader.fail(
+                f"{count} values as in the first curve were expected, found {len(row)}", name
+            )
+    at_table = next((t for t in (table, document) if _first(t, TIMES_KEYS)), {})
+    at = _first(at_table, TIMES_KEYS)
+    rate = reader.rate_of(document, document.get("metadata"))
+    times = reader.times(at_table[at] if at else None, count, rate, at or "times")
+    return reader.take(list(lists), rows, times, None if at else rate)
+
+
+def _first(table: Mapping[str, Any], keys: Sequence[str]) -> str | None:
+    return next((key for key in keys if key in table), None)
+
+
+def _is_rows(value: object) -> bool:
+    """A list of lists, or of tables with a list in each."""
+    if not isinstance(value, list) or not value:
+        return False
+    return all(
+        isinstance(row, list)
+        or (isinstance(row, dict) and any(isinstance(row.get(k), list) for k in WEIGHT_KEYS))
+        for row in value
+    )
+
+
+def _is_tables(value: object) -> bool:
+    return isinstance(value, list) and bool(value) and all(isinstance(row, dict) for row in value)
+
+
+def _is_list(value: object) -> bool:
+    return isinstance(value, list) and bool(value) and not isinstance(value[0], dict | list)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        return math.isfinite(float(text))
+    except ValueError:
+        return False
+
+
+def _kind(value: object) -> str:
+    names = {
+        dict: "a table",
+        list: "a list",
+        str: "text",
+        bool: "true or false",
+        type(None): "null",
+    }
+    return names.get(type(value), "a number")

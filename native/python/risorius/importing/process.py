@@ -1,0 +1,292 @@
+# SPDX-License-Identifier: MIT
+"""What is done to a clip between a capture and a face: each a function from clip to clip."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from ..clip import Clip, Event
+from .mapping import ANGLES, fits
+
+Doubles = npt.NDArray[np.float64]
+
+# Below this, what is left above a neutral value is noise that would only be blown up.
+LEAST_RANGE = 0.05
+_SIDES = {"L": "R", "R": "L"}
+_WORDS = {"Left": "Right", "Right": "Left"}
+# Turning to the other side is the negative angle.
+_MIRRORED_ANGLES = ("yaw", "roll")
+
+
+def resample(clip: Clip, rate: float) -> Clip:
+    """Frames `rate` a second from the first frame to the last; straight lines between frames.
+
+    Raises:
+        ValueError: a rate that is not above 0.
+    """
+    if not 0.0 < rate < 1e6:
+        raise ValueError(f"a rate above 0 frames per second was expected, found {rate}")
+    return clip.resampled(rate)
+
+
+def shift(clip: Clip, seconds: float) -> Clip:
+    """The clip and its events, later by `seconds`; negative: earlier."""
+    times = None if clip.times is None else clip.times + seconds
+    events = [event._replace(time=event.time + seconds) for event in clip.events]
+    return clip.replaced(start=clip.start + seconds, times=times, events=events)
+
+
+def cut(clip: Clip, first: float, last: float) -> Clip:
+    """The frames and events from `first` to `last`, seconds on the clip's clock, both included.
+
+    Raises:
+        ValueError: no frame lies there.
+    """
+    at = clip.frame_times()
+    keep = (at >= first - 1e-9) & (at <= last + 1e-9)
+    if not keep.any():
+        raise ValueError(
+            f"frames from {first:g} s to {last:g} s were expected, the clip goes from "
+            f"{at.min(initial=0.0):g} s to {at.max(initial=0.0):g} s"
+        )
+    events: list[Event] = [e for e in clip.events if first <= e.time <= last]
+    times = None if clip.times is None else at[keep]
+    return clip.replaced(
+        curves=clip.curves[:, keep], start=float(at[keep][0]), times=times, events=events
+    )
+
+
+def adjust(
+    clip: Clip, gains: Mapping[str, float] | None = None, offsets: Mapping[str, float] | None = None
+) -> Clip:
+    """Each control as gain * value + offset.
+
+    Args:
+        gains: pattern of control names -> factor; of several that fit, all are multiplied.
+        offsets: pattern -> what is added after that; of several, all are added.
+
+    Raises:
+        ValueError: a pattern that fits no control.
+    """
+    curves = clip.curves.astype(np.float64)
+    for table, is_gain in ((gains or {}, True), (offsets or {}, False)):
+        for pattern, amount in table.items():
+            rows = [i for i, name in enumerate(clip.names) if fits(name, pattern)]
+            if not rows:
+                raise ValueError(f"{pattern}: fits no control of the clip")
+            curves[rows] = curves[rows] * amount if is_gain else curves[rows] + amount
+    return clip.replaced(curves=curves)
+
+
+def calibrate(clip: Clip, first: int, last: int | None = None) -> Clip:
+    """Make a neutral face neutral: subtract it, and stretch the rest so that full stays full.
+
+    A control whose neutral value is n becomes (value - n) / (1 - n), and 0 where that is negative
+    and the control never was. Of the head and the eyes the angles are subtracted only.
+
+    Args:
+        first: frame of the neutral face.
+        last: last frame, if it is the mean of several; included.
+
+    Raises:
+        ValueError: frames that the clip does not have.
+    """
+    last = first if last is None else last
+    if not 0 <= first <= last < clip.frame_count:
+        raise ValueError(
+            f"frames from 0 to {clip.frame_count - 1} were expected, found {first} to {last}"
+        )
+    curves = clip.curves.astype(np.float64)
+    neutral = curves[:, first : last + 1].mean(axis=1)[:, None]
+    is_angle = np.array([name in ANGLES for name in clip.names], bool)[:, None]
+    left = np.where(is_angle, 1.0, np.maximum(1.0 - neutral, LEAST_RANGE))
+    out = (curves - neutral) / left
+    is_positive = ~is_angle & (curves.min(axis=1, initial=0.0)[:, None] >= 0.0)
+    return clip.replaced(curves=np.where(is_positive, np.maximum(out, 0.0), out))
+
+
+def smooth(clip: Clip, window: float, *, order: int = 3) -> Clip:
+    """Savitzky-Golay: fit a polynomial around each frame; peaks keep their height and their time.
+
+    Polynomials up to `order` pass unchanged, at the ends too; nothing is delayed. A clip with
+    times of its own is smoothed by frame, as captures are taken at even times but for what was
+    dropped.
+
+    Args:
+        window: seconds of frames that each fit takes.
+        order: degree of the polynomial.
+
+    Raises:
+        ValueError: a window or an order that is not above 0.
+    """
+    if not window > 0.0 or order < 0:
+        raise ValueError(f"a window above 0 s was expected, found {window:g} s, degree {order}")
+    half = round(0.5 * window * clip.rate)
+    if 2 * half <= order or clip.frame_count <= 2 * half:
+        return clip
+    return clip.replaced(curves=_savitzky_golay(clip.curves.astype(np.float64), half, order))
+
+
+def _savitzky_golay(curves: Doubles, half: int, order: int) -> Doubles:
+    size = 2 * half + 1
+    base = np.vander(np.arange(-half, half + 1) / half, order + 1, increasing=True)
+    fit = base @ np.linalg.pinv(base)  # [at, from]: values of the polynomial fitted to a window
+    out = np.empty_like(curves)
+    windows = np.lib.stride_tricks.sliding_window_view(curves, size, axis=1)
+    out[:, half:-half] = windows @ fit[half]
+    out[:, :half] = curves[:, :size] @ fit[:half].T
+    out[:, -half:] = curves[:, -size:] @ fit[half + 1 :].T
+    return out
+
+
+def gaussian(clip: Clip, width: float) -> Clip:
+    """A weighted mean around each frame: softer than `smooth`, and lowers short peaks.
+
+    Args:
+        width: standard deviation in seconds; the weights fall off over the frames' own times.
+
+    Raises:
+        ValueError: a width that is not above 0.
+    """
+    if not width > 0.0:
+        raise ValueError(f"a width above 0 s was expected, found {width:g} s")
+    at = clip.frame_times()
+    reach = int(np.ceil(4.0 * width * clip.rate))
+    total, weights = np.zeros(clip.curves.shape), np.zeros(clip.frame_count)
+    curves = clip.curves.astype(np.float64)
+    for lag in range(-min(reach, clip.frame_count - 1), min(reach, clip.frame_count - 1) + 1):
+        here = slice(max(0, -lag), clip.frame_count - max(0, lag))
+        there = slice(max(0, lag), clip.frame_count - max(0, -lag))
+        weight = np.exp(-0.5 * ((at[there] - at[here]) / width) ** 2)
+        total[:, here] += curves[:, there] * weight
+        weights[here] += weight
+    return clip.replaced(curves=total / np.maximum(weights, 1e-300))
+
+
+class OneEuro:
+    """The one-euro filter: a low pass that opens with speed; for what comes in live.
+
+    Slow noise is held back by `cutoff`, fast motion passes with little delay by `beta`.
+    From: Casiez, Roussel, Vogel, "1 euro filter", CHI 2012.
+    """
+
+    def __init__(self, cutoff: float = 1.5, beta: float = 5.0, speed_cutoff: float = 1.0) -> None:
+        """Args: cutoff Hz at rest; Hz more per unit and second; cutoff Hz of the speed itself."""
+        if not (cutoff > 0.0 and beta >= 0.0 and speed_cutoff > 0.0):
+            raise ValueError("cutoffs above 0 Hz and a beta of 0 or more were expected")
+        self.cutoff, self.beta, self.speed_cutoff = cutoff, beta, speed_cutoff
+        self._time = 0.0
+        self._values: Doubles | None = None
+        self._speeds: Doubles | None = None
+
+    def __call__(self, time: float, values: npt.ArrayLike) -> Doubles:
+        """Filtered values of a frame; a time that is not after the last gives the last again.
+
+        Args:
+            time: seconds.
+            values: [controls].
+
+        Returns:
+            float64[controls].
+        """
+        now = np.asarray(values, np.float64)
+        if self._values is None or self._speeds is None or self._values.shape != now.shape:
+            self._time, self._values, self._speeds = time, now.copy(), np.zeros_like(now)
+            return now.copy()
+        step = time - self._time
+        if step <= 0.0:
+            return self._values.copy()
+        self._speeds += _share(self.speed_cutoff, step) * (
+            (now - self._values) / step - self._speeds
+        )
+        cutoffs = self.cutoff + self.beta * np.abs(self._speeds)
+        self._values = self._values + _share(cutoffs, step) * (now - self._values)
+        self._time = time
+        return self._values.copy()
+
+
+def _share(cutoff: float | Doubles, step: float) -> Doubles:
+    """Of a new value in a first order low pass."""
+    return np.asarray(1.0 / (1.0 + 1.0 / (2.0 * np.pi * np.asarray(cutoff) * step)))
+
+
+def one_euro(clip: Clip, cutoff: float = 1.5, beta: float = 5.0) -> Clip:
+    """What a live viewer would have seen: OneEuro over the frames, one after the other."""
+    running = OneEuro(cutoff, beta)
+    rows = [running(t, v) for t, v in zip(clip.frame_times(), clip.curves.T, strict=True)]
+    return clip.replaced(curves=np.array(rows).reshape(clip.frame_count, -1).T)
+
+
+def fill_gaps(clip: Clip, longest: float | None = None) -> Clip:
+    """Even frames at the clip's rate; where frames are missing the curves go straight across.
+
+    Args:
+        longest: seconds; across a longer gap the last value is held until a frame before its end.
+    """
+    at = clip.frame_times()
+    if clip.frame_count < 2:
+        return clip
+    count = int(np.floor((at[-1] - at[0]) * clip.rate + 0.5)) + 1
+    wanted = at[0] + np.arange(count) / clip.rate
+    curves = clip.sample(wanted).T
+    if longest is not None:
+        before = np.clip(np.searchsorted(at, wanted, side="right") - 1, 0, clip.frame_count - 2)
+        long = at[before + 1] - at[before] > longest
+        held = long & (wanted < at[before + 1] - 1.0 / clip.rate + 1e-9)
+        curves = np.where(held, clip.curves[:, before], curves)
+    return clip.replaced(curves=curves, start=float(at[0]), times=None)
+
+
+def drop_repeats(clip: Clip) -> Clip:
+    """Without frames that repeat the one before in every curve: a capture that stood still for a
+    frame because none came. The last frame stays, so that the clip keeps its length.
+    """
+    if clip.frame_count < 3:
+        return clip
+    same = (clip.curves[:, 1:] == clip.curves[:, :-1]).all(axis=0)
+    same[-1] = False
+    keep = np.concatenate([[True], ~same])
+    return clip.replaced(curves=clip.curves[:, keep], times=clip.frame_times()[keep])
+
+
+def mirror(clip: Clip) -> Clip:
+    """Left for right: each control takes its partner's curve, sideways angles change their sign."""
+    names = [mirrored_name(name) for name in clip.names]
+    turned = [name in ANGLES and name.rpartition(".")[2] in _MIRRORED_ANGLES for name in names]
+    signs = np.where(np.array(turned, bool), -1.0, 1.0).astype(np.float32)
+    return clip.replaced(names=names, curves=clip.curves * signs[:, None])
+
+
+def mirrored_name(name: str) -> str:
+    """A control's partner: ...L and ...R, ...Left and ...Right; eyeLookLeftL and eyeLookRightR.
+
+    A control without a side is its own partner.
+    """
+    before, dot, last = name.rpartition(".")
+    if before in ("eyeL", "eyeR"):
+        return f"eye{_SIDES[before[-1]]}.{last}"
+    last = re.sub("Left|Right", lambda match: _WORDS[match[0]], last)
+    last = re.sub(r"[LR](?=$|Ph\d$)", lambda match: _SIDES[match[0]], last)
+    return before + dot + last
+
+
+def parse_amounts(texts: Sequence[str]) -> dict[str, float]:
+    """Patterns with amounts from texts as "jaw*=1.2".
+
+    Raises:
+        ValueError: another form.
+    """
+    out = {}
+    for text in texts:
+        pattern, equals, amount = text.rpartition("=")
+        try:
+            out[pattern] = float(amount)
+        except ValueError:
+            equals = ""
+        if not equals or not pattern or not np.isfinite(out[pattern]):
+            raise ValueError(f"PATTERN=NUMBER was expected, found {text!r}")
+    return out

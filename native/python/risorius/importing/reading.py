@@ -1,0 +1,299 @@
+# SPDX-License-Identifier: MIT
+"""From a file to a clip of raw controls: reading, choosing a mapping, applying it, reporting."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from ..clip import Clip
+from . import named_json, tables, visemes
+from .errors import AnimationFileError
+from .keys import Keys, on_one_clock
+from .mapping import ANGLES, Mapped, apply_rows, best_mapping, load_mapping
+from .mapping import Mapping as ControlMapping
+from .report import Report
+from .source import Take, decode, make_clip, read_bytes
+
+KINDS = {
+    "live_link_face": "Live Link Face CSV",
+    "csv": "CSV of named curves",
+    "json": "JSON of named curves",
+    "rhubarb": "mouth shapes of Rhubarb Lip Sync: TSV, XML, JSON",
+    "moho": "mouth shapes of Moho and Papagayo: .dat",
+    "papagayo": "Papagayo documents: .pgo",
+}
+ROTATIONS = ("head", "all", "none")
+
+
+class RigLike(Protocol):
+    """What a mapping of GUI controls needs of a `risorius.Rig`."""
+
+    @property
+    def gui_control_names(self) -> list[str]: ...
+    @property
+    def raw_control_names(self) -> list[str]: ...
+    def gui_to_raw(self, gui: npt.ArrayLike, /) -> npt.NDArray[np.float32]: ...
+
+
+@dataclass
+class Imported:
+    """What a file holds, before any mapping.
+
+    Attributes:
+        clip: curves by the file's own names, at the file's own times; time 0 is the first frame of
+            a take, and the sound's start for visemes.
+        kind: one of KINDS.
+        mapping: name of the mapping that fits: by kind, else the built-in one that knows most of
+            the names; "" if none knows any.
+        source: the file's name.
+        notes: what the reading has to say.
+    """
+
+    clip: Clip
+    kind: str
+    mapping: str
+    source: str
+    notes: list[str] = field(default_factory=list)
+
+    def apply(
+        self,
+        mapping: str | os.PathLike[str] | ControlMapping | None = None,
+        *,
+        rig_names: Iterable[str] | None = None,
+        rig: RigLike | None = None,
+        rotations: str = "head",
+    ) -> tuple[Clip, Report]:
+        """A clip of raw controls, and what became of each curve.
+
+        Args:
+            mapping: a built-in one by name, a TOML file, or a Mapping; None: the one that fits.
+            rig_names: raw controls of the rig, `Rig.raw_control_names`; others are left out and
+                reported. None: all are kept.
+            rig: for a mapping of GUI controls, whose table is the rig's.
+            rotations: "head": the head's angles, if it was captured; the eyes come as eyeLook
+                controls. "all": the eyes' angles too. "none": neither.
+
+        Raises:
+            ValueError: no mapping fits, a mapping that cannot be used, a GUI mapping without a rig.
+        """
+        if rotations not in ROTATIONS:
+            raise ValueError(
+                f"rotations: one of {', '.join(ROTATIONS)} was expected, found {rotations!r}"
+            )
+        chosen = load_mapping(mapping if mapping is not None else self._fitting())
+        done = apply_rows(chosen, self.clip)
+        report = Report(
+            self.source, self.kind, chosen.name, done.mapped, done.unmapped, done.ignored,
+            absent=done.absent, notes=[*self.notes, *done.notes],
+        )  # fmt: skip
+        report.always_zero = [
+            name
+            for name, row in zip(self.clip.names, self.clip.curves, strict=True)
+            if not row.any()
+        ]
+        clip = _without_angles(done, rotations, report)
+        if chosen.is_gui:
+            if rig is None:
+                raise ValueError(
+                    f"mapping {chosen.name}: its curves are GUI controls, which only a rig's own "
+                    "table turns into raw controls: give the rig"
+                )
+            clip = _gui_to_raw(clip, rig, report)
+        if rig_names is not None:
+            clip = _in_rig(clip, rig_names, report)
+        return clip, report
+
+    def _fitting(self) -> str:
+        if self.mapping:
+            return self.mapping
+        raise AnimationFileError(
+            self.source,
+            f"no mapping knows any of its {len(self.clip.names)} curves "
+            f"({', '.join(self.clip.names[:4])} ...): give a mapping of your own",
+        )
+
+
+def _without_angles(done: Mapped, rotations: str, report: Report) -> Clip:
+    """Head and eye angles as asked; a head that was not captured is not held still."""
+    clip = done.clip
+    drop = set()
+    for name in clip.names:
+        if name not in ANGLES:
+            continue
+        is_head = name.startswith("head.")
+        if rotations == "none" or (rotations == "head" and not is_head):
+            drop.add(name)
+    head = [name for name in clip.names if name.startswith("head.")]
+    if head and rotations != "none" and not any(clip.curve(name).any() for name in head):
+        drop.update(head)
+        report.notes.append("the head does not move: its rotation was not recorded")
+    for source, row in list(report.mapped.items()):
+        if set(row) <= drop:
+            del report.mapped[source]
+            report.ignored.append(source)
+    return clip.selected([name for name in clip.names if name not in drop])
+
+
+def _gui_to_raw(clip: Clip, rig: RigLike, report: Report) -> Clip:
+    """Raw controls of GUI curves, frame by frame through the rig's table."""
+    index = {name: i for i, name in enumerate(rig.gui_control_names)}
+    gui = np.zeros((clip.frame_count, len(index)), np.float32)
+    angles = [name for name in clip.names if name in ANGLES]
+    for name, curve in zip(clip.names, clip.curves, strict=True):
+        if name in index:
+            gui[:, index[name]] = curve
+        elif name not in ANGLES:
+            report.not_in_rig.append(name)
+    raw = np.array([rig.gui_to_raw(frame) for frame in gui], np.float32)
+    raw = raw.reshape(clip.frame_count, len(rig.raw_control_names))
+    moving = np.flatnonzero(raw.any(axis=0))
+    names = [rig.raw_control_names[i] for i in moving]
+    report.notes.append(f"{len(index)} GUI controls of the rig gave {len(names)} raw controls")
+    rows = [raw[:, moving].T, clip.selected(angles).curves]
+    return clip.replaced(names=[*names, *angles], curves=np.concatenate(rows))
+
+
+def _in_rig(clip: Clip, rig_names: Iterable[str], report: Report) -> Clip:
+    known = set(rig_names) | set(ANGLES)
+    report.not_in_rig += [name for name in clip.names if name not in known]
+    return clip.selected([name for name in clip.names if name in known])
+
+
+def read(
+    path: str | os.PathLike[str],
+    *,
+    kind: str | None = None,
+    rate: float | None = None,
+    timecode_rate: float | None = None,
+) -> Imported:
+    """Read a file of animation.
+
+    Args:
+        path: the file.
+        kind: one of KINDS, or None: told from the content, and the suffix where that says nothing.
+        rate: frames a second, of tables whose time is a frame number or is not there.
+        timecode_rate: frames a second of timecodes, where they do not tell; 29.97 and the like
+            stand for 30000/1001.
+
+    Raises:
+        AnimationFileError: cannot be read or used; the sentence names file and place.
+        ValueError: an option that makes no sense.
+    """
+    if kind is not None and kind not in KINDS:
+        raise ValueError(f"kind: one of {', '.join(KINDS)} was expected, found {kind!r}")
+    for name, value in (("rate", rate), ("timecode_rate", timecode_rate)):
+        if value is not None and not 0.0 < value < 1e6:
+            raise ValueError(f"{name}: frames a second above 0 were expected, found {value}")
+    file = Path(path)
+    data = read_bytes(file)
+    try:
+        take = _read_kind(file, data, kind, rate, timecode_rate)
+    except AnimationFileError:
+        raise
+    except ValueError as error:
+        raise AnimationFileError(str(path), str(error)) from error
+    mapping = take.mapping or best_mapping(take.clip.names) or ""
+    clip = take.clip.replaced(
+        metadata={"source": file.name, "kind": take.kind, **take.clip.metadata}
+    )
+    return Imported(clip, take.kind, mapping, str(path), take.notes)
+
+
+def _read_kind(
+    file: Path, data: bytes, kind: str | None, rate: float | None, timecode_rate: float | None
+) -> Take:
+    name = str(file)
+    text = decode(data, name)
+    if text.lstrip()[:1] in ("{", "[") or kind == "json":
+        return _read_json(named_json.parse(text, name), name, kind, rate)
+    if kind in (None, "moho") and text.lstrip().startswith("MohoSwitch1"):
+        return visemes.read_dat(text.lstrip(), name, rate)
+    mouth = visemes.reader_of(text) if kind in (None, "rhubarb", "papagayo", "moho") else None
+    if mouth is not None:
+        return mouth(text, name)
+    if kind in ("rhubarb", "papagayo", "moho"):
+        raise AnimationFileError(name, f"{KINDS[kind]}: expected, found something else")
+    table = tables.read_table(text, name)
+    if kind == "live_link_face" or (kind is None and tables.is_live_link_face(table.header)):
+        return tables.read_live_link_face(table, timecode_rate)
+    return tables.read_plain(table, rate, timecode_rate)
+
+
+def _read_json(document: object, name: str, kind: str | None, rate: float | None) -> Take:
+    if isinstance(document, dict) and kind != "json":
+        if "mouthCues" in document:
+            return visemes.read_rhubarb_json(document, name)
+        if "voices" in document and "fps" in document:
+            return visemes.read_pgo_json(document, name)
+    return named_json.read(document, name, rate)
+
+
+def import_file(
+    path: str | os.PathLike[str],
+    rig_names: Iterable[str] | None = None,
+    *,
+    mapping: str | os.PathLike[str] | ControlMapping | None = None,
+    kind: str | None = None,
+    rate: float | None = None,
+    timecode_rate: float | None = None,
+    rig: RigLike | None = None,
+    rotations: str = "head",
+) -> tuple[Clip, Report]:
+    """A file as a clip of raw controls, and what became of each of its curves.
+
+    Args: as of `read` and `Imported.apply`.
+
+    Raises:
+        ValueError: as they do.
+    """
+    found = read(path, kind=kind, rate=rate, timecode_rate=timecode_rate)
+    return found.apply(mapping, rig_names=rig_names, rig=rig, rotations=rotations)
+
+
+def import_curves(
+    curves: Mapping[str, tuple[npt.ArrayLike, npt.ArrayLike]],
+    rig_names: Iterable[str] | None = None,
+    *,
+    source: str = "action",
+    mapping: str | os.PathLike[str] | ControlMapping | None = None,
+    rig: RigLike | None = None,
+    rotations: str = "head",
+) -> tuple[Clip, Report]:
+    """Named curves as a clip of raw controls: shape keys of another rig's action.
+
+    Args:
+        curves: name, as a shape key or property has it, -> (float64[keys] seconds, ascending;
+            float[keys] values). Between keys the curves go straight.
+        source: what the report names them.
+        rig_names, mapping, rig, rotations: as of `Imported.apply`.
+
+    Raises:
+        ValueError: nothing given, times that do not ascend, values that are not finite; as apply.
+    """
+    keys = {name: _keys(name, times, values) for name, (times, values) in curves.items()}
+    if not any(key.times.size for key in keys.values()):
+        raise ValueError(f"{source}: curves with keys were expected, found none")
+    times, rows = on_one_clock(list(keys.values()))
+    clip = make_clip(list(keys), rows, times, metadata={"source": source, "kind": "curves"})
+    found = Imported(clip, "curves", best_mapping(clip.names) or "", source)
+    return found.apply(mapping, rig_names=rig_names, rig=rig, rotations=rotations)
+
+
+def _keys(name: str, times: npt.ArrayLike, values: npt.ArrayLike) -> Keys:
+    t, v = np.asarray(times, np.float64), np.asarray(values, np.float64)
+    if t.ndim != 1 or t.shape != v.shape:
+        raise ValueError(
+            f"{name}: as many values as times were expected, found {v.shape}, {t.shape}"
+        )
+    if not (np.isfinite(t).all() and np.isfinite(v).all()):
+        raise ValueError(f"{name}: finite times and values were expected")
+    if (np.diff(t) <= 0.0).any():
+        raise ValueError(f"{name}: times that ascend were expected")
+    return Keys(t, v)

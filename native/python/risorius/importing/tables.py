@@ -1,0 +1,332 @@
+# SPDX-License-Identifier: MIT
+"""Comma separated tables: Live Link Face takes, and curves by column of any software."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from . import timecode
+from .errors import AnimationFileError
+from .source import Take, keep_ascending, make_clip, number
+
+Doubles = npt.NDArray[np.float64]
+
+DELIMITERS = (",", "\t", ";", "|")
+# Headers of a time column, without letter case, blanks and signs -> seconds of 1, or 0 for frames.
+TIME_COLUMNS = {
+    "time": 1.0, "timecode": 1.0, "timestamp": 1.0, "seconds": 1.0, "second": 1.0, "sec": 1.0,
+    "secs": 1.0, "s": 1.0, "t": 1.0, "times": 1.0, "timesec": 1.0, "timeseconds": 1.0,
+    "timesecs": 1.0, "timeins": 1.0, "timeinseconds": 1.0,
+    "ms": 1e-3, "timems": 1e-3, "milliseconds": 1e-3, "timemilliseconds": 1e-3, "millis": 1e-3,
+    "timestampms": 1e-3,
+    "frame": 0.0, "frames": 0.0, "framenumber": 0.0, "frameindex": 0.0, "frameid": 0.0,
+    "frameno": 0.0,
+}  # fmt: skip
+# Columns that count, and are no curve.
+COUNTS = ("blendshapecount",)
+
+
+@dataclass
+class Table:
+    """A table's cells as text; every row as long as the header.
+
+    Attributes:
+        header: names of the columns, without blanks around them.
+        rows: the other rows.
+        lines: line of the file, from 1, at which each row ends.
+        delimiter: what stands between cells.
+    """
+
+    name: str
+    header: list[str]
+    rows: list[list[str]]
+    lines: list[int]
+    delimiter: str
+
+    def cell(self, row: int, column: int) -> float:
+        """Raises: AnimationFileError: no finite number."""
+        text = self.rows[row][column].strip()
+        if self.delimiter == ";" and "." not in text:
+            text = text.replace(",", ".")  # a decimal comma, as spreadsheets of many lands write
+        return number(text, self.name, self.lines[row], self.place(column))
+
+    def place(self, column: int) -> str:
+        header = self.header[column]
+        return f"{column + 1} ({header})" if header else str(column + 1)
+
+
+def sniff(text: str) -> str:
+    """The delimiter: the sign that parts the first line into most cells outside quotes."""
+    first = re.sub(r'"[^"]*"', '""', text.lstrip("\r\n").splitlines()[0])
+    return max(DELIMITERS, key=first.count)
+
+
+def read_table(text: str, name: str) -> Table:
+    """A table with a header.
+
+    Raises:
+        AnimationFileError: no header, a name twice, a row of another length, no row, bad quotes.
+    """
+    if "\0" in text:
+        line = text[: text.index("\0")].count("\n") + 1
+        raise AnimationFileError(name, "text was expected, found a zero byte", line=line)
+    delimiter = sniff(text)
+    # strict: a quote that is never closed would swallow the rest of the file
+    reader = csv.reader(re.split(r"\r\n|\n|\r", text), delimiter=delimiter, strict=True)
+    rows: list[list[str]] = []
+    lines: list[int] = []
+    try:
+        for row in reader:
+            if any(cell.strip() for cell in row):
+                rows.append(row)
+                lines.append(reader.line_num)
+    except csv.Error as error:
+        raise AnimationFileError(name, f"no table: {error}", line=reader.line_num) from error
+    if not rows:
+        raise AnimationFileError(name, "it holds nothing")
+    table = Table(name, [cell.strip() for cell in rows[0]], rows[1:], lines[1:], delimiter)
+    _check(table, lines[0])
+    return table
+
+
+def _check(table: Table, line: int) -> None:
+    if all(_is_number(cell) for cell in table.header):
+        raise AnimationFileError(
+            table.name,
+            "a header with the names of the curves was expected, found numbers",
+            line=line,
+        )
+    # A line that ends in a delimiter has one empty column more; so have its rows, or not.
+    if len(table.header) > 1 and not table.header[-1]:
+        table.header.pop()
+        for row in table.rows:
+            if len(row) == len(table.header) + 1 and not row[-1].strip():
+                row.pop()
+    seen: dict[str, int] = {}
+    for column, header in enumerate(table.header):
+        if header and header in seen:
+            raise AnimationFileError(
+                table.name,
+                f"{header!r} was expected once, found in the columns {seen[header] + 1} and "
+                f"{column + 1}",
+                line=line,
+            )
+        seen[header] = column
+    for row, at in zip(table.rows, table.lines, strict=True):
+        if len(row) != len(table.header):
+            raise AnimationFileError(
+                table.name,
+                f"{len(table.header)} columns as in the header were expected, found {len(row)}",
+                line=at,
+            )
+    if not table.rows:
+        raise AnimationFileError(table.name, "rows after the header were expected, found none")
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def plain(header: str) -> str:
+    """A header without letter case, blanks and signs."""
+    return re.sub(r"[^a-z0-9]", "", header.lower())
+
+
+def is_live_link_face(header: Sequence[str]) -> bool:
+    """A timecode, the count of shapes, then shapes: what Live Link Face and its likes write."""
+    names = [plain(cell) for cell in header]
+    return len(names) > 2 and names[0] == "timecode" and names[1] in COUNTS
+
+
+def read_live_link_face(table: Table, timecode_rate: float | None = None) -> Take:
+    """A take of Live Link Face: time from the timecode and its rate, not from the row.
+
+    Args:
+        table: 2 columns and 51 to 61 curves, in any order, in either style of names.
+        timecode_rate: frames a second of the timecode, where the file does not tell.
+
+    Raises:
+        AnimationFileError: a cell that is none, timecodes whose rate cannot be told.
+    """
+    notes: list[str] = []
+    codes = [
+        timecode.parse(row[0], table.name, line, table.place(0))
+        for row, line in zip(table.rows, table.lines, strict=True)
+    ]
+    seconds = _timecode_seconds(table, codes, timecode_rate, notes)
+    columns = [i for i, cell in enumerate(table.header) if i > 1 and cell]
+    curves = np.array([[table.cell(r, c) for r in range(len(codes))] for c in columns])
+    _note_count(table, len(columns), notes)
+    keep = keep_ascending(seconds, notes)
+    times = seconds[keep] - seconds[0]
+    _note_dropped(times, notes)
+    clip = make_clip(
+        [table.header[c] for c in columns],
+        curves.reshape(len(columns), -1)[:, keep],
+        times,
+        metadata={"timecode": table.rows[0][0].strip()},
+    )
+    return Take(clip, "live_link_face", "live_link_face", notes)
+
+
+def _timecode_seconds(
+    table: Table, codes: list[timecode.Timecode], rate: float | None, notes: list[str]
+) -> Doubles:
+    if rate is not None:
+        base = round(rate)
+    else:
+        found = timecode.infer_base(codes)
+        if found is None:
+            raise AnimationFileError(
+                table.name,
+                "its timecodes do not tell whether they count 24, 25, 30 or 60 frames a second "
+                f"(the largest frame number is {max(c.frames for c in codes):g}): give the "
+                "timecode rate",
+                column=table.place(0),
+            )
+        base = found
+    over = next((i for i, code in enumerate(codes) if code.frames >= base), None)
+    if over is not None:
+        raise AnimationFileError(
+            table.name,
+            f"a frame number below {base} was expected, found {codes[over].frames:g}",
+            line=table.lines[over],
+            column=table.place(0),
+        )
+    if any(code.is_dropped for code in codes) and base % 30:
+        raise AnimationFileError(
+            table.name, f"drop-frame timecodes count 30 or 60 frames a second, not {base}"
+        )
+    notes.append(f"the timecode counts {base} frames a second")
+    true_rate = rate is None or abs(rate - base) < 1e-3
+    return timecode.seconds_of(codes, base, true_rate)
+
+
+def _note_count(table: Table, found: int, notes: list[str]) -> None:
+    stated = table.rows[0][1].strip()
+    if stated.isdigit() and int(stated) != found:
+        notes.append(f"{table.header[1]} says {stated}, the file has {found} curves")
+
+
+def _note_dropped(times: Doubles, notes: list[str]) -> None:
+    """Rows that were not written, as a phone under load does."""
+    if times.size < 3:
+        return
+    steps = np.diff(times)
+    usual = float(np.median(steps))
+    gaps = steps > 1.5 * usual
+    if gaps.any():
+        lost = int(np.rint(steps[gaps] / usual - 1.0).sum())
+        notes.append(
+            f"{lost} frame(s) are missing in {int(gaps.sum())} gap(s), the longest "
+            f"{steps.max():.3f} s; the curves go straight across"
+        )
+
+
+def read_plain(table: Table, rate: float | None = None, timecode_rate: float | None = None) -> Take:
+    """Curves by column.
+
+    Time is the column that is headed so (seconds, milliseconds, timecodes, or frame numbers at
+    `rate`), else the row number at `rate`. An empty cell is a value that is not there: the curve
+    goes straight across, or keeps its first or last value.
+
+    Raises:
+        AnimationFileError: no time and no rate, a cell that is no number, no curve.
+    """
+    notes: list[str] = []
+    at = _time_column(table)
+    times = _plain_times(table, at, rate, timecode_rate, notes)
+    columns = [i for i, cell in enumerate(table.header) if i != at and _is_curve(table, i, notes)]
+    if not columns:
+        raise AnimationFileError(table.name, "columns with curves were expected, found none")
+    keep = keep_ascending(times, notes)
+    curves = np.stack([_column(table, column, times, notes) for column in columns])
+    clip = make_clip(
+        [_curve_name(table.header[c]) for c in columns], curves[:, keep], times[keep],
+        rate=rate if at is None else None,
+    )  # fmt: skip
+    return Take(clip, "csv", "", notes)
+
+
+def _curve_name(header: str) -> str:
+    """Without what Audio2Face writes before each name."""
+    return header.removeprefix("blendShapes.")
+
+
+def _time_column(table: Table) -> int | None:
+    """The first column of the best kind: a time before a frame number."""
+    found = [(i, plain(re.sub(r"\(.*?\)|\[.*?\]", _unit, h))) for i, h in enumerate(table.header)]
+    times = [i for i, header in found if TIME_COLUMNS.get(header, 0.0) > 0.0]
+    frames = [i for i, header in found if TIME_COLUMNS.get(header) == 0.0]
+    return next(iter(times + frames), None)
+
+
+def _unit(match: re.Match[str]) -> str:
+    """What a unit in brackets adds to a header: "time (ms)"."""
+    return "ms" if match[0].strip("()[] ").lower() in ("ms", "msec", "milliseconds") else ""
+
+
+def _plain_times(
+    table: Table, at: int | None, rate: float | None, timecode_rate: float | None, notes: list[str]
+) -> Doubles:
+    if at is None:
+        if rate is None:
+            raise AnimationFileError(
+                table.name, "no column gives the time: give the rate in frames a second"
+            )
+        return np.arange(len(table.rows)) / rate
+    header = plain(re.sub(r"\(.*?\)|\[.*?\]", _unit, table.header[at]))
+    if ":" in table.rows[0][at]:
+        codes = [
+            timecode.parse(row[at], table.name, line, table.place(at))
+            for row, line in zip(table.rows, table.lines, strict=True)
+        ]
+        seconds = _timecode_seconds(table, codes, timecode_rate, notes)
+        return seconds - seconds[0]
+    values = np.array([table.cell(row, at) for row in range(len(table.rows))])
+    unit = TIME_COLUMNS[header]
+    if unit:
+        return values * unit
+    if rate is None:
+        raise AnimationFileError(
+            table.name, "its time is a frame number: give the rate in frames a second",
+            column=table.place(at),
+        )  # fmt: skip
+    return values / rate
+
+
+def _is_curve(table: Table, column: int, notes: list[str]) -> bool:
+    """Not a row number, a count, a second time, or a column of text."""
+    header = plain(table.header[column])
+    if header in COUNTS or header in TIME_COLUMNS:
+        return False
+    cells = [row[column].strip() for row in table.rows]
+    if not any(cells):
+        notes.append(f"{table.header[column] or f'column {column + 1}'}: empty, left out")
+        return False
+    if not header:
+        return False  # the row numbers that pandas writes without a header
+    if not any(re.search(r"\d", cell) or _is_number(cell) for cell in cells):
+        notes.append(f"{table.header[column]}: text, left out")
+        return False
+    return True
+
+
+def _column(table: Table, column: int, times: Doubles, notes: list[str]) -> Doubles:
+    filled = np.array([bool(row[column].strip()) for row in table.rows])
+    known = np.flatnonzero(filled)
+    values = np.array([table.cell(int(row), column) for row in known])
+    if filled.all():
+        return values
+    notes.append(f"{table.header[column]}: {int((~filled).sum())} empty cell(s) filled")
+    return np.interp(times, times[known], values)

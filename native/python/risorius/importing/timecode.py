@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: MIT
+"""Times of SMPTE timecodes HH:MM:SS:FF, with a fraction of a frame, dropped or not."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from .errors import AnimationFileError
+
+BASES = (24, 25, 30, 48, 50, 60, 100, 120)
+DAY = 86400.0
+# A second sign ; or , before the frames says drop-frame, as edit lists write it.
+_FORM = re.compile(r"(\d{1,2})[:;](\d{1,2})[:;](\d{1,2})([:;,])(\d{1,3}(?:\.\d*)?)")
+
+
+class Timecode(NamedTuple):
+    hours: int
+    minutes: int
+    seconds: int
+    frames: float
+    """With its fraction."""
+    is_dropped: bool
+
+
+def parse(text: str, name: str, line: int, column: int | str) -> Timecode:
+    """Raises: AnimationFileError: another form, 60 minutes or seconds."""
+    match = _FORM.fullmatch(text.strip())
+    if match is None:
+        raise AnimationFileError(
+            name,
+            f"a timecode as 12:21:59:06.595 was expected, found {text[:40]!r}",
+            line=line,
+            column=column,
+        )
+    hours, minutes, seconds = (int(match[i]) for i in (1, 2, 3))
+    if hours > 23 or minutes > 59 or seconds > 59:
+        raise AnimationFileError(
+            name,
+            f"hours to 23, minutes and seconds to 59 were expected, found {text[:40]!r}",
+            line=line,
+            column=column,
+        )
+    return Timecode(hours, minutes, seconds, float(match[5]), match[4] != ":")
+
+
+def infer_base(codes: Sequence[Timecode]) -> int | None:
+    """Frames a second of the timecodes' own clock, or None if nothing tells.
+
+    Where the second changes by one, the frame number must fall by base minus a step; that tells it
+    even of few frames. Otherwise the largest frame number does, where only one base is usual.
+    """
+    frames = np.array([code.frames for code in codes])
+    seconds = np.array([3600 * c.hours + 60 * c.minutes + c.seconds for c in codes])
+    largest = int(frames.max(initial=0.0))
+    if largest == 0 and not frames.any():
+        return 30  # every frame number is 0: any base gives the same times
+    change, step = np.diff(seconds), np.diff(frames)
+    within = step[(change == 0) & (step > 0.0)]
+    wraps = np.flatnonzero(change == 1)
+    if within.size and wraps.size:
+        estimate = float(np.median(np.median(within) - step[wraps]))
+        near = min(BASES, key=lambda base: abs(base - estimate))
+        if abs(near - estimate) <= 0.04 * near and near > largest:
+            return near
+    usual = (30, 60) if largest < 60 else (100, 120)
+    if largest >= 30:
+        return next((base for base in (*usual, 1000) if base > largest), None)
+    # Frame 29 was reached; at 60 a take this long would have passed it.
+    if len(codes) > 1 and largest == 29 and seconds[-1] - seconds[0] >= 2:
+        return 30
+    return None
+
+
+def seconds_of(
+    codes: Sequence[Timecode], base: int, is_true_rate: bool = True
+) -> npt.NDArray[np.float64]:
+    """Seconds of each timecode since midnight of the first, with midnights counted.
+
+    Args:
+        base: frames that the timecode counts a second: 30 of 29.97.
+        is_true_rate: False where a second of timecode lasts 1.001 s: 23.976, 29.97, 59.94.
+    """
+    hours, minutes, secs, frames, dropped = np.array(codes, np.float64).reshape(-1, 5).T
+    count = (3600.0 * hours + 60.0 * minutes + secs) * base + frames
+    # Drop-frame leaves out the first two numbers (of 30) of each minute but every tenth.
+    total = 60.0 * hours + minutes
+    count -= dropped * (base // 15) * (total - np.floor(total / 10.0))
+    seconds = count / base * (1.0 if is_true_rate and not dropped.any() else 1.001)
+    # Hours back is midnight; less is a row out of order, which is not ours to move.
+    wraps = np.concatenate([[0.0], np.diff(seconds) < -0.5 * DAY])
+    length = DAY if not dropped.any() else float((24 * 60 * 60 * base - 2592 * (base // 30)) / base)
+    return seconds + np.cumsum(wraps) * (length if not dropped.any() else length * 1.001)

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: MIT
+"""Clips as text that other software reads, and that reads back to the same bits."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+
+from ..clip import Clip
+
+
+def csv_text(clip: Clip) -> str:
+    """A table: time in seconds, then a column for each control; lines end in LF.
+
+    Every number has as many digits as its float32 (the time: float64) needs to come back.
+
+    Raises:
+        ValueError: a value that is not finite, which other software would stumble over.
+    """
+    _check_finite(clip, "CSV")
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(["time", *clip.names])
+    for time, frame in zip(clip.frame_times().tolist(), clip.curves.T, strict=True):
+        writer.writerow([repr(time), *map(_shortest, frame)])
+    return out.getvalue()
+
+
+def json_text(clip: Clip) -> str:
+    """All of a clip: rate, times, curves by name, events, metadata.
+
+    Raises:
+        ValueError: a value that is not finite.
+    """
+    _check_finite(clip, "JSON")
+    head = {
+        "risorius_clip": 1,
+        "rate": clip.rate,
+        "start": clip.start,
+        "frames": clip.frame_count,
+        "times": None if clip.times is None else clip.times.tolist(),
+        "events": [event._asdict() for event in clip.events],
+        "metadata": clip.metadata,
+    }
+    # json writes floats with all of a double's digits; a float32 needs fewer.
+    rows = [
+        f"{json.dumps(name)}: [{', '.join(map(_shortest, curve))}]"
+        for name, curve in zip(clip.names, clip.curves, strict=True)
+    ]
+    body = ",\n    ".join(rows)
+    return json.dumps(head, indent=2)[:-2] + f',\n  "curves": {{\n    {body}\n  }}\n}}\n'
+
+
+def write_text(text: str, path: str | os.PathLike[str]) -> None:
+    """Write a file whole or not at all.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    target = Path(path)
+    part = target.with_name(target.name + ".part")
+    try:
+        part.write_text(text, encoding="utf-8", newline="")
+        part.replace(target)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _shortest(value: np.float32) -> str:
+    return str(value)  # NumPy writes the fewest digits that give the same float32
+
+
+def _check_finite(clip: Clip, kind: str) -> None:
+    bad = np.argwhere(~np.isfinite(clip.curves))
+    if bad.size:
+        name, frame = clip.names[bad[0, 0]], int(bad[0, 1])
+        raise ValueError(f"{name}, frame {frame}: {kind} holds finite numbers only")

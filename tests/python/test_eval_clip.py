@@ -1,0 +1,248 @@
+# SPDX-License-Identifier: MIT
+"""The command `risorius eval CLIP DNA -o OUT`: every frame is Rig.evaluate of its controls."""
+
+import csv
+import json
+import zipfile
+
+import numpy as np
+import pytest
+import risorius
+from conftest import GOLDEN
+from risorius.batch import face as faces
+from risorius.cli import main
+
+FIELDS = {
+    "joints": "joints",
+    "shapes": "blend_shapes",
+    "maps": "animated_maps",
+    "controls": "controls",
+}
+
+
+@pytest.fixture(autouse=True)
+def own_cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+
+
+def write_clip(path, names, curves, rate=30.0, start=0.0):
+    """A CSV of curves[names, frames], digits enough to give every float32 back."""
+    with open(path, "w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(["time", *names])
+        for i, row in enumerate(np.asarray(curves).T):
+            writer.writerow([repr(start + i / rate), *(f"{v:.9g}" for v in row)])
+    return path
+
+
+def random_clip(path, name="medium", frames=50, seed=1):
+    """A clip of half the controls of a golden face; its DNA; float32[frames, R] as a rig reads."""
+    dna = risorius.load(GOLDEN / f"{name}.dna")
+    rig = risorius.Rig(dna)
+    rng = np.random.default_rng(seed)
+    raw = np.tile(rig.initial_raw_controls, (frames, 1))
+    some = np.flatnonzero(rng.random(raw.shape[1]) < 0.5)
+    raw[:, some] = rng.random((frames, len(some))).astype(np.float32)
+    write_clip(path, [rig.raw_control_names[i] for i in some], raw[:, some].T)
+    return GOLDEN / f"{name}.dna", rig, raw
+
+
+def expected(rig, raw, lod):
+    poses = [rig.evaluate(row, lod=lod) for row in raw]
+    return {f: np.stack([getattr(p, f) for p in poses]) for f in FIELDS.values()}
+
+
+@pytest.mark.parametrize("extra", [[], ["--compress"]])
+@pytest.mark.parametrize(("name", "lod"), [("medium", 0), ("medium", 2), ("rbf", 1), ("ml", 0)])
+def test_npz_is_every_frame(tmp_path, name, lod, extra, monkeypatch):
+    monkeypatch.setattr(faces, "_CHUNK_BYTES", 1)  # 16 frames a chunk: several, the last not full
+    dna, rig, raw = random_clip(tmp_path / "clip.csv", name)
+    out = tmp_path / "new" / "out.npz"
+    arguments = ["eval", tmp_path / "clip.csv", dna, "-o", out, "--lod", lod, *extra]
+    assert main([*map(str, arguments), "--what", "controls,joints,maps,shapes"]) == 0
+    with np.load(out) as arrays:
+        for field, values in expected(rig, raw, lod).items():
+            np.testing.assert_array_equal(arrays[field], values, field)
+        np.testing.assert_allclose(arrays["times"], np.arange(50) / 30, atol=1e-12)
+        assert arrays["lod"] == lod
+        assert arrays["translation_unit"] == risorius.load(dna).translation_unit
+        assert len(arrays["control_names"]) == rig.control_count
+        names = arrays["control_names"][: len(rig.raw_control_names)]
+        assert names.tolist() == rig.raw_control_names
+        assert len(set(arrays["joint_names"])) == rig.joint_count
+        np.testing.assert_array_equal(arrays["neutral_joints"], rig.neutral_joints)
+    assert [p.name for p in out.parent.iterdir()] == ["out.npz"]
+
+
+def test_the_same_clip_gives_the_same_bytes(tmp_path):
+    dna, _, _ = random_clip(tmp_path / "clip.csv")
+    for name in ("a.npz", "b.npz"):
+        assert main(["eval", str(tmp_path / "clip.csv"), str(dna), "-o", str(tmp_path / name)]) == 0
+    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
+    with zipfile.ZipFile(tmp_path / "a.npz") as archive:
+        assert archive.testzip() is None
+        assert "controls.npy" not in archive.namelist()
+
+
+def test_large_arrays_wait_in_a_file(tmp_path, monkeypatch):
+    from risorius.batch import writing
+
+    monkeypatch.setattr(writing, "_SPOOL_BYTES", 1000)
+    dna, rig, raw = random_clip(tmp_path / "clip.csv")
+    assert main(["eval", str(tmp_path / "clip.csv"), str(dna), "-o", str(tmp_path / "a.npz")]) == 0
+    with np.load(tmp_path / "a.npz") as arrays:
+        np.testing.assert_array_equal(arrays["blend_shapes"], expected(rig, raw, 0)["blend_shapes"])
+
+
+def test_quaternions(tmp_path):
+    dna, _, raw = random_clip(tmp_path / "clip.csv", "quatjoints")
+    rig = risorius.Rig(risorius.load(dna), rotation="quaternion")
+    out = tmp_path / "out.npz"
+    assert (
+        main(["eval", str(tmp_path / "clip.csv"), str(dna), "-o", str(out), "--quaternions"]) == 0
+    )
+    with np.load(out) as arrays:
+        np.testing.assert_array_equal(arrays["joints"], expected(rig, raw, 0)["joints"])
+        assert arrays["joint_columns"].tolist() == "tx ty tz qx qy qz qw sx sy sz".split()
+
+
+@pytest.mark.parametrize("quaternions", [[], ["--quaternions"]])
+def test_csv_is_what_is_not_at_rest(tmp_path, quaternions):
+    dna, rig, raw = random_clip(tmp_path / "clip.csv")
+    rotation = "quaternion" if quaternions else "euler"
+    rig = risorius.Rig(risorius.load(dna), rotation=rotation)
+    out = tmp_path / "out.csv"
+    arguments = ["eval", str(tmp_path / "clip.csv"), str(dna), "-o", str(out), "--lod", "1"]
+    assert main([*arguments, "--what", "joints,shapes,maps,controls", *quaternions]) == 0
+    header, *rows = csv.reader(out.read_text().splitlines())
+    columns = ["tx", "ty", "tz", "rx", "ry", "rz", "sx", "sy", "sz"]
+    if quaternions:
+        columns[3:6] = ["qx", "qy", "qz", "qw"]
+    poses, rest = expected(rig, raw, 1), rig.evaluate(rig.initial_raw_controls, lod=1)
+    wanted, numbers = ["time"], []
+    names = [n for n in rig.raw_control_names]
+    names += [None] * (rig.control_count - len(names))
+    definition = risorius.load(dna, layers="definition")
+    kinds = {"shape": definition.blend_shape_channel_names, "map": definition.animated_map_names}
+    identity = [c == "qw" for c in columns]
+    for (j, c), _ in np.ndenumerate(rest.joints):
+        values = poses["joints"][:, j, c]
+        if (values != identity[c]).any():
+            wanted.append(f"joint:{definition.joint_names[j]}.{columns[c]}")
+            numbers.append(values)
+    for kind, field in (("shape", "blend_shapes"), ("map", "animated_maps")):
+        for i, values in enumerate(poses[field].T):
+            if values.any():
+                wanted.append(f"{kind}:{kinds[kind][i]}")
+                numbers.append(values)
+    assert header[: len(wanted)] == wanted
+    assert len(header) > len(wanted)
+    assert all(name.startswith("control:") for name in header[len(wanted) :])
+    table = np.array(rows, np.float64)
+    np.testing.assert_array_equal(table[:, 1 : len(wanted)].astype(np.float32).T, numbers)
+    at = {f"control:{name}": i for i, name in enumerate(names) if name}
+    for column, name in enumerate(header):
+        if name in at:
+            np.testing.assert_array_equal(
+                table[:, column].astype(np.float32), poses["controls"][:, at[name]]
+            )
+
+
+def test_frames_and_rate(tmp_path):
+    ramp = write_clip(tmp_path / "ramp.csv", ["CTRL_expressions.jawOpen"], [[0, 0.25, 0.5, 1]], 10)
+    core = str(GOLDEN / "core.dna")
+    out = tmp_path / "out.npz"
+    jaw = risorius.load(core).raw_control_names.index("CTRL_expressions.jawOpen")
+    arguments = ["eval", str(ramp), core, "-o", str(out), "--what", "controls"]
+    # 10 fps to 20: the frames between are half way.
+    assert main([*arguments, "--rate", "20", "--frames", "1:6"]) == 0
+    with np.load(out) as arrays:
+        np.testing.assert_array_equal(
+            arrays["controls"][:, jaw], np.float32([0.125, 0.25, 0.375, 0.5, 0.75])
+        )
+        np.testing.assert_allclose(arrays["times"], [0.05, 0.1, 0.15, 0.2, 0.25], atol=1e-12)
+        assert arrays["rate"] == 20
+    assert main([*arguments, "--frames", "2:"]) == 0
+    with np.load(out) as arrays:
+        np.testing.assert_array_equal(arrays["controls"][:, jaw], [0.5, 1])
+        np.testing.assert_allclose(arrays["times"], [0.2, 0.3], atol=1e-12)
+
+
+def test_facts(tmp_path, capsys):
+    core = GOLDEN / "core.dna"
+    rig = risorius.Rig(risorius.load(core))
+    jaw = "CTRL_expressions.jawOpen"
+    clip = write_clip(tmp_path / "c.csv", [jaw, "head.yaw"], [[0, 1.5, -0.25], [0, 0, np.nan]])
+    out = str(tmp_path / "out.npz")
+    assert main(["eval", str(clip), str(core), "-o", out, "--json"]) == 0
+    output = capsys.readouterr()
+    facts = json.loads(output.out)
+    assert facts["frames"] == 3
+    assert facts["control_ranges"] == {jaw: [-0.25, 1.5]}
+    assert facts["out_of_range"] == [jaw]
+    assert facts["missing_controls"] == ["head.yaw"]
+    assert "1 control of the clip that the character does not have: head.yaw" in output.err
+    raw = np.zeros(4, np.float32)
+    raw[rig.raw_control_names.index(jaw)] = 1.5
+    moves = np.linalg.norm(rig.evaluate(raw).joints[:, :3].astype(float), axis=1)
+    assert facts["largest_move"] == pytest.approx(moves.max(), rel=1e-6)
+    assert facts["largest_move_joint"] == risorius.load(core).joint_names[int(moves.argmax())]
+    assert facts["largest_move_frame"] == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["-o", "out.txt"], ".npz or .csv"),
+        (["-o", "out.csv", "--compress"], "--compress"),
+        (["-o", "out.npz", "--lod", "2"], "0 to 1"),
+        (["-o", "out.npz", "--lod", "-1"], "0 to 1"),
+        (["-o", "out.npz", "--rate", "0"], "'0'"),
+        (["-o", "out.npz", "--rate", "nan"], "'nan'"),
+        (["-o", "out.npz", "--frames", "3"], "A:B"),
+        (["-o", "out.npz", "--frames", "3:3"], "A below B"),
+        (["-o", "out.npz", "--frames", "-3:3"], None),
+        (["-o", "out.npz", "--what", "bones"], "'bones'"),
+        (["-o", "out.npz", "--what", "maps,maps"], "each once"),
+        (["-o", "out.npz", "--gui"], "--gui"),
+        (["-o", "out.npz", "--explain"], "--explain"),
+        (["-o", "out.npz", "more.dna"], "CLIP DNA"),
+        (["--rate", "30"], "-o is missing"),
+        ([], "-o OUT.npz"),
+        (["-o", "clip.csv"], "INPUT itself"),
+    ],
+)
+def test_bad_command_line_is_exit_code_2(tmp_path, monkeypatch, capsys, arguments, message):
+    monkeypatch.chdir(tmp_path)
+    write_clip("clip.csv", ["CTRL_expressions.jawOpen"], [[0, 1, 0.5, 0]])
+    before = set(tmp_path.iterdir())
+    try:
+        code = main(["eval", "clip.csv", str(GOLDEN / "core.dna"), *arguments])
+    except SystemExit as error:  # argparse's own
+        code = error.code
+    assert code == 2
+    assert message is None or message in capsys.readouterr().err
+    assert set(tmp_path.iterdir()) - before <= {tmp_path / "cache"}
+
+
+@pytest.mark.parametrize(
+    ("clip", "dna", "message"),
+    [
+        ("absent.csv", "core.dna", "absent.csv: No such file"),
+        ("clip.csv", "absent.dna", "absent.dna"),
+        ("bad.csv", "core.dna", "bad.csv"),
+        ("clip.csv", "bad.csv", "bad.csv"),
+        ("empty.csv", "core.dna", "0"),
+    ],
+)
+def test_bad_input_is_exit_code_1_and_no_file(tmp_path, capsys, clip, dna, message):
+    write_clip(tmp_path / "clip.csv", ["CTRL_expressions.jawOpen"], [[0, 1]])
+    (tmp_path / "bad.csv").write_text("time,a\n0,x\n")
+    (tmp_path / "empty.csv").write_text("time,a\n")
+    dna = GOLDEN / dna if dna == "core.dna" else tmp_path / dna
+    out = tmp_path / "out" / "out.npz"
+    assert main(["eval", str(tmp_path / clip), str(dna), "-o", str(out)]) == 1
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.count("\n") == 1
+    assert not out.parent.exists()
