@@ -93,6 +93,13 @@ def forget():
     _stacks.clear()
 
 
+def forget_unused(there):
+    """Drop what is compiled of characters that are gone. Args: there  control armatures."""
+    kept = {controls.session_uid for controls in there if controls is not None}
+    for uid in [uid for uid in _stacks if uid not in kept]:
+        del _stacks[uid]
+
+
 def note_edits(actions):
     """Note that actions were edited. Returns: whether a layer of this file plays one of them."""
     for action in actions:
@@ -266,25 +273,15 @@ def _action_source(controls, live, layer, rate, _scene):
     if action is None:
         raise ValueError("choose an action")
     span = span_of(layer)
-    curves = compat.curves_for(action, controls)
-    keys = sorted({key.co[0] for curve in curves for key in curve.keyframe_points})
-    frames = logic.sample_frames(span, keys, any(_is_bent(curve) for curve in curves))
+    curves = clips.playing_curves(action, controls)
+    keys = np.unique(np.concatenate([clips.key_points(c)[0] for c in curves] or [[]]))
+    frames = logic.sample_frames(span, keys, any(clips.is_bent(c) for c in curves))
     clip = clips.clip_of_action(controls, live, action, frames, rate)
     if not clip.names:
         raise ValueError(f"{action.name} has no keys of a control of this face")
     if clip.frame_count < 2:
         return clip, _still_times(layer, rate)
     return clip, _span_times(span, rate)
-
-
-def _is_bent(curve):
-    """Whether a curve is anything else than straight lines from key to key."""
-    if len(curve.modifiers) or curve.extrapolation != "CONSTANT":
-        return True
-    count = len(curve.keyframe_points)
-    kinds = np.empty(count, np.int32)
-    curve.keyframe_points.foreach_get("interpolation", kinds)
-    return bool((kinds[: max(count - 1, 0)] != clips.LINEAR).any())
 
 
 def span_of(layer, action=None):
