@@ -4,7 +4,7 @@
 import bpy
 
 from . import native
-from .scene import handlers, layer_props
+from .scene import handlers, layer_props, live
 from .ui import (
     about,
     animation_operators,
@@ -15,11 +15,13 @@ from .ui import (
     import_operators,
     layer_panel,
     life_operators,
+    live_operators,
     operators,
     overlay,
     panels,
     scene_operators,
     shape_test,
+    ship_operators,
     speech_operators,
 )
 
@@ -32,6 +34,7 @@ CLASSES = (
     *life_operators.CLASSES,
     *scene_operators.CLASSES,
     *bake_operators.CLASSES,
+    *ship_operators.CLASSES,
     *panels.CLASSES,
     *bake_panel.CLASSES,
     *shape_test.CLASSES,
@@ -39,6 +42,7 @@ CLASSES = (
     *speech_operators.CLASSES,
     *layer_panel.CLASSES,
     *animation_panel.CLASSES,
+    *live_operators.CLASSES,
 )
 
 
@@ -57,6 +61,9 @@ def register():
     layer_props.register()
     bpy.types.WindowManager.risorius_search = _search_property()
     bpy.types.WindowManager.risorius_show_timing = overlay.show_property()
+    bpy.types.WindowManager.risorius_live = bpy.props.PointerProperty(
+        type=live_operators.RISORIUS_PG_live
+    )
     bpy.types.WindowManager.risorius_test = shape_test.weight_property()
     bpy.types.TOPBAR_MT_file_import.append(import_operators.draw_import)
     bpy.types.TOPBAR_MT_file_import.append(animation_operators.draw_import)
@@ -66,6 +73,7 @@ def register():
     if trouble:
         print(f"Risorius: {trouble}")
     handlers.register()
+    live.register()
     bpy.app.timers.register(_refresh_once, first_interval=0.0)
 
 
@@ -78,6 +86,7 @@ def unregister():
     """Undo `register` in reverse."""
     if bpy.app.timers.is_registered(_refresh_once):
         bpy.app.timers.unregister(_refresh_once)
+    live.unregister()
     handlers.unregister()
     overlay.stop()
     bpy.types.VIEW3D_MT_add.remove(import_operators.draw_add)
@@ -86,6 +95,7 @@ def unregister():
     bpy.types.TOPBAR_MT_file_import.remove(import_operators.draw_import)
     del bpy.types.WindowManager.risorius_show_timing
     del bpy.types.WindowManager.risorius_test
+    del bpy.types.WindowManager.risorius_live
     del bpy.types.WindowManager.risorius_search
     layer_props.unregister()
     for cls in reversed(CLASSES):

@@ -6,6 +6,7 @@ import time
 import bpy
 
 from ..scene import bake, parts, runtime
+from .import_operators import usable
 from .operators import FaceOperator
 
 _SLICE = 0.05  # seconds of baking between two looks at the keyboard
@@ -24,6 +25,19 @@ def selected_rigs(context):
     if not found and parts.active_rig(context) is not None:
         found = [parts.active_rig(context)]
     return [r for r in found if parts.controls_of(r) is not None and runtime.of(r) is not None]
+
+
+class FacesOperator(FaceOperator):
+    """What operators on all selected faces share."""
+
+    @classmethod
+    def poll(cls, context):
+        if not usable(cls):
+            return False
+        if not selected_rigs(context):
+            cls.poll_message_set("Select a face first.")
+            return False
+        return True
 
 
 class FrameRange:
@@ -54,7 +68,7 @@ class FrameRange:
         layout.prop(self, "step")
 
 
-class RISORIUS_OT_bake(FrameRange, FaceOperator, bpy.types.Operator):
+class RISORIUS_OT_bake(FrameRange, FacesOperator, bpy.types.Operator):
     """Write the animation of the selected faces into plain actions; the way back stays open"""
 
     bl_idname = "risorius.bake"
@@ -97,7 +111,6 @@ class RISORIUS_OT_bake(FrameRange, FaceOperator, bpy.types.Operator):
     strip: bpy.props.BoolProperty(
         name="Onto NLA Track", description="Put the actions onto new NLA tracks", default=False
     )
-    baked_too = True
     _interactive = False
 
     def invoke(self, context, _event):
@@ -183,13 +196,12 @@ class RISORIUS_OT_bake(FrameRange, FaceOperator, bpy.types.Operator):
         return False
 
 
-class RISORIUS_OT_unbake(FaceOperator, bpy.types.Operator):
+class RISORIUS_OT_unbake(FacesOperator, bpy.types.Operator):
     """Let the controls move the selected faces again, as before they were baked. What was baked is
     removed, except actions that you protected or use elsewhere"""
 
     bl_idname = "risorius.unbake"
     bl_label = "Back to Live"
-    baked_too = True
 
     def execute(self, context):
         back = [rig for rig in selected_rigs(context) if bake.unbake(context, rig)]

@@ -17,6 +17,7 @@ class RISORIUS_PT_out(FaceOnlyPanel, bpy.types.Panel):
         # A dialog for each; the defaults are those of the last time.
         column.operator_context = "INVOKE_DEFAULT"
         column.operator("risorius.bake", icon="ACTION")
+        column.operator("risorius.export_animation", icon="EXPORT")
 
 
 CLASSES = (RISORIUS_PT_out,)
