@@ -166,6 +166,7 @@ def _performance(rig, rules):
     _entry(rig, action=blink, start=6.0, extend="REPEAT", blend="ADD", controls="eye* -*squint*")
     _layers().fire(controls, "flash", 14.5, 0.9)
     _layers().fire(controls, "flash", 40.0, 0.5)
+    _layers().fire(controls, "blink", 400.0)  # long after the others are over
 
 
 def _mixer(rig, rules):
@@ -197,6 +198,7 @@ def _mixer(rig, rules):
         ],
         exclusives="default" if rules else None,
     )
+    mixer.fire("blink", 400.0 / 24)
     mixer.fire("flash", 40.0 / 24, 0.5)
     mixer.fire("flash", 14.5 / 24, 0.9)
     return mixer
@@ -210,7 +212,7 @@ def test_what_one_sees_is_what_the_mixer_computes(blinker, rules):
     scene.update(scene.controls(blinker))
     base = np.zeros(len(mixer.names), np.float32)
     base[mixer.names.index("CTRL_expressions.eyeLookUpL")] = 0.3
-    for frame in (*range(0, 60, 3), 7.25, 15.5, 15.75, 41.125):
+    for frame in (*range(0, 60, 3), 7.25, 15.5, 15.75, 41.125, 403):
         wanted = mixer.evaluate(frame / 24, base)
         np.testing.assert_allclose(_raw(blinker, frame), wanted, atol=2e-6)
     assert _value(blinker, 18.5, BLINK) > 0.85  # the flash
@@ -286,6 +288,7 @@ def test_keys_of_a_weight_go_with_their_layer(rig):
     assert bpy.ops.risorius.layer_duplicate() == {"FINISHED"}
     assert [y.name for y in controls.risorius_layers] == ["high", "high.001", "low"]
     assert _value(rig, 6, PULL) == pytest.approx(0.75)  # half of the half that was left
+    assert _value(rig, 3.5, PULL) == pytest.approx(1.0 - 0.75**2)  # its keys came along
     controls.risorius_layers_index = 0
     assert bpy.ops.risorius.layer_remove() == {"FINISHED"}
     assert _value(rig, 6, PULL) == pytest.approx(0.5)
