@@ -502,3 +502,31 @@ def test_expressions_become_pose_assets_in_catalogues(rig, tmp_path):
     assert scene.face(rig)[PULL] == pytest.approx(0.82)
     assert bpy.ops.risorius.make_pose_assets() == {"FINISHED"}
     assert len(bpy.data.actions) == count
+
+
+def test_idle_life_is_that_of_its_seed(blinker):
+    from risorius.idle import idle
+
+    entry = _entry(blinker, kind="IDLE", seed=7, start=5.0, length=240.0)
+    wanted = idle(7, 10.0)
+    for frame in (5, 33, 100, 200.5):
+        value = wanted.sample((frame - 5) / 24)[0, wanted.names.index(BLINK)]
+        assert _value(blinker, frame, BLINK) == pytest.approx(value, abs=1e-6)
+    entry.length = 0.0
+    loop = idle(7, 120.0, loop=True).curve(BLINK)
+    assert loop.max() > 0.9
+    top = int(np.argmax(loop)) / 60  # seconds
+    for turn in (-1, 0, 3):
+        frame = 5 + (top + 120.0 * turn) * 24
+        assert _value(blinker, frame, BLINK) == pytest.approx(loop.max(), abs=1e-4)
+    assert bpy.ops.risorius.layer_add(kind="IDLE") == {"FINISHED"}
+
+
+def test_idle_life_with_a_length_becomes_a_strip(blinker):
+    _entry(blinker, kind="IDLE", seed=7, start=5.0, length=240.0, extend="NOTHING")
+    frames = (3, 33, 100, 200, 260)
+    scene.controls(blinker).risorius_layer_rules = False
+    wanted = [_raw(blinker, f) for f in frames]
+    assert bpy.ops.risorius.layers_to_nla() == {"FINISHED"}
+    for frame, raw in zip(frames, wanted, strict=True):
+        np.testing.assert_allclose(_raw(blinker, frame), raw, atol=2e-6)

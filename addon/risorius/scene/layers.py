@@ -45,7 +45,7 @@ _KEY_SETTINGS = (
     "handle_right",
 )
 _BLENDS = {"OVERRIDE": "override", "ADD": "additive", "MAXIMUM": "max"}
-_IDLE_SECONDS = 600.0  # before idle life without a length comes again
+_IDLE_LOOP = 120.0  # seconds before idle life without a length comes again
 
 
 @dataclass
@@ -180,10 +180,10 @@ def _compile(controls, live, scene, maximum, made_of):
     made, places, problems = [], [], {}
     for place, layer in enumerate(of(controls)):
         try:
-            made.append(native_layer(controls, live, layer, rate, scene))
+            made.append(native_layer(controls, live, layer, rate))
             places.append(place)
-        except (ValueError, LookupError) as error:
-            problems[place] = str(error)
+        except (ValueError, LookupError, RuntimeError) as error:
+            problems[place] = str(error).rstrip(".")
     mixer = native.module().Mixer(
         names,
         ranges={label: (0.0, maximum) for label in live.labels},
@@ -214,7 +214,7 @@ def _set_weights(stack, weights):
     stack.weights = weights
 
 
-def native_layer(controls, live, layer, rate, scene):
+def native_layer(controls, live, layer, rate):
     """A layer as risorius.Layer, at full weight.
 
     Args:
@@ -222,12 +222,11 @@ def native_layer(controls, live, layer, rate, scene):
         live: the character's Runtime.
         layer: its settings.
         rate: frames per second.
-        scene: says how long idle life lasts that has no length.
 
     Raises:
         ValueError: it has nothing to play, or something that does not fit; the sentence says what.
     """
-    source, times = _SOURCES[layer.kind](controls, live, layer, rate, scene)
+    source, own = _SOURCES[layer.kind](controls, live, layer, rate)
     allowed = allowed_names(live, layer)
     names = [*live.labels, *clip_logic.HEAD]
     return native.module().Layer(
@@ -235,12 +234,14 @@ def native_layer(controls, live, layer, rate, scene):
         name=layer.name,
         blend=_BLENDS[layer.blend],
         mask=np.array([name in allowed for name in names], np.float32),
-        extend=layer.extend.lower(),
-        fade_in=layer.fade_in / rate,
-        fade_out=layer.fade_out / rate,
         mute=layer.mute,
         solo=layer.solo,
-        **times,
+        **{
+            "extend": layer.extend.lower(),
+            "fade_in": layer.fade_in / rate,
+            "fade_out": layer.fade_out / rate,
+            **own,
+        },
     )
 
 
@@ -257,9 +258,9 @@ def _still_times(layer, rate):
     return {"start": layer.start / rate, "end": (layer.start + layer.length) / rate}
 
 
-def _expression_source(_controls, live, layer, _rate, _scene):
+def _expression_source(_controls, live, layer, rate):
     pose = native.part("expressions").get(layer.expression).weights
-    return _for_face(live, pose), _still_times(layer, _rate)
+    return _for_face(live, pose), _still_times(layer, rate)
 
 
 def _for_face(live, pose):
@@ -268,7 +269,7 @@ def _for_face(live, pose):
     return {sliders[name]: value for name, value in pose.items() if name in sliders}
 
 
-def _action_source(controls, live, layer, rate, _scene):
+def _action_source(controls, live, layer, rate):
     action = layer.action
     if action is None:
         raise ValueError("choose an action")
@@ -314,8 +315,17 @@ def _span_times(span, rate):
     }
 
 
-def _idle_source(_controls, live, layer, rate, scene):
-    raise ValueError("idle life is not there")
+def _idle_source(_controls, live, layer, rate):
+    """Idle life of its length, or in a long loop that goes on for ever."""
+    endless = not layer.length
+    seconds = _IDLE_LOOP if endless else layer.length / rate
+    clip = native.part("idle").idle(layer.seed, seconds, loop=endless)
+    sliders = clips.sliders_of(live)
+    clip = clip.selected([name for name in clip.names if name in sliders])
+    times = {"start": layer.start / rate}
+    if endless:  # its loop has no begin and no end to fade at
+        times.update(extend="repeat", fade_in=0.0, fade_out=0.0)
+    return clip.replaced(names=[sliders[name] for name in clip.names]), times
 
 
 _SOURCES = {"ACTION": _action_source, "EXPRESSION": _expression_source, "IDLE": _idle_source}
