@@ -530,3 +530,22 @@ def test_idle_life_with_a_length_becomes_a_strip(blinker):
     assert bpy.ops.risorius.layers_to_nla() == {"FINISHED"}
     for frame, raw in zip(frames, wanted, strict=True):
         np.testing.assert_allclose(_raw(blinker, frame), raw, atol=2e-6)
+
+
+def test_keys_of_weights_outlive_their_action(rig, tmp_path):
+    controls = scene.controls(rig)
+    scene.submodule("scene.clips").play(rig, _action(rig, "First", jawOpen={1: 0.5, 9: 0.5}))
+    _entry(rig, kind="EXPRESSION", expression="joy")
+    for frame, value in ((1, 0.0), (11, 1.0)):
+        controls.risorius_layers[0].weight = value
+        controls.keyframe_insert("risorius_layers[0].weight", frame=frame)
+    wanted = _value(rig, 4, PULL)
+    assert 0.0 < wanted < 0.5
+    table = tmp_path / "brow.csv"
+    table.write_text("time,browDownLeft\n0,0.1\n1,0.2\n", encoding="utf-8")
+    assert bpy.ops.risorius.import_animation(filepath=str(table)) == {"FINISHED"}
+    assert _value(rig, 4, PULL) == pytest.approx(wanted)
+    assert bpy.ops.risorius.layer_add(kind="ACTION") == {"FINISHED"}
+    assert [y.name for y in controls.risorius_layers] == ["Layer", "brow"]
+    assert _value(rig, 4, PULL) == pytest.approx(wanted)
+    assert _value(rig, 4, BROW) == pytest.approx(0.1 + 0.1 * 3 / 24, abs=1e-5)

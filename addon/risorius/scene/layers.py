@@ -8,6 +8,7 @@ kept.
 
 from dataclasses import dataclass, replace
 
+import bpy
 import numpy as np
 from mathutils import Quaternion
 
@@ -131,7 +132,8 @@ def mix(seen, live, raw, head, depsgraph, maximum):
         return raw, head
     scene = depsgraph.scene
     stack = compiled(controls, live, scene, maximum)
-    weights = tuple(layer.weight for layer in of(seen))
+    there = len(of(seen)) == len(of(controls))  # else one was added, and not evaluated since
+    weights = tuple(layer.weight for layer in of(seen if there else controls))
     if stack.weights != weights:
         _set_weights(stack, weights)
     base = np.zeros(len(raw) + 3, np.float32)
@@ -482,6 +484,28 @@ def copy_keys(source, target):
         for name in _KEY_SETTINGS:
             setattr(new, name, getattr(old, name))
     target.update()
+
+
+def keep_weights(controls, before):
+    """Give the action that now plays the keys of weights that were in another one.
+
+    Args:
+        controls: control armature.
+        before: the action that it played until now, or None.
+    """
+    old = compat.bag_for(before, controls) if before is not None else None
+    curves = [c for c in old.fcurves if c.data_path.startswith(logic.COLLECTION)] if old else []
+    if not curves:
+        return
+    data = controls.animation_data
+    if data.action is None:
+        action = bpy.data.actions.new(f"{controls.name} layers")
+        compat.add_curves(action, controls)
+        compat.assign_action(data, action, compat.slot_for(action, controls))
+    new = compat.bag_for(data.action, controls).fcurves
+    for curve in curves:
+        if new.find(curve.data_path) is None:
+            copy_keys(curve, new.new(curve.data_path))
 
 
 def fire(controls, name, frame, strength=1.0):

@@ -65,6 +65,7 @@ class PlacesClip:
         notes = [*notes, *made.notes]
         if self.target == "ACTION":
             before = clips.play(rig, made.action)
+            layers.keep_weights(parts.controls_of(rig), before)
             if before is not None:
                 notes.append(f"The action {before.name} was kept.")
         elif self.target == "STRIP":
