@@ -123,7 +123,7 @@ def test_statistics_alone(tmp_path, capsys):
     fired = np.stack([p.controls for p in poses])[:, psds].any(axis=0)
     assert fired.sum() > 0
     assert job["correctives_fired"] == fired.sum()
-    assert job["missing_controls"] == ["other"]
+    assert job["unmapped_curves"] == ["other"]
     assert job["out_of_range"] == [names[2]]
     assert job["control_ranges"][names[2]] == [raw[:, 2].min(), raw[:, 2].max()]
     assert job["evaluation_seconds"] > 0

@@ -172,7 +172,9 @@ def test_facts(tmp_path, capsys):
     core = GOLDEN / "core.dna"
     rig = risorius.Rig(risorius.load(core))
     jaw = "CTRL_expressions.jawOpen"
-    clip = write_clip(tmp_path / "c.csv", [jaw, "head.yaw"], [[0, 1.5, -0.25], [0, 0, np.nan]])
+    nobody = "CTRL_expressions.nobody"
+    names = [jaw, nobody, "strange"]
+    clip = write_clip(tmp_path / "c.csv", names, [[0, 1.5, -0.25], [0, 1, 0], [1, 1, 1]])
     out = str(tmp_path / "out.npz")
     assert main(["eval", str(clip), str(core), "-o", out, "--json"]) == 0
     output = capsys.readouterr()
@@ -180,8 +182,11 @@ def test_facts(tmp_path, capsys):
     assert facts["frames"] == 3
     assert facts["control_ranges"] == {jaw: [-0.25, 1.5]}
     assert facts["out_of_range"] == [jaw]
-    assert facts["missing_controls"] == ["head.yaw"]
-    assert "1 control of the clip that the character does not have: head.yaw" in output.err
+    assert facts["missing_controls"] == [nobody]
+    assert facts["unmapped_curves"] == ["strange"]
+    assert facts["mapping"] == "controls"
+    assert f"1 control of the clip that the character does not have: {nobody}" in output.err
+    assert "1 curve of the clip that is no control and not mapped: strange" in output.err
     raw = np.zeros(4, np.float32)
     raw[rig.raw_control_names.index(jaw)] = 1.5
     moves = np.linalg.norm(rig.evaluate(raw).joints[:, :3].astype(float), axis=1)
