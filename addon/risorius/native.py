@@ -4,6 +4,7 @@
 import re
 import sys
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 
 try:
@@ -67,6 +68,25 @@ def sample_module():
     from risorius import sample
 
     return sample
+
+
+def part(name: str):
+    """A module of the `risorius` package that is loaded only where it is used.
+
+    Args:
+        name: `importing`, `speech` and the like.
+
+    Raises:
+        RuntimeError: the wheel is missing, of another version, or has no such part; the text says
+            so.
+    """
+    module()
+    try:
+        return import_module(f"risorius.{name}")
+    except ModuleNotFoundError as error:
+        if error.name != f"risorius.{name}":
+            raise
+        raise RuntimeError(f"The native module has no {name}: install the add-on anew.") from error
 
 
 def dna_error() -> type[Exception]:

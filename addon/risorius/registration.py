@@ -4,28 +4,45 @@
 import bpy
 
 from . import native
-from .scene import handlers
+from .scene import handlers, layer_props, live
 from .ui import (
     about,
+    animation_operators,
+    animation_panel,
+    bake_operators,
+    bake_panel,
     file_operators,
     import_operators,
+    layer_panel,
     life_operators,
+    live_operators,
     operators,
     overlay,
     panels,
     scene_operators,
     shape_test,
+    ship_operators,
+    speech_operators,
 )
 
 CLASSES = (
+    *layer_props.CLASSES,
     *about.CLASSES,
     *import_operators.CLASSES,
     *file_operators.CLASSES,
     *operators.CLASSES,
     *life_operators.CLASSES,
     *scene_operators.CLASSES,
+    *bake_operators.CLASSES,
+    *ship_operators.CLASSES,
     *panels.CLASSES,
+    *bake_panel.CLASSES,
     *shape_test.CLASSES,
+    *animation_operators.CLASSES,
+    *speech_operators.CLASSES,
+    *layer_panel.CLASSES,
+    *animation_panel.CLASSES,
+    *live_operators.CLASSES,
 )
 
 
@@ -41,16 +58,22 @@ def register():
     """Register classes, menus and handlers; without the native module only words."""
     for cls in CLASSES:
         bpy.utils.register_class(cls)
+    layer_props.register()
     bpy.types.WindowManager.risorius_search = _search_property()
     bpy.types.WindowManager.risorius_show_timing = overlay.show_property()
+    bpy.types.WindowManager.risorius_live = bpy.props.PointerProperty(
+        type=live_operators.RISORIUS_PG_live
+    )
     bpy.types.WindowManager.risorius_test = shape_test.weight_property()
     bpy.types.TOPBAR_MT_file_import.append(import_operators.draw_import)
+    bpy.types.TOPBAR_MT_file_import.append(animation_operators.draw_import)
     bpy.types.TOPBAR_MT_file_export.append(file_operators.draw_export)
     bpy.types.VIEW3D_MT_add.append(import_operators.draw_add)
     trouble = native.problem()
     if trouble:
         print(f"Risorius: {trouble}")
     handlers.register()
+    live.register()
     bpy.app.timers.register(_refresh_once, first_interval=0.0)
 
 
@@ -63,13 +86,17 @@ def unregister():
     """Undo `register` in reverse."""
     if bpy.app.timers.is_registered(_refresh_once):
         bpy.app.timers.unregister(_refresh_once)
+    live.unregister()
     handlers.unregister()
     overlay.stop()
     bpy.types.VIEW3D_MT_add.remove(import_operators.draw_add)
     bpy.types.TOPBAR_MT_file_export.remove(file_operators.draw_export)
+    bpy.types.TOPBAR_MT_file_import.remove(animation_operators.draw_import)
     bpy.types.TOPBAR_MT_file_import.remove(import_operators.draw_import)
     del bpy.types.WindowManager.risorius_show_timing
     del bpy.types.WindowManager.risorius_test
+    del bpy.types.WindowManager.risorius_live
     del bpy.types.WindowManager.risorius_search
+    layer_props.unregister()
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

@@ -28,3 +28,69 @@ def deselect_all(layer):
     layer.update()
     for item in layer.objects[:]:
         item.select_set(False, view_layer=layer)
+
+
+def add_curves(action, owner):
+    """Where new F-curves of an action go.
+
+    Args:
+        action: a new action.
+        owner: the datablock that it moves.
+
+    Returns:
+        What has `fcurves` and `groups`: since 4.4 the bag of a slot.
+    """
+    if not hasattr(action, "slots"):
+        return action
+    slot = action.slots.new(id_type=owner.id_type, name=owner.name)
+    strip = action.layers.new("Layer").strips.new(type="KEYFRAME")
+    return strip.channelbag(slot, ensure=True)
+
+
+def slot_for(action, owner):
+    """The slot of an action that fits a datablock, or None: before 4.4, and where none fits.
+
+    The one that it plays, else the one of its name, else the first of its kind.
+    """
+    kinds = (owner.id_type, "UNSPECIFIED")
+    slots = [s for s in getattr(action, "slots", ()) if s.target_id_type in kinds]
+    data = owner.animation_data
+    current = getattr(data, "action_slot", None) if data and data.action == action else None
+    if current is not None:
+        return current
+    named = [s for s in slots if s.name_display == owner.name]
+    return (named or slots or [None])[0]
+
+
+def bag_for(action, owner):
+    """What holds the F-curves by which an action moves a datablock, or None where there is none.
+
+    Actions as one makes them have one layer with one strip.
+    """
+    if not hasattr(action, "slots") or not len(action.layers):
+        return action if hasattr(action, "fcurves") else None
+    slot = slot_for(action, owner)
+    strips = action.layers[0].strips
+    return strips[0].channelbag(slot) if slot is not None and len(strips) else None
+
+
+def curves_for(action, owner):
+    """The F-curves by which an action moves a datablock: of one slot, where it has slots."""
+    if not hasattr(action, "slots") or not len(action.layers):
+        return list(getattr(action, "fcurves", ()))
+    slot = slot_for(action, owner)
+    bags = [s.channelbag(slot) for y in action.layers for s in y.strips] if slot else []
+    return [curve for bag in bags if bag is not None for curve in bag.fcurves]
+
+
+def assign_action(target, action, slot=None):
+    """Let an object's animation data, or an NLA strip, play an action."""
+    target.action = action
+    if slot is not None:
+        target.action_slot = slot
+
+
+def strips_of(scene):
+    """The strips of a scene's sequencer, which is made where there is none."""
+    editor = scene.sequence_editor or scene.sequence_editor_create()
+    return editor.strips if hasattr(editor, "strips") else editor.sequences

@@ -18,7 +18,7 @@ def evaluate_all(depsgraph, force=False):
         depsgraph: the evaluated dependency graph to read from.
         force: write also what seems unchanged.
     """
-    if native.problem():
+    if native.problem() or runtime.is_paused():
         return
     for rig in parts.rigs():
         evaluate(rig, depsgraph, force)
@@ -35,7 +35,7 @@ def evaluate(rig, depsgraph, force=False):
     Returns:
         Whether there was anything to write.
     """
-    controls = parts.controls_of(rig)
+    controls = None if parts.BAKED in rig else parts.controls_of(rig)  # baked: its actions move it
     live = runtime.of(rig) if controls is not None else None
     if live is None:
         return False

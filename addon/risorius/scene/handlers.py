@@ -5,7 +5,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from .. import native
-from . import copies, evaluate, heal, lods, parts, place, runtime, testing, timing
+from . import copies, evaluate, heal, layers, lods, parts, place, runtime, testing, timing
 
 _state = {"objects": -1, "busy": False}
 
@@ -38,6 +38,8 @@ def _updated(_scene, depsgraph):
     """React to edits of control armatures; writes here tag the rig only, so it ends at once."""
     # While a render runs beside the interface, only its own frames are written.
     if _state["busy"] or bpy.app.is_job_running("RENDER") or native.problem():
+        return
+    if runtime.is_paused():
         return
     _state["busy"] = True
     try:
@@ -73,12 +75,14 @@ def _notice_copies():
 
 def _edited(depsgraph):
     """The characters that the updates concern: by their controls, their body or the camera."""
-    armatures, bones_edited, camera_moved = set(), False, False
+    armatures, actions, bones_edited, camera_moved = set(), set(), False, False
     camera = depsgraph.scene.camera
     for update in depsgraph.updates:
         item = update.id.original
         if isinstance(item, bpy.types.Armature):
             bones_edited = True
+        elif isinstance(item, bpy.types.Action):
+            actions.add(item)
         elif isinstance(item, bpy.types.Object):
             if item.type == "ARMATURE":
                 armatures.add(item)
@@ -86,16 +90,18 @@ def _edited(depsgraph):
     if bones_edited:
         runtime.forget_outputs()
         heal.heal_all()
-    return [rig for rig in parts.rigs() if _concerned(rig, armatures, camera_moved)]
+    layers.note_edits(actions)
+    return [rig for rig in parts.rigs() if _concerned(rig, armatures, actions, camera_moved)]
 
 
-def _concerned(rig, armatures, camera_moved):
+def _concerned(rig, armatures, actions, camera_moved):
     controls = parts.controls_of(rig)
     hold = place.body_of(controls) if controls is not None else None
     return (
         controls in armatures
         or (hold is not None and hold.target in armatures)
         or (camera_moved and lods.by_distance(rig))
+        or (bool(actions) and controls is not None and layers.plays(controls, actions))
     )
 
 
@@ -119,6 +125,7 @@ def _restored(*_arguments):
     point to bones that are no more, and Blender dies of a look at them.
     """
     runtime.forget_outputs()
+    layers.forget()
     _state["objects"] = -1
     if native.problem():
         return
@@ -182,4 +189,5 @@ def unregister():
         present = getattr(bpy.app.handlers, name)
         if handler in present:
             present.remove(handler)
+    layers.forget()
     runtime.forget()

@@ -5,14 +5,14 @@ import numpy as np
 from mathutils import Matrix, Quaternion, Vector
 
 from ..logic.space import yaw_pitch
-from . import parts, place
+from . import layers, parts, place
 
 _STRAIGHT = Matrix.Identity(4)
 _AHEAD = Vector((0.0, -1.0, 0.0))
 
 
 def read_inputs(seen, live, depsgraph, maximum=1.0):
-    """Read the sliders and bones of an evaluated control armature.
+    """Read the sliders and bones of an evaluated control armature, with its layers above them.
 
     Args:
         seen: the evaluated control armature object.
@@ -25,18 +25,25 @@ def read_inputs(seen, live, depsgraph, maximum=1.0):
         armature's axes, without those that are straight.
     """
     bones = seen.pose.bones
-    values = dict(bones[parts.FACE].items())
-    rests = live.rests
-    raw = np.array([values.get(label, rests[i]) for i, label in enumerate(live.labels)], np.float32)
-    if not np.isfinite(raw).all():
-        np.nan_to_num(raw, copy=False, nan=0.0, posinf=0.0, neginf=0.0)
+    raw = read_sliders(seen, live)
     turns = place.body_turns(seen.original, depsgraph)
-    for name in ("neck", "head"):
-        turn = _turn(seen, bones.get(name))
+    own = {name: _turn(seen, bones.get(name)) for name in ("neck", "head")}
+    raw, own["head"] = layers.mix(seen, live, raw, own["head"], depsgraph, maximum)
+    for name, turn in own.items():
         if turn is not None:
             turns[name] = turns[name] @ turn if name in turns else turn
     _add_look(seen, live, raw, maximum)
     return raw, turns
+
+
+def read_sliders(seen, live):
+    """Read the sliders alone, float32[R]; what is no number counts as 0 or rest."""
+    values = dict(seen.pose.bones[parts.FACE].items())
+    rests = live.rests
+    raw = np.array([values.get(label, rests[i]) for i, label in enumerate(live.labels)], np.float32)
+    if not np.isfinite(raw).all():
+        np.nan_to_num(raw, copy=False, nan=0.0, posinf=0.0, neginf=0.0)
+    return raw
 
 
 def _rests(bone):

@@ -214,15 +214,20 @@ def edits_of(block, imported, deltas):
     return edits.key_edits(base, points_of(block), imported, edits.shaped(base, *deltas))
 
 
-def add_channel_key(item, rig, channel, name, deltas):
-    """A real, driven key of a channel."""
-    key = item.data.shape_keys
+def add_key(item, name, deltas):
+    """A real key of value 0. Args: deltas  (vertex indices, float32[K, 3])."""
     block = item.shape_key_add(name=name, from_mix=False)
     block.slider_min, block.slider_max = -10.0, 10.0
     block.value = 0.0
-    points = edits.shaped(points_of(key.reference_key), *deltas)
+    points = edits.shaped(points_of(item.data.shape_keys.reference_key), *deltas)
     block.points.foreach_set("co", points.ravel())
-    drive_key(key, block, rig, channel)
+    return block
+
+
+def add_channel_key(item, rig, channel, name, deltas):
+    """A real, driven key of a channel."""
+    block = add_key(item, name, deltas)
+    drive_key(item.data.shape_keys, block, rig, channel)
     return block
 
 
@@ -257,7 +262,7 @@ def _to_live(item, deltas, imported, labels):
     kept = []
     for name, channel in real_channels(item).items():
         block = key.key_blocks[name]
-        if channel not in deltas or _touched(key, block, imported, deltas[channel]):
+        if channel not in deltas or touched(key, block, imported, deltas[channel]):
             kept.append(channel)
         else:
             remove_channel_key(item, block)
@@ -276,7 +281,7 @@ def _to_live(item, deltas, imported, labels):
             item.active_shape_key_index = 0
 
 
-def _touched(key, block, imported, deltas):
+def touched(key, block, imported, deltas):
     """Whether a key of ours bears something that the channel sum cannot."""
     if block.mute or block.vertex_group or block.relative_key != key.reference_key:
         return True

@@ -28,6 +28,7 @@ KEY_NAMES = "risorius_key_names"  # on a Key in LIVE mode: names that the user g
 KEY_ORDER = "risorius_key_order"  # on a Key in LIVE mode: their order, as channels
 CHANNEL_VARIABLE = "risorius_channel"  # name of the driver variable of our keys
 TEST = "risorius_test"  # on the deforming armature: a channel's test override, see testing.py
+BAKED = "risorius_baked"  # on rig or controls: what was baked; the rig's is not live meanwhile
 MAPS = "maps"  # on the deforming armature: values of the animated maps
 CHANNELS = "channels"  # on the deforming armature: values of the channels
 FACE = "face"  # the bone of the control armature that bears the controls

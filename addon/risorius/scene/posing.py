@@ -45,13 +45,8 @@ def write(rig, live, deltas, turns, depsgraph):
         Whether Blender took them: it refuses bulk writes to overrides without a word.
     """
     bones = rig.pose.bones
-    writer = _writer(rig, live)
-    location, rotation, scale = writer.space.evaluate(deltas)
-    for name, row, share, rest in writer.turning:
-        if name in turns:
-            part = Quaternion().slerp(turns[name], share) if share < 1.0 else turns[name]
-            rotation[row] = (rest.inverted() @ part @ rest) @ Quaternion(rotation[row])
-    owned = {"location": location, "rotation_quaternion": rotation, "scale": scale}
+    writer = writer_of(rig, live)
+    owned = pose_of(writer, deltas, turns)
     if writer.buffers is None:
         for name, values in owned.items():
             bones.foreach_set(name, values.ravel())
@@ -67,6 +62,24 @@ def write(rig, live, deltas, turns, depsgraph):
     return _taken(rig, writer.buffers)
 
 
+def pose_of(writer, deltas, turns):
+    """The channels of the bones that the evaluator owns.
+
+    Args:
+        writer: see writer_of.
+        deltas, turns: as for `write`.
+
+    Returns:
+        "location", "rotation_quaternion", "scale" -> float32[n, width].
+    """
+    location, rotation, scale = writer.space.evaluate(deltas)
+    for name, row, share, rest in writer.turning:
+        if name in turns:
+            part = Quaternion().slerp(turns[name], share) if share < 1.0 else turns[name]
+            rotation[row] = (rest.inverted() @ part @ rest) @ Quaternion(rotation[row])
+    return {"location": location, "rotation_quaternion": rotation, "scale": scale}
+
+
 def _taken(rig, written):
     if not rig.override_library:
         return True
@@ -80,7 +93,8 @@ def is_there(values, name, wanted):
     return np.array_equal(got, wanted)
 
 
-def _writer(rig, live):
+def writer_of(rig, live):
+    """The Writer of an armature as it is now."""
     key = ("bones", rig.session_uid)
     kept = runtime.outputs.get(key)
     if kept is None or kept.count != len(rig.pose.bones):

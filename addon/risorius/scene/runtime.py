@@ -4,6 +4,7 @@
 Holds no Blender object: it is found anew, or rebuilt, after load, undo, append and enable.
 """
 
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -65,7 +66,22 @@ class Runtime:
 
 
 _cache = {}
+_pauses = []
 outputs = {}  # (what, session uid) -> what was last written there
+
+
+@contextmanager
+def paused():
+    """While this lasts no frame and no update brings a face up: what is read is read by others."""
+    _pauses.append(True)
+    try:
+        yield
+    finally:
+        _pauses.pop()
+
+
+def is_paused():
+    return bool(_pauses)
 
 
 def of(rig):

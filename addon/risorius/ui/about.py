@@ -9,6 +9,7 @@ import numpy as np
 
 from .. import native
 from ..scene import meshes, parts, runtime
+from . import speech_operators
 from .operators import FaceOperator
 
 
@@ -39,6 +40,8 @@ class RISORIUS_Preferences(bpy.types.AddonPreferences):
     def draw(self, _context):
         works, text = self_test()
         self.layout.label(text=text, icon="CHECKMARK" if works else "ERROR")
+        if works:
+            speech_operators.draw_preferences(self.layout)
 
 
 def describe(rig):
@@ -78,6 +81,7 @@ class RISORIUS_OT_describe(FaceOperator, bpy.types.Operator):
 
     bl_idname = "risorius.describe"
     bl_label = "What Is in It"
+    baked_too = True
     bl_options = {"REGISTER"}
 
     def execute(self, context):

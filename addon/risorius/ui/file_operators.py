@@ -20,6 +20,9 @@ def has_face(cls, context):
     if parts.active_rig(context) is None:
         cls.poll_message_set("Select a face first.")
         return False
+    if parts.BAKED in parts.active_rig(context):
+        cls.poll_message_set("This face is baked: choose Back to Live first.")
+        return False
     return True
 
 

@@ -19,6 +19,9 @@ def has_face(cls, context):
     if runtime.of(rig) is None:
         cls.poll_message_set("This face has lost the text that holds its DNA.")
         return False
+    if parts.BAKED in rig and not getattr(cls, "baked_too", False):
+        cls.poll_message_set("This face is baked: choose Back to Live first.")
+        return False
     return True
 
 

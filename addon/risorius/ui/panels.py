@@ -8,7 +8,7 @@ import bpy
 from .. import native
 from ..logic import plans, regions
 from ..scene import lods, parts, place, runtime
-from . import life_operators
+from . import bake_operators, life_operators
 
 _ICONS = {
     "brow": "MOD_CURVE",
@@ -43,7 +43,7 @@ class FaceOnlyPanel(FacePanel):
         return rig is not None and parts.controls_of(rig) is not None
 
 
-def _write(layout, text, icon="NONE"):
+def write(layout, text, icon="NONE"):
     """A sentence in as many lines as a narrow sidebar needs."""
     column = layout.column(align=True)
     column.scale_y = 0.8
@@ -60,7 +60,7 @@ class RISORIUS_PT_character(FacePanel, bpy.types.Panel):
         layout = self.layout
         trouble = native.problem()
         if trouble:
-            _write(layout, trouble, "ERROR")
+            write(layout, trouble, "ERROR")
             return
         if life_operators.draw_trouble(layout, context):
             return
@@ -73,17 +73,18 @@ class RISORIUS_PT_character(FacePanel, bpy.types.Panel):
         if live is None or controls is None:
             return  # said above
         layout.label(text=rig.name.removesuffix("_rig"), icon="USER")
+        bake_operators.draw_state(layout, rig, write)
         _draw_detail(layout, rig)
         _draw_shapes(layout, rig)
         row = layout.row(align=True)
         row.operator("risorius.reset", icon="LOOP_BACK").region = ""
         row.operator("risorius.key", text="Key All", icon="KEYFRAME_HLT").region = ""
         for warning in plans.layer_warnings(live.rig.ignored_layers):
-            _write(layout, warning, "INFO")
+            write(layout, warning, "INFO")
 
 
 def _draw_start(layout):
-    _write(layout, "No face is selected.", "INFO")
+    write(layout, "No face is selected.", "INFO")
     layout.operator("risorius.add_character", text="Add a Face", icon="USER")
     layout.operator("risorius.import_dna", text="Import DNA", icon="IMPORT")
 
@@ -147,7 +148,7 @@ class RISORIUS_PT_controls(FaceOnlyPanel, bpy.types.Panel):
             if body is not None:
                 _draw_sliders(body, face, names)
         if not shown:
-            _write(layout, "No control has these words in its name.", "INFO")
+            write(layout, "No control has these words in its name.", "INFO")
 
 
 def _draw_region_header(layout, region):

@@ -1,0 +1,493 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The layers of a character, compiled to native curves and mixed over its sliders.
+
+What is compiled is kept by the character and compared with what it was made of: a frame costs one
+look at the settings and one native call, and nothing at all without layers. No Blender object is
+kept.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from mathutils import Quaternion
+
+from .. import native
+from ..logic import clips as clip_logic
+from ..logic import layers as logic
+from . import clips, compat, parts
+
+_SETTINGS = (
+    "kind",
+    "expression",
+    "seed",
+    "blend",
+    "controls",
+    "start",
+    "scale",
+    "trim_start",
+    "trim_end",
+    "length",
+    "repeat",
+    "extend",
+    "reverse",
+    "fade_in",
+    "fade_out",
+    "mute",
+    "solo",
+)
+_KEY_SETTINGS = (
+    "co",
+    "interpolation",
+    "easing",
+    "handle_left_type",
+    "handle_right_type",
+    "handle_left",
+    "handle_right",
+)
+_BLENDS = {"OVERRIDE": "override", "ADD": "additive", "MAXIMUM": "max"}
+_IDLE_SECONDS = 600.0  # before idle life without a length comes again
+
+
+@dataclass
+class Stack:
+    """Compiled layers of a character.
+
+    Attributes:
+        made_of: what they were compiled from.
+        mixer: risorius.Mixer of the character's labels, then the head's three angles.
+        layers: risorius.Layer, bottom to top, at full weight.
+        places: of each the place in the list of settings.
+        weights: those that the mixer has now.
+        problems: sentences on layers that cannot be played, by their place.
+    """
+
+    made_of: tuple
+    mixer: object
+    layers: list
+    places: list
+    weights: tuple = ()
+    problems: dict = None
+
+
+_stacks = {}  # session uid of a control armature -> Stack
+_versions = {}  # session uid of an action -> how often it was edited
+
+
+def of(controls):
+    """The settings of all layers of a character. Args: controls  its control armature."""
+    return getattr(controls, logic.COLLECTION)
+
+
+def reactions_of(controls):
+    """The reactions that were fired."""
+    return controls.risorius_reactions
+
+
+def has_any(controls):
+    """Whether anything lies above the sliders."""
+    return bool(len(of(controls)) or len(reactions_of(controls)))
+
+
+def forget():
+    """Drop all that is compiled: after load and undo, session uids may mean others."""
+    _stacks.clear()
+
+
+def note_edits(actions):
+    """Note that actions were edited. Returns: whether a layer of this file plays one of them."""
+    for action in actions:
+        _versions[action.session_uid] = _versions.get(action.session_uid, 0) + 1
+    return bool(actions)
+
+
+def plays(controls, actions):
+    """Whether a layer of a character plays one of the actions."""
+    return any(layer.action in actions for layer in of(controls) if layer.action is not None)
+
+
+def mix(seen, live, raw, head, depsgraph, maximum):
+    """Mix the layers of a character over its sliders and its head bone.
+
+    Args:
+        seen: the evaluated control armature; its layers have the weights of this frame.
+        live: the character's Runtime.
+        raw: float32[R], the sliders.
+        head: Quaternion in the armature's axes by which the head bone is turned, or None.
+        depsgraph: its scene gives the time.
+        maximum: of the sliders.
+
+    Returns:
+        float32[R], and the head's turn.
+    """
+    controls = seen.original
+    if not has_any(controls):
+        return raw, head
+    scene = depsgraph.scene
+    stack = compiled(controls, live, scene, maximum)
+    weights = tuple(layer.weight for layer in of(seen))
+    if stack.weights != weights:
+        _set_weights(stack, weights)
+    base = np.zeros(len(raw) + 3, np.float32)
+    base[: len(raw)] = raw
+    if head is not None:
+        base[len(raw) :] = clip_logic.angles_of(np.array(head))
+    out = stack.mixer.evaluate(scene.frame_current_final / clips.frame_rate(scene), base)
+    angles = out[len(raw) :]
+    if not np.array_equal(angles, base[len(raw) :]):
+        head = Quaternion(clip_logic.quaternions(angles[None].astype(np.float64))[0])
+    return np.ascontiguousarray(out[: len(raw)]), head
+
+
+def compiled(controls, live, scene, maximum=1.0):
+    """The Stack of a character, compiled anew only where something changed."""
+    made_of = (
+        id(live),
+        maximum,
+        controls.risorius_layer_rules,
+        clips.frame_rate(scene),
+        tuple(_settings(layer) for layer in of(controls)),
+        tuple((r.name, r.frame, r.strength) for r in reactions_of(controls)),
+    )
+    stack = _stacks.get(controls.session_uid)
+    if stack is None or stack.made_of != made_of:
+        stack = _compile(controls, live, scene, maximum, made_of)
+        _stacks[controls.session_uid] = stack
+    return stack
+
+
+def _settings(layer):
+    action = layer.action
+    uid = action.session_uid if action is not None else 0
+    return (
+        *(getattr(layer, name) for name in _SETTINGS),
+        tuple(sorted(layer.regions)),
+        uid,
+        _versions.get(uid, 0),
+        tuple((point.frame, point.source) for point in layer.warp),
+    )
+
+
+def _compile(controls, live, scene, maximum, made_of):
+    names = [*live.labels, *clip_logic.HEAD]
+    rate = clips.frame_rate(scene)
+    made, places, problems = [], [], {}
+    for place, layer in enumerate(of(controls)):
+        try:
+            made.append(native_layer(controls, live, layer, rate, scene))
+            places.append(place)
+        except (ValueError, LookupError) as error:
+            problems[place] = str(error)
+    mixer = native.module().Mixer(
+        names,
+        ranges={label: (0.0, maximum) for label in live.labels},
+        exclusives="default" if controls.risorius_layer_rules else None,
+        max_fired=max(len(reactions_of(controls)), 1),
+    )
+    _fire(mixer, controls, rate, problems)
+    stack = Stack(made_of, mixer, made, places, problems=problems)
+    stack.mixer.layers = made
+    return stack
+
+
+def _fire(mixer, controls, rate, problems):
+    """Fire the reactions, last first: so none takes the voice of one that is over before it."""
+    for reaction in sorted(reactions_of(controls), key=lambda r: -r.frame):
+        try:
+            mixer.fire(reaction.name, reaction.frame / rate, reaction.strength)
+        except (ValueError, LookupError) as error:
+            problems[reaction.name] = str(error)
+
+
+def _set_weights(stack, weights):
+    """Give the layers the weights of this frame: cheap, their curves stay."""
+    stack.mixer.layers = tuple(
+        replace(layer, weight=min(max(weights[place], 0.0), 1.0))
+        for layer, place in zip(stack.layers, stack.places, strict=True)
+    )
+    stack.weights = weights
+
+
+def native_layer(controls, live, layer, rate, scene):
+    """A layer as risorius.Layer, at full weight.
+
+    Args:
+        controls: control armature.
+        live: the character's Runtime.
+        layer: its settings.
+        rate: frames per second.
+        scene: says how long idle life lasts that has no length.
+
+    Raises:
+        ValueError: it has nothing to play, or something that does not fit; the sentence says what.
+    """
+    source, times = _SOURCES[layer.kind](controls, live, layer, rate, scene)
+    allowed = allowed_names(live, layer)
+    names = [*live.labels, *clip_logic.HEAD]
+    return native.module().Layer(
+        source,
+        name=layer.name,
+        blend=_BLENDS[layer.blend],
+        mask=np.array([name in allowed for name in names], np.float32),
+        extend=layer.extend.lower(),
+        fade_in=layer.fade_in / rate,
+        fade_out=layer.fade_out / rate,
+        mute=layer.mute,
+        solo=layer.solo,
+        **times,
+    )
+
+
+def allowed_names(live, layer):
+    """What a layer may move: sliders, and the head's angles, which belong to the neck's region."""
+    regions = {region.lower() for region in layer.regions}
+    return set(logic.masked([*live.labels, *clip_logic.HEAD], regions, layer.controls))
+
+
+def _still_times(layer, rate):
+    """A pose stands always, or for its length from its start on."""
+    if not layer.length:
+        return {}
+    return {"start": layer.start / rate, "end": (layer.start + layer.length) / rate}
+
+
+def _expression_source(_controls, live, layer, _rate, _scene):
+    pose = native.part("expressions").get(layer.expression).weights
+    return _for_face(live, pose), _still_times(layer, _rate)
+
+
+def _for_face(live, pose):
+    """A pose by the labels of this face's sliders; what it does not have is left out."""
+    sliders = clips.sliders_of(live)
+    return {sliders[name]: value for name, value in pose.items() if name in sliders}
+
+
+def _action_source(controls, live, layer, rate, _scene):
+    action = layer.action
+    if action is None:
+        raise ValueError("choose an action")
+    span = span_of(layer)
+    curves = compat.curves_for(action, controls)
+    keys = sorted({key.co[0] for curve in curves for key in curve.keyframe_points})
+    frames = logic.sample_frames(span, keys, any(_is_bent(curve) for curve in curves))
+    clip = clips.clip_of_action(controls, live, action, frames, rate)
+    if not clip.names:
+        raise ValueError(f"{action.name} has no keys of a control of this face")
+    if clip.frame_count < 2:
+        return clip, _still_times(layer, rate)
+    return clip, _span_times(span, rate)
+
+
+def _is_bent(curve):
+    """Whether a curve is anything else than straight lines from key to key."""
+    if len(curve.modifiers) or curve.extrapolation != "CONSTANT":
+        return True
+    count = len(curve.keyframe_points)
+    kinds = np.empty(count, np.int32)
+    curve.keyframe_points.foreach_get("interpolation", kinds)
+    return bool((kinds[: max(count - 1, 0)] != clips.LINEAR).any())
+
+
+def span_of(layer, action=None):
+    """When a layer plays its action, or another one instead."""
+    first, last = (action or layer.action).frame_range
+    points = sorted((point.frame, point.source) for point in layer.warp)
+    warp = None
+    if len(points) > 1:
+        warp = tuple(np.array(column, np.float64) for column in zip(*points, strict=True))
+    return logic.Span(
+        layer.start,
+        min(first + layer.trim_start, last),
+        max(last - layer.trim_end, first + layer.trim_start),
+        layer.scale,
+        layer.repeat,
+        layer.reverse,
+        warp,
+    )
+
+
+def _span_times(span, rate):
+    if span.warp is not None:
+        return {"warp": (span.warp[0] / rate, span.warp[1] / rate)}
+    return {
+        "start": span.start / rate,
+        "clip_range": (span.first / rate, span.last / rate),
+        "scale": span.scale,
+        "repeat": span.repeat,
+        "reverse": span.reverse,
+    }
+
+
+def _idle_source(_controls, live, layer, rate, scene):
+    raise ValueError("idle life is not there")
+
+
+_SOURCES = {"ACTION": _action_source, "EXPRESSION": _expression_source, "IDLE": _idle_source}
+
+
+def problems(controls, live, scene):
+    """Sentences on layers that cannot be played, as last compiled."""
+    stack = compiled(controls, live, scene, parts.maximum_of(controls))
+    names = {place: layer.name for place, layer in enumerate(of(controls))}
+    return [f"{names.get(place, place)}: {words}." for place, words in stack.problems.items()]
+
+
+def known_reactions():
+    """Name -> what can be fired."""
+    return native.part("reactions").load_reactions()
+
+
+def fits(controls, action):
+    """Whether an action has keys of a slider of a character."""
+    path = parts.property_path("")[:-3]
+    return any(c.data_path.startswith(path) for c in compat.curves_for(action, controls))
+
+
+def add_warp_point(layer, frame):
+    """Pin what a layer with an action shows at a frame of the scene to that frame.
+
+    The first time its two ends are pinned too, so that nothing else changes.
+    """
+    span = span_of(layer)
+    shown = float(span.source(np.array([frame]))[0])
+    if not len(layer.warp):
+        begin, end = span.start, span.start + span.period
+        ends = (span.last, span.first) if span.reverse else (span.first, span.last)
+        for at, source in zip((begin, end), ends, strict=True):
+            _add_point(layer, at, source)
+    if all(abs(point.frame - frame) > 1e-3 for point in layer.warp):
+        _add_point(layer, frame, shown)
+
+
+def _add_point(layer, frame, source):
+    point = layer.warp.add()
+    point.frame, point.source = frame, source
+
+
+def add(controls, kind, name, **settings):
+    """Put a new layer on top of the others and make it the active one.
+
+    Args:
+        controls: control armature.
+        kind: see layer_props.KINDS.
+        name: what the list shows; numbered where a layer has it already.
+        settings: other properties of the layer.
+
+    Returns:
+        The layer.
+    """
+    taken = {layer.name for layer in of(controls)}
+    layer = of(controls).add()
+    layer.name = _free_name(name, taken)
+    layer.kind = kind
+    for key, value in settings.items():
+        setattr(layer, key, value)
+    controls.risorius_layers_index = len(of(controls)) - 1
+    controls.update_tag()
+    return layer
+
+
+def _free_name(name, taken):
+    if name not in taken:
+        return name
+    return next(n for n in (f"{name}.{i:03d}" for i in range(1, 10_000)) if n not in taken)
+
+
+def add_action(controls, action, **settings):
+    """A layer that plays an action where its keys are. Returns: the layer."""
+    first = action.frame_range[0]
+    return add(controls, "ACTION", action.name, action=action, start=first, **settings)
+
+
+def remove(controls, place):
+    """Remove a layer and the keys of its weight."""
+    count = len(of(controls))
+    of(controls).remove(place)
+    _reorder_paths(controls, [i for i in range(count) if i != place])
+    controls.risorius_layers_index = max(0, min(place, count - 2))
+    controls.update_tag()
+
+
+def move(controls, place, to):
+    """Put a layer at another place; the keys of weights go with their layers."""
+    count = len(of(controls))
+    of(controls).move(place, to)
+    order = [i for i in range(count) if i != place]
+    order.insert(to, place)
+    _reorder_paths(controls, order)
+    controls.risorius_layers_index = to
+    controls.update_tag()
+
+
+def duplicate(controls, place):
+    """Put a copy of a layer, with the keys of its weight, right above it. Returns: the copy."""
+    source = of(controls)[place]
+    name, kind = source.name, source.kind
+    add(controls, kind, name)
+    source, copy = of(controls)[place], of(controls)[-1]  # adding moved them in memory
+    for prop in source.bl_rna.properties:
+        if prop.identifier not in ("rna_type", "name", "kind", "warp"):
+            setattr(copy, prop.identifier, getattr(source, prop.identifier))
+    for point in source.warp:
+        added = copy.warp.add()
+        added.frame, added.source = point.frame, point.source
+    last = len(of(controls)) - 1
+    _copy_curves(controls, f"{logic.COLLECTION}[{place}].", f"{logic.COLLECTION}[{last}].")
+    if last != place + 1:
+        move(controls, last, place + 1)
+    return of(controls)[place + 1]
+
+
+def _curve_lists(controls):
+    """The lists of F-curves that move a control armature: its action's and its drivers."""
+    data = controls.animation_data
+    if data is None:
+        return
+    if data.action is not None and data.action.library is None:
+        bag = compat.bag_for(data.action, controls)
+        if bag is not None:
+            yield bag.fcurves
+    yield data.drivers
+
+
+def _reorder_paths(controls, order):
+    for curves in _curve_lists(controls):
+        for curve in list(curves):
+            path = logic.moved_path(curve.data_path, order)
+            if path is None:
+                curves.remove(curve)
+            elif path != curve.data_path:
+                curve.data_path = path
+
+
+def _copy_curves(controls, before, after):
+    for curves in _curve_lists(controls):
+        if not hasattr(curves, "new") or curves == controls.animation_data.drivers:
+            continue
+        for curve in [c for c in curves if c.data_path.startswith(before)]:
+            copy = curves.new(after + curve.data_path[len(before) :], index=curve.array_index)
+            copy_keys(curve, copy)
+
+
+def copy_keys(source, target):
+    """Give an F-curve without keys those of another."""
+    target.keyframe_points.add(len(source.keyframe_points))
+    for new, old in zip(target.keyframe_points, source.keyframe_points, strict=True):
+        for name in _KEY_SETTINGS:
+            setattr(new, name, getattr(old, name))
+    target.update()
+
+
+def fire(controls, name, frame, strength=1.0):
+    """Fire a reaction at a frame. Returns: its entry in the list."""
+    entry = reactions_of(controls).add()
+    entry.name, entry.frame, entry.strength = name, frame, strength
+    controls.risorius_reactions_index = len(reactions_of(controls)) - 1
+    controls.update_tag()
+    return entry
+
+
+def unfire(controls, place):
+    """Take a fired reaction out again."""
+    reactions_of(controls).remove(place)
+    controls.risorius_reactions_index = max(0, min(place, len(reactions_of(controls)) - 1))
+    controls.update_tag()

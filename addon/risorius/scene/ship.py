@@ -1,0 +1,240 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A face's animation for other programs: a baked copy for Blender's exporters, or its controls.
+
+The copy lives in a scene of its own for as long as an exporter needs it; the character itself, its
+scene and the frame that it shows are never touched.
+"""
+
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from .. import native
+from ..logic import curves
+from . import actions, bake, baked_keys, baked_tracks, meshes, parts, runtime, sampling
+
+_HEAD = ("head.yaw", "head.pitch", "head.roll")
+
+
+@dataclass(frozen=True)
+class ShipOptions:
+    """What goes out.
+
+    Attributes:
+        start, end, step: frames.
+        lod: level of detail; -1 for the one that the viewport shows.
+        wanted: some of "BONES", "SHAPES".
+        all_shapes: keep shape keys that the range does not use.
+    """
+
+    start: float = 1
+    end: float = 250
+    step: float = 1
+    lod: int = -1
+    wanted: frozenset = frozenset(("BONES", "SHAPES"))
+    all_shapes: bool = False
+
+
+def sampled(context, rigs, options):
+    """Sample characters for `copies` or `clip`; a generator like sampling.sample.
+
+    Returns:
+        (rig, level, Samples) of each.
+
+    Raises:
+        BakeError: a character is baked: what it plays is no longer what its controls say.
+        ValueError: the range is none.
+    """
+    for rig in rigs:
+        if bake.baked(rig) == bake.RESULT:
+            raise bake.BakeError(f"{rig.name} is baked: choose Back to Live first.")
+    frames = curves.frame_list(options.start, options.end, options.step)
+    levels = [bake.level_of(rig, options.lod) for rig in rigs]
+    keys = [k for rig, n in zip(rigs, levels, strict=True) for k in bake.animated_keys(rig, n)]
+    found = yield from sampling.sample(context, rigs, frames, keys)
+    return list(zip(rigs, levels, found, strict=True))
+
+
+@contextmanager
+def copies(context, characters, options):
+    """Baked copies of characters, selected, alone in a scene that is shown meanwhile.
+
+    Args:
+        context: with the window whose scene is exchanged.
+        characters: from `sampled`.
+        options: ShipOptions.
+
+    Yields:
+        The context override for an exporter, as a dict.
+    """
+    window, user = context.window, context.scene
+    before = _everything()
+    shown = window.scene if window is not None else None
+    with runtime.paused():
+        try:
+            stage = _stage(user, characters[0][2].frames)
+            for rig, level, samples in characters:
+                _copy(stage, rig, level, samples, options)
+            layer = stage.view_layers[0]
+            if window is not None:
+                window.scene = stage
+            stage.frame_set(stage.frame_start)
+            for item in layer.objects:
+                item.select_set(True, view_layer=layer)
+            layer.objects.active = layer.objects[0]
+            yield {"scene": stage, "view_layer": layer, "selected_objects": layer.objects[:]}
+        finally:
+            if shown is not None:
+                window.scene = shown
+            _remove_all_but(before)
+            runtime.forget_outputs()
+
+
+def _stage(user, frames):
+    stage = bpy.data.scenes.new("Risorius Export")
+    for name in ("fps", "fps_base"):
+        setattr(stage.render, name, getattr(user.render, name))
+    for name in ("system", "scale_length", "length_unit"):
+        setattr(stage.unit_settings, name, getattr(user.unit_settings, name))
+    stage.frame_start = int(np.floor(frames[0]))
+    stage.frame_end = int(np.ceil(frames[-1]))
+    return stage
+
+
+def _copy(stage, rig, level, samples, options):
+    """One character: armature, meshes of the level, and their actions."""
+    live = runtime.of(rig)
+    pose = baked_tracks.evaluate(live, samples, level)
+    copy = rig.copy()
+    copy.animation_data_clear()
+    copy.name = rig.name.removesuffix("_rig")
+    stage.collection.objects.link(copy)
+    _show(copy)
+    if "BONES" in options.wanted:
+        tracks = baked_tracks.rig_tracks(rig, live, samples, pose, {"BONES"}, copy)
+        _play(copy, samples.frames, tracks)
+    for item in bake.shown(rig, level):
+        made = _copy_mesh(stage, item, copy, live)
+        weights = pose.blend_shapes if "SHAPES" in options.wanted else pose.blend_shapes * 0.0
+        _shapes(made, item, live, samples, weights, options)
+        _forget(made)
+    _forget(copy)
+
+
+def _copy_mesh(stage, item, rig_copy, live):
+    made = item.copy()
+    made.data = item.data.copy()
+    made.animation_data_clear()
+    made.name = live.dna.mesh_names[item[parts.MESH]]
+    made.data.name = made.name
+    made.parent = rig_copy
+    for modifier in made.modifiers:
+        if modifier.type == "ARMATURE":
+            modifier.object = rig_copy
+    stage.collection.objects.link(made)
+    _show(made)
+    return made
+
+
+def _shapes(made, item, live, samples, weights, options):
+    """Real keys with values that are animated, and no others of ours."""
+    key = made.data.shape_keys
+    if key is None:
+        return
+    used = set(np.flatnonzero(weights.any(axis=0)).tolist())
+    wanted = set(range(weights.shape[1])) if options.all_shapes else used
+    names = baked_keys.opened(made, live, wanted)
+    key.animation_data_clear()
+    live_block = meshes.live_block(made)
+    if live_block is not None:
+        made.shape_key_remove(live_block)
+    for channel in set(names) - wanted:
+        made.shape_key_remove(key.key_blocks[names.pop(channel)])
+    if len(key.key_blocks) < 2:
+        made.shape_key_clear()
+        return
+    others = samples.others.get(item.data.shape_keys)
+    _play(key, samples.frames, baked_tracks.key_tracks(key, names, weights, others))
+
+
+def _play(owner, frames, tracks):
+    action, slot = actions.write(owner.name, owner, frames, tracks, 0.0, actions.Counts())
+    data = owner.animation_data_create()
+    data.action = action
+    if slot is not None:
+        data.action_slot = slot
+
+
+def _show(item):
+    item.hide_viewport = item.hide_render = item.hide_select = False
+    item.lock_location = item.lock_rotation = item.lock_scale = (False, False, False)
+
+
+def _forget(item):
+    """Take off what makes an object a part of a character."""
+    for name in list(item.keys()):
+        if name.startswith(("risorius_", "dna_")) or name in (parts.MAPS, parts.CHANNELS):
+            del item[name]
+
+
+def _everything():
+    """Every datablock of the file, by kind."""
+    return {
+        kind.identifier: set(getattr(bpy.data, kind.identifier))
+        for kind in bpy.data.bl_rna.properties
+        if kind.type == "COLLECTION" and kind.identifier not in ("all_ids", "shape_keys")
+    }
+
+
+def _remove_all_but(before):
+    """Remove what was made since: by us, and by an exporter that failed half-way."""
+    new = [
+        item
+        for kind, there in before.items()
+        for item in getattr(bpy.data, kind)
+        if isinstance(item, bpy.types.ID) and item not in there
+    ]
+    if new:
+        bpy.data.batch_remove(new)
+
+
+def clip(rig, samples, rate):
+    """The raw controls of a range, and how the head was turned.
+
+    Args:
+        rig: deforming armature.
+        samples: its Samples.
+        rate: frames per second of the scene.
+
+    Returns:
+        risorius.Clip, names as in the DNA (Blender's where the DNA has one twice); frame 0 of the
+        scene is its second 0.
+    """
+    live, names = runtime.of(rig), []
+    for label, name in zip(live.labels, live.dna.raw_control_names, strict=True):
+        names.append(label if name in names else name)
+    rows = samples.raw.T
+    if any("head" in turns for turns in samples.turns):
+        names += _HEAD
+        rows = np.concatenate([rows, _head_angles(samples.turns)])
+    frames = samples.frames
+    step = float(frames[1] - frames[0]) if len(frames) > 1 else 1.0
+    return native.module().Clip(
+        names, rows, rate / step, start=float(frames[0]) / rate, metadata={"source": rig.name}
+    )
+
+
+def _head_angles(turns):
+    """float32[3, N] radians: yaw to the face's own left, pitch up, roll to its own left."""
+    found = np.zeros((3, len(turns)), np.float32)
+    for number, both in enumerate(turns):
+        if "head" in both:
+            w, x, y, z = both["head"]
+            found[:, number] = (
+                np.arctan2(-2 * (x * y - w * z), 1 - 2 * (x * x + z * z)),
+                -np.arcsin(np.clip(2 * (w * x + y * z), -1.0, 1.0)),
+                -np.arctan2(2 * (x * z - w * y), 1 - 2 * (x * x + y * y)),
+            )
+    return found

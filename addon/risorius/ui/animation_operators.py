@@ -1,0 +1,351 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators that bring animation in from files and from other rigs."""
+
+from functools import cache
+from pathlib import Path
+
+import bpy
+from bpy_extras.io_utils import ImportHelper
+
+from .. import native
+from ..logic.names import printable
+from ..scene import clips, evaluate, layers, parts, retarget, runtime
+from .import_operators import explain, shown_progress
+from .operators import has_face
+
+TARGETS = (
+    ("ACTION", "Action", "As the face's active action; the one before is kept"),
+    ("STRIP", "NLA Strip", "On a new NLA track"),
+    ("LAYER", "Layer", "As a layer above what the face does already"),
+)
+RATES = (
+    ("TIME", "Keep Time", "Keys lie at their times, between frames where need be"),
+    ("SCENE", "Set Scene Rate", "The scene takes over the rate of the file"),
+    ("FRAMES", "One Key a Frame", "The curves are sampled anew at the scene's frames"),
+)
+EXTENSIONS = (
+    ".csv",
+    ".tsv",
+    ".txt",
+    ".json",
+    ".xml",
+    ".dat",
+    ".pgo",
+    ".glb",
+    ".gltf",
+    ".fbx",
+    ".rzc",
+)
+CLIP_EXTENSION = ".rzc"
+_REPORT = "risorius_report"  # on an action: words on what became of the file
+_SHOWN = 6
+
+
+class PlacesClip:
+    """Properties of all operators that end with a clip on the active face."""
+
+    target: bpy.props.EnumProperty(
+        name="As", description="How the animation is played", items=TARGETS
+    )
+    start: bpy.props.FloatProperty(
+        name="Start Frame",
+        description="Where the time 0 of the animation lies: its first frame, or its sound's begin",
+        default=1.0,
+    )
+
+    @classmethod
+    def poll(cls, context):
+        return has_face(cls, context)
+
+    def place(self, context, clip, name, notes=(), with_eyes=True):
+        """Put a clip onto the active face and report on it. Returns: its action."""
+        rig = parts.active_rig(context)
+        timing = clips.timing_of(clip, context.scene, self.start, keep_clock=True)
+        made = clips.make_action(rig, clip, timing, name, with_eyes)
+        notes = [*notes, *made.notes]
+        if self.target == "ACTION":
+            before = clips.play(rig, made.action)
+            if before is not None:
+                notes.append(f"The action {before.name} was kept.")
+        elif self.target == "STRIP":
+            clips.add_strip(rig, made.action)
+        else:
+            layers.add_action(parts.controls_of(rig), made.action)
+        context.scene.frame_end = max(context.scene.frame_end, round(made.last))
+        evaluate.bring_up(context, rig)
+        self._report_on(made, notes)
+        return made.action
+
+    def _report_on(self, made, notes):
+        if made.unknown:
+            notes.append(f"No control of this face: {', '.join(made.unknown)}.")
+        made.action[_REPORT] = "\n".join(printable(note, 4000) for note in notes)
+        for note in notes[:_SHOWN]:
+            self.report({"INFO"}, printable(note))
+        if len(notes) > _SHOWN:
+            self.report({"INFO"}, f"and {len(notes) - _SHOWN} more lines in the panel Animation")
+        span = f"frame {made.first:g} to {made.last:g}"
+        self.report({"INFO"}, f"{made.action.name}: {made.curves} curves, {span}")
+
+    def draw_place(self, layout):
+        """The properties of this class."""
+        layout.prop(self, "target")
+        layout.prop(self, "start")
+
+
+def report_of(action):
+    """What was said when an action was imported: lines."""
+    text = action.get(_REPORT, "") if action is not None else ""
+    return text.split("\n") if isinstance(text, str) and text else []
+
+
+@cache
+def _kinds():
+    kinds = native.part("importing").KINDS.items()
+    return [("AUTO", "Automatic", "Told from the file"), *((k, t, "") for k, t in kinds)]
+
+
+@cache
+def _mappings():
+    names = native.part("importing").mapping_names()
+    return [
+        ("AUTO", "Automatic", "The one that knows the file's names"),
+        ("FILE", "File", "A mapping of your own, a TOML file"),
+        *((n, n.replace("_", " ").title(), "") for n in names),
+    ]
+
+
+class RISORIUS_OT_import_animation(PlacesClip, bpy.types.Operator, ImportHelper):
+    """Bring a capture, a table of curves, a viseme track or a clip onto the active face"""
+
+    bl_idname = "risorius.import_animation"
+    bl_label = "Import Animation"
+    bl_options = {"REGISTER", "UNDO", "PRESET"}
+
+    filter_glob: bpy.props.StringProperty(
+        default=";".join(f"*{e}" for e in EXTENSIONS), options={"HIDDEN"}
+    )
+    kind: bpy.props.EnumProperty(
+        name="Kind", description="What kind of file it is", items=lambda _s, _c: _kinds()
+    )
+    mapping: bpy.props.EnumProperty(
+        name="Mapping",
+        description="Which controls the file's curves move",
+        items=lambda _s, _c: _mappings(),
+    )
+    mapping_file: bpy.props.StringProperty(
+        name="Mapping File", description="A TOML file", subtype="FILE_PATH"
+    )
+    rate_mode: bpy.props.EnumProperty(name="Rate", description="Frame rates", items=RATES)
+    file_rate: bpy.props.FloatProperty(
+        name="File Rate",
+        description="Frames per second of a file that does not say it; 0: as found",
+        min=0.0,
+        soft_max=240.0,
+    )
+    gain: bpy.props.FloatProperty(
+        name="Gain", description="Factor of all controls", default=1.0, min=0.0, soft_max=2.0
+    )
+    gains: bpy.props.StringProperty(
+        name="Gains",
+        description="Factors of single controls or patterns of their names, as "
+        "CTRL_expressions.jawOpen=1.3 *Blink*=1.1",
+    )
+    smoothing: bpy.props.FloatProperty(
+        name="Smoothing",
+        description="Seconds around each sample that are smoothed together; 0: none",
+        min=0.0,
+        soft_max=0.5,
+    )
+    use_neutral: bpy.props.BoolProperty(
+        name="Calibrate", description="Make the face of some frames of the file the neutral one"
+    )
+    neutral_first: bpy.props.IntProperty(
+        name="Neutral From", description="Sample of the file, from 0", min=0
+    )
+    neutral_last: bpy.props.IntProperty(
+        name="Neutral To", description="Last of these samples", min=0
+    )
+    use_eyes: bpy.props.BoolProperty(
+        name="Turn Eye Bones",
+        description="Where the file has the eyes' angles, turn the eye bones too",
+    )
+
+    def invoke(self, context, event):
+        if self.filepath:  # dropped onto the window
+            return self.execute(context)
+        self.start = float(context.scene.frame_start)
+        return ImportHelper.invoke(self, context, event)
+
+    def execute(self, context):
+        live = runtime.of(parts.active_rig(context))
+        try:
+            with shown_progress(context) as progress:
+                clip, notes = self._read(live)
+                progress(0.4)
+                clip = self._at_rate(context.scene, self._adjusted(clip))
+                progress(0.6)
+                self.place(context, clip, Path(self.filepath).stem, notes, self.use_eyes)
+        except (ValueError, OSError, RuntimeError) as error:
+            self.report({"ERROR"}, explain(self.filepath, error))
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+    def _read(self, live):
+        """The file as a clip of raw controls, and lines on what became of its curves."""
+        if Path(self.filepath).suffix.lower() == CLIP_EXTENSION:
+            return native.module().Clip.load(self.filepath), []
+        mapping = None if self.mapping == "AUTO" else self.mapping
+        if mapping == "FILE":
+            mapping = bpy.path.abspath(self.mapping_file)
+        clip, report = native.part("importing").import_file(
+            self.filepath,
+            live.dna.raw_control_names,
+            kind=None if self.kind == "AUTO" else self.kind,
+            mapping=mapping,
+            rate=self.file_rate or None,
+            rig=live.rig,
+            rotations="all" if self.use_eyes else "head",
+        )
+        return clip, lines_of(report)
+
+    def _adjusted(self, clip):
+        """Calibrated, smoothed and multiplied."""
+        process = native.part("importing.process")
+        if self.use_neutral:
+            last = max(self.neutral_first, self.neutral_last)
+            clip = process.calibrate(clip, self.neutral_first, last)
+        if self.smoothing > 0.0:
+            clip = process.smooth(clip, self.smoothing)
+        gains = {} if self.gain == 1.0 else dict.fromkeys(_sliders(clip), self.gain)
+        if gains:
+            clip = process.adjust(clip, gains)
+        single = _gains(self.gains)
+        return process.adjust(clip, single) if single else clip
+
+    def _at_rate(self, scene, clip):
+        if self.rate_mode == "SCENE":
+            scene.render.fps = max(1, round(clip.rate))
+            scene.render.fps_base = scene.render.fps / clip.rate
+        elif self.rate_mode == "FRAMES":
+            return clip.resampled(clips.frame_rate(scene))
+        return clip
+
+    def draw(self, _context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        self.draw_place(layout)
+        for name in ("kind", "mapping"):
+            layout.prop(self, name)
+        if self.mapping == "FILE":
+            layout.prop(self, "mapping_file")
+        for name in ("rate_mode", "file_rate", "gain", "gains", "smoothing", "use_eyes"):
+            layout.prop(self, name)
+        layout.prop(self, "use_neutral")
+        if self.use_neutral:
+            layout.prop(self, "neutral_first")
+            layout.prop(self, "neutral_last")
+
+
+def _sliders(clip):
+    """The names of a clip's curves that are no angles."""
+    return [n for n in clip.names if n.partition(".")[0] not in ("head", "eyeL", "eyeR")]
+
+
+def _gains(text):
+    """`jawOpen=1.2 mouth*=0.8` as a table. Raises: ValueError."""
+    table = {}
+    for word in text.replace(",", " ").split():
+        name, _, value = word.rpartition("=")
+        try:
+            table[name] = float(value)
+        except ValueError:
+            name = ""
+        if not name:
+            raise ValueError(f"gains: name=factor was expected, found {word}")
+    return table
+
+
+def lines_of(report):
+    """What a report of risorius.importing has to say, a line each."""
+    lines = [f"{len(report.mapped)} curves mapped by {report.mapping}."]
+    lines += [f"{head[:1].upper()}{head[1:]}: {', '.join(n)}." for head, n in report.lists()]
+    return [*lines, *(f"{note[:1].upper()}{note[1:].rstrip('.')}." for note in report.notes)]
+
+
+class RISORIUS_FH_animation(bpy.types.FileHandler):
+    """Drop a file of animation onto the 3D view"""
+
+    bl_idname = "RISORIUS_FH_animation"
+    bl_label = "Face Animation"
+    bl_import_operator = "risorius.import_animation"
+    bl_file_extensions = ".csv;.tsv;.json;.xml;.dat;.pgo;.rzc"
+
+    @classmethod
+    def poll_drop(cls, context):
+        area = context.area
+        return area is not None and area.type == "VIEW_3D" and parts.active_rig(context) is not None
+
+
+class RISORIUS_OT_import_arkit_rig(PlacesClip, bpy.types.Operator):
+    """Take over the shape-key animation of a selected object: action, NLA strips and drivers"""
+
+    bl_idname = "risorius.import_arkit_rig"
+    bl_label = "From ARKit Rig"
+    bl_options = {"REGISTER", "UNDO"}
+
+    source: bpy.props.StringProperty(
+        name="Object",
+        description="A mesh whose shape keys move; empty: the selected one, else the only one",
+        options={"SKIP_SAVE"},
+    )
+
+    @classmethod
+    def poll(cls, context):
+        if not has_face(cls, context):
+            return False
+        if not retarget.sources(context):
+            cls.poll_message_set("No other object of this scene has animated shape keys.")
+            return False
+        return True
+
+    def invoke(self, context, _event):
+        found = retarget.source_of(context)
+        self.source = found.name if found is not None else ""
+        self.start = 0.0
+        return context.window_manager.invoke_props_dialog(self)
+
+    def execute(self, context):
+        item = bpy.data.objects.get(self.source) if self.source else retarget.source_of(context)
+        if item not in retarget.sources(context):
+            self.report({"ERROR"}, "Select the object whose shape keys are animated.")
+            return {"CANCELLED"}
+        live = runtime.of(parts.active_rig(context))
+        try:
+            keys = retarget.clip_of(context, item)
+            times = keys.frame_times()
+            clip, report = native.part("importing").import_curves(
+                {name: (times, curve) for name, curve in zip(keys.names, keys.curves, strict=True)},
+                live.dna.raw_control_names,
+                source=item.name,
+            )
+            self.place(context, clip, item.name, lines_of(report))
+        except (ValueError, RuntimeError) as error:
+            self.report({"ERROR"}, explain(item.name, error))
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.prop_search(self, "source", context.scene, "objects")
+        self.draw_place(layout)
+
+
+def draw_import(self, _context):
+    """Entry of File > Import."""
+    self.layout.operator(RISORIUS_OT_import_animation.bl_idname, text="Face Animation")
+
+
+CLASSES = (RISORIUS_OT_import_animation, RISORIUS_FH_animation, RISORIUS_OT_import_arkit_rig)

@@ -1,0 +1,229 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators that bake faces to plain actions and bring them back to live."""
+
+import time
+
+import bpy
+
+from ..scene import bake, parts, runtime
+from .import_operators import usable
+from .operators import FaceOperator
+
+_SLICE = 0.05  # seconds of baking between two looks at the keyboard
+
+RANGES = (
+    ("SCENE", "Scene", "The frame range of the scene"),
+    ("PREVIEW", "Preview", "The preview range, where one is set; else that of the scene"),
+    ("CUSTOM", "Custom", "Frames of your choice"),
+)
+
+
+def selected_rigs(context):
+    """The characters of the selected objects, else the active one; linked ones are left out."""
+    found = [parts.rig_of(item) for item in context.selected_objects]
+    found = list(dict.fromkeys(r for r in found if r is not None and r.library is None))
+    if not found and parts.active_rig(context) is not None:
+        found = [parts.active_rig(context)]
+    return [r for r in found if parts.controls_of(r) is not None and runtime.of(r) is not None]
+
+
+class FacesOperator(FaceOperator):
+    """What operators on all selected faces share."""
+
+    @classmethod
+    def poll(cls, context):
+        if not usable(cls):
+            return False
+        if not selected_rigs(context):
+            cls.poll_message_set("Select a face first.")
+            return False
+        return True
+
+
+class FrameRange:
+    """The frames that an operator works on."""
+
+    range: bpy.props.EnumProperty(name="Range", items=RANGES)
+    start: bpy.props.FloatProperty(name="Start", default=1)
+    end: bpy.props.FloatProperty(name="End", default=250)
+    step: bpy.props.FloatProperty(
+        name="Step", description="Frames from key to key", default=1, min=0.01, soft_min=1
+    )
+
+    def frames(self, context):
+        """(start, end) that were chosen."""
+        scene = context.scene
+        if self.range == "CUSTOM":
+            return self.start, self.end
+        if self.range == "PREVIEW" and scene.use_preview_range:
+            return scene.frame_preview_start, scene.frame_preview_end
+        return scene.frame_start, scene.frame_end
+
+    def draw_range(self, layout):
+        """The rows of a dialog."""
+        layout.prop(self, "range")
+        if self.range == "CUSTOM":
+            layout.prop(self, "start")
+            layout.prop(self, "end")
+        layout.prop(self, "step")
+
+
+class RISORIUS_OT_bake(FrameRange, FacesOperator, bpy.types.Operator):
+    """Write the animation of the selected faces into plain actions; the way back stays open"""
+
+    bl_idname = "risorius.bake"
+    bl_label = "Bake Face"
+
+    kind: bpy.props.EnumProperty(
+        name="Bake",
+        items=(
+            (bake.RESULT, "Bones, Shapes, Maps", "The face itself: plays without the add-on"),
+            (bake.CONTROLS, "Controls", "Sliders and control bones: one clean action"),
+        ),
+    )
+    wanted: bpy.props.EnumProperty(
+        name="Parts",
+        description="What is baked; the rest stays as it stands now",
+        items=(
+            ("BONES", "Bones", "Bones of the deforming armature, and its place"),
+            ("SHAPES", "Shapes", "Shape keys of the meshes"),
+            ("MAPS", "Maps", "Values of the animated maps, which materials read"),
+        ),
+        options={"ENUM_FLAG"},
+        default={"BONES", "SHAPES", "MAPS"},
+    )
+    lod: bpy.props.IntProperty(
+        name="LOD",
+        description="-1 is the level that the viewport shows",
+        default=-1,
+        min=-1,
+        max=31,
+    )
+    error: bpy.props.FloatProperty(
+        name="Largest Error",
+        description="Leave keys out while lines between the others stay within this of every "
+        "baked value, in the units of each curve; 0 keeps a key at every frame",
+        default=0.0,
+        min=0.0,
+        soft_max=0.01,
+        precision=6,
+    )
+    strip: bpy.props.BoolProperty(
+        name="Onto NLA Track", description="Put the actions onto new NLA tracks", default=False
+    )
+    _interactive = False
+
+    def invoke(self, context, _event):
+        self._interactive = True
+        return context.window_manager.invoke_props_dialog(self)
+
+    def draw(self, _context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.prop(self, "kind")
+        self.draw_range(layout)
+        if self.kind == bake.RESULT:
+            layout.prop(self, "wanted")
+            layout.prop(self, "lod")
+        layout.prop(self, "error")
+        layout.prop(self, "strip")
+
+    def execute(self, context):
+        start, end = self.frames(context)
+        options = bake.BakeOptions(
+            self.kind,
+            start,
+            end,
+            self.step,
+            self.lod,
+            frozenset(self.wanted),
+            self.error,
+            self.strip,
+        )
+        job = bake.bake(context, selected_rigs(context), options)
+        if self._interactive and not bpy.app.background:
+            return self._begin(context, job)
+        return self._run(context, job)
+
+    def _run(self, context, job):
+        """Bake without looking up: from scripts and headless."""
+        manager = context.window_manager
+        manager.progress_begin(0, 100)
+        try:
+            while not self._step(context, job, seconds=1.0):
+                if bpy.app.background:
+                    print(f"Risorius: baking, {self._share:.0%}", flush=True)
+        finally:
+            manager.progress_end()
+        return self._result
+
+    def _begin(self, context, job):
+        manager = context.window_manager
+        self._job = job
+        self._timer = manager.event_timer_add(0.01, window=context.window)
+        manager.progress_begin(0, 100)
+        manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context, event):
+        if event.type == "ESC":
+            self._job.close()
+            self.report({"INFO"}, "Baking was ended; nothing was changed.")
+            self._result = {"CANCELLED"}
+        elif event.type != "TIMER" or not self._step(context, self._job, _SLICE):
+            return {"RUNNING_MODAL"}
+        manager = context.window_manager
+        manager.event_timer_remove(self._timer)
+        manager.progress_end()
+        return self._result
+
+    def _step(self, context, job, seconds):
+        """Bake for a while. Returns whether it is over."""
+        end = time.monotonic() + seconds
+        self._result = {"FINISHED"}
+        try:
+            while time.monotonic() < end:
+                self._share = next(job)
+        except StopIteration as finished:
+            for sentence in finished.value:
+                self.report({"INFO"}, sentence)
+            return True
+        except (bake.BakeError, ValueError) as error:
+            self.report({"ERROR"}, str(error))
+            self._result = {"CANCELLED"}
+            return True
+        context.window_manager.progress_update(self._share * 100)
+        return False
+
+
+class RISORIUS_OT_unbake(FacesOperator, bpy.types.Operator):
+    """Let the controls move the selected faces again, as before they were baked. What was baked is
+    removed, except actions that you protected or use elsewhere"""
+
+    bl_idname = "risorius.unbake"
+    bl_label = "Back to Live"
+
+    def execute(self, context):
+        back = [rig for rig in selected_rigs(context) if bake.unbake(context, rig)]
+        if not back:
+            self.report({"WARNING"}, "Nothing of the selected faces is baked.")
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
+def draw_state(layout, rig, write):
+    """What the panel says of a baked face, and the way back.
+
+    Args:
+        layout: of the panel.
+        rig: deforming armature.
+        write: function (layout, text, icon) that writes a sentence.
+    """
+    text = bake.words(rig)
+    if text:
+        box = layout.box()
+        write(box, text, "ACTION")
+        box.operator(RISORIUS_OT_unbake.bl_idname, icon="LOOP_BACK")
+
+
+CLASSES = (RISORIUS_OT_bake, RISORIUS_OT_unbake)

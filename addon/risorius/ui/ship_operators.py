@@ -1,0 +1,261 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Export of a face's animation through Blender's own exporters, and of its controls."""
+
+import csv
+from pathlib import Path
+
+import bpy
+from bpy_extras.io_utils import ExportHelper
+
+from ..scene import bake, ship
+from .bake_operators import FacesOperator, FrameRange, selected_rigs
+
+FORMATS = (
+    ("GLTF", "glTF", "Bones and shape keys, one binary .glb file"),
+    ("FBX", "FBX", "Bones and shape keys"),
+    ("USD", "USD", "Bones and shape keys"),
+    ("ALEMBIC", "Alembic", "Vertices of every frame, no bones"),
+    ("RZC", "Clip (.rzc)", "The controls, without loss and small, for any face"),
+    ("CSV", "CSV", "The controls as a plain table"),
+)
+_ENDINGS = {
+    "GLTF": ".glb",
+    "FBX": ".fbx",
+    "USD": ".usdc",
+    "ALEMBIC": ".abc",
+    "RZC": ".rzc",
+    "CSV": ".csv",
+}
+_OPERATORS = {
+    "GLTF": ("export_scene", "gltf"),
+    "FBX": ("export_scene", "fbx"),
+    "USD": ("wm", "usd_export"),
+    "ALEMBIC": ("wm", "alembic_export"),
+}
+
+
+def _settings(operator, stage):
+    """What Blender's exporter of each format is told."""
+    step = max(1, round(operator.step))
+    every = {
+        "GLTF": {
+            "export_format": "GLB",
+            "use_active_scene": True,
+            "export_animations": True,
+            "export_animation_mode": "ACTIVE_ACTIONS",
+            "export_nla_strips_merged_animation_name": stage.objects[0].name,
+            "export_frame_range": True,
+            "export_frame_step": step,
+            "export_force_sampling": True,
+            "export_optimize_animation_size": False,
+            "export_skins": True,
+            "export_all_influences": operator.influences == 0,
+            "export_influence_nb": max(operator.influences, 1),
+            "export_morph": True,
+            "export_morph_normal": False,
+            "export_rest_position_armature": True,
+            "export_apply": False,
+        },
+        "FBX": {
+            "object_types": {"ARMATURE", "MESH"},
+            "add_leaf_bones": False,
+            "use_armature_deform_only": False,
+            "bake_anim": True,
+            "bake_anim_use_all_bones": True,
+            "bake_anim_use_nla_strips": False,
+            "bake_anim_use_all_actions": False,
+            "bake_anim_force_startend_keying": True,
+            "bake_anim_step": float(step),
+            "bake_anim_simplify_factor": 0.0,
+            # With a modifier applied Blender drops the shape keys.
+            "use_mesh_modifiers": False,
+            "mesh_smooth_type": "FACE",
+        },
+        "USD": {
+            "export_animation": True,
+            "export_armatures": True,
+            "export_shapekeys": True,
+            "only_deform_bones": False,
+            "export_hair": False,
+            "export_materials": True,
+            "evaluation_mode": "RENDER",
+        },
+        "ALEMBIC": {
+            "start": stage.frame_start,
+            "end": stage.frame_end,
+            "xsamples": 1,
+            "gsamples": 1,
+            "uvs": True,
+            "normals": True,
+            "face_sets": True,
+            "as_background_job": False,
+            "evaluation_mode": "RENDER",
+        },
+    }
+    return every[operator.format]
+
+
+class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, bpy.types.Operator):
+    """Write the animation of the selected faces to a file: baked, from a copy; the scene stays as
+    it is"""
+
+    bl_idname = "risorius.export_animation"
+    bl_label = "Export Animation"
+    bl_options = {"PRESET"}
+
+    filename_ext = ".glb"
+    check_extension = None  # set by the format
+    filter_glob: bpy.props.StringProperty(
+        default="*.glb;*.fbx;*.usd;*.usdc;*.usda;*.usdz;*.abc;*.rzc;*.csv", options={"HIDDEN"}
+    )
+    format: bpy.props.EnumProperty(name="Format", items=FORMATS)
+    lod: bpy.props.IntProperty(
+        name="LOD",
+        description="-1 is the level that the viewport shows",
+        default=-1,
+        min=-1,
+        max=31,
+    )
+    wanted: bpy.props.EnumProperty(
+        name="Parts",
+        items=(
+            ("BONES", "Bones", "Animation of the bones"),
+            ("SHAPES", "Shapes", "Shape keys and their animation"),
+        ),
+        options={"ENUM_FLAG"},
+        default={"BONES", "SHAPES"},
+    )
+    all_shapes: bpy.props.BoolProperty(
+        name="All Shapes",
+        description="Write also shape keys that this range does not use",
+        default=False,
+    )
+    influences: bpy.props.IntProperty(
+        name="Joints per Vertex",
+        description="Engines take 4 or 8; 0 writes all, which is what Blender shows",
+        default=0,
+        min=0,
+        max=32,
+    )
+
+    def invoke(self, context, event):
+        rigs = selected_rigs(context)
+        if not self.filepath and rigs:
+            self.filepath = rigs[0].name.removesuffix("_rig") + _ENDINGS[self.format]
+        return ExportHelper.invoke(self, context, event)
+
+    def check(self, _context):
+        """Give the file the ending of its format while the dialog is open."""
+        if self.format == "USD" and self.filepath.endswith((".usd", ".usda", ".usdz")):
+            return False
+        changed = str(Path(self.filepath).with_suffix(_ENDINGS[self.format]))
+        if Path(self.filepath).name in ("", ".") or changed == self.filepath:
+            return False
+        self.filepath = changed
+        return True
+
+    def draw(self, _context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.prop(self, "format")
+        self.draw_range(layout)
+        if self.format not in ("RZC", "CSV"):
+            layout.prop(self, "lod")
+        if self.format in ("GLTF", "FBX", "USD"):
+            layout.prop(self, "wanted")
+            layout.prop(self, "all_shapes")
+        if self.format == "GLTF":
+            layout.prop(self, "influences")
+
+    def execute(self, context):
+        trouble = _missing(self.format)
+        if trouble:
+            self.report({"ERROR"}, trouble)
+            return {"CANCELLED"}
+        start, end = self.frames(context)
+        options = ship.ShipOptions(
+            start, end, self.step, self.lod, frozenset(self.wanted), self.all_shapes
+        )
+        try:
+            characters = _run(context, ship.sampled(context, selected_rigs(context), options))
+            written = self._write(context, characters, options)
+        except (bake.BakeError, ValueError, RuntimeError, OSError) as error:
+            self.report({"ERROR"}, _one_sentence(self.filepath, error))
+            return {"CANCELLED"}
+        self.report({"INFO"}, written)
+        return {"FINISHED"}
+
+    def _write(self, context, characters, options):
+        path = Path(bpy.path.abspath(self.filepath))
+        frames = len(characters[0][2].frames)
+        if self.format in ("RZC", "CSV"):
+            if len(characters) > 1:
+                raise ValueError("a file holds the controls of one face: select one")
+            rig, _level, samples = characters[0]
+            render = context.scene.render
+            clip = ship.clip(rig, samples, render.fps / render.fps_base)
+            _write_csv(clip, path) if self.format == "CSV" else clip.save(path)
+        else:
+            with ship.copies(context, characters, options) as override:
+                _export(context, self, override, path)
+        return f"{path.name}: {frames} frames, {path.stat().st_size:,} bytes"
+
+
+def _run(context, job):
+    """Run a generator to its end, with progress. Returns what it returns."""
+    manager = context.window_manager
+    manager.progress_begin(0, 100)
+    try:
+        while True:
+            manager.progress_update(next(job) * 100)
+    except StopIteration as finished:
+        return finished.value
+    finally:
+        manager.progress_end()
+
+
+def _missing(kind):
+    """Why this Blender cannot write a format, in one sentence; empty when it can."""
+    if kind == "RZC":
+        from .. import native
+
+        there = hasattr(native.module().Clip, "save")
+        return "" if there else "This build of Risorius cannot write .rzc files."
+    if kind not in _OPERATORS:
+        return ""
+    group, name = _OPERATORS[kind]
+    if name in dir(getattr(bpy.ops, group)):
+        return ""
+    label = next(f[1] for f in FORMATS if f[0] == kind)
+    return f"This Blender has no {label} exporter: enable its add-on, or use another build."
+
+
+def _export(context, operator, override, path):
+    group, name = _OPERATORS[operator.format]
+    function = getattr(getattr(bpy.ops, group), name)
+    known = set(function.get_rna_type().properties.keys())
+    settings = _settings(operator, override["scene"])
+    with context.temp_override(**override):
+        done = function(filepath=str(path), **{k: v for k, v in settings.items() if k in known})
+    if "FINISHED" not in done or not path.exists():
+        raise RuntimeError(f"Blender's exporter wrote nothing to {path.name}.")
+
+
+def _write_csv(clip, path):
+    """A table: the time in seconds and every control; as many digits as a float32 has."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        rows = csv.writer(file, lineterminator="\n")
+        rows.writerow(["time", *clip.names])
+        for time, values in zip(clip.frame_times().tolist(), clip.curves.T, strict=True):
+            rows.writerow([repr(time), *map(str, values)])
+
+
+def _one_sentence(path, error):
+    """What went wrong; of an exporter's traceback only the last line."""
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    useful = [x for x in lines if not x.startswith(("Location:", "File ", "Traceback"))]
+    text = (useful or ["it failed without a word"])[-1].removeprefix("Error: ").rstrip(".")
+    return f"{Path(path).name}: {text}."
+
+
+CLASSES = (RISORIUS_OT_export_animation,)

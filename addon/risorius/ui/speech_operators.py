@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Speech: a sound file becomes movement of the face, and a strip that is heard with it."""
+
+from pathlib import Path
+
+import bpy
+from bpy_extras.io_utils import ImportHelper
+
+from ..logic.clips import ClipError
+from ..scene import clips, listening
+from .animation_operators import PlacesClip
+from .import_operators import explain, usable
+
+_EXTENSIONS = (".wav", ".mp3", ".flac", ".ogg", ".m4a", ".aac", ".opus", ".mp4", ".mov", ".mkv")
+_MISSING = (
+    "Speech needs the package PocketSphinx: install it by the button in the add-on's preferences."
+)
+
+
+class RISORIUS_OT_speak(PlacesClip, bpy.types.Operator, ImportHelper):
+    """Let the active face say what is heard in a sound file; better with the words typed in"""
+
+    bl_idname = "risorius.speak"
+    bl_label = "Speak from Audio"
+    bl_options = {"REGISTER", "UNDO", "PRESET"}
+
+    filter_glob: bpy.props.StringProperty(
+        default=";".join(f"*{e}" for e in _EXTENSIONS), options={"HIDDEN"}
+    )
+    transcript: bpy.props.StringProperty(
+        name="Transcript", description="What is said, in English; empty: listen for it"
+    )
+    transcript_text: bpy.props.StringProperty(
+        name="Text", description="A text of this file that holds the transcript"
+    )
+    intensity: bpy.props.FloatProperty(
+        name="Intensity", description="Of mouth and brows", default=1.0, min=0.0, max=4.0
+    )
+    seed: bpy.props.IntProperty(name="Seed", description="Of the blinks")
+    use_blinks: bpy.props.BoolProperty(name="Blinks", default=True)
+    use_accents: bpy.props.BoolProperty(
+        name="Accents", description="Brows and head follow what is stressed", default=True
+    )
+    use_sound: bpy.props.BoolProperty(
+        name="Sound Strip", description="Add the sound to the sequencer", default=True
+    )
+
+    def invoke(self, context, event):
+        self._asynchronous = not bpy.app.background
+        self.start = float(context.scene.frame_start)
+        if self.filepath:
+            return self.execute(context)
+        return ImportHelper.invoke(self, context, event)
+
+    def execute(self, context):
+        if not listening.has_recogniser():
+            self.report({"ERROR"}, _MISSING)
+            return {"CANCELLED"}
+        text = bpy.data.texts.get(self.transcript_text) if self.transcript_text else None
+        if self.transcript_text and text is None:
+            self.report({"ERROR"}, f"There is no text {self.transcript_text}.")
+            return {"CANCELLED"}
+        self._task = listening.Task(
+            self.filepath,
+            text.as_string() if text is not None else self.transcript,
+            intensity=self.intensity,
+            seed=self.seed,
+            blinks=self.use_blinks,
+            accents=self.use_accents,
+        )
+        if not getattr(self, "_asynchronous", False):
+            self._task.run()
+            return self._finish(context)
+        self._task.start()
+        manager = context.window_manager
+        manager.progress_begin(0, 100)
+        self._timer = manager.event_timer_add(0.1, window=context.window)
+        manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context, event):
+        if event.type == "ESC":
+            self.cancel(context)
+            self.report({"WARNING"}, "Speech was cancelled.")
+            return {"CANCELLED"}
+        if event.type == "TIMER":
+            share = round(self._task.share * 100)
+            context.window_manager.progress_update(share)
+            words = f"Listening to {Path(self.filepath).name}: {share} %, Esc cancels"
+            context.workspace.status_text_set(words)
+            if not self._task.is_running():
+                self._end(context)
+                return self._finish(context)
+        return {"PASS_THROUGH"}
+
+    def cancel(self, context):
+        """Blender calls this too, when it closes."""
+        self._task.cancel()
+        self._end(context)
+
+    def _end(self, context):
+        manager = context.window_manager
+        manager.event_timer_remove(self._timer)
+        manager.progress_end()
+        context.workspace.status_text_set(None)
+
+    def _finish(self, context):
+        """Put what was made onto the face. It may have gone while the thread worked."""
+        task = self._task
+        try:
+            if task.error is not None:
+                raise task.error
+            if not type(self).poll(context):
+                self.report({"ERROR"}, "The face is no longer there.")
+                return {"CANCELLED"}
+            notes = [n for n in task.clip.metadata.get("notes", "").split("; ") if n]
+            self.place(context, task.clip, Path(self.filepath).stem, notes)
+            if self.use_sound:
+                clips.add_sound(context.scene, self.filepath, self.start)
+        except (ValueError, ClipError, OSError, RuntimeError) as error:
+            self.report({"ERROR"}, explain(self.filepath, error))
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+    def draw(self, _context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        self.draw_place(layout)
+        layout.prop(self, "transcript")
+        layout.prop_search(self, "transcript_text", bpy.data, "texts")
+        for name in ("intensity", "seed", "use_blinks", "use_accents", "use_sound"):
+            layout.prop(self, name)
+
+
+class RISORIUS_OT_install_speech(bpy.types.Operator):
+    """Download PocketSphinx (28 MB, with its model of English) for Speak from Audio"""
+
+    bl_idname = "risorius.install_speech"
+    bl_label = "Install PocketSphinx"
+
+    @classmethod
+    def poll(cls, _context):
+        if not usable(cls):
+            return False
+        if not bpy.app.online_access:
+            cls.poll_message_set("Allow online access in the preferences (System) first.")
+            return False
+        return True
+
+    def execute(self, _context):
+        try:
+            listening.install_recogniser()
+        except (RuntimeError, OSError) as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        self.report({"INFO"}, "PocketSphinx is installed.")
+        return {"FINISHED"}
+
+
+def draw_preferences(layout):
+    """Whether speech works, and the button that makes it work."""
+    if listening.has_recogniser():
+        layout.label(text="Speak from Audio is ready.", icon="CHECKMARK")
+        return
+    layout.label(text="Speak from Audio needs the package PocketSphinx.", icon="INFO")
+    layout.operator(RISORIUS_OT_install_speech.bl_idname, icon="IMPORT")
+
+
+CLASSES = (RISORIUS_OT_speak, RISORIUS_OT_install_speech)

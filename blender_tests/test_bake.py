@@ -1,0 +1,349 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Baked faces move as the live ones did, by plain actions alone, and come back as they were."""
+
+import addon_utils
+import bpy
+import numpy as np
+import pytest
+from support import scene
+from support.animation import animate
+
+NEAR = 1e-5  # of the size: what a bake may move a vertex by
+FRAMES = (1, 2, 3, 4, 6, 8, 10)
+
+
+def _face(dna_file, mode="AUTO", **options):
+    rig = scene.load(dna_file, mode, **options)
+    animate(rig)
+    return rig
+
+
+def _shown(rig, frame, whole=True):
+    """Vertices and maps at a frame."""
+    bpy.context.scene.frame_set(int(frame), subframe=frame - int(frame))
+    shown = [m for _, m in sorted(scene.meshes(rig).items()) if not m.hide_viewport]
+    return np.concatenate([scene.evaluated(m) for m in shown]), list(rig["maps"])
+
+
+def _film(rig, frames=FRAMES):
+    return [_shown(rig, f) for f in frames]
+
+
+def _assert_same(film, wanted, near=NEAR):
+    for (points, maps), (points_wanted, maps_wanted) in zip(film, wanted, strict=True):
+        size = np.ptp(points_wanted, axis=0).max()
+        np.testing.assert_allclose(points, points_wanted, rtol=0, atol=near * size)
+        np.testing.assert_allclose(maps, maps_wanted, atol=near)
+
+
+def _bake(rig=None, **options):
+    if rig is not None:
+        bpy.context.view_layer.objects.active = scene.controls(rig)
+    settings = {"range": "CUSTOM", "start": 1, "end": 10, **options}
+    assert bpy.ops.risorius.bake(**settings) == {"FINISHED"}
+
+
+def _state(rig):
+    """All that animates a character, and its shape keys, as plain values."""
+    owners = [rig, scene.controls(rig)]
+    owners += [m.data.shape_keys for m in scene.meshes(rig).values() if m.data.shape_keys]
+    found = []
+    for owner in owners:
+        data = owner.animation_data
+        if data is None:
+            found.append(None)
+            continue
+        slot = getattr(data, "action_slot", None)
+        found.append(
+            (
+                data.action.name if data.action else None,
+                slot.identifier if slot else None,
+                data.use_nla,
+                round(data.action_influence, 6),
+                data.action_blend_type,
+                [(t.name, t.mute, t.is_solo, len(t.strips)) for t in data.nla_tracks],
+                [(c.data_path, c.array_index, c.mute, c.driver.is_valid) for c in data.drivers],
+            )
+        )
+    blocks = [
+        [(b.name, b.mute) for b in m.data.shape_keys.key_blocks]
+        for m in scene.meshes(rig).values()
+        if m.data.shape_keys
+    ]
+    shown = [(m.hide_viewport, m.hide_render) for m in scene.meshes(rig).values()]
+    return found, blocks, shown
+
+
+def test_a_baked_face_moves_as_the_live_one(mode, dna_file):
+    rig = _face(dna_file, mode)
+    wanted = _film(rig)
+    _bake()
+    _assert_same(_film(rig), wanted)
+    assert np.abs(wanted[0][0] - wanted[3][0]).max() > 1e-3  # it does move
+
+
+def test_it_plays_without_the_add_on_and_controls_move_it_no_more(mode, dna_file):
+    rig = _face(dna_file, mode)
+    wanted = _film(rig)
+    _bake()
+    addon_utils.disable(scene.MODULE)
+    _assert_same(_film(rig), wanted)
+    addon_utils.enable(scene.MODULE)
+    bpy.context.scene.frame_set(4)
+    scene.controls(rig).animation_data.action = None
+    scene.set_controls(rig, jawOpen=0.9)
+    bpy.context.scene.frame_set(3)
+    _assert_same(_film(rig), wanted)
+
+
+def test_back_to_live_is_exact_also_after_save_and_load(mode, dna_file, tmp_path):
+    rig = _face(dna_file, mode)
+    wanted, before, counts = _film(rig), _state(rig), scene.counts()
+    _bake()
+    assert _state(rig) != before
+    blend = tmp_path / "baked.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+    bpy.ops.wm.open_mainfile(filepath=str(blend))
+    rig = bpy.data.objects["Small_rig"]
+    _assert_same(_film(rig), wanted)
+    assert bpy.ops.risorius.unbake() == {"FINISHED"}
+    assert _state(rig) == before
+    _assert_same(_film(rig), wanted, near=0)
+    assert scene.counts() == counts
+    scene.controls(rig).animation_data.action = None
+    bpy.ops.risorius.reset()
+    scene.set_controls(rig, jawOpen=0.35)
+    raw = scene.raw_of(rig, dna_file)
+    assert scene.error_against_oracle(rig, dna_file, raw) < scene.TOLERANCE
+
+
+def _complicate(rig):
+    """NLA, a driver, a constraint, a body, an own bone, own shape keys: all at once."""
+    controls = scene.controls(rig)
+    data = controls.animation_data
+    base = data.action
+    track = data.nla_tracks.new()
+    strip = track.strips.new("base", 1, base)
+    strip.influence = 0.75
+    data.action = None
+    controls.location = (0.0, 0.0, 0.1)
+    for frame, x in ((2, 0.0), (9, 0.3)):
+        controls.location.x = x
+        controls.keyframe_insert("location", frame=frame)
+    data.action_blend_type = "ADD"
+    curve = scene.face(rig).driver_add('["CTRL_expressions.browDownL"]')
+    curve.driver.expression = "frame / 20"
+    empty = bpy.data.objects.new("Target", None)
+    bpy.context.scene.collection.objects.link(empty)
+    for frame, y in ((1, 0.0), (10, 0.2)):
+        empty.location.x = y
+        empty.keyframe_insert("location", frame=frame)
+    follow = controls.pose.bones["eyes"].constraints.new("COPY_LOCATION")
+    follow.target, follow.influence = empty, 0.5
+    own = rig.pose.bones["user_joint"]
+    for frame, angle in ((1, 0.0), (10, 1.0)):
+        own.rotation_mode = "XYZ"
+        own.rotation_euler.z = angle
+        own.keyframe_insert("rotation_euler", frame=frame)
+    mesh = scene.meshes(rig)[0]
+    mine = mesh.shape_key_add(name="Mine", from_mix=False)
+    mine.points[3].co.z += 0.05
+    for frame, value in ((1, 0.0), (10, 1.0)):
+        mine.value = value
+        mine.keyframe_insert("value", frame=frame)
+    scene.update(controls, rig)
+
+
+def test_nla_drivers_constraints_and_the_users_own_animation_are_baked(mode, dna_file):
+    rig = _face(dna_file, mode)
+    _complicate(rig)
+    wanted, before = _film(rig), _state(rig)
+    _bake()
+    _assert_same(_film(rig), wanted)
+    assert bpy.ops.risorius.unbake() == {"FINISHED"}
+    assert _state(rig) == before
+    _assert_same(_film(rig), wanted, near=0)
+
+
+def test_baked_controls_are_one_clean_action(mode, dna_file):
+    rig = _face(dna_file, mode)
+    _complicate(rig)
+    wanted, before = _film(rig), _state(rig)
+    _bake(kind="CONTROLS")
+    data = scene.controls(rig).animation_data
+    assert not data.use_nla
+    assert all(c.mute for c in data.drivers)
+    paths = {c.data_path for c in scene.curves(scene.controls(rig))}
+    assert 'pose.bones["face"]["CTRL_expressions.browDownL"]' in paths
+    assert 'pose.bones["face"]["CTRL_expressions.mouthCornerPullR"]' not in paths  # at rest
+    _assert_same(_film(rig), wanted)
+    assert bpy.ops.risorius.unbake() == {"FINISHED"}
+    assert _state(rig) == before
+    _assert_same(_film(rig), wanted, near=0)
+
+
+def test_onto_an_nla_track(dna_file):
+    rig = _face(dna_file)
+    wanted, before = _film(rig), _state(rig)
+    _bake(strip=True, start=1, end=10)
+    assert rig.animation_data.action is None
+    assert [t.name for t in rig.animation_data.nla_tracks] == ["Small_baked"]
+    _assert_same(_film(rig), wanted)
+    bpy.ops.risorius.unbake()
+    _bake(kind="CONTROLS", strip=True)
+    _assert_same(_film(rig), wanted)
+    bpy.ops.risorius.unbake()
+    assert _state(rig) == before
+
+
+def test_left_out_keys_stay_within_the_error(dna_file):
+    rig = _face(dna_file)
+    _bake(step=0.25)
+    full = {(c.data_path, c.array_index): c for c in scene.curves(rig)}
+    every = np.arange(1, 10.01, 0.25)
+    wanted = {k: np.array([c.evaluate(f) for f in every]) for k, c in full.items()}
+    count = sum(len(c.keyframe_points) for c in full.values())
+    bpy.ops.risorius.unbake()
+    _bake(step=0.25, error=1e-3)
+    found = {(c.data_path, c.array_index): c for c in scene.curves(rig)}
+    assert set(found) == set(full)
+    worst = 0.0
+    for key, curve in found.items():
+        worst = max(worst, np.abs([curve.evaluate(f) for f in every] - wanted[key]).max())
+        assert {p.interpolation for p in curve.keyframe_points} == {"LINEAR"}
+    assert 0.0 < worst <= 1e-3
+    assert sum(len(c.keyframe_points) for c in found.values()) < 0.6 * count
+
+
+def test_reduction_holds_its_bound_on_any_curve():
+    curves = scene.submodule("logic.curves")
+    random = np.random.default_rng(3)
+    frames = np.cumsum(random.uniform(0.2, 2.0, 400))
+    values = np.cumsum(random.normal(0, 0.1, (400, 60)), axis=0).astype(np.float32)
+    values[:, 40:] = np.sin(frames / 9)[:, None] * np.arange(1, 21) * 50  # large numbers
+    values[:, 0], values[:, 1] = 7.0, frames  # still, and a line
+    for error in (1e-6, 1e-3, 0.05, 1.0):
+        keep = curves.reduce_keys(frames, values, error)
+        for i in range(values.shape[1]):
+            at = keep[:, i]
+            line = np.interp(frames, frames[at], values[at, i])
+            assert np.abs(line - values[:, i]).max() <= error * 1.0000001, (error, i)
+    assert keep[:, 0].sum() == 1
+    assert curves.reduce_keys(frames, values, 1e-3)[:, 1].sum() == 2
+    assert curves.reduce_keys(frames, values)[:, 2:].all()
+
+
+def test_sampling_is_frame_stepping_and_touches_nothing(dna_file):
+    rig = _face(dna_file)
+    _complicate(rig)
+    bpy.context.scene.frame_set(7)
+    values, counts = dict(scene.face(rig).items()), scene.counts()
+    frames = np.array([1.0, 2.5, 4.0, 10.0])
+    sampling, inputs = scene.submodule("scene.sampling"), scene.submodule("scene.inputs")
+    job = sampling.sample(bpy.context, [rig], frames)
+    while True:
+        try:
+            next(job)
+        except StopIteration as finished:
+            (got,) = finished.value
+            break
+    assert bpy.context.scene.frame_current == 7
+    assert dict(scene.face(rig).items()) == values
+    assert scene.counts() == counts
+    live = scene.submodule("scene.runtime").of(rig)
+    for number, frame in enumerate(frames):
+        bpy.context.scene.frame_set(int(frame), subframe=frame % 1)
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        seen = scene.controls(rig).evaluated_get(depsgraph)
+        raw, turns = inputs.read_inputs(seen, live, depsgraph)
+        np.testing.assert_array_equal(got.raw[number], raw)
+        assert got.turns[number] == turns
+        np.testing.assert_array_equal(got.places[number], np.array(seen.matrix_world))
+    assert np.ptp(got.raw[:, 3]) > 0.1
+    assert np.ptp(got.places[:, 0, 3]) > 0.1
+
+
+def test_a_bake_that_is_ended_changes_nothing(dna_file):
+    rig = _face(dna_file)
+    before, counts = _state(rig), scene.counts()
+    bake = scene.submodule("scene.bake")
+    job = bake.bake(bpy.context, [rig], bake.BakeOptions(end=10))
+    assert 0 < next(job) < 1
+    assert next(job) < 1
+    job.close()
+    assert (_state(rig), scene.counts()) == (before, counts)
+    assert not bake.baked(rig)
+
+
+def test_level_of_detail_and_parts(dna_file):
+    rig = _face(dna_file)
+    wanted = _film(rig)
+    _bake(wanted={"BONES"})
+    assert scene.meshes(rig)[0].data.shape_keys.animation_data is None or not (
+        scene.meshes(rig)[0].data.shape_keys.animation_data.action
+    )
+    assert not any("maps" in c.data_path for c in scene.curves(rig))
+    film = _film(rig)
+    assert np.abs(film[0][0] - film[3][0]).max() > 1e-3
+    bpy.ops.risorius.unbake()
+    _assert_same(_film(rig), wanted, near=0)
+
+
+def test_all_selected_faces_in_one_call_and_one_undo_step(dna_file):
+    bpy.context.preferences.edit.use_global_undo = True
+    rigs = [_face(dna_file), _face(dna_file, "KEYS")]
+    scene.controls(rigs[1]).location.x = 1.0
+    films = [_film(rig) for rig in rigs]
+    for rig in rigs:
+        scene.controls(rig).select_set(True)
+    bpy.ops.ed.undo_push(message="before")
+    _bake()
+    assert all("risorius_baked" in rig for rig in rigs)
+    for rig, film in zip(rigs, films, strict=True):
+        _assert_same(_film(rig), film)
+    bpy.ops.ed.undo_push(message="after")
+    bpy.ops.ed.undo()
+    rigs = [bpy.data.objects[n] for n in ("Small_rig", "Small.001_rig")]
+    assert not any("risorius_baked" in rig for rig in rigs)
+    bpy.context.view_layer.update()
+    for rig, film in zip(rigs, films, strict=True):
+        _assert_same(_film(rig), film)
+
+
+def test_an_edited_baked_key_stays_a_real_key(dna_file):
+    rig = _face(dna_file, "LIVE")
+    mesh = scene.meshes(rig)[0]
+    _bake()
+    block = mesh.data.shape_keys.key_blocks["jaw"]
+    block.points[5].co.z += 0.02
+    bpy.ops.risorius.unbake()
+    names = [b.name for b in mesh.data.shape_keys.key_blocks]
+    assert names == ["Basis", "<channel sum>", "jaw"]
+    bad, _seen = scene.invalid_drivers()
+    assert not bad
+    bpy.context.scene.frame_set(5)
+    assert mesh.data.shape_keys.key_blocks["jaw"].value == pytest.approx(1.0)
+
+
+def test_what_cannot_be_baked_says_so(dna_file):
+    rig = _face(dna_file)
+    _bake()
+    with pytest.raises(RuntimeError, match="baked already: choose Back to Live first"):
+        bpy.ops.risorius.bake()
+    with pytest.raises(RuntimeError, match="This face is baked"):
+        bpy.ops.risorius.set_shape_mode(mode="KEYS")
+    bpy.ops.risorius.unbake()
+    with pytest.raises(RuntimeError, match="ends at frame 2, before it starts at 5"):
+        bpy.ops.risorius.bake(range="CUSTOM", start=5, end=2)
+    with pytest.raises(RuntimeError, match="Level 9 was not built"):
+        bpy.ops.risorius.bake(lod=9)
+    data = scene.controls(rig).animation_data
+    data.nla_tracks.new().strips.new("base", 1, data.action)
+    data.action = None
+    data.nla_tracks[0].select = data.nla_tracks[0].strips[0].select = True
+    data.use_tweak_mode = True
+    if data.use_tweak_mode:
+        with pytest.raises(RuntimeError, match="tweak mode"):
+            bpy.ops.risorius.bake(kind="CONTROLS")
+    else:
+        pytest.fail("Blender did not enter the tweak mode")

@@ -1,0 +1,227 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Exported animation comes back from the file as the same vertices, and nothing is left behind."""
+
+import csv
+import json
+import struct
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Vector
+from mathutils.kdtree import KDTree
+from support import scene
+from support.animation import animate
+
+FRAMES = (1, 3, 5, 8, 10)
+ENDINGS = {"GLTF": "glb", "FBX": "fbx", "USD": "usdc", "ALEMBIC": "abc"}
+# Of the head's size, by what each file holds.
+NEAR = {
+    "ALEMBIC": 5e-6,  # the vertices themselves: a float32 at 1.6 m is 6e-7 of a head wide
+    "GLTF": 2e-5,  # float32 joints at every frame, weights normalised anew, axes turned
+    "FBX": 2e-5,  # the same, rotations as Euler angles in degrees
+    # Joint scales are half floats: 2**-11 of the distance to the joint, for two joints in a row.
+    "USD": 1e-3,
+}
+
+
+def _film(items, frames=FRAMES):
+    film = []
+    for frame in frames:
+        bpy.context.scene.frame_set(frame)
+        film.append([scene.evaluated(i) for i in items])
+    return film
+
+
+def _export(kind, tmp_path, **options):
+    path = tmp_path / f"out.{ENDINGS.get(kind, kind.lower())}"
+    settings = {"range": "CUSTOM", "start": 1, "end": 10, "format": kind, **options}
+    done = bpy.ops.risorius.export_animation(filepath=str(path), **settings)
+    assert done == {"FINISHED"}
+    return path
+
+
+def _import(kind, path):
+    """The meshes of a file."""
+    before = set(bpy.data.objects)
+    if kind == "GLTF":
+        bpy.ops.import_scene.gltf(filepath=str(path), disable_bone_shape=True)
+    elif kind == "FBX":
+        bpy.ops.import_scene.fbx(filepath=str(path), anim_offset=0.0, ignore_leaf_bones=False)
+    elif kind == "USD":
+        bpy.ops.wm.usd_import(filepath=str(path))
+    else:
+        bpy.ops.wm.alembic_import(filepath=str(path), as_background_job=False)
+    return [o for o in bpy.data.objects if o not in before and o.type == "MESH"]
+
+
+def _partner(points, wanted):
+    """For each wanted vertex the nearest imported one: some formats split or sort vertices."""
+    tree = KDTree(len(points))
+    for i, point in enumerate(points):
+        tree.insert(Vector(point), i)
+    tree.balance()
+    return np.array([tree.find(Vector(p))[1] for p in wanted])
+
+
+def _error(film, wanted):
+    """Largest distance over the size of the head; vertices are matched at the first frame."""
+    size = max(np.ptp(p, axis=0).max() for p in wanted[0])
+    points = [np.concatenate(meshes) for meshes in film]
+    target = [np.concatenate(meshes) for meshes in wanted]
+    rows = _partner(points[0], target[0])
+    return max(np.abs(p[rows] - t).max() / size for p, t in zip(points, target, strict=True))
+
+
+@pytest.mark.parametrize("kind", ENDINGS)
+def test_the_file_gives_the_same_vertices(kind, dna_file, tmp_path):
+    rig = scene.load(dna_file)
+    animate(rig)
+    shown = [m for m in scene.meshes(rig).values() if 0 in list(m["dna_lods"])]
+    wanted = _film(shown)
+    assert max(np.abs(a - b).max() for a, b in zip(wanted[0], wanted[2], strict=True)) > 0.01
+    counts = scene.counts()
+    path = _export(kind, tmp_path)
+    assert scene.counts() == counts
+    found = _import(kind, path)
+    assert len(found) == len(shown)
+    assert _error(_film(found), wanted) < NEAR[kind]
+
+
+def _everywhere(rig):
+    """What an export must not touch."""
+    layer = bpy.context.view_layer
+    return (
+        scene.counts(),
+        bpy.context.scene.name,
+        bpy.context.scene.frame_current,
+        [o.name for o in layer.objects if o.select_get()],
+        layer.objects.active.name,
+        sorted(o.name for o in bpy.data.objects),
+        sorted(rig.keys()),
+        dict(scene.face(rig).items()),
+        [(m.hide_viewport, m.data.name) for m in scene.meshes(rig).values()],
+        rig.animation_data.action,
+        list(rig["maps"]),
+        scene.snapshot(rig).tobytes(),
+    )
+
+
+def _json_of(path):
+    """The JSON of a .glb file."""
+    content = path.read_bytes()
+    length, _kind = struct.unpack_from("<II", content, 12)
+    return json.loads(content[20 : 20 + length])
+
+
+@pytest.mark.parametrize("kind", ["GLTF", "FBX", "USD", "ALEMBIC", "CSV"])
+def test_the_scene_stays_untouched_also_after_an_error(kind, dna_file, tmp_path):
+    rig = scene.load(dna_file, "KEYS" if kind == "FBX" else "LIVE")
+    animate(rig)
+    bpy.context.scene.frame_set(4)
+    before = _everywhere(rig)
+    _export(kind, tmp_path)
+    assert _everywhere(rig) == before
+    (tmp_path / "file").write_text("no folder")
+    with pytest.raises(RuntimeError, match=r"^Error: [^\n]+\n?$"):
+        _export(kind, tmp_path / "file")
+    assert _everywhere(rig) == before
+    scene.set_controls(rig, browDownL=0.5)
+    raw = scene.raw_of(rig, dna_file)
+    rig_head = scene.controls(rig).pose.bones["head"]
+    rig_head.rotation_euler = (0, 0, 0)
+    scene.controls(rig).animation_data_clear()
+    scene.update(scene.controls(rig))
+    assert scene.error_against_oracle(rig, dna_file, raw) < scene.TOLERANCE
+
+
+@pytest.mark.parametrize("kind", ["GLTF", "FBX"])
+def test_a_face_that_walks_and_a_part_of_the_range(kind, dna_file, tmp_path):
+    rig = scene.load(dna_file)
+    controls = animate(rig)
+    for frame, x in ((1, 0.0), (10, 0.4)):
+        controls.location.x = x
+        controls.rotation_euler.z = 3 * x
+        controls.keyframe_insert("location", frame=frame)
+        controls.keyframe_insert("rotation_euler", frame=frame)
+    frames = (3, 5, 8)
+    wanted = _film([scene.meshes(rig)[0], scene.meshes(rig)[1]], frames)
+    path = _export(kind, tmp_path, start=3, end=8)
+    assert _error(_film(_import(kind, path), frames), wanted) < NEAR[kind]
+
+
+def test_options_of_gltf_reach_the_file(dna_file, tmp_path):
+    rig = scene.load(dna_file, lods=(True, True, *[False] * 6))
+    animate(rig)
+
+    def parts(**options):
+        found = _json_of(_export("GLTF", tmp_path, **options))
+        first = found["meshes"][0]
+        attributes = first["primitives"][0]["attributes"]
+        keys = first.get("extras", {}).get("targetNames", [])
+        paths = {c["target"]["path"] for a in found.get("animations", ()) for c in a["channels"]}
+        return found, attributes, keys, paths
+
+    found, attributes, keys, paths = parts()
+    assert [a["name"] for a in found["animations"]] == ["Small"]
+    assert {n["name"] for n in found["nodes"]} >= {"Small", "head_lod0_mesh", "FACIAL_C_Jaw"}
+    assert "JOINTS_1" in attributes  # five joints a vertex
+    assert keys == ["jaw", "pull_l", "y" * 63]  # a corrective's too; the others rest
+    assert paths == {"translation", "rotation", "scale", "weights"}
+    assert "JOINTS_1" not in parts(influences=4)[1]
+    assert len(parts(all_shapes=True)[2]) == 6
+    assert parts(wanted={"BONES"})[3] == {"translation", "rotation", "scale"}
+    assert parts(wanted={"SHAPES"})[3] == {"weights"}
+    assert {m["name"] for m in parts(lod=1)[0]["meshes"]} == {"head_lod1_mesh"}
+
+
+def test_all_selected_faces_go_into_one_file(dna_file, tmp_path):
+    rigs = [scene.load(dna_file), scene.load(dna_file)]
+    for rig in rigs:
+        animate(rig)
+        scene.controls(rig).select_set(True)
+    scene.controls(rigs[1]).location.x = 1.0
+    wanted = _film([scene.meshes(rig)[0] for rig in rigs])
+    path = _export("GLTF", tmp_path)
+    names = {n["name"] for n in _json_of(path)["nodes"]}
+    assert {"Small", "Small.001"} <= names
+    with pytest.raises(RuntimeError, match="the controls of one face: select one"):
+        _export("CSV", tmp_path)
+    found = [o for o in _import("GLTF", path) if "head" in o.name]
+    assert _error(_film(found), wanted) < NEAR["GLTF"]
+
+
+def test_controls_as_csv_and_clip(dna_file, tmp_path):
+    rig = scene.load(dna_file)
+    animate(rig)
+    path = _export("CSV", tmp_path, start=2, end=4, step=0.5)
+    header, *rows = list(csv.reader(path.open(encoding="utf-8")))
+    table = np.array(rows, np.float64)
+    assert header[:2] == ["time", "CTRL_expressions.jawOpen"]
+    assert header[-3:] == ["head.yaw", "head.pitch", "head.roll"]
+    assert len(set(header)) == len(header) == 1 + 11 + 3
+    rate = bpy.context.scene.render.fps
+    np.testing.assert_allclose(table[:, 0], np.arange(2, 4.1, 0.5) / rate)
+    for row, frame in zip(table, np.arange(2, 4.1, 0.5), strict=True):
+        bpy.context.scene.frame_set(int(frame), subframe=frame % 1)
+        raw = scene.raw_of(rig, dna_file)
+        assert np.float32(row[1]) == raw[0]
+        assert np.float32(row[header.index("CTRL_expressions.eyeLookUpL")]) == raw[6]
+        # The head bone stands upright: its own x and y axes are the armature's x and z.
+        turn = scene.controls(rig).pose.bones["head"].rotation_euler.to_quaternion()
+        rest = scene.controls(rig).data.bones["head"].matrix_local.to_quaternion()
+        ahead = (rest @ turn @ rest.inverted()) @ Vector((0, -1, 0))
+        assert row[-3] == pytest.approx(np.arctan2(ahead.x, -ahead.y), abs=1e-5)
+        assert row[-2] == pytest.approx(np.arcsin(ahead.z), abs=1e-5)
+
+
+def test_a_missing_exporter_is_one_sentence(dna_file, tmp_path):
+    import addon_utils
+
+    scene.load(dna_file)
+    addon_utils.disable("io_scene_fbx")
+    try:
+        with pytest.raises(RuntimeError, match=r"This Blender has no FBX exporter: enable its add"):
+            _export("FBX", tmp_path)
+    finally:
+        addon_utils.enable("io_scene_fbx")

@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: MIT
+"""risorius live: listen to a face-capture app, show what comes, record it."""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+from pathlib import Path
+from time import monotonic, sleep
+from types import FrameType
+
+from ..clip import Clip
+from ..importing import MappingError, csv_text, write_text
+from ..live import EVERYWHERE, PORTS, SOURCES, THIS_MACHINE, LiveError, Receiver, Shaper, Status
+
+_KINDS = (".rzc", ".csv")
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = subparsers.add_parser(
+        "live",
+        help="faces from a phone, as they come; recorded",
+        description="Listens for Live Link Face (ARKit mode) or for VMC and other OSC, shows on "
+        "one line what comes, and records a subject as curves of raw controls at the sender's own "
+        "times. Ctrl-C ends it and saves.",
+    )
+    parser.add_argument("--source", choices=SOURCES, default="livelink", help="default livelink")
+    ports = ", ".join(f"{port} for {source}" for source, port in PORTS.items())
+    parser.add_argument("--port", type=int, metavar="N", help=f"default {ports}; 0 for any")
+    parser.add_argument(
+        "--everywhere",
+        action="store_true",
+        help="listen to the network too, as a phone needs; else to this machine alone",
+    )
+    parser.add_argument("--subject", default="", metavar="NAME", help="default: the first heard")
+    parser.add_argument("--record", type=Path, metavar="OUT", help="clip.rzc or clip.csv")
+    parser.add_argument("--seconds", type=float, metavar="N", help="end after them")
+    parser.add_argument(
+        "--mapping", default="arkit", metavar="NAME|FILE", help="of names to controls, as TOML"
+    )
+    parser.add_argument("--gain", type=float, default=1.0, metavar="X", help="on all units")
+    parser.set_defaults(func=run)
+
+
+def complaint(args: argparse.Namespace) -> str | None:
+    """What is wrong with the command line before anything is listened to."""
+    if args.port is not None and not 0 <= args.port <= 65535:
+        return f"--port: 0 to 65535 was expected, found {args.port}"
+    if args.seconds is not None and not args.seconds > 0.0:
+        return f"--seconds: more than 0 was expected, found {args.seconds:g}"
+    if args.record is None:
+        return None
+    if args.record.suffix.lower() not in _KINDS:
+        return f"--record: a name ending in .rzc or .csv was expected, found {args.record.name!r}"
+    if not args.record.parent.is_dir():
+        return f"--record: {args.record.parent} is no folder"
+    return None
+
+
+def run(args: argparse.Namespace) -> int:
+    if wrong := complaint(args):
+        print(f"risorius: {wrong}", file=sys.stderr)
+        return 2
+    receiver = Receiver(args.source, args.port, EVERYWHERE if args.everywhere else THIS_MACHINE)
+    try:
+        shaper = Shaper(args.mapping, gain=args.gain)
+        receiver.start()
+    except (LiveError, MappingError) as error:
+        print(f"risorius: {error}", file=sys.stderr)
+        return 1
+    take = receiver.record(args.subject)
+    try:
+        _listen(receiver, args)
+    finally:
+        receiver.stop()
+    receiver.finish(take)
+    if take.full:
+        print(f"risorius: the take is full: {take.full} frames were left out", file=sys.stderr)
+    if args.record is None:
+        return 0
+    if not len(take):
+        print(f"risorius: {args.record} was not written: no face came", file=sys.stderr)
+        return 1
+    clip = take.clip(shaper)
+    if missed := take.unmapped(shaper):
+        print(f"risorius: not mapped: {', '.join(missed)}", file=sys.stderr)
+    try:
+        save(clip, args.record)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        print(f"risorius: {args.record}: cannot write it: {reason}", file=sys.stderr)
+        return 1
+    print(f"{args.record}: {clip.frame_count} frames of {take.subject}, {clip.duration:.3f} s")
+    return 0
+
+
+def _listen(receiver: Receiver, args: argparse.Namespace) -> None:
+    """Show the status until the time is over, or somebody ends it."""
+    ended: list[int] = []
+
+    def end(number: int, _frame: FrameType | None) -> None:
+        ended.append(number)
+
+    before = {which: signal.signal(which, end) for which in (signal.SIGINT, signal.SIGTERM)}
+    place = "this machine" if receiver.host == THIS_MACHINE else "the network"
+    print(f"listening to {place} at port {receiver.port}; Ctrl-C ends", file=sys.stderr, flush=True)
+    still = sys.stderr.isatty()
+    began, shown = monotonic(), 0.0
+    try:
+        while not ended and not (args.seconds and monotonic() - began >= args.seconds):
+            sleep(0.05)
+            if monotonic() - shown >= (0.25 if still else 2.0):
+                shown = monotonic()
+                line = words(receiver.status(args.subject))
+                print(
+                    f"\r{line:<78}" if still else line, end="" if still else "\n", file=sys.stderr
+                )
+                sys.stderr.flush()
+    finally:
+        for which, handler in before.items():
+            signal.signal(which, handler)
+    print(f"\r{words(receiver.status(args.subject)):<78}" if still else "", file=sys.stderr)
+
+
+def words(status: Status) -> str:
+    """One line of what comes."""
+    if not status.subject:
+        heard = "nothing heard yet" if not status.packets else "no face yet"
+        refused = f", {status.refused} refused ({status.reasons[0][0]})" if status.refused else ""
+        return f"{heard}, {status.packets} packets{refused}"
+    parts = [f"{status.subject}: {status.per_second:.0f}/s", f"{status.recording} frames"]
+    for count, what in (
+        (status.lost, "lost"),
+        (status.late, "late"),
+        (status.refused, "refused"),
+        (status.floods, "floods"),
+    ):
+        if count:
+            parts.append(f"{count} {what}")
+    if status.age is not None and status.age > 1.0:
+        parts.append(f"silent for {status.age:.0f} s")
+    others = [s for s in status.subjects if s != status.subject]
+    return ", ".join(parts) + (f"; also {', '.join(others)}" if others else "")
+
+
+def save(clip: Clip, path: Path) -> None:
+    """Write a clip whole or not at all.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    if path.suffix.lower() == ".csv":
+        write_text(csv_text(clip), path)
+    else:
+        clip.save(path)

@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: MIT
+"""Live capture: faces over UDP, from Live Link Face, VMC and other senders of OSC.
+
+    with Receiver("livelink", host=EVERYWHERE) as receiver:
+        take = receiver.record()
+        ...
+        clip = receiver.finish(take).clip(Shaper())
+
+packets --livelink, osc--> frames of names --Shaper--> raw controls
+"""
+
+from __future__ import annotations
+
+from .frame import Frame, LiveError, Packet
+from .receiver import EVERYWHERE, PORTS, SOURCES, THIS_MACHINE, Receiver, Status
+from .shaping import HEAD, Controls, Shaper
+from .take import Take
+
+__all__ = [
+    "EVERYWHERE",
+    "HEAD",
+    "PORTS",
+    "SOURCES",
+    "THIS_MACHINE",
+    "Controls",
+    "Frame",
+    "LiveError",
+    "Packet",
+    "Receiver",
+    "Shaper",
+    "Status",
+    "Take",
+]

@@ -1,0 +1,300 @@
+# SPDX-License-Identifier: MIT
+"""Faces over OSC: VMC, Face Cap and its relatives, and plain messages of a name and a value.
+
+    /VMC/Ext/Blend/Val  name value      a blend shape; /VMC/Ext/Blend/Apply ends the face
+    /VMC/Ext/Bone/Pos   name px py pz qx qy qz qw     Neck, Head, LeftEye and RightEye are used
+    /W index value                      a unit by its index in FACE_CAP
+    /HRQ x y z w, /HR x y z             the head, as a quaternion or in degrees
+    /ELR x y, /ERR x y                  the eyes, in degrees
+    /any/path/name value                anything else
+
+Messages come one by one or in bundles. A face is whole at its Apply; of senders that send none,
+at the end of a bundle, when a message comes that the face has already, or when nothing more comes.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from .frame import LiveError, Packet, turn_angles, unit_name
+
+PORT = 39539
+# The order of Face Cap, which is that of ARKit's first headers.
+FACE_CAP = tuple(
+    (
+        "browInnerUp browDownLeft browDownRight browOuterUpLeft browOuterUpRight eyeLookUpLeft "
+        "eyeLookUpRight eyeLookDownLeft eyeLookDownRight eyeLookInLeft eyeLookInRight "
+        "eyeLookOutLeft eyeLookOutRight eyeBlinkLeft eyeBlinkRight eyeSquintLeft eyeSquintRight "
+        "eyeWideLeft eyeWideRight cheekPuff cheekSquintLeft cheekSquintRight noseSneerLeft "
+        "noseSneerRight jawOpen jawForward jawLeft jawRight mouthFunnel mouthPucker mouthLeft "
+        "mouthRight mouthRollUpper mouthRollLower mouthShrugUpper mouthShrugLower mouthClose "
+        "mouthSmileLeft mouthSmileRight mouthFrownLeft mouthFrownRight mouthDimpleLeft "
+        "mouthDimpleRight mouthUpperUpLeft mouthUpperUpRight mouthLowerDownLeft "
+        "mouthLowerDownRight mouthPressLeft mouthPressRight mouthStretchLeft mouthStretchRight "
+        "tongueOut"
+    ).split()
+)
+_BUNDLE = b"#bundle\0"
+_DEEPEST = 8
+_MOST_NAMES = 512
+_MOST_SENDERS = 32
+_LONGEST_NAME = 64
+_LARGEST = 100.0
+_NTP_EPOCH = 2208988800  # seconds from 1900 to 1970
+_NEEDS = "OSC needs the package python-osc, which is not installed: pip install risorius[live]"
+
+
+def messages(data: bytes, depth: int = 0) -> Iterator[tuple[str, list[Any]]]:
+    """The messages of a packet, those of its bundles too, in their order.
+
+    The sizes inside are checked here: python-osc follows a negative one back for ever.
+
+    Raises:
+        LiveError: the packet is no OSC.
+    """
+    if not data.startswith(_BUNDLE):
+        yield _message(data)
+        return
+    if depth == _DEEPEST:
+        raise LiveError("bundles inside bundles, too deep")
+    place = 16
+    while place < len(data):
+        if len(data) < place + 4:
+            raise LiveError("a bundle that is cut short")
+        (size,) = struct.unpack_from(">i", data, place)
+        place += 4
+        if size <= 0 or size % 4 or place + size > len(data):
+            raise LiveError(f"a part of {size} bytes does not fit its bundle")
+        yield from messages(data[place : place + size], depth + 1)
+        place += size
+
+
+def bundle_time(data: bytes) -> float | None:
+    """Seconds since 1970 that a bundle says it is for; None for "at once" and for a message."""
+    if not data.startswith(_BUNDLE) or len(data) < 16:
+        return None
+    whole, part = struct.unpack_from(">II", data, 8)
+    return None if whole == 0 else whole - _NTP_EPOCH + part / 2**32
+
+
+def require() -> None:
+    """Say early that python-osc is missing. Raises: LiveError."""
+    try:
+        import pythonosc  # noqa: F401
+    except ImportError as error:
+        raise LiveError(_NEEDS) from error
+
+
+def _message(data: bytes) -> tuple[str, list[Any]]:
+    from pythonosc.osc_message import OscMessage, ParseError
+
+    end = data.find(b"\0")
+    tags = data[(end + 4) & ~3 :].split(b"\0", 1)[0]
+    if not data.startswith(b"/") or end < 2 or tags.strip(b",ifhdsTF") or len(tags) > 64:
+        raise LiveError("a message of OSC was expected")
+    try:
+        message = OscMessage(data)
+        return message.address, message.params
+    except (ParseError, ValueError, IndexError, struct.error) as error:
+        raise LiveError("a message of OSC that is cut short") from error
+
+
+class Decoder:
+    """Puts the messages of all senders together to faces."""
+
+    def __init__(self) -> None:
+        self._faces: dict[str, _Face] = {}
+
+    def feed(self, data: bytes, sender: str) -> list[Packet]:
+        """Take a packet in.
+
+        Args:
+            data: its bytes.
+            sender: who sent it, the subject of its faces.
+
+        Returns:
+            The faces that are whole with it.
+
+        Raises:
+            LiveError: it is no OSC, or has a value that no face has; what came before stays.
+        """
+        found = list(messages(data))
+        if sender not in self._faces and len(self._faces) == _MOST_SENDERS:
+            raise LiveError(f"at most {_MOST_SENDERS} senders are taken")
+        face = self._faces.setdefault(sender, _Face(sender))
+        time, done = bundle_time(data), []
+        for address, values in found:
+            if packet := face.take(address, values, time):
+                done.append(packet)
+        if data.startswith(_BUNDLE) and not face.applies and (packet := face.finish()):
+            done.append(packet)
+        return done
+
+    def pending(self) -> bool:
+        """Whether a face waits that nothing but silence ends."""
+        return any(face.fresh and not face.applies for face in self._faces.values())
+
+    def flush(self) -> list[Packet]:
+        """The faces that nothing but silence ends."""
+        waiting = [face for face in self._faces.values() if face.fresh and not face.applies]
+        return [packet for face in waiting if (packet := face.finish())]
+
+
+class _Face:
+    """The newest values of one sender: a message that does not come leaves its value."""
+
+    def __init__(self, sender: str) -> None:
+        self.sender = sender
+        self.values: dict[str, float] = {}
+        self.bones: dict[str, tuple[float, ...]] = {}
+        self.fresh: set[str] = set()
+        self.applies = False
+        self.time: float | None = None
+        self.quaternion = False
+
+    def take(self, address: str, values: list[Any], time: float | None) -> Packet | None:
+        """Take a message in. Returns: the face that ends before it, or with it."""
+        if address == "/VMC/Ext/Blend/Apply":
+            self.applies = True
+            return self.finish()
+        read = _READERS.get(address)
+        if read is None:
+            if address.startswith("/VMC/") or len(values) != 1:
+                return None
+            key, changes = _named(address.rpartition("/")[2], values[0])
+        else:
+            key, changes = read(self, values)
+        done = self.finish() if key in self.fresh and not self.applies else None
+        if not changes:
+            return done
+        if len(self.values.keys() | changes.keys()) > _MOST_NAMES:
+            raise LiveError(f"at most {_MOST_NAMES} names of one sender are taken")
+        if not self.fresh:
+            self.time = time
+        self.fresh.add(key)
+        self.values.update(changes)
+        return done
+
+    def finish(self) -> Packet | None:
+        """The face as it is now, if anything of it is new."""
+        if not self.fresh:
+            return None
+        self.fresh.clear()
+        values = np.fromiter(self.values.values(), np.float32, len(self.values))
+        return Packet(self.sender, "", self.time, tuple(self.values), values)
+
+
+def _numbers(values: list[Any], count: int) -> tuple[float, ...]:
+    """The last `count` values, as numbers that a face may have."""
+    if len(values) < count:
+        raise LiveError(f"{count} numbers were expected, found {len(values)}")
+    numbers = tuple(float(v) if isinstance(v, int | float) else math.nan for v in values[:count])
+    if not all(abs(v) <= _LARGEST * 10.0 for v in numbers):
+        raise LiveError(f"numbers of a face were expected, found {numbers}")
+    return numbers
+
+
+def _named(name: Any, value: Any) -> tuple[str, dict[str, float]]:
+    if not isinstance(name, str) or not name or len(name) > _LONGEST_NAME:
+        raise LiveError(f"a name of at most {_LONGEST_NAME} letters was expected")
+    if isinstance(value, str):
+        return name, {}
+    (number,) = _numbers([value], 1)
+    if abs(number) > _LARGEST:
+        raise LiveError(f"{name}: a value of a face was expected, found {number}")
+    unit = name if name.startswith("CTRL_") else unit_name(name)
+    return unit, {unit: number}
+
+
+def _blend(_face: _Face, values: list[Any]) -> tuple[str, dict[str, float]]:
+    if len(values) < 2:
+        raise LiveError("a name and a value were expected")
+    return _named(values[0], values[1])
+
+
+def _indexed(_face: _Face, values: list[Any]) -> tuple[str, dict[str, float]]:
+    if len(values) < 2 or not isinstance(values[0], int) or not 0 <= values[0] < len(FACE_CAP):
+        raise LiveError(f"an index below {len(FACE_CAP)} and a value were expected")
+    return _named(FACE_CAP[values[0]], values[1])
+
+
+def _bone(face: _Face, values: list[Any]) -> tuple[str, dict[str, float]]:
+    if not values or not isinstance(values[0], str):
+        raise LiveError("a bone's name and seven numbers were expected")
+    name = values[0]
+    if name not in ("Neck", "Head", "LeftEye", "RightEye"):
+        return f"bone {name}"[:_LONGEST_NAME], {}
+    face.bones[name] = _unit(_numbers(values[1:], 7)[3:])
+    if name in ("Neck", "Head"):
+        still = (0.0, 0.0, 0.0, 1.0)
+        turn = _times(face.bones.get("Neck", still), face.bones.get("Head", still))
+        yaw, pitch, roll = _angles(turn)
+        return name, {"head.yaw": yaw, "head.pitch": pitch, "head.roll": roll}
+    yaw, pitch, _ = _angles(face.bones[name])
+    side = name[0]
+    return name, {f"eye{side}.yaw": yaw, f"eye{side}.pitch": pitch}
+
+
+def _head_quaternion(face: _Face, values: list[Any]) -> tuple[str, dict[str, float]]:
+    face.quaternion = True
+    x, y, z, w = _unit(_numbers(values, 4))
+    # ARKit's axes: own left, up, ahead. Seen in own right, up, ahead two parts turn round.
+    yaw, pitch, roll = _angles((x, -y, -z, w))
+    return "HRQ", {"head.yaw": yaw, "head.pitch": pitch, "head.roll": roll}
+
+
+def _head_degrees(face: _Face, values: list[Any]) -> tuple[str, dict[str, float]]:
+    x, y, z = (math.radians(v) for v in _numbers(values, 3))
+    if face.quaternion:  # which says the same without an order of angles
+        return "HR", {}
+    return "HR", {"head.yaw": y, "head.pitch": -x, "head.roll": -z}
+
+
+def _eye(side: str) -> Any:
+    def read(_face: _Face, values: list[Any]) -> tuple[str, dict[str, float]]:
+        x, y = (math.radians(v) for v in _numbers(values, 2))
+        return f"E{side}R", {f"eye{side}.yaw": y, f"eye{side}.pitch": -x}
+
+    return read
+
+
+def _unit(q: tuple[float, ...]) -> tuple[float, ...]:
+    length = math.hypot(*q)
+    if length < 1e-6:
+        raise LiveError("a rotation was expected, found a quaternion of zeros")
+    return tuple(v / length for v in q)
+
+
+def _times(a: tuple[float, ...], b: tuple[float, ...]) -> tuple[float, ...]:
+    (ax, ay, az, aw), (bx, by, bz, bw) = a, b
+    return (
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+        aw * bw - ax * bx - ay * by - az * bz,
+    )
+
+
+def _angles(q: tuple[float, ...]) -> tuple[float, float, float]:
+    """Yaw, pitch, roll of a quaternion in the axes own right, up, ahead."""
+    x, y, z, w = q
+    right = np.array([1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)])
+    up = np.array([2 * (x * y - z * w), 1 - 2 * (x * x + z * z), 2 * (y * z + x * w)])
+    ahead = np.array([2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)])
+    return turn_angles(ahead, right, up)
+
+
+_READERS: dict[str, Any] = {
+    "/VMC/Ext/Blend/Val": _blend,
+    "/VMC/Ext/Bone/Pos": _bone,
+    "/W": _indexed,
+    "/HRQ": _head_quaternion,
+    "/HR": _head_degrees,
+    "/ELR": _eye("L"),
+    "/ERR": _eye("R"),
+}

@@ -1,0 +1,322 @@
+# SPDX-License-Identifier: MIT
+"""Receives faces on a thread: the newest frame of each subject, and takes that are recorded.
+
+The thread touches nothing but its own data, under one lock, for as long as it takes to hand over a
+frame; whoever shows the face asks when it suits.
+"""
+
+from __future__ import annotations
+
+import errno
+import socket
+import threading
+from collections import Counter, deque
+from statistics import median
+from time import monotonic
+from typing import NamedTuple
+
+from . import livelink, osc
+from .frame import Frame, LiveError, Packet
+from .take import Take
+
+SOURCES = ("livelink", "osc")
+PORTS = {"livelink": livelink.PORT, "osc": osc.PORT}
+THIS_MACHINE, EVERYWHERE = "127.0.0.1", "0.0.0.0"
+_MOST_SUBJECTS = 32
+_SILENCE = 0.004  # seconds that end a face whose sender does not say where it ends
+_WINDOW = 0.05  # seconds over which a flood is counted
+_MOST_PACKETS = {"livelink": 100, "osc": 1000}  # of one window: far beyond what phones send
+_BACK = 1.0  # a packet that is older by less came late; by more, the sender's clock was set
+_AHEAD = 10.0  # seconds that a sender's clock may leap ahead of ours and still be believed
+_DAY = 86400.0
+
+
+class Status(NamedTuple):
+    """What a panel or a status line shows."""
+
+    packets: int
+    """All that came, since the start."""
+    frames: int
+    """Accepted faces of all subjects."""
+    per_second: float
+    """Accepted faces of the subject over the last second."""
+    refused: int
+    """Packets that could not be used."""
+    reasons: tuple[tuple[str, int], ...]
+    """What was wrong with them, the most frequent first."""
+    late: int
+    """Faces that came after a newer one of their subject and were left out."""
+    lost: int
+    """Faces that never came, judged by the sender's own time."""
+    faceless: int
+    """Packets of phones that saw no face."""
+    floods: int
+    """Times when packets came faster than they are looked at."""
+    subjects: tuple[str, ...]
+    subject: str
+    """The one that this is about; "" while none was heard."""
+    age: float | None
+    """Seconds since its last face."""
+    recording: int
+    """Faces in the takes that are being recorded."""
+
+
+class _Subject:
+    """One face: its clock and its newest frame."""
+
+    def __init__(self, label: str) -> None:
+        self.label = label
+        self.latest: Frame | None = None
+        self.lost = 0
+        self._offset = 0.0
+        self._sent = 0.0  # the sender's time of the newest frame, midnights added
+        self._days = 0.0
+        self._steps: deque[float] = deque(maxlen=31)
+        self.arrivals: deque[float] = deque(maxlen=512)
+
+    def accept(self, packet: Packet, arrival: float) -> Frame | None:
+        """The packet as a frame, or None for one that came late."""
+        time = self._own_time(packet.time, arrival)
+        if time is None:
+            return None
+        number = self.latest.sequence + 1 if self.latest else 1
+        packet.values.flags.writeable = False
+        self.latest = Frame(self.label, time, arrival, number, packet.names, packet.values)
+        self.arrivals.append(arrival)
+        return self.latest
+
+    def _own_time(self, sent: float | None, arrival: float) -> float | None:
+        """The sender's time without its leaps; arrival, where it sends none."""
+        last = self.latest
+        if sent is None:
+            return arrival if last is None else max(arrival, last.time)
+        if last is None:
+            self._sent, self._offset = sent, 0.0
+            return sent
+        step = sent + self._days - self._sent
+        if abs(step + _DAY) < _AHEAD:  # midnight
+            self._days += _DAY
+            step += _DAY
+        passed = arrival - last.arrival
+        if -_BACK <= step < 0.0:
+            return None
+        if step < -_BACK or step > passed + _AHEAD:
+            self._days, self._sent = 0.0, sent
+            self._offset = last.time + passed - sent
+            return last.time + passed
+        self._count_lost(step)
+        self._sent = sent + self._days
+        return self._sent + self._offset
+
+    def _count_lost(self, step: float) -> None:
+        if len(self._steps) >= 5:
+            usual = median(self._steps)
+            if usual > 0.0 and step > 1.5 * usual:
+                self.lost += min(round(step / usual) - 1, 10_000)
+        if step > 0.0:
+            self._steps.append(step)
+
+    def per_second(self, now: float) -> float:
+        return float(sum(arrival > now - 1.0 for arrival in self.arrivals))
+
+
+class Receiver:
+    """Listens on a UDP port.
+
+    Args:
+        source: "livelink" or "osc".
+        port: 0 for any free one; None for the source's own.
+        host: the address to listen at: THIS_MACHINE, or EVERYWHERE for phones.
+    """
+
+    def __init__(
+        self, source: str = "livelink", port: int | None = None, host: str = THIS_MACHINE
+    ) -> None:
+        if source not in SOURCES:
+            raise LiveError(f"a source of {' or '.join(SOURCES)} was expected, found {source!r}")
+        self.source = source
+        self.host = host
+        self.port = PORTS[source] if port is None else port
+        self._lock = threading.Lock()
+        self._subjects: dict[tuple[str, str], _Subject] = {}
+        self._takes: list[Take] = []
+        self._reasons: Counter[str] = Counter()
+        self._counts: Counter[str] = Counter()
+        self._decoder = osc.Decoder()
+        self._stop = threading.Event()
+        self._socket: socket.socket | None = None
+        self._thread: threading.Thread | None = None
+
+    def __enter__(self) -> Receiver:
+        self.start()
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        self.stop()
+
+    def start(self) -> None:
+        """Listen. Raises: LiveError, where the port cannot be had or a package is missing."""
+        if self._thread is not None:
+            return
+        if self.source == "osc":
+            osc.require()
+        self._socket = _bound(self.host, self.port)
+        self.port = int(self._socket.getsockname()[1])
+        self._stop.clear()
+        self._thread = threading.Thread(target=self._run, name="risorius live", daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Stop listening; the last frames and takes stay."""
+        self._stop.set()
+        if self._thread is not None:
+            self._thread.join(2.0)
+            self._thread = None
+        if self._socket is not None:
+            self._socket.close()
+            self._socket = None
+
+    def latest(self, subject: str = "") -> Frame | None:
+        """The newest frame of a subject, or of the one heard first."""
+        with self._lock:
+            found = self._find(subject)
+            return found.latest if found else None
+
+    def record(self, subject: str = "", limit: int = 108_000) -> Take:
+        """Record a subject, or the one heard first, until `finish`.
+
+        Args:
+            limit: frames that are kept at most, half an hour at 60 a second.
+        """
+        with self._lock:
+            found = self._find(subject)
+            take = Take(found.label if found else subject, limit)
+            self._takes.append(take)
+        return take
+
+    def finish(self, take: Take) -> Take:
+        """End a recording. Returns: it."""
+        with self._lock:
+            if take in self._takes:
+                self._takes.remove(take)
+        return take
+
+    def status(self, subject: str = "") -> Status:
+        """What has come so far."""
+        now = monotonic()
+        with self._lock:
+            found = self._find(subject)
+            count = self._counts
+            return Status(
+                packets=count["packets"],
+                frames=count["frames"],
+                per_second=found.per_second(now) if found else 0.0,
+                refused=sum(self._reasons.values()),
+                reasons=tuple(self._reasons.most_common(5)),
+                late=count["late"],
+                lost=sum(s.lost for s in self._subjects.values()),
+                faceless=count["faceless"],
+                floods=count["floods"],
+                subjects=tuple(s.label for s in self._subjects.values()),
+                subject=found.label if found else "",
+                age=now - found.latest.arrival if found and found.latest else None,
+                recording=sum(len(take) for take in self._takes),
+            )
+
+    def _find(self, label: str) -> _Subject | None:
+        for subject in self._subjects.values():
+            if not label or subject.label == label:
+                return subject
+        return None
+
+    def _run(self) -> None:
+        listener = self._socket
+        assert listener is not None
+        window, seen = monotonic(), 0
+        while not self._stop.is_set():
+            listener.settimeout(_SILENCE if self._decoder.pending() else 0.1)
+            try:
+                data, sender = listener.recvfrom(65536)
+            except TimeoutError:
+                self._keep(self._decoder.flush(), monotonic())
+                continue
+            except OSError:  # Windows reports here that an answer of ours was refused
+                continue
+            now = monotonic()
+            if now - window >= _WINDOW:
+                window, seen = now, 0
+            seen += 1
+            self._take_in(data, sender[0], now)
+            if seen >= _MOST_PACKETS[self.source]:
+                # What comes meanwhile waits, and then is dropped, in the system's buffer: so a
+                # flood costs nothing of the time that the viewport needs.
+                self._counts["floods"] += 1
+                self._stop.wait(max(0.0, window + _WINDOW - monotonic()))
+        self._keep(self._decoder.flush(), monotonic())
+
+    def _take_in(self, data: bytes, sender: str, now: float) -> None:
+        try:
+            if self.source == "livelink":
+                packets = [livelink.decode(data)]
+            else:
+                packets = self._decoder.feed(data, sender)
+        except livelink.NoFace:
+            self._counts["faceless"] += 1
+        except LiveError as error:
+            self._refuse(str(error))
+        except Exception as error:  # noqa: BLE001  no packet may end the thread
+            self._refuse(f"{type(error).__name__}: {error}")
+        else:
+            self._keep(packets, now)
+        self._counts["packets"] += 1
+
+    def _refuse(self, reason: str) -> None:
+        with self._lock:
+            known = reason in self._reasons or len(self._reasons) < 50
+            self._reasons[reason[:200] if known else "other reasons"] += 1
+
+    def _keep(self, packets: list[Packet], now: float) -> None:
+        for packet in packets:
+            subject = self._subject_of(packet)
+            if subject is None:
+                self._refuse(f"at most {_MOST_SUBJECTS} subjects are taken")
+                continue
+            with self._lock:
+                frame = subject.accept(packet, now)
+                if frame is None:
+                    self._counts["late"] += 1
+                    continue
+                self._counts["frames"] += 1
+                for take in self._takes:
+                    take.add(frame)
+
+    def _subject_of(self, packet: Packet) -> _Subject | None:
+        key = (packet.device, packet.subject)
+        subject = self._subjects.get(key)
+        if subject is None and len(self._subjects) < _MOST_SUBJECTS:
+            label = packet.subject or packet.device or "unnamed"
+            if any(s.label == label for s in self._subjects.values()):
+                label = f"{label} ({packet.device[:8]})"
+            subject = _Subject(label)
+            with self._lock:
+                self._subjects[key] = subject
+        return subject
+
+
+def _bound(host: str, port: int) -> socket.socket:
+    if not 0 <= port <= 65535:
+        raise LiveError(f"a port of 0 to 65535 was expected, found {port}")
+    listener = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    try:
+        # Without SO_REUSEADDR, which would let two programs have the port and one the packets.
+        listener.bind((host, port))
+    except OSError as error:
+        listener.close()
+        if error.errno == errno.EADDRINUSE:
+            raise LiveError(
+                f"Port {port} is in use: close the program that listens there, or take another."
+            ) from error
+        raise LiveError(
+            f"Port {port} at {host} cannot be listened to: {error.strerror}."
+        ) from error
+    return listener

@@ -1,0 +1,233 @@
+# SPDX-License-Identifier: MIT
+"""From what a sender says to raw controls: calibration, gain, mapping, smoothing."""
+
+from __future__ import annotations
+
+import math
+import os
+import tomllib
+from functools import cache
+from importlib import resources
+from typing import NamedTuple
+
+import numpy as np
+
+from ..importing import Mapping, load_mapping
+from .frame import Floats, Frame
+
+HEAD = ("head.yaw", "head.pitch", "head.roll")
+_EYES = ("eyeL.yaw", "eyeL.pitch", "eyeR.yaw", "eyeR.pitch")
+_IGNORED = {"eyeL.roll", "eyeR.roll"}
+_LOOK_AT_ONE = math.radians(30.0)  # an eye's turn that a look control at 1 stands for
+_FULL_SET = 10  # ARKit units from which on the expressions of VRM are taken to repeat them
+Row = dict[str, float]
+_ANGLES = {*HEAD, *_EYES, *_IGNORED}
+
+
+class Controls(NamedTuple):
+    """A frame for a rig."""
+
+    names: tuple[str, ...]
+    """Raw controls as a DNA spells them, and head.yaw, head.pitch, head.roll."""
+    values: Floats
+    """float32[names]: controls 0 to 1, the head in radians."""
+
+
+@cache
+def expressions() -> dict[str, Row]:
+    """VRM expression, in lower case -> {ARKit unit: weight}; of VRM 0 and 1."""
+    text = resources.files(__package__).joinpath("vrm.toml").read_text(encoding="utf-8")
+    table = tomllib.loads(text)
+    found = {name: dict(row) for name, row in table["expressions"].items()}
+    return found | {name: found[same] for name, same in table["same"].items()}
+
+
+class Plan:
+    """The way from names that a sender uses to controls, compiled once for a set of names.
+
+    Attributes:
+        controls: the controls that the names reach.
+        matrix: float32[controls, names].
+        adjusted: (place of a control, what the mapping does to it).
+        unmapped: names that reach none, and that the mapping does not leave out either.
+        is_angle: bool[names].
+        head: bool[controls], the three angles of the head.
+    """
+
+    def __init__(self, names: tuple[str, ...], mapping: Mapping) -> None:
+        rows = _rows(names, mapping)
+        found: dict[str, int] = {}
+        for row in rows:
+            for control in row or ():
+                found.setdefault(control, len(found))
+        self.controls = tuple(found)
+        self.matrix = np.zeros((len(found), len(names)), np.float32)
+        for column, row in enumerate(rows):
+            for control, weight in (row or {}).items():
+                self.matrix[found[control], column] = weight
+        changes = ((i, mapping.adjustment(control)) for control, i in found.items())
+        self.adjusted = tuple((i, change) for i, change in changes if change is not None)
+        self.unmapped = tuple(n for n, row in zip(names, rows, strict=True) if row is None)
+        self.is_angle = np.array([name in _ANGLES for name in names], bool)
+        self.head = np.array([name in HEAD for name in self.controls], bool)
+
+
+def _rows(names: tuple[str, ...], mapping: Mapping) -> list[Row | None]:
+    """The controls of each name; none for what is left out, None for what nobody knows."""
+    find = mapping.finder()
+    rows = [found[1] if (found := find(name)) else None for name in names]
+    units = sum(bool(row) for row in rows)
+    looks = any(name.startswith("eyeLook") for name in names)
+    for i, name in enumerate(names):
+        if rows[i] is not None:
+            continue
+        if name in HEAD or name.startswith("CTRL_"):
+            rows[i] = {name: 1.0}
+        elif name.lower() in expressions():
+            full = units >= _FULL_SET
+            rows[i] = {} if full else _through(expressions()[name.lower()], mapping)
+        elif name in _ANGLES:
+            rows[i] = _look(name, mapping) if name in _EYES and not looks else {}
+    return rows
+
+
+def _through(row: Row, mapping: Mapping) -> Row:
+    """A row in units as a row in controls."""
+    result: Row = {}
+    for unit, weight in row.items():
+        for control, share in mapping.rows.get(unit, {}).items():
+            result[control] = result.get(control, 0.0) + weight * share
+    return result
+
+
+def _look(name: str, mapping: Mapping) -> Row:
+    """An eye's angle as look controls: one side with its sign, the other against it."""
+    side = "Left" if name[3] == "L" else "Right"
+    if name.endswith("pitch"):
+        ahead, back = f"eyeLookUp{side}", f"eyeLookDown{side}"
+    else:  # to the own left: out for the left eye, in for the right
+        ahead, back = ("eyeLookOut", "eyeLookIn") if side == "Left" else ("eyeLookIn", "eyeLookOut")
+        ahead, back = ahead + side, back + side
+    weight = 1.0 / _LOOK_AT_ONE
+    return _through({ahead: weight}, mapping) | _through({back: -weight}, mapping)
+
+
+class Shaper:
+    """Turns frames into controls. Not for several threads, nor for several subjects, at once.
+
+    Args:
+        mapping: risorius.importing.Mapping, the name of one that comes with Risorius, or a file.
+
+    Attributes:
+        mapping: the Mapping; names that it does not have may be raw controls, angles of the head,
+            expressions of VRM.
+        gain: factor on all units; head_gain: on the head's angles, negative to turn them round.
+        gains: factor for single units, by their name as the frame has it, beside `gain`.
+        smoothing: 0 for none, to 1: a one-euro filter, which holds a still face still and lets a
+            quick move pass.
+        maximum: controls are clamped to it.
+        neutral: the values that count as a face at rest, by name; see `capture`.
+    """
+
+    def __init__(
+        self,
+        mapping: str | os.PathLike[str] | Mapping = "arkit",
+        *,
+        smoothing: float = 0.0,
+        gain: float = 1.0,
+        head_gain: float = 1.0,
+        maximum: float = 1.0,
+    ) -> None:
+        """Load the mapping. Raises: risorius.importing.MappingError."""
+        self.mapping = load_mapping(mapping)
+        self.smoothing = smoothing
+        self.gain, self.head_gain, self.maximum = gain, head_gain, maximum
+        self.gains: dict[str, float] = {}
+        self.neutral: dict[str, float] = {}
+        self._plan: Plan | None = None
+        self._names: tuple[str, ...] = ()
+        self._filter = OneEuro()
+
+    def plan(self, names: tuple[str, ...]) -> Plan:
+        """The way of these names; kept for the next frame, which mostly has the same."""
+        if self._plan is None or names != self._names:
+            self._plan, self._names = Plan(names, self.mapping), names
+            self._filter = OneEuro()
+        return self._plan
+
+    def capture(self, frame: Frame | None) -> None:
+        """Take a frame as the face at rest; None forgets it."""
+        self.neutral = {}
+        if frame is not None:
+            self.neutral = dict(zip(frame.names, map(float, frame.values), strict=True))
+
+    @property
+    def unmapped(self) -> tuple[str, ...]:
+        """Names of the last frame that move nothing."""
+        return self._plan.unmapped if self._plan else ()
+
+    def without_smoothing(self) -> Shaper:
+        """One of the same settings for a recording."""
+        other = Shaper(self.mapping, gain=self.gain, head_gain=self.head_gain, maximum=self.maximum)
+        other.gains, other.neutral = dict(self.gains), dict(self.neutral)
+        return other
+
+    def apply(self, frame: Frame) -> Controls:
+        """The controls of a frame. Frames are to come in the order of their times."""
+        plan = self.plan(frame.names)
+        values = self._calibrated(frame, plan.is_angle)
+        if self.gains:
+            values = values * np.array([self.gains.get(n, 1.0) for n in frame.names], np.float32)
+        result = plan.matrix @ values
+        for place, change in plan.adjusted:
+            result[place] = change.apply(result[place])
+        result *= np.where(plan.head, np.float32(self.head_gain), np.float32(self.gain))
+        if self.smoothing > 0.0:
+            result = self._filter.step(result, frame.time, self.smoothing)
+        np.clip(result, 0.0, self.maximum, out=result, where=~plan.head)
+        return Controls(plan.controls, result)
+
+    def _calibrated(self, frame: Frame, is_angle: np.ndarray) -> Floats:  # type: ignore[type-arg]
+        """Values with the face at rest taken away; what is left of a unit still reaches 1."""
+        if not self.neutral:
+            return frame.values
+        rest = np.array([self.neutral.get(n, 0.0) for n in frame.names], np.float32)
+        room = np.maximum(1.0 - rest, 0.05)
+        units = np.maximum(frame.values - rest, 0.0) / room
+        return np.where(is_angle, frame.values - rest, units).astype(np.float32)
+
+
+class OneEuro:
+    """The one-euro filter (Casiez, Roussel, Vogel 2012) for many values at once."""
+
+    def __init__(self) -> None:
+        self._time = 0.0
+        self._value: Floats | None = None
+        self._speed: Floats | None = None
+
+    def step(self, values: Floats, time: float, amount: float) -> Floats:
+        """The filtered values.
+
+        Args:
+            values: float32[n].
+            time: seconds; a step back, or of more than half a second, begins anew.
+            amount: above 0, to 1: a still value is cut at 12 Hz down to 0.6 Hz.
+        """
+        step = time - self._time
+        if self._value is None or self._speed is None or not 0.0 <= step < 0.5:
+            self._time, self._value, self._speed = time, values.copy(), np.zeros_like(values)
+            return values.copy()
+        if step == 0.0:
+            return self._value.copy()
+        lowest = 12.0 * 0.05 ** min(amount, 1.0)
+        speed = (values - self._value) / np.float32(step)
+        self._speed = self._speed + _share(1.0, step) * (speed - self._speed)
+        cutoff = lowest + 4.0 * np.abs(self._speed)
+        self._value = self._value + _share(cutoff, step) * (values - self._value)
+        self._time = time
+        return self._value.copy()
+
+
+def _share(cutoff: float | Floats, step: float) -> Floats:
+    """How much of a change passes in a step, of a low pass at `cutoff` Hz."""
+    return np.asarray(1.0 - 1.0 / (1.0 + 2.0 * math.pi * cutoff * step), np.float32)

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: MIT
+"""What was recorded: the frames of one subject, as they came."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..clip import Clip
+from .frame import Frame
+from .shaping import Plan, Shaper
+
+
+class Take:
+    """Frames of one subject at their own times, in order; gaps stay gaps.
+
+    Attributes:
+        subject: whom it follows; "" until the first frame decides.
+        full: frames that came after the limit was reached, and are not in it.
+    """
+
+    def __init__(self, subject: str = "", limit: int = 108_000) -> None:
+        self.subject = subject
+        self.full = 0
+        self.limit = limit
+        self._frames: list[Frame] = []
+
+    def __len__(self) -> int:
+        return len(self._frames)
+
+    def add(self, frame: Frame) -> None:
+        """Keep a frame, if it is of the subject; one of the same time takes the other's place."""
+        self.subject = self.subject or frame.subject
+        if frame.subject != self.subject:
+            return
+        if self._frames and frame.time <= self._frames[-1].time:
+            self._frames[-1] = frame._replace(time=self._frames[-1].time)
+        elif len(self._frames) < self.limit:
+            self._frames.append(frame)
+        else:
+            self.full += 1
+
+    def clip(self, shaper: Shaper | None = None) -> Clip:
+        """The take as a clip of raw controls, starting at 0.
+
+        Args:
+            shaper: how values become controls; without smoothing, which can be added later and
+                could not be taken away.
+
+        Returns:
+            A Clip with times of its own. A control that came later than others is 0 before.
+        """
+        shaper = (shaper or Shaper()).without_smoothing()
+        rows = [shaper.apply(frame) for frame in self._frames]
+        names: dict[str, int] = {}
+        for row in rows:
+            for name in row.names:
+                names.setdefault(name, len(names))
+        curves = np.zeros((len(names), len(rows)), np.float32)
+        for column, row in enumerate(rows):
+            curves[[names[name] for name in row.names], column] = row.values
+        times = np.array([frame.time for frame in self._frames], np.float64)
+        times -= times[0] if len(times) else 0.0
+        return Clip(names, curves, _rate(times), times=times, metadata={"subject": self.subject})
+
+    def unmapped(self, shaper: Shaper) -> list[str]:
+        """Names of its frames that a shaper's mapping does not know."""
+        kinds = dict.fromkeys(frame.names for frame in self._frames)
+        plans = (Plan(names, shaper.mapping) for names in kinds)
+        return sorted({name for plan in plans for name in plan.unmapped})
+
+
+def _rate(times: np.ndarray) -> float:  # type: ignore[type-arg]
+    """The frames per second that most frames keep to; 60 for a take too short to tell."""
+    steps = np.diff(times)
+    return round(1.0 / float(np.median(steps)), 3) if steps.size else 60.0
