@@ -182,6 +182,93 @@ def test_baked_controls_are_one_clean_action(mode, dna_file):
     _assert_same(_film(rig), wanted, near=0)
 
 
+def _add_layers(rig):
+    """A layer of an action whose weight is animated, one that turns the head, and a reaction."""
+    controls = scene.controls(rig)
+    own = controls.animation_data.action
+    controls.animation_data.action = None
+    head = controls.pose.bones["head"]
+    for frame, value, turn in ((1, 0.0, 0.0), (6, 1.0, 0.5)):
+        for name in ("browDownL", "mouthCornerPullR"):
+            path = f'["CTRL_expressions.{name}"]'
+            scene.face(rig)[f"CTRL_expressions.{name}"] = value
+            scene.face(rig).keyframe_insert(path, frame=frame)
+        head.rotation_euler.z = turn
+        head.keyframe_insert("rotation_euler", frame=frame)
+    action = controls.animation_data.action
+    controls.animation_data.action = own
+    for name in ("browDownL", "mouthCornerPullR"):
+        scene.face(rig)[f"CTRL_expressions.{name}"] = 0.0
+    layers = scene.submodule("scene.layers")
+    layer = layers.add_action(controls, action, blend="ADD")
+    for frame, weight in ((1, 1.0), (10, 0.2)):
+        layer.weight = weight
+        layer.keyframe_insert("weight", frame=frame)
+    scene.update(controls)
+
+
+@pytest.mark.parametrize("kind", ["CONTROLS", "RESULT"])
+def test_layers_are_in_the_bake(kind, dna_file):
+    rig = _face(dna_file)
+    plain = _film(rig)
+    _add_layers(rig)
+    wanted, before = _film(rig), _state(rig)
+    assert np.abs(wanted[4][0] - plain[4][0]).max() > 1e-3
+    _bake(kind=kind)
+    _assert_same(_film(rig), wanted)
+    if kind == "CONTROLS":
+        paths = {c.data_path for c in scene.curves(scene.controls(rig))}
+        assert 'pose.bones["face"]["CTRL_expressions.mouthCornerPullR"]' in paths
+    assert bpy.ops.risorius.unbake() == {"FINISHED"}
+    assert _state(rig) == before
+    _assert_same(_film(rig), wanted, near=0)
+
+
+def test_a_face_on_a_body_that_moves(dna_file):
+    rig = _face(dna_file)
+    data = bpy.data.armatures.new("body")
+    body = bpy.data.objects.new("body", data)
+    bpy.context.scene.collection.objects.link(body)
+    with bpy.context.temp_override(object=body, active_object=body, selected_objects=[body]):
+        bpy.context.view_layer.objects.active = body
+        bpy.ops.object.mode_set(mode="EDIT")
+        parent = None
+        for number, name in enumerate(("spine", "neck", "head")):
+            bone = data.edit_bones.new(name)
+            bone.head, bone.tail = (0, 0, 1.2 + 0.1 * number), (0, 0.01, 1.3 + 0.1 * number)
+            bone.parent, bone.roll = parent, 0.5 * number
+            parent = bone
+        bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.context.view_layer.objects.active = scene.controls(rig)
+    assert bpy.ops.risorius.attach_body(body="body") == {"FINISHED"}
+    for name in ("spine", "neck", "head"):
+        bone = body.pose.bones[name]
+        bone.rotation_mode = "XYZ"
+        for frame, angle in ((1, 0.0), (10, 2.5 if name == "spine" else 0.4)):
+            bone.rotation_euler.y = angle
+            bone.keyframe_insert("rotation_euler", frame=frame)
+    wanted, before = _film(rig), _state(rig)
+    assert np.abs(wanted[0][0] - wanted[-1][0]).max() > 0.3
+    _bake()
+    _assert_same(_film(rig), wanted)
+    bpy.ops.risorius.unbake()
+    assert _state(rig) == before
+    _assert_same(_film(rig), wanted, near=0)
+
+
+def test_controls_first_and_then_the_result(dna_file):
+    rig = _face(dna_file)
+    wanted, before, counts = _film(rig), _state(rig), scene.counts()
+    _bake(kind="CONTROLS")
+    _bake()
+    _assert_same(_film(rig), wanted)
+    bpy.ops.risorius.unbake()
+    _assert_same(_film(rig), wanted)
+    bpy.ops.risorius.unbake()
+    assert (_state(rig), scene.counts()) == (before, counts)
+    assert bpy.ops.risorius.unbake() == {"CANCELLED"}
+
+
 def test_onto_an_nla_track(dna_file):
     rig = _face(dna_file)
     wanted, before = _film(rig), _state(rig)
@@ -233,9 +320,11 @@ def test_reduction_holds_its_bound_on_any_curve():
     assert curves.reduce_keys(frames, values)[:, 2:].all()
 
 
-def test_sampling_is_frame_stepping_and_touches_nothing(dna_file):
+@pytest.mark.parametrize("hidden", [False, True])
+def test_sampling_is_frame_stepping_and_touches_nothing(hidden, dna_file):
     rig = _face(dna_file)
     _complicate(rig)
+    rig.hide_viewport = scene.controls(rig).hide_viewport = hidden
     bpy.context.scene.frame_set(7)
     values, counts = dict(scene.face(rig).items()), scene.counts()
     frames = np.array([1.0, 2.5, 4.0, 10.0])

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Export of a face's animation through Blender's own exporters, and of its controls."""
 
-import csv
 from pathlib import Path
 
 import bpy
 from bpy_extras.io_utils import ExportHelper
 
+from .. import native
 from ..scene import bake, ship
 from .bake_operators import FacesOperator, FrameRange, selected_rigs
 
@@ -217,8 +217,6 @@ def _run(context, job):
 def _missing(kind):
     """Why this Blender cannot write a format, in one sentence; empty when it can."""
     if kind == "RZC":
-        from .. import native
-
         there = hasattr(native.module().Clip, "save")
         return "" if there else "This build of Risorius cannot write .rzc files."
     if kind not in _OPERATORS:
@@ -242,12 +240,8 @@ def _export(context, operator, override, path):
 
 
 def _write_csv(clip, path):
-    """A table: the time in seconds and every control; as many digits as a float32 has."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        rows = csv.writer(file, lineterminator="\n")
-        rows.writerow(["time", *clip.names])
-        for time, values in zip(clip.frame_times().tolist(), clip.curves.T, strict=True):
-            rows.writerow([repr(time), *map(str, values)])
+    writing = native.part("importing.writing")
+    writing.write_text(writing.csv_text(clip), path)
 
 
 def _one_sentence(path, error):
