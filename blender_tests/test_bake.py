@@ -348,7 +348,7 @@ def test_sampling_is_frame_stepping_and_touches_nothing(hidden, dna_file):
         np.testing.assert_array_equal(got.raw[number], raw)
         assert got.turns[number] == turns
         np.testing.assert_array_equal(got.places[number], np.array(seen.matrix_world))
-    assert np.ptp(got.raw[:, 3]) > 0.1
+    assert np.ptp(got.raw[:, 0]) > 0.1
     assert np.ptp(got.places[:, 0, 3]) > 0.1
 
 
