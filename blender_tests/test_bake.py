@@ -320,6 +320,75 @@ def test_reduction_holds_its_bound_on_any_curve():
     assert curves.reduce_keys(frames, values)[:, 2:].all()
 
 
+def test_signs_of_quaternions_follow_each_other():
+    curves = scene.submodule("logic.curves")
+    turns = np.float32(
+        [[[1, 0, 0, 0]], [[-0.9, -0.1, 0, 0]], [[-0.8, 0.2, 0, 0]], [[0.9, 0, 0, 0]]]
+    )
+    wanted = np.float32([[[1, 0, 0, 0]], [[0.9, 0.1, 0, 0]], [[0.8, -0.2, 0, 0]], [[0.9, 0, 0, 0]]])
+    np.testing.assert_array_equal(curves.continuous(turns), wanted)
+
+
+def test_between_baked_frames_lie_straight_lines(dna_file):
+    rig = _face(dna_file)
+    between = (1.5, 4.25, 7.5)
+    wanted = _film(rig, between)
+    _bake(step=0.25)
+    _assert_same(_film(rig, between), wanted)
+    bpy.ops.risorius.unbake()
+    _bake()
+    _assert_same(_film(rig, between), wanted, near=0.05)
+
+
+class _Window:
+    """What a modal operator is given, without a window."""
+
+    def __init__(self, job):
+        self.window_manager, self.scene = self, bpy.context.scene
+        self._job, self._timer, self.said, self.over = job, None, [], False
+        operators = scene.submodule("ui.bake_operators")
+        self.modal = lambda kind: operators.RISORIUS_OT_bake.modal(self, self, _Event(kind))
+        self._step = lambda *rest: operators.RISORIUS_OT_bake._step(self, *rest)
+
+    def report(self, _kind, words):
+        self.said.append(words)
+
+    def progress_update(self, value):
+        assert 0 <= value <= 100
+
+    def progress_end(self):
+        self.over = True
+
+    def event_timer_remove(self, _timer):
+        assert not self.over
+
+
+class _Event:
+    def __init__(self, kind):
+        self.type = kind
+
+
+@pytest.mark.parametrize("ended", [False, True])
+def test_with_a_window_it_shows_progress_and_esc_ends_it(ended, dna_file):
+    rig = _face(dna_file)
+    before, counts = _state(rig), scene.counts()
+    bake = scene.submodule("scene.bake")
+    scene.submodule("ui.bake_operators")._SLICE = 0.0
+    window = _Window(bake.bake(bpy.context, [rig], bake.BakeOptions(end=10)))
+    assert window.modal("MOUSEMOVE") == {"RUNNING_MODAL"}
+    if ended:
+        assert window.modal("TIMER") == {"RUNNING_MODAL"}
+        assert window.modal("ESC") == {"CANCELLED"}
+        assert (_state(rig), scene.counts()) == (before, counts)
+    else:
+        while (result := window.modal("TIMER")) == {"RUNNING_MODAL"}:
+            pass
+        assert result == {"FINISHED"}
+        assert bake.baked(rig) == "RESULT"
+    assert window.over
+    assert window.said
+
+
 @pytest.mark.parametrize("hidden", [False, True])
 def test_sampling_is_frame_stepping_and_touches_nothing(hidden, dna_file):
     rig = _face(dna_file)

@@ -135,6 +135,21 @@ def test_the_scene_stays_untouched_also_after_an_error(kind, dna_file, tmp_path)
     assert scene.error_against_oracle(rig, dna_file, raw) < scene.TOLERANCE
 
 
+@pytest.mark.parametrize("kind", ENDINGS)
+def test_bones_alone(kind, dna_file, tmp_path):
+    rig = scene.load(dna_file)
+    animate(rig)
+    path = _export(kind, tmp_path, wanted={"BONES"})
+    shown = [scene.meshes(rig)[0], scene.meshes(rig)[1]]
+    for item in shown:
+        for block in item.data.shape_keys.key_blocks[1:]:
+            block.mute = True
+    wanted = _film(shown)
+    found = _import(kind, path)
+    assert all(len(o.data.shape_keys.key_blocks) < 2 for o in found if o.data.shape_keys)
+    assert _error(_film(found), wanted) < NEAR[kind]
+
+
 @pytest.mark.parametrize("kind", ["GLTF", "FBX"])
 def test_a_face_that_walks_and_a_part_of_the_range(kind, dna_file, tmp_path):
     rig = scene.load(dna_file)
@@ -162,6 +177,7 @@ def test_options_of_gltf_reach_the_file(dna_file, tmp_path):
         paths = {c["target"]["path"] for a in found.get("animations", ()) for c in a["channels"]}
         return found, attributes, keys, paths
 
+    counts = scene.counts()
     found, attributes, keys, paths = parts()
     assert [a["name"] for a in found["animations"]] == ["Small"]
     assert {n["name"] for n in found["nodes"]} >= {"Small", "head_lod0_mesh", "FACIAL_C_Jaw"}
@@ -173,6 +189,7 @@ def test_options_of_gltf_reach_the_file(dna_file, tmp_path):
     assert parts(wanted={"BONES"})[3] == {"translation", "rotation", "scale"}
     assert parts(wanted={"SHAPES"})[3] == {"weights"}
     assert {m["name"] for m in parts(lod=1)[0]["meshes"]} == {"head_lod1_mesh"}
+    assert scene.counts() == counts
 
 
 def test_all_selected_faces_go_into_one_file(dna_file, tmp_path):

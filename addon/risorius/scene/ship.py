@@ -152,8 +152,7 @@ def _shapes(made, item, live, samples, weights, options):
     for channel in set(names) - wanted:
         made.shape_key_remove(key.key_blocks[names.pop(channel)])
     if len(key.key_blocks) < 2:
-        made.shape_key_clear()
-        return
+        return  # a Key taken off a copied mesh would stay in the file for ever
     others = samples.others.get(item.data.shape_keys)
     _play(key, samples.frames, baked_tracks.key_tracks(key, names, weights, others))
 

@@ -182,6 +182,7 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, bpy.types.Operator):
         end = time.monotonic() + seconds
         self._result = {"FINISHED"}
         try:
+            self._share = next(job)
             while time.monotonic() < end:
                 self._share = next(job)
         except StopIteration as finished:
