@@ -1,11 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Clips become actions of the controls and come back, at any rate and in every way to play them."""
 
+import importlib.util
+import shutil
+import subprocess
+
 import bpy
 import numpy as np
 import pytest
 import risorius
 from mathutils import Euler, Vector
+from risorius import speech
 from support import scene
 
 JAW, PULL, BROW = (f"CTRL_expressions.{n}" for n in ("jawOpen", "mouthCornerPullL", "browDownL"))
@@ -326,3 +331,70 @@ def test_another_rigs_shape_keys_move_the_face(rig, as_strip):
         found = [_played(rig, frame)[name] for name in EXPECTED]
         np.testing.assert_allclose(found, values, atol=1e-6)
     assert "hat" in scene.controls(rig).animation_data.action["risorius_report"]
+
+
+WORDS = "Hello, my name is Bob."
+
+
+@pytest.fixture
+def voice(tmp_path):
+    """A spoken sentence."""
+    program = shutil.which("espeak-ng")
+    if program is None or importlib.util.find_spec("pocketsphinx") is None:
+        pytest.skip("EXTRA NOT RUN: speech needs the program espeak-ng and PocketSphinx")
+    path = tmp_path / "voice.wav"
+    subprocess.run([program, "-w", str(path), WORDS], check=True)
+    return path
+
+
+def test_a_face_speaks_and_is_heard(rig, voice):
+    bpy.context.scene.render.fps = 24
+    text = bpy.data.texts.new("Lines")
+    text.write(WORDS)
+    done = bpy.ops.risorius.speak(
+        filepath=str(voice), transcript_text="Lines", start=31.0, target="LAYER"
+    )
+    assert done == {"FINISHED"}
+    (strip,) = scene.submodule("scene.compat").strips_of(bpy.context.scene)
+    assert strip.type == "SOUND"
+    assert strip.frame_final_start == 31
+    layer = scene.controls(rig).risorius_layers[0]
+    assert layer.start == pytest.approx(31.0, abs=1e-4)
+    clip = speech.speak(str(voice), WORDS)
+    jaw = next(c for c in _curves(layer.action) if "jawOpen" in c.data_path)
+    loudest = clip.frame_times()[int(np.argmax(clip.curve(JAW)))]
+    assert jaw.evaluate(31.0 + loudest * 24) == pytest.approx(clip.curve(JAW).max(), abs=1e-3)
+    assert clip.curve(JAW).max() > 0.1
+
+
+def test_speech_in_a_thread_is_the_same_and_can_be_cancelled(rig, voice):
+    listening = scene.submodule("scene.listening")
+    task = listening.Task(str(voice), WORDS, seed=3)
+    task.start()
+    task.wait()
+    clip = speech.speak(str(voice), WORDS, seed=3)
+    assert task.error is None
+    np.testing.assert_array_equal(task.clip.curves, clip.curves)
+    ended = listening.Task(str(voice), WORDS)
+    ended.cancel()
+    ended.run()
+    assert type(ended.error).__name__ == "CancelledError"
+    assert ended.clip is None
+
+
+def test_speech_without_the_recogniser_says_what_to_do(rig, voice, monkeypatch):
+    listening = scene.submodule("scene.listening")
+    monkeypatch.setattr(listening, "has_recogniser", lambda: False)
+    with pytest.raises(RuntimeError, match="PocketSphinx: install it by the button"):
+        bpy.ops.risorius.speak(filepath=str(voice))
+    if not bpy.app.online_access:
+        with pytest.raises(RuntimeError, match="online access"):
+            bpy.ops.risorius.install_speech()
+
+
+def test_a_file_that_is_no_sound(rig, voice, tmp_path):
+    noise = tmp_path / "noise.wav"
+    noise.write_bytes(b"RIFF nothing of the kind")
+    with pytest.raises(RuntimeError, match=r"noise\.wav"):
+        bpy.ops.risorius.speak(filepath=str(noise))
+    assert not bpy.data.actions

@@ -127,3 +127,375 @@ def test_a_layer_is_what_the_nla_makes_of_it(rig, layer, strip, interpolation):
     theirs = np.array([_raw(rig, f) for f in FRAMES])
     np.testing.assert_allclose(ours, theirs, atol=1e-6)
     assert np.abs(ours - without).max() > 0.1
+
+
+BLINK = PREFIX + "eyeBlinkL"
+
+
+@pytest.fixture
+def blinker(tmp_path):
+    """A face that can blink."""
+    from support.faces import renumbered, small_face
+
+    eyes = [PREFIX + n for n in ("eyeBlinkL", "eyeBlinkR", "eyeSquintInnerL")]
+    dna = renumbered(small_face(), controls=[*range(8), *eyes, 8, 9, 10])
+    path = tmp_path / "blinker.dna"
+    dna.save(str(path))
+    bpy.context.scene.render.fps = 24
+    return scene.load(path, "LIVE")
+
+
+def _entry(rig, **settings):
+    controls = scene.controls(rig)
+    kind = settings.pop("kind", "ACTION")
+    name = settings.pop("name", "Layer")
+    entry = _layers().add(controls, kind, name)
+    for key, value in settings.items():
+        setattr(entry, key, value)
+    return entry
+
+
+def _performance(rig, rules):
+    """Speech, an emotion that fades in on a mask, a nod at half speed, a flash: the list."""
+    controls = scene.controls(rig)
+    controls.risorius_layer_rules = rules
+    _entry(rig, action=_wave(rig, interpolation="LINEAR"), start=3.0, scale=1.5)
+    joy = {"expression": "joy", "start": 10.0, "length": 30.0, "fade_in": 8.0, "fade_out": 5.0}
+    _entry(rig, kind="EXPRESSION", regions={"MOUTH"}, blend="MAXIMUM", weight=0.7, **joy)
+    blink = _action(rig, "Blink", "LINEAR", eyeBlinkL={0: 0.0, 3: 0.8, 6: 0.0}, jawOpen={0: 0.3})
+    _entry(rig, action=blink, start=6.0, extend="REPEAT", blend="ADD", controls="eye* -*squint*")
+    _layers().fire(controls, "flash", 14.5, 0.9)
+    _layers().fire(controls, "flash", 40.0, 0.5)
+
+
+def _mixer(rig, rules):
+    """The same by risorius.Mixer alone, its times in seconds."""
+    import risorius
+
+    names = scene.submodule("scene.runtime").of(rig).labels
+    frames = np.array([1.0, 7.0, 12.0, 21.0])
+    jaw = np.interp(np.arange(1, 22), frames, [0.0, 0.9, 0.2, 0.6])
+    pull = np.interp(np.arange(1, 22), [3.0, 15.0], [0.7, 0.1])
+    brow = np.linspace(0.3, 1.0, 21)
+    wave = risorius.Clip([JAW, PULL, BROW], [jaw, pull, brow], 24.0, start=1 / 24)
+    blink = risorius.Clip([BLINK], [np.interp(np.arange(7), [0, 3, 6], [0, 0.8, 0])], 24.0)
+    mixer = risorius.Mixer(
+        names,
+        [
+            risorius.Layer(wave, start=3 / 24, scale=1.5),
+            risorius.Layer(
+                "joy",
+                mask={"mouth": 1.0},
+                blend="max",
+                weight=0.7,
+                start=10 / 24,
+                end=40 / 24,
+                fade_in=8 / 24,
+                fade_out=5 / 24,
+            ),
+            risorius.Layer(blink, start=6 / 24, extend="repeat", blend="additive"),
+        ],
+        exclusives="default" if rules else None,
+    )
+    mixer.fire("flash", 40.0 / 24, 0.5)
+    mixer.fire("flash", 14.5 / 24, 0.9)
+    return mixer
+
+
+@pytest.mark.parametrize("rules", [False, True])
+def test_what_one_sees_is_what_the_mixer_computes(blinker, rules):
+    _performance(blinker, rules)
+    mixer = _mixer(blinker, rules)
+    scene.face(blinker)["CTRL_expressions.eyeLookUpL"] = 0.3
+    scene.update(scene.controls(blinker))
+    base = np.zeros(len(mixer.names), np.float32)
+    base[mixer.names.index("CTRL_expressions.eyeLookUpL")] = 0.3
+    for frame in (*range(0, 60, 3), 7.25, 15.5, 15.75, 41.125):
+        wanted = mixer.evaluate(frame / 24, base)
+        np.testing.assert_allclose(_raw(blinker, frame), wanted, atol=2e-6)
+    assert _value(blinker, 18.5, BLINK) > 0.85  # the flash
+
+
+def test_the_mesh_shows_the_layers(rig, dna_file):
+    _entry(rig, action=_wave(rig))
+    bpy.context.scene.frame_set(9)
+    raw = _raw(rig, 9)
+    assert raw[0] > 0.3
+    assert scene.face(rig)[JAW] == 0.0
+    assert scene.error_against_oracle(rig, dna_file, raw) < scene.TOLERANCE
+
+
+def test_any_order_of_frames_gives_the_same(blinker):
+    _performance(blinker, True)
+    forwards = {}
+    for frame in (2, 16, 30, 44):
+        bpy.context.scene.frame_set(frame)
+        forwards[frame] = scene.snapshot(blinker)
+    for frame in (44, 2, 30, 16):
+        bpy.context.scene.frame_set(frame)
+        np.testing.assert_array_equal(scene.snapshot(blinker), forwards[frame])
+
+
+def test_a_render_shows_what_the_viewport_shows(blinker, tmp_path):
+    from support import pictures
+
+    _performance(blinker, True)
+    camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
+    setup = pictures.small_render(camera, 16)
+    setup.collection.objects.link(camera)
+    seen, wanted = {}, {}
+    layers = _layers()
+
+    def note(_scene, depsgraph):
+        runtime = scene.submodule("scene.runtime")
+        inputs = scene.submodule("scene.inputs")
+        face = scene.controls(blinker).evaluated_get(depsgraph)
+        frame = depsgraph.scene.frame_current_final
+        seen[frame] = inputs.read_inputs(face, runtime.of(blinker), depsgraph)[0]
+
+    setup.frame_start, setup.frame_end, setup.frame_step = 15, 17, 2
+    setup.render.filepath = str(tmp_path / "frame")
+    bpy.app.handlers.frame_change_post.append(note)
+    try:
+        bpy.ops.render.render(animation=True)
+    finally:
+        bpy.app.handlers.frame_change_post.remove(note)
+    layers.forget()
+    wanted = {frame: _raw(blinker, frame) for frame in (15, 17)}
+    for frame, raw in wanted.items():
+        np.testing.assert_array_equal(seen[frame], raw)
+
+
+def test_keys_of_a_weight_go_with_their_layer(rig):
+    controls = scene.controls(rig)
+    _entry(rig, name="low", action=_action(rig, "Low", jawOpen={1: 1.0, 2: 1.0}))
+    _entry(rig, name="high", action=_action(rig, "High", mouthCornerPullL={1: 1.0, 2: 1.0}))
+    for frame, value in ((1, 0.0), (11, 1.0)):
+        controls.risorius_layers[1].weight = value
+        controls.keyframe_insert("risorius_layers[1].weight", frame=frame)
+    for curve in scene.curves(controls):
+        for key in curve.keyframe_points:
+            key.interpolation = "LINEAR"
+    assert _value(rig, 6, PULL) == pytest.approx(0.5)
+    assert _value(rig, 6, JAW) == 1.0
+    assert _value(rig, 3.5, PULL) == pytest.approx(0.25)  # subframes, as motion blur asks
+    assert bpy.ops.risorius.layer_move(up=False) == {"FINISHED"}
+    assert [y.name for y in controls.risorius_layers] == ["high", "low"]
+    assert _value(rig, 6, PULL) == pytest.approx(0.5)
+    assert _value(rig, 6, JAW) == 1.0
+    assert bpy.ops.risorius.layer_duplicate() == {"FINISHED"}
+    assert [y.name for y in controls.risorius_layers] == ["high", "high.001", "low"]
+    assert _value(rig, 6, PULL) == pytest.approx(0.75)  # half of the half that was left
+    controls.risorius_layers_index = 0
+    assert bpy.ops.risorius.layer_remove() == {"FINISHED"}
+    assert _value(rig, 6, PULL) == pytest.approx(0.5)
+    assert bpy.ops.risorius.layer_remove() == {"FINISHED"}
+    assert _value(rig, 6, PULL) == 0.0
+    assert _value(rig, 6, JAW) == 1.0
+
+
+def test_an_edit_of_an_action_is_seen_at_once(rig):
+    action = _action(rig, jawOpen={1: 0.25, 20: 0.25})
+    _entry(rig, action=action)
+    assert _value(rig, 10, JAW) == pytest.approx(0.25)
+    before = scene.snapshot(rig)
+    for curve in scene.submodule("scene.compat").curves_of(action):
+        for key in curve.keyframe_points:
+            key.co[1] = key.handle_left[1] = key.handle_right[1] = 0.75
+        curve.update()
+    bpy.context.view_layer.update()
+    assert np.abs(scene.snapshot(rig) - before).max() > 1e-3
+    assert _value(rig, 10, JAW) == pytest.approx(0.75)
+
+
+def test_mute_solo_and_masks(rig):
+    wave = _action(rig, jawOpen={1: 0.5, 2: 0.5}, browDownL={1: 0.5, 2: 0.5})
+    one = _entry(rig, action=wave, regions={"BROW"})
+    assert (_value(rig, 5, JAW), _value(rig, 5, BROW)) == (0.0, 0.5)
+    one.regions, one.controls = set(), "-brow*"
+    assert (_value(rig, 5, JAW), _value(rig, 5, BROW)) == (0.5, 0.0)
+    one.mute = True
+    assert _value(rig, 5, JAW) == 0.0
+    one.mute = False
+    two = _entry(rig, action=_action(rig, "Two", mouthCornerPullL={1: 1.0, 2: 1.0}))
+    two.solo = True
+    assert (_value(rig, 5, JAW), _value(rig, 5, PULL)) == (0.0, 1.0)
+
+
+def test_warp_points_pin_what_is_shown(rig):
+    entry = _entry(rig, action=_action(rig, "Ramp", "LINEAR", jawOpen={0: 0.0, 20: 1.0}), start=0)
+    _raw(rig, 10)
+    assert bpy.ops.risorius.layer_warp() == {"FINISHED"}
+    assert _value(rig, 5, JAW) == pytest.approx(0.25)  # nothing has changed yet
+    point = next(p for p in entry.warp if p.frame == 10)
+    point.frame = 4
+    assert _value(rig, 4, JAW) == pytest.approx(0.5)
+    assert _value(rig, 2, JAW) == pytest.approx(0.25)
+    assert _value(rig, 12, JAW) == pytest.approx(0.75)
+
+
+def test_the_head_of_a_layer_replaces_or_adds(rig):
+    clips = scene.submodule("scene.clips")
+    import risorius
+
+    clip = risorius.Clip(["head.yaw"], [[0.4, 0.4]], 24.0)
+    timing = clips.timing_of(clip, bpy.context.scene, 0.0)
+    action = clips.make_action(rig, clip, timing, "Turn").action
+    head = scene.controls(rig).pose.bones["head"]
+    head.rotation_mode = "XYZ"
+    head.rotation_euler = (0.0, 0.1, 0.0)  # about the upright bone: yaw
+    entry = _entry(rig, action=action)
+    for blend, wanted in (("OVERRIDE", 0.4), ("ADD", 0.5)):
+        entry.blend = blend
+        bpy.context.scene.frame_set(0)
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        seen = scene.controls(rig).evaluated_get(depsgraph)
+        live = scene.submodule("scene.runtime").of(rig)
+        turn = scene.submodule("scene.inputs").read_inputs(seen, live, depsgraph)[1]["head"]
+        assert turn.angle == pytest.approx(wanted, abs=1e-5)
+
+
+@pytest.mark.parametrize("how", ["save", "undo", "copy", "replace"])
+def test_layers_live_on(rig, dna_file, tmp_path, how):
+    from support.faces import other_face
+
+    bpy.context.preferences.edit.use_global_undo = True
+    _entry(rig, action=_action(rig, "Keep", jawOpen={1: 0.6, 2: 0.6}), weight=0.5)
+    name = rig.name
+    if how == "save":
+        path = tmp_path / "kept.blend"
+        bpy.ops.wm.save_as_mainfile(filepath=str(path))
+        bpy.ops.wm.open_mainfile(filepath=str(path))
+    elif how == "undo":
+        bpy.ops.ed.undo_push(message="a layer")
+        scene.controls(rig).risorius_layers[0].weight = 1.0
+        _entry(rig, action=_action(rig, "More", mouthCornerPullL={1: 1.0, 2: 1.0}))
+        bpy.ops.ed.undo_push(message="two layers")
+        assert _value(rig, 5, PULL) == 1.0
+        bpy.ops.ed.undo()
+    elif how == "copy":
+        name = _duplicated(rig)
+        scene.controls(rig).risorius_layers[0].weight = 0.0
+        assert _value(rig, 5, JAW) == 0.0
+    else:
+        other = tmp_path / "other.dna"
+        other_face().save(str(other))
+        assert bpy.ops.risorius.replace_dna(filepath=str(other)) == {"FINISHED"}
+    bpy.context.view_layer.update()
+    kept = bpy.data.objects[name]
+    assert _value(kept, 5, JAW) == pytest.approx(0.3)
+    assert _value(kept, 5, PULL) == 0.0
+
+
+def _duplicated(rig):
+    bpy.context.view_layer.objects.active = None
+    for item in [o for o in bpy.context.scene.objects if o.name.startswith("Small")]:
+        item.hide_set(False)
+        item.select_set(True)
+    bpy.ops.object.duplicate()
+    bpy.context.view_layer.update()
+    return next(o.name for o in bpy.context.selected_objects if "risorius_controls" in o)
+
+
+def test_layers_on_an_override(rig, tmp_path):
+    _entry(rig, action=_action(rig, "Keep", jawOpen={1: 0.6, 2: 0.6}))
+    path = tmp_path / "library.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    bpy.ops.wm.read_homefile(use_empty=True)
+    bpy.ops.wm.link(directory=f"{path}/Collection/", filename="Small", instance_collections=True)
+    item = next(o for o in bpy.data.objects if o.instance_collection)
+    bpy.context.view_layer.objects.active = item
+    bpy.context.view_layer.update()
+    assert bpy.ops.risorius.make_override() == {"FINISHED"}
+    own = next(o for o in bpy.data.objects if "risorius_controls" in o and not o.library)
+    assert _value(own, 5, JAW) == pytest.approx(0.6)
+    scene.controls(own).risorius_layers[0].weight = 0.5
+    bpy.context.view_layer.objects.active = scene.controls(own)
+    assert bpy.ops.risorius.layer_add(kind="EXPRESSION", source="joy") == {"FINISHED"}
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
+    own = next(o for o in bpy.data.objects if "risorius_controls" in o and not o.library)
+    kept = scene.controls(own).risorius_layers
+    assert [(y.kind, y.weight) for y in kept] == [("ACTION", 0.5), ("EXPRESSION", 1.0)]
+    assert _value(own, 5, PULL) > 0.5
+
+
+def test_layers_become_strips_that_show_the_same(rig):
+    controls = scene.controls(rig)
+    base = _action(rig, "Base", "LINEAR", jawOpen={1: 0.2, 40: 0.5}, browDownL={1: 0.1, 2: 0.1})
+    scene.submodule("scene.clips").play(rig, base)
+    wave = _wave(rig)
+    _entry(rig, action=wave, start=4.0, scale=1.5, regions={"JAW", "MOUTH"}, extend="NOTHING")
+    _entry(rig, action=wave, blend="ADD", reverse=True, repeat=2.0)
+    joy = {"length": 16.0, "fade_in": 9.0, "fade_out": 11.0, "start": 2.0, "extend": "NOTHING"}
+    _entry(rig, kind="EXPRESSION", expression="joy", name="Joy", weight=0.3, **joy)
+    _entry(rig, kind="EXPRESSION", expression="joy", name="Joy", weight=0.1)
+    _entry(rig, action=wave, start=8.0, fade_in=5.0, fade_out=6.0, weight=0.8, extend="NOTHING")
+    controls.risorius_layers[1].weight = 0.2
+    controls.keyframe_insert("risorius_layers[1].weight", frame=1)
+    controls.risorius_layers[1].weight = 0.9
+    controls.keyframe_insert("risorius_layers[1].weight", frame=30)
+    wanted = [_raw(rig, f) for f in FRAMES]
+    assert bpy.ops.risorius.layers_to_nla() == {"FINISHED"}
+    assert all(layer.mute for layer in controls.risorius_layers)
+    assert len(controls.animation_data.nla_tracks) == 6
+    for frame, raw in zip(FRAMES, wanted, strict=True):
+        np.testing.assert_allclose(_raw(rig, frame), raw, atol=1e-6)
+
+
+def test_what_no_strip_can_say_stays_a_layer_and_all_above_it(rig):
+    controls = scene.controls(rig)
+    wave = _wave(rig)
+    _entry(rig, name="a", action=wave)
+    _entry(rig, name="b", action=wave, blend="MAXIMUM")
+    _entry(rig, name="c", action=wave)
+    assert bpy.ops.risorius.layers_to_nla() == {"FINISHED"}
+    assert [layer.mute for layer in controls.risorius_layers] == [True, False, False]
+
+
+def test_operators_and_panel(rig):
+    from support.layout import Recorder
+
+    controls = scene.controls(rig)
+    play = scene.submodule("scene.clips").play
+    play(rig, _wave(rig))
+    assert bpy.ops.risorius.layer_add(kind="ACTION") == {"FINISHED"}
+    assert controls.animation_data.action is None
+    assert bpy.ops.risorius.layer_add(kind="EXPRESSION", source="joy") == {"FINISHED"}
+    assert bpy.ops.risorius.fire(reaction="flash") == {"FINISHED"}
+    with pytest.raises(RuntimeError, match="no reaction sneeze"):
+        bpy.ops.risorius.fire(reaction="sneeze")
+    _entry(rig, name="broken", kind="EXPRESSION", expression="nothing")
+    drawn = Recorder()
+    panel = bpy.types.RISORIUS_PT_layers
+    panel.draw(type("Panel", (), {"layout": drawn})(), bpy.context)
+    assert "broken: nothing: an expression" in drawn.text()
+    assert bpy.ops.risorius.unfire() == {"FINISHED"}
+    assert not len(controls.risorius_reactions)
+
+
+def test_expressions_set_and_key_sliders(rig):
+    face = scene.face(rig)
+    face[BROW] = 1.0
+    assert bpy.ops.risorius.expression(expression="joy", strength=0.5, key=True) == {"FINISHED"}
+    assert face[PULL] == pytest.approx(0.41)
+    assert face[BROW] == pytest.approx(0.5)
+    paths = {c.data_path for c in scene.curves(scene.controls(rig))}
+    assert f'pose.bones["face"]["{PULL}"]' in paths
+
+
+def test_expressions_become_pose_assets_in_catalogues(rig, tmp_path):
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "poses.blend"))
+    rig = bpy.data.objects["Small_rig"]
+    assert bpy.ops.risorius.make_pose_assets() == {"FINISHED"}
+    joy = bpy.data.actions["Face Joy"]
+    count = len(bpy.data.actions)
+    assert joy.asset_data is not None
+    catalogs = (tmp_path / "blender_assets.cats.txt").read_text(encoding="utf-8")
+    assert f"{joy.asset_data.catalog_id}:Faces/Emotions:Faces-Emotions" in catalogs
+    scene.face(rig)["CTRL_expressions.jawOpen"] = 0.9
+    scene.controls(rig).pose.apply_pose_from_action(joy)
+    scene.update(scene.controls(rig))
+    assert scene.face(rig)[PULL] == pytest.approx(0.82)
+    assert bpy.ops.risorius.make_pose_assets() == {"FINISHED"}
+    assert len(bpy.data.actions) == count

@@ -3,7 +3,8 @@
 
     python packaging/build_extension.py --wheels WHEEL [WHEEL ...] --out FOLDER
 
-Prints the path of the zip. The wheels' version must equal the add-on's.
+Prints the path of the zip. The wheels' version must equal the add-on's. The pure wheels that
+extension_wheels.txt pins are fetched with pip, their hashes checked, and kept in OUT/pure.
 """
 
 from __future__ import annotations
@@ -11,12 +12,14 @@ from __future__ import annotations
 import argparse
 import re
 import shutil
+import subprocess
 import sys
 import tempfile
 import zipfile
 from pathlib import Path
 
 ADDON = Path(__file__).resolve().parents[1] / "addon" / "risorius"
+PINNED = Path(__file__).with_name("extension_wheels.txt")
 PLATFORMS = {
     "linux_x86_64": "linux-x64",
     "manylinux": "linux-x64",
@@ -53,14 +56,40 @@ def name_inside(wheel: Path) -> str:
     return "-".join(parts)
 
 
-def build(wheels: list[Path], out: Path) -> Path:
-    """Write the zip. Raises SystemExit with a sentence when something does not fit together."""
+def fetch_pinned(folder: Path) -> list[Path]:
+    """The wheels of extension_wheels.txt, from the folder where they are there, else from PyPI.
+
+    Raises SystemExit where they cannot be had, or are not those that were pinned.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    pip = [sys.executable, "-m", "pip", "download", "-q", "--no-deps", "--only-binary", ":all:"]
+    pip += ["--require-hashes", "-r", str(PINNED), "-d", str(folder)]
+    local = [*pip, "--no-index", "--find-links", str(folder)]
+    if subprocess.run(local, capture_output=True, check=False).returncode:
+        done = subprocess.run(pip, capture_output=True, text=True, check=False)
+        if done.returncode:
+            raise SystemExit(f"the wheels of {PINNED.name} cannot be had: {done.stderr.strip()}")
+    names = re.findall(r"^([\w-]+)==([\w.]+)", PINNED.read_text(encoding="utf-8"), re.MULTILINE)
+    found = (folder.glob(f"{name.replace('-', '_')}-{version}-*.whl") for name, version in names)
+    return [wheel for wheels in found for wheel in wheels]
+
+
+def build(wheels: list[Path], out: Path, pure: list[Path] | None = None) -> Path:
+    """Write the zip. Raises SystemExit with a sentence when something does not fit together.
+
+    Args:
+        wheels: of ours, one for each Python and platform.
+        out: folder of the zip.
+        pure: wheels for every Python and platform, taken as they are.
+    """
+    pure = pure or []
     text = (ADDON / "blender_manifest.toml").read_text(encoding="utf-8")
     version = manifest_version(text)
     for wheel in wheels:
         if wheel.name.split("-")[1] != version:
             raise SystemExit(f"{wheel.name} is not version {version}, the add-on is")
-    names = ", ".join(f'"./wheels/{name_inside(w)}"' for w in sorted(wheels))
+    inside = [*map(name_inside, sorted(wheels)), *(w.name for w in sorted(pure))]
+    names = ", ".join(f'"./wheels/{name}"' for name in inside)
     platforms = ", ".join(f'"{p}"' for p in sorted({platform_of(w) for w in wheels}))
     head, mark, tail = text.partition("\n[permissions]")
     text = f"{head}\nplatforms = [{platforms}]\nwheels = [{names}]\n{mark}{tail}"
@@ -74,6 +103,8 @@ def build(wheels: list[Path], out: Path) -> Path:
         (root / "wheels").mkdir()
         for wheel in wheels:
             shutil.copy(wheel, root / "wheels" / name_inside(wheel))
+        for wheel in pure:
+            shutil.copy(wheel, root / "wheels")
         with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
             for path in sorted(root.rglob("*")):
                 if path.is_file():
@@ -86,7 +117,7 @@ def main() -> int:
     parser.add_argument("--wheels", nargs="+", type=Path, required=True)
     parser.add_argument("--out", type=Path, required=True)
     args = parser.parse_args()
-    print(build(args.wheels, args.out))
+    print(build(args.wheels, args.out, fetch_pinned(args.out / "pure")))
     return 0
 
 

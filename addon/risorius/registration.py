@@ -4,7 +4,7 @@
 import bpy
 
 from . import native
-from .scene import handlers, layer_props
+from .scene import handlers, layer_props, live
 from .ui import (
     about,
     animation_operators,
@@ -15,6 +15,7 @@ from .ui import (
     import_operators,
     layer_panel,
     life_operators,
+    live_operators,
     operators,
     overlay,
     panels,
@@ -41,6 +42,7 @@ CLASSES = (
     *speech_operators.CLASSES,
     *layer_panel.CLASSES,
     *animation_panel.CLASSES,
+    *live_operators.CLASSES,
 )
 
 
@@ -59,6 +61,9 @@ def register():
     layer_props.register()
     bpy.types.WindowManager.risorius_search = _search_property()
     bpy.types.WindowManager.risorius_show_timing = overlay.show_property()
+    bpy.types.WindowManager.risorius_live = bpy.props.PointerProperty(
+        type=live_operators.RISORIUS_PG_live
+    )
     bpy.types.WindowManager.risorius_test = shape_test.weight_property()
     bpy.types.TOPBAR_MT_file_import.append(import_operators.draw_import)
     bpy.types.TOPBAR_MT_file_import.append(animation_operators.draw_import)
@@ -68,6 +73,7 @@ def register():
     if trouble:
         print(f"Risorius: {trouble}")
     handlers.register()
+    live.register()
     bpy.app.timers.register(_refresh_once, first_interval=0.0)
 
 
@@ -80,6 +86,7 @@ def unregister():
     """Undo `register` in reverse."""
     if bpy.app.timers.is_registered(_refresh_once):
         bpy.app.timers.unregister(_refresh_once)
+    live.unregister()
     handlers.unregister()
     overlay.stop()
     bpy.types.VIEW3D_MT_add.remove(import_operators.draw_add)
@@ -88,6 +95,7 @@ def unregister():
     bpy.types.TOPBAR_MT_file_import.remove(import_operators.draw_import)
     del bpy.types.WindowManager.risorius_show_timing
     del bpy.types.WindowManager.risorius_test
+    del bpy.types.WindowManager.risorius_live
     del bpy.types.WindowManager.risorius_search
     layer_props.unregister()
     for cls in reversed(CLASSES):

@@ -7,6 +7,8 @@ const char* to_string(ErrorCode code) {
   switch (code) {
     case ErrorCode::kNotDna:
       return "not_dna";
+    case ErrorCode::kNotClip:
+      return "not_clip";
     case ErrorCode::kUnsupportedGeneration:
       return "unsupported_generation";
     case ErrorCode::kTruncated:

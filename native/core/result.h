@@ -13,7 +13,8 @@ namespace risorius::core {
 
 enum class ErrorCode {
   kNotDna,                 // the first bytes are not a DNA signature
-  kUnsupportedGeneration,  // a DNA file of another generation than 2
+  kNotClip,                // the first bytes are not those of a .rzc file
+  kUnsupportedGeneration,  // a DNA file of another generation than 2, a clip of another version
   kTruncated,              // the bytes end before the structure does
   kInvalidCount,           // a count that cannot fit the bytes left or a limit
   kInvalidLength,          // parallel lists of different lengths

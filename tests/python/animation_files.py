@@ -30,7 +30,8 @@ SIDED_EYE = [
     "EyeWide",
 ]
 MOUTH = """JawForward JawRight JawLeft JawOpen MouthClose MouthFunnel MouthPucker MouthRight
-MouthLeft MouthSmileLeft MouthSmileRight MouthFrownLeft MouthFrownRight MouthDimpleLeft MouthDimpleRight
+MouthLeft MouthSmileLeft MouthSmileRight MouthFrownLeft MouthFrownRight MouthDimpleLeft
+MouthDimpleRight
 MouthStretchLeft MouthStretchRight MouthRollLower MouthRollUpper MouthShrugLower MouthShrugUpper
 MouthPressLeft MouthPressRight MouthLowerDownLeft MouthLowerDownRight MouthUpperUpLeft
 MouthUpperUpRight BrowDownLeft BrowDownRight BrowInnerUp BrowOuterUpLeft BrowOuterUpRight CheekPuff
@@ -123,3 +124,106 @@ def unreal_animation(curves: dict[str, dict[float, float]], mode: str = "RCIM_Li
         [{"Type": "AnimSequence", "Name": "A_Take", "RawCurveData": {"FloatCurves": floats}}],
         indent=2,
     )
+
+
+def rhubarb_tsv(cues: list[tuple[float, float, str]]) -> str:
+    """Starts with hundredths, a tab, the shape; X closes at the end. LF."""
+    lines = [f"{start:.2f}\t{shape}\n" for start, _, shape in cues]
+    return "".join(lines) + f"{cues[-1][1]:.2f}\tX\n"
+
+
+def rhubarb_xml(cues: list[tuple[float, float, str]]) -> str:
+    """As Boost's property tree writes it, with 2 blanks a level."""
+    rows = [
+        f'    <mouthCue start="{start:.2f}" end="{end:.2f}">{shape}</mouthCue>\n'
+        for start, end, shape in cues
+    ]
+    return (
+        '<?xml version="1.0" encoding="utf-8"?>\n<rhubarbResult>\n  <metadata>\n'
+        "    <soundFile>/home/me/a &amp; b.wav</soundFile>\n"
+        f"    <duration>{cues[-1][1]:.2f}</duration>\n  </metadata>\n  <mouthCues>\n"
+        + "".join(rows)
+        + "  </mouthCues>\n</rhubarbResult>\n"
+    )
+
+
+def rhubarb_json(cues: list[tuple[float, float, str]]) -> str:
+    """Formatted by hand, as the tool does: one cue a line."""
+    rows = [
+        f'    {{ "start": {start:.2f}, "end": {end:.2f}, "value": "{shape}" }}'
+        for start, end, shape in cues
+    ]
+    return (
+        '{\n  "metadata": {\n    "soundFile": "C:\\\\takes\\\\a.wav",\n'
+        f'    "duration": {cues[-1][1]:.2f}\n  }},\n  "mouthCues": [\n'
+        + ",\n".join(rows)
+        + "\n  ]\n}\n"
+    )
+
+
+# Two words of a Papagayo document of 24 frames a second: (text, first frame, last frame, phonemes).
+WORDS = [
+    ("hello", 6, 17, [(6, "AI"), (9, "L"), (13, "O")]),
+    ("bob", 24, 35, [(24, "MBP"), (28, "O")]),
+]
+
+
+def papagayo_pgo() -> str:
+    """Version 1: tabs for the levels, "|" for line ends of the text."""
+    out = ["lipsync version 1", "voice.wav", "24", "72", "1"]
+    out += ["\tVoice 1", "\thello|bob", "\t1", "\t\thello bob", "\t\t6", "\t\t35", "\t\t2"]
+    for text, first, last, phonemes in WORDS:
+        out.append(f"\t\t\t{text} {first} {last} {len(phonemes)}")
+        out += [f"\t\t\t\t{frame} {shape}" for frame, shape in phonemes]
+    return "\n".join(out) + "\n"
+
+
+def papagayo_pgo_json() -> str:
+    """Version 2 of Papagayo-NG."""
+    words = [
+        {
+            "id": i, "text": text, "start_frame": first, "end_frame": last, "tags": [],
+            "phonemes": [
+                {"id": k, "text": shape, "frame": frame, "tags": []}
+                for k, (frame, shape) in enumerate(phonemes)
+            ],
+        }
+        for i, (text, first, last, phonemes) in enumerate(WORDS)
+    ]  # fmt: skip
+    phrase = {
+        "id": 0,
+        "text": "hello bob",
+        "start_frame": 6,
+        "end_frame": 35,
+        "tags": [],
+        "words": words,
+    }
+    voice = {"name": "Voice 1", "start_frame": 6, "end_frame": 35, "text": "hello\nbob"}
+    return json.dumps(
+        {
+            "version": 2,
+            "sound_path": "voice.wav",
+            "fps": 24,
+            "sound_duration": 72,
+            "num_voices": 1,
+            "voices": [{**voice, "num_children": 8, "phrases": [phrase]}],
+        },
+        indent=True,
+    )
+
+
+def moho_dat() -> str:
+    """The same words as Papagayo exports them: frames from 1, a rest at the end of each pause."""
+    rows = [
+        "1 rest",
+        "6 rest",
+        "7 AI",
+        "10 L",
+        "14 O",
+        "19 rest",
+        "24 rest",
+        "25 MBP",
+        "29 O",
+        "37 rest",
+    ]
+    return "MohoSwitch1\n" + "\n".join(rows) + "\n"

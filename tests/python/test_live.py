@@ -15,6 +15,7 @@ from time import monotonic, sleep
 import numpy as np
 import pytest
 import risorius
+from risorius.importing import load_mapping
 from risorius.live import Frame, LiveError, Receiver, Shaper, livelink, osc, shaping
 
 SENDER = Path(__file__).with_name("face_sender.py")
@@ -231,7 +232,7 @@ def test_vmc_applies_a_whole_face_at_once():
     yaw = [-0.4, 0.0, -0.4]  # to the own right in Unity
     assert np.allclose(clip.curve("head.yaw"), yaw, atol=1e-6)
     assert status.subjects == ("127.0.0.1",)
-    plan = shaping.Plan(("A", "unheardOf"), risorius.arkit.mapping())
+    plan = shaping.Plan(("A", "unheardOf"), load_mapping("arkit"))
     assert plan.unmapped == ("unheardOf",)
 
 
@@ -334,6 +335,30 @@ def test_neutral_now_and_gains():
     assert got.values.tolist() == pytest.approx([0.5, 0.0, 1.0])  # clamped; 1 is still reached
 
 
+def test_a_mapping_of_ones_own(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(
+        """
+        base = "arkit"
+        ignore = ["cheekPuff"]
+        [rows]
+        jawOpen = { "CTRL_expressions.mouthStretchL" = 0.5 }
+        glare = { "CTRL_expressions.eyeWidenL" = 1.0 }
+        [controls]
+        eyeWidenL = { gain = 0.5, offset = 0.25 }
+        """
+    )
+    shaper = Shaper(path)
+    got = shaper.apply(frame_of(jawOpen=0.5, glare=0.5, cheekPuff=1.0, other=1.0))
+    assert dict(zip(got.names, got.values.tolist(), strict=True)) == {
+        "CTRL_expressions.mouthStretchL": 0.25,
+        "CTRL_expressions.eyeWidenL": 0.5,
+    }
+    assert shaper.unmapped == ("other",)
+    with pytest.raises(ValueError, match="absent"):
+        Shaper(tmp_path / "absent.toml")
+
+
 def test_eyes_look_where_only_their_bones_are_sent():
     turn = math.radians(15.0)
     shaper = Shaper()
@@ -399,6 +424,7 @@ def test_the_command_records_and_saves_on_ctrl_c(tmp_path):
         words, errors = process.communicate(timeout=20)
     assert process.returncode == 0, errors
     assert "5 frames of iPhone" in words
+    assert "not mapped" not in errors
     lines = out.read_text().splitlines()
     names = lines[0].split(",")
     jaw, yaw = names.index("CTRL_expressions.jawOpen"), names.index("head.yaw")

@@ -3,6 +3,7 @@
 
 import importlib.util
 import sys
+import tomllib
 import zipfile
 from pathlib import Path
 
@@ -46,6 +47,26 @@ def test_the_wheel_for_3_11_has_the_name_that_sorts_last(tmp_path):
     assert len(inside) == 3
     assert "-cp311-" in inside[-1]
     assert all(f'"./{name}"' in manifest for name in inside)
+
+
+def test_pure_wheels_are_carried_as_they_are_and_pinned_by_hash(tmp_path):
+    build = _script("build_extension")
+    version = build.manifest_version(
+        (build.ADDON / "blender_manifest.toml").read_text(encoding="utf-8")
+    )
+    ours = tmp_path / f"risorius-{version}-cp313-cp313-linux_x86_64.whl"
+    pure = tmp_path / "python_osc-1.10.2-py3-none-any.whl"
+    for wheel in (ours, pure):
+        wheel.write_bytes(wheel.name.encode())
+    with zipfile.ZipFile(build.build([ours], tmp_path / "out", [pure])) as package:
+        assert package.read(f"wheels/{pure.name}") == pure.read_bytes()
+        manifest = tomllib.loads(package.read("blender_manifest.toml").decode())
+    assert f"./wheels/{pure.name}" in manifest["wheels"]
+    assert all(len(words) <= 64 for words in manifest["permissions"].values())  # Blender's limit
+    pinned = build.PINNED.read_text(encoding="utf-8")
+    required = tomllib.loads((PACKAGING.parent / "pyproject.toml").read_text(encoding="utf-8"))
+    (osc,) = required["project"]["optional-dependencies"]["live"]
+    assert f"\n{osc} --hash=sha256:" in pinned
 
 
 def test_the_table_counts_by_version_and_file(tmp_path):

@@ -250,25 +250,31 @@ def _head_rows(controls, curves, frames):
     bone = controls.pose.bones.get("head")
     if bone is None:
         return None
-    path = f'pose.bones["head"].{rotation_path(bone)}'
-    size = 3 if path.endswith("euler") else 4
-    if not any((path, i) in curves for i in range(size)):
+    # Its own way first: an action of another face may turn the head in another way.
+    for mode in (bone.rotation_mode, "QUATERNION", "XYZ", "AXIS_ANGLE"):
+        path = f'pose.bones["head"].{_ROTATIONS.get(mode, "rotation_euler")}'
+        rest = {"QUATERNION": (1.0, 0.0, 0.0, 0.0), "AXIS_ANGLE": (0.0, 0.0, 1.0, 0.0)}.get(
+            mode, (0.0, 0.0, 0.0)
+        )
+        found = [curves.get((path, i)) for i in range(len(rest))]
+        if any(found):
+            break
+    else:
         return None
-    rest = [1.0, 0.0, 0.0, 0.0] if bone.rotation_mode == "QUATERNION" else [0.0] * size
     values = [
-        sampled(curves[path, i], frames) if (path, i) in curves else np.full(len(frames), rest[i])
-        for i in range(size)
+        np.full(len(frames), still) if curve is None else sampled(curve, frames)
+        for curve, still in zip(found, rest, strict=True)
     ]
-    turns = _from_bone(bone, _from_rotation(bone, np.stack(values, axis=1)))
+    turns = _from_bone(bone, _from_rotation(mode, np.stack(values, axis=1)))
     return clips.angles_of(turns).T
 
 
-def _from_rotation(bone, values):
-    if bone.rotation_mode == "QUATERNION":
+def _from_rotation(mode, values):
+    if mode == "QUATERNION":
         return values / np.linalg.norm(values, axis=1, keepdims=True).clip(1e-12)
-    if bone.rotation_mode == "AXIS_ANGLE":
+    if mode == "AXIS_ANGLE":
         return np.array([tuple(Quaternion(v[1:], v[0])) for v in values])
-    return np.array([tuple(Euler(v, bone.rotation_mode).to_quaternion()) for v in values])
+    return np.array([tuple(Euler(v, mode).to_quaternion()) for v in values])
 
 
 def _from_bone(bone, turns):

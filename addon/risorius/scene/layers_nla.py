@@ -26,16 +26,17 @@ def push(scene, rig):
     playing = [layer for layer in settings if not layer.mute]
     if any(layer.solo for layer in playing):
         playing = [layer for layer in playing if layer.solo]
+    curves = [_weight_curve(controls, layer) for layer in playing]  # of the action as it plays
     notes, count = [], 0
     for place, layer in enumerate(playing):
-        trouble = obstacle(controls, layer)
+        trouble = obstacle(controls, layer, curves[place])
         if trouble:
             kept = "stays a layer" if layer == playing[-1] else "and those above it stay layers"
             notes.append(f"{layer.name} {kept}: {trouble}.")
             break
         if place == 0:
             _push_down(controls, rig)
-        _add_strip(scene, rig, live, layer)
+        _add_strip(scene, rig, live, layer, curves[place])
         count += 1
     for layer in playing[:count]:
         layer.mute = True
@@ -47,19 +48,24 @@ def push(scene, rig):
     return count, notes
 
 
-def obstacle(controls, layer):
-    """Why a strip cannot say the same as a layer; empty where it can."""
-    if layer.blend == "MAXIMUM":
-        return "the NLA has no maximum"
-    if layer.extend == "REPEAT":
-        return "a strip does not repeat for ever"
-    if len(layer.warp) > 1:
-        return "a strip has no warp points"
-    if _weight_driver(controls, layer) is not None:
-        return "its weight has a driver"
-    if layer.kind == "ACTION" and layer.action is None:
-        return "it has no action"
-    return ""
+def obstacle(controls, layer, curve=None):
+    """Why a strip cannot say the same as a layer; empty where it can.
+
+    Args:
+        controls: control armature.
+        layer: settings of a layer.
+        curve: the F-curve of its weight, or None.
+    """
+    fades = layer.fade_in or layer.fade_out
+    reasons = (
+        (layer.blend == "MAXIMUM", "the NLA has no maximum"),
+        (layer.extend == "REPEAT", "a strip does not repeat for ever"),
+        (len(layer.warp) > 1, "a strip has no warp points"),
+        (_weight_driver(controls, layer) is not None, "its weight has a driver"),
+        (curve is not None and fades, "a strip either fades or has keys of its influence"),
+        (layer.kind == "ACTION" and layer.action is None, "it has no action"),
+    )
+    return next((words for holds, words in reasons if holds), "")
 
 
 def _weight_path(controls, layer):
@@ -89,15 +95,14 @@ def _push_down(controls, rig):
         data.action_extrapolation,
         data.action_influence,
     )
+    data.action = None
     strip = clips.add_strip(rig, action)
     strip.blend_type, strip.extrapolation = blend, extrapolation
     if influence != 1.0:
-        _set_influence(strip, None, influence)
+        _set_influence(strip, influence)
 
 
-def _add_strip(scene, rig, live, layer):
-    controls = parts.controls_of(rig)
-    curve = _weight_curve(controls, layer)  # before the action is pushed away
+def _add_strip(scene, rig, live, layer, curve):
     action, still = _action_of(scene, rig, live, layer)
     strip = clips.add_strip(rig, action, layer.name)
     strip.use_auto_blend = False
@@ -110,9 +115,15 @@ def _add_strip(scene, rig, live, layer):
         _place_strip(strip, layers.span_of(layer, action))
         strip.extrapolation = layer.extend
     strip.use_reverse = layer.reverse
-    strip.blend_in, strip.blend_out = layer.fade_in, layer.fade_out
-    if curve is not None or layer.weight != 1.0:
-        _set_influence(strip, curve, layer.weight)
+    if curve is not None:
+        strip.use_animated_influence = True
+        own = strip.fcurves.find("influence")
+        own.keyframe_points.clear()
+        layers.copy_keys(curve, own)
+    elif layer.weight != 1.0:
+        _set_influence(strip, layer.weight, layer.fade_in, layer.fade_out)
+    else:
+        strip.blend_in, strip.blend_out = layer.fade_in, layer.fade_out
 
 
 def _place_strip(strip, span):
@@ -122,15 +133,23 @@ def _place_strip(strip, span):
     strip.frame_end = span.scene_range()[1]
 
 
-def _set_influence(strip, curve, value):
+def _set_influence(strip, value, fade_in=0.0, fade_out=0.0):
+    """A constant influence; with it a strip does not fade of itself, so its keys do."""
     strip.use_animated_influence = True
     strip.influence = value
-    own = strip.fcurves.find("influence")
-    if curve is None:
-        own.keyframe_points.insert(strip.frame_start, value)
-        return
-    own.keyframe_points.clear()
-    layers.copy_keys(curve, own)
+    start, end = strip.frame_start, strip.frame_end
+    # Where the fades meet they make a peak: min((t - start) / in, (end - t) / out).
+    top = min(1.0, (end - start) / max(fade_in + fade_out, 1e-9))
+    keys = {start + fade_in * top: value * top, end - fade_out * top: value * top}
+    if fade_in:
+        keys[start] = 0.0
+    if fade_out:
+        keys[end] = 0.0
+    points = strip.fcurves.find("influence").keyframe_points
+    points.clear()
+    for frame, height in sorted(keys.items()):
+        points.insert(frame, height, options={"FAST"}).interpolation = "LINEAR"
+    strip.fcurves.find("influence").update()
 
 
 def _action_of(scene, rig, live, layer):

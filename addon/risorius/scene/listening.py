@@ -54,11 +54,15 @@ class Task:
         """Whether the thread still works."""
         return self._thread.is_alive()
 
+    def wait(self):
+        """Until the thread ends."""
+        if self.is_running():
+            self._thread.join()
+
     def cancel(self):
         """Ask it to end and wait for that."""
         self._cancelled.set()
-        if self._thread.is_alive():
-            self._thread.join()
+        self.wait()
 
 
 def has_recogniser():

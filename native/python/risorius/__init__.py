@@ -50,6 +50,7 @@ from ._native import (
     parse_file,
 )
 from .clip import Clip, Event
+from .clip_file import ClipError, ClipReader, ClipWriter
 from .mixer import Layer, Mixer
 
 __version__ = "0.1.0"
@@ -59,6 +60,9 @@ __all__ = [
     "BlendShapeTarget",
     "BoneSpace",
     "Clip",
+    "ClipError",
+    "ClipReader",
+    "ClipWriter",
     "Conditionals",
     "Dna",
     "DnaError",

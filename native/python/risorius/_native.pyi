@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 _F32: TypeAlias = npt.NDArray[np.float32]
+_F64: TypeAlias = npt.NDArray[np.float64]
 _U16: TypeAlias = npt.NDArray[np.uint16]
 _U32: TypeAlias = npt.NDArray[np.uint32]
 _Int: TypeAlias = SupportsInt | SupportsIndex
@@ -19,6 +20,81 @@ _Float: TypeAlias = SupportsFloat | SupportsIndex
 _Path: TypeAlias = PathLike[str] | str | bytes
 # is_error, code, where, offset, message
 _Finding: TypeAlias = tuple[bool, str, str, int | None, str]
+
+# time, name, duration, value
+_Event: TypeAlias = tuple[float, str, float, str]
+
+class ClipError(ValueError):
+    """A clip that cannot be read or written."""
+
+    code: str
+    """E.g. "truncated"."""
+    offset: int | None
+    """Byte offset in the file."""
+    where: str
+    """The part of the clip, e.g. "blocks[3].times"."""
+
+class ClipFile:
+    """A .rzc file that is read in parts."""
+
+    def __init__(self, source: _Path, recover: bool = False) -> None: ...
+    @property
+    def names(self) -> tuple[str, ...]: ...
+    @property
+    def rate(self) -> float: ...
+    @property
+    def start(self) -> float: ...
+    @property
+    def has_times(self) -> bool: ...
+    @property
+    def frame_count(self) -> int: ...
+    @property
+    def byte_count(self) -> int: ...
+    @property
+    def block_starts(self) -> list[int]: ...
+    @property
+    def metadata(self) -> dict[str, str]: ...
+    @property
+    def events(self) -> list[_Event]: ...
+    def read(
+        self, begin: _Int, end: _Int, controls: Sequence[_Int] | None = None
+    ) -> tuple[_F32, _F64 | None]:
+        """float32[controls, frames], and the times of the frames if they have any."""
+
+class ClipFileWriter:
+    """A .rzc file that is being recorded."""
+
+    def __init__(
+        self,
+        path: _Path,
+        names: Sequence[str],
+        rate: _Float,
+        start: _Float,
+        has_times: bool,
+        metadata: Sequence[tuple[str, str]],
+        block_frames: _Int = 512,
+    ) -> None: ...
+    @property
+    def frame_count(self) -> int: ...
+    @property
+    def is_open(self) -> bool: ...
+    @property
+    def part(self) -> PathLike[str]: ...
+    def append(self, frames: npt.ArrayLike, times: npt.ArrayLike | None = None) -> None: ...
+    def event(self, event: _Event) -> None: ...
+    def close(self) -> None: ...
+
+def encode_clip(
+    names: Sequence[str],
+    curves: npt.ArrayLike,
+    rate: _Float,
+    start: _Float,
+    times: npt.ArrayLike | None,
+    events: Sequence[_Event],
+    metadata: Sequence[tuple[str, str]],
+    block_frames: _Int = 512,
+) -> bytes: ...
+def write_clip(path: _Path, bytes: bytes) -> None: ...
 
 class DnaError(ValueError):
     """A DNA file or Dna value that cannot be used."""

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Sequence
 
 from . import DnaError, __version__
-from .commands import batch, bench, check, convert, edit, info, live, plot, sample, speech
+from .commands import batch, bench, check, clip, convert, edit, info, live, plot, sample, speech
 from .commands import eval as evaluate
 
 
@@ -21,12 +21,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="risorius", description="Face rigs from DNA files.")
     parser.add_argument("--version", action="version", version=__version__)
     subparsers = parser.add_subparsers(dest="command", required=True)
-    for command in (info, check, convert, evaluate, sample, plot, bench, edit, speech, live, batch):
-        command.add_parser(subparsers)
-    args, rest = parser.parse_known_args(arguments)
-    # argparse ends a list of operands at the first option: FILE --json NAME=1.
-    operands: list[str] | None = getattr(args, "controls", getattr(args, "files", None))
-    if any(text.startswith("-") for text in rest) or (rest and operands is None):
+    for command in (
+        info,
+        check,
+        convert,
+        evaluate,
+        sample,
+        plot,
+        bench,
+        edit,
+        clip,
+        speech,
+        live,
+        batch,
+    ):
         parser.error(f"unrecognized arguments: {' '.join(rest)}")
     if operands is not None:
         operands += rest

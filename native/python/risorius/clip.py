@@ -3,11 +3,14 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+
+from ._native import encode_clip, write_clip
 
 Floats = npt.NDArray[np.float32]
 Times = npt.NDArray[np.float64]
@@ -188,6 +191,43 @@ class Clip:
         if unknown:
             raise TypeError(f"a clip has no {sorted(unknown)[0]}")
         return Clip(**{**values, **changes})  # type: ignore[arg-type]
+
+    def to_bytes(self) -> bytes:
+        """The clip as the bytes of a .rzc file: no bit of it is lost."""
+        return encode_clip(
+            self.names,
+            self.curves,
+            self.rate,
+            self.start,
+            self.times,
+            [tuple(event) for event in self.events],
+            list(self.metadata.items()),
+        )
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the clip to a .rzc file; a file of that name from before is replaced as a whole.
+
+        Raises:
+            ClipError: the file cannot be written.
+        """
+        write_clip(path, self.to_bytes())
+
+    @staticmethod
+    def load(
+        source: str | os.PathLike[str] | bytes,
+        *,
+        frames: tuple[int, int] | None = None,
+        controls: Sequence[str] | None = None,
+    ) -> Clip:
+        """Read a .rzc file, or the frames begin to end - 1 or some controls of it.
+
+        Raises:
+            ClipError: no .rzc file, cut, damaged, of another version; or it cannot be opened.
+            KeyError: a control that is not there.
+        """
+        from .clip_file import ClipReader
+
+        return ClipReader(source).read(frames, controls)
 
     def raw_controls(self, rig_names: Sequence[str]) -> tuple[Floats, list[str]]:
         """What a rig is to be evaluated with.

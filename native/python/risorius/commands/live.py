@@ -11,8 +11,8 @@ from time import monotonic, sleep
 from types import FrameType
 
 from ..clip import Clip
+from ..importing import MappingError, csv_text, write_text
 from ..live import EVERYWHERE, PORTS, SOURCES, THIS_MACHINE, LiveError, Receiver, Shaper, Status
-from .plot import write
 
 _KINDS = (".rzc", ".csv")
 
@@ -36,6 +36,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--subject", default="", metavar="NAME", help="default: the first heard")
     parser.add_argument("--record", type=Path, metavar="OUT", help="clip.rzc or clip.csv")
     parser.add_argument("--seconds", type=float, metavar="N", help="end after them")
+    parser.add_argument(
+        "--mapping", default="arkit", metavar="NAME|FILE", help="of names to controls, as TOML"
+    )
     parser.add_argument("--gain", type=float, default=1.0, metavar="X", help="on all units")
     parser.set_defaults(func=run)
 
@@ -61,8 +64,9 @@ def run(args: argparse.Namespace) -> int:
         return 2
     receiver = Receiver(args.source, args.port, EVERYWHERE if args.everywhere else THIS_MACHINE)
     try:
+        shaper = Shaper(args.mapping, gain=args.gain)
         receiver.start()
-    except LiveError as error:
+    except (LiveError, MappingError) as error:
         print(f"risorius: {error}", file=sys.stderr)
         return 1
     take = receiver.record(args.subject)
@@ -78,7 +82,9 @@ def run(args: argparse.Namespace) -> int:
     if not len(take):
         print(f"risorius: {args.record} was not written: no face came", file=sys.stderr)
         return 1
-    clip = take.clip(Shaper(gain=args.gain))
+    clip = take.clip(shaper)
+    if missed := take.unmapped(shaper):
+        print(f"risorius: not mapped: {', '.join(missed)}", file=sys.stderr)
     try:
         save(clip, args.record)
     except (OSError, ValueError) as error:
@@ -145,14 +151,6 @@ def save(clip: Clip, path: Path) -> None:
         OSError: it cannot be written.
     """
     if path.suffix.lower() == ".csv":
-        write(path, table(clip).encode())
+        write_text(csv_text(clip), path)
     else:
         clip.save(path)
-
-
-def table(clip: Clip) -> str:
-    """A clip as a table: a row a frame, its time in seconds first, all digits of every float."""
-    lines = [",".join(["time", *clip.names])]
-    for time, row in zip(clip.frame_times(), clip.curves.T, strict=True):
-        lines.append(",".join([f"{time:.9f}", *(f"{value:.9g}" for value in row)]))
-    return "\n".join(lines) + "\n"

@@ -21,8 +21,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .. import arkit
+from .. import arkit, expressions
 from ..clip import Clip
+from ..regions import expand_sides
 from .errors import AnimationFileError
 
 Doubles = npt.NDArray[np.float64]
@@ -350,37 +351,45 @@ def _table(table: Table[str, Any], key: str, where: str) -> dict[str, Any]:
 
 
 def _row(key: str, value: object, prefix: str, where: str) -> Row:
-    """A row's controls in full: a name without a dot gets the prefix."""
+    """A row's controls in full.
+
+    "@PP" is the pose of the expression PP, weighted; a name that ends in * stands for both sides,
+    in ** for the four lip quarters, unless the row is a pattern itself; a name without a dot gets
+    the prefix.
+    """
     if isinstance(value, str):
-        return _expression(value, f"rows.{key}", where)
+        value = {"@" + value: 1.0}
     if not isinstance(value, dict):
         raise MappingError(
             where,
             f"rows.{key}: {{ control = weight }} or an expression was expected, found {value!r}",
         )
-    out = {}
-    for control, weight in value.items():
-        at = f"rows.{key}.{control}"
-        out[control if "." in control else prefix + control] = _number(weight, at, where)
-        if "*" in control and "*" not in key:
-            raise MappingError(where, f"{at}: a * was expected in the curve's name too")
     if key.count("*") > 1:
         raise MappingError(where, f"rows.{key}: one * at most was expected")
+    out: Row = {}
+    for control, given in value.items():
+        at = f"rows.{key}.{control}"
+        weight = _number(given, at, where)
+        if control.startswith("@"):
+            parts = _expression(control[1:], at, where)
+        else:
+            full = control if "." in control else prefix + control
+            parts = dict.fromkeys([full] if "*" in key else expand_sides(full), 1.0)
+        for name, part in parts.items():
+            out[name] = out.get(name, 0.0) + weight * part
+    if "*" not in key and any("*" in control for control in out):
+        raise MappingError(
+            where, f"rows.{key}: a * was expected at the end of a control, or in both"
+        )
     return out
 
 
-def _expression(name: str, at: str, where: str) -> Row:
+def _expression(name: str, at: str, where: str) -> Table[str, float]:
     """The pose of an expression by its name."""
     try:
-        from .. import expressions  # type: ignore[attr-defined, unused-ignore]
-    except ImportError:
-        raise MappingError(
-            where, f"{at}: this version has no expressions, found {name!r}"
-        ) from None
-    try:
-        return {control: float(weight) for control, weight in expressions.pose(name).items()}
-    except (KeyError, ValueError) as error:
-        raise MappingError(where, f"{at}: an expression was expected, found {name!r}") from error
+        return expressions.get(name).weights
+    except ValueError as error:
+        raise MappingError(where, f"{at}: {error}") from error
 
 
 def _adjustment(key: str, value: object, where: str) -> Adjustment:

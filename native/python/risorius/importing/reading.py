@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..clip import Clip
-from . import named_json, tables
+from . import named_json, tables, visemes
 from .errors import AnimationFileError
 from .keys import Keys, on_one_clock
 from .mapping import ANGLES, Mapped, apply_rows, best_mapping, load_mapping
@@ -25,6 +25,9 @@ KINDS = {
     "live_link_face": "Live Link Face CSV",
     "csv": "CSV of named curves",
     "json": "JSON of named curves",
+    "rhubarb": "mouth shapes of Rhubarb Lip Sync: TSV, XML, JSON",
+    "moho": "mouth shapes of Moho and Papagayo: .dat",
+    "papagayo": "Papagayo documents: .pgo",
 }
 ROTATIONS = ("head", "all", "none")
 
@@ -208,12 +211,28 @@ def _read_kind(
 ) -> Take:
     name = str(file)
     text = decode(data, name)
-    if kind == "json" or (kind is None and text.lstrip()[:1] in ("{", "[")):
-        return named_json.read(named_json.parse(text, name), name, rate)
+    if text.lstrip()[:1] in ("{", "[") or kind == "json":
+        return _read_json(named_json.parse(text, name), name, kind, rate)
+    if kind in (None, "moho") and text.lstrip().startswith("MohoSwitch1"):
+        return visemes.read_dat(text.lstrip(), name, rate)
+    mouth = visemes.reader_of(text) if kind in (None, "rhubarb", "papagayo", "moho") else None
+    if mouth is not None:
+        return mouth(text, name)
+    if kind in ("rhubarb", "papagayo", "moho"):
+        raise AnimationFileError(name, f"{KINDS[kind]}: expected, found something else")
     table = tables.read_table(text, name)
     if kind == "live_link_face" or (kind is None and tables.is_live_link_face(table.header)):
         return tables.read_live_link_face(table, timecode_rate)
     return tables.read_plain(table, rate, timecode_rate)
+
+
+def _read_json(document: object, name: str, kind: str | None, rate: float | None) -> Take:
+    if isinstance(document, dict) and kind != "json":
+        if "mouthCues" in document:
+            return visemes.read_rhubarb_json(document, name)
+        if "voices" in document and "fps" in document:
+            return visemes.read_pgo_json(document, name)
+    return named_json.read(document, name, rate)
 
 
 def import_file(

@@ -39,8 +39,9 @@ CURVES = (
 ).split()
 NAMES = tuple(CURVES)
 _SHAPES = 52
-# Found on a recording of the app (an eye that looks down has a positive pitch, one that looks to
-# its own right a positive yaw): its axes look out of the back of the head.
+# Found on a recording of the app: an eye that looks down has a positive pitch, one that looks to
+# its own right a positive yaw, and its roll has the sign that an eye has which only turns up and
+# aside. So the axes look out of the back of the head, to its own left and up; the head shares them.
 _SIGNS = np.array([1.0] * _SHAPES + [-1.0, -1.0, 1.0] * 3, np.float32)
 _COUNTS = (len(CURVES), _SHAPES, _SHAPES - 1)
 _LONGEST_TEXT = 256

@@ -4,15 +4,15 @@
 from __future__ import annotations
 
 import math
+import os
 import tomllib
-from collections.abc import Mapping
 from functools import cache
 from importlib import resources
 from typing import NamedTuple
 
 import numpy as np
 
-from .. import arkit
+from ..importing import Mapping, load_mapping
 from .frame import Floats, Frame
 
 HEAD = ("head.yaw", "head.pitch", "head.roll")
@@ -20,6 +20,7 @@ _EYES = ("eyeL.yaw", "eyeL.pitch", "eyeR.yaw", "eyeR.pitch")
 _IGNORED = {"eyeL.roll", "eyeR.roll"}
 _LOOK_AT_ONE = math.radians(30.0)  # an eye's turn that a look control at 1 stands for
 _FULL_SET = 10  # ARKit units from which on the expressions of VRM are taken to repeat them
+Row = dict[str, float]
 _ANGLES = {*HEAD, *_EYES, *_IGNORED}
 
 
@@ -33,7 +34,7 @@ class Controls(NamedTuple):
 
 
 @cache
-def expressions() -> dict[str, dict[str, float]]:
+def expressions() -> dict[str, Row]:
     """VRM expression, in lower case -> {ARKit unit: weight}; of VRM 0 and 1."""
     text = resources.files(__package__).joinpath("vrm.toml").read_text(encoding="utf-8")
     table = tomllib.loads(text)
@@ -47,60 +48,59 @@ class Plan:
     Attributes:
         controls: the controls that the names reach.
         matrix: float32[controls, names].
-        unmapped: names that reach none.
+        adjusted: (place of a control, what the mapping does to it).
+        unmapped: names that reach none, and that the mapping does not leave out either.
         is_angle: bool[names].
         head: bool[controls], the three angles of the head.
     """
 
-    def __init__(self, names: tuple[str, ...], table: Mapping[str, Mapping[str, float]]) -> None:
-        rows = _rows(names, table)
+    def __init__(self, names: tuple[str, ...], mapping: Mapping) -> None:
+        rows = _rows(names, mapping)
         found: dict[str, int] = {}
         for row in rows:
-            for control in row:
+            for control in row or ():
                 found.setdefault(control, len(found))
         self.controls = tuple(found)
         self.matrix = np.zeros((len(found), len(names)), np.float32)
         for column, row in enumerate(rows):
-            for control, weight in row.items():
+            for control, weight in (row or {}).items():
                 self.matrix[found[control], column] = weight
-        empty = {n for n, row in zip(names, rows, strict=True) if not row}
-        self.unmapped = tuple(sorted(empty - _ANGLES - {"neutral"}))
+        changes = ((i, mapping.adjustment(control)) for control, i in found.items())
+        self.adjusted = tuple((i, change) for i, change in changes if change is not None)
+        self.unmapped = tuple(n for n, row in zip(names, rows, strict=True) if row is None)
         self.is_angle = np.array([name in _ANGLES for name in names], bool)
         self.head = np.array([name in HEAD for name in self.controls], bool)
 
 
-def _rows(
-    names: tuple[str, ...], table: Mapping[str, Mapping[str, float]]
-) -> list[Mapping[str, float]]:
-    units = sum(name in table for name in names)
+def _rows(names: tuple[str, ...], mapping: Mapping) -> list[Row | None]:
+    """The controls of each name; none for what is left out, None for what nobody knows."""
+    find = mapping.finder()
+    rows = [found[1] if (found := find(name)) else None for name in names]
+    units = sum(bool(row) for row in rows)
     looks = any(name.startswith("eyeLook") for name in names)
-    rows: list[Mapping[str, float]] = []
-    for name in names:
+    for i, name in enumerate(names):
+        if rows[i] is not None:
+            continue
         if name in HEAD or name.startswith("CTRL_"):
-            rows.append({name: 1.0})
-        elif name in table:
-            rows.append(table[name])
-        elif name.lower() in expressions() and units < _FULL_SET:
-            rows.append(_through(expressions()[name.lower()], table))
-        elif name in _EYES and not looks:
-            rows.append(_look(name, table))
-        else:
-            rows.append({})
+            rows[i] = {name: 1.0}
+        elif name.lower() in expressions():
+            full = units >= _FULL_SET
+            rows[i] = {} if full else _through(expressions()[name.lower()], mapping)
+        elif name in _ANGLES:
+            rows[i] = _look(name, mapping) if name in _EYES and not looks else {}
     return rows
 
 
-def _through(
-    row: Mapping[str, float], table: Mapping[str, Mapping[str, float]]
-) -> dict[str, float]:
+def _through(row: Row, mapping: Mapping) -> Row:
     """A row in units as a row in controls."""
-    result: dict[str, float] = {}
+    result: Row = {}
     for unit, weight in row.items():
-        for control, share in table.get(unit, {}).items():
+        for control, share in mapping.rows.get(unit, {}).items():
             result[control] = result.get(control, 0.0) + weight * share
     return result
 
 
-def _look(name: str, table: Mapping[str, Mapping[str, float]]) -> dict[str, float]:
+def _look(name: str, mapping: Mapping) -> Row:
     """An eye's angle as look controls: one side with its sign, the other against it."""
     side = "Left" if name[3] == "L" else "Right"
     if name.endswith("pitch"):
@@ -109,13 +109,18 @@ def _look(name: str, table: Mapping[str, Mapping[str, float]]) -> dict[str, floa
         ahead, back = ("eyeLookOut", "eyeLookIn") if side == "Left" else ("eyeLookIn", "eyeLookOut")
         ahead, back = ahead + side, back + side
     weight = 1.0 / _LOOK_AT_ONE
-    return _through({ahead: weight}, table) | _through({back: -weight}, table)
+    return _through({ahead: weight}, mapping) | _through({back: -weight}, mapping)
 
 
 class Shaper:
     """Turns frames into controls. Not for several threads, nor for several subjects, at once.
 
+    Args:
+        mapping: risorius.importing.Mapping, the name of one that comes with Risorius, or a file.
+
     Attributes:
+        mapping: the Mapping; names that it does not have may be raw controls, angles of the head,
+            expressions of VRM.
         gain: factor on all units; head_gain: on the head's angles, negative to turn them round.
         gains: factor for single units, by their name as the frame has it, beside `gain`.
         smoothing: 0 for none, to 1: a one-euro filter, which holds a still face still and lets a
@@ -126,14 +131,15 @@ class Shaper:
 
     def __init__(
         self,
-        table: Mapping[str, Mapping[str, float]] | None = None,
+        mapping: str | os.PathLike[str] | Mapping = "arkit",
         *,
         smoothing: float = 0.0,
         gain: float = 1.0,
         head_gain: float = 1.0,
         maximum: float = 1.0,
     ) -> None:
-        self._table = arkit.mapping() if table is None else table
+        """Load the mapping. Raises: risorius.importing.MappingError."""
+        self.mapping = load_mapping(mapping)
         self.smoothing = smoothing
         self.gain, self.head_gain, self.maximum = gain, head_gain, maximum
         self.gains: dict[str, float] = {}
@@ -145,7 +151,7 @@ class Shaper:
     def plan(self, names: tuple[str, ...]) -> Plan:
         """The way of these names; kept for the next frame, which mostly has the same."""
         if self._plan is None or names != self._names:
-            self._plan, self._names = Plan(names, self._table), names
+            self._plan, self._names = Plan(names, self.mapping), names
             self._filter = OneEuro()
         return self._plan
 
@@ -155,9 +161,14 @@ class Shaper:
         if frame is not None:
             self.neutral = dict(zip(frame.names, map(float, frame.values), strict=True))
 
+    @property
+    def unmapped(self) -> tuple[str, ...]:
+        """Names of the last frame that move nothing."""
+        return self._plan.unmapped if self._plan else ()
+
     def without_smoothing(self) -> Shaper:
         """One of the same settings for a recording."""
-        other = Shaper(self._table, gain=self.gain, head_gain=self.head_gain, maximum=self.maximum)
+        other = Shaper(self.mapping, gain=self.gain, head_gain=self.head_gain, maximum=self.maximum)
         other.gains, other.neutral = dict(self.gains), dict(self.neutral)
         return other
 
@@ -168,6 +179,8 @@ class Shaper:
         if self.gains:
             values = values * np.array([self.gains.get(n, 1.0) for n in frame.names], np.float32)
         result = plan.matrix @ values
+        for place, change in plan.adjusted:
+            result[place] = change.apply(result[place])
         result *= np.where(plan.head, np.float32(self.head_gain), np.float32(self.gain))
         if self.smoothing > 0.0:
             result = self._filter.step(result, frame.time, self.smoothing)

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..clip import Clip
 from .frame import Frame
-from .shaping import Shaper
+from .shaping import Plan, Shaper
 
 
 class Take:
@@ -61,6 +61,12 @@ class Take:
         times = np.array([frame.time for frame in self._frames], np.float64)
         times -= times[0] if len(times) else 0.0
         return Clip(names, curves, _rate(times), times=times, metadata={"subject": self.subject})
+
+    def unmapped(self, shaper: Shaper) -> list[str]:
+        """Names of its frames that a shaper's mapping does not know."""
+        kinds = dict.fromkeys(frame.names for frame in self._frames)
+        plans = (Plan(names, shaper.mapping) for names in kinds)
+        return sorted({name for plan in plans for name in plan.unmapped})
 
 
 def _rate(times: np.ndarray) -> float:  # type: ignore[type-arg]

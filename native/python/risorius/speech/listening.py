@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from . import text
+from . import text, voting
 from .audio import RATE, Samples, read_audio, resample
 from .phones import Phoneme
 from .recogniser import Recogniser, Segment, agreement, to_phonemes
@@ -24,6 +24,9 @@ STEP = 0.01
 _PIECE = 12.0  # seconds that a piece has at least, if silences allow it
 _LONGEST_PIECE = 30.0  # a decoder's memory grows with it
 _PAUSE = 0.15  # seconds of silence that one may cut in
+_SHORTEST_SILENCE = 0.08  # seconds
+_SHORTEST_PHONEME = 0.03
+_STOPS = frozenset({"P", "B", "T", "D", "K", "G", "CH", "JH"})
 
 
 class CancelledError(Exception):
@@ -80,6 +83,7 @@ def listen(
     if found is None:
         found = _recognised(recogniser, samples, tell)
     tell(1.0)
+    found = with_silences(found, loudness(samples))
     return Heard(_filled(found, len(samples) / RATE), samples, aligned, notes)
 
 
@@ -135,14 +139,8 @@ def _recognised(recogniser: Recogniser, samples: Samples, tell: Progress) -> lis
     for begin, end in pieces(loudness(samples)):
         tell(0.02 + 0.98 * begin * RATE / len(samples))
         piece = samples[int(begin * RATE) : int(end * RATE)]
-        heard = recogniser.hear_phonemes(piece)
-        phones = recogniser.hear_words(piece)
-        shares = agreement(phones, heard) if phones else []
-        found += (
-            to_phonemes(phones, shares, begin)
-            if phones
-            else to_phonemes(heard, [0.5] * len(heard), begin)
-        )
+        for phone in voting.hear(recogniser, piece):
+            found.append(phone._replace(begin=phone.begin + begin, end=min(phone.end + begin, end)))
     return found
 
 
@@ -181,6 +179,40 @@ def pieces(levels: npt.NDArray[np.float64]) -> list[tuple[float, float]]:
             cuts.append(middle)
     ends = [*cuts[1:], len(levels)]
     return [(a * STEP, b * STEP) for a, b in zip(cuts, ends, strict=True)]
+
+
+def with_silences(found: Sequence[Phoneme], levels: npt.NDArray[np.float64]) -> list[Phoneme]:
+    """The phonemes without the pauses that a decoder counted to one of them.
+
+    Silence within a word is the closure of a stop, and stays it. A phoneme keeps 30 ms at least.
+    """
+    quiet = np.concatenate([[False], ~speaking(levels), [False]])
+    edges = np.flatnonzero(np.diff(quiet.astype(np.int8))).reshape(-1, 2) * STEP
+    phones = list(found)
+    for begin, end in edges:
+        if end - begin < _SHORTEST_SILENCE:
+            continue
+        inside = [i for i, p in enumerate(phones) if p.end > begin and p.begin < end]
+        if not inside or _is_closure(phones, inside[-1], float(begin)):
+            continue
+        place = float(begin)
+        for i in inside:
+            phone = phones[i]
+            if phone.name == "SIL":
+                continue
+            if phone.end > end and phone.begin > begin - _SHORTEST_PHONEME:
+                phones[i] = phone._replace(begin=min(float(end), phone.end - _SHORTEST_PHONEME))
+            else:
+                first = min(phone.begin, place)
+                place = max(place, first + _SHORTEST_PHONEME)
+                phones[i] = phone._replace(begin=first, end=min(place, phone.end))
+    return [phone for phone in phones if phone.end > phone.begin]
+
+
+def _is_closure(phones: Sequence[Phoneme], last: int, begin: float) -> bool:
+    """Whether a silence from `begin` on leads into the middle of a word."""
+    phone = phones[last]
+    return phone.name in _STOPS and not phone.word and phone.begin > begin - 0.05
 
 
 def _filled(found: Sequence[Phoneme], duration: float) -> list[Phoneme]:

@@ -1,0 +1,296 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Live capture: operators, the choices that they read, and their panel."""
+
+import bpy
+
+from .. import native
+from ..logic import names
+from ..scene import live, parts
+from .import_operators import usable
+from .panels import FaceOnlyPanel, write
+
+SOURCES = (
+    ("livelink", "Live Link Face", "Epic's app for iPhones and iPads, in its ARKit mode"),
+    ("osc", "VMC / OSC", "VMC performers, Face Cap, iFacialMocap by OSC, or plain /name value"),
+)
+PORTS = {"livelink": 11111, "osc": 39539}
+
+
+def _source_changed(self, _context):
+    self.port = PORTS[self.source]
+
+
+def _changed(_self, context):
+    session = live.of(_controls(context))
+    if session is not None:
+        live.apply_settings(session, settings_of(context))
+
+
+class RISORIUS_PG_live(bpy.types.PropertyGroup):
+    """What the user chose; it goes with the window."""
+
+    source: bpy.props.EnumProperty(
+        name="Source", description="Who sends", items=SOURCES, update=_source_changed
+    )
+    port: bpy.props.IntProperty(
+        name="Port",
+        description="UDP port to listen at, the one that the app sends to",
+        default=PORTS["livelink"],
+        min=1,
+        max=65535,
+    )
+    everywhere: bpy.props.BoolProperty(
+        name="From the Network",
+        description="Listen to other devices too, as a phone needs; else to this computer alone",
+        default=True,
+    )
+    subject: bpy.props.StringProperty(
+        name="Subject",
+        description="Whom to follow, by the name that the app sends; empty for the first heard",
+        update=_changed,
+    )
+    mapping: bpy.props.StringProperty(
+        name="Mapping",
+        description="File that says which controls a name moves; empty for ARKit's names and VRM's",
+        subtype="FILE_PATH",
+    )
+    smoothing: bpy.props.FloatProperty(
+        name="Smoothing",
+        description="Hold a still face still; a recording keeps what was sent",
+        default=0.3,
+        min=0.0,
+        max=1.0,
+        update=_changed,
+    )
+    gain: bpy.props.FloatProperty(
+        name="Gain",
+        description="Factor on all units of the face",
+        default=1.0,
+        min=0.0,
+        max=3.0,
+        update=_changed,
+    )
+    head_gain: bpy.props.FloatProperty(
+        name="Head",
+        description="Factor on the head's turn: 0 leaves the head alone, -1 turns it around",
+        default=1.0,
+        min=-2.0,
+        max=2.0,
+        update=_changed,
+    )
+
+
+def settings_of(context):
+    """The choices as scene/live.py takes them."""
+    chosen = context.window_manager.risorius_live
+    return live.Settings(
+        chosen.source,
+        chosen.port,
+        chosen.everywhere,
+        chosen.subject,
+        chosen.smoothing,
+        chosen.gain,
+        chosen.head_gain,
+        bpy.path.abspath(chosen.mapping) or "arkit",
+    )
+
+
+def _controls(context):
+    rig = None if native.problem() else parts.active_rig(context)
+    return parts.controls_of(rig) if rig is not None else None
+
+
+class _Running:
+    """What operators share that need a capture of the active face."""
+
+    @classmethod
+    def poll(cls, context):
+        if not usable(cls):
+            return False
+        if live.of(_controls(context)) is None:
+            cls.poll_message_set("Start live capture first.")
+            return False
+        return True
+
+
+class RISORIUS_OT_live_start(bpy.types.Operator):
+    """Let the active face follow a capture app, until it is stopped"""
+
+    bl_idname = "risorius.live_start"
+    bl_label = "Start"
+
+    @classmethod
+    def poll(cls, context):
+        if not usable(cls):
+            return False
+        if _controls(context) is None:
+            cls.poll_message_set("Select a face first.")
+            return False
+        return True
+
+    def execute(self, context):
+        try:
+            live.start(parts.active_rig(context), settings_of(context))
+        except (native.part("live").LiveError, native.part("importing").MappingError) as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
+class RISORIUS_OT_live_stop(_Running, bpy.types.Operator):
+    """Stop following; a recording is finished, the sliders go back to where they were"""
+
+    bl_idname = "risorius.live_stop"
+    bl_label = "Stop"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context):
+        session = live.of(_controls(context))
+        if session.take is not None:
+            _finish(self, context, session)
+        live.stop(_controls(context))
+        return {"FINISHED"}
+
+
+class RISORIUS_OT_live_record(_Running, bpy.types.Operator):
+    """Begin a recording at the current frame, or end it as an action of the face"""
+
+    bl_idname = "risorius.live_record"
+    bl_label = "Record"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context):
+        session = live.of(_controls(context))
+        if session.take is None:
+            live.begin_take(session, float(context.scene.frame_current))
+            return {"FINISHED"}
+        return {"FINISHED"} if _finish(self, context, session) else {"CANCELLED"}
+
+
+class RISORIUS_OT_live_neutral(_Running, bpy.types.Operator):
+    """Take the face of this moment as the face at rest: it is subtracted from what comes"""
+
+    bl_idname = "risorius.live_neutral"
+    bl_label = "Neutral Now"
+
+    forget: bpy.props.BoolProperty(
+        name="Forget", description="Take what comes as it is again", options={"SKIP_SAVE"}
+    )
+
+    def execute(self, context):
+        session = live.of(_controls(context))
+        if self.forget:
+            live.forget_neutral(session)
+        elif not live.neutral_now(session):
+            self.report({"ERROR"}, "No face was received yet.")
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
+class RISORIUS_OT_live_subject(_Running, bpy.types.Operator):
+    """Follow this subject"""
+
+    bl_idname = "risorius.live_subject"
+    bl_label = "Follow"
+
+    name: bpy.props.StringProperty(name="Subject", options={"SKIP_SAVE"})
+
+    def execute(self, context):
+        context.window_manager.risorius_live.subject = self.name
+        return {"FINISHED"}
+
+
+def _finish(operator, context, session):
+    """End the recording as an action. Returns: whether there is one."""
+    rig = parts.active_rig(context)
+    try:
+        report = live.finish_take(session, rig, context.scene)
+    except ValueError as error:
+        operator.report({"ERROR"}, f"{names.printable(str(error)).rstrip('.')}.")
+        return False
+    if report is None:
+        operator.report({"WARNING"}, "Nothing was received: there is no recording.")
+        return False
+    length = f"{report.curves} curves, frames {report.first:.0f} to {report.last:.0f}"
+    operator.report({"INFO"}, f"{report.action.name}: {length}")
+    for note in report.notes:
+        operator.report({"WARNING"}, note)
+    return True
+
+
+class RISORIUS_PT_live(FaceOnlyPanel, bpy.types.Panel):
+    bl_idname = "RISORIUS_PT_live"
+    bl_label = "Live Capture"
+    bl_order = 1
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layout = self.layout
+        chosen = context.window_manager.risorius_live
+        session = live.of(_controls(context))
+        column = layout.column()
+        column.enabled = session is None
+        column.prop(chosen, "source", text="")
+        row = column.row(align=True)
+        row.prop(chosen, "port")
+        row.prop(chosen, "everywhere", text="", icon="URL")
+        column.prop(chosen, "mapping", text="")
+        layout.prop(chosen, "subject", icon="USER", text="")
+        column = layout.column(align=True)
+        for name in ("smoothing", "gain", "head_gain"):
+            column.prop(chosen, name)
+        if session is None:
+            layout.operator("risorius.live_start", icon="PLAY")
+            if live.last_error():
+                write(layout, live.last_error(), "ERROR")
+            return
+        row = layout.row(align=True)
+        row.operator("risorius.live_stop", icon="SNAP_FACE")
+        recording = session.take is not None
+        text = "Finish Recording" if recording else "Record"
+        row.operator("risorius.live_record", text=text, icon="REC", depress=recording)
+        row = layout.row(align=True)
+        row.operator("risorius.live_neutral")
+        row.operator("risorius.live_neutral", text="", icon="X").forget = True
+        _draw_status(layout, session)
+
+
+def _draw_status(layout, session):
+    status = session.receiver.status(session.subject)
+    column = layout.column(align=True)
+    column.scale_y = 0.8
+    if not status.subject:
+        heard = "no face in what comes" if status.packets else "nothing heard yet"
+        column.label(text=f"Port {session.receiver.port}: {heard}", icon="INFO")
+    else:
+        column.label(text=f"{status.subject}: {status.per_second:.0f} a second", icon="USER")
+        column.label(text=f"Last face {status.age * 1000:.0f} ms ago", icon="BLANK1")
+    if session.take is not None:
+        column.label(text=f"Recording: {len(session.take)} faces", icon="REC")
+    for count, what in (
+        (status.lost, "lost on the way"),
+        (status.late, "late, left out"),
+        (status.refused, "packets refused"),
+        (status.floods, "times flooded"),
+    ):
+        if count:
+            column.label(text=f"{count} {what}", icon="ERROR")
+    if status.reasons:
+        write(layout, names.printable(status.reasons[0][0], 120))
+    missed = session.shaper.unmapped
+    if missed:
+        write(layout, f"Not mapped: {names.printable(', '.join(missed), 120)}")
+    others = [s for s in status.subjects if s != status.subject]
+    for name in others[:8]:
+        layout.operator("risorius.live_subject", text=name, icon="USER").name = name
+
+
+CLASSES = (
+    RISORIUS_PG_live,
+    RISORIUS_OT_live_start,
+    RISORIUS_OT_live_stop,
+    RISORIUS_OT_live_record,
+    RISORIUS_OT_live_neutral,
+    RISORIUS_OT_live_subject,
+    RISORIUS_PT_live,
+)

@@ -1,0 +1,319 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Live capture: a program sends faces over this machine's network, the viewport follows."""
+
+import json
+import math
+import socket
+import subprocess
+import sys
+from pathlib import Path
+from time import monotonic, sleep
+
+import bpy
+import numpy as np
+import pytest
+import risorius.live
+from support import scene
+from support.faces import CONTROLS, HEAD
+
+SENDER = Path(__file__).resolve().parents[1] / "tests" / "python" / "face_sender.py"
+PHONE = "6F0F5B52-8E3C-4E7B-9D42-0123456789AB"
+JAW, SMILE_LEFT, BROW_LEFT, YAW = 17, 23, 41, 52  # places in a packet of Live Link Face
+JAW_OPEN = "CTRL_expressions.jawOpen"
+
+
+def free_port():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def choose(port):
+    chosen = bpy.context.window_manager.risorius_live
+    chosen.source, chosen.port = "livelink", port
+    chosen.everywhere, chosen.smoothing, chosen.subject = False, 0.0, ""
+    return port
+
+
+@pytest.fixture
+def port():
+    return choose(free_port())
+
+
+def packet(frame, subject="iPhone", rate=60, **places):
+    values = [0.0] * 61
+    for place, value in places.items():
+        values[int(place[1:])] = value
+    return ["v6", PHONE, subject, frame, 0.0, rate, 1, values]
+
+
+def send(port, *steps):
+    """Run the sender to its end."""
+    lines = "".join(json.dumps(step) + "\n" for step in steps)
+    command = [sys.executable, str(SENDER), str(port)]
+    subprocess.run(command, input=lines, text=True, check=True, timeout=60)
+
+
+def session_of(rig):
+    return scene.submodule("scene.live").of(scene.controls(rig))
+
+
+def tick_until(rig, frames):
+    """Let the timer beat until so many faces of the subject have come."""
+    module, ends = scene.submodule("scene.live"), monotonic() + 20.0
+    session = session_of(rig)
+    while True:
+        newest = session.receiver.latest(session.subject)
+        if newest is not None and newest.sequence >= frames:
+            break
+        assert monotonic() < ends, session.receiver.status()
+        sleep(0.005)
+    module._tick()
+    bpy.context.view_layer.update()
+
+
+def raw(**values):
+    found = np.zeros(len(CONTROLS), np.float32)
+    for end, value in values.items():
+        found[next(i for i, name in enumerate(CONTROLS) if name.endswith(end))] = value
+    return found
+
+
+def test_the_viewport_follows(mode, dna_file, port):
+    rig = scene.load(dna_file, mode)
+    scene.set_controls(rig, browDownL=0.25, eyeLookUpL=0.5)
+    before, still = dict(scene.face(rig).items()), scene.snapshot(rig)
+    assert bpy.ops.risorius.live_start() == {"FINISHED"}
+    send(port, packet(1, _17=0.1), packet(2, _17=0.6, _23=0.4))
+    tick_until(rig, 2)
+    wanted = raw(jawOpen=0.6, mouthCornerPullL=0.4)
+    assert scene.error_against_oracle(rig, dna_file, wanted) < scene.TOLERANCE
+    assert np.abs(scene.snapshot(rig) - still).max() > 0.01  # and that is not nothing
+    assert scene.controls(rig).animation_data is None
+    assert bpy.ops.risorius.live_stop() == {"FINISHED"}
+    bpy.context.view_layer.update()
+    assert dict(scene.face(rig).items()) == before
+    assert np.allclose(scene.snapshot(rig), still, atol=1e-6)
+
+
+def test_only_new_faces_are_written(dna_file, port):
+    rig = scene.load(dna_file)
+    bpy.ops.risorius.live_start()
+    send(port, packet(1, _17=0.5))
+    tick_until(rig, 1)
+    scene.face(rig)[JAW_OPEN] = 0.75  # by hand, while the phone is silent
+    module = scene.submodule("scene.live")
+    assert module._tick() == module.INTERVAL
+    assert scene.face(rig)[JAW_OPEN] == 0.75
+    assert module.show(session_of(rig), scene.controls(rig)) is False
+
+
+def test_the_head_turns(dna_file, port):
+    rig = scene.load(dna_file)
+    bone = scene.controls(rig).pose.bones["head"]
+    bone.rotation_mode = "XYZ"
+    bone.rotation_euler = (0.1, 0.2, 0.3)
+    bpy.ops.risorius.live_start()
+    send(port, packet(1, _52=-0.4, _53=-0.3))  # to the own left and up, in the app's signs
+    tick_until(rig, 1)
+    head = next(b for b in rig.pose.bones if b.bone["dna_joint"] == HEAD)
+    turn = head.matrix.to_3x3() @ head.bone.matrix_local.to_3x3().inverted()
+    ahead = np.array(turn)[:, 1] * -1.0  # the face looks along -y, its left is +x
+    up = math.sin(0.3)
+    wanted = [math.sin(0.4) * math.cos(0.3), -math.cos(0.4) * math.cos(0.3), up]
+    assert np.allclose(ahead, wanted, atol=1e-5)
+    turned = tuple(bone.rotation_euler)
+    bpy.context.window_manager.risorius_live.head_gain = 0.0
+    send(port, packet(2, _52=0.8))
+    tick_until(rig, 2)
+    assert tuple(bone.rotation_euler) == turned  # left alone from then on
+    bpy.ops.risorius.live_stop()
+    assert tuple(bone.rotation_euler) == pytest.approx((0.1, 0.2, 0.3))
+
+
+def test_a_recording_is_an_action(dna_file, port):
+    rig = scene.load(dna_file)
+    bpy.context.scene.render.fps = 24
+    bpy.context.scene.frame_set(11)
+    scene.set_controls(rig, jawOpen=0.9)
+    bpy.ops.risorius.live_start()
+    assert bpy.ops.risorius.live_record() == {"FINISHED"}
+    numbers = [0, 1, 2, 3, 9, 10]  # the phone was silent for a while
+    faces = [packet(600 + n, _17=n / 16.0, _41=0.5, _52=-0.02 * n) for n in numbers]
+    send(port, *faces)
+    tick_until(rig, len(numbers))
+    live_value = scene.face(rig)[JAW_OPEN]
+    assert bpy.ops.risorius.live_stop() == {"FINISHED"}
+    assert live_value == pytest.approx(10 / 16.0)
+    bpy.context.view_layer.update()
+    seen = scene.controls(rig).evaluated_get(bpy.context.evaluated_depsgraph_get())
+    assert seen.pose.bones["face"][JAW_OPEN] == 0.0  # the recording's first, not the 0.9 of before
+    curves = {c.data_path: c for c in scene.curves(scene.controls(rig)) if c.array_index == 0}
+    jaw = curves[f'pose.bones["face"]["{JAW_OPEN}"]']
+    keys = np.array([tuple(k.co) for k in jaw.keyframe_points])
+    assert np.allclose(keys[:, 0], [11 + n / 60 * 24 for n in numbers], atol=1e-4)
+    assert np.allclose(keys[:, 1], [n / 16.0 for n in numbers], atol=1e-7)
+    # Blender plays it: at whole frames, on the straight line between the faces.
+    for frame in (11, 13, 15):
+        bpy.context.scene.frame_set(frame)
+        at = np.interp((frame - 11) / 24 * 60, numbers, np.array(numbers) / 16.0)
+        wanted = raw(jawOpen=at, browDownL=0.5)
+        seen = scene.controls(rig).evaluated_get(bpy.context.evaluated_depsgraph_get())
+        assert seen.pose.bones["face"][JAW_OPEN] == pytest.approx(at, abs=1e-5)
+        assert seen.pose.bones["head"].matrix_basis.to_quaternion().angle > 0 or frame == 11
+        assert wanted[3] == pytest.approx(scene.face(rig)["CTRL_expressions.browDownL"])
+
+
+def test_keys_do_not_hold_the_face_and_come_back(dna_file, port):
+    rig = scene.load(dna_file)
+    bone = scene.face(rig)
+    for frame, value in ((1, 0.2), (21, 0.4)):
+        bone[JAW_OPEN] = value
+        bone.keyframe_insert(f'["{JAW_OPEN}"]', frame=frame)
+    bpy.context.scene.frame_set(11)
+    bpy.ops.risorius.live_start()
+    send(port, packet(1, _17=0.875))
+    tick_until(rig, 1)
+    assert scene.error_against_oracle(rig, dna_file, raw(jawOpen=0.875)) < scene.TOLERANCE
+    action = scene.controls(rig).animation_data.action
+    assert [len(c.keyframe_points) for c in scene.curves(scene.controls(rig))] == [2]
+    bpy.ops.risorius.live_stop()
+    bpy.context.view_layer.update()
+    assert scene.controls(rig).animation_data.action == action
+    assert scene.error_against_oracle(rig, dna_file, raw(jawOpen=0.3)) < scene.TOLERANCE
+
+
+def test_two_faces_follow_two_phones_on_one_port(dna_file, port):
+    rigs = [scene.load(dna_file), scene.load(dna_file)]
+    chosen = bpy.context.window_manager.risorius_live
+    for rig, name in zip(rigs, ("Ada", "Bob"), strict=True):
+        bpy.context.view_layer.objects.active = scene.controls(rig)
+        chosen.subject = name
+        assert bpy.ops.risorius.live_start() == {"FINISHED"}
+    send(port, packet(1, "Ada", _17=0.25), packet(7, "Bob", _17=0.5), packet(2, "Ada", _17=0.75))
+    tick_until(rigs[0], 2)
+    tick_until(rigs[1], 1)
+    assert [scene.face(rig)[JAW_OPEN] for rig in rigs] == [0.75, 0.5]
+    assert session_of(rigs[0]).receiver is session_of(rigs[1]).receiver
+    bpy.context.view_layer.objects.active = scene.controls(rigs[0])
+    bpy.ops.risorius.live_stop()
+    assert session_of(rigs[1]).receiver.status().subjects == ("Ada", "Bob")
+
+
+def test_vmc_and_neutral_now(dna_file, port):
+    from pythonosc.osc_message_builder import OscMessageBuilder  # must be there: no skipping
+
+    chosen = bpy.context.window_manager.risorius_live
+    chosen.source = "osc"
+    assert chosen.port == 39539
+    chosen.port = port
+    rig = scene.load(dna_file)
+    assert bpy.ops.risorius.live_start() == {"FINISHED"}
+    with pytest.raises(RuntimeError, match="No face was received yet"):
+        bpy.ops.risorius.live_neutral()
+    steps = []
+    for address, *arguments in (
+        ("/VMC/Ext/Blend/Val", "JawOpen", 0.2),
+        ("/VMC/Ext/Blend/Apply",),
+        ("/VMC/Ext/Blend/Val", "JawOpen", 0.6),
+        ("/VMC/Ext/Blend/Apply",),
+    ):
+        message = OscMessageBuilder(address)
+        for argument in arguments:
+            message.add_arg(argument)
+        steps.append(["hex", message.build().dgram.hex()])
+    send(port, *steps[:2])
+    tick_until(rig, 1)
+    assert scene.face(rig)[JAW_OPEN] == pytest.approx(0.2)
+    assert bpy.ops.risorius.live_neutral() == {"FINISHED"}
+    tick_until(rig, 1)
+    assert scene.face(rig)[JAW_OPEN] == 0.0
+    send(port, *steps[2:])
+    tick_until(rig, 2)
+    assert scene.face(rig)[JAW_OPEN] == pytest.approx(0.4 / 0.8)
+    bpy.ops.risorius.live_neutral(forget=True)
+    tick_until(rig, 2)
+    assert scene.face(rig)[JAW_OPEN] == pytest.approx(0.6)
+
+
+def listens(port):
+    """Whether somebody has the port."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.bind(("127.0.0.1", port))
+        except OSError:
+            return True
+    return False
+
+
+def test_it_ends_with_the_face_the_file_and_the_addon(dna_file, port, tmp_path):
+    module = scene.submodule("scene.live")
+    rig = scene.load(dna_file)
+    bpy.ops.risorius.live_start()
+    assert listens(port)
+    for item in scene.submodule("scene.parts").members_of(rig):
+        bpy.data.objects.remove(item)
+    scene.load(dna_file)  # another face of the same name
+    assert module._tick() is None
+    assert not listens(port)
+    assert "went away" in module.last_error()
+
+    rig = scene.load(dna_file)
+    bpy.ops.risorius.live_start()
+    send(port, packet(1, _17=0.5))
+    tick_until(rig, 1)
+    path = tmp_path / "saved.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    assert listens(port)
+    send(port, packet(2, _17=0.625))
+    tick_until(rig, 2)
+    assert scene.face(rig)[JAW_OPEN] == 0.625  # saving does not end it
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    assert not listens(port)
+    rig = next(o for o in bpy.data.objects if "risorius_controls" in o)
+    assert scene.face(rig)[JAW_OPEN] == 0.0  # what was saved is the face without the capture
+
+    choose(port)  # choices are the window's, and that came with the file
+    bpy.ops.risorius.live_start()
+    assert listens(port)
+    module.unregister()
+    assert not listens(port)
+    assert not bpy.app.timers.is_registered(module._tick)
+    module.register()
+
+
+def test_undo_does_not_end_it(dna_file, port):
+    rig = scene.load(dna_file)
+    bpy.ops.ed.undo_push(message="before")
+    bpy.context.scene.frame_end = 77
+    bpy.ops.ed.undo_push(message="an edit")
+    bpy.ops.risorius.live_start()
+    send(port, packet(1, _17=0.5))
+    tick_until(rig, 1)
+    name = rig.name
+    bpy.ops.ed.undo()
+    rig = bpy.data.objects[name]
+    assert bpy.context.scene.frame_end != 77
+    tick_until(rig, 1)
+    assert scene.face(rig)[JAW_OPEN] == 0.5
+    assert scene.error_against_oracle(rig, dna_file, raw(jawOpen=0.5)) < scene.TOLERANCE
+
+
+def test_what_cannot_start_is_one_sentence(dna_file, port):
+    scene.load(dna_file)
+    with (
+        risorius.live.Receiver("livelink", port),
+        pytest.raises(RuntimeError, match=f"^Error: Port {port} is in use"),
+    ):
+        bpy.ops.risorius.live_start()
+    assert bpy.ops.risorius.live_start() == {"FINISHED"}
+    bpy.ops.risorius.live_stop()
+    bpy.context.window_manager.risorius_live.mapping = str(dna_file.with_name("absent.toml"))
+    with pytest.raises(RuntimeError, match="^Error: .*absent.toml: cannot read it"):
+        bpy.ops.risorius.live_start()
+    bpy.context.window_manager.risorius_live.mapping = ""
+    assert bpy.ops.risorius.live_start() == {"FINISHED"}
+    for operator in ("live_neutral", "live_record", "live_stop"):
+        assert getattr(bpy.ops.risorius, operator).poll()
+    bpy.ops.risorius.live_stop()
+    assert not bpy.ops.risorius.live_stop.poll()

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: MIT
+// The curves of a run of frames as bytes: what is chosen for each control, and the codes they
+// share.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "clip/bytes.h"
+#include "core/result.h"
+
+namespace risorius::clip {
+
+inline constexpr std::size_t kMostBlockFrames = 4096;
+
+// First byte of a block's curves, and of a coded curve that is none.
+inline constexpr std::uint8_t kCodedBlock = 0, kStoredBlock = 1, kStoredChunk = 0xFF;
+
+/// What the list of controls says of one, or of several that rest.
+enum class PartKind : std::uint8_t { kZero, kConstant, kRepeated, kCoded };
+
+/// Curves [controls, frames] that lie `stride` values apart.
+struct BlockCurves {
+  const float* values = nullptr;
+  std::size_t stride = 0, controls = 0, frames = 0;
+
+  std::span<const float> curve(std::size_t control) const {
+    return {values + control * stride, frames};
+  }
+};
+
+/// Appends the block's bytes; never more than 1 + 4 * controls * frames.
+/// In: 1 to kMostBlockFrames frames.
+void encode_curves(const BlockCurves& curves, Bytes& out);
+
+/// The curves of a block. Nothing is decoded before it is asked for.
+class EncodedCurves {
+ public:
+  /// Reads what lies where. bytes must outlive the result.
+  /// Fails: kInvalidValue, kTruncated; offset counts in bytes.
+  static core::Result<EncodedCurves> open(View bytes, std::size_t controls, std::size_t frames);
+
+  EncodedCurves(EncodedCurves&&) noexcept;
+  EncodedCurves& operator=(EncodedCurves&&) noexcept;
+  ~EncodedCurves();
+
+  /// Writes the frames of a control to out [frames].
+  core::Status decode(std::size_t control, float* out) const;
+
+ private:
+  struct Tables;
+  struct Part {
+    enum Kind : std::uint8_t { kConstant, kCoded, kStored } kind = kConstant;
+    std::uint32_t bits = 0;            // of kConstant
+    std::size_t offset = 0, size = 0;  // of the others' bytes
+  };
+  EncodedCurves();
+  bool read_tables(Cursor& in);
+  core::Status read_parts(Cursor& in, std::size_t controls);
+
+  View bytes_;
+  std::size_t frames_ = 0;
+  std::vector<Part> parts_;
+  std::unique_ptr<Tables> tables_;
+};
+
+}  // namespace risorius::clip

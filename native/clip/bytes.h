@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: MIT
+// Little-endian numbers into a vector and out of a span that nobody has checked.
+#pragma once
+
+#include <bit>
+#include <cstdint>
+#include <cstring>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace risorius::clip {
+
+static_assert(std::endian::native == std::endian::little, "files are read as they lie in memory");
+
+using Bytes = std::vector<std::uint8_t>;
+using View = std::span<const std::uint8_t>;
+
+template <class T>
+void put(Bytes& out, T value) {
+  const auto* first = reinterpret_cast<const std::uint8_t*>(&value);
+  out.insert(out.end(), first, first + sizeof value);
+}
+
+/// Seven bits a byte, the lowest first; the top bit says that more follow.
+inline void put_count(Bytes& out, std::uint64_t value) {
+  for (; value >= 0x80; value >>= 7) out.push_back(static_cast<std::uint8_t>(value | 0x80));
+  out.push_back(static_cast<std::uint8_t>(value));
+}
+
+inline void put_text(Bytes& out, const std::string& text) {
+  put_count(out, text.size());
+  out.insert(out.end(), text.begin(), text.end());
+}
+
+/// Reads one number after the other. After the first failure everything is zero or empty.
+class Cursor {
+ public:
+  explicit Cursor(View bytes) : bytes_(bytes) {}
+
+  bool failed() const { return failed_; }
+  std::size_t position() const { return at_; }
+  std::size_t left() const { return bytes_.size() - at_; }
+
+  template <class T>
+  T get() {
+    T value{};
+    const View from = take(sizeof value);
+    if (!failed_) std::memcpy(&value, from.data(), sizeof value);
+    return value;
+  }
+  std::uint64_t count() {
+    std::uint64_t value = 0;
+    for (int shift = 0; shift < 64; shift += 7) {
+      const auto byte = get<std::uint8_t>();
+      value |= std::uint64_t{byte & 0x7Fu} << shift;
+      if (byte < 0x80) return failed_ ? 0 : value;
+    }
+    failed_ = true;
+    return 0;
+  }
+  View take(std::uint64_t size) {
+    if (failed_ || size > left()) {
+      failed_ = true;
+      return {};
+    }
+    at_ += static_cast<std::size_t>(size);
+    return bytes_.subspan(at_ - static_cast<std::size_t>(size), static_cast<std::size_t>(size));
+  }
+  std::string text() {
+    const View from = take(count());
+    return {from.begin(), from.end()};
+  }
+
+ private:
+  View bytes_;
+  std::size_t at_ = 0;
+  bool failed_ = false;
+};
+
+}  // namespace risorius::clip

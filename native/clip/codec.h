@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: MIT
+// Clips as .rzc files, without a bit lost. FORMAT.md describes them.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "clip/bytes.h"
+#include "clip/clip.h"
+#include "core/result.h"
+#include "core/source.h"
+
+namespace risorius::clip {
+
+inline constexpr std::size_t kDefaultBlockFrames = 512;
+
+/// What a file may ask for at most.
+struct Limits {
+  std::uint32_t controls = 1u << 16;
+  std::uint64_t frames = std::uint64_t{1} << 32;
+  std::uint64_t head_bytes = std::uint64_t{1} << 24;
+  std::uint64_t values = std::uint64_t{1} << 29;  // in one read: controls * frames
+};
+
+/// Turns frames into the bytes of a file, as they come.
+class Encoder {
+ public:
+  /// In: block_frames, 1 to 4096, that are compressed, and read again, together.
+  /// Fails: kInvalidArgument with the field; a name twice, a rate that is not above 0.
+  static core::Result<Encoder> create(Head head, std::size_t block_frames = kDefaultBlockFrames);
+
+  /// In: frames [n, controls]; times [n] when the clip has them, else empty: finite and ascending.
+  core::Status append(std::span<const float> frames, std::span<const double> times);
+  void add(Event event) { pending_.push_back(std::move(event)); }
+  /// All that was given is in the bytes; the encoder takes no more.
+  void finish();
+
+  /// The bytes that are ready and were not taken yet.
+  Bytes take();
+  const Head& head() const { return head_; }
+  std::uint64_t frame_count() const { return frames_ + filled_; }
+
+ private:
+  friend core::Result<Bytes> encode(const Clip& clip, std::size_t block_frames);
+  struct Block {
+    std::uint64_t offset;
+    std::uint32_t size, frames;
+  };
+  void put_block(const float* curves, std::size_t stride, std::span<const double> times,
+                 std::size_t frames);
+
+  Head head_;
+  std::size_t block_frames_ = 0, filled_ = 0;
+  std::uint64_t frames_ = 0, written_ = 0;
+  std::vector<float> curves_;  // [controls, block_frames], of which filled_ are there
+  std::vector<double> times_;
+  double last_time_ = 0.0;
+  std::vector<Event> pending_, events_;
+  std::vector<Block> blocks_;
+  Bytes out_;
+};
+
+/// A clip as a file. Fails: kInvalidArgument with the field.
+core::Result<Bytes> encode(const Clip& clip, std::size_t block_frames = kDefaultBlockFrames);
+
+/// How a file without a good end is taken: one that was cut while it was recorded.
+enum class Ends { kMustBeWhole, kMayBeCut };
+
+/// A file that is read piece by piece. Reading from several threads needs a Reader each.
+class Reader {
+ public:
+  /// Reads the head and the index, no curve.
+  /// Fails: kNotClip, kUnsupportedGeneration, kTruncated, kInvalidValue, kLimitExceeded.
+  static core::Result<Reader> open(std::unique_ptr<core::Source> source,
+                                   Ends ends = Ends::kMustBeWhole, const Limits& limits = {});
+
+  const Head& head() const { return head_; }
+  std::uint64_t frame_count() const { return frames_; }
+  const std::vector<Event>& events() const { return events_; }
+  /// Of the file that were read; more follow only where it was cut.
+  std::uint64_t byte_count() const { return end_; }
+  /// First frame of each block, and the frame behind the last.
+  const std::vector<std::uint64_t>& block_starts() const { return starts_; }
+
+  /// What read() would refuse before it reads anything: to be asked before memory is made for it.
+  core::Status may_read(std::uint64_t begin, std::uint64_t end,
+                        std::span<const std::uint32_t> controls) const;
+
+  /// Writes the curves of controls to out [controls.size(), end - begin], and with out_times the
+  /// times to it [end - begin]. A block that has been read last is not read again.
+  /// In: begin <= end <= frame_count(), controls below their number.
+  /// Fails: kInvalidArgument, kLimitExceeded, kInvalidValue, kTruncated, kIoRead.
+  core::Status read(std::uint64_t begin, std::uint64_t end, std::span<const std::uint32_t> controls,
+                    float* out, double* out_times);
+
+ private:
+  struct Block {
+    std::uint64_t offset;
+    std::uint32_t size, frames;
+  };
+  struct Loaded;
+  core::Status read_head(const Limits& limits);
+  core::Status read_index();
+  void find_blocks();
+  bool take_block(std::uint64_t offset, Block& block);
+  core::Status load(std::size_t block);
+  core::Status read_block(std::size_t block, std::uint64_t begin, std::uint64_t end,
+                          std::span<const std::uint32_t> controls, float* out, std::size_t stride,
+                          double* out_times);
+
+  std::shared_ptr<core::Source> source_;
+  Limits limits_;
+  Head head_;
+  std::uint64_t frames_ = 0, first_block_ = 0, end_ = 0;
+  std::vector<Block> blocks_;
+  std::vector<std::uint64_t> starts_;
+  std::vector<Event> events_;
+  std::shared_ptr<Loaded> loaded_;
+};
+
+/// A whole file. Fails: as Reader.
+core::Result<Clip> decode(View bytes, Ends ends = Ends::kMustBeWhole, const Limits& limits = {});
+
+}  // namespace risorius::clip

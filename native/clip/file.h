@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: MIT
+// A clip that is written while it is recorded.
+#pragma once
+
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <span>
+
+#include "clip/codec.h"
+
+namespace risorius::clip {
+
+/// Writes frames to PATH.part as they come, each full block at once, and makes PATH of it when it
+/// is closed. One that is not closed stays: Reader takes it with Ends::kMayBeCut.
+class FileWriter {
+ public:
+  /// Fails: kInvalidArgument as Encoder; kIoWrite with the system's reason.
+  static core::Result<FileWriter> create(const std::filesystem::path& path, Head head,
+                                         std::size_t block_frames = kDefaultBlockFrames);
+
+  /// As Encoder. Fails also: kIoWrite.
+  core::Status append(std::span<const float> frames, std::span<const double> times);
+  void add(Event event) { encoder_.add(std::move(event)); }
+  /// Writes what is left and the index, and gives the file its name; a file of that name from
+  /// before is replaced. Fails: kIoWrite.
+  core::Status close();
+
+  bool is_open() const { return file_ != nullptr; }
+  const Head& head() const { return encoder_.head(); }
+  std::uint64_t frame_count() const { return encoder_.frame_count(); }
+  /// Where the frames are while the file is open.
+  const std::filesystem::path& part() const { return part_; }
+
+ private:
+  struct Close {
+    void operator()(std::FILE* file) const { std::fclose(file); }
+  };
+  explicit FileWriter(Encoder encoder) : encoder_(std::move(encoder)) {}
+  core::Status write_ready();
+
+  Encoder encoder_;
+  std::filesystem::path path_, part_;
+  std::unique_ptr<std::FILE, Close> file_;
+};
+
+}  // namespace risorius::clip

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: MIT
+// What the next value of a curve will be, with the same bits on every machine.
+#pragma once
+
+#include <bit>
+#include <cfenv>
+#include <cmath>
+#include <cstdint>
+
+namespace risorius::clip {
+
+/// Predictors continue the polynomial through the last 1 (order 0) to 5 (order 4) values.
+inline constexpr int kOrders = 5;
+
+/// Floats of ascending value as ascending integers; its own inverse.
+inline std::uint32_t in_order(std::uint32_t bits) {
+  return bits ^ static_cast<std::uint32_t>(static_cast<std::int32_t>(bits) >> 31) >> 1;
+}
+
+/// A difference as a number whose size says how far, whatever its sign.
+inline std::uint32_t fold(std::uint32_t difference) {
+  return difference << 1 ^ static_cast<std::uint32_t>(static_cast<std::int32_t>(difference) >> 31);
+}
+inline std::uint32_t unfold(std::uint32_t folded) { return folded >> 1 ^ (0 - (folded & 1)); }
+
+/// The last values of a curve, the newest first.
+template <int kOrder>
+class History {
+ public:
+  explicit History(std::uint32_t bits) { rest(bits, kOrder + 1); }
+
+  void add(std::uint32_t bits) {
+    for (int i = kOrder; i > 0; --i) values_[i] = values_[i - 1];
+    last_ = bits;
+    if constexpr (kOrder > 0) values_[0] = std::bit_cast<float>(bits);
+  }
+  /// The same value n times.
+  void rest(std::uint32_t bits, std::size_t n) {
+    for (std::size_t i = 0; i < n && i <= kOrder; ++i) add(bits);
+  }
+  std::uint32_t last() const { return last_; }
+
+  /// in_order of what is expected next.
+  std::uint32_t next() const {
+    if constexpr (kOrder == 0) return in_order(last_);
+    double p = 0.0;
+    if constexpr (kOrder == 1) p = 2 * v(0) - v(1);
+    if constexpr (kOrder == 2) p = 3 * (v(0) - v(1)) + v(2);
+    if constexpr (kOrder == 3) p = 4 * (v(0) + v(2)) - 6 * v(1) - v(3);
+    if constexpr (kOrder == 4) p = 5 * (v(0) - v(3)) - 10 * (v(1) - v(2)) + v(4);
+    // Also where a float's range, its denormals or NaNs would make processors differ.
+    const double size = std::fabs(p);
+    if (!(size >= 0x1p-60 && size <= 0x1p100)) return 0;
+    return in_order(std::bit_cast<std::uint32_t>(static_cast<float>(p)));
+  }
+
+ private:
+  double v(int i) const { return values_[i]; }
+
+  std::uint32_t last_ = 0;
+  float values_[kOrder + 1] = {};
+};
+
+/// Rounding and denormals as every process begins with them, while this lives.
+class DefaultArithmetic {
+ public:
+  DefaultArithmetic() {
+    std::fegetenv(&before_);
+    std::fesetenv(FE_DFL_ENV);
+  }
+  ~DefaultArithmetic() { std::fesetenv(&before_); }
+  DefaultArithmetic(const DefaultArithmetic&) = delete;
+  DefaultArithmetic& operator=(const DefaultArithmetic&) = delete;
+
+ private:
+  std::fenv_t before_;
+};
+
+/// Calls what with the order as a constant.
+template <class What>
+auto with_order(int order, const What& what) {
+  switch (order) {
+    case 1:
+      return what.template operator()<1>();
+    case 2:
+      return what.template operator()<2>();
+    case 3:
+      return what.template operator()<3>();
+    case 4:
+      return what.template operator()<4>();
+    default:
+      return what.template operator()<0>();
+  }
+}
+
+}  // namespace risorius::clip

@@ -1,0 +1,302 @@
+# SPDX-License-Identifier: MIT
+"""risorius clip: animation of other software, converted, looked at, mapped."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+import risorius
+from risorius import Clip, importing
+from risorius.importing import process
+
+from .files import CommandLineError, InputError, counted, refuse_same_file
+
+OUTPUTS = (".rzc", ".csv", ".json")
+_MAPPING = (
+    "a mapping by its name (risorius clip mappings) or a TOML file; default: the one that fits"
+)
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = subparsers.add_parser(
+        "clip",
+        help="animation of other software as clips of a rig's controls",
+        description="Reads Live Link Face takes, tables and JSON of named curves, mouth shapes of "
+        "Rhubarb, Papagayo and Moho, glTF and FBX; what a curve moves is said by a mapping.",
+    )
+    commands = parser.add_subparsers(dest="clip_command", required=True)
+    _add_convert(commands)
+    _add_info(commands)
+    _add_mappings(commands)
+    _add_check(commands)
+
+
+def _add_convert(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = commands.add_parser(
+        "convert",
+        help="a file of animation as .rzc, .csv or .json of raw controls",
+        description="What is asked for is done in this order: mapping, neutral, gain and offset, "
+        "gaps, smoothing, mirror, cut, rate, shift.",
+    )
+    _add_input(parser)
+    parser.add_argument("-o", "--output", required=True, type=Path, metavar="OUT")
+    parser.add_argument("--mapping", metavar="M", help=_MAPPING)
+    parser.add_argument(
+        "--rig", type=Path, metavar="DNA", help="keep only what this rig has; its GUI table"
+    )
+    parser.add_argument(
+        "--rotations",
+        choices=importing.ROTATIONS,
+        default="head",
+        help="angles to keep beside the controls: of the head (default), of the eyes too, none",
+    )
+    parser.add_argument(
+        "--neutral", metavar="A[:B]", help="frame or frames of a neutral face, which become 0"
+    )
+    for name, what in (("gain", "factor"), ("offset", "what is added")):
+        parser.add_argument(
+            f"--{name}",
+            action="append",
+            default=[],
+            metavar="PATTERN=N",
+            help=f'{what} for controls, e.g. "jaw*=1.2"; may be given again',
+        )
+    parser.add_argument(
+        "--fill-gaps", action="store_true", help="even frames; straight across missing ones"
+    )
+    parser.add_argument(
+        "--smooth",
+        metavar="S|KIND:S",
+        help="seconds, e.g. 0.1: peaks are kept; gaussian:0.03; one-euro:1.5, a cutoff in Hz",
+    )
+    parser.add_argument("--mirror", action="store_true", help="left for right")
+    parser.add_argument("--cut", metavar="A:B", help="from A to B seconds")
+    parser.add_argument("--rate", type=float, metavar="FPS", help="frames a second of OUT")
+    parser.add_argument("--shift", type=float, default=0.0, metavar="S", help="seconds later")
+    parser.add_argument(
+        "--report", action="store_true", help="print what was mapped and what was not, to stdout"
+    )
+    parser.set_defaults(func=_guarded(run_convert))
+
+
+def _add_input(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("input", type=Path, metavar="IN")
+    parser.add_argument(
+        "--kind", choices=tuple(importing.KINDS), help="what IN is (default: told from its content)"
+    )
+    parser.add_argument(
+        "--input-rate",
+        type=float,
+        metavar="FPS",
+        help="frames a second of IN, where its time is a frame number or is not there",
+    )
+    parser.add_argument(
+        "--timecode-rate", type=float, metavar="FPS", help="of timecodes that do not tell it"
+    )
+
+
+def _add_info(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = commands.add_parser("info", help="what a file of animation holds")
+    _add_input(parser)
+    parser.set_defaults(func=_guarded(run_info))
+
+
+def _add_mappings(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = commands.add_parser("mappings", help="the mappings that come with Risorius")
+    parser.add_argument("--write", metavar="NAME", help="copy one for editing, to --output")
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="M.toml", help="default: NAME.toml; never replaced"
+    )
+    parser.set_defaults(func=_guarded(run_mappings))
+
+
+def _add_check(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = commands.add_parser("check", help="a mapping against the controls of a rig")
+    parser.add_argument("mapping", metavar="M.toml")
+    parser.add_argument("--rig", type=Path, required=True, metavar="DNA")
+    parser.set_defaults(func=_guarded(run_check))
+
+
+def _guarded(run: Callable[[argparse.Namespace], int]) -> Callable[[argparse.Namespace], int]:
+    """A command whose errors are one sentence and an exit code."""
+
+    def guarded(args: argparse.Namespace) -> int:
+        try:
+            return run(args)
+        except CommandLineError as error:
+            print(f"risorius: {error}", file=sys.stderr)
+            return 2
+        except risorius.DnaError:
+            raise  # main says it
+        except (InputError, ValueError, OSError) as error:
+            print(f"risorius: {error}", file=sys.stderr)
+            return 1
+
+    return guarded
+
+
+def load(args: argparse.Namespace) -> importing.Imported:
+    """What IN holds; a clip of Risorius is of raw controls already."""
+    if args.input.suffix.lower() == ".rzc":
+        return importing.Imported(Clip.load(args.input), "clip", "controls", str(args.input))
+    return importing.read(
+        args.input, kind=args.kind, rate=args.input_rate, timecode_rate=args.timecode_rate
+    )
+
+
+def run_convert(args: argparse.Namespace) -> int:
+    if args.output.suffix.lower() not in OUTPUTS:
+        raise CommandLineError(f"{args.output}: a name ending in {', '.join(OUTPUTS)} was expected")
+    refuse_same_file(str(args.input), str(args.output))
+    steps = _steps(args)
+    dna = risorius.load(args.rig, layers="behavior") if args.rig else None
+    clip, report = load(args).apply(
+        args.mapping,
+        rig_names=dna.raw_control_names if dna else None,
+        rig=risorius.Rig(dna) if dna else None,
+        rotations=args.rotations,
+    )
+    for step in steps:
+        clip = step(clip)
+    _save(clip, args.output)
+    if args.report:
+        print(report.text())
+    else:
+        left = [f"{len(names)} {heading}" for heading, names in report.lists()[:2]]
+        more = f" ({', '.join(left)}: see --report)" if left else ""
+        print(f"{args.output}: {_summary(clip)}{more}")
+    return 0
+
+
+def _steps(args: argparse.Namespace) -> list[Callable[[Clip], Clip]]:
+    """What is to be done after the mapping, in order.
+
+    Raises:
+        CommandLineError: an option of another form.
+    """
+    steps: list[Callable[[Clip], Clip]] = []
+    try:
+        gains, offsets = process.parse_amounts(args.gain), process.parse_amounts(args.offset)
+    except ValueError as error:
+        raise CommandLineError(f"--gain, --offset: {error}") from error
+    if args.neutral is not None:
+        first, last = _pair(args.neutral, "--neutral", int)
+        steps.append(lambda clip: process.calibrate(clip, int(first), int(last)))
+    if gains or offsets:
+        steps.append(lambda clip: process.adjust(clip, gains, offsets))
+    if args.fill_gaps:
+        steps.append(process.fill_gaps)
+    if args.smooth is not None:
+        steps.append(_smoothing(args.smooth))
+    if args.mirror:
+        steps.append(process.mirror)
+    if args.cut is not None:
+        start, end = _pair(args.cut, "--cut", float)
+        steps.append(lambda clip: process.cut(clip, start, end))
+    if args.rate is not None:
+        if not 0.0 < args.rate < 1e6:
+            raise CommandLineError(f"--rate: above 0 was expected, found {args.rate:g}")
+        steps.append(lambda clip: process.resample(clip, args.rate))
+    if args.shift:
+        steps.append(lambda clip: process.shift(clip, args.shift))
+    return steps
+
+
+def _smoothing(text: str) -> Callable[[Clip], Clip]:
+    kind, _, amount = text.rpartition(":")
+    runs: dict[str, Callable[[Clip, float], Clip]]
+    runs = {"": process.smooth, "gaussian": process.gaussian, "one-euro": process.one_euro}
+    try:
+        width = float(amount)
+    except ValueError:
+        width = np.nan
+    if kind not in runs or not 0.0 < width < np.inf:
+        raise CommandLineError(
+            f"--smooth: seconds, gaussian:SECONDS or one-euro:HZ was expected, found {text!r}"
+        )
+    return lambda clip: runs[kind](clip, width)
+
+
+def _pair(text: str, option: str, number: type[int] | type[float]) -> tuple[float, float]:
+    first, colon, last = text.partition(":")
+    try:
+        start = number(first)
+        end = number(last) if colon else start
+    except ValueError:
+        raise CommandLineError(f"{option}: A:B was expected, found {text!r}") from None
+    if not 0 <= start <= end:
+        raise CommandLineError(f"{option}: A:B with 0 <= A <= B was expected, found {text!r}")
+    return start, end
+
+
+def _save(clip: Clip, path: Path) -> None:
+    """By the suffix."""
+    suffix = path.suffix.lower()
+    if suffix == ".rzc":
+        clip.save(path)
+    elif suffix == ".csv":
+        importing.write_text(importing.csv_text(clip), path)
+    else:
+        importing.write_text(importing.json_text(clip), path)
+
+
+def _summary(clip: Clip) -> str:
+    return (
+        f"{counted(len(clip.names), 'control')}, {counted(clip.frame_count, 'frame')}, "
+        f"{clip.rate:g} fps, {clip.duration:.3f} s"
+    )
+
+
+def run_info(args: argparse.Namespace) -> int:
+    found = load(args)
+    clip = found.clip
+    kind = importing.KINDS.get(found.kind, "clip of Risorius")
+    print(f"{args.input}: {kind}, mapping {found.mapping or 'none fits'}\n{_summary(clip)}")
+    if clip.times is not None:
+        print("frames have times of their own")
+    for key, value in clip.metadata.items():
+        print(f"{key}: {value}")
+    for note in found.notes:
+        print(f"note: {note}")
+    if clip.events:
+        print(f"{counted(len(clip.events), 'event')}, the first: {clip.events[0].name}")
+    width = max((len(name) for name in clip.names), default=0)
+    for name, curve in zip(clip.names, clip.curves, strict=True):
+        low, high = curve.min(initial=np.inf), curve.max(initial=-np.inf)
+        print(f"  {name:<{width}}  {low:>9.4f} to {high:>9.4f}")
+    return 0
+
+
+def run_mappings(args: argparse.Namespace) -> int:
+    if args.write is None:
+        for name in importing.mapping_names():
+            print(f"{name:<16} {importing.load_mapping(name).description}")
+        return 0
+    if args.write not in importing.mapping_names():
+        raise CommandLineError(
+            f"--write: one of {', '.join(importing.mapping_names())} was expected, "
+            f"found {args.write!r}"
+        )
+    target = args.output or Path(f"{args.write}.toml")
+    if target.exists():
+        raise CommandLineError(f"{target}: it is there already")
+    importing.write_text(importing.mapping_text(args.write), target)
+    print(target)
+    return 0
+
+
+def run_check(args: argparse.Namespace) -> int:
+    mapping = importing.load_mapping(args.mapping)
+    dna = risorius.load(args.rig, layers="definition")
+    names = dna.gui_control_names if mapping.is_gui else dna.raw_control_names
+    lacks = importing.check(mapping, names)
+    for lack in lacks:
+        print(lack)
+    rows = counted(len(mapping.rows), "row")
+    print(f"{args.mapping}: {rows}, {counted(len(lacks), 'control')} that the rig lacks")
+    return 1 if lacks else 0

@@ -1,0 +1,399 @@
+# SPDX-License-Identifier: MIT
+"""Viseme tracks of lip sync tools, as curves that flow into each other instead of steps."""
+
+from __future__ import annotations
+
+import re
+import xml.etree.ElementTree as Xml
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from ..clip import Clip, Event
+from .errors import AnimationFileError
+from .source import Take, number
+
+Doubles = npt.NDArray[np.float64]
+
+# Frames a second of the curves; the cues themselves are timed to a hundredth or a frame.
+RATE = 60.0
+# Seconds that a mouth takes from one shape to the next.
+BLEND = 0.12
+# Moho and Papagayo count frames of a film; a .dat does not say how many a second.
+DAT_RATE = 24.0
+# Seconds; a file that asks for more frames than this takes has a number wrong.
+LONGEST = 7200.0
+# A mouth that never closes for an M shows at once; that a D was cut short nobody sees. 1: held back
+# for no neighbour; 0: neighbours may reach all through it.
+DOMINANCE = {
+    "A": 1.0, "B": 0.3, "C": 0.5, "D": 0.7, "E": 0.6, "F": 0.8, "G": 0.9, "H": 0.5, "X": 0.3,
+    "MBP": 1.0, "FV": 0.9, "U": 0.8, "WQ": 0.8, "O": 0.7, "AI": 0.7, "L": 0.5, "etc": 0.3,
+    "rest": 0.3,
+}  # fmt: skip
+RHUBARB = frozenset("ABCDEFGHX")
+# The name of Papagayo's ten that no shape of Rhubarb has tells the two apart; E and X say nothing.
+PAPAGAYO = frozenset(("AI", "E", "etc", "FV", "L", "MBP", "O", "rest", "U", "WQ"))
+_TSV = re.compile(r"\d+(\.\d+)?\t\S+")
+
+
+class Cue(NamedTuple):
+    """A mouth shape from `start` to `end`, seconds."""
+
+    start: float
+    end: float
+    shape: str
+
+
+def flowing_curves(
+    cues: Sequence[Cue], times: Doubles, blend: float = BLEND
+) -> tuple[list[str], Doubles]:
+    """How much of each shape the mouth has: weights that add up to 1 in every frame.
+
+    At the border of two cues one goes over into the other along half a cosine, `blend` seconds
+    long and with the border in its middle, but no longer than the cues allow: it may reach into a
+    cue to its middle if that is dominant, and up to its other end if it is weak. So a dominant cue
+    is a whole 1 in its middle, and a short weak one between two others never comes to full weight.
+
+    Args:
+        cues: by time, each ending where the next starts.
+        times: float64[frames], seconds, ascending.
+        blend: seconds.
+
+    Returns:
+        The shapes, in order of their first cue; float64[shapes, frames].
+    """
+    names = list(dict.fromkeys(cue.shape for cue in cues))
+    weights = np.zeros((len(names), times.size))
+    if not cues:
+        return names, weights
+    weights[0, :] = 1.0
+    reach = [(c.end - c.start) * (1.0 - 0.5 * DOMINANCE.get(c.shape, 0.5)) for c in cues]
+    for i in range(1, len(cues)):
+        border = cues[i].start
+        half = min(0.5 * blend, reach[i - 1], reach[i])
+        # No window reaches beyond the cue after it; later borders settle what lies further on.
+        beyond = cues[i + 1].end if i + 1 < len(cues) else np.inf
+        first, last = np.searchsorted(times, [border - half, beyond])
+        at = times[first:last]
+        part = np.clip((at - border + half) / (2.0 * half), 0.0, 1.0) if half > 0 else at >= border
+        rise = 0.5 - 0.5 * np.cos(np.pi * np.asarray(part, np.float64))
+        weights[:, first:last] *= 1.0 - rise
+        weights[names.index(cues[i].shape), first:last] += rise
+    return names, weights
+
+
+def _take(
+    cues: list[Cue], kind: str, name: str, notes: list[str], events: Sequence[Event] = ()
+) -> Take:
+    """A take of cues: curves at RATE, the cues themselves as events.
+
+    Raises:
+        AnimationFileError: no cue of any length.
+    """
+    cues = [cue for cue in cues if cue.end > cue.start]
+    if not cues:
+        raise AnimationFileError(name, "mouth shapes with a length were expected, found none")
+    if cues[-1].end > LONGEST:
+        raise AnimationFileError(
+            name, f"times to {LONGEST:g} s were expected, found {cues[-1].end:g} s"
+        )
+    count = int(np.ceil(cues[-1].end * RATE - 1e-6)) + 1
+    names, weights = flowing_curves(cues, np.arange(count) / RATE)
+    marks = [Event(c.start, "viseme", c.end - c.start, c.shape) for c in cues]
+    clip = Clip(names, weights, RATE, events=[*marks, *events])
+    mapping = "papagayo" if set(names) & (PAPAGAYO - {"E"}) else "rhubarb"
+    return Take(clip, kind, mapping, notes)
+
+
+def _from_starts(starts: Sequence[tuple[float, str]], end: float, rest: str) -> list[Cue]:
+    """Cues of start times, each lasting to the next; a rest before the first."""
+    out = [Cue(0.0, starts[0][0], rest)] if starts and starts[0][0] > 0.0 else []
+    ends = [start for start, _ in starts[1:]] + [end]
+    out += [Cue(start, stop, shape) for (start, shape), stop in zip(starts, ends, strict=True)]
+    return out
+
+
+def is_rhubarb_tsv(text: str) -> bool:
+    """Lines of a time, a tab and a shape of Rhubarb's."""
+    lines = [line for line in re.split(r"\r\n|\n|\r", text) if line]
+    return bool(lines) and all(
+        _TSV.fullmatch(line) and line.partition("\t")[2] in RHUBARB for line in lines
+    )
+
+
+def read_rhubarb_tsv(text: str, name: str) -> Take:
+    """Lines "0.32<tab>B"; the last one tells the end.
+
+    Raises:
+        AnimationFileError: a line of another form, times that do not ascend.
+    """
+    starts: list[tuple[float, str]] = []
+    for line, row in enumerate(re.split(r"\r\n|\n|\r", text), start=1):
+        if not row.strip():
+            continue
+        time, tab, shape = row.partition("\t")
+        if not tab or shape.strip() not in RHUBARB:
+            raise AnimationFileError(
+                name,
+                f"a time, a tab and a shape A-H or X were expected, found {row[:40]!r}",
+                line=line,
+            )
+        starts.append((number(time, name, line, 1), shape.strip()))
+        _check_order(starts, name, line)
+    if len(starts) < 2:
+        raise AnimationFileError(name, "two lines at least were expected: a shape and the end")
+    return _take(_from_starts(starts[:-1], starts[-1][0], "X"), "rhubarb", name, [])
+
+
+def _check_order(starts: Sequence[tuple[float, str]], name: str, line: int) -> None:
+    if starts[-1][0] < 0.0 or (len(starts) > 1 and starts[-1][0] < starts[-2][0]):
+        raise AnimationFileError(
+            name, f"times that ascend from 0 were expected, found {starts[-1][0]:g}", line=line
+        )
+
+
+def read_rhubarb_xml(text: str, name: str) -> Take:
+    """<rhubarbResult> with <mouthCue start end>.
+
+    Raises:
+        AnimationFileError: no such XML, or XML with declarations of its own.
+    """
+    if "<!" in re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL):
+        raise AnimationFileError(name, "XML without declarations of its own was expected")
+    try:
+        root = Xml.fromstring(re.sub(r"^\s*<\?xml.*?\?>", "", text, flags=re.DOTALL))
+    except Xml.ParseError as error:
+        line, column = error.position
+        raise AnimationFileError(
+            name, f"not XML: {error.msg}", line=line, column=column + 1
+        ) from error
+    if root.tag != "rhubarbResult":
+        raise AnimationFileError(name, f"<rhubarbResult> was expected, found <{root.tag[:40]}>")
+    rows = [
+        (cue.get("start", ""), cue.get("end", ""), (cue.text or "").strip())
+        for cue in root.iterfind("mouthCues/mouthCue")
+    ]
+    return _rhubarb_cues(rows, name)
+
+
+def read_rhubarb_json(document: dict[str, object], name: str) -> Take:
+    """{"metadata": ..., "mouthCues": [{"start", "end", "value"}]}.
+
+    Raises:
+        AnimationFileError: cues of another form.
+    """
+    rows = document.get("mouthCues")
+    if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
+        raise AnimationFileError(name, "mouthCues: a list of tables was expected")
+    return _rhubarb_cues(
+        [(str(r.get("start")), str(r.get("end")), str(r.get("value"))) for r in rows], name
+    )
+
+
+def _rhubarb_cues(rows: Sequence[tuple[str, str, str]], name: str) -> Take:
+    cues: list[Cue] = []
+    for i, (start, end, shape) in enumerate(rows):
+        place = f"mouth cue {i}"
+        try:
+            cue = Cue(float(start), float(end), shape)
+        except ValueError:
+            raise AnimationFileError(
+                name, f"{place}: numbers for start and end were expected, found {start!r}, {end!r}"
+            ) from None
+        if shape not in RHUBARB:
+            raise AnimationFileError(
+                name, f"{place}: a shape A-H or X was expected, found {shape!r}"
+            )
+        before = cues[-1].end if cues else 0.0
+        if not before - 0.005 <= cue.start <= cue.end < np.inf:
+            raise AnimationFileError(
+                name, f"{place}: times that ascend were expected, found {start} to {end}"
+            )
+        if cue.start > before + 0.005:
+            cues.append(Cue(before, cue.start, "X"))
+        cues.append(Cue(max(cue.start, before), cue.end, shape))
+    return _take(cues, "rhubarb", name, [])
+
+
+def read_dat(text: str, name: str, rate: float | None = None) -> Take:
+    """Moho's switch data: MohoSwitch1, then lines of a frame, counted from 1, and a shape.
+
+    Args:
+        rate: frames a second; None: what an FPS line says, else DAT_RATE, noted.
+
+    Raises:
+        AnimationFileError: a line of another form, frames that do not ascend.
+    """
+    lines = re.split(r"\r\n|\n|\r", text)
+    notes: list[str] = []
+    rows: list[tuple[int, float, str]] = []
+    for line, row in enumerate(lines[1:], start=2):
+        words = row.split()
+        if not words:
+            continue
+        if words[0] == "FPS" and len(words) == 2:
+            rate = rate or number(words[1], name, line, 2)
+            continue
+        if len(words) != 2:
+            raise AnimationFileError(
+                name, f"a frame number and a shape were expected, found {row[:40]!r}", line=line
+            )
+        rows.append((line, number(words[0], name, line, 1), words[1]))
+    if rate is None:
+        rate = DAT_RATE
+        notes.append(f"a .dat does not say its frames a second: {rate:g} were assumed")
+    if not rate > 0.0:
+        raise AnimationFileError(name, f"frames a second above 0 were expected, found {rate:g}")
+    starts: list[tuple[float, str]] = []
+    for line, frame, shape in rows:
+        starts.append((max(frame - 1.0, 0.0) / rate, shape))
+        _check_order(starts, name, line)
+    if len(starts) < 2:
+        raise AnimationFileError(name, "two shapes at least were expected")
+    rest = "X" if {shape for _, shape in starts} <= RHUBARB else "rest"
+    last = starts[-1][0]
+    end = last + 1.0 / rate if starts[-1][1] in ("rest", "X") else last + BLEND
+    return _take(_from_starts(starts, end, rest), "moho", name, notes)
+
+
+class Lines:
+    """The lines of a .pgo, one after the other."""
+
+    def __init__(self, text: str, name: str) -> None:
+        self.rows = re.split(r"\r\n|\n|\r", text.rstrip("\r\n"))
+        self.name = name
+        self.at = 0
+
+    def next(self) -> str:
+        if self.at >= len(self.rows):
+            raise AnimationFileError(self.name, "the file ends too early", line=self.at)
+        self.at += 1
+        return self.rows[self.at - 1].strip()
+
+    def fail(self, message: str) -> AnimationFileError:
+        return AnimationFileError(self.name, message, line=self.at)
+
+    def count(self, text: str, what: str) -> int:
+        """A whole number, and as many as there are lines left at most where it counts lines."""
+        if not re.fullmatch(r"-?\d{1,9}", text):
+            raise self.fail(f"{what} was expected, found {text[:40]!r}")
+        return int(text)
+
+
+class Word(NamedTuple):
+    """A word of Papagayo: frames from 0, the last one included."""
+
+    text: str
+    start: int
+    end: int
+    phonemes: list[tuple[int, str]]
+
+
+def read_pgo(text: str, name: str) -> Take:
+    """Papagayo's own file, as text: voices of phrases of words of phonemes.
+
+    Raises:
+        AnimationFileError: a line of another form, or too few.
+    """
+    lines = Lines(text, name)
+    lines.next()
+    lines.next()  # the sound's path
+    rate = float(lines.count(lines.next(), "frames a second"))
+    lines.count(lines.next(), "the sound's length in frames")
+    voices = []
+    for _ in range(lines.count(lines.next(), "the number of voices")):
+        voice, words = lines.next(), []
+        lines.next()  # its text
+        for _ in range(lines.count(lines.next(), "the number of phrases")):
+            lines.next()
+            lines.count(lines.next(), "the phrase's first frame")
+            lines.count(lines.next(), "the phrase's last frame")
+            for _ in range(lines.count(lines.next(), "the number of words")):
+                words.append(_pgo_word(lines))
+        voices.append((voice, words))
+    return _from_voices(voices, rate, name)
+
+
+def _pgo_word(lines: Lines) -> Word:
+    parts = lines.next().rsplit(maxsplit=3)
+    if len(parts) == 3:
+        parts.insert(0, "")
+    if len(parts) != 4:
+        raise lines.fail("a word, its first and last frame and its phonemes' number were expected")
+    start, end, count = (lines.count(part, "a frame or a number") for part in parts[1:])
+    phonemes = []
+    for _ in range(count):
+        row = lines.next().split()
+        if len(row) != 2:
+            raise lines.fail("a frame and a phoneme were expected")
+        phonemes.append((lines.count(row[0], "a frame"), row[1]))
+    return Word(parts[0], start, end, phonemes)
+
+
+def read_pgo_json(document: dict[str, object], name: str) -> Take:
+    """Papagayo-NG's own file of version 2.
+
+    Raises:
+        AnimationFileError: tables of another form.
+    """
+    try:
+        voices = [
+            (
+                str(voice["name"]),
+                [
+                    Word(
+                        str(word["text"]), int(word["start_frame"]), int(word["end_frame"]),
+                        [(int(p["frame"]), str(p["text"])) for p in word["phonemes"]],
+                    )
+                    for phrase in voice["phrases"]
+                    for word in phrase["words"]
+                ],
+            )
+            for voice in document["voices"]  # type: ignore[attr-defined]
+        ]  # fmt: skip
+        rate = float(document["fps"])  # type: ignore[arg-type]
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
+        raise AnimationFileError(name, f"not a Papagayo document: {error!r}"[:120]) from error
+    return _from_voices(voices, rate, name)
+
+
+def _from_voices(voices: Sequence[tuple[str, list[Word]]], rate: float, name: str) -> Take:
+    """The first voice that speaks; between words the mouth rests."""
+    if not 0.0 < rate < 1e4:
+        raise AnimationFileError(name, f"frames a second above 0 were expected, found {rate:g}")
+    speaking = [(voice, words) for voice, words in voices if any(w.phonemes for w in words)]
+    if not speaking:
+        raise AnimationFileError(name, "phonemes were expected, found none")
+    voice, words = speaking[0]
+    notes = [f"voice {other!r}: left out" for other, _ in speaking[1:]]
+    starts: list[tuple[int, str]] = []
+    for word in sorted(words, key=lambda word: word.start):
+        if starts and starts[-1][1] == "rest" and starts[-1][0] >= word.start:
+            starts.pop()
+        starts += [(frame, shape) for frame, shape in word.phonemes if frame >= 0]
+        starts.append((word.end + 1, "rest"))
+    times = [frame for frame, _ in starts]
+    if any(b < a for a, b in pairwise(times)) or starts[0][0] < 0:
+        raise AnimationFileError(name, f"voice {voice!r}: frames that ascend were expected")
+    cues = _from_starts(
+        [(frame / rate, shape) for frame, shape in starts], (times[-1] + 1) / rate, "rest"
+    )
+    events = [
+        Event(w.start / rate, "word", (w.end + 1 - w.start) / rate, w.text) for w in words if w.text
+    ]
+    return _take(cues, "papagayo", name, notes, events)
+
+
+def reader_of(text: str) -> Callable[[str, str], Take] | None:
+    """What reads a text that is neither JSON nor a table, or None."""
+    head = text.lstrip()[:200]
+    if head.startswith("<"):
+        return read_rhubarb_xml
+    if head.startswith("lipsync version"):
+        return read_pgo
+    if is_rhubarb_tsv(text):
+        return read_rhubarb_tsv
+    return None

@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: MIT
+"""Recognition by vote: several decoders hear the voice at several sizes of its vocal tract.
+
+A decoder of words is held up by its language, one of phonemes is not held at all; a voice played
+a little faster sounds like a smaller speaker, whom the model may know better. Where they disagree
+the most of them are right more often than any one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from .audio import RATE, Samples, resample
+from .phones import CLASS_OF, VISEMES, Phoneme
+from .recogniser import FRAME, Recogniser, Segment
+
+Votes = npt.NDArray[np.float64]
+
+_SPEEDS = (0.95, 1.0, 1.05)
+_WORD_VOTE, _PHONE_VOTE = 1.2, 1.0
+_MAJORITY = 0.01  # for the voice as it is, where votes are equal
+_SHORTEST = 3  # frames that a phoneme has at least
+
+_PHONES = tuple(CLASS_OF)
+_COLUMN = {phone: i for i, phone in enumerate(_PHONES)}
+_VISEME_OF_COLUMN = np.array([VISEMES.index(CLASS_OF[phone]) for phone in _PHONES])
+
+
+def hear(recogniser: Recogniser, samples: Samples) -> list[Phoneme]:
+    """The phonemes of a piece of a voice, with the words that were made out of it.
+
+    Args:
+        samples: float32[n] at audio.RATE.
+    """
+    votes = np.zeros((max(1, round(len(samples) / RATE / FRAME)), len(_PHONES)))
+    words: list[Segment] = []
+    for speed in _SPEEDS:
+        played = samples if speed == 1.0 else resample(samples, round(RATE * speed), RATE)
+        extra = _MAJORITY if speed == 1.0 else 0.0
+        _count(votes, recogniser.hear_phonemes(played), speed, _PHONE_VOTE + extra)
+        heard = recogniser.hear_words(played) or []
+        _count(votes, heard, speed, _WORD_VOTE)
+        if speed == 1.0:
+            words = [segment for segment in heard if segment.word]
+    return _with_words(_elected(votes), words)
+
+
+def _count(votes: Votes, heard: Sequence[Segment], speed: float, weight: float) -> None:
+    for segment in heard:
+        first, last = (round(t * speed / FRAME) for t in (segment.begin, segment.end))
+        votes[first:last, _COLUMN.get(segment.name, _COLUMN["SIL"])] += weight
+
+
+def _elected(votes: Votes) -> list[Phoneme]:
+    """First the viseme is elected, then one of its phonemes; short runs join their neighbours."""
+    visemes = np.zeros((len(votes), len(VISEMES)))
+    for column, viseme in enumerate(_VISEME_OF_COLUMN):
+        visemes[:, viseme] += votes[:, column]
+    padded = np.pad(visemes, ((1, 1), (0, 0)), mode="edge")
+    smooth = 0.25 * padded[:-2] + 0.5 * padded[1:-1] + 0.25 * padded[2:]
+    best = smooth.argmax(axis=1)
+    share = visemes[np.arange(len(votes)), best] / np.maximum(votes.sum(axis=1), 1e-9)
+    runs = _runs(best)
+    found = []
+    for first, last in runs:
+        of_viseme = votes[first:last].sum(axis=0) * (best[first] == _VISEME_OF_COLUMN)
+        confidence = round(float(min(1.0, share[first:last].mean())), 3)
+        name = _PHONES[int(of_viseme.argmax())]
+        found.append(Phoneme(first * FRAME, last * FRAME, name, confidence))
+    return found
+
+
+def _runs(best: npt.NDArray[np.intp]) -> list[tuple[int, int]]:
+    """First and last + 1 frame of each stretch of one viseme; the short are given to the left."""
+    edges = [0, *(int(i) + 1 for i in np.flatnonzero(np.diff(best))), len(best)]
+    runs: list[tuple[int, int]] = []
+    for first, last in pairwise(edges):
+        if runs and (last - first < _SHORTEST or best[first] == best[runs[-1][0]]):
+            runs[-1] = (runs[-1][0], last)
+        else:
+            runs.append((first, last))
+    return runs
+
+
+def _with_words(found: list[Phoneme], words: Sequence[Segment]) -> list[Phoneme]:
+    """Each word is marked at the phoneme that begins nearest to its begin, one word a phoneme."""
+    spoken = [i for i, phone in enumerate(found) if phone.name != "SIL"]
+    if not spoken:
+        return found
+    begins = np.array([found[i].begin for i in spoken])
+    for word in words:
+        i = spoken[int(np.argmin(np.abs(begins - word.begin)))]
+        if not found[i].word:
+            found[i] = found[i]._replace(word=word.word)
+    return found
