@@ -483,6 +483,11 @@ def test_all_selected_faces_in_one_call_and_one_undo_step(dna_file):
     rigs = [_face(dna_file), _face(dna_file, "KEYS")]
     scene.controls(rigs[1]).location.x = 1.0
     films = [_film(rig) for rig in rigs]
+    for item in bpy.context.selected_objects:
+        item.select_set(False)
+    bpy.context.view_layer.objects.active = None
+    with pytest.raises(RuntimeError, match="No face is selected"):
+        bpy.ops.risorius.bake()
     for rig in rigs:
         scene.controls(rig).select_set(True)
     bpy.ops.ed.undo_push(message="before")
@@ -494,6 +499,10 @@ def test_all_selected_faces_in_one_call_and_one_undo_step(dna_file):
     bpy.ops.ed.undo()
     rigs = [bpy.data.objects[n] for n in ("Small_rig", "Small.001_rig")]
     assert not any("risorius_baked" in rig for rig in rigs)
+    scene.controls(rigs[0]).select_set(False)
+    _bake(every=True)
+    assert all("risorius_baked" in rig for rig in rigs)
+    assert bpy.ops.risorius.unbake(every=True) == {"FINISHED"}
     bpy.context.view_layer.update()
     for rig, film in zip(rigs, films, strict=True):
         _assert_same(_film(rig), film)

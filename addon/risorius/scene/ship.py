@@ -14,6 +14,7 @@ from mathutils import Quaternion
 
 from .. import native
 from ..logic import clips, curves
+from ..logic.names import unique_labels
 from . import actions, bake, baked_keys, baked_tracks, compat, meshes, parts, runtime, sampling
 
 
@@ -195,13 +196,15 @@ def _remove_all_but(before):
         bpy.data.batch_remove(new)
 
 
-def clip(rig, samples, rate):
+def clip(rig, level, samples, rate, maps=False):
     """The raw controls of a range, and how the head was turned.
 
     Args:
         rig: deforming armature.
+        level: of detail, for the maps.
         samples: its Samples.
         rate: frames per second of the scene.
+        maps: add the values of the animated maps, each by its name in the DNA.
 
     Returns:
         risorius.Clip, names as in the DNA (Blender's where the DNA has one twice); frame 0 of the
@@ -215,6 +218,10 @@ def clip(rig, samples, rate):
         names += clips.HEAD
         heads = np.array([turns.get("head", Quaternion()) for turns in samples.turns])
         rows = np.concatenate([rows, clips.angles_of(heads).T])
+    if maps:
+        labels = unique_labels(live.dna.animated_map_names, names)
+        names += labels
+        rows = np.concatenate([rows, baked_tracks.evaluate(live, samples, level).animated_maps.T])
     frames = samples.frames
     step = float(frames[1] - frames[0]) if len(frames) > 1 else 1.0
     return native.module().Clip(
