@@ -128,8 +128,8 @@ def mix(seen, live, raw, head, depsgraph, maximum):
         float32[R], and the head's turn.
     """
     controls = seen.original
-    if not has_any(controls):
-        return raw, head
+    if not has_any(controls) or parts.BAKED in controls:
+        return raw, head  # baked controls have them in their action
     scene = depsgraph.scene
     stack = compiled(controls, live, scene, maximum)
     there = len(of(seen)) == len(of(controls))  # else one was added, and not evaluated since
