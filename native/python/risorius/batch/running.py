@@ -128,13 +128,14 @@ def _gather(
     by_name = {job.name: job for job in jobs}
     failed = 0
     for outcome in results:
-        report.outcomes[outcome.name] = dataclasses.replace(outcome, facts={})
         if outcome.error:
             failed += 1
             progress.say(f"{outcome.name}: {outcome.error}")
         else:
+            # First, so that whatever the report knows is in the journal, Ctrl-C or not.
             journal.add(by_name[outcome.name], outcome)
             report.frames += int(outcome.facts.get("frames", 0))
+        report.outcomes[outcome.name] = dataclasses.replace(outcome, facts={})
         note = f"{failed:,} failed" if failed else ""
         progress.update(len(report.outcomes), report.frames, note)
 
