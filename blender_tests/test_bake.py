@@ -523,6 +523,38 @@ def test_an_edited_baked_key_stays_a_real_key(dna_file):
     assert mesh.data.shape_keys.key_blocks["jaw"].value == pytest.approx(1.0)
 
 
+def test_back_to_live_keeps_what_the_user_made_of_it(dna_file):
+    rig = _face(dna_file)
+    _bake()
+    curve = scene.curves(rig)[0]
+    curve.keyframe_points[3].co.y += 0.25
+    bpy.ops.risorius.unbake()
+    assert bpy.data.actions["Small_baked"].use_fake_user
+    assert "Small_head_lod0_mesh_baked" not in bpy.data.actions
+    _bake(kind="CONTROLS")
+    mine = bpy.data.actions.new("Mine")
+    scene.controls(rig).animation_data.action = mine
+    bpy.ops.risorius.unbake()
+    assert mine.use_fake_user
+    assert scene.controls(rig).animation_data.action.name == "Small_controlsAction"
+
+
+def test_a_copy_of_a_baked_face_is_a_baked_face(mode, dna_file):
+    rig = _face(dna_file, mode)
+    wanted = _film(rig)
+    _bake()
+    for item in [rig, scene.controls(rig), *scene.meshes(rig).values()]:
+        item.select_set(True)
+    bpy.ops.object.duplicate()
+    bpy.context.view_layer.update()
+    copy = next(o for o in bpy.data.objects if "risorius_controls" in o and o != rig)
+    assert bpy.ops.risorius.unbake(every=True) == {"FINISHED"}
+    for one in (rig, copy):
+        assert "risorius_baked" not in one
+        _assert_same(_film(one), wanted)
+    assert not any("_baked" in a.name for a in bpy.data.actions)
+
+
 def test_what_cannot_be_baked_says_so(dna_file):
     rig = _face(dna_file)
     _bake()
