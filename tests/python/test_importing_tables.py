@@ -157,6 +157,11 @@ def test_crlf_a_byte_order_mark_and_utf16_read_the_same(tmp_path):
         assert clip.names == plain.names
 
 
+def test_a_byte_order_mark_is_no_part_of_the_first_name(tmp_path):
+    clip = read(tmp_path, b"\xef\xbb\xbfjawOpen,time\n1,0\n2,1\n").clip
+    assert clip.names == ("jawOpen",)
+
+
 @pytest.mark.parametrize(
     ("text", "values", "times"),
     [

@@ -276,15 +276,10 @@ def read_plain(table: Table, rate: float | None = None, timecode_rate: float | N
     keep = keep_ascending(times, notes)
     curves = np.stack([_column(table, column, times, notes) for column in columns])
     clip = make_clip(
-        [_curve_name(table.header[c]) for c in columns], curves[:, keep], times[keep],
+        [table.header[c] for c in columns], curves[:, keep], times[keep],
         rate=rate if at is None else None,
     )  # fmt: skip
     return Take(clip, "csv", "", notes)
-
-
-def _curve_name(header: str) -> str:
-    """Without what Audio2Face writes before each name."""
-    return header.removeprefix("blendShapes.")
 
 
 def _time_column(table: Table) -> int | None:
