@@ -21,7 +21,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="risorius", description="Face rigs from DNA files.")
     parser.add_argument("--version", action="version", version=__version__)
     subparsers = parser.add_subparsers(dest="command", required=True)
-    for command in (
+    commands = (
         info,
         check,
         convert,
@@ -34,7 +34,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         speech,
         live,
         batch,
-    ):
+    )
+    for command in commands:
         command.add_parser(subparsers)
     args, rest = parser.parse_known_args(arguments)
     # argparse ends a list of operands at the first option: FILE --json NAME=1.
