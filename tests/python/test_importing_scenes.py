@@ -235,6 +235,18 @@ def test_a_face_boards_sliders_and_a_channels_percent(tmp_path):
     assert clip.curves[:, -1].tolist() == [-1.0, 0.5, 1.0]
 
 
+def test_what_moves_chooses_the_mapping(tmp_path):
+    still = {f"d|{axis}": fbx.curve(i, [0, 1], [0, 0]) for i, axis in enumerate("XYZ")}
+    tracks = [("Model/Null", "CTRL_C_jaw", "Lcl Translation", still, 0)]
+    found = read_fbx(tmp_path, [*tracks, prop("jawOpen", fbx.curve(9, [0, 1], [0, 1]))])
+    assert found.mapping == "arkit"
+
+
+def test_key_times_are_exact_after_an_hour(tmp_path):
+    clip = read_fbx(tmp_path, [prop("a", fbx.curve(1, [0.0, 4000.0], [0, 1]))]).clip
+    assert clip.duration == pytest.approx(4000.0, abs=1e-9)
+
+
 def test_cubic_and_constant_keys_are_sampled(tmp_path):
     slopes = np.zeros((2, 2))
     smooth = fbx.curve(1, [0, 1], [0, 1], fbx.CUBIC | fbx.USER, slopes)
