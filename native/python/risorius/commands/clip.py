@@ -179,7 +179,8 @@ def run_convert(args: argparse.Namespace) -> int:
     if args.report:
         print(report.text())
     else:
-        left = [f"{len(names)} {heading}" for heading, names in report.lists()[:2]]
+        lists = (("not mapped", report.unmapped), ("not in the rig", report.not_in_rig))
+        left = [f"{len(names)} {heading}" for heading, names in lists if names]
         more = f" ({', '.join(left)}: see --report)" if left else ""
         print(f"{args.output}: {_summary(clip)}{more}")
     return 0
