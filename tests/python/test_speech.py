@@ -86,7 +86,7 @@ def test_every_common_kind_of_wav_gives_the_same_sound(kind, bits):
     values = 0.8 * sine(440, 22050, 0.05)
     samples, rate = parse_wav(wav(kind, bits, 1, 22050, encoded(kind, bits, values)))
     assert rate == 22050
-    assert np.abs(samples - values).max() < (0.008 if bits == 8 else 1e-4)
+    assert np.abs(samples - values).max() < (0.5 / 127 + 0.8 / 128 if bits == 8 else 1e-4)
 
 
 def test_extensible_header_stereo_and_streamed_length():
@@ -287,9 +287,18 @@ def test_a_transcript_of_another_recording_is_doubted(voice):
 
 
 def test_words_that_no_dictionary_has_are_aligned_by_rule(voice):
-    path, _ = voice("The zorblax of Nvidiana paid $3.50.")
-    said = [p.word for p in phonemes(path, "The zorblax of Nvidiana paid $3.50.") if p.word]
-    assert said == "the zorblax of nvidiana paid three dollars and fifty cents".split()
+    path, _ = voice("The zorblax of Nvidiana paid three dollars in 1984.")
+    heard = phonemes(path, "The zorblax of Nvidiana paid 3 dollars in 1984")
+    words = [phone.word for phone in heard if phone.word]
+    assert words == "the zorblax of nvidiana paid three dollars in nineteen eighty four".split()
+
+
+def test_a_transcript_that_is_not_to_the_letter_is_used_where_it_fits(voice):
+    path, _ = voice("The cat paid dollar three point five zero at home.")
+    heard = listen(path, "The cat paid $3.50 at home.")  # three dollars and fifty cents
+    assert heard.aligned
+    assert any("words were not heard" in note for note in heard.notes)
+    assert {"cat", "three", "home"} <= {phone.word for phone in heard.phonemes}
 
 
 def test_listening_tells_how_far_it_is_and_can_be_cancelled(voice):
@@ -402,8 +411,8 @@ def test_curves_are_smooth_and_in_range():
 def test_intensity_scales_shapes_but_not_closures():
     low, high = (animate(spell("AA", "AA", "M", "AA"), intensity=x) for x in (0.5, 1.0))
     assert np.allclose(2 * low.curve(P + "jawOpen")[:5], high.curve(P + "jawOpen")[:5], atol=1e-5)
-    closed = [c.curve(P + "mouthLipsPressL").max() for c in (low, high)]
-    assert closed[0] == closed[1] > 0.3
+    closed = [c.curve(P + "mouthLipsTogetherUL").max() for c in (low, high)]
+    assert closed[0] == closed[1] > 0.1
 
 
 def test_a_louder_vowel_opens_wider():
