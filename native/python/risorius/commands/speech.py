@@ -11,6 +11,7 @@ from pathlib import Path
 from ..clip import Clip
 from ..importing import writing
 from ..speech import Heard, Phoneme, animate, listen
+from ..speech.listening import confidence
 from .files import InputError, read_bytes
 
 _KINDS = (".rzc", ".csv", ".json")
@@ -119,13 +120,6 @@ def _report(heard: Heard, clip: Clip) -> dict[str, object]:
         "confidence": round(confidence(heard.phonemes), 3),
         "notes": heard.notes,
     }
-
-
-def confidence(found: list[Phoneme]) -> float:
-    """The mean over the time of all phonemes but silence; 0 of silence only."""
-    spoken = [p for p in found if p.name != "SIL"]
-    whole = sum(p.end - p.begin for p in spoken)
-    return sum(p.confidence * (p.end - p.begin) for p in spoken) / whole if whole else 0.0
 
 
 def _summary(heard: Heard, clip: Clip, args: argparse.Namespace) -> str:
