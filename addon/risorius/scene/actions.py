@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 
 from ..logic import curves as reduction
+from . import compat
 
 BEFORE = "risorius_before"  # on what plays a baked action: what animated it before
 BAKED_ACTION = "risorius_baked_action"  # on an action that was baked: removed on the way back
@@ -72,14 +73,14 @@ def write(name, owner, frames, tracks, error, counts):
     action[BAKED_ACTION] = True
     action.use_frame_range = True
     action.frame_start, action.frame_end = float(frames[0]), float(frames[-1])
-    bag, slot = _bag(action, owner)
+    bag = compat.add_curves(action, owner)
     times = np.asarray(frames, np.float32)
     moving = [t for t in tracks if t.now is None or (t.values != _flat(t.now)).any()]
     for track, values, keep in _reduced(frames, moving, error, counts):
         for column in range(values.shape[1]):
             curve = _new_curve(bag, track, track.first + column if track.indexed else 0)
             _fill(curve, times[keep[:, column]], values[keep[:, column], column])
-    return action, slot
+    return action, compat.slot_for(action, owner)
 
 
 def _flat(value):
@@ -106,15 +107,6 @@ def _reduced(frames, tracks, error, counts):
         ends = np.cumsum([t.values.shape[1] for t in waiting])[:-1]
         yield from zip(waiting, np.split(values, ends, 1), np.split(keep, ends, 1), strict=True)
         waiting, width = [], 0
-
-
-def _bag(action, owner):
-    """Where the curves go, and the slot."""
-    if not hasattr(action, "slots"):
-        return action, None
-    slot = action.slots.new(id_type=owner.id_type, name=owner.name)
-    strip = action.layers.new("Layer").strips.new(type="KEYFRAME")
-    return strip.channelbag(slot, ensure=True), slot
 
 
 def _new_curve(bag, track, index):
@@ -158,7 +150,7 @@ def play(owner, action, slot, muted=(), strip=False):
     data.action_extrapolation = "HOLD"
     if not strip:
         data.use_nla = False
-        _assign(data, action, slot)
+        compat.assign_action(data, action, slot)
         return
     held["tracks"] = [f"{int(t.mute)} {int(t.is_solo)}" for t in data.nla_tracks]
     for track in data.nla_tracks:
@@ -173,12 +165,6 @@ def play(owner, action, slot, muted=(), strip=False):
         made.action_slot = slot
     made.frame_start_ui = made.action_frame_start
     held["track"] = track.name
-
-
-def _assign(data, action, slot):
-    data.action = action
-    if slot is not None:
-        data.action_slot = slot
 
 
 def keep(owner):

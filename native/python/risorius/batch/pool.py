@@ -8,8 +8,9 @@ import multiprocessing
 import multiprocessing.connection
 import os
 import signal
-from collections import Counter, deque
+from collections import Counter, OrderedDict, deque
 from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .jobs import Job
@@ -62,11 +63,10 @@ class _Worker:
         theirs.close()
         self.job: Job | None = None
         self.ready = False
-        self.last: tuple[object, ...] = ()
+        self.last: Job | None = None
 
     def give(self, job: Job) -> None:
-        self.job = job
-        self.last = _face_of(job)
+        self.job = self.last = job
         with contextlib.suppress(OSError):  # it has died: noticed by who waits for it
             self.connection.send(job)
 
@@ -83,20 +83,34 @@ def _face_of(job: Job) -> tuple[object, ...]:
 
 
 class _Queue:
-    """Jobs by face, so that a worker stays with one as long as it can."""
+    """Jobs by face and clip, so that a worker stays with what it has loaded as long as it can."""
 
     def __init__(self, jobs: Sequence[Job]) -> None:
-        self._lines: dict[tuple[object, ...], deque[Job]] = {}
+        self._lines: dict[tuple[object, ...], OrderedDict[Path, deque[Job]]] = {}
+        self._lengths: Counter[tuple[object, ...]] = Counter()
         for job in jobs:
             self.put(job)
 
     def put(self, job: Job) -> None:
-        self._lines.setdefault(_face_of(job), deque()).append(job)
+        line = self._lines.setdefault(_face_of(job), OrderedDict())
+        line.setdefault(job.clip, deque()).append(job)
+        self._lengths[_face_of(job)] += 1
 
-    def take(self, last: tuple[object, ...]) -> Job | None:
-        """The next job of the face that the worker had last, else of the longest line."""
-        line = self._lines.get(last) or max(self._lines.values(), key=len, default=None)
-        return line.popleft() if line else None
+    def take(self, last: Job | None) -> Job | None:
+        """The next job for a worker that had a certain one last."""
+        face = _face_of(last) if last else None
+        if face is None or not self._lengths[face]:
+            face, length = max(self._lengths.items(), key=lambda item: item[1])
+            if not length:
+                return None
+        line = self._lines[face]
+        clip = last.clip if last and last.clip in line else next(iter(line))
+        job = line[clip].popleft()
+        self._lengths[face] -= 1
+        line.move_to_end(clip)  # the next worker begins another one
+        if not line[clip]:
+            del line[clip]
+        return job
 
 
 class Pool:

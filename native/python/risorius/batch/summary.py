@@ -19,7 +19,8 @@ from .outcome import Outcome
 _COLUMNS = (
     "frames", "seconds", "largest_move", "translation_unit", "largest_move_joint",
     "largest_move_frame", "correctives_fired", "correctives", "out_of_range", "not_finite",
-    "missing_controls", "load_seconds", "evaluation_seconds", "job_seconds",
+    "missing_controls", "unmapped_curves", "mapping", "load_seconds", "evaluation_seconds",
+    "job_seconds",
 )  # fmt: skip
 
 
