@@ -284,6 +284,17 @@ def test_it_ends_with_the_face_the_file_and_the_addon(dna_file, port, tmp_path):
     module.register()
 
 
+def test_an_error_ends_it_and_is_shown(dna_file, port, monkeypatch):
+    module = scene.submodule("scene.live")
+    scene.load(dna_file)
+    bpy.ops.risorius.live_start()
+    monkeypatch.setattr(module, "show", lambda *_arguments: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        module._tick()
+    assert not listens(port)
+    assert "the console shows" in drawn()
+
+
 def test_undo_does_not_end_it(dna_file, port):
     rig = scene.load(dna_file)
     bpy.ops.ed.undo_push(message="before")
