@@ -234,8 +234,8 @@ class RISORIUS_PT_live(FaceOnlyPanel, bpy.types.Panel):
         row = column.row(align=True)
         row.prop(chosen, "port")
         row.prop(chosen, "everywhere", text="", icon="URL")
-        column.prop(chosen, "mapping", text="")
-        layout.prop(chosen, "subject", icon="USER", text="")
+        column.prop(chosen, "mapping")
+        layout.prop(chosen, "subject", icon="USER")
         column = layout.column(align=True)
         for name in ("smoothing", "gain", "head_gain"):
             column.prop(chosen, name)
