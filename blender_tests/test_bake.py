@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Baked faces move as the live ones did, by plain actions alone, and come back as they were."""
 
+from types import SimpleNamespace
+
 import addon_utils
 import bpy
 import numpy as np
 import pytest
 from support import scene
 from support.animation import animate
+from support.layout import Recorder
 
 NEAR = 1e-5  # of the size: what a bake may move a vertex by
 FRAMES = (1, 2, 3, 4, 6, 8, 10)
@@ -521,6 +524,58 @@ def test_an_edited_baked_key_stays_a_real_key(dna_file):
     assert not bad
     bpy.context.scene.frame_set(5)
     assert mesh.data.shape_keys.key_blocks["jaw"].value == pytest.approx(1.0)
+
+
+def test_back_to_live_keeps_what_the_user_made_of_it(dna_file):
+    rig = _face(dna_file)
+    _bake()
+    curve = scene.curves(rig)[0]
+    curve.keyframe_points[3].co.y += 0.25
+    bpy.ops.risorius.unbake()
+    assert bpy.data.actions["Small_baked"].use_fake_user
+    assert "Small_head_lod0_mesh_baked" not in bpy.data.actions
+    _bake(kind="CONTROLS")
+    mine = bpy.data.actions.new("Mine")
+    scene.controls(rig).animation_data.action = mine
+    bpy.ops.risorius.unbake()
+    assert mine.use_fake_user
+    assert scene.controls(rig).animation_data.action.name == "Small_controlsAction"
+
+
+def test_a_copy_of_a_baked_face_is_a_baked_face(mode, dna_file):
+    rig = _face(dna_file, mode)
+    wanted = _film(rig)
+    _bake()
+    for item in [rig, scene.controls(rig), *scene.meshes(rig).values()]:
+        item.select_set(True)
+    bpy.ops.object.duplicate()
+    bpy.context.view_layer.update()
+    copy = next(o for o in bpy.data.objects if "risorius_controls" in o and o != rig)
+    assert bpy.ops.risorius.unbake(every=True) == {"FINISHED"}
+    for one in (rig, copy):
+        assert "risorius_baked" not in one
+        _assert_same(_film(one), wanted)
+    assert not any("_baked" in a.name for a in bpy.data.actions)
+
+
+def _drawn(cls):
+    layout = Recorder()
+    cls.draw(SimpleNamespace(layout=layout), bpy.context)
+    return layout
+
+
+def test_the_panel_shows_the_state_and_the_way_back(dna_file):
+    _face(dna_file)
+    panel = scene.submodule("ui.panels").RISORIUS_PT_character
+    assert "risorius.unbake" not in _drawn(panel).operators
+    _bake(start=2, end=9)
+    assert "it plays its actions, frames 2 to 9." in _drawn(panel).text()
+    assert "risorius.unbake" in _drawn(panel).operators
+    out = _drawn(scene.submodule("ui.bake_panel").RISORIUS_PT_out)
+    assert out.operators == ["risorius.bake", "risorius.export_animation"]
+    bpy.ops.risorius.unbake()
+    _bake(kind="CONTROLS")
+    assert "The controls are baked; layers, NLA and drivers rest, frames 1 to 10." in _drawn(panel).text()
 
 
 def test_what_cannot_be_baked_says_so(dna_file):

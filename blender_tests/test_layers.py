@@ -549,3 +549,20 @@ def test_keys_of_weights_outlive_their_action(rig, tmp_path):
     assert [y.name for y in controls.risorius_layers] == ["Layer", "brow"]
     assert _value(rig, 4, PULL) == pytest.approx(wanted)
     assert _value(rig, 4, BROW) == pytest.approx(0.1 + 0.1 * 3 / 24, abs=1e-5)
+
+
+def test_undo_of_an_edited_action(rig):
+    bpy.context.preferences.edit.use_global_undo = True
+    action = _action(rig, "Edited", "LINEAR", jawOpen={1: 0.25, 20: 0.25})
+    _entry(rig, action=action)
+    bpy.ops.ed.undo_push(message="as it was")
+    assert _value(rig, 5, JAW) == pytest.approx(0.25)
+    for curve in scene.submodule("scene.compat").curves_of(action):
+        for key in curve.keyframe_points:
+            key.co[1] = 0.75
+        curve.update()
+    bpy.context.view_layer.update()
+    bpy.ops.ed.undo_push(message="edited")
+    assert _value(rig, 5, JAW) == pytest.approx(0.75)
+    assert bpy.ops.ed.undo() == {"FINISHED"}
+    assert _value(bpy.data.objects["Small_rig"], 5, JAW) == pytest.approx(0.25)

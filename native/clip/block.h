@@ -3,6 +3,7 @@
 // share.
 #pragma once
 
+#include <bit>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -50,6 +51,12 @@ class EncodedCurves {
   /// Fails: kInvalidValue. In: controls of this block.
   core::Status decode(std::span<const std::uint32_t> controls, float* out,
                       std::size_t stride) const;
+  /// Whether a control rests in the whole block; then value is its value.
+  bool is_resting(std::size_t control, float& value) const {
+    if (parts_[control].kind != Part::kConstant) return false;
+    value = std::bit_cast<float>(parts_[control].bits);
+    return true;
+  }
 
  private:
   struct Tables;

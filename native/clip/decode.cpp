@@ -19,6 +19,7 @@ using core::fail;
 // bits 0-5    how many bits the code and what follows it have together
 // bit 6       a rest, bit 7: no code begins so
 // bits 8-11   length of the code, 16-20: how many bits follow it
+// bit 14      the error has another sign than the one before
 // bit 15      1 above the bits that follow
 // bits 24-27  the code of the next symbol
 using Entry = std::uint32_t;
@@ -27,7 +28,8 @@ constexpr Entry kIsRest = 1u << 6, kIsNone = 1u << 7;
 Entry entry_of(std::uint32_t symbol, std::uint32_t length, std::uint32_t next) {
   const std::uint32_t extra = extra_bits(symbol);
   return (length + extra) | (symbol >= kRest ? kIsRest : 0) | length << 8 |
-         (symbol > 0 ? 1u << 15 : 0) | extra << 16 | next << 24;
+         (has_other_sign(symbol) ? 1u << 14 : 0) | (symbol > 0 ? 1u << 15 : 0) | extra << 16 |
+         next << 24;
 }
 
 constexpr std::size_t kTableSize = std::size_t{1} << kLongestCode;
@@ -85,7 +87,8 @@ class Lane {
     const std::uint32_t number = number_of(word, entry);
     if ((entry & (kIsRest | kIsNone)) != 0) [[unlikely]]
       return rest(entry, number);
-    const std::uint32_t value = in_order(history_.next() + unfold(number));
+    sign_ ^= 0 - (entry >> 14 & 1);
+    const std::uint32_t value = in_order(history_.next() + ((number ^ sign_) - sign_));
     *out_++ = value;
     history_.add(value);
     return true;
@@ -109,6 +112,7 @@ class Lane {
   BitReader bits_;
   History<kOrder> history_;
   std::uint32_t *out_, *end_;
+  std::uint32_t sign_ = 0;  // of the last error that was not 0
 };
 
 // Out: every frame was there, and nothing more.

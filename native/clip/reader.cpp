@@ -113,8 +113,14 @@ core::Status Reader::read_head(const Limits& limits) {
         std::to_string(controls) + " controls, the limit is " + std::to_string(limits.controls));
   }
   std::unordered_set<std::string> seen;
+  std::uint64_t length = 0;
   for (std::uint64_t i = 0; i < controls && !in.failed(); ++i) {
-    head_.names.push_back(in.text());
+    head_.names.push_back(in.next_text(head_.names.empty() ? "" : head_.names.back()));
+    // A name may repeat the one before in a few bytes: these, too, are counted.
+    if ((length += head_.names.back().size()) > limits.head_bytes) {
+      return refuse(ErrorCode::kLimitExceeded, "head.names",
+                    "names longer than " + std::to_string(limits.head_bytes) + " bytes together");
+    }
     if (!seen.insert(head_.names.back()).second && !in.failed()) {
       return refuse(ErrorCode::kInvalidValue, "head.names[" + std::to_string(i) + "]",
                     "a control may have one curve only, found two");
@@ -355,6 +361,17 @@ core::Status Reader::read(std::uint64_t begin, std::uint64_t end,
                   "times after those of the block before were expected", blocks_[block].offset);
     }
     at = until;
+  }
+  return core::ok();
+}
+
+core::Status Reader::resting(std::size_t block, std::span<float> values,
+                             std::vector<std::uint32_t>& moving) {
+  if (auto read = load(block); !read) return read;
+  for (std::uint32_t control = 0; control < values.size(); ++control) {
+    if (!loaded_->curves || !loaded_->curves->is_resting(control, values[control])) {
+      moving.push_back(control);
+    }
   }
   return core::ok();
 }

@@ -6,6 +6,7 @@
 
 #include <numeric>
 
+#include "clip/player.h"
 #include "support/clips.h"
 #include "support/files.h"
 
@@ -72,6 +73,22 @@ TEST(ClipFile, AnyFramesOfAnyControlsAreThoseOfTheWhole) {
   }
 }
 
+TEST(ClipPlayer, GivesTheFramesOfTheClip) {
+  const Clip clip = make_full_clip(250);
+  const Bytes bytes = must_encode(clip);
+  Player player(must_open(bytes));
+  for (const std::size_t at : {0u, 1u, 99u, 100u, 249u, 5u, 200u}) {
+    const auto frame = player.frame(at);
+    ASSERT_TRUE(frame.has_value());
+    for (std::size_t k = 0; k < 8; ++k) {
+      EXPECT_TRUE(same_bits((*frame).subspan(k, 1), clip.curve(k).subspan(at, 1))) << at;
+    }
+  }
+  EXPECT_EQ(player.frame(250).error().where, "frames");
+  EXPECT_EQ(player.frame(UINT64_MAX).error().where, "frames");
+  EXPECT_TRUE(player.frame(7).has_value());
+}
+
 TEST(ClipFile, FramesThatAreNotThereAreRefused) {
   const Bytes bytes = must_encode(make_full_clip(50));
   Reader reader = must_open(bytes);
@@ -86,6 +103,21 @@ TEST(ClipFile, FramesThatAreNotThereAreRefused) {
   limits = {};
   limits.controls = 7;
   EXPECT_EQ(decode(bytes, Ends::kMustBeWhole, limits).error().where, "head.names");
+}
+
+// Each name repeats the one before and adds a letter: 3 bytes in the file.
+TEST(ClipFile, NamesThatGrowOutOfFewBytesAreLimited) {
+  Clip clip;
+  std::string name;
+  for (int i = 0; i < 3000; ++i) clip.head.names.push_back(name += 'x');
+  const Bytes bytes = must_encode(clip);
+  EXPECT_LT(bytes.size(), 20000u);
+  EXPECT_TRUE(decode(bytes).has_value());
+  Limits limits;
+  limits.head_bytes = 1u << 20;
+  const auto read = decode(bytes, Ends::kMustBeWhole, limits);
+  ASSERT_FALSE(read.has_value());
+  EXPECT_EQ(read.error().where, "head.names");
 }
 
 // The encoder writes what encode does, in pieces of any size.

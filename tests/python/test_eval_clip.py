@@ -193,6 +193,7 @@ def test_a_clip_of_our_own_is_taken_as_it_is(tmp_path, capsys):
         assert arrays["event_values"].tolist() == ["yes"]
         assert json.loads(str(arrays["metadata"])) == {"take": "7"}
     assert facts["not_finite"] == 2
+    assert np.isfinite(facts["largest_move"])
     assert facts["control_ranges"][names[0]] == [np.float32(0.1), np.float32(0.3)]
     assert facts["control_ranges"][names[2]] == [-2, 1]
     assert facts["out_of_range"] == [names[2]]

@@ -69,9 +69,7 @@ def encoded(kind, bits, values):
 # ---- sound files ----
 
 
-@pytest.mark.parametrize(
-    ("kind", "bits"), [(1, 8), (1, 16), (1, 24), (1, 32), (3, 32), (3, 64)]
-)
+@pytest.mark.parametrize(("kind", "bits"), [(1, 8), (1, 16), (1, 24), (1, 32), (3, 32), (3, 64)])
 def test_every_common_kind_of_wav_gives_the_same_sound(kind, bits):
     values = 0.8 * sine(440, 22050, 0.05)
     samples, rate = parse_wav(wav(kind, bits, 1, 22050, encoded(kind, bits, values)))

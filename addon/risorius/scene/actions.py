@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Actions with baked curves, and what an object was animated by before it played one."""
 
+import hashlib
 import json
 from dataclasses import dataclass
 
@@ -12,6 +13,7 @@ from . import compat
 
 BEFORE = "risorius_before"  # on what plays a baked action: what animated it before
 BAKED_ACTION = "risorius_baked_action"  # on an action that was baked: removed on the way back
+_DIGEST = "risorius_digest"  # on the same: of its keys as they were baked
 _LINEAR = 1
 _AT_ONCE = 1 << 21  # values that are reduced in one go
 
@@ -80,6 +82,7 @@ def write(name, owner, frames, tracks, error, counts):
         for column in range(values.shape[1]):
             curve = _new_curve(bag, track, track.first + column if track.indexed else 0)
             _fill(curve, times[keep[:, column]], values[keep[:, column], column])
+    action[_DIGEST] = _digest(action)
     return action, compat.slot_for(action, owner)
 
 
@@ -128,6 +131,17 @@ def _fill(curve, times, values):
     for name in ("co", "handle_left", "handle_right"):
         points.foreach_set(name, places)
     points.foreach_set("interpolation", np.full(len(times), _LINEAR, np.int32))
+
+
+def _digest(action):
+    """What tells whether an action was edited since."""
+    found = hashlib.sha1(usedforsecurity=False)
+    for curve in compat.curves_of(action):
+        places = np.empty(len(curve.keyframe_points) * 2, np.float32)
+        curve.keyframe_points.foreach_get("co", places)
+        found.update(f"{curve.data_path} {curve.array_index}".encode())
+        found.update(places.tobytes())
+    return found.hexdigest()
 
 
 def play(owner, action, slot, muted=(), strip=False):
@@ -228,13 +242,16 @@ def _set(owner, path, number):
 def restore(owner):
     """Let a datablock be animated again as it was before `play`.
 
-    What was baked goes, unless somebody else uses it or the user protected it.
+    What was baked goes, unless somebody else uses it, or the user protected or edited it; an action
+    that the user gave it meanwhile stays in the file.
     """
     state = owner.get(BEFORE)
     if state is None:
         return
     data = owner.animation_data or owner.animation_data_create()
     baked = [data.action]
+    if data.action is not None and data.action != state.get("action"):
+        data.action.use_fake_user |= not data.action.get(BAKED_ACTION)
     if "track" in state:
         baked += _remove_track(data, state)
     for curve in data.drivers:
@@ -254,8 +271,12 @@ def restore(owner):
         owner.animation_data_clear()
     del owner[BEFORE]
     for made in baked:
-        if made is not None and made.get(BAKED_ACTION) and made.users == 0:
+        if made is None or not made.get(BAKED_ACTION) or made.users:
+            continue
+        if made.get(_DIGEST) == _digest(made):
             bpy.data.actions.remove(made)
+        else:
+            made.use_fake_user = True
 
 
 def _remove_track(data, state):

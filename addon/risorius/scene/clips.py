@@ -369,10 +369,11 @@ def add_sound(scene, path, frame, name=""):
     try:
         strip = strips.new_sound(name or Path(path).stem, str(path), _free(strips, start), start)
     except RuntimeError as error:
-        raise clips.ClipError("Blender cannot read it as a sound") from error
+        said = str(error).strip().removeprefix("Error: ")
+        raise clips.ClipError(f"no sound strip: {said}") from error
     if strip.frame_final_duration <= 1 and not strip.sound.samplerate:
         strips.remove(strip)
-        raise clips.ClipError("Blender cannot read it as a sound")
+        raise clips.ClipError("no sound strip: Blender cannot read it")
     return strip
 
 

@@ -49,6 +49,8 @@ def _settings(operator, stage):
             "export_frame_step": step,
             "export_force_sampling": True,
             "export_optimize_animation_size": False,
+            # Its quicker way of hiding other objects gave wrong bones with two armatures (4.5).
+            "export_optimize_disable_viewport": False,
             "export_skins": True,
             "export_all_influences": operator.influences == 0,
             "export_influence_nb": max(operator.influences, 1),

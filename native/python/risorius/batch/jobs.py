@@ -27,7 +27,7 @@ _KEYS = (
     "clips", "characters", "lods", "name", "write", "what", "rate", "frames", "quaternions",
     "compress", "mapping",
 )  # fmt: skip
-MAX_JOBS = 1_000_000
+MAX_JOBS = 200_000
 
 
 class JobsError(ValueError):

@@ -4,10 +4,12 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import multiprocessing
 import multiprocessing.connection
 import os
 import signal
+import threading
 from collections import Counter, OrderedDict, deque
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -45,6 +47,19 @@ def _serve(connection: Connection[object, object], work: Work) -> None:
             connection.send(outcome)
 
 
+@contextlib.contextmanager
+def _ignoring_interrupts() -> Iterator[None]:
+    """Who is started in here does not hear Ctrl-C, from its first moment on."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
 def _leave(number: int, frame: object) -> None:
     """As an exception, so that half a file is deleted on the way out."""
     raise SystemExit(128 + number)
@@ -59,7 +74,8 @@ class _Worker:
         self.process: SpawnProcess = context.Process(
             target=_serve, args=(theirs, work), daemon=True
         )
-        self.process.start()
+        with _ignoring_interrupts():
+            self.process.start()
         theirs.close()
         self.job: Job | None = None
         self.ready = False
@@ -157,7 +173,7 @@ class Pool:
                 continue
             if isinstance(message, Outcome):
                 tries = self._deaths[message.name] + 1
-                yield Outcome(**{**message.__dict__, "attempts": tries})
+                yield dataclasses.replace(message, attempts=tries)
             worker.ready = True
             worker.job = None
             self._feed(worker, queue)

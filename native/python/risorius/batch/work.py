@@ -99,15 +99,15 @@ def _performance(job: Job) -> Performance:
     return _clips.get(key, lambda: load_performance(job.clip, face, job.options.mapping))
 
 
-def run_job(job: Job, threads: int = 1, version: str = risorius.__version__) -> Outcome:
+def run_job(job: Job, threads: int = 1, version: str | None = None) -> Outcome:
     """Do a job.
 
     Args:
         job: its paths must be there for whoever runs this.
         threads: that may evaluate it.
-        version: of Risorius that gave it out.
+        version: of Risorius that gave it out, where it may be another one.
     """
-    if version != risorius.__version__:
+    if version not in (None, risorius.__version__):
         return Outcome(
             job.name,
             f"a worker with risorius {version} was expected, found {risorius.__version__}",
