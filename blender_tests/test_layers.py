@@ -566,3 +566,36 @@ def test_undo_of_an_edited_action(rig):
     assert _value(rig, 5, JAW) == pytest.approx(0.75)
     assert bpy.ops.ed.undo() == {"FINISHED"}
     assert _value(bpy.data.objects["Small_rig"], 5, JAW) == pytest.approx(0.25)
+
+
+@pytest.mark.parametrize(
+    ("setting", "value"),
+    [
+        ("start", 4.0),
+        ("scale", 0.5),
+        ("trim_start", 3.0),
+        ("trim_end", 9.0),
+        ("repeat", 2.0),
+        ("reverse", True),
+        ("blend", "MAXIMUM"),
+        ("extend", "NOTHING"),
+        ("fade_in", 9.0),
+        ("fade_out", 9.0),
+        ("mute", True),
+        ("controls", "jaw*"),
+        ("regions", {"JAW"}),
+        ("kind", "EXPRESSION"),
+    ],
+)
+def test_every_setting_is_heeded_at_once(rig, setting, value):
+    entry = _entry(rig, action=_wave(rig), expression="anger")
+    scene.face(rig)[BROW] = 0.5
+    other = _entry(rig, kind="EXPRESSION", expression="joy", weight=0.1)
+    frames = (2, 6, 14, 25)
+    before = np.array([_raw(rig, f) for f in frames])
+    setattr(entry, setting, value)
+    changed = np.array([_raw(rig, f) for f in frames])
+    assert np.abs(changed - before).max() > 0.01
+    _layers().forget()
+    np.testing.assert_array_equal([_raw(rig, f) for f in frames], changed)
+    assert other.name == "Layer.001"
