@@ -539,15 +539,15 @@ def test_keys_of_weights_outlive_their_action(rig, tmp_path):
     for frame, value in ((1, 0.0), (11, 1.0)):
         controls.risorius_layers[0].weight = value
         controls.keyframe_insert("risorius_layers[0].weight", frame=frame)
-    wanted = _value(rig, 4, PULL)
-    assert 0.0 < wanted < 0.5
+    wanted = [_value(rig, frame, PULL) for frame in (4, 8)]
+    assert 0.0 < wanted[0] < wanted[1]
     table = tmp_path / "brow.csv"
     table.write_text("time,browDownLeft\n0,0.1\n1,0.2\n", encoding="utf-8")
     assert bpy.ops.risorius.import_animation(filepath=str(table)) == {"FINISHED"}
-    assert _value(rig, 4, PULL) == pytest.approx(wanted)
+    assert [_value(rig, frame, PULL) for frame in (4, 8)] == pytest.approx(wanted)
     assert bpy.ops.risorius.layer_add(kind="ACTION") == {"FINISHED"}
     assert [y.name for y in controls.risorius_layers] == ["Layer", "brow"]
-    assert _value(rig, 4, PULL) == pytest.approx(wanted)
+    assert [_value(rig, frame, PULL) for frame in (4, 8)] == pytest.approx(wanted)
     assert _value(rig, 4, BROW) == pytest.approx(0.1 + 0.1 * 3 / 24, abs=1e-5)
 
 
@@ -599,3 +599,10 @@ def test_every_setting_is_heeded_at_once(rig, setting, value):
     _layers().forget()
     np.testing.assert_array_equal([_raw(rig, f) for f in frames], changed)
     assert other.name == "Layer.001"
+
+
+def test_a_reaction_needs_no_layer(blinker):
+    assert _value(blinker, 19, BLINK) == 0.0
+    bpy.context.scene.frame_set(15)
+    assert bpy.ops.risorius.fire(reaction="flash") == {"FINISHED"}
+    assert _value(blinker, 19, BLINK) > 0.9
