@@ -250,6 +250,35 @@ def test_a_clip_file_holds_the_same_and_maps_where_wanted(dna_file, tmp_path):
     assert np.ptp(clip.curve("flush")) > 0.5
 
 
+@pytest.mark.parametrize("shapes", ["DRIVEN", "LOCAL"])
+def test_a_linked_face_bakes_its_controls_and_is_exported(shapes, dna_file, tmp_path):
+    scene.load(dna_file, "LIVE")
+    blend = str(tmp_path / "library.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=blend)
+    bpy.ops.wm.read_homefile(use_empty=True)
+    bpy.ops.wm.link(directory=f"{blend}/Collection/", filename="Small")
+    bpy.context.view_layer.objects.active = bpy.context.scene.objects[0]
+    assert bpy.ops.risorius.make_override(shapes=shapes) == {"FINISHED"}
+    rig = next(o for o in bpy.data.objects if "risorius_controls" in o and not o.library)
+    animate(rig)
+    shown = [scene.meshes(rig)[0], scene.meshes(rig)[1]]
+    wanted, counts = _film(shown), scene.counts()
+    with pytest.raises(RuntimeError, match="is linked: bake its controls"):
+        bpy.ops.risorius.bake(range="CUSTOM", end=10)
+    path = _export("GLTF", tmp_path)
+    assert scene.counts() == counts
+    before = [p.tobytes() for p in wanted[-1]]
+    assert [p.tobytes() for p in _film(shown)[-1]] == before
+    assert bpy.ops.risorius.bake(kind="CONTROLS", range="CUSTOM", end=10) == {"FINISHED"}
+    again = _film(shown)
+    for points, target in zip(again, wanted, strict=True):
+        for one, other in zip(points, target, strict=True):
+            np.testing.assert_allclose(one, other, atol=2e-6)
+    assert bpy.ops.risorius.unbake() == {"FINISHED"}
+    assert [p.tobytes() for p in _film(shown)[-1]] == before
+    assert _error(_film(_import("GLTF", path)), wanted) < NEAR["GLTF"]
+
+
 def test_a_missing_exporter_is_one_sentence(dna_file, tmp_path):
     import addon_utils
 
