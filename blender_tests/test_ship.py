@@ -34,6 +34,16 @@ def _film(items, frames=FRAMES):
     return film
 
 
+def _is_built(kind):
+    """Whether this Blender has the exporter; where it has not, the face says so."""
+    switch = {"USD": "usd", "ALEMBIC": "alembic"}.get(kind)
+    if switch is None or getattr(bpy.app.build_options, switch):
+        return True
+    with pytest.raises(RuntimeError, match="This Blender has no .* exporter"):
+        bpy.ops.risorius.export_animation(filepath="no file", format=kind)
+    return False
+
+
 def _export(kind, tmp_path, **options):
     path = tmp_path / f"out.{ENDINGS.get(kind, kind.lower())}"
     settings = {"range": "CUSTOM", "start": 1, "end": 10, "format": kind, **options}
@@ -77,6 +87,8 @@ def _error(film, wanted):
 @pytest.mark.parametrize("kind", ENDINGS)
 def test_the_file_gives_the_same_vertices(kind, dna_file, tmp_path):
     rig = scene.load(dna_file)
+    if not _is_built(kind):
+        return
     animate(rig)
     shown = [m for m in scene.meshes(rig).values() if 0 in list(m["dna_lods"])]
     wanted = _film(shown)
@@ -118,6 +130,8 @@ def _json_of(path):
 @pytest.mark.parametrize("kind", ["GLTF", "FBX", "USD", "ALEMBIC", "CSV"])
 def test_the_scene_stays_untouched_also_after_an_error(kind, dna_file, tmp_path):
     rig = scene.load(dna_file, "KEYS" if kind == "FBX" else "LIVE")
+    if not _is_built(kind):
+        return
     animate(rig)
     bpy.context.scene.frame_set(4)
     before = _everywhere(rig)
@@ -139,6 +153,8 @@ def test_the_scene_stays_untouched_also_after_an_error(kind, dna_file, tmp_path)
 @pytest.mark.parametrize("kind", ["FBX", "USD"])
 def test_bones_alone(kind, dna_file, tmp_path):
     rig = scene.load(dna_file)
+    if not _is_built(kind):
+        return
     animate(rig)
     path = _export(kind, tmp_path, wanted={"BONES"})
     shown = [scene.meshes(rig)[0], scene.meshes(rig)[1]]
@@ -157,6 +173,8 @@ def test_bones_alone(kind, dna_file, tmp_path):
 )
 def test_a_face_that_walks_and_a_part_of_the_range(kind, options, dna_file, tmp_path):
     rig = scene.load(dna_file)
+    if not _is_built(kind):
+        return
     controls = animate(rig)
     for frame, x in ((1, 0.0), (10, 0.4)):
         controls.location.x = x
