@@ -6,7 +6,7 @@
 set -uo pipefail
 source "$(dirname "$0")/setup.sh"
 
-targets=(parse filter round_trip json evaluate coordinates rig)
+targets=(parse filter round_trip json evaluate coordinates rig clip)
 programs="$project/build/fuzz/tests/fuzz"
 corpora="$project/build/fuzz-corpus"
 finds="$project/build/fuzz-finds"
@@ -79,7 +79,7 @@ cat << END
 Finds lie in $finds; the last lines of $logs/<target>.log say what broke.
 Make one small, keep it, and name it in a test:
   $programs/<target>_fuzz -minimize_crash=1 -runs=100000 -exact_artifact_path=small FIND
-  cut what the target takes for options off its beginning (8 bytes: filter, coordinates; 4: evaluate, rig)
+  cut what the target takes for options off its beginning (8 bytes: filter, coordinates; 4: evaluate, rig, clip)
   cp small tests/data/fuzz/NNN-short-name.dna       # the next number
   and a TEST of that name in tests/dna/regressions_test.cpp
 END

@@ -3,6 +3,7 @@
 // share.
 #pragma once
 
+#include <bit>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -46,24 +47,40 @@ class EncodedCurves {
   EncodedCurves& operator=(EncodedCurves&&) noexcept;
   ~EncodedCurves();
 
-  /// Writes the frames of a control to out [frames].
-  core::Status decode(std::size_t control, float* out) const;
+  /// Writes the frames of controls to out [controls.size(), frames], rows `stride` values apart.
+  /// Fails: kInvalidValue. In: controls of this block.
+  core::Status decode(std::span<const std::uint32_t> controls, float* out,
+                      std::size_t stride) const;
+  /// Whether a control rests in the whole block; then value is its value.
+  bool is_resting(std::size_t control, float& value) const {
+    if (parts_[control].kind != Part::kConstant) return false;
+    value = std::bit_cast<float>(parts_[control].bits);
+    return true;
+  }
 
  private:
   struct Tables;
+  struct Pending;
   struct Part {
     enum Kind : std::uint8_t { kConstant, kCoded, kStored } kind = kConstant;
+    bool is_near_end = false;          // its bytes lie in tail_
     std::uint32_t bits = 0;            // of kConstant
     std::size_t offset = 0, size = 0;  // of the others' bytes
   };
   EncodedCurves();
   bool read_tables(Cursor& in);
   core::Status read_parts(Cursor& in, std::size_t controls);
+  void keep_tail();
+  core::Status refuse(std::size_t control, const char* message) const;
+  core::Result<bool> fill(std::size_t control, float* out) const;
+  core::Status decode_pair(const Pending& a, const Pending* b) const;
 
   View bytes_;
   std::size_t frames_ = 0;
   std::vector<Part> parts_;
   std::unique_ptr<Tables> tables_;
+  Bytes tail_;  // a copy of the bytes from tail_begin_ on
+  std::size_t tail_begin_ = 0;
 };
 
 }  // namespace risorius::clip

@@ -33,6 +33,14 @@ inline void put_text(Bytes& out, const std::string& text) {
   out.insert(out.end(), text.begin(), text.end());
 }
 
+/// What of a text differs from the one before, behind how much does not.
+inline void put_next_text(Bytes& out, const std::string& before, const std::string& text) {
+  std::size_t same = 0;
+  while (same < before.size() && same < text.size() && before[same] == text[same]) ++same;
+  put_count(out, same);
+  put_text(out, text.substr(same));
+}
+
 /// Reads one number after the other. After the first failure everything is zero or empty.
 class Cursor {
  public:
@@ -70,6 +78,12 @@ class Cursor {
   std::string text() {
     const View from = take(count());
     return {from.begin(), from.end()};
+  }
+  std::string next_text(const std::string& before) {
+    const std::uint64_t same = count();
+    if (same > before.size()) failed_ = true;
+    if (failed_) return {};
+    return before.substr(0, static_cast<std::size_t>(same)) + text();
   }
 
  private:

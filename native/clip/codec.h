@@ -95,6 +95,11 @@ class Reader {
   core::Status read(std::uint64_t begin, std::uint64_t end, std::span<const std::uint32_t> controls,
                     float* out, double* out_times);
 
+  /// Of a block's controls, those that rest, as their values in `values` [controls]; appends the
+  /// others to `moving`. Fails: as read.
+  core::Status resting(std::size_t block, std::span<float> values,
+                       std::vector<std::uint32_t>& moving);
+
  private:
   struct Block {
     std::uint64_t offset;

@@ -20,6 +20,7 @@ template <int kOrder>
 std::vector<Token> tokens_of(std::span<const float> curve) {
   std::vector<Token> tokens;
   History<kOrder> history(bits_of(curve[0]));
+  std::uint32_t sign = 0;
   for (std::size_t i = 1; i < curve.size();) {
     std::size_t rest = 0;
     while (i + rest < curve.size() && bits_of(curve[i + rest]) == history.last()) ++rest;
@@ -30,7 +31,7 @@ std::vector<Token> tokens_of(std::span<const float> curve) {
       continue;
     }
     const std::uint32_t bits = bits_of(curve[i++]);
-    tokens.push_back(value_token(fold(in_order(bits) - history.next())));
+    tokens.push_back(value_token(in_order(bits) - history.next(), sign));
     history.add(bits);
   }
   return tokens;

@@ -11,7 +11,7 @@
 namespace risorius::clip {
 
 inline constexpr int kLongestCode = 10;
-inline constexpr std::size_t kMostSymbols = 48;
+inline constexpr std::size_t kMostSymbols = 78;
 
 struct Code {
   std::array<std::uint8_t, kMostSymbols> lengths{};  // bits; 0 for a symbol that does not occur

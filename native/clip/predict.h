@@ -17,11 +17,10 @@ inline std::uint32_t in_order(std::uint32_t bits) {
   return bits ^ static_cast<std::uint32_t>(static_cast<std::int32_t>(bits) >> 31) >> 1;
 }
 
-/// A difference as a number whose size says how far, whatever its sign.
-inline std::uint32_t fold(std::uint32_t difference) {
-  return difference << 1 ^ static_cast<std::uint32_t>(static_cast<std::int32_t>(difference) >> 31);
+/// All ones for what is below 0, else 0.
+inline std::uint32_t sign_of(std::uint32_t difference) {
+  return static_cast<std::uint32_t>(static_cast<std::int32_t>(difference) >> 31);
 }
-inline std::uint32_t unfold(std::uint32_t folded) { return folded >> 1 ^ (0 - (folded & 1)); }
 
 /// The last values of a curve, the newest first.
 template <int kOrder>

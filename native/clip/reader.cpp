@@ -113,8 +113,14 @@ core::Status Reader::read_head(const Limits& limits) {
         std::to_string(controls) + " controls, the limit is " + std::to_string(limits.controls));
   }
   std::unordered_set<std::string> seen;
+  std::uint64_t length = 0;
   for (std::uint64_t i = 0; i < controls && !in.failed(); ++i) {
-    head_.names.push_back(in.text());
+    head_.names.push_back(in.next_text(head_.names.empty() ? "" : head_.names.back()));
+    // A name may repeat the one before in a few bytes: these, too, are counted.
+    if ((length += head_.names.back().size()) > limits.head_bytes) {
+      return refuse(ErrorCode::kLimitExceeded, "head.names",
+                    "names longer than " + std::to_string(limits.head_bytes) + " bytes together");
+    }
     if (!seen.insert(head_.names.back()).second && !in.failed()) {
       return refuse(ErrorCode::kInvalidValue, "head.names[" + std::to_string(i) + "]",
                     "a control may have one curve only, found two");
@@ -284,17 +290,28 @@ core::Status Reader::read_block(std::size_t index, std::uint64_t begin, std::uin
   const std::uint64_t first = starts_[index];
   const auto skip = static_cast<std::size_t>(begin - first);
   const auto count = static_cast<std::size_t>(end - begin);
-  const bool is_whole = count == blocks_[index].frames;
-  std::vector<float> curve(is_whole ? 0 : blocks_[index].frames);
-  for (std::size_t i = 0; i < controls.size(); ++i) {
-    float* const to = out + i * stride;
-    auto decoded = loaded_->curves->decode(controls[i], is_whole ? to : curve.data());
-    if (!decoded) {
-      const core::Error& error = decoded.error();
-      return fail(error.code, "blocks[" + std::to_string(index) + "]." + error.where, error.message,
-                  blocks_[index].offset);
+  const std::size_t frames = blocks_[index].frames;
+  const auto decode = [&](std::span<const std::uint32_t> some, float* to, std::size_t apart) {
+    auto decoded = loaded_->curves->decode(some, to, apart);
+    if (decoded) return decoded;
+    const core::Error& error = decoded.error();
+    return core::Status(fail(error.code, "blocks[" + std::to_string(index) + "]." + error.where,
+                             error.message, blocks_[index].offset));
+  };
+  if (count == frames) {
+    if (auto decoded = decode(controls, out, stride); !decoded) return decoded;
+  } else {
+    // Room for all frames of a few controls, of which the wanted ones are kept.
+    constexpr std::size_t kAtOnce = 16;
+    std::vector<float> curves(kAtOnce * frames);
+    for (std::size_t i = 0; i < controls.size(); i += kAtOnce) {
+      const auto some = controls.subspan(i, std::min(kAtOnce, controls.size() - i));
+      if (auto decoded = decode(some, curves.data(), frames); !decoded) return decoded;
+      for (std::size_t k = 0; k < some.size(); ++k) {
+        std::memcpy(out + (i + k) * stride, curves.data() + k * frames + skip,
+                    sizeof(float) * count);
+      }
     }
-    if (!is_whole) std::memcpy(to, curve.data() + skip, sizeof(float) * count);
   }
   if (out_times != nullptr) {
     std::copy_n(loaded_->times.begin() + static_cast<std::ptrdiff_t>(skip), count, out_times);
@@ -339,7 +356,22 @@ core::Status Reader::read(std::uint64_t begin, std::uint64_t end,
     auto read = read_block(block, at, until, controls, out + done, static_cast<std::size_t>(count),
                            out_times == nullptr ? nullptr : out_times + done);
     if (!read) return read;
+    if (out_times != nullptr && done > 0 && out_times[done] <= out_times[done - 1]) {
+      return fail(ErrorCode::kInvalidValue, "blocks[" + std::to_string(block) + "].times",
+                  "times after those of the block before were expected", blocks_[block].offset);
+    }
     at = until;
+  }
+  return core::ok();
+}
+
+core::Status Reader::resting(std::size_t block, std::span<float> values,
+                             std::vector<std::uint32_t>& moving) {
+  if (auto read = load(block); !read) return read;
+  for (std::uint32_t control = 0; control < values.size(); ++control) {
+    if (!loaded_->curves || !loaded_->curves->is_resting(control, values[control])) {
+      moving.push_back(control);
+    }
   }
   return core::ok();
 }

@@ -6,12 +6,14 @@
 #include <cstdint>
 
 #include "clip/huffman.h"
+#include "clip/predict.h"
 
 namespace risorius::clip {
 
-// 0 to 32: a value whose folded error has so many bits; all below the first one follow.
+// 0: a value as it was predicted. 2 b - 1 and 2 b: the error has b bits, and the sign of the error
+// before, or not; all its bits below the first one follow.
 // kRest + k: the last value 2^k to 2^(k+1) - 1 times more; k bits follow.
-inline constexpr std::uint32_t kRest = 33;
+inline constexpr std::uint32_t kRest = 65;
 inline constexpr std::uint32_t kRests = 13;  // up to kMostBlockFrames
 static_assert(kRest + kRests <= kMostSymbols);
 
@@ -21,7 +23,10 @@ inline constexpr std::size_t kMostCodes = 9;
 
 constexpr std::uint32_t extra_bits(std::uint32_t symbol) {
   if (symbol >= kRest) return symbol - kRest;
-  return symbol > 0 ? symbol - 1 : 0;
+  return symbol > 0 ? (symbol - 1) / 2 : 0;
+}
+constexpr bool has_other_sign(std::uint32_t symbol) {
+  return symbol > 0 && symbol < kRest && symbol % 2 == 0;
 }
 
 struct Token {
@@ -29,8 +34,13 @@ struct Token {
   std::uint32_t extra;  // the lowest extra_bits(symbol) bits count
 };
 
-inline Token value_token(std::uint32_t folded) {
-  return {static_cast<std::uint32_t>(std::bit_width(folded)), folded};
+/// In: sign, 0 or all ones, of the last error that was not 0; Out: also of this one.
+inline Token value_token(std::uint32_t error, std::uint32_t& sign) {
+  if (error == 0) return {0, 0};
+  const std::uint32_t own = sign_of(error), size = (error ^ own) - own;
+  const std::uint32_t is_other = own != sign ? 1 : 0;
+  sign = own;
+  return {2 * static_cast<std::uint32_t>(std::bit_width(size)) - 1 + is_other, size};
 }
 inline Token rest_token(std::uint32_t count) {
   return {kRest + static_cast<std::uint32_t>(std::bit_width(count)) - 1, count};

@@ -40,7 +40,11 @@ void put_head(Bytes& out, const Head& head) {
   put(body, head.start);
   body.push_back(head.has_times ? 1 : 0);
   put_count(body, head.names.size());
-  for (const std::string& name : head.names) put_text(body, name);
+  std::string before;
+  for (const std::string& name : head.names) {
+    put_next_text(body, before, name);
+    before = name;
+  }
   put_count(body, head.metadata.size());
   for (const auto& [key, value] : head.metadata) {
     put_text(body, key);

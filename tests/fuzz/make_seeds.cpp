@@ -9,6 +9,7 @@
 #include "compile/compile.h"
 #include "dna/json.h"
 #include "dna/layers.h"
+#include "support/clips.h"
 #include "support/full_face.h"
 #include "support/promises.h"
 
@@ -54,6 +55,22 @@ class Seeds {
     const std::string json = without_spaces(*dna::to_json(*read));
     put("json", name, {}, {json.begin(), json.end()});
     add_rig(name, *read);
+  }
+
+  void add_clips() {
+    namespace clip = risorius::clip;
+    for (const std::size_t frames : {0u, 1u, 40u, 90u}) {
+      const clip::Clip made = risorius::testing_support::make_full_clip(frames);
+      put("clip", "file-" + std::to_string(frames), {0, 0, 0, 0}, *clip::encode(made, 30));
+      if (frames == 0) continue;
+      Bytes curves;
+      clip::encode_curves({made.curves.data(), frames, 8, frames}, curves);
+      const auto count = static_cast<std::uint8_t>(frames - 1);
+      put("clip", "curves-" + std::to_string(frames), {1, 7, count, 0}, curves);
+      const auto* first = reinterpret_cast<const std::uint8_t*>(made.curves.data());
+      put("clip", "values-" + std::to_string(frames), {2, 7, 0, 0},
+          {first, first + 4 * made.curves.size()});
+    }
   }
 
  private:
@@ -132,6 +149,7 @@ int main(int argc, char** argv) {
     seeds.add("empty-" + version, written({}, minor));
   }
   add_parts(seeds);
+  seeds.add_clips();
   for (int i = 2; i < argc; ++i) {
     const fs::path path = argv[i];
     seeds.add(path.stem().string(), read_file(path));

@@ -7,6 +7,8 @@ import tomllib
 
 import numpy as np
 import pytest
+import risorius
+from conftest import GOLDEN
 from risorius import Clip, arkit, expressions, importing
 from risorius.importing.mapping import Mapping, apply_rows, loose_name, parse_mapping
 
@@ -133,6 +135,20 @@ def test_gui_curves_go_through_the_rigs_own_table():
     assert report.not_in_rig == ["CTRL_C_ear.ty"]
     with pytest.raises(ValueError, match="give the rig"):
         found.apply()
+
+
+def test_gui_curves_and_a_real_rig():
+    dna = risorius.load(GOLDEN / "core.dna")
+    rig = risorius.Rig(dna)
+    names = dna.gui_control_names
+    values = np.linspace(0, 1, 5 * len(names), dtype=np.float32).reshape(len(names), 5)
+    mapping = parse_mapping('gui = true\n[rows]\n"GUI_*" = { "GUI_*" = 1.0 }', "m")
+    clip, _ = importing.Imported(Clip(names, values, 30), "csv", "", "a").apply(mapping, rig=rig)
+    raw, unknown = clip.raw_controls(dna.raw_control_names)
+    assert unknown == []
+    for frame, gui in zip(raw, values.T, strict=True):
+        np.testing.assert_array_equal(frame, rig.gui_to_raw(np.ascontiguousarray(gui)))
+    assert raw.any()
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ kept.
 
 from dataclasses import dataclass, replace
 
+import bpy
 import numpy as np
 from mathutils import Quaternion
 
@@ -45,7 +46,7 @@ _KEY_SETTINGS = (
     "handle_right",
 )
 _BLENDS = {"OVERRIDE": "override", "ADD": "additive", "MAXIMUM": "max"}
-_IDLE_SECONDS = 600.0  # before idle life without a length comes again
+_IDLE_LOOP = 120.0  # seconds before idle life without a length comes again
 
 
 @dataclass
@@ -93,6 +94,13 @@ def forget():
     _stacks.clear()
 
 
+def forget_unused(there):
+    """Drop what is compiled of characters that are gone. Args: there  control armatures."""
+    kept = {controls.session_uid for controls in there if controls is not None}
+    for uid in [uid for uid in _stacks if uid not in kept]:
+        del _stacks[uid]
+
+
 def note_edits(actions):
     """Note that actions were edited. Returns: whether a layer of this file plays one of them."""
     for action in actions:
@@ -120,11 +128,12 @@ def mix(seen, live, raw, head, depsgraph, maximum):
         float32[R], and the head's turn.
     """
     controls = seen.original
-    if not has_any(controls):
-        return raw, head
+    if not has_any(controls) or parts.BAKED in controls:
+        return raw, head  # baked controls have them in their action
     scene = depsgraph.scene
     stack = compiled(controls, live, scene, maximum)
-    weights = tuple(layer.weight for layer in of(seen))
+    there = len(of(seen)) == len(of(controls))  # else one was added, and not evaluated since
+    weights = tuple(layer.weight for layer in of(seen if there else controls))
     if stack.weights != weights:
         _set_weights(stack, weights)
     base = np.zeros(len(raw) + 3, np.float32)
@@ -173,10 +182,10 @@ def _compile(controls, live, scene, maximum, made_of):
     made, places, problems = [], [], {}
     for place, layer in enumerate(of(controls)):
         try:
-            made.append(native_layer(controls, live, layer, rate, scene))
+            made.append(native_layer(controls, live, layer, rate))
             places.append(place)
-        except (ValueError, LookupError) as error:
-            problems[place] = str(error)
+        except (ValueError, LookupError, RuntimeError) as error:
+            problems[place] = str(error).rstrip(".")
     mixer = native.module().Mixer(
         names,
         ranges={label: (0.0, maximum) for label in live.labels},
@@ -207,7 +216,7 @@ def _set_weights(stack, weights):
     stack.weights = weights
 
 
-def native_layer(controls, live, layer, rate, scene):
+def native_layer(controls, live, layer, rate):
     """A layer as risorius.Layer, at full weight.
 
     Args:
@@ -215,12 +224,11 @@ def native_layer(controls, live, layer, rate, scene):
         live: the character's Runtime.
         layer: its settings.
         rate: frames per second.
-        scene: says how long idle life lasts that has no length.
 
     Raises:
         ValueError: it has nothing to play, or something that does not fit; the sentence says what.
     """
-    source, times = _SOURCES[layer.kind](controls, live, layer, rate, scene)
+    source, own = _SOURCES[layer.kind](controls, live, layer, rate)
     allowed = allowed_names(live, layer)
     names = [*live.labels, *clip_logic.HEAD]
     return native.module().Layer(
@@ -228,12 +236,14 @@ def native_layer(controls, live, layer, rate, scene):
         name=layer.name,
         blend=_BLENDS[layer.blend],
         mask=np.array([name in allowed for name in names], np.float32),
-        extend=layer.extend.lower(),
-        fade_in=layer.fade_in / rate,
-        fade_out=layer.fade_out / rate,
         mute=layer.mute,
         solo=layer.solo,
-        **times,
+        **{
+            "extend": layer.extend.lower(),
+            "fade_in": layer.fade_in / rate,
+            "fade_out": layer.fade_out / rate,
+            **own,
+        },
     )
 
 
@@ -250,9 +260,9 @@ def _still_times(layer, rate):
     return {"start": layer.start / rate, "end": (layer.start + layer.length) / rate}
 
 
-def _expression_source(_controls, live, layer, _rate, _scene):
+def _expression_source(_controls, live, layer, rate):
     pose = native.part("expressions").get(layer.expression).weights
-    return _for_face(live, pose), _still_times(layer, _rate)
+    return _for_face(live, pose), _still_times(layer, rate)
 
 
 def _for_face(live, pose):
@@ -261,30 +271,20 @@ def _for_face(live, pose):
     return {sliders[name]: value for name, value in pose.items() if name in sliders}
 
 
-def _action_source(controls, live, layer, rate, _scene):
+def _action_source(controls, live, layer, rate):
     action = layer.action
     if action is None:
         raise ValueError("choose an action")
     span = span_of(layer)
-    curves = compat.curves_for(action, controls)
-    keys = sorted({key.co[0] for curve in curves for key in curve.keyframe_points})
-    frames = logic.sample_frames(span, keys, any(_is_bent(curve) for curve in curves))
+    curves = clips.playing_curves(action, controls)
+    keys = np.unique(np.concatenate([clips.key_points(c)[0] for c in curves] or [[]]))
+    frames = logic.sample_frames(span, keys, any(clips.is_bent(c) for c in curves))
     clip = clips.clip_of_action(controls, live, action, frames, rate)
     if not clip.names:
         raise ValueError(f"{action.name} has no keys of a control of this face")
     if clip.frame_count < 2:
         return clip, _still_times(layer, rate)
     return clip, _span_times(span, rate)
-
-
-def _is_bent(curve):
-    """Whether a curve is anything else than straight lines from key to key."""
-    if len(curve.modifiers) or curve.extrapolation != "CONSTANT":
-        return True
-    count = len(curve.keyframe_points)
-    kinds = np.empty(count, np.int32)
-    curve.keyframe_points.foreach_get("interpolation", kinds)
-    return bool((kinds[: max(count - 1, 0)] != clips.LINEAR).any())
 
 
 def span_of(layer, action=None):
@@ -317,8 +317,17 @@ def _span_times(span, rate):
     }
 
 
-def _idle_source(_controls, live, layer, rate, scene):
-    raise ValueError("idle life is not there")
+def _idle_source(_controls, live, layer, rate):
+    """Idle life of its length, or in a long loop that goes on for ever."""
+    endless = not layer.length
+    seconds = _IDLE_LOOP if endless else layer.length / rate
+    clip = native.part("idle").idle(layer.seed, seconds, loop=endless)
+    sliders = clips.sliders_of(live)
+    clip = clip.selected([name for name in clip.names if name in sliders])
+    times = {"start": layer.start / rate}
+    if endless:  # its loop has no begin and no end to fade at
+        times.update(extend="repeat", fade_in=0.0, fade_out=0.0)
+    return clip.replaced(names=[sliders[name] for name in clip.names]), times
 
 
 _SOURCES = {"ACTION": _action_source, "EXPRESSION": _expression_source, "IDLE": _idle_source}
@@ -475,6 +484,28 @@ def copy_keys(source, target):
         for name in _KEY_SETTINGS:
             setattr(new, name, getattr(old, name))
     target.update()
+
+
+def keep_weights(controls, before):
+    """Give the action that now plays the keys of weights that were in another one.
+
+    Args:
+        controls: control armature.
+        before: the action that it played until now, or None.
+    """
+    old = compat.bag_for(before, controls) if before is not None else None
+    curves = [c for c in old.fcurves if c.data_path.startswith(logic.COLLECTION)] if old else []
+    if not curves:
+        return
+    data = controls.animation_data
+    if data.action is None:
+        action = bpy.data.actions.new(f"{controls.name} layers")
+        compat.add_curves(action, controls)
+        compat.assign_action(data, action, compat.slot_for(action, controls))
+    new = compat.bag_for(data.action, controls).fcurves
+    for curve in curves:
+        if new.find(curve.data_path) is None:
+            copy_keys(curve, new.new(curve.data_path))
 
 
 def fire(controls, name, frame, strength=1.0):

@@ -70,6 +70,7 @@ class RISORIUS_OT_layer_add(FaceOperator, bpy.types.Operator):
         data = controls.animation_data
         if action is None and not self.source and data is not None:
             action, data.action = data.action, None
+            layers.keep_weights(controls, action)
         if action is None:
             self.report({"ERROR"}, f"There is no action {self.source or 'to make a layer of'}.")
             return {"CANCELLED"}

@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Export of a face's animation through Blender's own exporters, and of its controls."""
 
-import csv
 from pathlib import Path
 
 import bpy
 from bpy_extras.io_utils import ExportHelper
 
+from .. import native
 from ..scene import bake, ship
+from ..scene.clips import frame_rate
 from .bake_operators import FacesOperator, FrameRange, selected_rigs
 
 FORMATS = (
@@ -48,6 +49,8 @@ def _settings(operator, stage):
             "export_frame_step": step,
             "export_force_sampling": True,
             "export_optimize_animation_size": False,
+            # Its quicker way of hiding other objects gave wrong bones with two armatures (4.5).
+            "export_optimize_disable_viewport": False,
             "export_skins": True,
             "export_all_influences": operator.influences == 0,
             "export_influence_nb": max(operator.influences, 1),
@@ -67,6 +70,7 @@ def _settings(operator, stage):
             "bake_anim_force_startend_keying": True,
             "bake_anim_step": float(step),
             "bake_anim_simplify_factor": 0.0,
+            "apply_scale_options": operator.fbx_units,
             # With a modifier applied Blender drops the shape keys.
             "use_mesh_modifiers": False,
             "mesh_smooth_type": "FACE",
@@ -137,6 +141,19 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, bpy.
         min=0,
         max=32,
     )
+    fbx_units: bpy.props.EnumProperty(
+        name="Units",
+        description="Where an FBX file says that a Blender unit is a metre",
+        items=(
+            ("FBX_SCALE_NONE", "On Objects", "Objects are scaled by 100: as Unreal expects it"),
+            ("FBX_SCALE_ALL", "In the File", "Objects have scale 1: as Unity expects it"),
+        ),
+    )
+    maps: bpy.props.BoolProperty(
+        name="With Maps",
+        description="Write also the values of the animated maps, which no other format can hold",
+        default=False,
+    )
 
     def invoke(self, context, event):
         rigs = selected_rigs(context)
@@ -166,6 +183,11 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, bpy.
             layout.prop(self, "all_shapes")
         if self.format == "GLTF":
             layout.prop(self, "influences")
+        if self.format == "FBX":
+            layout.prop(self, "fbx_units")
+        if self.format in ("RZC", "CSV"):
+            layout.prop(self, "maps")
+        layout.prop(self, "every")
 
     def execute(self, context):
         trouble = _missing(self.format)
@@ -177,7 +199,7 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, bpy.
             start, end, self.step, self.lod, frozenset(self.wanted), self.all_shapes
         )
         try:
-            characters = _run(context, ship.sampled(context, selected_rigs(context), options))
+            characters = _run(context, ship.sampled(context, self.faces(context), options))
             written = self._write(context, characters, options)
         except (bake.BakeError, ValueError, RuntimeError, OSError) as error:
             self.report({"ERROR"}, _one_sentence(self.filepath, error))
@@ -191,9 +213,7 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, bpy.
         if self.format in ("RZC", "CSV"):
             if len(characters) > 1:
                 raise ValueError("a file holds the controls of one face: select one")
-            rig, _level, samples = characters[0]
-            render = context.scene.render
-            clip = ship.clip(rig, samples, render.fps / render.fps_base)
+            clip = ship.clip(*characters[0], frame_rate(context.scene), self.maps)
             _write_csv(clip, path) if self.format == "CSV" else clip.save(path)
         else:
             with ship.copies(context, characters, options) as override:
@@ -216,11 +236,6 @@ def _run(context, job):
 
 def _missing(kind):
     """Why this Blender cannot write a format, in one sentence; empty when it can."""
-    if kind == "RZC":
-        from .. import native
-
-        there = hasattr(native.module().Clip, "save")
-        return "" if there else "This build of Risorius cannot write .rzc files."
     if kind not in _OPERATORS:
         return ""
     group, name = _OPERATORS[kind]
@@ -242,12 +257,8 @@ def _export(context, operator, override, path):
 
 
 def _write_csv(clip, path):
-    """A table: the time in seconds and every control; as many digits as a float32 has."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        rows = csv.writer(file, lineterminator="\n")
-        rows.writerow(["time", *clip.names])
-        for time, values in zip(clip.frame_times().tolist(), clip.curves.T, strict=True):
-            rows.writerow([repr(time), *map(str, values)])
+    writing = native.part("importing.writing")
+    writing.write_text(writing.csv_text(clip), path)
 
 
 def _one_sentence(path, error):

@@ -200,7 +200,7 @@ class Clip:
             self.rate,
             self.start,
             self.times,
-            [tuple(event) for event in self.events],
+            self.events,
             list(self.metadata.items()),
         )
 

@@ -163,7 +163,7 @@ class ClipWriter:
 
     def event(self, event: Event) -> None:
         """Add an event; it is written with the frames that come next."""
-        self._file.event(tuple(event))
+        self._file.event(event)
 
     def close(self) -> None:
         """Write what is left and give the file its name. Closing twice is closing once.

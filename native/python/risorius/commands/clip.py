@@ -98,6 +98,9 @@ def _add_input(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--timecode-rate", type=float, metavar="FPS", help="of timecodes that do not tell it"
     )
+    parser.add_argument(
+        "--take", metavar="NAME", help="animation of a glTF or FBX, by name or number (the first)"
+    )
 
 
 def _add_info(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -131,8 +134,8 @@ def _guarded(run: Callable[[argparse.Namespace], int]) -> Callable[[argparse.Nam
         except CommandLineError as error:
             print(f"risorius: {error}", file=sys.stderr)
             return 2
-        except risorius.DnaError:
-            raise  # main says it
+        except (risorius.DnaError, BrokenPipeError):
+            raise  # for main
         except (InputError, ValueError, OSError) as error:
             print(f"risorius: {error}", file=sys.stderr)
             return 1
@@ -145,7 +148,11 @@ def load(args: argparse.Namespace) -> importing.Imported:
     if args.input.suffix.lower() == ".rzc":
         return importing.Imported(Clip.load(args.input), "clip", "controls", str(args.input))
     return importing.read(
-        args.input, kind=args.kind, rate=args.input_rate, timecode_rate=args.timecode_rate
+        args.input,
+        kind=args.kind,
+        rate=args.input_rate,
+        timecode_rate=args.timecode_rate,
+        take=args.take,
     )
 
 

@@ -136,10 +136,14 @@ def _word_pieces(
 
 def _recognised(recogniser: Recogniser, samples: Samples, tell: Progress) -> list[Phoneme]:
     found: list[Phoneme] = []
+    duration = len(samples) / RATE
     for begin, end in pieces(loudness(samples)):
-        tell(0.02 + 0.98 * begin * RATE / len(samples))
         piece = samples[int(begin * RATE) : int(end * RATE)]
-        for phone in voting.hear(recogniser, piece):
+
+        def of_all(part: float, begin: float = begin, end: float = end) -> None:
+            tell(0.02 + 0.98 * (begin + part * (end - begin)) / duration)
+
+        for phone in voting.hear(recogniser, piece, of_all):
             found.append(phone._replace(begin=phone.begin + begin, end=min(phone.end + begin, end)))
     return found
 

@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: MIT
+// Clips in .rzc files: clip_bench FILE.rzc ... [--dna FILE.dna] [options of the library]
+//   encode, decode     GB/s of curve data, one core, from memory to memory
+//   one frame          any frame of all controls, its block read and decoded for it alone
+//   play               frame after frame, each block read and decoded when it is reached; per frame
+//   play, decoded      the same within a block that is decoded already
+//   evaluate           the rig of --dna on such frames, per frame: what play is to be compared with
+#include <benchmark/benchmark.h>
+
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <numeric>
+#include <string>
+#include <vector>
+
+#include "bench/frames.h"
+#include "bench/machine.h"
+#include "clip/codec.h"
+#include "clip/player.h"
+#include "compile/compile.h"
+#include "core/source.h"
+#include "dna/io.h"
+
+namespace {
+
+using namespace risorius;
+
+struct File {
+  std::string name;
+  clip::Bytes bytes;
+  clip::Clip clip;
+};
+
+clip::Reader open(const File& file) {
+  return *clip::Reader::open(std::make_unique<core::SpanSource>(file.bytes));
+}
+
+void set_rate(benchmark::State& state, const File& file) {
+  state.SetBytesProcessed(
+      static_cast<std::int64_t>(state.iterations() * file.clip.curves.size() * sizeof(float)));
+}
+
+void encode(benchmark::State& state, const File& file) {
+  for (auto _ : state) benchmark::DoNotOptimize(clip::encode(file.clip)->size());
+  set_rate(state, file);
+}
+
+void decode(benchmark::State& state, const File& file) {
+  std::vector<std::uint32_t> all(file.clip.head.names.size());
+  std::iota(all.begin(), all.end(), 0u);
+  std::vector<float> out(file.clip.curves.size());
+  for (auto _ : state) {
+    clip::Reader reader = open(file);
+    if (!reader.read(0, reader.frame_count(), all, out.data(), nullptr)) state.SkipWithError("");
+    benchmark::ClobberMemory();
+  }
+  set_rate(state, file);
+}
+
+void one_frame(benchmark::State& state, const File& file) {
+  clip::Player player(open(file));
+  // Far from the frame before: another block, but in a clip of one.
+  std::size_t at = 0;
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(player.frame(at));
+    at = (at + clip::kDefaultBlockFrames + 7) % file.clip.frame_count;
+  }
+}
+
+void play(benchmark::State& state, const File& file) {
+  clip::Player player(open(file));
+  std::size_t at = 0;
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(player.frame(at));
+    if (++at == file.clip.frame_count) at = 0;
+  }
+}
+
+void play_decoded(benchmark::State& state, const File& file) {
+  clip::Player player(open(file));
+  std::size_t at = 0;
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(player.frame(at));
+    if (++at == clip::kDefaultBlockFrames) at = 0;
+  }
+}
+
+void evaluate(benchmark::State& state, const std::string& path) {
+  auto source = core::open_file(path);
+  if (!source) return state.SkipWithError(source.error().describe().c_str());
+  const auto dna = dna::parse(**source, {});
+  if (!dna) return state.SkipWithError(dna.error().describe().c_str());
+  const auto rig = compile::compile(*dna, {});
+  if (!rig) return state.SkipWithError(rig.error().describe().c_str());
+  const bench::Frames frames = bench::make_frames(rig->raw_count, 60);
+  rig::Workspace work = rig::make_workspace(*rig);
+  rig::Pose pose = rig::make_pose(*rig);
+  std::size_t at = 0;
+  for (auto _ : state) {
+    rig::evaluate(*rig, frames.at(at++ % frames.count), 0, true, work, pose);
+    benchmark::DoNotOptimize(pose.joints.data());
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::vector<std::unique_ptr<File>> files;
+  std::vector<char*> rest{argv[0]};
+  for (int i = 1; i < argc; ++i) {
+    if (std::strcmp(argv[i], "--dna") == 0 && i + 1 < argc) {
+      benchmark::RegisterBenchmark("evaluate", evaluate, std::string(argv[++i]));
+      continue;
+    }
+    if (argv[i][0] == '-') {
+      rest.push_back(argv[i]);
+      continue;
+    }
+    auto file = std::make_unique<File>();
+    file->name = argv[i];
+    std::ifstream in(argv[i], std::ios::binary);
+    file->bytes.assign(std::istreambuf_iterator<char>(in), {});
+    auto read = clip::decode(file->bytes);
+    if (!read) {
+      std::fprintf(stderr, "%s: %s\n", argv[i], read.error().describe().c_str());
+      return 1;
+    }
+    file->clip = std::move(read).value();
+    files.push_back(std::move(file));
+  }
+  for (const auto& file : files) {
+    const std::string name = file->name.substr(file->name.find_last_of('/') + 1);
+    const auto& one = *file;
+    for (const auto& [what, run] : {std::pair{"encode", encode},
+                                    {"decode", decode},
+                                    {"one frame", one_frame},
+                                    {"play", play},
+                                    {"play, decoded", play_decoded}}) {
+      benchmark::RegisterBenchmark((std::string(what) + ", " + name).c_str(),
+                                   [run = run, &one](benchmark::State& state) { run(state, one); });
+    }
+  }
+  std::printf("%s, %s, commit %s\n", bench::processor().c_str(), bench::compiler(),
+              bench::commit());
+  int count = static_cast<int>(rest.size());
+  benchmark::Initialize(&count, rest.data());
+  benchmark::RunSpecifiedBenchmarks();
+}
