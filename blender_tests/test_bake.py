@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Baked faces move as the live ones did, by plain actions alone, and come back as they were."""
 
+from types import SimpleNamespace
+
 import addon_utils
 import bpy
 import numpy as np
 import pytest
 from support import scene
 from support.animation import animate
+from support.layout import Recorder
 
 NEAR = 1e-5  # of the size: what a bake may move a vertex by
 FRAMES = (1, 2, 3, 4, 6, 8, 10)
@@ -89,9 +92,10 @@ def test_it_plays_without_the_add_on_and_controls_move_it_no_more(mode, dna_file
     addon_utils.disable(scene.MODULE)
     _assert_same(_film(rig), wanted)
     addon_utils.enable(scene.MODULE)
-    bpy.context.scene.frame_set(4)
+    shown = _shown(rig, 4)
     scene.controls(rig).animation_data.action = None
     scene.set_controls(rig, jawOpen=0.9)
+    np.testing.assert_array_equal(scene.evaluated(scene.meshes(rig)[0]), shown[0][: 12 * 14])
     bpy.context.scene.frame_set(3)
     _assert_same(_film(rig), wanted)
 
@@ -182,6 +186,93 @@ def test_baked_controls_are_one_clean_action(mode, dna_file):
     _assert_same(_film(rig), wanted, near=0)
 
 
+def _add_layers(rig):
+    """A layer of an action whose weight is animated, one that turns the head, and a reaction."""
+    controls = scene.controls(rig)
+    own = controls.animation_data.action
+    controls.animation_data.action = None
+    head = controls.pose.bones["head"]
+    for frame, value, turn in ((1, 0.0, 0.0), (6, 1.0, 0.5)):
+        for name in ("browDownL", "mouthCornerPullR"):
+            path = f'["CTRL_expressions.{name}"]'
+            scene.face(rig)[f"CTRL_expressions.{name}"] = value
+            scene.face(rig).keyframe_insert(path, frame=frame)
+        head.rotation_euler.z = turn
+        head.keyframe_insert("rotation_euler", frame=frame)
+    action = controls.animation_data.action
+    controls.animation_data.action = own
+    for name in ("browDownL", "mouthCornerPullR"):
+        scene.face(rig)[f"CTRL_expressions.{name}"] = 0.0
+    layers = scene.submodule("scene.layers")
+    layer = layers.add_action(controls, action, blend="ADD")
+    for frame, weight in ((1, 1.0), (10, 0.2)):
+        layer.weight = weight
+        layer.keyframe_insert("weight", frame=frame)
+    scene.update(controls)
+
+
+@pytest.mark.parametrize("kind", ["CONTROLS", "RESULT"])
+def test_layers_are_in_the_bake(kind, dna_file):
+    rig = _face(dna_file)
+    plain = _film(rig)
+    _add_layers(rig)
+    wanted, before = _film(rig), _state(rig)
+    assert np.abs(wanted[4][0] - plain[4][0]).max() > 1e-3
+    _bake(kind=kind)
+    _assert_same(_film(rig), wanted)
+    if kind == "CONTROLS":
+        paths = {c.data_path for c in scene.curves(scene.controls(rig))}
+        assert 'pose.bones["face"]["CTRL_expressions.mouthCornerPullR"]' in paths
+    assert bpy.ops.risorius.unbake() == {"FINISHED"}
+    assert _state(rig) == before
+    _assert_same(_film(rig), wanted, near=0)
+
+
+def test_a_face_on_a_body_that_moves(dna_file):
+    rig = _face(dna_file)
+    data = bpy.data.armatures.new("body")
+    body = bpy.data.objects.new("body", data)
+    bpy.context.scene.collection.objects.link(body)
+    with bpy.context.temp_override(object=body, active_object=body, selected_objects=[body]):
+        bpy.context.view_layer.objects.active = body
+        bpy.ops.object.mode_set(mode="EDIT")
+        parent = None
+        for number, name in enumerate(("spine", "neck", "head")):
+            bone = data.edit_bones.new(name)
+            bone.head, bone.tail = (0, 0, 1.2 + 0.1 * number), (0, 0.01, 1.3 + 0.1 * number)
+            bone.parent, bone.roll = parent, 0.5 * number
+            parent = bone
+        bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.context.view_layer.objects.active = scene.controls(rig)
+    assert bpy.ops.risorius.attach_body(body="body") == {"FINISHED"}
+    for name in ("spine", "neck", "head"):
+        bone = body.pose.bones[name]
+        bone.rotation_mode = "XYZ"
+        for frame, angle in ((1, 0.0), (10, 2.5 if name == "spine" else 0.4)):
+            bone.rotation_euler.y = angle
+            bone.keyframe_insert("rotation_euler", frame=frame)
+    wanted, before = _film(rig), _state(rig)
+    assert np.abs(wanted[0][0] - wanted[-1][0]).max() > 0.3
+    _bake()
+    _assert_same(_film(rig), wanted)
+    bpy.ops.risorius.unbake()
+    assert _state(rig) == before
+    _assert_same(_film(rig), wanted, near=0)
+
+
+def test_controls_first_and_then_the_result(dna_file):
+    rig = _face(dna_file)
+    wanted, before, counts = _film(rig), _state(rig), scene.counts()
+    _bake(kind="CONTROLS")
+    _bake()
+    _assert_same(_film(rig), wanted)
+    bpy.ops.risorius.unbake()
+    _assert_same(_film(rig), wanted)
+    bpy.ops.risorius.unbake()
+    assert (_state(rig), scene.counts()) == (before, counts)
+    assert bpy.ops.risorius.unbake() == {"CANCELLED"}
+
+
 def test_onto_an_nla_track(dna_file):
     rig = _face(dna_file)
     wanted, before = _film(rig), _state(rig)
@@ -228,16 +319,102 @@ def test_reduction_holds_its_bound_on_any_curve():
             at = keep[:, i]
             line = np.interp(frames, frames[at], values[at, i])
             assert np.abs(line - values[:, i]).max() <= error * 1.0000001, (error, i)
+        if error == 0.05:
+            assert keep[:, 2:40].mean() < 0.6
     assert keep[:, 0].sum() == 1
     assert curves.reduce_keys(frames, values, 1e-3)[:, 1].sum() == 2
     assert curves.reduce_keys(frames, values)[:, 2:].all()
 
 
-def test_sampling_is_frame_stepping_and_touches_nothing(dna_file):
+def test_where_float32_is_coarser_than_the_bound_all_keys_stay():
+    curves = scene.submodule("logic.curves")
+    frames = np.arange(400.0)
+    values = (frames[:, None] * [1.0, 1000.5]).astype(np.float32)  # lines, exactly
+    keep = curves.reduce_keys(frames, values, 1e-4)
+    first, last = values[0], values[-1]
+    part = np.float32((frames - frames[0]) / (frames[-1] - frames[0]))[:, None]
+    off = np.abs(first + part * (last - first) - values).max(axis=0)
+    assert off[1] > 1e-4
+    assert keep[:, 1].all()
+
+
+def test_signs_of_quaternions_follow_each_other():
+    curves = scene.submodule("logic.curves")
+    turns = np.float32(
+        [[[1, 0, 0, 0]], [[-0.9, -0.1, 0, 0]], [[-0.8, 0.2, 0, 0]], [[0.9, 0, 0, 0]]]
+    )
+    wanted = np.float32([[[1, 0, 0, 0]], [[0.9, 0.1, 0, 0]], [[0.8, -0.2, 0, 0]], [[0.9, 0, 0, 0]]])
+    np.testing.assert_array_equal(curves.continuous(turns), wanted)
+
+
+def test_between_baked_frames_lie_straight_lines(dna_file):
+    rig = _face(dna_file)
+    between = (1.5, 4.25, 7.5)
+    wanted = _film(rig, between)
+    _bake(step=0.25)
+    _assert_same(_film(rig, between), wanted)
+    bpy.ops.risorius.unbake()
+    _bake()
+    _assert_same(_film(rig, between), wanted, near=0.05)
+
+
+class _Window:
+    """What a modal operator is given, without a window."""
+
+    def __init__(self, job):
+        self.window_manager, self.scene = self, bpy.context.scene
+        self._job, self._timer, self.said, self.over = job, None, [], False
+        operators = scene.submodule("ui.bake_operators")
+        self.modal = lambda kind: operators.RISORIUS_OT_bake.modal(self, self, _Event(kind))
+        self._step = lambda *rest: operators.RISORIUS_OT_bake._step(self, *rest)
+
+    def report(self, _kind, words):
+        self.said.append(words)
+
+    def progress_update(self, value):
+        assert 0 <= value <= 100
+
+    def progress_end(self):
+        self.over = True
+
+    def event_timer_remove(self, _timer):
+        assert not self.over
+
+
+class _Event:
+    def __init__(self, kind):
+        self.type = kind
+
+
+@pytest.mark.parametrize("ended", [False, True])
+def test_with_a_window_it_shows_progress_and_esc_ends_it(ended, dna_file):
+    rig = _face(dna_file)
+    before, counts = _state(rig), scene.counts()
+    bake = scene.submodule("scene.bake")
+    scene.submodule("ui.bake_operators")._SLICE = 0.0
+    window = _Window(bake.bake(bpy.context, [rig], bake.BakeOptions(end=10)))
+    assert window.modal("MOUSEMOVE") == {"RUNNING_MODAL"}
+    if ended:
+        assert window.modal("TIMER") == {"RUNNING_MODAL"}
+        assert window.modal("ESC") == {"CANCELLED"}
+        assert (_state(rig), scene.counts()) == (before, counts)
+    else:
+        while (result := window.modal("TIMER")) == {"RUNNING_MODAL"}:
+            pass
+        assert result == {"FINISHED"}
+        assert bake.baked(rig) == "RESULT"
+    assert window.over
+    assert window.said
+
+
+@pytest.mark.parametrize("hidden", [False, True])
+def test_sampling_is_frame_stepping_and_touches_nothing(hidden, dna_file):
     rig = _face(dna_file)
     _complicate(rig)
+    rig.hide_viewport = scene.controls(rig).hide_viewport = hidden
     bpy.context.scene.frame_set(7)
     values, counts = dict(scene.face(rig).items()), scene.counts()
+    posed = [tuple(b.rotation_quaternion) for b in rig.pose.bones]
     frames = np.array([1.0, 2.5, 4.0, 10.0])
     sampling, inputs = scene.submodule("scene.sampling"), scene.submodule("scene.inputs")
     job = sampling.sample(bpy.context, [rig], frames)
@@ -249,6 +426,7 @@ def test_sampling_is_frame_stepping_and_touches_nothing(dna_file):
             break
     assert bpy.context.scene.frame_current == 7
     assert dict(scene.face(rig).items()) == values
+    assert [tuple(b.rotation_quaternion) for b in rig.pose.bones] == posed
     assert scene.counts() == counts
     live = scene.submodule("scene.runtime").of(rig)
     for number, frame in enumerate(frames):
@@ -259,7 +437,7 @@ def test_sampling_is_frame_stepping_and_touches_nothing(dna_file):
         np.testing.assert_array_equal(got.raw[number], raw)
         assert got.turns[number] == turns
         np.testing.assert_array_equal(got.places[number], np.array(seen.matrix_world))
-    assert np.ptp(got.raw[:, 3]) > 0.1
+    assert np.ptp(got.raw[:, 0]) > 0.1
     assert np.ptp(got.places[:, 0, 3]) > 0.1
 
 
@@ -275,7 +453,21 @@ def test_a_bake_that_is_ended_changes_nothing(dna_file):
     assert not bake.baked(rig)
 
 
-def test_level_of_detail_and_parts(dna_file):
+def test_another_level_of_detail(mode, dna_file):
+    rig = _face(dna_file, mode, lods=(True, True, *[False] * 6))
+    bpy.ops.risorius.set_lod(lod=1)
+    coarse = _film(rig)
+    bpy.ops.risorius.set_lod(lod=0, target="VIEWPORT")
+    bpy.ops.risorius.set_lod(lod=1, target="RENDER")
+    wanted, before = _film(rig), _state(rig)
+    _bake(lod=1)
+    _assert_same(_film(rig), coarse)
+    bpy.ops.risorius.unbake()
+    assert _state(rig) == before
+    _assert_same(_film(rig), wanted, near=0)
+
+
+def test_parts_that_are_not_baked_stand(dna_file):
     rig = _face(dna_file)
     wanted = _film(rig)
     _bake(wanted={"BONES"})
@@ -294,6 +486,11 @@ def test_all_selected_faces_in_one_call_and_one_undo_step(dna_file):
     rigs = [_face(dna_file), _face(dna_file, "KEYS")]
     scene.controls(rigs[1]).location.x = 1.0
     films = [_film(rig) for rig in rigs]
+    for item in bpy.context.selected_objects:
+        item.select_set(False)
+    bpy.context.view_layer.objects.active = None
+    with pytest.raises(RuntimeError, match="No face is selected"):
+        bpy.ops.risorius.bake()
     for rig in rigs:
         scene.controls(rig).select_set(True)
     bpy.ops.ed.undo_push(message="before")
@@ -305,6 +502,10 @@ def test_all_selected_faces_in_one_call_and_one_undo_step(dna_file):
     bpy.ops.ed.undo()
     rigs = [bpy.data.objects[n] for n in ("Small_rig", "Small.001_rig")]
     assert not any("risorius_baked" in rig for rig in rigs)
+    scene.controls(rigs[0]).select_set(False)
+    _bake(every=True)
+    assert all("risorius_baked" in rig for rig in rigs)
+    assert bpy.ops.risorius.unbake(every=True) == {"FINISHED"}
     bpy.context.view_layer.update()
     for rig, film in zip(rigs, films, strict=True):
         _assert_same(_film(rig), film)
@@ -323,6 +524,61 @@ def test_an_edited_baked_key_stays_a_real_key(dna_file):
     assert not bad
     bpy.context.scene.frame_set(5)
     assert mesh.data.shape_keys.key_blocks["jaw"].value == pytest.approx(1.0)
+
+
+def test_back_to_live_keeps_what_the_user_made_of_it(dna_file):
+    rig = _face(dna_file)
+    _bake()
+    curve = scene.curves(rig)[0]
+    curve.keyframe_points[3].co.y += 0.25
+    bpy.ops.risorius.unbake()
+    assert bpy.data.actions["Small_baked"].use_fake_user
+    assert "Small_head_lod0_mesh_baked" not in bpy.data.actions
+    _bake(kind="CONTROLS")
+    mine = bpy.data.actions.new("Mine")
+    scene.controls(rig).animation_data.action = mine
+    bpy.ops.risorius.unbake()
+    assert mine.use_fake_user
+    assert scene.controls(rig).animation_data.action.name == "Small_controlsAction"
+
+
+def test_a_copy_of_a_baked_face_is_a_baked_face(mode, dna_file):
+    rig = _face(dna_file, mode)
+    wanted = _film(rig)
+    _bake()
+    for item in [rig, scene.controls(rig), *scene.meshes(rig).values()]:
+        item.select_set(True)
+    bpy.ops.object.duplicate()
+    bpy.context.view_layer.update()
+    copy = next(o for o in bpy.data.objects if "risorius_controls" in o and o != rig)
+    assert bpy.ops.risorius.unbake(every=True) == {"FINISHED"}
+    for one in (rig, copy):
+        assert "risorius_baked" not in one
+        _assert_same(_film(one), wanted)
+    assert not any("_baked" in a.name for a in bpy.data.actions)
+
+
+def _drawn(cls):
+    layout = Recorder()
+    cls.draw(SimpleNamespace(layout=layout), bpy.context)
+    return layout
+
+
+def test_the_panel_shows_the_state_and_the_way_back(dna_file):
+    _face(dna_file)
+    panel = scene.submodule("ui.panels").RISORIUS_PT_character
+    assert "risorius.unbake" not in _drawn(panel).operators
+    _bake(start=2, end=9)
+    assert "it plays its actions, frames 2 to 9." in _drawn(panel).text()
+    assert "risorius.unbake" in _drawn(panel).operators
+    out = _drawn(scene.submodule("ui.bake_panel").RISORIUS_PT_out)
+    assert out.operators == ["risorius.bake", "risorius.export_animation"]
+    bpy.ops.risorius.unbake()
+    _bake(kind="CONTROLS")
+    assert (
+        "The controls are baked; layers, NLA and drivers rest, frames 1 to 10."
+        in _drawn(panel).text()
+    )
 
 
 def test_what_cannot_be_baked_says_so(dna_file):

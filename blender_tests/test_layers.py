@@ -166,6 +166,7 @@ def _performance(rig, rules):
     _entry(rig, action=blink, start=6.0, extend="REPEAT", blend="ADD", controls="eye* -*squint*")
     _layers().fire(controls, "flash", 14.5, 0.9)
     _layers().fire(controls, "flash", 40.0, 0.5)
+    _layers().fire(controls, "blink", 400.0)  # long after the others are over
 
 
 def _mixer(rig, rules):
@@ -197,6 +198,7 @@ def _mixer(rig, rules):
         ],
         exclusives="default" if rules else None,
     )
+    mixer.fire("blink", 400.0 / 24)
     mixer.fire("flash", 40.0 / 24, 0.5)
     mixer.fire("flash", 14.5 / 24, 0.9)
     return mixer
@@ -210,7 +212,7 @@ def test_what_one_sees_is_what_the_mixer_computes(blinker, rules):
     scene.update(scene.controls(blinker))
     base = np.zeros(len(mixer.names), np.float32)
     base[mixer.names.index("CTRL_expressions.eyeLookUpL")] = 0.3
-    for frame in (*range(0, 60, 3), 7.25, 15.5, 15.75, 41.125):
+    for frame in (*range(0, 60, 3), 7.25, 15.5, 15.75, 41.125, 403):
         wanted = mixer.evaluate(frame / 24, base)
         np.testing.assert_allclose(_raw(blinker, frame), wanted, atol=2e-6)
     assert _value(blinker, 18.5, BLINK) > 0.85  # the flash
@@ -286,6 +288,7 @@ def test_keys_of_a_weight_go_with_their_layer(rig):
     assert bpy.ops.risorius.layer_duplicate() == {"FINISHED"}
     assert [y.name for y in controls.risorius_layers] == ["high", "high.001", "low"]
     assert _value(rig, 6, PULL) == pytest.approx(0.75)  # half of the half that was left
+    assert _value(rig, 3.5, PULL) == pytest.approx(1.0 - 0.75**2)  # its keys came along
     controls.risorius_layers_index = 0
     assert bpy.ops.risorius.layer_remove() == {"FINISHED"}
     assert _value(rig, 6, PULL) == pytest.approx(0.5)
@@ -499,3 +502,107 @@ def test_expressions_become_pose_assets_in_catalogues(rig, tmp_path):
     assert scene.face(rig)[PULL] == pytest.approx(0.82)
     assert bpy.ops.risorius.make_pose_assets() == {"FINISHED"}
     assert len(bpy.data.actions) == count
+
+
+def test_idle_life_is_that_of_its_seed(blinker):
+    from risorius.idle import idle
+
+    entry = _entry(blinker, kind="IDLE", seed=7, start=5.0, length=240.0)
+    wanted = idle(7, 10.0)
+    for frame in (5, 33, 100, 200.5):
+        value = wanted.sample((frame - 5) / 24)[0, wanted.names.index(BLINK)]
+        assert _value(blinker, frame, BLINK) == pytest.approx(value, abs=1e-6)
+    entry.length = 0.0
+    loop = idle(7, 120.0, loop=True).curve(BLINK)
+    assert loop.max() > 0.9
+    top = int(np.argmax(loop)) / 60  # seconds
+    for turn in (-1, 0, 3):
+        frame = 5 + (top + 120.0 * turn) * 24
+        assert _value(blinker, frame, BLINK) == pytest.approx(loop.max(), abs=1e-4)
+    assert bpy.ops.risorius.layer_add(kind="IDLE") == {"FINISHED"}
+
+
+def test_idle_life_with_a_length_becomes_a_strip(blinker):
+    _entry(blinker, kind="IDLE", seed=7, start=5.0, length=240.0, extend="NOTHING")
+    frames = (3, 33, 100, 200, 260)
+    scene.controls(blinker).risorius_layer_rules = False
+    wanted = [_raw(blinker, f) for f in frames]
+    assert bpy.ops.risorius.layers_to_nla() == {"FINISHED"}
+    for frame, raw in zip(frames, wanted, strict=True):
+        np.testing.assert_allclose(_raw(blinker, frame), raw, atol=2e-6)
+
+
+def test_keys_of_weights_outlive_their_action(rig, tmp_path):
+    controls = scene.controls(rig)
+    scene.submodule("scene.clips").play(rig, _action(rig, "First", jawOpen={1: 0.5, 9: 0.5}))
+    _entry(rig, kind="EXPRESSION", expression="joy")
+    for frame, value in ((1, 0.0), (11, 1.0)):
+        controls.risorius_layers[0].weight = value
+        controls.keyframe_insert("risorius_layers[0].weight", frame=frame)
+    wanted = [_value(rig, frame, PULL) for frame in (4, 8)]
+    assert 0.0 < wanted[0] < wanted[1]
+    table = tmp_path / "brow.csv"
+    table.write_text("time,browDownLeft\n0,0.1\n1,0.2\n", encoding="utf-8")
+    assert bpy.ops.risorius.import_animation(filepath=str(table)) == {"FINISHED"}
+    assert [_value(rig, frame, PULL) for frame in (4, 8)] == pytest.approx(wanted)
+    assert bpy.ops.risorius.layer_add(kind="ACTION") == {"FINISHED"}
+    assert [y.name for y in controls.risorius_layers] == ["Layer", "brow"]
+    assert [_value(rig, frame, PULL) for frame in (4, 8)] == pytest.approx(wanted)
+    assert _value(rig, 4, BROW) == pytest.approx(0.1 + 0.1 * 3 / 24, abs=1e-5)
+
+
+def test_undo_of_an_edited_action(rig):
+    bpy.context.preferences.edit.use_global_undo = True
+    action = _action(rig, "Edited", "LINEAR", jawOpen={1: 0.25, 20: 0.25})
+    _entry(rig, action=action)
+    bpy.ops.ed.undo_push(message="as it was")
+    assert _value(rig, 5, JAW) == pytest.approx(0.25)
+    for curve in scene.submodule("scene.compat").curves_of(action):
+        for key in curve.keyframe_points:
+            key.co[1] = 0.75
+        curve.update()
+    bpy.context.view_layer.update()
+    bpy.ops.ed.undo_push(message="edited")
+    assert _value(rig, 5, JAW) == pytest.approx(0.75)
+    assert bpy.ops.ed.undo() == {"FINISHED"}
+    assert _value(bpy.data.objects["Small_rig"], 5, JAW) == pytest.approx(0.25)
+
+
+@pytest.mark.parametrize(
+    ("setting", "value"),
+    [
+        ("start", 4.0),
+        ("scale", 0.5),
+        ("trim_start", 3.0),
+        ("trim_end", 9.0),
+        ("repeat", 2.0),
+        ("reverse", True),
+        ("blend", "MAXIMUM"),
+        ("extend", "NOTHING"),
+        ("fade_in", 9.0),
+        ("fade_out", 9.0),
+        ("mute", True),
+        ("controls", "jaw*"),
+        ("regions", {"JAW"}),
+        ("kind", "EXPRESSION"),
+    ],
+)
+def test_every_setting_is_heeded_at_once(rig, setting, value):
+    entry = _entry(rig, action=_wave(rig), expression="anger")
+    scene.face(rig)[BROW] = 0.5
+    other = _entry(rig, kind="EXPRESSION", expression="joy", weight=0.1)
+    frames = (2, 6, 14, 25)
+    before = np.array([_raw(rig, f) for f in frames])
+    setattr(entry, setting, value)
+    changed = np.array([_raw(rig, f) for f in frames])
+    assert np.abs(changed - before).max() > 0.01
+    _layers().forget()
+    np.testing.assert_array_equal([_raw(rig, f) for f in frames], changed)
+    assert other.name == "Layer.001"
+
+
+def test_a_reaction_needs_no_layer(blinker):
+    assert _value(blinker, 19, BLINK) == 0.0
+    bpy.context.scene.frame_set(15)
+    assert bpy.ops.risorius.fire(reaction="flash") == {"FINISHED"}
+    assert _value(blinker, 19, BLINK) > 0.9

@@ -8,6 +8,7 @@ import struct
 import bpy
 import numpy as np
 import pytest
+import risorius
 from mathutils import Vector
 from mathutils.kdtree import KDTree
 from support import scene
@@ -31,6 +32,16 @@ def _film(items, frames=FRAMES):
         bpy.context.scene.frame_set(frame)
         film.append([scene.evaluated(i) for i in items])
     return film
+
+
+def _is_built(kind):
+    """Whether this Blender has the exporter; where it has not, the face says so."""
+    switch = {"USD": "usd", "ALEMBIC": "alembic"}.get(kind)
+    if switch is None or getattr(bpy.app.build_options, switch):
+        return True
+    with pytest.raises(RuntimeError, match="This Blender has no .* exporter"):
+        bpy.ops.risorius.export_animation(filepath="no file", format=kind)
+    return False
 
 
 def _export(kind, tmp_path, **options):
@@ -76,6 +87,8 @@ def _error(film, wanted):
 @pytest.mark.parametrize("kind", ENDINGS)
 def test_the_file_gives_the_same_vertices(kind, dna_file, tmp_path):
     rig = scene.load(dna_file)
+    if not _is_built(kind):
+        return
     animate(rig)
     shown = [m for m in scene.meshes(rig).values() if 0 in list(m["dna_lods"])]
     wanted = _film(shown)
@@ -117,6 +130,8 @@ def _json_of(path):
 @pytest.mark.parametrize("kind", ["GLTF", "FBX", "USD", "ALEMBIC", "CSV"])
 def test_the_scene_stays_untouched_also_after_an_error(kind, dna_file, tmp_path):
     rig = scene.load(dna_file, "KEYS" if kind == "FBX" else "LIVE")
+    if not _is_built(kind):
+        return
     animate(rig)
     bpy.context.scene.frame_set(4)
     before = _everywhere(rig)
@@ -135,9 +150,31 @@ def test_the_scene_stays_untouched_also_after_an_error(kind, dna_file, tmp_path)
     assert scene.error_against_oracle(rig, dna_file, raw) < scene.TOLERANCE
 
 
-@pytest.mark.parametrize("kind", ["GLTF", "FBX"])
-def test_a_face_that_walks_and_a_part_of_the_range(kind, dna_file, tmp_path):
+@pytest.mark.parametrize("kind", ["FBX", "USD"])
+def test_bones_alone(kind, dna_file, tmp_path):
     rig = scene.load(dna_file)
+    if not _is_built(kind):
+        return
+    animate(rig)
+    path = _export(kind, tmp_path, wanted={"BONES"})
+    shown = [scene.meshes(rig)[0], scene.meshes(rig)[1]]
+    for item in shown:
+        for block in item.data.shape_keys.key_blocks[1:]:
+            block.mute = True
+    wanted = _film(shown)
+    found = _import(kind, path)
+    assert all(len(o.data.shape_keys.key_blocks) < 2 for o in found if o.data.shape_keys)
+    assert _error(_film(found), wanted) < NEAR[kind]
+
+
+@pytest.mark.parametrize(
+    ("kind", "options"),
+    [("GLTF", {}), ("FBX", {}), ("FBX", {"fbx_units": "FBX_SCALE_ALL"}), ("USD", {})],
+)
+def test_a_face_that_walks_and_a_part_of_the_range(kind, options, dna_file, tmp_path):
+    rig = scene.load(dna_file)
+    if not _is_built(kind):
+        return
     controls = animate(rig)
     for frame, x in ((1, 0.0), (10, 0.4)):
         controls.location.x = x
@@ -146,7 +183,7 @@ def test_a_face_that_walks_and_a_part_of_the_range(kind, dna_file, tmp_path):
         controls.keyframe_insert("rotation_euler", frame=frame)
     frames = (3, 5, 8)
     wanted = _film([scene.meshes(rig)[0], scene.meshes(rig)[1]], frames)
-    path = _export(kind, tmp_path, start=3, end=8)
+    path = _export(kind, tmp_path, start=3, end=8, **options)
     assert _error(_film(_import(kind, path), frames), wanted) < NEAR[kind]
 
 
@@ -162,6 +199,7 @@ def test_options_of_gltf_reach_the_file(dna_file, tmp_path):
         paths = {c["target"]["path"] for a in found.get("animations", ()) for c in a["channels"]}
         return found, attributes, keys, paths
 
+    counts = scene.counts()
     found, attributes, keys, paths = parts()
     assert [a["name"] for a in found["animations"]] == ["Small"]
     assert {n["name"] for n in found["nodes"]} >= {"Small", "head_lod0_mesh", "FACIAL_C_Jaw"}
@@ -173,6 +211,7 @@ def test_options_of_gltf_reach_the_file(dna_file, tmp_path):
     assert parts(wanted={"BONES"})[3] == {"translation", "rotation", "scale"}
     assert parts(wanted={"SHAPES"})[3] == {"weights"}
     assert {m["name"] for m in parts(lod=1)[0]["meshes"]} == {"head_lod1_mesh"}
+    assert scene.counts() == counts
 
 
 def test_all_selected_faces_go_into_one_file(dna_file, tmp_path):
@@ -213,6 +252,49 @@ def test_controls_as_csv_and_clip(dna_file, tmp_path):
         ahead = (rest @ turn @ rest.inverted()) @ Vector((0, -1, 0))
         assert row[-3] == pytest.approx(np.arctan2(ahead.x, -ahead.y), abs=1e-5)
         assert row[-2] == pytest.approx(np.arcsin(ahead.z), abs=1e-5)
+
+
+def test_a_clip_file_holds_the_same_and_maps_where_wanted(dna_file, tmp_path):
+    rig = scene.load(dna_file)
+    animate(rig)
+    clip = risorius.Clip.load(_export("RZC", tmp_path, maps=True))
+    assert (clip.rate, clip.frame_count) == (bpy.context.scene.render.fps, 10)
+    assert clip.names[-5:] == ("head.yaw", "head.pitch", "head.roll", "flush", "wrinkle")
+    for frame in (1, 4, 10):
+        bpy.context.scene.frame_set(frame)
+        shown = clip.sample([frame / clip.rate])[0]
+        assert shown[0] == scene.raw_of(rig, dna_file)[0]
+        assert shown[-2:] == pytest.approx(list(rig["maps"]), abs=1e-7)
+    assert np.ptp(clip.curve("flush")) > 0.5
+
+
+@pytest.mark.parametrize("shapes", ["DRIVEN", "LOCAL"])
+def test_a_linked_face_bakes_its_controls_and_is_exported(shapes, dna_file, tmp_path):
+    scene.load(dna_file, "LIVE")
+    blend = str(tmp_path / "library.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=blend)
+    bpy.ops.wm.read_homefile(use_empty=True)
+    bpy.ops.wm.link(directory=f"{blend}/Collection/", filename="Small")
+    bpy.context.view_layer.objects.active = bpy.context.scene.objects[0]
+    assert bpy.ops.risorius.make_override(shapes=shapes) == {"FINISHED"}
+    rig = next(o for o in bpy.data.objects if "risorius_controls" in o and not o.library)
+    animate(rig)
+    shown = [scene.meshes(rig)[0], scene.meshes(rig)[1]]
+    wanted, counts = _film(shown), scene.counts()
+    with pytest.raises(RuntimeError, match="is linked: bake its controls"):
+        bpy.ops.risorius.bake(range="CUSTOM", end=10)
+    path = _export("GLTF", tmp_path)
+    assert scene.counts() == counts
+    before = [p.tobytes() for p in wanted[-1]]
+    assert [p.tobytes() for p in _film(shown)[-1]] == before
+    assert bpy.ops.risorius.bake(kind="CONTROLS", range="CUSTOM", end=10) == {"FINISHED"}
+    again = _film(shown)
+    for points, target in zip(again, wanted, strict=True):
+        for one, other in zip(points, target, strict=True):
+            np.testing.assert_allclose(one, other, atol=2e-6)
+    assert bpy.ops.risorius.unbake() == {"FINISHED"}
+    assert [p.tobytes() for p in _film(shown)[-1]] == before
+    assert _error(_film(_import("GLTF", path)), wanted) < NEAR["GLTF"]
 
 
 def test_a_missing_exporter_is_one_sentence(dna_file, tmp_path):

@@ -40,8 +40,8 @@ CLASSES = (
     *shape_test.CLASSES,
     *animation_operators.CLASSES,
     *speech_operators.CLASSES,
-    *layer_panel.CLASSES,
     *animation_panel.CLASSES,
+    *layer_panel.CLASSES,
     *live_operators.CLASSES,
 )
 

@@ -173,7 +173,8 @@ void Mixer::react(double time, float* out) const noexcept {
       if (amount == 0.0f) continue;
       for (std::size_t i = 0; i < part.controls.size(); ++i) {
         const std::uint32_t c = part.controls[i];
-        if (out[c] < high_[c]) out[c] += (high_[c] - out[c]) * (amount * part.weights[i]);
+        const float peak = std::min(high_[c], 1.0f);
+        if (out[c] < peak) out[c] += (peak - out[c]) * (amount * part.weights[i]);
       }
     }
   }

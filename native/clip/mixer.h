@@ -143,7 +143,8 @@ struct Opposites {
 ///    v = a + (b - a) * part, and m = mask * w; see Blend.
 /// 3. Each reaction in the order of its place, each part with envelope e: r = strength * e *
 /// weight;
-///    out += (high - out) * r where out < high: for [0, 1] this is 1 - (1 - out) * (1 - r).
+///    out += (peak - out) * r where out < peak = min(high, 1): 1 - (1 - out) * (1 - r), also
+///    where a control may be driven beyond 1.
 /// 4. Yields: all s from the values as they are, then all products. Then opposites:
 ///    c = min(a, b); if c > 0: a -= c, b -= c.
 /// 5. Clamped to the range; NaN becomes its lower end.

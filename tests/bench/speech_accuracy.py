@@ -80,12 +80,14 @@ def frames(found, at: np.ndarray) -> np.ndarray:
     return classes
 
 
-def measure(half: str, folder: Path, with_text: bool) -> np.ndarray:
-    """[true class, found class]: how many frames."""
+def measure(
+    sentences: list[tuple[str, str, int, int]], folder: Path, with_text: bool
+) -> np.ndarray:
+    """[true class, found class]: how many frames; sentences as corpus gives them."""
     table = np.zeros((len(VISEMES), len(VISEMES)), int)
-    for i, (text, voice, speed, pitch) in enumerate(corpus(half)):
+    for i, (text, voice, speed, pitch) in enumerate(sentences):
         spoken = espeak_truth.say(text, voice, speed, pitch)
-        path = folder / f"{half}{i}.wav"
+        path = folder / f"{i}.wav"
         spoken.save(path)
         at = np.arange(STEP / 2, spoken.times[-1], STEP)
         found = frames(phonemes(path, text if with_text else None), at)
@@ -126,7 +128,7 @@ def main() -> int:
         for half in args.half or ("tuned", "held-out"):
             for with_text in (True, False):
                 begin = time.perf_counter()
-                table = measure(half, Path(folder), with_text)
+                table = measure(corpus(half), Path(folder), with_text)
                 guess, share = commonest(table)
                 print(
                     f"{half}, {'with' if with_text else 'without'} transcript: "

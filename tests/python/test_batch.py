@@ -22,6 +22,7 @@ from risorius.batch.files import remove_parts, replacing
 from risorius.batch.jobs import JobsError, read_jobs
 from risorius.batch.pool import Pool, PoolError
 from risorius.batch.progress import Progress, clock
+from risorius.batch.work import stamp
 from risorius.cli import main
 from test_eval_clip import write_clip
 
@@ -123,7 +124,7 @@ def test_statistics_alone(tmp_path, capsys):
     fired = np.stack([p.controls for p in poses])[:, psds].any(axis=0)
     assert fired.sum() > 0
     assert job["correctives_fired"] == fired.sum()
-    assert job["missing_controls"] == ["other"]
+    assert job["unmapped_curves"] == ["other"]
     assert job["out_of_range"] == [names[2]]
     assert job["control_ranges"][names[2]] == [raw[:, 2].min(), raw[:, 2].max()]
     assert job["evaluation_seconds"] > 0
@@ -147,6 +148,24 @@ def test_all_kinds_of_options_in_one_file(tmp_path):
     lines = (out / "core" / "lod0" / "take0.csv").read_text().splitlines()
     assert len(lines) == 13
     assert lines[0].startswith("time,joint:")
+
+
+def test_clips_are_mapped_and_resampled_to_clips(tmp_path):
+    own = 'name = "own"\n[rows]\nJawOpen = { "CTRL_expressions.jawOpen" = 0.5 }\n'
+    table = 'write = "rzc"\nrate = 60\nmapping = "own.toml"\n'
+    jobs = make(tmp_path / "j", clips=1, faces=["core"], table=table)
+    write_clip(tmp_path / "j" / "clips" / "take0.csv", ["JawOpen"], [[0, 0.5, 1]], RATE)
+    (tmp_path / "j" / "own.toml").write_text(own)
+    assert main(["batch", str(jobs), "--workers", "1"]) == 0
+    clip = risorius.Clip.load(jobs.parent / "out" / "core" / "lod0" / "take0.rzc")
+    assert clip.rate == 60
+    np.testing.assert_array_equal(
+        clip.curve("CTRL_expressions.jawOpen"), np.float32([0, 0.125, 0.25, 0.375, 0.5])
+    )
+    plan = read_jobs(jobs)
+    before = stamp(plan.jobs[0])
+    (tmp_path / "j" / "own.toml").write_text(own.replace("0.5", "0.25"))
+    assert stamp(plan.jobs[0]) != before  # another mapping is another output
 
 
 # ---- what is done again, and what not
@@ -385,7 +404,9 @@ class Dask:
             process.wait()
 
 
-def test_dask_with_a_worker_killed_in_the_middle(tmp_path, capsys):
+def test_dask_with_a_worker_killed_in_the_middle(tmp_path, capsys, monkeypatch):
+    version = risorius.__version__
+    monkeypatch.setattr("risorius.batch.cluster._CONNECT_SECONDS", 3.0)
     jobs = make(tmp_path / "j", clips=5)
     plan, outcomes = read_jobs(jobs), []
     with Dask(tmp_path) as dask:
@@ -405,10 +426,15 @@ def test_dask_with_a_worker_killed_in_the_middle(tmp_path, capsys):
         assert main(["batch", str(jobs), "--scheduler", dask.address, "--json"]) == 0
         assert json.loads(capsys.readouterr().out)["done"] == 20
         check_outputs(jobs, clips=5)
+        monkeypatch.setattr(risorius, "__version__", "9.9")
+        assert main(["batch", str(jobs), "--scheduler", dask.address, "--restart"]) == 1
+        wanted = f"core/lod0/take0: a worker with risorius 9.9 was expected, found {version}"
+        assert wanted in capsys.readouterr().err
+        monkeypatch.setattr(risorius, "__version__", version)
         dask.processes[0].kill()
         dask.processes[0].wait()
-        assert main(["batch", str(jobs), "--scheduler", dask.address, "--json"]) == 0  # all kept
-        assert json.loads(capsys.readouterr().out)["kept"] == 20
+        assert main(["batch", str(jobs), "--scheduler", dask.address]) == 1
+        assert "no Dask scheduler answers there" in capsys.readouterr().err
 
 
 def test_nobody_at_the_address(tmp_path, capsys, monkeypatch):
@@ -417,14 +443,6 @@ def test_nobody_at_the_address(tmp_path, capsys, monkeypatch):
     for address in ("nowhere", "tcp://127.0.0.1:9"):
         assert main(["batch", str(jobs), "--scheduler", address]) == 1
         assert f"{address}: no Dask scheduler answers there" in capsys.readouterr().err
-
-
-def test_a_worker_of_another_version_is_refused(tmp_path):
-    from risorius.batch.work import run_job
-
-    plan = read_jobs(make(tmp_path / "j", clips=1, faces=["core"]))
-    assert "with risorius 9.9 was expected" in run_job(plan.jobs[0], version="9.9").error
-    assert not plan.output.exists()
 
 
 # ---- JOBS.toml
@@ -486,6 +504,9 @@ GOOD = 'output = "out"\n[[jobs]]\nclips = "clips/*.csv"\ncharacters = "faces/*.d
         (GOOD + "frames = [3, 3]", "jobs[0].frames: [first, end] with first below end"),
         (GOOD + "frames = [0, 99999999999999999999]", "jobs[0].frames"),
         (GOOD + "quaternions = 1", "jobs[0].quaternions: true or false was expected, found 1"),
+        (GOOD + "mapping = 3", "jobs[0].mapping: a mapping was expected, found 3"),
+        (GOOD + 'mapping = "no.toml"', "no.toml: cannot read it"),
+        (GOOD + 'mapping = "clips/take0.csv"', "jobs[0].mapping:"),
         (GOOD + 'name = "{clip.__class__}"', "jobs[0].name: a pattern of {clip}, {character}"),
         (GOOD + 'name = "{clip!r}"', "jobs[0].name"),
         (GOOD + 'name = "{lod:99999999999}"', "jobs[0].name"),
@@ -558,12 +579,12 @@ def test_progress(monkeypatch):
     for terminal in (True, False):
         now[0] = 0.0
         shown = Terminal(terminal)
-        progress = Progress(40, "jobs", shown)
-        progress.update(1, 100)
+        progress = Progress(40, "jobs", before=5, stream=shown)
+        progress.update(6, 100)
         assert shown.text == ""  # what is done at once needs no bar
         now[0] = 20.0
-        progress.update(10, 3000, "1 failed")
-        line = "[#####...............] 10 of 40 jobs, 150 frames/s, 1:00 left, 1 failed"
+        progress.update(15, 3000, "1 failed")
+        line = "[#######.............] 15 of 40 jobs, 150 frames/s, 0:50 left, 1 failed"
         assert line in shown.text
         assert shown.text.startswith("\r" if terminal else "risorius: ")
         progress.say("so it is")

@@ -41,7 +41,7 @@ def random_clip(path, name="medium", frames=50, seed=1):
     rig = risorius.Rig(dna)
     rng = np.random.default_rng(seed)
     raw = np.tile(rig.initial_raw_controls, (frames, 1))
-    some = np.flatnonzero(rng.random(raw.shape[1]) < 0.5)
+    some = rng.permutation(np.flatnonzero(rng.random(raw.shape[1]) < 0.5))
     raw[:, some] = rng.random((frames, len(some))).astype(np.float32)
     write_clip(path, [rig.raw_control_names[i] for i in some], raw[:, some].T)
     return GOLDEN / f"{name}.dna", rig, raw
@@ -168,11 +168,70 @@ def test_frames_and_rate(tmp_path):
         np.testing.assert_allclose(arrays["times"], [0.2, 0.3], atol=1e-12)
 
 
+def test_a_clip_of_our_own_is_taken_as_it_is(tmp_path, capsys):
+    dna = GOLDEN / "core.dna"
+    rig = risorius.Rig(risorius.load(dna))
+    names = rig.raw_control_names
+    curves = np.float32([[0.1, np.nan, 0.3], [0, -0.0, 1e-40], [np.inf, 1, -2], [0, 0, 0]])
+    curves = curves[: len(names)]
+    clip = risorius.Clip(
+        [*names, "head.yaw"], [*curves, [1, 2, 3]], times=[0, 0.5, 3],
+        events=[risorius.Event(0.5, "word", 0.25, "yes")], metadata={"take": "7"},
+    )  # fmt: skip
+    clip.save(tmp_path / "clip.rzc")
+    out = tmp_path / "out.npz"
+    arguments = ["eval", str(tmp_path / "clip.rzc"), str(dna), "-o", str(out), "--json"]
+    assert main([*arguments, "--what", "joints,shapes,maps,controls"]) == 0
+    facts = json.loads(capsys.readouterr().out)
+    with np.load(out) as arrays:
+        for field, values in expected(rig, curves.T, 0).items():
+            np.testing.assert_array_equal(arrays[field], values, field)
+        assert arrays["times"].tolist() == [0, 0.5, 3]
+        assert arrays["event_times"].tolist() == [0.5]
+        assert arrays["event_durations"].tolist() == [0.25]
+        assert arrays["event_names"].tolist() == ["word"]
+        assert arrays["event_values"].tolist() == ["yes"]
+        assert json.loads(str(arrays["metadata"])) == {"take": "7"}
+    assert facts["not_finite"] == 2
+    moves = np.stack([rig.evaluate(row).joints[:, :3].astype(float) for row in curves.T])
+    moves = np.linalg.norm(moves, axis=2)
+    finite = moves[np.isfinite(moves)]
+    assert len(finite) < moves.size
+    assert facts["largest_move"] == pytest.approx(finite.max(), rel=1e-6)
+    assert facts["control_ranges"][names[0]] == [np.float32(0.1), np.float32(0.3)]
+    assert facts["control_ranges"][names[2]] == [-2, 1]
+    assert facts["out_of_range"] == [names[2]]
+    assert facts["missing_controls"] == ["head.yaw"]
+    assert facts["mapping"] == ""
+
+
+def test_a_capture_is_mapped(tmp_path, capsys):
+    """Live Link Face's names: the mapping that fits, and one of the user's own."""
+    dna = GOLDEN / "core.dna"
+    rig = risorius.Rig(risorius.load(dna))
+    jaw = rig.raw_control_names.index("CTRL_expressions.jawOpen")
+    write_clip(tmp_path / "c.csv", ["JawOpen", "Strange"], [[0, 0.5, 1], [1, 1, 1]])
+    (tmp_path / "own.toml").write_text(
+        'name = "own"\n[rows]\nJawOpen = { "CTRL_expressions.jawOpen" = 0.25 }\n'
+    )
+    out = tmp_path / "out.npz"
+    arguments = ["eval", str(tmp_path / "c.csv"), str(dna), "-o", str(out), "--what", "controls"]
+    for options, gain in (([], 1), (["--mapping", str(tmp_path / "own.toml")], 0.25)):
+        assert main([*arguments, *options]) == 0
+        assert "Strange" in capsys.readouterr().err
+        with np.load(out) as arrays:
+            np.testing.assert_allclose(arrays["controls"][:, jaw], np.float32([0, 0.5, 1]) * gain)
+    assert main([*arguments, "--mapping", "none"]) == 2
+    assert "--mapping: none: " in capsys.readouterr().err
+
+
 def test_facts(tmp_path, capsys):
     core = GOLDEN / "core.dna"
     rig = risorius.Rig(risorius.load(core))
     jaw = "CTRL_expressions.jawOpen"
-    clip = write_clip(tmp_path / "c.csv", [jaw, "head.yaw"], [[0, 1.5, -0.25], [0, 0, np.nan]])
+    nobody = "CTRL_expressions.nobody"
+    names = [jaw, nobody, "strange"]
+    clip = write_clip(tmp_path / "c.csv", names, [[0, 1.5, -0.25], [0, 1, 0], [1, 1, 1]])
     out = str(tmp_path / "out.npz")
     assert main(["eval", str(clip), str(core), "-o", out, "--json"]) == 0
     output = capsys.readouterr()
@@ -180,8 +239,11 @@ def test_facts(tmp_path, capsys):
     assert facts["frames"] == 3
     assert facts["control_ranges"] == {jaw: [-0.25, 1.5]}
     assert facts["out_of_range"] == [jaw]
-    assert facts["missing_controls"] == ["head.yaw"]
-    assert "1 control of the clip that the character does not have: head.yaw" in output.err
+    assert facts["missing_controls"] == [nobody]
+    assert facts["unmapped_curves"] == ["strange"]
+    assert facts["mapping"] == "controls"
+    assert f"1 control of the clip that the character does not have: {nobody}" in output.err
+    assert "1 curve of the clip that is no control and not mapped: strange" in output.err
     raw = np.zeros(4, np.float32)
     raw[rig.raw_control_names.index(jaw)] = 1.5
     moves = np.linalg.norm(rig.evaluate(raw).joints[:, :3].astype(float), axis=1)
@@ -228,17 +290,20 @@ def test_bad_command_line_is_exit_code_2(tmp_path, monkeypatch, capsys, argument
 @pytest.mark.parametrize(
     ("clip", "dna", "message"),
     [
-        ("absent.csv", "core.dna", "absent.csv: No such file"),
+        ("absent.csv", "core.dna", "No such file"),
         ("clip.csv", "absent.dna", "absent.dna"),
         ("bad.csv", "core.dna", "bad.csv"),
         ("clip.csv", "bad.csv", "bad.csv"),
-        ("empty.csv", "core.dna", "0"),
+        ("empty.csv", "core.dna", "empty.csv: rows"),
+        ("none.rzc", "core.dna", "none.rzc"),
+        ("bad.rzc", "core.dna", "bad.rzc"),
     ],
 )
 def test_bad_input_is_exit_code_1_and_no_file(tmp_path, capsys, clip, dna, message):
     write_clip(tmp_path / "clip.csv", ["CTRL_expressions.jawOpen"], [[0, 1]])
     (tmp_path / "bad.csv").write_text("time,a\n0,x\n")
     (tmp_path / "empty.csv").write_text("time,a\n")
+    (tmp_path / "bad.rzc").write_bytes(b"no clip")
     dna = GOLDEN / dna if dna == "core.dna" else tmp_path / dna
     out = tmp_path / "out" / "out.npz"
     assert main(["eval", str(tmp_path / clip), str(dna), "-o", str(out)]) == 1

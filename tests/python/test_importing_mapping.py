@@ -7,6 +7,8 @@ import tomllib
 
 import numpy as np
 import pytest
+import risorius
+from conftest import GOLDEN
 from risorius import Clip, arkit, expressions, importing
 from risorius.importing.mapping import Mapping, apply_rows, loose_name, parse_mapping
 
@@ -135,6 +137,20 @@ def test_gui_curves_go_through_the_rigs_own_table():
         found.apply()
 
 
+def test_gui_curves_and_a_real_rig():
+    dna = risorius.load(GOLDEN / "core.dna")
+    rig = risorius.Rig(dna)
+    names = dna.gui_control_names
+    values = np.linspace(0, 1, 5 * len(names), dtype=np.float32).reshape(len(names), 5)
+    mapping = parse_mapping('gui = true\n[rows]\n"GUI_*" = { "GUI_*" = 1.0 }', "m")
+    clip, _ = importing.Imported(Clip(names, values, 30), "csv", "", "a").apply(mapping, rig=rig)
+    raw, unknown = clip.raw_controls(dna.raw_control_names)
+    assert unknown == []
+    for frame, gui in zip(raw, values.T, strict=True):
+        np.testing.assert_array_equal(frame, rig.gui_to_raw(np.ascontiguousarray(gui)))
+    assert raw.any()
+
+
 @pytest.mark.parametrize(
     ("names", "mapping"),
     [
@@ -215,3 +231,15 @@ def test_a_mapping_that_does_not_hold_together_is_one_sentence(text, sentence):
 def test_a_mapping_that_is_not_there_names_those_that_are(tmp_path):
     with pytest.raises(importing.MappingError, match="cannot read it.*built in: arkit"):
         importing.load_mapping(tmp_path / "no.toml")
+
+
+def test_a_take_and_the_live_stream_turn_the_same_way():
+    """Both say how the app's angles turn; they were written apart."""
+    from risorius.live import livelink
+
+    rows = importing.load_mapping("live_link_face").rows
+    signs = dict(zip(livelink.CURVES, livelink._SIGNS.tolist(), strict=True))
+    for row in rows.values():
+        for control, weight in row.items():
+            if control in signs:
+                assert signs[control] == weight, control

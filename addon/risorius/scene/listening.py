@@ -2,6 +2,7 @@
 """Speech from a sound file, computed beside Blender's own thread; and the recogniser's package."""
 
 import importlib.util
+import os
 import subprocess
 import sys
 import threading
@@ -89,13 +90,17 @@ def install_recogniser():
     target = str(packages_folder())
     options = ["--target", target, "--upgrade", "--no-deps", "--only-binary", ":all:"]
     command = [sys.executable, "-m", "pip", "install", *options, PACKAGE]
-    if importlib.util.find_spec("pip") is None:
-        _run([sys.executable, "-m", "ensurepip", "--user"])
-    _run(command)
-
-
-def _run(command):
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    environment = {**os.environ, "PYTHONPATH": _bundled_pip()}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     if done.returncode:
         said = [line for line in (done.stderr or done.stdout).splitlines() if line.strip()]
         raise RuntimeError(f"pip could not install {PACKAGE}: {(said or ['no reason given'])[-1]}")
+
+
+def _bundled_pip():
+    """The wheel of pip that Python carries, which runs as it lies; "" where pip is installed."""
+    if importlib.util.find_spec("pip") is not None:
+        return ""
+    found = importlib.util.find_spec("ensurepip")
+    folder = Path(found.origin).parent / "_bundled" if found is not None else Path()
+    return str(next(iter(sorted(folder.glob("pip-*.whl"))), ""))

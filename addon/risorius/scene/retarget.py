@@ -6,7 +6,7 @@ import numpy as np
 
 from .. import native
 from ..logic.clips import ClipError
-from . import clips, compat, parts
+from . import clips, parts
 
 
 def sources(context):
@@ -79,9 +79,7 @@ def _blocks(keys):
 
 
 def _read(keys, frames):
-    curves = {
-        c.data_path: c for c in compat.curves_for(keys.animation_data.action, keys) if not c.mute
-    }
+    curves = {c.data_path: c for c in clips.playing_curves(keys.animation_data.action, keys)}
     table = {}
     for block in _blocks(keys):
         path = f'key_blocks["{bpy.utils.escape_identifier(block.name)}"].value'

@@ -11,8 +11,9 @@ from dataclasses import dataclass, field
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 
-from . import compat, inputs, parts, place, runtime
+from . import compat, inputs, layers, parts, place, runtime
 
 _CHANNELS = {"location": 3, "rotation_quaternion": 4, "rotation_euler": 3, "scale": 3}
 _BONES = ("neck", "head", "eyes", "eye_L", "eye_R")
@@ -25,9 +26,10 @@ class Samples:
     Attributes:
         frames: float64[N].
         raw: float32[N, R] raw controls as the rig is evaluated with them.
-        sliders: float32[N, R] the same before the eye bones add to the look controls.
+        sliders: float32[N, R] the same before the eye bones add to the look controls; both with
+            the layers.
         turns: per frame "neck", "head" -> Quaternion, as inputs.read_inputs gives them.
-        basis: control bone -> float64[N, 4, 4], local to its rest, after constraints.
+        basis: control bone -> float64[N, 4, 4], local to its rest, after constraints and layers.
         places: float64[N, 4, 4] of the control armature in the world.
         bones: "location", ... -> float32[N, bones, width] of the deforming armature's bones as
             they are without the evaluator; None where nothing animates them.
@@ -90,7 +92,7 @@ def _stage(context, rigs, items):
     own.render.frame_map_new = user.render.frame_map_new
     own.frame_start, own.frame_end = user.frame_start, user.frame_end
     try:
-        for item in items:
+        for item in dict.fromkeys(items):
             own.collection.objects.link(item)
         yield own
     finally:
@@ -107,13 +109,17 @@ def _whole_scene(scene):
 
 
 def _needs_whole_scene(scene, rigs):
-    """Whether something asks for the scene itself: simulated bodies, drivers by context."""
+    """Whether something asks for the scene itself: simulated bodies, drivers by context, and what
+    is hidden everywhere, which Blender evaluates only for what is seen with it.
+    """
     if scene.rigidbody_world is not None:
         return True
     for rig in rigs:
         controls = parts.controls_of(rig)
         hold = place.body_of(controls)
         for item in (rig, controls, hold.target if hold else None):
+            if item is not None and item.hide_viewport:
+                return True
             data = item.animation_data if item else None
             for curve in data.drivers if data else ():
                 if any(v.type == "CONTEXT_PROP" for v in curve.driver.variables):
@@ -135,8 +141,13 @@ class _Reader:
             basis={n: np.empty((count, 4, 4)) for n in bones},
             places=np.empty((count, 4, 4)),
         )
+        self.layered = layers.has_any(self.controls)
         self.maximum = parts.maximum_of(self.controls)
         self.objects = [self.controls, rig, *(item for item, _paths in keys)]
+        hold = place.body_of(self.controls)
+        if hold is not None:
+            # All of its bones: of what nothing visible depends on Blender evaluates nothing.
+            self.objects.append(hold.target)
         if _animated(rig):
             size = len(rig.pose.bones)
             self.samples.bones = {
@@ -152,19 +163,12 @@ class _Reader:
 
     def read(self, number, depsgraph):
         got, seen = self.samples, self.controls.evaluated_get(depsgraph)
-        raw, turns = inputs.read_inputs(seen, self.live, depsgraph, self.maximum)
-        got.raw[number], got.sliders[number] = raw, inputs.read_sliders(seen, self.live)
+        raw, own = inputs.read_mixed(seen, self.live, depsgraph, self.maximum)
+        got.sliders[number] = raw
+        got.raw[number], turns = inputs.complete(seen, self.live, depsgraph, self.maximum, raw, own)
         got.turns.append(turns)
         got.places[number] = seen.matrix_world
-        for name, matrices in got.basis.items():
-            bone = seen.pose.bones[name]
-            matrices[number] = (
-                seen.convert_space(
-                    pose_bone=bone, matrix=bone.matrix, from_space="POSE", to_space="LOCAL"
-                )
-                if bone.constraints
-                else bone.matrix_basis
-            )
+        self._read_control_bones(number, seen, own["head"])
         if got.bones is not None:
             moved = self.rig.evaluated_get(depsgraph).pose.bones
             for name, values in got.bones.items():
@@ -175,6 +179,25 @@ class _Reader:
                 value = _value(evaluated, path)
                 if value is not None:
                     got.others[owner].setdefault(path, []).append(value)
+
+    def _read_control_bones(self, number, seen, head):
+        """Args: head  how it is turned with the layers, in the armature's axes; or None."""
+        basis = self.samples.basis
+        for name, matrices in basis.items():
+            bone = seen.pose.bones[name]
+            matrices[number] = (
+                seen.convert_space(
+                    pose_bone=bone, matrix=bone.matrix, from_space="POSE", to_space="LOCAL"
+                )
+                if bone.constraints
+                else bone.matrix_basis
+            )
+        if self.layered and head is not None and "head" in basis:
+            matrix = Matrix(basis["head"][number].tolist())
+            rest = self.controls.data.bones["head"].matrix_local.to_quaternion()
+            basis["head"][number] = Matrix.LocRotScale(
+                matrix.to_translation(), rest.inverted() @ head @ rest, matrix.to_scale()
+            )
 
 
 def _value(owner, path):

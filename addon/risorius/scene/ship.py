@@ -10,12 +10,12 @@ from dataclasses import dataclass
 
 import bpy
 import numpy as np
+from mathutils import Quaternion
 
 from .. import native
-from ..logic import curves
-from . import actions, bake, baked_keys, baked_tracks, meshes, parts, runtime, sampling
-
-_HEAD = ("head.yaw", "head.pitch", "head.roll")
+from ..logic import clips, curves
+from ..logic.names import unique_labels
+from . import actions, bake, baked_keys, baked_tracks, compat, meshes, parts, runtime, sampling
 
 
 @dataclass(frozen=True)
@@ -153,18 +153,14 @@ def _shapes(made, item, live, samples, weights, options):
     for channel in set(names) - wanted:
         made.shape_key_remove(key.key_blocks[names.pop(channel)])
     if len(key.key_blocks) < 2:
-        made.shape_key_clear()
-        return
+        return  # a Key taken off a copied mesh would stay in the file for ever
     others = samples.others.get(item.data.shape_keys)
     _play(key, samples.frames, baked_tracks.key_tracks(key, names, weights, others))
 
 
 def _play(owner, frames, tracks):
     action, slot = actions.write(owner.name, owner, frames, tracks, 0.0, actions.Counts())
-    data = owner.animation_data_create()
-    data.action = action
-    if slot is not None:
-        data.action_slot = slot
+    compat.assign_action(owner.animation_data_create(), action, slot)
 
 
 def _show(item):
@@ -200,13 +196,15 @@ def _remove_all_but(before):
         bpy.data.batch_remove(new)
 
 
-def clip(rig, samples, rate):
+def clip(rig, level, samples, rate, maps=False):
     """The raw controls of a range, and how the head was turned.
 
     Args:
         rig: deforming armature.
+        level: of detail, for the maps.
         samples: its Samples.
         rate: frames per second of the scene.
+        maps: add the values of the animated maps, each by its name in the DNA.
 
     Returns:
         risorius.Clip, names as in the DNA (Blender's where the DNA has one twice); frame 0 of the
@@ -217,24 +215,15 @@ def clip(rig, samples, rate):
         names.append(label if name in names else name)
     rows = samples.raw.T
     if any("head" in turns for turns in samples.turns):
-        names += _HEAD
-        rows = np.concatenate([rows, _head_angles(samples.turns)])
+        names += clips.HEAD
+        heads = np.array([turns.get("head", Quaternion()) for turns in samples.turns])
+        rows = np.concatenate([rows, clips.angles_of(heads).T])
+    if maps:
+        labels = unique_labels(live.dna.animated_map_names, names)
+        names += labels
+        rows = np.concatenate([rows, baked_tracks.evaluate(live, samples, level).animated_maps.T])
     frames = samples.frames
     step = float(frames[1] - frames[0]) if len(frames) > 1 else 1.0
     return native.module().Clip(
         names, rows, rate / step, start=float(frames[0]) / rate, metadata={"source": rig.name}
     )
-
-
-def _head_angles(turns):
-    """float32[3, N] radians: yaw to the face's own left, pitch up, roll to its own left."""
-    found = np.zeros((3, len(turns)), np.float32)
-    for number, both in enumerate(turns):
-        if "head" in both:
-            w, x, y, z = both["head"]
-            found[:, number] = (
-                np.arctan2(-2 * (x * y - w * z), 1 - 2 * (x * x + z * z)),
-                -np.arcsin(np.clip(2 * (w * x + y * z), -1.0, 1.0)),
-                -np.arctan2(2 * (x * z - w * y), 1 - 2 * (x * x + y * y)),
-            )
-    return found

@@ -65,6 +65,7 @@ class PlacesClip:
         notes = [*notes, *made.notes]
         if self.target == "ACTION":
             before = clips.play(rig, made.action)
+            layers.keep_weights(parts.controls_of(rig), before)
             if before is not None:
                 notes.append(f"The action {before.name} was kept.")
         elif self.target == "STRIP":
@@ -270,7 +271,8 @@ def _gains(text):
 def lines_of(report):
     """What a report of risorius.importing has to say, a line each."""
     lines = [f"{len(report.mapped)} curves mapped by {report.mapping}."]
-    lines += [f"{head[:1].upper()}{head[1:]}: {', '.join(n)}." for head, n in report.lists()]
+    told = [(head, names) for head, names in report.lists() if names != report.absent]
+    lines += [f"{head[:1].upper()}{head[1:]}: {', '.join(names)}." for head, names in told]
     return [*lines, *(f"{note[:1].upper()}{note[1:].rstrip('.')}." for note in report.notes)]
 
 

@@ -18,9 +18,15 @@ RANGES = (
 )
 
 
-def selected_rigs(context):
-    """The characters of the selected objects, else the active one; linked ones are left out."""
-    found = [parts.rig_of(item) for item in context.selected_objects]
+def selected_rigs(context, every=False):
+    """The characters of the selected objects, else the active one; linked ones are left out.
+
+    Args:
+        context: scene and selection.
+        every: all characters of the scene instead.
+    """
+    items = context.scene.objects if every else context.selected_objects
+    found = [parts.rig_of(item) for item in items]
     found = list(dict.fromkeys(r for r in found if r is not None and r.library is None))
     if not found and parts.active_rig(context) is not None:
         found = [parts.active_rig(context)]
@@ -30,11 +36,28 @@ def selected_rigs(context):
 class FacesOperator(FaceOperator):
     """What operators on all selected faces share."""
 
+    every: bpy.props.BoolProperty(
+        name="All Faces",
+        description="All faces of the scene, whatever is selected",
+        options={"SKIP_SAVE"},
+    )
+
+    def faces(self, context):
+        """The characters to work on.
+
+        Raises:
+            BakeError: there are none.
+        """
+        found = selected_rigs(context, self.every)
+        if not found:
+            raise bake.BakeError("No face is selected.")
+        return found
+
     @classmethod
     def poll(cls, context):
         if not usable(cls):
             return False
-        if not selected_rigs(context):
+        if not (selected_rigs(context) or selected_rigs(context, every=True)):
             cls.poll_message_set("Select a face first.")
             return False
         return True
@@ -127,6 +150,7 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, bpy.types.Operator):
             layout.prop(self, "lod")
         layout.prop(self, "error")
         layout.prop(self, "strip")
+        layout.prop(self, "every")
 
     def execute(self, context):
         start, end = self.frames(context)
@@ -140,7 +164,11 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, bpy.types.Operator):
             self.error,
             self.strip,
         )
-        job = bake.bake(context, selected_rigs(context), options)
+        try:
+            job = bake.bake(context, self.faces(context), options)
+        except bake.BakeError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
         if self._interactive and not bpy.app.background:
             return self._begin(context, job)
         return self._run(context, job)
@@ -182,6 +210,7 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, bpy.types.Operator):
         end = time.monotonic() + seconds
         self._result = {"FINISHED"}
         try:
+            self._share = next(job)
             while time.monotonic() < end:
                 self._share = next(job)
         except StopIteration as finished:
@@ -204,7 +233,8 @@ class RISORIUS_OT_unbake(FacesOperator, bpy.types.Operator):
     bl_label = "Back to Live"
 
     def execute(self, context):
-        back = [rig for rig in selected_rigs(context) if bake.unbake(context, rig)]
+        faces = selected_rigs(context, self.every)
+        back = [rig for rig in faces if bake.unbake(context, rig)]
         if not back:
             self.report({"WARNING"}, "Nothing of the selected faces is baked.")
             return {"CANCELLED"}

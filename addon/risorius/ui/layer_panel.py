@@ -70,6 +70,7 @@ class RISORIUS_OT_layer_add(FaceOperator, bpy.types.Operator):
         data = controls.animation_data
         if action is None and not self.source and data is not None:
             action, data.action = data.action, None
+            layers.keep_weights(controls, action)
         if action is None:
             self.report({"ERROR"}, f"There is no action {self.source or 'to make a layer of'}.")
             return {"CANCELLED"}
@@ -387,7 +388,7 @@ class RISORIUS_PT_layers(FaceOnlyPanel, bpy.types.Panel):
             for sentence in layers.problems(controls, live, context.scene):
                 write(layout, sentence, "ERROR")
         _draw_reactions(layout, controls)
-        if layers.has_any(controls):
+        if len(layers.of(controls)) or len(layers.reactions_of(controls)):
             layout.prop(controls, "risorius_layer_rules")
 
 

@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Export of a face's animation through Blender's own exporters, and of its controls."""
 
-import csv
 from pathlib import Path
 
 import bpy
 from bpy_extras.io_utils import ExportHelper
 
+from .. import native
 from ..scene import bake, ship
+from ..scene.clips import frame_rate
 from .bake_operators import FacesOperator, FrameRange, selected_rigs
 
 FORMATS = (
@@ -34,65 +35,81 @@ _OPERATORS = {
 }
 
 
-def _settings(operator, stage):
-    """What Blender's exporter of each format is told."""
-    step = max(1, round(operator.step))
-    every = {
-        "GLTF": {
-            "export_format": "GLB",
-            "use_active_scene": True,
-            "export_animations": True,
-            "export_animation_mode": "ACTIVE_ACTIONS",
-            "export_nla_strips_merged_animation_name": stage.objects[0].name,
-            "export_frame_range": True,
-            "export_frame_step": step,
-            "export_force_sampling": True,
-            "export_optimize_animation_size": False,
-            "export_skins": True,
-            "export_all_influences": operator.influences == 0,
-            "export_influence_nb": max(operator.influences, 1),
-            "export_morph": True,
-            "export_morph_normal": False,
-            "export_rest_position_armature": True,
-            "export_apply": False,
-        },
-        "FBX": {
-            "object_types": {"ARMATURE", "MESH"},
-            "add_leaf_bones": False,
-            "use_armature_deform_only": False,
-            "bake_anim": True,
-            "bake_anim_use_all_bones": True,
-            "bake_anim_use_nla_strips": False,
-            "bake_anim_use_all_actions": False,
-            "bake_anim_force_startend_keying": True,
-            "bake_anim_step": float(step),
-            "bake_anim_simplify_factor": 0.0,
-            # With a modifier applied Blender drops the shape keys.
-            "use_mesh_modifiers": False,
-            "mesh_smooth_type": "FACE",
-        },
-        "USD": {
-            "export_animation": True,
-            "export_armatures": True,
-            "export_shapekeys": True,
-            "only_deform_bones": False,
-            "export_hair": False,
-            "export_materials": True,
-            "evaluation_mode": "RENDER",
-        },
-        "ALEMBIC": {
-            "start": stage.frame_start,
-            "end": stage.frame_end,
-            "xsamples": 1,
-            "gsamples": 1,
-            "uvs": True,
-            "normals": True,
-            "face_sets": True,
-            "as_background_job": False,
-            "evaluation_mode": "RENDER",
-        },
+def _gltf(operator, stage):
+    return {
+        "export_format": "GLB",
+        "use_active_scene": True,
+        "export_animations": True,
+        "export_animation_mode": "ACTIVE_ACTIONS",
+        "export_nla_strips_merged_animation_name": stage.objects[0].name,
+        "export_frame_range": True,
+        "export_frame_step": _whole_step(operator),
+        "export_force_sampling": True,
+        "export_optimize_animation_size": False,
+        # Its quicker way of hiding other objects gave wrong bones with two armatures (4.5).
+        "export_optimize_disable_viewport": False,
+        "export_skins": True,
+        "export_all_influences": operator.influences == 0,
+        "export_influence_nb": max(operator.influences, 1),
+        "export_morph": True,
+        "export_morph_normal": False,
+        "export_rest_position_armature": True,
+        "export_apply": False,
     }
-    return every[operator.format]
+
+
+def _fbx(operator, _stage):
+    return {
+        "object_types": {"ARMATURE", "MESH"},
+        "add_leaf_bones": False,
+        "use_armature_deform_only": False,
+        "bake_anim": True,
+        "bake_anim_use_all_bones": True,
+        "bake_anim_use_nla_strips": False,
+        "bake_anim_use_all_actions": False,
+        "bake_anim_force_startend_keying": True,
+        "bake_anim_step": float(_whole_step(operator)),
+        "bake_anim_simplify_factor": 0.0,
+        "apply_scale_options": operator.fbx_units,
+        # With a modifier applied Blender drops the shape keys.
+        "use_mesh_modifiers": False,
+        "mesh_smooth_type": "FACE",
+    }
+
+
+def _usd(_operator, _stage):
+    return {
+        "export_animation": True,
+        "export_armatures": True,
+        "export_shapekeys": True,
+        "only_deform_bones": False,
+        "export_hair": False,
+        "export_materials": True,
+        "evaluation_mode": "RENDER",
+    }
+
+
+def _alembic(_operator, stage):
+    return {
+        "start": stage.frame_start,
+        "end": stage.frame_end,
+        "xsamples": 1,
+        "gsamples": 1,
+        "uvs": True,
+        "normals": True,
+        "face_sets": True,
+        "as_background_job": False,
+        "evaluation_mode": "RENDER",
+    }
+
+
+# What Blender's exporter of each format is told; what a version does not know is left out.
+_SETTINGS = {"GLTF": _gltf, "FBX": _fbx, "USD": _usd, "ALEMBIC": _alembic}
+
+
+def _whole_step(operator):
+    """Exporters step by whole frames."""
+    return max(1, round(operator.step))
 
 
 class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, bpy.types.Operator):
@@ -137,6 +154,19 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, bpy.
         min=0,
         max=32,
     )
+    fbx_units: bpy.props.EnumProperty(
+        name="Units",
+        description="Where an FBX file says that a Blender unit is a metre",
+        items=(
+            ("FBX_SCALE_NONE", "On Objects", "Objects are scaled by 100: as Unreal expects it"),
+            ("FBX_SCALE_ALL", "In the File", "Objects have scale 1: as Unity expects it"),
+        ),
+    )
+    maps: bpy.props.BoolProperty(
+        name="With Maps",
+        description="Write also the values of the animated maps, which no other format can hold",
+        default=False,
+    )
 
     def invoke(self, context, event):
         rigs = selected_rigs(context)
@@ -166,6 +196,11 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, bpy.
             layout.prop(self, "all_shapes")
         if self.format == "GLTF":
             layout.prop(self, "influences")
+        if self.format == "FBX":
+            layout.prop(self, "fbx_units")
+        if self.format in ("RZC", "CSV"):
+            layout.prop(self, "maps")
+        layout.prop(self, "every")
 
     def execute(self, context):
         trouble = _missing(self.format)
@@ -177,7 +212,7 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, bpy.
             start, end, self.step, self.lod, frozenset(self.wanted), self.all_shapes
         )
         try:
-            characters = _run(context, ship.sampled(context, selected_rigs(context), options))
+            characters = _run(context, ship.sampled(context, self.faces(context), options))
             written = self._write(context, characters, options)
         except (bake.BakeError, ValueError, RuntimeError, OSError) as error:
             self.report({"ERROR"}, _one_sentence(self.filepath, error))
@@ -191,9 +226,7 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, bpy.
         if self.format in ("RZC", "CSV"):
             if len(characters) > 1:
                 raise ValueError("a file holds the controls of one face: select one")
-            rig, _level, samples = characters[0]
-            render = context.scene.render
-            clip = ship.clip(rig, samples, render.fps / render.fps_base)
+            clip = ship.clip(*characters[0], frame_rate(context.scene), self.maps)
             _write_csv(clip, path) if self.format == "CSV" else clip.save(path)
         else:
             with ship.copies(context, characters, options) as override:
@@ -216,11 +249,6 @@ def _run(context, job):
 
 def _missing(kind):
     """Why this Blender cannot write a format, in one sentence; empty when it can."""
-    if kind == "RZC":
-        from .. import native
-
-        there = hasattr(native.module().Clip, "save")
-        return "" if there else "This build of Risorius cannot write .rzc files."
     if kind not in _OPERATORS:
         return ""
     group, name = _OPERATORS[kind]
@@ -234,7 +262,7 @@ def _export(context, operator, override, path):
     group, name = _OPERATORS[operator.format]
     function = getattr(getattr(bpy.ops, group), name)
     known = set(function.get_rna_type().properties.keys())
-    settings = _settings(operator, override["scene"])
+    settings = _SETTINGS[operator.format](operator, override["scene"])
     with context.temp_override(**override):
         done = function(filepath=str(path), **{k: v for k, v in settings.items() if k in known})
     if "FINISHED" not in done or not path.exists():
@@ -242,12 +270,8 @@ def _export(context, operator, override, path):
 
 
 def _write_csv(clip, path):
-    """A table: the time in seconds and every control; as many digits as a float32 has."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        rows = csv.writer(file, lineterminator="\n")
-        rows.writerow(["time", *clip.names])
-        for time, values in zip(clip.frame_times().tolist(), clip.curves.T, strict=True):
-            rows.writerow([repr(time), *map(str, values)])
+    writing = native.part("importing.writing")
+    writing.write_text(writing.csv_text(clip), path)
 
 
 def _one_sentence(path, error):

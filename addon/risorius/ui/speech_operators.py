@@ -115,12 +115,19 @@ class RISORIUS_OT_speak(PlacesClip, bpy.types.Operator, ImportHelper):
                 return {"CANCELLED"}
             notes = [n for n in task.clip.metadata.get("notes", "").split("; ") if n]
             self.place(context, task.clip, Path(self.filepath).stem, notes)
-            if self.use_sound:
-                clips.add_sound(context.scene, self.filepath, self.start)
-        except (ValueError, ClipError, OSError, RuntimeError) as error:
+        except (ValueError, OSError, RuntimeError) as error:
             self.report({"ERROR"}, explain(self.filepath, error))
             return {"CANCELLED"}
+        self._add_sound(context)
         return {"FINISHED"}
+
+    def _add_sound(self, context):
+        if not self.use_sound:
+            return
+        try:
+            clips.add_sound(context.scene, self.filepath, self.start)
+        except ClipError as error:  # the face speaks all the same
+            self.report({"WARNING"}, explain(self.filepath, error))
 
     def draw(self, _context):
         layout = self.layout

@@ -10,6 +10,7 @@ import os
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
+from . import expressions
 from ._native import (
     AnimatedMaps,
     BlendShapeChannels,
@@ -51,6 +52,7 @@ from ._native import (
 )
 from .clip import Clip, Event
 from .clip_file import ClipError, ClipReader, ClipWriter
+from .idle import Life, idle
 from .mixer import Layer, Mixer
 
 __version__ = "0.1.0"
@@ -72,6 +74,7 @@ __all__ = [
     "JointBehaviorMetadata",
     "JointGroup",
     "Layer",
+    "Life",
     "Limits",
     "LodMapping",
     "MachineLearnedBehavior",
@@ -97,6 +100,8 @@ __all__ = [
     "available_simd",
     "check",
     "compile_cached",
+    "expressions",
+    "idle",
     "load",
 ]
 

@@ -21,7 +21,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="risorius", description="Face rigs from DNA files.")
     parser.add_argument("--version", action="version", version=__version__)
     subparsers = parser.add_subparsers(dest="command", required=True)
-    for command in (
+    commands = (
         info,
         check,
         convert,
@@ -34,7 +34,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         speech,
         live,
         batch,
-    ):
+    )
+    for command in commands:
+        command.add_parser(subparsers)
+    args, rest = parser.parse_known_args(arguments)
+    # argparse ends a list of operands at the first option: FILE --json NAME=1.
+    operands: list[str] | None = getattr(args, "controls", getattr(args, "files", None))
+    if any(text.startswith("-") for text in rest) or (rest and operands is None):
         parser.error(f"unrecognized arguments: {' '.join(rest)}")
     if operands is not None:
         operands += rest

@@ -7,6 +7,7 @@ import os
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -26,7 +27,7 @@ class ReactionPart:
     """Controls that go the same way in time; see Reaction."""
 
     weights: Mapping[str, float]
-    """By control, in [0, 1]: the share of the way to its upper limit."""
+    """By control, in [0, 1]: the share of the way to 1, or to its upper limit if that is less."""
     delay: float = 0.0
     """Seconds from the firing; so are the others."""
     attack: float = 0.1
@@ -97,8 +98,9 @@ def load_reactions(path: str | os.PathLike[str] | None = None) -> dict[str, Reac
         ValueError: the file, what was found and what was expected.
     """
     table, where = _read(path, "reactions.toml")
-    prefix = table.pop("prefix", "")
-    return {name: _reaction(name, row, prefix, where) for name, row in table.items()}
+    prefix = table.get("prefix", "")
+    rows = {name: row for name, row in table.items() if name != "prefix"}
+    return {name: _reaction(name, row, prefix, where) for name, row in rows.items()}
 
 
 def load_exclusives(path: str | os.PathLike[str] | None = None) -> Exclusives:
@@ -156,10 +158,14 @@ def named_weights(table: Mapping[str, Any], prefix: str, where: str) -> dict[str
 
 
 def _read(path: str | os.PathLike[str] | None, own: str) -> tuple[dict[str, Any], str]:
-    if path is None:
-        text = resources.files(__package__).joinpath(own).read_text(encoding="utf-8")
-        return tomllib.loads(text), own
-    return read_toml(path), os.fspath(path)
+    return (_own(own), own) if path is None else (read_toml(path), os.fspath(path))
+
+
+@cache
+def _own(file: str) -> dict[str, Any]:
+    """Read once: every new mixer asks for it."""
+    text = resources.files(__package__).joinpath(file).read_text(encoding="utf-8")
+    return tomllib.loads(text)
 
 
 def _names(names: list[str], prefix: str) -> tuple[str, ...]:

@@ -70,7 +70,7 @@ def bake(
                 moving = find_moving(face, played(clip, face, lod, threads), parts)
                 sinks.append(CsvWriter(file, face, clip.frame_times(), moving))
             else:
-                file.write(clip.to_bytes())  # type: ignore[attr-defined]
+                file.write(clip.to_bytes())
         chunks = played(clip, face, lod, threads)
         while True:
             started = time.perf_counter()

@@ -1,31 +1,64 @@
 # SPDX-License-Identifier: MIT
-"""Clips from files of any kind that animation comes in."""
+"""Clips of a character's controls, from files of any kind that animation comes in."""
 
 from __future__ import annotations
 
-import csv
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 import risorius
+from risorius import importing
+
+from .face import Face
+
+SUFFIX = ".rzc"
 
 
-def load_clip(path: Path) -> risorius.Clip:
-    """A clip from a file.
+@dataclass(frozen=True)
+class Performance:
+    """A clip as a character can play it.
+
+    Attributes:
+        clip: curves of raw controls, some of which the character may not have.
+        mapping: name of the mapping that made them so; "" if the file's names are the controls'.
+        unmapped: curves of the file that are no control and that the mapping does not know.
+    """
+
+    clip: risorius.Clip
+    mapping: str
+    unmapped: tuple[str, ...]
+
+
+def load_performance(path: Path, face: Face, mapping: str | None = None) -> Performance:
+    """The clip of a file for a character.
+
+    Args:
+        path: .rzc, or what risorius.importing reads.
+        face: whose raw controls are taken as they are, and whose table GUI controls go through.
+        mapping: a built-in one or a TOML file; None: the one that fits, none at all for .rzc.
 
     Raises:
-        OSError: it cannot be read.
-        ValueError: what is in it is no animation; names the file.
+        OSError, ValueError: no animation, or none that can be mapped; names the file.
     """
-    with open(path, encoding="utf-8", newline="") as file:
-        rows = list(csv.reader(file))
-    if not rows or not rows[0] or rows[0][0] != "time":
-        raise ValueError(f"{path}: a CSV whose first column is time was expected")
-    try:
-        values = np.array(rows[1:], np.float64).reshape(-1, len(rows[0]))
-        steps = np.diff(values[:, 0])
-        rate = 1 / float(np.median(steps)) if len(steps) else 60.0
-        return risorius.Clip(rows[0][1:], values[:, 1:].T, rate, times=values[:, 0])
-    except ValueError as error:
-        raise ValueError(f"{path}: {error}") from error
+    if path.suffix.lower() == SUFFIX:
+        clip = risorius.Clip.load(path)
+        if mapping is None:
+            return Performance(clip, "", ())
+        found = importing.Imported(clip, "rzc", "", str(path))
+    else:
+        found = importing.read(path)
+    raw = set(face.rig.raw_control_names)
+    own = [name for name in found.clip.names if name in raw]
+    if mapping is None and not found.mapping and own:
+        others = tuple(name for name in found.clip.names if name not in raw)
+        return Performance(found.clip.selected(own), "", others)
+    clip, report = found.apply(mapping, rig=face.rig)
+    # A mapping knows names of faces; a rig may have others, for a neck's rotation for instance.
+    own = [name for name in own if name in report.unmapped and name not in clip]
+    if own:
+        curves = np.concatenate([clip.curves, found.clip.selected(own).curves])
+        clip = clip.replaced(names=[*clip.names, *own], curves=curves)
+    unmapped = tuple(name for name in report.unmapped if name not in own)
+    return Performance(clip, report.mapping, unmapped)

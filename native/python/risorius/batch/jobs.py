@@ -14,6 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from risorius import importing
+
 from .baking import DEFAULT_PARTS, KINDS
 from .face import PARTS
 
@@ -23,9 +25,9 @@ DEFAULT_SUMMARY = ("summary.csv", "summary.json")
 _TOP_KEYS = ("output", "summary", "jobs")
 _KEYS = (
     "clips", "characters", "lods", "name", "write", "what", "rate", "frames", "quaternions",
-    "compress",
+    "compress", "mapping",
 )  # fmt: skip
-MAX_JOBS = 1_000_000
+MAX_JOBS = 200_000
 
 
 class JobsError(ValueError):
@@ -41,6 +43,8 @@ class Options:
     frames: tuple[int | None, int | None] = (None, None)
     quaternions: bool = False
     compress: bool = False
+    mapping: str | None = None
+    """A built-in one's name or the absolute path of a TOML file; None for the one that fits."""
 
 
 @dataclass(frozen=True)
@@ -192,7 +196,7 @@ def _jobs_of(table: _Table, base: Path, output: Path) -> Iterator[Job]:
     pattern = table.take("name", "a pattern", _is_name, DEFAULT_NAME)
     _check_pattern(table, pattern)
     kinds = table.choice("write", KINDS, ())
-    options = _options(table)
+    options = _options(table, base)
     for character in characters:
         for clip in clips:
             for lod in lods:
@@ -203,7 +207,7 @@ def _jobs_of(table: _Table, base: Path, output: Path) -> Iterator[Job]:
                 yield Job(name, clip.path, character.path, lod, outputs, options)
 
 
-def _options(table: _Table) -> Options:
+def _options(table: _Table, base: Path) -> Options:
     rate = table.take(
         "rate", "frames per second above 0",
         lambda v: type(v) in (int, float) and math.isfinite(v) and 0 < v <= 1e6, 0.0,
@@ -221,7 +225,21 @@ def _options(table: _Table) -> Options:
         frames=(frames[0], frames[1]) if frames else (None, None),
         quaternions=table.flag("quaternions"),
         compress=table.flag("compress"),
+        mapping=_mapping(table, base),
     )
+
+
+def _mapping(table: _Table, base: Path) -> str | None:
+    name: str = table.take("mapping", "a mapping", lambda v: isinstance(v, str), "")
+    if not name:
+        return None
+    if name not in importing.mapping_names():
+        name = os.path.abspath(base / name)
+    try:
+        importing.load_mapping(name)
+    except ValueError as error:
+        raise table.error("mapping", str(error)) from error
+    return name
 
 
 def _find(table: _Table, key: str, base: Path) -> list[_Found]:

@@ -3,12 +3,11 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from .files import replacing
 from .jobs import Job
@@ -18,68 +17,103 @@ from .work import stamp
 _HEAD = {"risorius_batch": 1}
 
 
+class _Record(NamedTuple):
+    """What must hold for a job to be done, and where in the file its facts are."""
+
+    stamp: str
+    files: list[list[Any]]
+    offset: int
+    size: int
+
+
 class Journal:
     """A file of JSON lines beside the outputs.
 
     A job in it is done if what it was made from has not changed and its files are still those that
-    it wrote, by size and time.
+    it wrote, by size and time. The facts stay in the file: thousands of jobs with the range of
+    every control are more than one wants in memory.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._records: dict[str, dict[str, Any]] = {}
+        self._records: dict[str, _Record] = {}
+        self._size = 0
 
     def read(self) -> None:
         """Read what an earlier run left; lines that it did not finish are not there."""
         try:
-            lines = self.path.read_bytes().split(b"\n")
+            with open(self.path, "rb") as file:
+                if _parsed(next(file, b"")) != _HEAD:
+                    return  # of another version: everything is to be done again
+                offset = file.tell()
+                for line in iter(file.readline, b""):
+                    self._take(line, offset)
+                    offset += len(line)
         except OSError:
             return
-        for index, line in enumerate(lines):
-            try:
-                record = json.loads(line)
-            except ValueError:
-                continue
-            if index == 0 and record != _HEAD:
-                return  # of another version: everything is to be done again
-            if isinstance(record, dict) and isinstance(record.get("name"), str):
-                self._records[record["name"]] = record
 
-    def done(self, job: Job) -> Outcome | None:
-        """What became of a job, if it need not be done again."""
+    def _take(self, line: bytes, offset: int) -> None:
+        record = _parsed(line)
+        if not isinstance(record, dict) or not isinstance(record.get("facts"), dict):
+            return
+        name = str(record.get("name"))
+        files = record.get("files")
+        self._records[name] = _Record(
+            str(record.get("stamp")), files if isinstance(files, list) else [[]], offset, len(line)
+        )
+
+    def is_done(self, job: Job) -> bool:
+        """The job need not be done again."""
         record = self._records.get(job.name)
-        if record is None:
-            return None
-        with contextlib.suppress(OSError):
-            same_files = record.get("files") == _files(job)
-            if same_files and record.get("stamp") == stamp(job):
-                facts = record.get("facts")
-                return Outcome(
-                    job.name,
-                    stamp=str(record["stamp"]),
-                    facts=facts if isinstance(facts, dict) else {},
-                )
-        return None
+        try:
+            return record is not None and record[:2] == (stamp(job), _files(job))
+        except OSError:
+            return False
 
-    def begin(self, jobs: Sequence[Job]) -> None:
+    def facts(self, name: str) -> dict[str, Any]:
+        """Of a job that is done. Raises: OSError, KeyError."""
+        record = self._records[name]
+        with open(self.path, "rb") as file:
+            file.seek(record.offset)
+            return dict(json.loads(file.read(record.size))["facts"])
+
+    def begin(self, kept: Iterable[str]) -> None:
         """Start the file anew with the lines of these jobs. Raises: OSError."""
+        records: dict[str, _Record] = {}
         with replacing(self.path) as file:
             file.write(_line(_HEAD))
-            for job in jobs:
-                file.write(_line(self._records[job.name]))
+            for name in kept:
+                offset, line = file.tell(), self._line_of(name)
+                file.write(line)
+                records[name] = self._records[name]._replace(offset=offset, size=len(line))
+            self._size = file.tell()
+        self._records = records
+
+    def _line_of(self, name: str) -> bytes:
+        record = self._records[name]
+        with open(self.path, "rb") as file:
+            file.seek(record.offset)
+            return file.read(record.size)
 
     def add(self, job: Job, outcome: Outcome) -> None:
         """A job is done. Raises: OSError."""
-        record = {
-            "name": job.name,
-            "stamp": outcome.stamp,
-            "files": _files(job),
-            "facts": outcome.facts,
-        }
+        files = _files(job)
+        line = _line(
+            {"name": job.name, "stamp": outcome.stamp, "files": files, "facts": outcome.facts}
+        )
         with open(self.path, "ab") as file:
-            file.write(_line(record))
+            file.write(line)
             file.flush()
             os.fsync(file.fileno())
+        self._records[job.name] = _Record(outcome.stamp, files, self._size, len(line))
+        self._size += len(line)
+
+
+def _parsed(line: bytes) -> object:
+    try:
+        return json.loads(line)
+    except ValueError:
+        return None
 
 
 def _line(record: dict[str, Any]) -> bytes:

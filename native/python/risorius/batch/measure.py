@@ -27,8 +27,8 @@ class Measure:
         squared = np.einsum("fjx,fjx->fj", moves, moves)
         if squared.size:
             largest = int(np.argmax(squared))
-            if np.isnan(squared.flat[largest]):  # argmax takes a NaN for the largest
-                squared = np.nan_to_num(squared, nan=-1.0)
+            if not np.isfinite(squared.flat[largest]):  # argmax takes a NaN for the largest
+                squared = np.nan_to_num(squared, nan=-1.0, posinf=-1.0)
                 largest = int(np.argmax(squared))
             if squared.flat[largest] > self._squared:
                 frame, self._joint = divmod(largest, squared.shape[1])

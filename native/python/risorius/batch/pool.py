@@ -4,12 +4,15 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import multiprocessing
 import multiprocessing.connection
 import os
 import signal
-from collections import Counter, deque
+import threading
+from collections import Counter, OrderedDict, deque
 from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .jobs import Job
@@ -31,7 +34,6 @@ class PoolError(RuntimeError):
 def _serve(connection: Connection[object, object], work: Work) -> None:
     """A worker's life: jobs in, outcomes out, until nobody is at the other end."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal's Ctrl-C is the parent's to handle
-    signal.signal(signal.SIGTERM, _leave)
     with contextlib.suppress(EOFError, BrokenPipeError, ConnectionResetError):
         connection.send(_READY)
         while True:
@@ -44,9 +46,17 @@ def _serve(connection: Connection[object, object], work: Work) -> None:
             connection.send(outcome)
 
 
-def _leave(number: int, frame: object) -> None:
-    """As an exception, so that half a file is deleted on the way out."""
-    raise SystemExit(128 + number)
+@contextlib.contextmanager
+def _ignoring_interrupts() -> Iterator[None]:
+    """Who is started in here does not hear Ctrl-C, from its first moment on."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 class _Worker:
@@ -58,15 +68,15 @@ class _Worker:
         self.process: SpawnProcess = context.Process(
             target=_serve, args=(theirs, work), daemon=True
         )
-        self.process.start()
+        with _ignoring_interrupts():
+            self.process.start()
         theirs.close()
         self.job: Job | None = None
         self.ready = False
-        self.last: tuple[object, ...] = ()
+        self.last: Job | None = None
 
     def give(self, job: Job) -> None:
-        self.job = job
-        self.last = _face_of(job)
+        self.job = self.last = job
         with contextlib.suppress(OSError):  # it has died: noticed by who waits for it
             self.connection.send(job)
 
@@ -83,20 +93,34 @@ def _face_of(job: Job) -> tuple[object, ...]:
 
 
 class _Queue:
-    """Jobs by face, so that a worker stays with one as long as it can."""
+    """Jobs by face and clip, so that a worker stays with what it has loaded as long as it can."""
 
     def __init__(self, jobs: Sequence[Job]) -> None:
-        self._lines: dict[tuple[object, ...], deque[Job]] = {}
+        self._lines: dict[tuple[object, ...], OrderedDict[Path, deque[Job]]] = {}
+        self._lengths: Counter[tuple[object, ...]] = Counter()
         for job in jobs:
             self.put(job)
 
     def put(self, job: Job) -> None:
-        self._lines.setdefault(_face_of(job), deque()).append(job)
+        line = self._lines.setdefault(_face_of(job), OrderedDict())
+        line.setdefault(job.clip, deque()).append(job)
+        self._lengths[_face_of(job)] += 1
 
-    def take(self, last: tuple[object, ...]) -> Job | None:
-        """The next job of the face that the worker had last, else of the longest line."""
-        line = self._lines.get(last) or max(self._lines.values(), key=len, default=None)
-        return line.popleft() if line else None
+    def take(self, last: Job | None) -> Job | None:
+        """The next job for a worker that had a certain one last."""
+        face = _face_of(last) if last else None
+        if face is None or not self._lengths[face]:
+            face, length = max(self._lengths.items(), key=lambda item: item[1])
+            if not length:
+                return None
+        line = self._lines[face]
+        clip = last.clip if last and last.clip in line else next(iter(line))
+        job = line[clip].popleft()
+        self._lengths[face] -= 1
+        line.move_to_end(clip)  # the next worker begins another one
+        if not line[clip]:
+            del line[clip]
+        return job
 
 
 class Pool:
@@ -143,7 +167,7 @@ class Pool:
                 continue
             if isinstance(message, Outcome):
                 tries = self._deaths[message.name] + 1
-                yield Outcome(**{**message.__dict__, "attempts": tries})
+                yield dataclasses.replace(message, attempts=tries)
             worker.ready = True
             worker.job = None
             self._feed(worker, queue)
@@ -171,7 +195,7 @@ class Pool:
         self._workers.append(_Worker(self._work))
 
     def _stop(self) -> None:
-        """End every worker; one that has a job deletes what it has written of it."""
+        """End every worker, at once if it has a job; half a file is deleted by who runs this."""
         for worker in self._workers:
             worker.connection.close()
             if worker.job is not None or not worker.ready:

@@ -4,11 +4,14 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import functools
 import time
 from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
+
+import risorius
 
 from . import summary
 from .cluster import Cluster
@@ -55,8 +58,8 @@ def pending(plan: Plan, journal: Journal, report: Report) -> list[Job]:
     """The jobs that are to be done; the report takes those that are."""
     out = []
     for job in plan.jobs:
-        if outcome := journal.done(job):
-            report.outcomes[job.name] = outcome
+        if journal.is_done(job):
+            report.outcomes[job.name] = Outcome(job.name)
             report.reused.add(job.name)
         else:
             out.append(job)
@@ -80,10 +83,9 @@ def run(plan: Plan, *, workers: int | None, scheduler: str | None, restart: bool
     if not restart:
         journal.read()
     jobs = pending(plan, journal, report)
-    journal.begin([job for job in plan.jobs if job.name in report.reused])
+    journal.begin(job.name for job in plan.jobs if job.name in report.reused)
     outputs = [path for job in jobs for _, path in job.outputs]
-    remove_parts(outputs)
-    progress = Progress(len(plan.jobs), "jobs")
+    progress = Progress(len(plan.jobs), "jobs", before=len(report.reused))
     if report.reused:
         progress.say(f"{len(report.reused):,} of {len(plan.jobs):,} jobs are done already")
     started = time.monotonic()
@@ -94,7 +96,7 @@ def run(plan: Plan, *, workers: int | None, scheduler: str | None, restart: bool
         progress.close()
         remove_parts(outputs)  # of workers that were killed
         report.seconds = time.monotonic() - started
-        summary.write(plan, summary.rows(plan, report.outcomes, report.reused))
+        summary.write(plan, lambda: summary.rows(plan, report.outcomes, report.reused, journal))
     return report
 
 
@@ -109,7 +111,7 @@ def _results(
         threads = max(1, count // len(jobs))  # with fewer jobs than cores, a job gets several
         yield from Pool(functools.partial(run_job, threads=threads), count).results(jobs)
         return
-    cluster = Cluster(scheduler, run_job)
+    cluster = Cluster(scheduler, functools.partial(run_job, version=risorius.__version__))
     if not cluster.workers():
         progress.say(f"{scheduler}: waiting for workers, there are none")
     yield from cluster.results(jobs)
@@ -125,13 +127,14 @@ def _gather(
     by_name = {job.name: job for job in jobs}
     failed = 0
     for outcome in results:
-        report.outcomes[outcome.name] = outcome
         if outcome.error:
             failed += 1
             progress.say(f"{outcome.name}: {outcome.error}")
         else:
+            # First, so that whatever the report knows is in the journal, Ctrl-C or not.
             journal.add(by_name[outcome.name], outcome)
             report.frames += int(outcome.facts.get("frames", 0))
+        report.outcomes[outcome.name] = dataclasses.replace(outcome, facts={})
         note = f"{failed:,} failed" if failed else ""
         progress.update(len(report.outcomes), report.frames, note)
 

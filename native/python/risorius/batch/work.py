@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import threading
 import time
 from collections import OrderedDict
@@ -17,7 +18,7 @@ import risorius
 from risorius._native import rig_block_version
 
 from .baking import bake
-from .clips import load_clip
+from .clips import Performance, load_performance
 from .face import Face, load_face, prepared
 from .files import digest, sentence
 from .jobs import Job
@@ -50,7 +51,7 @@ class Kept(Generic[_Value]):
 
 
 _faces: Kept[Face] = Kept(8)
-_clips: Kept[risorius.Clip] = Kept(4)
+_clips: Kept[Performance] = Kept(4)
 _digests: Kept[str] = Kept(4096)
 
 
@@ -75,20 +76,38 @@ def stamp(job: Job) -> str:
         "names": [job.clip.stem, job.character.stem],  # an .npz says them
         "lod": job.lod,
         "kinds": [kind for kind, _ in job.outputs],
-        "options": asdict(job.options),
+        "options": asdict(job.options) | {"mapping": _mapping_digest(job)},
     }
     return hashlib.sha256(json.dumps(what, sort_keys=True).encode()).hexdigest()
 
 
-def run_job(job: Job, threads: int = 1, version: str = risorius.__version__) -> Outcome:
+def _mapping_digest(job: Job) -> str | None:
+    """Of a mapping's file, or the name of one that comes with this version."""
+    name = job.options.mapping
+    return file_digest(Path(name)) if name and os.path.isabs(name) else name
+
+
+def _face(job: Job) -> Face:
+    quaternions = job.options.quaternions
+    key = (file_digest(job.character), job.character.stem, quaternions)
+    return _faces.get(key, lambda: load_face(job.character, quaternions=quaternions))
+
+
+def _performance(job: Job) -> Performance:
+    face = _face(job)
+    key = (file_digest(job.clip), job.clip.name, file_digest(job.character), _mapping_digest(job))
+    return _clips.get(key, lambda: load_performance(job.clip, face, job.options.mapping))
+
+
+def run_job(job: Job, threads: int = 1, version: str | None = None) -> Outcome:
     """Do a job.
 
     Args:
         job: its paths must be there for whoever runs this.
         threads: that may evaluate it.
-        version: of Risorius that gave it out.
+        version: of Risorius that gave it out, where it may be another one.
     """
-    if version != risorius.__version__:
+    if version not in (None, risorius.__version__):
         return Outcome(
             job.name,
             f"a worker with risorius {version} was expected, found {risorius.__version__}",
@@ -96,12 +115,8 @@ def run_job(job: Job, threads: int = 1, version: str = risorius.__version__) -> 
     try:
         started = time.perf_counter()
         made_from = stamp(job)
-        face = _faces.get(
-            (file_digest(job.character), job.character.stem, job.options.quaternions),
-            lambda: load_face(job.character, quaternions=job.options.quaternions),
-        )
-        clip = _clips.get((file_digest(job.clip), job.clip.name), lambda: load_clip(job.clip))
-        clip = prepared(clip, job.options.rate, job.options.frames)
+        face, performance = _face(job), _performance(job)
+        clip = prepared(performance.clip, job.options.rate, job.options.frames)
         loaded = time.perf_counter()
         facts = bake(
             clip, face, job.lod, dict(job.outputs), parts=job.options.parts,
@@ -109,6 +124,8 @@ def run_job(job: Job, threads: int = 1, version: str = risorius.__version__) -> 
         )  # fmt: skip
     except (OSError, ValueError, MemoryError) as error:
         return Outcome(job.name, sentence(error))
+    facts["mapping"] = performance.mapping
+    facts["unmapped_curves"] = list(performance.unmapped)
     facts["load_seconds"] = loaded - started
     facts["job_seconds"] = time.perf_counter() - started
     return Outcome(job.name, stamp=made_from, facts=facts)

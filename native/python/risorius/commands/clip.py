@@ -41,7 +41,7 @@ def _add_convert(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "convert",
         help="a file of animation as .rzc, .csv or .json of raw controls",
         description="What is asked for is done in this order: mapping, neutral, gain and offset, "
-        "gaps, smoothing, mirror, cut, rate, shift.",
+        "repeats, gaps, smoothing, mirror, cut, rate, shift.",
     )
     _add_input(parser)
     parser.add_argument("-o", "--output", required=True, type=Path, metavar="OUT")
@@ -66,6 +66,11 @@ def _add_convert(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
             metavar="PATTERN=N",
             help=f'{what} for controls, e.g. "jaw*=1.2"; may be given again',
         )
+    parser.add_argument(
+        "--drop-repeats",
+        action="store_true",
+        help="leave out frames that only repeat the one before",
+    )
     parser.add_argument(
         "--fill-gaps", action="store_true", help="even frames; straight across missing ones"
     )
@@ -97,6 +102,9 @@ def _add_input(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--timecode-rate", type=float, metavar="FPS", help="of timecodes that do not tell it"
+    )
+    parser.add_argument(
+        "--take", metavar="NAME", help="animation of a glTF or FBX, by name or number (the first)"
     )
 
 
@@ -131,8 +139,8 @@ def _guarded(run: Callable[[argparse.Namespace], int]) -> Callable[[argparse.Nam
         except CommandLineError as error:
             print(f"risorius: {error}", file=sys.stderr)
             return 2
-        except risorius.DnaError:
-            raise  # main says it
+        except (risorius.DnaError, BrokenPipeError):
+            raise  # for main
         except (InputError, ValueError, OSError) as error:
             print(f"risorius: {error}", file=sys.stderr)
             return 1
@@ -145,7 +153,11 @@ def load(args: argparse.Namespace) -> importing.Imported:
     if args.input.suffix.lower() == ".rzc":
         return importing.Imported(Clip.load(args.input), "clip", "controls", str(args.input))
     return importing.read(
-        args.input, kind=args.kind, rate=args.input_rate, timecode_rate=args.timecode_rate
+        args.input,
+        kind=args.kind,
+        rate=args.input_rate,
+        timecode_rate=args.timecode_rate,
+        take=args.take,
     )
 
 
@@ -167,7 +179,8 @@ def run_convert(args: argparse.Namespace) -> int:
     if args.report:
         print(report.text())
     else:
-        left = [f"{len(names)} {heading}" for heading, names in report.lists()[:2]]
+        lists = (("not mapped", report.unmapped), ("not in the rig", report.not_in_rig))
+        left = [f"{len(names)} {heading}" for heading, names in lists if names]
         more = f" ({', '.join(left)}: see --report)" if left else ""
         print(f"{args.output}: {_summary(clip)}{more}")
     return 0
@@ -189,6 +202,8 @@ def _steps(args: argparse.Namespace) -> list[Callable[[Clip], Clip]]:
         steps.append(lambda clip: process.calibrate(clip, int(first), int(last)))
     if gains or offsets:
         steps.append(lambda clip: process.adjust(clip, gains, offsets))
+    if args.drop_repeats:
+        steps.append(process.drop_repeats)
     if args.fill_gaps:
         steps.append(process.fill_gaps)
     if args.smooth is not None:

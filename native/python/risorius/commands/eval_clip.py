@@ -10,15 +10,16 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from risorius import importing
 from risorius.batch.baking import DEFAULT_PARTS, bake
-from risorius.batch.clips import load_clip
+from risorius.batch.clips import load_performance
 from risorius.batch.face import PARTS, load_face, prepared
 from risorius.batch.files import sentence
 from risorius.batch.progress import Progress
 
 from .files import CommandLineError, counted, refuse_same_file
 
-OPTIONS = ("rate", "frames", "what", "quaternions", "compress")
+OPTIONS = ("mapping", "rate", "frames", "what", "quaternions", "compress")
 SUFFIXES = {".npz": "npz", ".csv": "csv"}
 
 
@@ -33,6 +34,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="OUT.npz: joints, blend_shapes, animated_maps, controls as float32[frames, ...] with "
         "names, times in seconds and units, all numbers; OUT.csv: a row a frame, its time and the "
         "numbers that are not at rest throughout",
+    )
+    group.add_argument(
+        "--mapping",
+        metavar="NAME|FILE.toml",
+        help="how the clip's curves become raw controls; else the mapping that fits, for .rzc none",
     )
     group.add_argument("--rate", metavar="R", help="resample to R frames per second first")
     group.add_argument(
@@ -126,14 +132,15 @@ def page(facts: dict[str, Any]) -> str:
 def complaints(facts: dict[str, Any]) -> list[str]:
     """What one should know of the clip on this character, in sentences."""
     out = []
-    for key, what in (
-        ("missing_controls", "of the clip that the character does not have"),
-        ("out_of_range", "outside 0 to 1 in some frame"),
+    for key, kind, what in (
+        ("unmapped_curves", "curve", "of the clip that is no control and not mapped"),
+        ("missing_controls", "control", "of the clip that the character does not have"),
+        ("out_of_range", "control", "outside 0 to 1 in some frame"),
     ):
         names = facts[key]
         if names:
             more = f" and {len(names) - 8:,} more" if len(names) > 8 else ""
-            out.append(f"{counted(len(names), 'control')} {what}: {', '.join(names[:8])}{more}")
+            out.append(f"{counted(len(names), kind)} {what}: {', '.join(names[:8])}{more}")
     if facts["not_finite"]:
         out.append(f"{counted(facts['not_finite'], 'value')} of the clip that is no finite number")
     if facts["ignored_layers"]:
@@ -146,10 +153,12 @@ def run(args: argparse.Namespace) -> int:
     rate = _option("rate", parse_rate, args.rate, None)
     frames = _option("frames", parse_frames, args.frames, (None, None))
     parts = _option("what", lambda text: parse_parts(text.split(",")), args.what, DEFAULT_PARTS)
+    _option("mapping", importing.load_mapping, args.mapping, None)
     kind, out = _target(args)
     try:
-        clip = prepared(load_clip(args.file), rate, frames)
         face = load_face(Path(args.controls[0]), quaternions=args.quaternions)
+        performance = load_performance(args.file, face, args.mapping)
+        clip = prepared(performance.clip, rate, frames)
         progress = Progress(clip.frame_count, "frames")
         try:
             face.check_lod(args.lod)
@@ -163,6 +172,8 @@ def run(args: argparse.Namespace) -> int:
     except (OSError, ValueError, MemoryError) as error:
         print(f"risorius: {sentence(error)}", file=sys.stderr)
         return 1
+    facts["mapping"] = performance.mapping
+    facts["unmapped_curves"] = list(performance.unmapped)
     facts["output"] = str(out)
     for text in complaints(facts):
         print(f"risorius: {text}", file=sys.stderr)

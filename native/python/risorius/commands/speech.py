@@ -9,9 +9,10 @@ import sys
 from pathlib import Path
 
 from ..clip import Clip
+from ..importing import writing
 from ..speech import Heard, Phoneme, animate, listen
+from ..speech.listening import confidence
 from .files import InputError, read_bytes
-from .plot import write
 
 _KINDS = (".rzc", ".csv", ".json")
 
@@ -66,11 +67,8 @@ def run(args: argparse.Namespace) -> int:
         heard, clip = _spoken(args)
         _save(clip, args.out)
         if args.phonemes is not None:
-            write(args.phonemes, phoneme_table(heard.phonemes).encode())
-    except OSError as error:
-        print(f"risorius: {error}", file=sys.stderr)
-        return 1
-    except (InputError, ValueError) as error:
+            writing.write_text(phoneme_table(heard.phonemes), args.phonemes)
+    except (InputError, OSError, ValueError) as error:
         print(f"risorius: {error}", file=sys.stderr)
         return 1
     for note in heard.notes:
@@ -124,13 +122,6 @@ def _report(heard: Heard, clip: Clip) -> dict[str, object]:
     }
 
 
-def confidence(found: list[Phoneme]) -> float:
-    """The mean over the time of all phonemes but silence; 0 of silence only."""
-    spoken = [p for p in found if p.name != "SIL"]
-    whole = sum(p.end - p.begin for p in spoken)
-    return sum(p.confidence * (p.end - p.begin) for p in spoken) / whole if whole else 0.0
-
-
 def _summary(heard: Heard, clip: Clip, args: argparse.Namespace) -> str:
     report = _report(heard, clip)
     return (
@@ -144,28 +135,8 @@ def _save(clip: Clip, path: Path) -> None:
     """Write a clip whole or not at all. Raises: OSError, ValueError."""
     suffix = path.suffix.lower()
     if suffix == ".csv":
-        write(path, _csv(clip).encode())
+        writing.write_text(writing.csv_text(clip), path)
     elif suffix == ".json":
-        write(path, _json(clip).encode())
+        writing.write_text(writing.json_text(clip), path)
     else:
-        getattr(clip, "save")(path)  # noqa: B009
-
-
-def _csv(clip: Clip) -> str:
-    lines = [",".join(["time", *clip.names])]
-    for time, row in zip(clip.frame_times(), clip.curves.T, strict=True):
-        lines.append(",".join([f"{time:.9f}", *(f"{value:.9g}" for value in row)]))
-    return "\n".join(lines) + "\n"
-
-
-def _json(clip: Clip) -> str:
-    curves = {
-        name: [float(f"{value:.9g}") for value in curve]
-        for name, curve in zip(clip.names, clip.curves, strict=True)
-    }
-    document = {
-        "risorius_clip": 1, "rate": clip.rate, "start": clip.start, "frames": clip.frame_count,
-        "metadata": clip.metadata, "events": [event._asdict() for event in clip.events],
-        "curves": curves,
-    }  # fmt: skip
-    return json.dumps(document) + "\n"
+        clip.save(path)

@@ -6,6 +6,7 @@ file --read--> Imported (the file's own curves) --apply(mapping)--> Clip of raw 
 
 from __future__ import annotations
 
+from . import process
 from .errors import AnimationFileError
 from .mapping import (
     Mapping,
@@ -37,6 +38,7 @@ __all__ = [
     "load_mapping",
     "mapping_names",
     "mapping_text",
+    "process",
     "read",
     "write_text",
 ]

@@ -443,10 +443,14 @@ def best_mapping(names: Sequence[str]) -> str | None:
     Of equals the one with fewer rows: it was made for less.
     """
     scores = []
-    for name in mapping_names():
-        mapping = _built_in(name)
-        find = mapping.finder()
+    for mapping, find in _finders():
         hits = sum(1 for curve in names if find(curve) is not None)
         if hits:
-            scores.append((-hits, len(mapping.rows), name))
+            scores.append((-hits, len(mapping.rows), mapping.name))
     return min(scores)[2] if scores else None
+
+
+@cache
+def _finders() -> list[tuple[Mapping, Callable[[str], tuple[str, Row] | None]]]:
+    mappings = [_built_in(name) for name in mapping_names()]
+    return [(mapping, mapping.finder()) for mapping in mappings]

@@ -15,6 +15,7 @@ from ..clip import Event
 from .errors import AnimationFileError
 from .keys import Keys, on_one_clock
 from .source import Take, keep_ascending, make_clip
+from .tables import LIVE_LINK_FACE
 
 Doubles = npt.NDArray[np.float64]
 
@@ -27,6 +28,9 @@ RATE_KEYS = ("exportFps", "fps", "rate", "frameRate", "framerate", "frame_rate",
 TIME_KEYS = ("time", "timeCode", "timecode", "timestamp", "t", "seconds")
 TIMES_KEYS = ("times", "timeCodes", "timecodes", "timestamps", "time")
 WEIGHT_KEYS = ("weights", "values", "blendShapes", "blendshapes", "curves", "shapes")
+# What NeuroSync returns has no names: Live Link Face's columns, and seven emotions after them.
+NEUROSYNC_EMOTIONS = ("Angry", "Disgusted", "Fearful", "Happy", "Neutral", "Sad", "Surprised")
+NEUROSYNC_RATE = 60.0
 KEYS_KEYS = ("Keys", "keys")
 CURVE_NAME_KEYS = ("CurveName", "Name", "name", "curveName")
 INNER_CURVE_KEYS = ("FloatCurve", "Curve", "curve", "floatCurve")
@@ -124,7 +128,15 @@ def read(document: object, name: str, rate: float | None = None) -> Take:
         AnimationFileError: none of the shapes, or one that does not hold together.
     """
     reader = Reader(name, rate)
-    for shape in (own_clip, matrix, frame_tables, curve_table, keyed_curves, lists_by_name):
+    for shape in (
+        own_clip,
+        matrix,
+        neurosync,
+        frame_tables,
+        curve_table,
+        keyed_curves,
+        lists_by_name,
+    ):
         take = shape(reader, document)
         if take is not None:
             return take
@@ -221,6 +233,29 @@ def matrix(reader: Reader, document: object) -> Take | None:
     return reader.take(
         names, np.array(values).reshape(-1, len(names)).T, clock, None if by_time else rate
     )
+
+
+def neurosync(reader: Reader, document: object) -> Take | None:
+    """{"blendshapes": [[61 or 68 values], ...]}, as the NeuroSync service returns."""
+    rows = document.get("blendshapes") if isinstance(document, dict) else None
+    if not isinstance(rows, list) or not rows or not all(isinstance(row, list) for row in rows):
+        return None
+    columns = (*LIVE_LINK_FACE, *NEUROSYNC_EMOTIONS)
+    count = len(rows[0])
+    if count not in (len(LIVE_LINK_FACE), len(columns)):
+        return None
+    values = [reader.numbers(row, f"blendshapes[{i}]") for i, row in enumerate(rows)]
+    for i, row in enumerate(values):
+        if len(row) != count:
+            raise reader.fail(
+                f"{count} values as in the first frame were expected, found {len(row)}",
+                f"blendshapes[{i}]",
+            )
+    rate = reader.rate_of(document)
+    if rate is None:
+        rate = NEUROSYNC_RATE
+        reader.notes.append(f"{rate:g} frames a second were assumed, as NeuroSync makes")
+    return reader.take(columns[:count], np.array(values).T, np.arange(len(values)) / rate, rate)
 
 
 def frame_tables(reader: Reader, document: object) -> Take | None:

@@ -112,7 +112,8 @@ def calibrate(clip: Clip, first: int, last: int | None = None) -> Clip:
 def smooth(clip: Clip, window: float, *, order: int = 3) -> Clip:
     """Savitzky-Golay: fit a polynomial around each frame; peaks keep their height and their time.
 
-    Polynomials up to `order` pass unchanged, at the ends too; nothing is delayed. A clip with
+    Polynomials up to `order` pass unchanged, at the ends too; nothing is delayed; no curve leaves
+    the range that it had. A clip with
     times of its own is smoothed by frame, as captures are taken at even times but for what was
     dropped.
 
@@ -128,7 +129,10 @@ def smooth(clip: Clip, window: float, *, order: int = 3) -> Clip:
     half = round(0.5 * window * clip.rate)
     if 2 * half <= order or clip.frame_count <= 2 * half:
         return clip
-    return clip.replaced(curves=_savitzky_golay(clip.curves.astype(np.float64), half, order))
+    curves = clip.curves.astype(np.float64)
+    low, high = curves.min(axis=1, keepdims=True), curves.max(axis=1, keepdims=True)
+    # A fit swings beyond a sharp edge; no lid may open further than the capture ever had it.
+    return clip.replaced(curves=np.clip(_savitzky_golay(curves, half, order), low, high))
 
 
 def _savitzky_golay(curves: Doubles, half: int, order: int) -> Doubles:

@@ -7,13 +7,13 @@ import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from ..clip import Clip
-from . import named_json, tables, visemes
+from . import fbx, gltf, named_json, tables, visemes
 from .errors import AnimationFileError
 from .keys import Keys, on_one_clock
 from .mapping import ANGLES, Mapped, apply_rows, best_mapping, load_mapping
@@ -28,8 +28,19 @@ KINDS = {
     "rhubarb": "mouth shapes of Rhubarb Lip Sync: TSV, XML, JSON",
     "moho": "mouth shapes of Moho and Papagayo: .dat",
     "papagayo": "Papagayo documents: .pgo",
+    "gltf": "glTF and GLB: morph targets and properties",
+    "fbx": "FBX: properties, blend shapes, face boards",
 }
 ROTATIONS = ("head", "all", "none")
+
+
+class Options(NamedTuple):
+    """Of `read`."""
+
+    kind: str | None
+    rate: float | None
+    timecode_rate: float | None
+    take: str | None
 
 
 class RigLike(Protocol):
@@ -172,6 +183,7 @@ def read(
     kind: str | None = None,
     rate: float | None = None,
     timecode_rate: float | None = None,
+    take: str | None = None,
 ) -> Imported:
     """Read a file of animation.
 
@@ -181,6 +193,7 @@ def read(
         rate: frames a second, of tables whose time is a frame number or is not there.
         timecode_rate: frames a second of timecodes, where they do not tell; 29.97 and the like
             stand for 30000/1001.
+        take: name or number of an animation, of files that hold several; None: the first.
 
     Raises:
         AnimationFileError: cannot be read or used; the sentence names file and place.
@@ -194,45 +207,68 @@ def read(
     file = Path(path)
     data = read_bytes(file)
     try:
-        take = _read_kind(file, data, kind, rate, timecode_rate)
+        found = _read_kind(file, data, Options(kind, rate, timecode_rate, take))
     except AnimationFileError:
         raise
     except ValueError as error:
         raise AnimationFileError(str(path), str(error)) from error
-    mapping = take.mapping or best_mapping(take.clip.names) or ""
-    clip = take.clip.replaced(
-        metadata={"source": file.name, "kind": take.kind, **take.clip.metadata}
+    mapping = found.mapping or best_mapping(_moving(found.clip)) or ""
+    facts = {"source": file.name, "kind": found.kind, **found.clip.metadata}
+    return Imported(
+        found.clip.replaced(metadata=facts), found.kind, mapping, str(path), found.notes
     )
-    return Imported(clip, take.kind, mapping, str(path), take.notes)
 
 
-def _read_kind(
-    file: Path, data: bytes, kind: str | None, rate: float | None, timecode_rate: float | None
-) -> Take:
+def _moving(clip: Clip) -> list[str]:
+    """The curves that say something, or all."""
+    moving = [n for n, curve in zip(clip.names, clip.curves, strict=True) if curve.any()]
+    return moving or list(clip.names)
+
+
+def _read_kind(file: Path, data: bytes, options: Options) -> Take:
     name = str(file)
+    if gltf.is_glb(data):
+        return gltf.read(gltf.open_glb(file, data), options.take)
+    if fbx.is_fbx(data):
+        return fbx.read(data, name, options.take)
     text = decode(data, name)
-    if text.lstrip()[:1] in ("{", "[") or kind == "json":
-        return _read_json(named_json.parse(text, name), name, kind, rate)
-    if kind in (None, "moho") and text.lstrip().startswith("MohoSwitch1"):
-        return visemes.read_dat(text.lstrip(), name, rate)
-    mouth = visemes.reader_of(text) if kind in (None, "rhubarb", "papagayo", "moho") else None
-    if mouth is not None:
-        return mouth(text, name)
-    if kind in ("rhubarb", "papagayo", "moho"):
-        raise AnimationFileError(name, f"{KINDS[kind]}: expected, found something else")
+    if text.lstrip()[:1] in ("{", "[") or options.kind == "json":
+        return _read_json(named_json.parse(text, name), file, options)
+    return _read_mouth(text, name, options) or _read_table(text, name, options)
+
+
+def _read_mouth(text: str, name: str, options: Options) -> Take | None:
+    """Mouth shapes, where a text holds such."""
+    if options.kind in (None, "moho") and text.lstrip().startswith("MohoSwitch1"):
+        return visemes.read_dat(text.lstrip(), name, options.rate)
+    reader = visemes.reader_of(text) if options.kind in (None, "rhubarb", "papagayo") else None
+    return reader(text, name) if reader is not None else None
+
+
+def _read_table(text: str, name: str, options: Options) -> Take:
+    if fbx.is_text_fbx(text):
+        raise AnimationFileError(
+            name, "a binary FBX was expected, found one as text: export as binary"
+        )
+    if options.kind not in (None, "live_link_face", "csv"):
+        raise AnimationFileError(name, f"{KINDS[options.kind]} was expected, found something else")
     table = tables.read_table(text, name)
-    if kind == "live_link_face" or (kind is None and tables.is_live_link_face(table.header)):
-        return tables.read_live_link_face(table, timecode_rate)
-    return tables.read_plain(table, rate, timecode_rate)
+    is_capture = options.kind is None and tables.is_live_link_face(table.header)
+    if is_capture or options.kind == "live_link_face":
+        return tables.read_live_link_face(table, options.timecode_rate)
+    return tables.read_plain(table, options.rate, options.timecode_rate)
 
 
-def _read_json(document: object, name: str, kind: str | None, rate: float | None) -> Take:
-    if isinstance(document, dict) and kind != "json":
+def _read_json(document: object, file: Path, options: Options) -> Take:
+    name = str(file)
+    if isinstance(document, dict) and options.kind != "json":
+        if gltf.is_gltf(document):
+            return gltf.read(gltf.open_gltf(file, document), options.take)
         if "mouthCues" in document:
             return visemes.read_rhubarb_json(document, name)
         if "voices" in document and "fps" in document:
             return visemes.read_pgo_json(document, name)
-    return named_json.read(document, name, rate)
+    return named_json.read(document, name, options.rate)
 
 
 def import_file(
@@ -243,6 +279,7 @@ def import_file(
     kind: str | None = None,
     rate: float | None = None,
     timecode_rate: float | None = None,
+    take: str | None = None,
     rig: RigLike | None = None,
     rotations: str = "head",
 ) -> tuple[Clip, Report]:
@@ -253,7 +290,7 @@ def import_file(
     Raises:
         ValueError: as they do.
     """
-    found = read(path, kind=kind, rate=rate, timecode_rate=timecode_rate)
+    found = read(path, kind=kind, rate=rate, timecode_rate=timecode_rate, take=take)
     return found.apply(mapping, rig_names=rig_names, rig=rig, rotations=rotations)
 
 
@@ -282,7 +319,7 @@ def import_curves(
         raise ValueError(f"{source}: curves with keys were expected, found none")
     times, rows = on_one_clock(list(keys.values()))
     clip = make_clip(list(keys), rows, times, metadata={"source": source, "kind": "curves"})
-    found = Imported(clip, "curves", best_mapping(clip.names) or "", source)
+    found = Imported(clip, "curves", best_mapping(_moving(clip)) or "", source)
     return found.apply(mapping, rig_names=rig_names, rig=rig, rotations=rotations)
 
 

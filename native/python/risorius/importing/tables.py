@@ -7,6 +7,7 @@ import csv
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -28,6 +29,19 @@ TIME_COLUMNS = {
     "frame": 0.0, "frames": 0.0, "framenumber": 0.0, "frameindex": 0.0, "frameid": 0.0,
     "frameno": 0.0,
 }  # fmt: skip
+# Curves of a take of Live Link Face, in their order.
+LIVE_LINK_FACE = tuple(
+    """EyeBlinkLeft EyeLookDownLeft EyeLookInLeft EyeLookOutLeft EyeLookUpLeft
+EyeSquintLeft EyeWideLeft EyeBlinkRight EyeLookDownRight EyeLookInRight EyeLookOutRight
+EyeLookUpRight EyeSquintRight EyeWideRight JawForward JawRight JawLeft JawOpen MouthClose
+MouthFunnel MouthPucker MouthRight MouthLeft MouthSmileLeft MouthSmileRight MouthFrownLeft
+MouthFrownRight MouthDimpleLeft MouthDimpleRight MouthStretchLeft MouthStretchRight MouthRollLower
+MouthRollUpper MouthShrugLower MouthShrugUpper MouthPressLeft MouthPressRight MouthLowerDownLeft
+MouthLowerDownRight MouthUpperUpLeft MouthUpperUpRight BrowDownLeft BrowDownRight BrowInnerUp
+BrowOuterUpLeft BrowOuterUpRight CheekPuff CheekSquintLeft CheekSquintRight NoseSneerLeft
+NoseSneerRight TongueOut HeadYaw HeadPitch HeadRoll LeftEyeYaw LeftEyePitch LeftEyeRoll RightEyeYaw
+RightEyePitch RightEyeRoll""".split()
+)
 # Columns that count, and are no curve.
 COUNTS = ("blendshapecount",)
 
@@ -55,6 +69,25 @@ class Table:
         if self.delimiter == ";" and "." not in text:
             text = text.replace(",", ".")  # a decimal comma, as spreadsheets of many lands write
         return number(text, self.name, self.lines[row], self.place(column))
+
+    @cached_property
+    def columns(self) -> list[tuple[str, ...]]:
+        """The cells by column, once the rows are known to be of one length."""
+        return list(zip(*self.rows, strict=True))
+
+    def column(self, column: int, rows: Sequence[int] | None = None) -> Doubles:
+        """float64[rows] of a column, all or some. Raises: as cell."""
+        cells = self.columns[column]
+        if rows is not None:
+            cells = tuple(cells[row] for row in rows)
+        try:  # at once; what is wrong with a cell is found out cell by cell
+            values = np.array(list(map(float, cells)))
+        except ValueError:
+            values = np.full(len(cells), np.nan)
+        if "_" in "".join(cells) or not (np.abs(values) <= np.finfo(np.float32).max).all():
+            wanted = range(len(cells)) if rows is None else rows
+            values = np.array([self.cell(row, column) for row in wanted])
+        return values
 
     def place(self, column: int) -> str:
         header = self.header[column]
@@ -165,7 +198,7 @@ def read_live_link_face(table: Table, timecode_rate: float | None = None) -> Tak
     ]
     seconds = _timecode_seconds(table, codes, timecode_rate, notes)
     columns = [i for i, cell in enumerate(table.header) if i > 1 and cell]
-    curves = np.array([[table.cell(r, c) for r in range(len(codes))] for c in columns])
+    curves = np.array([table.column(c) for c in columns])
     _note_count(table, len(columns), notes)
     keep = keep_ascending(seconds, notes)
     times = seconds[keep] - seconds[0]
@@ -252,15 +285,10 @@ def read_plain(table: Table, rate: float | None = None, timecode_rate: float | N
     keep = keep_ascending(times, notes)
     curves = np.stack([_column(table, column, times, notes) for column in columns])
     clip = make_clip(
-        [_curve_name(table.header[c]) for c in columns], curves[:, keep], times[keep],
+        [table.header[c] for c in columns], curves[:, keep], times[keep],
         rate=rate if at is None else None,
     )  # fmt: skip
     return Take(clip, "csv", "", notes)
-
-
-def _curve_name(header: str) -> str:
-    """Without what Audio2Face writes before each name."""
-    return header.removeprefix("blendShapes.")
 
 
 def _time_column(table: Table) -> int | None:
@@ -293,7 +321,7 @@ def _plain_times(
         ]
         seconds = _timecode_seconds(table, codes, timecode_rate, notes)
         return seconds - seconds[0]
-    values = np.array([table.cell(row, at) for row in range(len(table.rows))])
+    values = table.column(at)
     unit = TIME_COLUMNS[header]
     if unit:
         return values * unit
@@ -325,7 +353,7 @@ def _is_curve(table: Table, column: int, notes: list[str]) -> bool:
 def _column(table: Table, column: int, times: Doubles, notes: list[str]) -> Doubles:
     filled = np.array([bool(row[column].strip()) for row in table.rows])
     known = np.flatnonzero(filled)
-    values = np.array([table.cell(int(row), column) for row in known])
+    values = table.column(column, known.tolist())
     if filled.all():
         return values
     notes.append(f"{table.header[column]}: {int((~filled).sum())} empty cell(s) filled")

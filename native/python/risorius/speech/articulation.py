@@ -9,14 +9,12 @@ mean never closes anything.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Sequence
-from functools import cache
-from importlib import resources
 
 import numpy as np
 import numpy.typing as npt
 
+from .. import expressions
 from .phones import GLIDES, VISEMES, VOWEL_VISEMES, Phoneme, viseme_of
 
 Curves = npt.NDArray[np.float64]
@@ -42,18 +40,6 @@ _CLOSING, _OPENING = 0.08, 0.075  # seconds that lips take
 _QUICKEST = 0.035
 _SHORTEST_CLOSURE = 0.045  # seconds: shorter ones are not seen
 _SMOOTHING = 0.018  # seconds, standard deviation
-
-
-@cache
-def poses() -> dict[str, dict[str, float]]:
-    """Viseme -> {raw control name as a DNA spells it: weight in [0, 1]}."""
-    text = resources.files(__package__).joinpath("visemes.toml").read_text(encoding="utf-8")
-    table = tomllib.loads(text)
-    prefix = table["prefix"]
-    return {
-        name: {prefix + control: float(weight) for control, weight in row.items()}
-        for name, row in table["poses"].items()
-    }
 
 
 def viseme_weights(phonemes: Sequence[Phoneme], times: Times) -> Curves:
@@ -161,7 +147,7 @@ def controls(weights: Curves, openness: Curves, intensity: float) -> dict[str, C
     curves: dict[str, Curves] = {}
     for column, viseme in enumerate(VISEMES):
         scale = 1.0 if viseme in GATED else intensity
-        for name, weight in poses()[viseme].items():
+        for name, weight in expressions.get(viseme).weights.items():
             part = weights[:, column] * weight * scale
             if viseme in VOWEL_VISEMES and name.endswith(".jawOpen"):
                 part = part * openness

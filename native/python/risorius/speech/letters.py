@@ -56,7 +56,7 @@ def pronounce(word: str) -> list[str]:
         taken, sounds = _rule(letters, place)
         said += sounds.split()
         place += taken
-    return said or ["AH"]
+    return said
 
 
 def _is_long(letters: str, place: int) -> bool:

@@ -26,6 +26,10 @@ _LONGEST_PIECE = 30.0  # a decoder's memory grows with it
 _PAUSE = 0.15  # seconds of silence that one may cut in
 _SHORTEST_SILENCE = 0.08  # seconds
 _SHORTEST_PHONEME = 0.03
+_DOUBTFUL = 0.37  # confidence; of right transcripts 0.41 to 0.77, of wrong ones up to 0.35
+_UNSAID = 0.2  # of the loud time
+_LEAST_FOUND = 0.6  # of a transcript's words: of others' transcripts up to half are "found"
+_GAP = 0.05  # seconds between words that do not follow each other
 _STOPS = frozenset({"P", "B", "T", "D", "K", "G", "CH", "JH"})
 
 
@@ -76,14 +80,19 @@ def listen(
     notes: list[str] = []
     found = None
     if words is not None:
-        found = _aligned(recogniser, samples, words, tell)
+        found = _aligned(recogniser, samples, words, tell, notes)
         if found is None:
             notes.append("the transcript does not fit the voice: it was recognised without")
     aligned = found is not None
     if found is None:
         found = _recognised(recogniser, samples, tell)
+    levels = loudness(samples)
+    if aligned:
+        notes += _doubts(found, levels)
+    elif confidence(found) == 0.0:
+        notes.append("no speech was heard")
+    found = with_silences(found, levels)
     tell(1.0)
-    found = with_silences(found, loudness(samples))
     return Heard(_filled(found, len(samples) / RATE), samples, aligned, notes)
 
 
@@ -98,22 +107,83 @@ def _reporter(progress: Progress | None, cancel: Cancel | None) -> Progress:
 
 
 def _aligned(
-    recogniser: Recogniser, samples: Samples, words: Sequence[str], tell: Progress
+    recogniser: Recogniser, samples: Samples, words: Sequence[str], tell: Progress, notes: list[str]
 ) -> list[Phoneme] | None:
-    """The transcript's phonemes at their times, or None if it does not fit."""
+    """The transcript's phonemes at their times, or None if too little of it fits."""
+    duration = len(samples) / RATE
     segments = recogniser.align_words(samples, words)
-    if segments is None:
-        return None
-    found: list[Phoneme] = []
-    for begin, end, said in _word_pieces(segments, len(samples) / RATE):
-        tell(0.2 + 0.8 * begin * RATE / len(samples))
-        piece = samples[int(begin * RATE) : int(end * RATE)]
-        phones = recogniser.align_phonemes(piece, said)
-        heard = recogniser.hear_phonemes(piece)
-        if phones is None:
+    if segments is not None:
+        parts = list(_word_pieces(segments, duration))
+    else:
+        segments = recogniser.align_loosely(samples, words)
+        if len(segments) < _LEAST_FOUND * len(words):
             return None
-        found += to_phonemes(phones, agreement(phones, heard), begin)
+        parts = _loose_pieces(segments, duration)
+        if len(segments) < len(words):
+            notes.append(f"{len(words) - len(segments)} of {len(words)} words were not heard")
+    found: list[Phoneme] = []
+    for begin, end, said in parts:
+        tell(0.2 + 0.8 * begin / duration)
+        found += _piece(recogniser, samples, begin, end, said)
     return found
+
+
+def _piece(
+    recogniser: Recogniser, samples: Samples, begin: float, end: float, said: Sequence[str]
+) -> list[Phoneme]:
+    """The phonemes of a piece: of the words, or what is heard where there are none."""
+    piece = samples[int(begin * RATE) : int(end * RATE)]
+    phones = recogniser.align_phonemes(piece, said) if said else None
+    if phones is not None:
+        return to_phonemes(phones, agreement(phones, recogniser.hear_phonemes(piece)), begin)
+    return _shifted(voting.hear(recogniser, piece, lambda part: None), begin, end)
+
+
+def _shifted(found: Sequence[Phoneme], begin: float, end: float) -> list[Phoneme]:
+    """A piece's phonemes on the clock of the whole."""
+    return [p._replace(begin=p.begin + begin, end=min(p.end + begin, end)) for p in found]
+
+
+def _loose_pieces(
+    segments: Sequence[Segment], duration: float
+) -> list[tuple[float, float, list[str]]]:
+    """Begin, end and words of each piece: words that follow each other, and the gaps between."""
+    parts: list[tuple[float, float, list[str]]] = []
+    for segment in segments:
+        last = parts[-1][1] if parts else 0.0
+        if parts and segment.begin - last < _GAP and parts[-1][2]:
+            parts[-1] = (parts[-1][0], segment.end, [*parts[-1][2], segment.word])
+            continue
+        if segment.begin - last >= _GAP:
+            parts.append((last, segment.begin, []))
+        parts.append((segment.begin, segment.end, [segment.word]))
+    if duration - parts[-1][1] >= _GAP:
+        parts.append((parts[-1][1], duration, []))
+    return parts
+
+
+def confidence(found: Sequence[Phoneme]) -> float:
+    """The mean over the time of all phonemes but silence; 0 if there are none."""
+    spoken = [p for p in found if p.name != "SIL"]
+    whole = sum(p.end - p.begin for p in spoken)
+    return sum(p.confidence * (p.end - p.begin) for p in spoken) / whole if whole else 0.0
+
+
+def _doubts(found: Sequence[Phoneme], levels: npt.NDArray[np.float64]) -> list[str]:
+    """What makes one doubt that the transcript is this voice's, as sentences."""
+    notes = []
+    if confidence(found) < _DOUBTFUL:
+        notes.append("the transcript fits the voice badly: is it of another recording?")
+    loud = speaking(levels)
+    times = (np.flatnonzero(loud) + 0.5) * STEP
+    covered = np.zeros(len(times), bool)
+    for phone in found:
+        if phone.name != "SIL":
+            first, last = np.searchsorted(times, (phone.begin, phone.end))
+            covered[first:last] = True
+    if len(covered) and covered.mean() < 1.0 - _UNSAID:
+        notes.append(f"{1.0 - covered.mean():.0%} of the speech is not in the transcript")
+    return notes
 
 
 def _word_pieces(
@@ -136,10 +206,14 @@ def _word_pieces(
 
 def _recognised(recogniser: Recogniser, samples: Samples, tell: Progress) -> list[Phoneme]:
     found: list[Phoneme] = []
+    duration = len(samples) / RATE
     for begin, end in pieces(loudness(samples)):
-        tell(0.02 + 0.98 * begin * RATE / len(samples))
         piece = samples[int(begin * RATE) : int(end * RATE)]
-        for phone in voting.hear(recogniser, piece):
+
+        def of_all(part: float, begin: float = begin, end: float = end) -> None:
+            tell(0.02 + 0.98 * (begin + part * (end - begin)) / duration)
+
+        for phone in voting.hear(recogniser, piece, of_all):
             found.append(phone._replace(begin=phone.begin + begin, end=min(phone.end + begin, end)))
     return found
 

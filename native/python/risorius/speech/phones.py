@@ -5,10 +5,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-VISEMES = (
-    "sil", "PP", "FF", "TH", "DD", "kk", "CH", "SS", "nn", "RR", "aa", "E", "I", "O", "U",
-)  # fmt: skip
-"""The 15 classes: silence, nine of consonants, five of vowels."""
+from ..expressions import VISEMES
+
+__all__ = ["CLASS_OF", "GLIDES", "VISEMES", "VOWEL_VISEMES", "Phoneme", "viseme_of"]
 
 VOWEL_VISEMES = frozenset({"aa", "E", "I", "O", "U"})
 

@@ -15,7 +15,7 @@ from .phones import VOWEL_VISEMES, Phoneme, viseme_of
 
 Curve = npt.NDArray[np.float64]
 
-_PITCH_RATE = 4000  # samples a second: enough for a fundamental
+_PITCH_RATE = 8000  # samples a second: enough for a fundamental
 _LOWEST, _HIGHEST = 60.0, 400.0  # Hz
 _VOICED = 0.45  # of the power repeats after a period
 

@@ -24,6 +24,7 @@ _NEEDS = (
 )
 _PAD = 0.3  # of near silence around each piece: a decoder wants to hear where speech begins
 _LAG = 0.0128  # seconds from the begin of a frame to the middle of the 25.6 ms that it hears
+_SAID, _SKIPPED, _OTHER = 0.98, 0.002, 0.01  # likelihoods within a transcript that may be wrong
 _PHONE_OPTIONS: dict[str, Any] = {"beam": 1e-20, "pbeam": 1e-20, "lw": 1.0}
 # One pass with narrow beams: three quick hearings together are better than a thorough one.
 _WORD_OPTIONS: dict[str, Any] = {"fwdflat": False, "maxhmmpf": 3000, "beam": 1e-40, "wbeam": 1e-20}
@@ -95,11 +96,30 @@ class Recogniser:
                     return found
         return None
 
-    def _word_pass(self, kind: str, samples: Samples, words: Sequence[str]) -> list[Segment] | None:
-        decoder = self._decoder(kind)
+    def align_loosely(self, samples: Samples, words: Sequence[str]) -> list[Segment]:
+        """Those of the words that are said, at their times; the rest of the voice is left out.
+
+        For a transcript that is not to the letter: each word may be skipped, and noise of speech
+        may come before any.
+        """
+        decoder = self._decoder("one way")
+        self._learn(decoder, words)
+        steps: list[tuple[int, int, float] | tuple[int, int, float, str]] = []
+        for i, word in enumerate(words):
+            steps += [(i, i + 1, _SAID, word), (i, i + 1, _SKIPPED), (i, i, _OTHER, "[SPEECH]")]
+        decoder.add_fsg("loose", decoder.create_fsg("loose", 0, len(words), steps))
+        decoder.activate_search("loose")
+        _decode(decoder, _pcm(samples))
+        return [segment for segment in _segments(decoder, len(samples)) if segment.word]
+
+    def _learn(self, decoder: Any, words: Sequence[str]) -> None:
         for word in set(words):
             if not decoder.lookup_word(word):
                 decoder.add_word(word, " ".join(letters.pronounce(word)), True)
+
+    def _word_pass(self, kind: str, samples: Samples, words: Sequence[str]) -> list[Segment] | None:
+        decoder = self._decoder(kind)
+        self._learn(decoder, words)
         decoder.set_align_text(" ".join(words))
         _decode(decoder, _pcm(samples))
         found = _segments(decoder, len(samples))

@@ -8,7 +8,7 @@ the most of them are right more often than any one.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -30,15 +30,17 @@ _COLUMN = {phone: i for i, phone in enumerate(_PHONES)}
 _VISEME_OF_COLUMN = np.array([VISEMES.index(CLASS_OF[phone]) for phone in _PHONES])
 
 
-def hear(recogniser: Recogniser, samples: Samples) -> list[Phoneme]:
+def hear(recogniser: Recogniser, samples: Samples, tell: Callable[[float], None]) -> list[Phoneme]:
     """The phonemes of a piece of a voice, with the words that were made out of it.
 
     Args:
         samples: float32[n] at audio.RATE.
+        tell: called with the part that is done, in [0, 1].
     """
     votes = np.zeros((max(1, round(len(samples) / RATE / FRAME)), len(_PHONES)))
     words: list[Segment] = []
-    for speed in _SPEEDS:
+    for i, speed in enumerate(_SPEEDS):
+        tell(i / len(_SPEEDS))
         played = samples if speed == 1.0 else resample(samples, round(RATE * speed), RATE)
         extra = _MAJORITY if speed == 1.0 else 0.0
         _count(votes, recogniser.hear_phonemes(played), speed, _PHONE_VOTE + extra)

@@ -1,0 +1,378 @@
+# SPDX-License-Identifier: MIT
+"""Binary FBX: animated properties, blend shape channels, and the sliders of a face board."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from .errors import AnimationFileError
+from .keys import CONSTANT, CUBIC, LINEAR, Keys, on_one_clock
+from .source import Take, keep_ascending, make_clip
+
+Doubles = npt.NDArray[np.float64]
+
+MAGIC = b"Kaydara FBX Binary  \x00\x1a\x00"
+# Of a key's time in a second; FBX 8000 counts coarser.
+TICKS = 46186158000
+TICKS_8000 = 141120000
+# GlobalSettings.TimeMode -> frames a second.
+TIME_MODES = {
+    0: 30.0, 1: 120.0, 2: 100.0, 3: 60.0, 4: 50.0, 5: 48.0, 6: 30.0, 7: 30.0, 8: 30000 / 1001,
+    9: 30000 / 1001, 10: 25.0, 11: 24.0, 12: 1000.0, 13: 24000 / 1001, 15: 96.0, 16: 72.0,
+    17: 60000 / 1001, 18: 120000 / 1001,
+}  # fmt: skip
+_TOP = {"GlobalSettings", "Objects", "Connections"}
+# What is skipped unread: the bulk of a file.
+_BULK = {"Geometry", "Video", "Texture", "Material", "Pose", "Implementation"}
+_SCALARS = {"Y": "<h", "C": "<?", "B": "<?", "I": "<i", "F": "<f", "D": "<d", "L": "<q"}
+_ARRAYS = {"f": "<f4", "d": "<f8", "l": "<i8", "i": "<i4", "b": "<u1", "c": "<u1"}
+_DEEPEST = 32
+_MAX_ARRAY = 1 << 28
+# KeyAttrFlags.
+_CONSTANT, _CUBIC, _AUTO, _TCB, _CLAMP, _WEIGHTED = 0x2, 0x8, 0x100, 0x200, 0x5000, 0x3000000
+
+
+@dataclass
+class Node:
+    """A record: name, values, records inside."""
+
+    name: str
+    values: list[Any]
+    inner: list[Node] = field(default_factory=list)
+
+    def first(self, name: str) -> Node | None:
+        return next((node for node in self.inner if node.name == name), None)
+
+    def array(self, name: str) -> npt.NDArray[Any]:
+        """The array that a record inside holds; empty without it."""
+        node = self.first(name)
+        value = node.values[0] if node is not None and node.values else None
+        return value if isinstance(value, np.ndarray) else np.zeros(0)
+
+
+def is_fbx(data: bytes) -> bool:
+    return data[:20] == MAGIC[:20]
+
+
+def is_text_fbx(text: str) -> bool:
+    """The form that people can read, which no one should exchange animation in."""
+    head = text[:2000]
+    return "FBXHeaderExtension:" in head or head.lstrip().startswith("; FBX")
+
+
+class Parser:
+    """The records of a file."""
+
+    def __init__(self, data: bytes, name: str) -> None:
+        self.data = data
+        self.name = name
+        if len(data) < 27:
+            raise self.fail(len(data), "a header of 27 bytes was expected")
+        self.version = struct.unpack_from("<I", data, 23)[0]
+        if not 7100 <= self.version < 9000:
+            raise self.fail(23, f"FBX 7.1 to 8.x was expected, found {self.version}")
+        # From 7.5 on offsets have 64 bits.
+        self.head = struct.Struct("<QQQB" if self.version >= 7500 else "<IIIB")
+
+    def fail(self, at: int, message: str) -> AnimationFileError:
+        return AnimationFileError(self.name, f"byte {at}: {message}")
+
+    def top(self) -> dict[str, Node]:
+        """The records of _TOP."""
+        return {node.name: node for node in self._records(27, len(self.data), 0)}
+
+    def _records(self, at: int, end: int, depth: int) -> Iterator[Node]:
+        while at + self.head.size <= end:
+            stop, count, length, name_length = self.head.unpack_from(self.data, at)
+            if stop == 0:
+                return  # the empty record that closes a list
+            start = at + self.head.size + name_length
+            if not start + length <= stop <= end:
+                raise self.fail(at, f"a record that ends by byte {end} was expected, found {stop}")
+            name = self.data[at + self.head.size : start].decode("utf-8", "replace")
+            if depth > 0 or name in _TOP:
+                yield self._record(name, start, count, start + length, stop, depth)
+            at = stop
+
+    def _record(self, name: str, at: int, count: int, end: int, stop: int, depth: int) -> Node:
+        node = Node(name, [])
+        if depth >= _DEEPEST:
+            raise self.fail(at, f"records {_DEEPEST} deep at most were expected")
+        if count > end - at:
+            raise self.fail(at, f"{count} values were expected in {end - at} bytes")
+        for _ in range(count):
+            value, at = self._value(at, end)
+            node.values.append(value)
+        if not (depth == 1 and name in _BULK):
+            node.inner = list(self._records(end, stop, depth + 1))
+        return node
+
+    def _value(self, at: int, end: int) -> tuple[Any, int]:
+        kind = chr(self.data[at]) if at < end else ""
+        at += 1
+        if kind in _SCALARS and kind:
+            form = struct.Struct(_SCALARS[kind])
+            if at + form.size > end:
+                raise self.fail(at, "a value was expected, the record is cut short")
+            return form.unpack_from(self.data, at)[0], at + form.size
+        if kind in ("S", "R"):
+            length = self._length(at, end, 4)[0]
+            if at + 4 + length > end:
+                raise self.fail(at, f"{length} bytes were expected, the record is cut short")
+            text = self.data[at + 4 : at + 4 + length]
+            return (text.decode("utf-8", "replace") if kind == "S" else text), at + 4 + length
+        if kind in _ARRAYS and kind:
+            return self._array(np.dtype(_ARRAYS[kind]), at, end)
+        raise self.fail(at - 1, f"a value's type was expected, found {kind!r}")
+
+    def _length(self, at: int, end: int, size: int) -> tuple[int, ...]:
+        if at + size > end:
+            raise self.fail(at, "a length was expected, the record is cut short")
+        return struct.unpack_from(f"<{size // 4}I", self.data, at)
+
+    def _array(self, dtype: np.dtype[Any], at: int, end: int) -> tuple[npt.NDArray[Any], int]:
+        count, encoding, size = self._length(at, end, 12)
+        start, wanted = at + 12, count * dtype.itemsize
+        if start + size > end or encoding not in (0, 1) or wanted > _MAX_ARRAY:
+            raise self.fail(at, f"an array of {count} in {size} bytes does not fit its record")
+        packed = self.data[start : start + size]
+        if encoding == 1:
+            try:
+                packed = zlib.decompressobj().decompress(packed, wanted + 1)
+            except zlib.error as error:
+                raise self.fail(at, f"an array that zlib packed was expected: {error}") from error
+        if len(packed) != wanted:
+            raise self.fail(at, f"{wanted} bytes of an array were expected, found {len(packed)}")
+        return np.frombuffer(packed, dtype), start + size
+
+
+@dataclass
+class Scene:
+    """What of a file says how things move.
+
+    Attributes:
+        objects: id -> record.
+        parents: id -> (parent's id, property or ""), in the file's order.
+    """
+
+    name: str
+    ticks: int
+    rate: float
+    objects: dict[int, Node]
+    parents: dict[int, list[tuple[int, str]]]
+
+    def of_kind(self, kind: str) -> dict[int, Node]:
+        return {i: node for i, node in self.objects.items() if node.name == kind}
+
+
+def read(data: bytes, name: str, take: str | None = None) -> Take:
+    """The curves of an animation stack.
+
+    A blend shape channel's curve has its name, its percent as a fraction. A property's curve has
+    the property's name, on whatever node it stands: so a rig's curves are written. A node whose
+    name begins with CTRL_ is a slider of a face board: its place gives CTRL_C_jaw.tx, .ty, .tz.
+
+    Args:
+        take: name or number of a stack; None: the first that moves any of that.
+
+    Raises:
+        AnimationFileError: no FBX that can be read, no such stack, nothing of that animated.
+    """
+    scene = _scene(Parser(data, name))
+    stacks = scene.of_kind("AnimationStack")
+    notes: list[str] = []
+    for stack in _chosen(scene, stacks, take):
+        curves = _curves(scene, stack, notes)
+        if not curves:
+            continue
+        title = object_name(scene.objects[stack]) if stack in scene.objects else ""
+        if len(stacks) > 1:
+            names = ", ".join(object_name(node) for node in stacks.values())
+            notes.append(f"animation {title} is taken of {len(stacks)}: {names[:200]}")
+        times, rows = on_one_clock(list(curves.values()), scene.rate)
+        keep = keep_ascending(times, notes)
+        clip = make_clip(list(curves), rows[:, keep], times[keep], metadata={"take": title})
+        return Take(clip, "fbx", "", notes)
+    raise AnimationFileError(
+        name, "animated properties, blend shapes or CTRL_ nodes were expected, found none"
+    )
+
+
+def _scene(parser: Parser) -> Scene:
+    top = parser.top()
+    objects = {
+        node.values[0]: node
+        for node in (top["Objects"].inner if "Objects" in top else [])
+        if node.values and isinstance(node.values[0], int)
+    }
+    parents: dict[int, list[tuple[int, str]]] = defaultdict(list)
+    for link in top["Connections"].inner if "Connections" in top else []:
+        values = link.values
+        if len(values) >= 3 and isinstance(values[1], int) and isinstance(values[2], int):
+            way = str(values[3]) if values[0] == "OP" and len(values) > 3 else ""
+            parents[values[1]].append((values[2], way))
+    ticks = TICKS_8000 if parser.version >= 8000 else TICKS
+    return Scene(parser.name, ticks, _rate(top.get("GlobalSettings")), objects, parents)
+
+
+def _rate(settings: Node | None) -> float:
+    """Frames a second that the scene is made for."""
+    table = settings.first("Properties70") if settings is not None else None
+    rows = {p.values[0]: p.values[-1] for p in (table.inner if table else []) if len(p.values) > 4}
+    custom = rows.get("CustomFrameRate")
+    if rows.get("TimeMode") == 14 and isinstance(custom, int | float) and 0 < custom < 1e4:
+        return float(custom)
+    mode = rows.get("TimeMode")
+    return TIME_MODES.get(mode, 30.0) if isinstance(mode, int) else 30.0
+
+
+def object_name(node: Node) -> str:
+    """Of an object, without its class and without a namespace."""
+    text = str(node.values[1]) if len(node.values) > 1 else ""
+    return text.partition("\0")[0].rpartition(":")[2]
+
+
+def _chosen(scene: Scene, stacks: dict[int, Node], take: str | None) -> Sequence[int]:
+    if take is None:
+        return list(stacks) or [0]
+    for number, (identity, node) in enumerate(stacks.items()):
+        if take in (object_name(node), str(number)):
+            return [identity]
+    raise AnimationFileError(scene.name, f"an animation {take!r} was expected, found none")
+
+
+def _curves(scene: Scene, stack: int, notes: list[str]) -> dict[str, Keys]:
+    """Name -> keys of everything that a stack moves; 0 for what belongs to no stack."""
+    out: dict[str, Keys] = {}
+    bones = 0
+    channels = {object_name(node) for node in scene.of_kind("Deformer").values()}
+    for identity, parts in _components(scene, notes).items():
+        links = scene.parents.get(identity, [])
+        if stack and not any(_in_stack(scene, parent, stack) for parent, way in links if not way):
+            continue
+        for owner, way in _owners(scene, links):
+            if owner.name == "Geometry" and way in channels:
+                continue  # the percent of a blend shape once more, for other software
+            named = _named(owner, way, parts)
+            bones += not named
+            for name, keys in named:
+                if name not in out:
+                    out[name] = keys
+                elif not np.array_equal(out[name].values, keys.values):
+                    notes.append(f"{name}: another node moves it differently, the first is taken")
+    if bones:
+        notes.append(f"{bones} track(s) move nodes, not shapes or properties: left out")
+    return {name: keys for name, keys in out.items() if keys.times.size}
+
+
+def _components(scene: Scene, notes: list[str]) -> dict[int, list[tuple[str, Keys]]]:
+    """Curve node -> (component, keys) of its curves: d|X, d|Y, d|Z, or one."""
+    out: dict[int, list[tuple[str, Keys]]] = defaultdict(list)
+    for identity, node in scene.of_kind("AnimationCurve").items():
+        keys: Keys | None = None
+        for parent, way in scene.parents.get(identity, []):
+            owner = scene.objects.get(parent)
+            if owner is not None and owner.name == "AnimationCurveNode":
+                keys = keys or _keys(scene, node, notes)
+                out[parent].append((way, keys))
+    return out
+
+
+def _owners(scene: Scene, links: Sequence[tuple[int, str]]) -> list[tuple[Node, str]]:
+    """Objects and the properties of theirs that something is connected to."""
+    return [(scene.objects[i], way) for i, way in links if way and i in scene.objects]
+
+
+def _in_stack(scene: Scene, layer: int, stack: int) -> bool:
+    return any(parent == stack for parent, _ in scene.parents.get(layer, []))
+
+
+def _named(owner: Node, way: str, parts: Sequence[tuple[str, Keys]]) -> list[tuple[str, Keys]]:
+    """(curve's name, keys) of a property of an object; none of a bone's place and the like."""
+    name = object_name(owner)
+    if way == "DeformPercent":
+        return [(name, _scaled(keys, 0.01)) for _, keys in parts[:1]]
+    if way == "Lcl Translation" and name.startswith("CTRL_"):
+        axes = [(component.rpartition("|")[2].lower(), keys) for component, keys in parts]
+        return [(f"{name}.t{axis}", keys) for axis, keys in axes]
+    if way.startswith("Lcl "):
+        return []
+    last = way.rpartition("|")[2].rpartition(":")[2]
+    if len(parts) == 1:
+        return [(last, parts[0][1])]
+    return [(f"{last}.{component.rpartition('|')[2]}", keys) for component, keys in parts]
+
+
+def _scaled(keys: Keys, factor: float) -> Keys:
+    return Keys(
+        keys.times, keys.values * factor, keys.kinds, keys.leave * factor, keys.arrive * factor
+    )
+
+
+def _keys(scene: Scene, node: Node, notes: list[str]) -> Keys:
+    """Keys of an AnimationCurve.
+
+    Raises:
+        AnimationFileError: times and values that do not fit, times that do not ascend.
+    """
+    times = node.array("KeyTime").astype(np.float64) / scene.ticks
+    values = node.array("KeyValueFloat").astype(np.float64)
+    place = f"animation curve {node.values[0]}"
+    if times.size != values.size:
+        raise AnimationFileError(
+            scene.name, f"{place}: {times.size} values were expected, found {values.size}"
+        )
+    if not (np.isfinite(values).all() and np.isfinite(times).all()):
+        raise AnimationFileError(scene.name, f"{place}: finite values were expected")
+    if (np.diff(times) <= 0.0).any():
+        raise AnimationFileError(scene.name, f"{place}: key times that ascend were expected")
+    flags, slopes = _attributes(node, times.size)
+    if (flags & _WEIGHTED).any() and (flags & _CUBIC).any():
+        note = "weighted tangents are taken as plain ones"
+        notes += [note] if note not in notes else []
+    kinds = np.full(times.size, LINEAR, np.uint8)
+    kinds[(flags & _CONSTANT) != 0] = CONSTANT
+    kinds[(flags & _CUBIC) != 0] = CUBIC
+    if not (kinds == CUBIC).any():
+        return Keys(times, values, kinds)
+    arrive = np.concatenate([[0.0], slopes[:-1, 1]])
+    leave, arrive = _auto(times, values, flags, slopes[:, 0].copy(), arrive)
+    return Keys(times, values, kinds, leave, arrive)
+
+
+def _attributes(node: Node, count: int) -> tuple[npt.NDArray[np.int64], Doubles]:
+    """Flags of each key, slopes after it and before the next; the file has a set for each run."""
+    flags = node.array("KeyAttrFlags").astype(np.int64)
+    runs = node.array("KeyAttrRefCount").astype(np.int64)
+    data = node.array("KeyAttrDataFloat").astype(np.float64)
+    if not flags.size or flags.size != runs.size or (runs < 0).any() or runs.sum() != count:
+        return np.full(count, 4, np.int64), np.zeros((count, 2))
+    table = np.zeros((flags.size, 4))
+    if data.size == table.size and np.isfinite(data).all():
+        table = data.reshape(-1, 4)
+    return np.repeat(flags, runs), np.repeat(table[:, :2], runs, axis=0)
+
+
+def _auto(
+    times: Doubles, values: Doubles, flags: npt.NDArray[np.int64], leave: Doubles, arrive: Doubles
+) -> tuple[Doubles, Doubles]:
+    """Slopes of keys whose tangents are automatic: along their neighbours, flat at an extreme."""
+    automatic = ((flags & _AUTO) != 0) & ((flags & _TCB) == 0)
+    if times.size < 2 or not automatic.any():
+        return leave, arrive
+    slope = np.zeros(times.size)
+    slope[1:-1] = (values[2:] - values[:-2]) / (times[2:] - times[:-2])
+    slope[0] = (values[1] - values[0]) / (times[1] - times[0])
+    slope[-1] = (values[-1] - values[-2]) / (times[-1] - times[-2])
+    extreme = np.zeros(times.size, bool)
+    extreme[1:-1] = (values[1:-1] - values[:-2]) * (values[2:] - values[1:-1]) <= 0.0
+    slope[extreme & ((flags & _CLAMP) != 0)] = 0.0
+    return np.where(automatic, slope, leave), np.where(automatic, slope, arrive)

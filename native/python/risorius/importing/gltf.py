@@ -1,0 +1,330 @@
+# SPDX-License-Identifier: MIT
+"""glTF and GLB: animated morph target weights, and properties animated through pointers."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import re
+import struct
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import numpy as np
+import numpy.typing as npt
+
+from . import named_json
+from .errors import AnimationFileError
+from .keys import CONSTANT, CUBIC, LINEAR, Keys, on_one_clock
+from .source import Take, keep_ascending, make_clip, read_bytes
+
+Doubles = npt.NDArray[np.float64]
+
+MAGIC = b"glTF"
+# Frames a second of curves that bend between their keys.
+RATE = 60.0
+_TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+_KINDS = {"STEP": CONSTANT, "LINEAR": LINEAR, "CUBICSPLINE": CUBIC}
+
+
+class Document:
+    """A glTF document and its buffers, each read when it is asked for."""
+
+    def __init__(self, path: Path, json: Mapping[str, Any], binary: bytes | None) -> None:
+        self.path = path
+        self.name = str(path)
+        self.json = json
+        self._binary = binary
+        self._buffers: dict[int, bytes] = {}
+
+    def fail(self, place: str, message: str) -> AnimationFileError:
+        return AnimationFileError(self.name, f"{place}: {message}")
+
+    def item(self, kind: str, index: object, place: str) -> dict[str, Any]:
+        """`kind[index]`. Raises: AnimationFileError: not there, or no table."""
+        rows = self.json.get(kind)
+        if not isinstance(rows, list) or isinstance(index, bool) or not isinstance(index, int):
+            raise self.fail(place, f"an index of {kind} was expected, found {index!r}")
+        if not 0 <= index < len(rows) or not isinstance(rows[index], dict):
+            raise self.fail(place, f"{kind}[{index}] was expected, there are {len(rows)}")
+        return rows[index]
+
+    def whole(self, table: Mapping[str, Any], key: str, place: str, default: int = 0) -> int:
+        value = table.get(key, default)
+        if isinstance(value, bool) or not isinstance(value, int) or value < 0:
+            raise self.fail(f"{place}.{key}", f"a whole number was expected, found {value!r}")
+        return value
+
+    def numbers(self, index: object, place: str) -> Doubles:
+        """float64[count] of a scalar accessor; whole numbers as the fractions they stand for."""
+        accessor = self.item("accessors", index, place)
+        at = f"accessors[{index}]"
+        kind = accessor.get("componentType")
+        if kind not in _TYPES or accessor.get("type") != "SCALAR":
+            raise self.fail(at, "numbers one by one were expected")
+        if "sparse" in accessor:
+            raise self.fail(at, "an accessor that is not sparse was expected")
+        dtype = np.dtype(_TYPES[kind])
+        count = self.whole(accessor, "count", at)
+        view = self.item("bufferViews", accessor.get("bufferView"), at)
+        view_at = f"bufferViews[{accessor['bufferView']}]"
+        if self.whole(view, "byteStride", view_at, dtype.itemsize) != dtype.itemsize:
+            raise self.fail(view_at, "numbers close together were expected")
+        data = self._buffer(view.get("buffer"), view_at)
+        inside = self.whole(accessor, "byteOffset", at)
+        start = self.whole(view, "byteOffset", view_at) + inside
+        length = count * dtype.itemsize
+        if inside + length > self.whole(view, "byteLength", view_at) or start + length > len(data):
+            raise self.fail(at, f"{length} bytes from {start} were expected, the buffer is shorter")
+        out = np.frombuffer(data, dtype, count, start).astype(np.float64)
+        if dtype.kind != "f":
+            out = np.maximum(out / np.iinfo(dtype).max, -1.0)
+        if not np.isfinite(out).all():
+            raise self.fail(at, f"finite numbers were expected, found {out[~np.isfinite(out)][0]}")
+        return out
+
+    def _buffer(self, index: object, place: str) -> bytes:
+        table = self.item("buffers", index, place)
+        number = int(index)  # type: ignore[call-overload]  # item says it is one
+        if number not in self._buffers:
+            self._buffers[number] = self._load(table.get("uri"), number)
+        return self._buffers[number]
+
+    def _load(self, uri: object, index: int) -> bytes:
+        place = f"buffers[{index}]"
+        if uri is None:
+            if index or self._binary is None:
+                raise self.fail(place, "a uri was expected")
+            return self._binary
+        if not isinstance(uri, str):
+            raise self.fail(place, f"a uri was expected, found {uri!r}")
+        if uri.startswith("data:"):
+            try:
+                return base64.b64decode(uri.partition(",")[2], validate=True)
+            except (binascii.Error, ValueError) as error:
+                raise self.fail(place, f"base64 was expected: {error}") from error
+        file = unquote(uri)
+        # A file may bring its own neighbours, nothing else of the disk.
+        if re.match(r"[a-zA-Z]+:|[/\\]", file) or ".." in re.split(r"[/\\]", file):
+            raise self.fail(place, f"a file beside this one was expected, found {uri[:80]!r}")
+        return read_bytes(self.path.parent / file)
+
+
+def is_glb(data: bytes) -> bool:
+    return data[:4] == MAGIC
+
+
+def open_glb(path: Path, data: bytes) -> Document:
+    """Raises: AnimationFileError: no GLB of version 2, or a cut one; with the byte."""
+    name = str(path)
+    if len(data) < 20:
+        raise AnimationFileError(name, f"a GLB's header was expected, found {len(data)} bytes")
+    version, length = struct.unpack_from("<II", data, 4)
+    if version != 2:
+        raise AnimationFileError(name, f"a GLB of version 2 was expected, found {version}")
+    if length > len(data):
+        raise AnimationFileError(
+            name, f"{length} bytes were expected, found {len(data)}: cut short"
+        )
+    chunks: dict[bytes, bytes] = {}
+    at = 12
+    while at + 8 <= length:
+        size, kind = struct.unpack_from("<I4s", data, at)
+        if at + 8 + size > length:
+            raise AnimationFileError(
+                name, f"a chunk of {size} bytes at byte {at} ends beyond the file"
+            )
+        chunks.setdefault(kind, data[at + 8 : at + 8 + size])
+        at += 8 + size
+    if b"JSON" not in chunks:
+        raise AnimationFileError(name, "a JSON chunk was expected, found none")
+    try:
+        text = chunks[b"JSON"].decode()
+    except UnicodeDecodeError as error:
+        raise AnimationFileError(
+            name, f"JSON in UTF-8 was expected (byte {error.start})"
+        ) from error
+    document = named_json.parse(text, name)
+    return open_gltf(path, document, chunks.get(b"BIN\0"))
+
+
+def is_gltf(document: object) -> bool:
+    """JSON with the version that every glTF has to have."""
+    return (
+        isinstance(document, dict)
+        and isinstance(document.get("asset"), dict)
+        and "version" in document["asset"]
+    )
+
+
+def open_gltf(path: Path, document: object, binary: bytes | None = None) -> Document:
+    """Raises: AnimationFileError: no glTF of version 2."""
+    if not is_gltf(document) or not isinstance(document, dict):
+        raise AnimationFileError(str(path), "asset.version of a glTF was expected")
+    version = str(document["asset"]["version"])
+    if not version.startswith("2"):
+        raise AnimationFileError(
+            str(path), f"glTF of version 2 was expected, found {version[:20]!r}"
+        )
+    return Document(path, document, binary)
+
+
+def read(document: Document, take: str | None = None) -> Take:
+    """The curves of an animation.
+
+    A morph target's curve has the target's name: extras.targetNames of its mesh, as exporters
+    write them, else "mesh.number". A property that KHR_animation_pointer animates has the name at
+    the end of its pointer. Meshes that share a target's name move together as a rule: their curve
+    is taken once.
+
+    Args:
+        take: name or number of an animation; None: the first that moves any of that.
+
+    Raises:
+        AnimationFileError: no such animation, parts of it that are not there.
+    """
+    notes: list[str] = []
+    animations = document.json.get("animations")
+    if not isinstance(animations, list) or not animations:
+        raise AnimationFileError(document.name, "an animation was expected, found none")
+    found: list[tuple[str, dict[str, Keys]]] = []
+    for index in _chosen(document, animations, take):
+        animation = document.item("animations", index, "animations")
+        curves = _curves(document, animation, f"animations[{index}]", notes)
+        if curves:
+            found.append((str(animation.get("name", index)), curves))
+            break
+    if not found:
+        raise AnimationFileError(
+            document.name, "animated morph targets or properties were expected, found none"
+        )
+    title, curves = found[0]
+    if len(animations) > 1:
+        names = ", ".join(
+            str(a.get("name", i)) for i, a in enumerate(animations) if isinstance(a, dict)
+        )
+        notes.append(f"animation {title} is taken of {len(animations)}: {names[:200]}")
+    times, rows = on_one_clock(list(curves.values()), RATE)
+    keep = keep_ascending(times, notes)
+    clip = make_clip(list(curves), rows[:, keep], times[keep], metadata={"take": title})
+    return Take(clip, "gltf", "", notes)
+
+
+def _chosen(document: Document, animations: Sequence[Any], take: str | None) -> list[int]:
+    if take is None:
+        return list(range(len(animations)))
+    for i, animation in enumerate(animations):
+        if isinstance(animation, dict) and take in (animation.get("name"), str(i)):
+            return [i]
+    raise AnimationFileError(document.name, f"an animation {take!r} was expected, found none")
+
+
+def _curves(
+    document: Document, animation: Mapping[str, Any], place: str, notes: list[str]
+) -> dict[str, Keys]:
+    out: dict[str, Keys] = {}
+    bones = 0
+    channels = animation.get("channels")
+    if not isinstance(channels, list):
+        raise document.fail(place, "channels were expected")
+    for i, channel in enumerate(channels):
+        at = f"{place}.channels[{i}]"
+        target = channel.get("target") if isinstance(channel, dict) else None
+        if not isinstance(target, dict):
+            raise document.fail(at, "a target was expected")
+        names = _names(document, target, at)
+        if not names:
+            bones += 1
+            continue
+        for name, keys in zip(names, _keys(document, animation, channel, names, at), strict=True):
+            if name not in out:
+                out[name] = keys
+            elif not _is_same(out[name], keys):
+                notes.append(f"{name}: another mesh moves it differently, the first one is taken")
+    if bones:
+        notes.append(f"{bones} channel(s) move nodes, not shapes or properties: left out")
+    return out
+
+
+def _is_same(a: Keys, b: Keys) -> bool:
+    return bool(np.array_equal(a.times, b.times) and np.array_equal(a.values, b.values))
+
+
+def _names(document: Document, target: Mapping[str, Any], place: str) -> list[str]:
+    """Curves that a channel holds; none of a node's place, rotation or scale."""
+    if target.get("path") == "weights":
+        node = document.item("nodes", target.get("node"), f"{place}.target.node")
+        return _target_names(document, node.get("mesh"), place)
+    extensions = target.get("extensions")
+    pointer = extensions.get("KHR_animation_pointer") if isinstance(extensions, dict) else None
+    path = pointer.get("pointer") if isinstance(pointer, dict) else None
+    if not isinstance(path, str):
+        return []
+    parts = [part.replace("~1", "/").replace("~0", "~") for part in path.split("/")[1:]]
+    if len(parts) >= 3 and parts[0] in ("nodes", "meshes") and parts[2] == "weights":
+        index = int(parts[1]) if parts[1].isdigit() else -1
+        owner = document.item(parts[0], index, f"{place}.target")
+        mesh = index if parts[0] == "meshes" else owner.get("mesh")
+        names = _target_names(document, mesh, place)
+        if len(parts) == 3:
+            return names
+        if not parts[3].isdigit() or int(parts[3]) >= len(names):
+            raise document.fail(
+                place, f"a weight of {len(names)} was expected, found {path[:80]!r}"
+            )
+        return [names[int(parts[3])]]
+    # Colours, places and the like are no curves of a face; what an author put into extras may be.
+    return [parts[-1]] if "extras" in parts and parts[-1] != "extras" else []
+
+
+def _target_names(document: Document, mesh: object, place: str) -> list[str]:
+    table = document.item("meshes", mesh, f"{place}, mesh")
+    extras = table.get("extras")
+    names = extras.get("targetNames") if isinstance(extras, dict) else None
+    primitives = table.get("primitives")
+    first = primitives[0] if isinstance(primitives, list) and primitives else {}
+    targets = first.get("targets") if isinstance(first, dict) else None
+    count = len(targets) if isinstance(targets, list) else 0
+    if not isinstance(names, list) or (count and len(names) != count):
+        return [f"{table.get('name', mesh)}.{i}" for i in range(count)]
+    return [str(name) for name in names]
+
+
+def _keys(
+    document: Document,
+    animation: Mapping[str, Any],
+    channel: Mapping[str, Any],
+    names: Sequence[str],
+    place: str,
+) -> list[Keys]:
+    """A curve for each name of a channel's sampler."""
+    samplers, index = animation.get("samplers"), channel.get("sampler")
+    if not isinstance(samplers, list) or not isinstance(index, int):
+        raise document.fail(place, f"a sampler was expected, found {index!r}")
+    sampler = samplers[index] if 0 <= index < len(samplers) else None
+    if not isinstance(sampler, dict):
+        raise document.fail(place, f"a sampler was expected, found {index!r}")
+    way = sampler.get("interpolation", "LINEAR")
+    if way not in _KINDS:
+        raise document.fail(place, f"one of {', '.join(_KINDS)} was expected, found {way!r}")
+    times = document.numbers(sampler.get("input"), f"{place}, input")
+    if times.size == 0 or (np.diff(times) <= 0.0).any():
+        raise document.fail(place, "key times that ascend were expected")
+    values = document.numbers(sampler.get("output"), f"{place}, output")
+    parts = 3 if way == "CUBICSPLINE" else 1
+    if values.size != times.size * parts * len(names):
+        raise document.fail(
+            place,
+            f"{times.size * parts * len(names)} values for {len(names)} targets and "
+            f"{times.size} keys were expected, found {values.size}",
+        )
+    table = values.reshape(times.size, parts, len(names))
+    kinds = np.full(times.size, _KINDS[way], np.uint8)
+    if parts == 1:
+        return [Keys(times, table[:, 0, i], kinds) for i in range(len(names))]
+    return [
+        Keys(times, table[:, 1, i], kinds, table[:, 2, i], table[:, 0, i])
+        for i in range(len(names))
+    ]

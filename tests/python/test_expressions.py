@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: MIT
+"""Expressions: what comes with Risorius fits the standard controls; what is wrong is said."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from risorius import expressions
+from risorius.expressions import VISEMES, Expression, Lack
+from risorius.reactions import load_exclusives, load_reactions
+
+EMOTIONS = {"joy", "sadness", "anger", "fear", "disgust", "surprise"}
+MORE = set(
+    "blink wink_left wink_right squint smile_closed smile_open smirk kiss pout sneer yawn frown "
+    "contempt doubt concentration relief pain sleepy gasp cheek_puff tongue_out".split()
+)
+
+
+def test_all_that_were_asked_for_are_there():
+    own = expressions.load()
+    by_group = {}
+    for expression in own.values():
+        by_group.setdefault(expression.group, set()).add(expression.name)
+    assert by_group["emotion"] == EMOTIONS
+    assert by_group["viseme"] == set(VISEMES)
+    assert len(VISEMES) == 15
+    assert by_group["face"] >= MORE
+    labels = [e.label for e in own.values()]
+    assert len(set(labels)) == len(labels)
+    assert all(e.description.endswith(".") for e in own.values())
+
+
+def test_every_name_is_a_standard_control(standard_controls):
+    known = set(standard_controls)
+    used = {n: c for n, e in expressions.load().items() for c in e.weights}
+    used |= {r.name: c for r in load_reactions().values() for p in r.parts for c in p.weights}
+    assert set(used.values()) <= known
+    rules = load_exclusives()
+    named = {n for y in rules.yields for n in (*y.by, *y.of)}
+    assert named | {n for pair in rules.opposites for n in pair} <= known
+    assert expressions.check(standard_controls) == {}
+
+
+def test_expressions_differ(standard_controls):
+    own = expressions.load()
+    vectors = np.array([expressions.pose_vector(n, standard_controls) for n in own])
+    apart = np.abs(vectors[:, None] - vectors[None]).sum(axis=2)
+    assert apart[~np.eye(len(own), dtype=bool)].min() > 0.3
+    assert ((vectors >= 0) & (vectors <= 1)).all()
+
+
+def test_what_visemes_do_to_jaw_and_lips():
+    weights = {n: e.weights for n, e in expressions.load().items() if e.group == "viseme"}
+
+    def of(name, control):
+        return weights[name].get("CTRL_expressions." + control, 0.0)
+
+    jaw = {name: of(name, "jawOpen") for name in weights}
+    assert max(jaw, key=jaw.get) == "aa"
+    assert jaw["aa"] > jaw["O"] > jaw["U"]
+    assert jaw["E"] > jaw["I"] > jaw["SS"]
+    assert weights["sil"] == {}
+    assert of("PP", "mouthPressUL") > 0
+    assert of("FF", "mouthLowerLipBiteL") > 0
+    assert of("U", "mouthLipsPurseUL") > of("O", "mouthLipsPurseUL") > 0
+    assert of("I", "mouthCornerPullL") > of("aa", "mouthCornerPullL")
+
+
+def test_pose_vector_by_hand():
+    rig = ["other", "CTRL_expressions.eyeBlinkR", "CTRL_expressions.browDownL"]
+    found = expressions.pose_vector("blink", rig)
+    assert found.dtype == np.float32
+    assert found.tolist() == np.float32([0, 1, 0.05]).tolist()
+    own = Expression("x", "X", "g", "", {"other": 0.5})
+    assert expressions.pose_vector(own, rig).tolist() == [0.5, 0, 0]
+
+
+def test_what_a_rig_lacks():
+    rig = ["CTRL_expressions.eyeBlinkL", "CTRL_expressions.browDownL", "CTRL_expressions.browDownR"]
+    lack = expressions.check(rig)
+    assert lack["blink"].missing == ("CTRL_expressions.eyeBlinkR",)
+    assert lack["blink"].share == pytest.approx(1.1 / 2.1)
+    assert "sil" not in lack
+    own = {"x": Expression("x", "X", "g", "", {"a": 0.2, "b": 0.6})}
+    assert expressions.check(["b"], own) == {"x": Lack(("a",), pytest.approx(0.75))}
+
+
+FILE = """prefix = "P."
+group = "own"
+[expressions.one]
+label = "One"
+weights = { "lip**" = 0.5, "brow*" = 0.4, "browL" = 0.6 }
+"""
+
+
+def test_a_file_of_ones_own(tmp_path):
+    path = tmp_path / "own.toml"
+    path.write_text(FILE, encoding="utf-8")
+    one = expressions.load(path)["one"]
+    assert (one.label, one.group, one.description) == ("One", "own", "")
+    assert one.weights == {
+        **{f"P.lip{q}": 0.5 for q in ("UL", "UR", "DL", "DR")},
+        "P.browL": 0.6,
+        "P.browR": 0.4,
+    }
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("= 0.5", "= 1.5", "one: lip.*: a weight from 0 to 1 was expected, found 1.5"),
+        ("= 0.5", "= true", "found True"),
+        ("= 0.5", "= 'much'", "found 'much'"),
+        ("weights =", "weight =", "one: a table with weights"),
+        ("label =", "titel =", "found titel"),
+        ("[expressions.one]", "[one]", "a table of expressions was expected"),
+        ("[expressions.one]", "[expressions.one", "a TOML file was expected"),
+    ],
+)
+def test_refuses(tmp_path, old, new, sentence):
+    path = tmp_path / "own.toml"
+    path.write_text(FILE.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(ValueError, match=sentence) as error:
+        expressions.load(path)
+    assert str(path) in str(error.value)
+
+
+def test_an_unknown_name_is_said():
+    with pytest.raises(ValueError, match="joi: an expression such as joy"):
+        expressions.get("joi")
