@@ -95,6 +95,20 @@ TEST(ClipCurves, AreTheSameHoweverTheProcessRounds) {
   EXPECT_EQ(after, FE_UPWARD) << "the caller's rounding is to stay";
 }
 
+TEST(ClipCurves, OfAnotherLengthAreRefused) {
+  const Clip clip = make_all_kinds(64);
+  Clip smooth = make_clip(1, 64);
+  std::copy_n(clip.curve(3).begin(), 64, smooth.curves.data());
+  const Bytes bytes = encoded(smooth);
+  const std::uint32_t first = 0;  // one frame more or less may lie in the bits that fill a byte
+  for (const std::size_t frames : {1u, 32u, 64u, 200u}) {
+    const auto curves = EncodedCurves::open(bytes, 1, frames);
+    ASSERT_TRUE(curves.has_value());
+    std::vector<float> out(frames);
+    EXPECT_EQ(curves->decode({&first, 1}, out.data(), frames).has_value(), frames == 64) << frames;
+  }
+}
+
 TEST(ClipCurves, OrderOfFloatsIsTheirOwn) {
   const float values[] = {-INFINITY, -2.0f, -1e-40f, -0.0f, 0.0f, 1e-40f, 1.0f, INFINITY};
   for (std::size_t i = 0; i + 1 < std::size(values); ++i) {
