@@ -575,7 +575,10 @@ def test_the_panel_shows_the_state_and_the_way_back(dna_file):
     assert out.operators == ["risorius.bake", "risorius.export_animation"]
     bpy.ops.risorius.unbake()
     _bake(kind="CONTROLS")
-    assert "The controls are baked; layers, NLA and drivers rest, frames 1 to 10." in _drawn(panel).text()
+    assert (
+        "The controls are baked; layers, NLA and drivers rest, frames 1 to 10."
+        in _drawn(panel).text()
+    )
 
 
 def test_what_cannot_be_baked_says_so(dna_file):

@@ -539,15 +539,15 @@ def test_keys_of_weights_outlive_their_action(rig, tmp_path):
     for frame, value in ((1, 0.0), (11, 1.0)):
         controls.risorius_layers[0].weight = value
         controls.keyframe_insert("risorius_layers[0].weight", frame=frame)
-    wanted = _value(rig, 4, PULL)
-    assert 0.0 < wanted < 0.5
+    wanted = [_value(rig, frame, PULL) for frame in (4, 8)]
+    assert 0.0 < wanted[0] < wanted[1]
     table = tmp_path / "brow.csv"
     table.write_text("time,browDownLeft\n0,0.1\n1,0.2\n", encoding="utf-8")
     assert bpy.ops.risorius.import_animation(filepath=str(table)) == {"FINISHED"}
-    assert _value(rig, 4, PULL) == pytest.approx(wanted)
+    assert [_value(rig, frame, PULL) for frame in (4, 8)] == pytest.approx(wanted)
     assert bpy.ops.risorius.layer_add(kind="ACTION") == {"FINISHED"}
     assert [y.name for y in controls.risorius_layers] == ["Layer", "brow"]
-    assert _value(rig, 4, PULL) == pytest.approx(wanted)
+    assert [_value(rig, frame, PULL) for frame in (4, 8)] == pytest.approx(wanted)
     assert _value(rig, 4, BROW) == pytest.approx(0.1 + 0.1 * 3 / 24, abs=1e-5)
 
 
@@ -566,3 +566,43 @@ def test_undo_of_an_edited_action(rig):
     assert _value(rig, 5, JAW) == pytest.approx(0.75)
     assert bpy.ops.ed.undo() == {"FINISHED"}
     assert _value(bpy.data.objects["Small_rig"], 5, JAW) == pytest.approx(0.25)
+
+
+@pytest.mark.parametrize(
+    ("setting", "value"),
+    [
+        ("start", 4.0),
+        ("scale", 0.5),
+        ("trim_start", 3.0),
+        ("trim_end", 9.0),
+        ("repeat", 2.0),
+        ("reverse", True),
+        ("blend", "MAXIMUM"),
+        ("extend", "NOTHING"),
+        ("fade_in", 9.0),
+        ("fade_out", 9.0),
+        ("mute", True),
+        ("controls", "jaw*"),
+        ("regions", {"JAW"}),
+        ("kind", "EXPRESSION"),
+    ],
+)
+def test_every_setting_is_heeded_at_once(rig, setting, value):
+    entry = _entry(rig, action=_wave(rig), expression="anger")
+    scene.face(rig)[BROW] = 0.5
+    other = _entry(rig, kind="EXPRESSION", expression="joy", weight=0.1)
+    frames = (2, 6, 14, 25)
+    before = np.array([_raw(rig, f) for f in frames])
+    setattr(entry, setting, value)
+    changed = np.array([_raw(rig, f) for f in frames])
+    assert np.abs(changed - before).max() > 0.01
+    _layers().forget()
+    np.testing.assert_array_equal([_raw(rig, f) for f in frames], changed)
+    assert other.name == "Layer.001"
+
+
+def test_a_reaction_needs_no_layer(blinker):
+    assert _value(blinker, 19, BLINK) == 0.0
+    bpy.context.scene.frame_set(15)
+    assert bpy.ops.risorius.fire(reaction="flash") == {"FINISHED"}
+    assert _value(blinker, 19, BLINK) > 0.9

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 from time import monotonic, sleep
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -251,9 +252,10 @@ def test_it_ends_with_the_face_the_file_and_the_addon(dna_file, port, tmp_path):
     rig = scene.load(dna_file)
     bpy.ops.risorius.live_start()
     assert listens(port)
+    name = scene.controls(rig).name
     for item in scene.submodule("scene.parts").members_of(rig):
         bpy.data.objects.remove(item)
-    scene.load(dna_file)  # another face of the same name
+    scene.controls(scene.load(dna_file)).name = name  # another face of the same name
     assert module._tick() is None
     assert not listens(port)
     assert "went away" in module.last_error()
@@ -282,6 +284,17 @@ def test_it_ends_with_the_face_the_file_and_the_addon(dna_file, port, tmp_path):
     module.register()
 
 
+def test_an_error_ends_it_and_is_shown(dna_file, port, monkeypatch):
+    module = scene.submodule("scene.live")
+    scene.load(dna_file)
+    bpy.ops.risorius.live_start()
+    monkeypatch.setattr(module, "show", lambda *_arguments: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        module._tick()
+    assert not listens(port)
+    assert "the console shows" in drawn()
+
+
 def test_undo_does_not_end_it(dna_file, port):
     rig = scene.load(dna_file)
     bpy.ops.ed.undo_push(message="before")
@@ -297,6 +310,62 @@ def test_undo_does_not_end_it(dna_file, port):
     tick_until(rig, 1)
     assert scene.face(rig)[JAW_OPEN] == 0.5
     assert scene.error_against_oracle(rig, dna_file, raw(jawOpen=0.5)) < scene.TOLERANCE
+
+
+class Layout:
+    """Stands in for a panel's layout: takes what Blender's would, keeps the words."""
+
+    ICONS = set(bpy.types.UILayout.bl_rna.functions["label"].parameters["icon"].enum_items.keys())
+
+    def __init__(self):
+        self.words = []
+
+    def label(self, text="", icon="NONE"):
+        assert icon in self.ICONS, icon
+        self.words.append(text)
+
+    def prop(self, data, name, text=None, icon="NONE"):
+        assert name in data.bl_rna.properties
+        assert icon in self.ICONS, icon
+
+    def operator(self, name, text="", icon="NONE", depress=False):
+        assert icon in self.ICONS, icon
+        assert name.partition(".")[2] in dir(bpy.ops.risorius), name
+        self.words.append(text)
+        return SimpleNamespace()
+
+    def row(self, align=False):
+        return self
+
+    column = row
+
+
+def drawn():
+    """The words of the panel as it is now."""
+    layout = Layout()
+    panel = scene.submodule("ui.live_operators").RISORIUS_PT_live
+    panel.draw(SimpleNamespace(layout=layout), bpy.context)
+    return " | ".join(layout.words)
+
+
+def test_the_panel_says_what_comes(dna_file, port):
+    rig = scene.load(dna_file)
+    drawn()
+    bpy.ops.risorius.live_start()
+    assert f"Port {port}: nothing heard yet" in drawn()
+    bpy.ops.risorius.live_record()
+    steps = [packet(1, _17=0.5), ["hex", "09"], packet(2, "Bob"), packet(2, _17=0.5), packet(1)]
+    send(port, *steps)
+    tick_until(rig, 2)
+    words, ends = drawn(), monotonic() + 10.0
+    while "Late" not in words and monotonic() < ends:
+        sleep(0.01)
+        words = drawn()
+    for part in ("iPhone: 2 a second", "ms ago", "Recording: 2 faces", "Late, left out: 1", "Bob"):
+        assert part in words
+    assert "Packets refused: 1 | packet version 1, 2, 5 or 6 was" in words  # and on, in more lines
+    assert bpy.ops.risorius.live_subject(name="Bob") == {"FINISHED"}
+    assert "Bob: 1 a second" in drawn()
 
 
 def test_what_cannot_start_is_one_sentence(dna_file, port):

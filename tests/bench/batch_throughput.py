@@ -1,20 +1,22 @@
 # SPDX-License-Identifier: MIT
 """Frames per second of a batch on each core, beside those of evaluating one frame after the other.
 
-    python tests/bench/batch_throughput.py CHARACTER.dna [--clips 16] [--frames 3600] [--lod 0]
+    python tests/bench/batch_throughput.py CHARACTER.dna [--clips 80] [--frames 3600] [--lod 0]
 
 Clips by formula: a third of the controls move, as sines of their own speeds, 60 frames a second.
-Rows that run in this process take one clip; rows with workers take all, start of processes and
-reading of clips included. What a row has beyond the evaluation is where its time goes.
+Rows of a bake take one clip in this process; rows of a batch take all (those with files a tenth),
+start of processes and reading of clips included. CPU time is that of all processes, so it is a
+core's; on a machine that does other things too, compare it and not the wall time.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import platform
+import shutil
 import subprocess
-import sys
 import tempfile
 import time
 from pathlib import Path
@@ -53,58 +55,95 @@ def make_clip(names: list[str], frames: int, seed: int) -> risorius.Clip:
     return risorius.Clip([names[i] for i in some], curves, 60.0)
 
 
-def single(clip: risorius.Clip, face: Face, lod: int) -> float:
-    """Seconds of Rig.evaluate, frame by frame."""
+class Clock:
+    """Seconds on the wall and on processors, of this process and of those it has waited for."""
+
+    def __enter__(self) -> Clock:
+        self._wall, self._cpu = time.perf_counter(), self._spent()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.wall = time.perf_counter() - self._wall
+        self.cpu = self._spent() - self._cpu
+
+    def _spent(self) -> float:
+        return time.process_time() + sum(os.times()[2:4])
+
+
+class Table:
+    """Rows of frames per second; the first is what the others are compared with."""
+
+    def __init__(self) -> None:
+        self._alone = 0.0
+        print(f"{'frames per second':<42}{'of CPU time':>13}{'of single':>11}{'of wall time':>14}")
+
+    def row(self, what: str, frames: int, clock: Clock, note: str = "") -> None:
+        speed = frames / max(clock.cpu, 1e-9)
+        self._alone = self._alone or speed
+        ratio, wall = speed / self._alone, frames / clock.wall
+        print(f"{what:<42}{speed:>13,.0f}{ratio:>11.2f}{wall:>14,.0f}  {note}", flush=True)
+
+
+def single(clip: risorius.Clip, face: Face, lod: int) -> Clock:
+    """Rig.evaluate, frame by frame."""
     raw, _ = clip.raw_controls(face.rig.raw_control_names)
-    started = time.perf_counter()
-    for frame in raw:
-        face.rig.evaluate(frame, lod=lod)
-    return time.perf_counter() - started
+    with Clock() as clock:
+        for frame in raw:
+            face.rig.evaluate(frame, lod=lod)
+    return clock
 
 
-def in_chunks(clip: risorius.Clip, face: Face, lod: int) -> float:
-    """Seconds of evaluate_batch on one core, poses thrown away."""
-    started = time.perf_counter()
-    for _ in played(clip, face, lod):
-        pass
-    return time.perf_counter() - started
+def in_chunks(clip: risorius.Clip, face: Face, lod: int) -> Clock:
+    """evaluate_batch on one core, poses thrown away."""
+    with Clock() as clock:
+        for _ in played(clip, face, lod):
+            pass
+    return clock
 
 
-def baked(
-    clip: risorius.Clip, face: Face, lod: int, folder: Path, kind: str, compress: bool
-) -> tuple[float, int]:
-    """Seconds and bytes of one bake; kind "" for the facts only."""
-    outputs = {kind: folder / f"out.{kind}"} if kind else {}
-    started = time.perf_counter()
-    bake(clip, face, lod, outputs, parts=PARTS, compress=compress)
-    seconds = time.perf_counter() - started
-    size = sum(path.stat().st_size for path in outputs.values())
-    for path in outputs.values():
-        path.unlink()
-    return seconds, size
+def bakes(table: Table, clip: risorius.Clip, face: Face, lod: int, folder: Path) -> None:
+    """What each kind of output adds to the evaluation, in this process."""
+    for kind, compress in (("", False), ("npz", False), ("npz", True), ("csv", False)):
+        path = folder / f"out.{kind}"
+        with Clock() as clock:
+            bake(clip, face, lod, {kind: path} if kind else {}, parts=PARTS, compress=compress)
+        size = path.stat().st_size / clip.frame_count if kind else 0
+        what = f"bake: {kind or 'statistics'}{' --compress' * compress}"
+        table.row(what, clip.frame_count, clock, f"{size:,.0f} bytes a frame" if kind else "")
 
 
-def batched(folder: Path, dna: Path, lod: int, workers: int, write: str) -> float:
-    """Seconds of a whole batch."""
-    jobs = folder / f"jobs_{write or 'facts'}_{workers}.toml"
-    jobs.write_text(
-        f'output = "{jobs.stem}"\n[[jobs]]\nclips = "clips/*.rzc"\n'
-        f"characters = '{dna}'\nlods = [{lod}]\nwrite = {[write] if write else []}\n"
-    )
-    started = time.perf_counter()
-    report = run(read_jobs(jobs), workers=workers, scheduler=None, restart=True)
-    seconds = time.perf_counter() - started
-    if report.failed():
-        raise SystemExit(report.failed()[0].error)
-    for path in (folder / jobs.stem).rglob("*.npz"):
-        path.unlink()
-    return seconds
+def batches(table: Table, dna: Path, lod: int, folder: Path) -> None:
+    """Whole batches; a tenth of the clips where files are written."""
+    for write, pattern in (("", "*"), ("npz", "*0")):
+        for workers in sorted({1, default_workers()}):
+            jobs = folder / f"jobs{write}{workers}.toml"
+            jobs.write_text(
+                f"output = '{jobs.stem}'\n[[jobs]]\nclips = 'clips/{pattern}.rzc'\n"
+                f"characters = '{dna}'\nlods = [{lod}]\nwrite = {[write] if write else []}\n"
+            )
+            with Clock() as clock:
+                report = run(read_jobs(jobs), workers=workers, scheduler=None, restart=True)
+            if report.failed():
+                raise SystemExit(report.failed()[0].error)
+            what = f"batch: {write or 'statistics'}, {workers} worker{'s' * (workers > 1)}"
+            table.row(what, report.frames, clock, shares(folder / jobs.stem / "summary.json"))
+            shutil.rmtree(folder / jobs.stem)
+
+
+def shares(summary: Path) -> str:
+    """Of the time that jobs took in their workers: reading, evaluating, the rest."""
+    rows = json.loads(summary.read_text())["jobs"]
+    total = sum(row["job_seconds"] for row in rows)
+    load = sum(row["load_seconds"] for row in rows) / total
+    evaluation = sum(row["evaluation_seconds"] for row in rows) / total
+    rest = 1 - load - evaluation
+    return f"jobs: {load:.0%} reading, {evaluation:.0%} evaluating, {rest:.0%} facts and writing"
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("dna", type=Path)
-    parser.add_argument("--clips", type=int, default=16)
+    parser.add_argument("--clips", type=int, default=80)
     parser.add_argument("--frames", type=int, default=3600)
     parser.add_argument("--lod", type=int, default=0)
     parser.add_argument("--folder", type=Path, help="where to write, else the temporary folder")
@@ -117,40 +156,21 @@ def main() -> None:
     print(about())
     print(
         f"{dna.name}, LOD {args.lod}: {len(names)} controls, {face.rig.joint_count} joints, "
-        f"{4 * numbers:,} bytes of pose a frame; clips of {args.frames} frames"
+        f"{4 * numbers:,} bytes of pose a frame; {args.clips} clips of {args.frames} frames"
     )
-    print(f"{'':<44}{'frames/s a core':>16}{'of single':>12}{'bytes a frame':>15}")
-    alone = args.frames / single(clip, face, args.lod)
-
-    def row(what: str, frames: float, seconds: float, cores: int = 1, size: int = 0) -> None:
-        speed = frames / seconds / cores
-        tail = f"{size / frames:>15,.0f}" if size else ""
-        print(f"{what:<44}{speed:>16,.0f}{speed / alone:>12.2f}{tail}", flush=True)
-
-    row("Rig.evaluate, frame by frame", args.frames, args.frames / alone)
-    row("evaluate_batch in chunks", args.frames, in_chunks(clip, face, args.lod))
+    table = Table()
+    table.row("Rig.evaluate, frame by frame", args.frames, single(clip, face, args.lod))
+    table.row("evaluate_batch in chunks", args.frames, in_chunks(clip, face, args.lod))
     with tempfile.TemporaryDirectory(dir=args.folder) as name:
         folder = Path(name)
-        for what, kind, compress in (
-            ("bake: statistics", "", False),
-            ("bake: .npz", "npz", False),
-            ("bake: .npz --compress", "npz", True),
-            ("bake: .csv", "csv", False),
-        ):
-            seconds, size = baked(clip, face, args.lod, folder, kind, compress)
-            row(what, args.frames, seconds, 1, size)
+        bakes(table, clip, face, args.lod, folder)
         (folder / "clips").mkdir()
         for i in range(args.clips):
             make_clip(names, args.frames, i).save(folder / "clips" / f"clip{i:03}.rzc")
-        cores = default_workers()
-        for write in ("", "npz"):
-            for workers in sorted({1, cores}):
-                seconds = batched(folder, dna, args.lod, workers, write)
-                what = f"batch: {(write and '.' + write) or 'statistics'}, {args.clips} clips"
-                what += f", {workers} worker{'s' * (workers > 1)}"
-                row(what, args.clips * args.frames, seconds, workers)
-    print(f"{os.cpu_count()} cores; load {os.getloadavg() if hasattr(os, 'getloadavg') else '?'}")
+        batches(table, dna, args.lod, folder)
+    if hasattr(os, "getloadavg"):
+        print(f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}")
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

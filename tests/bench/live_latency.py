@@ -45,8 +45,8 @@ def _prepare(dna):
 
     os.environ["BLENDER_USER_RESOURCES"] = tempfile.mkdtemp(prefix="risorius-bench-")
     os.environ["RISORIUS_TEST_USER"] = os.environ["BLENDER_USER_RESOURCES"]
+    import bpy  # isort: skip  it puts addon_utils on the path
     import addon_utils
-    import bpy
     import conftest
 
     bpy.ops.wm.read_factory_settings(use_empty=True)

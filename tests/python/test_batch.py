@@ -579,12 +579,12 @@ def test_progress(monkeypatch):
     for terminal in (True, False):
         now[0] = 0.0
         shown = Terminal(terminal)
-        progress = Progress(40, "jobs", shown)
-        progress.update(1, 100)
+        progress = Progress(40, "jobs", before=5, stream=shown)
+        progress.update(6, 100)
         assert shown.text == ""  # what is done at once needs no bar
         now[0] = 20.0
-        progress.update(10, 3000, "1 failed")
-        line = "[#####...............] 10 of 40 jobs, 150 frames/s, 1:00 left, 1 failed"
+        progress.update(15, 3000, "1 failed")
+        line = "[#######.............] 15 of 40 jobs, 150 frames/s, 0:50 left, 1 failed"
         assert line in shown.text
         assert shown.text.startswith("\r" if terminal else "risorius: ")
         progress.say("so it is")

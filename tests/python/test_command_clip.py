@@ -65,6 +65,15 @@ def test_a_clip_of_its_own_goes_in_and_out(take, tmp_path, capsys):
     np.testing.assert_array_equal(again.curves, want.curves)
 
 
+def test_repeated_frames_are_dropped_before_gaps_are_filled(tmp_path):
+    (tmp_path / "a.csv").write_text("time,jawOpen\n0,0\n0.1,0\n0.2,1\n0.3,0\n")
+    assert run("convert", tmp_path / "a.csv", "-o", tmp_path / "b.csv", "--drop-repeats") == 0
+    assert importing.read(tmp_path / "b.csv").clip.curves.tolist() == [[0, 1, 0]]
+    options = ["--drop-repeats", "--fill-gaps"]
+    assert run("convert", tmp_path / "a.csv", "-o", tmp_path / "b.csv", *options) == 0
+    assert importing.read(tmp_path / "b.csv").clip.curves.tolist() == [[0, 0.5, 1, 0]]
+
+
 def test_reports_by_name_and_keeps_to_the_rig(take, tmp_path, capsys):
     out = tmp_path / "out.csv"
     assert run("convert", take, "-o", out, "--rig", GOLDEN / "core.dna", "--report") == 0

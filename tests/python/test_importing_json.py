@@ -110,6 +110,7 @@ def test_unreals_curves_share_one_clock(tmp_path, write):
     assert found.mapping == "controls"
     clip, report = found.apply()
     np.testing.assert_allclose(clip.frame_times(), [0, 0.25, 0.5])
+    assert clip.rate == 60.0  # keys that lie far apart are no frame rate
     np.testing.assert_array_equal(clip.curve(RIG + "jawOpen"), [0, 0.5, 1])
     np.testing.assert_array_equal(clip.curve(RIG + "eyeBlinkL"), [0.5, 0.5, 0.5])
     assert report.unmapped == []

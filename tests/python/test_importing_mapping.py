@@ -231,3 +231,15 @@ def test_a_mapping_that_does_not_hold_together_is_one_sentence(text, sentence):
 def test_a_mapping_that_is_not_there_names_those_that_are(tmp_path):
     with pytest.raises(importing.MappingError, match="cannot read it.*built in: arkit"):
         importing.load_mapping(tmp_path / "no.toml")
+
+
+def test_a_take_and_the_live_stream_turn_the_same_way():
+    """Both say how the app's angles turn; they were written apart."""
+    from risorius.live import livelink
+
+    rows = importing.load_mapping("live_link_face").rows
+    signs = dict(zip(livelink.CURVES, livelink._SIGNS.tolist(), strict=True))
+    for row in rows.values():
+        for control, weight in row.items():
+            if control in signs:
+                assert signs[control] == weight, control

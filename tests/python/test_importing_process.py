@@ -86,6 +86,18 @@ def test_smoothing_passes_cubics_and_takes_noise():
     assert abs(out[20:-20].var() / expected - 1.0) < 0.1
 
 
+def test_smoothing_fits_a_polynomial_around_every_frame_and_keeps_the_range():
+    values = np.random.default_rng(4).uniform(size=60)
+    out = only(process.smooth(clip(values), 0.2))
+    for i in range(60):
+        first = min(max(i - 6, 0), 60 - 13)
+        window = np.arange(first, first + 13)
+        fit = np.polyval(np.polyfit(window - i, values[window], 3), 0.0)
+        assert out[i] == pytest.approx(np.clip(fit, values.min(), values.max()), abs=1e-5)
+    step = only(process.smooth(clip(np.where(AT < 1.0, 0.0, 1.0)), 0.2))
+    assert (step.min(), step.max()) == (0.0, 1.0)
+
+
 def test_smoothing_keeps_a_peaks_height_and_time():
     blink = np.exp(-0.5 * ((AT - 1.0) / 0.05) ** 2)
     kept = only(process.smooth(clip(blink), 0.1))

@@ -129,7 +129,8 @@ def test_steps_and_splines_are_sampled(tmp_path):
     at = clip.frame_times()
     np.testing.assert_array_equal(clip.curve("jawOpen"), np.where((at >= 0.5) & (at < 1), 1, 0))
     # In, value, out of each key: the cubic 3 t^2 - 2 t^3 with flat ends; and t with slope 1.
-    values = [0, 1, 0, 0, 0, 1, 0, 1, 1, 1, 0, 1]
+    # What comes before the first key and after the last (9) says nothing.
+    values = [9, 9, 0, 0, 0, 1, 0, 1, 1, 1, 9, 9]
     clip = read_small(tmp_path, [0, 1], values, WEIGHTS, "CUBICSPLINE").clip
     at = clip.frame_times()
     assert at.size == 61
@@ -164,6 +165,7 @@ def damaged(change):
         (lambda d: d.pop("animations"), "an animation was expected, found none"),
         (lambda d: d["accessors"][1].update(count=3), "4 values for 2 targets and 2 keys"),
         (lambda d: d["accessors"][1].update(count=5), "bytes from 8 were expected, the buffer is"),
+        (lambda d: d["accessors"][0].update(count=3), "12 bytes from 0 were expected"),
         (lambda d: d["accessors"][0].update(type="VEC3"), "numbers one by one were expected"),
         (lambda d: d["animations"][0]["channels"][0].update(sampler=7), "a sampler was expected"),
         (lambda d: d["nodes"].clear(), r"nodes\[0\] was expected, there are 0"),
@@ -233,10 +235,22 @@ def test_a_face_boards_sliders_and_a_channels_percent(tmp_path):
     assert clip.curves[:, -1].tolist() == [-1.0, 0.5, 1.0]
 
 
+def test_what_moves_chooses_the_mapping(tmp_path):
+    still = {f"d|{axis}": fbx.curve(i, [0, 1], [0, 0]) for i, axis in enumerate("XYZ")}
+    tracks = [("Model/Null", "CTRL_C_jaw", "Lcl Translation", still, 0)]
+    found = read_fbx(tmp_path, [*tracks, prop("jawOpen", fbx.curve(9, [0, 1], [0, 1]))])
+    assert found.mapping == "arkit"
+
+
+def test_key_times_are_exact_after_an_hour(tmp_path):
+    clip = read_fbx(tmp_path, [prop("a", fbx.curve(1, [0.0, 4000.0], [0, 1]))]).clip
+    assert clip.duration == pytest.approx(4000.0, abs=1e-9)
+
+
 def test_cubic_and_constant_keys_are_sampled(tmp_path):
     slopes = np.zeros((2, 2))
     smooth = fbx.curve(1, [0, 1], [0, 1], fbx.CUBIC | fbx.USER, slopes)
-    slanted = fbx.curve(2, [0, 1], [0, 1], fbx.CUBIC | fbx.USER, [[2.0, 0.0], [0.0, 0.0]])
+    slanted = fbx.curve(2, [0, 1], [0, 1], fbx.CUBIC | fbx.USER, [[2.0, 0.5], [7.0, 7.0]])
     step = fbx.curve(3, [0, 0.5, 1], [0, 1, 0], fbx.CONSTANT)
     auto = fbx.curve(4, [0, 0.5, 1], [0, 0.5, 1], fbx.CUBIC | fbx.AUTO)
     tracks = [prop(name, c) for name, c in zip("abcd", (smooth, slanted, step, auto), strict=True)]
@@ -244,8 +258,8 @@ def test_cubic_and_constant_keys_are_sampled(tmp_path):
     at = clip.frame_times()
     assert at.size == 61
     np.testing.assert_allclose(clip.curve("a"), 3 * at**2 - 2 * at**3, atol=1e-6)
-    # Slope 2 at the start, 0 at the end.
-    np.testing.assert_allclose(clip.curve("b"), 2 * at - at**2, atol=1e-6)
+    # The cubic from 0 to 1 with slope 2 at the start and 0.5 at the end.
+    np.testing.assert_allclose(clip.curve("b"), 2 * at - 1.5 * at**2 + 0.5 * at**3, atol=1e-6)
     np.testing.assert_array_equal(clip.curve("c"), np.where((at >= 0.5) & (at < 1), 1, 0))
     np.testing.assert_allclose(clip.curve("d"), at, atol=1e-6)
 

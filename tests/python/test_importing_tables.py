@@ -114,11 +114,12 @@ def test_columns_are_known_by_their_names(tmp_path, names):
     )
 
 
-def test_angles_turn_to_the_faces_own_left_and_up(tmp_path):
+def test_angles_turn_to_the_faces_own_left_up_and_left_shoulder(tmp_path):
     clip, report = read(tmp_path, take()).apply()
     values = capture(90).astype(np.float32)
-    for control, column in (("head.yaw", "HeadYaw"), ("head.pitch", "HeadPitch")):
-        np.testing.assert_array_equal(clip.curve(control), -values[:, COLUMNS.index(column)])
+    turns = (("head.yaw", "HeadYaw", -1), ("head.pitch", "HeadPitch", -1))
+    for control, column, sign in (*turns, ("head.roll", "HeadRoll", 1)):
+        np.testing.assert_array_equal(clip.curve(control), sign * values[:, COLUMNS.index(column)])
     assert "eyeL.yaw" not in clip
     assert {"LeftEyeYaw", "LeftEyeRoll", "RightEyeRoll"} <= set(report.ignored)
     both, _ = importing.import_file(tmp_path / "take.csv", rotations="all")
@@ -155,6 +156,11 @@ def test_crlf_a_byte_order_mark_and_utf16_read_the_same(tmp_path):
         clip = read(tmp_path, data, timecode_rate=60).clip
         np.testing.assert_array_equal(clip.curves, plain.curves)
         assert clip.names == plain.names
+
+
+def test_a_byte_order_mark_is_no_part_of_the_first_name(tmp_path):
+    clip = read(tmp_path, b"\xef\xbb\xbfjawOpen,time\n1,0\n2,1\n").clip
+    assert clip.names == ("jawOpen",)
 
 
 @pytest.mark.parametrize(

@@ -409,11 +409,22 @@ def test_a_recording_is_not_smoothed():
     assert clip.curve("CTRL_expressions.jawOpen").tolist() == [0.0, 1.0] * 3
 
 
-def test_the_command_records_and_saves_on_ctrl_c(tmp_path):
+def saved(path):
+    """names, times and curves of what the command wrote."""
+    if path.suffix == ".rzc":
+        clip = risorius.Clip.load(path)
+        return list(clip.names), clip.frame_times(), clip.curves
+    lines = path.read_text().splitlines()
+    rows = np.array([[float(v) for v in line.split(",")] for line in lines[1:]])
+    return lines[0].split(",")[1:], rows[:, 0], rows[:, 1:].T
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".rzc"])
+def test_the_command_records_and_saves_on_ctrl_c(tmp_path, suffix):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
-    out = tmp_path / "take.csv"
+    out = tmp_path / f"take{suffix}"
     command = [sys.executable, "-m", "risorius", "live", "--port", str(port), "--record", str(out)]
     with subprocess.Popen(
         command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=os.environ
@@ -425,14 +436,11 @@ def test_the_command_records_and_saves_on_ctrl_c(tmp_path):
     assert process.returncode == 0, errors
     assert "5 frames of iPhone" in words
     assert "not mapped" not in errors
-    lines = out.read_text().splitlines()
-    names = lines[0].split(",")
-    jaw, yaw = names.index("CTRL_expressions.jawOpen"), names.index("head.yaw")
-    rows = [[float(v) for v in line.split(",")] for line in lines[1:]]
-    assert [row[jaw] for row in rows] == [n / 8.0 for n in range(5)]
-    assert [row[yaw] for row in rows] == [0.5] * 5
-    assert [row[0] for row in rows] == pytest.approx([n / 60 for n in range(5)], abs=1e-8)
-    assert [p.name for p in tmp_path.iterdir()] == ["take.csv"]
+    names, times, curves = saved(out)
+    assert curves[names.index("CTRL_expressions.jawOpen")].tolist() == [n / 8.0 for n in range(5)]
+    assert curves[names.index("head.yaw")].tolist() == [0.5] * 5
+    assert times == pytest.approx([n / 60 for n in range(5)], abs=1e-9)
+    assert [p.name for p in tmp_path.iterdir()] == [out.name]
 
 
 @pytest.mark.parametrize(

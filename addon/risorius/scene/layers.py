@@ -6,7 +6,7 @@ look at the settings and one native call, and nothing at all without layers. No 
 kept.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import bpy
 import numpy as np
@@ -17,25 +17,19 @@ from ..logic import clips as clip_logic
 from ..logic import layers as logic
 from . import clips, compat, parts
 
-_SETTINGS = (
+_OF_SOURCE = (
     "kind",
     "expression",
     "seed",
-    "blend",
-    "controls",
     "start",
     "scale",
     "trim_start",
     "trim_end",
     "length",
     "repeat",
-    "extend",
     "reverse",
-    "fade_in",
-    "fade_out",
-    "mute",
-    "solo",
 )
+_OF_PLAYING = ("name", "blend", "extend", "fade_in", "fade_out", "mute", "solo")
 _KEY_SETTINGS = (
     "co",
     "interpolation",
@@ -46,6 +40,7 @@ _KEY_SETTINGS = (
     "handle_right",
 )
 _BLENDS = {"OVERRIDE": "override", "ADD": "additive", "MAXIMUM": "max"}
+_MOST_FIRED = 4096
 _IDLE_LOOP = 120.0  # seconds before idle life without a length comes again
 
 
@@ -60,14 +55,16 @@ class Stack:
         places: of each the place in the list of settings.
         weights: those that the mixer has now.
         problems: sentences on layers that cannot be played, by their place.
+        kept: sources and masks, by what they were made of.
     """
 
     made_of: tuple
     mixer: object
-    layers: list
-    places: list
+    layers: list = field(default_factory=list)
+    places: list = field(default_factory=list)
     weights: tuple = ()
-    problems: dict = None
+    problems: dict = field(default_factory=dict)
+    kept: dict = field(default_factory=dict)
 
 
 _stacks = {}  # session uid of a control armature -> Stack
@@ -85,8 +82,8 @@ def reactions_of(controls):
 
 
 def has_any(controls):
-    """Whether anything lies above the sliders."""
-    return bool(len(of(controls)) or len(reactions_of(controls)))
+    """Whether anything is played above the sliders."""
+    return len(reactions_of(controls)) > 0 or any(not layer.mute for layer in of(controls))
 
 
 def forget():
@@ -102,10 +99,9 @@ def forget_unused(there):
 
 
 def note_edits(actions):
-    """Note that actions were edited. Returns: whether a layer of this file plays one of them."""
+    """Note that actions were edited: what is made of them is made anew."""
     for action in actions:
         _versions[action.session_uid] = _versions.get(action.session_uid, 0) + 1
-    return bool(actions)
 
 
 def plays(controls, actions):
@@ -149,62 +145,68 @@ def mix(seen, live, raw, head, depsgraph, maximum):
 
 def compiled(controls, live, scene, maximum=1.0):
     """The Stack of a character, compiled anew only where something changed."""
+    rate = clips.frame_rate(scene)
     made_of = (
-        id(live),
-        maximum,
-        controls.risorius_layer_rules,
-        clips.frame_rate(scene),
-        tuple(_settings(layer) for layer in of(controls)),
-        tuple((r.name, r.frame, r.strength) for r in reactions_of(controls)),
+        (id(live), maximum, controls.risorius_layer_rules),
+        tuple((r.name, r.frame / rate, r.strength) for r in reactions_of(controls)),
+        tuple((*_key(layer, rate), *_get(layer, _OF_PLAYING)) for layer in of(controls)),
     )
     stack = _stacks.get(controls.session_uid)
     if stack is None or stack.made_of != made_of:
-        stack = _compile(controls, live, scene, maximum, made_of)
+        stack = _compile(controls, live, rate, maximum, made_of, stack)
         _stacks[controls.session_uid] = stack
     return stack
 
 
-def _settings(layer):
+def _get(layer, names):
+    return (getattr(layer, name) for name in names)
+
+
+def _key(layer, rate):
+    """What a layer's curves depend on, and what its mask does."""
     action = layer.action
     uid = action.session_uid if action is not None else 0
-    return (
-        *(getattr(layer, name) for name in _SETTINGS),
-        tuple(sorted(layer.regions)),
-        uid,
-        _versions.get(uid, 0),
-        tuple((point.frame, point.source) for point in layer.warp),
-    )
+    warp = tuple((point.frame, point.source) for point in layer.warp)
+    source = (rate, uid, _versions.get(uid, 0), warp, *_get(layer, _OF_SOURCE))
+    return source, (tuple(sorted(layer.regions)), layer.controls)
 
 
-def _compile(controls, live, scene, maximum, made_of):
-    names = [*live.labels, *clip_logic.HEAD]
-    rate = clips.frame_rate(scene)
-    made, places, problems = [], [], {}
+def _compile(controls, live, rate, maximum, made_of, old):
+    """A new Stack. Args: old  the one before it, whose curves serve where they are the same."""
+    same_face = old is not None and old.made_of[0] == made_of[0]
+    stack = Stack(made_of, _mixer(controls, live, maximum) if not same_face else old.mixer)
+    kept = old.kept if same_face else {}
     for place, layer in enumerate(of(controls)):
         try:
-            made.append(native_layer(controls, live, layer, rate))
-            places.append(place)
+            stack.layers.append(native_layer(controls, live, layer, rate, kept, stack.kept))
+            stack.places.append(place)
         except (ValueError, LookupError, RuntimeError) as error:
-            problems[place] = str(error).rstrip(".")
-    mixer = native.module().Mixer(
-        names,
-        ranges={label: (0.0, maximum) for label in live.labels},
-        exclusives="default" if controls.risorius_layer_rules else None,
-        max_fired=max(len(reactions_of(controls)), 1),
-    )
-    _fire(mixer, controls, rate, problems)
-    stack = Stack(made_of, mixer, made, places, problems=problems)
-    stack.mixer.layers = made
+            stack.problems[place] = str(error).rstrip(".")
+    _fire(stack, controls, rate)
+    stack.mixer.layers = stack.layers
     return stack
 
 
-def _fire(mixer, controls, rate, problems):
-    """Fire the reactions, last first: so none takes the voice of one that is over before it."""
-    for reaction in sorted(reactions_of(controls), key=lambda r: -r.frame):
+def _mixer(controls, live, maximum):
+    return native.module().Mixer(
+        [*live.labels, *clip_logic.HEAD],
+        ranges={label: (0.0, maximum) for label in live.labels},
+        exclusives="default" if controls.risorius_layer_rules else None,
+        max_fired=_MOST_FIRED,
+    )
+
+
+def _fire(stack, controls, rate):
+    """Fire all reactions, whenever they are: so each frame is the same in any order of frames."""
+    stack.mixer.clear_fired()
+    for reaction in reactions_of(controls):
         try:
-            mixer.fire(reaction.name, reaction.frame / rate, reaction.strength)
-        except (ValueError, LookupError) as error:
-            problems[reaction.name] = str(error)
+            fired = stack.mixer.fire(reaction.name, reaction.frame / rate, reaction.strength)
+        except KeyError:
+            stack.problems[reaction.name] = "there is no such reaction"
+            continue
+        if not fired:
+            stack.problems["Reactions"] = f"only the first {_MOST_FIRED} are shown"
 
 
 def _set_weights(stack, weights):
@@ -216,7 +218,7 @@ def _set_weights(stack, weights):
     stack.weights = weights
 
 
-def native_layer(controls, live, layer, rate):
+def native_layer(controls, live, layer, rate, old=None, kept=None):
     """A layer as risorius.Layer, at full weight.
 
     Args:
@@ -224,18 +226,26 @@ def native_layer(controls, live, layer, rate):
         live: the character's Runtime.
         layer: its settings.
         rate: frames per second.
+        old: sources and masks made before, which serve again; the mixer knows them.
+        kept: where those of this layer are put.
 
     Raises:
         ValueError: it has nothing to play, or something that does not fit; the sentence says what.
     """
-    source, own = _SOURCES[layer.kind](controls, live, layer, rate)
-    allowed = allowed_names(live, layer)
-    names = [*live.labels, *clip_logic.HEAD]
+    old, kept = old or {}, {} if kept is None else kept
+    source_key, mask_key = _key(layer, rate)
+    if source_key not in kept:
+        made = old.get(source_key)
+        kept[source_key] = made or _SOURCES[layer.kind](controls, live, layer, rate)
+    if mask_key not in kept:
+        made = old.get(mask_key)
+        kept[mask_key] = _mask(live, layer) if made is None else made
+    source, own = kept[source_key]
     return native.module().Layer(
         source,
         name=layer.name,
         blend=_BLENDS[layer.blend],
-        mask=np.array([name in allowed for name in names], np.float32),
+        mask=kept[mask_key],
         mute=layer.mute,
         solo=layer.solo,
         **{
@@ -245,6 +255,12 @@ def native_layer(controls, live, layer, rate):
             **own,
         },
     )
+
+
+def _mask(live, layer):
+    allowed = allowed_names(live, layer)
+    names = [*live.labels, *clip_logic.HEAD]
+    return np.array([name in allowed for name in names], np.float32)
 
 
 def allowed_names(live, layer):

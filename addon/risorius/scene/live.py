@@ -223,19 +223,31 @@ def finish_take(session, rig, scene):
 
 def _tick():
     """One beat of the timer; returns the seconds to the next, None to end."""
+    try:
+        return _beat()
+    except Exception:
+        # Blender drops a timer that fails; what it fed must not go on listening.
+        _last["error"] = "Live capture ended by an error, which the console shows."
+        for session in list(_sessions.values()):
+            _close(session)
+        raise
+
+
+def _beat():
     if bpy.app.is_job_running("RENDER"):
         return INTERVAL  # what a render reads is not to be written
     if _last["undone"]:
         _last["undone"] = False
         bpy.context.view_layer.update()  # bones that undo brought back are not there before
+    changed = False
     for session in list(_sessions.values()):
         controls = session.controls()
         if controls is None or runtime.of(parts.rig_of(controls) or controls) is None:
             _last["error"] = f"The face {session.name} went away: its capture ended."
             _close(session)
             continue
-        show(session, controls)
-    _redraw()
+        changed |= show(session, controls)
+    _redraw(changed)
     return INTERVAL if _sessions else None
 
 
@@ -329,17 +341,18 @@ def _put_back(session, controls):
     controls.update_tag()
 
 
-def _redraw():
-    """Let the sidebars show the status now and then."""
+def _redraw(changed):
+    """Let the views show a change at once, and the sidebars the status now and then."""
     _last["redraw"] += INTERVAL
-    if _last["redraw"] < _REDRAW or bpy.context.window_manager is None:
-        return
-    _last["redraw"] = 0.0
-    for window in bpy.context.window_manager.windows:
+    status = _last["redraw"] >= _REDRAW
+    kinds = {"WINDOW": changed, "UI": status}
+    if status:
+        _last["redraw"] = 0.0
+    for window in bpy.context.window_manager.windows if changed or status else ():
         for area in window.screen.areas:
             if area.type == "VIEW_3D":
                 for region in area.regions:
-                    if region.type == "UI":
+                    if kinds.get(region.type):
                         region.tag_redraw()
 
 

@@ -168,22 +168,7 @@ class _Reader:
         got.raw[number], turns = inputs.complete(seen, self.live, depsgraph, self.maximum, raw, own)
         got.turns.append(turns)
         got.places[number] = seen.matrix_world
-        for name, matrices in got.basis.items():
-            bone = seen.pose.bones[name]
-            matrices[number] = (
-                seen.convert_space(
-                    pose_bone=bone, matrix=bone.matrix, from_space="POSE", to_space="LOCAL"
-                )
-                if bone.constraints
-                else bone.matrix_basis
-            )
-        if self.layered and own["head"] is not None and "head" in got.basis:
-            matrix = Matrix(got.basis["head"][number].tolist())
-            rest = self.controls.data.bones["head"].matrix_local.to_quaternion()
-            turn = rest.inverted() @ own["head"] @ rest
-            got.basis["head"][number] = Matrix.LocRotScale(
-                matrix.to_translation(), turn, matrix.to_scale()
-            )
+        self._read_control_bones(number, seen, own["head"])
         if got.bones is not None:
             moved = self.rig.evaluated_get(depsgraph).pose.bones
             for name, values in got.bones.items():
@@ -194,6 +179,25 @@ class _Reader:
                 value = _value(evaluated, path)
                 if value is not None:
                     got.others[owner].setdefault(path, []).append(value)
+
+    def _read_control_bones(self, number, seen, head):
+        """Args: head  how it is turned with the layers, in the armature's axes; or None."""
+        basis = self.samples.basis
+        for name, matrices in basis.items():
+            bone = seen.pose.bones[name]
+            matrices[number] = (
+                seen.convert_space(
+                    pose_bone=bone, matrix=bone.matrix, from_space="POSE", to_space="LOCAL"
+                )
+                if bone.constraints
+                else bone.matrix_basis
+            )
+        if self.layered and head is not None and "head" in basis:
+            matrix = Matrix(basis["head"][number].tolist())
+            rest = self.controls.data.bones["head"].matrix_local.to_quaternion()
+            basis["head"][number] = Matrix.LocRotScale(
+                matrix.to_translation(), rest.inverted() @ head @ rest, matrix.to_scale()
+            )
 
 
 def _value(owner, path):

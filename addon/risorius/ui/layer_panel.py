@@ -388,7 +388,7 @@ class RISORIUS_PT_layers(FaceOnlyPanel, bpy.types.Panel):
             for sentence in layers.problems(controls, live, context.scene):
                 write(layout, sentence, "ERROR")
         _draw_reactions(layout, controls)
-        if layers.has_any(controls):
+        if len(layers.of(controls)) or len(layers.reactions_of(controls)):
             layout.prop(controls, "risorius_layer_rules")
 
 

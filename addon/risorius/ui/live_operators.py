@@ -234,8 +234,8 @@ class RISORIUS_PT_live(FaceOnlyPanel, bpy.types.Panel):
         row = column.row(align=True)
         row.prop(chosen, "port")
         row.prop(chosen, "everywhere", text="", icon="URL")
-        column.prop(chosen, "mapping", text="")
-        layout.prop(chosen, "subject", icon="USER", text="")
+        column.prop(chosen, "mapping")
+        layout.prop(chosen, "subject", icon="USER")
         column = layout.column(align=True)
         for name in ("smoothing", "gain", "head_gain"):
             column.prop(chosen, name)
@@ -268,13 +268,13 @@ def _draw_status(layout, session):
     if session.take is not None:
         column.label(text=f"Recording: {len(session.take)} faces", icon="REC")
     for count, what in (
-        (status.lost, "lost on the way"),
-        (status.late, "late, left out"),
-        (status.refused, "packets refused"),
-        (status.floods, "times flooded"),
+        (status.lost, "Lost on the way"),
+        (status.late, "Late, left out"),
+        (status.refused, "Packets refused"),
+        (status.floods, "Floods"),
     ):
         if count:
-            column.label(text=f"{count} {what}", icon="ERROR")
+            column.label(text=f"{what}: {count}", icon="ERROR")
     if status.reasons:
         write(layout, names.printable(status.reasons[0][0], 120))
     missed = session.shaper.unmapped

@@ -35,68 +35,81 @@ _OPERATORS = {
 }
 
 
-def _settings(operator, stage):
-    """What Blender's exporter of each format is told."""
-    step = max(1, round(operator.step))
-    every = {
-        "GLTF": {
-            "export_format": "GLB",
-            "use_active_scene": True,
-            "export_animations": True,
-            "export_animation_mode": "ACTIVE_ACTIONS",
-            "export_nla_strips_merged_animation_name": stage.objects[0].name,
-            "export_frame_range": True,
-            "export_frame_step": step,
-            "export_force_sampling": True,
-            "export_optimize_animation_size": False,
-            # Its quicker way of hiding other objects gave wrong bones with two armatures (4.5).
-            "export_optimize_disable_viewport": False,
-            "export_skins": True,
-            "export_all_influences": operator.influences == 0,
-            "export_influence_nb": max(operator.influences, 1),
-            "export_morph": True,
-            "export_morph_normal": False,
-            "export_rest_position_armature": True,
-            "export_apply": False,
-        },
-        "FBX": {
-            "object_types": {"ARMATURE", "MESH"},
-            "add_leaf_bones": False,
-            "use_armature_deform_only": False,
-            "bake_anim": True,
-            "bake_anim_use_all_bones": True,
-            "bake_anim_use_nla_strips": False,
-            "bake_anim_use_all_actions": False,
-            "bake_anim_force_startend_keying": True,
-            "bake_anim_step": float(step),
-            "bake_anim_simplify_factor": 0.0,
-            "apply_scale_options": operator.fbx_units,
-            # With a modifier applied Blender drops the shape keys.
-            "use_mesh_modifiers": False,
-            "mesh_smooth_type": "FACE",
-        },
-        "USD": {
-            "export_animation": True,
-            "export_armatures": True,
-            "export_shapekeys": True,
-            "only_deform_bones": False,
-            "export_hair": False,
-            "export_materials": True,
-            "evaluation_mode": "RENDER",
-        },
-        "ALEMBIC": {
-            "start": stage.frame_start,
-            "end": stage.frame_end,
-            "xsamples": 1,
-            "gsamples": 1,
-            "uvs": True,
-            "normals": True,
-            "face_sets": True,
-            "as_background_job": False,
-            "evaluation_mode": "RENDER",
-        },
+def _gltf(operator, stage):
+    return {
+        "export_format": "GLB",
+        "use_active_scene": True,
+        "export_animations": True,
+        "export_animation_mode": "ACTIVE_ACTIONS",
+        "export_nla_strips_merged_animation_name": stage.objects[0].name,
+        "export_frame_range": True,
+        "export_frame_step": _whole_step(operator),
+        "export_force_sampling": True,
+        "export_optimize_animation_size": False,
+        # Its quicker way of hiding other objects gave wrong bones with two armatures (4.5).
+        "export_optimize_disable_viewport": False,
+        "export_skins": True,
+        "export_all_influences": operator.influences == 0,
+        "export_influence_nb": max(operator.influences, 1),
+        "export_morph": True,
+        "export_morph_normal": False,
+        "export_rest_position_armature": True,
+        "export_apply": False,
     }
-    return every[operator.format]
+
+
+def _fbx(operator, _stage):
+    return {
+        "object_types": {"ARMATURE", "MESH"},
+        "add_leaf_bones": False,
+        "use_armature_deform_only": False,
+        "bake_anim": True,
+        "bake_anim_use_all_bones": True,
+        "bake_anim_use_nla_strips": False,
+        "bake_anim_use_all_actions": False,
+        "bake_anim_force_startend_keying": True,
+        "bake_anim_step": float(_whole_step(operator)),
+        "bake_anim_simplify_factor": 0.0,
+        "apply_scale_options": operator.fbx_units,
+        # With a modifier applied Blender drops the shape keys.
+        "use_mesh_modifiers": False,
+        "mesh_smooth_type": "FACE",
+    }
+
+
+def _usd(_operator, _stage):
+    return {
+        "export_animation": True,
+        "export_armatures": True,
+        "export_shapekeys": True,
+        "only_deform_bones": False,
+        "export_hair": False,
+        "export_materials": True,
+        "evaluation_mode": "RENDER",
+    }
+
+
+def _alembic(_operator, stage):
+    return {
+        "start": stage.frame_start,
+        "end": stage.frame_end,
+        "xsamples": 1,
+        "gsamples": 1,
+        "uvs": True,
+        "normals": True,
+        "face_sets": True,
+        "as_background_job": False,
+        "evaluation_mode": "RENDER",
+    }
+
+
+# What Blender's exporter of each format is told; what a version does not know is left out.
+_SETTINGS = {"GLTF": _gltf, "FBX": _fbx, "USD": _usd, "ALEMBIC": _alembic}
+
+
+def _whole_step(operator):
+    """Exporters step by whole frames."""
+    return max(1, round(operator.step))
 
 
 class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, bpy.types.Operator):
@@ -249,7 +262,7 @@ def _export(context, operator, override, path):
     group, name = _OPERATORS[operator.format]
     function = getattr(getattr(bpy.ops, group), name)
     known = set(function.get_rna_type().properties.keys())
-    settings = _settings(operator, override["scene"])
+    settings = _SETTINGS[operator.format](operator, override["scene"])
     with context.temp_override(**override):
         done = function(filepath=str(path), **{k: v for k, v in settings.items() if k in known})
     if "FINISHED" not in done or not path.exists():

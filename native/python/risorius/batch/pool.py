@@ -34,7 +34,6 @@ class PoolError(RuntimeError):
 def _serve(connection: Connection[object, object], work: Work) -> None:
     """A worker's life: jobs in, outcomes out, until nobody is at the other end."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal's Ctrl-C is the parent's to handle
-    signal.signal(signal.SIGTERM, _leave)
     with contextlib.suppress(EOFError, BrokenPipeError, ConnectionResetError):
         connection.send(_READY)
         while True:
@@ -58,11 +57,6 @@ def _ignoring_interrupts() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, before)
-
-
-def _leave(number: int, frame: object) -> None:
-    """As an exception, so that half a file is deleted on the way out."""
-    raise SystemExit(128 + number)
 
 
 class _Worker:
@@ -201,7 +195,7 @@ class Pool:
         self._workers.append(_Worker(self._work))
 
     def _stop(self) -> None:
-        """End every worker; one that has a job deletes what it has written of it."""
+        """End every worker, at once if it has a job; half a file is deleted by who runs this."""
         for worker in self._workers:
             worker.connection.close()
             if worker.job is not None or not worker.ready:

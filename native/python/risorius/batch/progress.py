@@ -18,10 +18,13 @@ class Progress:
     Nothing is shown before the first interval has passed: what is done at once needs no bar.
     """
 
-    def __init__(self, total: int, noun: str, stream: TextIO | None = None) -> None:
-        """Args: total: of what noun says, e.g. "jobs". stream: else stderr."""
+    def __init__(
+        self, total: int, noun: str, *, before: int = 0, stream: TextIO | None = None
+    ) -> None:
+        """Args: total: of what noun says, e.g. "jobs". before: done already, at no cost. stream:
+        else stderr."""
         self.total, self.noun = total, noun
-        self.done = 0
+        self.done = self._before = before
         self.frames = 0
         self._stream = stream or sys.stderr
         self._terminal = self._stream.isatty()
@@ -42,8 +45,9 @@ class Progress:
         words = [f"{self.done:,} of {self.total:,} {self.noun}"]
         if self.frames and elapsed > 0:
             words.append(f"{self.frames / elapsed:,.0f} frames/s")
-        if 0 < self.done < self.total:
-            words.append(f"{clock(elapsed * (1 - part) / part)} left")
+        new = self.done - self._before
+        if new > 0 and self.done < self.total:
+            words.append(f"{clock(elapsed * (self.total - self.done) / new)} left")
         if note:
             words.append(note)
         bar = "#" * int(20 * part)

@@ -85,8 +85,7 @@ def run(plan: Plan, *, workers: int | None, scheduler: str | None, restart: bool
     jobs = pending(plan, journal, report)
     journal.begin(job.name for job in plan.jobs if job.name in report.reused)
     outputs = [path for job in jobs for _, path in job.outputs]
-    remove_parts(outputs)
-    progress = Progress(len(plan.jobs), "jobs")
+    progress = Progress(len(plan.jobs), "jobs", before=len(report.reused))
     if report.reused:
         progress.say(f"{len(report.reused):,} of {len(plan.jobs):,} jobs are done already")
     started = time.monotonic()

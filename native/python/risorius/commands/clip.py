@@ -41,7 +41,7 @@ def _add_convert(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "convert",
         help="a file of animation as .rzc, .csv or .json of raw controls",
         description="What is asked for is done in this order: mapping, neutral, gain and offset, "
-        "gaps, smoothing, mirror, cut, rate, shift.",
+        "repeats, gaps, smoothing, mirror, cut, rate, shift.",
     )
     _add_input(parser)
     parser.add_argument("-o", "--output", required=True, type=Path, metavar="OUT")
@@ -66,6 +66,11 @@ def _add_convert(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
             metavar="PATTERN=N",
             help=f'{what} for controls, e.g. "jaw*=1.2"; may be given again',
         )
+    parser.add_argument(
+        "--drop-repeats",
+        action="store_true",
+        help="leave out frames that only repeat the one before",
+    )
     parser.add_argument(
         "--fill-gaps", action="store_true", help="even frames; straight across missing ones"
     )
@@ -174,7 +179,8 @@ def run_convert(args: argparse.Namespace) -> int:
     if args.report:
         print(report.text())
     else:
-        left = [f"{len(names)} {heading}" for heading, names in report.lists()[:2]]
+        lists = (("not mapped", report.unmapped), ("not in the rig", report.not_in_rig))
+        left = [f"{len(names)} {heading}" for heading, names in lists if names]
         more = f" ({', '.join(left)}: see --report)" if left else ""
         print(f"{args.output}: {_summary(clip)}{more}")
     return 0
@@ -196,6 +202,8 @@ def _steps(args: argparse.Namespace) -> list[Callable[[Clip], Clip]]:
         steps.append(lambda clip: process.calibrate(clip, int(first), int(last)))
     if gains or offsets:
         steps.append(lambda clip: process.adjust(clip, gains, offsets))
+    if args.drop_repeats:
+        steps.append(process.drop_repeats)
     if args.fill_gaps:
         steps.append(process.fill_gaps)
     if args.smooth is not None:

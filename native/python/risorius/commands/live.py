@@ -10,9 +10,19 @@ from pathlib import Path
 from time import monotonic, sleep
 from types import FrameType
 
-from ..clip import Clip
+from ..clip_file import ClipError
 from ..importing import MappingError, csv_text, write_text
-from ..live import EVERYWHERE, PORTS, SOURCES, THIS_MACHINE, LiveError, Receiver, Shaper, Status
+from ..live import (
+    EVERYWHERE,
+    PORTS,
+    SOURCES,
+    THIS_MACHINE,
+    LiveError,
+    Receiver,
+    Shaper,
+    Status,
+    Take,
+)
 
 _KINDS = (".rzc", ".csv")
 
@@ -75,23 +85,31 @@ def run(args: argparse.Namespace) -> int:
     finally:
         receiver.stop()
     receiver.finish(take)
+    return _save(take, shaper, args.record) if args.record is not None else 0
+
+
+def _save(take: Take, shaper: Shaper, path: Path) -> int:
+    """Write what was recorded, and say what is not in it. Returns: the exit code."""
+    if not len(take):
+        print(f"risorius: {path} was not written: no face came", file=sys.stderr)
+        return 1
     if take.full:
         print(f"risorius: the take is full: {take.full} frames were left out", file=sys.stderr)
-    if args.record is None:
-        return 0
-    if not len(take):
-        print(f"risorius: {args.record} was not written: no face came", file=sys.stderr)
-        return 1
-    clip = take.clip(shaper)
     if missed := take.unmapped(shaper):
         print(f"risorius: not mapped: {', '.join(missed)}", file=sys.stderr)
+    clip = take.clip(shaper)
     try:
-        save(clip, args.record)
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        print(f"risorius: {args.record}: cannot write it: {reason}", file=sys.stderr)
+        if path.suffix.lower() == ".csv":
+            write_text(csv_text(clip), path)
+        else:
+            clip.save(path)
+    except OSError as error:
+        print(f"risorius: {path}: cannot write it: {error.strerror}", file=sys.stderr)
         return 1
-    print(f"{args.record}: {clip.frame_count} frames of {take.subject}, {clip.duration:.3f} s")
+    except ClipError as error:
+        print(f"risorius: {error}", file=sys.stderr)
+        return 1
+    print(f"{path}: {clip.frame_count} frames of {take.subject}, {clip.duration:.3f} s")
     return 0
 
 
@@ -142,15 +160,3 @@ def words(status: Status) -> str:
         parts.append(f"silent for {status.age:.0f} s")
     others = [s for s in status.subjects if s != status.subject]
     return ", ".join(parts) + (f"; also {', '.join(others)}" if others else "")
-
-
-def save(clip: Clip, path: Path) -> None:
-    """Write a clip whole or not at all.
-
-    Raises:
-        OSError: it cannot be written.
-    """
-    if path.suffix.lower() == ".csv":
-        write_text(csv_text(clip), path)
-    else:
-        clip.save(path)

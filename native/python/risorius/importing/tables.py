@@ -7,6 +7,7 @@ import csv
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -69,15 +70,23 @@ class Table:
             text = text.replace(",", ".")  # a decimal comma, as spreadsheets of many lands write
         return number(text, self.name, self.lines[row], self.place(column))
 
-    def column(self, column: int, rows: Sequence[int]) -> Doubles:
-        """float64[rows] of a column. Raises: as cell."""
-        cells = [self.rows[row][column] for row in rows]
+    @cached_property
+    def columns(self) -> list[tuple[str, ...]]:
+        """The cells by column, once the rows are known to be of one length."""
+        return list(zip(*self.rows, strict=True))
+
+    def column(self, column: int, rows: Sequence[int] | None = None) -> Doubles:
+        """float64[rows] of a column, all or some. Raises: as cell."""
+        cells = self.columns[column]
+        if rows is not None:
+            cells = tuple(cells[row] for row in rows)
         try:  # at once; what is wrong with a cell is found out cell by cell
             values = np.array(list(map(float, cells)))
         except ValueError:
             values = np.full(len(cells), np.nan)
-        if not (np.abs(values) <= np.finfo(np.float32).max).all() or any("_" in c for c in cells):
-            values = np.array([self.cell(row, column) for row in rows])
+        if "_" in "".join(cells) or not (np.abs(values) <= np.finfo(np.float32).max).all():
+            wanted = range(len(cells)) if rows is None else rows
+            values = np.array([self.cell(row, column) for row in wanted])
         return values
 
     def place(self, column: int) -> str:
@@ -189,7 +198,7 @@ def read_live_link_face(table: Table, timecode_rate: float | None = None) -> Tak
     ]
     seconds = _timecode_seconds(table, codes, timecode_rate, notes)
     columns = [i for i, cell in enumerate(table.header) if i > 1 and cell]
-    curves = np.array([table.column(c, range(len(codes))) for c in columns])
+    curves = np.array([table.column(c) for c in columns])
     _note_count(table, len(columns), notes)
     keep = keep_ascending(seconds, notes)
     times = seconds[keep] - seconds[0]
@@ -276,15 +285,10 @@ def read_plain(table: Table, rate: float | None = None, timecode_rate: float | N
     keep = keep_ascending(times, notes)
     curves = np.stack([_column(table, column, times, notes) for column in columns])
     clip = make_clip(
-        [_curve_name(table.header[c]) for c in columns], curves[:, keep], times[keep],
+        [table.header[c] for c in columns], curves[:, keep], times[keep],
         rate=rate if at is None else None,
     )  # fmt: skip
     return Take(clip, "csv", "", notes)
-
-
-def _curve_name(header: str) -> str:
-    """Without what Audio2Face writes before each name."""
-    return header.removeprefix("blendShapes.")
 
 
 def _time_column(table: Table) -> int | None:
@@ -317,7 +321,7 @@ def _plain_times(
         ]
         seconds = _timecode_seconds(table, codes, timecode_rate, notes)
         return seconds - seconds[0]
-    values = table.column(at, range(len(table.rows)))
+    values = table.column(at)
     unit = TIME_COLUMNS[header]
     if unit:
         return values * unit

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: MIT
+"""clip_stands_for.py FILE.dna ...: how much smaller a clip of controls is than the animation of the
+face that it stands for.
+
+What it stands for, a frame: the float32 values that the rig gives at LOD 0: nine a joint (three
+each of translation, rotation, scale), a weight a blend shape, a value an animated map. `all` counts
+every one of them; `moving` only those that take more than one value in the clip, which is what an
+exporter that drops resting channels would keep. The curves are those of clip_curves.py, spread over
+the raw controls of the rig; where it has fewer, those that move come first.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import risorius
+from clip_curves import KINDS, RATE, Curves
+
+
+def values_of(rig: risorius.Rig, raw: Curves) -> tuple[int, int]:
+    """Values a frame of the face: all, and those that move."""
+    poses = rig.evaluate_batch(raw)
+    moving = count = 0
+    for part in (poses.joints, poses.blend_shapes, poses.animated_maps):
+        bits = np.ascontiguousarray(part).reshape(len(raw), -1).view(np.uint32)
+        count += bits.shape[1]
+        moving += int((bits != bits[:1]).any(axis=0).sum())
+    return count, moving
+
+
+def clip_for(names: list[str], curves: Curves) -> risorius.Clip:
+    if len(names) < len(curves):
+        order = np.argsort(~(curves != curves[:, :1]).any(axis=1), kind="stable")
+        return risorius.Clip(names, curves[order][: len(names)], RATE)
+    places = np.linspace(0, len(names) - 1, len(curves)).astype(int)
+    return risorius.Clip([names[i] for i in places], curves, RATE)
+
+
+def row(path: str, kind: str, rig: risorius.Rig, clip: risorius.Clip) -> str:
+    raw, _ = clip.raw_controls(rig.raw_control_names)
+    count, moving = values_of(rig, raw)
+    size, curves = len(clip.to_bytes()), len(clip.names)
+    frame = 4 * clip.frame_count
+    ratios = (frame * count / size, frame * moving / size, count / curves, moving / curves)
+    cells = [Path(path).name, f"{kind}, {curves} curves", f"{count} ({moving})", str(size)]
+    return "| " + " | ".join(cells + [f"{ratio:.1f}" for ratio in ratios]) + " |"
+
+
+def main() -> None:
+    heads = ["rig", "clip", "values a frame, all (moving)", "bytes of .rzc", "all : .rzc"]
+    heads += ["moving : .rzc", "all : float32 curves", "moving : float32 curves"]
+    print("| " + " | ".join(heads) + " |")
+    print("|---|---|" + "---:|" * (len(heads) - 2))
+    for path in sys.argv[1:]:
+        rig = risorius.Rig(risorius.load(path))
+        for kind, make in KINDS.items():
+            print(row(path, kind, rig, clip_for(rig.raw_control_names, make())))
+
+
+if __name__ == "__main__":
+    main()
