@@ -12,7 +12,7 @@ import conftest
 import espeak_truth
 import numpy as np
 import pytest
-from risorius import Clip, cli
+from risorius import Clip, cli, expressions
 from risorius.speech import (
     CancelledError,
     Heard,
@@ -241,12 +241,12 @@ def test_lips_are_closed_at_the_true_times_of_bilabials(voice):
     clip = speak(path, said)
     times = clip.frame_times()
     jaw = clip.curve(P + "jawOpen")
-    together = clip.curve(P + "mouthLipsTogetherUL")
+    pressed = clip.curve(P + "mouthPressUL") / expressions.get("PP").weights[P + "mouthPressUL"]
     closed = []
     for name, begin, end in zip(spoken.names, spoken.times, spoken.times[1:], strict=False):
         if espeak_truth.CLASS_OF[name] == "PP":
             frames = (times >= begin - 0.03) & (times <= end + 0.03)
-            closed.append(jaw[frames].min() < 0.05 and together[frames].max() > 0.24)
+            closed.append(jaw[frames].min() < 0.05 and pressed[frames].max() > 0.95)
     assert len(closed) >= 12
     assert np.mean(closed) >= 0.9  # a reduced vowel that is missed takes a closure along
     vowels = [
@@ -421,7 +421,7 @@ def test_curves_are_smooth_and_in_range():
 def test_intensity_scales_shapes_but_not_closures():
     low, high = (animate(spell("AA", "AA", "M", "AA"), intensity=x) for x in (0.5, 1.0))
     assert np.allclose(2 * low.curve(P + "jawOpen")[:5], high.curve(P + "jawOpen")[:5], atol=1e-5)
-    closed = [c.curve(P + "mouthLipsTogetherUL").max() for c in (low, high)]
+    closed = [c.curve(P + "mouthPressUL").max() for c in (low, high)]
     assert closed[0] == closed[1] > 0.1
 
 
