@@ -210,6 +210,19 @@ def test_a_flood_is_bounded():
         assert (len(take), take.full) == (2, 2)
 
 
+def test_a_flood_of_large_packets_is_bounded_too():
+    with Receiver("osc", 0) as receiver:
+        large = ["bundle", [["/VMC/Ext/OK", [1]]] * 2000]
+        send(receiver.port, *[large] * 12, ["wait", 0.5], ["osc", "/jawOpen", [0.5]])
+        ends = monotonic() + 10.0
+        while receiver.latest() is None and monotonic() < ends:
+            sleep(0.01)
+        status = receiver.status()
+        assert receiver.latest() is not None
+        assert status.floods > 0
+        assert status.packets < 1000  # not their number stopped them
+
+
 def vmc(values, head=(0.0, 0.0, 0.0, 1.0)):
     steps = [["/VMC/Ext/OK", [1]], ["/VMC/Ext/T", [1.5]]]
     steps.append(["/VMC/Ext/Bone/Pos", ["Head", 0.0, 0.0, 0.0, *head]])

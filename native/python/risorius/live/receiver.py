@@ -26,6 +26,7 @@ _MOST_SUBJECTS = 32
 _SILENCE = 0.004  # seconds that end a face whose sender does not say where it ends
 _WINDOW = 0.05  # seconds over which a flood is counted
 _MOST_PACKETS = {"livelink": 100, "osc": 1000}  # of one window: far beyond what phones send
+_BUSIEST = 0.02  # seconds of one window that reading packets may take: large ones are few
 _BACK = 1.0  # a packet that is older by less came late; by more, the sender's clock was set
 _AHEAD = 10.0  # seconds that a sender's clock may leap ahead of ours and still be believed
 _DAY = 86400.0
@@ -232,7 +233,7 @@ class Receiver:
     def _run(self) -> None:
         listener = self._socket
         assert listener is not None
-        window, seen = monotonic(), 0
+        window, seen, spent = monotonic(), 0, 0.0
         while not self._stop.is_set():
             listener.settimeout(_SILENCE if self._decoder.pending() else 0.1)
             try:
@@ -244,10 +245,10 @@ class Receiver:
                 continue
             now = monotonic()
             if now - window >= _WINDOW:
-                window, seen = now, 0
-            seen += 1
+                window, seen, spent = now, 0, 0.0
             self._take_in(data, sender[0], now)
-            if seen >= _MOST_PACKETS[self.source]:
+            seen, spent = seen + 1, spent + monotonic() - now
+            if seen >= _MOST_PACKETS[self.source] or spent >= _BUSIEST:
                 # What comes meanwhile waits, and then is dropped, in the system's buffer: so a
                 # flood costs nothing of the time that the viewport needs.
                 self._counts["floods"] += 1
