@@ -106,7 +106,7 @@ def test_it_is_there_in_the_next_process(home):
     assert found["moved"]
     assert "frame_change_post" in found["handlers"]
     assert "import_dna" in found["operators"]
-    assert found["menus"] == 2
+    assert found["menus"] == 3
     assert str(home) in found["wheel"]
 
 

@@ -1,12 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Baked values to keys: which frames a curve needs so that straight lines stay near all of them."""
 
-import numpy as np
+from __future__ import annotations
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Floats = NDArray[np.float32]
+Times = NDArray[np.float64]
+Kept = NDArray[np.bool_]
 _EPS = float(np.finfo(np.float32).eps)
 
 
-def frame_list(start, end, step):
+def frame_list(start: float, end: float, step: float) -> Times:
     """The frames to bake, float64[N]: from start in steps, none after the end.
 
     Raises:
@@ -19,7 +25,7 @@ def frame_list(start, end, step):
     return start + step * np.arange(int(np.floor((end - start) / step + 1e-9)) + 1)
 
 
-def continuous(quaternions):
+def continuous(quaternions: Floats) -> Floats:
     """Quaternions whose signs follow each other, so that lines between them turn the short way.
 
     Args:
@@ -30,7 +36,7 @@ def continuous(quaternions):
     return np.concatenate([quaternions[:1], quaternions[1:] * signs])
 
 
-def reduce_keys(frames, values, error=0.0):
+def reduce_keys(frames: ArrayLike, values: ArrayLike, error: float = 0.0) -> Kept:
     """The keys that curves need.
 
     All curves are walked at once: from the last key of each a cone of slopes is kept that pass all
@@ -45,18 +51,19 @@ def reduce_keys(frames, values, error=0.0):
     Returns:
         bool[N, curves]. A curve that stays within the error of its first value has one key.
     """
+    times = np.asarray(frames, np.float64)
     values = np.asarray(values, np.float32)
     keep = np.ones(values.shape, bool)
     still = np.abs(values - values[:1]).max(axis=0, initial=0.0) <= error
-    if error > 0.0 and len(frames) > 2:
-        keep = _cones(np.asarray(frames, np.float64), values.astype(np.float64), error)
+    if error > 0.0 and len(times) > 2:
+        keep = _cones(times, values.astype(np.float64), error)
         # Where float32 lines are coarser than the error, all keys stay.
-        keep[:, np.abs(rebuilt(frames, values, keep) - values).max(axis=0) > error] = True
+        keep[:, np.abs(rebuilt(times, values, keep) - values).max(axis=0) > error] = True
     keep[1:, still] = False
     return keep
 
 
-def _cones(frames, values, error):
+def _cones(frames: Times, values: Times, error: float) -> Kept:
     inner = np.maximum(error - 4 * _EPS * np.abs(values).max(axis=0), 0.0)
     keep = np.zeros(values.shape, bool)
     keep[[0, -1]] = True
@@ -76,7 +83,7 @@ def _cones(frames, values, error):
     return keep
 
 
-def rebuilt(frames, values, keep):
+def rebuilt(frames: Times, values: Floats, keep: Kept) -> Floats:
     """What straight lines between the keys give at every frame.
 
     Args:
