@@ -107,7 +107,9 @@ class Reader {
   };
   struct Loaded;
   core::Status read_head(const Limits& limits);
+  core::Status read_names(View body, const Limits& limits);
   core::Status read_index();
+  core::Status read_blocks(View index, std::uint64_t offset);
   void find_blocks();
   bool take_block(std::uint64_t offset, Block& block);
   core::Status load(std::size_t block);

@@ -94,7 +94,12 @@ core::Status Reader::read_head(const Limits& limits) {
                 kHeadStart);
   }
   first_block_ = end_ = bytes->size();
-  Cursor in(View(*bytes).subspan(kHeadStart, size));
+  return read_names(View(*bytes).subspan(kHeadStart, size), limits);
+}
+
+// In: the head's body.
+core::Status Reader::read_names(View body, const Limits& limits) {
+  Cursor in(body);
   const auto refuse = [&](ErrorCode code, std::string where, std::string message) {
     return fail(code, std::move(where), std::move(message), kHeadStart + in.position());
   };
@@ -157,7 +162,13 @@ core::Status Reader::read_index() {
     return fail(ErrorCode::kInvalidValue, "index", "the index is damaged: its checksum is another",
                 offset);
   }
-  Cursor in(View(*bytes).first(length));
+  end_ = size;
+  return read_blocks(View(*bytes).first(length), offset);
+}
+
+// In: the index, which lies at offset.
+core::Status Reader::read_blocks(View index, std::uint64_t offset) {
+  Cursor in(index);
   const auto refuse = [&](ErrorCode code, std::string message) {
     return fail(code, "index[" + std::to_string(blocks_.size()) + "]", std::move(message),
                 offset + in.position());
@@ -181,7 +192,6 @@ core::Status Reader::read_index() {
   if (in.failed() || in.left() > 0 || at != offset) {
     return refuse(ErrorCode::kInvalidLength, "blocks and events do not fill the file");
   }
-  end_ = size;
   return core::ok();
 }
 
