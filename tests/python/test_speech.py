@@ -301,6 +301,19 @@ def test_a_transcript_that_is_not_to_the_letter_is_used_where_it_fits(voice):
     assert {"cat", "three", "home"} <= {phone.word for phone in heard.phonemes}
 
 
+@pytest.mark.parametrize("said", [None, "Hello there"])
+@pytest.mark.parametrize("count", [3, 16000])
+def test_in_a_silent_recording_no_speech_is_heard(tmp_path, said, count):
+    pytest.importorskip("pocketsphinx")
+    path = tmp_path / "silent.wav"
+    path.write_bytes(wav(1, 16, 1, RATE, bytes(2 * count)))
+    heard = listen(path, said)
+    assert [p.name for p in heard.phonemes] == ["SIL"]
+    assert heard.notes == ["no speech was heard"]
+    clip = animate(heard, blinks=False)
+    assert np.abs(clip.curves).max() == 0.0
+
+
 def test_listening_tells_how_far_it_is_and_can_be_cancelled(voice):
     path, _ = voice("A short sentence.")
     parts = []

@@ -29,7 +29,9 @@ _SHORTEST_PHONEME = 0.03
 _DOUBTFUL = 0.37  # confidence; of right transcripts 0.41 to 0.77, of wrong ones up to 0.35
 _UNSAID = 0.2  # of the loud time
 _LEAST_FOUND = 0.6  # of a transcript's words: of others' transcripts up to half are "found"
+_SILENT = -80.0  # decibels below full scale: nothing quieter is speech
 _GAP = 0.05  # seconds between words that do not follow each other
+_NO_SPEECH = "no speech was heard"
 _STOPS = frozenset({"P", "B", "T", "D", "K", "G", "CH", "JH"})
 
 
@@ -77,6 +79,10 @@ def listen(
     samples = resample(samples, rate)
     tell = _reporter(progress, cancel)
     tell(0.02)
+    levels = loudness(samples)
+    if not speaking(levels).any():
+        tell(1.0)
+        return Heard(_filled([], len(samples) / RATE), samples, False, [_NO_SPEECH])
     notes: list[str] = []
     found = None
     if words is not None:
@@ -86,11 +92,10 @@ def listen(
     aligned = found is not None
     if found is None:
         found = _recognised(recogniser, samples, tell)
-    levels = loudness(samples)
     if aligned:
         notes += _doubts(found, levels)
     elif confidence(found) == 0.0:
-        notes.append("no speech was heard")
+        notes.append(_NO_SPEECH)
     found = with_silences(found, levels)
     tell(1.0)
     return Heard(_filled(found, len(samples) / RATE), samples, aligned, notes)
@@ -233,8 +238,8 @@ def loudness(samples: Samples) -> npt.NDArray[np.float64]:
 
 def speaking(levels: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
     """Where the sound is loud enough to be speech: [levels]."""
-    floor, peak = np.quantile(levels, 0.05), np.quantile(levels, 0.98)
-    return levels > max(peak - 38.0, min(floor + 8.0, peak - 12.0))
+    floor, peak = float(np.quantile(levels, 0.05)), float(np.quantile(levels, 0.98))
+    return levels > max(_SILENT, peak - 38.0, min(floor + 8.0, peak - 12.0))
 
 
 def pieces(levels: npt.NDArray[np.float64]) -> list[tuple[float, float]]:
