@@ -118,7 +118,7 @@ run_blender "bpy $version" "$python" blender_tests/run.py -- --extension "$zip"
 
 # What differs most between versions: installing, building, keys and actions, odd files.
 subset=()
-for group in extension vertices controls frames failures; do
+for group in extension vertices controls frames failures animation_import bake; do
   subset+=("blender_tests/test_$group.py")
 done
 for version in 4.2.23 5.0.1; do
