@@ -126,6 +126,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path)
     folder = parser.parse_args().out
+    if folder:
+        folder.mkdir(parents=True, exist_ok=True)
     sizes: dict[str, list[float]] = {}
     print("| | " + " | ".join(f"{kind}, unpacked at GB/s" for kind in KINDS) + " |")
     print("|---|" + "---:|" * len(KINDS))
