@@ -166,7 +166,6 @@ def test_the_head_turns_as_the_clip_says(rig, rotation_mode):
 
 @pytest.mark.parametrize("rotation_mode", ["QUATERNION", "XYZ", "AXIS_ANGLE"])
 def test_an_action_comes_back_as_the_clip_it_was(rig, rotation_mode):
-    clips = scene.submodule("scene.clips")
     scene.controls(rig).pose.bones["head"].rotation_mode = rotation_mode
     angles = np.random.default_rng(5).uniform(-0.7, 0.7, (3, 13)).astype(np.float32)
     sliders = np.random.default_rng(6).random((2, 13), np.float32)
@@ -177,10 +176,6 @@ def test_an_action_comes_back_as_the_clip_it_was(rig, rotation_mode):
     assert back.names == clip.names
     np.testing.assert_allclose(back.curves[:2], clip.curves[:2], atol=1e-7)
     np.testing.assert_allclose(back.curves[2:], clip.curves[2:], atol=2e-6)
-    clips.play(rig, action)
-    seen = clips.clip_of_scene(bpy.context, rig, np.arange(13.0))
-    np.testing.assert_allclose(seen.curve(PULL), clip.curve(PULL), atol=1e-7)
-    np.testing.assert_allclose(seen.curve("head.roll"), clip.curve("head.roll"), atol=2e-6)
 
 
 def test_names_that_are_cut_or_stand_twice_find_their_sliders(rig):

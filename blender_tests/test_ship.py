@@ -240,7 +240,9 @@ def test_controls_as_csv_and_clip(dna_file, tmp_path):
     assert header[-3:] == ["head.yaw", "head.pitch", "head.roll"]
     assert len(set(header)) == len(header) == 1 + 11 + 3
     rate = bpy.context.scene.render.fps
-    np.testing.assert_allclose(table[:, 0], np.arange(2, 4.1, 0.5) / rate)
+    # Second 0 is the scene's first frame, as of a sound that begins there.
+    first = bpy.context.scene.frame_start
+    np.testing.assert_allclose(table[:, 0], (np.arange(2, 4.1, 0.5) - first) / rate)
     for row, frame in zip(table, np.arange(2, 4.1, 0.5), strict=True):
         bpy.context.scene.frame_set(int(frame), subframe=frame % 1)
         raw = scene.raw_of(rig, dna_file)
@@ -254,6 +256,23 @@ def test_controls_as_csv_and_clip(dna_file, tmp_path):
         assert row[-2] == pytest.approx(np.arcsin(ahead.z), abs=1e-5)
 
 
+@pytest.mark.parametrize("first", [1, 0, 5])
+def test_a_clip_comes_back_to_the_frames_that_it_left(dna_file, tmp_path, first):
+    bpy.context.scene.frame_start = first
+    rig = scene.load(dna_file)
+    animate(rig)
+    scene.controls(rig).select_set(True)
+    path = _export("RZC", tmp_path)
+    other = scene.load(dna_file)
+    bpy.context.view_layer.objects.active = scene.controls(other)
+    done = bpy.ops.risorius.import_animation(filepath=str(path), start=float(first))
+    assert done == {"FINISHED"}
+    for frame in (1, 4, 9):
+        bpy.context.scene.frame_set(frame)
+        wanted, found = scene.raw_of(rig, dna_file), scene.raw_of(other, dna_file)
+        np.testing.assert_allclose(found, wanted, atol=1e-6)
+
+
 def test_a_clip_file_holds_the_same_and_maps_where_wanted(dna_file, tmp_path):
     rig = scene.load(dna_file)
     animate(rig)
@@ -262,7 +281,7 @@ def test_a_clip_file_holds_the_same_and_maps_where_wanted(dna_file, tmp_path):
     assert clip.names[-5:] == ("head.yaw", "head.pitch", "head.roll", "flush", "wrinkle")
     for frame in (1, 4, 10):
         bpy.context.scene.frame_set(frame)
-        shown = clip.sample([frame / clip.rate])[0]
+        shown = clip.sample([(frame - 1) / clip.rate])[0]  # the scene begins at 1
         assert shown[0] == scene.raw_of(rig, dna_file)[0]
         assert shown[-2:] == pytest.approx(list(rig["maps"]), abs=1e-7)
     assert np.ptp(clip.curve("flush")) > 0.5

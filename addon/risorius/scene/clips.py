@@ -305,50 +305,6 @@ def _from_bone(bone, turns):
     return clips.multiply(clips.multiply(rest, turns), rest * [1.0, -1.0, -1.0, -1.0])
 
 
-def clip_of_scene(context, rig, frames):
-    """Sample what the sliders and the head bone show, NLA and drivers included.
-
-    The scene is stepped through and put back to its frame.
-
-    Args:
-        context: scene and view layer.
-        rig: the character.
-        frames: float64[n], ascending.
-
-    Returns:
-        risorius.Clip of all controls, frame 0 at second 0.
-    """
-    scene, controls, live = context.scene, parts.controls_of(rig), runtime.of(rig)
-    head = controls.pose.bones.get("head")
-    before = scene.frame_current, scene.frame_subframe
-    raw, turns = [], []
-    try:
-        for frame in frames:
-            whole = int(np.floor(frame))
-            scene.frame_set(whole, subframe=float(frame - whole))
-            seen = controls.evaluated_get(context.evaluated_depsgraph_get())
-            values = dict(seen.pose.bones[parts.FACE].items())
-            raw.append([values.get(label, 0.0) for label in live.labels])
-            turns.append(own_rotation(seen, head) if head is not None else (1.0, 0.0, 0.0, 0.0))
-    finally:
-        scene.frame_set(before[0], subframe=before[1])
-    rate = frame_rate(scene)
-    rows = np.array(raw, np.float32).reshape(len(frames), len(live.labels)).T
-    names = dna_names(live, live.labels)
-    turned = np.array(turns).reshape(-1, 4)
-    if head is not None and (turned != [1.0, 0.0, 0.0, 0.0]).any():
-        names = [*names, *clips.HEAD]
-        angles = clips.angles_of(_from_bone(head, turned)).T
-        rows = np.concatenate([rows, angles.astype(np.float32)])
-    times = np.asarray(frames, np.float64) / rate
-    return native.module().Clip(names, rows, rate, times=times)
-
-
-def own_rotation(seen, bone):
-    """(w, x, y, z) by which a bone itself is turned, without its constraints."""
-    return tuple(seen.pose.bones[bone.name].matrix_basis.to_quaternion())
-
-
 def add_sound(scene, path, frame, name=""):
     """Put a sound strip into the sequencer, on the first channel that is free there.
 

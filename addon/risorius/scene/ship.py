@@ -196,7 +196,7 @@ def _remove_all_but(before):
         bpy.data.batch_remove(new)
 
 
-def clip(rig, level, samples, rate, maps=False):
+def clip(rig, level, samples, rate, origin, maps=False):
     """The raw controls of a range, and how the head was turned.
 
     Args:
@@ -204,11 +204,11 @@ def clip(rig, level, samples, rate, maps=False):
         level: of detail, for the maps.
         samples: its Samples.
         rate: frames per second of the scene.
+        origin: the frame of the scene that is the clip's second 0; an import puts it there again.
         maps: add the values of the animated maps, each by its name in the DNA.
 
     Returns:
-        risorius.Clip, names as in the DNA (Blender's where the DNA has one twice); frame 0 of the
-        scene is its second 0.
+        risorius.Clip, names as in the DNA (Blender's where the DNA has one twice).
     """
     live, names = runtime.of(rig), []
     for label, name in zip(live.labels, live.dna.raw_control_names, strict=True):
@@ -224,6 +224,7 @@ def clip(rig, level, samples, rate, maps=False):
         rows = np.concatenate([rows, baked_tracks.evaluate(live, samples, level).animated_maps.T])
     frames = samples.frames
     step = float(frames[1] - frames[0]) if len(frames) > 1 else 1.0
+    start = (float(frames[0]) - origin) / rate
     return native.module().Clip(
-        names, rows, rate / step, start=float(frames[0]) / rate, metadata={"source": rig.name}
+        names, rows, rate / step, start=start, metadata={"source": rig.name}
     )

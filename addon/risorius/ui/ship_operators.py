@@ -226,7 +226,8 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, bpy.
         if self.format in ("RZC", "CSV"):
             if len(characters) > 1:
                 raise ValueError("a file holds the controls of one face: select one")
-            clip = ship.clip(*characters[0], frame_rate(context.scene), self.maps)
+            scene = context.scene
+            clip = ship.clip(*characters[0], frame_rate(scene), scene.frame_start, self.maps)
             _write_csv(clip, path) if self.format == "CSV" else clip.save(path)
         else:
             with ship.copies(context, characters, options) as override:
