@@ -6,6 +6,7 @@
 #include "clip/codec.h"
 #include "clip/file.h"
 #include "core/file_write.h"
+#include "core/path_text.h"
 
 namespace risorius::bindings {
 
@@ -100,7 +101,7 @@ class ClipFile {
           clip::View(reinterpret_cast<const std::uint8_t*>(view.data()), view.size()));
     } else {
       const auto path = source.cast<std::filesystem::path>();
-      name_ = path.string();
+      name_ = core::utf8(path);
       from = taken(core::open_file(path));
     }
     auto opened = [&] {

@@ -2,6 +2,7 @@
 // Dna from and to bytes, files and JSON, and what changes one as a whole.
 #include "bindings/fields.h"
 #include "core/file_write.h"
+#include "core/path_text.h"
 #include "core/source.h"
 #include "dna/coordinates.h"
 #include "dna/io.h"
@@ -324,7 +325,7 @@ void bind_dna_files(py::module_& m, DnaClass& c) {
   });
   m.def("parse_file", [](const std::filesystem::path& path, const dna::ParseOptions& options) {
     std::unique_ptr<core::Source> source = unwrap(core::open_file(path));
-    return parse(*source, options, path.string());
+    return parse(*source, options, core::utf8(path));
   });
   m.def("check_bytes", [](const py::bytes& bytes, const dna::Limits& limits) {
     core::SpanSource source = source_of(bytes);

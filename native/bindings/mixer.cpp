@@ -176,7 +176,8 @@ FloatArray evaluate_batch(clip::Mixer& mixer, const DoubleArray& times, const py
     below = FloatArray::ensure(base);
     if (!below) throw py::value_error("base: an array of numbers was expected");
     const bool each = below.ndim() == 2 && below.shape(0) == times.size();
-    if (below.shape(below.ndim() - 1) != count || (below.ndim() != 1 && !each)) {
+    if (below.ndim() < 1 || below.shape(below.ndim() - 1) != count ||
+        (below.ndim() != 1 && !each)) {
       shape_error("base", "(controls,) or (times, controls)", below);
     }
     stride = each ? count : 0;

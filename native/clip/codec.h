@@ -21,6 +21,7 @@ struct Limits {
   std::uint32_t controls = 1u << 16;
   std::uint64_t frames = std::uint64_t{1} << 32;
   std::uint64_t head_bytes = std::uint64_t{1} << 24;
+  std::uint64_t metadata = std::uint64_t{1} << 18;
   std::uint64_t values = std::uint64_t{1} << 29;  // in one read: controls * frames
 };
 

@@ -5,6 +5,8 @@
 #include <string>
 #include <system_error>
 
+#include "core/path_text.h"
+
 namespace risorius::clip {
 
 namespace {
@@ -23,9 +25,12 @@ std::FILE* create_new(const std::filesystem::path& path) {
 #endif
 }
 
+core::Unexpected failure(const std::filesystem::path& path, const std::string& reason) {
+  return fail(ErrorCode::kIoWrite, "", "cannot write " + core::utf8(path) + ": " + reason);
+}
+
 core::Unexpected failure(const std::filesystem::path& path, int reason) {
-  return fail(ErrorCode::kIoWrite, "",
-              "cannot write " + path.string() + ": " + std::generic_category().message(reason));
+  return failure(path, std::generic_category().message(reason));
 }
 
 }  // namespace
@@ -61,22 +66,24 @@ core::Status FileWriter::write_ready() {
 }
 
 core::Status FileWriter::append(std::span<const float> frames, std::span<const double> times) {
+  if (!trouble_) return trouble_;
   if (!is_open()) return fail(ErrorCode::kInvalidArgument, "", "the clip has been closed");
   if (auto taken = encoder_.append(frames, times); !taken) return taken;
-  return write_ready();
+  return trouble_ = write_ready();
 }
 
 core::Status FileWriter::close() {
-  if (!is_open()) return core::ok();
+  if (!trouble_) file_.reset();
+  if (!is_open()) return trouble_;
   encoder_.finish();
-  auto written = write_ready();
+  trouble_ = write_ready();
   errno = 0;
-  if (std::fclose(file_.release()) != 0 && written) written = failure(part_, errno);
-  if (!written) return written;
+  if (std::fclose(file_.release()) != 0 && trouble_) trouble_ = failure(part_, errno);
+  if (!trouble_) return trouble_;
   std::error_code error;
   std::filesystem::rename(part_, path_, error);
-  if (error) return failure(path_, error.value());
-  return core::ok();
+  if (error) trouble_ = failure(path_, error.message());
+  return trouble_;
 }
 
 }  // namespace risorius::clip

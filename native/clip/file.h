@@ -23,7 +23,8 @@ class FileWriter {
   core::Status append(std::span<const float> frames, std::span<const double> times);
   void add(Event event) { encoder_.add(std::move(event)); }
   /// Writes what is left and the index, and gives the file its name; a file of that name from
-  /// before is replaced. Fails: kIoWrite.
+  /// before is replaced. Fails: kIoWrite; then, and after an append that could not write, PATH is
+  /// left as it was, what was written stays in part(), and every later call fails with the same.
   core::Status close();
 
   bool is_open() const { return file_ != nullptr; }
@@ -42,6 +43,7 @@ class FileWriter {
   Encoder encoder_;
   std::filesystem::path path_, part_;
   std::unique_ptr<std::FILE, Close> file_;
+  core::Status trouble_ = core::ok();  // bytes are missing, so what would follow is no clip
 };
 
 }  // namespace risorius::clip

@@ -103,7 +103,10 @@ bool Mixer::moment(const Layer& layer, double time, Moment& out) noexcept {
   } else if (!layer.warp.x.empty()) {
     out.clip_time = layer.warp.at(t);
   } else {
-    const double turns = snapped((t - layer.start) / ((layer.last - layer.first) * layer.scale));
+    const double length = (layer.last - layer.first) * layer.scale;
+    // The end itself is rounded: where times are large its turn would be lost.
+    const double turns =
+        t >= layer.end ? layer.repeat : std::min(snapped((t - layer.start) / length), layer.repeat);
     double part = turns - std::floor(turns);
     // The end of the last turn is the end of the clip and not the beginning of one more.
     if (part == 0.0 && t > layer.start && turns >= layer.repeat) part = 1.0;

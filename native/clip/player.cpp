@@ -32,6 +32,7 @@ core::Result<std::span<const float>> Player::frame(std::uint64_t index) {
     auto loaded = load(static_cast<std::size_t>(after - starts.begin()) - 1);
     if (!loaded) return std::move(loaded).propagate();
   }
+  if (moving_.empty()) return std::span<const float>(values_);
   const auto frames = static_cast<std::size_t>(end_ - begin_);
   const float* from = curves_.data() + (index - begin_);
   for (const std::uint32_t control : moving_) {

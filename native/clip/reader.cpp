@@ -132,6 +132,11 @@ core::Status Reader::read_names(View body, const Limits& limits) {
     }
   }
   const std::uint64_t pairs = in.count();
+  if (pairs > limits.metadata) {
+    return refuse(
+        ErrorCode::kLimitExceeded, "head.metadata",
+        std::to_string(pairs) + " pairs, the limit is " + std::to_string(limits.metadata));
+  }
   for (std::uint64_t i = 0; i < pairs && !in.failed(); ++i) {
     std::string key = in.text();
     head_.metadata.emplace_back(std::move(key), in.text());
@@ -344,7 +349,9 @@ core::Status Reader::may_read(std::uint64_t begin, std::uint64_t end,
     }
   }
   const std::uint64_t count = end - begin;
-  if (count > limits_.values / std::max<std::uint64_t>(controls.size(), 1)) {
+  // A time is as large as two values.
+  const std::uint64_t values = controls.size() + (head_.has_times ? 2 : 0);
+  if (count > limits_.values / std::max<std::uint64_t>(values, 1)) {
     return fail(ErrorCode::kLimitExceeded, "frames",
                 std::to_string(count) + " frames of " + std::to_string(controls.size()) +
                     " controls, the limit is " + std::to_string(limits_.values) + " values");
@@ -363,7 +370,8 @@ core::Status Reader::read(std::uint64_t begin, std::uint64_t end,
     const std::uint64_t until = std::min(end, starts_[block + 1]);
     if (until == at) continue;  // a block of events only
     const auto done = static_cast<std::size_t>(at - begin);
-    auto read = read_block(block, at, until, controls, out + done, static_cast<std::size_t>(count),
+    auto read = read_block(block, at, until, controls, out == nullptr ? nullptr : out + done,
+                           static_cast<std::size_t>(count),
                            out_times == nullptr ? nullptr : out_times + done);
     if (!read) return read;
     if (out_times != nullptr && done > 0 && out_times[done] <= out_times[done - 1]) {

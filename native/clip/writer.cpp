@@ -15,7 +15,29 @@ namespace {
 using core::ErrorCode;
 using core::fail;
 
+// What a reader would refuse is not written.
+core::Status check_sizes(const Head& head) {
+  const Limits limits;
+  if (head.names.size() > limits.controls || head.metadata.size() > limits.metadata) {
+    return fail(ErrorCode::kInvalidArgument, "names",
+                "at most " + std::to_string(limits.controls) + " controls and " +
+                    std::to_string(limits.metadata) + " metadata were expected, found " +
+                    std::to_string(head.names.size()) + " and " +
+                    std::to_string(head.metadata.size()));
+  }
+  std::uint64_t bytes = 64;
+  for (const std::string& name : head.names) bytes += name.size() + 16;
+  for (const auto& [key, value] : head.metadata) bytes += key.size() + value.size() + 16;
+  if (bytes > limits.head_bytes) {
+    return fail(ErrorCode::kInvalidArgument, "metadata",
+                "names and metadata of " + std::to_string(bytes) + " bytes, the limit is " +
+                    std::to_string(limits.head_bytes));
+  }
+  return core::ok();
+}
+
 core::Status check(const Head& head) {
+  if (auto sizes = check_sizes(head); !sizes) return sizes;
   std::unordered_set<std::string> seen;
   for (std::size_t i = 0; i < head.names.size(); ++i) {
     if (!seen.insert(head.names[i]).second) {
@@ -187,7 +209,7 @@ core::Result<Bytes> encode(const Clip& clip, std::size_t block_frames) {
   for (std::size_t first = 0; first < frames; first += block_frames) {
     const std::size_t count = std::min(block_frames, frames - first);
     const std::span<const double> times(clip.times);
-    encoder.put_block(clip.curves.data() + first, frames,
+    encoder.put_block(clip.curves.empty() ? nullptr : clip.curves.data() + first, frames,
                       clip.head.has_times ? times.subspan(first, count) : times, count);
   }
   encoder.finish();

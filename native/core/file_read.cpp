@@ -7,6 +7,7 @@
 #include <system_error>
 
 #include "core/aligned.h"
+#include "core/path_text.h"
 #include "core/source.h"
 
 #ifndef _WIN32
@@ -23,7 +24,7 @@ namespace {
 using std::filesystem::path;
 
 Unexpected cut_short(const path& file) {
-  return fail(ErrorCode::kIoRead, "", file.string() + " was cut while it was read");
+  return fail(ErrorCode::kIoRead, "", utf8(file) + " was cut while it was read");
 }
 
 }  // namespace
@@ -45,7 +46,7 @@ namespace {
 
 Unexpected failure(ErrorCode code, const char* verb, const path& file, int reason) {
   return fail(code, "",
-              std::string("cannot ") + verb + " " + file.string() + ": " +
+              std::string("cannot ") + verb + " " + utf8(file) + ": " +
                   std::generic_category().message(reason));
 }
 
@@ -95,7 +96,7 @@ Result<FileBytes> read_file(const path& name, ReadBy by) {
   }
   if (!S_ISREG(about.st_mode)) {
     return fail(ErrorCode::kIoOpen, "",
-                name.string() + (S_ISDIR(about.st_mode) ? " is a folder" : " is no plain file") +
+                utf8(name) + (S_ISDIR(about.st_mode) ? " is a folder" : " is no plain file") +
                     ", a file was expected");
   }
   const auto size = static_cast<std::size_t>(about.st_size);

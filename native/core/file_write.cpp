@@ -7,6 +7,8 @@
 #include <string>
 #include <system_error>
 
+#include "core/path_text.h"
+
 #ifdef _WIN32
 #include <io.h>
 #else
@@ -45,7 +47,7 @@ std::filesystem::path temporary_name(const std::filesystem::path& path) {
 
 Unexpected failure(const std::filesystem::path& path, int reason) {
   return fail(ErrorCode::kIoWrite, "",
-              "cannot write " + path.string() + ": " + std::generic_category().message(reason) +
+              "cannot write " + utf8(path) + ": " + std::generic_category().message(reason) +
                   "; a file of that name from before is unchanged");
 }
 

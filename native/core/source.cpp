@@ -7,6 +7,8 @@
 #include <cstring>
 #include <system_error>
 
+#include "core/path_text.h"
+
 #ifndef _WIN32
 #include <fcntl.h>
 #include <unistd.h>
@@ -87,7 +89,7 @@ class FileSource final : public Source {
 }  // namespace
 
 Result<std::unique_ptr<Source>> open_file(const std::filesystem::path& path) {
-  const std::string name = path.string();
+  const std::string name = utf8(path);
   std::error_code error;
   if (std::filesystem::is_directory(path, error)) {
     return fail(ErrorCode::kIoOpen, "", name + " is a folder, a file was expected");

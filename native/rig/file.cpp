@@ -2,6 +2,7 @@
 #include "rig/file.h"
 
 #include "core/file_write.h"
+#include "core/path_text.h"
 
 namespace risorius::rig {
 
@@ -22,7 +23,7 @@ core::Result<Rig> open_rig_file(const std::filesystem::path& path, Trust trust, 
   auto rig = open_rig(file->bytes, file->owner, check, kernels);
   if (rig) return rig;
   core::Error error = rig.error();
-  error.message = path.string() + ": " + error.message;
+  error.message = core::utf8(path) + ": " + error.message;
   return core::Unexpected{std::move(error)};
 }
 

@@ -83,3 +83,8 @@ def test_is_a_value():
     assert (clip.curves == 0.0).all()
     with pytest.raises(ValueError, match="read-only"):
         clip.curves[0, 0] = 1.0
+
+
+def test_a_time_that_is_no_number_is_the_first_frames():
+    assert make().sample([np.nan]).tolist() == [[0, 4]]
+    assert make(times=[0.0, 1.0, 4.0]).sample([np.nan]).tolist() == [[0, 4]]

@@ -184,3 +184,43 @@ def test_a_reader_serves_threads():
     for thread in threads:
         thread.join()
     assert wrong == []
+
+
+def test_after_a_write_that_failed_nothing_more_is_written(tmp_path):
+    resource = pytest.importorskip("resource")
+    path = tmp_path / "take.rzc"
+    Clip(["a"], [[1.0, 2.0]]).save(path)
+    before = path.read_bytes()
+    noise = np.random.default_rng(1).normal(size=(64, 1)).astype(np.float32)
+    writer = ClipWriter(path, ["a"], 60.0, block_frames=16)
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, hard))
+    try:
+        with pytest.raises(ClipError, match="cannot write"):
+            writer.append(noise)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    for go_on in (lambda: writer.append(noise), writer.close, writer.close):
+        with pytest.raises(ClipError, match="cannot write"):
+            go_on()
+    assert path.read_bytes() == before
+
+
+def test_a_name_that_cannot_be_taken_is_said_each_time(tmp_path):
+    path = tmp_path / "take.rzc"
+    path.mkdir()
+    writer = ClipWriter(path, ["a"], 60.0)
+    writer.append(np.ones((3, 1), np.float32))
+    for _ in range(2):
+        with pytest.raises(ClipError, match="cannot write"):
+            writer.close()
+    assert ClipReader(writer.part).frame_count == 3
+
+
+def test_what_a_reader_would_refuse_is_not_written():
+    for clip in (
+        Clip(["a"], [[1.0]], metadata={"x": "y" * (1 << 24)}),
+        Clip([str(i) for i in range(65537)], np.zeros((65537, 1))),
+    ):
+        with pytest.raises(ClipError, match="limit is|were expected"):
+            clip.to_bytes()

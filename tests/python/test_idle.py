@@ -151,3 +151,14 @@ def test_refuses(arguments, sentence):
         idle(*arguments)
     with pytest.raises(ValueError, match="of a loop"):
         idle(1, 1.0, loop=True)
+
+
+def test_a_short_loop_of_a_wide_gaze_closes():
+    for seed in range(60):
+        clip = idle(seed, 2.0, loop=True, life=Life(gaze=60.0))
+        assert np.isfinite(clip.curves).all()
+
+
+def test_a_loop_needs_frames():
+    with pytest.raises(ValueError, match="at least 2 s"):
+        idle(0, 2.0, 0.4, loop=True)

@@ -392,3 +392,21 @@ def test_masks_by_region_side_control_and_pattern():
 
 def test_is_public():
     assert {"Mixer", "Layer"} <= set(risorius.__all__)
+
+
+def test_a_base_without_axes_is_refused():
+    with pytest.raises(ValueError, match="base"):
+        Mixer(["a"]).evaluate_batch([0.0], 0.5)
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.7, 1.3, 3.1])
+def test_a_layer_holds_its_end_however_late_it_is(scale):
+    clip = Clip(["a"], [[0.1, 0.3, 0.5, 0.7, 0.9]], 30.0)
+    mixer = Mixer(["a"], [Layer(clip, start=1.7e9, scale=scale)])
+    assert mixer.evaluate(1.7e9 + 100.0)[0] == pytest.approx(0.9)
+
+
+def test_events_of_other_values_fire_at_full_strength():
+    mixer = Mixer(["CTRL_expressions.eyeBlinkL"])
+    events = [Event(0.0, "blink", 0.0, text) for text in ("left", "nan", "")]
+    assert mixer.fire_events(events) == 3

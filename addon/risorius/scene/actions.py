@@ -82,7 +82,7 @@ def write(name, owner, frames, tracks, error, counts):
         for column in range(values.shape[1]):
             curve = _new_curve(bag, track, track.first + column if track.indexed else 0)
             _fill(curve, times[keep[:, column]], values[keep[:, column], column])
-    action[_DIGEST] = _digest(action)
+    stamp(action)
     return action, compat.slot_for(action, owner)
 
 
@@ -131,6 +131,16 @@ def _fill(curve, times, values):
     for name in ("co", "handle_left", "handle_right"):
         points.foreach_set(name, places)
     points.foreach_set("interpolation", np.full(len(times), _LINEAR, np.int32))
+
+
+def was_edited(action):
+    """Whether somebody edited an action since `stamp`. One without a stamp is somebody's."""
+    return action.get(_DIGEST) != _digest(action)
+
+
+def stamp(action):
+    """Note what an action holds."""
+    action[_DIGEST] = _digest(action)
 
 
 def _digest(action):
@@ -182,7 +192,9 @@ def play(owner, action, slot, muted=(), strip=False):
 
 
 def keep(owner):
-    """Note on a datablock what animates it now; it has animation data then."""
+    """Note on a datablock what animates it now, unless that is noted; give it animation data."""
+    if BEFORE in owner:
+        return
     had = owner.animation_data is not None
     data = owner.animation_data or owner.animation_data_create()
     state = {
@@ -273,7 +285,7 @@ def restore(owner):
     for made in baked:
         if made is None or not made.get(BAKED_ACTION) or made.users:
             continue
-        if made.get(_DIGEST) == _digest(made):
+        if not was_edited(made):
             bpy.data.actions.remove(made)
         else:
             made.use_fake_user = True

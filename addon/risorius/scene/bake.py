@@ -124,7 +124,12 @@ def bake(context, rigs, options):
     sampled = yield from sampling.sample(context, rigs, frames, keys)
     write = _write_result if options.kind == RESULT else _write_controls
     with runtime.paused():
-        done = [write(rig, s, levels[rig], options) for rig, s in zip(rigs, sampled, strict=True)]
+        try:
+            done = [write(r, s, levels[r], options) for r, s in zip(rigs, sampled, strict=True)]
+        except Exception:
+            for rig in rigs:
+                _take_back(rig, options.kind)
+            raise
     runtime.forget_outputs()
     for rig in rigs:
         evaluate.bring_up(context, rig)
@@ -242,13 +247,30 @@ def unbake(context, rig):
     return True
 
 
-def _restore_result(rig):
-    state, live = rig[parts.BAKED], runtime.of(rig)
+def _take_back(rig, kind):
+    """Undo what a bake that failed has written on a character: all of it, or a part."""
+    controls = parts.controls_of(rig)
+    if kind == CONTROLS and parts.BAKED in controls:
+        _restore_controls(controls)
+    elif kind == CONTROLS:
+        actions.restore(controls)
+    elif parts.BAKED in rig:
+        _restore_result(rig)
+    else:
+        _restore_animation(rig)
+
+
+def _restore_animation(rig):
     actions.restore(rig)
     for item in parts.meshes_of(rig):
         if item.data.shape_keys is not None:
             actions.restore(item.data.shape_keys)
-            baked_keys.close(item, rig, live)
+            baked_keys.close(item, rig, runtime.of(rig))
+
+
+def _restore_result(rig):
+    state = rig[parts.BAKED]
+    _restore_animation(rig)
     (viewport, render), by_distance = list(state["levels"]), bool(state["by_distance"])
     del rig[parts.BAKED]
     rig[parts.LOD], rig[parts.LOD_RENDER] = max(viewport, 0), render

@@ -463,12 +463,14 @@ def duplicate(controls, place):
 
 
 def _curve_lists(controls):
-    """The lists of F-curves that move a control armature: its action's and its drivers."""
+    """The lists of F-curves that move a control armature: actions', its strips' and its drivers."""
     data = controls.animation_data
     if data is None:
         return
-    if data.action is not None and data.action.library is None:
-        bag = compat.bag_for(data.action, controls)
+    strips = [strip for track in data.nla_tracks for strip in track.strips]
+    played = {data.action, *(strip.action for strip in strips)}
+    for action in played:
+        bag = None if action is None or action.library else compat.bag_for(action, controls)
         if bag is not None:
             yield bag.fcurves
     yield data.drivers

@@ -15,7 +15,8 @@ from mathutils import Euler, Quaternion
 
 from .. import native
 from ..logic import names
-from . import clips, parts, runtime
+from ..logic.clips import ClipError
+from . import actions, clips, layers, parts, runtime
 
 INTERVAL = 1 / 60  # seconds; faster than a phone sends helps nobody
 _REDRAW = 0.25  # seconds between redraws of the status
@@ -207,8 +208,13 @@ def finish_take(session, rig, scene):
         clips.Report, or None where nothing came.
 
     Raises:
-        clips.ClipError: nothing of it is for this face, or it is longer than Blender can play.
+        clips.ClipError: nothing of it is for this face, it is longer than Blender can play, or the
+            NLA is being edited; what was recorded then waits to be finished again.
     """
+    controls = parts.controls_of(rig)
+    trouble = actions.busy(controls)
+    if trouble:
+        raise ClipError(trouble)
     take, session.take = session.receiver.finish(session.take), None
     if not len(take):
         return None
@@ -217,7 +223,8 @@ def finish_take(session, rig, scene):
     report = clips.make_action(rig, clip, timing, f"Live {names.printable(take.subject, 40)}")
     if take.full:
         report.notes.append(f"The take is full: {take.full} faces were left out.")
-    clips.play(rig, report.action)
+    layers.keep_weights(controls, clips.play(rig, report.action))
+    scene.frame_end = max(scene.frame_end, round(report.last))
     return report
 
 

@@ -9,7 +9,7 @@ import bpy
 from .. import native
 from ..logic import clips as clip_logic
 from ..logic import regions
-from . import armatures, clips, parts, runtime
+from . import actions, armatures, clips, parts, runtime
 
 CATALOG = "Faces"
 _NAMESPACE = uuid.UUID("6f0a5c9e-2f0b-4d2e-9a3b-0d9f6f0b7a11")
@@ -73,7 +73,7 @@ def make_assets(rig):
     """Make a pose asset of every expression that this face can show.
 
     An asset holds all sliders of the regions that its expression moves, so that it looks the same
-    whatever the face did before; one that is there already is made anew.
+    whatever the face did before; one that is there already is made anew, unless it was edited.
 
     Args:
         rig: the character.
@@ -106,9 +106,10 @@ def _asset(rig, live, expression, weights):
     clip = native.module().Clip(list(pose), [[value] for value in pose.values()])
     name = f"Face {expression.label}"
     old = bpy.data.actions.get(name)
-    if old is not None and old.library is None and old.asset_data is not None:
+    if old is not None and old.library is None and not actions.was_edited(old):
         bpy.data.actions.remove(old)
     action = clips.make_action(rig, clip, clip_logic.Timing(24.0), name).action
+    actions.stamp(action)
     action.asset_mark()
     action.asset_data.catalog_id = str(catalog_id(expression.group))
     action.asset_data.description = expression.description
@@ -136,6 +137,14 @@ def _write_catalogs(wanted):
     if not bpy.data.filepath:
         return ["Save the file and run this again to sort the poses into a catalogue."]
     path = Path(bpy.path.abspath("//")) / _CATALOG_FILE
+    try:
+        _add_catalogs(path, wanted)
+    except (OSError, ValueError) as error:
+        return [f"The poses have no catalogue, {path} cannot be changed: {error}"]
+    return []
+
+
+def _add_catalogs(path, wanted):
     text = path.read_text(encoding="utf-8") if path.is_file() else _HEADER
     for group in sorted(wanted):
         number = str(catalog_id(group))
@@ -143,4 +152,3 @@ def _write_catalogs(wanted):
             title = f"{group[:1].upper()}{group[1:]}s"
             text = f"{text.rstrip()}\n{number}:{CATALOG}/{title}:{CATALOG}-{title}\n"
     path.write_text(text, encoding="utf-8")
-    return []

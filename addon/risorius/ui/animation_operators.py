@@ -8,8 +8,9 @@ import bpy
 from bpy_extras.io_utils import ImportHelper
 
 from .. import native
+from ..logic.clips import ClipError
 from ..logic.names import printable
-from ..scene import clips, evaluate, layers, parts, retarget, runtime
+from ..scene import actions, clips, evaluate, layers, parts, retarget, runtime
 from .import_operators import explain, shown_progress
 from .operators import has_face
 
@@ -57,9 +58,17 @@ class PlacesClip:
     def poll(cls, context):
         return has_face(cls, context)
 
+    def start_with(self, scene):
+        """Begin where the scene begins, unless it was said where."""
+        if not self.properties.is_property_set("start"):
+            self.start = float(scene.frame_start)
+
     def place(self, context, clip, name, notes=(), with_eyes=True):
         """Put a clip onto the active face and report on it. Returns: its action."""
         rig = parts.active_rig(context)
+        trouble = actions.busy(parts.controls_of(rig))
+        if trouble:
+            raise ClipError(trouble)
         timing = clips.timing_of(clip, context.scene, self.start, keep_clock=True)
         made = clips.make_action(rig, clip, timing, name, with_eyes)
         notes = [*notes, *made.notes]
@@ -173,13 +182,14 @@ class RISORIUS_OT_import_animation(PlacesClip, bpy.types.Operator, ImportHelper)
     )
 
     def invoke(self, context, event):
-        if self.filepath:  # dropped onto the window
+        self.start_with(context.scene)
+        if self.properties.is_property_set("filepath"):  # dropped onto the window
             return self.execute(context)
-        self.start = float(context.scene.frame_start)
         return ImportHelper.invoke(self, context, event)
 
     def execute(self, context):
-        live = runtime.of(parts.active_rig(context))
+        live, render = runtime.of(parts.active_rig(context)), context.scene.render
+        rate = render.fps, render.fps_base
         try:
             with shown_progress(context) as progress:
                 clip, notes = self._read(live)
@@ -188,6 +198,7 @@ class RISORIUS_OT_import_animation(PlacesClip, bpy.types.Operator, ImportHelper)
                 progress(0.6)
                 self.place(context, clip, Path(self.filepath).stem, notes, self.use_eyes)
         except (ValueError, OSError, RuntimeError) as error:
+            render.fps, render.fps_base = rate
             self.report({"ERROR"}, explain(self.filepath, error))
             return {"CANCELLED"}
         return {"FINISHED"}
@@ -297,6 +308,9 @@ class RISORIUS_OT_import_arkit_rig(PlacesClip, bpy.types.Operator):
     bl_label = "From ARKit Rig"
     bl_options = {"REGISTER", "UNDO"}
 
+    start: bpy.props.FloatProperty(
+        name="Start Frame", description="Where frame 0 of the other rig's animation lies"
+    )
     source: bpy.props.StringProperty(
         name="Object",
         description="A mesh whose shape keys move; empty: the selected one, else the only one",
@@ -315,7 +329,6 @@ class RISORIUS_OT_import_arkit_rig(PlacesClip, bpy.types.Operator):
     def invoke(self, context, _event):
         found = retarget.source_of(context)
         self.source = found.name if found is not None else ""
-        self.start = 0.0
         return context.window_manager.invoke_props_dialog(self)
 
     def execute(self, context):

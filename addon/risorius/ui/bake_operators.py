@@ -2,6 +2,7 @@
 """Operators that bake faces to plain actions and bring them back to live."""
 
 import time
+import traceback
 
 import bpy
 
@@ -153,6 +154,8 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, bpy.types.Operator):
         layout.prop(self, "every")
 
     def execute(self, context):
+        # Adjusting the last operation calls this again, on the same operator: without a dialog.
+        interactive, self._interactive = self._interactive, False
         start, end = self.frames(context)
         options = bake.BakeOptions(
             self.kind,
@@ -169,7 +172,7 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, bpy.types.Operator):
         except bake.BakeError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        if self._interactive and not bpy.app.background:
+        if interactive and not bpy.app.background:
             return self._begin(context, job)
         return self._run(context, job)
 
@@ -214,11 +217,16 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, bpy.types.Operator):
             while time.monotonic() < end:
                 self._share = next(job)
         except StopIteration as finished:
-            for sentence in finished.value:
+            for sentence in finished.value or ():
                 self.report({"INFO"}, sentence)
             return True
         except (bake.BakeError, ValueError) as error:
             self.report({"ERROR"}, str(error))
+            self._result = {"CANCELLED"}
+            return True
+        except Exception as error:  # noqa: BLE001  an operator that raises would stay for ever
+            traceback.print_exc()
+            self.report({"ERROR"}, f"Baking failed, and the faces are as before: {error!r}.")
             self._result = {"CANCELLED"}
             return True
         context.window_manager.progress_update(self._share * 100)

@@ -141,7 +141,8 @@ class RISORIUS_OT_import_dna(bpy.types.Operator, ImportHelper):
         return {"FINISHED"} if {"FINISHED"} in results else {"CANCELLED"}
 
     def invoke(self, context, event):
-        if self.filepath or self.files:  # dropped onto the window
+        given = self.properties.is_property_set
+        if given("filepath") or given("files"):  # dropped onto the window
             return self.execute(context)
         return ImportHelper.invoke(self, context, event)
 

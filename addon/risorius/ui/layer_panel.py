@@ -79,6 +79,12 @@ class RISORIUS_OT_layer_add(FaceOperator, bpy.types.Operator):
         return {"FINISHED"}
 
 
+def _of_library(operator):
+    """Blender lets the items of a library neither go nor move."""
+    operator.report({"ERROR"}, "It belongs to the linked file: mute it, or change it there.")
+    return {"CANCELLED"}
+
+
 class RISORIUS_OT_layer_remove(LayerOperator, bpy.types.Operator):
     """Remove the active layer and the keys of its weight; its action stays"""
 
@@ -87,7 +93,10 @@ class RISORIUS_OT_layer_remove(LayerOperator, bpy.types.Operator):
 
     def execute(self, context):
         controls = _controls(context)
-        layers.remove(controls, self.place(controls))
+        try:
+            layers.remove(controls, self.place(controls))
+        except TypeError:
+            return _of_library(self)
         evaluate.bring_up(context, parts.active_rig(context))
         return {"FINISHED"}
 
@@ -106,7 +115,10 @@ class RISORIUS_OT_layer_move(LayerOperator, bpy.types.Operator):
         to = place + 1 if self.up else place - 1
         if not 0 <= to < len(layers.of(controls)):
             return {"CANCELLED"}
-        layers.move(controls, place, to)
+        try:
+            layers.move(controls, place, to)
+        except TypeError:
+            return _of_library(self)
         evaluate.bring_up(context, parts.active_rig(context))
         return {"FINISHED"}
 

@@ -27,6 +27,7 @@ _ENDINGS = {
     "RZC": ".rzc",
     "CSV": ".csv",
 }
+_KNOWN = {*_ENDINGS.values(), ".usd", ".usda", ".usdz", ".gltf"}
 _OPERATORS = {
     "GLTF": ("export_scene", "gltf"),
     "FBX": ("export_scene", "fbx"),
@@ -178,7 +179,10 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, bpy.
         """Give the file the ending of its format while the dialog is open."""
         if self.format == "USD" and self.filepath.endswith((".usd", ".usda", ".usdz")):
             return False
-        changed = str(Path(self.filepath).with_suffix(_ENDINGS[self.format]))
+        path = Path(self.filepath)
+        # A dot may be part of a name: shot.v02.
+        stem = path.stem if path.suffix.lower() in _KNOWN else path.name
+        changed = str(path.with_name(stem + _ENDINGS[self.format])) if stem else self.filepath
         if Path(self.filepath).name in ("", ".") or changed == self.filepath:
             return False
         self.filepath = changed

@@ -7,7 +7,7 @@ import bpy
 from bpy_extras.io_utils import ImportHelper
 
 from ..logic.clips import ClipError
-from ..scene import clips, listening
+from ..scene import clips, listening, parts
 from .animation_operators import PlacesClip
 from .import_operators import explain, usable
 
@@ -47,8 +47,8 @@ class RISORIUS_OT_speak(PlacesClip, bpy.types.Operator, ImportHelper):
 
     def invoke(self, context, event):
         self._asynchronous = not bpy.app.background
-        self.start = float(context.scene.frame_start)
-        if self.filepath:
+        self.start_with(context.scene)
+        if self.properties.is_property_set("filepath"):
             return self.execute(context)
         return ImportHelper.invoke(self, context, event)
 
@@ -68,7 +68,10 @@ class RISORIUS_OT_speak(PlacesClip, bpy.types.Operator, ImportHelper):
             blinks=self.use_blinks,
             accents=self.use_accents,
         )
-        if not getattr(self, "_asynchronous", False):
+        self._face = parts.active_rig(context).session_uid
+        # Adjusting the last operation calls this again, on the same operator.
+        asynchronous, self._asynchronous = getattr(self, "_asynchronous", False), False
+        if not asynchronous:
             self._task.run()
             return self._finish(context)
         self._task.start()
@@ -110,8 +113,9 @@ class RISORIUS_OT_speak(PlacesClip, bpy.types.Operator, ImportHelper):
         try:
             if task.error is not None:
                 raise task.error
-            if not type(self).poll(context):
-                self.report({"ERROR"}, "The face is no longer there.")
+            if not type(self).poll(context) or parts.active_rig(context).session_uid != self._face:
+                words = "The face that was to speak is no longer the active one: speak again."
+                self.report({"ERROR"}, words)
                 return {"CANCELLED"}
             notes = [n for n in task.clip.metadata.get("notes", "").split("; ") if n]
             self.place(context, task.clip, Path(self.filepath).stem, notes)

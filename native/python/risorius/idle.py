@@ -141,6 +141,8 @@ def idle(
     count = math.floor(duration * rate + 1e-6) + 1
     times = np.arange(count) / rate
     length = float(times[-1])
+    if loop and length < 2.0:
+        raise ValueError(f"rate: frames over at least 2 s were expected of a loop, found {rate}")
     saccades = make_saccades(seed, length, life, loop)
     blinks = make_blinks(seed, length, life, loop, saccades)
     curves = _gaze_curves(times, saccades, life)
@@ -281,7 +283,7 @@ def make_saccades(seed: int, length: float, life: Life, loop: bool) -> list[Sacc
         gaze = after
         time = out[-1].start + out[-1].duration + min(max(pause, 0.14), 6.0)
     if loop and out:
-        while out[-1].start + out[-1].duration > end:
+        while out and out[-1].start + out[-1].duration > end:
             out.pop()
         out.append(_saccade(end, out[-1].after if out else (0.0, 0.0), (0.0, 0.0)))
     return out

@@ -201,8 +201,7 @@ class Mixer:
         count = 0
         for event in events:
             if event.name in self.reactions:
-                strength = min(max(float(event.value or 1.0), 0.0), 1.0)
-                count += self.fire(event.name, event.time + offset, strength)
+                count += self.fire(event.name, event.time + offset, _strength(event.value))
         return count
 
     def clear_fired(self) -> None:
@@ -319,3 +318,12 @@ def _settings(place: int, layer: Layer, curves: LayerCurves) -> dict[str, Any]:
         "mute": layer.mute,
         "solo": layer.solo,
     }
+
+
+def _strength(text: str) -> float:
+    """The number in [0, 1] that an event's value is, or 1."""
+    try:
+        value = float(text)
+    except ValueError:
+        return 1.0
+    return min(max(value, 0.0), 1.0) if math.isfinite(value) else 1.0
