@@ -131,6 +131,7 @@ def perform(args, man, woman):
     must(bpy.ops.risorius.import_animation(filepath=str(clip)))
     for controls, seed in ((man, 3), (woman, 8)):
         add_acting(controls, seed)
+    bpy.context.scene.frame_end = round(man.animation_data.action.frame_range[1])
 
 
 def render(args):
