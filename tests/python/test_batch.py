@@ -240,7 +240,7 @@ def wait_for_outputs(jobs, process):
 
 @pytest.mark.parametrize("how", ["interrupt", "kill"])
 def test_interrupted_goes_on_where_it_was(tmp_path, how, capsys):
-    jobs = make(tmp_path / "j", clips=8, frames=60, table='write = ["npz", "csv"]\n')
+    jobs = make(tmp_path / "j", clips=8, frames=1500, table='write = ["npz", "csv"]\n')
     process = start(jobs)
     wait_for_outputs(jobs, process)
     # A terminal's Ctrl-C reaches every process, and so does a machine that fails.
@@ -256,7 +256,7 @@ def test_interrupted_goes_on_where_it_was(tmp_path, how, capsys):
         assert states.count("not done") == 16 - states.count("done")
     for path in out.rglob("take*.npz"):  # whole or not there
         with np.load(path) as arrays:
-            assert len(arrays["joints"]) == 60
+            assert len(arrays["joints"]) == 1500
     first = files_of(jobs)
     assert main(["batch", str(jobs), "--workers", "2", "--json"]) == 0
     facts = json.loads(capsys.readouterr().out)
