@@ -406,7 +406,7 @@ class Dask:
 
 def test_dask_with_a_worker_killed_in_the_middle(tmp_path, capsys, monkeypatch):
     version = risorius.__version__
-    monkeypatch.setattr("risorius.batch.cluster._CONNECT_SECONDS", 3.0)
+    monkeypatch.setattr("risorius.batch.cluster._CONNECT_SECONDS", 30.0)  # of a busy machine
     jobs = make(tmp_path / "j", clips=5)
     plan, outcomes = read_jobs(jobs), []
     with Dask(tmp_path) as dask:
@@ -433,6 +433,7 @@ def test_dask_with_a_worker_killed_in_the_middle(tmp_path, capsys, monkeypatch):
         monkeypatch.setattr(risorius, "__version__", version)
         dask.processes[0].kill()
         dask.processes[0].wait()
+        monkeypatch.setattr("risorius.batch.cluster._CONNECT_SECONDS", 2.0)
         assert main(["batch", str(jobs), "--scheduler", dask.address]) == 1
         assert "no Dask scheduler answers there" in capsys.readouterr().err
 
