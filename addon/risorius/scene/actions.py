@@ -283,12 +283,19 @@ def restore(owner):
         owner.animation_data_clear()
     del owner[BEFORE]
     for made in baked:
-        if made is None or not made.get(BAKED_ACTION) or made.users:
+        if made is None or not made.get(BAKED_ACTION) or _is_used(made):
             continue
         if not was_edited(made):
             bpy.data.actions.remove(made)
         else:
             made.use_fake_user = True
+
+
+def _is_used(action):
+    """Blender 4.3 counts a user too many of an action that was duplicated with its object."""
+    return bool(
+        action.users and (action.use_fake_user or bpy.data.user_map(subset=[action])[action])
+    )
 
 
 def _remove_track(data, state):
