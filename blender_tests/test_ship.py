@@ -326,3 +326,12 @@ def test_a_missing_exporter_is_one_sentence(dna_file, tmp_path):
             _export("FBX", tmp_path)
     finally:
         addon_utils.enable("io_scene_fbx")
+
+
+def test_without_a_name_nothing_is_written(dna_file, tmp_path, monkeypatch):
+    animate(scene.load(dna_file))
+    monkeypatch.chdir(tmp_path)
+    before = set(tmp_path.iterdir())
+    with pytest.raises(RuntimeError, match="no name"):
+        bpy.ops.risorius.export_animation(filepath="", format="GLTF")
+    assert set(tmp_path.iterdir()) == before

@@ -207,6 +207,9 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, bpy.
         layout.prop(self, "every")
 
     def execute(self, context):
+        if not Path(self.filepath).name:
+            self.report({"ERROR"}, "Say into which file: there is no name.")
+            return {"CANCELLED"}
         trouble = _missing(self.format)
         if trouble:
             self.report({"ERROR"}, trouble)
