@@ -126,12 +126,12 @@ def perform(args, man, woman):
     clip = args.out / "performance.rzc"
     choose(man)
     must(bpy.ops.risorius.speak(filepath=str(args.voice), transcript=args.text))
+    bpy.context.scene.frame_end = round(man.animation_data.action.frame_range[1])
     must(bpy.ops.risorius.export_animation(filepath=str(clip), format="RZC"))
     choose(woman)
     must(bpy.ops.risorius.import_animation(filepath=str(clip)))
     for controls, seed in ((man, 3), (woman, 8)):
         add_acting(controls, seed)
-    bpy.context.scene.frame_end = round(man.animation_data.action.frame_range[1])
 
 
 def render(args):

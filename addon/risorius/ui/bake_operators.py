@@ -65,13 +65,20 @@ class FacesOperator(FaceOperator):
 
 
 class FrameRange:
-    """The frames that an operator works on."""
+    """The frames, and the level of detail, that an operator works on."""
 
     range: bpy.props.EnumProperty(name="Range", items=RANGES)
     start: bpy.props.FloatProperty(name="Start", default=1)
     end: bpy.props.FloatProperty(name="End", default=250)
     step: bpy.props.FloatProperty(
         name="Step", description="Frames from key to key", default=1, min=0.01, soft_min=1
+    )
+    lod: bpy.props.IntProperty(
+        name="LOD",
+        description="-1 is the level that the viewport shows",
+        default=-1,
+        min=-1,
+        max=31,
     )
 
     def frames(self, context):
@@ -115,13 +122,6 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, bpy.types.Operator):
         ),
         options={"ENUM_FLAG"},
         default={"BONES", "SHAPES", "MAPS"},
-    )
-    lod: bpy.props.IntProperty(
-        name="LOD",
-        description="-1 is the level that the viewport shows",
-        default=-1,
-        min=-1,
-        max=31,
     )
     error: bpy.props.FloatProperty(
         name="Largest Error",

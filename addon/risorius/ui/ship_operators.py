@@ -127,13 +127,6 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, bpy.
         default="*.glb;*.fbx;*.usd;*.usdc;*.usda;*.usdz;*.abc;*.rzc;*.csv", options={"HIDDEN"}
     )
     format: bpy.props.EnumProperty(name="Format", items=FORMATS)
-    lod: bpy.props.IntProperty(
-        name="LOD",
-        description="-1 is the level that the viewport shows",
-        default=-1,
-        min=-1,
-        max=31,
-    )
     wanted: bpy.props.EnumProperty(
         name="Parts",
         items=(
