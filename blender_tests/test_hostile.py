@@ -4,6 +4,7 @@
 import gc
 import hashlib
 import random
+import tracemalloc
 import zlib
 from pathlib import Path
 from types import SimpleNamespace
@@ -266,14 +267,45 @@ def test_a_blend_whose_dna_was_tampered_with(how, dna_file, mode, tmp_path, caps
     assert lines[0].endswith(".")
 
 
-def test_a_small_stream_that_unfolds_without_end(dna_file, monkeypatch, capsys):
-    storage = scene.submodule("scene.storage")
-    monkeypatch.setattr(storage, "_MOST_BYTES", 1 << 20)
-    rig = scene.load(dna_file)
-    rig["risorius_dna"]["risorius_bytes"] = zlib.compress(bytes(64 << 20))
+# Whoever writes a .blend writes the length and the hash too: neither may be believed.
+@pytest.mark.parametrize("said", ["nothing", "the truth", "too little", "no number"])
+@pytest.mark.parametrize("begins", ["as a DNA file", "as nothing known"])
+def test_a_small_stream_that_unfolds_to_a_thousand_times_its_size(said, begins, dna_file, capsys):
+    whole = (b"DNA" if begins == "as a DNA file" else b"") + bytes(16 << 20)
+    packed = zlib.compress(whole)
+    text = scene.load(dna_file)["risorius_dna"]
+    for name in ("risorius_bytes", "risorius_hash", "risorius_length"):
+        text.pop(name, None)
+    text["risorius_bytes"] = packed
+    text["risorius_hash"] = hashlib.sha256(whole).hexdigest()
+    length = {"the truth": str(len(whole)), "too little": "5000", "no number": "1e99"}
+    if said in length:
+        text["risorius_length"] = length[said]
+    del whole
     scene.submodule("scene.runtime").forget()
+    tracemalloc.start()
     bpy.context.scene.frame_set(2)
-    assert "more than a DNA file can be" in capsys.readouterr().out
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 70 * len(packed) + (4 << 20)
+    told = capsys.readouterr()
+    assert "Traceback" not in told.err + told.out
+    (line,) = [s for s in told.out.splitlines() if "cannot be read" in s]
+    assert "Small_rig" in line
+    assert line.endswith(".")
+
+
+@pytest.mark.parametrize("length", [True, False])
+def test_a_dna_that_packs_to_almost_nothing_is_kept_whole(length, tmp_path):
+    face = small_face()
+    face.metadata = {"nothing": " " * (8 << 20)}
+    path = tmp_path / "empty_inside.dna"
+    face.save(str(path))
+    assert len(zlib.compress(path.read_bytes())) < 100 << 10
+    rig = scene.load(path)
+    if not length:
+        del rig["risorius_dna"]["risorius_length"]
+    assert scene.submodule("scene.storage").content(rig["risorius_dna"]) == path.read_bytes()
 
 
 @pytest.mark.parametrize("name", ["two\nlines", "é\U0001f600", "x" * 200, "a. b", "%s{0}\\", " "])

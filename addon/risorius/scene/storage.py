@@ -11,7 +11,13 @@ import bpy
 
 _BYTES = "risorius_bytes"
 _HASH = "risorius_hash"
-_MOST_BYTES = 1 << 32
+_LENGTH = "risorius_length"  # of the unpacked file; Texts of older versions have none
+# Whatever a .blend says, what is unpacked is at most so many times what the .blend holds, and a
+# little more. DNA files pack to a half or a fifth; one that packs better is kept as it is.
+_MOST_TIMES = 32
+_ALWAYS = 1 << 16  # bytes
+_PIECE = 1 << 20  # bytes
+_SIGNATURE = b"DNA"  # what the first bytes of every DNA file are
 
 
 class ContentError(ValueError):
@@ -36,9 +42,20 @@ def store(name, content, made):
         f"The DNA file of {name} ({len(content):,} bytes) is kept in this datablock.\n"
         "The character needs it; it is not meant to be edited.\n"
     )
-    text[_BYTES] = zlib.compress(content, 6)
+    text[_BYTES] = _packed(content)
     text[_HASH] = hashlib.sha256(content).hexdigest()
+    text[_LENGTH] = str(len(content))  # words: Blender's integers end at 2 GiB
     return text
+
+
+def _packed(content):
+    """The bytes of a file as a zlib stream, within the bound of those that are unpacked."""
+    packed = zlib.compress(content, 6)
+    return packed if len(content) <= _most(packed) else zlib.compress(content, 0)
+
+
+def _most(packed):
+    return _MOST_TIMES * len(packed) + _ALWAYS
 
 
 def content_hash(text):
@@ -56,14 +73,43 @@ def content(text):
     packed = text.get(_BYTES)
     if not isinstance(packed, bytes):
         raise ContentError("the Text holds no bytes of a DNA file")
-    try:
-        # Not all at once: a few kilobytes of zeros would unfold to any size.
-        unpacking = zlib.decompressobj()
-        content = unpacking.decompress(packed, _MOST_BYTES)
-    except zlib.error as error:
-        raise ContentError("its bytes cannot be unpacked") from error
-    if not unpacking.eof:
-        raise ContentError("its bytes end too early, or unpack to more than a DNA file can be")
+    content = _unpack(packed, _limit(text, packed))
     if hashlib.sha256(content).hexdigest() != content_hash(text):
         raise ContentError("its bytes are not those that were imported")
     return content
+
+
+def _limit(text, packed):
+    """The bytes that may be unpacked: what was said when they were packed, within the bound."""
+    said = text.get(_LENGTH)
+    if said is None:
+        return _most(packed)
+    if not isinstance(said, str) or not said.isdecimal() or len(said) > 15:
+        raise ContentError("the length of its file is no number")
+    if int(said) > _most(packed):
+        raise ContentError(
+            f"its file is said to have {int(said):,} bytes, "
+            f"{_most(packed):,} can be in the {len(packed):,} that are there"
+        )
+    return int(said)
+
+
+def _unpack(packed, limit):
+    """Unpack piece by piece: a few kilobytes of zeros would unfold to any size."""
+    unpacking = zlib.decompressobj()
+    pieces, count, rest = [], 0, packed
+    while not unpacking.eof:
+        try:
+            piece = unpacking.decompress(rest, min(_PIECE, limit - count + 1))
+        except zlib.error as error:
+            raise ContentError("its bytes cannot be unpacked") from error
+        rest = unpacking.unconsumed_tail
+        count += len(piece)
+        if not pieces and not piece.startswith(_SIGNATURE[: len(piece)]):
+            raise ContentError(f"its bytes begin with {piece[:3]!r} instead of {_SIGNATURE!r}")
+        if count > limit:
+            raise ContentError(f"its bytes unpack to more than {limit:,}")
+        if not piece and not rest and not unpacking.eof:
+            raise ContentError("its bytes end too early")
+        pieces.append(piece)
+    return b"".join(pieces)
