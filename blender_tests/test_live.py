@@ -41,6 +41,13 @@ def port():
     return choose(free_port())
 
 
+@pytest.fixture(autouse=True)
+def no_recordings_of_other_tests(addon):
+    module = scene.submodule("scene.live")
+    for recording in module.waiting():
+        module.discard(recording)
+
+
 def packet(frame, subject="iPhone", rate=60, **places):
     values = [0.0] * 61
     for place, value in places.items():
@@ -284,15 +291,119 @@ def test_it_ends_with_the_face_the_file_and_the_addon(dna_file, port, tmp_path):
     module.register()
 
 
+def sliders(rig):
+    return dict(scene.face(rig).items())
+
+
+def begin_recording(rig, *steps):
+    """A capture that records what the steps send."""
+    assert bpy.ops.risorius.live_start() == {"FINISHED"}
+    assert bpy.ops.risorius.live_record() == {"FINISHED"}
+    send(bpy.context.window_manager.risorius_live.port, *steps)
+    tick_until(rig, len(steps))
+
+
+def jaw_keys(rig):
+    """The keys of the jaw, float64[keys, 2], and their action."""
+    path = f'pose.bones["face"]["{JAW_OPEN}"]'
+    curve = next(c for c in scene.curves(scene.controls(rig)) if c.data_path == path)
+    return np.array([tuple(k.co) for k in curve.keyframe_points])
+
+
+def only_recording(faces):
+    """The one that waits, with so many faces."""
+    (recording,) = scene.submodule("scene.live").waiting()
+    assert len(recording.take) == faces
+    return recording
+
+
 def test_an_error_ends_it_and_is_shown(dna_file, port, monkeypatch):
     module = scene.submodule("scene.live")
-    scene.load(dna_file)
-    bpy.ops.risorius.live_start()
-    monkeypatch.setattr(module, "show", lambda *_arguments: 1 / 0)
-    with pytest.raises(ZeroDivisionError):
-        module._tick()
+    rig = scene.load(dna_file)
+    scene.set_controls(rig, jawOpen=0.25)
+    before = sliders(rig)
+    begin_recording(rig, packet(1, _17=0.5), packet(2, _17=0.75))
+    assert sliders(rig) != before
+    with monkeypatch.context() as broken:
+        broken.setattr(module, "show", lambda *_arguments: 1 / 0)
+        with pytest.raises(ZeroDivisionError):
+            module._tick()
     assert not listens(port)
     assert "the console shows" in drawn()
+    assert sliders(rig) == before
+    only_recording(2)
+    assert "2 faces wait" in drawn()
+    assert bpy.ops.risorius.live_finish() == {"FINISHED"}
+    assert jaw_keys(rig)[:, 1].tolist() == [0.5, 0.75]
+    assert not module.waiting()
+    assert not bpy.ops.risorius.live_finish.poll()
+
+
+def test_a_recording_that_cannot_be_finished_waits(dna_file, port):
+    rig = scene.load(dna_file)
+    bone = scene.face(rig)
+    for frame, value in ((1, 0.0), (50, 0.5)):
+        bone[JAW_OPEN] = value
+        bone.keyframe_insert(f'["{JAW_OPEN}"]', frame=frame)
+    data = scene.controls(rig).animation_data
+    track = data.nla_tracks.new()
+    track.strips.new("own", 1, data.action)
+    data.action = None
+    bpy.context.scene.frame_set(5)
+    before = sliders(rig)
+    begin_recording(rig, packet(1, _17=0.5), packet(4, _17=0.75))
+    data.use_tweak_mode = True
+    assert data.use_tweak_mode
+    with pytest.raises(RuntimeError, match="The recording waits"):
+        bpy.ops.risorius.live_stop()
+    assert not listens(port)
+    assert sliders(rig) == before
+    data.use_tweak_mode = False
+    only_recording(2)
+    bpy.context.scene.frame_set(9)  # it lies where it was recorded all the same
+    assert bpy.ops.risorius.live_finish() == {"FINISHED"}
+    assert np.allclose(jaw_keys(rig), [(5.0, 0.5), (5.0 + 3 / 60 * 24, 0.75)], atol=1e-4)
+
+
+def test_a_recording_beyond_the_last_frame_waits(dna_file, port):
+    rig = scene.load(dna_file)
+    before = sliders(rig)
+    bpy.context.scene.frame_set(1_048_570)
+    begin_recording(rig, packet(1, _17=0.5), packet(61, _17=0.75))
+    with pytest.raises(RuntimeError, match="1048574.*The recording waits"):
+        bpy.ops.risorius.live_stop()
+    assert sliders(rig) == before
+    assert scene.controls(rig).animation_data is None
+    only_recording(2)
+    with pytest.raises(RuntimeError, match="The recording waits"):
+        bpy.ops.risorius.live_finish()
+    only_recording(2)
+    bpy.context.scene.frame_set(3)
+    assert bpy.ops.risorius.live_finish(at_current=True) == {"FINISHED"}
+    assert np.allclose(jaw_keys(rig), [(3.0, 0.5), (27.0, 0.75)], atol=1e-4)
+
+
+def test_the_recording_of_a_face_that_went_away_and_of_a_file_that_was_closed(dna_file, port):
+    module = scene.submodule("scene.live")
+    rig = scene.load(dna_file)
+    begin_recording(rig, packet(1, _17=0.5))
+    for item in scene.submodule("scene.parts").members_of(rig):
+        bpy.data.objects.remove(item)
+    assert module._tick() is None
+    only_recording(1)
+    assert bpy.ops.risorius.live_discard() == {"FINISHED"}
+    assert not module.waiting()
+
+    rig = scene.load(dna_file)
+    begin_recording(rig, packet(1, _17=0.5), packet(2, _17=0.75))
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    assert not listens(port)
+    only_recording(2)
+    with pytest.raises(RuntimeError, match="There is no recording 1: 1 wait"):
+        bpy.ops.risorius.live_discard(index=1)
+    rig = scene.load(dna_file)
+    assert bpy.ops.risorius.live_finish() == {"FINISHED"}
+    assert jaw_keys(rig)[:, 1].tolist() == [0.5, 0.75]
 
 
 def test_undo_does_not_end_it(dna_file, port):
@@ -337,7 +448,7 @@ class Layout:
     def row(self, align=False):
         return self
 
-    column = row
+    column = box = row
 
 
 def drawn():

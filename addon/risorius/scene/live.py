@@ -3,10 +3,14 @@
 
 Packets are received on a thread of `risorius.live`, which knows nothing of Blender. The timer takes
 the newest frame, if there is a new one, and writes it as a hand on the sliders would: no keys, no
-undo steps. What was there before is put back at the end. No Blender object is kept: characters are
-found anew at each tick.
+undo steps. What was there before is put back at the end, however it ends. No Blender object is
+kept: characters are found anew at each tick.
+
+A recording becomes an action when it is finished. One that cannot, whose face went away or whose
+file is closed waits in memory until it is finished or thrown away: nobody acts the same twice.
 """
 
+import contextlib
 from dataclasses import dataclass, field
 
 import bpy
@@ -24,6 +28,7 @@ _HEAD = "head"
 
 _sessions = {}  # session uid of a control armature -> Session
 _receivers = {}  # (source, port, host) -> the Receiver of all sessions that listen there
+_waiting = []  # Recordings that ended without becoming an action, the oldest first
 _last = {"error": "", "redraw": 0.0, "undone": False}
 
 
@@ -49,6 +54,23 @@ class Settings:
 
 
 @dataclass
+class Recording:
+    """What was recorded, or is being recorded.
+
+    Attributes:
+        take: risorius.live.Take.
+        shaper: risorius.live.Shaper, of the capture that it belongs to.
+        frame: of the scene, when it began.
+        face: name of the control armature.
+    """
+
+    take: object
+    shaper: object
+    frame: float
+    face: str = ""
+
+
+@dataclass
 class Session:
     """One character that follows one subject.
 
@@ -59,7 +81,7 @@ class Session:
         subject: whom it follows; "" for the one heard first.
         sequence: of the frame that was written last.
         before: slider -> value before the capture; turn: the head bone's rotation before it.
-        take: risorius.live.Take, while recording; frame: of the scene, when recording began.
+        recording: Recording, while one is made.
         names, sliders: the control names of the last frame, and (slider, place) of those that this
             character has.
     """
@@ -72,8 +94,7 @@ class Session:
     sequence: int = 0
     before: dict = field(default_factory=dict)
     turn: tuple | None = None
-    take: object = None
-    frame: float = 0.0
+    recording: Recording | None = None
     names: tuple = ()
     sliders: tuple = ()
 
@@ -147,31 +168,48 @@ def stop(controls):
     """End the capture of a character and put back what was there before.
 
     Returns:
-        Whether there was one.
+        Whether there was one. A recording that was not finished waits, see waiting.
     """
     session = of(controls)
     if session is None:
         return False
-    _put_back(session, controls)
-    _close(session)
+    _end(session)
     return True
 
 
 def stop_all():
     """End every capture; characters that are still there get their values back."""
     for session in list(_sessions.values()):
+        _end(session)
+    if bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.unregister(_tick)
+
+
+def _end(session):
+    """Close a session whatever state its character is in: nothing of the user's goes with it."""
+    _lay_by(session)
+    try:
         controls = session.controls()
         if controls is not None:
             _put_back(session, controls)
+    finally:
         _close(session)
-    if bpy.app.timers.is_registered(_tick):
-        bpy.app.timers.unregister(_tick)
 
 
 def _close(session):
     del _sessions[session.uid]
     if not any(other.key == session.key for other in _sessions.values()):
         _receivers.pop(session.key).stop()
+
+
+def _lay_by(session):
+    """End a session's recording; it waits, if anything was recorded. Returns: it, or None."""
+    recording, session.recording = session.recording, None
+    if recording is None or not len(session.receiver.finish(recording.take)):
+        return None
+    recording.face = session.name
+    _waiting.append(recording)
+    return recording
 
 
 def neutral_now(session):
@@ -192,8 +230,8 @@ def forget_neutral(session):
 
 def begin_take(session, frame):
     """Record from now. Args: frame  of the scene at which the take is to begin."""
-    session.take = session.receiver.record(session.subject)
-    session.frame = frame
+    take = session.receiver.record(session.subject)
+    session.recording = Recording(take, session.shaper, frame)
 
 
 def finish_take(session, rig, scene):
@@ -208,23 +246,49 @@ def finish_take(session, rig, scene):
         clips.Report, or None where nothing came.
 
     Raises:
-        clips.ClipError: nothing of it is for this face, it is longer than Blender can play, or the
-            NLA is being edited; what was recorded then waits to be finished again.
+        clips.ClipError: as finish; what was recorded then waits to be finished again.
     """
-    controls = parts.controls_of(rig)
+    recording = _lay_by(session)
+    return finish(recording, rig, scene) if recording is not None else None
+
+
+def waiting():
+    """The recordings that wait to be finished: a tuple of Recordings, the oldest first."""
+    return tuple(_waiting)
+
+
+def discard(recording):
+    """Throw away a recording that waits."""
+    _waiting.remove(recording)
+
+
+def finish(recording, rig, scene):
+    """Let a character play a recording that waits; then it waits no more.
+
+    Args:
+        recording: of waiting(); made with this character or with another.
+        rig: the character.
+        scene: gives the rate.
+
+    Returns:
+        clips.Report.
+
+    Raises:
+        clips.ClipError: nothing of it is for this face, it is longer than Blender can play, or the
+            NLA is being edited.
+    """
+    controls, take = parts.controls_of(rig), recording.take
     trouble = actions.busy(controls)
     if trouble:
         raise ClipError(trouble)
-    take, session.take = session.receiver.finish(session.take), None
-    if not len(take):
-        return None
-    clip = take.clip(session.shaper)
-    timing = clips.timing_of(clip, scene, session.frame)
+    clip = take.clip(recording.shaper)
+    timing = clips.timing_of(clip, scene, recording.frame)
     report = clips.make_action(rig, clip, timing, f"Live {names.printable(take.subject, 40)}")
     if take.full:
         report.notes.append(f"The take is full: {take.full} faces were left out.")
     layers.keep_weights(controls, clips.play(rig, report.action))
     scene.frame_end = max(scene.frame_end, round(report.last))
+    _waiting.remove(recording)
     return report
 
 
@@ -236,7 +300,8 @@ def _tick():
         # Blender drops a timer that fails; what it fed must not go on listening.
         _last["error"] = "Live capture ended by an error, which the console shows."
         for session in list(_sessions.values()):
-            _close(session)
+            with contextlib.suppress(Exception):  # the first error is the one to show
+                _end(session)
         raise
 
 
@@ -251,7 +316,7 @@ def _beat():
         controls = session.controls()
         if controls is None or runtime.of(parts.rig_of(controls) or controls) is None:
             _last["error"] = f"The face {session.name} went away: its capture ended."
-            _close(session)
+            _end(session)
             continue
         changed |= show(session, controls)
     _redraw(changed)

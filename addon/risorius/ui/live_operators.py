@@ -138,7 +138,7 @@ class RISORIUS_OT_live_start(bpy.types.Operator):
 
 
 class RISORIUS_OT_live_stop(_Running, bpy.types.Operator):
-    """Stop following; a recording is finished, the sliders go back to where they were"""
+    """Stop following; a recording is finished, or waits; the sliders go back to where they were"""
 
     bl_idname = "risorius.live_stop"
     bl_label = "Stop"
@@ -146,8 +146,8 @@ class RISORIUS_OT_live_stop(_Running, bpy.types.Operator):
 
     def execute(self, context):
         session = live.of(_controls(context))
-        if session.take is not None:
-            _finish(self, context, session)
+        if session.recording is not None:
+            _finish(self, context, lambda *where: live.finish_take(session, *where))
         live.stop(_controls(context))
         return {"FINISHED"}
 
@@ -161,10 +161,85 @@ class RISORIUS_OT_live_record(_Running, bpy.types.Operator):
 
     def execute(self, context):
         session = live.of(_controls(context))
-        if session.take is None:
+        if session.recording is None:
             live.begin_take(session, float(context.scene.frame_current))
             return {"FINISHED"}
-        return {"FINISHED"} if _finish(self, context, session) else {"CANCELLED"}
+        done = _finish(self, context, lambda *where: live.finish_take(session, *where))
+        return {"FINISHED"} if done else {"CANCELLED"}
+
+
+class _Waiting:
+    """What operators share that need a recording that waits."""
+
+    index: bpy.props.IntProperty(
+        name="Recording", description="Which one of those that wait", options={"SKIP_SAVE"}
+    )
+
+    @classmethod
+    def poll(cls, _context):
+        if not usable(cls):
+            return False
+        if not live.waiting():
+            cls.poll_message_set("No recording waits to be finished.")
+            return False
+        return True
+
+    def recording(self):
+        """The Recording that is meant, or None."""
+        found = live.waiting()
+        if not 0 <= self.index < len(found):
+            self.report({"ERROR"}, f"There is no recording {self.index}: {len(found)} wait.")
+            return None
+        return found[self.index]
+
+
+class RISORIUS_OT_live_finish(_Waiting, bpy.types.Operator):
+    """Let the active face play a recording that waits"""
+
+    bl_idname = "risorius.live_finish"
+    bl_label = "Finish"
+    bl_options = {"REGISTER", "UNDO"}
+
+    at_current: bpy.props.BoolProperty(
+        name="At Current Frame",
+        description="Begin at the scene's frame of now, not where the recording began",
+        options={"SKIP_SAVE"},
+    )
+
+    @classmethod
+    def poll(cls, context):
+        if not super().poll(context):
+            return False
+        if _controls(context) is None:
+            cls.poll_message_set("Select a face first.")
+            return False
+        return True
+
+    def execute(self, context):
+        recording = self.recording()
+        if recording is None:
+            return {"CANCELLED"}
+        if self.at_current:
+            recording.frame = float(context.scene.frame_current)
+        done = _finish(self, context, lambda *where: live.finish(recording, *where))
+        return {"FINISHED"} if done else {"CANCELLED"}
+
+
+class RISORIUS_OT_live_discard(_Waiting, bpy.types.Operator):
+    """Throw away a recording that waits; this cannot be undone"""
+
+    bl_idname = "risorius.live_discard"
+    bl_label = "Throw Away"
+
+    def invoke(self, context, event):
+        return context.window_manager.invoke_confirm(self, event)
+
+    def execute(self, _context):
+        recording = self.recording()
+        if recording is None:
+            return {"CANCELLED"}
+        live.discard(recording)
+        return {"FINISHED"}
 
 
 class RISORIUS_OT_live_neutral(_Running, bpy.types.Operator):
@@ -200,13 +275,23 @@ class RISORIUS_OT_live_subject(_Running, bpy.types.Operator):
         return {"FINISHED"}
 
 
-def _finish(operator, context, session):
-    """End the recording as an action. Returns: whether there is one."""
+def _finish(operator, context, finish):
+    """End a recording as an action.
+
+    Args:
+        operator: reports how it went.
+        context: has the face and the scene.
+        finish: called with both.
+
+    Returns:
+        Whether there is an action. Where there is none, what was recorded waits.
+    """
     rig = parts.active_rig(context)
     try:
-        report = live.finish_take(session, rig, context.scene)
+        report = finish(rig, context.scene)
     except ValueError as error:
-        operator.report({"ERROR"}, f"{names.printable(str(error)).rstrip('.')}.")
+        why = names.printable(str(error)).rstrip(".")
+        operator.report({"ERROR"}, f"{why}. The recording waits: finish it in the panel.")
         return False
     if report is None:
         operator.report({"WARNING"}, "Nothing was received: there is no recording.")
@@ -239,6 +324,7 @@ class RISORIUS_PT_live(FaceOnlyPanel, bpy.types.Panel):
         column = layout.column(align=True)
         for name in ("smoothing", "gain", "head_gain"):
             column.prop(chosen, name)
+        _draw_waiting(layout)
         if session is None:
             layout.operator("risorius.live_start", icon="PLAY")
             if live.last_error():
@@ -246,13 +332,26 @@ class RISORIUS_PT_live(FaceOnlyPanel, bpy.types.Panel):
             return
         row = layout.row(align=True)
         row.operator("risorius.live_stop", icon="SNAP_FACE")
-        recording = session.take is not None
+        recording = session.recording is not None
         text = "Finish Recording" if recording else "Record"
         row.operator("risorius.live_record", text=text, icon="REC", depress=recording)
         row = layout.row(align=True)
         row.operator("risorius.live_neutral")
         row.operator("risorius.live_neutral", text="", icon="X").forget = True
         _draw_status(layout, session)
+
+
+def _draw_waiting(layout):
+    """The recordings that are no action yet."""
+    for index, recording in enumerate(live.waiting()):
+        box = layout.box()
+        words = f"{recording.face}: {len(recording.take)} faces wait"
+        box.label(text=names.printable(words, 60), icon="REC")
+        row = box.row(align=True)
+        row.operator("risorius.live_finish").index = index
+        here = row.operator("risorius.live_finish", text="Finish Here")
+        here.index, here.at_current = index, True
+        row.operator("risorius.live_discard", text="", icon="TRASH").index = index
 
 
 def _draw_status(layout, session):
@@ -265,8 +364,8 @@ def _draw_status(layout, session):
     else:
         column.label(text=f"{status.subject}: {status.per_second:.0f} a second", icon="USER")
         column.label(text=f"Last face {status.age * 1000:.0f} ms ago", icon="BLANK1")
-    if session.take is not None:
-        column.label(text=f"Recording: {len(session.take)} faces", icon="REC")
+    if session.recording is not None:
+        column.label(text=f"Recording: {len(session.recording.take)} faces", icon="REC")
     for count, what in (
         (status.lost, "Lost on the way"),
         (status.late, "Late, left out"),
@@ -290,6 +389,8 @@ CLASSES = (
     RISORIUS_OT_live_start,
     RISORIUS_OT_live_stop,
     RISORIUS_OT_live_record,
+    RISORIUS_OT_live_finish,
+    RISORIUS_OT_live_discard,
     RISORIUS_OT_live_neutral,
     RISORIUS_OT_live_subject,
     RISORIUS_PT_live,
