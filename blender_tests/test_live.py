@@ -14,6 +14,7 @@ import bpy
 import numpy as np
 import pytest
 import risorius.live
+from mathutils import Euler
 from support import scene
 from support.faces import CONTROLS, HEAD
 
@@ -137,6 +138,39 @@ def test_the_head_turns(dna_file, port):
     assert tuple(bone.rotation_euler) == turned  # left alone from then on
     bpy.ops.risorius.live_stop()
     assert tuple(bone.rotation_euler) == pytest.approx((0.1, 0.2, 0.3))
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        ("XYZ", "QUATERNION"),
+        ("XYZ", "AXIS_ANGLE"),
+        ("XYZ", "ZXY"),
+        ("QUATERNION", "AXIS_ANGLE"),
+        ("QUATERNION", "XYZ"),
+        ("AXIS_ANGLE", "QUATERNION"),
+        ("AXIS_ANGLE", "AXIS_ANGLE"),
+    ],
+)
+def test_the_head_comes_back_when_its_rotation_mode_was_changed(dna_file, port, before, after):
+    rig = scene.load(dna_file)
+    bone = scene.controls(rig).pose.bones["head"]
+    turn = Euler((0.5, -0.4, 0.3), "XYZ").to_quaternion()
+    bone.rotation_mode = before
+    axis, angle = turn.to_axis_angle()
+    bone.rotation_quaternion, bone.rotation_axis_angle = turn, (angle, *axis)
+    bone.rotation_euler = (0.5, -0.4, 0.3)
+    bpy.context.view_layer.update()
+    still = bone.matrix.copy()
+    bpy.ops.risorius.live_start()
+    send(port, packet(1, _52=-0.6, _53=0.3))
+    tick_until(rig, 1)
+    assert not np.allclose(bone.matrix, still, atol=0.1)
+    bone.rotation_mode = after
+    bpy.ops.risorius.live_stop()
+    bpy.context.view_layer.update()
+    assert bone.rotation_mode == after
+    assert np.allclose(bone.matrix, still, atol=1e-5)
 
 
 def test_a_recording_is_an_action(dna_file, port):

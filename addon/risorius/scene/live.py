@@ -80,7 +80,8 @@ class Session:
         shaper: risorius.live.Shaper.
         subject: whom it follows; "" for the one heard first.
         sequence: of the frame that was written last.
-        before: slider -> value before the capture; turn: the head bone's rotation before it.
+        before: slider -> value before the capture.
+        turn: the head bone's (rotation mode, rotation as that mode keeps it) before it, or None.
         recording: Recording, while one is made.
         names, sliders: the control names of the last frame, and (slider, place) of those that this
             character has.
@@ -377,12 +378,17 @@ def _turn_head(session, controls, values):
 
 
 def _rotation(bone):
-    """A bone's rotation as its mode keeps it."""
-    if bone.rotation_mode == "QUATERNION":
-        return tuple(bone.rotation_quaternion)
-    if bone.rotation_mode == "AXIS_ANGLE":
-        return tuple(bone.rotation_axis_angle)
-    return tuple(bone.rotation_euler)
+    """A bone's rotation mode, and its rotation as that keeps it."""
+    return bone.rotation_mode, tuple(getattr(bone, clips.rotation_path(bone)))
+
+
+def _as_quaternion(mode, values):
+    """What _rotation gave, for a bone that is turned in another way by now."""
+    if mode == "QUATERNION":
+        return Quaternion(values).normalized()
+    if mode == "AXIS_ANGLE":
+        return Quaternion(values[1:], values[0])
+    return Euler(values, mode).to_quaternion()
 
 
 def _rotate(bone, turn):
@@ -404,10 +410,11 @@ def _put_back(session, controls):
             bone[slider] = value
     head = controls.pose.bones.get(_HEAD)
     if session.turn is not None and head is not None:
-        kept = {3: "rotation_euler", 4: "rotation_quaternion"}[len(session.turn)]
-        if head.rotation_mode == "AXIS_ANGLE":
-            kept = "rotation_axis_angle"
-        setattr(head, kept, session.turn)
+        mode, values = session.turn
+        if head.rotation_mode == mode:
+            setattr(head, clips.rotation_path(head), values)
+        else:
+            _rotate(head, _as_quaternion(mode, values))
     session.before.clear()
     session.turn, session.sequence = None, 0
     controls.update_tag()
