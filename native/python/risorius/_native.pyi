@@ -840,6 +840,19 @@ class ParseOptions:
     limits: Limits
     def set_lods(self, lods: tuple[int, int] | Sequence[int] | None) -> None: ...
 
+class FileReplacement:
+    """A new file beside `path`, to be written under the name `temporary` and closed before commit()
+    puts it in the place of `path`."""
+
+    def __init__(self, path: _Path, sweep: bool = True) -> None: ...
+    @property
+    def temporary(self) -> PathLike[str]: ...
+    def commit(self) -> None: ...
+    def discard(self) -> None: ...
+
+def remove_leftovers(folder: _Path) -> None:
+    """Removes what processes of this machine that have ended left of files that they wrote."""
+
 def write_file(path: _Path, data: bytes, /) -> None:
     """Writes any bytes as Dna.save does: the old file is whole until the new one is."""
 

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: MIT
+// Files that Python writes and that appear as a whole.
+#include "bindings/arrays.h"
+#include "core/file_write.h"
+#include "core/path_text.h"
+
+namespace risorius::bindings {
+
+namespace {
+
+[[noreturn]] void throw_os_error(const std::filesystem::path& path, const std::error_code& reason) {
+  // OSError makes the class that is the number's own of these, e.g. PermissionError.
+  const py::tuple about =
+      py::make_tuple(reason.default_error_condition().value(),
+                     to_python(core::write_trouble(reason)), py::str(py::cast(path)));
+  PyErr_SetObject(PyExc_OSError, about.ptr());
+  throw py::error_already_set();
+}
+
+// The bytes are Python's to write, the rest is as in write_file_atomically.
+class FileReplacement {
+ public:
+  FileReplacement(const std::filesystem::path& path, bool sweep) : path_(path) {
+    std::error_code reason;
+    {
+      const py::gil_scoped_release release;
+      target_ = core::linked_file(path);
+      if (sweep) core::remove_leftovers(target_.parent_path());
+      file_ = core::NewFile::beside(target_, reason);
+    }
+    if (!file_) throw_os_error(path_, reason);
+    temporary_ = file_->path();
+  }
+
+  const std::filesystem::path& temporary() const { return temporary_; }
+
+  void commit() {
+    if (!file_) throw py::value_error("the file has been written or given up");
+    const std::error_code reason = [&] {
+      const py::gil_scoped_release release;
+      const std::error_code error = file_->take_place_of(target_);
+      file_.reset();
+      return error;
+    }();
+    if (reason) throw_os_error(path_, reason);
+  }
+
+  void discard() { file_.reset(); }
+
+ private:
+  std::filesystem::path path_, target_, temporary_;
+  std::optional<core::NewFile> file_;
+};
+
+}  // namespace
+
+void bind_files(py::module_& m) {
+  py::class_<FileReplacement>(m, "FileReplacement",
+                              "A new file beside `path`, to be written under the name `temporary` "
+                              "and closed before commit() puts it in the place of `path`.")
+      .def(py::init<const std::filesystem::path&, bool>(), py::arg("path"), py::arg("sweep") = true)
+      .def_property_readonly("temporary", &FileReplacement::temporary)
+      .def("commit", &FileReplacement::commit)
+      .def("discard", &FileReplacement::discard);
+  m.def(
+      "remove_leftovers",
+      [](const std::filesystem::path& folder) {
+        const py::gil_scoped_release release;
+        core::remove_leftovers(folder);
+      },
+      py::arg("folder"),
+      "Removes what processes of this machine that have ended left of files that they wrote.");
+}
+
+}  // namespace risorius::bindings

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: MIT
+"""Files that are whole or not there: the one way in which this package writes them."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import IO, TYPE_CHECKING
+
+from ._native import FileReplacement, remove_leftovers
+
+if TYPE_CHECKING:
+    from _typeshed import ReadableBuffer
+
+__all__ = ["check_writable", "replacing", "sweep", "write_bytes", "write_text"]
+
+_Path = str | os.PathLike[str]
+
+
+@contextlib.contextmanager
+def replacing(path: _Path, *, sweep: bool = True) -> Iterator[IO[bytes]]:
+    """A file to write that takes its name when it is whole, on the disk too.
+
+    An old file of the name stays until then, and for good after an exception. A link stays a link,
+    an old file's rights stay. Until it is whole the file has a hidden name of its own in the same
+    folder; what a killed process left of this kind goes when somebody writes there again. Devices
+    and pipes take the bytes as they come.
+
+    Args:
+        path: of a file in a folder that is there.
+        sweep: look for what killed processes left; not for each of thousands of files in a folder,
+            see sweep().
+
+    Raises:
+        OSError: it cannot be written; the error names path.
+    """
+    name = os.fspath(path)
+    if os.path.exists(name) and not os.path.isfile(name) and not os.path.isdir(name):
+        with io.BufferedWriter(_Named(name, "wb", name)) as device:
+            yield device
+        return
+    new = FileReplacement(name, sweep)
+    try:
+        with io.BufferedRandom(_Named(new.temporary, "r+b", name)) as file:
+            yield file
+        new.commit()
+    finally:
+        new.discard()
+
+
+class _Named(io.FileIO):
+    """A file whose errors of writing name the file that the user knows."""
+
+    def __init__(self, file: _Path, mode: str, shown: str) -> None:
+        super().__init__(file, mode)
+        self._shown = shown
+
+    def write(self, data: ReadableBuffer, /) -> int:
+        try:
+            return super().write(data)
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, self._shown) from None
+
+
+def write_bytes(path: _Path, data: ReadableBuffer) -> None:
+    """Write a file as replacing() does. Raises: OSError."""
+    with replacing(path) as file:
+        file.write(data)
+
+
+def write_text(path: _Path, text: str) -> None:
+    """Write UTF-8, lines ending as they do in text, as replacing() does. Raises: OSError."""
+    write_bytes(path, text.encode())
+
+
+def check_writable(path: _Path, *, parents: bool = False) -> None:
+    """Find out before long work whether replacing(path) would have a place to write.
+
+    Args:
+        parents: folders that are not there will be made.
+
+    Raises:
+        OSError: it would not; the error names path, and the reason.
+    """
+    target = Path(path)
+    if os.path.exists(target) and not target.is_file() and not target.is_dir():
+        return  # a device
+    if parents:
+        missing = target
+        while not os.path.lexists(missing.parent) and missing.parent != missing:
+            missing = missing.parent
+        if missing != target:
+            target = missing.with_name(f"{missing.name}-")  # a folder is to be there, not a file
+    try:
+        FileReplacement(os.fspath(target), False).discard()
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, os.fspath(path)) from None
+
+
+def sweep(folders: Iterable[Path]) -> None:
+    """Delete what processes of this machine that have ended left in folders."""
+    for folder in folders:
+        remove_leftovers(folder)

@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: MIT
+// Files that are whole or as they were, whatever call of the system fails.
+#include "core/file_write.h"
+
+#include <gtest/gtest.h>
+
+#include <cerrno>
+#include <fstream>
+#include <random>
+
+#include "support/files.h"
+
+#ifndef _WIN32
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+#endif
+
+namespace risorius::core {
+namespace {
+
+using testing_support::read_file;
+using Bytes = std::vector<std::uint8_t>;
+namespace fs = std::filesystem;
+
+// What was asked of the system, one letter a call; the call `failing` fails with `reason`.
+std::string asked;
+char failing = 0;
+int reason = 0;
+bool in_halves = false;
+
+bool fails(char call) {
+  asked += call;
+  if (call == failing) errno = reason;
+  return call == failing;
+}
+int create(const fs::path& path, bool is_private) {
+  return fails('o') ? -1 : system_file_calls().create(path, is_private);
+}
+std::ptrdiff_t write(int file, const std::uint8_t* bytes, std::size_t count) {
+  if (fails('w')) return -1;
+  return system_file_calls().write(file, bytes, in_halves ? (count + 1) / 2 : count);
+}
+int sync(int file) { return fails('s') ? -1 : system_file_calls().sync(file); }
+int close(int file) {
+  const int done = system_file_calls().close(file);
+  return fails('c') ? -1 : done;
+}
+int rename(const fs::path& from, const fs::path& to) {
+  return fails('r') ? -1 : system_file_calls().rename(from, to);
+}
+int sync_folder(const fs::path& folder) {
+  return fails('f') ? -1 : system_file_calls().sync_folder(folder);
+}
+constexpr FileCalls kCalls = {create, write, sync, close, rename, sync_folder};
+
+class FileWrite : public testing::Test {
+ protected:
+  FileWrite() {
+    folder_ = fs::temp_directory_path() / ("risorius-" + std::to_string(std::random_device{}()));
+    fs::create_directories(folder_);
+    asked.clear();
+    failing = 0;
+    in_halves = false;
+  }
+  ~FileWrite() override {
+    std::error_code ignored;
+    fs::remove_all(folder_, ignored);
+  }
+  std::size_t file_count() const {
+    return static_cast<std::size_t>(
+        std::distance(fs::directory_iterator(folder_), fs::directory_iterator()));
+  }
+
+  fs::path folder_;
+  const Bytes old_{'o', 'l', 'd'}, new_{'n', 'e', 'w', 'e', 'r'};
+};
+
+TEST_F(FileWrite, IsOnTheDiskBeforeItHasItsNameAndTheNameAfterwards) {
+  ASSERT_TRUE(write_file_atomically(folder_ / "a", new_, kCalls).has_value());
+  EXPECT_EQ(asked, "owscrf");
+  EXPECT_EQ(read_file(folder_ / "a"), new_);
+}
+
+TEST_F(FileWrite, WhateverFailsTheOldFileStaysAndNothingElse) {
+  for (const char call : {'o', 'w', 's', 'c', 'r'}) {
+    std::ofstream(folder_ / "a") << "old";
+    failing = call;
+    reason = ENOSPC;
+    const auto status = write_file_atomically(folder_ / "a", new_, kCalls);
+    ASSERT_FALSE(status.has_value()) << call;
+    EXPECT_EQ(status.error().code, ErrorCode::kIoWrite);
+    EXPECT_EQ(status.error().message, "cannot write " + (folder_ / "a").string() +
+                                          ": No space left on device; the file of that name from "
+                                          "before is unchanged")
+        << call;
+    EXPECT_EQ(read_file(folder_ / "a"), old_) << call;
+    EXPECT_EQ(file_count(), 1u) << call;
+  }
+}
+
+TEST_F(FileWrite, AFolderThatCannotBeSyncedIsNoFailure) {
+  failing = 'f';
+  reason = EINVAL;
+  EXPECT_TRUE(write_file_atomically(folder_ / "a", new_, kCalls).has_value());
+}
+
+TEST_F(FileWrite, GoesOnAfterPartsOfWhatWasAsked) {
+  in_halves = true;
+  ASSERT_TRUE(write_file_atomically(folder_ / "a", new_, kCalls).has_value());
+  EXPECT_EQ(asked, "owwwscrf");
+  EXPECT_EQ(read_file(folder_ / "a"), new_);
+}
+
+TEST_F(FileWrite, OfNoFileFromBeforeAndOfAFolderThatIsNotThereItSaysSo) {
+  const fs::path path = folder_ / "none" / "a";
+  const auto status = write_file_atomically(path, new_);
+  ASSERT_FALSE(status.has_value());
+  EXPECT_EQ(status.error().message, "cannot write " + path.string() + ": its folder is not there");
+  const auto folder = write_file_atomically(folder_, new_);
+  ASSERT_FALSE(folder.has_value());
+  EXPECT_EQ(folder.error().message, "cannot write " + folder_.string() + ": Is a directory");
+}
+
+TEST_F(FileWrite, TakesNamesAsLongAsTheSystemDoes) {
+  for (const std::size_t length : {244u, 250u, 255u}) {
+    const fs::path path = folder_ / std::string(length, 'n');
+    ASSERT_TRUE(write_file_atomically(path, new_).has_value()) << length;
+    EXPECT_EQ(read_file(path), new_);
+  }
+}
+
+TEST_F(FileWrite, FilesThatLookLikeTemporaryOnesStay) {
+  const std::vector<std::string> names = {"a.part", "a.1.tmp", ".risorius-", ".risorius-x-1-0.part",
+                                          ".risorius-elsewhere-99999999-01234567.part"};
+  for (const std::string& name : names) std::ofstream(folder_ / name) << name;
+  ASSERT_TRUE(write_file_atomically(folder_ / "a", new_).has_value());
+  for (const std::string& name : names) EXPECT_TRUE(fs::exists(folder_ / name)) << name;
+}
+
+#ifndef _WIN32
+
+std::vector<std::string> hidden_files(const fs::path& folder) {
+  std::vector<std::string> names;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    const std::string name = entry.path().filename().string();
+    if (name.starts_with(".")) names.push_back(name);
+  }
+  return names;
+}
+
+TEST_F(FileWrite, WhatADeadWriterLeftGoesAndWhatALiveOneWritesStays) {
+  std::error_code error;
+  const auto live = NewFile::beside(folder_ / "live", error);
+  ASSERT_TRUE(live.has_value());
+  const pid_t child = ::fork();
+  if (child == 0) {  // dies while it writes, as by kill -9
+    std::error_code why;
+    auto file = NewFile::beside(folder_ / "dead", why);
+    ::_exit(file ? 0 : 1);
+  }
+  int end = 1;
+  ASSERT_EQ(::waitpid(child, &end, 0), child);
+  ASSERT_EQ(end, 0);
+  ASSERT_EQ(hidden_files(folder_).size(), 2u);
+  ASSERT_TRUE(write_file_atomically(folder_ / "a", new_).has_value());
+  EXPECT_EQ(hidden_files(folder_), std::vector{live->path().filename().string()});
+}
+
+TEST_F(FileWrite, LinksAreFollowedAlsoToWhereNothingIsYet) {
+  fs::create_directory(folder_ / "far");
+  fs::create_symlink("far/a", folder_ / "b");
+  fs::create_symlink(folder_ / "b", folder_ / "c");
+  for (const Bytes& bytes : {old_, new_}) {
+    ASSERT_TRUE(write_file_atomically(folder_ / "c", bytes).has_value());
+    EXPECT_TRUE(fs::is_symlink(folder_ / "c"));
+    EXPECT_TRUE(fs::is_symlink(folder_ / "b"));
+    EXPECT_EQ(read_file(folder_ / "far" / "a"), bytes);
+  }
+  EXPECT_TRUE(hidden_files(folder_ / "far").empty());
+}
+
+mode_t rights_of(const fs::path& path) {
+  struct stat about = {};
+  return ::stat(path.c_str(), &about) == 0 ? about.st_mode & 0777 : 0;
+}
+
+mode_t rights_while_written;
+std::ptrdiff_t look_and_write(int file, const std::uint8_t* bytes, std::size_t count) {
+  struct stat about = {};
+  rights_while_written = ::fstat(file, &about) == 0 ? about.st_mode & 0777 : 0;
+  return system_file_calls().write(file, bytes, count);
+}
+
+TEST_F(FileWrite, ANewFileHasTheUsualRightsAnOldOneItsOwnAndASecretIsNeverOpen) {
+  const mode_t mask = ::umask(027);
+  FileCalls calls = system_file_calls();
+  calls.write = look_and_write;
+  EXPECT_TRUE(write_file_atomically(folder_ / "a", new_, calls).has_value());
+  EXPECT_EQ(rights_of(folder_ / "a"), 0640u);
+  for (const mode_t mode : {0600, 0666, 0400}) {
+    ::chmod((folder_ / "a").c_str(), mode);
+    EXPECT_TRUE(write_file_atomically(folder_ / "a", new_, calls).has_value());
+    EXPECT_EQ(rights_of(folder_ / "a"), mode);
+    EXPECT_EQ(rights_while_written, 0600u);
+  }
+  EXPECT_EQ(::umask(mask), 027u) << "the process's mask is nobody's to change";
+}
+
+#endif
+
+}  // namespace
+}  // namespace risorius::core

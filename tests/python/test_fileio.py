@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: MIT
+"""The one writer of whole files: what is left after whatever happens to it."""
+
+import contextlib
+import errno
+import os
+import signal
+import stat
+import subprocess
+import sys
+import textwrap
+
+import pytest
+from risorius import fileio
+
+posix = pytest.mark.skipif(os.name == "nt", reason="of POSIX")
+
+
+def run(code, *arguments, **options):
+    return subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(code), *map(str, arguments)],
+        capture_output=True, text=True, check=False, timeout=60, **options,
+    )  # fmt: skip
+
+
+def test_nothing_is_seen_before_it_is_whole(tmp_path):
+    path = tmp_path / "a"
+    path.write_text("old")
+    with fileio.replacing(path) as file:
+        file.write(b"new")
+        file.flush()
+        assert path.read_text() == "old"
+    assert path.read_text() == "new"
+    assert os.listdir(tmp_path) == ["a"]
+
+
+def test_after_an_exception_the_old_file_stays_and_nothing_else(tmp_path):
+    path = tmp_path / "a"
+    path.write_text("old")
+    with contextlib.suppress(KeyboardInterrupt), fileio.replacing(path) as file:
+        file.write(b"new")
+        raise KeyboardInterrupt
+    assert path.read_text() == "old"
+    assert os.listdir(tmp_path) == ["a"]
+
+
+def test_a_users_files_of_like_names_stay(tmp_path):
+    names = ["a.part", ".a.01234567.part", "a.tmp", ".risorius-1-2.part"]
+    for name in names:
+        (tmp_path / name).write_text(name)
+    fileio.write_text(tmp_path / "a", "new")
+    assert sorted(os.listdir(tmp_path)) == sorted([*names, "a"])
+    assert all((tmp_path / name).read_text() == name for name in names)
+
+
+@posix
+@pytest.mark.parametrize("size", [10, 100_000], ids=["at the end", "in the middle"])
+def test_without_room_the_old_file_stays_and_the_error_names_it(size, tmp_path):
+    path = tmp_path / "a"
+    path.write_text("old")
+    # A limit on the size of files fails as a full disk does, when the bytes are written.
+    done = run(
+        """
+        import resource, sys
+        from risorius import fileio
+        resource.setrlimit(resource.RLIMIT_FSIZE, (5, 5))
+        try:
+            fileio.write_bytes(sys.argv[1], b"x" * int(sys.argv[2]))
+        except OSError as error:
+            print(error.strerror, error.filename, sep="|")
+        """,
+        path, size,
+    )  # fmt: skip
+    assert done.stdout == f"{os.strerror(errno.EFBIG)}|{path}\n", done.stderr
+    assert path.read_text() == "old"
+    assert os.listdir(tmp_path) == ["a"]
+
+
+@posix
+def test_a_full_device_is_an_error_of_that_name():
+    with pytest.raises(OSError, match="/dev/full") as caught:
+        fileio.write_bytes("/dev/full", b"x")
+    assert caught.value.errno == errno.ENOSPC
+    fileio.check_writable("/dev/full")
+    assert stat.S_ISCHR(os.stat("/dev/full").st_mode)
+
+
+@posix
+def test_what_a_killed_writer_left_goes_with_the_next_one_and_a_live_ones_stays(tmp_path):
+    code = """
+        import os, signal, sys
+        from risorius import fileio
+        with fileio.replacing(sys.argv[1]) as file:
+            file.write(b"half")
+            file.flush()
+            os.kill(os.getpid(), signal.SIGKILL)
+        """
+    with fileio.replacing(tmp_path / "live") as file:
+        (mine,) = os.listdir(tmp_path)
+        assert run(code, tmp_path / "a").returncode == -signal.SIGKILL
+        assert len(os.listdir(tmp_path)) == 2
+        fileio.write_bytes(tmp_path / "b", b"b")
+        assert sorted(os.listdir(tmp_path)) == [mine, "b"]
+        file.write(b"live")
+    assert (tmp_path / "live").read_bytes() == b"live"
+
+
+@posix
+def test_rights_and_links_stay_and_the_mask_is_the_systems(tmp_path):
+    path, link = tmp_path / "a", tmp_path / "link"
+    done = run(
+        "import os, sys; os.umask(0o027)\n"
+        "from risorius import fileio; fileio.write_text(sys.argv[1], 'new')",
+        path,
+    )
+    assert done.returncode == 0, done.stderr
+    assert stat.S_IMODE(path.stat().st_mode) == 0o640
+    path.chmod(0o604)
+    link.symlink_to("a")
+    fileio.write_text(link, "newer\n")
+    assert link.is_symlink()
+    assert path.read_bytes() == b"newer\n"
+    assert stat.S_IMODE(path.stat().st_mode) == 0o604
+
+
+@posix
+def test_names_as_long_as_the_system_takes_them(tmp_path):
+    for name in ("n" * 245, "n" * 250, "n" * 255, "\N{LATIN SMALL LETTER E WITH ACUTE}" * 125):
+        fileio.write_text(tmp_path / name, name)
+        assert (tmp_path / name).read_text(encoding="utf-8") == name
+
+
+@pytest.mark.parametrize("do", [lambda p: fileio.write_text(p, ""), fileio.check_writable])
+def test_a_place_that_is_none_is_named_as_the_user_named_it(do, tmp_path):
+    path = tmp_path / "none" / "a"
+    with pytest.raises(FileNotFoundError) as caught:
+        do(path)
+    assert (caught.value.filename, caught.value.strerror) == (
+        str(path),
+        "its folder is not there",
+    )
+    (tmp_path / "file").touch()
+    with pytest.raises(OSError, match="a file stands where its folder should be"):
+        do(tmp_path / "file" / "a")
+    with pytest.raises(IsADirectoryError):
+        do(tmp_path)
+    assert os.listdir(tmp_path) == ["file"]
+
+
+def test_folders_that_will_be_made_are_looked_for_where_they_will_be(tmp_path):
+    fileio.check_writable(tmp_path / "x" / "y" / "a", parents=True)
+    (tmp_path / "file").touch()
+    with pytest.raises(NotADirectoryError) as caught:
+        fileio.check_writable(tmp_path / "file" / "y" / "a", parents=True)
+    assert caught.value.filename == str(tmp_path / "file" / "y" / "a")
+    assert os.listdir(tmp_path) == ["file"]
+
+
+@posix
+def test_a_folder_that_may_not_be_written_is_known_before(tmp_path):
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    (folder / "a").write_text("old")
+    # Root may write everywhere: the child is nobody, where that is possible.
+    for above in tmp_path.parents:
+        if above.stat().st_uid == os.getuid() and above.name.startswith("pytest-"):
+            above.chmod(above.stat().st_mode | 0o055)
+    tmp_path.chmod(0o755)
+    folder.chmod(0o555)
+    done = run(
+        """
+        import os, sys
+        from risorius import fileio
+        if os.getuid() == 0: os.setgid(65534); os.setuid(65534)
+        for name in ("a", "b/c"):
+            try:
+                fileio.check_writable(os.path.join(sys.argv[1], name), parents=True)
+            except PermissionError as error:
+                print(error.filename)
+        """,
+        folder,
+    )
+    assert done.stdout.split() == [f"{folder}/a", f"{folder}/b/c"], done.stderr
+    assert os.listdir(folder) == ["a"]
