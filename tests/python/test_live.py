@@ -308,13 +308,102 @@ def test_hostile_osc():
             osc.Decoder().feed(data, "here")
 
 
-def test_names_without_end_are_refused():
+def test_names_without_end_do_not_stop_a_sender():
     decoder = osc.Decoder()
-    for number in range(512):
-        decoder.feed(packed(["bundle", [[f"/n{number}", [0.5]]]]), "here")
-    with pytest.raises(LiveError, match="512 names"):
-        decoder.feed(packed(["bundle", [["/one_more", [0.5]]]]), "here")
-    assert decoder.feed(packed(["bundle", [["/n7", [0.25]]]]), "here")[0].values[7] == 0.25
+    for number in range(3000):
+        decoder.feed(packed(["bundle", [[f"/n{number}", [0.5]]]]), "here", 1.0)
+    units = [[f"/{name}", [0.25]] for name in livelink.NAMES[:52]]
+    for _ in range(2):
+        (face,) = decoder.feed(packed(["bundle", units]), "here", 1.0)
+        assert len(face.names) == 512
+        values = dict(zip(face.names, face.values.tolist(), strict=True))
+        assert [values[name] for name in livelink.NAMES[:52]] == [0.25] * 52
+        # The names that are sent again and again keep their places among those that come once.
+        for number in range(400):
+            decoder.feed(packed(["bundle", [[f"/m{number}", [0.5]], *units]]), "here", 1.0)
+
+
+def fed(receiver, step, now, sender="127.0.0.1"):
+    """Give a receiver a packet as its thread does, at a time of our own."""
+    receiver._take_in(packed(step), sender, now)
+
+
+def test_made_up_subjects_lock_no_phone_out():
+    receiver = Receiver("livelink")
+    for n in range(500):
+        fed(receiver, v6(n, face(), f"made up {n}", OTHER), 1.0 + n / 500)
+    assert len(receiver.status().subjects) == 32
+    for n in range(120):  # the phone comes later and streams; they go on
+        fed(receiver, v6(n, face(i17=n / 128.0)), 2.0 + n / 60)
+        for other in range(3):
+            fed(receiver, v6(n, face(), f"again {n} {other}", OTHER), 2.0 + n / 60 + 0.005)
+    latest = receiver.latest("iPhone")
+    assert (latest.sequence, latest.values[JAW]) == (120, np.float32(119 / 128.0))
+    assert len(receiver.status().subjects) == 32
+    assert receiver.status().refused == 0
+
+
+def test_subjects_that_stream_keep_their_places():
+    receiver = Receiver("livelink")
+    names = [f"phone {k}" for k in range(32)]
+    for n in range(10):
+        for name in names:
+            fed(receiver, v6(n, face(), name), 1.0 + n / 60)
+    fed(receiver, v6(0, face(), "one more"), 1.2)
+    assert list(receiver.status().subjects) == names
+    assert receiver.status().reasons[0][0].startswith("32 subjects are heard at once")
+    fed(receiver, v6(0, face(), "one more"), 3.0)  # they fell silent; the first of them goes
+    assert list(receiver.status().subjects) == [*names[1:], "one more"]
+
+
+def test_a_subject_is_forgotten_after_a_minute_but_not_while_it_is_recorded():
+    receiver = Receiver("livelink")
+    fed(receiver, v6(0, face(), "Ada"), 1.0)
+    fed(receiver, v6(0, face(), "Bob"), 1.0)
+    take = receiver.record("Bob")
+    fed(receiver, v6(1, face(), "Bob"), 1.1)
+    fed(receiver, v6(0, face(), "Cid"), 61.0)
+    assert receiver.status().subjects == ("Ada", "Bob", "Cid")
+    fed(receiver, v6(0, face(), "Dan"), 100.0)
+    assert receiver.status().subjects == ("Bob", "Cid", "Dan")
+    for n in range(500):
+        fed(receiver, v6(0, face(), f"made up {n}"), 200.0 + n / 500)
+    fed(receiver, v6(60 * 220, face(), "Bob"), 221.0)
+    assert np.allclose(receiver.finish(take).clip().times, [0.0, 220.0 - 1 / 60], atol=0.1)
+
+
+def test_made_up_senders_lock_no_other_out():
+    receiver = Receiver("osc")
+    bundle = ["bundle", [["/jawOpen", [0.5]]]]
+    for n in range(500):
+        fed(receiver, bundle, 1.0 + n / 500, f"10.0.{n // 250}.{n % 250}")
+    for n in range(60):
+        fed(receiver, bundle, 2.0 + n / 60, "10.9.9.9")
+        fed(receiver, bundle, 2.0 + n / 60 + 0.001, f"10.1.0.{n}")
+    assert receiver.latest("10.9.9.9").sequence == 60
+    assert len(receiver.status().subjects) == 32
+
+
+@pytest.mark.parametrize("wrong", [120, 598, 30_000, -30_000, 86_400 * 60, -86_400 * 60 + 100])
+@pytest.mark.parametrize("often", [1, 100])
+def test_a_wrong_frame_number_does_not_make_a_take_longer_than_it_took(wrong, often):
+    receiver, start = Receiver("livelink"), 50_000 * 60
+    fed(receiver, v6(start, face()), 1.0)
+    take = receiver.record()
+    for n in range(1, 600):
+        off = wrong if n % (600 // (often + 1)) == 0 else 0
+        fed(receiver, v6(start + n + off, face(i17=n / 600.0)), 1.0 + n / 60)
+    clip = receiver.finish(take).clip()
+    assert clip.frame_count >= 599 - 2 * often
+    assert 599 / 60 - 1.0 < clip.duration < 599 / 60 * 1.001 + 2.01
+
+
+def test_midnight_in_a_pause():
+    receiver, day = Receiver("livelink"), 86_400 * 60
+    take = receiver.record()
+    for number, now in ((day - 60, 1.0), (day - 1, 2.0 - 1 / 60), (60 * 60, 62.0)):
+        fed(receiver, v6(number % day, face()), now)
+    assert np.allclose(receiver.finish(take).clip().times, [0.0, 59 / 60, 61.0], atol=1e-6)
 
 
 def test_a_port_in_use_is_one_sentence():

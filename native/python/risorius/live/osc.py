@@ -17,11 +17,13 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Iterator
+from time import monotonic
 from typing import Any
 
 import numpy as np
 
 from .frame import LiveError, Packet, turn_angles, unit_name
+from .roster import MOST, Roster
 
 PORT = 39539
 # The order of Face Cap, which is that of ARKit's first headers.
@@ -42,7 +44,6 @@ FACE_CAP = tuple(
 _BUNDLE = b"#bundle\0"
 _DEEPEST = 8
 _MOST_NAMES = 512
-_MOST_SENDERS = 32
 _LONGEST_NAME = 64
 _LARGEST = 100.0
 _NTP_EPOCH = 2208988800  # seconds from 1900 to 1970
@@ -108,14 +109,15 @@ class Decoder:
     """Puts the messages of all senders together to faces."""
 
     def __init__(self) -> None:
-        self._faces: dict[str, _Face] = {}
+        self._faces: Roster[str, _Face] = Roster()
 
-    def feed(self, data: bytes, sender: str) -> list[Packet]:
+    def feed(self, data: bytes, sender: str, now: float | None = None) -> list[Packet]:
         """Take a packet in.
 
         Args:
             data: its bytes.
             sender: who sent it, the subject of its faces.
+            now: seconds on this machine's monotonic clock; None asks it.
 
         Returns:
             The faces that are whole with it.
@@ -124,9 +126,12 @@ class Decoder:
             LiveError: it is no OSC, or has a value that no face has; what came before stays.
         """
         found = list(messages(data))
-        if sender not in self._faces and len(self._faces) == _MOST_SENDERS:
-            raise LiveError(f"at most {_MOST_SENDERS} senders are taken")
-        face = self._faces.setdefault(sender, _Face(sender))
+        now = monotonic() if now is None else now
+        face = self._faces.hear(sender, now)
+        if face is None:
+            face = _Face(sender)
+            if not self._faces.add(sender, face, now):
+                raise LiveError(f"{MOST} senders are heard at once: there is no room for another")
         time, done = bundle_time(data), []
         for address, values in found:
             if packet := face.take(address, values, time):
@@ -137,11 +142,11 @@ class Decoder:
 
     def pending(self) -> bool:
         """Whether a face waits that nothing but silence ends."""
-        return any(face.fresh and not face.applies for face in self._faces.values())
+        return any(face.fresh and not face.applies for face in self._faces)
 
     def flush(self) -> list[Packet]:
         """The faces that nothing but silence ends."""
-        waiting = [face for face in self._faces.values() if face.fresh and not face.applies]
+        waiting = [face for face in self._faces if face.fresh and not face.applies]
         return [packet for face in waiting if (packet := face.finish())]
 
 
@@ -151,6 +156,8 @@ class _Face:
     def __init__(self, sender: str) -> None:
         self.sender = sender
         self.values: dict[str, float] = {}
+        self._age: dict[str, int] = {}  # of each name the number of the face that it came for last
+        self._number = 0
         self.bones: dict[str, tuple[float, ...]] = {}
         self.fresh: set[str] = set()
         self.applies = False
@@ -172,19 +179,29 @@ class _Face:
         done = self.finish() if key in self.fresh and not self.applies else None
         if not changes:
             return done
-        if len(self.values.keys() | changes.keys()) > _MOST_NAMES:
-            raise LiveError(f"at most {_MOST_NAMES} names of one sender are taken")
+        self._make_room(changes)
         if not self.fresh:
             self.time = time
         self.fresh.add(key)
         self.values.update(changes)
+        self._age.update(dict.fromkeys(changes, self._number))
         return done
+
+    def _make_room(self, changes: dict[str, float]) -> None:
+        """Forget those names that were not sent for the longest time, where there are too many."""
+        if len(self.values.keys() | changes.keys()) <= _MOST_NAMES:
+            return
+        others = sorted(self._age.keys() - changes.keys(), key=self._age.__getitem__)
+        for name in others[: len(others) + len(changes) - _MOST_NAMES]:
+            del self.values[name], self._age[name]
+            self.fresh.discard(name)
 
     def finish(self) -> Packet | None:
         """The face as it is now, if anything of it is new."""
         if not self.fresh:
             return None
         self.fresh.clear()
+        self._number += 1
         values = np.fromiter(self.values.values(), np.float32, len(self.values))
         return Packet(self.sender, "", self.time, tuple(self.values), values)
 

@@ -17,18 +17,19 @@ from typing import NamedTuple
 
 from . import livelink, osc
 from .frame import Frame, LiveError, Packet
+from .roster import MOST, Roster
 from .take import Take
 
 SOURCES = ("livelink", "osc")
 PORTS = {"livelink": livelink.PORT, "osc": osc.PORT}
 THIS_MACHINE, EVERYWHERE = "127.0.0.1", "0.0.0.0"
-_MOST_SUBJECTS = 32
 _SILENCE = 0.004  # seconds that end a face whose sender does not say where it ends
 _WINDOW = 0.05  # seconds over which a flood is counted
 _MOST_PACKETS = {"livelink": 100, "osc": 1000}  # of one window: far beyond what phones send
 _BUSIEST = 0.02  # seconds of one window that reading packets may take: large ones are few
 _BACK = 1.0  # a packet that is older by less came late; by more, the sender's clock was set
-_AHEAD = 10.0  # seconds that a sender's clock may leap ahead of ours and still be believed
+_AHEAD = 2.0  # seconds that a sender's clock may get ahead of ours and still be believed
+_DRIFT = 0.001  # and this share of the time since its first face: no two clocks run alike
 _DAY = 86400.0
 
 
@@ -72,6 +73,7 @@ class _Subject:
         self._offset = 0.0
         self._sent = 0.0  # the sender's time of the newest frame, midnights added
         self._days = 0.0
+        self._began = (0.0, 0.0)  # time and arrival of the first frame
         self._steps: deque[float] = deque(maxlen=31)
         self.arrivals: deque[float] = deque(maxlen=512)
 
@@ -82,6 +84,8 @@ class _Subject:
             return None
         number = self.latest.sequence + 1 if self.latest else 1
         packet.values.flags.writeable = False
+        if self.latest is None:
+            self._began = (time, arrival)
         self.latest = Frame(self.label, time, arrival, number, packet.names, packet.values)
         self.arrivals.append(arrival)
         return self.latest
@@ -94,20 +98,29 @@ class _Subject:
         if last is None:
             self._sent, self._offset = sent, 0.0
             return sent
-        step = sent + self._days - self._sent
-        if abs(step + _DAY) < _AHEAD:  # midnight
-            self._days += _DAY
-            step += _DAY
         passed = arrival - last.arrival
+        step, days = sent + self._days - self._sent, 0.0
+        if step < -_DAY / 2.0 and step + _DAY <= passed + _AHEAD:  # midnight
+            step, days = step + _DAY, _DAY
         if -_BACK <= step < 0.0:
             return None
-        if step < -_BACK or step > passed + _AHEAD:
+        if step < -_BACK or self._lead(last.time + step, arrival) > 0.0:
             self._days, self._sent = 0.0, sent
             self._offset = last.time + passed - sent
             return last.time + passed
+        self._days += days
         self._count_lost(step)
         self._sent = sent + self._days
         return self._sent + self._offset
+
+    def _lead(self, time: float, arrival: float) -> float:
+        """Seconds by which the sender's clock would be farther ahead of ours than is believed.
+
+        Counted from the first frame, not from the last one: what is believed of single packets
+        would add up, and a recording last longer than it took.
+        """
+        passed = arrival - self._began[1]
+        return time - self._began[0] - passed - _AHEAD - _DRIFT * passed
 
     def _count_lost(self, step: float) -> None:
         if len(self._steps) >= 5:
@@ -139,7 +152,7 @@ class Receiver:
         self.host = host
         self.port = PORTS[source] if port is None else port
         self._lock = threading.Lock()
-        self._subjects: dict[tuple[str, str], _Subject] = {}
+        self._subjects: Roster[tuple[str, str], _Subject] = Roster()
         self._takes: list[Take] = []
         self._reasons: Counter[str] = Counter()
         self._counts: Counter[str] = Counter()
@@ -178,13 +191,13 @@ class Receiver:
             self._socket = None
 
     def latest(self, subject: str = "") -> Frame | None:
-        """The newest frame of a subject, or of the one heard first."""
+        """The newest frame of a subject, or of the one heard first of those that are known."""
         with self._lock:
             found = self._find(subject)
             return found.latest if found else None
 
     def record(self, subject: str = "", limit: int = 108_000) -> Take:
-        """Record a subject, or the one heard first, until `finish`.
+        """Record a subject, or the one heard first of those that are known, until `finish`.
 
         Args:
             limit: frames that are kept at most, half an hour at 60 a second.
@@ -215,17 +228,17 @@ class Receiver:
                 refused=sum(self._reasons.values()),
                 reasons=tuple(self._reasons.most_common(5)),
                 late=count["late"],
-                lost=sum(s.lost for s in self._subjects.values()),
+                lost=sum(s.lost for s in self._subjects),
                 faceless=count["faceless"],
                 floods=count["floods"],
-                subjects=tuple(s.label for s in self._subjects.values()),
+                subjects=tuple(s.label for s in self._subjects),
                 subject=found.label if found else "",
                 age=now - found.latest.arrival if found and found.latest else None,
                 recording=sum(len(take) for take in self._takes),
             )
 
     def _find(self, label: str) -> _Subject | None:
-        for subject in self._subjects.values():
+        for subject in self._subjects:
             if not label or subject.label == label:
                 return subject
         return None
@@ -260,7 +273,7 @@ class Receiver:
             if self.source == "livelink":
                 packets = [livelink.decode(data)]
             else:
-                packets = self._decoder.feed(data, sender)
+                packets = self._decoder.feed(data, sender, now)
         except livelink.NoFace:
             self._counts["faceless"] += 1
         except LiveError as error:
@@ -278,9 +291,9 @@ class Receiver:
 
     def _keep(self, packets: list[Packet], now: float) -> None:
         for packet in packets:
-            subject = self._subject_of(packet)
+            subject = self._subject_of(packet, now)
             if subject is None:
-                self._refuse(f"at most {_MOST_SUBJECTS} subjects are taken")
+                self._refuse(f"{MOST} subjects are heard at once: there is no room for another")
                 continue
             with self._lock:
                 frame = subject.accept(packet, now)
@@ -291,17 +304,21 @@ class Receiver:
                 for take in self._takes:
                     take.add(frame)
 
-    def _subject_of(self, packet: Packet) -> _Subject | None:
+    def _subject_of(self, packet: Packet, now: float) -> _Subject | None:
+        """Whose face it is; None where there is no room for another."""
         key = (packet.device, packet.subject)
-        subject = self._subjects.get(key)
-        if subject is None and len(self._subjects) < _MOST_SUBJECTS:
+        with self._lock:
+            subject = self._subjects.hear(key, now)
+            if subject is not None:
+                return subject
             label = packet.subject or packet.device or "unnamed"
-            if any(s.label == label for s in self._subjects.values()):
+            if any(s.label == label for s in self._subjects):
                 label = f"{label} ({packet.device[:8]})"
             subject = _Subject(label)
-            with self._lock:
-                self._subjects[key] = subject
-        return subject
+            # Forgotten and heard again it would begin anew, with its clock, within the take.
+            recorded = {take.subject for take in self._takes}
+            added = self._subjects.add(key, subject, now, lambda s: s.label in recorded)
+        return subject if added else None
 
 
 def _bound(host: str, port: int) -> socket.socket:
