@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Makes the files of the past with any build of the extension, and notes what they play there.
+
+    python blender_tests/support/make_past.py ZIP FOLDER [--record]
+
+Run by a Python with bpy. With --record the files that are in FOLDER already are played by ZIP
+and not made anew: what they play goes to FOLDER/values.npz.
+"""
+
+import argparse
+import os
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+
+HERE = Path(__file__).resolve()
+
+
+def _start(package):
+    """The extension, installed in a throw-away folder of this process."""
+    os.environ["BLENDER_USER_RESOURCES"] = tempfile.mkdtemp(prefix="risorius-past-")
+    import bpy
+
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    sys.path[:0] = [str(HERE.parents[1]), str(HERE.parents[2] / "packaging")]
+    from install_extension import install
+
+    install(package.resolve())
+
+
+def main():
+    """Make the files, record what they play."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("zip", type=Path)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--record", action="store_true")
+    options = parser.parse_args()
+    _start(options.zip)
+    from support import past, past_scenes
+
+    # A .blend holds the path it was saved at: one that says nothing of this machine.
+    work = Path(tempfile.gettempdir()) / "risorius-past"
+    shutil.rmtree(work, ignore_errors=True)
+    if options.record:
+        shutil.copytree(options.folder, work)
+    work.mkdir(exist_ok=True)
+    with past.scalar():
+        if not options.record:
+            past_scenes.make_all(work)
+        past.record(work)
+    shutil.copytree(work, options.folder, dirs_exist_ok=True)
+    shutil.rmtree(work)
+
+
+if __name__ == "__main__":
+    code = 1
+    try:
+        main()
+        code = 0
+    except BaseException:  # noqa: BLE001  printed, and the exit code says it
+        import traceback
+
+        traceback.print_exc()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)  # Blender as a module sometimes hangs in its destructors

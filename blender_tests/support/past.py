@@ -1,0 +1,253 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Files of the past: how they are brought into Blender, and what they play."""
+
+import json
+import os
+from contextlib import contextmanager
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+DATA = Path(__file__).resolve().parents[1] / "data" / "past"
+FRAMES = (1.0, 4.5, 9.0, 14.0, 20.0, 31.0)
+AS_SAVED = "as saved"
+LIVE_AGAIN = "live again"
+# File -> what is done before it plays: the name of an action is one that the face is given.
+PLAYS = {
+    "layers": (AS_SAVED, "Other"),
+    "meta": (AS_SAVED,),
+    "linked_action": (AS_SAVED,),
+    "shared_action": (AS_SAVED,),
+    "nla": (AS_SAVED,),
+    "baked_result": (AS_SAVED, LIVE_AGAIN),
+    "baked_controls": (AS_SAVED, LIVE_AGAIN),
+    "shape_modes": (AS_SAVED,),
+    "bones": (AS_SAVED,),
+    "overridden_live": (AS_SAVED,),
+    "overridden_keys": (AS_SAVED,),
+}
+
+
+@contextmanager
+def scalar():
+    """While this lasts faces are compiled for the kernels that are the same on every processor."""
+    before = os.environ.get("RISORIUS_SIMD")
+    os.environ["RISORIUS_SIMD"] = "scalar"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ["RISORIUS_SIMD"]
+        else:
+            os.environ["RISORIUS_SIMD"] = before
+
+
+def rigs():
+    """The deforming armatures of the scene, also linked ones, by name."""
+    found = [o for o in bpy.context.scene.objects if "risorius_controls" in o]
+    return sorted(found, key=lambda o: o.name)
+
+
+def controls():
+    """The control armatures of the scene's faces."""
+    return [rig["risorius_controls"] for rig in rigs()]
+
+
+def open_it(path, _folder):
+    """As one opens it."""
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+
+
+def save_and_open(path, folder):
+    """Opened, saved under another name and opened again."""
+    open_it(path, folder)
+    again = folder / f"again_{path.name}"
+    bpy.ops.wm.save_as_mainfile(filepath=str(again))
+    open_it(again, folder)
+
+
+def append(path, _folder):
+    """Its characters and actions appended to an empty file."""
+    bpy.ops.wm.read_homefile(use_empty=True)
+    with bpy.data.libraries.load(str(path)) as (there, _here):
+        collections, actions = list(there.collections), list(there.actions)
+    for name in collections:
+        bpy.ops.wm.append(directory=f"{path}/Collection/", filename=name)
+    for name in actions:
+        if name not in bpy.data.actions:
+            bpy.ops.wm.append(directory=f"{path}/Action/", filename=name)
+    bpy.context.view_layer.update()
+
+
+def link(path, _folder):
+    """Its characters and actions linked into an empty file."""
+    bpy.ops.wm.read_homefile(use_empty=True)
+    with bpy.data.libraries.load(str(path), link=True) as (there, here):
+        collections = list(there.collections)
+        here.actions = list(there.actions)
+    for name in collections:
+        bpy.ops.wm.link(directory=f"{path}/Collection/", filename=name, instance_collections=False)
+    bpy.context.view_layer.update()
+
+
+def override(path, folder):
+    """Its characters linked and made ready to animate."""
+    link(path, folder)
+    for rig in rigs():
+        bpy.context.view_layer.objects.active = rig["risorius_controls"]
+        assert bpy.ops.risorius.make_override() == {"FINISHED"}
+    bpy.context.view_layer.update()
+
+
+def undo(path, folder):
+    """Opened, changed, and the change undone."""
+    bpy.context.preferences.edit.use_global_undo = True
+    open_it(path, folder)
+    bpy.ops.ed.undo_push(message="as it was")
+    for item in controls():
+        item.pose.bones["face"]["CTRL_expressions.jawOpen"] = 0.77
+        for layer in item.risorius_layers:
+            layer.weight = 0.123
+        item.update_tag()
+    bpy.context.view_layer.update()
+    bpy.ops.ed.undo_push(message="changed")
+    bpy.ops.ed.undo()
+    bpy.context.view_layer.update()
+
+
+ROUTES = {
+    "open": open_it,
+    "save": save_and_open,
+    "append": append,
+    "link": link,
+    "override": override,
+    "undo": undo,
+}
+# Overrides of a library are not appended or linked once more.
+NOT_OVERRIDDEN = ("append", "link", "override")
+
+
+def routes_of(name):
+    """The ways in which a file is brought into Blender."""
+    skipped = NOT_OVERRIDDEN if name.startswith("overridden") else ()
+    return [route for route in ROUTES if route not in skipped]
+
+
+def prepare(play):
+    """What is done with the open file before it plays."""
+    for rig, item in [(r, r["risorius_controls"]) for r in rigs()]:
+        if item.library is not None:
+            continue  # it stands as it was saved
+        _choose_slot(item)
+        if play == LIVE_AGAIN:
+            bpy.context.view_layer.objects.active = item
+            if bpy.ops.risorius.unbake.poll():
+                assert bpy.ops.risorius.unbake() == {"FINISHED"}, rig.name
+        elif play != AS_SAVED:
+            action = next(a for a in bpy.data.actions if a.name == play)
+            item.animation_data.action = action
+            _choose_slot(item)
+    bpy.context.view_layer.update()
+
+
+def _choose_slot(item):
+    """Choose the slot of an action where there is none.
+
+    Blender 5.0 does not choose one for an override's action that comes from 4.2.
+    """
+    data = item.animation_data
+    if data is not None and data.action is not None and hasattr(data, "action_slot"):
+        data.action_slot = data.action_slot or data.action.slots[0]
+
+
+def film(frames=FRAMES):
+    """What the faces of the open file play: {"face/frame/what": float32[...]}."""
+    found = {}
+    for frame in frames:
+        bpy.context.scene.frame_set(int(np.floor(frame)), subframe=float(frame % 1))
+        bpy.context.view_layer.update()
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        for rig in rigs():
+            for what, values in _read(rig, depsgraph).items():
+                found[f"{rig.name}/{frame:g}/{what}"] = values
+    return found
+
+
+def _read(rig, depsgraph):
+    """Bones, shape keys, channels and maps as Blender shows them."""
+    seen = rig.evaluated_get(depsgraph)
+    bones = seen.pose.bones
+    found = {
+        "bones": np.array([_numbers(bone) for bone in bones], np.float32),
+        "channels": np.array(list(rig["channels"]), np.float32),
+        "maps": np.array(list(seen["maps"]), np.float32),
+        "place": np.array(seen.matrix_world, np.float32),
+    }
+    for key in sorted(k for k in rig.keys() if k.startswith("risorius_mesh_")):  # noqa: SIM118
+        item = rig[key].evaluated_get(depsgraph)
+        blocks = item.data.shape_keys
+        if blocks is None:
+            continue
+        blocks = blocks.evaluated_get(depsgraph).key_blocks
+        number = key.removeprefix("risorius_mesh_")
+        found[f"values{number}"] = np.array([b.value for b in blocks], np.float32)
+        live = rig[key].data.shape_keys.key_blocks.get("<channel sum>")
+        if live is not None:
+            points = np.empty(len(live.points) * 3, np.float32)
+            live.points.foreach_get("co", points)
+            found[f"points{number}"] = points
+    return found
+
+
+def _numbers(bone):
+    turn = bone.rotation_quaternion
+    if bone.rotation_mode not in ("QUATERNION", "AXIS_ANGLE"):
+        turn = (*bone.rotation_euler, 0.0)
+    return (*bone.location, *turn, *bone.scale)
+
+
+def films(folder, name, work, routes=None):
+    """Plays a file in every way.
+
+    Args:
+        folder: where the files are.
+        name: of one of PLAYS.
+        work: a folder to write to.
+        routes: some of ROUTES; None for all that there are for it.
+
+    Yields:
+        "name/route/play" and its film.
+    """
+    for route in routes or routes_of(name):
+        for play in PLAYS[name]:
+            ROUTES[route](folder / f"{name}.blend", work)
+            prepare(play)
+            yield f"{name}/{route}/{play}", film()
+
+
+def record(folder):
+    """Write what the files of a folder play to its values.npz; equal films are kept once."""
+    index, kept = {}, []
+    for name in PLAYS:
+        for key, found in films(folder, name, Path(bpy.app.tempdir)):
+            flat = np.concatenate([v.ravel() for v in found.values()])
+            assert np.isfinite(flat).all(), key
+            same = next((i for i, k in enumerate(kept) if np.array_equal(k, flat)), len(kept))
+            if same == len(kept):
+                kept.append(flat)
+            index[key] = {"film": same, "layout": [[k, v.size] for k, v in found.items()]}
+    named = {f"film{i}": flat for i, flat in enumerate(kept)}
+    np.savez_compressed(folder / "values.npz", index=json.dumps(index), **named)
+
+
+def recorded(folder):
+    """What `record` wrote: "name/route/play" -> film."""
+    with np.load(folder / "values.npz") as held:
+        films_of = {}
+        for key, entry in json.loads(str(held["index"])).items():
+            ends = np.cumsum([size for _name, size in entry["layout"]])[:-1]
+            parts = np.split(held[f"film{entry['film']}"], ends)
+            names = [name for name, _size in entry["layout"]]
+            films_of[key] = dict(zip(names, parts, strict=True))
+        return films_of

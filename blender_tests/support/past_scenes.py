@@ -1,0 +1,319 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The scenes that are saved as files of the past: every way in which a face is animated."""
+
+import bpy
+
+from . import faces, scene
+from .faces import small_face
+
+PREFIX = "CTRL_expressions."
+EYES = ("eyeBlinkL", "eyeBlinkR", "eyeSquintInnerL")
+
+
+def make_all(folder):
+    """Save every scene, each from an empty file, under its name."""
+    dna = folder / "face.dna"
+    face = small_face(head_grid=(5, 6))
+    names = [PREFIX + n for n in EYES]
+    faces.renumbered(face, controls=[*range(8), *names, 8, 9, 10]).save(str(dna))
+    try:
+        for make in (
+            layers,
+            meta,
+            linked_action,
+            shared_action,
+            nla,
+            baked_result,
+            baked_controls,
+            shape_modes,
+            bones,
+            overridden_live,
+            overridden_keys,
+        ):
+            _empty()
+            make(dna, folder)
+            save(folder / f"{make.__name__}.blend")
+    finally:
+        dna.unlink()
+
+
+def _empty():
+    bpy.ops.wm.read_homefile(use_empty=True)
+    bpy.context.scene.render.fps = 24
+    bpy.context.preferences.filepaths.save_version = 0
+
+
+def save(path):
+    """Save the open file, packed, at a frame that shows something."""
+    bpy.context.scene.frame_set(9)
+    bpy.context.view_layer.update()
+    bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=True)
+
+
+def _empty_action(item, name):
+    """A new action that the control armature plays from now on."""
+    data = item.animation_data_create()
+    data.action = bpy.data.actions.new(name)
+    data.action.use_fake_user = True
+    return data.action
+
+
+def _key_sliders(item, **curves):
+    """Keys on sliders of the action that is played: control -> {frame: value}."""
+    bone = item.pose.bones["face"]
+    for short, keys in curves.items():
+        for frame, value in keys.items():
+            bone[PREFIX + short] = value
+            bone.keyframe_insert(f'["{PREFIX}{short}"]', frame=frame)
+        bone[PREFIX + short] = 0.0
+
+
+def _key_weight(item, place, keys):
+    """Keys on the weight of a layer, by its place, as 38364e4 and before it wrote them."""
+    for frame, value in keys.items():
+        item.risorius_layers[place].weight = value
+        item.keyframe_insert(f"risorius_layers[{place}].weight", frame=frame)
+
+
+def _three_layers(rig):
+    """An action, an expression and idle life; nothing plays on the sliders below them."""
+    item, layers_module = scene.controls(rig), scene.submodule("scene.layers")
+    item.risorius_layer_rules = False
+    wave = _empty_action(item, f"Wave of {rig.name}")
+    _key_sliders(item, jawOpen={1: 0.1, 8: 0.9, 20: 0.3}, eyeBlinkL={2: 0.0, 6: 0.8, 12: 0.1})
+    item.animation_data.action = None
+    layers_module.add(item, "ACTION", "Wave", action=wave, start=1.0)
+    layers_module.add(item, "EXPRESSION", "Joy", expression="joy", fade_in=6.0, start=2.0)
+    layers_module.add(item, "IDLE", 'Idle "Life"', seed=5, start=1.0, blend="ADD")
+    return item
+
+
+def layers(dna, _folder):
+    """Keys of weights in the assigned action, in one that is not, and a driver."""
+    item = _three_layers(scene.load(dna, "LIVE"))
+    other = _empty_action(item, "Other")
+    _key_weight(item, 0, {1: 0.2, 20: 0.9})
+    _key_weight(item, 1, {1: 1.0, 14: 0.0})
+    _key_sliders(item, browDownL={1: 0.4, 9: 0.1})
+    _empty_action(item, "Main")
+    _key_weight(item, 0, {1: 1.0, 18: 0.1})
+    _key_weight(item, 1, {3: 0.0, 12: 0.8})
+    _key_sliders(item, browDownL={1: 0.0, 20: 1.0})
+    assert other.users
+    curve = item.driver_add("risorius_layers[2].weight")
+    curve.driver.expression = "min(frame / 25, 1)"
+
+
+def meta(dna, _folder):
+    """Keys of weights in an action whose strip lies in a meta strip."""
+    item = _three_layers(scene.load(dna, "LIVE"))
+    action = _empty_action(item, "In a meta strip")
+    _key_weight(item, 1, {1: 0.0, 20: 1.0})
+    _key_weight(item, 2, {1: 0.9, 12: 0.2})
+    _key_sliders(item, browDownL={1: 0.0, 20: 0.7})
+    _make_meta(item, _strip(item, action))
+
+
+def _strip(item, action, name="", **settings):
+    """A strip of a new NLA track, where the action's keys are."""
+    data = item.animation_data
+    slot = getattr(data, "action_slot", None)
+    data.action = None
+    track = data.nla_tracks.new()
+    track.name = name or action.name
+    first, last = action.frame_range
+    strip = track.strips.new(track.name, int(first), action)
+    if slot is not None:
+        strip.action_slot = slot
+    strip.action_frame_start, strip.action_frame_end = first, last
+    strip.frame_start, strip.frame_end = first, last
+    strip.use_auto_blend = False
+    for key, value in settings.items():
+        setattr(strip, key, value)
+    return strip
+
+
+def _make_meta(item, strip):
+    """Put a strip into a meta strip, in an NLA editor as Blender demands."""
+    bpy.context.view_layer.objects.active = item
+    item.select_set(True)
+    for track in item.animation_data.nla_tracks:
+        for other in track.strips:
+            other.select = other == strip
+    window = bpy.context.window_manager.windows[0]
+    area = window.screen.areas[0]
+    before, area.type = area.type, "NLA_EDITOR"
+    region = next(r for r in area.regions if r.type == "WINDOW")
+    with bpy.context.temp_override(window=window, area=area, region=region):
+        assert bpy.ops.nla.meta_add() == {"FINISHED"}
+    area.type = before
+
+
+def linked_action(dna, folder):
+    """Keys of weights in an action of another file."""
+    item = _three_layers(scene.load(dna, "LIVE"))
+    _empty_action(item, "Of a library")
+    _key_weight(item, 0, {1: 0.3, 16: 0.9})
+    _key_weight(item, 1, {1: 0.9, 16: 0.1})
+    _key_sliders(item, browDownL={1: 0.0, 20: 0.6})
+    library = folder / "library_actions.blend"
+    bpy.data.libraries.write(str(library), {item.animation_data.action}, compress=True)
+    own = item.animation_data.action
+    item.animation_data.action = None
+    bpy.data.actions.remove(own)
+    save(folder / "linked_action.blend")  # so that the link is relative
+    with bpy.data.libraries.load(str(library), link=True, relative=True) as (_there, here):
+        here.actions = ["Of a library"]
+    item = scene.controls(next(o for o in bpy.data.objects if "risorius_controls" in o))
+    _assign(item, here.actions[0])
+
+
+def _assign(item, action):
+    item.animation_data.action = action
+    if hasattr(item.animation_data, "action_slot"):
+        item.animation_data.action_slot = action.slots[0]
+
+
+def shared_action(dna, _folder):
+    """One action that moves two characters, whose layers stand in another order."""
+    one = _three_layers(scene.load(dna, "LIVE"))
+    two = _three_layers(scene.load(dna, "KEYS"))
+    two.risorius_layers.move(0, 2)
+    shared = _empty_action(one, "Shared")
+    _key_weight(one, 0, {1: 0.1, 20: 1.0})
+    _key_weight(one, 1, {1: 0.7, 13: 0.0})
+    _key_sliders(one, browDownL={1: 0.0, 20: 0.9})
+    two.animation_data_create()
+    _assign(two, shared)
+
+
+def nla(dna, _folder):
+    """Strips that replace, are added, fade and are muted; the active action adds to them."""
+    item = _three_layers(scene.load(dna, "LIVE"))
+    _strips(item)
+    _empty_action(item, "On top")
+    _key_sliders(item, eyeLookUpL={1: 0.0, 14: 0.5})
+    item.animation_data.action_blend_type = "ADD"
+
+
+def _strips(item):
+    low = _empty_action(item, "Low")
+    _key_weight(item, 0, {1: 0.2, 20: 0.8})
+    _key_sliders(item, browDownL={1: 0.1, 20: 0.8}, jawOpen={1: 0.4, 12: 0.0})
+    _strip(item, low, extrapolation="HOLD", repeat=1.5)
+    high = _empty_action(item, "High")
+    _key_weight(item, 1, {4: 0.9, 16: 0.3})
+    _key_sliders(item, browDownL={4: 0.3, 16: 0.1}, mouthCornerPullR={4: 0.0, 16: 0.9})
+    _strip(item, high, blend_type="ADD", blend_in=3.0, blend_out=5.0, extrapolation="NOTHING")
+    silent = _empty_action(item, "Silent")
+    _key_sliders(item, jawOpen={1: 1.0, 20: 1.0})
+    _strip(item, silent)
+    item.animation_data.nla_tracks["Silent"].mute = True
+
+
+def baked_result(dna, _folder):
+    """A baked face: strips of bones, keys and maps lie above tracks that were silenced."""
+    rig = scene.load(dna, "LIVE")
+    item = _three_layers(rig)
+    _strips(item)
+    _own_joint(rig)
+    _bake(item, kind="RESULT")
+
+
+def _own_joint(rig):
+    """Tracks on the deforming armature itself: one muted, one that plays."""
+    bone = rig.pose.bones["user_joint"]
+    bone.rotation_mode = "XYZ"
+    for name, angle in (("Turn", 0.7), ("Back", -0.4)):
+        action = _empty_action(rig, name)
+        for frame, share in ((1, 0.0), (20, 1.0)):
+            bone.rotation_euler.z = angle * share
+            bone.keyframe_insert("rotation_euler", frame=frame)
+        _strip(rig, action)
+    rig.animation_data.nla_tracks["Back"].mute = True
+
+
+def baked_controls(dna, _folder):
+    """Baked controls: their strip lies above a muted track and one that played alone."""
+    item = _three_layers(scene.load(dna, "KEYS"))
+    _strips(item)
+    item.animation_data.nla_tracks["Low"].is_solo = True
+    _bake(item, kind="CONTROLS")
+
+
+def _bake(item, kind):
+    bpy.context.view_layer.objects.active = item
+    bpy.context.view_layer.update()
+    assert bpy.ops.risorius.bake(kind=kind, range="CUSTOM", start=1, end=31, strip=True) == {
+        "FINISHED"
+    }
+
+
+def shape_modes(dna, _folder):
+    """Two faces, with live keys and with real ones, an edited real key among them."""
+    for mode in ("LIVE", "KEYS"):
+        rig = scene.load(dna, mode)
+        item = scene.controls(rig)
+        _empty_action(item, f"Moves {mode}")
+        _key_sliders(
+            item,
+            jawOpen={1: 0.0, 9: 1.0, 20: 0.2},
+            mouthCornerPullL={1: 0.8, 20: 0.0},
+            browDownL={1: 0.1, 14: 0.9},
+        )
+        item.location = (0.1, 0.2, 0.3)
+        own = scene.meshes(rig)[0].shape_key_add(name="Own")
+        own.value = 0.25
+
+
+def bones(dna, _folder):
+    """An action of head, neck and eye bones, and of the sliders that they add to."""
+    rig = scene.load(dna, "LIVE")
+    item = _three_layers(rig)
+    _empty_action(item, "Bones")
+    for name, axis in (("head", 0), ("neck", 2), ("eye_L", 0)):
+        bone = item.pose.bones[name]
+        bone.rotation_mode = "XYZ"
+        for frame, angle in ((1, 0.0), (9, 0.3), (20, -0.2)):
+            bone.rotation_euler[axis] = angle
+            bone.keyframe_insert("rotation_euler", frame=frame)
+    eyes = item.pose.bones["eyes"]
+    for frame, place in ((1, 0.0), (14, 0.05)):
+        eyes.location = (place, 0.0, -place)
+        eyes.keyframe_insert("location", frame=frame)
+    _key_sliders(item, eyeLookUpL={1: 0.2, 20: 0.4})
+
+
+def overridden_live(dna, folder):
+    """An override of a linked face, its live meshes copied; with a layer and keys of its own."""
+    _overridden(dna, folder, "LIVE")
+
+
+def overridden_keys(dna, folder):
+    """The same of a face with real keys, which stay linked."""
+    _overridden(dna, folder, "KEYS")
+
+
+def _overridden(dna, folder, mode):
+    _three_layers(scene.load(dna, mode))
+    library = folder / f"library_face_{mode.lower()}.blend"
+    save(library)
+    _empty()
+    save(folder / f"overridden_{mode.lower()}.blend")
+    bpy.ops.wm.link(
+        directory=f"{library}/Collection/",
+        filename="Small",
+        instance_collections=True,
+        relative_path=True,
+    )
+    shown = next(o for o in bpy.context.scene.objects if o.instance_collection)
+    bpy.context.view_layer.objects.active = shown
+    assert bpy.ops.risorius.make_override(shapes="DRIVEN") == {"FINISHED"}
+    rig = next(o for o in bpy.data.objects if "risorius_controls" in o and not o.library)
+    item = scene.controls(rig)
+    _empty_action(item, "Own")
+    scene.submodule("scene.layers").add(item, "EXPRESSION", "Fear", expression="fear")
+    _key_weight(item, 0, {1: 0.0, 20: 1.0})
+    _key_weight(item, 1, {1: 0.8, 16: 0.2})
+    _key_weight(item, 3, {1: 0.0, 14: 0.5})
+    _key_sliders(item, browDownL={1: 0.1, 20: 0.9})
