@@ -513,6 +513,24 @@ def test_the_panel_says_what_comes(dna_file, port):
     assert "Bob: 1 a second" in drawn()
 
 
+def test_the_network_is_heard_only_by_choice_and_the_panel_says_where(dna_file):
+    rig = scene.load(dna_file)
+    chosen = bpy.context.window_manager.risorius_live
+    chosen.port = free_port()
+    assert not chosen.everywhere
+    assert f"Hears this computer only, at | 127.0.0.1, port {chosen.port}." in drawn()
+    bpy.ops.risorius.live_start()
+    assert session_of(rig).receiver._socket.getsockname()[0] == "127.0.0.1"
+    bpy.ops.risorius.live_stop()
+    chosen.everywhere = True
+    words = drawn().replace(" | ", " ")
+    address = risorius.live.own_address() or "this computer's address"
+    assert f"In the app: {address}, port {chosen.port}." in words
+    bpy.ops.risorius.live_start()
+    assert session_of(rig).receiver._socket.getsockname()[0] == "0.0.0.0"
+    bpy.ops.risorius.live_stop()
+
+
 def test_what_cannot_start_is_one_sentence(dna_file, port):
     scene.load(dna_file)
     with (

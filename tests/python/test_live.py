@@ -415,6 +415,52 @@ def test_a_port_in_use_is_one_sentence():
         assert again.port == port
 
 
+@pytest.fixture
+def bound(monkeypatch):
+    """The addresses that receivers listen at, as the system tells them."""
+    from risorius.live import receiver
+
+    found, bind = [], receiver._bound
+
+    def spy(host, port):
+        listener = bind(host, port)
+        found.append(listener.getsockname()[0])
+        return listener
+
+    monkeypatch.setattr(receiver, "_bound", spy)
+    return found
+
+
+def test_nothing_but_this_machine_is_heard_unless_it_is_said(bound, capsys):
+    from risorius import cli
+
+    with Receiver("livelink", 0):
+        pass
+    assert cli.main(["live", "--port", "0", "--seconds", "0.01"]) == 0
+    assert bound == ["127.0.0.1", "127.0.0.1"]
+    assert "this machine alone" in capsys.readouterr().err
+    assert cli.main(["live", "--everywhere", "--port", "0", "--seconds", "0.01"]) == 0
+    assert bound[2:] == ["0.0.0.0"]
+    words = capsys.readouterr().err
+    assert "the network; in the app: " in words
+    assert risorius.live.own_address() in words
+
+
+def test_the_address_for_the_app_is_one_of_this_machine(monkeypatch):
+    address = risorius.live.own_address()
+    if address:  # somebody listens there: only an own address can be bound
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            probe.bind((address, 0))
+    assert not address.startswith("127.")
+
+    class Offline(socket.socket):
+        def connect(self, _where):
+            raise OSError("Network is unreachable")
+
+    monkeypatch.setattr(socket, "socket", Offline)
+    assert risorius.live.own_address() == ""
+
+
 def frame_of(**values):
     return frame_at(0.0, **values)
 

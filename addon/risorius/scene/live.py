@@ -45,7 +45,7 @@ class Settings:
 
     source: str = "livelink"
     port: int = 11111
-    everywhere: bool = True
+    everywhere: bool = False
     subject: str = ""
     smoothing: float = 0.3
     gain: float = 1.0
@@ -227,6 +227,11 @@ def forget_neutral(session):
     """Take what comes as it is again."""
     session.shaper.capture(None)
     session.sequence = 0
+
+
+def address():
+    """What a phone's app takes for this computer; "" where it is in no network."""
+    return native.part("live").own_address()
 
 
 def begin_take(session, frame):

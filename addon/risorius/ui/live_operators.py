@@ -41,8 +41,9 @@ class RISORIUS_PG_live(bpy.types.PropertyGroup):
     )
     everywhere: bpy.props.BoolProperty(
         name="From the Network",
-        description="Listen to other devices too, as a phone needs; else to this computer alone",
-        default=True,
+        description="Hear any device of the network, as a phone needs; off: programs of this "
+        "computer alone. In a network that is not your own, others could move the face",
+        default=False,
     )
     subject: bpy.props.StringProperty(
         name="Subject",
@@ -316,9 +317,9 @@ class RISORIUS_PT_live(FaceOnlyPanel, bpy.types.Panel):
         column = layout.column()
         column.enabled = session is None
         column.prop(chosen, "source", text="")
-        row = column.row(align=True)
-        row.prop(chosen, "port")
-        row.prop(chosen, "everywhere", text="", icon="URL")
+        column.prop(chosen, "port")
+        column.prop(chosen, "everywhere")
+        write(column, _where(chosen))
         column.prop(chosen, "mapping")
         layout.prop(chosen, "subject", icon="USER")
         column = layout.column(align=True)
@@ -339,6 +340,14 @@ class RISORIUS_PT_live(FaceOnlyPanel, bpy.types.Panel):
         row.operator("risorius.live_neutral")
         row.operator("risorius.live_neutral", text="", icon="X").forget = True
         _draw_status(layout, session)
+
+
+def _where(chosen):
+    """What to type into the app."""
+    if not chosen.everywhere:
+        return f"Hears this computer only, at 127.0.0.1, port {chosen.port}."
+    address = live.address() or "this computer's address"
+    return f"In the app: {address}, port {chosen.port}."
 
 
 def _draw_waiting(layout):

@@ -22,6 +22,7 @@ from ..live import (
     Shaper,
     Status,
     Take,
+    own_address,
 )
 
 _KINDS = (".rzc", ".csv")
@@ -121,8 +122,7 @@ def _listen(receiver: Receiver, args: argparse.Namespace) -> None:
         ended.append(number)
 
     before = {which: signal.signal(which, end) for which in (signal.SIGINT, signal.SIGTERM)}
-    place = "this machine" if receiver.host == THIS_MACHINE else "the network"
-    print(f"listening to {place} at port {receiver.port}; Ctrl-C ends", file=sys.stderr, flush=True)
+    print(f"listening to {_place(receiver)}; Ctrl-C ends", file=sys.stderr, flush=True)
     still = sys.stderr.isatty()
     began, shown = monotonic(), 0.0
     try:
@@ -139,6 +139,14 @@ def _listen(receiver: Receiver, args: argparse.Namespace) -> None:
         for which, handler in before.items():
             signal.signal(which, handler)
     print(f"\r{words(receiver.status(args.subject)):<78}" if still else "", file=sys.stderr)
+
+
+def _place(receiver: Receiver) -> str:
+    """Who is heard, and where: what to type into the app."""
+    if receiver.host == THIS_MACHINE:
+        return f"this machine alone at port {receiver.port}; --everywhere for a phone"
+    address = own_address() or "this machine's address"
+    return f"the network; in the app: {address}, port {receiver.port}"
 
 
 def words(status: Status) -> str:

@@ -12,7 +12,7 @@ packets --livelink, osc--> frames of names --Shaper--> raw controls
 from __future__ import annotations
 
 from .frame import Frame, LiveError, Packet
-from .receiver import EVERYWHERE, PORTS, SOURCES, THIS_MACHINE, Receiver, Status
+from .receiver import EVERYWHERE, PORTS, SOURCES, THIS_MACHINE, Receiver, Status, own_address
 from .shaping import HEAD, Controls, Shaper
 from .take import Take
 
@@ -30,4 +30,5 @@ __all__ = [
     "Shaper",
     "Status",
     "Take",
+    "own_address",
 ]

@@ -321,6 +321,17 @@ class Receiver:
         return subject if added else None
 
 
+def own_address() -> str:
+    """The address at which the devices of the network find this machine; "" without a network."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.connect(("192.0.2.1", 9))  # of no machine; nothing is sent, only the way is asked
+        except OSError:
+            return ""
+        found = str(probe.getsockname()[0])
+    return "" if found.startswith(("127.", "0.")) else found
+
+
 def _bound(host: str, port: int) -> socket.socket:
     if not 0 <= port <= 65535:
         raise LiveError(f"a port of 0 to 65535 was expected, found {port}")
