@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Where test data lies, and the extras that need data which a clone does not have."""
 
+import contextlib
 import os
 from pathlib import Path
 
@@ -31,3 +32,16 @@ def standard_controls():
     """The raw controls of a standard face, as a DNA spells them."""
     path = PROJECT / "tests" / "data" / "controls" / "standard_raw.txt"
     return path.read_text(encoding="utf-8").split()
+
+
+@contextlib.contextmanager
+def no_room(size):
+    """No file may become longer than so many bytes: as on a disk that is full by then."""
+    import resource  # of POSIX
+
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)

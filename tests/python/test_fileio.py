@@ -11,6 +11,7 @@ import sys
 import textwrap
 
 import pytest
+from conftest import no_room
 from risorius import fileio
 
 posix = pytest.mark.skipif(os.name == "nt", reason="of POSIX")
@@ -58,20 +59,9 @@ def test_a_users_files_of_like_names_stay(tmp_path):
 def test_without_room_the_old_file_stays_and_the_error_names_it(size, tmp_path):
     path = tmp_path / "a"
     path.write_text("old")
-    # A limit on the size of files fails as a full disk does, when the bytes are written.
-    done = run(
-        """
-        import resource, sys
-        from risorius import fileio
-        resource.setrlimit(resource.RLIMIT_FSIZE, (5, 5))
-        try:
-            fileio.write_bytes(sys.argv[1], b"x" * int(sys.argv[2]))
-        except OSError as error:
-            print(error.strerror, error.filename, sep="|")
-        """,
-        path, size,
-    )  # fmt: skip
-    assert done.stdout == f"{os.strerror(errno.EFBIG)}|{path}\n", done.stderr
+    with no_room(5), pytest.raises(OSError, match=os.strerror(errno.EFBIG)) as caught:
+        fileio.write_bytes(path, b"x" * size)
+    assert caught.value.filename == str(path)
     assert path.read_text() == "old"
     assert os.listdir(tmp_path) == ["a"]
 

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
 import pytest
 from animation_files import (
@@ -14,6 +16,7 @@ from animation_files import (
     capture,
     live_link_face,
 )
+from conftest import no_room
 from risorius import Clip, importing
 
 RIG = "CTRL_expressions."
@@ -296,6 +299,23 @@ def test_what_is_written_reads_back_bit_for_bit(tmp_path, kind):
         assert again.names == clip.names
         np.testing.assert_array_equal(again.curves.view(np.uint32), bits.view(np.uint32))
         np.testing.assert_allclose(again.frame_times(), clip.frame_times(), rtol=0, atol=1e-9)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="limits are those of POSIX")
+@pytest.mark.parametrize("kind", ["csv", "json"])
+def test_text_is_written_whole_or_not_at_all_and_takes_no_name_of_the_users(tmp_path, kind):
+    clip = Clip("ab", [[0, 1], [1, 0]])
+    text = importing.csv_text(clip) if kind == "csv" else importing.json_text(clip)
+    for name in (f"out.{kind}", f"out.{kind}.part"):
+        (tmp_path / name).write_text("the user's own")
+    path = tmp_path / f"out.{kind}"
+    with no_room(10), pytest.raises(OSError, match=f"out.{kind}'"):
+        importing.write_text(text, path)
+    assert path.read_text() == "the user's own"
+    importing.write_text(text, path)
+    assert path.read_text() == text
+    assert (tmp_path / f"out.{kind}.part").read_text() == "the user's own"
+    assert len(os.listdir(tmp_path)) == 2
 
 
 def test_what_text_cannot_hold_is_refused():

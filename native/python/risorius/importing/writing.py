@@ -7,10 +7,10 @@ import csv
 import io
 import json
 import os
-from pathlib import Path
 
 import numpy as np
 
+from .. import fileio
 from ..clip import Clip
 
 
@@ -57,18 +57,8 @@ def json_text(clip: Clip) -> str:
 
 
 def write_text(text: str, path: str | os.PathLike[str]) -> None:
-    """Write a file whole or not at all.
-
-    Raises:
-        OSError: it cannot be written.
-    """
-    target = Path(path)
-    part = target.with_name(target.name + ".part")
-    try:
-        part.write_text(text, encoding="utf-8", newline="")
-        part.replace(target)
-    finally:
-        part.unlink(missing_ok=True)
+    """Write a file whole or not at all, see fileio. Raises: OSError."""
+    fileio.write_text(path, text)
 
 
 def _shortest(value: np.float32) -> str:
