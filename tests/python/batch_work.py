@@ -5,8 +5,8 @@ import os
 import signal
 import time
 
-from risorius.batch.files import replacing
 from risorius.batch.work import run_job
+from risorius.fileio import replacing
 
 SECONDS = 0.05
 
@@ -19,7 +19,9 @@ def slow(job, threads=1):
 def deadly(job, threads=1):
     """One clip ends whoever gets it, as a fault of native code would, in the middle of a file."""
     if job.clip.stem == "deadly":
-        with replacing(job.outputs[0][1]) as file:
+        path = job.outputs[0][1]
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with replacing(path) as file:
             file.write(b"half")
             file.flush()
             os.kill(os.getpid(), signal.SIGKILL)

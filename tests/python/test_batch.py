@@ -17,8 +17,8 @@ import numpy as np
 import pytest
 import risorius
 from conftest import GOLDEN, PROJECT
+from risorius import fileio
 from risorius.batch.cluster import Cluster
-from risorius.batch.files import remove_parts, replacing
 from risorius.batch.jobs import JobsError, read_jobs
 from risorius.batch.pool import Pool, PoolError
 from risorius.batch.progress import Progress, clock
@@ -282,7 +282,7 @@ def test_a_killed_worker_costs_an_attempt_only(tmp_path):
     assert {o.name for o in outcomes} == {job.name for job in plan.jobs}
     assert [o.error for o in outcomes] == [""] * 20
     assert max(o.attempts for o in outcomes) <= 2
-    remove_parts(path for job in plan.jobs for _, path in job.outputs)
+    fileio.sweep({path.parent for job in plan.jobs for _, path in job.outputs})
     check_outputs(jobs, clips=5)
 
 
@@ -349,24 +349,6 @@ def test_failed_jobs_are_named_and_the_others_done(tmp_path, capsys):
     assert "found 2" in rows["core/lod2/take0"]["error"]
 
 
-def test_what_killed_writers_left_is_known_by_its_name(tmp_path):
-    others = [".a.npz.0123456.part", "a.npz.01234567.part", ".b.npz.01234567.part", "a.npz"]
-    for name in [*others, ".a.npz.01234567.part"]:
-        (tmp_path / name).touch()
-    remove_parts([tmp_path / "a.npz", tmp_path / "none" / "a.npz"])
-    assert sorted(p.name for p in tmp_path.iterdir()) == sorted(others)
-
-
-def test_half_a_file_is_never_seen(tmp_path):
-    path = tmp_path / "new" / "file.bin"
-    with contextlib.suppress(RuntimeError), replacing(path) as file:
-        file.write(b"half")
-        file.flush()
-        assert not path.exists()
-        raise RuntimeError
-    assert list(path.parent.iterdir()) == []
-
-
 # ---- a cluster
 
 
@@ -418,9 +400,10 @@ def test_dask_with_a_worker_killed_in_the_middle(tmp_path, capsys, monkeypatch):
             outcomes.append(outcome)
             if len(outcomes) == 4:
                 dask.processes[1].kill()
+                dask.processes[1].wait()
         assert sorted(o.name for o in outcomes) == sorted(job.name for job in plan.jobs)
         assert [o.error for o in outcomes] == [""] * 20
-        remove_parts(path for job in plan.jobs for _, path in job.outputs)
+        fileio.sweep({path.parent for job in plan.jobs for _, path in job.outputs})
         check_outputs(jobs, clips=5)
         shutil.rmtree(jobs.parent / "out")  # the one that is left does it again, by the command
         assert main(["batch", str(jobs), "--scheduler", dask.address, "--json"]) == 0

@@ -11,8 +11,8 @@ from typing import Any, Protocol
 
 import risorius
 
+from ..fileio import replacing
 from .face import PARTS, Chunk, Face, played
-from .files import replacing
 from .measure import Measure
 from .writing import CsvWriter, NpzWriter, about, find_moving
 
@@ -43,7 +43,8 @@ def bake(
     Args:
         clip: already resampled and cut, see prepared.
         face, lod: of whom.
-        outputs: "npz", "csv" or "rzc" (the clip itself) -> path; none for the facts only.
+        outputs: "npz", "csv" or "rzc" (the clip itself) -> path; none for the facts only. What
+            killed processes left beside them stays, see fileio.sweep.
         parts: of PARTS, what the files shall hold.
         compress: make an .npz smaller, and several times slower.
         threads: that evaluate; 0 is all cores.
@@ -62,7 +63,8 @@ def bake(
     with contextlib.ExitStack() as stack:
         sinks: list[Sink] = [measure]
         for kind, path in outputs.items():
-            file = stack.enter_context(replacing(path))
+            path.parent.mkdir(parents=True, exist_ok=True)
+            file = stack.enter_context(replacing(path, sweep=False))
             if kind == "npz":
                 npz = NpzWriter(file, about(clip, face, lod, parts), face, parts, compress)
                 sinks.append(stack.enter_context(npz))

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from .files import replacing
+from ..fileio import replacing
 from .jobs import Job
 from .outcome import Outcome
 from .work import stamp
@@ -80,6 +80,7 @@ class Journal:
     def begin(self, kept: Iterable[str]) -> None:
         """Start the file anew with the lines of these jobs. Raises: OSError."""
         records: dict[str, _Record] = {}
+        self.path.parent.mkdir(parents=True, exist_ok=True)
         with replacing(self.path) as file:
             file.write(_line(_HEAD))
             for name in kept:

@@ -13,9 +13,9 @@ from typing import Any
 
 import risorius
 
+from .. import fileio
 from . import summary
 from .cluster import Cluster
-from .files import remove_parts
 from .jobs import Job, Plan
 from .journal import Journal
 from .outcome import Outcome
@@ -84,7 +84,7 @@ def run(plan: Plan, *, workers: int | None, scheduler: str | None, restart: bool
         journal.read()
     jobs = pending(plan, journal, report)
     journal.begin(job.name for job in plan.jobs if job.name in report.reused)
-    outputs = [path for job in jobs for _, path in job.outputs]
+    folders = {path.parent for job in jobs for _, path in job.outputs}
     progress = Progress(len(plan.jobs), "jobs", before=len(report.reused))
     if report.reused:
         progress.say(f"{len(report.reused):,} of {len(plan.jobs):,} jobs are done already")
@@ -94,7 +94,7 @@ def run(plan: Plan, *, workers: int | None, scheduler: str | None, restart: bool
             _gather(results, jobs, report, journal, progress)
     finally:
         progress.close()
-        remove_parts(outputs)  # of workers that were killed
+        fileio.sweep(folders)  # of workers that were killed
         report.seconds = time.monotonic() - started
         summary.write(plan, lambda: summary.rows(plan, report.outcomes, report.reused, journal))
     return report

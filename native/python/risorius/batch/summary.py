@@ -11,7 +11,7 @@ from typing import Any, TextIO
 
 import risorius
 
-from .files import replacing
+from ..fileio import replacing
 from .jobs import Plan
 from .journal import Journal
 from .outcome import Outcome
@@ -49,6 +49,7 @@ def rows(plan: Plan, outcomes: Mapping[str, Outcome], reused: set[str], journal:
 def write(plan: Plan, table: Callable[[], Rows]) -> None:
     """Write the summary in each form that is asked for, row by row. Raises: OSError."""
     for path in plan.summary:
+        path.parent.mkdir(parents=True, exist_ok=True)
         with replacing(path) as file:
             text = io.TextIOWrapper(file, encoding="utf-8", newline="\n", write_through=True)
             (_write_csv if path.suffix == ".csv" else _write_json)(text, table())

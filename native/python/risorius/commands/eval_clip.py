@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from risorius import importing
+from risorius import fileio, importing
 from risorius.batch.baking import DEFAULT_PARTS, bake
 from risorius.batch.clips import load_performance
 from risorius.batch.face import PARTS, load_face, prepared
@@ -168,6 +168,7 @@ def run(args: argparse.Namespace) -> int:
             clip, face, args.lod, {kind: out}, parts=parts, compress=args.compress, threads=0,
             progress=lambda done: progress.update(done, done),
         )  # fmt: skip
+        fileio.sweep([out.parent])
         progress.close()
     except (OSError, ValueError, MemoryError) as error:
         print(f"risorius: {sentence(error)}", file=sys.stderr)
