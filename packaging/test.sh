@@ -109,7 +109,7 @@ run_blender() { # run_blender NAME COMMAND...
 }
 run_subsets() { # what differs most between versions: installing, building, keys and actions, odd files
   local subset=() group version other
-  for group in extension vertices controls frames failures animation_import bake; do
+  for group in extension vertices controls frames failures animation_import bake past; do
     subset+=("blender_tests/test_$group.py")
   done
   for version in 4.2.23 5.0.1; do
