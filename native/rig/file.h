@@ -12,13 +12,13 @@ namespace risorius::rig {
 /// Who answers for the bytes of a file. They are offsets and indices that the evaluator follows
 /// without a look, so somebody must.
 enum class Trust {
-  /// The user's own files get the check of the header, all others the full one. Own is what this
+  /// The user's own files get the check of the hash, all others the full one. Own is what this
   /// user owns and nobody else may write: whoever could change it could as well change the program.
   /// The owner does not say where the bytes came from: for what was downloaded or unpacked,
-  /// kNobody.
+  /// kNobody. The hash finds damage; anybody can put a right one on bytes of his own.
   kOwner,
   kNobody,  // the full check
-  kCaller,  // the check of the header
+  kCaller,  // the check of the header: one flipped bit may end the process
 };
 
 /// Writes the block of a Rig so that an old file is whole until the new one is.

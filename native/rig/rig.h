@@ -47,7 +47,8 @@ class Rig : public RigHeader, public RigArrays<View> {
 
 enum class BlockCheck {
   kHeader,  // version, sizes and places of the arrays: for bytes that this process wrote
-  kFull,    // the hash, and every index against its space: for bytes from anywhere
+  kHash,    // and the hash, which finds every changed bit: for bytes that this program once wrote
+  kFull,    // and every index against its space: for bytes from anywhere, forged ones as well
 };
 
 /// In: data that compile() made. Fails: kLimitExceeded (more than 4 GiB of matrices).

@@ -57,12 +57,14 @@ int main(int argc, char** argv) {
     for (auto _ : state) benchmark::DoNotOptimize(compiled());
   })->Unit(benchmark::kMicrosecond);
   using core::ReadBy;
-  add("header checked, mapped", file, rig::Trust::kOwner, ReadBy::kMap);
-  add("header checked, copied", file, rig::Trust::kOwner, ReadBy::kCopy);
+  add("header checked, mapped", file, rig::Trust::kCaller, ReadBy::kMap);
+  add("header checked, copied", file, rig::Trust::kCaller, ReadBy::kCopy);
+  add("hash checked, mapped", file, rig::Trust::kOwner, ReadBy::kMap);
+  add("hash checked, copied", file, rig::Trust::kOwner, ReadBy::kCopy);
   add("all checked, copied", file, rig::Trust::kNobody, ReadBy::kCopy);
-  add("header checked, mapped, first pose of all controls", file, rig::Trust::kOwner, ReadBy::kMap,
+  add("header checked, mapped, first pose of all controls", file, rig::Trust::kCaller, ReadBy::kMap,
       true);
-  add("header checked, copied, first pose of all controls", file, rig::Trust::kOwner, ReadBy::kCopy,
+  add("hash checked, copied, first pose of all controls", file, rig::Trust::kOwner, ReadBy::kCopy,
       true);
   benchmark::Initialize(&argc, argv);
   benchmark::RunSpecifiedBenchmarks();

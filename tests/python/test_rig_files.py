@@ -2,6 +2,7 @@
 """Compiled rigs in files and in a cache, and the opt-in check of controls."""
 
 import os
+import struct
 import sys
 from pathlib import Path
 
@@ -18,6 +19,28 @@ JAW = "CTRL_expressions.jawOpen"
 @pytest.fixture
 def rig():
     return risorius.Rig(risorius.load(FILE))
+
+
+HASH = slice(24, 32)  # of a block; what lies behind it is hashed
+FACTOR, ALL = 0x9E3779B97F4A7C15, (1 << 64) - 1
+
+
+def block_hash(data):
+    """A second telling of native/rig/block.cpp's hash: four lanes, multiplied and turned."""
+
+    def turned(value, by):
+        return (value << by | value >> (64 - by)) & ALL
+
+    lanes = [1, 2, 3, len(data)]
+    whole = len(data) // 32 * 32
+    for i, word in enumerate(struct.unpack(f"<{whole // 8}Q", data[:whole])):
+        lanes[i % 4] = turned((lanes[i % 4] ^ word) * FACTOR & ALL, 29)
+    for i in range(whole, len(data)):
+        lanes[i % 4] = (lanes[i % 4] ^ data[i]) * FACTOR & ALL
+    total = 0
+    for lane in lanes:
+        total = turned((total ^ lane) * FACTOR & ALL, 31)
+    return total ^ total >> 32
 
 
 # ---- files
@@ -57,17 +80,35 @@ def test_what_is_refused_names_the_file_and_the_field(tmp_path, rig):
         risorius.Rig.load(file, simd="abacus")
 
 
+def forged(rig):
+    """The bytes of a rig with an index that points outside, under a right hash."""
+    data = bytearray(rig.to_bytes())
+    data[data.index(b"\x00\x01\x02\x00", HASH.stop)] = 9  # an axis of the rotation order
+    data[HASH] = block_hash(data[HASH.stop :]).to_bytes(8, "little")
+    return data
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="files have no modes there")
 def test_a_file_that_others_may_write_is_checked(tmp_path, rig):
     file = tmp_path / "face.rig"
-    data = bytearray(rig.to_bytes())
-    data[-1] ^= 1
+    data = forged(rig)
     file.write_bytes(data)
     file.chmod(0o644)
     risorius.Rig.load(file, trusted=None)
     file.chmod(0o666)
-    with pytest.raises(risorius.DnaError, match="changed"):
+    with pytest.raises(risorius.DnaError, match="points outside"):
         risorius.Rig.load(file, trusted=None)
+    risorius.Rig.load(file, trusted=True)
+
+
+def test_only_the_caller_answers_for_a_wrong_hash(tmp_path, rig):
+    file = tmp_path / "face.rig"
+    data = bytearray(rig.to_bytes())
+    data[-1] ^= 1  # past the last array: nothing reads it
+    file.write_bytes(data)
+    for trusted in (False, None):
+        with pytest.raises(risorius.DnaError, match="changed or cut"):
+            risorius.Rig.load(file, trusted=trusted)
     risorius.Rig.load(file, trusted=True)
 
 
@@ -131,6 +172,22 @@ def test_a_damaged_cache_is_made_anew(tmp_path, rig, no_compiling):
         assert file.read_bytes() == rig.to_bytes()
     no_compiling()
     risorius.compile_cached(FILE, tmp_path)
+
+
+def test_a_flipped_bit_in_the_cache_is_a_face_made_anew(tmp_path, rig):
+    """In the header, in every array of the block, and between them."""
+    risorius.compile_cached(FILE, tmp_path)
+    (file,) = tmp_path.glob("*.rig")
+    good = rig.to_bytes()
+    raw = np.full(len(rig.raw_control_names), 0.5, np.float32)
+    pose = rig.evaluate(raw)
+    for at in range(0, len(good), 61):  # an array begins on a multiple of 64
+        data = bytearray(good)
+        data[at] ^= 1 << at % 8
+        file.write_bytes(data)
+        again = risorius.compile_cached(FILE, tmp_path)
+        assert file.read_bytes() == good
+        np.testing.assert_array_equal(again.evaluate(raw).joints, pose.joints)
 
 
 def test_a_cache_that_cannot_be_written_is_no_error(tmp_path, rig):

@@ -122,9 +122,25 @@ TEST_F(RigFile, ABitOfEachFieldOfTheHeaderIsFound) {
     expect_refused(changed(12, flipped(12)), trust, "rig.header_size", "bytes");
     expect_refused(changed(16, flipped(16)), trust, "rig.size");
   }
-  expect_refused(changed(24, flipped(24)), Trust::kNobody, "rig.hash");
-  for (std::size_t at = 32; at < 64; ++at) {
-    expect_refused(changed(at, flipped(at)), Trust::kNobody, "rig.hash");
+  for (const Trust trust : {Trust::kOwner, Trust::kNobody}) {
+    expect_refused(changed(24, flipped(24)), trust, "rig.hash");
+    for (std::size_t at = 32; at < 64; ++at) {
+      expect_refused(changed(at, flipped(at)), trust, "rig.hash");
+    }
+  }
+}
+
+// Arrays begin on multiples of 64: every region of the block is met, and what lies between them.
+TEST_F(RigFile, AFlippedBitOfOnesOwnFileIsFound) {
+  const path file = folder_ / "face.rig";
+  for (std::size_t at = 0; at < bytes_.size(); at += 13) {
+    const auto bit = static_cast<std::uint8_t>(1u << (at % 8));
+    const Bytes flipped = changed(at, bytes_[at] ^ bit);
+    std::ofstream(file, std::ios::binary)
+        .write(reinterpret_cast<const char*>(flipped.data()),
+               static_cast<std::streamsize>(flipped.size()));
+    const ReadBy by = at % 2 == 0 ? ReadBy::kCopy : ReadBy::kMap;
+    EXPECT_FALSE(open(file, Trust::kOwner, by).has_value()) << at;
   }
 }
 

@@ -918,11 +918,14 @@ class Rig:
         *,
         mapped: bool = False,
     ) -> Rig:
-        """A Rig from a file of save, of this version and byte order. Its hash and every index are
-        checked, unless trusted is True, or None and the file is this user's and nobody else may
-        write it (never so on Windows): what was downloaded or unpacked is so as well, therefore
-        None is for folders that only this program fills. mapped uses the pages of a trusted file in place: at once, but
-        the file may only be replaced as a whole and not be written to or cut while the Rig lives.
+        """A Rig from a file of save, of this version and byte order.
+
+        Its hash and every index are checked. trusted=None leaves out the indices where the file is
+        this user's and nobody else may write it (never so on Windows): what was downloaded or
+        unpacked is so as well, therefore None is for folders that only this program fills. The hash
+        finds damage, not forgery. trusted=True leaves out both: one flipped bit may then end the
+        process. mapped uses the pages of a trusted file in place: they may only be replaced as a
+        whole file and not be written to or cut while the Rig lives. Raises DnaError.
         """
     def block(self) -> memoryview:
         """The same without a copy."""

@@ -38,13 +38,14 @@ def compile_cached(
     """Rig(load(path)), from a cache if it was compiled before.
 
     The file of the cache is named by a hash of the DNA's bytes, the options, this version and the
-    byte order: an edited DNA is another one. One that is damaged is replaced. A folder that cannot
-    be written costs the time to compile and is no error. Nothing is ever deleted, but may be.
+    byte order: an edited DNA is another one. Its hash is checked each time; one that is damaged,
+    were it by a single bit, is replaced. A folder that cannot be written costs the time to compile
+    and is no error. Nothing is ever deleted, but may be.
 
     Args:
         path: of a DNA file.
         cache_dir: else a folder among the user's caches; made if it is not there. What others may
-            write there is checked as DNA files are, see Rig.load.
+            write there is checked as DNA files are, see Rig.load: a hash finds damage, not forgery.
         precision, rotation, simd: as of Rig.
 
     Raises:
