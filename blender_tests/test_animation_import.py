@@ -2,8 +2,10 @@
 """Clips become actions of the controls and come back, at any rate and in every way to play them."""
 
 import importlib.util
+import os
 import shutil
 import subprocess
+import sys
 
 import bpy
 import numpy as np
@@ -367,7 +369,7 @@ def test_a_face_speaks_and_is_heard(rig, voice):
     assert clip.curve(JAW).max() > 0.1
 
 
-def test_speech_in_a_thread_is_the_same_and_can_be_cancelled(rig, voice):
+def test_speech_beside_blender_is_the_same_and_can_be_cancelled(rig, voice, tmp_path):
     listening = scene.submodule("scene.listening")
     task = listening.Task(str(voice), WORDS, seed=3)
     task.start()
@@ -380,6 +382,25 @@ def test_speech_in_a_thread_is_the_same_and_can_be_cancelled(rig, voice):
     ended.run()
     assert type(ended.error).__name__ == "CancelledError"
     assert ended.clip is None
+    # Nothing ever comes out of this file; the process that reads it is ended all the same.
+    os.mkfifo(tmp_path / "endless.wav")
+    stuck = listening.Task(str(tmp_path / "endless.wav"), WORDS)
+    stuck.start()
+    assert stuck.is_running()
+    stuck.cancel()
+    assert not stuck.is_running()
+    assert type(stuck.error).__name__ == "CancelledError"
+
+
+def test_speech_needs_nothing_of_what_this_blender_has_loaded(rig, voice, monkeypatch):
+    """A Blender that holds another libpocketsphinx cannot load the recogniser: nor does it."""
+    monkeypatch.setitem(sys.modules, "pocketsphinx", None)
+    monkeypatch.setattr(scene.submodule("scene.listening"), "has_recogniser", lambda: True)
+    assert bpy.ops.risorius.speak(filepath=str(voice), transcript=WORDS, use_sound=False) == {
+        "FINISHED"
+    }
+    jaw = next(c for c in scene.curves(scene.controls(rig)) if "jawOpen" in c.data_path)
+    assert max(point.co.y for point in jaw.keyframe_points) > 0.1
 
 
 def test_speech_without_the_recogniser_says_what_to_do(rig, voice, monkeypatch):

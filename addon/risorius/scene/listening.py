@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Speech from a sound file, computed beside Blender's own thread; and the recogniser's package."""
+"""Speech from a sound file, computed in a process beside Blender; and the recogniser's package."""
 
 import importlib.util
 import os
@@ -33,13 +33,13 @@ class Task:
         self._thread = threading.Thread(target=self.run, daemon=True)
 
     def start(self):
-        """Begin in a thread of its own; it touches nothing of Blender's."""
+        """Begin in a thread, which waits for the process and touches nothing of Blender's."""
         self._thread.start()
 
     def run(self):
-        """Do it now, in this thread."""
+        """Do it now, waiting in this thread."""
         try:
-            self.clip = native.part("speech").speak(
+            self.clip = native.part("speech.apart").speak_apart(
                 *self._arguments,
                 progress=self._progress,
                 cancel=self._cancelled.is_set,
@@ -61,7 +61,7 @@ class Task:
             self._thread.join()
 
     def cancel(self):
-        """Ask it to end and wait for that."""
+        """End the process, and wait for that."""
         self._cancelled.set()
         self.wait()
 

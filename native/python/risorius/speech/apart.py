@@ -1,0 +1,234 @@
+# SPDX-License-Identifier: MIT
+"""Speech in a process of its own.
+
+A program that carries Python, as Blender does, may hold another libpocketsphinx already: brought by
+its ffmpeg, the linker gives its functions to the recogniser too, which then fails or crashes. In a
+process of its own the recogniser has nothing beside it, a crash of it is a sentence, and it can be
+ended at any moment.
+
+    here                                         there
+    one line of JSON: what to do         -->     speak()
+    share, share, ..., clip or error     <--     lines of JSON
+    the pipe closes: cancelled, or dead  -->     ends
+"""
+
+from __future__ import annotations
+
+import base64
+import contextlib
+import importlib
+import json
+import os
+import queue
+import subprocess
+import sys
+import tempfile
+import threading
+from collections.abc import Iterator
+from time import monotonic
+from typing import IO, Any
+
+import numpy as np
+
+from ..clip import Clip, Event
+from . import speak
+from .audio import AudioError
+from .listening import Cancel, CancelledError, Progress
+from .recogniser import MissingError
+
+_PATIENCE = 3600.0  # seconds without a word: a long voice is aligned in one go
+_ASKED = 0.05  # seconds between two questions whether to cancel
+_BEGIN = (
+    "import json, sys; task = json.loads(sys.stdin.buffer.readline()); sys.path[:] = task['paths'];"
+    "from risorius.speech import apart; apart.serve(task)"
+)
+_ERRORS: dict[str, type[Exception]] = {
+    "AudioError": AudioError,
+    "MissingError": MissingError,
+    "ValueError": ValueError,
+}
+
+
+class RecogniserError(ValueError):
+    """The process of the recogniser could not be started, or ended by itself; one sentence."""
+
+
+def speak_apart(
+    path: str | os.PathLike[str],
+    transcript: str | None = None,
+    *,
+    progress: Progress | None = None,
+    cancel: Cancel | None = None,
+    **options: Any,
+) -> Clip:
+    """As speak, in a process of its own, which is ended at once when cancel() is true.
+
+    Args:
+        path, transcript, progress, cancel, options: as of speak. Both are called from the thread
+            that calls this, which waits.
+
+    Raises:
+        RecogniserError: the process could not be started, or ended by itself. What speak raises.
+    """
+    task = {
+        "paths": [os.path.abspath(place) for place in sys.path],
+        "path": os.fspath(path),
+        "transcript": transcript,
+        "options": options,
+    }
+    # Its errors go into a file: a pipe that nobody empties would stop it.
+    with tempfile.TemporaryFile() as said, _started(said) as process:
+        try:
+            _write(process, task)
+            for message in _messages(process, cancel):
+                if "share" in message:
+                    if progress is not None:
+                        progress(message["share"])
+                elif "error" in message:
+                    raise _ERRORS.get(message["kind"], RecogniserError)(message["error"])
+                else:
+                    return _clip_of(message)
+            raise RecogniserError(_how_it_ended(process, said))
+        finally:
+            process.kill()
+
+
+def _started(said: IO[bytes]) -> subprocess.Popen[bytes]:
+    python = _python()
+    options = ["-I", "-B"] if sys.dont_write_bytecode else ["-I"]
+    quiet = getattr(subprocess, "CREATE_NO_WINDOW", 0)  # of Windows, where one would flash up
+    try:
+        return subprocess.Popen(
+            [python, *options, "-c", _BEGIN],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=said,
+            creationflags=quiet,
+        )
+    except OSError as error:
+        raise RecogniserError(
+            f"the recogniser's process could not be started: {python}: {error.strerror}"
+        ) from error
+
+
+def _python() -> str:
+    """The program of the running Python; sys.executable may be the one that Python is built into.
+
+    Raises: RecogniserError.
+    """
+    version = f"python{sys.version_info.major}.{sys.version_info.minor}"
+    places = [os.path.join(sys.exec_prefix, "bin", name) for name in (version, "python3")]
+    places += [os.path.join(sys.exec_prefix, *part, "python.exe") for part in (["bin"], [])]
+    for place in (sys.executable, getattr(sys, "_base_executable", ""), *places):
+        name = os.path.basename(place or "").lower()
+        if name.startswith("python") and os.path.isfile(place):
+            return place
+    raise RecogniserError(
+        f"speech needs the program of Python to run beside this one: none was found in "
+        f"{sys.exec_prefix}"
+    )
+
+
+def _write(process: subprocess.Popen[bytes], task: dict[str, Any]) -> None:
+    assert process.stdin is not None
+    try:
+        process.stdin.write(json.dumps(task).encode() + b"\n")
+        process.stdin.flush()
+    except OSError:
+        pass  # it is gone already: how, is said by who waits for its words
+
+
+def _messages(process: subprocess.Popen[bytes], cancel: Cancel | None) -> Iterator[dict[str, Any]]:
+    """What the process says, until it ends. Raises: CancelledError, RecogniserError."""
+    lines: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+    threading.Thread(target=_hand_over, args=(process.stdout, lines), daemon=True).start()
+    heard = monotonic()
+    while True:
+        if cancel is not None and cancel():
+            raise CancelledError("listening was cancelled")
+        try:
+            line = lines.get(timeout=_ASKED)
+        except queue.Empty:
+            if monotonic() - heard > _PATIENCE:
+                raise RecogniserError(
+                    f"the recogniser said nothing for {_PATIENCE:g} s and was ended"
+                ) from None
+            continue
+        if not line:
+            return
+        heard = monotonic()
+        yield json.loads(line)
+
+
+def _hand_over(pipe: IO[bytes], lines: queue.SimpleQueue[bytes]) -> None:
+    try:
+        for line in pipe:
+            lines.put(line)
+    except (OSError, ValueError):
+        pass  # closed here while it was read
+    lines.put(b"")
+
+
+def _how_it_ended(process: subprocess.Popen[bytes], said: IO[bytes]) -> str:
+    code = process.wait()
+    how = f"signal {-code}" if code < 0 else f"exit code {code}"
+    said.seek(0, os.SEEK_END)
+    said.seek(max(0, said.tell() - 4096))
+    lines = [line for line in said.read().decode("utf-8", "replace").splitlines() if line.strip()]
+    reason = f": {lines[-1].strip()}" if lines else ""
+    return f"the recogniser's process ended by itself ({how}){reason}"
+
+
+def _clip_of(message: dict[str, Any]) -> Clip:
+    curves = np.frombuffer(base64.b64decode(message["curves"]), "<f4")
+    return Clip(
+        message["names"],
+        curves.reshape(len(message["names"]), -1),
+        message["rate"],
+        events=[Event(*event) for event in message["events"]],
+        metadata=message["metadata"],
+    )
+
+
+def serve(task: dict[str, Any]) -> None:
+    """The other end: do what the line says, and end the process."""
+    # What a library prints must not get between the lines.
+    words = os.fdopen(os.dup(1), "w", encoding="ascii")
+    os.dup2(2, 1)
+
+    def tell(**message: Any) -> None:
+        words.write(json.dumps(message) + "\n")
+        words.flush()
+
+    with contextlib.suppress(ImportError):  # first: Windows loads nothing while a pipe is read
+        importlib.import_module("pocketsphinx")
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    try:
+        clip = speak(
+            task["path"],
+            task["transcript"],
+            progress=lambda share: tell(share=share),
+            **task["options"],
+        )
+        curves = base64.b64encode(np.ascontiguousarray(clip.curves, "<f4").tobytes())
+        tell(
+            names=clip.names,
+            curves=curves.decode("ascii"),
+            rate=clip.rate,
+            events=clip.events,
+            metadata=clip.metadata,
+        )
+    except Exception as error:  # noqa: BLE001  told to who waits, as a sentence
+        kind = next((c.__name__ for c in type(error).__mro__ if c.__name__ in _ERRORS), "")
+        known = kind or isinstance(error, OSError)
+        tell(error=str(error) if known else f"{type(error).__name__}: {error}", kind=kind)
+
+
+def _end_with_parent() -> None:
+    """Wait until the pipe closes, be it that who began this has died.
+
+    Read below Python's own buffer, which could not be locked when Python ends.
+    """
+    while os.read(0, 4096):
+        pass
+    os._exit(1)
