@@ -268,6 +268,11 @@ def test_a_render_shows_what_the_viewport_shows(blinker, tmp_path):
         np.testing.assert_array_equal(seen[frame], raw)
 
 
+def _names(controls):
+    """Of the layers, bottom to top."""
+    return [layer.name for layer in _layers().of(controls)]
+
+
 def test_keys_of_a_weight_go_with_their_layer(rig):
     controls = scene.controls(rig)
     _entry(rig, name="low", action=_action(rig, "Low", jawOpen={1: 1.0, 2: 1.0}))
@@ -282,19 +287,149 @@ def test_keys_of_a_weight_go_with_their_layer(rig):
     assert _value(rig, 6, JAW) == 1.0
     assert _value(rig, 3.5, PULL) == pytest.approx(0.25)  # subframes, as motion blur asks
     assert bpy.ops.risorius.layer_move(up=False) == {"FINISHED"}
-    assert [y.name for y in controls.risorius_layers] == ["high", "low"]
+    assert _names(controls) == ["high", "low"]
     assert _value(rig, 6, PULL) == pytest.approx(0.5)
     assert _value(rig, 6, JAW) == 1.0
     assert bpy.ops.risorius.layer_duplicate() == {"FINISHED"}
-    assert [y.name for y in controls.risorius_layers] == ["high", "high.001", "low"]
+    assert _names(controls) == ["high", "high.001", "low"]
     assert _value(rig, 6, PULL) == pytest.approx(0.75)  # half of the half that was left
     assert _value(rig, 3.5, PULL) == pytest.approx(1.0 - 0.75**2)  # its keys came along
-    controls.risorius_layers_index = 0
+    controls.risorius_layers_index = 1
     assert bpy.ops.risorius.layer_remove() == {"FINISHED"}
+    assert _names(controls) == ["high.001", "low"]
     assert _value(rig, 6, PULL) == pytest.approx(0.5)
+    assert bpy.ops.risorius.layer_move(up=True) == {"FINISHED"}
+    assert _names(controls) == ["low", "high.001"]
     assert bpy.ops.risorius.layer_remove() == {"FINISHED"}
     assert _value(rig, 6, PULL) == 0.0
     assert _value(rig, 6, JAW) == 1.0
+
+
+def _key_weights(controls, name, *values):
+    """An action with a key for the weight of each layer; nothing plays it."""
+    data = controls.animation_data_create()
+    data.action = action = bpy.data.actions.new(name)
+    for place, value in enumerate(values):
+        controls.risorius_layers[place].weight = value
+        controls.keyframe_insert(f"risorius_layers[{place}].weight", frame=1)
+    data.action = None
+    return action
+
+
+def _as_assigned(controls, action):
+    data = controls.animation_data
+    data.action = action
+    if hasattr(data, "action_slot") and data.action_slot is None:
+        data.action_slot = action.slots[0]
+
+
+def _as_meta_strip(controls, action):
+    from support.past_scenes import make_meta
+
+    strip = controls.animation_data.nla_tracks.new().strips.new("Weights", 1, action)
+    if hasattr(strip, "action_slot"):
+        strip.action_slot = action.slots[0]
+    make_meta(controls, strip)
+
+
+def _as_linked(controls, action, folder):
+    """The action as another file's."""
+    path = folder / "actions.blend"
+    name = action.name
+    bpy.data.libraries.write(str(path), {action})
+    bpy.data.actions.remove(action)
+    with bpy.data.libraries.load(str(path), link=True) as (_there, here):
+        here.actions = [name]
+    _as_assigned(controls, here.actions[0])
+
+
+@pytest.mark.parametrize("how", ["later", "meta", "linked", "driver"])
+def test_order_and_removal_leave_the_weights_of_every_action_where_they_are(rig, tmp_path, how):
+    controls = scene.controls(rig)
+    poses = {
+        "jaw": ("jawOpen", JAW),
+        "pull": ("mouthCornerPullL", PULL),
+        "brow": ("browDownL", BROW),
+    }
+    for name, (short, _control) in poses.items():
+        _entry(rig, name=name, action=_action(rig, name, **{short: {1: 1.0, 2: 1.0}}))
+    weights = {"jaw": 0.25, "pull": 0.5, "brow": 0.75}
+    action = _key_weights(controls, "Weights", *weights.values())
+    if how == "meta":
+        _as_meta_strip(controls, action)
+    elif how == "linked":
+        _as_linked(controls, action, tmp_path)
+    elif how == "driver":
+        for place, value in enumerate(weights.values()):
+            controls.driver_add(f"risorius_layers[{place}].weight").driver.expression = str(value)
+    controls.risorius_layers_index = 0
+    assert bpy.ops.risorius.layer_move(up=True) == {"FINISHED"}
+    assert bpy.ops.risorius.layer_move(up=True) == {"FINISHED"}
+    assert bpy.ops.risorius.layer_move(up=True) == {"CANCELLED"}
+    assert _names(controls) == ["pull", "brow", "jaw"]
+    if how == "later":
+        _as_assigned(controls, action)
+    found = {name: _value(rig, 5, control) for name, (_short, control) in poses.items()}
+    assert found == pytest.approx(weights)
+    controls.risorius_layers_index = 1
+    assert bpy.ops.risorius.layer_remove() == {"FINISHED"}
+    assert _names(controls) == ["brow", "jaw"]
+    new = _entry(rig, name="new", action=_action(rig, "New", mouthCornerPullR={1: 1.0, 2: 1.0}))
+    found = {name: _value(rig, 5, control) for name, (_short, control) in poses.items()}
+    assert found == pytest.approx({**weights, "pull": 0.0})
+    assert _value(rig, 5, PREFIX + "mouthCornerPullR") == new.weight == 1.0
+
+
+def test_a_shared_action_moves_the_other_face_as_before(rig, dna_file):
+    controls, other = scene.controls(rig), scene.load(dna_file, "LIVE")
+    scene.controls(other).risorius_layer_rules = False
+    for one in (rig, other):
+        _entry(one, name="jaw", action=_action(one, "Jaw", jawOpen={1: 1.0, 2: 1.0}))
+        _entry(one, name="pull", action=_action(one, "Pull", mouthCornerPullL={1: 1.0, 2: 1.0}))
+    shared = _key_weights(controls, "Shared", 0.25, 0.5)
+    for one in (rig, other):
+        scene.controls(one).animation_data_create()
+        _as_assigned(scene.controls(one), shared)
+    bpy.context.view_layer.objects.active = controls
+    controls.risorius_layers_index = 0
+    assert bpy.ops.risorius.layer_move(up=True) == {"FINISHED"}
+    assert (_value(other, 5, JAW), _value(other, 5, PULL)) == pytest.approx((0.25, 0.5))
+    assert bpy.ops.risorius.layer_duplicate() == {"FINISHED"}
+    assert bpy.ops.risorius.layer_remove() == {"FINISHED"}
+    controls.risorius_layers_index = 0
+    assert bpy.ops.risorius.layer_remove() == {"FINISHED"}
+    assert (_value(other, 5, JAW), _value(other, 5, PULL)) == pytest.approx((0.25, 0.5))
+    assert _value(rig, 5, PULL) == pytest.approx(0.5)
+
+
+def test_the_list_shows_the_highest_first_and_no_empty_places(rig):
+    controls = scene.controls(rig)
+    for name in ("a", "b", "c"):
+        _entry(rig, name=name, kind="EXPRESSION", expression="joy")
+    _key_weights(controls, "Keyed", 1.0, 1.0, 1.0)
+    _layers().move(controls, 0, up=True)
+    _layers().remove(controls, 1)
+    fake = type("List", (), {"bitflag_filter_item": 1 << 30})()
+    filter_items = bpy.types.RISORIUS_UL_layers.filter_items
+    shown, order = filter_items(fake, bpy.context, controls, "risorius_layers")
+    lines = sorted(
+        (line, y.name)
+        for y, line, s in zip(controls.risorius_layers, order, shown, strict=True)
+        if s
+    )
+    assert lines == [(0, "c"), (1, "a")]
+    assert sorted(order) == [0, 1, 2]
+
+
+def test_places_that_no_action_knows_go_with_their_layers(rig):
+    controls = scene.controls(rig)
+    for name in ("a", "b"):
+        _entry(rig, name=name, kind="EXPRESSION", expression="joy")
+    _layers().remove(controls, 0)
+    assert len(controls.risorius_layers) == 2
+    _layers().remove(controls, 1)
+    assert len(controls.risorius_layers) == 0
+    assert bpy.ops.risorius.layer_move.poll() is False
 
 
 def test_an_edit_of_an_action_is_seen_at_once(rig):
@@ -421,6 +556,15 @@ def test_layers_on_an_override(rig, tmp_path):
     kept = scene.controls(own).risorius_layers
     assert [(y.kind, y.weight) for y in kept] == [("ACTION", 0.5), ("EXPRESSION", 1.0)]
     assert _value(own, 5, PULL) > 0.5
+    bpy.context.view_layer.objects.active = scene.controls(own)
+    scene.controls(own).risorius_layers_index = 0
+    assert bpy.ops.risorius.layer_move(up=True) == {"FINISHED"}
+    assert _value(own, 5, JAW) > 0.3
+    assert bpy.ops.risorius.layer_remove() == {"FINISHED"}  # the library's own
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
+    own = next(o for o in bpy.data.objects if "risorius_controls" in o and not o.library)
+    assert [y.kind for y in _layers().of(scene.controls(own))] == ["EXPRESSION"]
 
 
 def test_layers_become_strips_that_show_the_same(rig):

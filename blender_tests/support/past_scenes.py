@@ -111,7 +111,7 @@ def meta(dna, _folder):
     _key_weight(item, 1, {1: 0.0, 20: 1.0})
     _key_weight(item, 2, {1: 0.9, 12: 0.2})
     _key_sliders(item, browDownL={1: 0.0, 20: 0.7})
-    _make_meta(item, _strip(item, action))
+    make_meta(item, _strip(item, action))
 
 
 def _strip(item, action, name="", **settings):
@@ -133,7 +133,7 @@ def _strip(item, action, name="", **settings):
     return strip
 
 
-def _make_meta(item, strip):
+def make_meta(item, strip):
     """Put a strip into a meta strip, in an NLA editor as Blender demands."""
     bpy.context.view_layer.objects.active = item
     item.select_set(True)

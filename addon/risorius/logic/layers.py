@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
@@ -15,7 +15,7 @@ from . import regions
 
 Float = NDArray[np.float64]
 COLLECTION = "risorius_layers"
-_PATH = re.compile(rf"^{COLLECTION}\[(\d+)\](.*)$")
+_PATH = re.compile(rf"^{COLLECTION}\[(\d+)\]")
 _LIMIT = 100_000  # samples of one source
 _NEAR = 1e-7  # frames
 
@@ -123,18 +123,7 @@ def sample_frames(span: Span, keys: Float, bent: bool) -> Float:
     return every[np.concatenate([[True], np.diff(every) > _NEAR])]
 
 
-def moved_path(path: str, order: Sequence[int]) -> str | None:
-    """The data path of a layer's property after layers were put into another order.
-
-    Args:
-        path: `risorius_layers[2].weight`, or any other.
-        order: for each new place the old one; a layer that is not in it was removed.
-
-    Returns:
-        The new path, or None where its layer is gone. Other paths stay.
-    """
+def place_of(path: str) -> int | None:
+    """The place of the layer that a data path leads into, as `risorius_layers[2].weight`."""
     found = _PATH.match(path)
-    if not found:
-        return path
-    old = int(found.group(1))
-    return f"{COLLECTION}[{order.index(old)}]{found.group(2)}" if old in order else None
+    return int(found.group(1)) if found else None

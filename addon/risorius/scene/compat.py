@@ -83,6 +83,21 @@ def curves_for(action, owner):
     return [curve for bag in bags if bag is not None for curve in bag.fcurves]
 
 
+def played_actions(owner):
+    """The actions that a datablock plays: its active one and its strips', also in meta strips."""
+    data = owner.animation_data
+    if data is None:
+        return []
+    found = [data.action, *(s.action for t in data.nla_tracks for s in _strips(t.strips))]
+    return [action for action in dict.fromkeys(found) if action is not None]
+
+
+def _strips(strips):
+    for strip in strips:
+        yield strip
+        yield from _strips(strip.strips)
+
+
 def assign_action(target, action, slot=None):
     """Let an object's animation data, or an NLA strip, play an action."""
     target.action = action

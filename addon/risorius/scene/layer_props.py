@@ -120,6 +120,10 @@ class RISORIUS_PG_layer(bpy.types.PropertyGroup):
     fade_out: _still(bpy.props.FloatProperty, name="Fade Out", description="Frames", min=0.0)
     mute: _still(bpy.props.BoolProperty, name="Mute")
     solo: _still(bpy.props.BoolProperty, name="Solo", description="Only this and other solo layers")
+    # Keys and drivers name a layer by its place, also Blender's own buttons: so places stay, and
+    # order and removal are settings.
+    rank: _still(bpy.props.IntProperty, options={"HIDDEN"})
+    removed: _still(bpy.props.BoolProperty, options={"HIDDEN"})
     warp: bpy.props.CollectionProperty(
         type=RISORIUS_PG_warp, override={*_OVERRIDE, "USE_INSERTION"}
     )

@@ -52,8 +52,8 @@ class Stack:
         made_of: what they were compiled from.
         mixer: risorius.Mixer of the character's labels, then the head's three angles.
         layers: risorius.Layer, bottom to top, at full weight.
-        places: of each the place in the list of settings.
-        weights: those that the mixer has now.
+        places: of each the place among the settings.
+        weights: of all settings by place, as the mixer has them now.
         problems: sentences on layers that cannot be played, by their place.
         kept: sources and masks, by what they were made of.
     """
@@ -71,9 +71,24 @@ _stacks = {}  # session uid of a control armature -> Stack
 _versions = {}  # session uid of an action -> how often it was edited
 
 
-def of(controls):
-    """The settings of all layers of a character. Args: controls  its control armature."""
+def places(controls):
+    """The settings of all layers of a character by their places, which never change.
+
+    Args:
+        controls: its control armature.
+    """
     return getattr(controls, logic.COLLECTION)
+
+
+def of(controls):
+    """The layers that are there, bottom to top. Args: controls  the control armature."""
+    return [layer for _place, layer in _ordered(controls)]
+
+
+def _ordered(controls):
+    """Place and layer of those that are there, bottom to top."""
+    there = ((i, layer) for i, layer in enumerate(places(controls)) if not layer.removed)
+    return sorted(there, key=lambda pair: pair[1].rank)
 
 
 def reactions_of(controls):
@@ -128,8 +143,9 @@ def mix(seen, live, raw, head, depsgraph, maximum):
         return raw, head  # baked controls have them in their action
     scene = depsgraph.scene
     stack = compiled(controls, live, scene, maximum)
-    there = len(of(seen)) == len(of(controls))  # else one was added, and not evaluated since
-    weights = tuple(layer.weight for layer in of(seen if there else controls))
+    # Where there are not as many, one was added and not evaluated since.
+    there = len(places(seen)) == len(places(controls))
+    weights = tuple(layer.weight for layer in places(seen if there else controls))
     if stack.weights != weights:
         _set_weights(stack, weights)
     base = np.zeros(len(raw) + 3, np.float32)
@@ -149,7 +165,7 @@ def compiled(controls, live, scene, maximum=1.0):
     made_of = (
         (id(live), maximum, controls.risorius_layer_rules),
         tuple((r.name, r.frame / rate, r.strength) for r in reactions_of(controls)),
-        tuple((*_key(layer, rate), *_get(layer, _OF_PLAYING)) for layer in of(controls)),
+        tuple((i, *_key(y, rate), *_get(y, _OF_PLAYING)) for i, y in _ordered(controls)),
     )
     stack = _stacks.get(controls.session_uid)
     if stack is None or stack.made_of != made_of:
@@ -176,7 +192,7 @@ def _compile(controls, live, rate, maximum, made_of, old):
     same_face = old is not None and old.made_of[0] == made_of[0]
     stack = Stack(made_of, _mixer(controls, live, maximum) if not same_face else old.mixer)
     kept = old.kept if same_face else {}
-    for place, layer in enumerate(of(controls)):
+    for place, layer in _ordered(controls):
         try:
             stack.layers.append(native_layer(controls, live, layer, rate, kept, stack.kept))
             stack.places.append(place)
@@ -352,7 +368,7 @@ _SOURCES = {"ACTION": _action_source, "EXPRESSION": _expression_source, "IDLE": 
 def problems(controls, live, scene):
     """Sentences on layers that cannot be played, as last compiled."""
     stack = compiled(controls, live, scene, parts.maximum_of(controls))
-    names = {place: layer.name for place, layer in enumerate(of(controls))}
+    names = {place: layer.name for place, layer in enumerate(places(controls))}
     return [f"{names.get(place, place)}: {words}." for place, words in stack.problems.items()]
 
 
@@ -400,13 +416,14 @@ def add(controls, kind, name, **settings):
     Returns:
         The layer.
     """
-    taken = {layer.name for layer in of(controls)}
-    layer = of(controls).add()
-    layer.name = _free_name(name, taken)
-    layer.kind = kind
+    there = of(controls)
+    layer_name = _free_name(name, {layer.name for layer in there})
+    rank = there[-1].rank + 1 if there else 0
+    layer = places(controls).add()
+    layer.name, layer.kind, layer.rank = layer_name, kind, rank
     for key, value in settings.items():
         setattr(layer, key, value)
-    controls.risorius_layers_index = len(of(controls)) - 1
+    controls.risorius_layers_index = len(places(controls)) - 1
     controls.update_tag()
     return layer
 
@@ -423,76 +440,101 @@ def add_action(controls, action, **settings):
     return add(controls, "ACTION", action.name, action=action, start=first, **settings)
 
 
+def place_of(controls, layer):
+    """The place of a layer: what its keys and drivers call it by."""
+    return list(places(controls)).index(layer)
+
+
 def remove(controls, place):
-    """Remove a layer and the keys of its weight."""
-    count = len(of(controls))
-    of(controls).remove(place)
-    _reorder_paths(controls, [i for i in range(count) if i != place])
-    controls.risorius_layers_index = max(0, min(place, count - 2))
+    """Remove a layer, and the keys of its weight where no other character plays them.
+
+    Its place stays empty while an action has keys for it, so that they move no other layer.
+    """
+    layer = places(controls)[place]
+    below = of(controls).index(layer) - 1
+    layer.removed, layer.action = True, None
+    for curves in _own_curve_lists(controls):
+        for curve in [c for c in curves if logic.place_of(c.data_path) == place]:
+            curves.remove(curve)
+    if not controls.override_library:
+        _trim(controls)
+    there = of(controls)
+    if there:
+        controls.risorius_layers_index = place_of(controls, there[max(below, 0)])
     controls.update_tag()
 
 
-def move(controls, place, to):
-    """Put a layer at another place; the keys of weights go with their layers."""
-    count = len(of(controls))
-    of(controls).move(place, to)
-    order = [i for i in range(count) if i != place]
-    order.insert(to, place)
-    _reorder_paths(controls, order)
-    controls.risorius_layers_index = to
+def _trim(controls):
+    """Take empty places from the end that no action of the file has keys for."""
+    curves = (c for action in bpy.data.actions for c in compat.curves_of(action))
+    keyed = {logic.place_of(c.data_path) for c in curves}
+    last = len(places(controls)) - 1
+    while last >= 0 and places(controls)[last].removed and last not in keyed:
+        places(controls).remove(last)
+        last -= 1
+
+
+def move(controls, place, up):
+    """Put a layer one higher or lower; its place, and with it its keys, stay.
+
+    Returns:
+        Whether there was one to change with.
+    """
+    there = of(controls)
+    at = there.index(places(controls)[place])
+    to = at + 1 if up else at - 1
+    if not 0 <= to < len(there):
+        return False
+    there.insert(to, there.pop(at))
+    _rank(there)
     controls.update_tag()
+    return True
+
+
+def _rank(there):
+    for rank, layer in enumerate(there):
+        if layer.rank != rank:
+            layer.rank = rank
 
 
 def duplicate(controls, place):
     """Put a copy of a layer, with the keys of its weight, right above it. Returns: the copy."""
-    source = of(controls)[place]
+    source = places(controls)[place]
     name, kind = source.name, source.kind
     add(controls, kind, name)
-    source, copy = of(controls)[place], of(controls)[-1]  # adding moved them in memory
+    source, copy = places(controls)[place], places(controls)[-1]  # adding moved them in memory
     for prop in source.bl_rna.properties:
-        if prop.identifier not in ("rna_type", "name", "kind", "warp"):
+        if prop.identifier not in ("rna_type", "name", "kind", "warp", "rank"):
             setattr(copy, prop.identifier, getattr(source, prop.identifier))
     for point in source.warp:
         added = copy.warp.add()
         added.frame, added.source = point.frame, point.source
-    last = len(of(controls)) - 1
-    _copy_curves(controls, f"{logic.COLLECTION}[{place}].", f"{logic.COLLECTION}[{last}].")
-    if last != place + 1:
-        move(controls, last, place + 1)
-    return of(controls)[place + 1]
+    there = [layer for layer in of(controls) if layer != copy]
+    there.insert(there.index(source) + 1, copy)
+    _rank(there)
+    _copy_curves(controls, place, len(places(controls)) - 1)
+    return copy
 
 
-def _curve_lists(controls):
-    """The lists of F-curves that move a control armature: actions', its strips' and its drivers."""
-    data = controls.animation_data
-    if data is None:
-        return
-    strips = [strip for track in data.nla_tracks for strip in track.strips]
-    played = {data.action, *(strip.action for strip in strips)}
+def _own_curve_lists(controls):
+    """The lists of F-curves that move a control armature and nothing else, its drivers too."""
+    played = [action for action in compat.played_actions(controls) if action.library is None]
+    users = bpy.data.user_map(subset=played) if played else {}
     for action in played:
-        bag = None if action is None or action.library else compat.bag_for(action, controls)
+        bag = compat.bag_for(action, controls) if users[action] == {controls} else None
         if bag is not None:
             yield bag.fcurves
-    yield data.drivers
+    if controls.animation_data is not None:
+        yield controls.animation_data.drivers
 
 
-def _reorder_paths(controls, order):
-    for curves in _curve_lists(controls):
-        for curve in list(curves):
-            path = logic.moved_path(curve.data_path, order)
-            if path is None:
-                curves.remove(curve)
-            elif path != curve.data_path:
-                curve.data_path = path
-
-
-def _copy_curves(controls, before, after):
-    for curves in _curve_lists(controls):
+def _copy_curves(controls, place, to):
+    for curves in _own_curve_lists(controls):
         if not hasattr(curves, "new") or curves == controls.animation_data.drivers:
             continue
-        for curve in [c for c in curves if c.data_path.startswith(before)]:
-            copy = curves.new(after + curve.data_path[len(before) :], index=curve.array_index)
-            copy_keys(curve, copy)
+        for curve in [c for c in curves if logic.place_of(c.data_path) == place]:
+            path = curve.data_path.replace(f"[{place}]", f"[{to}]", 1)
+            copy_keys(curve, curves.new(path, index=curve.array_index))
 
 
 def copy_keys(source, target):

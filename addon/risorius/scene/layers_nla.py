@@ -70,8 +70,7 @@ def obstacle(controls, layer, curve=None):
 
 
 def _weight_path(controls, layer):
-    place = list(layers.of(controls)).index(layer)
-    return f"{logic.COLLECTION}[{place}].weight"
+    return f"{logic.COLLECTION}[{layers.place_of(controls, layer)}].weight"
 
 
 def _weight_driver(controls, layer):

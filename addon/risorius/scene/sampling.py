@@ -228,14 +228,6 @@ def animated_paths(owner, drivers=True):
     data = owner.animation_data
     if data is None:
         return []
-    actions = [data.action]
-    actions += [s.action for t in data.nla_tracks for s in _strips(t.strips)]
-    curves = [c for a in actions if a is not None for c in compat.curves_of(a)]
+    curves = [c for action in compat.played_actions(owner) for c in compat.curves_of(action)]
     curves += list(data.drivers) if drivers else []
     return list(dict.fromkeys(c.data_path for c in curves))
-
-
-def _strips(strips):
-    for strip in strips:
-        yield strip
-        yield from _strips(strip.strips)

@@ -29,8 +29,11 @@ class LayerOperator(FaceOperator):
 
     @staticmethod
     def place(controls):
-        """The active layer's place."""
-        return min(max(controls.risorius_layers_index, 0), len(layers.of(controls)) - 1)
+        """The active layer's place; the highest one's where none is active."""
+        place, count = controls.risorius_layers_index, len(layers.places(controls))
+        if 0 <= place < count and not layers.places(controls)[place].removed:
+            return place
+        return layers.place_of(controls, layers.of(controls)[-1])
 
 
 class RISORIUS_OT_layer_add(FaceOperator, bpy.types.Operator):
@@ -79,12 +82,6 @@ class RISORIUS_OT_layer_add(FaceOperator, bpy.types.Operator):
         return {"FINISHED"}
 
 
-def _of_library(operator):
-    """Blender lets the items of a library neither go nor move."""
-    operator.report({"ERROR"}, "It belongs to the linked file: mute it, or change it there.")
-    return {"CANCELLED"}
-
-
 class RISORIUS_OT_layer_remove(LayerOperator, bpy.types.Operator):
     """Remove the active layer and the keys of its weight; its action stays"""
 
@@ -93,10 +90,7 @@ class RISORIUS_OT_layer_remove(LayerOperator, bpy.types.Operator):
 
     def execute(self, context):
         controls = _controls(context)
-        try:
-            layers.remove(controls, self.place(controls))
-        except TypeError:
-            return _of_library(self)
+        layers.remove(controls, self.place(controls))
         evaluate.bring_up(context, parts.active_rig(context))
         return {"FINISHED"}
 
@@ -111,14 +105,8 @@ class RISORIUS_OT_layer_move(LayerOperator, bpy.types.Operator):
 
     def execute(self, context):
         controls = _controls(context)
-        place = self.place(controls)
-        to = place + 1 if self.up else place - 1
-        if not 0 <= to < len(layers.of(controls)):
+        if not layers.move(controls, self.place(controls), self.up):
             return {"CANCELLED"}
-        try:
-            layers.move(controls, place, to)
-        except TypeError:
-            return _of_library(self)
         evaluate.bring_up(context, parts.active_rig(context))
         return {"FINISHED"}
 
@@ -146,7 +134,7 @@ class RISORIUS_OT_layer_warp(LayerOperator, bpy.types.Operator):
 
     def execute(self, context):
         controls = _controls(context)
-        layer = layers.of(controls)[self.place(controls)]
+        layer = layers.places(controls)[self.place(controls)]
         if self.clear:
             layer.warp.clear()
         elif layer.kind != "ACTION" or layer.action is None:
@@ -357,9 +345,14 @@ class RISORIUS_UL_layers(bpy.types.UIList):
         icon = "CHECKBOX_DEHLT" if item.mute else "CHECKBOX_HLT"
         row.prop(item, "mute", text="", emboss=False, icon=icon, invert_checkbox=True)
 
-    def filter_items(self, _context, data, name):
-        count = len(getattr(data, name))
-        return [], [count - 1 - i for i in range(count)]
+    def filter_items(self, _context, data, _name):
+        there = layers.of(data)
+        shown = [0 if layer.removed else self.bitflag_filter_item for layer in layers.places(data)]
+        order = [0] * len(shown)
+        lines = [*reversed(there), *(y for y in layers.places(data) if y.removed)]
+        for line, layer in enumerate(lines):
+            order[layers.place_of(data, layer)] = line
+        return shown, order
 
 
 class RISORIUS_UL_reactions(bpy.types.UIList):
@@ -396,7 +389,7 @@ class RISORIUS_PT_layers(FaceOnlyPanel, bpy.types.Panel):
         )
         _draw_side(row.column(align=True))
         if len(layers.of(controls)):
-            _draw_layer(layout, controls, layers.of(controls)[LayerOperator.place(controls)])
+            _draw_layer(layout, controls, layers.places(controls)[LayerOperator.place(controls)])
             for sentence in layers.problems(controls, live, context.scene):
                 write(layout, sentence, "ERROR")
         _draw_reactions(layout, controls)
