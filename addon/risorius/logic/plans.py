@@ -14,7 +14,9 @@ from . import names, regions, textures
 from .space import Float, Space, make_space, world_matrices
 
 LIVE_KEY = "<channel sum>"
-AUTO_LIMIT = 2_000_000  # keys x vertices of a mesh, above which real keys cost too much a frame
+# Keys x vertices of a mesh, above which real keys cost too much: time in every frame from two
+# million on, and before that 12 bytes each in every .blend and for every face of the same file.
+AUTO_LIMIT = 500_000
 AUTO_KEYS = 200  # real keys of a character: each driver costs Blender some 3 us a frame
 _LAYER_WORDS = {
     "mlbh": "neural network behaviour",

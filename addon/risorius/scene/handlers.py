@@ -5,7 +5,19 @@ import bpy
 from bpy.app.handlers import persistent
 
 from .. import native
-from . import copies, evaluate, heal, layers, lods, parts, place, runtime, testing, timing
+from . import (
+    copies,
+    evaluate,
+    heal,
+    layers,
+    lods,
+    parts,
+    place,
+    runtime,
+    sharing,
+    testing,
+    timing,
+)
 
 _state = {"objects": -1, "busy": False}
 
@@ -44,6 +56,7 @@ def _updated(_scene, depsgraph):
     _state["busy"] = True
     try:
         _notice_copies()
+        _say(sharing.separate())
         edited = _edited(depsgraph)
         if edited:
             timing.begin()
@@ -57,8 +70,7 @@ def _updated(_scene, depsgraph):
 
 def _mend(rig):
     done = heal.heal(rig)
-    for sentence in done:
-        print(f"Risorius: {sentence}")
+    _say(done)
     if done:
         parts.controls_of(rig).update_tag()
     return bool(done)
@@ -70,8 +82,13 @@ def _notice_copies():
         _state["objects"] = count
         runtime.forget_unused(parts.rigs())
         layers.forget_unused(map(parts.controls_of, parts.rigs()))
-        for sentence in copies.separate_all():
-            print(f"Risorius: {sentence}")
+        _say(copies.separate_all())
+        sharing.keep()
+
+
+def _say(sentences):
+    for sentence in sentences:
+        print(f"Risorius: {sentence}")
 
 
 def _edited(depsgraph):
@@ -143,6 +160,7 @@ def _before_save(*_arguments):
     copies.separate_all()
     _end_tests()
     heal.remove_dead()
+    _say(sharing.share())
 
 
 @persistent
@@ -191,4 +209,5 @@ def unregister():
         if handler in present:
             present.remove(handler)
     layers.forget()
+    sharing.forget()
     runtime.forget()

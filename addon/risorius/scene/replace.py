@@ -161,11 +161,13 @@ def _take_properties(change, fresh):
     label = former.name
     parts.point(rig, parts.DNA, text)
     rig[parts.SOURCE] = fresh[parts.SOURCE]
-    if not any(r.get(parts.DNA) == former for r in parts.rigs()):
-        bpy.data.texts.remove(former)
-        # The new character loses its pointer, or its removal would take the Text along.
-        text.name = label
+    # The new character loses its pointer, or its removal would take the Text along.
     del fresh[parts.DNA]
+    used = [r.get(parts.DNA) for r in parts.rigs()]
+    if former not in used:
+        bpy.data.texts.remove(former)
+        if used.count(text) == 1:  # a Text that others share keeps its name
+            text.name = label
     for name in armatures.LIVE_PROPERTIES:
         if len(rig[name]) != len(fresh[name]):
             del rig[name]  # an overridable array keeps its length

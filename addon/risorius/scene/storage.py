@@ -25,16 +25,19 @@ class ContentError(ValueError):
 
 
 def store(name, content, made):
-    """Put the bytes of a file into a new Text datablock.
+    """Put the bytes of a file into a Text datablock: a new one, or that which has them already.
 
     Args:
         name: the character's name.
         content: bytes of the DNA file.
-        made: list that the new datablock is put on.
+        made: list that a new datablock is put on.
 
     Returns:
-        The Text.
+        The Text. Nothing ever writes into it again: characters of one file share it.
     """
+    there = _holding(content)
+    if there is not None:
+        return there
     text = bpy.data.texts.new(f"{name}.dna")
     made.append(text)
     text.use_fake_user = False  # the armature's pointer keeps it
@@ -46,6 +49,29 @@ def store(name, content, made):
     text[_HASH] = hashlib.sha256(content).hexdigest()
     text[_LENGTH] = str(len(content))  # words: Blender's integers end at 2 GiB
     return text
+
+
+def _holding(wanted):
+    """A Text of this .blend that holds these bytes, unpacked and not believed; or None."""
+    digest = hashlib.sha256(wanted).hexdigest()
+    for text in bpy.data.texts:
+        if text.library is None and content_hash(text) == digest and _holds(text, wanted):
+            return text
+    return None
+
+
+def _holds(text, wanted):
+    try:
+        return content(text) == wanted
+    except ContentError:
+        return False
+
+
+def same(one, other):
+    """Whether two Texts hold the same packed bytes of a DNA file."""
+    return one == other or (
+        content_hash(one) == content_hash(other) and one.get(_BYTES) == other.get(_BYTES)
+    )
 
 
 def _packed(content):

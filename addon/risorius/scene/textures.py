@@ -4,6 +4,8 @@
 import bpy
 import numpy as np
 
+from . import sharing
+
 # Names of one and the same space in the configurations that people use: Blender's own, ACES 1,
 # ACES CG and studio configurations, Filmic ones. The first that the running one knows is taken.
 COLOR_SPACES = (
@@ -64,8 +66,12 @@ class Images:
 
     def _read(self, path, data):
         try:
+            content = path.read_bytes() if path.stat().st_size <= PACK_LIMIT else None
+            there = sharing.find(content, data) if content is not None else None
+            if there is not None:
+                return there
             image = bpy.data.images.load(str(path), check_existing=False)
-        except RuntimeError:
+        except (RuntimeError, OSError):
             self._complain(f"The texture {path.name} cannot be read.")
             return None
         self.made.append(image)
@@ -75,8 +81,9 @@ class Images:
             self.made.remove(image)
             bpy.data.images.remove(image)
             return None
-        if path.stat().st_size <= PACK_LIMIT:
-            image.pack()
+        if content is not None:
+            image.pack(data=content, data_len=len(content))
+            sharing.mark(image)
         else:
             self._complain(f"The texture {path.name} is large and stays outside the .blend file.")
         return image
@@ -119,7 +126,17 @@ class Images:
         image.pixels.foreach_set(pixels.ravel())
         image.update()
         image.pack()
-        return image, places
+        return self._shared(image), places
+
+    def _shared(self, image):
+        """An image of this .blend with the same packed bytes in the place of a new one."""
+        there = sharing.find(bytes(image.packed_file.data), True)
+        if there is None:
+            sharing.mark(image)
+            return image
+        self.made.remove(image)
+        bpy.data.images.remove(image)
+        return there
 
 
 def _small_copy(path):

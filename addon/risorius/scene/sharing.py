@@ -1,0 +1,201 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What equal characters hold once in a .blend: the Texts of their files, their packed images.
+
+An image is shared until somebody edits it, by whatever tool: then the others are given one as it
+was. Meshes and shape keys are never shared, because the values of keys belong to one face alone.
+"""
+
+import hashlib
+
+import bpy
+
+from . import parts, storage
+
+DIGEST = "risorius_sha256"  # on an image: hash of the packed file
+STATE = "risorius_state"  # on an image: colour space, way of alpha and size of the packed file
+
+_kept = {}  # digest -> bytes of an image that several characters show
+
+
+def mark(image):
+    """Remember what is packed in an image, so that it may be shared from now on."""
+    content = _packed(image)
+    if content is not None:
+        image[DIGEST], image[STATE] = hashlib.sha256(content).hexdigest(), _state(image)
+
+
+def find(content, data):
+    """An image of this .blend that holds these bytes and was not edited, or None.
+
+    Args:
+        content: bytes of an image file.
+        data: whether it is read as numbers, not as colours.
+    """
+    digest = hashlib.sha256(content).hexdigest()
+    for image in bpy.data.images:
+        if image.get(DIGEST) != digest or image.library is not None or _edited(image):
+            continue
+        if image.colorspace_settings.is_data == data and _packed(image) == content:
+            return image
+    return None
+
+
+def nodes_of(rig):
+    """The image nodes in the materials of a character's meshes."""
+    used = {m for item in parts.meshes_pointing_at(rig) for m in item.data.materials if m}
+    for material in sorted(used, key=lambda m: m.name):
+        for node in material.node_tree.nodes if material.node_tree else ():
+            if node.type == "TEX_IMAGE" and node.image is not None:
+                yield node
+
+
+def keep():
+    """Hold the bytes of the images that several characters show: what is edited is lost else."""
+    shown = {i[DIGEST]: i for i, owners in _owners(parts.rigs()).items() if len(owners) > 1}
+    for digest in [d for d in _kept if d not in shown]:
+        del _kept[digest]
+    for digest, image in shown.items():
+        if digest not in _kept and _is_whole(image, digest):
+            _kept[digest] = _packed(image)
+
+
+def separate(exact=False):
+    """Give characters an image as it was, where one that they share with another was edited.
+
+    The edited one stays with the active character.
+
+    Args:
+        exact: look at what is packed as well, as is done before a save.
+
+    Returns:
+        Sentences on what was changed.
+    """
+    ours = [i for i in bpy.data.images if DIGEST in i and i.library is None]
+    edited = [i for i in ours if _edited(i) or (exact and i.users > 1 and not _is_whole(i))]
+    if not edited:
+        return []
+    owners = _owners(parts.rigs())
+    return [sentence for image in edited for sentence in _separate(image, owners.get(image, []))]
+
+
+def share():
+    """Before a save: what equal characters hold is held once; an edited image is its own again.
+
+    Returns:
+        Sentences on what was changed.
+    """
+    rigs = parts.rigs()
+    done = separate(exact=True)
+    if len(rigs) < 2:
+        return done
+    _share_texts(rigs)
+    first = {}
+    for image in _images(rigs):
+        if image.library is None and image.source == "FILE" and image.packed_file:
+            if DIGEST not in image and not image.is_dirty:
+                mark(image)
+            if DIGEST in image:
+                first.setdefault((image[DIGEST], image[STATE]), []).append(image)
+    for equal in first.values():
+        _merge(equal, rigs)
+    keep()
+    return done
+
+
+def _share_texts(rigs):
+    texts = []
+    for rig in rigs:
+        own = rig.get(parts.DNA)
+        if not storage.content_hash(own) or own.library or rig.override_library:
+            continue
+        keeper = next((t for t in texts if storage.same(t, own)), None)
+        if keeper is None:
+            texts.append(own)
+        elif keeper != own:
+            parts.point(rig, parts.DNA, keeper)
+            if own.users == 0:
+                bpy.data.texts.remove(own)
+
+
+def _merge(equal, rigs):
+    keeper, content = equal[0], _packed(equal[0])
+    for image in equal[1:]:
+        if _packed(image) != content:
+            continue
+        for rig in rigs:
+            for node in nodes_of(rig):
+                if node.image == image and node.id_data.library is None:
+                    node.image = keeper
+        if image.users == 0:
+            bpy.data.images.remove(image)
+
+
+def _separate(image, owners):
+    digest, state = image[DIGEST], image[STATE]
+    del image[DIGEST], image[STATE]
+    active = parts.rig_of(bpy.context.view_layer.objects.active)
+    keeper = active if active in owners else next(iter(owners), None)
+    others = [rig for rig in owners if rig != keeper]
+    if not others:
+        return []
+    content = _kept.get(digest) or (_packed(image) if _is_whole(image, digest) else None)
+    if content is None:
+        return [f"The image {image.name} was changed for all faces that show it."]
+    fresh = _image_of(content, image, state)
+    for rig in others:
+        for node in nodes_of(rig):
+            if node.image == image and node.id_data.library is None:
+                node.image = fresh
+    return [f"The image {image.name} was edited: the other faces keep it as it was."]
+
+
+def _image_of(content, image, state):
+    """A new image of packed bytes, with the settings that another had."""
+    space, alpha, _ = state.split("\n")
+    fresh = bpy.data.images.new(image.name, 1, 1)
+    fresh.pack(data=content, data_len=len(content))
+    fresh.source = "FILE"
+    fresh.filepath_raw = image.filepath_raw
+    fresh.colorspace_settings.name, fresh.alpha_mode = space, alpha
+    mark(fresh)
+    return fresh
+
+
+def _images(rigs):
+    """The images that these characters show, each once."""
+    return list(dict.fromkeys(node.image for rig in rigs for node in nodes_of(rig)))
+
+
+def _owners(rigs):
+    """Image that may be shared -> the characters that show it."""
+    found = {}
+    for rig in rigs:
+        for image in _images([rig]):
+            if DIGEST in image and image.library is None:
+                found.setdefault(image, []).append(rig)
+    return found
+
+
+def _packed(image):
+    """The bytes that are packed in an image, or None."""
+    return bytes(image.packed_file.data) if image.packed_file is not None else None
+
+
+def _is_whole(image, digest=None):
+    """Whether what is packed is what was marked."""
+    content = _packed(image)
+    return content is not None and hashlib.sha256(content).hexdigest() == (digest or image[DIGEST])
+
+
+def _state(image):
+    size = image.packed_file.size if image.packed_file is not None else 0
+    return f"{image.colorspace_settings.name}\n{image.alpha_mode}\n{size}"
+
+
+def _edited(image):
+    return image.is_dirty or image.get(STATE) != _state(image)
+
+
+def forget():
+    """Drop the bytes that are held."""
+    _kept.clear()
