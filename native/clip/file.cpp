@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "clip/file.h"
 
-#include <cerrno>
+#include <algorithm>
 #include <string>
 #include <system_error>
 
@@ -14,54 +14,61 @@ namespace {
 using core::ErrorCode;
 using core::fail;
 
-std::FILE* create_new(const std::filesystem::path& path) {
-#ifdef _WIN32
-  std::FILE* file = nullptr;
-  const int reason = _wfopen_s(&file, path.c_str(), L"wbx");
-  if (reason != 0) errno = reason;
-  return file;
-#else
-  return std::fopen(path.c_str(), "wbx");
-#endif
+// The name without some of its end, for one that has no room for more; whole characters of UTF-8.
+std::filesystem::path shortened(const std::filesystem::path& path) {
+  constexpr std::size_t kRoom = 12;
+  std::u8string name = path.filename().u8string();
+  std::size_t length = name.size() - std::min(name.size(), kRoom);
+  while (length > 0 && (name[length] & 0xC0) == 0x80) --length;
+  return path.parent_path() / name.substr(0, length);
 }
 
-core::Unexpected failure(const std::filesystem::path& path, const std::string& reason) {
-  return fail(ErrorCode::kIoWrite, "", "cannot write " + core::utf8(path) + ": " + reason);
-}
-
-core::Unexpected failure(const std::filesystem::path& path, int reason) {
-  return failure(path, std::generic_category().message(reason));
+core::Unexpected failure(const std::filesystem::path& path, const std::error_code& reason) {
+  return fail(ErrorCode::kIoWrite, "",
+              "cannot write " + core::utf8(path) + ": " + core::write_trouble(reason));
 }
 
 }  // namespace
 
 core::Result<FileWriter> FileWriter::create(const std::filesystem::path& path, Head head,
-                                            std::size_t block_frames) {
+                                            std::size_t block_frames,
+                                            const core::FileCalls& calls) {
   auto encoder = Encoder::create(std::move(head), block_frames);
   if (!encoder) return std::move(encoder).propagate();
   FileWriter writer(std::move(encoder).value());
-  writer.path_ = path;
-  // What an earlier recording left when it ended badly is never written over.
-  for (int i = 1; i <= 100 && !writer.file_; ++i) {
-    writer.part_ = path;
-    writer.part_ += i == 1 ? ".part" : "." + std::to_string(i) + ".part";
-    errno = 0;
-    writer.file_.reset(create_new(writer.part_));
-    if (!writer.file_ && errno != EEXIST) break;
+  writer.path_ = core::linked_file(path);
+  std::error_code ignored;
+  if (std::filesystem::is_directory(path, ignored)) {
+    return failure(path, std::make_error_code(std::errc::is_a_directory));
   }
-  if (!writer.file_) return failure(writer.part_, errno);
+  if (const std::error_code error = writer.open_part(calls)) return failure(path, error);
   if (auto written = writer.write_ready(); !written) return std::move(written).propagate();
   return writer;
+}
+
+// What an earlier recording left when it ended badly is never written over.
+std::error_code FileWriter::open_part(const core::FileCalls& calls) {
+  constexpr int kMostParts = 100;
+  std::filesystem::path base = path_;
+  std::error_code error;
+  for (int i = 1; i <= kMostParts && !file_; ++i) {
+    part_ = base;
+    part_ += i == 1 ? ".part" : "." + std::to_string(i) + ".part";
+    file_ = core::NewFile::create(part_, core::NewFile::Leftover::kKeep, error, calls);
+    if (error == std::errc::filename_too_long && base == path_) {
+      base = shortened(path_);
+      i = 0;
+    } else if (error && error != std::errc::file_exists) {
+      break;
+    }
+  }
+  return error;
 }
 
 // What is written reaches the system, so that it outlives this process.
 core::Status FileWriter::write_ready() {
   const Bytes bytes = encoder_.take();
-  if (bytes.empty()) return core::ok();
-  errno = 0;
-  const bool written = std::fwrite(bytes.data(), 1, bytes.size(), file_.get()) == bytes.size() &&
-                       std::fflush(file_.get()) == 0;
-  if (!written) return failure(part_, errno);
+  if (const std::error_code error = file_->write(bytes)) return failure(part_, error);
   return core::ok();
 }
 
@@ -73,16 +80,14 @@ core::Status FileWriter::append(std::span<const float> frames, std::span<const d
 }
 
 core::Status FileWriter::close() {
-  if (!trouble_) file_.reset();
-  if (!is_open()) return trouble_;
-  encoder_.finish();
-  trouble_ = write_ready();
-  errno = 0;
-  if (std::fclose(file_.release()) != 0 && trouble_) trouble_ = failure(part_, errno);
-  if (!trouble_) return trouble_;
-  std::error_code error;
-  std::filesystem::rename(part_, path_, error);
-  if (error) trouble_ = failure(path_, error.message());
+  if (is_open() && trouble_.has_value()) {
+    encoder_.finish();
+    trouble_ = write_ready();
+    const std::error_code error =
+        trouble_.has_value() ? file_->take_place_of(path_) : std::error_code();
+    if (error) trouble_ = failure(path_, error);
+  }
+  file_.reset();
   return trouble_;
 }
 
