@@ -7,6 +7,7 @@ import json
 import os
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -16,13 +17,14 @@ import batch_work
 import numpy as np
 import pytest
 import risorius
-from conftest import GOLDEN, PROJECT
+from conftest import GOLDEN, PROJECT, no_room
 from risorius import fileio
 from risorius.batch.cluster import Cluster
 from risorius.batch.jobs import JobsError, read_jobs
+from risorius.batch.journal import Journal
 from risorius.batch.pool import Pool, PoolError
 from risorius.batch.progress import Progress, clock
-from risorius.batch.work import stamp
+from risorius.batch.work import run_job, stamp
 from risorius.cli import main
 from test_eval_clip import write_clip
 
@@ -266,6 +268,58 @@ def test_interrupted_goes_on_where_it_was(tmp_path, how, capsys):
     assert len(again) <= 2  # whole, but killed before the journal said so: one a worker
     assert len(files_of(jobs)) == 16
     assert not list(out.rglob("*.part"))
+
+
+def test_a_second_batch_in_a_folder_is_told_who_works_there(tmp_path):
+    jobs = make(tmp_path / "j", clips=4, frames=1500)
+    first = start(jobs)
+    wait_for_outputs(jobs, first)
+    second = start(jobs)
+    error = second.communicate()[1].decode()
+    assert second.returncode == 1
+    assert len(error.splitlines()) == 1
+    assert f"out: process {first.pid} on {socket.gethostname()}, since " in error
+    assert first.wait() == 0, first.communicate()[1]
+    check_outputs(jobs, clips=4, frames=1500)
+    assert [row["state"] for row in table_of(jobs)] == ["done"] * 16
+    assert not (jobs.parent / "out" / ".risorius.lock").exists()
+
+
+def test_a_journal_that_somebody_changes_is_a_sentence(tmp_path):
+    plan = read_jobs(make(tmp_path / "j", clips=1, faces=["core"]))
+    journal = Journal(plan.journal)
+    journal.begin([])
+    journal.add(plan.jobs[0], run_job(plan.jobs[0]))
+    plan.journal.write_bytes(b"something else")
+    with pytest.raises(JobsError, match=r"\.jobs\.journal: somebody else has changed it"):
+        journal.facts(plan.jobs[0].name)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="limits are those of POSIX")
+def test_a_journal_without_room_says_its_name_and_stays_as_it_was(tmp_path):
+    plan = read_jobs(make(tmp_path / "j", clips=2, faces=["core"], table='write = "npz"\n'))
+    journal, outcomes = Journal(plan.journal), [run_job(job) for job in plan.jobs]
+    journal.begin([])
+    journal.add(plan.jobs[0], outcomes[0])
+    before = plan.journal.read_bytes()
+    with no_room(len(before) + 20), pytest.raises(OSError, match=r"\.jobs\.journal"):
+        journal.add(plan.jobs[1], outcomes[1])
+    assert plan.journal.read_bytes() == before
+    journal.add(plan.jobs[1], outcomes[1])
+    again = Journal(plan.journal)
+    again.read()
+    assert [again.is_done(job) for job in plan.jobs] == [True, True]
+    assert again.facts(plan.jobs[1].name) == json.loads(json.dumps(outcomes[1].facts))
+
+
+def test_a_folder_that_cannot_be_is_said_before_any_job(tmp_path, capsys):
+    jobs = make(tmp_path / "j", clips=1)
+    (jobs.parent / "out").write_text("a file")
+    assert main(["batch", str(jobs)]) == 1
+    error = capsys.readouterr().err
+    assert len(error.splitlines()) == 1
+    assert "summary.csv: a file stands where its folder should be" in error
+    assert not (tmp_path / "cache").exists()
 
 
 # ---- workers that die

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 from collections.abc import Iterable
@@ -10,7 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..fileio import replacing
-from .jobs import Job
+from .jobs import Job, JobsError
 from .outcome import Outcome
 from .work import stamp
 
@@ -37,7 +38,6 @@ class Journal:
     def __init__(self, path: Path) -> None:
         self.path = path
         self._records: dict[str, _Record] = {}
-        self._size = 0
 
     def read(self) -> None:
         """Read what an earlier run left; lines that it did not finish are not there."""
@@ -71,11 +71,11 @@ class Journal:
             return False
 
     def facts(self, name: str) -> dict[str, Any]:
-        """Of a job that is done. Raises: OSError, KeyError."""
-        record = self._records[name]
-        with open(self.path, "rb") as file:
-            file.seek(record.offset)
-            return dict(json.loads(file.read(record.size))["facts"])
+        """Of a job that is done. Raises: OSError, KeyError; JobsError: its line is not there."""
+        record = _parsed(self._line_of(name))
+        if not isinstance(record, dict) or not isinstance(record.get("facts"), dict):
+            raise JobsError(f"{self.path}: somebody else has changed it while this batch ran")
+        return dict(record["facts"])
 
     def begin(self, kept: Iterable[str]) -> None:
         """Start the file anew with the lines of these jobs. Raises: OSError."""
@@ -87,7 +87,6 @@ class Journal:
                 offset, line = file.tell(), self._line_of(name)
                 file.write(line)
                 records[name] = self._records[name]._replace(offset=offset, size=len(line))
-            self._size = file.tell()
         self._records = records
 
     def _line_of(self, name: str) -> bytes:
@@ -102,12 +101,18 @@ class Journal:
         line = _line(
             {"name": job.name, "stamp": outcome.stamp, "files": files, "facts": outcome.facts}
         )
-        with open(self.path, "ab") as file:
-            file.write(line)
-            file.flush()
-            os.fsync(file.fileno())
-        self._records[job.name] = _Record(outcome.stamp, files, self._size, len(line))
-        self._size += len(line)
+        with open(self.path, "ab", buffering=0) as file:
+            offset = file.seek(0, os.SEEK_END)
+            try:
+                rest = memoryview(line)
+                while rest:
+                    rest = rest[file.write(rest) :]
+                os.fsync(file.fileno())
+            except OSError as error:
+                with contextlib.suppress(OSError):  # half a line would spoil the next one
+                    file.truncate(offset)
+                raise OSError(error.errno, error.strerror, str(self.path)) from None
+        self._records[job.name] = _Record(outcome.stamp, files, offset, len(line))
 
 
 def _parsed(line: bytes) -> object:

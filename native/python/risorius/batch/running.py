@@ -14,6 +14,7 @@ from typing import Any
 import risorius
 
 from .. import fileio
+from ..locking import locked
 from . import summary
 from .cluster import Cluster
 from .jobs import Job, Plan
@@ -75,10 +76,19 @@ def run(plan: Plan, *, workers: int | None, scheduler: str | None, restart: bool
         restart: do everything again.
 
     Raises:
+        LockedError: another batch works in the output folder.
         PoolError: no worker can be started, the cluster cannot be reached or has gone.
         OSError: the output folder cannot be written.
         KeyboardInterrupt: the workers have been stopped, what is done is in the journal.
     """
+    for path in plan.summary:
+        fileio.check_writable(path, parents=True)
+    plan.output.mkdir(parents=True, exist_ok=True)
+    with locked(plan.output):
+        return _run(plan, workers, scheduler, restart)
+
+
+def _run(plan: Plan, workers: int | None, scheduler: str | None, restart: bool) -> Report:
     report, journal = Report(plan), Journal(plan.journal)
     if not restart:
         journal.read()

@@ -18,6 +18,7 @@ from risorius.batch.journal import Journal
 from risorius.batch.pool import PoolError
 from risorius.batch.running import Report, closing_line, pending
 from risorius.batch.running import run as run_plan
+from risorius.locking import LockedError
 
 INTERRUPTED = 130
 
@@ -72,7 +73,7 @@ def run(args: argparse.Namespace) -> int:
             file=sys.stderr,
         )
         return INTERRUPTED
-    except (JobsError, PoolError, OSError) as error:
+    except (JobsError, LockedError, PoolError, OSError) as error:
         print(f"risorius: {sentence(error)}", file=sys.stderr)
         return 1
     return tell(report, as_json=args.json)

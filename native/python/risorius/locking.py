@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: MIT
+"""A folder in which one process works at a time."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import json
+import os
+import socket
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+NAME = ".risorius.lock"
+_UNKNOWN = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL)
+
+
+class LockedError(ValueError):
+    """Another process works in the folder; the text says which."""
+
+
+@contextlib.contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Work alone in a folder that is there.
+
+    The lock is the system's and ends with the process that has it, however that ends. A file
+    `.risorius.lock` says who has it meanwhile.
+
+    Raises:
+        LockedError: another process works there; says which, where and since when.
+        OSError: the folder cannot be written; the error names it.
+    """
+    handle = _open(folder)
+    try:
+        os.ftruncate(handle, 0)
+        os.write(handle, _about_this_process())
+        yield
+    finally:
+        # Whoever waits for the name opens another file; see _open.
+        if sys.platform != "win32":
+            _remove(folder)
+        os.close(handle)
+        if sys.platform == "win32":
+            _remove(folder)
+
+
+def _remove(folder: Path) -> None:
+    with contextlib.suppress(OSError):
+        os.unlink(folder / NAME)
+
+
+def _open(folder: Path) -> int:
+    """A descriptor of the folder's lock, which this process has now."""
+    path = folder / NAME
+    while True:
+        try:
+            handle = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_CLOEXEC", 0), 0o666)
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, str(folder)) from None
+        try:
+            _take(handle, folder)
+            # The one before may have removed the file between our opening and our locking it.
+            with contextlib.suppress(FileNotFoundError):
+                if os.path.samestat(os.fstat(handle), os.stat(path)):
+                    return handle
+        except BaseException:
+            os.close(handle)
+            raise
+        os.close(handle)
+
+
+if sys.platform == "win32":
+    import msvcrt
+
+    _FAR = 1 << 30  # bytes that are locked cannot be read, and who has the lock is to be read
+
+    def _take(handle: int, folder: Path) -> None:
+        os.lseek(handle, _FAR, os.SEEK_SET)
+        try:
+            msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
+        except OSError:
+            raise LockedError(_refusal(folder, _holder(handle))) from None
+        os.lseek(handle, 0, os.SEEK_SET)
+
+else:
+    import fcntl
+
+    def _take(handle: int, folder: Path) -> None:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise LockedError(_refusal(folder, _holder(handle))) from None
+        except OSError as error:
+            if error.errno not in _UNKNOWN:
+                raise
+            # A file system without locks: what the file says must do.
+            holder = _holder(handle)
+            if _may_live(holder):
+                raise LockedError(_refusal(folder, holder)) from None
+
+    def _may_live(holder: dict[str, object]) -> bool:
+        process = holder.get("process")
+        if not isinstance(process, int) or process <= 0:
+            return False
+        if holder.get("machine") != socket.gethostname():
+            return True
+        try:
+            os.kill(process, 0)
+        except OSError as error:
+            return error.errno != errno.ESRCH
+        return True
+
+
+def _about_this_process() -> bytes:
+    since = time.strftime("%Y-%m-%d %H:%M:%S")
+    about = {"machine": socket.gethostname(), "process": os.getpid(), "since": since}
+    return json.dumps(about).encode() + b"\n"
+
+
+def _holder(handle: int) -> dict[str, object]:
+    """What the file says of who has it; nothing where it says nothing yet."""
+    os.lseek(handle, 0, os.SEEK_SET)
+    try:
+        found = json.loads(os.read(handle, 4096))
+    except ValueError:
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _refusal(folder: Path, holder: dict[str, object]) -> str:
+    who = "another process"
+    if holder:
+        who = "process {process} on {machine}, since {since},".format(
+            **{key: holder.get(key, "?") for key in ("process", "machine", "since")}
+        )
+    return f"{folder}: {who} works in this folder; one at a time can"
