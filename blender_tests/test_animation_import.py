@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Clips become actions of the controls and come back, at any rate and in every way to play them."""
 
+import hashlib
 import importlib.util
 import os
 import shutil
 import subprocess
 import sys
+import zipfile
 
 import bpy
 import numpy as np
@@ -408,9 +410,84 @@ def test_speech_without_the_recogniser_says_what_to_do(rig, voice, monkeypatch):
     monkeypatch.setattr(listening, "has_recogniser", lambda: False)
     with pytest.raises(RuntimeError, match="PocketSphinx: install it by the button"):
         bpy.ops.risorius.speak(filepath=str(voice))
-    if not bpy.app.online_access:
-        with pytest.raises(RuntimeError, match="online access"):
+
+
+class Labels:
+    """Stands in for a layout; keeps the words, and what its buttons are called."""
+
+    def __init__(self):
+        self.words = []
+
+    def label(self, text="", icon="NONE"):
+        self.words.append(text)
+
+    def operator(self, name, icon="NONE"):
+        self.words.append(name)
+
+
+def test_the_preferences_say_in_words_why_the_button_is_grey(monkeypatch):
+    listening = scene.submodule("scene.listening")
+    monkeypatch.setattr(listening, "has_recogniser", lambda: False)
+    layout = Labels()
+    scene.submodule("ui.speech_operators").draw_preferences(layout)
+    assert layout.words[-1] == "risorius.install_speech"
+    said = any("Allow online access" in line for line in layout.words)
+    assert said == (not bpy.app.online_access)
+    if said:
+        with pytest.raises(RuntimeError, match="Allow online access first"):
             bpy.ops.risorius.install_speech()
+
+
+@pytest.fixture
+def shelf(tmp_path, monkeypatch):
+    """A folder that pip takes packages from, instead of the network."""
+    folder = tmp_path / "shelf"
+    folder.mkdir()
+    for name in [name for name in os.environ if name.startswith("PIP_")]:
+        monkeypatch.delenv(name)
+    monkeypatch.setenv("PIP_CONFIG_FILE", os.devnull)
+    monkeypatch.setenv("PIP_NO_INDEX", "1")
+    monkeypatch.setenv("PIP_FIND_LINKS", str(folder))
+    listening = scene.submodule("scene.listening")
+    monkeypatch.setattr(listening, "packages_folder", lambda: tmp_path / "packages")
+    return folder
+
+
+def put_wheel(shelf):
+    """A package that calls itself PocketSphinx. Returns: its SHA-256."""
+    info = "pocketsphinx-5.1.1.dist-info"
+    path = shelf / "pocketsphinx-5.1.1-py3-none-any.whl"
+    with zipfile.ZipFile(path, "w") as wheel:
+        wheel.writestr("pocketsphinx/__init__.py", "")
+        wheel.writestr(
+            f"{info}/METADATA", "Metadata-Version: 2.1\nName: pocketsphinx\nVersion: 5.1.1\n"
+        )
+        wheel.writestr(
+            f"{info}/WHEEL", "Wheel-Version: 1.0\nRoot-Is-Purelib: true\nTag: py3-none-any\n"
+        )
+        wheel.writestr(f"{info}/RECORD", "")
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def test_only_the_files_that_are_known_are_installed(shelf, tmp_path, monkeypatch):
+    listening = scene.submodule("scene.listening")
+    version = f"Python {sys.version_info.major}.{sys.version_info.minor}"
+    with pytest.raises(RuntimeError, match=f"there is no file of it for {version} on "):
+        listening.install_recogniser()
+    digest = put_wheel(shelf)
+    with pytest.raises(RuntimeError, match="not the file that this add-on knows"):
+        listening.install_recogniser()
+    assert not (tmp_path / "packages").exists()
+    monkeypatch.setattr(scene.submodule("logic.recogniser"), "HASHES", (digest,))
+    listening.install_recogniser()
+    assert (tmp_path / "packages" / "pocketsphinx" / "__init__.py").exists()
+
+
+def test_without_a_network_the_button_says_so(shelf, monkeypatch):
+    monkeypatch.delenv("PIP_NO_INDEX")
+    monkeypatch.setenv("PIP_INDEX_URL", "http://127.0.0.1:9/simple")  # nobody listens there
+    with pytest.raises(RuntimeError, match=r"could not be reached \(Connection refused\)"):
+        scene.submodule("scene.listening").install_recogniser()
 
 
 def test_a_file_that_is_no_sound(rig, voice, tmp_path):

@@ -36,6 +36,7 @@ names = importlib.import_module("risorius_addon_logic.names")
 regions = importlib.import_module("risorius_addon_logic.regions")
 space = importlib.import_module("risorius_addon_logic.space")
 plans = importlib.import_module("risorius_addon_logic.plans")
+recogniser = importlib.import_module("risorius_addon_logic.recogniser")
 
 
 def test_logic_needs_neither_blender_nor_the_native_module() -> None:
@@ -287,3 +288,40 @@ def test_sliders_of_a_rotation_reach_below_0_and_rest_at_no_turn():
     assert [c.rest for c in turn] == [0.0, 0.0, 0.0, 1.0]
     assert [c.lowest for c in turn] == [-1.0] * 4
     assert all((c.rest, c.lowest) == (0.0, 0.0) for c in plans.plan_controls(raw_names))
+
+
+# What pip 23.2 wrote, met by a certificate that signs itself.
+_CERTIFICATE = """\
+Looking in indexes: https://127.0.0.1:8443/simple
+WARNING: Retrying (Retry(total=0, connect=None, read=None, redirect=None, status=None)) after \
+connection broken by 'SSLError(SSLCertVerificationError(1, '[SSL: CERTIFICATE_VERIFY_FAILED] \
+certificate verify failed: self-signed certificate (_ssl.c:1006)'))': /simple/pocketsphinx/
+Could not fetch URL https://127.0.0.1:8443/simple/pocketsphinx/: There was a problem confirming \
+the ssl certificate: HTTPSConnectionPool(host='127.0.0.1', port=8443): Max retries exceeded with \
+url: /simple/pocketsphinx/ (Caused by SSLError(SSLCertVerificationError(1, '[SSL: \
+CERTIFICATE_VERIFY_FAILED] certificate verify failed: self-signed certificate (_ssl.c:1006)'))) - \
+skipping
+ERROR: Could not find a version that satisfies the requirement pocketsphinx==5.1.1 (from versions: \
+none)
+ERROR: No matching distribution found for pocketsphinx==5.1.1
+"""
+
+
+@pytest.mark.parametrize(
+    ("said", "why"),
+    [
+        (
+            _CERTIFICATE,
+            "the certificate of the package index was not accepted (self-signed certificate)",
+        ),
+        ("python: No module named pip\n\n", "python: No module named pip"),
+        (
+            "ERROR: Could not install packages due to an OSError: [Errno 28] No space left on "
+            "device\n\n[notice] A new release of pip is available: 23.2 -> 25.0\n",
+            "Could not install packages due to an OSError: [Errno 28] No space left on device",
+        ),
+        ("", "no reason was given"),
+    ],
+)
+def test_the_reason_why_a_package_is_not_installed(said: str, why: str) -> None:
+    assert recogniser.reason(said, "Python 3.14 on Linux x86_64") == why

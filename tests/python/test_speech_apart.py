@@ -147,6 +147,6 @@ def test_the_program_of_python_is_found_from_one_that_carries_python(tmp_path, m
         apart.speak_apart(tmp_path / "any.wav")
     own = tmp_path / "bin" / f"python{sys.version_info.major}.{sys.version_info.minor}"
     own.touch()
-    assert apart._python() == str(own)
+    assert apart.python_program() == str(own)
     with pytest.raises(apart.RecogniserError, match="could not be started: .*Permission denied"):
         apart.speak_apart(tmp_path / "any.wav")

@@ -3,16 +3,17 @@
 
 import importlib.util
 import os
+import platform
 import subprocess
 import sys
+import tempfile
 import threading
 from pathlib import Path
 
 import bpy
 
 from .. import native
-
-PACKAGE = "pocketsphinx==5.1.1"
+from ..logic import recogniser
 
 
 class Task:
@@ -85,16 +86,25 @@ def install_recogniser():
     """Install the recogniser with pip into the extension's own user folder.
 
     Raises:
-        RuntimeError: pip failed; the last line that it said.
+        RuntimeError: pip failed; the sentence says why. ValueError: there is no Python to run it.
     """
-    target = str(packages_folder())
-    options = ["--target", target, "--upgrade", "--no-deps", "--only-binary", ":all:"]
-    command = [sys.executable, "-m", "pip", "install", *options, PACKAGE]
+    python = native.part("speech.apart").python_program()
+    options = ["--no-deps", "--only-binary", ":all:", "--require-hashes"]
+    options += ["--retries", "1", "--timeout", "20"]  # with fewer it does not say what it retries
     environment = {**os.environ, "PYTHONPATH": _bundled_pip()}
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    with tempfile.TemporaryDirectory() as folder:
+        wanted = Path(folder) / "recogniser.txt"
+        wanted.write_text(recogniser.requirements(), encoding="ascii")
+        target = ["--target", str(packages_folder()), "--upgrade", "-r", str(wanted)]
+        command = [python, "-m", "pip", "install", *options, *target]
+        done = subprocess.run(
+            command, env=environment, capture_output=True, text=True, errors="replace", check=False
+        )
     if done.returncode:
-        said = [line for line in (done.stderr or done.stdout).splitlines() if line.strip()]
-        raise RuntimeError(f"pip could not install {PACKAGE}: {(said or ['no reason given'])[-1]}")
+        running = f"Python {sys.version_info.major}.{sys.version_info.minor}"
+        running += f" on {platform.system()} {platform.machine()}"
+        why = recogniser.reason(f"{done.stdout}\n{done.stderr}", running)
+        raise RuntimeError(f"{recogniser.PACKAGE} could not be installed: {why}.")
 
 
 def _bundled_pip():

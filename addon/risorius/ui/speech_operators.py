@@ -15,6 +15,7 @@ _EXTENSIONS = (".wav", ".mp3", ".flac", ".ogg", ".m4a", ".aac", ".opus", ".mp4",
 _MISSING = (
     "Speech needs the package PocketSphinx: install it by the button in the add-on's preferences."
 )
+_OFFLINE = "Allow online access first: Preferences, System, Network."
 
 
 class RISORIUS_OT_speak(PlacesClip, bpy.types.Operator, ImportHelper):
@@ -155,14 +156,14 @@ class RISORIUS_OT_install_speech(bpy.types.Operator):
         if not usable(cls):
             return False
         if not bpy.app.online_access:
-            cls.poll_message_set("Allow online access in the preferences (System) first.")
+            cls.poll_message_set(_OFFLINE)
             return False
         return True
 
     def execute(self, _context):
         try:
             listening.install_recogniser()
-        except (RuntimeError, OSError) as error:
+        except (RuntimeError, OSError, ValueError) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         self.report({"INFO"}, "PocketSphinx is installed.")
@@ -174,7 +175,9 @@ def draw_preferences(layout):
     if listening.has_recogniser():
         layout.label(text="Speak from Audio is ready.", icon="CHECKMARK")
         return
-    layout.label(text="Speak from Audio needs the package PocketSphinx.", icon="INFO")
+    layout.label(text="Speak from Audio needs the package PocketSphinx (28 MB).", icon="INFO")
+    if not bpy.app.online_access:
+        layout.label(text=_OFFLINE, icon="ERROR")
     layout.operator(RISORIUS_OT_install_speech.bl_idname, icon="IMPORT")
 
 

@@ -94,7 +94,7 @@ def speak_apart(
 
 
 def _started(said: IO[bytes]) -> subprocess.Popen[bytes]:
-    python = _python()
+    python = python_program()
     options = ["-I", "-B"] if sys.dont_write_bytecode else ["-I"]
     quiet = getattr(subprocess, "CREATE_NO_WINDOW", 0)  # of Windows, where one would flash up
     try:
@@ -111,7 +111,7 @@ def _started(said: IO[bytes]) -> subprocess.Popen[bytes]:
         ) from error
 
 
-def _python() -> str:
+def python_program() -> str:
     """The program of the running Python; sys.executable may be the one that Python is built into.
 
     Raises: RecogniserError.
