@@ -167,24 +167,50 @@ def test_users_own_shape_key_stays_on_top(dna_file):
     assert np.abs(np.delete(moved, 3, axis=0)).max() < 1e-5
 
 
-def test_a_rotation_rests_at_no_turn_and_reset_returns_to_it(tmp_path):
+TURN = ["turn.x", "turn.y", "turn.z", "turn.w"]
+
+
+@pytest.fixture
+def turning(tmp_path):
+    """A face with the four parts of a rotation among its sliders."""
     dna = small_face()
-    turn = ["turn.x", "turn.y", "turn.z", "turn.w"]
-    dna.raw_control_names = [*CONTROLS[:7], *turn]
+    dna.raw_control_names = [*CONTROLS[:7], *TURN]
     dna.twist_swing_behavior.twists = [
         risorius.TwistSwingSetup(
             input_control_indices=[7, 8, 9, 10], output_joint_indices=[UNOWNED], blend_weights=[1.0]
         )
     ]
     dna.save(str(tmp_path / "turn.dna"))
-    rig = scene.load(tmp_path / "turn.dna")
+    return scene.load(tmp_path / "turn.dna")
+
+
+def test_a_rotation_rests_at_no_turn_and_reset_returns_to_it(turning):
+    rig = turning
     bone = scene.face(rig)
-    assert [bone[name] for name in turn] == [0.0, 0.0, 0.0, 1.0]
-    for name, default in zip(turn, (0.0, 0.0, 0.0, 1.0), strict=True):
+    assert [bone[name] for name in TURN] == [0.0, 0.0, 0.0, 1.0]
+    for name, default in zip(TURN, (0.0, 0.0, 0.0, 1.0), strict=True):
         words = bone.id_properties_ui(name).as_dict()
         assert (words["min"], words["max"], words["default"]) == (-1.0, 1.0, default)
     bone["turn.x"], bone["turn.w"], bone[CONTROLS[0]] = -0.6, 0.8, 0.5
     bpy.context.view_layer.objects.active = rig
     assert bpy.ops.risorius.reset() == {"FINISHED"}
-    assert [bone[name] for name in turn] == [0.0, 0.0, 0.0, 1.0]
+    assert [bone[name] for name in TURN] == [0.0, 0.0, 0.0, 1.0]
     assert bone[CONTROLS[0]] == 0.0
+
+
+def test_layers_and_expressions_leave_a_rotation_its_sign(turning):
+    controls, bone = scene.controls(turning), scene.face(turning)
+    for name, value in zip(TURN, (-0.48, 0.6, -0.64, -0.0), strict=True):
+        bone[name] = value
+    scene.update(controls)
+    layers = scene.submodule("scene.layers")
+    layers.add(controls, "EXPRESSION", "Joy", expression="joy", weight=0.5)
+    live = scene.submodule("scene.runtime").of(turning)
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    seen = controls.evaluated_get(depsgraph)
+    raw = scene.submodule("scene.inputs").read_inputs(seen, live, depsgraph)[0]
+    np.testing.assert_array_equal(raw[7:], np.float32([-0.48, 0.6, -0.64, 0.0]))
+    assert raw[1] > 0.1  # the layer plays
+    given = {"expression": "joy", "strength": 0.5, "only": True}
+    assert bpy.ops.risorius.expression(**given) == {"FINISHED"}
+    assert [bone[name] for name in TURN] == pytest.approx([-0.24, 0.3, -0.32, 0.5])

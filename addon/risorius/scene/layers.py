@@ -206,7 +206,7 @@ def _compile(controls, live, rate, maximum, made_of, old):
 def _mixer(controls, live, maximum):
     return native.module().Mixer(
         [*live.labels, *clip_logic.HEAD],
-        ranges={label: (0.0, maximum) for label in live.labels},
+        ranges={n: (low, maximum) for n, low in zip(live.labels, live.lowest, strict=True)},
         exclusives="default" if controls.risorius_layer_rules else None,
         max_fired=_MOST_FIRED,
     )

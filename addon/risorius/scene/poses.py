@@ -52,11 +52,11 @@ def apply(rig, expression, strength, others_to_rest=False):
     goals = weights_for(live, expression)
     if others_to_rest:
         goals = {**dict(zip(live.labels, live.rests, strict=True)), **goals}
-    maximum = parts.maximum_of(controls)
+    maximum, lowest = parts.maximum_of(controls), dict(zip(live.labels, live.lowest, strict=True))
     goals = {name: goal for name, goal in goals.items() if name in face}
     for name, goal in goals.items():
         value = float(face[name]) * (1.0 - strength) + goal * strength
-        face[name] = min(max(value, 0.0), maximum)
+        face[name] = min(max(value, lowest[name]), maximum)
     controls.update_tag()
     return list(goals)
 

@@ -25,6 +25,7 @@ class Runtime:
         dna: the file; rig: its risorius.Rig; space: its Space.
         labels: property names of the raw controls, by index.
         rests: their values at rest.
+        lowest: the least that they can be: parts of rotations go below 0.
         owned: the joints that the evaluator writes.
         rest: float64[J, 4, 4] neutral joints.
         anchors: joints of neck, head and eyes.
@@ -37,6 +38,7 @@ class Runtime:
     space: object
     labels: list
     rests: list
+    lowest: list
     owned: frozenset
     rest: object
     anchors: object
@@ -138,12 +140,14 @@ def _compile(content, unit):
         space.points(dna.neutral_joint_translations),
         np.asarray(dna.joint_parents),
     )
+    sliders = plans.plan_controls(dna.raw_control_names, rig.initial_raw_controls)
     runtime = Runtime(
         dna=dna,
         rig=rig,
         space=space,
-        labels=names.unique_labels(dna.raw_control_names),
-        rests=[float(rest) for rest in rig.initial_raw_controls],
+        labels=[slider.label for slider in sliders],
+        rests=[slider.rest for slider in sliders],
+        lowest=[slider.lowest for slider in sliders],
         owned=frozenset(owned),
         rest=rest,
         anchors=anchors,
