@@ -67,6 +67,22 @@ def test_without_room_the_old_file_stays_and_the_error_names_it(size, tmp_path):
 
 
 @posix
+def test_files_that_belong_together_are_written_all_or_none(tmp_path):
+    files = {
+        tmp_path / "a": b"a" * 10,
+        tmp_path / "new" / "er" / "b": b"b" * 100,
+        tmp_path / "c": b"c",
+    }
+    (tmp_path / "c").write_text("old")
+    with no_room(50), pytest.raises(OSError, match="new/er/b"):
+        fileio.write_all(files)
+    assert os.listdir(tmp_path) == ["c"]
+    assert (tmp_path / "c").read_text() == "old"
+    fileio.write_all(files)
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == files
+
+
+@posix
 def test_a_full_device_is_an_error_of_that_name():
     with pytest.raises(OSError, match="/dev/full") as caught:
         fileio.write_bytes("/dev/full", b"x")

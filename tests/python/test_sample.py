@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: MIT
 """The sample person: its parts by formula, and the whole against the data that it is made from."""
 
+import os
 import tomllib
 from importlib import resources
 
 import numpy as np
 import pytest
 import risorius
-from conftest import _not_run
+from conftest import _not_run, no_room
 from risorius.arkit import mapping
+from risorius.cli import main
 from risorius.sample import build, expressions, people, polygons, source
 
 ARKIT = """browDownLeft browDownRight browInnerUp browOuterUpLeft browOuterUpRight cheekPuff
@@ -203,3 +205,29 @@ def test_a_missing_wheel_is_one_sentence(tmp_path, monkeypatch):
     other.write_bytes(b"something else")
     with pytest.raises(source.SourceError, match="hash"):
         source.Source(other)
+
+
+def test_a_folder_that_is_not_there_is_said_before_anything_is_fetched(tmp_path, capsys):
+    path = tmp_path / "none" / "s.dna"
+    assert main(["sample", "build", str(path), "--data", str(tmp_path / "no.whl")]) == 1
+    error = capsys.readouterr().err
+    assert str(path) in error
+    assert "its folder is not there" in error
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(os.name == "nt", reason="limits are those of POSIX")
+def test_without_room_neither_the_sample_nor_its_textures_are_there(tmp_path, monkeypatch):
+    textures = {"head_color.png": b"x" * 100_000}, {"texture:head:color": "head_color.png"}
+    monkeypatch.setattr(build, "Source", lambda path: None)
+    monkeypatch.setattr(build, "assemble", lambda *_: (risorius.Dna(), [], [], {}))
+    monkeypatch.setattr(build, "paint_textures", lambda *_: textures)
+    path = tmp_path / "s.dna"
+    options = {"data": tmp_path, "say": lambda text: None}
+    with no_room(50_000), pytest.raises(OSError, match=r"head_color\.png"):
+        build.build_sample(path, **options)
+    assert list(tmp_path.iterdir()) == []
+    build.build_sample(path, **options)
+    assert risorius.load(path).metadata["texture:head:color"] == "head_color.png"
+    assert (tmp_path / "s_textures" / "head_color.png").read_bytes() == b"x" * 100_000
+    assert len(list(tmp_path.rglob("*"))) == 3

@@ -6,7 +6,7 @@ from __future__ import annotations
 import contextlib
 import io
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
@@ -15,7 +15,7 @@ from ._native import FileReplacement, remove_leftovers
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
 
-__all__ = ["check_writable", "replacing", "sweep", "write_bytes", "write_text"]
+__all__ = ["check_writable", "replacing", "sweep", "write_all", "write_bytes", "write_text"]
 
 _Path = str | os.PathLike[str]
 
@@ -74,6 +74,39 @@ def write_bytes(path: _Path, data: ReadableBuffer) -> None:
 def write_text(path: _Path, text: str) -> None:
     """Write UTF-8, lines ending as they do in text, as replacing() does. Raises: OSError."""
     write_bytes(path, text.encode())
+
+
+def write_all(files: Mapping[Path, ReadableBuffer]) -> None:
+    """Write several files that belong together: all have room before the first takes its name.
+
+    Args:
+        files: path -> bytes; the first takes its name last. Folders that are not there are made,
+            and go again if the files cannot be written.
+
+    Raises:
+        OSError: one cannot be written; then each is as it was.
+    """
+    made: list[Path] = []
+    try:
+        with contextlib.ExitStack() as stack:
+            for path, data in files.items():
+                made += _made(path.parent)
+                file = stack.enter_context(replacing(path))
+                file.write(data)
+                file.flush()
+    except BaseException:
+        for folder in reversed(made):
+            with contextlib.suppress(OSError):  # it is not empty
+                folder.rmdir()
+        raise
+
+
+def _made(folder: Path) -> list[Path]:
+    """Make a folder; which ones that took, the outermost first."""
+    missing = [part for part in (folder, *folder.parents) if not part.exists()][::-1]
+    for part in missing:
+        part.mkdir(exist_ok=True)
+    return missing
 
 
 def check_writable(path: _Path, *, parents: bool = False) -> None:

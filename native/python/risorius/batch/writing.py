@@ -80,7 +80,12 @@ class NpzWriter:
             values = np.ascontiguousarray(getattr(chunk.pose, FIELDS[part]), "<f4")
             file = self._waiting.get(part, self._first)
             assert file is not None
-            file.write(values.data.cast("B") if values.size else b"")
+            try:
+                file.write(values.data.cast("B") if values.size else b"")
+            except OSError as error:
+                if error.filename is None:  # of a spool, which nobody knows by a name
+                    raise OSError(error.errno, error.strerror, tempfile.gettempdir()) from None
+                raise
 
     def finish(self) -> None:
         """Write what waits, and what is not of frames."""

