@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What was imported comes out byte for byte; edits come out as what the scene shows."""
 
+import os
 from pathlib import Path
 
 import bpy
@@ -291,8 +292,38 @@ def test_a_folder_that_cannot_be_written(dna_file, tmp_path):
     scene.load(dna_file)
     with pytest.raises(RuntimeError) as caught:
         bpy.ops.risorius.export_dna(filepath=str(tmp_path / "missing" / "out.dna"))
-    assert "Traceback" not in str(caught.value)
-    assert "out.dna" in str(caught.value)
+    assert str(caught.value) == "Error: out.dna: its folder is not there.\n"
+    folder = tmp_path / "folder.dna"
+    folder.mkdir()
+    with pytest.raises(RuntimeError, match=r"^Error: folder.dna: Is a directory\.$"):
+        bpy.ops.risorius.export_dna(filepath=str(folder))
+    assert sorted(tmp_path.rglob("*")) == sorted([dna_file, folder])
+
+
+@pytest.mark.skipif(os.name == "nt", reason="links, rights and limits are those of POSIX")
+def test_an_export_follows_links_keeps_rights_and_is_whole_or_not_there(dna_file, tmp_path):
+    import resource
+
+    scene.load(dna_file)
+    folder = tmp_path / "out"
+    folder.mkdir()
+    path, link = folder / "out.dna", folder / "link.dna"
+    path.write_text("old")
+    path.chmod(0o640)
+    link.symlink_to("out.dna")
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))  # as on a full disk
+    try:
+        with pytest.raises(RuntimeError, match=r"^Error: link.dna: File too large\.$"):
+            bpy.ops.risorius.export_dna(filepath=str(link))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert path.read_text() == "old"
+    bpy.ops.risorius.export_dna(filepath=str(link))
+    assert link.is_symlink()
+    assert path.read_bytes() == dna_file.read_bytes()
+    assert path.stat().st_mode & 0o777 == 0o640
+    assert sorted(p.name for p in folder.iterdir()) == ["link.dna", "out.dna"]
 
 
 def test_exporting_changes_nothing_in_the_scene(mode, dna_file, tmp_path):

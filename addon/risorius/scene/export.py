@@ -1,11 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A character's file with what the user edited, and every other byte as it was imported."""
 
-import os
-import tempfile
 import warnings
 from dataclasses import dataclass
-from pathlib import Path
 
 import bpy
 import numpy as np
@@ -226,32 +223,6 @@ def _normalised(present, known, ours, vertex):
     total = sum(weight for weight, _ in held)
     joints = np.array([joint for _, joint in held], np.int64)
     return joints, np.array([weight / total for weight, _ in held], np.float32)
-
-
-def write(path, content):
-    """Put bytes into a file; the old file is whole until the new one is.
-
-    Raises:
-        OSError: it cannot be written; then nothing is left behind.
-    """
-    path = Path(path)
-    handle, made = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-        mode = path.stat().st_mode & 0o777 if path.exists() else 0o666 & ~_mask()
-        Path(made).chmod(mode)
-        Path(made).replace(path)
-    except BaseException:
-        Path(made).unlink(missing_ok=True)
-        raise
-
-
-def _mask():
-    """What the system takes from the rights of new files."""
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
 
 
 def _keep_report(rig, sentences):

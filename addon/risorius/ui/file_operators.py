@@ -143,9 +143,11 @@ class RISORIUS_OT_export_dna(bpy.types.Operator, ExportHelper):
         options = export.ExportOptions(
             self.use_shapes, self.use_neutral, self.use_joints, self.use_weights
         )
+        fileio = native.part("fileio")
         try:
+            fileio.check_writable(self.filepath)
             content, sentences = export.export(context, rig, options)
-            export.write(self.filepath, content)
+            fileio.write_bytes(self.filepath, content)
         except export.ExportError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}

@@ -22,7 +22,8 @@ MODES = (
 
 def explain(path, error):
     """One sentence for what is wrong with a file."""
-    text = names.printable(str(error)).strip().rstrip(".")
+    reason = error.strerror if isinstance(error, OSError) else None
+    text = names.printable(reason or str(error)).strip().rstrip(".")
     name = names.printable(Path(path).name)
     return f"{text}." if name in text else f"{name}: {text}."
 
