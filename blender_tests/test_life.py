@@ -104,6 +104,19 @@ def test_duplicate_is_independent(mode, dna_file, linked):
     _moves_and_is_right(rig, dna_file)
 
 
+def test_a_copy_is_noticed_where_as_many_objects_went(dna_file):
+    rig = scene.load(dna_file, "LIVE")
+    other = bpy.data.objects.new("Other", None)
+    bpy.context.scene.collection.objects.link(other)
+    bpy.context.view_layer.update()
+    head = scene.meshes(rig)[0]
+    copy = head.copy()  # shows the same mesh
+    bpy.context.scene.collection.objects.link(copy)
+    bpy.data.objects.remove(other)
+    scene.update(scene.controls(rig))
+    assert copy.data != head.data
+
+
 def test_undo_and_redo(mode, dna_file):
     bpy.context.preferences.edit.use_global_undo = True
     rig = _posed(dna_file, mode)

@@ -19,7 +19,7 @@ from . import (
     timing,
 )
 
-_state = {"objects": -1, "busy": False}
+_state = {"objects": frozenset(), "busy": False}  # objects: session uids of those seen
 
 
 @persistent
@@ -55,7 +55,7 @@ def _updated(_scene, depsgraph):
         return
     _state["busy"] = True
     try:
-        _notice_copies()
+        _notice_copies(depsgraph.updates)
         _say(sharing.separate())
         edited = _edited(depsgraph)
         if edited:
@@ -76,10 +76,13 @@ def _mend(rig):
     return bool(done)
 
 
-def _notice_copies():
-    count = len(bpy.data.objects)
-    if count != _state["objects"]:
-        _state["objects"] = count
+def _notice_copies(updates):
+    # Their number alone does not tell: as many may go as come in one step.
+    known = _state["objects"]
+    seen = (u.id.original for u in updates if isinstance(u.id, bpy.types.Object))
+    new = any(item.session_uid not in known for item in seen)
+    if new or len(bpy.data.objects) != len(known):
+        _state["objects"] = {item.session_uid for item in bpy.data.objects}
         runtime.forget_unused(parts.rigs())
         layers.forget_unused(map(parts.controls_of, parts.rigs()))
         _say(copies.separate_all())
@@ -144,7 +147,7 @@ def _restored(*_arguments):
     """
     runtime.forget_outputs()
     layers.forget()
-    _state["objects"] = -1
+    _state["objects"] = frozenset()
     if native.problem():
         return
     for rig in parts.rigs():
@@ -195,7 +198,7 @@ _HANDLERS = (
 
 def register():
     """Add the handlers, and bring up what is already there."""
-    _state.update(objects=-1, busy=False)
+    _state.update(objects=frozenset(), busy=False)
     for name, handler in _HANDLERS:
         present = getattr(bpy.app.handlers, name)
         if handler not in present:
