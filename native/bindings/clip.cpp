@@ -19,20 +19,9 @@ using Pairs = std::vector<std::pair<py::object, py::object>>;
 
 PyObject* clip_error_type = nullptr;
 
-[[noreturn]] void throw_clip_error(const core::Error& error, const std::string& file) {
-  const std::string text = (file.empty() ? "" : file + ": ") + error.describe();
-  py::object instance = py::reinterpret_borrow<py::object>(clip_error_type)(to_python(text));
-  instance.attr("code") = core::to_string(error.code);
-  instance.attr("offset") =
-      error.offset ? py::object(py::int_(*error.offset)) : py::object(py::none());
-  instance.attr("where") = to_python(error.where);
-  PyErr_SetObject(clip_error_type, instance.ptr());
-  throw py::error_already_set();
-}
-
 template <class T>
 T taken(core::Result<T>&& result, const std::string& file = "") {
-  if (!result) throw_clip_error(result.error(), file);
+  if (!result) throw_error(result.error(), file, clip_error_type);
   return std::move(result).value();
 }
 
@@ -231,12 +220,11 @@ void bind_reader(py::module_& m) {
 
 void bind_clip(py::module_& m) {
   // Kept for the life of the process, as the interpreter keeps its own exception types.
-  clip_error_type = PyErr_NewExceptionWithDoc(
+  clip_error_type = new_error_type(
       "risorius.ClipError",
       "A clip that cannot be read or written.\n\n"
       "code: str, e.g. 'truncated'. offset: byte offset in the file or None. where: the part of "
-      "the clip, e.g. 'blocks[3].times'.",
-      PyExc_ValueError, nullptr);
+      "the clip, e.g. 'blocks[3].times'.");
   m.attr("ClipError") = py::handle(clip_error_type);
   m.def("encode_clip", &encode_clip, py::arg("names"), py::arg("curves"), py::arg("rate"),
         py::arg("start"), py::arg("times"), py::arg("events"), py::arg("metadata"),

@@ -19,14 +19,20 @@ PyObject* dna_error_type = nullptr;
 
 }  // namespace
 
-void throw_error(const core::Error& error, const std::string& file) {
+PyObject* new_error_type(const char* name, const char* doc) {
+  const py::object family = py::module_::import("risorius.errors").attr("RisoriusError");
+  return PyErr_NewExceptionWithDoc(name, doc, family.ptr(), nullptr);
+}
+
+void throw_error(const core::Error& error, const std::string& file, PyObject* type) {
+  if (type == nullptr) type = dna_error_type;
   const std::string text = (file.empty() ? "" : file + ": ") + error.describe();
-  py::object instance = py::reinterpret_borrow<py::object>(dna_error_type)(to_python(text));
+  py::object instance = py::reinterpret_borrow<py::object>(type)(to_python(text));
   instance.attr("code") = core::to_string(error.code);
   instance.attr("offset") =
       error.offset ? py::object(py::int_(*error.offset)) : py::object(py::none());
   instance.attr("where") = to_python(error.where);
-  PyErr_SetObject(dna_error_type, instance.ptr());
+  PyErr_SetObject(type, instance.ptr());
   throw py::error_already_set();
 }
 
@@ -36,11 +42,10 @@ PYBIND11_MODULE(_native, m) {
   m.doc() = "The native part of Risorius: DNA files and rig evaluation.";
   // Kept for the life of the process, as the interpreter keeps its own exception types.
   risorius::bindings::dna_error_type =
-      PyErr_NewExceptionWithDoc("risorius.DnaError",
-                                "A DNA file or Dna value that cannot be used.\n\n"
-                                "code: str, e.g. 'truncated'. offset: byte offset in the file or "
-                                "None. where: the DNA field.",
-                                PyExc_ValueError, nullptr);
+      risorius::bindings::new_error_type("risorius.DnaError",
+                                         "A DNA file or Dna value that cannot be used.\n\n"
+                                         "code: str, e.g. 'truncated'. offset: byte offset in the "
+                                         "file or None. where: the DNA field.");
   m.attr("DnaError") = pybind11::handle(risorius::bindings::dna_error_type);
   risorius::bindings::bind_dna(m);
   risorius::bindings::bind_rig(m);

@@ -52,6 +52,7 @@ from ._native import (
 )
 from .clip import Clip, Event
 from .clip_file import ClipError, ClipReader, ClipWriter
+from .errors import ArgumentError, RisoriusError
 from .idle import Life, idle
 from .mixer import Layer, Mixer
 
@@ -95,6 +96,7 @@ __all__ = [
     "RbfPoseControls",
     "RbfSolver",
     "Rig",
+    "RisoriusError",
     "TwistSwingBehavior",
     "TwistSwingSetup",
     "available_simd",
@@ -172,10 +174,10 @@ def load(
     wanted: set[str] = set()
     for name in names:
         if name not in _LAYERS:
-            raise ValueError(f"layers: one of {', '.join(_LAYERS)} was expected, found {name!r}")
+            raise ArgumentError(f"layers: one of {', '.join(_LAYERS)} was expected, found {name!r}")
         wanted |= _LAYERS[name]
     if unknown_layers not in ("preserve", "ignore"):
-        raise ValueError(
+        raise ArgumentError(
             f"unknown_layers: preserve or ignore was expected, found {unknown_layers!r}"
         )
     options = ParseOptions()

@@ -11,6 +11,8 @@ from typing import Any, SupportsFloat, SupportsIndex, SupportsInt, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from .errors import RisoriusError
+
 _F32: TypeAlias = npt.NDArray[np.float32]
 _F64: TypeAlias = npt.NDArray[np.float64]
 _U16: TypeAlias = npt.NDArray[np.uint16]
@@ -24,7 +26,7 @@ _Finding: TypeAlias = tuple[bool, str, str, int | None, str]
 # time, name, duration, value
 _Event: TypeAlias = tuple[float, str, float, str]
 
-class ClipError(ValueError):
+class ClipError(RisoriusError):
     """A clip that cannot be read or written."""
 
     code: str
@@ -96,7 +98,7 @@ def encode_clip(
 ) -> bytes: ...
 def write_clip(path: _Path, bytes: bytes) -> None: ...
 
-class DnaError(ValueError):
+class DnaError(RisoriusError):
     """A DNA file or Dna value that cannot be used."""
 
     code: str

@@ -1,16 +1,25 @@
 # SPDX-License-Identifier: MIT
-"""The command line. Exit codes: 0 done, 1 the input is bad, 2 the command line is bad."""
+"""The command line, and the one place that prints errors: a sentence on the standard error.
+
+Exit codes: 0 done, 1 the input is bad, 2 the command line is bad, 130 interrupted.
+"""
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import io
+import os
 import sys
 from collections.abc import Sequence
 
-from . import DnaError, __version__
+from . import __version__
 from .commands import batch, bench, check, clip, convert, edit, info, live, plot, sample, speech
 from .commands import eval as evaluate
+from .commands.files import CommandLineError
+from .errors import RisoriusError, sentence
+
+INTERRUPTED = 130
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -18,6 +27,43 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # names need not be text that a terminal can show
             stream.reconfigure(errors="backslashreplace")
+    try:
+        code = _run(arguments)
+        _flush()
+    except BrokenPipeError:  # who read has enough
+        _drop_output()
+        return 0
+    except KeyboardInterrupt as interrupt:
+        return _say(str(interrupt) or "interrupted", INTERRUPTED)
+    except (RisoriusError, OSError, MemoryError) as error:
+        return _say(sentence(error), 2 if isinstance(error, CommandLineError) else 1)
+    return code
+
+
+def _say(text: str, code: int) -> int:
+    with contextlib.suppress(OSError):  # there may be nobody to say it to
+        print(f"risorius: {text}", file=sys.stderr, flush=True)
+    return code
+
+
+def _flush() -> None:
+    """Raises: OSError: what was printed cannot be written, e.g. to a disk that is full."""
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        _drop_output()
+        raise OSError(error.errno, error.strerror, "<stdout>") from error
+
+
+def _drop_output() -> None:
+    """Let nothing that is still buffered fail again when the interpreter ends."""
+    with contextlib.suppress(OSError, ValueError):  # a stream that is no file has no such end
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _run(arguments: Sequence[str] | None) -> int:
     parser = argparse.ArgumentParser(prog="risorius", description="Face rigs from DNA files.")
     parser.add_argument("--version", action="version", version=__version__)
     subparsers = parser.add_subparsers(dest="command", required=True)
@@ -44,10 +90,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error(f"unrecognized arguments: {' '.join(rest)}")
     if operands is not None:
         operands += rest
-    try:
-        return int(args.func(args))
-    except DnaError as error:
-        print(f"risorius: {error}", file=sys.stderr)
-        return 1
-    except BrokenPipeError:
-        return 0
+    return int(args.func(args))

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ._native import encode_clip, write_clip
+from .errors import ArgumentError
 
 Floats = npt.NDArray[np.float32]
 Times = npt.NDArray[np.float64]
@@ -79,30 +80,32 @@ class Clip:
 
     def _check(self) -> None:
         if self.curves.ndim != 2 or self.curves.shape[0] != len(self.names):
-            raise ValueError(
+            raise ArgumentError(
                 f"curves of {len(self.names)} controls were expected as [controls, frames], found "
                 f"the shape {list(self.curves.shape)}"
             )
         if len(self._index) != len(self.names):
             twice = next(n for i, n in enumerate(self.names) if self._index[n] != i)
-            raise ValueError(f"{twice}: a control may have one curve only, found two")
+            raise ArgumentError(f"{twice}: a control may have one curve only, found two")
         if not (np.isfinite(self.rate) and self.rate > 0.0):
-            raise ValueError(f"a rate above 0 frames per second was expected, found {self.rate}")
+            raise ArgumentError(f"a rate above 0 frames per second was expected, found {self.rate}")
         if not np.isfinite(self.start):
-            raise ValueError(f"a start in seconds was expected, found {self.start}")
+            raise ArgumentError(f"a start in seconds was expected, found {self.start}")
         if self.times is not None:
             self._check_times(self.times)
 
     def _check_times(self, times: Times) -> None:
         if times.shape != (self.frame_count,):
-            raise ValueError(
+            raise ArgumentError(
                 f"{self.frame_count} times were expected, found the shape {list(times.shape)}"
             )
         if not np.isfinite(times).all():
-            raise ValueError(f"frame {int(np.argmin(np.isfinite(times)))}: its time is no number")
+            raise ArgumentError(
+                f"frame {int(np.argmin(np.isfinite(times)))}: its time is no number"
+            )
         if (np.diff(times) <= 0.0).any():
             frame = int(np.argmax(np.diff(times) <= 0.0)) + 1
-            raise ValueError(
+            raise ArgumentError(
                 f"frame {frame}: a time after {times[frame - 1]} s was expected, "
                 f"found {times[frame]} s"
             )

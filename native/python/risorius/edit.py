@@ -11,6 +11,7 @@ from typing import cast
 
 from . import _native
 from ._native import Dna, GroupSizes, LargestChange, RegroupReport
+from .errors import ArgumentError
 
 __all__ = ["GroupSizes", "LargestChange", "RegroupReport", "regroup"]
 
@@ -76,7 +77,7 @@ def _three(threshold: float | Sequence[float]) -> tuple[float, float, float]:
     if isinstance(threshold, int | float):
         return float(threshold), float(threshold), threshold / 100
     if len(threshold) != 3:
-        raise ValueError(
+        raise ArgumentError(
             f"threshold: one number or (mm, degrees, scale) was expected, found {threshold!r}"
         )
     mm, degrees, scale = threshold
@@ -101,13 +102,13 @@ def _indices(dna: Dna, regions: Regions) -> list[list[int]]:
     out = []
     for region, joints in named:
         if isinstance(joints, str):
-            raise ValueError(f"{region}: a list of joints was expected, found {joints!r}")
+            raise ArgumentError(f"{region}: a list of joints was expected, found {joints!r}")
         found: list[int] = []
         for joint in joints:
             if isinstance(joint, str) and joint not in known:
-                raise ValueError(f"{region}: there is no joint {joint!r}")
+                raise ArgumentError(f"{region}: there is no joint {joint!r}")
             if not isinstance(joint, str) and not 0 <= joint < len(dna.joint_names):
-                raise ValueError(f"{region}: there is no joint {joint!r}")
+                raise ArgumentError(f"{region}: there is no joint {joint!r}")
             found += known[joint] if isinstance(joint, str) else [joint]
         out.append(found)
     return out

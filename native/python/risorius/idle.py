@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .clip import Clip, Event
+from .errors import ArgumentError
 
 Doubles = npt.NDArray[np.float64]
 
@@ -132,17 +133,17 @@ def idle(
     """
     life = life or Life()
     if seed < 0:
-        raise ValueError(f"seed: a whole number from 0 was expected, found {seed}")
+        raise ArgumentError(f"seed: a whole number from 0 was expected, found {seed}")
     for name, value in (("duration", duration), ("rate", rate)):
         if not (math.isfinite(value) and value > 0.0):
-            raise ValueError(f"{name}: a number above 0 was expected, found {value}")
+            raise ArgumentError(f"{name}: a number above 0 was expected, found {value}")
     if loop and duration < 2.0:
-        raise ValueError(f"duration: at least 2 s were expected of a loop, found {duration}")
+        raise ArgumentError(f"duration: at least 2 s were expected of a loop, found {duration}")
     count = math.floor(duration * rate + 1e-6) + 1
     times = np.arange(count) / rate
     length = float(times[-1])
     if loop and length < 2.0:
-        raise ValueError(f"rate: frames over at least 2 s were expected of a loop, found {rate}")
+        raise ArgumentError(f"rate: frames over at least 2 s were expected of a loop, found {rate}")
     saccades = make_saccades(seed, length, life, loop)
     blinks = make_blinks(seed, length, life, loop, saccades)
     curves = _gaze_curves(times, saccades, life)

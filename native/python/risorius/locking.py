@@ -13,12 +13,16 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+from .errors import RisoriusError
+
 NAME = ".risorius.lock"
 _UNKNOWN = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL)
 
 
-class LockedError(ValueError):
+class LockedError(RisoriusError):
     """Another process works in the folder; the text says which."""
+
+    code = "locked"
 
 
 @contextlib.contextmanager

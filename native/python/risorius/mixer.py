@@ -15,6 +15,7 @@ import numpy.typing as npt
 from . import expressions
 from ._native import LayerCurves, MixerCore
 from .clip import Clip, Event
+from .errors import ArgumentError
 from .reactions import Exclusives, Reaction, load_exclusives, load_reactions
 from .regions import mask as region_mask
 
@@ -189,7 +190,7 @@ class Mixer:
             KeyError: no such reaction. ValueError: time or strength out of range.
         """
         if not (math.isfinite(time) and 0.0 <= strength <= 1.0):
-            raise ValueError(
+            raise ArgumentError(
                 f"fire {name}: a time and a strength from 0 to 1 were expected, "
                 f"found {time} and {strength}"
             )
@@ -273,7 +274,7 @@ def _limits(
     elif ranges is not None:
         limits = np.asarray(ranges, np.float32)
         if limits.shape != (len(names), 2):
-            raise ValueError(
+            raise ArgumentError(
                 f"ranges: the shape [{len(names)}, 2] was expected, found {list(limits.shape)}"
             )
     return np.ascontiguousarray(limits[:, 0]), np.ascontiguousarray(limits[:, 1])
@@ -290,12 +291,12 @@ def _settings(place: int, layer: Layer, curves: LayerCurves) -> dict[str, Any]:
     start, end = layer.start, layer.end
     if layer.warp is not None:
         if (start, layer.clip_range, layer.scale, layer.repeat) != (None, None, 1.0, 1.0):
-            raise ValueError(
+            raise ArgumentError(
                 f"layers[{place}].warp: a warp alone, without start, clip_range, scale and repeat, "
                 "was expected"
             )
     elif not still and end is not None:
-        raise ValueError(f"layers[{place}].end: a clip ends by its length, none was expected")
+        raise ArgumentError(f"layers[{place}].end: a clip ends by its length, none was expected")
     if start is None:
         start = -math.inf if still else first
     weight = layer.weight

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from .errors import ArgumentError
 from .regions import expand_sides
 
 Index = Mapping[str, int]
@@ -125,7 +126,7 @@ def load_exclusives(path: str | os.PathLike[str] | None = None) -> Exclusives:
         rows = table.get("opposites", {}).get("pairs", [])
         pairs = tuple((prefix + a, prefix + b) for a, b in rows)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise ValueError(
+        raise ArgumentError(
             f"{where}: yields with by and of, and pairs of opposites were expected: {error!r}"
         ) from None
     return Exclusives(yields, pairs)
@@ -136,7 +137,7 @@ def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
     try:
         return tomllib.loads(Path(path).read_text(encoding="utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ValueError(f"{os.fspath(path)}: a TOML file was expected: {error}") from None
+        raise ArgumentError(f"{os.fspath(path)}: a TOML file was expected: {error}") from None
 
 
 def named_weights(table: Mapping[str, Any], prefix: str, where: str) -> dict[str, float]:
@@ -149,7 +150,7 @@ def named_weights(table: Mapping[str, Any], prefix: str, where: str) -> dict[str
     for name in sorted(table, key=lambda name: -name.count("*")):
         weight = table[name]
         if isinstance(weight, bool) or not isinstance(weight, int | float) or not 0 <= weight <= 1:
-            raise ValueError(
+            raise ArgumentError(
                 f"{where}: {name}: a weight from 0 to 1 was expected, found {weight!r}"
             )
         for control in expand_sides(name):
@@ -174,7 +175,7 @@ def _names(names: list[str], prefix: str) -> tuple[str, ...]:
 
 def _reaction(name: str, row: Any, prefix: str, where: str) -> Reaction:
     if not isinstance(row, dict) or not row.get("parts"):
-        raise ValueError(f"{where}: {name}: a table with parts was expected, found {row!r}")
+        raise ArgumentError(f"{where}: {name}: a table with parts was expected, found {row!r}")
     parts = []
     for number, part in enumerate(row["parts"]):
         place = f"{where}: {name}.parts[{number}]"
@@ -183,13 +184,13 @@ def _reaction(name: str, row: Any, prefix: str, where: str) -> Reaction:
             lowest = "above 0" if key in ("attack", "release") else "from 0"
             number_given = isinstance(seconds, int | float) and not isinstance(seconds, bool)
             if not number_given or seconds < 0 or (lowest == "above 0" and seconds == 0):
-                raise ValueError(
+                raise ArgumentError(
                     f"{place}.{key}: seconds {lowest} were expected, found {seconds!r}"
                 )
         unknown = set(part) - set(times) - {"weights"}
         if unknown or not part.get("weights"):
             found = sorted(unknown)[0] if unknown else "no weights"
-            raise ValueError(
+            raise ArgumentError(
                 f"{place}: delay, attack, hold, release and weights were expected, found {found}"
             )
         parts.append(ReactionPart(named_weights(part["weights"], prefix, place), **times))

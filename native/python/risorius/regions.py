@@ -10,6 +10,8 @@ from fnmatch import fnmatchcase
 import numpy as np
 import numpy.typing as npt
 
+from .errors import ArgumentError
+
 # The order decides: mouthCheekBlow is a cheek, eyeCheekRaise an eye, jawChinRaise a jaw.
 _STARTS = (
     ("brow", ("brow",)),
@@ -79,10 +81,10 @@ def mask(
     out = np.full(len(names), default, np.float32)
     for part, weight in parts.items():
         if not 0.0 <= weight <= 1.0:
-            raise ValueError(f"mask {part}: a weight from 0 to 1 was expected, found {weight}")
+            raise ArgumentError(f"mask {part}: a weight from 0 to 1 was expected, found {weight}")
         named = [i for i, name in enumerate(names) if _is_part(name, part)]
         if not named and part.partition(".")[0] not in REGIONS:
-            raise ValueError(f"mask {part}: a region, a control or a pattern was expected")
+            raise ArgumentError(f"mask {part}: a region, a control or a pattern was expected")
         out[named] = weight
     return out
 

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 import risorius
+from risorius.errors import ArgumentError
 from risorius.explain.control_names import ControlNames
 
 Floats = npt.NDArray[np.float32]
@@ -61,7 +62,7 @@ class Face:
         """Raises: ValueError: the character has no such LOD."""
         last = max(1, self.rig.lod_count) - 1
         if not 0 <= lod <= last:
-            raise ValueError(f"{self.name}: a LOD from 0 to {last} was expected, found {lod}")
+            raise ArgumentError(f"{self.name}: a LOD from 0 to {last} was expected, found {lod}")
 
 
 def load_face(path: Path, *, quaternions: bool = False) -> Face:
@@ -121,7 +122,7 @@ def prepared(
             start=float(times[0]) if times.size else clip.start,
         )
     if not clip.frame_count:
-        raise ValueError(f"a clip with frames was expected, found {found}, of them 0 asked for")
+        raise ArgumentError(f"a clip with frames was expected, found {found}, of them 0 asked for")
     return clip
 
 

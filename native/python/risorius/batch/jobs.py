@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from risorius import importing
+from risorius.errors import RisoriusError
 
 from .baking import DEFAULT_PARTS, KINDS
 from .face import PARTS
@@ -30,8 +31,10 @@ _KEYS = (
 MAX_JOBS = 200_000
 
 
-class JobsError(ValueError):
+class JobsError(RisoriusError):
     """A JOBS.toml that cannot be used: file, field, what was found, what was expected."""
+
+    code = "jobs"
 
 
 @dataclass(frozen=True)

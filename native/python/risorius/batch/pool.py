@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..errors import RisoriusError
 from .jobs import Job
 from .outcome import Outcome
 
@@ -27,8 +28,10 @@ _READY = "ready"
 _STOP_SECONDS = 5.0
 
 
-class PoolError(RuntimeError):
+class PoolError(RisoriusError, RuntimeError):
     """Workers that cannot be started, or a cluster that has gone."""
+
+    code = "pool"
 
 
 def _serve(connection: Connection[object, object], work: Work) -> None:

@@ -16,11 +16,12 @@ from typing import Generic, TypeVar
 
 import risorius
 from risorius._native import rig_block_version
+from risorius.errors import sentence
 
 from .baking import bake
 from .clips import Performance, load_performance
 from .face import Face, load_face, prepared
-from .files import digest, sentence
+from .files import digest
 from .jobs import Job
 from .outcome import Outcome
 

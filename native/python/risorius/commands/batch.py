@@ -12,15 +12,12 @@ import threading
 from collections.abc import Iterator
 from pathlib import Path
 
-from risorius.batch.files import sentence
-from risorius.batch.jobs import JobsError, Plan, read_jobs
+from risorius.batch.jobs import Plan, read_jobs
 from risorius.batch.journal import Journal
-from risorius.batch.pool import PoolError
 from risorius.batch.running import Report, closing_line, pending
 from risorius.batch.running import run as run_plan
-from risorius.locking import LockedError
 
-INTERRUPTED = 130
+from .files import CommandLineError
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -55,10 +52,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     if args.workers is not None and not 1 <= args.workers <= 1024:
-        print(
-            f"risorius: --workers: 1 to 1024 were expected, found {args.workers}", file=sys.stderr
-        )
-        return 2
+        raise CommandLineError(f"--workers: 1 to 1024 were expected, found {args.workers}")
     try:
         plan = read_jobs(args.jobs)
         if args.dry_run:
@@ -68,14 +62,9 @@ def run(args: argparse.Namespace) -> int:
                 plan, workers=args.workers, scheduler=args.scheduler, restart=args.restart
             )
     except KeyboardInterrupt:
-        print(
-            "risorius: interrupted; what is done is kept, the same command goes on",
-            file=sys.stderr,
-        )
-        return INTERRUPTED
-    except (JobsError, LockedError, PoolError, OSError) as error:
-        print(f"risorius: {sentence(error)}", file=sys.stderr)
-        return 1
+        raise KeyboardInterrupt(
+            "interrupted; what is done is kept, the same command goes on"
+        ) from None
     return tell(report, as_json=args.json)
 
 

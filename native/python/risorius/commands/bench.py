@@ -13,6 +13,9 @@ from pathlib import Path
 import numpy as np
 
 import risorius
+from risorius.errors import RisoriusError
+
+from .files import InputError
 
 FRAMES = ("active_20", "active_60", "active_260")
 
@@ -48,16 +51,25 @@ def export_frames(source: Path, raw_count: int, folder: Path) -> list[str]:
     """The frames of an .npz as files for the benchmark.
 
     Raises:
-        ValueError: an array that is missing or has another shape.
+        InputError: no .npz, or an array that is missing or has another shape.
     """
+    try:
+        return _export_frames(source, raw_count, folder)
+    except RisoriusError:
+        raise
+    except (ValueError, EOFError, zipfile.BadZipFile) as error:  # of NumPy
+        raise InputError(f"{source}: an .npz of arrays was expected: {error}") from error
+
+
+def _export_frames(source: Path, raw_count: int, folder: Path) -> list[str]:
     paths = []
     with np.load(source) as arrays:
         for name in FRAMES:
             if name not in arrays:
-                raise ValueError(f"{source}: an array {name!r} was expected")
+                raise InputError(f"{source}: an array {name!r} was expected")
             frames = np.asarray(arrays[name], "<f4")
             if frames.ndim != 2 or frames.shape[1] != raw_count or len(frames) < 2:
-                raise ValueError(
+                raise InputError(
                     f"{source}: {name}: [2 or more frames, {raw_count} raw controls] were "
                     f"expected, found {list(frames.shape)}"
                 )
@@ -70,19 +82,11 @@ def export_frames(source: Path, raw_count: int, folder: Path) -> list[str]:
 def run(args: argparse.Namespace) -> int:
     path = program()
     if path is None:
-        print(
-            "risorius: this wheel was built without Google Benchmark, which bench runs on",
-            file=sys.stderr,
-        )
-        return 1
+        raise InputError("this wheel was built without Google Benchmark, which bench runs on")
     dna = risorius.load(args.file, layers="definition")
     with tempfile.TemporaryDirectory() as folder:
-        try:
-            raw = len(dna.raw_control_names)
-            frames = export_frames(args.frames, raw, Path(folder)) if args.frames else []
-        except (OSError, ValueError, zipfile.BadZipFile) as error:
-            print(f"risorius: {error}", file=sys.stderr)
-            return 1
+        raw = len(dna.raw_control_names)
+        frames = export_frames(args.frames, raw, Path(folder)) if args.frames else []
         command = [str(path), str(args.file), *frames]
         if args.sweep:
             command.append("--sweep")

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,7 +13,7 @@ import risorius
 from risorius import Clip, importing
 from risorius.importing import process
 
-from .files import CommandLineError, InputError, counted, refuse_same_file
+from .files import CommandLineError, counted, refuse_same_file, require_writable
 
 OUTPUTS = (".rzc", ".csv", ".json")
 _MAPPING = (
@@ -86,7 +85,7 @@ def _add_convert(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--report", action="store_true", help="print what was mapped and what was not, to stdout"
     )
-    parser.set_defaults(func=_guarded(run_convert))
+    parser.set_defaults(func=run_convert)
 
 
 def _add_input(parser: argparse.ArgumentParser) -> None:
@@ -111,7 +110,7 @@ def _add_input(parser: argparse.ArgumentParser) -> None:
 def _add_info(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = commands.add_parser("info", help="what a file of animation holds")
     _add_input(parser)
-    parser.set_defaults(func=_guarded(run_info))
+    parser.set_defaults(func=run_info)
 
 
 def _add_mappings(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -120,32 +119,14 @@ def _add_mappings(commands: argparse._SubParsersAction[argparse.ArgumentParser])
     parser.add_argument(
         "-o", "--output", type=Path, metavar="M.toml", help="default: NAME.toml; never replaced"
     )
-    parser.set_defaults(func=_guarded(run_mappings))
+    parser.set_defaults(func=run_mappings)
 
 
 def _add_check(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = commands.add_parser("check", help="a mapping against the controls of a rig")
     parser.add_argument("mapping", metavar="M.toml")
     parser.add_argument("--rig", type=Path, required=True, metavar="DNA")
-    parser.set_defaults(func=_guarded(run_check))
-
-
-def _guarded(run: Callable[[argparse.Namespace], int]) -> Callable[[argparse.Namespace], int]:
-    """A command whose errors are one sentence and an exit code."""
-
-    def guarded(args: argparse.Namespace) -> int:
-        try:
-            return run(args)
-        except CommandLineError as error:
-            print(f"risorius: {error}", file=sys.stderr)
-            return 2
-        except (risorius.DnaError, BrokenPipeError):
-            raise  # for main
-        except (InputError, ValueError, OSError) as error:
-            print(f"risorius: {error}", file=sys.stderr)
-            return 1
-
-    return guarded
+    parser.set_defaults(func=run_check)
 
 
 def load(args: argparse.Namespace) -> importing.Imported:
@@ -165,6 +146,7 @@ def run_convert(args: argparse.Namespace) -> int:
     if args.output.suffix.lower() not in OUTPUTS:
         raise CommandLineError(f"{args.output}: a name ending in {', '.join(OUTPUTS)} was expected")
     refuse_same_file(str(args.input), str(args.output))
+    require_writable(args.output)
     steps = _steps(args)
     dna = risorius.load(args.rig, layers="behavior") if args.rig else None
     clip, report = load(args).apply(

@@ -25,6 +25,7 @@ from .files import (
     label,
     read,
     refuse_same_file,
+    require_writable,
     summary,
 )
 
@@ -108,6 +109,7 @@ def complain(args: argparse.Namespace) -> None:
         raise CommandLineError(f"--indent: 0 to 8 was expected, found {args.indent}")
     if not args.force:
         refuse_same_file(args.input, args.output)
+    require_writable(args.output)
 
 
 def _say(text: str) -> None:
@@ -215,22 +217,19 @@ def write(name: str, data: bytes) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
+    args.input_kind = kind_of(args.input, args.input_kind, "--from")
+    args.output_kind = kind_of(args.output, args.output_kind, "--to")
+    complain(args)
+    source = read(args.input, args.input_kind)
     try:
-        args.input_kind = kind_of(args.input, args.input_kind, "--from")
-        args.output_kind = kind_of(args.output, args.output_kind, "--to")
-        complain(args)
-        source = read(args.input, args.input_kind)
         with warnings_as_lines(label(args.input)):
             dna, data = convert(source, args)
         if args.output_kind == "json":
             data = json_text(dna, args.indent)
-        write(args.output, data)
-    except (CommandLineError, InputError) as error:
-        _say(str(error))
-        return 2 if isinstance(error, CommandLineError) else 1
     except risorius.DnaError as error:
-        _say(f"{label(args.input)}: {error}")
-        return 2 if error.code == "invalid_argument" else 1
+        kind_of_error = CommandLineError if error.code == "invalid_argument" else InputError
+        raise kind_of_error(f"{label(args.input)}: {error}") from error
+    write(args.output, data)
     kind = ", JSON" if args.output_kind == "json" else ""
     print(
         f"{label(args.output, '<stdout>')}: {summary(dna)}, {counted(len(data), 'byte')}{kind}",

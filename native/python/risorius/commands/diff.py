@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -45,13 +44,16 @@ def page(found: list[Difference], everything: bool) -> str:
 
 
 def run(a: str, b: str, *, everything: bool, as_json: bool) -> int:
-    """Prints what differs. Returns: 0 nothing, 1 something, 2 a file cannot be used."""
+    """Prints what differs. Returns: 0 nothing, 1 something.
+
+    Raises:
+        CommandLineError: a file cannot be used.
+    """
     try:
         kinds = [kind_of(name, None, "another name") for name in (a, b)]
         rig_a, rig_b = read(a, kinds[0]), read(b, kinds[1])
-    except (CommandLineError, InputError) as error:
-        print(f"risorius: {error}", file=sys.stderr)
-        return 2
+    except InputError as error:  # 1 is "they differ", as of diff
+        raise CommandLineError(str(error)) from error
     found = compare(rig_a, rig_b, everything or as_json)
     if not found and kinds == ["dna", "dna"] and (bytes_differ := same_but_for(a, b)):
         found = [bytes_differ]

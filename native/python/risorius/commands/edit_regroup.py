@@ -24,6 +24,7 @@ from .files import (
     read,
     read_bytes,
     refuse_same_file,
+    require_writable,
     summary,
 )
 
@@ -115,6 +116,7 @@ def complain(args: argparse.Namespace) -> None:
         raise CommandLineError(f"--foreign-share: 0 to 1 was expected, found {args.foreign_share}")
     if not args.force:
         refuse_same_file(args.input, args.output)
+    require_writable(args.output, args.plot)
 
 
 def read_regions(name: str) -> edit.Regions:
@@ -214,7 +216,7 @@ def _require_plot() -> None:
         ) from error
 
 
-def _regroup(args: argparse.Namespace) -> None:
+def run(args: argparse.Namespace) -> int:
     threshold = parse_threshold(args.threshold)
     complain(args)
     kinds = [
@@ -248,12 +250,4 @@ def _regroup(args: argparse.Namespace) -> None:
         print(f"{label(args.output, '<stdout>')}: {summary(dna)}, {counted(len(data), 'byte')}\n",
               file=out)  # fmt: skip
     print(json.dumps(facts, indent=2) if args.json else page(facts), file=out)
-
-
-def run(args: argparse.Namespace) -> int:
-    try:
-        _regroup(args)
-    except (CommandLineError, InputError) as error:
-        print(f"risorius: {error}", file=sys.stderr)
-        return 2 if isinstance(error, CommandLineError) else 1
     return 0

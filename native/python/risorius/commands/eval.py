@@ -186,12 +186,8 @@ def check_options(args: argparse.Namespace) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    try:
-        check_options(args)
-        return eval_clip.run(args) if args.out is not None else run_pose(args)
-    except CommandLineError as error:
-        print(f"risorius: {error}", file=sys.stderr)
-        return 2
+    check_options(args)
+    return eval_clip.run(args) if args.out is not None else run_pose(args)
 
 
 def run_pose(args: argparse.Namespace) -> int:

@@ -14,8 +14,8 @@ from risorius import fileio, importing
 from risorius.batch.baking import DEFAULT_PARTS, bake
 from risorius.batch.clips import load_performance
 from risorius.batch.face import PARTS, load_face, prepared
-from risorius.batch.files import sentence
 from risorius.batch.progress import Progress
+from risorius.errors import ArgumentError
 
 from .files import CommandLineError, counted, refuse_same_file
 
@@ -63,10 +63,10 @@ def parse_frames(text: str) -> tuple[int | None, int | None]:
     """ "A:B" -> (A, B). Raises: ValueError."""
     first, colon, end = text.partition(":")
     if not (colon and all(t == "" or (t.isascii() and t.isdigit()) for t in (first, end))):
-        raise ValueError(f"A:B was expected, e.g. 0:240, found {text!r}")
+        raise ArgumentError(f"A:B was expected, e.g. 0:240, found {text!r}")
     out = (int(first) if first else None, int(end) if end else None)
     if out[1] is not None and (out[0] or 0) >= out[1]:
-        raise ValueError(f"A:B with A below B was expected, found {text!r}")
+        raise ArgumentError(f"A:B with A below B was expected, found {text!r}")
     return out
 
 
@@ -74,9 +74,9 @@ def parse_parts(texts: list[str]) -> tuple[str, ...]:
     """Parts in the order of PARTS. Raises: ValueError: an unknown one, one twice, none."""
     for text in texts:
         if text not in PARTS:
-            raise ValueError(f"some of {', '.join(PARTS)} were expected, found {text!r}")
+            raise ArgumentError(f"some of {', '.join(PARTS)} were expected, found {text!r}")
     if not texts or len(set(texts)) != len(texts):
-        raise ValueError(f"some of {', '.join(PARTS)} were expected, each once")
+        raise ArgumentError(f"some of {', '.join(PARTS)} were expected, each once")
     return tuple(part for part in PARTS if part in texts)
 
 
@@ -87,7 +87,7 @@ def parse_rate(text: str) -> float:
     except ValueError:
         rate = math.nan
     if not 0 < rate <= 1e6:
-        raise ValueError(f"frames per second above 0 were expected, found {text!r}")
+        raise ArgumentError(f"frames per second above 0 were expected, found {text!r}")
     return rate
 
 
@@ -155,24 +155,20 @@ def run(args: argparse.Namespace) -> int:
     parts = _option("what", lambda text: parse_parts(text.split(",")), args.what, DEFAULT_PARTS)
     _option("mapping", importing.load_mapping, args.mapping, None)
     kind, out = _target(args)
+    face = load_face(Path(args.controls[0]), quaternions=args.quaternions)
+    performance = load_performance(args.file, face, args.mapping)
+    clip = prepared(performance.clip, rate, frames)
     try:
-        face = load_face(Path(args.controls[0]), quaternions=args.quaternions)
-        performance = load_performance(args.file, face, args.mapping)
-        clip = prepared(performance.clip, rate, frames)
-        progress = Progress(clip.frame_count, "frames")
-        try:
-            face.check_lod(args.lod)
-        except ValueError as error:
-            raise CommandLineError(f"--lod: {error}") from None
-        facts = bake(
-            clip, face, args.lod, {kind: out}, parts=parts, compress=args.compress, threads=0,
-            progress=lambda done: progress.update(done, done),
-        )  # fmt: skip
-        fileio.sweep([out.parent])
-        progress.close()
-    except (OSError, ValueError, MemoryError) as error:
-        print(f"risorius: {sentence(error)}", file=sys.stderr)
-        return 1
+        face.check_lod(args.lod)
+    except ArgumentError as error:
+        raise CommandLineError(f"--lod: {error}") from None
+    progress = Progress(clip.frame_count, "frames")
+    facts = bake(
+        clip, face, args.lod, {kind: out}, parts=parts, compress=args.compress, threads=0,
+        progress=lambda done: progress.update(done, done),
+    )  # fmt: skip
+    fileio.sweep([out.parent])
+    progress.close()
     facts["mapping"] = performance.mapping
     facts["unmapped_curves"] = list(performance.unmapped)
     facts["output"] = str(out)

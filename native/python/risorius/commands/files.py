@@ -5,24 +5,29 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import risorius
+from risorius import fileio
+from risorius.errors import RisoriusError
 
 KINDS = ("dna", "json")
 
 
-class InputError(Exception):
+class InputError(RisoriusError):
     """Input that cannot be used: one line that names the file and the place.
 
     offset: byte offset, where it is known and no DnaError is the cause.
     """
 
-    offset: int | None = None
+    code = "input"
 
 
-class CommandLineError(Exception):
+class CommandLineError(RisoriusError):
     """What was typed makes no sense."""
+
+    code = "command_line"
 
 
 def label(name: str, standard: str = "<stdin>") -> str:
@@ -56,6 +61,31 @@ def refuse_same_file(source: str, target: str) -> None:
         return
     if same:
         raise CommandLineError(f"{target}: OUTPUT is INPUT itself; --force replaces it")
+
+
+def require_suffix(path: Path, kinds: Sequence[str], option: str) -> None:
+    """Raises CommandLineError for a name of an output that ends otherwise."""
+    if path.suffix.lower() not in kinds:
+        *most, last = kinds
+        listed = f"{', '.join(most)} or {last}"
+        raise CommandLineError(
+            f"{option}: a name ending in {listed} was expected, found {path.name!r}"
+        )
+
+
+def require_writable(*names: str | Path | None) -> None:
+    """Before long work: what will be written has a place; "-" and None need none.
+
+    Raises:
+        InputError: no folder, or one that may not be written to.
+    """
+    for name in names:
+        if name is None or str(name) == "-":
+            continue
+        try:
+            fileio.check_writable(name)
+        except OSError as error:
+            raise InputError(f"{name}: cannot write it: {error.strerror}") from error
 
 
 def read_bytes(name: str) -> bytes:

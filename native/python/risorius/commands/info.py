@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from typing import Any
 import risorius
 
 from . import diff
+from .files import CommandLineError
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -144,8 +144,7 @@ def page(facts: dict[str, Any]) -> str:
 
 def run(args: argparse.Namespace) -> int:
     if (args.file is None) == (args.diff is None) or (args.all and not args.diff):
-        print("risorius: info: either FILE or --diff A B [--all] was expected", file=sys.stderr)
-        return 2
+        raise CommandLineError("info: either FILE or --diff A B [--all] was expected")
     if args.diff:
         return diff.run(*args.diff, everything=args.all, as_json=args.json)
     facts = describe(risorius.load(args.file))

@@ -10,20 +10,19 @@ from pathlib import Path
 from time import monotonic, sleep
 from types import FrameType
 
-from ..clip_file import ClipError
-from ..importing import MappingError, csv_text, write_text
+from ..importing import csv_text, write_text
 from ..live import (
     EVERYWHERE,
     PORTS,
     SOURCES,
     THIS_MACHINE,
-    LiveError,
     Receiver,
     Shaper,
     Status,
     Take,
     own_address,
 )
+from .files import CommandLineError, InputError, require_suffix, require_writable
 
 _KINDS = (".rzc", ".csv")
 
@@ -54,46 +53,38 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.set_defaults(func=run)
 
 
-def complaint(args: argparse.Namespace) -> str | None:
-    """What is wrong with the command line before anything is listened to."""
+def complain(args: argparse.Namespace) -> None:
+    """Raises CommandLineError for what is wrong before anything is listened to."""
     if args.port is not None and not 0 <= args.port <= 65535:
-        return f"--port: 0 to 65535 was expected, found {args.port}"
+        raise CommandLineError(f"--port: 0 to 65535 was expected, found {args.port}")
     if args.seconds is not None and not args.seconds > 0.0:
-        return f"--seconds: more than 0 was expected, found {args.seconds:g}"
+        raise CommandLineError(f"--seconds: more than 0 was expected, found {args.seconds:g}")
     if args.record is None:
-        return None
-    if args.record.suffix.lower() not in _KINDS:
-        return f"--record: a name ending in .rzc or .csv was expected, found {args.record.name!r}"
-    if not args.record.parent.is_dir():
-        return f"--record: {args.record.parent} is no folder"
-    return None
+        return
+    require_suffix(args.record, _KINDS, "--record")
+    require_writable(args.record)
 
 
 def run(args: argparse.Namespace) -> int:
-    if wrong := complaint(args):
-        print(f"risorius: {wrong}", file=sys.stderr)
-        return 2
+    complain(args)
     receiver = Receiver(args.source, args.port, EVERYWHERE if args.everywhere else THIS_MACHINE)
-    try:
-        shaper = Shaper(args.mapping, gain=args.gain)
-        receiver.start()
-    except (LiveError, MappingError) as error:
-        print(f"risorius: {error}", file=sys.stderr)
-        return 1
+    shaper = Shaper(args.mapping, gain=args.gain)
+    receiver.start()
     take = receiver.record(args.subject)
     try:
         _listen(receiver, args)
     finally:
         receiver.stop()
     receiver.finish(take)
-    return _save(take, shaper, args.record) if args.record is not None else 0
+    if args.record is not None:
+        _save(take, shaper, args.record)
+    return 0
 
 
-def _save(take: Take, shaper: Shaper, path: Path) -> int:
-    """Write what was recorded, and say what is not in it. Returns: the exit code."""
+def _save(take: Take, shaper: Shaper, path: Path) -> None:
+    """Write what was recorded, and say what is not in it."""
     if not len(take):
-        print(f"risorius: {path} was not written: no face came", file=sys.stderr)
-        return 1
+        raise InputError(f"{path} was not written: no face came")
     if take.full:
         print(f"risorius: the take is full: {take.full} frames were left out", file=sys.stderr)
     if missed := take.unmapped(shaper):
@@ -105,13 +96,8 @@ def _save(take: Take, shaper: Shaper, path: Path) -> int:
         else:
             clip.save(path)
     except OSError as error:
-        print(f"risorius: {path}: cannot write it: {error.strerror}", file=sys.stderr)
-        return 1
-    except ClipError as error:
-        print(f"risorius: {error}", file=sys.stderr)
-        return 1
+        raise InputError(f"{path}: cannot write it: {error.strerror}") from error
     print(f"{path}: {clip.frame_count} frames of {take.subject}, {clip.duration:.3f} s")
-    return 0
 
 
 def _listen(receiver: Receiver, args: argparse.Namespace) -> None:

@@ -5,13 +5,14 @@ from __future__ import annotations
 
 import argparse
 import os
-import sys
 import tempfile
 from pathlib import Path
 
 import risorius
 
-_NEEDS = "risorius: plot draws with Matplotlib, which is not installed: pip install risorius[plot]"
+from .files import CommandLineError, InputError, read_bytes, require_suffix, require_writable
+
+_NEEDS = "plot draws with Matplotlib, which is not installed: pip install risorius[plot]"
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -31,13 +32,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.set_defaults(func=run)
 
 
-def complaint(args: argparse.Namespace) -> str | None:
-    """What is wrong with the command line before the file is looked at."""
-    if args.out.suffix.lower() not in (".html", ".png"):
-        return f"-o: a name ending in .html or .png was expected, found {args.out.name!r}"
+def complain(args: argparse.Namespace) -> None:
+    """Raises CommandLineError for what is wrong before the file is looked at."""
+    require_suffix(args.out, (".html", ".png"), "-o")
+    require_writable(args.out)
     if not 40 <= args.dpi <= 600:
-        return f"--dpi: 40 to 600 was expected, found {args.dpi}"
-    return None
+        raise CommandLineError(f"--dpi: 40 to 600 was expected, found {args.dpi}")
 
 
 def write(path: Path, data: bytes) -> None:
@@ -56,34 +56,22 @@ def write(path: Path, data: bytes) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    if wrong := complaint(args):
-        print(f"risorius: {wrong}", file=sys.stderr)
-        return 2
+    complain(args)
     try:
         from ..plot import page, sheet
     except ImportError as error:
         if (error.name or "").partition(".")[0] != "matplotlib":
             raise
-        print(_NEEDS, file=sys.stderr)
-        return 1
+        raise InputError(_NEEDS) from error
     from ..plot.facts import gather
 
-    try:
-        data = args.file.read_bytes()
-    except OSError as error:
-        print(f"risorius: {error}", file=sys.stderr)
-        return 1
+    data = read_bytes(str(args.file))
     dna = risorius.load(data)
     if not 0 <= args.lod < max(1, dna.lod_count):
         last = max(1, dna.lod_count) - 1
-        print(f"risorius: --lod: 0 to {last} was expected, found {args.lod}", file=sys.stderr)
-        return 2
+        raise CommandLineError(f"--lod: 0 to {last} was expected, found {args.lod}")
     facts = gather(dna, data, args.file.name, args.title)
     kind = page if args.out.suffix.lower() == ".html" else sheet
-    try:
-        write(args.out, kind.render(facts, args.lod, args.dpi))
-    except OSError as error:
-        print(f"risorius: {error}", file=sys.stderr)
-        return 1
+    write(args.out, kind.render(facts, args.lod, args.dpi))
     print(f"{args.out}: {args.out.stat().st_size / 1e6:.1f} MB")
     return 0

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 import time
 from pathlib import Path
 
@@ -23,20 +22,16 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    from ..sample import SourceError, build_sample
+    from ..sample import build_sample
 
     begin = time.monotonic()
 
     def say(text: str) -> None:
         print(f"[{time.monotonic() - begin:5.1f} s] {text}", flush=True)
 
-    try:
-        dna = build_sample(
-            args.out, person=PEOPLE[args.person], data=args.data, offline=args.offline, say=say
-        )
-    except (SourceError, OSError) as error:
-        print(f"risorius: {error}", file=sys.stderr)
-        return 1
+    dna = build_sample(
+        args.out, person=PEOPLE[args.person], data=args.data, offline=args.offline, say=say
+    )
     vertices = sum(len(mesh.positions) for mesh in dna.meshes)
     say(
         f"{args.out}: {len(dna.meshes)} meshes, {vertices} vertices, "

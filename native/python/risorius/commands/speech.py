@@ -12,7 +12,7 @@ from ..clip import Clip
 from ..importing import writing
 from ..speech import Heard, Phoneme, animate, listen
 from ..speech.listening import confidence
-from .files import InputError, read_bytes
+from .files import CommandLineError, InputError, read_bytes, require_suffix, require_writable
 
 _KINDS = (".rzc", ".csv", ".json")
 
@@ -46,31 +46,24 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.set_defaults(func=run)
 
 
-def complaint(args: argparse.Namespace) -> str | None:
-    """What is wrong with the command line before the voice is listened to."""
-    if args.out.suffix.lower() not in _KINDS:
-        return f"-o: a name ending in .rzc, .csv or .json was expected, found {args.out.name!r}"
+def complain(args: argparse.Namespace) -> None:
+    """Raises CommandLineError for what is wrong before the voice is listened to."""
+    require_suffix(args.out, _KINDS, "-o")
+    require_writable(args.out, args.phonemes)
     if not 1.0 <= args.rate <= 1000.0:
-        return f"--rate: 1 to 1000 was expected, found {args.rate:g}"
+        raise CommandLineError(f"--rate: 1 to 1000 was expected, found {args.rate:g}")
     if not 0.0 <= args.intensity <= 4.0:
-        return f"--intensity: 0 to 4 was expected, found {args.intensity:g}"
+        raise CommandLineError(f"--intensity: 0 to 4 was expected, found {args.intensity:g}")
     if args.seed < 0:
-        return f"--seed: 0 or more was expected, found {args.seed}"
-    return None
+        raise CommandLineError(f"--seed: 0 or more was expected, found {args.seed}")
 
 
 def run(args: argparse.Namespace) -> int:
-    if wrong := complaint(args):
-        print(f"risorius: {wrong}", file=sys.stderr)
-        return 2
-    try:
-        heard, clip = _spoken(args)
-        _save(clip, args.out)
-        if args.phonemes is not None:
-            writing.write_text(phoneme_table(heard.phonemes), args.phonemes)
-    except (InputError, OSError, ValueError) as error:
-        print(f"risorius: {error}", file=sys.stderr)
-        return 1
+    complain(args)
+    heard, clip = _spoken(args)
+    _save(clip, args.out)
+    if args.phonemes is not None:
+        writing.write_text(phoneme_table(heard.phonemes), args.phonemes)
     for note in heard.notes:
         print(f"risorius: {args.voice}: {note}", file=sys.stderr)
     print(json.dumps(_report(heard, clip), indent=1) if args.json else _summary(heard, clip, args))

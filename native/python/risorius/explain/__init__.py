@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 import risorius
+from risorius.errors import ArgumentError
 
 from .behavior import (
     explain_correctives,
@@ -55,10 +56,10 @@ def explain(
         ValueError: a rig with quaternions, controls that are not finite.
     """
     if rig.rotation != "euler":
-        raise ValueError("explain: a rig with rotation='euler' was expected")
+        raise ArgumentError("explain: a rig with rotation='euler' was expected")
     values = np.asarray(raw, np.float32)
     if not np.isfinite(values).all():
-        raise ValueError("explain: raw controls that are finite were expected")
+        raise ArgumentError("explain: raw controls that are finite were expected")
     pose = rig.evaluate(values, lod=lod)
     names = ControlNames(dna)
     controls = np.asarray(pose.controls, float)

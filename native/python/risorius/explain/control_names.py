@@ -10,10 +10,13 @@ from dataclasses import dataclass
 
 import risorius
 from risorius import arkit
+from risorius.errors import RisoriusError
 
 
-class UnknownControlError(ValueError):
+class UnknownControlError(RisoriusError):
     """No control, or more than one, goes by what was typed."""
+
+    code = "unknown_control"
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from ..errors import ArgumentError
 from ..reactions import named_weights, read_toml
 
 FILES = ("emotions.toml", "visemes.toml", "faces.toml")
@@ -64,7 +65,9 @@ def get(name: str) -> Expression:
     """One of Risorius' own. Raises: ValueError naming some that there are."""
     own = _own()
     if name not in own:
-        raise ValueError(f"{name}: an expression such as {', '.join(list(own)[:6])} was expected")
+        raise ArgumentError(
+            f"{name}: an expression such as {', '.join(list(own)[:6])} was expected"
+        )
     return own[name]
 
 
@@ -119,17 +122,17 @@ def _parsed(table: dict[str, Any], where: str) -> dict[str, Expression]:
     prefix, group = table.get("prefix", ""), table.get("group", "")
     rows = table.get("expressions")
     if not isinstance(rows, dict) or not isinstance(prefix, str) or not isinstance(group, str):
-        raise ValueError(f"{where}: a table of expressions was expected, found {sorted(table)}")
+        raise ArgumentError(f"{where}: a table of expressions was expected, found {sorted(table)}")
     return {name: _expression(name, row, prefix, group, where) for name, row in rows.items()}
 
 
 def _expression(name: str, row: Any, prefix: str, group: str, where: str) -> Expression:
     place = f"{where}: {name}"
     if not isinstance(row, dict) or not isinstance(row.get("weights"), dict):
-        raise ValueError(f"{place}: a table with weights was expected, found {row!r}")
+        raise ArgumentError(f"{place}: a table with weights was expected, found {row!r}")
     unknown = set(row) - {"label", "group", "description", "weights"}
     if unknown:
-        raise ValueError(
+        raise ArgumentError(
             f"{place}: label, group, description and weights were expected, "
             f"found {sorted(unknown)[0]}"
         )

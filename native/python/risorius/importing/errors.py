@@ -1,11 +1,15 @@
 # SPDX-License-Identifier: MIT
-"""The one error of this package."""
+"""The error of files of animation."""
 
 from __future__ import annotations
 
+from ..errors import RisoriusError
 
-class AnimationFileError(ValueError):
+
+class AnimationFileError(RisoriusError):
     """A file of animation, or a mapping, that cannot be used; the sentence names file and place."""
+
+    code = "animation_file"
 
     def __init__(
         self, name: str, message: str, *, line: int | None = None, column: int | str | None = None
@@ -17,4 +21,5 @@ class AnimationFileError(ValueError):
         place = "" if line is None else f", line {line}"
         if column is not None:
             place += f", column {column}"
-        super().__init__(f"{name}{place}: {message}")
+        self.where = f"{name}{place}"
+        super().__init__(f"{self.where}: {message}")

@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from ..errors import ArgumentError
+
 Doubles = npt.NDArray[np.float64]
 Bytes = npt.NDArray[np.uint8]
 
@@ -97,4 +99,4 @@ def on_one_clock(curves: Sequence[Keys], rate: float | None = None) -> tuple[Dou
 
 def _check_size(curves: int, frames: float) -> None:
     if curves * frames > MAX_VALUES:
-        raise ValueError(f"{curves} curves of {frames:.0f} frames are more than can be held")
+        raise ArgumentError(f"{curves} curves of {frames:.0f} frames are more than can be held")

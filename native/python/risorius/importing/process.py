@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..clip import Clip, Event
+from ..errors import ArgumentError
 from .mapping import ANGLES, fits
 
 Doubles = npt.NDArray[np.float64]
@@ -29,7 +30,7 @@ def resample(clip: Clip, rate: float) -> Clip:
         ValueError: a rate that is not above 0.
     """
     if not 0.0 < rate < 1e6:
-        raise ValueError(f"a rate above 0 frames per second was expected, found {rate}")
+        raise ArgumentError(f"a rate above 0 frames per second was expected, found {rate}")
     return clip.resampled(rate)
 
 
@@ -49,7 +50,7 @@ def cut(clip: Clip, first: float, last: float) -> Clip:
     at = clip.frame_times()
     keep = (at >= first - 1e-9) & (at <= last + 1e-9)
     if not keep.any():
-        raise ValueError(
+        raise ArgumentError(
             f"frames from {first:g} s to {last:g} s were expected, the clip goes from "
             f"{at.min(initial=0.0):g} s to {at.max(initial=0.0):g} s"
         )
@@ -77,7 +78,7 @@ def adjust(
         for pattern, amount in table.items():
             rows = [i for i, name in enumerate(clip.names) if fits(name, pattern)]
             if not rows:
-                raise ValueError(f"{pattern}: fits no control of the clip")
+                raise ArgumentError(f"{pattern}: fits no control of the clip")
             curves[rows] = curves[rows] * amount if is_gain else curves[rows] + amount
     return clip.replaced(curves=curves)
 
@@ -97,7 +98,7 @@ def calibrate(clip: Clip, first: int, last: int | None = None) -> Clip:
     """
     last = first if last is None else last
     if not 0 <= first <= last < clip.frame_count:
-        raise ValueError(
+        raise ArgumentError(
             f"frames from 0 to {clip.frame_count - 1} were expected, found {first} to {last}"
         )
     curves = clip.curves.astype(np.float64)
@@ -125,7 +126,7 @@ def smooth(clip: Clip, window: float, *, order: int = 3) -> Clip:
         ValueError: a window or an order that is not above 0.
     """
     if not window > 0.0 or order < 0:
-        raise ValueError(f"a window above 0 s was expected, found {window:g} s, degree {order}")
+        raise ArgumentError(f"a window above 0 s was expected, found {window:g} s, degree {order}")
     half = round(0.5 * window * clip.rate)
     if 2 * half <= order or clip.frame_count <= 2 * half:
         return clip
@@ -157,7 +158,7 @@ def gaussian(clip: Clip, width: float) -> Clip:
         ValueError: a width that is not above 0.
     """
     if not width > 0.0:
-        raise ValueError(f"a width above 0 s was expected, found {width:g} s")
+        raise ArgumentError(f"a width above 0 s was expected, found {width:g} s")
     at = clip.frame_times()
     reach = int(np.ceil(4.0 * width * clip.rate))
     total, weights = np.zeros(clip.curves.shape), np.zeros(clip.frame_count)
@@ -181,7 +182,7 @@ class OneEuro:
     def __init__(self, cutoff: float = 1.5, beta: float = 5.0, speed_cutoff: float = 1.0) -> None:
         """Args: cutoff Hz at rest; Hz more per unit and second; cutoff Hz of the speed itself."""
         if not (cutoff > 0.0 and beta >= 0.0 and speed_cutoff > 0.0):
-            raise ValueError("cutoffs above 0 Hz and a beta of 0 or more were expected")
+            raise ArgumentError("cutoffs above 0 Hz and a beta of 0 or more were expected")
         self.cutoff, self.beta, self.speed_cutoff = cutoff, beta, speed_cutoff
         self._time = 0.0
         self._values: Doubles | None = None
@@ -292,5 +293,5 @@ def parse_amounts(texts: Sequence[str]) -> dict[str, float]:
         except ValueError:
             equals = ""
         if not equals or not pattern or not np.isfinite(out[pattern]):
-            raise ValueError(f"PATTERN=NUMBER was expected, found {text!r}")
+            raise ArgumentError(f"PATTERN=NUMBER was expected, found {text!r}")
     return out

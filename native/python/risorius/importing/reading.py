@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..clip import Clip
+from ..errors import ArgumentError
 from . import fbx, gltf, named_json, tables, visemes
 from .errors import AnimationFileError
 from .keys import Keys, on_one_clock
@@ -95,7 +96,7 @@ class Imported:
             ValueError: no mapping fits, a mapping that cannot be used, a GUI mapping without a rig.
         """
         if rotations not in ROTATIONS:
-            raise ValueError(
+            raise ArgumentError(
                 f"rotations: one of {', '.join(ROTATIONS)} was expected, found {rotations!r}"
             )
         chosen = load_mapping(mapping if mapping is not None else self._fitting())
@@ -112,7 +113,7 @@ class Imported:
         clip = _without_angles(done, rotations, report)
         if chosen.is_gui:
             if rig is None:
-                raise ValueError(
+                raise ArgumentError(
                     f"mapping {chosen.name}: its curves are GUI controls, which only a rig's own "
                     "table turns into raw controls: give the rig"
                 )
@@ -200,10 +201,10 @@ def read(
         ValueError: an option that makes no sense.
     """
     if kind is not None and kind not in KINDS:
-        raise ValueError(f"kind: one of {', '.join(KINDS)} was expected, found {kind!r}")
+        raise ArgumentError(f"kind: one of {', '.join(KINDS)} was expected, found {kind!r}")
     for name, value in (("rate", rate), ("timecode_rate", timecode_rate)):
         if value is not None and not 0.0 < value < 1e6:
-            raise ValueError(f"{name}: frames a second above 0 were expected, found {value}")
+            raise ArgumentError(f"{name}: frames a second above 0 were expected, found {value}")
     file = Path(path)
     data = read_bytes(file)
     try:
@@ -316,7 +317,7 @@ def import_curves(
     """
     keys = {name: _keys(name, times, values) for name, (times, values) in curves.items()}
     if not any(key.times.size for key in keys.values()):
-        raise ValueError(f"{source}: curves with keys were expected, found none")
+        raise ArgumentError(f"{source}: curves with keys were expected, found none")
     times, rows = on_one_clock(list(keys.values()))
     clip = make_clip(list(keys), rows, times, metadata={"source": source, "kind": "curves"})
     found = Imported(clip, "curves", best_mapping(_moving(clip)) or "", source)
@@ -326,11 +327,11 @@ def import_curves(
 def _keys(name: str, times: npt.ArrayLike, values: npt.ArrayLike) -> Keys:
     t, v = np.asarray(times, np.float64), np.asarray(values, np.float64)
     if t.ndim != 1 or t.shape != v.shape:
-        raise ValueError(
+        raise ArgumentError(
             f"{name}: as many values as times were expected, found {v.shape}, {t.shape}"
         )
     if not (np.isfinite(t).all() and np.isfinite(v).all()):
-        raise ValueError(f"{name}: finite times and values were expected")
+        raise ArgumentError(f"{name}: finite times and values were expected")
     if (np.diff(t) <= 0.0).any():
-        raise ValueError(f"{name}: times that ascend were expected")
+        raise ArgumentError(f"{name}: times that ascend were expected")
     return Keys(t, v)

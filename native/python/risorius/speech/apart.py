@@ -31,6 +31,7 @@ from typing import IO, Any
 import numpy as np
 
 from ..clip import Clip, Event
+from ..errors import ArgumentError, RisoriusError
 from . import speak
 from .audio import AudioError
 from .listening import Cancel, CancelledError, Progress
@@ -45,12 +46,14 @@ _BEGIN = (
 _ERRORS: dict[str, type[Exception]] = {
     "AudioError": AudioError,
     "MissingError": MissingError,
-    "ValueError": ValueError,
+    "ArgumentError": ArgumentError,
 }
 
 
-class RecogniserError(ValueError):
+class RecogniserError(RisoriusError):
     """The process of the recogniser could not be started, or ended by itself; one sentence."""
+
+    code = "recogniser"
 
 
 def speak_apart(

@@ -13,6 +13,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from ..errors import RisoriusError
+
 Samples = npt.NDArray[np.float32]
 
 RATE = 16000
@@ -25,8 +27,10 @@ _PCM, _FLOAT, _EXTENSIBLE = 1, 3, 0xFFFE
 _LENGTH_UNKNOWN = (0, 0xFFFFFFFF)  # what programs that write to a pipe leave in the size fields
 
 
-class AudioError(ValueError):
+class AudioError(RisoriusError):
     """A sound file that cannot be used; the sentence names the file and says why."""
+
+    code = "audio"
 
 
 class _Format(NamedTuple):

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from ..errors import ArgumentError, RisoriusError
 from . import text, voting
 from .audio import RATE, Samples, read_audio, resample
 from .phones import Phoneme
@@ -35,8 +36,10 @@ _NO_SPEECH = "no speech was heard"
 _STOPS = frozenset({"P", "B", "T", "D", "K", "G", "CH", "JH"})
 
 
-class CancelledError(Exception):
+class CancelledError(RisoriusError):
     """The caller's cancel() said so."""
+
+    code = "cancelled"
 
 
 class Heard(NamedTuple):
@@ -73,7 +76,7 @@ def listen(
     """
     words = None if transcript is None else text.words(transcript)
     if words is not None and not words:
-        raise ValueError("the transcript has no English word: letters a to z were expected")
+        raise ArgumentError("the transcript has no English word: letters a to z were expected")
     recogniser = Recogniser()
     samples, rate = read_audio(path)
     samples = resample(samples, rate)

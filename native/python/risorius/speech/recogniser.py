@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..errors import RisoriusError
 from . import letters
 from .audio import RATE, Samples
 from .phones import Phoneme, viseme_of
@@ -37,8 +38,10 @@ _ALIGNERS: dict[str, dict[str, Any]] = {
 }
 
 
-class MissingError(ValueError):
+class MissingError(RisoriusError):
     """PocketSphinx is not installed; the sentence says how to get it."""
+
+    code = "missing_package"
 
 
 class Segment(NamedTuple):
