@@ -8,6 +8,7 @@
 #include "bindings/arrays.h"
 #include "compile/compile.h"
 #include "core/parallel_for.h"
+#include "dna/io.h"
 #include "rig/bone_space.h"
 #include "rig/file.h"
 #include "rig/morph.h"
@@ -46,6 +47,18 @@ void require_finite(const FloatArray& array, const char* name) {
     spoiled |= (std::bit_cast<std::uint32_t>(begin[i]) & kExponent) == kExponent ? 1u : 0u;
   }
   if (spoiled != 0) throw py::value_error(std::string(name) + ": finite numbers were expected");
+}
+
+py::list quaternion_column_orders(const dna::Dna& dna) {
+  std::vector<dna::Warning> warnings;
+  unwrap(dna::validate(dna, warnings));
+  const std::vector<bool> joints = compile::quaternion_joints(dna);
+  py::list out;
+  for (const dna::JointGroup& g : dna.behavior.joint_groups) {
+    const auto order = compile::quaternion_column_order(g, dna.descriptor.lod_count, joints);
+    out.append(py::array_t<std::uint32_t>(static_cast<py::ssize_t>(order.size()), order.data()));
+  }
+  return out;
 }
 
 FloatArray matrix_argument(const py::object& object, const char* name, py::ssize_t rows) {
@@ -528,6 +541,12 @@ void bind_rig(py::module_& m) {
   bind_morph(m);
   bind_bone_space(m);
   m.def("rig_block_version", &rig::block_version, "Of Rig.to_bytes; others are refused.");
+  m.def(
+      "compile_version", [] { return compile::kVersion; },
+      "Of what Rig makes of a DNA; counted up where the poses of an old file change.");
+  m.def("quaternion_column_orders", &quaternion_column_orders, py::arg("dna"),
+        "Of each joint group the columns that turn quaternion joints, uint32[n], in the order in "
+        "which their rotations are multiplied.");
   m.def(
       "available_simd", [] { return std::string(simd::available_kernels()); },
       "The instruction sets that this processor has, as simd= takes them, apart by blanks.");

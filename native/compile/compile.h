@@ -3,7 +3,9 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "core/result.h"
 #include "dna/dna.h"
@@ -26,6 +28,23 @@ struct CompileOptions {
 ///        kInvalidValue for a joint value beyond 65504 in float16; kLimitExceeded.
 /// From:  dna-format 12; joint matrices by columns, so that inactive columns cost nothing
 core::Result<rig::Rig> compile(const dna::Dna& dna, const CompileOptions& options = {});
+
+/// What compile makes of a file; counted up where the poses of an old file change. What was
+/// compiled by another version is compiled anew.
+constexpr std::uint32_t kVersion = 2;
+
+/// [joints]: those whose rotation the file's joint metadata declares a quaternion.
+std::vector<bool> quaternion_joints(const dna::Dna& dna);
+
+/// The columns of a joint group that turn quaternion joints, in the order in which their rotations
+/// are multiplied: that of the reference, whose storage swaps columns that are empty at a LOD to
+/// the end. Columns that already stand by the number of their LODs, most first, keep their order.
+/// In:    quaternion_joints  of the group's file, as quaternion_joints() has it
+/// Out:   columns of the group, each at most once
+/// Cost:  the values of the rows that turn quaternion joints
+std::vector<std::uint32_t> quaternion_column_order(const dna::JointGroup& g,
+                                                   std::uint32_t lod_count,
+                                                   const std::vector<bool>& quaternion_joints);
 
 /// Compiles the blend shape targets of one mesh; each delta d is stored as matrix * d.
 /// In:    matrix  row-major 3x3, e.g. the file's axes and units to the scene's

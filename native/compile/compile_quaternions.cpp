@@ -5,7 +5,9 @@
 #include <functional>
 #include <map>
 #include <numeric>
+#include <utility>
 
+#include "compile/compile.h"
 #include "compile/parts.h"
 
 namespace risorius::compile {
@@ -14,13 +16,20 @@ namespace {
 
 using rig::RigData;
 
-std::vector<bool> quaternion_joint_flags(const dna::Dna& dna) {
-  std::vector<bool> flags(dna.definition.joint_names.size(), false);
-  const auto& entries = dna.joint_behavior_metadata.joint_representations;
-  for (std::size_t j = 0; j < entries.size() && j < flags.size(); ++j) {
-    flags[j] = entries[j].rotation == 1;
+// The first row of each column that turns a quaternion joint; kNone where there is none.
+std::vector<std::uint32_t> first_turning_rows(const dna::JointGroup& g,
+                                              const std::vector<bool>& quaternion_joints) {
+  const std::size_t columns = g.input_indices.size();
+  std::vector<std::uint32_t> first(columns, rig::kNone);
+  for (std::uint32_t r = 0; r < g.output_indices.size(); ++r) {
+    const std::uint32_t joint = g.output_indices[r] / 9u, attribute = g.output_indices[r] % 9u;
+    if (attribute < 3 || attribute > 5 || !quaternion_joints[joint]) continue;
+    const float* row = g.values.data() + r * columns;
+    for (std::size_t c = 0; c < columns; ++c) {
+      if (first[c] == rig::kNone && row[c] != 0.0f) first[c] = r;
+    }
   }
-  return flags;
+  return first;
 }
 
 // Rotation rows of a joint in a group, by axis; kNone where there is none.
@@ -99,12 +108,41 @@ void add_group(const dna::JointGroup& g, std::uint32_t index, const std::vector<
     turned.push_back(rows);
   }
   if (turned.empty()) return;
-  for (std::size_t c = 0; c < g.input_indices.size(); ++c) {
+  for (const std::uint32_t c : quaternion_column_order(g, out.lod_count, flags)) {
     add_column(g, c, turned, first_slot, out);
   }
 }
 
 }  // namespace
+
+std::vector<bool> quaternion_joints(const dna::Dna& dna) {
+  std::vector<bool> flags(dna.definition.joint_names.size(), false);
+  const auto& entries = dna.joint_behavior_metadata.joint_representations;
+  for (std::size_t j = 0; j < entries.size() && j < flags.size(); ++j) {
+    flags[j] = entries[j].rotation == 1;
+  }
+  return flags;
+}
+
+std::vector<std::uint32_t> quaternion_column_order(const dna::JointGroup& g,
+                                                   std::uint32_t lod_count,
+                                                   const std::vector<bool>& quaternion_joints) {
+  const std::vector<std::uint32_t> first = first_turning_rows(g, quaternion_joints);
+  std::vector<std::uint32_t> order;
+  for (std::uint32_t c = 0; c < first.size(); ++c) {
+    if (first[c] != rig::kNone) order.push_back(c);
+  }
+  std::size_t live = order.size();  // values at every LOD so far
+  std::uint32_t rows = UINT32_MAX;  // a LOD of as many rows finds no other column empty
+  for (std::size_t l = 0; l < lod_count && l < g.lods.size(); ++l) {
+    if (g.lods[l] >= rows) continue;
+    rows = g.lods[l];
+    for (std::size_t i = live; i-- > 0;) {
+      if (first[order[i]] >= rows) std::swap(order[i], order[--live]);
+    }
+  }
+  return order;
+}
 
 rig::EulerConvention detail::euler_convention(const dna::Dna& dna) {
   static constexpr std::uint8_t kOrders[6][3] = {{0, 1, 2}, {0, 2, 1}, {1, 0, 2},
@@ -121,7 +159,7 @@ rig::EulerConvention detail::euler_convention(const dna::Dna& dna) {
 }
 
 void detail::compile_quaternion_joints(const dna::Dna& dna, const Groups& groups, RigData& out) {
-  const std::vector<bool> flags = quaternion_joint_flags(dna);
+  const std::vector<bool> flags = quaternion_joints(dna);
   std::vector<std::uint32_t> euler(flags.size(), 0);
   // In the order of the file: the last group that turns a joint wins.
   std::vector<std::uint32_t> file_order(groups.size());

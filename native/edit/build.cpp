@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Dense groups of units.
 #include <algorithm>
+#include <functional>
 #include <map>
+#include <numeric>
 #include <string>
 #include <tuple>
 
@@ -23,41 +25,33 @@ constexpr std::size_t kMost = 65535;  // rows or columns
 // Groups in the order in which they are written: later ones win.
 struct GroupKey {
   std::uint32_t below;  // the higher the layer, the earlier
-  std::uint32_t region, chain, order;
+  // levels: where units of one order cannot share a group, those of equal LODs do; else 0. The
+  // bundle's group has no region.
+  std::uint32_t region, chain, bundle, order, levels;
   auto operator<=>(const GroupKey&) const = default;
 };
 using Members = std::map<GroupKey, std::vector<const Unit*>>;
 
-Members list_members(const std::vector<Unit>& units, const Regions& regions) {
-  Members out;
-  std::uint32_t top = 0;
-  for (const Unit& u : units) top = std::max(top, u.layer);
-  const auto key = [&](const Unit& u, std::uint32_t order) {
-    return GroupKey{top - u.layer, regions.of_joint[u.joint], u.chain, order};
-  };
-  for (const Unit& u : units) {
-    if (u.order != kAnyOrder) out[key(u, u.order)].push_back(&u);
-  }
-  // What may stand in any order joins what may not, if there is something.
-  Members free;
-  for (const Unit& u : units) {
-    if (u.order == kAnyOrder) free[key(u, kAnyOrder)].push_back(&u);
-  }
-  for (auto& [at, list] : free) {
-    auto found = out.lower_bound(at);
-    const bool same = found != out.end() && found->first.below == at.below &&
-                      found->first.region == at.region && found->first.chain == at.chain;
-    auto& to = same ? found->second : out[at];
-    to.insert(to.end(), list.begin(), list.end());
-  }
-  return out;
-}
-
-// The columns of a group and where each unit's columns are among them.
+// The columns of a group and where each unit's columns are among them. Those that turn quaternions
+// stand as they are multiplied (compile::quaternion_column_order leaves them there), then the
+// others.
 class Columns {
  public:
   explicit Columns(const std::vector<const Unit*>& units) {
-    std::vector<std::pair<std::uint32_t, std::uint16_t>> ordered;  // place in the source group
+    add_source_orders(units);
+    add_ascending(units);
+    if (!units.empty() && units[0]->bundle == 0) sort_by_levels(units);
+  }
+  const Indices& controls() const { return controls_; }
+  std::size_t place(const Unit& u, std::size_t column) const {
+    return u.order >= kOfGroup ? by_source_.at(u.source[column])
+                               : by_control_.at(u.columns[column]);
+  }
+  bool keeps_orders() const { return keeps_orders_; }
+
+ private:
+  void add_source_orders(const std::vector<const Unit*>& units) {
+    std::vector<std::pair<std::uint32_t, std::uint16_t>> ordered;  // place in the source's order
     for (const Unit* u : units) {
       if (u->order < kOfGroup) continue;
       for (std::size_t c = 0; c < u->columns.size(); ++c) {
@@ -71,6 +65,9 @@ class Columns {
       by_control_.try_emplace(control, controls_.size());
       controls_.push_back(control);
     }
+  }
+
+  void add_ascending(const std::vector<const Unit*>& units) {
     Indices others;
     for (const Unit* u : units) {
       if (u->order >= kOfGroup) continue;
@@ -82,17 +79,89 @@ class Columns {
       if (by_control_.try_emplace(control, controls_.size()).second) controls_.push_back(control);
     }
   }
-  const Indices& controls() const { return controls_; }
-  std::size_t place(const Unit& u, std::size_t column) const {
-    return u.order >= kOfGroup ? by_source_.at(u.source[column])
-                               : by_control_.at(u.columns[column]);
+
+  // LODs at which each column turns a quaternion.
+  std::vector<std::uint32_t> levels_of(const std::vector<const Unit*>& units) const {
+    std::vector<std::uint32_t> levels(controls_.size(), 0);
+    for (const Unit* u : units) {
+      if (u->order == kAnyOrder) continue;
+      for (std::size_t c = 0; c < u->columns.size(); ++c) {
+        std::uint32_t& to = levels[place(*u, c)];
+        to = std::max(to, u->rows[0].levels);  // all rows have as many, but in bundles
+      }
+    }
+    return levels;
   }
 
- private:
+  void sort_by_levels(const std::vector<const Unit*>& units) {
+    const std::vector<std::uint32_t> levels = levels_of(units);
+    std::vector<std::size_t> order(controls_.size()), to(controls_.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::ranges::stable_sort(order, std::greater{}, [&](std::size_t c) { return levels[c]; });
+    Indices controls;
+    for (const std::size_t c : order) {
+      to[c] = controls.size();
+      controls.push_back(controls_[c]);
+    }
+    controls_ = std::move(controls);
+    for (auto& [source, at] : by_source_) at = to[at];
+    for (auto& [control, at] : by_control_) at = to[at];
+    for (const Unit* u : units) {
+      for (std::size_t c = 1; u->order != kAnyOrder && c < u->columns.size(); ++c) {
+        keeps_orders_ &= place(*u, c - 1) < place(*u, c);
+      }
+    }
+  }
+
   Indices controls_;
   std::map<std::uint32_t, std::size_t> by_source_;
   std::map<std::uint16_t, std::size_t> by_control_;
+  bool keeps_orders_ = true;
 };
+
+// Quaternions of one group share the order of its columns, in which those of more LODs come first.
+// Where that is not the order of one of them, those whose rows have equal LODs keep theirs: all
+// their columns have as many.
+Members separated(const Members& groups) {
+  Members out;
+  for (const auto& [key, list] : groups) {
+    const bool whole = key.bundle != 0 || Columns(list).keeps_orders();
+    for (const Unit* u : list) {
+      GroupKey to = key;
+      to.levels = whole ? 0 : u->rows[0].levels;
+      out[to].push_back(u);
+    }
+  }
+  return out;
+}
+
+Members list_members(const std::vector<Unit>& units, const Regions& regions) {
+  Members out;
+  std::uint32_t top = 0;
+  for (const Unit& u : units) top = std::max(top, u.layer);
+  const auto key = [&](const Unit& u, std::uint32_t order) {
+    const std::uint32_t region = u.bundle == 0 ? regions.of_joint[u.joint] : 0;
+    return GroupKey{top - u.layer, region, u.chain, u.bundle, order, 0};
+  };
+  for (const Unit& u : units) {
+    if (u.order != kAnyOrder) out[key(u, u.order)].push_back(&u);
+  }
+  out = separated(out);
+  // What may stand in any order joins what may not, if there is something.
+  Members free;
+  for (const Unit& u : units) {
+    if (u.order == kAnyOrder) free[key(u, kAnyOrder)].push_back(&u);
+  }
+  for (auto& [at, list] : free) {
+    auto found = out.lower_bound(at);
+    const bool same = found != out.end() && found->first.below == at.below &&
+                      found->first.region == at.region && found->first.chain == at.chain &&
+                      found->first.bundle == at.bundle;
+    auto& to = same ? found->second : out[at];
+    to.insert(to.end(), list.begin(), list.end());
+  }
+  return out;
+}
 
 struct Placed {
   const Unit* unit;

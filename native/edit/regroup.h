@@ -71,8 +71,8 @@ struct Regrouped {
 /// and nothing else is: with a threshold of 0 the function stays as it was, to the order of sums
 /// (on the scalar path, to the last bit). A row is used at the LODs where it was.
 ///
-/// Joints that are turned by quaternions keep every coefficient and the order of their columns.
-/// Where several groups write a row, or LODs do not nest, or columns of quaternions stand in an
+/// Joints that are turned by quaternions keep every coefficient and the order of their product.
+/// Where several groups write a row, or LODs do not nest, or columns of quaternions have an
 /// order that others cannot share, a region has several groups. A corrective that other things
 /// read as well stays in use at each LOD where it was.
 ///

@@ -3,9 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <map>
+#include <tuple>
 #include <utility>
+
+#include "compile/compile.h"
 
 namespace risorius::edit::detail {
 
@@ -19,15 +23,6 @@ std::uint32_t levels_of(const dna::JointGroup& g, std::uint32_t row, std::uint32
 }
 
 bool rotates(std::uint16_t output) { return output % 9 >= 3 && output % 9 <= 5; }
-
-std::vector<bool> quaternion_joints(const dna::Dna& dna) {
-  std::vector<bool> flags(dna.definition.joint_names.size(), false);
-  const auto& entries = dna.joint_behavior_metadata.joint_representations;
-  for (std::size_t j = 0; j < entries.size() && j < flags.size(); ++j) {
-    flags[j] = entries[j].rotation == 1;
-  }
-  return flags;
-}
 
 // One row: its controls in ascending order, those named twice added.
 void take_linear(const dna::JointGroup& g, std::uint32_t row, Unit& unit) {
@@ -53,19 +48,43 @@ bool is_ascending(const std::vector<std::uint16_t>& values) {
   return std::ranges::adjacent_find(values, std::greater_equal<>()) == values.end();
 }
 
-// The rows that turn a joint, column by column as they stand.
-void take_rotation(const dna::JointGroup& g, std::uint32_t group, Unit& unit) {
+// The rows that turn a joint, column by column as they are multiplied.
+void take_rotation(const dna::JointGroup& g, std::uint32_t group,
+                   const std::vector<std::uint32_t>& order, Unit& unit) {
   const std::size_t columns = g.input_indices.size();
-  for (std::size_t c = 0; c < columns; ++c) {
+  std::vector<std::uint32_t> mine;
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const std::uint32_t c = order[i];
     const auto turns = [&](const Row& r) { return g.values[r.row * columns + c] != 0.0f; };
     if (!std::ranges::any_of(unit.rows, turns)) continue;
+    mine.push_back(c);
     unit.columns.push_back(g.input_indices[c]);
-    unit.source.push_back(static_cast<std::uint32_t>(c));
+    unit.source.push_back(static_cast<std::uint32_t>(i));
   }
   for (const Row& r : unit.rows) {
-    for (const std::uint32_t c : unit.source) unit.values.push_back(g.values[r.row * columns + c]);
+    for (const std::uint32_t c : mine) unit.values.push_back(g.values[r.row * columns + c]);
   }
   unit.order = is_ascending(unit.columns) ? kAscending : kOfGroup + group;
+}
+
+// turned: joint -> unit, of the quaternion joints of a group
+void take_rotations(const dna::Dna& dna, std::uint32_t index, const std::vector<bool>& quaternions,
+                    const std::map<std::uint32_t, std::size_t>& turned, std::vector<Unit>& units) {
+  if (turned.empty()) return;
+  const dna::JointGroup& g = dna.behavior.joint_groups[index];
+  const auto order = compile::quaternion_column_order(g, dna.descriptor.lod_count, quaternions);
+  bool mixed = false;
+  for (const auto& [joint, unit] : turned) {
+    take_rotation(g, index, order, units[unit]);
+    const auto& rows = units[unit].rows;
+    const auto other = [&](const Row& r) { return r.levels != rows[0].levels; };
+    mixed |= std::ranges::any_of(rows, other);
+  }
+  for (const auto& [joint, unit] : turned) {
+    if (!mixed) continue;
+    units[unit].bundle = index + 1;
+    units[unit].order = kOfGroup + index;
+  }
 }
 
 void add_group(const dna::Dna& dna, std::uint32_t index, const std::vector<bool>& quaternions,
@@ -92,7 +111,7 @@ void add_group(const dna::Dna& dna, std::uint32_t index, const std::vector<bool>
     const auto [at, added] = turned.try_emplace(joint, out.size());
     (added ? new_unit(joint) : out[at->second]).rows.push_back(row);
   }
-  for (const auto& [joint, unit] : turned) take_rotation(g, index, out[unit]);
+  take_rotations(dna, index, quaternions, turned, out);
 }
 
 // LODs that a row is used at, finest first.
@@ -108,6 +127,7 @@ std::vector<bool> lods_of(const dna::Dna& dna, const Row& row) {
 void find_chains(const dna::Dna& dna, std::vector<Unit>& units) {
   std::map<std::vector<std::vector<bool>>, std::vector<Unit*>> chains;
   for (Unit& unit : units) {
+    if (unit.bundle != 0) continue;  // rows of one source group nest whatever they skip
     std::vector<std::vector<bool>> sets;
     bool skips = false;
     for (const Row& row : unit.rows) {
@@ -155,9 +175,9 @@ bool is_hidden(const dna::Dna& dna, const Unit& unit, const std::vector<const Un
   return true;
 }
 
-}  // namespace
-
-void find_layers(const dna::Dna& dna, std::vector<Unit>& units) {
+// Units that later ones hide at every LOD, unless they keep a corrective in use or the order of a
+// bundle's columns.
+void remove_hidden(const dna::Dna& dna, std::vector<Unit>& units) {
   const std::vector<bool> watched = watched_correctives(dna);
   std::map<std::uint32_t, std::vector<std::size_t>> writers;
   for (std::size_t i = 0; i < units.size(); ++i) writers[key_of(units[i])].push_back(i);
@@ -165,22 +185,46 @@ void find_layers(const dna::Dna& dna, std::vector<Unit>& units) {
   for (const auto& [key, list] : writers) {
     std::vector<const Unit*> later;
     for (std::size_t n = list.size(); n-- > 0;) {
-      Unit& unit = units[list[n]];
+      const Unit& unit = units[list[n]];
       const auto keeps = [&](std::uint16_t c) { return watched[c]; };
-      gone[list[n]] = !later.empty() && !std::ranges::any_of(unit.columns, keeps) &&
-                      is_hidden(dna, unit, later);
-      if (gone[list[n]]) continue;
-      unit.layer = static_cast<std::uint32_t>(later.size());
-      later.push_back(&unit);
+      gone[list[n]] = !later.empty() && unit.bundle == 0 &&
+                      !std::ranges::any_of(unit.columns, keeps) && is_hidden(dna, unit, later);
+      if (!gone[list[n]]) later.push_back(&unit);
     }
   }
   std::size_t i = 0;
   std::erase_if(units, [&](const Unit&) { return gone[i++]; });
 }
 
+}  // namespace
+
+void find_layers(const dna::Dna& dna, std::vector<Unit>& units) {
+  remove_hidden(dna, units);
+  std::vector<Unit*> order;
+  for (Unit& unit : units) order.push_back(&unit);
+  std::ranges::stable_sort(order, std::greater{}, [](const Unit* u) {
+    return std::tuple(u->rows[0].group, u->bundle, u->rows[0].row);
+  });
+  std::map<std::uint32_t, std::uint32_t> next;  // of what is written: the layer before
+  for (auto at = order.begin(); at != order.end();) {
+    const Unit& first = **at;
+    const auto other = [&](const Unit* u) {
+      return first.bundle == 0 || u->bundle != first.bundle;
+    };
+    const auto end = std::find_if(at + 1, order.end(), other);
+    std::uint32_t layer = 0;
+    std::for_each(at, end, [&](const Unit* u) { layer = std::max(layer, next[key_of(*u)]); });
+    std::for_each(at, end, [&](Unit* u) {
+      u->layer = layer;
+      next[key_of(*u)] = layer + 1;
+    });
+    at = end;
+  }
+}
+
 std::vector<Unit> list_units(const dna::Dna& dna) {
   std::vector<Unit> units;
-  const std::vector<bool> quaternions = quaternion_joints(dna);
+  const std::vector<bool> quaternions = compile::quaternion_joints(dna);
   for (std::uint32_t i = 0; i < dna.behavior.joint_groups.size(); ++i) {
     add_group(dna, i, quaternions, units);
   }

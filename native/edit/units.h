@@ -17,8 +17,8 @@ struct Row {
   std::uint32_t levels = 0;  // number of LODs that use it, more than 0
 };
 
-/// How the columns of a unit may stand: in any order, in ascending order, or as in source group
-/// order - kOfGroup.
+/// How the columns of a unit are multiplied: in any order, in ascending order, or as in source
+/// group order - kOfGroup.
 constexpr std::uint32_t kAnyOrder = 0, kAscending = 1, kOfGroup = 2;
 
 /// Rows that stay together: one, or those that turn one quaternion joint.
@@ -28,9 +28,12 @@ struct Unit {
   std::uint32_t layer = 0;     // units in later groups that write the same rows
   std::uint32_t chain = 0;     // LODs of units of one chain nest in each other
   std::uint32_t order = kAnyOrder;
+  // Units of one bundle stay in one group of their own, 0: none. Where rows of a quaternion come in
+  // at different LODs the order of its columns hangs on the other quaternions of its source group.
+  std::uint32_t bundle = 0;
   std::vector<Row> rows;
   std::vector<std::uint16_t> columns;  // controls; linear: ascending, each once
-  std::vector<std::uint32_t> source;   // kOfGroup: the columns' places in their group
+  std::vector<std::uint32_t> source;   // kOfGroup: the columns' places in the order of their group
   std::vector<float> values;           // [rows, columns]
 
   bool is_zero() const { return columns.empty(); }

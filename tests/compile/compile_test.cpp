@@ -198,6 +198,20 @@ TEST(Compile, TheLastGroupThatTurnsAQuaternionJointWinsWhateverItsLods) {
             evaluate_once(must_compile(one), {1.0f}).joints);
 }
 
+// Joint 0 is there at both LODs, joint 1 at LOD 0 alone; column 1 turns nothing and column 5 only a
+// joint of Euler angles. LOD 1 finds column 3 empty, which changes places with 4, and then 0, which
+// changes places with 4 too: no stable sort.
+TEST(Compile, ColumnsOfQuaternionsStandAsTheLodsSwappedThem) {
+  const std::vector<bool> quaternions{true, true, false};
+  const dna::JointGroup g = make_group({3, 1}, {0, 1, 2, 3, 4, 5}, {3, 13, 22},
+                                       {0, 0, 1, 0, 1, 0,    // joint 0
+                                        1, 0, 1, 1, 0, 0,    // joint 1
+                                        1, 1, 1, 1, 1, 1});  // Euler angles
+  const std::vector<std::uint32_t> both{4, 2, 0, 3}, finest{0, 2, 3, 4};
+  EXPECT_EQ(quaternion_column_order(g, 2, quaternions), both);
+  EXPECT_EQ(quaternion_column_order(g, 1, quaternions), finest);
+}
+
 // LOD 1 has only the first of two rows for one angle; it is an angle there and no part of a
 // quaternion.
 TEST(Compile, AnAngleWrittenTwiceIsTurnedAtEveryLod) {

@@ -101,20 +101,47 @@ def quaternion_to_matrix(q):
     return (np.eye(3) + 2 * w * cross + 2 * cross @ cross).T
 
 
+def is_quaternion(dna, joint):
+    """Declared so by the file's joint metadata."""
+    given = dna.joint_behavior_metadata.joint_representations
+    return joint < len(given) and given[joint][1] == 1
+
+
+def column_order(dna, group):
+    """The columns that turn quaternion joints, as the reference's storage of LODs leaves them.
+
+    LOD by LOD, finest first: look down from the end for a column that is zero in all rotation rows
+    of the LOD; it changes places with the one at the end, and the end moves up by one.
+    """
+    matrix, outputs = np.asarray(group.values), np.asarray(group.output_indices).tolist()
+    turning = [r for r, o in enumerate(outputs) if 3 <= o % 9 <= 5 and is_quaternion(dna, o // 9)]
+    order = [c for c in range(matrix.shape[1]) if np.any(matrix[turning, c])]
+    start, lod = len(order) - 1, 0
+    while start >= 0 and lod < min(len(group.lods), dna.lod_count):
+        here = [r for r in turning if r < group.lods[lod]]
+        empty = [i for i in range(start + 1) if not np.any(matrix[here, order[i]])]
+        if not empty:
+            lod += 1
+            continue
+        order[empty[-1]], order[start] = order[start], order[empty[-1]]
+        start -= 1
+    return order
+
+
 def quaternion_rotations(dna, group, rows, inputs, joints, bounds):
     """Overwrite the Euler angles of the joints that jbmd declares to be quaternions.
 
     The bound: float32 products of n unit quaternions err by some 8 (n + 2) eps, the reference's
     arc sine by 1e-6; the cosine of the middle angle magnifies both.
     """
-    flags = dna.joint_behavior_metadata.joint_representations[:, 1]
     matrix = np.asarray(group.values, float)
     outputs = np.asarray(group.output_indices)
     for joint in sorted({int(o) // 9 for o in outputs[:rows] if 3 <= o % 9 <= 5}):
-        if joint >= len(flags) or flags[joint] != 1:
+        if not is_quaternion(dna, joint):
             continue
         total = np.eye(3)
-        for c, v in enumerate(inputs):
+        for c in column_order(dna, group):
+            v = inputs[c]
             angles = [
                 matrix[outputs == joint * 9 + 3 + a, c].sum() if len(outputs) else 0
                 for a in range(3)

@@ -305,16 +305,6 @@ def blended(dna, group, joint, controls, order):
     return total
 
 
-def reference_order(group):
-    """The reference stores the columns of a group by the coarsest LOD that has values in them."""
-    matrix = np.asarray(group.values)
-    last = [
-        max((i for i, rows in enumerate(group.lods) if np.any(matrix[:rows, c])), default=-1)
-        for c in range(matrix.shape[1])
-    ]
-    return sorted(range(matrix.shape[1]), key=lambda c: -last[c])
-
-
 def twist(q, axis):
     t = np.zeros(4)
     t[[axis, 3]] = q[[axis, 3]]
@@ -384,21 +374,18 @@ def ml_values(dna, c, lod):
     return out
 
 
-def joints(dna, c, lod, rotation, order=None):
-    """[J, 9 or 10] of the controls. order(group): of a group's columns, else the file's."""
+def joints(dna, c, lod, rotation):
+    """[J, 9 or 10] of the controls."""
     count = len(dna.joint_names)
     linear = np.zeros(count * 9)
-    flags = np.zeros(count, int)
-    given = dna.joint_behavior_metadata.joint_representations
-    flags[: len(given)] = given[:, 1] if len(given) else 0
     turned, q_of = {}, {}
     for group in dna.joint_groups:
         rows = int(group.lods[lod]) if len(group.lods) else 0
         outputs = np.asarray(group.output_indices)[:rows]
         linear[outputs] = np.asarray(group.values, float)[:rows] @ c[group.input_indices]
-        columns = range(len(group.input_indices)) if order is None else order(group)
+        columns = oracle.column_order(dna, group)
         for joint in {int(o) // 9 for o in outputs if 3 <= o % 9 <= 5}:
-            if flags[joint]:
+            if oracle.is_quaternion(dna, joint):
                 q_of[joint] = blended(dna, group, joint, c, columns)
             else:
                 turned[joint] = True

@@ -1033,6 +1033,17 @@ class BoneSpace:
 def rig_block_version() -> int:
     """Of Rig.to_bytes; others are refused."""
 
+def compile_version() -> int:
+    """Of what Rig makes of a DNA; counted up where the poses of an old file change."""
+
+def quaternion_column_orders(dna: Dna) -> list[npt.NDArray[np.uint32]]:
+    """Of each joint group the columns that turn quaternion joints, uint32[n], in the order in
+    which their rotations are multiplied.
+
+    Raises:
+        DnaError: lists that do not fit each other, as Dna.validate.
+    """
+
 def available_simd() -> str:
     """The instruction sets that this processor has, as `simd=` takes them, apart by blanks."""
 

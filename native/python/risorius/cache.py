@@ -11,7 +11,7 @@ from pathlib import Path
 
 import risorius
 
-from ._native import DnaError, Rig, rig_block_version
+from ._native import DnaError, Rig, compile_version, rig_block_version
 
 
 def cache_folder() -> Path:
@@ -74,6 +74,7 @@ def compile_cached(
 
 def _key(data: bytes, precision: str, rotation: str) -> str:
     what = hashlib.sha256(data)  # CPUs have instructions for it: twice as fast as blake2b
-    about = (risorius.__version__, rig_block_version(), sys.byteorder, precision, rotation)
+    versions = (risorius.__version__, rig_block_version(), compile_version())
+    about = (*versions, sys.byteorder, precision, rotation)
     what.update(repr(about).encode())
     return what.hexdigest() + ".rig"

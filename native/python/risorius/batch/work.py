@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Generic, TypeVar
 
 import risorius
-from risorius._native import rig_block_version
+from risorius._native import compile_version, rig_block_version
 from risorius.errors import sentence
 
 from .baking import bake
@@ -72,6 +72,7 @@ def stamp(job: Job) -> str:
         "format": _FORMAT,
         "risorius": risorius.__version__,
         "block": rig_block_version(),
+        "compile": compile_version(),
         "clip": file_digest(job.clip),
         "character": file_digest(job.character),
         "names": [job.clip.stem, job.character.stem],  # an .npz says them

@@ -7,8 +7,10 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 import risorius
+from risorius import _native
 
 from .control_names import ControlNames, named
 from .rotation import Convention, Doubles, angle_degrees, product
@@ -26,7 +28,7 @@ def contributions(
 
     Rows of joint groups add up control by control. Rotations that are products of quaternions do
     not: a control's part is by how much the Euler angles change when its column is multiplied, in
-    the order of the columns. What a twist, a swing or a network's quaternion gives is one part.
+    the order in which they are. What a twist, a swing or a network's quaternion gives is one part.
     """
     controls = np.asarray(pose.controls, float)
     out = _linear(dna, controls, lod)
@@ -81,24 +83,30 @@ def _quaternions(dna: risorius.Dna, controls: Doubles, lod: int) -> dict[int, di
     if len(kinds) == 0:
         return {}
     convention, out = Convention.of(dna), dict[int, dict[Key, Doubles]]()
-    for group in dna.joint_groups:
+    orders = _native.quaternion_column_orders(dna)
+    for group, order in zip(dna.joint_groups, orders, strict=True):
         outputs = group.output_indices.tolist()
         here = {o // 9 for o in outputs[: _rows(group, lod)] if 3 <= o % 9 < 6}
         for joint in here:
             if joint < len(kinds) and kinds[joint, 1] == 1:
                 rows = {o % 9 - 3: r for r, o in enumerate(outputs) if o // 9 == joint}
                 rows = {a: r for a, r in rows.items() if 0 <= a < 3}
-                out[joint] = _product(convention, group, rows, controls)
+                out[joint] = _product(convention, group, order, rows, controls)
     return out
 
 
 def _product(
-    convention: Convention, group: risorius.JointGroup, rows: dict[int, int], controls: Doubles
+    convention: Convention,
+    group: risorius.JointGroup,
+    order: npt.NDArray[np.uint32],
+    rows: dict[int, int],
+    controls: Doubles,
 ) -> dict[Key, Doubles]:
-    """Columns of one joint, one after the other."""
+    """Columns of one joint, one after the other in this order."""
     total, before = np.array([0.0, 0.0, 0.0, 1.0]), np.zeros(3)
     out: dict[Key, Doubles] = {}
-    for column, control in enumerate(group.input_indices.tolist()):
+    for column in order.tolist():
+        control = int(group.input_indices[column])
         angles = np.zeros(3)
         for axis, row in rows.items():
             angles[axis] = group.values[row, column]
