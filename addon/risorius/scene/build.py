@@ -8,7 +8,7 @@ import bpy
 
 from .. import native
 from ..logic import names, plans, textures
-from . import armatures, compat, lods, materials, meshes, parts, runtime, storage
+from . import armatures, compat, lods, materials, meshes, migrate, parts, runtime, storage
 
 
 @dataclass(frozen=True)
@@ -132,6 +132,7 @@ def _connect(plan, rig, controls, text, path, unit):
     parts.point(controls, parts.RIG, rig)
     parts.point(rig, parts.CONTROLS, controls)
     parts.point(rig, parts.DNA, text)
+    migrate.be_born(controls)
     rig[parts.UNIT] = unit
     rig[parts.LOD] = 0
     rig[parts.LOD_RENDER] = lods.SAME

@@ -11,6 +11,7 @@ from . import (
     heal,
     layers,
     lods,
+    migrate,
     parts,
     place,
     runtime,
@@ -85,6 +86,7 @@ def _notice_copies(updates):
         _state["objects"] = {item.session_uid for item in bpy.data.objects}
         runtime.forget_unused(parts.rigs())
         layers.forget_unused(map(parts.controls_of, parts.rigs()))
+        _say(migrate.bring_up_all())
         _say(copies.separate_all())
         sharing.keep()
 
@@ -130,6 +132,9 @@ def _concerned(rig, armatures, actions, camera_moved):
 def _loaded(*_arguments):
     """After load: Blender calls no update handler when it evaluates a file for the first time."""
     layer = bpy.context.view_layer
+    migrate.forget()
+    if not native.problem():
+        _say(migrate.bring_up_all())
     if layer is not None and not native.problem() and parts.rigs():
         layer.update()
         heal.heal_all()

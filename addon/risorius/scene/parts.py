@@ -36,9 +36,13 @@ PART = "risorius_part"  # on the control armature's bones: what each is, whateve
 PULL = "risorius_pull"  # on the deforming armature: its driver keeps the controls evaluated
 
 
-def rigs():
-    """The deforming armatures of all characters of this file; linked ones are not written."""
-    return [o for o in bpy.data.objects if o.library is None and is_rig(o)]
+def rigs(linked=False):
+    """The deforming armatures of all characters of this file; linked ones are not written.
+
+    Args:
+        linked: also those of other files.
+    """
+    return [o for o in bpy.data.objects if (linked or o.library is None) and is_rig(o)]
 
 
 def is_rig(item):

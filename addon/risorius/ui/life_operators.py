@@ -5,7 +5,7 @@ import textwrap
 
 import bpy
 
-from ..scene import evaluate, heal, overrides, parts
+from ..scene import evaluate, heal, migrate, overrides, parts
 from .import_operators import usable
 
 SHAPES = (
@@ -87,6 +87,9 @@ def draw_trouble(layout, context):
     Returns:
         Whether the panel need not say anything more.
     """
+    shown = overrides.linked_rig(context) or parts.active_rig(context)
+    if shown is not None and migrate.newer(shown):
+        _say(layout, migrate.newer(shown), "INFO")
     if overrides.linked_rig(context) is not None:
         _say(layout, "Linked: make an override to animate.", "LINKED")
         layout.operator_menu_enum(RISORIUS_OT_make_override.bl_idname, "shapes")

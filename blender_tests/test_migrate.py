@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Characters of older files are brought to the present form, those of newer ones left alone."""
+
+import bpy
+import numpy as np
+import pytest
+from support import past, scene
+from support.layout import Recorder
+
+FOLDER = past.DATA / "4.2.23"
+LAYERS = FOLDER / "layers.blend"
+VERSION = "risorius_version"
+
+
+def _said():
+    layout = Recorder()
+    scene.submodule("ui.life_operators").draw_trouble(layout, bpy.context)
+    return layout.text()
+
+
+def _lines(capsys):
+    return [x for x in capsys.readouterr().out.splitlines() if x.startswith("Risorius: Small")]
+
+
+def test_a_new_character_is_of_the_present_form_and_says_what_it_needs(dna_file, capsys):
+    controls = scene.controls(scene.load(dna_file))
+    assert controls[VERSION] == scene.submodule("scene.migrate").PRESENT == 1
+    assert "add-on" in controls["Needs Risorius"]
+    bpy.context.view_layer.update()
+    assert _lines(capsys) == []
+
+
+@pytest.mark.parametrize("how", ["open", "append"])
+def test_an_old_character_is_brought_up_once_and_it_is_said(capsys, tmp_path, how):
+    past.ROUTES[how](LAYERS, tmp_path)
+    controls = past.controls()[0]
+    assert controls[VERSION] == 1
+    assert "add-on" in controls["Needs Risorius"]
+    (line,) = _lines(capsys)
+    assert "older file" in line
+    assert "need Risorius" in line
+    scene.update(controls)
+    past.save_and_open(LAYERS, tmp_path)
+    bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath)  # what was just saved
+    assert len(_lines(capsys)) == 1  # of opening LAYERS
+
+
+def test_undo_brings_back_an_old_character_and_it_is_brought_up_again(capsys):
+    bpy.context.preferences.edit.use_global_undo = True
+    bpy.ops.wm.open_mainfile(filepath=str(LAYERS))
+    del past.controls()[0][VERSION]
+    bpy.ops.ed.undo_push(message="old")
+    past.controls()[0].location.x = 1.0
+    bpy.ops.ed.undo_push(message="changed")
+    capsys.readouterr()
+    bpy.ops.ed.undo()
+    bpy.context.view_layer.update()
+    assert past.controls()[0][VERSION] == 1
+    assert len(_lines(capsys)) == 1
+
+
+def test_a_linked_character_is_not_written_and_its_override_is(capsys, tmp_path):
+    past.link(LAYERS, tmp_path)
+    assert VERSION not in past.controls()[0]
+    assert _lines(capsys) == []
+    bpy.context.view_layer.objects.active = past.controls()[0]
+    assert bpy.ops.risorius.make_override() == {"FINISHED"}
+    bpy.context.view_layer.update()
+    own = next(c for c in past.controls() if not c.library)
+    assert own[VERSION] == 1
+    assert _lines(capsys) == []  # nothing of it had to be changed
+    shot = tmp_path / "shot.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(shot))
+    capsys.readouterr()
+    bpy.ops.wm.open_mainfile(filepath=str(shot))
+    assert next(c for c in past.controls() if not c.library)[VERSION] == 1
+    assert _lines(capsys) == []
+
+
+@pytest.mark.parametrize("how", ["open", "append", "link"])
+def test_a_newer_character_plays_and_is_left_as_it_is(capsys, tmp_path, how):
+    bpy.ops.wm.open_mainfile(filepath=str(LAYERS))
+    wanted = past.film((1.0, 9.0, 20.0))
+    controls = past.controls()[0]
+    controls[VERSION], controls["of_the_future"] = 7, "kept"
+    bpy.context.scene.frame_set(9)
+    path = tmp_path / "newer.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    capsys.readouterr()
+    past.ROUTES[how](path, tmp_path)
+    controls = past.controls()[0]
+    assert (controls[VERSION], controls["of_the_future"]) == (7, "kept")
+    found = past.film((1.0, 9.0, 20.0))
+    for name, values in wanted.items():
+        if how != "link":  # stands as it was saved
+            np.testing.assert_array_equal(found[name], values)
+    (line,) = _lines(capsys)
+    assert "newer Risorius" in line
+    bpy.context.view_layer.objects.active = controls
+    assert "form 7, this one knows 1" in " ".join(_said().split())
+
+
+@pytest.mark.parametrize("rubbish", ["words", -3, 2.5, [1, 2]])
+def test_a_form_that_is_no_number_counts_as_none(rubbish):
+    bpy.ops.wm.open_mainfile(filepath=str(LAYERS))
+    del past.controls()[0][VERSION]
+    past.controls()[0][VERSION] = rubbish
+    assert scene.submodule("scene.migrate").version_of(past.controls()[0]) == 0
+    scene.submodule("scene.migrate").bring_up_all()
+    assert past.controls()[0][VERSION] == 1
