@@ -221,7 +221,7 @@ def _import(path, **options):
 
 def test_a_capture_lands_on_the_face_at_its_timecodes(rig, capture):
     bpy.context.scene.render.fps = 24
-    assert _import(capture) == {"FINISHED"}
+    assert _import(capture, rate_mode="TIME") == {"FINISHED"}
     action = scene.controls(rig).animation_data.action
     assert action.name == "take 1"
     jaw = next(c for c in _curves(action) if "jawOpen" in c.data_path)
@@ -235,6 +235,60 @@ def test_a_capture_lands_on_the_face_at_its_timecodes(rig, capture):
     _played(rig, 25)
     turn = scene.controls(rig).pose.bones["head"].matrix_basis.to_quaternion()
     assert turn.angle == pytest.approx(30 / 200, abs=1e-3)
+
+
+@pytest.mark.parametrize(("fps", "fps_base"), [(24, 1.0), (60, 1.001)])
+def test_a_capture_lands_on_whole_frames_of_the_scene(rig, capture, fps, fps_base):
+    bpy.context.scene.render.fps, bpy.context.scene.render.fps_base = fps, fps_base
+    assert _import(capture) == {"FINISHED"}
+    action = scene.controls(rig).animation_data.action
+    curves = list(_curves(action))
+    assert len(curves) == 8  # of four sliders, and of the head's four numbers
+    for curve in curves:
+        frames = np.array([k.co[0] for k in curve.keyframe_points])
+        assert np.array_equal(frames, np.rint(frames))
+        assert (np.diff(frames) > 0).all()
+        assert len(frames) <= 2 * 39
+    # At whole frames it is what the file has there: straight lines between its rows, held outside.
+    rows = np.array([0, 1, 2, 4, *range(5, 40)])
+    jaw = next(c for c in curves if "jawOpen" in c.data_path)
+    for frame in range(-1, int(40 / 30 * fps) + 3):
+        row = (frame - 1) / fps * fps_base * 30
+        wanted = np.interp(row, rows, rows / 100)
+        assert jaw.evaluate(frame) == pytest.approx(wanted, abs=1e-5)
+    _played(rig, 11)
+    turn = scene.controls(rig).pose.bones["head"].matrix_basis.to_quaternion()
+    assert turn.angle == pytest.approx(10 / fps * fps_base * 30 / 200, abs=1e-3)
+
+
+def test_a_long_pause_makes_no_keys(rig, tmp_path):
+    path = tmp_path / "pause.csv"
+    path.write_text(f"time,{JAW}\n0.01,0.25\n0.5,0.5\n40000.0,0.75\n", encoding="utf-8")
+    assert _import(path) == {"FINISHED"}
+    (curve,) = _curves(scene.controls(rig).animation_data.action)
+    frames = [1, 2, 13, 40000 * 24 + 1]  # each sample has the frame before it and the one after
+    assert [k.co[0] for k in curve.keyframe_points] == frames
+    path.write_text(f"time,{JAW}\n0,0.25\n1e12,0.5\n", encoding="utf-8")
+    with pytest.raises(RuntimeError, match="beyond what Blender can play"):
+        _import(path)
+
+
+@pytest.mark.parametrize(
+    ("choice", "before", "after"),
+    [
+        ({}, (5, 250), (5, 250)),
+        ({}, (5, 20), (5, 51)),
+        ({"scene_range": "FIT"}, (5, 250), (18, 51)),
+        ({"scene_range": "KEEP"}, (5, 20), (5, 20)),
+    ],
+)
+def test_the_scenes_range_is_extended_fitted_or_kept(rig, capture, choice, before, after):
+    bpy.context.scene.frame_start, bpy.context.scene.frame_end = before
+    bpy.context.scene.render.fps = 24
+    # 39 thirtieths of a second: 31.2 frames from a begin of 18.9.
+    done = bpy.ops.risorius.import_animation(filepath=str(capture), start=18.9, **choice)
+    assert done == {"FINISHED"}
+    assert (bpy.context.scene.frame_start, bpy.context.scene.frame_end) == after
 
 
 def test_options_of_an_import(rig, capture):
@@ -364,8 +418,9 @@ def test_a_face_speaks_and_is_heard(rig, voice):
         _is_heard_from(31)
     layer = scene.controls(rig).risorius_layers[0]
     assert layer.start == pytest.approx(31.0, abs=1e-4)
-    clip = speech.speak(str(voice), WORDS)
+    clip = speech.speak(str(voice), WORDS, rate=24.0)
     jaw = next(c for c in _curves(layer.action) if "jawOpen" in c.data_path)
+    assert all(key.co[0] == round(key.co[0]) for key in jaw.keyframe_points)
     loudest = clip.frame_times()[int(np.argmax(clip.curve(JAW)))]
     assert jaw.evaluate(31.0 + loudest * 24) == pytest.approx(clip.curve(JAW).max(), abs=1e-3)
     assert clip.curve(JAW).max() > 0.1
@@ -522,7 +577,7 @@ def test_a_clip_of_our_own_comes_back_bit_for_bit(rig, tmp_path):
     clip = _clip(start=0.0)
     path = tmp_path / "take.rzc"
     clip.save(str(path))
-    assert _import(path) == {"FINISHED"}
+    assert _import(path, rate_mode="TIME") == {"FINISHED"}
     action = scene.controls(rig).animation_data.action
     jaw = next(c for c in _curves(action) if "jawOpen" in c.data_path)
     values = np.array([k.co[1] for k in jaw.keyframe_points], np.float32)

@@ -27,11 +27,13 @@ class Timing:
         rate: frames per second of the scene, fps / fps_base.
         start: the scene's frame at which the time `origin` lies.
         origin: seconds on the clip's clock.
+        whole: whether keys lie on whole frames only, see onto_frames.
     """
 
     rate: float
     start: float = 1.0
     origin: float = 0.0
+    whole: bool = False
 
     def frames(self, seconds: Float) -> Float:
         """Frames of the scene, with their subframes, for seconds on the clip's clock."""
@@ -40,6 +42,31 @@ class Timing:
     def seconds(self, frames: Float) -> Float:
         """The inverse of `frames`."""
         return self.origin + (np.asarray(frames, np.float64) - self.start) / self.rate
+
+    def placed(self, frames: Float, values: Float) -> tuple[Float, Float]:
+        """Keys where they lie in the scene: as they are, or on whole frames."""
+        return onto_frames(frames, values) if self.whole else (frames, values)
+
+
+def onto_frames(frames: Float, values: Float) -> tuple[Float, Float]:
+    """Keys on whole frames for samples anywhere.
+
+    Each sample has a key on the frame before it and on the one after it. So there are at most
+    twice as many keys as samples, however long the pauses are, and the straight lines between the
+    keys meet every whole frame where those between the samples do.
+
+    Args:
+        frames: float64[n], ascending; a ten thousandth of a frame beside a whole one is that one.
+        values: float64[n] or float64[n, width].
+
+    Returns:
+        Whole frames float64[m] and the values there; the first and the last value are held.
+    """
+    near = np.rint(frames)
+    frames = np.where(np.abs(frames - near) < 1e-4, near, frames)
+    whole = np.unique(np.concatenate([np.floor(frames), np.ceil(frames)]))
+    columns = [np.interp(whole, frames, column) for column in values.reshape(len(frames), -1).T]
+    return whole, np.stack(columns, axis=1).reshape(len(whole), *values.shape[1:])
 
 
 @dataclass
@@ -112,16 +139,18 @@ def keys_of(
     angles = {name for group in turned for name in group}
     for name, values in zip(names, curves, strict=True):
         if name in sliders:
-            curve = _curve(sliders[name], frames, values, keys)
+            curve = _curve(sliders[name], frames, values, timing, keys)
             if curve is not None:
                 keys.controls.append(curve)
         elif name not in angles:
             keys.unknown.append(name)
-    _add_turns(keys, names, curves, frames, with_eyes)
+    _add_turns(keys, names, curves, frames, timing, with_eyes)
     return keys
 
 
-def _curve(name: str, frames: Float, values: NDArray[np.float32], keys: Keys) -> Curve | None:
+def _curve(
+    name: str, frames: Float, values: NDArray[np.float32], timing: Timing, keys: Keys
+) -> Curve | None:
     good = np.isfinite(values)
     if not good.all():
         keys.dropped += int(len(values) - good.sum())
@@ -129,8 +158,9 @@ def _curve(name: str, frames: Float, values: NDArray[np.float32], keys: Keys) ->
     if not len(values):
         return None
     if (values == values[0]).all():
-        return Curve(name, frames[:1], values[:1].astype(np.float64))
-    return Curve(name, frames, values.astype(np.float64))
+        frames, values = frames[:1], values[:1]
+        return Curve(name, np.floor(frames) if timing.whole else frames, values.astype(np.float64))
+    return Curve(name, *timing.placed(frames, values.astype(np.float64)))
 
 
 def _add_turns(
@@ -138,6 +168,7 @@ def _add_turns(
     names: Sequence[str],
     curves: NDArray[np.float32],
     frames: Float,
+    timing: Timing,
     with_eyes: bool,
 ) -> None:
     rows = dict(zip(names, curves, strict=True))
@@ -151,7 +182,10 @@ def _add_turns(
         keys.dropped += int(len(good) - good.sum())
         if good.any():
             moving = good if (angles[good] != angles[good][0]).any() else np.flatnonzero(good)[:1]
-            keys.turns[bone] = (frames[moving], quaternions(angles[moving]))
+            at, turns = timing.placed(frames[moving], quaternions(angles[moving]))
+            if timing.whole:  # on a straight line between two turns, which is shorter than either
+                turns /= np.linalg.norm(turns, axis=1, keepdims=True)
+            keys.turns[bone] = at, turns
 
 
 def quaternions(angles: Float) -> Float:

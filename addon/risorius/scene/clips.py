@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Clips become actions of a character's controls, and actions become clips again."""
 
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -41,7 +42,7 @@ def frame_rate(scene):
     return scene.render.fps / scene.render.fps_base
 
 
-def timing_of(clip, scene, start, keep_clock=False):
+def timing_of(clip, scene, start, keep_clock=False, whole=False):
     """Where a clip lies in a scene.
 
     Args:
@@ -49,9 +50,10 @@ def timing_of(clip, scene, start, keep_clock=False):
         scene: gives the rate.
         start: the frame of the clip's first sample, or, with keep_clock, of its second 0.
         keep_clock: count from the clip's own second 0, as for tracks that belong together.
+        whole: whether keys lie on whole frames only.
     """
     origin = 0.0 if keep_clock else float(clip.start)
-    return clips.Timing(frame_rate(scene), float(start), origin)
+    return clips.Timing(frame_rate(scene), float(start), origin, whole)
 
 
 def sliders_of(live):
@@ -92,7 +94,7 @@ def make_action(rig, clip, timing, name, with_eyes=True):
             _add_turn(bag, groups.named(bone), controls.pose.bones[bone], frames, turns)
         else:
             keys.unknown.extend(n for n in clip.names if n.partition(".")[0] == bone)
-    first, last = _span(timing.frames(times))
+    first, last = _span(timing.frames(times), timing.whole)
     report = Report(action, first, last, len(keys.controls) + len(keys.turns), keys.unknown)
     if keys.dropped:
         report.notes.append(f"{keys.dropped} samples that are no numbers were left out.")
@@ -112,8 +114,28 @@ class _Groups:
         return self.made[name]
 
 
-def _span(frames):
-    return (float(frames[0]), float(frames[-1])) if len(frames) else (0.0, 0.0)
+def _span(frames, whole):
+    if not len(frames):
+        return 0.0, 0.0
+    if whole:
+        frames, _ = clips.onto_frames(frames[[0, -1]], np.zeros(2))
+    return float(frames[0]), float(frames[-1])
+
+
+def set_range(scene, report, mode):
+    """Let a scene last as long as what was imported.
+
+    Args:
+        scene: its range is changed.
+        report: Report.
+        mode: "EXTEND" ends it where the animation ends, if that is later; "FIT" begins and ends it
+            with the animation; "KEEP" leaves it.
+    """
+    first, last = math.floor(report.first + 1e-4), math.ceil(report.last - 1e-4)
+    if mode == "FIT":
+        scene.frame_start, scene.frame_end = max(0, first), max(0, last)
+    elif mode == "EXTEND":
+        scene.frame_end = max(scene.frame_end, last)
 
 
 def _add(bag, group, path, index, frames, values):

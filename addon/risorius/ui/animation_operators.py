@@ -20,9 +20,18 @@ TARGETS = (
     ("LAYER", "Layer", "As a layer above what the face does already"),
 )
 RATES = (
-    ("TIME", "Keep Time", "Keys lie at their times, between frames where need be"),
-    ("SCENE", "Set Scene Rate", "The scene takes over the rate of the file"),
-    ("FRAMES", "One Key a Frame", "The curves are sampled anew at the scene's frames"),
+    (
+        "FRAMES",
+        "Whole Frames",
+        "Keys lie on the scene's frames, where hands and eyes look for them",
+    ),
+    ("TIME", "Every Sample", "A key for each sample at its time, between frames where need be"),
+    ("SCENE", "Set Scene Rate", "The scene takes over the rate of the file; a key for each sample"),
+)
+RANGES = (
+    ("EXTEND", "Extend", "The scene ends where the animation ends, if that is later"),
+    ("FIT", "Fit", "The scene begins and ends with the animation"),
+    ("KEEP", "Keep", "The scene's range stays as it is"),
 )
 EXTENSIONS = (
     ".csv",
@@ -53,6 +62,9 @@ class PlacesClip:
         description="Where the time 0 of the animation lies: its first frame, or its sound's begin",
         default=1.0,
     )
+    scene_range: bpy.props.EnumProperty(
+        name="Scene Range", description="First and last frame of the scene", items=RANGES
+    )
 
     @classmethod
     def poll(cls, context):
@@ -63,13 +75,25 @@ class PlacesClip:
         if not self.properties.is_property_set("start"):
             self.start = float(scene.frame_start)
 
-    def place(self, context, clip, name, notes=(), with_eyes=True):
-        """Put a clip onto the active face and report on it. Returns: its action."""
+    def place(self, context, clip, name, notes=(), with_eyes=True, whole=False):
+        """Put a clip onto the active face and report on it.
+
+        Args:
+            context: has the face and the scene.
+            clip: risorius.Clip.
+            name: of the action.
+            notes: lines for the report.
+            with_eyes: whether to turn the eye bones too.
+            whole: whether keys lie on whole frames only.
+
+        Returns:
+            Its action.
+        """
         rig = parts.active_rig(context)
         trouble = actions.busy(parts.controls_of(rig))
         if trouble:
             raise ClipError(trouble)
-        timing = clips.timing_of(clip, context.scene, self.start, keep_clock=True)
+        timing = clips.timing_of(clip, context.scene, self.start, keep_clock=True, whole=whole)
         made = clips.make_action(rig, clip, timing, name, with_eyes)
         notes = [*notes, *made.notes]
         if self.target == "ACTION":
@@ -81,7 +105,7 @@ class PlacesClip:
             clips.add_strip(rig, made.action)
         else:
             layers.add_action(parts.controls_of(rig), made.action)
-        context.scene.frame_end = max(context.scene.frame_end, round(made.last))
+        clips.set_range(context.scene, made, self.scene_range)
         evaluate.bring_up(context, rig)
         self._report_on(made, notes)
         return made.action
@@ -99,8 +123,8 @@ class PlacesClip:
 
     def draw_place(self, layout):
         """The properties of this class."""
-        layout.prop(self, "target")
-        layout.prop(self, "start")
+        for name in ("target", "start", "scene_range"):
+            layout.prop(self, name)
 
 
 def report_of(action):
@@ -146,7 +170,9 @@ class RISORIUS_OT_import_animation(PlacesClip, bpy.types.Operator, ImportHelper)
     mapping_file: bpy.props.StringProperty(
         name="Mapping File", description="A TOML file", subtype="FILE_PATH"
     )
-    rate_mode: bpy.props.EnumProperty(name="Rate", description="Frame rates", items=RATES)
+    rate_mode: bpy.props.EnumProperty(
+        name="Keys", description="Where the file's samples become keys", items=RATES
+    )
     file_rate: bpy.props.FloatProperty(
         name="File Rate",
         description="Frames per second of a file that does not say it; 0: as found",
@@ -194,9 +220,13 @@ class RISORIUS_OT_import_animation(PlacesClip, bpy.types.Operator, ImportHelper)
             with shown_progress(context) as progress:
                 clip, notes = self._read(live)
                 progress(0.4)
-                clip = self._at_rate(context.scene, self._adjusted(clip))
+                clip = self._adjusted(clip)
+                if self.rate_mode == "SCENE":
+                    render.fps = max(1, round(clip.rate))
+                    render.fps_base = render.fps / clip.rate
                 progress(0.6)
-                self.place(context, clip, Path(self.filepath).stem, notes, self.use_eyes)
+                name, whole = Path(self.filepath).stem, self.rate_mode == "FRAMES"
+                self.place(context, clip, name, notes, self.use_eyes, whole)
         except (ValueError, OSError, RuntimeError) as error:
             render.fps, render.fps_base = rate
             self.report({"ERROR"}, explain(self.filepath, error))
@@ -234,14 +264,6 @@ class RISORIUS_OT_import_animation(PlacesClip, bpy.types.Operator, ImportHelper)
             clip = process.adjust(clip, gains)
         single = _gains(self.gains)
         return process.adjust(clip, single) if single else clip
-
-    def _at_rate(self, scene, clip):
-        if self.rate_mode == "SCENE":
-            scene.render.fps = max(1, round(clip.rate))
-            scene.render.fps_base = scene.render.fps / clip.rate
-        elif self.rate_mode == "FRAMES":
-            return clip.resampled(clips.frame_rate(scene))
-        return clip
 
     def draw(self, _context):
         layout = self.layout

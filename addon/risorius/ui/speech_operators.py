@@ -42,6 +42,11 @@ class RISORIUS_OT_speak(PlacesClip, bpy.types.Operator, ImportHelper):
     use_accents: bpy.props.BoolProperty(
         name="Accents", description="Brows and head follow what is stressed", default=True
     )
+    use_whole_frames: bpy.props.BoolProperty(
+        name="Whole Frames",
+        description="A key at each frame of the scene; off: 60 a second, between frames",
+        default=True,
+    )
     use_sound: bpy.props.BoolProperty(
         name="Sound Strip", description="Add the sound to the sequencer", default=True
     )
@@ -68,6 +73,8 @@ class RISORIUS_OT_speak(PlacesClip, bpy.types.Operator, ImportHelper):
             seed=self.seed,
             blinks=self.use_blinks,
             accents=self.use_accents,
+            # Made for these frames, not sampled at them: lips that meet shall meet on one.
+            rate=clips.frame_rate(context.scene) if self.use_whole_frames else 60.0,
         )
         self._face = parts.active_rig(context).session_uid
         # Adjusting the last operation calls this again, on the same operator.
@@ -119,7 +126,8 @@ class RISORIUS_OT_speak(PlacesClip, bpy.types.Operator, ImportHelper):
                 self.report({"ERROR"}, words)
                 return {"CANCELLED"}
             notes = [n for n in task.clip.metadata.get("notes", "").split("; ") if n]
-            self.place(context, task.clip, Path(self.filepath).stem, notes)
+            name = Path(self.filepath).stem
+            self.place(context, task.clip, name, notes, whole=self.use_whole_frames)
         except (ValueError, OSError, RuntimeError) as error:
             self.report({"ERROR"}, explain(self.filepath, error))
             return {"CANCELLED"}
@@ -141,7 +149,14 @@ class RISORIUS_OT_speak(PlacesClip, bpy.types.Operator, ImportHelper):
         self.draw_place(layout)
         layout.prop(self, "transcript")
         layout.prop_search(self, "transcript_text", bpy.data, "texts")
-        for name in ("intensity", "seed", "use_blinks", "use_accents", "use_sound"):
+        for name in (
+            "intensity",
+            "seed",
+            "use_blinks",
+            "use_accents",
+            "use_sound",
+            "use_whole_frames",
+        ):
             layout.prop(self, name)
 
 
