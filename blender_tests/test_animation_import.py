@@ -7,6 +7,7 @@ import os
 import shutil
 import subprocess
 import sys
+import wave
 import zipfile
 
 import bpy
@@ -314,6 +315,17 @@ def test_options_of_an_import(rig, capture):
 def test_what_cannot_be_is_said_in_a_sentence(rig, capture, options, words):
     with pytest.raises(RuntimeError, match=words):
         _import(capture, **options)
+    assert not bpy.data.actions
+
+
+@pytest.mark.parametrize("name", ["voice.wav", "voice.csv", "voice.MP3"])
+def test_a_sound_is_sent_to_where_sounds_are_taken(rig, tmp_path, name):
+    path = tmp_path / name
+    with wave.open(str(path), "wb") as sound:
+        sound.setparams((1, 2, 16000, 0, "NONE", ""))
+        sound.writeframes(b"\x86\x00" * 100)
+    with pytest.raises(RuntimeError, match=rf"{name}: this is a sound: use Speak from Audio\."):
+        _import(path)
     assert not bpy.data.actions
 
 

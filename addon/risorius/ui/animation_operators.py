@@ -47,6 +47,7 @@ EXTENSIONS = (
     ".rzc",
 )
 CLIP_EXTENSION = ".rzc"
+SOUNDS = (".wav", ".mp3", ".flac", ".ogg", ".m4a", ".aac", ".opus", ".mp4", ".mov", ".mkv")
 _REPORT = "risorius_report"  # on an action: words on what became of the file
 _SHOWN = 6
 
@@ -214,6 +215,10 @@ class RISORIUS_OT_import_animation(PlacesClip, bpy.types.Operator, ImportHelper)
         return ImportHelper.invoke(self, context, event)
 
     def execute(self, context):
+        if _is_sound(self.filepath):
+            name = printable(Path(self.filepath).name)
+            self.report({"ERROR"}, f"{name}: this is a sound: use Speak from Audio.")
+            return {"CANCELLED"}
         live, render = runtime.of(parts.active_rig(context)), context.scene.render
         rate = render.fps, render.fps_base
         try:
@@ -280,6 +285,18 @@ class RISORIUS_OT_import_animation(PlacesClip, bpy.types.Operator, ImportHelper)
         if self.use_neutral:
             layout.prop(self, "neutral_first")
             layout.prop(self, "neutral_last")
+
+
+def _is_sound(path):
+    """Whether a file is one that Speak from Audio takes, by its name or its first bytes."""
+    if Path(path).suffix.lower() in SOUNDS:
+        return True
+    try:
+        with Path(path).open("rb") as file:
+            head = file.read(12)
+    except OSError:
+        return False  # said by who reads it
+    return head[:4] == b"RIFF" and head[8:] == b"WAVE"
 
 
 def _sliders(clip):

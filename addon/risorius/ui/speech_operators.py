@@ -8,10 +8,9 @@ from bpy_extras.io_utils import ImportHelper
 
 from ..logic.clips import ClipError
 from ..scene import clips, listening, parts
-from .animation_operators import PlacesClip
+from .animation_operators import SOUNDS, PlacesClip
 from .import_operators import explain, usable
 
-_EXTENSIONS = (".wav", ".mp3", ".flac", ".ogg", ".m4a", ".aac", ".opus", ".mp4", ".mov", ".mkv")
 _MISSING = (
     "Speech needs the package PocketSphinx: install it by the button in the add-on's preferences."
 )
@@ -26,7 +25,7 @@ class RISORIUS_OT_speak(PlacesClip, bpy.types.Operator, ImportHelper):
     bl_options = {"REGISTER", "UNDO", "PRESET"}
 
     filter_glob: bpy.props.StringProperty(
-        default=";".join(f"*{e}" for e in _EXTENSIONS), options={"HIDDEN"}
+        default=";".join(f"*{e}" for e in SOUNDS), options={"HIDDEN"}
     )
     transcript: bpy.props.StringProperty(
         name="Transcript", description="What is said, in English; empty: listen for it"
