@@ -311,14 +311,6 @@ void bind_dna_files(py::module_& m, DnaClass& c) {
   bind_writing(c);
   bind_layers(c);
   bind_changes(c);
-  m.def(
-      "write_file",
-      [](const std::filesystem::path& path, const py::bytes& bytes) {
-        const std::string_view view = bytes;
-        const std::span data{reinterpret_cast<const std::uint8_t*>(view.data()), view.size()};
-        unwrap(unlocked([&] { return core::write_file_atomically(path, data); }));
-      },
-      "Writes any bytes as Dna.save does: the old file is whole until the new one is.");
   m.def("parse_bytes", [](const py::bytes& bytes, const dna::ParseOptions& options) {
     core::SpanSource source = source_of(bytes);
     return parse(source, options, "");

@@ -4,6 +4,7 @@
 import importlib.util
 import io
 import math
+import os
 import struct
 import subprocess
 import sys
@@ -12,7 +13,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 import risorius
-from conftest import GOLDEN
+from conftest import GOLDEN, no_room
 from risorius.cli import main
 from risorius.commands.info import describe
 from risorius.plot import layers, matrix, regions, shade, skeleton
@@ -393,6 +394,26 @@ def test_bad_input_is_exit_code_1_and_the_old_page_stays(tmp_path, capsys):
     assert out.read_text() == "old"
     assert len(capsys.readouterr().err.splitlines()) == 3
     assert sorted(p.name for p in tmp_path.iterdir()) == ["bad.dna", "page.html"]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="limits are those of POSIX")
+@drawing
+def test_without_room_the_page_is_named_and_the_old_one_stays(tmp_path, capsys):
+    out = tmp_path / "page.png"
+    out.write_text("old")
+    with no_room(1000):
+        assert main(["plot", str(GOLDEN / "core.dna"), "-o", str(out), "--dpi", "40"]) == 1
+    assert capsys.readouterr().err == f"risorius: {out}: File too large\n"
+    assert out.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [out]
+
+
+@pytest.mark.parametrize("place", ["none/page.png", "none/page.html"])
+def test_a_folder_that_is_not_there_is_said_before_the_face_is_looked_at(place, tmp_path, capsys):
+    out = tmp_path / place
+    assert main(["plot", str(tmp_path / "absent.dna"), "-o", str(out)]) == 1
+    error = capsys.readouterr().err
+    assert error == f"risorius: {out}: cannot write it: its folder is not there\n"
 
 
 def test_without_matplotlib_one_sentence_says_what_to_install(tmp_path):

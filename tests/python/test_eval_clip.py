@@ -3,6 +3,9 @@
 
 import csv
 import json
+import os
+import subprocess
+import sys
 import zipfile
 
 import numpy as np
@@ -285,6 +288,34 @@ def test_bad_command_line_is_exit_code_2(tmp_path, monkeypatch, capsys, argument
     assert code == 2
     assert message is None or message in capsys.readouterr().err
     assert set(tmp_path.iterdir()) - before <= {tmp_path / "cache"}
+
+
+def test_a_folder_that_cannot_be_is_said_before_the_inputs_are_read(tmp_path, capsys):
+    (tmp_path / "file").touch()
+    out = tmp_path / "file" / "out.npz"
+    assert main(["eval", str(tmp_path / "no.csv"), str(tmp_path / "no.dna"), "-o", str(out)]) == 1
+    error = capsys.readouterr().err
+    assert error == f"risorius: {out}: cannot write it: a file stands where its folder should be\n"
+
+
+@pytest.mark.skipif(os.name == "nt", reason="limits are those of POSIX")
+@pytest.mark.parametrize("kind", ["npz", "csv"])
+def test_without_room_the_target_is_named_and_the_old_file_stays(kind, tmp_path):
+    write_clip(tmp_path / "clip.csv", ["CTRL_expressions.jawOpen"], [[0, 1]])
+    path = tmp_path / f"out.{kind}"
+    path.write_text("old")
+    script = (
+        "import resource, sys; from risorius.cli import main\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100)); sys.exit(main(sys.argv[1:]))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script, "eval", str(tmp_path / "clip.csv"),
+         str(GOLDEN / "core.dna"), "-o", str(path)], capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.stderr == f"risorius: {path}: File too large\n"
+    assert done.returncode == 1
+    assert path.read_text() == "old"
+    assert {p.name for p in tmp_path.iterdir()} <= {"clip.csv", path.name, "cache"}
 
 
 @pytest.mark.parametrize(

@@ -855,9 +855,6 @@ class FileReplacement:
 def remove_leftovers(folder: _Path) -> None:
     """Removes what processes of this machine that have ended left of files that they wrote."""
 
-def write_file(path: _Path, data: bytes, /) -> None:
-    """Writes any bytes as Dna.save does: the old file is whole until the new one is."""
-
 def parse_bytes(data: bytes, options: ParseOptions, /) -> Dna: ...
 def parse_file(path: _Path, options: ParseOptions, /) -> Dna: ...
 def check_bytes(data: bytes, limits: Limits, /) -> list[_Finding]: ...

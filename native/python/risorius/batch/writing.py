@@ -59,9 +59,11 @@ class NpzWriter:
         return self
 
     def __exit__(self, *error: object) -> None:
-        if self._first is not None:
-            self._first.close()
-        self._stack.close()
+        try:
+            if self._first is not None:
+                self._first.close()
+        finally:  # it fails where there is no room for the rest, and the others are closed too
+            self._stack.close()
 
     def _member(self, part: str) -> IO[bytes]:
         """The array of a part, opened behind its header."""

@@ -5,17 +5,15 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import os
 import re
 import sys
 import warnings
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import risorius
 
-from .. import _native
+from .. import fileio
 from .files import (
     KINDS,
     CommandLineError,
@@ -203,17 +201,13 @@ def write(name: str, data: bytes) -> None:
         if name == "-":
             sys.stdout.buffer.write(data)
             sys.stdout.buffer.flush()
-        elif os.path.exists(name) and not os.path.isfile(name) and not os.path.isdir(name):
-            Path(name).write_bytes(data)
         else:
-            _native.write_file(name, data)
+            fileio.write_bytes(name, data)
     except BrokenPipeError:
         raise
     except OSError as error:
         name = label(name, "<stdout>")
         raise InputError(f"{name}: cannot write it: {error.strerror}") from error
-    except risorius.DnaError as error:
-        raise InputError(str(error)) from error
 
 
 def run(args: argparse.Namespace) -> int:

@@ -17,7 +17,7 @@ from risorius.batch.face import PARTS, load_face, prepared
 from risorius.batch.progress import Progress
 from risorius.errors import ArgumentError
 
-from .files import CommandLineError, counted, refuse_same_file
+from .files import CommandLineError, counted, refuse_same_file, require_writable
 
 OPTIONS = ("mapping", "rate", "frames", "what", "quaternions", "compress")
 SUFFIXES = {".npz": "npz", ".csv": "csv"}
@@ -155,6 +155,7 @@ def run(args: argparse.Namespace) -> int:
     parts = _option("what", lambda text: parse_parts(text.split(",")), args.what, DEFAULT_PARTS)
     _option("mapping", importing.load_mapping, args.mapping, None)
     kind, out = _target(args)
+    require_writable(out, parents=True)
     face = load_face(Path(args.controls[0]), quaternions=args.quaternions)
     performance = load_performance(args.file, face, args.mapping)
     clip = prepared(performance.clip, rate, frames)

@@ -73,8 +73,11 @@ def require_suffix(path: Path, kinds: Sequence[str], option: str) -> None:
         )
 
 
-def require_writable(*names: str | Path | None) -> None:
+def require_writable(*names: str | Path | None, parents: bool = False) -> None:
     """Before long work: what will be written has a place; "-" and None need none.
+
+    Args:
+        parents: folders that are not there will be made.
 
     Raises:
         InputError: no folder, or one that may not be written to.
@@ -83,7 +86,7 @@ def require_writable(*names: str | Path | None) -> None:
         if name is None or str(name) == "-":
             continue
         try:
-            fileio.check_writable(name)
+            fileio.check_writable(name, parents=parents)
         except OSError as error:
             raise InputError(f"{name}: cannot write it: {error.strerror}") from error
 

@@ -4,12 +4,11 @@
 from __future__ import annotations
 
 import argparse
-import os
-import tempfile
 from pathlib import Path
 
 import risorius
 
+from .. import fileio
 from .files import CommandLineError, InputError, read_bytes, require_suffix, require_writable
 
 _NEEDS = "plot draws with Matplotlib, which is not installed: pip install risorius[plot]"
@@ -40,21 +39,6 @@ def complain(args: argparse.Namespace) -> None:
         raise CommandLineError(f"--dpi: 40 to 600 was expected, found {args.dpi}")
 
 
-def write(path: Path, data: bytes) -> None:
-    """Write a file whole or not at all: beside it first, then in its place."""
-    handle, beside = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-        umask = os.umask(0)
-        os.umask(umask)
-        os.chmod(beside, 0o666 & ~umask)  # mkstemp's own is for one user only
-        os.replace(beside, path)
-    except BaseException:
-        os.unlink(beside)
-        raise
-
-
 def run(args: argparse.Namespace) -> int:
     complain(args)
     try:
@@ -72,6 +56,6 @@ def run(args: argparse.Namespace) -> int:
         raise CommandLineError(f"--lod: 0 to {last} was expected, found {args.lod}")
     facts = gather(dna, data, args.file.name, args.title)
     kind = page if args.out.suffix.lower() == ".html" else sheet
-    write(args.out, kind.render(facts, args.lod, args.dpi))
+    fileio.write_bytes(args.out, kind.render(facts, args.lod, args.dpi))
     print(f"{args.out}: {args.out.stat().st_size / 1e6:.1f} MB")
     return 0
