@@ -11,6 +11,7 @@ import sys
 from html.parser import HTMLParser
 
 import numpy as np
+import oracle
 import pytest
 import risorius
 from conftest import GOLDEN, no_room
@@ -429,3 +430,22 @@ def test_without_matplotlib_one_sentence_says_what_to_install(tmp_path):
     assert "pip install risorius[plot]" in done.stderr
     assert len(done.stderr.splitlines()) == 1
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_rotation_order_that_nobody_knows_is_drawn_as_x_y_z():
+    dna = risorius.Dna()
+    dna.joint_names, dna.joint_parents = ["root", "jaw"], [0, 0]
+    dna.neutral_joint_translations = [[0, 0, 0], [0, 1, 0]]
+    dna.neutral_joint_rotations = angles = np.float32([[30, 40, 50], [-10, 5, 80]])
+    known = [oracle.rotation_matrix(dna, np.asarray(row, float)) for row in angles]
+    dna.rotation_sequence, dna.rotation_signs, dna.rotation_unit = "#40", (0, 1, 65536), "#3"
+    dna = risorius.load(dna.to_bytes())
+    assert dna.rotation_sequence == "#40"
+    np.testing.assert_allclose(skeleton.rotations(dna), known, atol=1e-12)
+    dna.rotation_signs = (0, -7, 1)
+    dna.rotation_unit = "radians"
+    known = [
+        oracle.rotation_matrix(risorius.Dna(), np.degrees(np.asarray(row, float)) * [1, -1, 1])
+        for row in angles
+    ]
+    np.testing.assert_allclose(skeleton.rotations(dna), known, atol=1e-12)

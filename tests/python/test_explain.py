@@ -386,3 +386,22 @@ def test_rotations_of_the_file_rest_at_their_identity(capsys):
     assert main(["eval", str(GOLDEN / "twistswing.dna"), "--gui", "--json"]) == 0
     given = {r["index"]: r["value"] for r in json.loads(capsys.readouterr().out)["raw_controls"]}
     assert {i: given.get(i) for i in beside} == dict.fromkeys(beside, 1.0)
+
+
+@pytest.mark.parametrize("name", ["quatjoints", "mlquat"])
+def test_a_rotation_order_that_nobody_knows_is_that_of_the_evaluator(name):
+    """Numbers that the format has no word for are read, and taken as x y z, right, up, front."""
+    dna = risorius.load(GOLDEN / f"{name}.dna")
+    dna.rotation_sequence, dna.rotation_signs, dna.rotation_unit = "#40", (0, 1, 65536), "#3"
+    dna.coordinate_system = ("#7", "up", "#9")
+    joints = dna.machine_learned_behavior_ext.joints
+    if len(joints.parameter_keys):
+        values = joints.parameter_values.copy()
+        values[np.isin(joints.parameter_keys, [3, 9])] = [8, 40]
+        joints.parameter_values = values
+    dna = risorius.load(dna.to_bytes())
+    rig = risorius.Rig(dna)
+    moved = 0
+    for lod in range(rig.lod_count):
+        moved += len(check_sums(dna, rig, some_controls(dna, rig, 3), lod)["joints"])
+    assert moved > 0

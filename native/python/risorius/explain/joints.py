@@ -13,7 +13,7 @@ import risorius
 from risorius import _native
 
 from .control_names import ControlNames, named
-from .rotation import Convention, Doubles, angle_degrees, product
+from .rotation import SEQUENCES, Convention, Doubles, angle_degrees, product
 
 # Key of a contribution: a control's index, or what moves a joint by several controls at once.
 Key = int | str
@@ -137,7 +137,6 @@ def _setups(dna: risorius.Dna, names: ControlNames) -> Iterator[tuple[str, int]]
 
 _AXES = np.array([[-1, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], float)
 _WORDS = ("left", "right", "up", "down", "front", "back")
-_SEQUENCES = ("xyz", "xzy", "yxz", "yzx", "zxy", "zyx")
 _BY_NETWORKS = "networks"
 
 
@@ -166,9 +165,22 @@ def _system(dna: risorius.Dna, settings: dict[int, int]) -> tuple[Convention | N
     if not all(key in settings for key in range(3, 10)):
         return None, np.eye(3)
     signs = tuple(1 if settings[key] == 1 else -1 for key in (6, 7, 8))
-    theirs = Convention(_SEQUENCES[min(settings[9], 5)], signs, dna.rotation_unit)
-    ours = _AXES[[_WORDS.index(word) for word in dna.coordinate_system]]
-    return theirs, _AXES[[min(settings[key], 5) for key in (3, 4, 5)]] @ ours.T
+    sequence = SEQUENCES[settings[9]] if settings[9] < len(SEQUENCES) else ""
+    theirs = Convention(sequence, signs, dna.rotation_unit)
+    ours = np.array([_axis(_number(word)) for word in dna.coordinate_system])
+    return theirs, np.array([_axis(settings[key]) for key in (3, 4, 5)]) @ ours.T
+
+
+def _number(word: str) -> int:
+    """Of a direction; one that the format does not know is read as "#7"."""
+    return _WORDS.index(word) if word in _WORDS else int(word.removeprefix("#"))
+
+
+def _axis(number: int) -> Doubles:
+    """A direction; of numbers that the format does not know, the one that the evaluator takes."""
+    if number < len(_AXES):
+        return _AXES[number]
+    return np.eye(3)[number // 2 % 3]
 
 
 def _moved(

@@ -13,12 +13,17 @@ import risorius
 Doubles = npt.NDArray[np.float64]
 
 
+SEQUENCES = ("xyz", "xzy", "yxz", "yzx", "zxy", "zyx")
+
+
 class Convention:
-    """Order, signs and unit of Euler angles."""
+    """Order, signs and unit of Euler angles. What a file says and the format does not know is taken
+    as the evaluator takes it: x y z, a turn the usual way, degrees."""
 
     def __init__(self, sequence: str, signs: tuple[int, ...], unit: str) -> None:
-        self.order = ["xyz".index(axis) for axis in sequence]
-        self.signs = np.array(signs, float)
+        known = sequence if sequence in SEQUENCES else SEQUENCES[0]
+        self.order = ["xyz".index(axis) for axis in known]
+        self.signs = np.where(np.array(signs) < 0, -1.0, 1.0)
         self.radians = 1.0 if unit == "radians" else math.pi / 180
 
     @classmethod

@@ -6,12 +6,11 @@ Row vectors as everywhere in DNA files: v' = v * M.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import numpy.typing as npt
 
 import risorius
+from risorius.explain.rotation import Convention
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -36,13 +35,11 @@ def view_axes(dna: risorius.Dna) -> Floats:
 
 def rotations(dna: risorius.Dna) -> Floats:
     """The neutral rotation of each joint against its parent: float64[J, 3, 3], row vectors."""
+    convention = Convention.of(dna)
     angles = _rows(dna.neutral_joint_rotations, len(dna.joint_names))
-    if dna.rotation_unit == "degrees":
-        angles = angles * (math.pi / 180)
-    angles = angles * np.asarray(dna.rotation_signs, float)
+    angles = angles * convention.radians * convention.signs
     product = np.broadcast_to(np.eye(3), (len(angles), 3, 3))
-    for letter in dna.rotation_sequence:
-        axis = "xyz".index(letter)
+    for axis in convention.order:
         product = product @ _about(axis, angles[:, axis])
     return np.asarray(product)
 
