@@ -32,6 +32,7 @@ def noise(names=tuple(NAMES[:5]), frames=25, seed=3, **settings):
 def clip_time(layer, clip, t):
     """Clip time of a scene time within the layer's range."""
     if layer.warp is not None:
+        assert not layer.reverse  # refused: a warp that falls is the way to play backwards
         return float(np.interp(t, *layer.warp))
     first, last = layer.clip_range or (clip.frame_times()[0], clip.frame_times()[-1])
     start = first if layer.start is None else layer.start
@@ -208,6 +209,22 @@ def test_bakes_what_it_evaluates():
     assert (mixer.evaluate_batch(0.25 + np.arange(13) / 24) == clip.curves.T).all()
 
 
+def test_a_warp_that_falls_plays_backwards():
+    """A clip whose value is its time shows what the line of the warp says: 0.75 - t / 2."""
+    ramp = Clip(["mouth"], [np.arange(25) / 24], 24.0)
+    mixer = Mixer(["mouth"], [Layer(ramp, warp=([0.25, 1.25], [0.625, 0.125]))])
+    times = np.linspace(0.25, 1.25, 11)
+    shown = mixer.evaluate_batch(times)[:, 0]
+    np.testing.assert_allclose(shown, 0.75 - times / 2, rtol=0, atol=1e-6)
+
+
+# What a warp takes the place of; it would be ignored.
+BESIDE_A_WARP = (
+    {"start": 0.5}, {"end": 3.0}, {"clip_range": (0.25, 0.5)}, {"scale": 2.0}, {"repeat": 2.0},
+    {"reverse": True},
+)  # fmt: skip
+
+
 @pytest.mark.parametrize(
     ("settings", "sentence"),
     [
@@ -223,7 +240,7 @@ def test_bakes_what_it_evaluates():
         ({"start": math.inf}, r"layers\[0\].start"),
         ({"end": 3.0}, r"layers\[0\].end: a clip ends by its length"),
         ({"warp": ([0.0], [1.0])}, r"two or more .*layers\[0\].warp"),
-        ({"warp": ([0, 1], [0, 1]), "scale": 2.0}, "a warp alone"),
+        *(({"warp": ([0, 1], [0, 1]), **beside}, "a warp alone") for beside in BESIDE_A_WARP),
         ({"mask": [1.0]}, r"one value per control .*mask"),
         ({"mask": {"brow": 2.0}}, "a weight from 0 to 1"),
         ({"mask": {"brwo": 1.0}}, "mask brwo: a region, a control or a pattern"),

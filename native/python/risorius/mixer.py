@@ -47,8 +47,9 @@ class Layer:
         scale: 2 plays half as fast.
         repeat: how often the part is played one after the other; need not be whole.
         reverse: plays it backwards.
-        warp: (scene times, clip times), straight lines between: instead of start, clip_range,
-            scale, repeat and reverse. The layer lasts from the first to the last scene time.
+        warp: (scene times, clip times), straight lines between: instead of start, end, clip_range,
+            scale, repeat and reverse. The layer lasts from the first to the last scene time; clip
+            times that fall play backwards.
         extend: before its start and after its end the layer may "hold", "hold_forward" (only after
             its end), be "nothing", or "repeat" for ever both ways.
         fade_in: seconds from nothing to full weight at its start, in a straight line.
@@ -290,10 +291,11 @@ def _settings(place: int, layer: Layer, curves: LayerCurves) -> dict[str, Any]:
     first, last = layer.clip_range or curves.range
     start, end = layer.start, layer.end
     if layer.warp is not None:
-        if (start, layer.clip_range, layer.scale, layer.repeat) != (None, None, 1.0, 1.0):
+        plain = (None, None, None, 1.0, 1.0, False)
+        if (start, end, layer.clip_range, layer.scale, layer.repeat, layer.reverse) != plain:
             raise ArgumentError(
-                f"layers[{place}].warp: a warp alone, without start, clip_range, scale and repeat, "
-                "was expected"
+                f"layers[{place}].warp: a warp alone, without start, end, clip_range, scale, "
+                "repeat and reverse, was expected"
             )
     elif not still and end is not None:
         raise ArgumentError(f"layers[{place}].end: a clip ends by its length, none was expected")
