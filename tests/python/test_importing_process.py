@@ -176,7 +176,8 @@ def test_mirror_swaps_sides():
     for left, right in pairs.items():
         assert process.mirrored_name(RIG + left) == RIG + right
         assert process.mirrored_name(RIG + right) == RIG + left
-    names = [RIG + "jawLeft", "head.yaw", "head.pitch", "eyeL.yaw", "eyeR.pitch"]
-    out = process.mirror(Clip(names, [[0.1], [0.2], [0.3], [0.4], [0.5]]))
-    assert out.names == (RIG + "jawRight", "head.yaw", "head.pitch", "eyeR.yaw", "eyeL.pitch")
-    np.testing.assert_allclose(out.curves[:, 0], [0.1, -0.2, 0.3, -0.4, 0.5])
+    names = [RIG + "jawLeft", "head.yaw", "head.pitch", "head.roll", "eyeL.yaw", "eyeR.pitch"]
+    out = process.mirror(Clip(names, [[0.1], [0.2], [0.3], [0.6], [0.4], [0.5]]))
+    assert out.names[0] == RIG + "jawRight"
+    assert out.names[1:] == ("head.yaw", "head.pitch", "head.roll", "eyeR.yaw", "eyeL.pitch")
+    np.testing.assert_allclose(out.curves[:, 0], [0.1, -0.2, 0.3, -0.6, -0.4, 0.5])

@@ -386,3 +386,37 @@ def test_masks_are_one_per_region_and_checked():
 def test_rotation_is_one_of_two():
     with pytest.raises(ValueError, match="euler or quaternion"):
         risorius.Rig(risorius.load(GOLDEN / "core.dna"), rotation="matrix")
+
+
+def one_pose_solver(threshold):
+    """A pose at 0 whose value is 1 - x, written to a control that moves a joint."""
+    dna = risorius.Dna()
+    dna.lod_count, dna.rotation_unit = 1, "radians"
+    dna.raw_control_names, dna.joint_names, dna.joint_parents = ["x"], ["joint"], [0]
+    dna.neutral_joint_translations = dna.neutral_joint_rotations = [[0, 0, 0]]
+    dna.joint_groups = [
+        risorius.JointGroup(lods=[1], input_indices=[1], output_indices=[0], values=[[1]])
+    ]
+    dna.rbf_behavior.lod_solver_mapping = [[0]]
+    dna.rbf_behavior.solvers = [
+        risorius.RbfSolver(
+            name="s", raw_control_indices=[0], pose_indices=[0], raw_control_values=[0],
+            radius=1, automatic_radius=1, function_type=2, weight_threshold=threshold,
+        )
+    ]  # fmt: skip
+    dna.rbf_behavior.poses = [risorius.RbfPose(name="p", scale=1)]
+    dna.rbf_behavior_ext.pose_control_names = ["pose"]
+    dna.rbf_behavior_ext.poses = [
+        risorius.RbfPoseControls(output_control_indices=[1], output_control_weights=[1])
+    ]
+    return risorius.Rig(dna)
+
+
+def test_a_pose_must_be_above_the_threshold_and_not_at_it():
+    for threshold, wanted in ((0.5, 0), (np.nextafter(np.float32(0.5), np.float32(0)), 0.5)):
+        rig = one_pose_solver(threshold)
+        pose = rig.evaluate([0.5])
+        assert pose.controls.tolist() == [0.5, wanted]
+        assert pose.joints[0, 0] == wanted
+        _, weights = rig.solver_poses(0, pose.controls)
+        assert weights.tolist() == [wanted]
