@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: MIT
 """Jobs as workers of the tests run them: slow ones, and some that end their worker."""
 
+import contextlib
 import os
 import signal
 import time
 
+from risorius.batch.outcome import Outcome
 from risorius.batch.work import run_job
 from risorius.fileio import replacing
 
@@ -29,12 +31,24 @@ def deadly(job, threads=1):
 
 
 def deadly_once(job, threads=1):
-    """The same, but the second worker that gets it lives."""
-    mark = job.clip.with_suffix(".mark")
-    if job.clip.stem == "deadly" and not mark.exists():
-        mark.touch()
-        return deadly(job, threads)
+    """The same, but one worker alone dies of it, also where two have such a job at once."""
+    if job.clip.stem == "deadly":
+        with contextlib.suppress(FileExistsError):
+            job.clip.with_suffix(".mark").touch(exist_ok=False)
+            return deadly(job, threads)
     return slow(job, threads)
+
+
+def beside_deadly(job):
+    """The deadly job ends its worker each time, and the other lasts until it has done so thrice."""
+    deaths = job.clip.with_name("deaths")
+    if job.clip.stem == "deadly":
+        with deaths.open("ab") as file:
+            file.write(b"x")
+        os.kill(os.getpid(), signal.SIGKILL)
+    while not deaths.exists() or deaths.stat().st_size < 3:
+        time.sleep(0.01)
+    return Outcome(job.name)
 
 
 def faulty(job):

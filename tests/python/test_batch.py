@@ -356,6 +356,16 @@ def test_a_job_that_ends_its_worker_once_is_done_by_another(tmp_path, monkeypatc
     check_outputs(jobs)
 
 
+def test_a_job_beside_one_that_ends_its_workers_is_not_blamed(tmp_path):
+    jobs = make(tmp_path / "j", clips=2, faces=["core"])
+    (tmp_path / "j" / "clips" / "take1.csv").rename(tmp_path / "j" / "clips" / "deadly.csv")
+    both = [job for job in read_jobs(jobs).jobs if job.lod == 0]
+    assert sorted(job.clip.stem for job in both) == ["deadly", "take0"]
+    done = {o.name.rpartition("/")[2]: o for o in Pool(batch_work.beside_deadly, 2).results(both)}
+    assert (done["take0"].error, done["take0"].attempts) == ("", 1)
+    assert done["deadly"].error == "given up: it has ended 3 workers (signal 9)"
+
+
 def test_a_job_that_ends_every_worker_is_named_and_given_up(tmp_path, monkeypatch, capsys):
     jobs = make(tmp_path / "j", clips=3, faces=["core"])
     (tmp_path / "j" / "clips" / "take2.csv").rename(tmp_path / "j" / "clips" / "deadly.csv")
