@@ -4,6 +4,7 @@
 import os
 import shutil
 import sys
+import traceback
 from pathlib import Path
 
 import bpy
@@ -28,7 +29,28 @@ def installed():
 
 
 @pytest.fixture(autouse=True)
-def addon(installed):
+def tracebacks():
+    """What Blender printed of exceptions in our handlers, timers and operators; a test fails of it.
+
+    Blender prints those and goes on, so that no test would notice. One that plants an exception
+    takes it out of this list.
+    """
+    printed = []
+
+    def note(kind, error, trace):
+        files = [frame.filename for frame in traceback.extract_tb(trace)]
+        if any("user_default" in Path(file).parts for file in files):  # not Blender's exporters
+            printed.append("".join(traceback.format_exception(kind, error, trace)))
+        sys.__excepthook__(kind, error, trace)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "excepthook", note)
+        yield printed
+    assert not printed, "Blender printed a traceback:\n" + "\n".join(printed)
+
+
+@pytest.fixture(autouse=True)
+def addon(installed, tracebacks):
     """The enabled add-on in an empty file."""
     import addon_utils
 

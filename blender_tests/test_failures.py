@@ -52,7 +52,7 @@ def test_bad_files_leave_nothing_behind(tmp_path, mode):
     assert "plane" in said["flat_axes"]
 
 
-def test_a_failure_half_way_leaves_nothing_behind(dna_file, mode, monkeypatch):
+def test_a_failure_half_way_leaves_nothing_behind(dna_file, mode, monkeypatch, tracebacks):
     before = scene.counts()
     meshes = scene.submodule("scene.meshes")
 
@@ -62,6 +62,8 @@ def test_a_failure_half_way_leaves_nothing_behind(dna_file, mode, monkeypatch):
     monkeypatch.setattr(meshes, "set_mode", fail)
     with pytest.raises(RuntimeError, match="planted"):
         bpy.ops.risorius.import_dna(filepath=str(dna_file), shape_mode=mode)
+    assert [text.splitlines()[-1] for text in tracebacks] == ["MemoryError: planted"]
+    tracebacks.clear()
     assert scene.counts() == before
     assert bpy.context.mode == "OBJECT"
 
@@ -100,6 +102,34 @@ def test_no_permission_gets_a_sentence(dna_file, monkeypatch):
     with pytest.raises(RuntimeError, match="Permission denied"):
         bpy.ops.risorius.import_dna(filepath=str(dna_file))
     assert scene.counts() == before
+
+
+@pytest.mark.parametrize("handler", ["frame", "edit", "save", "load"])
+def test_an_exception_in_a_handler_does_not_pass_unseen(
+    handler, dna_file, tmp_path, monkeypatch, tracebacks
+):
+    rig = scene.load(dna_file)
+    blend = str(tmp_path / "face.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=blend)
+
+    def fail(*_arguments, **_options):
+        raise LookupError("planted")
+
+    monkeypatch.setattr(scene.submodule("scene.evaluate"), "evaluate_all", fail)
+    monkeypatch.setattr(scene.submodule("scene.evaluate"), "evaluate", fail)
+    monkeypatch.setattr(scene.submodule("scene.heal"), "remove_dead", fail)
+    assert not tracebacks
+    if handler == "frame":
+        bpy.context.scene.frame_set(3)
+    elif handler == "edit":
+        scene.set_controls(rig, jawOpen=0.5)
+    elif handler == "save":
+        bpy.ops.wm.save_as_mainfile(filepath=blend)
+    else:
+        bpy.ops.wm.open_mainfile(filepath=blend)
+    monkeypatch.undo()
+    assert any("planted" in text for text in tracebacks)
+    tracebacks.clear()
 
 
 def test_parts_that_were_deleted_do_no_harm(dna_file, mode):

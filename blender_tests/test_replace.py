@@ -469,7 +469,9 @@ def test_a_file_without_the_level_that_was_built(mode, dna_file, tmp_path):
     _right(rig, path)
 
 
-def test_a_failure_while_building_changes_nothing(mode, dna_file, other_file, monkeypatch):
+def test_a_failure_while_building_changes_nothing(
+    mode, dna_file, other_file, monkeypatch, tracebacks
+):
     rig = scene.load(dna_file, mode)
     before = _whole(rig)
 
@@ -479,6 +481,8 @@ def test_a_failure_while_building_changes_nothing(mode, dna_file, other_file, mo
     monkeypatch.setattr(scene.submodule("scene.meshes"), "set_mode", fail)
     with pytest.raises(RuntimeError, match="planted"):
         bpy.ops.risorius.replace_dna(filepath=str(other_file))
+    assert [text.splitlines()[-1] for text in tracebacks] == ["MemoryError: planted"]
+    tracebacks.clear()
     assert _whole(rig) == before
 
 
