@@ -157,3 +157,15 @@ def test_one_of_two_is_deleted(rig, dna_file):
     bpy.context.view_layer.update()
     np.testing.assert_array_equal(scene.snapshot(other), before)
     _right(dna_file)
+
+
+def test_a_deleted_character_with_a_material_without_nodes_leaves_the_file(rig, tmp_path):
+    plain = bpy.data.materials.new("plain")
+    plain.use_nodes = False
+    scene.meshes(rig)[0].data.materials.append(plain)
+    scene.meshes(rig)[0].data.materials.append(None)
+    _delete([rig, scene.controls(rig), *scene.meshes(rig).values()])
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "gone.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "gone.blend"))
+    assert not [o for o in bpy.data.objects if "risorius_controls" in o]
+    assert not bpy.data.meshes

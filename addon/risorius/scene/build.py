@@ -8,7 +8,18 @@ import bpy
 
 from .. import native
 from ..logic import names, plans, textures
-from . import armatures, compat, lods, materials, meshes, migrate, parts, runtime, storage
+from . import (
+    armatures,
+    compat,
+    lods,
+    materials,
+    meshes,
+    migrate,
+    parts,
+    runtime,
+    sharing,
+    storage,
+)
 
 
 @dataclass(frozen=True)
@@ -221,9 +232,9 @@ def remove(rig):
     collections = [c for c in bpy.data.collections if rig.name in c.objects]
     circles = {b.custom_shape for b in controls.pose.bones if b.custom_shape} if controls else ()
     data += [c.data for c in circles]
-    images = [n.image for m in used for n in m.node_tree.nodes if n.type == "TEX_IMAGE"]
+    images = [n.image for n in sharing.nodes_of(rig)]
     _remove([i for i in (*items, rig, controls, *circles) if i is not None])
-    for left in (data, used, [i for i in images if i is not None]):
+    for left in (data, used, images):
         _remove([d for d in dict.fromkeys(left) if d.users == 0])
     if text is not None and not any(r.get(parts.DNA) == text for r in parts.rigs()):
         _remove([text])
