@@ -90,18 +90,42 @@ def test_wheel_of_another_version_is_said_in_words(monkeypatch):
 def test_no_permission_gets_a_sentence(dna_file, monkeypatch):
     build = scene.submodule("scene.build")
 
-    class Refusing:
-        DnaError = risorius.DnaError
+    class Refusing(type(build.Path())):
+        def read_bytes(self):
+            raise PermissionError(13, "Permission denied", str(self))
 
-        @staticmethod
-        def load(path):
-            raise PermissionError(13, "Permission denied", path)
-
-    monkeypatch.setattr(build.native, "module", Refusing)
+    monkeypatch.setattr(build, "Path", Refusing)
     before = scene.counts()
-    with pytest.raises(RuntimeError, match="Permission denied"):
+    with pytest.raises(RuntimeError, match=r"small\.dna: Permission denied\.$"):
         bpy.ops.risorius.import_dna(filepath=str(dna_file))
     assert scene.counts() == before
+
+
+def test_a_file_that_changes_while_it_is_read_is_one_file(dna_file, monkeypatch, tmp_path):
+    """It is read once and compiled once, at the first import and the second."""
+    whole, calls = dna_file.read_bytes(), []
+    real_load, real_rig = risorius.load, risorius.Rig
+
+    def load(source):
+        calls.append("load")
+        dna = real_load(source)
+        small_face(name="Other", head_grid=(5, 6)).save(str(dna_file))
+        return dna
+
+    def compiled(*arguments):
+        calls.append("Rig")
+        return real_rig(*arguments)
+
+    monkeypatch.setattr(risorius, "load", load)
+    monkeypatch.setattr(risorius, "Rig", compiled)
+    rig = scene.load(dna_file)
+    scene.set_controls(rig, jawOpen=0.5)
+    assert calls == ["load", "Rig"]
+    monkeypatch.undo()
+    assert scene.submodule("scene.storage").content(rig["risorius_dna"]) == whole
+    dna_file.write_bytes(whole)
+    raw = scene.raw_of(rig, dna_file)
+    assert scene.error_against_oracle(rig, dna_file, raw) < scene.TOLERANCE
 
 
 @pytest.mark.parametrize("handler", ["frame", "edit", "save", "load"])

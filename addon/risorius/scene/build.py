@@ -3,6 +3,7 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import bpy
 
@@ -49,6 +50,31 @@ class BuildOptions:
     nearest_lods: bool = False
 
 
+@dataclass(frozen=True)
+class _File:
+    """What was read and compiled once.
+
+    Attributes:
+        path: of the file.
+        content: its bytes.
+        dna: what was read from them.
+        rig: the risorius.Rig of it.
+    """
+
+    path: Path
+    content: bytes
+    dna: Any
+    rig: Any
+
+
+def _read(path):
+    # One read: a file that is just being written may be another at a second look.
+    risorius = native.module()
+    content = Path(path).read_bytes()
+    dna = risorius.load(content)
+    return _File(Path(path), content, dna, risorius.Rig(dna))
+
+
 def import_file(context, path, options, progress=lambda _share: None):
     """Build a character from a file.
 
@@ -65,39 +91,36 @@ def import_file(context, path, options, progress=lambda _share: None):
         DnaError: the file is bad or cannot be read.
         PlanError, SpaceError: there is no character in it.
     """
-    risorius = native.module()
-    dna = risorius.load(str(path))
-    content = Path(path).read_bytes()
+    file = _read(path)
+    dna = file.dna
     progress(0.15)
     unit = options.unit or context.scene.unit_settings.scale_length
     options = replace(options, unit=unit)
     if options.nearest_lods:
         options = replace(options, lods=plans.existing_lods(dna, options.lods))
-    rests = risorius.Rig(dna).initial_raw_controls
-    plan = plans.plan_character(dna, Path(path).stem, options.lods, unit, rests)
+    rests = file.rig.initial_raw_controls
+    plan = plans.plan_character(dna, file.path.stem, options.lods, unit, rests)
     plan = replace(plan, name=names.unique_labels([plan.name], bpy.data.collections.keys())[0])
     progress(0.25)
     made = []
     try:
-        rig, warnings = _build(context, plan, dna, content, path, options, made, progress)
-        live = runtime.of(rig)
-        if live is None:
-            raise plans.PlanError("The file cannot be evaluated.")
-        layers = plans.layer_warnings(live.rig.ignored_layers)
+        rig, warnings = _build(context, plan, file, options, made, progress)
     except BaseException:
         _remove(made)
+        runtime.forget_unused(parts.rigs())
         raise
-    return rig, [*dna.warnings, *warnings, *layers]
+    return rig, [*dna.warnings, *warnings, *plans.layer_warnings(file.rig.ignored_layers)]
 
 
-def _build(context, plan, dna, content, path, options, made, progress):
-    text = storage.store(plan.name, content, made)
+def _build(context, plan, file, options, made, progress):
+    text = storage.store(plan.name, file.content, made)
     workshop = bpy.data.collections.new(f"{plan.name} (in the making)")
     made.append(workshop)
     context.scene.collection.children.link(workshop)
     rig = armatures.build_rig(context, plan, made, workshop)
     controls = armatures.build_controls(context, plan, made, workshop)
-    _connect(plan, rig, controls, text, path, options.unit)
+    _connect(plan, rig, controls, text, file.path, options.unit)
+    runtime.take(rig, file.dna, file.rig)
     progress(0.4)
     built = []
     for number, mesh_plan in enumerate(plan.meshes):
@@ -114,12 +137,12 @@ def _build(context, plan, dna, content, path, options, made, progress):
     settle(context, rig, controls)
     armatures.pull_controls(rig, controls)
     if options.materials:
-        found = _find_textures(plan, path, options)
+        found = _find_textures(plan, file.path, options)
         simple = options.simple_materials
         warnings = materials.build_materials(plan, rig, built, made, found, simple)
         rig[parts.TEXTURES] = found.summary()
     progress(0.8)
-    _add_shapes(plan, dna, rig, built, options.mode)
+    _add_shapes(plan, file.dna, rig, built, options.mode)
     for item in built:
         made.append(item.data.shape_keys)
     progress(0.95)

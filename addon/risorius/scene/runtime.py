@@ -111,6 +111,25 @@ def of(rig):
     return _cache[key]
 
 
+def take(armature, dna, rig):
+    """Keep what was read and compiled at an import: it is not done again for the same bytes.
+
+    Args:
+        armature: the deforming armature, which has its Text and its unit.
+        dna: what was read from the bytes in that Text.
+        rig: the risorius.Rig that was compiled of it.
+
+    Raises:
+        PlanError: the file cannot be evaluated.
+    """
+    key = (storage.content_hash(armature.get(parts.DNA)), unit_of(armature))
+    if _cache.get(key) is None:
+        try:
+            _cache[key] = _runtime(dna, rig, key[1])
+        except (native.dna_error(), SpaceError, ValueError, LookupError) as error:
+            raise plans.PlanError("The file cannot be evaluated.") from error
+
+
 def unit_of(rig):
     """Metres per Blender unit at import."""
     unit = rig.get(parts.UNIT)
@@ -129,7 +148,10 @@ def forget_unused(rigs):
 def _compile(content, unit):
     risorius = native.module()
     dna = risorius.load(content)
-    rig = risorius.Rig(dna)
+    return _runtime(dna, risorius.Rig(dna), unit)
+
+
+def _runtime(dna, rig, unit):
     space = plans.space_of(dna, unit)
     anchors = plans.find_anchors(dna.joint_names)
     owned = {int(j) for j in rig.joint_indices_written} | set(anchors.neck)

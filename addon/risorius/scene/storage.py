@@ -46,14 +46,14 @@ def store(name, content, made):
         "The character needs it; it is not meant to be edited.\n"
     )
     text[_BYTES] = _packed(content)
-    text[_HASH] = hashlib.sha256(content).hexdigest()
+    text[_HASH] = hash_of(content)
     text[_LENGTH] = str(len(content))  # words: Blender's integers end at 2 GiB
     return text
 
 
 def _holding(wanted):
     """A Text of this .blend that holds these bytes, unpacked and not believed; or None."""
-    digest = hashlib.sha256(wanted).hexdigest()
+    digest = hash_of(wanted)
     for text in bpy.data.texts:
         if text.library is None and content_hash(text) == digest and _holds(text, wanted):
             return text
@@ -84,6 +84,11 @@ def _most(packed):
     return _MOST_TIMES * len(packed) + _ALWAYS
 
 
+def hash_of(content):
+    """The hash of the bytes of a file, as it is kept beside them."""
+    return hashlib.sha256(content).hexdigest()
+
+
 def content_hash(text):
     """The hash of what a Text holds; empty where it holds no DNA or is no Text at all."""
     digest = text.get(_HASH) if isinstance(text, bpy.types.Text) else None
@@ -100,7 +105,7 @@ def content(text):
     if not isinstance(packed, bytes):
         raise ContentError("the Text holds no bytes of a DNA file")
     content = _unpack(packed, _limit(text, packed))
-    if hashlib.sha256(content).hexdigest() != content_hash(text):
+    if hash_of(content) != content_hash(text):
         raise ContentError("its bytes are not those that were imported")
     return content
 
