@@ -219,6 +219,24 @@ def _tamper(text, how):
 
 
 @pytest.mark.parametrize(
+    "how", ["no stream at all", "cut short", "one byte flipped", "a number for the bytes"]
+)
+def test_export_of_a_face_whose_dna_was_tampered_with_since(how, dna_file, tmp_path):
+    rig = scene.load(dna_file)
+    target = tmp_path / "kept.dna"
+    target.write_bytes(b"what was there")
+    _tamper(rig["risorius_dna"], how)  # what was compiled of it is still there
+    with pytest.raises(RuntimeError) as caught:
+        bpy.ops.risorius.export_dna(filepath=str(target))
+    text = str(caught.value).removeprefix("Error: ").strip()
+    assert text.startswith("Small_rig has lost the data of its file: its bytes") or how[0] == "a"
+    assert "Traceback" not in text
+    assert text.isprintable()
+    assert text.endswith(".")
+    assert target.read_bytes() == b"what was there"
+
+
+@pytest.mark.parametrize(
     "how",
     [
         "no stream at all",

@@ -45,7 +45,10 @@ def export(context, rig, options=None):
     live = runtime.of(rig)
     if live is None:
         raise ExportError(f"{rig.name} has lost the data of its file.")
-    content = storage.content(rig[parts.DNA])
+    try:
+        content = storage.content(rig[parts.DNA])
+    except storage.ContentError as error:
+        raise ExportError(f"{rig.name} has lost the data of its file: {error}.") from error
     unit = runtime.unit_of(rig)
     levels = tuple(lods.built(rig)) or (0,)
     plan = plans.plan_character(live.dna, rig.name, levels, unit, live.rests)
