@@ -13,6 +13,9 @@ def test_the_self_test_says_that_the_module_works(monkeypatch):
     assert works
     assert "works" in text
     assert "Python 3." in text
+    assert "scalar" in text
+    words = text.partition(": ")[2].split(", ")
+    assert all(w.strip(",") == w != "" for w in words), text
 
     class Wrong:
         def __init__(self, *_args, **_kwargs):

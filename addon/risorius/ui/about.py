@@ -27,10 +27,9 @@ def self_test():
     deltas = np.array([[1, 2, 3, 0, 0, 0, 0, 0, 0]], np.float32)
     if space.evaluate(deltas)[0].tolist() != [[2.0, 4.0, 6.0]]:
         return False, "The native module computes wrong numbers: install the extension anew."
-    simd = risorius.available_simd().replace(" ", ", ")
     return True, (
         f"Risorius {native.addon_version()} works: Python {sys.version_info.major}."
-        f"{sys.version_info.minor}, {platform.machine()}, {simd}"
+        f"{sys.version_info.minor}, {platform.machine()}, {risorius.available_simd()}"
     )
 
 
