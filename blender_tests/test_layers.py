@@ -648,6 +648,23 @@ def test_expressions_become_pose_assets_in_catalogues(rig, tmp_path):
     assert len(bpy.data.actions) == count
 
 
+def test_the_catalogues_are_whole_for_whoever_reads_them(rig, tmp_path):
+    """Other .blend files of the folder use the same file, and it may be a link to a shared one."""
+    shared, link = tmp_path / "shared.txt", tmp_path / "blender_assets.cats.txt"
+    old = "VERSION 1\n\n6f0a5c9e-2f0b-4d2e-9a3b-0d9f6f0b7a12:Props:Props\n"
+    shared.write_text(old, encoding="utf-8")
+    link.symlink_to(shared)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "poses.blend"))
+    with shared.open(encoding="utf-8") as reader:
+        assert bpy.ops.risorius.make_pose_assets() == {"FINISHED"}
+        assert reader.read() == old
+    assert link.is_symlink()
+    new = shared.read_text(encoding="utf-8")
+    assert new.startswith(old)
+    assert "Faces/Emotions" in new
+    assert sorted(p.name for p in tmp_path.glob("*cats*")) == [link.name]
+
+
 def test_idle_life_is_that_of_its_seed(blinker):
     from risorius.idle import idle
 

@@ -151,4 +151,5 @@ def _add_catalogs(path, wanted):
         if number not in text:
             title = f"{group[:1].upper()}{group[1:]}s"
             text = f"{text.rstrip()}\n{number}:{CATALOG}/{title}:{CATALOG}-{title}\n"
-    path.write_text(text, encoding="utf-8")
+    # The file belongs to every .blend of the folder: it is whole at all times.
+    native.part("fileio").write_text(path, text)
