@@ -287,6 +287,75 @@ def test_onto_an_nla_track(dna_file):
     assert _state(rig) == before
 
 
+def _delete(tracks):
+    tracks.remove(tracks["quiet"])
+
+
+def _rename(tracks):
+    quiet, alone = tracks["quiet"], tracks["alone"]
+    alone.name, quiet.name = "other", "alone"
+
+
+def _add_before(tracks):
+    tracks.new(prev=tracks[0]).name = "mine"
+
+
+def _swap_for_a_new_one(tracks):
+    tracks.remove(tracks["quiet"])
+    tracks.new(prev=tracks[0]).name = "mine"
+
+
+def _rename_the_baked_one(tracks):
+    tracks[-1].name = "quiet"
+
+
+def _group_the_baked_one(tracks):
+    from support.past_scenes import make_meta
+
+    make_meta(tracks.id_data, tracks[-1].strips[0])
+
+
+@pytest.mark.parametrize(
+    ("change", "wanted"),
+    [
+        (None, {"quiet": "muted", "plays": "", "alone": "solo"}),
+        (_delete, {"plays": "", "alone": "solo"}),
+        (_rename, {"alone": "muted", "plays": "", "other": "solo"}),
+        (_add_before, {"quiet": "muted", "mine": "", "plays": "", "alone": "solo"}),
+        (_swap_for_a_new_one, {"mine": "", "plays": "", "alone": "solo"}),
+        (_rename_the_baked_one, {"quiet": "muted", "plays": "", "alone": "solo"}),
+        (_group_the_baked_one, {"quiet": "muted", "plays": "", "alone": "solo"}),
+    ],
+)
+def test_tracks_that_were_changed_meanwhile_get_their_own_flags_back(dna_file, change, wanted):
+    controls = animate(scene.load(dna_file))
+    data = controls.animation_data
+    for name in ("quiet", "plays", "alone"):
+        track = data.nla_tracks.new()
+        track.name = name
+        track.strips.new(f"strip of {name}", 1, data.action)
+    data.nla_tracks["quiet"].mute = True
+    data.nla_tracks["alone"].is_solo = True
+    data.action = None
+    _bake(kind="CONTROLS", strip=True)
+    assert all(t.mute for t in list(data.nla_tracks)[:3])
+    if change is not None:
+        change(data.nla_tracks)
+    assert bpy.ops.risorius.unbake() == {"FINISHED"}
+    found = {t.name: "muted" * t.mute + "solo" * t.is_solo for t in data.nla_tracks}
+    assert found == wanted
+    assert len(data.nla_tracks) == len(wanted)
+
+
+def test_a_strip_put_beside_the_baked_one_stays(dna_file):
+    controls = animate(scene.load(dna_file))
+    data, action = controls.animation_data, controls.animation_data.action
+    _bake(kind="CONTROLS", strip=True)
+    data.nla_tracks[-1].strips.new("mine", 100, action)
+    assert bpy.ops.risorius.unbake() == {"FINISHED"}
+    assert [[s.name for s in t.strips] for t in data.nla_tracks] == [["mine"]]
+
+
 def test_left_out_keys_stay_within_the_error(dna_file):
     rig = _face(dna_file)
     _bake(step=0.25)

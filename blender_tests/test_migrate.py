@@ -108,3 +108,19 @@ def test_a_form_that_is_no_number_counts_as_none(rubbish):
     assert scene.submodule("scene.migrate").version_of(past.controls()[0]) == 0
     scene.submodule("scene.migrate").bring_up_all()
     assert past.controls()[0][VERSION] == 1
+
+
+def test_what_an_old_bake_silenced_is_known_by_name(capsys):
+    bpy.ops.wm.open_mainfile(filepath=str(FOLDER / "baked_controls.blend"))
+    (line,) = _lines(capsys)
+    assert "NLA tracks that its bake silenced are known by name" in line
+    controls = past.controls()[0]
+    tracks = controls.animation_data.nla_tracks
+    assert [t.name for t in tracks[:3]] == ["Low", "High", "Silent"]
+    tracks.new(prev=tracks[0]).name = "New"
+    tracks.remove(tracks["High"])
+    tracks[-1].name = "Renamed"
+    bpy.context.view_layer.objects.active = controls
+    assert bpy.ops.risorius.unbake() == {"FINISHED"}
+    flags = [(t.name, t.mute, t.is_solo) for t in tracks]
+    assert flags == [("Low", False, True), ("New", False, False), ("Silent", True, False)]

@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 
 from ..logic import curves as reduction
+from ..logic import tracks
 from . import compat
 
 BEFORE = "risorius_before"  # on what plays a baked action: what animated it before
@@ -176,7 +177,7 @@ def play(owner, action, slot, muted=(), strip=False):
         data.use_nla = False
         compat.assign_action(data, action, slot)
         return
-    held["tracks"] = [f"{int(t.mute)} {int(t.is_solo)}" for t in data.nla_tracks]
+    held["tracks"] = [_noted(track, track.mute, track.is_solo) for track in data.nla_tracks]
     for track in data.nla_tracks:
         track.is_solo = False
         track.mute = True
@@ -188,7 +189,7 @@ def play(owner, action, slot, muted=(), strip=False):
     if slot is not None:
         made.action_slot = slot
     made.frame_start_ui = made.action_frame_start
-    held["track"] = track.name
+    held["track"], held["baked"] = track.name, action
 
 
 def keep(owner):
@@ -265,7 +266,7 @@ def restore(owner):
     if data.action is not None and data.action != state.get("action"):
         data.action.use_fake_user |= not data.action.get(BAKED_ACTION)
     if "track" in state:
-        baked += _remove_track(data, state)
+        baked += _remove_track(owner, state)
     for curve in data.drivers:
         if f"{curve.array_index} {curve.data_path}" in list(state.get("drivers", ())):
             curve.mute = False
@@ -298,18 +299,63 @@ def _is_used(action):
     )
 
 
-def _remove_track(data, state):
-    track = data.nla_tracks.get(state["track"])
-    played = []
-    if track is not None:
-        played = [s.action for s in track.strips]
-        data.nla_tracks.remove(track)
-    for track, words in zip(data.nla_tracks, list(state.get("tracks", ())), strict=False):
-        mute, solo = (bool(int(w)) for w in words.split())
-        track.mute = mute
-        if solo:
-            track.is_solo = True
+def _noted(track, mute, solo):
+    """What is kept of a track while a baked one is played: flags, and what it is known by."""
+    return json.dumps([bool(mute), bool(solo), track.name, [s.name for s in track.strips]])
+
+
+def note_tracks_by_name(owner):
+    """Write what is kept of tracks in the present way: up to form 0 it was by their order.
+
+    Returns:
+        Whether there was anything to write.
+    """
+    state = owner.get(BEFORE)
+    lines = list(state.get("tracks", ())) if state is not None else []
+    if not lines or lines[0].startswith("["):
+        return False
+    data = owner.animation_data
+    own = data.nla_tracks.get(state["track"])
+    others = [track for track in data.nla_tracks if track != own]
+    pairs = [(t, *(int(w) for w in x.split())) for t, x in zip(others, lines, strict=False)]
+    state["tracks"] = [_noted(*pair) for pair in pairs]
+    if own is not None and len(own.strips) and own.strips[0].action is not None:
+        state["baked"] = own.strips[0].action
+    return True
+
+
+def _remove_track(owner, state):
+    """Take the baked strip away and give the other tracks their flags. Returns: its actions."""
+    note_tracks_by_name(owner)
+    data = owner.animation_data
+    own = _baked_strips(data, state)
+    played = [action for _track, strip in own for action in compat.actions_in([strip])]
+    for track, strip in own:
+        track.strips.remove(strip)
+    for track in {track.name: track for track, _strip in own}.values():
+        if not len(track.strips):
+            data.nla_tracks.remove(track)
+    noted = [json.loads(line) for line in state.get("tracks", ())]
+    there = [(track.name, [s.name for s in track.strips]) for track in data.nla_tracks]
+    pairs = tracks.matched([(name, strips) for _mute, _solo, name, strips in noted], there)
+    for at, before in pairs.items():
+        data.nla_tracks[at].mute = noted[before][0]
+    for at, before in pairs.items():
+        if noted[before][1]:
+            data.nla_tracks[at].is_solo = True
     return played
+
+
+def _baked_strips(data, state):
+    """Track and strip of what `play` put there, also where it was renamed or moved."""
+    strips = [(track, strip) for track in data.nla_tracks for strip in track.strips]
+    baked = state.get("baked")
+    own = [(t, s) for t, s in strips if baked and set(compat.actions_in([s])) == {baked}]
+    if own:
+        return own
+    # A copy of the object may play a copy of the action.
+    marked = [(t, s) for t, s in strips if s.action is not None and s.action.get(BAKED_ACTION)]
+    return [(t, s) for t, s in marked if t.name == state["track"]]
 
 
 def busy(owner):

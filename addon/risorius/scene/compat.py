@@ -88,14 +88,18 @@ def played_actions(owner):
     data = owner.animation_data
     if data is None:
         return []
-    found = [data.action, *(s.action for t in data.nla_tracks for s in _strips(t.strips))]
-    return [action for action in dict.fromkeys(found) if action is not None]
+    found = [] if data.action is None else [data.action]
+    for track in data.nla_tracks:
+        found += actions_in(track.strips)
+    return list(dict.fromkeys(found))
 
 
-def _strips(strips):
+def actions_in(strips):
+    """The actions of NLA strips and of those inside meta strips."""
     for strip in strips:
-        yield strip
-        yield from _strips(strip.strips)
+        if strip.action is not None:
+            yield strip.action
+        yield from actions_in(strip.strips)
 
 
 def assign_action(target, action, slot=None):

@@ -5,7 +5,7 @@ Nothing is done to linked ones, which cannot be written: what reads them underst
 Nothing is brought down: a character of a newer form plays as far as this version knows it.
 """
 
-from . import parts
+from . import actions, parts
 
 VERSION = "risorius_version"  # on the control armature: the number of its form
 PRESENT = 1
@@ -82,12 +82,17 @@ def forget():
     _said.clear()
 
 
-def _to_1(_rig, controls):
-    """It says what it needs."""
-    if controls.override_library:
-        return []
-    controls[NEEDS] = _WORDS
-    return ["its controls now say that they need Risorius"]
+def _to_1(rig, controls):
+    """It says what it needs; a baked one keeps what it silenced by name."""
+    changed = []
+    if not controls.override_library:
+        controls[NEEDS] = _WORDS
+        changed.append("its controls now say that they need Risorius")
+    keys = [item.data.shape_keys for item in parts.meshes_of(rig)]
+    owners = [rig, controls, *(key for key in keys if key is not None and key.library is None)]
+    if any([actions.note_tracks_by_name(owner) for owner in owners]):
+        changed.append("the NLA tracks that its bake silenced are known by name now")
+    return changed
 
 
 _STEPS = (_to_1,)
