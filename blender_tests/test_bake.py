@@ -436,6 +436,8 @@ class _Window:
         operators = scene.submodule("ui.bake_operators")
         self.modal = lambda kind: operators.RISORIUS_OT_bake.modal(self, self, _Event(kind))
         self._step = lambda *rest: operators.RISORIUS_OT_bake._step(self, *rest)
+        self._end = lambda context: operators.RISORIUS_OT_bake._end(self, context)
+        self.cancel = lambda: operators.RISORIUS_OT_bake.cancel(self, self)
 
     def report(self, _kind, words):
         self.said.append(words)
@@ -474,6 +476,31 @@ def test_with_a_window_it_shows_progress_and_esc_ends_it(ended, dna_file):
         assert bake.baked(rig) == "RESULT"
     assert window.over
     assert window.said
+
+
+@pytest.mark.parametrize("whole_scene", [False, True])
+@pytest.mark.parametrize("how", ["closed window", "scene removed", "other file"])
+def test_when_blender_ends_it_nothing_is_left(how, whole_scene, dna_file, tmp_path):
+    rig = _face(dna_file)
+    rig.hide_viewport = whole_scene
+    other = tmp_path / "other.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(other))
+    rig = bpy.data.objects["Small_rig"]
+    bpy.context.scene.frame_set(7)
+    before, counts = _state(rig), scene.counts()
+    bake = scene.submodule("scene.bake")
+    scene.submodule("ui.bake_operators")._SLICE = 0.0
+    window = _Window(bake.bake(bpy.context, [rig], bake.BakeOptions(end=10)))
+    assert window.modal("TIMER") == {"RUNNING_MODAL"}
+    if how == "scene removed" and not whole_scene:
+        bpy.data.scenes.remove(bpy.data.scenes["Risorius"])
+    elif how == "other file":
+        bpy.ops.wm.open_mainfile(filepath=str(other))
+    window.cancel()
+    assert window.over
+    rig = bpy.data.objects["Small_rig"]
+    assert (_state(rig), scene.counts()) == (before, counts)
+    assert bpy.context.scene.frame_current == (1 if how == "other file" else 7)
 
 
 @pytest.mark.parametrize("hidden", [False, True])

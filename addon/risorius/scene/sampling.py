@@ -96,7 +96,8 @@ def _stage(context, rigs, items):
             own.collection.objects.link(item)
         yield own
     finally:
-        bpy.data.scenes.remove(own)
+        if _is_there(own):
+            bpy.data.scenes.remove(own)
 
 
 @contextmanager
@@ -105,7 +106,16 @@ def _whole_scene(scene):
     try:
         yield scene
     finally:
-        scene.frame_set(before[0], subframe=before[1])
+        if _is_there(scene):
+            scene.frame_set(before[0], subframe=before[1])
+
+
+def _is_there(scene):
+    """Whether a scene is still in the file: another file may have been opened meanwhile."""
+    try:
+        return scene in bpy.data.scenes[:]
+    except ReferenceError:
+        return False
 
 
 def _needs_whole_scene(scene, rigs):

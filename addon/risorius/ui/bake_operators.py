@@ -203,10 +203,18 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, bpy.types.Operator):
             self._result = {"CANCELLED"}
         elif event.type != "TIMER" or not self._step(context, self._job, _SLICE):
             return {"RUNNING_MODAL"}
+        self._end(context)
+        return self._result
+
+    def cancel(self, context):
+        """Blender ends it: its window was closed, or another file is being opened."""
+        self._job.close()
+        self._end(context)
+
+    def _end(self, context):
         manager = context.window_manager
         manager.event_timer_remove(self._timer)
         manager.progress_end()
-        return self._result
 
     def _step(self, context, job, seconds):
         """Bake for a while. Returns whether it is over."""
