@@ -11,6 +11,7 @@ from .. import native
 from ..logic.clips import ClipError
 from ..logic.names import printable
 from ..scene import actions, clips, evaluate, layers, parts, retarget, runtime
+from . import words
 from .import_operators import explain, shown_progress
 from .operators import has_face
 
@@ -184,7 +185,7 @@ class RISORIUS_OT_import_animation(PlacesClip, bpy.types.Operator, ImportHelper)
         name="Gain", description="Factor of all controls", default=1.0, min=0.0, soft_max=2.0
     )
     gains: bpy.props.StringProperty(
-        name="Gains",
+        name="Single Gains",
         description="Factors of single controls or patterns of their names, as "
         "CTRL_expressions.jawOpen=1.3 *Blink*=1.1",
     )
@@ -279,8 +280,12 @@ class RISORIUS_OT_import_animation(PlacesClip, bpy.types.Operator, ImportHelper)
             layout.prop(self, name)
         if self.mapping == "FILE":
             layout.prop(self, "mapping_file")
-        for name in ("rate_mode", "file_rate", "gain", "gains", "smoothing", "use_eyes"):
-            layout.prop(self, name)
+        layout.prop(self, "rate_mode")
+        words.prop_or(layout, self, "file_rate", 0.0, "0: as the file says")
+        layout.prop(self, "gain")
+        words.prop_or(layout, self, "gains", "", "as *jawOpen=1.3 *Blink*=1.1")
+        words.prop_or(layout, self, "smoothing", 0.0, "0: none")
+        layout.prop(self, "use_eyes")
         layout.prop(self, "use_neutral")
         if self.use_neutral:
             layout.prop(self, "neutral_first")

@@ -7,6 +7,7 @@ import traceback
 import bpy
 
 from ..scene import bake, parts, runtime
+from . import words
 from .import_operators import usable
 from .operators import FaceOperator
 
@@ -74,7 +75,7 @@ class FrameRange:
         name="Step", description="Frames from key to key", default=1, min=0.01, soft_min=1
     )
     lod: bpy.props.IntProperty(
-        name="LOD",
+        name="Detail",
         description="-1 is the level that the viewport shows",
         default=-1,
         min=-1,
@@ -89,6 +90,10 @@ class FrameRange:
         if self.range == "PREVIEW" and scene.use_preview_range:
             return scene.frame_preview_start, scene.frame_preview_end
         return scene.frame_start, scene.frame_end
+
+    def draw_lod(self, layout):
+        """The level, and that the lowest number is none."""
+        words.prop_or(layout, self, "lod", -1, "-1: as in the viewport")
 
     def draw_range(self, layout):
         """The rows of a dialog."""
@@ -148,8 +153,8 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, bpy.types.Operator):
         self.draw_range(layout)
         if self.kind == bake.RESULT:
             layout.prop(self, "wanted")
-            layout.prop(self, "lod")
-        layout.prop(self, "error")
+            self.draw_lod(layout)
+        words.prop_or(layout, self, "error", 0.0, "0: a key at every step")
         layout.prop(self, "strip")
         layout.prop(self, "every")
 

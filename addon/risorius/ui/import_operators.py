@@ -12,6 +12,7 @@ from ..logic import names
 from ..logic.plans import PlanError
 from ..logic.space import SpaceError
 from ..scene import build, parts
+from . import words
 
 MODES = (
     ("AUTO", "Automatic", "Real shape keys where a mesh has few, else the live sum"),
@@ -151,7 +152,8 @@ class RISORIUS_OT_import_dna(bpy.types.Operator, ImportHelper):
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
-        row = layout.row(heading="Detail", align=True)
+        layout.label(text="Levels of Detail")
+        row = layout.row(align=True)
         row.use_property_split = False
         for level in range(8):
             row.prop(self, "lods", index=level, text=str(level), toggle=True)
@@ -167,7 +169,7 @@ class RISORIUS_OT_import_dna(bpy.types.Operator, ImportHelper):
         row.prop(self, "use_simple_materials")
         row = layout.row()
         row.active = self.use_materials and self.use_textures
-        row.prop(self, "texture_folder")
+        words.prop_or(row.column(), self, "texture_folder", "", "Empty: beside the file")
 
 
 class RISORIUS_FH_dna(bpy.types.FileHandler):

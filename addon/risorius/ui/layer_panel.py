@@ -5,6 +5,7 @@ import bpy
 
 from ..logic import layers as logic
 from ..scene import evaluate, layer_props, layers, layers_nla, parts, poses, runtime
+from . import words
 from .operators import FaceOperator
 from .panels import FaceOnlyPanel, write
 
@@ -360,8 +361,9 @@ class RISORIUS_UL_reactions(bpy.types.UIList):
 
     def draw_item(self, _context, layout, _data, item, _icon, _active, _property):
         known = layers.known_reactions().get(item.name)
-        row = layout.row(align=True)
-        row.label(text=known.label if known else item.name, icon="LIGHT_SUN")
+        split = layout.split(factor=0.52, align=True)
+        split.label(text=known.label if known else item.name)
+        row = split.row(align=True)
         row.prop(item, "frame", text="", emboss=False)
         row.prop(item, "strength", text="", emboss=False)
 
@@ -444,7 +446,7 @@ def _draw_time(layout, layer):
         column.prop(layer, "reverse")
     elif not warped:
         column.prop(layer, "start")
-        column.prop(layer, "length")
+        words.prop_or(column, layer, "length", 0.0, "0: without an end")
     for point in layer.warp:
         row = column.row(align=True)
         row.use_property_split = False

@@ -6,6 +6,7 @@ import bpy
 from .. import native
 from ..logic import names
 from ..scene import live, parts
+from . import words
 from .import_operators import usable
 from .panels import FaceOnlyPanel, write
 
@@ -320,8 +321,8 @@ class RISORIUS_PT_live(FaceOnlyPanel, bpy.types.Panel):
         column.prop(chosen, "port")
         column.prop(chosen, "everywhere")
         write(column, _where(chosen))
-        column.prop(chosen, "mapping")
-        layout.prop(chosen, "subject", icon="USER")
+        words.prop_or(column, chosen, "mapping", "", "Empty: names of ARKit and VRM")
+        words.prop_or(layout, chosen, "subject", "", "Empty: the first heard")
         column = layout.column(align=True)
         for name in ("smoothing", "gain", "head_gain"):
             column.prop(chosen, name)

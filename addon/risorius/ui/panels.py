@@ -8,7 +8,7 @@ import bpy
 from .. import native
 from ..logic import plans, regions
 from ..scene import lods, parts, place, runtime
-from . import bake_operators, life_operators
+from . import bake_operators, life_operators, words
 
 _ICONS = {
     "brow": "MOD_CURVE",
@@ -24,6 +24,7 @@ _ICONS = {
     "other": "DOT",
 }
 _OPEN = {"brow", "eye", "mouth", "jaw"}
+_TITLE = 0.5  # of the width, for the names of sliders
 
 
 class FacePanel:
@@ -96,12 +97,13 @@ def _draw_detail(layout, rig):
     column = layout.column(align=True)
     auto = lods.by_distance(rig)
     for target, text, shown in (
-        ("VIEWPORT", "LOD, Viewport", lods.viewport_level(rig)),
-        ("RENDER", "LOD, Render", lods.render_level(rig)),
+        ("VIEWPORT", "Detail in the Viewport", lods.viewport_level(rig)),
+        ("RENDER", "Detail in Renders", lods.render_level(rig)),
     ):
+        # On a line of its own: beside eight levels there is no room for words.
+        column.label(text=text)
         row = column.row(align=True)
         row.active = not auto
-        row.label(text=text)
         for level in levels:
             button = row.operator("risorius.set_lod", text=str(level), depress=level == shown)
             button.lod, button.target = level, target
@@ -139,14 +141,14 @@ class RISORIUS_PT_controls(FaceOnlyPanel, bpy.types.Panel):
             names = [shown[i] for i in indices]
             if search:
                 _draw_region_header(layout.row(), region)
-                _draw_sliders(layout, face, names)
+                _draw_sliders(context, layout, face, names)
                 continue
             header, body = layout.panel(
                 f"RISORIUS_PT_region_{region}", default_closed=region not in _OPEN
             )
             _draw_region_header(header, region)
             if body is not None:
-                _draw_sliders(body, face, names)
+                _draw_sliders(context, body, face, names)
         if not shown:
             write(layout, "No control has these words in its name.", "INFO")
 
@@ -159,8 +161,8 @@ def _draw_region_header(layout, region):
     row.operator("risorius.key", text="", icon="KEY_HLT").region = region
 
 
-def _draw_sliders(layout, face, names):
-    """One line per control; a left and its right control share it."""
+def _draw_sliders(context, layout, face, names):
+    """One line per control; a left and its right control share it, a long name stands above."""
     column = layout.column(align=True)
     there = set(names)
     for name in names:
@@ -168,8 +170,13 @@ def _draw_sliders(layout, face, names):
         if name == right and left in there:
             continue
         paired = name == left and right in there
-        line = column.split(factor=0.42, align=True)
-        line.label(text=regions.title_in_region(name, sided=not paired))
+        title = regions.title_in_region(name, sided=not paired)
+        if words.fits(context, title, _TITLE):
+            line = column.split(factor=_TITLE, align=True)
+            line.label(text=title)
+        else:
+            column.label(text=title)
+            line = column
         row = line.row(align=True)
         for one, text in ((left, "L"), (right, "R")) if paired else ((name, ""),):
             quoted = bpy.utils.escape_identifier(one)

@@ -9,6 +9,7 @@ from bpy_extras.io_utils import ExportHelper
 from .. import native
 from ..scene import bake, ship
 from ..scene.clips import frame_rate
+from . import words
 from .bake_operators import FacesOperator, FrameRange, selected_rigs
 
 FORMATS = (
@@ -142,8 +143,9 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, bpy.
         default=False,
     )
     influences: bpy.props.IntProperty(
-        name="Joints per Vertex",
-        description="Engines take 4 or 8; 0 writes all, which is what Blender shows",
+        name="Influences",
+        description="Joints that move a vertex. Engines take 4 or 8; 0 writes all, which is what "
+        "Blender shows",
         default=0,
         min=0,
         max=32,
@@ -187,12 +189,12 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, bpy.
         layout.prop(self, "format")
         self.draw_range(layout)
         if self.format not in ("RZC", "CSV"):
-            layout.prop(self, "lod")
+            self.draw_lod(layout)
         if self.format in ("GLTF", "FBX", "USD"):
             layout.prop(self, "wanted")
             layout.prop(self, "all_shapes")
         if self.format == "GLTF":
-            layout.prop(self, "influences")
+            words.prop_or(layout, self, "influences", 0, "0: all joints")
         if self.format == "FBX":
             layout.prop(self, "fbx_units")
         if self.format in ("RZC", "CSV"):

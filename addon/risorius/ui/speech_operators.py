@@ -8,6 +8,7 @@ from bpy_extras.io_utils import ImportHelper
 
 from ..logic.clips import ClipError
 from ..scene import clips, listening, parts
+from . import words
 from .animation_operators import SOUNDS, PlacesClip
 from .import_operators import explain, usable
 
@@ -146,7 +147,7 @@ class RISORIUS_OT_speak(PlacesClip, bpy.types.Operator, ImportHelper):
         layout.use_property_split = True
         layout.use_property_decorate = False
         self.draw_place(layout)
-        layout.prop(self, "transcript")
+        words.prop_or(layout, self, "transcript", "", "Empty: it is listened for")
         layout.prop_search(self, "transcript_text", bpy.data, "texts")
         for name in (
             "intensity",

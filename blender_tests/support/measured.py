@@ -1,0 +1,215 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A layout that stands in for a panel's and tells which words Blender would cut.
+
+It follows Blender's own layouts as far as widths go, at an interface scale of 1 and in Blender's
+font: a column gives each part its width, a row shares it out by what its parts ask for, a split
+goes by its factor, and with use_property_split names stand in the left two fifths.
+"""
+
+from types import SimpleNamespace
+
+import blf
+import bpy
+
+SIDEBAR = 280 - 20 - 16  # pixels: without the tabs at its edge and the panel's margins
+FILE_BROWSER = 240 - 16
+DIALOG = 300 - 24
+_MARGIN = 10  # around the text of a label; a button has more
+_BUTTON = 14
+_ICON = 20
+_ASKED = 30  # beside its text a button asks a row for as much, a label for next to nothing
+_NUMBER = 60  # a number for more
+_NAMES = 0.4
+_VALUE = "0.000"
+
+
+def width_of(text):
+    """Pixels of a text in Blender's interface font."""
+    points = bpy.context.preferences.ui_styles[0].widget.points
+    blf.size(0, points)
+    return blf.dimensions(0, text)[0]
+
+
+class Part:
+    """A row, a column or a split.
+
+    Its children are Parts and (text, pixels to be read, pixels that it asks a row for).
+    """
+
+    def __init__(self, kind="column", factor=0.0, split=False):
+        self.kind, self.factor, self.children = kind, factor, []
+        self.use_property_split = split
+        self.use_property_decorate = self.active = self.enabled = True
+        self.alignment, self.emboss, self.scale_x, self.scale_y = "EXPAND", "NORMAL", 1.0, 1.0
+        self.operator_context = "EXEC_DEFAULT"
+
+    def _inner(self, kind, factor=0.0):
+        part = Part(kind, factor, self.use_property_split)
+        self.children.append(part)
+        return part
+
+    def row(self, align=False, heading=""):
+        part = self._inner("row")
+        if heading:
+            self._named(heading)
+        return part
+
+    def column(self, align=False, heading=""):
+        if heading:
+            self._named(heading)
+        return self._inner("column")
+
+    def box(self):
+        return self._inner("column")
+
+    def grid_flow(self, columns=1, **_options):
+        return self._inner("grid", columns)
+
+    def split(self, factor=0.5, align=False):
+        return self._inner("split", factor)
+
+    def panel(self, _name, default_closed=False):
+        return self._inner("row"), self._inner("column")
+
+    def separator(self):
+        pass
+
+    def template_list(self, *_arguments, **_options):
+        self._leaf("", 100)
+
+    def _leaf(self, text, pixels, asked=None):
+        asked = (pixels if asked is None else asked) * self.scale_x
+        self.children.append((text, pixels, asked))
+
+    def _named(self, text):
+        """A name in the left part of a line that is split into name and value."""
+        part = self._inner("split", _NAMES)
+        part._leaf(text, width_of(text) + _MARGIN)
+        part._leaf("", 0)
+
+    def label(self, text="", icon="NONE"):
+        pixels = width_of(text) + _MARGIN + (_ICON if icon != "NONE" else 0)
+        self._leaf(text, pixels, pixels - _MARGIN / 2)
+
+    def operator(self, name, text=None, icon="NONE", **_options):
+        rna = getattr(bpy.ops.risorius, name.partition(".")[2]).get_rna_type()
+        self._button(rna.name if text is None else text, icon)
+        return SimpleNamespace()
+
+    def menu(self, name, text=None, icon="NONE"):
+        self._button(getattr(bpy.types, name).bl_label if text is None else text, icon)
+
+    def _button(self, text, icon):
+        there = width_of(text) + (_ICON if icon != "NONE" else 0)
+        if text:
+            self._leaf(text, there + _BUTTON, there + _ASKED)
+        else:
+            self._leaf("", _ICON)
+
+    def prop_enum(self, data, name, value):
+        items = _property(data, name).enum_items
+        self._button(items[value].name, "NONE")
+
+    def prop_search(self, data, name, _where, _names, **_options):
+        self._value(_property(data, name).name, 100)
+
+    def prop(self, data, name, text=None, icon="NONE", toggle=False, index=-1, **_options):
+        rule = None if name.startswith("[") else _property(data, name)
+        shown = (rule.name if rule is not None else name) if text is None else text
+        kind = "FLOAT" if rule is None else rule.type
+        if kind == "BOOLEAN":
+            self._checkbox(shown, icon, toggle)
+        elif kind == "ENUM":
+            names = [item.name for item in rule.enum_items]
+            self._value(shown, max(map(width_of, names), default=60) + _BUTTON + _ICON)
+        else:
+            number = kind in ("INT", "FLOAT")
+            self._value(shown, width_of(_VALUE) + _BUTTON if number else 60, number)
+
+    def _checkbox(self, text, icon, toggle):
+        if toggle or icon != "NONE":
+            self._button(text, icon)
+        elif self.use_property_split:
+            part = self._inner("split", _NAMES)
+            part._leaf("", 0)
+            part._leaf(text, width_of(text) + _ICON)
+        else:
+            self._leaf(text, width_of(text) + _ICON + _MARGIN)
+
+    def _value(self, text, pixels, within=False):
+        if not text:
+            self._leaf("", pixels, pixels + _NUMBER)
+        elif self.use_property_split and self.kind != "row":
+            self._named(text)
+            self.children[-1].children[-1] = (text, pixels, pixels)
+        elif within:  # a number bears its name
+            self._leaf(text, width_of(text) + pixels, width_of(text) + pixels + _NUMBER)
+        else:
+            part = self._inner("split", _NAMES)
+            part._leaf(text, width_of(text) + _MARGIN)
+            part._leaf(text, pixels)
+
+    def asks(self):
+        """Pixels that it asks a row for."""
+        asked = [c.asks() if isinstance(c, Part) else c[2] for c in self.children]
+        return sum(asked) if self.kind == "row" else max(asked, default=0)
+
+    def cut(self, width):
+        """The words that are cut where there is so much room, each with what it needs and has."""
+        found = []
+        for child, room in zip(self.children, self._rooms(width), strict=True):
+            if isinstance(child, Part):
+                found += child.cut(room)
+            elif child[1] > room + 0.5:
+                found.append((child[0], round(child[1]), round(room)))
+        return found
+
+    def _rooms(self, width):
+        count = len(self.children)
+        if self.kind == "row":
+            asked = [c.asks() if isinstance(c, Part) else c[2] for c in self.children]
+            scale = width / max(sum(asked), 1)
+            return [n * scale for n in asked]
+        if self.kind == "grid":
+            return [width / self.factor] * count
+        if self.kind == "split" and count > 1:
+            return [width * self.factor, *[width * (1 - self.factor) / (count - 1)] * (count - 1)]
+        return [width] * count
+
+
+def _property(data, name):
+    if isinstance(data, Operator):
+        return data._rna.properties[name]
+    return data.bl_rna.properties[name]
+
+
+class Operator:
+    """An operator as its draw() sees it: its properties as they are set, else at their defaults."""
+
+    def __init__(self, kind, **given):
+        self._kind = kind
+        self._rna = getattr(bpy.ops.risorius, kind.bl_idname.partition(".")[2]).get_rna_type()
+        self._given = given
+        self.layout = Part()
+
+    def __getattr__(self, name):
+        if name in self._given:
+            return self._given[name]
+        rule = self._rna.properties.get(name)
+        if rule is None:
+            return getattr(self._kind, name).__get__(self)
+        if rule.type == "ENUM" and rule.is_enum_flag:
+            return rule.default_flag
+        return rule.default_array if getattr(rule, "is_array", False) else rule.default
+
+    def draw(self, context):
+        """Let it draw. Returns: what was drawn."""
+        self._kind.draw(self, context)
+        return self.layout
+
+
+def drawn(kind, context, **given):
+    """What a panel or a list's line draws."""
+    layout = Part()
+    kind.draw(SimpleNamespace(layout=layout, **given), context)
+    return layout

@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""No word of a panel or a dialog is cut at Blender's own widths; automatic values say so."""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import bpy
+import pytest
+from support import measured, scene
+from support.measured import DIALOG, FILE_BROWSER, SIDEBAR, Operator, Part, drawn
+
+STANDARD = Path(__file__).resolve().parents[1] / "tests" / "data" / "controls"
+
+
+def texts(part):
+    """Every word that was drawn."""
+    found = []
+    for child in part.children:
+        found += texts(child) if isinstance(child, Part) else [child[0]]
+    return found
+
+
+def ui(name):
+    return scene.submodule(f"ui.{name}")
+
+
+@pytest.fixture
+def rig(dna_file):
+    return scene.load(dna_file)
+
+
+def test_the_ruler_finds_words_that_are_cut():
+    layout = Part()
+    row = layout.row()
+    row.label(text="LOD, Viewport")
+    for level in range(8):
+        row.operator("risorius.set_lod", text=str(level))
+    line = layout.split(factor=0.42)
+    line.label(text="Lower Lip Depress")
+    line.label(text="")
+    assert layout.cut(1000) == []
+    cut = [text for text, _needed, _room in layout.cut(SIDEBAR)]
+    assert {"LOD, Viewport", "Lower Lip Depress"} <= set(cut)  # as was seen in a window
+
+
+def test_every_panel_can_be_read(rig):
+    for name, kind in (
+        ("panels", "RISORIUS_PT_character"),
+        ("panels", "RISORIUS_PT_options"),
+        ("animation_panel", "RISORIUS_PT_animation"),
+        ("bake_panel", "RISORIUS_PT_out"),
+        ("live_operators", "RISORIUS_PT_live"),
+    ):
+        layout = drawn(getattr(ui(name), kind), bpy.context)
+        assert texts(layout)
+        assert layout.cut(SIDEBAR) == [], kind
+
+
+def test_eight_levels_of_detail_have_two_rows_that_can_be_told_apart(rig, monkeypatch):
+    panels = ui("panels")
+    monkeypatch.setattr(panels.lods, "built", lambda _rig: list(range(8)))
+    layout = drawn(panels.RISORIUS_PT_character, bpy.context)
+    assert layout.cut(SIDEBAR) == []
+    words = texts(layout)
+    assert words.count("7") == 2
+    assert {"Detail in the Viewport", "Detail in Renders"} <= set(words)
+
+
+def test_the_names_of_all_sliders_can_be_read(rig):
+    """Of the standard face: 260 sliders, in one column."""
+    face = {name: 0.0 for name in (STANDARD / "standard_raw.txt").read_text().split()}
+    layout = Part()
+    ui("panels")._draw_sliders(bpy.context, layout, face, list(face))
+    assert layout.cut(SIDEBAR) == []
+    words = texts(layout)
+    assert {"Upper Lip Towards Teeth", "Lower Lip Depress", "Dimple"} <= set(words)
+
+
+def test_a_slider_whose_name_is_short_has_one_line():
+    face = dict.fromkeys(("CTRL_expressions.jawOpen", "CTRL_expressions.jawChinRaiseDL"), 0.0)
+    layout = Part()
+    ui("panels")._draw_sliders(bpy.context, layout, face, list(face))
+    (column,) = layout.children
+    assert [part.kind for part in column.children] == ["split", "split"]
+
+
+def test_layers_and_reactions_can_be_read(rig):
+    panel, controls = ui("layer_panel"), scene.controls(rig)
+    props = scene.submodule("scene.layer_props")
+    for kind in ("IDLE", "EXPRESSION"):
+        known = next(iter(scene.submodule("scene.poses").all_expressions()))
+        bpy.ops.risorius.layer_add(kind=kind, source=known if kind == "EXPRESSION" else "")
+        layer = controls.risorius_layers[-1]
+        layout = Part()
+        panel._draw_layer(layout, controls, layer)
+        assert layout.cut(SIDEBAR) == []
+    assert "0: without an end" in texts(layout)
+    for name, reaction in scene.submodule("scene.layers").known_reactions().items():
+        layout = Part()
+        item = SimpleNamespace(name=name, bl_rna=props.RISORIUS_PG_reaction.bl_rna)
+        panel.RISORIUS_UL_reactions.draw_item(None, None, layout, None, item, 0, None, "")
+        assert reaction.label in texts(layout)
+        assert layout.cut(SIDEBAR - 36) == []  # beside the button, within the list's frame
+
+
+@pytest.mark.parametrize("choices", [{}, {"mapping": "FILE", "use_neutral": True}])
+def test_the_import_of_animation_can_be_read(rig, choices):
+    layout = Operator(ui("animation_operators").RISORIUS_OT_import_animation, **choices).draw(None)
+    assert layout.cut(FILE_BROWSER) == []
+    assert {"0: as the file says", "as *jawOpen=1.3 *Blink*=1.1", "0: none"} <= set(texts(layout))
+
+
+def test_the_import_of_a_face_can_be_read():
+    layout = Operator(ui("import_operators").RISORIUS_OT_import_dna).draw(None)
+    assert layout.cut(FILE_BROWSER) == []
+    assert "Levels of Detail" in texts(layout)
+
+
+def test_speech_can_be_read(rig):
+    layout = Operator(ui("speech_operators").RISORIUS_OT_speak).draw(None)
+    assert layout.cut(FILE_BROWSER) == []
+    assert "Empty: it is listened for" in texts(layout)
+
+
+@pytest.mark.parametrize("choice", ["GLTF", "FBX", "USD", "ALEMBIC", "RZC", "CSV"])
+@pytest.mark.parametrize("frames", ["SCENE", "CUSTOM"])
+def test_the_export_of_animation_can_be_read(rig, choice, frames):
+    kind = ui("ship_operators").RISORIUS_OT_export_animation
+    layout = Operator(kind, format=choice, range=frames).draw(None)
+    assert layout.cut(FILE_BROWSER) == []
+    if choice not in ("RZC", "CSV"):
+        assert "-1: as in the viewport" in texts(layout)
+    assert ("0: all joints" in texts(layout)) == (choice == "GLTF")
+
+
+def test_dialogs_can_be_read(rig):
+    layout = Operator(ui("bake_operators").RISORIUS_OT_bake).draw(None)
+    assert layout.cut(DIALOG) == []
+    assert {"-1: as in the viewport", "0: a key at every step"} <= set(texts(layout))
+    kind = ui("animation_operators").RISORIUS_OT_import_arkit_rig
+    assert Operator(kind, source="").draw(bpy.context).cut(DIALOG) == []
+
+
+def test_a_value_that_was_chosen_needs_no_words(rig):
+    layout = Operator(ui("bake_operators").RISORIUS_OT_bake, lod=2, error=0.1).draw(None)
+    assert not any(text.startswith(("-1:", "0:")) for text in texts(layout))
+
+
+def test_words_are_measured_for_the_width_that_the_sidebar_has():
+    words = ui("words")
+    long = "Upper Lip Towards Teeth"
+    context = SimpleNamespace(preferences=bpy.context.preferences, region=None)
+    assert not words.fits(context, long, 0.5)
+    assert words.width_of(long, bpy.context.preferences.ui_styles[0]) == measured.width_of(long)
+    context.region = SimpleNamespace(type="UI", width=500)
+    assert words.fits(context, long, 0.5)
