@@ -3,16 +3,17 @@
 
 from __future__ import annotations
 
-import tomllib
 from functools import cache
 from importlib import resources
+
+from . import toml
 
 
 @cache
 def mapping() -> dict[str, dict[str, float]]:
     """ARKit unit -> {raw control name as a DNA spells it: weight in [0, 1]}; 52 units."""
     text = resources.files(__package__).joinpath("arkit.toml").read_text(encoding="utf-8")
-    table = tomllib.loads(text)
+    table = toml.parse(text)
     prefix = table["prefix"]
     return {
         unit: {prefix + name: float(weight) for name, weight in row.items()}

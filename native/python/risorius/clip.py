@@ -11,7 +11,10 @@ import numpy as np
 import numpy.typing as npt
 
 from ._native import encode_clip, write_clip
+from .budget import Budget, BudgetError
 from .errors import ArgumentError
+
+_AT_ONCE = 4096  # frames
 
 Floats = npt.NDArray[np.float32]
 Times = npt.NDArray[np.float64]
@@ -169,10 +172,54 @@ class Clip:
         return np.where(part == 0.0, here, here + (following - here) * part)
 
     def resampled(self, rate: float) -> Clip:
-        """The clip with frames `rate` a second, from its start to its end."""
-        count = int(np.floor(self.duration * rate + 1e-6)) + 1 if self.frame_count else 0
+        """The clip with frames `rate` a second, from its start to its end.
+
+        Raises:
+            BudgetError: frames far apart would become more than a clip of this size can be worth.
+        """
+        count = self._even_count(rate, 1e-6)
         times = self.start + np.arange(count) / rate
-        return self.replaced(curves=self.sample(times).T, rate=rate, times=None)
+        return self.replaced(curves=self._sampled(times), rate=rate, times=None)
+
+    def without_gaps(self) -> Clip:
+        """The clip with even frames at its own rate from its first frame on.
+
+        Raises:
+            BudgetError: as resampled.
+        """
+        count = self._even_count(self.rate, 0.5)
+        start = float(self.frame_times()[0]) if self.frame_count else self.start
+        curves = self._sampled(start + np.arange(count) / self.rate)
+        return self.replaced(curves=curves, start=start, times=None)
+
+    def _even_count(self, rate: float, rounding: float) -> int:
+        """Frames from the first to the last at a rate, if that many can be held."""
+        frames = self.duration * rate
+        budget = Budget.of(self.curves.nbytes + 8 * self.frame_count)
+        each = 4 * len(self.names) + 8  # float32 of each control, and a time
+        if (frames + 1.0) * each > budget.bytes:
+            raise BudgetError(
+                f"{self._longest_step()}: {frames:,.0f} frames at {rate:g} a second were asked "
+                f"for, {budget.bytes // each:,} are the most of a clip of this size: mend the "
+                "time, or cut the clip before"
+            )
+        return int(np.floor(frames + rounding)) + 1 if self.frame_count else 0
+
+    def _longest_step(self) -> str:
+        """Where most of the clip's time goes, e.g. "frame 1 comes 9 s after frame 0 at 2 s"."""
+        if self.times is None:
+            return f"the clip has {self.frame_count:,} frames at {self.rate:g} a second"
+        frame = int(np.argmax(np.diff(self.times)))
+        step = self.times[frame + 1] - self.times[frame]
+        return f"frame {frame + 1} comes {step:g} s after frame {frame} at {self.times[frame]:g} s"
+
+    def _sampled(self, times: Times) -> Floats:
+        """float32[controls, times]; some thousand at a time, so that it takes little more."""
+        out = np.empty((len(self.names), times.size), np.float32)
+        for first in range(0, times.size, _AT_ONCE):
+            part = slice(first, first + _AT_ONCE)
+            out[:, part] = self.sample(times[part]).T
+        return out
 
     def selected(self, names: Sequence[str]) -> Clip:
         """The clip of these controls only, in this order. Raises: KeyError."""

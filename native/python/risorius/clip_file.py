@@ -11,9 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from ._native import ClipError, ClipFile, ClipFileWriter
+from .budget import BYTES_PER_BYTE
 from .clip import Clip, Event
 
 __all__ = ["ClipError", "ClipReader", "ClipWriter"]
+
+# What may be read at once however small the file: 75 minutes of 1,000 controls that stand still.
+MOST_BYTES = 1 << 30
 
 
 class ClipReader:
@@ -44,6 +48,7 @@ class ClipReader:
         if isinstance(source, bytearray | memoryview):
             source = bytes(source)
         self._file = ClipFile(source if isinstance(source, bytes) else os.fspath(source), recover)
+        self._size = len(source) if isinstance(source, bytes) else os.path.getsize(source)
         self.names: tuple[str, ...] = self._file.names
         self.rate: float = self._file.rate
         self.start: float = self._file.start
@@ -65,13 +70,22 @@ class ClipReader:
             the whole clip has all.
 
         Raises:
-            ClipError: frames that are not there, a damaged block.
+            ClipError: frames that are not there, a damaged block, more at once than a file of this
+                size may take.
             KeyError: a control that is not there.
         """
         begin, end = frames if frames is not None else (0, self.frame_count)
         if begin < 0 or end < begin or end > self.frame_count:
             raise ClipError(
                 f"frames from 0 to {self.frame_count} were expected, found {begin} to {end}"
+            )
+        count = len(self.names if controls is None else controls)
+        needed = (end - begin) * (4 * count + 8)
+        if needed > MOST_BYTES + BYTES_PER_BYTE * self._size:
+            raise ClipError(
+                f"{count:,} controls of {end - begin:,} frames take {needed:,} bytes, at most "
+                f"{MOST_BYTES + BYTES_PER_BYTE * self._size:,} were expected of a file of "
+                f"{self._size:,}: read it in parts (frames, controls)"
             )
         wanted = None if controls is None else [self._index[name] for name in controls]
         curves, times = self._file.read(begin, end, wanted)

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import os
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
@@ -15,6 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from . import toml
 from .errors import ArgumentError
 from .regions import expand_sides
 
@@ -135,8 +135,8 @@ def load_exclusives(path: str | os.PathLike[str] | None = None) -> Exclusives:
 def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
     """A TOML file. Raises: ValueError with the file's name; OSError."""
     try:
-        return tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        return toml.parse(Path(path).read_text(encoding="utf-8"))
+    except (toml.TomlError, UnicodeDecodeError) as error:
         raise ArgumentError(f"{os.fspath(path)}: a TOML file was expected: {error}") from None
 
 
@@ -166,7 +166,7 @@ def _read(path: str | os.PathLike[str] | None, own: str) -> tuple[dict[str, Any]
 def _own(file: str) -> dict[str, Any]:
     """Read once: every new mixer asks for it."""
     text = resources.files(__package__).joinpath(file).read_text(encoding="utf-8")
-    return tomllib.loads(text)
+    return toml.parse(text)
 
 
 def _names(names: list[str], prefix: str) -> tuple[str, ...]:

@@ -7,14 +7,13 @@ import glob
 import math
 import os
 import string
-import tomllib
 import unicodedata
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from risorius import importing
+from risorius import importing, toml
 from risorius.errors import RisoriusError
 
 from .baking import DEFAULT_PARTS, KINDS
@@ -155,13 +154,11 @@ def read_jobs(source: Path) -> Plan:
             nothing, two jobs would write one file.
     """
     try:
-        values = tomllib.loads(source.read_bytes().decode())
+        values = toml.parse(source.read_bytes().decode())
     except OSError as error:
         raise JobsError(f"{source}: cannot read it: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (toml.TomlError, UnicodeDecodeError) as error:
         raise JobsError(f"{source}: not TOML: {error}") from error
-    except RecursionError as error:
-        raise JobsError(f"{source}: not TOML that is made for this: nested too deep") from error
     top = _Table(source, "", values, _TOP_KEYS)
     base = Path(os.path.abspath(source)).parent
     output = base / top.take("output", "a folder", _is_name, None)

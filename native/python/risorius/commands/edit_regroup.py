@@ -7,13 +7,12 @@ import argparse
 import json
 import math
 import sys
-import tomllib
 from pathlib import Path
 from typing import Any
 
 import risorius
 
-from .. import edit
+from .. import edit, toml
 from .convert import json_text, version_of, warnings_as_lines, write
 from .files import (
     CommandLineError,
@@ -129,7 +128,9 @@ def read_regions(name: str) -> edit.Regions:
     data = read_bytes(name)
     try:
         text = data.decode()
-        found = tomllib.loads(text) if name.lower().endswith(".toml") else json.loads(text)
+        found = toml.parse(text) if name.lower().endswith(".toml") else json.loads(text)
+    except RecursionError as error:
+        raise InputError(f"{label(name)}: not JSON that can be read: nested too deeply") from error
     except ValueError as error:  # of UTF-8, JSON or TOML
         raise InputError(f"{label(name)}: {error}") from error
     if isinstance(found, dict) and list(found) == ["regions"]:

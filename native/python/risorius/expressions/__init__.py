@@ -8,7 +8,6 @@ loaded. A name that ends in * stands for both sides, in ** for the four lip quar
 from __future__ import annotations
 
 import os
-import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -18,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from .. import toml
 from ..errors import ArgumentError
 from ..reactions import named_weights, read_toml
 
@@ -114,7 +114,7 @@ def _own() -> dict[str, Expression]:
     out: dict[str, Expression] = {}
     for file in FILES:
         text = resources.files(__package__).joinpath(file).read_text(encoding="utf-8")
-        out |= _parsed(tomllib.loads(text), file)
+        out |= _parsed(toml.parse(text), file)
     return out
 
 

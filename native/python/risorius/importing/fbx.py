@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..budget import Budget
 from .errors import AnimationFileError
 from .keys import CONSTANT, CUBIC, LINEAR, Keys, on_one_clock
 from .source import Take, keep_ascending, make_clip
@@ -35,12 +36,43 @@ _BULK = {"Geometry", "Video", "Texture", "Material", "Pose", "Implementation"}
 _SCALARS = {"Y": "<h", "C": "<?", "B": "<?", "I": "<i", "F": "<f", "D": "<d", "L": "<q"}
 _ARRAYS = {"f": "<f4", "d": "<f8", "l": "<i8", "i": "<i4", "b": "<u1", "c": "<u1"}
 _DEEPEST = 32
-_MAX_ARRAY = 1 << 28
+# What a record and a value of it take in memory, on the safe side; and a key of a curve.
+_NODE_BYTES, _VALUE_BYTES, _KEY_BYTES = 300, 48, 120
 # KeyAttrFlags.
 _CONSTANT, _CUBIC, _AUTO, _TCB, _CLAMP, _WEIGHTED = 0x2, 0x8, 0x100, 0x200, 0x5000, 0x3000000
 
 
-@dataclass
+@dataclass(slots=True)
+class Packed:
+    """An array as it stands in the file; unfolded when somebody asks."""
+
+    parser: Parser
+    dtype: np.dtype[Any]
+    count: int
+    is_packed: bool
+    at: int
+    size: int
+
+    def unfold(self) -> npt.NDArray[Any]:
+        """Raises: AnimationFileError: other bytes. BudgetError: more than the file may take."""
+        wanted = self.count * self.dtype.itemsize
+        data = memoryview(self.parser.data)[self.at : self.at + self.size]
+        if self.is_packed:
+            self.parser.budget.hold(3 * wanted, f"byte {self.at}: an array of {self.count}")
+            try:
+                data = memoryview(zlib.decompressobj().decompress(data, wanted + 1))
+            except zlib.error as error:
+                raise self.parser.fail(
+                    self.at, f"an array that zlib packed was expected: {error}"
+                ) from error
+        if len(data) != wanted:
+            raise self.parser.fail(
+                self.at, f"{wanted} bytes of an array were expected, found {len(data)}"
+            )
+        return np.frombuffer(data, self.dtype)
+
+
+@dataclass(slots=True)
 class Node:
     """A record: name, values, records inside."""
 
@@ -52,10 +84,10 @@ class Node:
         return next((node for node in self.inner if node.name == name), None)
 
     def array(self, name: str) -> npt.NDArray[Any]:
-        """The array that a record inside holds; empty without it."""
+        """The array that a record inside holds, unfolded; empty without it."""
         node = self.first(name)
         value = node.values[0] if node is not None and node.values else None
-        return value if isinstance(value, np.ndarray) else np.zeros(0)
+        return value.unfold() if isinstance(value, Packed) else np.zeros(0)
 
 
 def is_fbx(data: bytes) -> bool:
@@ -71,9 +103,10 @@ def is_text_fbx(text: str) -> bool:
 class Parser:
     """The records of a file."""
 
-    def __init__(self, data: bytes, name: str) -> None:
+    def __init__(self, data: bytes, name: str, budget: Budget) -> None:
         self.data = data
         self.name = name
+        self.budget = budget
         if len(data) < 27:
             raise self.fail(len(data), "a header of 27 bytes was expected")
         self.version = struct.unpack_from("<I", data, 23)[0]
@@ -108,6 +141,7 @@ class Parser:
             raise self.fail(at, f"records {_DEEPEST} deep at most were expected")
         if count > end - at:
             raise self.fail(at, f"{count} values were expected in {end - at} bytes")
+        self.budget.hold(_NODE_BYTES + count * _VALUE_BYTES, f"byte {at}: a record {name[:40]}")
         for _ in range(count):
             value, at = self._value(at, end)
             node.values.append(value)
@@ -138,20 +172,12 @@ class Parser:
             raise self.fail(at, "a length was expected, the record is cut short")
         return struct.unpack_from(f"<{size // 4}I", self.data, at)
 
-    def _array(self, dtype: np.dtype[Any], at: int, end: int) -> tuple[npt.NDArray[Any], int]:
+    def _array(self, dtype: np.dtype[Any], at: int, end: int) -> tuple[Packed, int]:
         count, encoding, size = self._length(at, end, 12)
-        start, wanted = at + 12, count * dtype.itemsize
-        if start + size > end or encoding not in (0, 1) or wanted > _MAX_ARRAY:
+        start = at + 12
+        if start + size > end or encoding not in (0, 1):
             raise self.fail(at, f"an array of {count} in {size} bytes does not fit its record")
-        packed = self.data[start : start + size]
-        if encoding == 1:
-            try:
-                packed = zlib.decompressobj().decompress(packed, wanted + 1)
-            except zlib.error as error:
-                raise self.fail(at, f"an array that zlib packed was expected: {error}") from error
-        if len(packed) != wanted:
-            raise self.fail(at, f"{wanted} bytes of an array were expected, found {len(packed)}")
-        return np.frombuffer(packed, dtype), start + size
+        return Packed(self, dtype, count, encoding == 1, start, size), start + size
 
 
 @dataclass
@@ -161,19 +187,30 @@ class Scene:
     Attributes:
         objects: id -> record.
         parents: id -> (parent's id, property or ""), in the file's order.
+        budget: of the file.
+        notes: what is to be said of the reading.
     """
 
     name: str
+    budget: Budget
     ticks: int
     rate: float
     objects: dict[int, Node]
     parents: dict[int, list[tuple[int, str]]]
+    notes: list[str] = field(default_factory=list)
+    _keys: dict[int, Keys] = field(default_factory=dict)
+
+    def keys(self, curve: int) -> Keys:
+        """Of an AnimationCurve, unfolded when it is first asked for."""
+        if curve not in self._keys:
+            self._keys[curve] = _keys(self, self.objects[curve], self.notes)
+        return self._keys[curve]
 
     def of_kind(self, kind: str) -> dict[int, Node]:
         return {i: node for i, node in self.objects.items() if node.name == kind}
 
 
-def read(data: bytes, name: str, take: str | None = None) -> Take:
+def read(data: bytes, name: str, take: str | None = None, budget: Budget | None = None) -> Take:
     """The curves of an animation stack.
 
     A blend shape channel's curve has its name, its percent as a fraction. A property's curve has
@@ -182,22 +219,24 @@ def read(data: bytes, name: str, take: str | None = None) -> Take:
 
     Args:
         take: name or number of a stack; None: the first that moves any of that.
+        budget: of the file; None: by its size.
 
     Raises:
         AnimationFileError: no FBX that can be read, no such stack, nothing of that animated.
     """
-    scene = _scene(Parser(data, name))
-    stacks = scene.of_kind("AnimationStack")
-    notes: list[str] = []
+    scene = _scene(Parser(data, name, budget or Budget.of(len(data))))
+    stacks, components = scene.of_kind("AnimationStack"), _components(scene)
+    channels = {object_name(node) for node in scene.of_kind("Deformer").values()}
+    notes = scene.notes
     for stack in _chosen(scene, stacks, take):
-        curves = _curves(scene, stack, notes)
+        curves = _curves(scene, stack, components, channels)
         if not curves:
             continue
         title = object_name(scene.objects[stack]) if stack in scene.objects else ""
         if len(stacks) > 1:
             names = ", ".join(object_name(node) for node in stacks.values())
             notes.append(f"animation {title} is taken of {len(stacks)}: {names[:200]}")
-        times, rows = on_one_clock(list(curves.values()), scene.rate)
+        times, rows = on_one_clock(list(curves.values()), scene.rate, scene.budget)
         keep = keep_ascending(times, notes)
         clip = make_clip(list(curves), rows[:, keep], times[keep], metadata={"take": title})
         return Take(clip, "fbx", "", notes)
@@ -220,7 +259,8 @@ def _scene(parser: Parser) -> Scene:
             way = str(values[3]) if values[0] == "OP" and len(values) > 3 else ""
             parents[values[1]].append((values[2], way))
     ticks = TICKS_8000 if parser.version >= 8000 else TICKS
-    return Scene(parser.name, ticks, _rate(top.get("GlobalSettings")), objects, parents)
+    rate = _rate(top.get("GlobalSettings"))
+    return Scene(parser.name, parser.budget, ticks, rate, objects, parents)
 
 
 def _rate(settings: Node | None) -> float:
@@ -249,40 +289,46 @@ def _chosen(scene: Scene, stacks: dict[int, Node], take: str | None) -> Sequence
     raise AnimationFileError(scene.name, f"an animation {take!r} was expected, found none")
 
 
-def _curves(scene: Scene, stack: int, notes: list[str]) -> dict[str, Keys]:
+def _curves(
+    scene: Scene, stack: int, components: dict[int, list[tuple[str, int]]], channels: set[str]
+) -> dict[str, Keys]:
     """Name -> keys of everything that a stack moves; 0 for what belongs to no stack."""
     out: dict[str, Keys] = {}
     bones = 0
-    channels = {object_name(node) for node in scene.of_kind("Deformer").values()}
-    for identity, parts in _components(scene, notes).items():
+    for identity, parts in components.items():
         links = scene.parents.get(identity, [])
+        scene.budget.work(1 + sum(len(scene.parents.get(i, [])) for i, way in links if not way),
+                          "connections")  # fmt: skip
         if stack and not any(_in_stack(scene, parent, stack) for parent, way in links if not way):
             continue
         for owner, way in _owners(scene, links):
             if owner.name == "Geometry" and way in channels:
                 continue  # the percent of a blend shape once more, for other software
-            named = _named(owner, way, parts)
+            scene.budget.work(len(parts), "connections")
+            named = _named(scene, owner, way, parts)
             bones += not named
             for name, keys in named:
                 if name not in out:
                     out[name] = keys
-                elif not np.array_equal(out[name].values, keys.values):
-                    notes.append(f"{name}: another node moves it differently, the first is taken")
+                    continue
+                scene.budget.work(keys.times.size, name)
+                if not np.array_equal(out[name].values, keys.values):
+                    scene.notes.append(
+                        f"{name}: another node moves it differently, the first is taken"
+                    )
     if bones:
-        notes.append(f"{bones} track(s) move nodes, not shapes or properties: left out")
+        scene.notes.append(f"{bones} track(s) move nodes, not shapes or properties: left out")
     return {name: keys for name, keys in out.items() if keys.times.size}
 
 
-def _components(scene: Scene, notes: list[str]) -> dict[int, list[tuple[str, Keys]]]:
-    """Curve node -> (component, keys) of its curves: d|X, d|Y, d|Z, or one."""
-    out: dict[int, list[tuple[str, Keys]]] = defaultdict(list)
-    for identity, node in scene.of_kind("AnimationCurve").items():
-        keys: Keys | None = None
+def _components(scene: Scene) -> dict[int, list[tuple[str, int]]]:
+    """Curve node -> (component, curve) of its curves: d|X, d|Y, d|Z, or one."""
+    out: dict[int, list[tuple[str, int]]] = defaultdict(list)
+    for identity in scene.of_kind("AnimationCurve"):
         for parent, way in scene.parents.get(identity, []):
             owner = scene.objects.get(parent)
             if owner is not None and owner.name == "AnimationCurveNode":
-                keys = keys or _keys(scene, node, notes)
-                out[parent].append((way, keys))
+                out[parent].append((way, identity))
     return out
 
 
@@ -295,23 +341,26 @@ def _in_stack(scene: Scene, layer: int, stack: int) -> bool:
     return any(parent == stack for parent, _ in scene.parents.get(layer, []))
 
 
-def _named(owner: Node, way: str, parts: Sequence[tuple[str, Keys]]) -> list[tuple[str, Keys]]:
+def _named(
+    scene: Scene, owner: Node, way: str, parts: Sequence[tuple[str, int]]
+) -> list[tuple[str, Keys]]:
     """(curve's name, keys) of a property of an object; none of a bone's place and the like."""
     name = object_name(owner)
     if way == "DeformPercent":
-        return [(name, _scaled(keys, 0.01)) for _, keys in parts[:1]]
+        return [(name, _scaled(scene, scene.keys(curve), 0.01)) for _, curve in parts[:1]]
     if way == "Lcl Translation" and name.startswith("CTRL_"):
-        axes = [(component.rpartition("|")[2].lower(), keys) for component, keys in parts]
+        axes = [(c.rpartition("|")[2].lower(), scene.keys(curve)) for c, curve in parts]
         return [(f"{name}.t{axis}", keys) for axis, keys in axes]
     if way.startswith("Lcl "):
         return []
     last = way.rpartition("|")[2].rpartition(":")[2]
     if len(parts) == 1:
-        return [(last, parts[0][1])]
-    return [(f"{last}.{component.rpartition('|')[2]}", keys) for component, keys in parts]
+        return [(last, scene.keys(parts[0][1]))]
+    return [(f"{last}.{c.rpartition('|')[2]}", scene.keys(curve)) for c, curve in parts]
 
 
-def _scaled(keys: Keys, factor: float) -> Keys:
+def _scaled(scene: Scene, keys: Keys, factor: float) -> Keys:
+    scene.budget.hold(keys.times.size * 24, "a blend shape's curve")
     return Keys(
         keys.times, keys.values * factor, keys.kinds, keys.leave * factor, keys.arrive * factor
     )
@@ -323,7 +372,9 @@ def _keys(scene: Scene, node: Node, notes: list[str]) -> Keys:
     Raises:
         AnimationFileError: times and values that do not fit, times that do not ascend.
     """
-    times = node.array("KeyTime").astype(np.float64) / scene.ticks
+    ticks = node.array("KeyTime")
+    scene.budget.hold(ticks.size * _KEY_BYTES, f"{ticks.size} keys")
+    times = ticks.astype(np.float64) / scene.ticks
     values = node.array("KeyValueFloat").astype(np.float64)
     place = f"animation curve {node.values[0]}"
     if times.size != values.size:
@@ -353,7 +404,9 @@ def _attributes(node: Node, count: int) -> tuple[npt.NDArray[np.int64], Doubles]
     flags = node.array("KeyAttrFlags").astype(np.int64)
     runs = node.array("KeyAttrRefCount").astype(np.int64)
     data = node.array("KeyAttrDataFloat").astype(np.float64)
-    if not flags.size or flags.size != runs.size or (runs < 0).any() or runs.sum() != count:
+    good = 0 < flags.size <= count and flags.size == runs.size
+    # No run is longer than the curve: else a sum of them might wrap.
+    if not good or (runs < 0).any() or (runs > count).any() or runs.sum() != count:
         return np.full(count, 4, np.int64), np.zeros((count, 2))
     table = np.zeros((flags.size, 4))
     if data.size == table.size and np.isfinite(data).all():

@@ -15,6 +15,7 @@ from urllib.parse import unquote
 import numpy as np
 import numpy.typing as npt
 
+from ..budget import Budget
 from . import named_json
 from .errors import AnimationFileError
 from .keys import CONSTANT, CUBIC, LINEAR, Keys, on_one_clock
@@ -32,12 +33,16 @@ _KINDS = {"STEP": CONSTANT, "LINEAR": LINEAR, "CUBICSPLINE": CUBIC}
 class Document:
     """A glTF document and its buffers, each read when it is asked for."""
 
-    def __init__(self, path: Path, json: Mapping[str, Any], binary: bytes | None) -> None:
+    def __init__(
+        self, path: Path, json: Mapping[str, Any], binary: bytes | None, budget: Budget
+    ) -> None:
         self.path = path
+        self.budget = budget
         self.name = str(path)
         self.json = json
         self._binary = binary
         self._buffers: dict[int, bytes] = {}
+        self._numbers: dict[int, Doubles] = {}
 
     def fail(self, place: str, message: str) -> AnimationFileError:
         return AnimationFileError(self.name, f"{place}: {message}")
@@ -58,7 +63,12 @@ class Document:
         return value
 
     def numbers(self, index: object, place: str) -> Doubles:
-        """float64[count] of a scalar accessor; whole numbers as the fractions they stand for."""
+        """float64[count] of a scalar accessor; whole numbers as the fractions they stand for.
+
+        Who asks again gets the same array: a thousand channels may share one.
+        """
+        if isinstance(index, int) and not isinstance(index, bool) and index in self._numbers:
+            return self._numbers[index]
         accessor = self.item("accessors", index, place)
         at = f"accessors[{index}]"
         kind = accessor.get("componentType")
@@ -78,11 +88,13 @@ class Document:
         length = count * dtype.itemsize
         if inside + length > self.whole(view, "byteLength", view_at) or start + length > len(data):
             raise self.fail(at, f"{length} bytes from {start} were expected, the buffer is shorter")
+        self.budget.hold(count * 3 * 8, at)
         out = np.frombuffer(data, dtype, count, start).astype(np.float64)
         if dtype.kind != "f":
             out = np.maximum(out / np.iinfo(dtype).max, -1.0)
         if not np.isfinite(out).all():
             raise self.fail(at, f"finite numbers were expected, found {out[~np.isfinite(out)][0]}")
+        self._numbers[int(index)] = out  # type: ignore[call-overload]  # item says it is one
         return out
 
     def _buffer(self, index: object, place: str) -> bytes:
@@ -109,15 +121,19 @@ class Document:
         # A file may bring its own neighbours, nothing else of the disk.
         if re.match(r"[a-zA-Z]+:|[/\\]", file) or ".." in re.split(r"[/\\]", file):
             raise self.fail(place, f"a file beside this one was expected, found {uri[:80]!r}")
-        return read_bytes(self.path.parent / file)
+        data = read_bytes(self.path.parent / file)
+        # A buffer of its own file is input too; but a name costs little, and may be given often.
+        self.budget.hold(len(data), place)
+        return data
 
 
 def is_glb(data: bytes) -> bool:
     return data[:4] == MAGIC
 
 
-def open_glb(path: Path, data: bytes) -> Document:
+def open_glb(path: Path, data: bytes, budget: Budget | None = None) -> Document:
     """Raises: AnimationFileError: no GLB of version 2, or a cut one; with the byte."""
+    budget = budget or Budget.of(len(data))
     name = str(path)
     if len(data) < 20:
         raise AnimationFileError(name, f"a GLB's header was expected, found {len(data)} bytes")
@@ -147,7 +163,7 @@ def open_glb(path: Path, data: bytes) -> Document:
             name, f"JSON in UTF-8 was expected (byte {error.start})"
         ) from error
     document = named_json.parse(text, name)
-    return open_gltf(path, document, chunks.get(b"BIN\0"))
+    return open_gltf(path, document, chunks.get(b"BIN\0"), budget)
 
 
 def is_gltf(document: object) -> bool:
@@ -159,7 +175,9 @@ def is_gltf(document: object) -> bool:
     )
 
 
-def open_gltf(path: Path, document: object, binary: bytes | None = None) -> Document:
+def open_gltf(
+    path: Path, document: object, binary: bytes | None = None, budget: Budget | None = None
+) -> Document:
     """Raises: AnimationFileError: no glTF of version 2."""
     if not is_gltf(document) or not isinstance(document, dict):
         raise AnimationFileError(str(path), "asset.version of a glTF was expected")
@@ -168,7 +186,7 @@ def open_gltf(path: Path, document: object, binary: bytes | None = None) -> Docu
         raise AnimationFileError(
             str(path), f"glTF of version 2 was expected, found {version[:20]!r}"
         )
-    return Document(path, document, binary)
+    return Document(path, document, binary, budget or Budget.of(0))
 
 
 def read(document: Document, take: str | None = None) -> Take:
@@ -206,7 +224,7 @@ def read(document: Document, take: str | None = None) -> Take:
             str(a.get("name", i)) for i, a in enumerate(animations) if isinstance(a, dict)
         )
         notes.append(f"animation {title} is taken of {len(animations)}: {names[:200]}")
-    times, rows = on_one_clock(list(curves.values()), RATE)
+    times, rows = on_one_clock(list(curves.values()), RATE, document.budget)
     keep = keep_ascending(times, notes)
     clip = make_clip(list(curves), rows[:, keep], times[keep], metadata={"take": title})
     return Take(clip, "gltf", "", notes)
@@ -238,10 +256,13 @@ def _curves(
         if not names:
             bones += 1
             continue
+        document.budget.work(len(names), at)
         for name, keys in zip(names, _keys(document, animation, channel, names, at), strict=True):
             if name not in out:
                 out[name] = keys
-            elif not _is_same(out[name], keys):
+                continue
+            document.budget.work(keys.times.size, at)
+            if not _is_same(out[name], keys):
                 notes.append(f"{name}: another mesh moves it differently, the first one is taken")
     if bones:
         notes.append(f"{bones} channel(s) move nodes, not shapes or properties: left out")
@@ -310,6 +331,7 @@ def _keys(
     if way not in _KINDS:
         raise document.fail(place, f"one of {', '.join(_KINDS)} was expected, found {way!r}")
     times = document.numbers(sampler.get("input"), f"{place}, input")
+    document.budget.work(times.size, place)
     if times.size == 0 or (np.diff(times) <= 0.0).any():
         raise document.fail(place, "key times that ascend were expected")
     values = document.numbers(sampler.get("output"), f"{place}, output")
@@ -321,6 +343,7 @@ def _keys(
             f"{times.size} keys were expected, found {values.size}",
         )
     table = values.reshape(times.size, parts, len(names))
+    document.budget.hold(times.size, place)
     kinds = np.full(times.size, _KINDS[way], np.uint8)
     if parts == 1:
         return [Keys(times, table[:, 0, i], kinds) for i in range(len(names))]

@@ -9,14 +9,14 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from ..errors import ArgumentError
+from ..budget import Budget
 
 Doubles = npt.NDArray[np.float64]
 Bytes = npt.NDArray[np.uint8]
 
 CONSTANT, LINEAR, CUBIC = 0, 1, 2
-# Values of all curves together: 2 GB; a file that asks for more is not animation.
-MAX_VALUES = 1 << 28
+# Bytes that a value of a curve takes on its way to a clip: as float64 twice, as float32 once.
+VALUE_BYTES = 20
 
 
 @dataclass
@@ -68,7 +68,9 @@ class Keys:
         )
 
 
-def on_one_clock(curves: Sequence[Keys], rate: float | None = None) -> tuple[Doubles, Doubles]:
+def on_one_clock(
+    curves: Sequence[Keys], rate: float | None, budget: Budget
+) -> tuple[Doubles, Doubles]:
     """All curves at the times of all keys.
 
     Straight lines between the frames are then the curves themselves. Curves that bend or step are
@@ -76,27 +78,38 @@ def on_one_clock(curves: Sequence[Keys], rate: float | None = None) -> tuple[Dou
 
     Args:
         rate: frames a second, or None: nothing between keys.
+        budget: of the file.
 
     Returns:
         float64[frames] seconds; float64[curves, frames].
 
     Raises:
-        ValueError: more than MAX_VALUES of them.
+        BudgetError: many curves with keys at many times, or keys that lie far apart.
     """
-    parts = [keys.times for keys in curves if keys.times.size]
+    # Curves of one clock share the array of its times as a rule.
+    parts = list({id(keys.times): keys.times for keys in curves if keys.times.size}.values())
     if not parts:
         return np.zeros(0), np.zeros((len(curves), 0))
+    count = sum(part.size for part in parts)
+    budget.hold(count * 4 * 8, f"{count} times of keys")
     times = np.unique(np.concatenate(parts))
     if rate is not None and not all(keys.is_straight for keys in curves):
-        _check_size(len(curves), (times[-1] - times[0]) * rate)
+        _take(len(curves), (times[-1] - times[0]) * rate, times, budget)
         count = int(np.floor((times[-1] - times[0]) * rate + 1e-6)) + 1
         times = np.union1d(times, times[0] + np.arange(count) / rate)
     # Key times that were rounded apart by a tool are one time.
     times = times[np.concatenate([[True], np.diff(times) > 1e-6])]
-    _check_size(len(curves), times.size)
-    return times, np.array([keys.sample(times) for keys in curves])
+    _take(len(curves), times.size, times, budget)
+    rows = np.empty((len(curves), times.size))
+    for row, keys in zip(rows, curves, strict=True):
+        row[:] = keys.sample(times)
+    return times, rows
 
 
-def _check_size(curves: int, frames: float) -> None:
-    if curves * frames > MAX_VALUES:
-        raise ArgumentError(f"{curves} curves of {frames:.0f} frames are more than can be held")
+def _take(curves: int, frames: float, times: Doubles, budget: Budget) -> None:
+    place = (
+        f"{curves} curves of {frames:.0f} frames, from a key at {times[0]:g} s to one at "
+        f"{times[-1]:g} s"
+    )
+    budget.hold(curves * frames * VALUE_BYTES, place)
+    budget.work(curves * frames, place)

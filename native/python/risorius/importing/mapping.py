@@ -7,7 +7,6 @@ import fnmatch
 import math
 import os
 import re
-import tomllib
 from collections.abc import Callable, Iterable, Sequence
 from collections.abc import Mapping as Table
 from dataclasses import dataclass, field, replace
@@ -21,7 +20,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .. import arkit, expressions
+from .. import arkit, expressions, toml
 from ..clip import Clip
 from ..regions import expand_sides
 from .errors import AnimationFileError
@@ -277,8 +276,8 @@ def parse_mapping(text: str, where: str, name: str = "") -> Mapping:
         MappingError: see load_mapping.
     """
     try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+        table = toml.parse(text)
+    except toml.TomlError as error:
         raise MappingError(where, f"no TOML: {error}") from error
     unknown = sorted(set(table) - _KEYS)
     if unknown:

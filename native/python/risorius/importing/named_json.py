@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..budget import Budget
 from ..clip import Event
 from .errors import AnimationFileError
-from .keys import Keys, on_one_clock
+from .keys import VALUE_BYTES, Keys, on_one_clock
 from .source import Take, keep_ascending, make_clip
 from .tables import LIVE_LINK_FACE
 
@@ -35,14 +36,18 @@ KEYS_KEYS = ("Keys", "keys")
 CURVE_NAME_KEYS = ("CurveName", "Name", "name", "curveName")
 INNER_CURVE_KEYS = ("FloatCurve", "Curve", "curve", "floatCurve")
 DEEPEST = 64
+# Frames a second; what is slower or faster is a number gone wrong.
+SLOWEST, FASTEST = 0.01, 1e6
+_LARGEST = float(np.finfo(np.float32).max)
 
 
 class Reader:
-    """One file; `rate` is what the caller says of its frames a second, or None."""
+    """One file and its budget; `rate` is what the caller says of its frames a second, or None."""
 
-    def __init__(self, name: str, rate: float | None) -> None:
+    def __init__(self, name: str, rate: float | None, budget: Budget) -> None:
         self.name = name
         self.rate = rate
+        self.budget = budget
         self.notes: list[str] = []
 
     def fail(self, message: str, place: str | None = None) -> AnimationFileError:
@@ -50,15 +55,15 @@ class Reader:
 
     def number(self, value: object, place: str) -> float:
         """Raises: AnimationFileError: no finite number that a float32 holds."""
-        good = isinstance(value, int | float) and not isinstance(value, bool)
-        if isinstance(value, str):  # some write numbers as text
-            try:
-                value, good = float(value), True
-            except ValueError:
-                good = False
-        if good and math.isfinite(value) and abs(value) <= np.finfo(np.float32).max:  # type: ignore[arg-type]
-            return float(value)  # type: ignore[arg-type]
-        raise self.fail(f"a finite number was expected, found {str(value)[:40]}", place)
+        found = math.nan
+        if isinstance(value, int | float | str) and not isinstance(value, bool):
+            try:  # some write numbers as text
+                found = float(value)
+            except (ValueError, OverflowError):
+                found = math.nan
+        if math.isfinite(found) and abs(found) <= _LARGEST:
+            return found
+        raise self.fail(f"a finite number was expected, found {_shown(value)}", place)
 
     def numbers(self, values: object, place: str) -> list[float]:
         if not isinstance(values, list):
@@ -76,11 +81,18 @@ class Reader:
             return self.rate
         for table in tables:
             if isinstance(table, dict) and (key := _first(table, RATE_KEYS)):
-                rate = self.number(table[key], key)
-                if rate <= 0.0:
-                    raise self.fail(f"frames a second above 0 were expected, found {rate}", key)
-                return rate
+                return self.frames_a_second(table[key], key)
         return None
+
+    def frames_a_second(self, value: object, place: str) -> float:
+        rate = self.number(value, place)
+        if not SLOWEST <= rate <= FASTEST:
+            raise self.fail(
+                f"frames a second above 0 were expected ({SLOWEST:g} to {FASTEST:g}), "
+                f"found {rate:g}",
+                place,
+            )
+        return rate
 
     def times(self, given: object, count: int, rate: float | None, place: str) -> Doubles:
         """Times of `count` frames: as given, else by the rate."""
@@ -115,19 +127,24 @@ def parse(text: str, name: str) -> object:
         ) from error
     except RecursionError as error:
         raise AnimationFileError(name, "not JSON that can be read: nested too deeply") from error
+    except ValueError as error:  # a number of thousands of digits
+        raise AnimationFileError(name, f"not JSON that can be read: {error}") from error
 
 
-def read(document: object, name: str, rate: float | None = None) -> Take:
+def read(
+    document: object, name: str, rate: float | None = None, budget: Budget | None = None
+) -> Take:
     """Curves of a document, by the first shape that fits.
 
     Args:
         document: parsed JSON.
         rate: frames a second, where the file does not say it; it wins if it does.
+        budget: of the file; None: that of a small one.
 
     Raises:
         AnimationFileError: none of the shapes, or one that does not hold together.
     """
-    reader = Reader(name, rate)
+    reader = Reader(name, rate, budget or Budget.of(0))
     for shape in (
         own_clip,
         matrix,
@@ -160,9 +177,7 @@ def own_clip(reader: Reader, document: object) -> Take | None:
     for curve, row in zip(curves, rows, strict=True):
         if len(row) != count:
             raise reader.fail(f"{count} values were expected, found {len(row)}", f"curves.{curve}")
-    rate = reader.number(document.get("rate"), "rate")
-    if rate <= 0.0:
-        raise reader.fail(f"frames a second above 0 were expected, found {rate}", "rate")
+    rate = reader.frames_a_second(document.get("rate"), "rate")
     start = reader.number(document.get("start", 0.0), "start")
     given = document.get("times")
     times = start + np.arange(count) / rate if given is None else None
@@ -279,6 +294,9 @@ def frame_tables(reader: Reader, document: object) -> Take | None:
         clock = reader.times(None, len(frames), rate, "time")
     else:
         clock, rate = np.array(times, np.float64), None
+    place = f"{len(names)} curves of {len(frames)} frames"
+    reader.budget.hold(len(names) * len(frames) * VALUE_BYTES, place)
+    reader.budget.work(len(names) * len(frames), place)
     columns = [_frame_column(reader, tables, curve, clock) for curve in names]
     return reader.take(names, columns, clock, rate)
 
@@ -377,7 +395,7 @@ def _keyed(reader: Reader, curves: dict[str, Keys]) -> Take:
     for name, keys in curves.items():
         if (np.diff(keys.times) <= 0.0).any():
             raise reader.fail("key times that ascend were expected", name)
-    times, rows = on_one_clock(list(curves.values()))
+    times, rows = on_one_clock(list(curves.values()), None, reader.budget)
     return reader.take(list(curves), rows, times)
 
 
@@ -432,6 +450,14 @@ def _is_number(text: str) -> bool:
         return math.isfinite(float(text))
     except ValueError:
         return False
+
+
+def _shown(value: object) -> str:
+    """A value as messages show it; of a list or a table what it is, however deep it goes."""
+    if isinstance(value, dict | list):
+        return _kind(value)
+    is_long = isinstance(value, int) and abs(value) >= 1 << 64
+    return "a long number" if is_long else str(value)[:40]
 
 
 def _kind(value: object) -> str:

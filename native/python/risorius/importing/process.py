@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
+from ..budget import Budget
 from ..clip import Clip, Event
 from ..errors import ArgumentError
 from .mapping import ANGLES, fits
@@ -130,6 +131,8 @@ def smooth(clip: Clip, window: float, *, order: int = 3) -> Clip:
     half = round(0.5 * window * clip.rate)
     if 2 * half <= order or clip.frame_count <= 2 * half:
         return clip
+    budget = Budget.of(clip.curves.nbytes)
+    budget.hold((2 * half + 1) ** 2 * 24, f"a window of {window:g} s, {2 * half + 1} frames")
     curves = clip.curves.astype(np.float64)
     low, high = curves.min(axis=1, keepdims=True), curves.max(axis=1, keepdims=True)
     # A fit swings beyond a sharp edge; no lid may open further than the capture ever had it.
@@ -231,19 +234,20 @@ def fill_gaps(clip: Clip, longest: float | None = None) -> Clip:
 
     Args:
         longest: seconds; across a longer gap the last value is held until a frame before its end.
+
+    Raises:
+        BudgetError: a gap so long that its frames cannot be held.
     """
-    at = clip.frame_times()
     if clip.frame_count < 2:
         return clip
-    count = int(np.floor((at[-1] - at[0]) * clip.rate + 0.5)) + 1
-    wanted = at[0] + np.arange(count) / clip.rate
-    curves = clip.sample(wanted).T
+    at, filled = clip.frame_times(), clip.without_gaps()
     if longest is not None:
+        wanted, curves = filled.frame_times(), filled.curves
         before = np.clip(np.searchsorted(at, wanted, side="right") - 1, 0, clip.frame_count - 2)
         long = at[before + 1] - at[before] > longest
         held = long & (wanted < at[before + 1] - 1.0 / clip.rate + 1e-9)
-        curves = np.where(held, clip.curves[:, before], curves)
-    return clip.replaced(curves=curves, start=float(at[0]), times=None)
+        filled = filled.replaced(curves=np.where(held, clip.curves[:, before], curves))
+    return filled
 
 
 def drop_repeats(clip: Clip) -> Clip:

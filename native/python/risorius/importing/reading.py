@@ -12,6 +12,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from ..budget import Budget
 from ..clip import Clip
 from ..errors import ArgumentError
 from . import fbx, gltf, named_json, tables, visemes
@@ -42,6 +43,7 @@ class Options(NamedTuple):
     rate: float | None
     timecode_rate: float | None
     take: str | None
+    budget: Budget
 
 
 class RigLike(Protocol):
@@ -208,11 +210,14 @@ def read(
     file = Path(path)
     data = read_bytes(file)
     try:
-        found = _read_kind(file, data, Options(kind, rate, timecode_rate, take))
+        budget = Budget.of(len(data))
+        found = _read_kind(file, data, Options(kind, rate, timecode_rate, take, budget))
     except AnimationFileError:
         raise
-    except ValueError as error:
+    except (ValueError, ArithmeticError) as error:  # numbers that the file has and nobody expects
         raise AnimationFileError(str(path), str(error)) from error
+    except RecursionError as error:
+        raise AnimationFileError(str(path), "nested too deeply to be read") from error
     mapping = found.mapping or best_mapping(_moving(found.clip)) or ""
     facts = {"source": file.name, "kind": found.kind, **found.clip.metadata}
     return Imported(
@@ -229,9 +234,9 @@ def _moving(clip: Clip) -> list[str]:
 def _read_kind(file: Path, data: bytes, options: Options) -> Take:
     name = str(file)
     if gltf.is_glb(data):
-        return gltf.read(gltf.open_glb(file, data), options.take)
+        return gltf.read(gltf.open_glb(file, data, options.budget), options.take)
     if fbx.is_fbx(data):
-        return fbx.read(data, name, options.take)
+        return fbx.read(data, name, options.take, options.budget)
     text = decode(data, name)
     if text.lstrip()[:1] in ("{", "[") or options.kind == "json":
         return _read_json(named_json.parse(text, name), file, options)
@@ -264,12 +269,12 @@ def _read_json(document: object, file: Path, options: Options) -> Take:
     name = str(file)
     if isinstance(document, dict) and options.kind != "json":
         if gltf.is_gltf(document):
-            return gltf.read(gltf.open_gltf(file, document), options.take)
+            return gltf.read(gltf.open_gltf(file, document, None, options.budget), options.take)
         if "mouthCues" in document:
             return visemes.read_rhubarb_json(document, name)
         if "voices" in document and "fps" in document:
             return visemes.read_pgo_json(document, name)
-    return named_json.read(document, name, options.rate)
+    return named_json.read(document, name, options.rate, options.budget)
 
 
 def import_file(
@@ -318,7 +323,8 @@ def import_curves(
     keys = {name: _keys(name, times, values) for name, (times, values) in curves.items()}
     if not any(key.times.size for key in keys.values()):
         raise ArgumentError(f"{source}: curves with keys were expected, found none")
-    times, rows = on_one_clock(list(keys.values()))
+    budget = Budget.of(sum(key.times.nbytes + key.values.nbytes for key in keys.values()))
+    times, rows = on_one_clock(list(keys.values()), None, budget)
     clip = make_clip(list(keys), rows, times, metadata={"source": source, "kind": "curves"})
     found = Imported(clip, "curves", best_mapping(_moving(clip)) or "", source)
     return found.apply(mapping, rig_names=rig_names, rig=rig, rotations=rotations)

@@ -8,12 +8,15 @@ import xml.etree.ElementTree as Xml
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import NamedTuple
+from xml.parsers import expat
 
 import numpy as np
 import numpy.typing as npt
 
+from ..budget import Budget
 from ..clip import Clip, Event
 from .errors import AnimationFileError
+from .keys import VALUE_BYTES
 from .source import Take, number
 
 Doubles = npt.NDArray[np.float64]
@@ -66,6 +69,7 @@ def flowing_curves(
         The shapes, in order of their first cue; float64[shapes, frames].
     """
     names = list(dict.fromkeys(cue.shape for cue in cues))
+    place = {name: i for i, name in enumerate(names)}
     weights = np.zeros((len(names), times.size))
     if not cues:
         return names, weights
@@ -81,7 +85,7 @@ def flowing_curves(
         part = np.clip((at - border + half) / (2.0 * half), 0.0, 1.0) if half > 0 else at >= border
         rise = 0.5 - 0.5 * np.cos(np.pi * np.asarray(part, np.float64))
         weights[:, first:last] *= 1.0 - rise
-        weights[names.index(cues[i].shape), first:last] += rise
+        weights[place[cues[i].shape], first:last] += rise
     return names, weights
 
 
@@ -91,7 +95,7 @@ def _take(
     """A take of cues: curves at RATE, the cues themselves as events.
 
     Raises:
-        AnimationFileError: no cue of any length.
+        AnimationFileError: no cue of any length. BudgetError: too many shapes for so long a track.
     """
     cues = [cue for cue in cues if cue.end > cue.start]
     if not cues:
@@ -101,6 +105,10 @@ def _take(
             name, f"times to {LONGEST:g} s were expected, found {cues[-1].end:g} s"
         )
     count = int(np.ceil(cues[-1].end * RATE - 1e-6)) + 1
+    shapes = len({cue.shape for cue in cues})
+    Budget.of(sum(len(cue.shape) + 8 for cue in cues)).hold(
+        shapes * count * VALUE_BYTES, f"{shapes} mouth shapes of {count} frames"
+    )
     names, weights = flowing_curves(cues, np.arange(count) / RATE)
     marks = [Event(c.start, "viseme", c.end - c.start, c.shape) for c in cues]
     clip = Clip(names, weights, RATE, events=[*marks, *events])
@@ -161,10 +169,15 @@ def read_rhubarb_xml(text: str, name: str) -> Take:
     Raises:
         AnimationFileError: no such XML, or XML with declarations of its own.
     """
-    if "<!" in re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL):
-        raise AnimationFileError(name, "XML without declarations of its own was expected")
+    text = re.sub(r"^\s*<\?xml.*?\?>", "", text, flags=re.DOTALL)
     try:
-        root = Xml.fromstring(re.sub(r"^\s*<\?xml.*?\?>", "", text, flags=re.DOTALL))
+        _refuse_declarations(text, name)
+        root = Xml.fromstring(text)
+    except expat.ExpatError as error:
+        raise AnimationFileError(
+            name, f"not XML: {expat.ErrorString(error.code)}", line=error.lineno,
+            column=error.offset + 1,
+        ) from error  # fmt: skip
     except Xml.ParseError as error:
         line, column = error.position
         raise AnimationFileError(
@@ -177,6 +190,24 @@ def read_rhubarb_xml(text: str, name: str) -> Take:
         for cue in root.iterfind("mouthCues/mouthCue")
     ]
     return _rhubarb_cues(rows, name)
+
+
+def _refuse_declarations(text: str, name: str) -> None:
+    """Read through with nothing but a look for a document type, which may hold entities that grow.
+
+    Raises:
+        AnimationFileError: there is one. ExpatError: no XML.
+    """
+
+    def refuse(*_: object) -> None:
+        raise AnimationFileError(
+            name, "XML without declarations of its own was expected",
+            line=parser.CurrentLineNumber, column=parser.CurrentColumnNumber + 1,
+        )  # fmt: skip
+
+    parser = expat.ParserCreate()
+    parser.StartDoctypeDeclHandler = refuse
+    parser.Parse(text.encode("utf-8", "surrogatepass"), True)
 
 
 def read_rhubarb_json(document: dict[str, object], name: str) -> Take:

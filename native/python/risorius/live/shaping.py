@@ -5,13 +5,13 @@ from __future__ import annotations
 
 import math
 import os
-import tomllib
 from functools import cache
 from importlib import resources
 from typing import NamedTuple
 
 import numpy as np
 
+from .. import toml
 from ..importing import Mapping, load_mapping
 from .frame import Floats, Frame
 
@@ -37,7 +37,7 @@ class Controls(NamedTuple):
 def expressions() -> dict[str, Row]:
     """VRM expression, in lower case -> {ARKit unit: weight}; of VRM 0 and 1."""
     text = resources.files(__package__).joinpath("vrm.toml").read_text(encoding="utf-8")
-    table = tomllib.loads(text)
+    table = toml.parse(text)
     found = {name: dict(row) for name, row in table["expressions"].items()}
     return found | {name: found[same] for name, same in table["same"].items()}
 

@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: MIT
+"""What reading a file may take, in proportion to the file.
+
+A file may say in a few bytes what takes gigabytes: arrays that unfold a thousand times, a thousand
+curves on one array, two frames a year apart. So each reader counts what it is about to hold and to
+do, and stops before it does. No clock: the same file gives the same answer on every machine.
+"""
+
+from __future__ import annotations
+
+from .errors import RisoriusError
+
+BASE_BYTES = 256 << 20
+"""What any file may take, however small: an hour of a face's curves that say little."""
+BYTES_PER_BYTE = 32
+BASE_STEPS = 20_000_000
+STEPS_PER_BYTE = 64
+
+
+class BudgetError(RisoriusError):
+    """More memory or work would be needed than what was given can be worth."""
+
+    code = "limit"
+
+
+class Budget:
+    """Bytes and steps that are left; handed through all that one file goes through.
+
+    Args:
+        bytes_: that may be held, in all.
+        steps: that may be done; about one per number that is looked at, some nanoseconds each.
+    """
+
+    def __init__(self, bytes_: int, steps: int) -> None:
+        self.bytes = self._bytes = bytes_
+        self.steps = self._steps = steps
+
+    @classmethod
+    def of(cls, size: int) -> Budget:
+        """For what `size` bytes say."""
+        return cls(BASE_BYTES + BYTES_PER_BYTE * size, BASE_STEPS + STEPS_PER_BYTE * size)
+
+    def hold(self, count: float, place: str) -> None:
+        """Before `count` bytes are held. Raises: BudgetError."""
+        if not count <= self.bytes:
+            taken = self._bytes - self.bytes
+            raise BudgetError(
+                f"{place}: {count:,.0f} bytes more than the {taken:,} taken before would be "
+                f"needed, at most {self._bytes:,} in all were expected of what has this size"
+            )
+        self.bytes -= int(count)
+
+    def work(self, count: float, place: str) -> None:
+        """Before `count` steps are done. Raises: BudgetError."""
+        if not count <= self.steps:
+            taken = self._steps - self.steps
+            raise BudgetError(
+                f"{place}: {count:,.0f} steps more than the {taken:,} done before would be "
+                f"needed, at most {self._steps:,} in all were expected of what has this size"
+            )
+        self.steps -= int(count)

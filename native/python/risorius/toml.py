@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: MIT
+"""TOML that people gave: of a size and a depth that they write."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from typing import Any
+
+from .errors import RisoriusError
+
+MOST_BYTES = 16 << 20
+DEEPEST = 64
+# A dotted key of more parts than that: the parser's time grows with their square.
+_DEEP_KEY = re.compile(rf"""(?<![\w"'-])(?:[\w"'-]+[ \t]*\.[ \t]*){{{DEEPEST}}}""")
+
+
+class TomlError(RisoriusError):
+    """A text that is no TOML, or none that anybody wrote; says the line where it is known."""
+
+    code = "toml"
+
+
+def parse(text: str) -> dict[str, Any]:
+    """The tables of a text.
+
+    Raises:
+        TomlError: no TOML, larger than MOST_BYTES, nested deeper than DEEPEST.
+    """
+    if len(text) > MOST_BYTES:
+        raise TomlError(f"at most {MOST_BYTES:,} letters were expected, found {len(text):,}")
+    deep = f"nested at most {DEEPEST} deep was expected, found more"
+    if found := _DEEP_KEY.search(text):
+        raise TomlError(f"keys {deep} (line {text.count(chr(10), 0, found.start()) + 1})")
+    try:
+        table = tomllib.loads(text)
+    except RecursionError:
+        raise TomlError(f"values {deep}") from None
+    except ValueError as error:  # TOMLDecodeError, and a number of thousands of digits
+        raise TomlError(str(error)) from error
+    if _is_deep(table):
+        raise TomlError(f"values {deep}")
+    return table
+
+
+def _is_deep(table: dict[str, Any]) -> bool:
+    level: list[Any] = [table]
+    for _ in range(DEEPEST):
+        level = [
+            inner
+            for value in level
+            for inner in (value.values() if isinstance(value, dict) else value)
+            if isinstance(inner, dict | list)
+        ]
+        if not level:
+            return False
+    return True
