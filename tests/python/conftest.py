@@ -2,6 +2,7 @@
 """Where test data lies, and the extras that need data which a clone does not have."""
 
 import contextlib
+import json
 import os
 from pathlib import Path
 
@@ -9,9 +10,37 @@ import pytest
 
 PROJECT = Path(__file__).resolve().parents[2]
 GOLDEN = PROJECT / "tests" / "data" / "golden"
+# The same kind of data in another folder: files of other shapes, made by the same program.
+GOLDEN_SET = Path(os.environ.get("RISORIUS_GOLDEN", GOLDEN))
 SHARED = Path(os.environ.get("RISORIUS_SHARED", PROJECT.parent / "shared"))
 
 _not_run: set[str] = set()
+
+
+def evaluations(tag: str | None = None) -> list[tuple[str, str, dict[str, object]]]:
+    """(rig, tag, what its file says) of every evaluation in the golden set, or of those of a tag:
+    "" as loaded whole, ".quat" with quaternions, ".seq" through time, others filtered on load."""
+    found = []
+    for path in sorted(GOLDEN_SET.glob("*.eval*.json")):
+        name, _, rest = path.name.partition(".eval")
+        its_tag = rest.removesuffix(".json")
+        if tag in (None, its_tag) and (GOLDEN_SET / f"{name}.dna").exists():
+            found.append((name, its_tag, json.loads(path.read_text())))
+    if not found:
+        raise FileNotFoundError(
+            f"no <rig>.eval{tag or '*'}.json beside its <rig>.dna: {GOLDEN_SET}"
+        )
+    return found
+
+
+def lods_of(about: dict) -> list[int] | None:
+    """LODs of the file that a filtered load kept; None: it was not filtered."""
+    load, count = about["load"], about["counts"]["lods"]
+    if load["lods"]:
+        return load["lods"]
+    if (load["maxLOD"], load["minLOD"]) == (0, 65535):
+        return None
+    return list(range(load["maxLOD"], load["maxLOD"] + count))
 
 
 def require_extra(path: Path, what: str) -> Path:

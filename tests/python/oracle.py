@@ -142,6 +142,8 @@ def quaternion_rotations(dna, group, rows, inputs, joints, bounds):
         total = np.eye(3)
         for c in column_order(dna, group):
             v = inputs[c]
+            if v == 0:
+                continue
             angles = [
                 matrix[outputs == joint * 9 + 3 + a, c].sum() if len(outputs) else 0
                 for a in range(3)
