@@ -1,0 +1,397 @@
+# SPDX-License-Identifier: MIT
+"""What is done to the command line, and what must hold afterwards: packaging/faults.sh runs it.
+
+Bombs, flipped bits, kills, interrupts, full disks, folders that cannot be written, two processes at
+once. Each trial is a row: its group, its name, how often it ran, what went wrong.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import os
+import random
+import resource
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent / "python"))
+
+from bombs import BOMBS, MiB  # noqa: E402
+from risorius import importing  # noqa: E402
+from room import (  # noqa: E402
+    COMMANDS,
+    CORE,
+    Done,
+    Room,
+    Row,
+    begin,
+    complaints,
+    finish,
+    jobs,
+    measured,
+    take,
+)  # fmt: skip
+
+START_MEMORY = 200 * MiB  # Python, NumPy and the package, and what any small file takes
+MEMORY_PER_BYTE = 40
+
+
+def bombs(_rounds: int, names: Sequence[str] = ()) -> Iterator[Row]:
+    """Peak memory within k times the file, within a minute of CPU, a result or a sentence."""
+    for name, make, words in BOMBS:
+        if names and name not in names:
+            continue
+        with tempfile.TemporaryDirectory() as text:
+            folder = Path(text)
+            make(folder / name)
+            known = {"FILE": str(folder / name), "CORE": str(CORE)}
+            arguments = [
+                str(folder / word) if word.startswith("OUT") else known.get(word, word)
+                for word in words
+            ]
+            done = measured(arguments, folder)
+            size = (folder / name).stat().st_size
+            row = Row("bomb", name, 1, complaints(done, (0, 1)))
+            allowed = START_MEMORY + MEMORY_PER_BYTE * size
+            row.check(
+                done.peak <= allowed,
+                f"{done.peak / MiB:.0f} MiB for {size / MiB:.2f}, {allowed / MiB:.0f} were allowed",
+            )
+            yield row
+
+
+FLIPS = """
+import pathlib, random, sys
+import numpy as np
+import risorius
+kind, source, folder, seed, count = sys.argv[1:]
+folder, draw, rounds = pathlib.Path(folder), random.Random(int(seed)), int(count)
+good = pathlib.Path(source).read_bytes()
+
+def evaluated(rig):
+    raw = np.linspace(0, 1, len(rig.raw_control_names), dtype=np.float32)
+    pose = rig.evaluate(raw)
+    return pose.joints.tobytes() + pose.blend_shapes.tobytes() + pose.animated_maps.tobytes()
+
+def flipped(data):
+    data = bytearray(data)
+    for _ in range(draw.choice((1, 1, 1, 4))):
+        data[draw.randrange(len(data))] ^= 1 << draw.randrange(8)
+    return bytes(data)
+
+if kind == "cache":
+    want = evaluated(risorius.compile_cached(source, folder))
+    (file,) = folder.glob("*.rig")
+    block = file.read_bytes()
+for i in range(rounds):
+    try:
+        if kind == "dna":
+            evaluated(risorius.Rig(risorius.load(flipped(good))))
+        elif kind == "clip":
+            clip = risorius.ClipReader(flipped(good))
+            clip.read()
+        else:
+            file.write_bytes(flipped(block))
+            if evaluated(risorius.compile_cached(source, folder)) != want:
+                print("other poses after flip", i)
+            if file.read_bytes() != block:
+                print("not rebuilt after flip", i)
+    except (risorius.DnaError, risorius.ClipError):
+        pass
+print("done")
+"""
+
+
+def flips(rounds: int) -> Iterator[Row]:
+    """Bits turned in DNA files, clips and the cache of compiled faces: a sentence, or right."""
+    with tempfile.TemporaryDirectory() as text:
+        folder = Path(text)
+        clip = folder / "take.rzc"
+        importing.import_file(take(folder / "take.csv"))[0].save(clip)
+        for kind, source in (("dna", CORE), ("clip", clip), ("cache", CORE)):
+            (folder / kind).mkdir()
+            arguments = [kind, str(source), str(folder / kind), "3", str(20 * rounds)]
+            done = subprocess.run(
+                [sys.executable, "-c", FLIPS, *arguments], capture_output=True, text=True,
+                check=False,
+            )  # fmt: skip
+            row = Row("flip", kind, 20 * rounds)
+            row.check(done.returncode == 0, f"exit code {done.returncode}: {done.stderr[-200:]}")
+            row.check(done.stdout in ("done\n", ""), done.stdout[:200])
+            yield row
+
+
+def _wait(process: subprocess.Popen[str], room: Room, draw: random.Random, longest: float) -> None:
+    """Until a random moment, or until a hidden file shows that something is being written."""
+    end = time.monotonic() + draw.uniform(0.0, longest)
+    if draw.random() < 0.5:
+        end = time.monotonic() + 60.0
+    while time.monotonic() < end and process.poll() is None:
+        if end - time.monotonic() > longest and any(
+            name.startswith(".risorius") for name in os.listdir(room.outputs)
+        ):
+            return
+        time.sleep(0.0005)
+
+
+def _signalled(
+    group: str, what: signal.Signals, rounds: int, names: Sequence[str]
+) -> Iterator[Row]:
+    """A signal at random moments: the target is the old file or the new one."""
+    draw = random.Random(20)
+    for name in names or COMMANDS:
+        with tempfile.TemporaryDirectory() as text:
+            room = Room.make(Path(text))
+            target, words = room.arguments(name)
+            row = Row(group, name)
+            began = time.monotonic()
+            clean = finish(begin(words))
+            longest = time.monotonic() - began
+            if clean.code != 0:
+                row.not_run = clean.err.strip().splitlines()[-1][:80]
+                yield row
+                continue
+            new = room.contents()[target.name]
+            for _ in range(rounds):
+                target.write_bytes(b"old")
+                process = begin(words)
+                _wait(process, room, draw, longest)
+                with contextlib.suppress(ProcessLookupError):  # it has ended by itself
+                    os.killpg(process.pid, what)
+                done = finish(process)
+                row.runs += 1
+                row.check(target.read_bytes() in (b"old", new), "half a file")
+                if what == signal.SIGINT:
+                    row.faults += _interrupted(done)
+                    row.check(list(room.contents()) == [target.name], "something is left")
+            row.check(finish(begin(words)).code == 0, "the same command fails afterwards")
+            row.check(room.contents() == {target.name: new}, f"left: {list(room.contents())}")
+            yield row
+
+
+def _interrupted(done: Done) -> list[str]:
+    """What is wrong with how an interrupted command ended. One that has said what it did and is
+    leaving may end by the signal itself: Python listens no longer."""
+    leaving = done.code == -signal.SIGINT and done.out and not done.err
+    return [] if leaving else complaints(done, (0, 130))
+
+
+def kills(rounds: int, names: Sequence[str] = ()) -> Iterator[Row]:
+    """kill -9: no half file, and what is left goes with the next run."""
+    yield from _signalled("kill", signal.SIGKILL, rounds, names)
+
+
+def interrupts(rounds: int, names: Sequence[str] = ()) -> Iterator[Row]:
+    """Ctrl-C: a sentence, exit code 130, the old file or the new one, nothing left."""
+    yield from _signalled("interrupt", signal.SIGINT, rounds, names)
+    if not names:
+        yield from _printing(rounds)
+
+
+def _printing(rounds: int) -> Iterator[Row]:
+    """Ctrl-C in commands that write no file."""
+    draw = random.Random(5)
+    for words in (["bench", str(CORE)], ["info", str(CORE)], ["live", "--seconds", "5"]):
+        row = Row("interrupt", words[0])
+        for _ in range(rounds):
+            process = begin(words)
+            time.sleep(draw.uniform(0.0, 0.3))
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGINT)
+            row.runs += 1
+            row.faults += _interrupted(finish(process))
+        yield row
+
+
+def _refused(row: Row, room: Room, target: Path, done: Done, named: str) -> None:
+    """The command has failed with a sentence that names the target, and has changed nothing."""
+    row.runs += 1
+    row.faults += complaints(done, (1,))
+    row.check(named in done.err, f"{named} is not named: {done.err.strip()[-150:]}")
+    row.check(".risorius-" not in done.err, f"a hidden name: {done.err.strip()[-150:]}")
+    row.check("[Errno" not in done.err, f"a number of the system's: {done.err.strip()[-150:]}")
+    found = {name: len(data) for name, data in room.contents().items() if name != "filler"}
+    row.check(found == {target.name: 3}, f"the old file alone was expected, found {found}")
+
+
+def _limited() -> None:
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))
+
+
+@contextlib.contextmanager
+def small_disk(folder: Path, size: str) -> Iterator[bool]:
+    """A disk of its own at a folder; whether that could be had."""
+    command = ["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", str(folder)]
+    try:
+        made = subprocess.run(command, capture_output=True, check=False).returncode == 0
+    except FileNotFoundError:
+        made = False
+    try:
+        yield made
+    finally:
+        if made:
+            subprocess.run(["umount", "-l", str(folder)], check=False)
+
+
+def disks(_rounds: int, names: Sequence[str] = ()) -> Iterator[Row]:
+    """No room: a sentence that names the file, the old one whole, nothing left."""
+    for name in names or COMMANDS:
+        with tempfile.TemporaryDirectory() as text:
+            room = Room.make(Path(text))
+            target, words = room.arguments(name)
+            row = Row("full disk", name)
+            target.write_bytes(b"old")
+            _refused(row, room, target, finish(begin(words, _limited)), target.name)
+            yield row
+    if names:
+        return
+    for name in COMMANDS:
+        row = Row("full tmpfs", name)
+        with tempfile.TemporaryDirectory() as text:
+            room = Room.make(Path(text))
+            target, words = room.arguments(name)
+            with small_disk(room.outputs, "64k") as made:
+                if not made:
+                    row.not_run = "no disk can be mounted here"
+                else:
+                    target.write_bytes(b"old")
+                    with contextlib.suppress(OSError), open(room.outputs / "filler", "wb") as file:
+                        file.write(bytes(64 * 1024))
+                    _refused(row, room, target, finish(begin(words)), target.name)
+        yield row
+    for words in (["info", str(CORE)], ["check", str(CORE)], ["eval", str(CORE)],
+                  ["convert", str(CORE), "-", "--to", "dna"]):  # fmt: skip
+        row = Row("full /dev/full", words[0], 1)
+        with open("/dev/full", "w") as full:
+            done = subprocess.run(
+                [sys.executable, "-m", "risorius", *words], stdout=full, stderr=subprocess.PIPE,
+                text=True, check=False,
+            )  # fmt: skip
+        row.faults += complaints(Done(done.returncode, "", done.stderr), (1,))
+        yield row
+
+
+def folders(_rounds: int, names: Sequence[str] = ()) -> Iterator[Row]:
+    """A folder that is missing or cannot be written is said before the input is looked at."""
+    for name in names or COMMANDS:
+        with tempfile.TemporaryDirectory() as text:
+            room = Room.make(Path(text))
+            target, words = room.arguments(name)
+            row = Row("missing folder", name)
+            if name.startswith("eval"):
+                (room.outputs / "none").write_text("")  # it makes folders, but not out of a file
+            words = [
+                str(room.outputs / "none" / target.name) if word == str(target) else word
+                for word in words
+            ]
+            for i, word in enumerate(words):
+                if word in (str(CORE), str(room.inputs / "voice.wav")):
+                    words[i] = str(room.inputs / f"bad{Path(word).suffix}")
+                    Path(words[i]).write_bytes(b"nothing of the kind")
+            target.write_bytes(b"old")
+            done = finish(begin(words))
+            (room.outputs / "none").unlink(missing_ok=True)
+            _refused(row, room, target, done, f"none/{target.name}")
+            yield row
+    if names:
+        return
+    for name in COMMANDS:
+        row = Row("read-only folder", name)
+        with tempfile.TemporaryDirectory() as text:
+            room = Room.make(Path(text))
+            target, words = room.arguments(name)
+            with small_disk(room.outputs, "64k") as made:
+                target.write_bytes(b"old")
+                again = ["mount", "-o", "remount,ro", str(room.outputs)]
+                if not made or subprocess.run(again, check=False).returncode != 0:
+                    row.not_run = "no disk can be mounted here"
+                else:
+                    _refused(row, room, target, finish(begin(words)), target.name)
+        yield row
+
+
+def pairs(rounds: int, names: Sequence[str] = ()) -> Iterator[Row]:
+    """Several processes write one file, fill one cache, do one batch."""
+    for name in names or COMMANDS:
+        with tempfile.TemporaryDirectory() as text:
+            room = Room.make(Path(text))
+            words = room.arguments(name)[1]
+            row = Row("at once", name)
+            clean = finish(begin(words))
+            if clean.code != 0:
+                row.not_run = clean.err.strip().splitlines()[-1][:80]
+                yield row
+                continue
+            want = room.contents()
+            for _ in range(max(1, rounds // 5)):
+                for done in [finish(p) for p in [begin(words) for _ in range(3)]]:
+                    row.runs += 1
+                    row.faults += complaints(done, (0,))
+                row.check(room.contents() == want, f"left: {list(room.contents())}")
+            yield row
+    if not names or "batch" in names:
+        yield _batches(max(1, rounds // 5))
+
+
+def _batches(rounds: int) -> Row:
+    """Two batches in one folder: one does it, the other says who does, or comes later."""
+    row = Row("at once", "batch")
+    for _ in range(rounds):
+        with tempfile.TemporaryDirectory() as text:
+            room = Room.make(Path(text))
+            words = ["batch", str(jobs(room.inputs)), "--workers", "1"]
+            ended = [finish(p) for p in [begin(words) for _ in range(2)]]
+            row.runs += 2
+            for done in ended:
+                row.faults += complaints(done, (0, 1))
+                row.check(done.code == 0 or "works in this folder" in done.err, done.err[-200:])
+            row.check(any(done.code == 0 for done in ended), "none of them did it")
+            found = sorted(p.name for p in (room.inputs / "out").rglob("*") if p.is_file())
+            row.check(
+                found == [".jobs.journal", "summary.csv", "summary.json"] + ["take.csv"] * 2
+                + ["take.npz"] * 2, f"left: {found}",
+            )  # fmt: skip
+    return row
+
+
+Group = Callable[[int], Iterator[Row]]
+GROUPS: dict[str, Group] = {
+    "bombs": bombs, "flips": flips, "kills": kills, "interrupts": interrupts, "disks": disks,
+    "folders": folders, "pairs": pairs,
+}  # fmt: skip
+
+
+def line(row: Row) -> str:
+    """E.g. "kill       convert       30 runs  0 faults"."""
+    what = f"{row.runs:5} runs {len(row.faults):4} faults"
+    if row.not_run:
+        what = f"NOT RUN: {row.not_run}"
+    first = f"  {row.faults[0]}" if row.faults else ""
+    return f"{row.group:<17} {row.name:<20} {what}{first}"
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("groups", nargs="*", choices=[*GROUPS, []], help="default: all")
+    parser.add_argument("--rounds", type=int, default=20, help="of each kill and interrupt (20)")
+    args = parser.parse_args()
+    with tempfile.TemporaryDirectory() as cache:
+        os.environ["XDG_CACHE_HOME"] = cache
+        count = 0
+        for name in args.groups or GROUPS:
+            for row in GROUPS[name](args.rounds):
+                print(line(row), flush=True)
+                count += len(row.faults)
+    print(f"{count} faults")
+    return 1 if count else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
