@@ -18,6 +18,7 @@ from animation_files import (
 )
 from conftest import no_room
 from risorius import Clip, importing
+from risorius.importing import AnimationFileError
 
 RIG = "CTRL_expressions."
 
@@ -350,3 +351,53 @@ def test_seeded_damage_never_ends_in_anything_but_a_sentence(tmp_path):
         except importing.AnimationFileError as error:
             assert "\n" not in str(error)
     assert 10 < read_count < 150
+
+
+KINDS = {
+    "wav": (b"RIFF\x24\0\0\0WAVEfmt \x10\0\0\0", "a sound: Speak from Audio in Blender"),
+    "flac": (b"fLaC\0\0\0\x22", "`risorius speech` on the command line"),
+    "mp3": (b"ID3\x04\0\0\0\0", "a sound"),
+    "png": (b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", "a picture (PNG)"),
+    "jpg": (b"\xff\xd8\xff\xe0\0\x10JFIF", "a picture (JPEG)"),
+    "mp4": (b"\0\0\0\x20ftypisom", "a film"),
+    "zip": (b"PK\x03\x04\x14\0", "an archive (ZIP)"),
+    "blend": (b"BLENDER-v405", "a scene of Blender (.blend)"),
+    "zst.blend": (b"\x28\xb5\x2f\xfd\x04\0", "Zstandard"),
+    "dna": (b"DNA\0\2\0\x08\0\0\0\x0bd", "a face (DNA)"),
+}
+
+
+@pytest.mark.parametrize("suffix", KINDS)
+def test_a_file_of_another_kind_is_called_by_its_kind(suffix, tmp_path):
+    start, words = KINDS[suffix]
+    path = tmp_path / f"take.{suffix}"
+    path.write_bytes(start + bytes(range(256)))
+    with pytest.raises(AnimationFileError) as found:
+        importing.read(path)
+    assert str(found.value).startswith(f"{path}: animation was expected, this is ")
+    assert words in str(found.value)
+
+
+def test_a_clip_without_its_suffix_is_called_a_clip(tmp_path):
+    path = tmp_path / "take.csv"
+    Clip(["a"], [[0.0]], 60.0).save(path)
+    with pytest.raises(AnimationFileError, match=r"a clip of Risorius .* rename it"):
+        importing.read(path)
+
+
+def test_the_report_names_every_curve(tmp_path):
+    path = tmp_path / "take.csv"
+    strange = [f"strange{i}" for i in range(60)]
+    header = ["time", "JawOpen", "HeadYaw", *strange]
+    rows = [",".join([str(i)] * len(header)) for i in (0, 1)]
+    path.write_text("\n".join([",".join(header), *rows]))
+    clip, report = importing.import_file(path, ["CTRL_expressions.other"], mapping="live_link_face")
+    text = report.text()
+    words = text.replace(",", " ").split()
+    assert all(name in words for name in ["JawOpen", "HeadYaw", *strange])
+    assert all(name in words for row in report.mapped.values() for name in row)
+    assert "more" not in words
+    assert max(map(len, text.splitlines())) <= 100 + len(str(path))
+    # What the clip holds beside the rig's controls is said too.
+    assert report.bones == list(clip.names) == ["head.yaw"]
+    assert "for the bones of head and eyes: 1: head.yaw" in text

@@ -21,7 +21,7 @@ from .keys import Keys, on_one_clock
 from .mapping import ANGLES, Mapped, apply_rows, best_mapping, load_mapping
 from .mapping import Mapping as ControlMapping
 from .report import Report
-from .source import Take, decode, make_clip, read_bytes
+from .source import Take, decode, make_clip, read_bytes, refuse_other_kinds
 
 KINDS = {
     "live_link_face": "Live Link Face CSV",
@@ -175,8 +175,10 @@ def _gui_to_raw(clip: Clip, rig: RigLike, report: Report) -> Clip:
 
 
 def _in_rig(clip: Clip, rig_names: Iterable[str], report: Report) -> Clip:
-    known = set(rig_names) | set(ANGLES)
+    own = set(rig_names)
+    known = own | set(ANGLES)
     report.not_in_rig += [name for name in clip.names if name not in known]
+    report.bones += [name for name in clip.names if name in known - own]
     return clip.selected([name for name in clip.names if name in known])
 
 
@@ -237,6 +239,7 @@ def _read_kind(file: Path, data: bytes, options: Options) -> Take:
         return gltf.read(gltf.open_glb(file, data, options.budget), options.take)
     if fbx.is_fbx(data):
         return fbx.read(data, name, options.take, options.budget)
+    refuse_other_kinds(data, name)
     text = decode(data, name)
     if text.lstrip()[:1] in ("{", "[") or options.kind == "json":
         return _read_json(named_json.parse(text, name), file, options)

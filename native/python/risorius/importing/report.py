@@ -3,11 +3,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
+from textwrap import wrap
 
-# A list in the text is cut after so many names; the fields hold them all.
-SHOWN = 12
+_WIDTH = 100
 
 
 @dataclass
@@ -21,6 +20,7 @@ class Report:
     ignored: curves of the source that the mapping knows and leaves out on purpose.
     not_in_rig: controls that the mapping gives and the rig does not have; left out.
     always_zero: curves of the source that are 0 in every frame.
+    bones: controls of the clip that no rig has, because bones turn by them: head and eyes.
     absent: rows of the mapping that the source has no curve for.
     notes: what the reading and the processing have to say.
     """
@@ -33,6 +33,7 @@ class Report:
     ignored: list[str] = field(default_factory=list)
     not_in_rig: list[str] = field(default_factory=list)
     always_zero: list[str] = field(default_factory=list)
+    bones: list[str] = field(default_factory=list)
     absent: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
@@ -41,6 +42,7 @@ class Report:
         rows = [
             ("not mapped", self.unmapped),
             ("not in the rig", self.not_in_rig),
+            ("not in the rig, for the bones of head and eyes", self.bones),
             ("left out on purpose", self.ignored),
             ("always 0", self.always_zero),
             ("rows of the mapping without a curve", self.absent),
@@ -54,12 +56,16 @@ class Report:
             f"{self.source}: {self.kind}, mapping {self.mapping}",
             f"  mapped: {len(self.mapped)} curve(s) to {len(controls)} control(s)",
         ]
-        out += [f"  {head}: {len(names)}: {shortened(names)}" for head, names in self.lists()]
+        for source, row in self.mapped.items():
+            out += _lines(f"    {source} -> {', '.join(row)}")
+        for head, names in self.lists():
+            out += _lines(f"  {head}: {len(names)}: {', '.join(names)}")
         out += [f"  note: {note}" for note in self.notes]
         return "\n".join(out)
 
 
-def shortened(names: Sequence[str]) -> str:
-    """Names in one line, the many cut."""
-    more = len(names) - SHOWN
-    return ", ".join(names[:SHOWN]) + (f" and {more} more" if more > 0 else "")
+def _lines(text: str) -> list[str]:
+    """A long line as several; no name is parted."""
+    return wrap(
+        text, _WIDTH, subsequent_indent="      ", break_long_words=False, break_on_hyphens=False
+    )
