@@ -78,7 +78,7 @@ def test_errors_say_code_and_place():
         (RisoriusError("it is bad"), 1, "it is bad"),
         (FileNotFoundError(2, "No such file or directory", "a.dna"), 1,
          "a.dna: No such file or directory"),
-        (OSError(28, "No space left on device"), 1, "No space left on device"),
+        (OSError(28, "No space left on device", "a"), 1, "a: No space left on device"),
         (MemoryError(), 1, "not enough memory"),
         (KeyboardInterrupt(), 130, "interrupted"),
         (KeyboardInterrupt("interrupted; it goes on"), 130, "interrupted; it goes on"),

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import errno
 import io
 import os
 import sys
@@ -29,14 +30,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
             stream.reconfigure(errors="backslashreplace")
     try:
         code = _run(arguments)
-        _flush()
+        sys.stdout.flush()
     except BrokenPipeError:  # who read has enough
         _drop_output()
         return 0
     except KeyboardInterrupt as interrupt:
         return _say(str(interrupt) or "interrupted", INTERRUPTED)
     except (RisoriusError, OSError, MemoryError) as error:
-        return _say(sentence(error), 2 if isinstance(error, CommandLineError) else 1)
+        place = ""
+        if isinstance(error, OSError) and error.filename is None and error.errno == errno.ENOSPC:
+            place = "<stdout>: "  # the writers of files say their names
+            _drop_output()
+        return _say(place + sentence(error), 2 if isinstance(error, CommandLineError) else 1)
     return code
 
 
@@ -44,17 +49,6 @@ def _say(text: str, code: int) -> int:
     with contextlib.suppress(OSError):  # there may be nobody to say it to
         print(f"risorius: {text}", file=sys.stderr, flush=True)
     return code
-
-
-def _flush() -> None:
-    """Raises: OSError: what was printed cannot be written, e.g. to a disk that is full."""
-    try:
-        sys.stdout.flush()
-    except BrokenPipeError:
-        raise
-    except OSError as error:
-        _drop_output()
-        raise OSError(error.errno, error.strerror, "<stdout>") from error
 
 
 def _drop_output() -> None:

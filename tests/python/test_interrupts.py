@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: MIT
+"""Ctrl-C, a full disk and a reader that leaves end a command in a sentence, and nothing is left.
+
+Each command waits for a pipe that has a name, in place of a file of its input: whoever opens the
+other end knows that the command is at work, however busy the machine is.
+"""
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+from conftest import GOLDEN
+
+CORE = str(GOLDEN / "core.dna")
+COMMANDS = {
+    "convert": ["convert", "in.json", "out.dna"],
+    "regroup": ["edit", "regroup", CORE, "out.dna", "--regions", "in.json"],
+    "clip": ["clip", "convert", "in.csv", "-o", "out.rzc"],
+    "eval": ["eval", "in.csv", CORE, "-o", "out.npz"],
+    "plot": ["plot", "in.dna", "-o", "out.png"],
+    "speech": ["speech", "in.wav", "-o", "out.rzc"],
+    "sample": ["sample", "build", "out.dna", "--data", "in.whl"],
+    "bench": ["bench", CORE, "--frames", "in.npz"],
+}
+needs_pipes = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes with names")
+
+
+def started(arguments, folder):
+    """A command in a folder, waiting for the pipe among its arguments; the pipe's other end."""
+    name = next(a for a in arguments if a.startswith("in."))
+    os.mkfifo(folder / name)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "risorius", *arguments],
+        cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    return process, open(folder / name, "wb", buffering=0), folder / name
+
+
+@needs_pipes
+def test_an_interrupt_is_a_sentence_and_leaves_the_old_file(tmp_path):
+    running = {}
+    with contextlib.ExitStack() as stack:
+        for name, arguments in COMMANDS.items():
+            folder = tmp_path / name
+            folder.mkdir()
+            out = next((a for a in arguments if a.startswith("out.")), None)
+            if out:
+                (folder / out).write_text("old")
+            process, pipe, place = started(arguments, folder)
+            stack.callback(process.kill)
+            stack.enter_context(pipe)
+            running[name] = process, folder, place, out
+        for process, *_ in running.values():
+            process.send_signal(signal.SIGINT)
+        for name, (process, folder, place, out) in running.items():
+            said = process.communicate()[1]
+            assert (name, process.returncode, said) == (name, 130, "risorius: interrupted\n")
+            assert sorted(os.listdir(folder)) == sorted([place.name, *([out] if out else [])])
+            assert out is None or (folder / out).read_text() == "old"
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="a device that is full")
+def test_what_is_printed_to_a_full_disk_is_a_sentence():
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "risorius", "info", CORE],
+            stdout=full, stderr=subprocess.PIPE, text=True, check=False,
+        )  # fmt: skip
+    assert done.stderr == "risorius: <stdout>: No space left on device\n"
+    assert done.returncode == 1
+
+
+@needs_pipes
+def test_a_reader_that_leaves_is_no_error(tmp_path):
+    read, write = os.pipe()
+    os.close(read)
+    done = subprocess.run(
+        [sys.executable, "-m", "risorius", "info", CORE],
+        stdout=write, stderr=subprocess.PIPE, text=True, check=False,
+    )  # fmt: skip
+    os.close(write)
+    assert (done.returncode, done.stderr) == (0, "")
