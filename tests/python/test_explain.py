@@ -354,6 +354,22 @@ def test_the_command_says_what_it_took_a_name_for(capsys):
     assert "corrective 5 lacks browRaiseOuterL" in captured.out
 
 
+def test_a_corrective_has_the_name_of_its_shape_beside_it(tmp_path, capsys):
+    dna = risorius.load(CORE)
+    names = dna.blend_shape_channel_names
+    names[0] = "head.jawOpen_x_browIn"
+    dna.blend_shape_channel_names = names
+    dna.blend_shape_channels = risorius.BlendShapeChannels(
+        lods=[3, 3], input_indices=[6, 5, 5], output_indices=[0, 1, 2]
+    )
+    dna.save(tmp_path / "face.dna")
+    face = str(tmp_path / "face.dna")
+    assert main(["eval", face, "--explain", "jawOpen=0.75", "browRaiseInner=0.5"]) == 0
+    text = capsys.readouterr().out
+    assert "corrective 6 (head.jawOpen_x_browIn) = 0.5625: " in text
+    assert f"corrective 5 ({names[1]}, ...) lacks browRaiseOuterL" in text
+
+
 def test_the_command_gives_json_and_cuts_lists(capsys):
     assert main(["eval", CORE, "jawOpen=1", "--explain", "--json"]) == 0
     facts = json.loads(capsys.readouterr().out)

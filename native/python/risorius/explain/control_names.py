@@ -28,8 +28,9 @@ class Meaning:
 
 
 def last_part(name: str) -> str:
-    """jawOpen of CTRL_expressions.jawOpen."""
-    return name.rpartition(".")[2]
+    """jawOpen of CTRL_expressions.jawOpen; what follows in brackets stays whole."""
+    own, bracket, rest = name.partition(" (")
+    return own.rpartition(".")[2] + bracket + rest
 
 
 def find_controls(text: str, names: Sequence[str]) -> Meaning:
@@ -86,6 +87,20 @@ def named(names: Sequence[str], index: int, kind: str) -> str:
     return (names[index] if index < len(names) else "") or f"{kind} {index}"
 
 
+def _shapes_of_controls(dna: risorius.Dna) -> dict[int, str]:
+    """Control -> the blend shape channel that it drives, in brackets."""
+    table, names = dna.blend_shape_channels, dna.blend_shape_channel_names
+    driven: dict[int, list[int]] = {}
+    for control, channel in zip(
+        table.input_indices.tolist(), table.output_indices.tolist(), strict=True
+    ):
+        driven.setdefault(control, []).append(channel)
+    return {
+        control: f" ({named(names, channels[0], 'shape')}{', ...' if len(channels) > 1 else ''})"
+        for control, channels in driven.items()
+    }
+
+
 class ControlNames:
     """Names of the control vector raw | corrective | network | RBF pose of a file."""
 
@@ -99,7 +114,10 @@ class ControlNames:
             not poses and not dna.rbf_behavior_ext.poses
         ):  # 2.4: a pose writes the control of its name
             poses = [p.name for p in dna.rbf_behavior.poses]
-        correctives = [f"corrective {self.psd_begin + i}" for i in range(dna.psd_count)]
+        shapes = _shapes_of_controls(dna)
+        correctives = [
+            f"corrective {i}{shapes.get(i, '')}" for i in range(self.psd_begin, self.psd_end)
+        ]
         self.names = [*raw, *correctives, *ml, *poses]
         self.ml_end = self.psd_end + len(ml)
         parts = [last_part(n) for n in self.names]
