@@ -42,6 +42,29 @@ def test_page_names_what_moves(capsys):
     assert "shape_jawOpen" in page
 
 
+def test_the_page_has_no_rounding_noise(tmp_path, capsys):
+    dna = risorius.Dna()
+    dna.lod_count = 1
+    dna.raw_control_names, dna.joint_names, dna.joint_parents = ["open"], ["jaw", "still"], [0, 0]
+    dna.neutral_joint_translations = dna.neutral_joint_rotations = np.zeros((2, 3))
+    dna.joint_groups = [
+        risorius.JointGroup(
+            lods=[3], input_indices=[0], output_indices=[0, 1, 10],
+            values=[[0.25], [3.9e-17], [3.9e-17]],
+        )
+    ]  # fmt: skip
+    dna.save(tmp_path / "face.dna")
+    arguments = ["eval", str(tmp_path / "face.dna"), "open=1"]
+    assert main(arguments) == 0
+    text = capsys.readouterr().out
+    joints = text.partition("joints, as difference from the neutral pose")[2].splitlines()
+    assert "added to 1" in joints[0]
+    assert [line.split() for line in joints[2:]] == [["jaw", "0.25", *"00000000"]]
+    assert main([*arguments, "--json"]) == 0
+    jaw, still = json.loads(capsys.readouterr().out)["joints"]
+    assert jaw["ty"] == still["ty"] == 3.9e-17
+
+
 def test_gui_controls_go_through_the_table(capsys):
     name = risorius.load(FILE).gui_control_names[2]
     assert main(["eval", FILE, "--gui", f"{name}=1", "--json"]) == 0

@@ -20,6 +20,7 @@ from . import eval_clip
 from .files import CommandLineError
 
 ATTRIBUTES = ("tx", "ty", "tz", "rx", "ry", "rz", "sx", "sy", "sz")
+_NOISE = 1e-9  # cm, m, degrees, radians or of a size: smaller than anything that shows
 Floats = npt.NDArray[np.float32]
 
 
@@ -148,6 +149,10 @@ def describe(dna: risorius.Dna, rig: risorius.Rig, raw: Floats, lod: int) -> dic
     }
 
 
+def _moved(value: float) -> bool:
+    return not abs(value) < _NOISE  # NaN has to be seen
+
+
 def page(facts: dict[str, Any]) -> str:
     """The facts for a person."""
     width = max(
@@ -161,12 +166,17 @@ def page(facts: dict[str, Any]) -> str:
         out += [f"  {row['name']:<{width}}  {row['value']:>12.6g}" for row in facts[key]]
         if not facts[key]:
             out.append("  none")
-    out.append(f"\njoints ({facts['translation_unit']}, {facts['rotation_unit']})")
-    if not facts["joints"]:
+    out.append(
+        f"\njoints, as difference from the neutral pose ({facts['translation_unit']}, "
+        f"{facts['rotation_unit']}; sx sy sz are added to 1)"
+    )
+    # What is left of a sum in float32 is no movement; --json has every digit.
+    joints = [row for row in facts["joints"] if any(_moved(row[a]) for a in ATTRIBUTES)]
+    if not joints:
         return "\n".join([*out, "  none"])
     out.append("  ".join([" " * (width + 2), *(f"{a:>10}" for a in ATTRIBUTES)]).rstrip())
-    for row in facts["joints"]:
-        numbers = (f"{row[a]:>10.5g}" for a in ATTRIBUTES)
+    for row in joints:
+        numbers = (f"{row[a] if _moved(row[a]) else 0:>10.5g}" for a in ATTRIBUTES)
         out.append("  ".join([f"  {row['name']:<{width}}", *numbers]))
     return "\n".join(out)
 
