@@ -476,6 +476,9 @@ def test_the_command_writes_a_file_without_findings(tmp_path, capsys):
     assert main(["check", str(out)]) == 0
     assert capsys.readouterr().out.startswith(f"ok: {out}")
     assert out.read_bytes() == edit.regroup(risorius.load(GOLDEN / "medium.dna"))[0].to_bytes()
+    assert "nothing to do" not in text
+    assert main(["edit", "regroup", str(out), str(tmp_path / "again.dna")]) == 0
+    assert "nothing to do" in capsys.readouterr().out
 
 
 def test_the_report_for_a_program(tmp_path):

@@ -178,6 +178,8 @@ def page(facts: dict[str, Any]) -> str:
         out.append(f"{title:<22}{facts['before'][key]:>12,}{facts['after'][key]:>12,}")
     times = facts["microseconds"]
     out.append(f"{'evaluation, us':<22}{times['before']:>12.1f}{times['after']:>12.1f}")
+    if facts["before"] == facts["after"] and not facts["removed"]:
+        out.append("\nnothing to do: the joint groups are as dense as they get with this threshold")
     out.append(f"\ntaken out: {counted(facts['removed'], 'coefficient')}")
     out.append(
         f"largest changes at any LOD, {counted(facts['expressions'], 'expression')} and "
