@@ -292,6 +292,22 @@ def test_the_scenes_range_is_extended_fitted_or_kept(rig, capture, choice, befor
     assert (bpy.context.scene.frame_start, bpy.context.scene.frame_end) == after
 
 
+def test_a_fault_of_the_program_is_no_sentence_about_the_file(
+    rig, capture, monkeypatch, tracebacks
+):
+    def fail(*_arguments, **_options):
+        raise ValueError("operands could not be broadcast")
+
+    importing = scene.submodule("native").part("importing")
+    monkeypatch.setattr(importing, "import_file", fail)
+    with pytest.raises(RuntimeError, match="Traceback"):
+        _import(capture)
+    assert [text.splitlines()[-1] for text in tracebacks] == [
+        "ValueError: operands could not be broadcast"
+    ]
+    tracebacks.clear()
+
+
 def test_options_of_an_import(rig, capture):
     render = bpy.context.scene.render
     assert _import(capture, gain=0.5, gains=f"{JAW}=2", rate_mode="SCENE") == {"FINISHED"}

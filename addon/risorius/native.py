@@ -7,6 +7,8 @@ from functools import cache
 from importlib import import_module
 from pathlib import Path
 
+from .logic.errors import FaceError
+
 try:
     import risorius as _risorius
 except ImportError as _error:
@@ -50,11 +52,11 @@ def module():
     """The `risorius` package.
 
     Raises:
-        RuntimeError: it is missing or of another version; the text says so.
+        UnusableError: it is missing or of another version; the text says so.
     """
     trouble = problem()
     if trouble:
-        raise RuntimeError(trouble)
+        raise UnusableError(trouble)
     return _risorius
 
 
@@ -62,7 +64,7 @@ def sample_module():
     """The module `risorius.sample`, loaded only when a sample is built.
 
     Raises:
-        RuntimeError: the wheel is missing or of another version; the text says so.
+        UnusableError: the wheel is missing or of another version; the text says so.
     """
     module()
     from risorius import sample
@@ -77,7 +79,7 @@ def part(name: str):
         name: `importing`, `speech` and the like.
 
     Raises:
-        RuntimeError: the wheel is missing, of another version, or has no such part; the text says
+        UnusableError: the wheel is missing, of another version, or has no such part; the text says
             so.
     """
     module()
@@ -86,12 +88,24 @@ def part(name: str):
     except ModuleNotFoundError as error:
         if error.name != f"risorius.{name}":
             raise
-        raise RuntimeError(f"The native module has no {name}: install the add-on anew.") from error
+        raise UnusableError(f"The native module has no {name}: install the add-on anew.") from error
 
 
 def dna_error() -> type[Exception]:
     """The class of errors of bad files, or one that is never raised without the module."""
     return _risorius.DnaError if _risorius is not None else _Never
+
+
+def user_errors() -> tuple[type[Exception], ...]:
+    """What an operator catches: what a user can mend, of the add-on, the package or the system.
+
+    Anything else is a fault of the program and is to be seen as one.
+    """
+    return FaceError, getattr(_risorius, "RisoriusError", _Never), OSError
+
+
+class UnusableError(FaceError, RuntimeError):
+    """The native module is missing, of another version, or lacks a part."""
 
 
 class _Never(Exception):  # noqa: N818

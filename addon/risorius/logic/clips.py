@@ -9,13 +9,15 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from .errors import FaceError
+
 Float = NDArray[np.float64]
 HEAD = ("head.yaw", "head.pitch", "head.roll")
 EYES = {"L": ("eyeL.yaw", "eyeL.pitch"), "R": ("eyeR.yaw", "eyeR.pitch")}
 LAST_FRAME = 1_048_574  # Blender's own limit of a scene
 
 
-class ClipError(ValueError):
+class ClipError(FaceError):
     """A clip that cannot become an action, or an action that has nothing for this face."""
 
 

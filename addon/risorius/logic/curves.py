@@ -6,6 +6,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .errors import FaceError
+
 Floats = NDArray[np.float32]
 Times = NDArray[np.float64]
 Kept = NDArray[np.bool_]
@@ -19,9 +21,9 @@ def frame_list(start: float, end: float, step: float) -> Times:
         ValueError: the end lies before the start, or the step is not above 0.
     """
     if end < start:
-        raise ValueError(f"The range ends at frame {end:g}, before it starts at {start:g}.")
+        raise FaceError(f"The range ends at frame {end:g}, before it starts at {start:g}.")
     if not step > 0:
-        raise ValueError(f"A step above 0 was expected, found {step:g}.")
+        raise FaceError(f"A step above 0 was expected, found {step:g}.")
     return start + step * np.arange(int(np.floor((end - start) / step + 1e-9)) + 1)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import names, regions, textures
+from .errors import FaceError
 from .space import Float, Space, make_space, world_matrices
 
 LIVE_KEY = "<channel sum>"
@@ -36,7 +37,7 @@ _KINDS = (
 )
 
 
-class PlanError(ValueError):
+class PlanError(FaceError):
     """A file that cannot become a character; the text is one sentence for users."""
 
 

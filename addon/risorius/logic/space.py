@@ -14,6 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .errors import FaceError
+
 Float = NDArray[np.float64]
 
 _DIRECTIONS = {
@@ -28,7 +30,7 @@ _METRES = {"cm": 0.01, "m": 1.0}
 _SEQUENCES = ("xyz", "xzy", "yxz", "yzx", "zxy", "zyx")
 
 
-class SpaceError(ValueError):
+class SpaceError(FaceError):
     """A file whose axes or units cannot be converted; the text is one sentence for users."""
 
 

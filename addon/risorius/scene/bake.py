@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..logic import curves
+from ..logic.errors import FaceError
 from . import (
     actions,
     baked_keys,
@@ -27,7 +28,7 @@ RESULT, CONTROLS = "RESULT", "CONTROLS"
 _CONSTRAINTS = "constraints"
 
 
-class BakeError(RuntimeError):
+class BakeError(FaceError, RuntimeError):
     """Why a face cannot be baked, in one sentence."""
 
 

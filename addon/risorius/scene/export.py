@@ -9,10 +9,11 @@ import numpy as np
 
 from .. import native
 from ..logic import edits, plans
+from ..logic.errors import FaceError
 from . import armatures, bones, lods, parts, refit, runtime, storage, weights
 
 
-class ExportError(ValueError):
+class ExportError(FaceError):
     """A character that cannot be written; the text is one sentence for users."""
 
 

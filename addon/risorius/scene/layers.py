@@ -15,6 +15,7 @@ from mathutils import Quaternion
 from .. import native
 from ..logic import clips as clip_logic
 from ..logic import layers as logic
+from ..logic.errors import FaceError
 from . import clips, compat, parts
 
 _OF_SOURCE = (
@@ -306,14 +307,14 @@ def _for_face(live, pose):
 def _action_source(controls, live, layer, rate):
     action = layer.action
     if action is None:
-        raise ValueError("choose an action")
+        raise FaceError("choose an action")
     span = span_of(layer)
     curves = clips.playing_curves(action, controls)
     keys = np.unique(np.concatenate([clips.key_points(c)[0] for c in curves] or [[]]))
     frames = logic.sample_frames(span, keys, any(clips.is_bent(c) for c in curves))
     clip = clips.clip_of_action(controls, live, action, frames, rate)
     if not clip.names:
-        raise ValueError(f"{action.name} has no keys of a control of this face")
+        raise FaceError(f"{action.name} has no keys of a control of this face")
     if clip.frame_count < 2:
         return clip, _still_times(layer, rate)
     return clip, _span_times(span, rate)

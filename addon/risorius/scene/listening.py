@@ -14,6 +14,7 @@ import bpy
 
 from .. import native
 from ..logic import recogniser
+from ..logic.errors import FaceError
 
 
 class Task:
@@ -82,11 +83,15 @@ def packages_folder():
     return Path(bpy.utils.extension_path_user(package, path="packages", create=True))
 
 
+class InstallError(FaceError, RuntimeError):
+    """pip could not install the recogniser; the sentence says why."""
+
+
 def install_recogniser():
     """Install the recogniser with pip into the extension's own user folder.
 
     Raises:
-        RuntimeError: pip failed; the sentence says why. ValueError: there is no Python to run it.
+        InstallError: pip failed; the sentence says why. ValueError: there is no Python to run it.
     """
     python = native.part("speech.apart").python_program()
     options = ["--no-deps", "--only-binary", ":all:", "--require-hashes"]
@@ -104,7 +109,7 @@ def install_recogniser():
         running = f"Python {sys.version_info.major}.{sys.version_info.minor}"
         running += f" on {platform.system()} {platform.machine()}"
         why = recogniser.reason(f"{done.stdout}\n{done.stderr}", running)
-        raise RuntimeError(f"{recogniser.PACKAGE} could not be installed: {why}.")
+        raise InstallError(f"{recogniser.PACKAGE} could not be installed: {why}.")
 
 
 def _bundled_pip():

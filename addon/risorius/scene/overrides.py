@@ -8,6 +8,7 @@ keys, which drivers move without any write, or meshes of this file.
 
 import bpy
 
+from ..logic.errors import FaceError
 from . import compat, copies, evaluate, meshes, parts, runtime
 
 
@@ -35,7 +36,7 @@ def make_override(context, rig, local_meshes=False):
         The override's deforming armature, and sentences for a report.
 
     Raises:
-        RuntimeError: Blender made no override; the text says of what.
+        FaceError: Blender made no override; the text says of what.
     """
     shown = _instance_of(context, rig)
     root = shown.instance_collection if shown else _linked_root(rig)
@@ -47,7 +48,7 @@ def make_override(context, rig, local_meshes=False):
         (r for r in parts.rigs() if r.session_uid not in before and _overrides(r, rig)), None
     )
     if new is None:
-        raise RuntimeError(f"Blender made no override of {rig.name}.")
+        raise FaceError(f"Blender made no override of {rig.name}.")
     if shown is not None:
         _take_place(shown, new, root)
     elif isinstance(root, bpy.types.Collection):

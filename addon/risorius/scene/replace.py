@@ -12,10 +12,11 @@ from pathlib import Path
 import bpy
 
 from ..logic import edits, names, plans
+from ..logic.errors import FaceError
 from . import armatures, bones, build, copies, drivers, lods, parts, refit, runtime
 
 
-class ReplaceError(ValueError):
+class ReplaceError(FaceError):
     """A character that cannot be replaced; the text is one sentence for users."""
 
 

@@ -9,6 +9,8 @@ import zlib
 
 import bpy
 
+from ..logic.errors import FaceError
+
 _BYTES = "risorius_bytes"
 _HASH = "risorius_hash"
 _LENGTH = "risorius_length"  # of the unpacked file; Texts of older versions have none
@@ -20,7 +22,7 @@ _PIECE = 1 << 20  # bytes
 _SIGNATURE = b"DNA"  # what the first bytes of every DNA file are
 
 
-class ContentError(ValueError):
+class ContentError(FaceError):
     """What a Text holds is not the DNA file that was put there; the text goes on after a colon."""
 
 

@@ -9,6 +9,7 @@ from bpy_extras.io_utils import ImportHelper
 
 from .. import native
 from ..logic.clips import ClipError
+from ..logic.errors import FaceError
 from ..logic.names import printable
 from ..scene import actions, clips, evaluate, layers, parts, retarget, runtime
 from . import words
@@ -233,7 +234,7 @@ class RISORIUS_OT_import_animation(PlacesClip, bpy.types.Operator, ImportHelper)
                 progress(0.6)
                 name, whole = Path(self.filepath).stem, self.rate_mode == "FRAMES"
                 self.place(context, clip, name, notes, self.use_eyes, whole)
-        except (ValueError, OSError, RuntimeError) as error:
+        except native.user_errors() as error:
             render.fps, render.fps_base = rate
             self.report({"ERROR"}, explain(self.filepath, error))
             return {"CANCELLED"}
@@ -310,7 +311,7 @@ def _sliders(clip):
 
 
 def _gains(text):
-    """`jawOpen=1.2 mouth*=0.8` as a table. Raises: ValueError."""
+    """`jawOpen=1.2 mouth*=0.8` as a table. Raises: FaceError."""
     table = {}
     for word in text.replace(",", " ").split():
         name, _, value = word.rpartition("=")
@@ -319,7 +320,7 @@ def _gains(text):
         except ValueError:
             name = ""
         if not name:
-            raise ValueError(f"gains: name=factor was expected, found {word}")
+            raise FaceError(f"gains: name=factor was expected, found {word}")
     return table
 
 
@@ -390,7 +391,7 @@ class RISORIUS_OT_import_arkit_rig(PlacesClip, bpy.types.Operator):
                 source=item.name,
             )
             self.place(context, clip, item.name, lines_of(report))
-        except (ValueError, RuntimeError) as error:
+        except native.user_errors() as error:
             self.report({"ERROR"}, explain(item.name, error))
             return {"CANCELLED"}
         return {"FINISHED"}

@@ -6,6 +6,7 @@ import traceback
 
 import bpy
 
+from .. import native
 from ..scene import bake, parts, runtime
 from . import words
 from .import_operators import usable
@@ -174,7 +175,7 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, bpy.types.Operator):
         )
         try:
             job = bake.bake(context, self.faces(context), options)
-        except bake.BakeError as error:
+        except native.user_errors() as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         if interactive and not bpy.app.background:
@@ -233,7 +234,7 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, bpy.types.Operator):
             for sentence in finished.value or ():
                 self.report({"INFO"}, sentence)
             return True
-        except (bake.BakeError, ValueError) as error:
+        except native.user_errors() as error:
             self.report({"ERROR"}, str(error))
             self._result = {"CANCELLED"}
             return True

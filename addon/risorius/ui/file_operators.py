@@ -7,8 +7,6 @@ import bpy
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from .. import native
-from ..logic.plans import PlanError
-from ..logic.space import SpaceError
 from ..scene import evaluate, export, parts, replace
 from .import_operators import explain, shown_progress, usable
 
@@ -42,7 +40,7 @@ def _replace(operator, context, path):
     except replace.ReplaceError as error:
         operator.report({"ERROR"}, str(error))
         return {"CANCELLED"}
-    except (native.dna_error(), PlanError, SpaceError, OSError) as error:
+    except native.user_errors() as error:
         operator.report({"ERROR"}, explain(path, error))
         return {"CANCELLED"}
     evaluate.bring_up(context, rig)
@@ -151,7 +149,7 @@ class RISORIUS_OT_export_dna(bpy.types.Operator, ExportHelper):
         except export.ExportError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        except (native.dna_error(), OSError) as error:
+        except native.user_errors() as error:
             self.report({"ERROR"}, explain(self.filepath, error))
             return {"CANCELLED"}
         report_all(self, sentences)

@@ -9,8 +9,6 @@ from bpy_extras.io_utils import ImportHelper
 
 from .. import native
 from ..logic import names
-from ..logic.plans import PlanError
-from ..logic.space import SpaceError
 from ..scene import build, parts
 from . import words
 
@@ -62,7 +60,7 @@ def import_character(operator, context, path, options):
     try:
         with shown_progress(context) as progress:
             rig, warnings = build.import_file(context, path, options, progress)
-    except (native.dna_error(), PlanError, SpaceError, OSError) as error:
+    except native.user_errors() as error:
         operator.report({"ERROR"}, explain(path, error))
         return {"CANCELLED"}
     for warning in warnings[:5]:
@@ -234,7 +232,7 @@ def _build_sample(path, folder, person):
             data=wheels[0] if wheels else None,
             offline=not online,
         )
-    except (sample.SourceError, OSError) as error:
+    except native.user_errors() as error:
         advice = "" if online else " Allow online access in the preferences (System) first."
         return f"The sample face could not be built: {str(error).rstrip('.')}.{advice}"
     return ""

@@ -5,6 +5,7 @@ import textwrap
 
 import bpy
 
+from .. import native
 from ..scene import evaluate, heal, migrate, overrides, parts
 from .import_operators import usable
 
@@ -47,7 +48,7 @@ class RISORIUS_OT_make_override(bpy.types.Operator):
                 done = overrides.repair(context, rig, local)
             else:
                 rig, done = overrides.make_override(context, overrides.linked_rig(context), local)
-        except RuntimeError as error:
+        except native.user_errors() as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         rig.update_tag()

@@ -133,7 +133,7 @@ class RISORIUS_OT_live_start(bpy.types.Operator):
     def execute(self, context):
         try:
             live.start(parts.active_rig(context), settings_of(context))
-        except (native.part("live").LiveError, native.part("importing").MappingError) as error:
+        except native.user_errors() as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         return {"FINISHED"}
@@ -291,7 +291,7 @@ def _finish(operator, context, finish):
     rig = parts.active_rig(context)
     try:
         report = finish(rig, context.scene)
-    except ValueError as error:
+    except native.user_errors() as error:
         why = names.printable(str(error)).rstrip(".")
         operator.report({"ERROR"}, f"{why}. The recording waits: finish it in the panel.")
         return False

@@ -7,7 +7,8 @@ import bpy
 from bpy_extras.io_utils import ExportHelper
 
 from .. import native
-from ..scene import bake, ship
+from ..logic.errors import FaceError
+from ..scene import ship
 from ..scene.clips import frame_rate
 from . import words
 from .bake_operators import FacesOperator, FrameRange, selected_rigs
@@ -216,7 +217,7 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, bpy.
         try:
             characters = _run(context, ship.sampled(context, self.faces(context), options))
             written = self._write(context, characters, options)
-        except (bake.BakeError, ValueError, RuntimeError, OSError) as error:
+        except native.user_errors() as error:
             self.report({"ERROR"}, _one_sentence(self.filepath, error))
             return {"CANCELLED"}
         self.report({"INFO"}, written)
@@ -227,7 +228,7 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, bpy.
         frames = len(characters[0][2].frames)
         if self.format in ("RZC", "CSV"):
             if len(characters) > 1:
-                raise ValueError("a file holds the controls of one face: select one")
+                raise FaceError("a file holds the controls of one face: select one")
             scene = context.scene
             clip = ship.clip(*characters[0], frame_rate(scene), scene.frame_start, self.maps)
             _write_csv(clip, path) if self.format == "CSV" else clip.save(path)
@@ -267,9 +268,12 @@ def _export(context, operator, override, path):
     known = set(function.get_rna_type().properties.keys())
     settings = _SETTINGS[operator.format](operator, override["scene"])
     with context.temp_override(**override):
-        done = function(filepath=str(path), **{k: v for k, v in settings.items() if k in known})
+        try:
+            done = function(filepath=str(path), **{k: v for k, v in settings.items() if k in known})
+        except RuntimeError as error:  # what Blender's exporter says of the file or the scene
+            raise FaceError(str(error).strip().removeprefix("Error: ")) from error
     if "FINISHED" not in done or not path.exists():
-        raise RuntimeError(f"Blender's exporter wrote nothing to {path.name}.")
+        raise FaceError(f"Blender's exporter wrote nothing to {path.name}.")
 
 
 def _write_csv(clip, path):

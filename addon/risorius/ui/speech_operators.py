@@ -6,6 +6,7 @@ from pathlib import Path
 import bpy
 from bpy_extras.io_utils import ImportHelper
 
+from .. import native
 from ..logic.clips import ClipError
 from ..scene import clips, listening, parts
 from . import words
@@ -128,7 +129,7 @@ class RISORIUS_OT_speak(PlacesClip, bpy.types.Operator, ImportHelper):
             notes = [n for n in task.clip.metadata.get("notes", "").split("; ") if n]
             name = Path(self.filepath).stem
             self.place(context, task.clip, name, notes, whole=self.use_whole_frames)
-        except (ValueError, OSError, RuntimeError) as error:
+        except native.user_errors() as error:
             self.report({"ERROR"}, explain(self.filepath, error))
             return {"CANCELLED"}
         self._add_sound(context)
@@ -178,7 +179,7 @@ class RISORIUS_OT_install_speech(bpy.types.Operator):
     def execute(self, _context):
         try:
             listening.install_recogniser()
-        except (RuntimeError, OSError, ValueError) as error:
+        except native.user_errors() as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         self.report({"INFO"}, "PocketSphinx is installed.")
