@@ -4,6 +4,7 @@
 import bpy
 import numpy as np
 
+from ..logic import pictures
 from . import sharing
 
 # Names of one and the same space in the configurations that people use: Blender's own, ACES 1,
@@ -21,6 +22,9 @@ COLOR_SPACES = (
 )
 DATA_SPACES = ("Non-Color", "Raw", "Utility - Raw", "raw", "Generic Data", "Non-Colour Data")
 PACK_LIMIT = 64 << 20  # bytes; larger files stay outside, or a .blend would grow to gigabytes
+# What one image may take when it is unfolded, and all of an import together: this much, and so
+# many times their files. A flat picture of 8192 pixels packs to almost nothing and is taken.
+_ONE_IMAGE, _ALL_IMAGES, _MOST_TIMES = 256 << 20, 1 << 30, 64
 TILE = 512  # pixels of one tile of the mask atlas, each side
 
 
@@ -47,6 +51,32 @@ def set_color_space(image, data):
         settings.is_data = True  # at least the configuration's own role for data
 
 
+def _room_for(path):
+    """Bytes that an image takes when it is unfolded.
+
+    Raises:
+        ValueError: it is no picture, or takes too much for its file.
+        OSError: it cannot be read.
+    """
+    with path.open("rb") as file:
+
+        def read(offset, count):
+            file.seek(min(offset, 1 << 62))
+            return file.read(count)
+
+        found = pictures.size_of(read)
+    if found is None:
+        raise ValueError(f"The texture {path.name} cannot be read.")
+    width, height, depth = found
+    room, limit = width * height * depth, _ONE_IMAGE + _MOST_TIMES * path.stat().st_size
+    if room > limit:
+        raise ValueError(
+            f"The texture {path.name} of {width:,} x {height:,} pixels stays away: "
+            f"it takes {room:,} bytes, at most {limit:,} are given to a file of its size."
+        )
+    return room
+
+
 class Images:
     """Loads each file once for each role and packs it into the .blend; `troubles` are sentences."""
 
@@ -54,6 +84,7 @@ class Images:
         self.made = made
         self.troubles = []
         self._loaded = {}
+        self._room, self._files = 0, 0  # bytes, of all images that were loaded
 
     def load(self, path, data=False):
         """The image of a file, or None where there is none or it cannot be read."""
@@ -66,6 +97,7 @@ class Images:
 
     def _read(self, path, data):
         try:
+            self._make_room(path)
             content = path.read_bytes() if path.stat().st_size <= PACK_LIMIT else None
             there = sharing.find(content, data) if content is not None else None
             if there is not None:
@@ -73,6 +105,9 @@ class Images:
             image = bpy.data.images.load(str(path), check_existing=False)
         except (RuntimeError, OSError):
             self._complain(f"The texture {path.name} cannot be read.")
+            return None
+        except ValueError as error:
+            self._complain(str(error))
             return None
         self.made.append(image)
         set_color_space(image, data)
@@ -87,6 +122,16 @@ class Images:
         else:
             self._complain(f"The texture {path.name} is large and stays outside the .blend file.")
         return image
+
+    def _make_room(self, path):
+        room, size = _room_for(path), path.stat().st_size
+        limit = _ALL_IMAGES + _MOST_TIMES * (self._files + size)
+        if self._room + room > limit:
+            raise ValueError(
+                f"The texture {path.name} stays away: with those before it it takes "
+                f"{self._room + room:,} bytes, at most {limit:,} are given to files of their size."
+            )
+        self._room, self._files = self._room + room, self._files + size
 
     def _complain(self, sentence):
         if sentence not in self.troubles:
@@ -142,8 +187,9 @@ class Images:
 def _small_copy(path):
     """float32[TILE, TILE, 4] of a file's stored numbers, or None where it cannot be read."""
     try:
+        _room_for(path)
         image = bpy.data.images.load(str(path), check_existing=False)
-    except RuntimeError:
+    except (RuntimeError, OSError, ValueError):
         return None
     try:
         set_color_space(image, True)
