@@ -10,12 +10,19 @@ from bpy_extras.io_utils import ImportHelper
 from .. import native
 from ..logic import names
 from ..scene import build, parts
-from . import words
+from . import framing, words
 
 MODES = (
     ("AUTO", "Automatic", "Real shape keys where a mesh has few, else the live sum"),
     ("LIVE", "Live Sum", "One shape key per mesh that is summed natively: fast"),
     ("KEYS", "Shape Keys", "Every channel is a real, driven shape key: editable, exportable"),
+)
+
+FRAME_VIEW = bpy.props.BoolProperty(
+    name="Frame the View",
+    description="Move the 3D views of this window to the face; not where several are imported, and "
+    "not a view through a camera",
+    default=True,
 )
 
 
@@ -45,7 +52,7 @@ def shown_progress(context):
         manager.progress_end()
 
 
-def import_character(operator, context, path, options):
+def import_character(operator, context, path, options, show=False):
     """Build a character and report on it.
 
     Args:
@@ -53,6 +60,7 @@ def import_character(operator, context, path, options):
         context: Blender context.
         path: of the DNA file.
         options: build.BuildOptions.
+        show: let the 3D views of the user's window show it.
 
     Returns:
         What `execute` returns.
@@ -63,6 +71,8 @@ def import_character(operator, context, path, options):
     except native.user_errors() as error:
         operator.report({"ERROR"}, explain(path, error))
         return {"CANCELLED"}
+    if show and not bpy.app.background:
+        framing.frame(context, rig)
     for warning in warnings[:5]:
         operator.report({"WARNING"}, names.printable(str(warning)))
     if len(warnings) > 5:
@@ -119,6 +129,7 @@ class RISORIUS_OT_import_dna(bpy.types.Operator, ImportHelper):
         description="Cheap to draw: no subsurface, no pores, no wrinkles or flush",
         default=False,
     )
+    use_frame_view: FRAME_VIEW
 
     @classmethod
     def poll(cls, context):
@@ -135,9 +146,9 @@ class RISORIUS_OT_import_dna(bpy.types.Operator, ImportHelper):
             simple_materials=self.use_simple_materials,
         )
         named = [str(Path(self.directory, item.name)) for item in self.files if item.name]
-        results = [
-            import_character(self, context, path, options) for path in named or [self.filepath]
-        ]
+        paths = named or [self.filepath]
+        show = self.use_frame_view and len(paths) == 1
+        results = [import_character(self, context, path, options, show) for path in paths]
         return {"FINISHED"} if {"FINISHED"} in results else {"CANCELLED"}
 
     def invoke(self, context, event):
@@ -168,6 +179,7 @@ class RISORIUS_OT_import_dna(bpy.types.Operator, ImportHelper):
         row = layout.row()
         row.active = self.use_materials and self.use_textures
         words.prop_or(row.column(), self, "texture_folder", "", "Empty: beside the file")
+        layout.prop(self, "use_frame_view")
 
 
 class RISORIUS_FH_dna(bpy.types.FileHandler):
@@ -199,6 +211,7 @@ class RISORIUS_OT_add_character(bpy.types.Operator):
     shape_mode: bpy.props.EnumProperty(
         name="Shapes", description="How blend shapes are kept", items=MODES, default="AUTO"
     )
+    use_frame_view: FRAME_VIEW
 
     @classmethod
     def poll(cls, context):
@@ -213,7 +226,7 @@ class RISORIUS_OT_add_character(bpy.types.Operator):
                 self.report({"ERROR"}, trouble)
                 return {"CANCELLED"}
         options = build.BuildOptions(mode=self.shape_mode)
-        return import_character(self, context, path, options)
+        return import_character(self, context, path, options, self.use_frame_view)
 
 
 def _package():

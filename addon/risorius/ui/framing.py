@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""After an import the 3D views show the face: it is a speck in a view of the default scene."""
+
+import numpy as np
+from mathutils import Vector
+
+from ..logic import views
+from ..scene import parts
+
+
+def frame(context, rig):
+    """Let the 3D views of the user's window show a face from where they look.
+
+    A view through a camera is left alone, and one that shows the face well already. Views are no
+    part of undo: it takes the face away and leaves the view.
+
+    Args:
+        context: a Blender context; without a window nothing happens.
+        rig: deforming armature of the face.
+    """
+    screen = context.window.screen if context.window is not None else None
+    for area in screen.areas if screen is not None else ():
+        if area.type == "VIEW_3D":
+            _frame(area, *_ball(rig))
+
+
+def _frame(area, middle, radius):
+    space = area.spaces.active
+    region = next((r for r in area.regions if r.type == "WINDOW"), None)
+    locked = space.lock_object is not None or space.lock_cursor
+    if region is None or locked:
+        return
+    for view in (space.region_3d, *space.region_quadviews):
+        if view is None or view.view_perspective == "CAMERA":
+            continue
+        perspective = view.view_perspective == "PERSP"
+        far = views.distance(radius, space.lens, (region.width, region.height), perspective)
+        held = view.view_location[:]
+        if not views.is_well_in_view(middle, radius, far, held, view.view_distance):
+            view.view_location, view.view_distance = middle, far
+
+
+def _ball(rig):
+    """Middle and radius of the head, else of all meshes of the finest level that is built."""
+    items = parts.meshes_of(rig)
+    first = min((min(item[parts.LODS]) for item in items), default=0)
+    shown = [item for item in items if first in list(item[parts.LODS])]
+    heads = [item for item in shown if "head" in item.data.name.rpartition("_lod")[0].lower()]
+    corners = np.array(
+        [item.matrix_world @ Vector(c) for item in heads or shown for c in item.bound_box]
+    )
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    return ((low + high) / 2).tolist(), float(np.linalg.norm(high - low)) / 2
