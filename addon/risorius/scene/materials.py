@@ -11,16 +11,18 @@ from ..logic import folds, maps, textures
 from . import looks, nodes, skin
 from .textures import Images
 
-# What the solid view shows.
+# What the solid view shows. Lashes are cards: opaque ones would cover the lids with black bands.
 _VIEW_COLORS = {
     "skin": (0.62, 0.36, 0.27, 1.0),
     "eyes": (0.75, 0.70, 0.66, 1.0),
     "teeth": (0.72, 0.66, 0.55, 1.0),
     "tongue": (0.45, 0.12, 0.11, 1.0),
     "gum": (0.50, 0.17, 0.15, 1.0),
-    "lashes": (0.03, 0.02, 0.015, 1.0),
-    "wet": (1.0, 1.0, 1.0, 0.15),
+    "lashes": (0.03, 0.02, 0.015, 0.3),
+    "wet": (1.0, 1.0, 1.0, 0.0),
 }
+_IRIS_COLOR = (0.035, 0.02, 0.012, 1.0)
+_IRIS_RADIUS = 0.47  # of the eye's: where its limbus ends, see looks.eyes
 _WIDE = 1.6  # a mesh wider than this times its height holds both eyes
 
 
@@ -96,7 +98,10 @@ def build_materials(plan, rig, built, made, found=None, simple=False):
         if mesh.base not in by_base:
             look = _look(plan, mesh, rig, frame, uses, areas, found, images, simple)
             by_base[mesh.base] = _build(plan, look, made)
-        item.data.materials.append(by_base[mesh.base])
+        for material in by_base[mesh.base]:
+            item.data.materials.append(material)
+        if mesh.kind == "eyes" and looks.EYES in item.data.attributes:
+            _give_iris(item.data)
     return [*found.missing, *images.troubles]
 
 
@@ -125,6 +130,7 @@ def _look(plan, mesh, rig, frame, uses, areas, found, images, simple):
 
 
 def _build(plan, look, made):
+    """The materials of a mesh base, by slot."""
     material = bpy.data.materials.new(f"{plan.name}_{look.base}")
     made.append(material)
     material.diffuse_color = _VIEW_COLORS[look.kind]
@@ -134,7 +140,45 @@ def _build(plan, look, made):
     else:
         looks.build(graph, look)
     graph.tidy()
-    return material
+    _choose_picture(look, graph)
+    if look.kind != "eyes":
+        return [material]
+    # The same surface in a second slot: the solid view has one colour for each material, and
+    # without an iris nobody sees where an eye looks.
+    iris = material.copy()
+    made.append(iris)
+    iris.name, iris.diffuse_color = f"{material.name}_iris", _IRIS_COLOR
+    return [material, iris]
+
+
+def _choose_picture(look, graph):
+    """Make the colour's image active: the solid view's *Texture* shows the active one.
+
+    Without one a pattern is active, for which it shows the material's colour; else it would take
+    the first image that there is, such as a mask.
+    """
+    pictures = [n for n in graph.tree.nodes if n.type == "TEX_IMAGE" and n.image is not None]
+    colors = [n for n in pictures if n.image == look.image("color")]
+    if look.kind == "lashes":  # cards: without alpha they would hide the eyes
+        colors = [n for n in colors if n.image.channels == 4]
+    patterns = [n for n in graph.tree.nodes if n.type in ("TEX_NOISE", "TEX_VORONOI")]
+    graph.tree.nodes.active = next(iter([*colors, *patterns]), None)
+
+
+def _give_iris(mesh):
+    """Put the faces of the iris and the pupil into the second slot."""
+    flat = np.empty(len(mesh.vertices) * 3, np.float32)
+    mesh.attributes[looks.EYES].data.foreach_get("vector", flat)
+    places = flat.reshape(-1, 3)
+    away = np.hypot(places[:, 0], places[:, 1]) + 2.0 * (1.0 - places[:, 2])
+    corners = np.empty(len(mesh.loops), np.int32)
+    mesh.loops.foreach_get("vertex_index", corners)
+    starts = np.empty(len(mesh.polygons), np.int32)
+    mesh.polygons.foreach_get("loop_start", starts)
+    if len(starts):
+        counts = np.diff(np.append(starts, len(corners)))
+        inside = np.add.reduceat(away[corners], starts) / counts < _IRIS_RADIUS
+        mesh.polygons.foreach_set("material_index", inside.astype(np.int32))
 
 
 # --- mesh attributes that materials read -----------------------------------------------------

@@ -223,7 +223,7 @@ def _share_materials(change, item):
         worn = [m for m in other.data.materials if m is not None]
         if other != item and plan is not None and plan.base == base and worn:
             for slot in range(len(item.data.materials)):
-                item.data.materials[slot] = worn[0]
+                item.data.materials[slot] = worn[slot] if slot < len(worn) else worn[0]
             return
 
 
