@@ -22,11 +22,7 @@ if [ -n "${BLENDER:-}" ]; then
 else
   run=("$python" "$project/packaging/demo/demo.py")
 fi
-if ! timeout -s KILL 1200 "${run[@]}" "${arguments[@]}" > "$out/blender.log" 2>&1; then
-  tail -n 30 "$out/blender.log"
-  exit 1
-fi
-grep -E '^    ' "$out/blender.log"
+shown "$out/blender.log" timeout -s KILL 7200 "${run[@]}" "${arguments[@]}"
 step "contact sheet and film"
 "$python" "$project/packaging/demo/sheet.py" "$out/sheet" "$out/contact_sheet.png"
 ffmpeg -y -loglevel error -framerate 24 -i "$out/frames/frame_%04d.png" -c:v libx264 -crf 17 \

@@ -21,13 +21,9 @@ step "voice" && espeak-ng -v en-us -s 165 -p 45 -w "$out/voice.wav" "$text"
 step "Blender: speak, smile, flinch"
 export BLENDER_USER_RESOURCES="$out/blender-user"
 rm -rf "$BLENDER_USER_RESOURCES"
-if ! timeout -s KILL 3000 "$python" "$project/packaging/demo/performance.py" -- \
+shown "$out/blender.log" timeout -s KILL 14400 "$python" "$project/packaging/demo/performance.py" -- \
   --extension "$zip" --man "$out/man.dna" --woman "$out/woman.dna" --voice "$out/voice.wav" \
-  --text "$text" --out "$out" > "$out/blender.log" 2>&1; then
-  tail -n 30 "$out/blender.log"
-  exit 1
-fi
-grep -E '^    ' "$out/blender.log"
+  --text "$text" --out "$out"
 step "film"
 ffmpeg -y -loglevel error -framerate 24 -i "$out/frames/frame_%04d.png" -i "$out/voice.wav" \
   -c:v libx264 -crf 20 -pix_fmt yuv420p -c:a aac -b:a 96k -movflags +faststart "$out/performance.mp4"

@@ -21,6 +21,17 @@ step() {
   return 0
 }
 
+# shown LOG COMMAND...: what the command says goes into LOG; its lines that are indented, its progress,
+# are seen at once, and the end of LOG if it fails.
+shown() {
+  local log=$1
+  shift
+  if ! { "$@" 2>&1 | tee "$log" | { grep --line-buffered -E '^    ' || true; }; }; then
+    tail -n 30 "$log"
+    return 1
+  fi
+}
+
 install_packages() { # install_packages [MORE...]: what every build needs, and more
   local missing=()
   for package in python3-venv python3-dev g++ cmake ninja-build ccache libgtest-dev libgmock-dev libbenchmark-dev \

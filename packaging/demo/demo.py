@@ -21,6 +21,7 @@ import acting  # noqa: E402
 import bpy  # noqa: E402
 import install_extension  # noqa: E402
 import scene as stage  # noqa: E402
+from progress import Progress  # noqa: E402
 
 
 def parse():
@@ -102,7 +103,7 @@ def film(folder, last):
     scene.render.resolution_x = scene.render.resolution_y = 480
     scene.frame_start, scene.frame_end = 1, last
     scene.render.filepath = str(folder / "frame_####.png")
-    bpy.ops.render.render(animation=True)
+    stage.render_animation(Progress(last, "frame"))
 
 
 def main():
@@ -129,8 +130,10 @@ def main():
     stills.mkdir(exist_ok=True)
 
     def sheet():
+        progress = Progress(len(acting.SHEET), "picture")
         for number, (frame, _) in enumerate(acting.SHEET):
             still(stills / f"{number}.png", frame, 512)
+            progress.step()
 
     timed("render 8 pictures of 512 px", sheet)
     frames = args.out / "frames"

@@ -22,6 +22,7 @@ import install_extension  # noqa: E402
 import scene as stage  # noqa: E402
 from demo import timed  # noqa: E402
 from mathutils import Vector  # noqa: E402
+from progress import Progress  # noqa: E402
 
 FRAME_RATE = 24
 APART = 0.25  # metres between the two
@@ -150,7 +151,7 @@ def render(args):
     for old in frames.glob("*.png"):
         old.unlink()
     scene.render.filepath = str(frames / "frame_####.png")
-    bpy.ops.render.render(animation=True)
+    stage.render_animation(Progress(scene.frame_end - scene.frame_start + 1, "frame"))
 
 
 def main():

@@ -7,6 +7,19 @@ import bpy
 from mathutils import Vector
 
 
+def render_animation(progress):
+    """Render the scene's frames; progress.step() is called after each."""
+
+    def written(*_):
+        progress.step()
+
+    bpy.app.handlers.render_write.append(written)
+    try:
+        bpy.ops.render.render(animation=True)
+    finally:
+        bpy.app.handlers.render_write.remove(written)
+
+
 def aim(thing, target):
     thing.rotation_euler = (Vector(target) - thing.location).to_track_quat("-Z", "Y").to_euler()
 

@@ -2,6 +2,8 @@
 """What the packaging scripts compute: names of wheels in the zip, and the version matrix."""
 
 import importlib.util
+import shutil
+import subprocess
 import sys
 import tomllib
 import zipfile
@@ -99,3 +101,45 @@ def test_a_blender_that_died_without_a_report_is_a_failure(tmp_path, capsys):
     arguments = [f"1.0={report}", f"2.0={tmp_path / 'gone.xml'}"]
     assert _script("matrix_table").main(arguments) == 1
     assert "Failed: 2.0" in capsys.readouterr().out
+
+
+def test_a_rendering_says_how_far_it_is_and_what_is_left():
+    module = _script("demo/progress")
+    now, said = [100.0], []
+    progress = module.Progress(240, "frame", clock=lambda: now[0], say=said.append)
+    for _ in range(240):
+        now[0] += 2.0
+        progress.step()
+    assert said[0] == "frame 1 of 240, about 7 min 58 s left"
+    assert said[1] == "frame 4 of 240, about 7 min 52 s left"  # 6 s later: at least 5
+    assert said[-1] == "frame 240 of 240"
+    assert len(said) == 1 + 79 + 1
+    assert [module.duration(s) for s in (59.4, 80, 3900)] == ["59 s", "1 min 20 s", "1 h 05 min"]
+
+
+def _shown(tmp_path, command):
+    script = f"set -euo pipefail; source {PACKAGING}/setup.sh; shown {tmp_path}/log {command}"
+    return subprocess.run(["bash", "-c", script], capture_output=True, text=True, check=False)
+
+
+def test_progress_is_seen_and_the_rest_is_in_the_log(tmp_path):
+    done = _shown(tmp_path, "printf '    frame 1 of 2\\nnoise\\n    frame 2 of 2\\n'")
+    assert (done.returncode, done.stdout) == (0, "    frame 1 of 2\n    frame 2 of 2\n")
+    assert "noise" in (tmp_path / "log").read_text()
+    failed = _shown(tmp_path, "bash -c 'echo why; exit 3'")
+    assert (failed.returncode, failed.stdout) == (1, "why\n")
+    assert _shown(tmp_path, "true").returncode == 0
+
+
+def test_blenders_says_what_it_needs(tmp_path):
+    tools = tmp_path / "bin"
+    tools.mkdir()
+    for name in ("bash", "dirname"):
+        (tools / name).symlink_to(shutil.which(name))
+    done = subprocess.run(
+        ["bash", PACKAGING / "blenders.sh"],
+        env={"PATH": str(tools)}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 1
+    assert "apt-get install debootstrap" in done.stderr
+    assert done.stderr.count("\n") == 1
