@@ -283,6 +283,44 @@ def test_quaternions_come_out_of_one_group_whole(name):
     assert report.after.coefficients < report.before.coefficients
 
 
+def turning_face(*groups):
+    """Two joints of quaternions, at 2 LODs; groups: (rows of each LOD, controls, rows, values)."""
+    dna = risorius.Dna()
+    dna.lod_count = 2
+    dna.raw_control_names = [f"raw{i}" for i in range(4)]
+    dna.joint_names, dna.joint_parents = ["coarse", "fine"], [0, 0]
+    dna.neutral_joint_translations = dna.neutral_joint_rotations = np.zeros((2, 3))
+    dna.joint_groups = [
+        risorius.JointGroup(lods=lods, input_indices=inputs, output_indices=outputs, values=values)
+        for lods, inputs, outputs, values in groups
+    ]
+    metadata = risorius.JointBehaviorMetadata()
+    metadata.joint_representations = np.array([[0, 1, 0]] * 2, np.uint16)
+    dna.joint_behavior_metadata = metadata
+    return dna
+
+
+COARSE, FINE = [0, 0, 20], [[30, 0, 10], [0, 25, 5]]
+TURNING = {
+    # Together in one group control 3, which the coarser LOD has, would be multiplied first.
+    "apart": [([1, 1], [3], [4], [[20]]), ([2, 0], [1, 2, 3], [12, 13], FINE)],
+    "together": [([3, 1], [1, 2, 3], [4, 12, 13], [COARSE, *FINE])],
+    # The angles of one joint come in at two LODs: what its columns' order hangs on stays with it.
+    "mixed": [([3, 1], [1, 2, 3], [12, 4, 13], [FINE[0], COARSE, FINE[1]])],
+}
+
+
+@pytest.mark.parametrize("case", TURNING)
+def test_products_of_quaternions_stay_in_their_order(case):
+    dna = turning_face(*TURNING[case])
+    for regions in (None, [["coarse", "fine"]], [["coarse"], ["fine"]]):
+        out, _ = edit.regroup(dna, regions=regions, timed=0)
+        for lod in range(2):
+            assert turns(out, lod) == turns(dna, lod) != {}
+        assert_same_poses(dna, out)
+        assert edit.regroup(out, regions=regions, timed=0)[0].to_bytes() == out.to_bytes()
+
+
 def face_of_regions(seed, regions=6, joints=12, controls=20):
     """Dense regions of joints, shuffled, in one group; small values that do not belong there."""
     rng = np.random.default_rng(seed)
