@@ -351,23 +351,29 @@ class Sweep {
   std::vector<std::unique_ptr<dna::Dna>> smaller_;
 };
 
-// Keeps the medians.
+// Keeps the medians. In: progress  on one line of a terminal what runs
 class Reporter : public benchmark::ConsoleReporter {
  public:
+  explicit Reporter(bool progress) : progress_(progress) {}
   void ReportRuns(const std::vector<Run>& runs) override {
     for (const Run& run : runs) {
       if (run.run_type == Run::RT_Aggregate && run.aggregate_name == "median") {
         const bool manual = run.run_name.time_type == "manual_time";
         ns[run.run_name.function_name] =
             manual ? run.GetAdjustedRealTime() : run.GetAdjustedCPUTime();
-      } else if (run.run_type == Run::RT_Iteration && run.repetition_index == 0) {
+      } else if (progress_ && run.run_type == Run::RT_Iteration && run.repetition_index == 0) {
         std::fprintf(stderr, "\r%-50s", run.run_name.function_name.c_str());
       }
     }
   }
-  void Finalize() override { std::fprintf(stderr, "\r%50s\r", ""); }
+  void Finalize() override {
+    if (progress_) std::fprintf(stderr, "\r%50s\r", "");
+  }
   bool ReportContext(const Context&) override { return true; }
   Medians ns;
+
+ private:
+  bool progress_;
 };
 
 core::Result<dna::Dna> read(const char* path) {
@@ -380,8 +386,10 @@ core::Result<dna::Dna> read(const char* path) {
 
 int main(int argc, char** argv) {
   if (argc < 2) {
-    std::fputs("usage: rig_bench FILE.dna [FRAMES20 FRAMES60 FRAMES_ALL] [--sweep] [options]\n",
-               stderr);
+    std::fputs(
+        "usage: rig_bench FILE.dna [FRAMES20 FRAMES60 FRAMES_ALL] [--sweep] [--progress] "
+        "[options]\n",
+        stderr);
     return 2;
   }
   const auto dna = read(argv[1]);
@@ -408,19 +416,25 @@ int main(int argc, char** argv) {
     frames.push_back(std::move(list));
   }
   const int first = files ? 5 : 2;
-  const bool sweep = argc > first && std::strcmp(argv[first], "--sweep") == 0;
+  int option = first;
+  const auto asked_for = [&](const char* name) {
+    const bool found = option < argc && std::strcmp(argv[option], name) == 0;
+    option += found ? 1 : 0;
+    return found;
+  };
+  const bool sweep = asked_for("--sweep"), progress = asked_for("--progress");
   std::string repetitions = "--benchmark_repetitions=9",
               mixed = "--benchmark_enable_random_interleaving=true",
               time = "--benchmark_min_time=0.05";
   std::vector<char*> arguments{argv[0], repetitions.data(), mixed.data(), time.data()};
-  for (int i = first + (sweep ? 1 : 0); i < argc; ++i) arguments.push_back(argv[i]);
+  for (int i = option; i < argc; ++i) arguments.push_back(argv[i]);
   int count = static_cast<int>(arguments.size());
   benchmark::Initialize(&count, arguments.data());
   if (benchmark::ReportUnrecognizedArguments(count, arguments.data())) return 2;
   Suite suite(*dna, frames);
   Sweep growth(*dna, frames[1]);
   sweep ? growth.add_all() : suite.add_all();
-  Reporter reporter;
+  Reporter reporter(progress);
   benchmark::RunSpecifiedBenchmarks(&reporter);
   sweep ? growth.print(reporter.ns) : suite.print(reporter.ns);
   return 0;

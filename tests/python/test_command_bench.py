@@ -28,7 +28,10 @@ def number_of(text: str, name: str) -> float:
 @pytest.mark.usefixtures("quick")
 def test_the_table_has_every_row_that_was_asked_for(capfd: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["bench", str(MEDIUM), "--quick"]) == 0
-    text = capfd.readouterr().out
+    text, errors = capfd.readouterr()
+    assert "\r" not in text + errors  # progress is for a terminal
+    for word in ("us", "csr", "times csr", "active", "cold"):
+        assert f"\n{word:<9}  " in text.partition("two cores:")[2], word  # what it means
     for row in (
         "one face, 20 active",
         "one face, 60 active",
