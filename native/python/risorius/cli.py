@@ -29,7 +29,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if isinstance(stream, io.TextIOWrapper):  # names need not be text that a terminal can show
             stream.reconfigure(errors="backslashreplace")
     try:
-        code = _run(arguments)
+        args = parse(arguments)
+        code = int(args.func(args))
         sys.stdout.flush()
     except BrokenPipeError:  # who read has enough
         _drop_output()
@@ -57,7 +58,8 @@ def _drop_output() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def _run(arguments: Sequence[str] | None) -> int:
+def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
+    """What was typed; `func` is the command. Raises: SystemExit: it makes no sense."""
     parser = argparse.ArgumentParser(prog="risorius", description="Face rigs from DNA files.")
     parser.add_argument("--version", action="version", version=__version__)
     subparsers = parser.add_subparsers(dest="command", required=True)
@@ -84,4 +86,4 @@ def _run(arguments: Sequence[str] | None) -> int:
         parser.error(f"unrecognized arguments: {' '.join(rest)}")
     if operands is not None:
         operands += rest
-    return int(args.func(args))
+    return args
