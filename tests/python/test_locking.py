@@ -13,6 +13,9 @@ import threading
 import pytest
 from risorius.locking import NAME, LockedError, locked
 
+if os.name != "nt":
+    import fcntl
+
 HOLD = """
 import sys
 from pathlib import Path
@@ -74,6 +77,22 @@ def test_one_of_many_threads_has_it_at_a_time(tmp_path):
         thread.join()
     assert most[0] == 1
     assert os.listdir(tmp_path) == []
+
+
+@pytest.mark.skipif(os.name == "nt", reason="an open file stays in its folder there")
+def test_a_file_that_its_owner_removes_meanwhile_is_nobodys_lock(tmp_path, monkeypatch):
+    path, flock, calls = tmp_path / NAME, fcntl.flock, []
+
+    def removed_first(handle, how):
+        if not calls:
+            path.unlink()
+        calls.append(handle)
+        flock(handle, how)
+
+    monkeypatch.setattr("fcntl.flock", removed_first)
+    with locked(tmp_path):
+        assert len(calls) == 2
+        assert json.loads(path.read_text())["process"] == os.getpid()
 
 
 @pytest.mark.skipif(os.name == "nt", reason="every file system of Windows has locks")
