@@ -335,3 +335,23 @@ def test_without_a_name_nothing_is_written(dna_file, tmp_path, monkeypatch):
     with pytest.raises(RuntimeError, match="no name"):
         bpy.ops.risorius.export_animation(filepath="", format="GLTF")
     assert set(tmp_path.iterdir()) == before
+
+
+def test_actions_that_the_face_does_not_play_stay_out(dna_file, tmp_path):
+    rig = scene.load(dna_file)
+    controls = animate(rig)
+    wanted = _film([scene.meshes(rig)[0], scene.meshes(rig)[1]])
+    played = controls.animation_data.action
+    other = controls.animation_data.action = bpy.data.actions.new("A take of yesterday")
+    other.use_fake_user = True
+    bone = controls.pose.bones["head"]
+    for frame, x in ((1, 0.0), (10, 0.3)):
+        bone.location.x = x
+        bone.keyframe_insert("location", frame=frame)
+    slots = getattr(played, "slots", ())
+    controls.animation_data.action = played
+    if len(slots):
+        controls.animation_data.action_slot = slots[0]
+    bone.location.x = 0.0
+    found = _import("GLTF", _export("GLTF", tmp_path))
+    assert _error(_film(found), wanted) < NEAR["GLTF"]

@@ -44,6 +44,8 @@ def _gltf(operator, stage):
         "use_active_scene": True,
         "export_animations": True,
         "export_animation_mode": "ACTIVE_ACTIONS",
+        # Else a lone armature gets every action of the file that moves bones of these names.
+        "export_anim_single_armature": False,
         "export_nla_strips_merged_animation_name": stage.objects[0].name,
         "export_frame_range": True,
         "export_frame_step": _whole_step(operator),
