@@ -16,6 +16,7 @@ from .. import native
 from ..logic import clips, curves
 from ..logic.names import unique_labels
 from . import actions, bake, baked_keys, baked_tracks, compat, meshes, parts, runtime, sampling
+from .loans import Loans
 
 
 @dataclass(frozen=True)
@@ -67,16 +68,18 @@ def copies(context, characters, options):
         options: ShipOptions.
 
     Yields:
-        The context override for an exporter, as a dict.
+        The context override for an exporter, as a dict, and the Loans of names: the copies bear the
+        names that the file shall have, and whoever has them waits under others.
     """
     window, user = context.window, context.scene
-    before = _everything()
+    before, loans = _everything(), Loans()
     shown = window.scene if window is not None else None
     with runtime.paused():
         try:
             stage = _stage(user, characters[0][2].frames)
+            loans.take("scenes", stage, _name(characters[0][0]))  # a take's name, in some formats
             for rig, level, samples in characters:
-                _copy(stage, rig, level, samples, options)
+                _copy(stage, rig, level, samples, options, loans)
             layer = stage.view_layers[0]
             if window is not None:
                 window.scene = stage
@@ -84,11 +87,13 @@ def copies(context, characters, options):
             for item in layer.objects:
                 item.select_set(True, view_layer=layer)
             layer.objects.active = layer.objects[0]
-            yield {"scene": stage, "view_layer": layer, "selected_objects": layer.objects[:]}
+            selected = layer.objects[:]
+            yield {"scene": stage, "view_layer": layer, "selected_objects": selected}, loans
         finally:
             if shown is not None:
                 window.scene = shown
             _remove_all_but(before)
+            loans.give_back()
             runtime.forget_outputs()
 
 
@@ -103,32 +108,38 @@ def _stage(user, frames):
     return stage
 
 
-def _copy(stage, rig, level, samples, options):
+def _name(rig):
+    """What a character is called in a file."""
+    return rig.name.removesuffix("_rig")
+
+
+def _copy(stage, rig, level, samples, options, loans):
     """One character: armature, meshes of the level, and their actions."""
     live = runtime.of(rig)
     pose = baked_tracks.evaluate(live, samples, level)
     copy = rig.copy()
     copy.animation_data_clear()
-    copy.name = rig.name.removesuffix("_rig")
+    loans.take("objects", copy, _name(rig))
     stage.collection.objects.link(copy)
     _show(copy)
     if "BONES" in options.wanted:
         tracks = baked_tracks.rig_tracks(rig, live, samples, pose, {"BONES"}, copy)
         _play(copy, samples.frames, tracks)
     for item in bake.shown(rig, level):
-        made = _copy_mesh(stage, item, copy, live)
+        made = _copy_mesh(stage, item, copy, live, loans)
         weights = pose.blend_shapes if "SHAPES" in options.wanted else pose.blend_shapes * 0.0
         _shapes(made, item, live, samples, weights, options)
         _forget(made)
     _forget(copy)
 
 
-def _copy_mesh(stage, item, rig_copy, live):
+def _copy_mesh(stage, item, rig_copy, live, loans):
     made = item.copy()
     made.data = item.data.copy()
     made.animation_data_clear()
-    made.name = live.dna.mesh_names[item[parts.MESH]]
-    made.data.name = made.name
+    name = live.dna.mesh_names[item[parts.MESH]]
+    loans.take("objects", made, name)
+    loans.take("meshes", made.data, name)
     made.parent = rig_copy
     for modifier in made.modifiers:
         if modifier.type == "ARMATURE":

@@ -8,8 +8,9 @@ from bpy_extras.io_utils import ExportHelper
 
 from .. import native
 from ..logic.errors import FaceError
-from ..scene import ship
+from ..scene import flatten, ship
 from ..scene.clips import frame_rate
+from ..scene.quiet import quiet
 from . import words
 from .bake_operators import FacesOperator, FrameRange, selected_rigs
 
@@ -76,6 +77,8 @@ def _fbx(operator, _stage):
         "bake_anim_step": float(_whole_step(operator)),
         "bake_anim_simplify_factor": 0.0,
         "apply_scale_options": operator.fbx_units,
+        "path_mode": "COPY",
+        "embed_textures": True,
         # With a modifier applied Blender drops the shape keys.
         "use_mesh_modifiers": False,
         "mesh_smooth_type": "FACE",
@@ -161,6 +164,20 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, bpy.
             ("FBX_SCALE_ALL", "In the File", "Objects have scale 1: as Unity expects it"),
         ),
     )
+    bake_materials: bpy.props.BoolProperty(
+        name="Bake Materials",
+        description="Give the file plain materials with one image each for colour, roughness and "
+        "normals: other programs do not read node trees. Animated maps rest",
+        default=True,
+    )
+    texture_size: bpy.props.IntProperty(
+        name="Texture Size",
+        description="Pixels of a side of the images that are baked; images that a material shows "
+        "unchanged keep their own size",
+        default=1024,
+        min=64,
+        max=8192,
+    )
     maps: bpy.props.BoolProperty(
         name="With Maps",
         description="Write also the values of the animated maps, which no other format can hold",
@@ -193,6 +210,9 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, bpy.
         self.draw_range(layout)
         if self.format not in ("RZC", "CSV"):
             self.draw_lod(layout)
+            layout.prop(self, "bake_materials")
+            if self.bake_materials:
+                layout.prop(self, "texture_size")
         if self.format in ("GLTF", "FBX", "USD"):
             layout.prop(self, "wanted")
             layout.prop(self, "all_shapes")
@@ -235,8 +255,13 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, bpy.
             clip = ship.clip(*characters[0], frame_rate(scene), scene.frame_start, self.maps)
             _write_csv(clip, path) if self.format == "CSV" else clip.save(path)
         else:
-            with ship.copies(context, characters, options) as override:
-                _export(context, self, override, path)
+            with ship.copies(context, characters, options) as (override, loans):
+                if self.bake_materials:
+                    _run(context, flatten.flatten(override, loans, self.texture_size))
+                _export(self, override, path)
+                if self.bake_materials and self.format == "ALEMBIC":
+                    folder = path.with_name(path.stem + "_textures")
+                    flatten.write_images(override["scene"], folder)
         return f"{path.name}: {frames} frames, {path.stat().st_size:,} bytes"
 
 
@@ -264,12 +289,12 @@ def _missing(kind):
     return f"This Blender has no {label} exporter: enable its add-on, or use another build."
 
 
-def _export(context, operator, override, path):
+def _export(operator, override, path):
     group, name = _OPERATORS[operator.format]
     function = getattr(getattr(bpy.ops, group), name)
     known = set(function.get_rna_type().properties.keys())
     settings = _SETTINGS[operator.format](operator, override["scene"])
-    with context.temp_override(**override):
+    with bpy.context.temp_override(**override), quiet():
         try:
             done = function(filepath=str(path), **{k: v for k, v in settings.items() if k in known})
         except RuntimeError as error:  # what Blender's exporter says of the file or the scene

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where a picture of a mesh lies: its UV map, spread over the square, or a cell for each face."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float32 = NDArray[np.float32]
+
+_FULL = 0.5  # of the square: a layout whose bounds cover this much is kept as it is
+_RIM = 0.08  # of a cell, left free on each side: no face shows its neighbour's colour
+
+
+def spread(points: NDArray[Any]) -> Float32 | None:
+    """A UV layout that uses little of the unit square, or leaves it, stretched over all of it.
+
+    Args:
+        points: float[N, 2] UV coordinates of all corners that share a picture.
+
+    Returns:
+        float32[N, 2], or None where the layout is good as it is.
+    """
+    low, high = points.min(axis=0), points.max(axis=0)
+    size = np.maximum(high - low, 1e-9)
+    inside = bool((low >= -1e-4).all() and (high <= 1 + 1e-4).all())
+    if inside and size.prod() >= _FULL:
+        return None
+    return ((points - low) / size).astype(np.float32)
+
+
+def overlaps(points: NDArray[Any], totals: NDArray[Any]) -> bool:
+    """Whether faces must lie on each other: they are larger than the rectangle around them.
+
+    Args:
+        points: float[N, 2] UV coordinates of the corners, face after face.
+        totals: int[F] corners of each face.
+    """
+    if not len(points):
+        return False
+    totals = np.asarray(totals, np.int64)
+    first = np.cumsum(totals) - totals
+    following = np.arange(len(points)) + 1
+    following[first + totals - 1] = first
+    x, y = np.asarray(points, np.float64).T
+    twice = np.add.reduceat(x * y[following] - x[following] * y, first)
+    area = float(np.abs(twice).sum()) / 2
+    return area > 1.02 * float(np.ptp(points, axis=0).astype(np.float64).prod())
+
+
+def cells(totals: NDArray[Any]) -> Float32:
+    """A layout for a mesh that has none: every face as a regular polygon in a cell of its own.
+
+    Args:
+        totals: int[F] corners of each face.
+
+    Returns:
+        float32[sum of totals, 2], in the order of the corners.
+    """
+    totals = np.asarray(totals, np.int64)
+    side = int(np.ceil(np.sqrt(max(len(totals), 1))))
+    face = np.repeat(np.arange(len(totals)), totals)
+    first = np.repeat(np.cumsum(totals) - totals, totals)
+    corner = np.arange(len(face)) - first
+    angle = 2 * np.pi * (corner + 0.5) / totals[face]
+    # A square's corners lie at the square root of a half from its middle.
+    reach = np.where(totals[face] == 4, np.sqrt(0.5), 0.5) * (1 - 2 * _RIM)
+    place = np.stack([face % side, face // side], axis=1) + 0.5
+    ray = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    return ((place + ray * reach[:, None]) / side).astype(np.float32)
