@@ -2,17 +2,19 @@
 #include "compile/compile.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <functional>
 #include <iterator>
 #include <map>
 #include <numeric>
-#include <queue>
 #include <span>
 #include <string_view>
+#include <tuple>
 
 #include "compile/parts.h"
 #include "dna/io.h"
+#include "dna/size.h"
 #include "simd/half.h"
 
 namespace risorius::compile {
@@ -71,25 +73,57 @@ std::vector<rig::ConditionalRow> compile_table(const dna::Conditionals& source) 
   return rows;
 }
 
-// Of each GUI control its rows, in ranges of equal bounds.
-void list_gui_ranges(RigData& out) {
-  using Bounds = std::pair<float, float>;
-  std::map<std::uint16_t, std::vector<std::pair<Bounds, std::vector<std::uint32_t>>>> ranges;
-  for (std::uint32_t i = 0; i < out.gui_rows.size(); ++i) {
-    const rig::ConditionalRow& row = out.gui_rows[i];
-    auto& list = ranges[row.input];
-    const Bounds bounds{row.from, row.to};
-    auto at = std::ranges::find(list, bounds, [](const auto& entry) { return entry.first; });
-    if (at == list.end()) at = list.insert(at, {bounds, {}});
-    at->second.push_back(i);
+// Bounds of a row as a number that sorts: -0 is 0, and what is no number equals nothing.
+std::uint64_t bounds_key(const rig::ConditionalRow& row) {
+  const auto bits = [](float v) { return std::uint64_t{std::bit_cast<std::uint32_t>(v + 0.0f)}; };
+  return bits(row.from) << 32 | bits(row.to);
+}
+
+bool has_number_bounds(const rig::ConditionalRow& row) {
+  return row.from == row.from && row.to == row.to;
+}
+
+// The first row of each row's range: rows of one GUI control with equal bounds.
+std::vector<std::uint32_t> first_rows_of_ranges(const std::vector<rig::ConditionalRow>& rows,
+                                                std::uint64_t& steps) {
+  std::vector<std::uint32_t> order(rows.size()), first(rows.size());
+  std::iota(order.begin(), order.end(), 0u);
+  const auto before = [&](std::uint32_t a, std::uint32_t b) {
+    ++steps;
+    const auto key = [&](std::uint32_t i) {
+      return std::tuple(rows[i].input, bounds_key(rows[i]), i);
+    };
+    return key(a) < key(b);
+  };
+  std::ranges::sort(order, before);
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const rig::ConditionalRow& row = rows[order[i]];
+    const rig::ConditionalRow& last = rows[order[i > 0 ? i - 1 : 0]];
+    const bool same = i > 0 && has_number_bounds(row) && row.input == last.input &&
+                      bounds_key(row) == bounds_key(last);
+    first[order[i]] = same ? first[order[i - 1]] : order[i];
   }
-  for (const auto& [gui, list] : ranges) {
-    for (const auto& [bounds, rows] : list) {
-      const auto begin = static_cast<std::uint32_t>(out.gui_range_rows.size());
-      out.gui_range_rows.insert(out.gui_range_rows.end(), rows.begin(), rows.end());
-      out.gui_ranges.push_back({gui, begin, static_cast<std::uint32_t>(out.gui_range_rows.size())});
-    }
+  return first;
+}
+
+// Of each GUI control its rows, in ranges of equal bounds, in the order of their first rows.
+Status list_gui_ranges(core::Budget& budget, RigData& out) {
+  std::uint64_t steps = 0;
+  const std::vector<std::uint32_t> first = first_rows_of_ranges(out.gui_rows, steps);
+  std::vector<std::uint32_t>& list = out.gui_range_rows;
+  list.resize(out.gui_rows.size());
+  std::iota(list.begin(), list.end(), 0u);
+  const auto before = [&](std::uint32_t a, std::uint32_t b) {
+    ++steps;
+    return std::tuple(out.gui_rows[a].input, first[a], a) <
+           std::tuple(out.gui_rows[b].input, first[b], b);
+  };
+  std::ranges::sort(list, before);
+  for (std::uint32_t i = 0; i < list.size(); ++i) {
+    if (first[list[i]] == list[i]) out.gui_ranges.push_back({out.gui_rows[list[i]].input, i, i});
+    out.gui_ranges.back().rows_end = i + 1;
   }
+  return budget.take_steps(steps, "behavior.gui_to_raw");
 }
 
 bool is_quaternion_w(std::string_view name) {
@@ -432,7 +466,7 @@ Status narrow(RigData& out) {
 }
 
 // Names, sizes and tables.
-void compile_frame(const dna::Dna& dna, RigData& out) {
+Status compile_frame(const dna::Dna& dna, core::Budget& budget, RigData& out) {
   out.lod_count = dna.descriptor.lod_count;
   out.euler = detail::euler_convention(dna);
   for (const std::string& name : dna.definition.raw_control_names) add_text(name, out);
@@ -442,24 +476,29 @@ void compile_frame(const dna::Dna& dna, RigData& out) {
   compile_neutral(dna, out);
   compile_initial_controls(dna, out);
   out.gui_rows = compile_table(dna.behavior.gui_to_raw);
-  list_gui_ranges(out);
+  return list_gui_ranges(budget, out);
 }
 
-Result<RigData> compile_parts(const dna::Dna& dna, const CompileOptions& options) {
+Result<RigData> compile_parts(const dna::Dna& dna, const CompileOptions& options,
+                              core::Budget& budget) {
   RigData out;
   out.joint_stride = options.rotation == Rotation::kQuaternion ? 10 : 9;
   if (const std::uint32_t controls = dna::control_counts(dna).total(); controls > 65536) {
     return fail(ErrorCode::kLimitExceeded, "behavior.psd_count",
                 std::to_string(controls) + " controls, the format's indices reach 65536");
   }
-  compile_frame(dna, out);
+  if (Status s = compile_frame(dna, budget, out); !s) return std::move(s).propagate();
   detail::StepLods lods;
   Used used(out.lod_count, std::vector<bool>(out.control_count, false));
   const Groups groups = list_groups(dna);
   if (Status s = compile_joint_groups(dna, groups, out); !s) return std::move(s).propagate();
   detail::compile_quaternion_joints(dna, groups, out);
-  if (Status s = detail::compile_solvers(dna, out, lods); !s) return std::move(s).propagate();
-  if (Status s = detail::compile_networks(dna, out, lods); !s) return std::move(s).propagate();
+  if (Status s = detail::compile_solvers(dna, budget, out, lods); !s) {
+    return std::move(s).propagate();
+  }
+  if (Status s = detail::compile_networks(dna, budget, out, lods); !s) {
+    return std::move(s).propagate();
+  }
   if (Status s = detail::compile_ml_joints(dna, out); !s) return std::move(s).propagate();
   detail::compile_twist_and_swing(dna, out);
   if (Status s = compile_channels_and_maps(dna, out); !s) return std::move(s).propagate();
@@ -468,7 +507,7 @@ Result<RigData> compile_parts(const dna::Dna& dna, const CompileOptions& options
   if (Status s = compile_columns(groups, out, used); !s) return std::move(s).propagate();
   mark_channels_and_maps(out, used);
   detail::mark_ml_joints(out, used);
-  detail::schedule(used, lods, out);
+  if (Status s = detail::schedule(used, lods, budget, out); !s) return std::move(s).propagate();
   if (out.joint_stride == 10) {
     if (Status s = widen_joint_rows(out); !s) return std::move(s).propagate();
   }
@@ -492,6 +531,12 @@ Status detail::check_controls(const Array<std::uint16_t>& indices, std::uint32_t
   return ok();
 }
 
+core::Budget budget_for(const dna::Dna& dna) {
+  const std::uint64_t size = dna::size_in_bytes(dna);
+  return {"compiling this face", (std::uint64_t{1} << 20) + 64 * size,
+          (std::uint64_t{1} << 28) + 256 * size};
+}
+
 Result<rig::Rig> compile(const dna::Dna& dna, const CompileOptions& options) {
   std::vector<dna::Warning> warnings;
   if (Status s = dna::validate(dna, warnings); !s) return std::move(s).propagate();
@@ -502,7 +547,8 @@ Result<rig::Rig> compile(const dna::Dna& dna, const CompileOptions& options) {
                 std::string("this instruction set is not available; there are: ") +
                     simd::available_kernels());
   }
-  auto out = compile_parts(dna, options);
+  core::Budget own = budget_for(dna);
+  auto out = compile_parts(dna, options, options.budget != nullptr ? *options.budget : own);
   if (!out) return core::Unexpected{out.error()};
   return rig::make_rig(*out, *kernels);
 }

@@ -7,6 +7,7 @@
 #include <memory>
 #include <vector>
 
+#include "core/budget.h"
 #include "core/result.h"
 #include "dna/dna.h"
 #include "rig/morph.h"
@@ -21,11 +22,18 @@ struct CompileOptions {
   const simd::Kernels* kernels = nullptr;     // nullptr: the best that this CPU has
   Precision precision = Precision::kFloat32;  // of the joint matrices
   Rotation rotation = Rotation::kEuler;       // form of the rotations in a pose
+  core::Budget* budget = nullptr;             // nullptr: one of budget_for(dna)
 };
+
+/// What compiling a face may take: 1 MiB and 64 times its bytes of lists and matrices that are no
+/// copies of lists in the file, and 2^28 and 256 times its bytes of steps, to compile it and to
+/// evaluate it once at every LOD.
+core::Budget budget_for(const dna::Dna& dna);
 
 /// Compiles the behavior of a face. The result keeps nothing of the Dna.
 /// Fails: kInvalidIndex, kInvalidLength, kInvalidValue with the field: a Dna may have been edited;
-///        kInvalidValue for a joint value beyond 65504 in float16; kLimitExceeded.
+///        kInvalidValue for a joint value beyond 65504 in float16; kLimitExceeded (the format's
+///        indices, the budget).
 /// From:  dna-format 12; joint matrices by columns, so that inactive columns cost nothing
 core::Result<rig::Rig> compile(const dna::Dna& dna, const CompileOptions& options = {});
 

@@ -74,8 +74,9 @@ std::vector<bool> joint_w_controls(const dna::Dna& dna, std::uint32_t controls) 
 
 class GraphCompiler {
  public:
-  GraphCompiler(const dna::Dna& dna, RigData& out, StepLods& lods)
+  GraphCompiler(const dna::Dna& dna, detail::Budget& budget, RigData& out, StepLods& lods)
       : dna_(dna),
+        budget_(budget),
         out_(out),
         lods_(lods),
         masks_(masks_of_networks(dna, out)),
@@ -84,7 +85,8 @@ class GraphCompiler {
   Status add_type(const dna::MlType& type, const std::string& where) {
     // Operation o of set s is number numbers_[s][o]; those of later sets come after.
     numbers_.clear();
-    std::uint32_t next = count_of(out_.ml_operations);
+    first_ = count_of(out_.ml_operations);
+    std::uint32_t next = first_;
     for (const auto& set : type.operations) {
       numbers_.emplace_back();
       for (std::size_t o = 0; o < set.size(); ++o) numbers_.back().push_back(next++);
@@ -96,8 +98,7 @@ class GraphCompiler {
         if (Status added = add_operation(type.operations[s][o], at); !added) return added;
       }
     }
-    list_lods(type);
-    return ok();
+    return list_lods(type, where);
   }
 
  private:
@@ -120,6 +121,9 @@ class GraphCompiler {
         break;
       default:  // does nothing
         op.kind = MlOperation::kWeightedSum;
+    }
+    if (Status s = budget_.take_bytes(sizeof(float) * std::uint64_t{op.value_count}, where); !s) {
+      return s;
     }
     constexpr std::uint32_t kMost = 1u << 24;
     if (op.value_count > kMost || out_.operation_values > kMost) {
@@ -178,12 +182,26 @@ class GraphCompiler {
     const dna::NeuralNetwork& network = dna_.machine_learned_behavior.neural_networks[number];
     const auto mask = masks_.find(number);
     if (mask != masks_.end()) op.mask = mask->second;
+    op.item_count = count_of(network.layers);
+    const bool table = out_.lod_count > 0 &&
+                       source.parameters.size() >= 1 + network.layers.size() * out_.lod_count;
+    const auto [shared, is_first] = layers_.try_emplace(number, op.items_begin);
+    if (!table && !is_first) {
+      op.items_begin = shared->second;
+    } else {
+      if (table && is_first) layers_.erase(shared);  // these rows are this operation's own
+      if (Status s = add_layers(source, network, number, where); !s) return s;
+    }
+    if (op.item_count > 0) op.value_count = out_.ml_layers[op.items_begin + op.item_count - 1].rows;
+    return ok();
+  }
+
+  Status add_layers(const dna::MlOperation& source, const dna::NeuralNetwork& network,
+                    std::uint16_t number, const std::string& where) {
     for (std::size_t l = 0; l < network.layers.size(); ++l) {
       if (Status s = add_layer(network.layers[l], number, l, where); !s) return s;
       add_row_counts(source, l, network.layers.size());
     }
-    op.item_count = count_of(network.layers);
-    if (op.item_count > 0) op.value_count = out_.ml_layers.back().rows;
     return ok();
   }
 
@@ -225,34 +243,42 @@ class GraphCompiler {
   }
 
   // An operation runs at a LOD that lists it, if what it reads runs there.
-  void list_lods(const dna::MlType& type) {
+  Status list_lods(const dna::MlType& type, const std::string& where) {
     for (std::uint32_t lod = 0; lod < out_.lod_count; ++lod) {
-      std::vector<bool> listed_here(out_.ml_operations.size(), false);
+      std::vector<bool> runs_here(out_.ml_operations.size() - first_, false);  // of this type
       for (std::size_t s = 0; s < type.operations.size(); ++s) {
         if (s >= type.lod_operation_mappings.size()) break;
         for (const std::uint32_t o : listed(type.lod_operation_mappings[s], lod)) {
           const dna::MlOperation& op = type.operations[s][o];
-          bool runs = true;
-          for (std::size_t d = 0; d < op.operation_set_dependency_indices.size(); ++d) {
-            const std::uint32_t number = numbers_[op.operation_set_dependency_indices[d]]
-                                                 [op.operation_dependency_indices[d]];
-            runs = runs && listed_here[number];
-          }
-          if (!runs) continue;
-          listed_here[numbers_[s][o]] = true;
+          const std::uint64_t steps = 1 + op.operation_set_dependency_indices.size();
+          if (Status taken = budget_.take_steps(steps, where); !taken) return taken;
+          if (!has_all(runs_here, op)) continue;
+          runs_here[numbers_[s][o] - first_] = true;
           lods_.operations[lod].push_back(numbers_[s][o]);
         }
       }
     }
+    return ok();
+  }
+  bool has_all(const std::vector<bool>& runs, const dna::MlOperation& op) const {
+    for (std::size_t d = 0; d < op.operation_set_dependency_indices.size(); ++d) {
+      const std::uint32_t number =
+          numbers_[op.operation_set_dependency_indices[d]][op.operation_dependency_indices[d]];
+      if (!runs[number - first_]) return false;
+    }
+    return true;
   }
 
   const dna::Dna& dna_;
+  detail::Budget& budget_;
   RigData& out_;
   StepLods& lods_;
   std::map<std::uint16_t, std::uint32_t> masks_;
   std::vector<bool> rests_at_one_;
   std::map<std::pair<std::uint16_t, std::size_t>, std::uint32_t> weights_;
+  std::map<std::uint16_t, std::uint32_t> layers_;  // of networks whose LODs have all rows: first
   std::vector<std::vector<std::uint32_t>> numbers_;
+  std::uint32_t first_ = 0;  // operation of the type
 };
 
 // Rows are the directions of the axes; 0 left 1 right 2 up 3 down 4 front 5 back.
@@ -301,9 +327,9 @@ void add_system(const dna::Dna& dna, RigData& out) {
 
 }  // namespace
 
-Status detail::compile_networks(const dna::Dna& dna, RigData& out, StepLods& lods) {
+Status detail::compile_networks(const dna::Dna& dna, Budget& budget, RigData& out, StepLods& lods) {
   lods.operations.resize(out.lod_count);
-  GraphCompiler graph(dna, out, lods);
+  GraphCompiler graph(dna, budget, out, lods);
   const auto& types = dna.machine_learned_behavior_ext.types;
   const bool synthesize = types.empty() && !dna.machine_learned_behavior.neural_networks.empty();
   if (synthesize) {
@@ -333,11 +359,14 @@ Status detail::compile_ml_joints(const dna::Dna& dna, RigData& out) {
     entry.is_quaternion = stride == 10 ? 1 : 0;
     entry.controls[attribute + (stride == 9 && attribute > 5 ? 1 : 0)] = source.input_indices[i];
   }
+  std::vector<std::vector<bool>> has(out.lod_count, std::vector<bool>(out.joint_count, false));
+  for (std::uint32_t lod = 0; lod < out.lod_count && !joints.empty(); ++lod) {
+    for (const std::uint32_t j : listed(dna.definition.lod_joint_mapping, lod)) has[lod][j] = true;
+  }
   for (const auto& [joint, entry] : joints) {
     out.ml_joints.push_back(entry);
-    for (std::uint32_t lod = 0; lod < out.lod_count; ++lod) {
-      const auto list = listed(dna.definition.lod_joint_mapping, lod);
-      out.ml_joint_lods.push_back(std::ranges::find(list, joint) != list.end() ? 1 : 0);
+    for (const std::vector<bool>& joints_here : has) {
+      out.ml_joint_lods.push_back(joints_here[joint] ? 1 : 0);
     }
   }
   return ok();

@@ -98,53 +98,84 @@ void add_targets(const dna::RbfSolver& source, rig::RbfSolver& s, RigData& out) 
   }
 }
 
-// What a pose writes; in files without layer rbfe it is a control of its own.
-void add_pose(const dna::Dna& dna, std::uint16_t index, RigData& out) {
-  const auto& ext = dna.rbf_behavior_ext;
-  rig::RbfPose pose;
-  pose.scale = dna.rbf_behavior.poses[index].scale;
-  pose.inputs_begin = count_of(out.rbf_pose_inputs);
-  pose.outputs_begin = count_of(out.rbf_outputs);
-  const auto add = [&](std::uint32_t control, float weight) {
-    if (!is_corrective(out, control)) out.rbf_outputs.push_back({control, weight});
-  };
-  if (ext.poses.empty() && ext.pose_control_names.empty()) {
-    const dna::ControlCounts n = dna::control_counts(dna);
-    add(n.raw + n.psd + n.ml + index, 1.0f);
-  } else if (index < ext.poses.size()) {
-    const dna::RbfPoseControls& c = ext.poses[index];
-    for (const std::uint16_t i : c.input_control_indices) out.rbf_pose_inputs.push_back(i);
-    for (std::size_t i = 0; i < c.output_control_indices.size(); ++i) {
-      add(c.output_control_indices[i], c.output_control_weights[i]);
+// The poses of a file, each compiled once: solvers may list one any number of times.
+class PoseLists {
+ public:
+  PoseLists(const dna::Dna& dna, RigData& out) : dna_(dna), out_(out) {
+    poses_.resize(dna.rbf_behavior.poses.size());
+    known_.resize(poses_.size(), false);
+  }
+
+  const rig::RbfPose& of(std::uint16_t index) {
+    if (!known_[index]) poses_[index] = compile(index);
+    known_[index] = true;
+    return poses_[index];
+  }
+
+ private:
+  // What a pose writes; in files without layer rbfe it is a control of its own.
+  rig::RbfPose compile(std::uint16_t index) {
+    const auto& ext = dna_.rbf_behavior_ext;
+    rig::RbfPose pose;
+    pose.scale = dna_.rbf_behavior.poses[index].scale;
+    pose.inputs_begin = count_of(out_.rbf_pose_inputs);
+    pose.outputs_begin = count_of(out_.rbf_outputs);
+    if (ext.poses.empty() && ext.pose_control_names.empty()) {
+      const dna::ControlCounts n = dna::control_counts(dna_);
+      add_output(n.raw + n.psd + n.ml + index, 1.0f);
+    } else if (index < ext.poses.size()) {
+      const dna::RbfPoseControls& c = ext.poses[index];
+      for (const std::uint16_t i : c.input_control_indices) out_.rbf_pose_inputs.push_back(i);
+      for (std::size_t i = 0; i < c.output_control_indices.size(); ++i) {
+        add_output(c.output_control_indices[i], c.output_control_weights[i]);
+      }
     }
+    pose.input_count = count_of(out_.rbf_pose_inputs) - pose.inputs_begin;
+    pose.output_count = count_of(out_.rbf_outputs) - pose.outputs_begin;
+    return pose;
   }
-  pose.input_count = count_of(out.rbf_pose_inputs) - pose.inputs_begin;
-  pose.output_count = count_of(out.rbf_outputs) - pose.outputs_begin;
-  out.rbf_poses.push_back(pose);
+  void add_output(std::uint32_t control, float weight) {
+    if (!is_corrective(out_, control)) out_.rbf_outputs.push_back({control, weight});
+  }
+
+  const dna::Dna& dna_;
+  RigData& out_;
+  std::vector<rig::RbfPose> poses_;
+  std::vector<bool> known_;
+};
+
+Status check_solver(const dna::RbfSolver& s, const std::string& where) {
+  if (s.distance_method == rig::kEuclidean || s.raw_control_indices.size() % 4 == 0) return ok();
+  return fail(ErrorCode::kInvalidLength, where + ".raw_control_indices",
+              std::to_string(s.raw_control_indices.size()) +
+                  " controls, but a distance of rotations needs four for each");
 }
 
-// Work of compiling a solver: a file of a few bytes must not take minutes.
-double cost_of(const dna::RbfSolver& s) {
-  const auto n = static_cast<double>(s.pose_indices.size());
-  const auto inputs = static_cast<double>(s.raw_control_indices.size()) + 1;
-  return (s.automatic_radius == 0 ? n * n * inputs : 0) + (s.solver_type == 1 ? n * n * n : 0);
+// Distances between all poses, and the matrix of those that interpolate.
+Status take_matrices(const dna::RbfSolver& s, const std::string& where, detail::Budget& budget) {
+  const std::uint64_t n = s.pose_indices.size();
+  const std::uint64_t inputs = s.raw_control_indices.size() + 1;
+  const bool interpolates = s.solver_type == 1;
+  const std::uint64_t distances = s.automatic_radius == 0 || interpolates ? n * n : 0;
+  if (Status taken = budget.take_steps(distances * inputs, where); !taken) return taken;
+  if (!interpolates) return ok();
+  if (Status taken = budget.take_bytes(n * n * sizeof(double), where); !taken) return taken;
+  return budget.take_steps(n * n * n, where);
 }
 
-Status check_solver(const dna::RbfSolver& s, const std::string& where, double& cost) {
-  if (s.distance_method != rig::kEuclidean && s.raw_control_indices.size() % 4 != 0) {
-    return fail(ErrorCode::kInvalidLength, where + ".raw_control_indices",
-                std::to_string(s.raw_control_indices.size()) +
-                    " controls, but a distance of rotations needs four for each");
+// What evaluating the solver's poses takes: one that is listed often is read and written often.
+Status add_poses(const dna::RbfSolver& source, const std::string& where, PoseLists& poses,
+                 detail::Budget& budget, RigData& out) {
+  std::uint64_t steps = 0;
+  for (const std::uint16_t p : source.pose_indices) {
+    out.rbf_poses.push_back(poses.of(p));
+    steps += out.rbf_poses.back().input_count + out.rbf_poses.back().output_count;
   }
-  cost += cost_of(s);
-  if (cost > 2e9) {
-    return fail(ErrorCode::kLimitExceeded, where + ".pose_indices",
-                "the solvers' matrices are larger than any face needs");
-  }
-  return ok();
+  return budget.take_steps(steps, where);
 }
 
-void add_solver(const dna::Dna& dna, const dna::RbfSolver& source, RigData& out) {
+Status add_solver(const dna::Dna& dna, const dna::RbfSolver& source, const std::string& where,
+                  PoseLists& poses, detail::Budget& budget, RigData& out) {
   rig::RbfSolver s;
   s.threshold = source.weight_threshold;
   s.inputs_begin = count_of(out.rbf_inputs);
@@ -156,7 +187,7 @@ void add_solver(const dna::Dna& dna, const dna::RbfSolver& source, RigData& out)
   s.axis = source.twist_axis < 3 ? source.twist_axis : 0;
   s.always_normalize = source.normalize_method == 1 ? 1 : 0;
   for (const std::uint16_t i : source.raw_control_indices) out.rbf_inputs.push_back(i);
-  for (const std::uint16_t p : source.pose_indices) add_pose(dna, p, out);
+  if (Status added = add_poses(source, where, poses, budget, out); !added) return added;
   add_targets(source, s, out);
   s.radius = static_cast<double>(source.radius) *
              (dna.descriptor.rotation_unit == 1 ? 1.0 : 0.017453292519943295);
@@ -165,6 +196,7 @@ void add_solver(const dna::Dna& dna, const dna::RbfSolver& source, RigData& out)
   out.solver_inputs = std::max(out.solver_inputs, s.input_count);
   out.solver_poses = std::max(out.solver_poses, s.pose_count);
   out.rbf_solvers.push_back(s);
+  return ok();
 }
 
 }  // namespace
@@ -175,13 +207,15 @@ std::vector<std::uint32_t> detail::listed(const dna::LodMapping& mapping, std::u
   return {row.begin(), row.end()};
 }
 
-Status detail::compile_solvers(const dna::Dna& dna, RigData& out, StepLods& lods) {
+Status detail::compile_solvers(const dna::Dna& dna, Budget& budget, RigData& out, StepLods& lods) {
   const auto& solvers = dna.rbf_behavior.solvers;
-  double cost = 0;
+  PoseLists poses(dna, out);
   for (std::size_t i = 0; i < solvers.size(); ++i) {
     const std::string where = "rbf_behavior.solvers[" + std::to_string(i) + "]";
-    if (Status s = check_solver(solvers[i], where, cost); !s) return s;
-    add_solver(dna, solvers[i], out);
+    if (Status s = check_solver(solvers[i], where); !s) return s;
+    const std::string list = where + ".pose_indices";
+    if (Status s = take_matrices(solvers[i], list, budget); !s) return s;
+    if (Status s = add_solver(dna, solvers[i], list, poses, budget, out); !s) return s;
   }
   for (std::uint32_t lod = 0; lod < out.lod_count; ++lod) {
     lods.solvers.push_back(listed(dna.rbf_behavior.lod_solver_mapping, lod));

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Twist and swing setups. From: dna-format 12.5
 #include <algorithm>
+#include <cstdint>
+#include <set>
+#include <vector>
 
 #include "compile/parts.h"
 
@@ -30,11 +33,17 @@ void add_setup(const dna::TwistSwingSetup& source, TwistSwing::Kind kind, RigDat
 
 void detail::compile_twist_and_swing(const dna::Dna& dna, RigData& out) {
   const auto& [twists, swings] = dna.twist_swing_behavior;
-  for (const dna::TwistSwingSetup& s : swings) add_setup(s, TwistSwing::kSwing, out);
+  std::set<std::vector<std::uint16_t>> swung;
+  const auto inputs = [](const dna::TwistSwingSetup& s) {
+    return std::vector<std::uint16_t>(s.input_control_indices.begin(),
+                                      s.input_control_indices.end());
+  };
+  for (const dna::TwistSwingSetup& s : swings) {
+    add_setup(s, TwistSwing::kSwing, out);
+    if (s.input_control_indices.size() == 4) swung.insert(inputs(s));
+  }
   for (const dna::TwistSwingSetup& t : twists) {
-    const auto swing = std::ranges::find(swings, t.input_control_indices,
-                                         &dna::TwistSwingSetup::input_control_indices);
-    const bool merged = swing != swings.end();
+    const bool merged = t.input_control_indices.size() == 4 && swung.contains(inputs(t));
     add_setup(t, merged ? TwistSwing::kUntwist : TwistSwing::kTwist, out);
   }
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/array.h"
+#include "core/budget.h"
 #include "core/result.h"
 #include "dna/dna.h"
 #include "rig/arrays.h"
@@ -14,6 +15,7 @@
 namespace risorius::compile::detail {
 
 using core::Array;
+using core::Budget;
 using core::Status;
 using rig::RigData;
 
@@ -41,13 +43,13 @@ std::vector<std::uint32_t> listed(const dna::LodMapping& mapping, std::uint32_t 
 rig::EulerConvention euler_convention(const dna::Dna& dna);
 /// After the joint groups.
 void compile_quaternion_joints(const dna::Dna& dna, const Groups& groups, RigData& out);
-Status compile_solvers(const dna::Dna& dna, RigData& out, StepLods& lods);
-Status compile_networks(const dna::Dna& dna, RigData& out, StepLods& lods);
+Status compile_solvers(const dna::Dna& dna, Budget& budget, RigData& out, StepLods& lods);
+Status compile_networks(const dna::Dna& dna, Budget& budget, RigData& out, StepLods& lods);
 Status compile_ml_joints(const dna::Dna& dna, RigData& out);
 void mark_ml_joints(const RigData& r, Used& used);
 void compile_twist_and_swing(const dna::Dna& dna, RigData& out);
 
 /// After everything else: which correctives are watched, and the lists of steps of each LOD.
-void schedule(const Used& used, const StepLods& lods, RigData& out);
+Status schedule(const Used& used, const StepLods& lods, Budget& budget, RigData& out);
 
 }  // namespace risorius::compile::detail

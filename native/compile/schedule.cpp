@@ -2,8 +2,11 @@
 // The order of evaluation: what is watched, and the lists of steps of each LOD.
 #include <algorithm>
 #include <functional>
+#include <iterator>
+#include <numeric>
 #include <queue>
 #include <span>
+#include <utility>
 
 #include "compile/parts.h"
 
@@ -11,6 +14,9 @@ namespace risorius::compile {
 
 namespace {
 
+using core::Result;
+using core::Status;
+using detail::Budget;
 using detail::StepLods;
 using detail::Used;
 using rig::MlOperation;
@@ -21,26 +27,72 @@ std::span<const std::uint16_t> factors(const RigData& r, const rig::Psd& p) {
   return {r.psd_factors.data() + p.factors_begin, p.factor_count};
 }
 
-// Everything that reads and writes controls, as nodes: operations, solvers, correctives.
+// Lists of numbers, one after the other.
+class Lists {
+ public:
+  // In: each  each(add) calls add(list, number) for all of them, twice the same
+  template <class Each>
+  static Result<Lists> collect(std::size_t lists, Budget& budget, Each each) {
+    Lists out;
+    out.begins_.assign(lists + 1, 0);
+    std::uint64_t count = 0;
+    each([&](std::uint32_t list, std::uint32_t) { ++out.begins_[list + std::size_t{1}], ++count; });
+    if (Status s = budget.take_bytes(4 * count, "rbf_behavior.solvers"); !s) {
+      return std::move(s).propagate();
+    }
+    std::partial_sum(out.begins_.begin(), out.begins_.end(), out.begins_.begin());
+    out.items_.resize(static_cast<std::size_t>(count));
+    std::vector<std::uint32_t> next(out.begins_.begin(), out.begins_.end() - 1);
+    each([&](std::uint32_t list, std::uint32_t number) { out.items_[next[list]++] = number; });
+    return out;
+  }
+
+  std::span<const std::uint32_t> of(std::uint32_t list) const {
+    return std::span(items_).subspan(begins_[list], begins_[list + std::size_t{1}] - begins_[list]);
+  }
+
+ private:
+  std::vector<std::uint32_t> begins_, items_;
+};
+
+// Everything that reads and writes controls, as nodes: operations, solvers, correctives. What
+// writes a control comes before what reads it. The controls stand between the two, so that n
+// writers and n readers of one are 2 n edges and not their product.
 class Graph {
  public:
-  explicit Graph(const RigData& r)
-      : r_(r),
-        operations_(static_cast<std::uint32_t>(r.ml_operations.size())),
-        solvers_(static_cast<std::uint32_t>(r.rbf_solvers.size())) {
-    writers_.resize(r.control_count);
-    first_.resize(size());
-    for (std::uint32_t n = 0; n < size(); ++n) {
-      for_writes(n, [&](std::uint32_t c) {
-        if (writers_[c].empty() || writers_[c].back() != n) writers_[c].push_back(n);
-      });
+  static Result<Graph> make(const RigData& r, Budget& budget) {
+    Graph g(r);
+    const auto lists = [&](std::size_t count, Lists& out, auto each) -> Status {
+      auto made = Lists::collect(count, budget, each);
+      if (!made) return std::move(made).propagate();
+      out = std::move(made).value();
+      return core::ok();
+    };
+    if (Status s = lists(g.size(), g.written_,
+                         [&](auto add) {
+                           g.for_once([&](std::uint32_t n, auto f) { g.for_writes(n, f); }, add);
+                         });
+        !s) {
+      return std::move(s).propagate();
     }
-    find_first();
+    if (Status s = lists(r.control_count, g.readers_,
+                         [&](auto add) {
+                           g.for_once([&](std::uint32_t n, auto f) { g.for_reads(n, f); },
+                                      [&](std::uint32_t n, std::uint32_t c) { add(c, n); });
+                         });
+        !s) {
+      return std::move(s).propagate();
+    }
+    if (Status s = lists(g.size(), g.after_, [&](auto add) { g.for_edges(add); }); !s) {
+      return std::move(s).propagate();
+    }
+    return g;
   }
 
   std::uint32_t size() const {
-    return operations_ + solvers_ + static_cast<std::uint32_t>(r_.psds.size());
+    return operations_ + solvers_ + static_cast<std::uint32_t>(r_->psds.size());
   }
+  std::uint32_t control_count() const { return r_->control_count; }
   std::uint32_t operation(std::uint32_t i) const { return i; }
   std::uint32_t solver(std::uint32_t i) const { return operations_ + i; }
   std::uint32_t psd(std::uint32_t i) const { return operations_ + solvers_ + i; }
@@ -50,89 +102,101 @@ class Graph {
     if (!is_psd(n)) return rig::make_step(StepKind::kSolver, n - operations_);
     return rig::make_step(StepKind::kPsd, n - operations_ - solvers_);
   }
-  const std::vector<std::uint32_t>& writers(std::uint32_t control) const {
-    return writers_[control];
+  /// Controls that n writes, each once.
+  std::span<const std::uint32_t> written(std::uint32_t n) const { return written_.of(n); }
+  /// Nodes that read the control, each once.
+  std::span<const std::uint32_t> readers(std::uint32_t control) const {
+    return readers_.of(control);
   }
-  /// Nodes that must run before n.
-  const std::vector<std::uint32_t>& before(std::uint32_t n) const { return first_[n]; }
+  /// Nodes that must run after n whatever they read.
+  std::span<const std::uint32_t> after(std::uint32_t n) const { return after_.of(n); }
 
+ private:
+  explicit Graph(const RigData& r)
+      : r_(&r),
+        operations_(static_cast<std::uint32_t>(r.ml_operations.size())),
+        solvers_(static_cast<std::uint32_t>(r.rbf_solvers.size())) {}
+
+  // Calls f(n, control) for what each node reads or writes, once for each pair.
+  template <class Each, class F>
+  void for_once(Each each, F f) const {
+    std::vector<std::uint32_t> last(r_->control_count, rig::kNone);
+    for (std::uint32_t n = 0; n < size(); ++n) {
+      each(n, [&](std::uint32_t c) {
+        if (std::exchange(last[c], n) != n) f(n, c);
+      });
+    }
+  }
   template <class F>
   void for_writes(std::uint32_t n, F f) const {
     if (n < operations_) {
-      const MlOperation& op = r_.ml_operations[n];
+      const MlOperation& op = r_->ml_operations[n];
       if (op.kind != MlOperation::kScatter) return;
       for (std::uint32_t i = 0; i < op.item_count; ++i) {
-        const std::uint32_t control = r_.ml_controls[op.items_begin + i].control;
+        const std::uint32_t control = r_->ml_controls[op.items_begin + i].control;
         if (control != rig::kNone) f(control);
       }
     } else if (!is_psd(n)) {
-      const rig::RbfSolver& s = r_.rbf_solvers[n - operations_];
+      const rig::RbfSolver& s = r_->rbf_solvers[n - operations_];
       for (std::uint32_t p = s.poses_begin; p < s.poses_begin + s.pose_count; ++p) {
-        const rig::RbfPose& pose = r_.rbf_poses[p];
+        const rig::RbfPose& pose = r_->rbf_poses[p];
         for (std::uint32_t i = 0; i < pose.output_count; ++i) {
-          f(r_.rbf_outputs[pose.outputs_begin + i].control);
+          f(r_->rbf_outputs[pose.outputs_begin + i].control);
         }
       }
     } else {
-      f(r_.psds[n - operations_ - solvers_].output);
+      f(r_->psds[n - operations_ - solvers_].output);
     }
   }
-
- private:
   template <class F>
   void for_reads(std::uint32_t n, F f) const {
     if (n < operations_) {
-      const MlOperation& op = r_.ml_operations[n];
+      const MlOperation& op = r_->ml_operations[n];
       if (op.kind != MlOperation::kGather) return;
       for (std::uint32_t i = 0; i < op.item_count; ++i) {
-        f(r_.ml_controls[op.items_begin + i].control);
+        f(r_->ml_controls[op.items_begin + i].control);
       }
     } else if (!is_psd(n)) {
-      const rig::RbfSolver& s = r_.rbf_solvers[n - operations_];
-      for (std::uint32_t i = 0; i < s.input_count; ++i) f(r_.rbf_inputs[s.inputs_begin + i]);
+      const rig::RbfSolver& s = r_->rbf_solvers[n - operations_];
+      for (std::uint32_t i = 0; i < s.input_count; ++i) f(r_->rbf_inputs[s.inputs_begin + i]);
       for (std::uint32_t p = s.poses_begin; p < s.poses_begin + s.pose_count; ++p) {
-        const rig::RbfPose& pose = r_.rbf_poses[p];
+        const rig::RbfPose& pose = r_->rbf_poses[p];
         for (std::uint32_t i = 0; i < pose.input_count; ++i) {
-          f(r_.rbf_pose_inputs[pose.inputs_begin + i]);
+          f(r_->rbf_pose_inputs[pose.inputs_begin + i]);
         }
       }
     } else {
-      for (const std::uint16_t c : factors(r_, r_.psds[n - operations_ - solvers_])) f(c);
+      for (const std::uint16_t c : factors(*r_, r_->psds[n - operations_ - solvers_])) f(c);
     }
   }
 
-  // Writers of what it reads, and of what it writes the one before it in the file.
-  void find_first() {
+  // Of what writes one control each after the one before it in the file, and operations after
+  // those whose values they read.
+  template <class F>
+  void for_edges(F f) const {
+    std::vector<std::uint32_t> last(r_->control_count, rig::kNone);
     for (std::uint32_t n = 0; n < size(); ++n) {
-      for_reads(n, [&](std::uint32_t c) {
-        first_[n].insert(first_[n].end(), writers_[c].begin(), writers_[c].end());
-      });
+      for (const std::uint32_t c : written_.of(n)) {
+        const std::uint32_t before = std::exchange(last[c], n);
+        if (before != rig::kNone) f(before, n);
+      }
     }
-    for (const auto& list : writers_) {
-      for (std::size_t i = 1; i < list.size(); ++i) first_[list[i]].push_back(list[i - 1]);
-    }
-    for (std::uint32_t n = 0; n < operations_; ++n) add_operations_before(n);
-    for (auto& list : first_) {
-      std::ranges::sort(list);
-      list.erase(std::unique(list.begin(), list.end()), list.end());
-    }
-  }
-  // Operations whose values it reads.
-  void add_operations_before(std::uint32_t n) {
-    const MlOperation& op = r_.ml_operations[n];
-    const auto& all = r_.ml_operations;
-    for (std::uint32_t s = 0; s < op.segment_count; ++s) {
-      const rig::MlSegment& segment = r_.ml_segments[op.segments_begin + s];
-      if (segment.count == 0) continue;
-      const auto after =
-          std::ranges::upper_bound(all, segment.begin, {}, &MlOperation::values_begin);
-      first_[n].push_back(static_cast<std::uint32_t>(after - all.begin()) - 1);
+    for (std::uint32_t n = 0; n < operations_; ++n) {
+      const MlOperation& op = r_->ml_operations[n];
+      const auto& all = r_->ml_operations;
+      for (std::uint32_t s = 0; s < op.segment_count; ++s) {
+        const rig::MlSegment& segment = r_->ml_segments[op.segments_begin + s];
+        if (segment.count == 0) continue;
+        const auto after =
+            std::ranges::upper_bound(all, segment.begin, {}, &MlOperation::values_begin);
+        f(static_cast<std::uint32_t>(after - all.begin()) - 1, n);
+      }
     }
   }
 
-  const RigData& r_;
+  const RigData* r_;
   std::uint32_t operations_, solvers_;
-  std::vector<std::vector<std::uint32_t>> writers_, first_;
+  Lists written_, readers_, after_;
 };
 
 struct Order {
@@ -140,56 +204,94 @@ struct Order {
   std::vector<std::uint32_t> cyclic;  // members of cycles, and what hangs on them
 };
 
+// How many nodes each node still waits for, itself or through a control that they write.
+class Waiting {
+ public:
+  // In: nodes  each once; others are taken as done
+  Waiting(const Graph& g, const std::vector<std::uint32_t>& nodes)
+      : g_(g), here_(g.size(), false), nodes_(g.size(), 0), controls_(g.control_count(), 0) {
+    for (const std::uint32_t n : nodes) here_[n] = true;
+    for (const std::uint32_t n : nodes) {
+      for (const std::uint32_t c : g.written(n)) {
+        if (controls_[c]++ > 0) continue;
+        for (const std::uint32_t m : g.readers(c)) ++nodes_[m];
+      }
+      for (const std::uint32_t m : g.after(n)) ++nodes_[m];
+    }
+  }
+
+  bool is_ready(std::uint32_t n) const { return nodes_[n] == 0; }
+
+  /// Calls f(m) for each node that waited for n alone.
+  template <class F>
+  void finish(std::uint32_t n, F f) {
+    const auto done = [&](std::uint32_t m) {
+      if (--nodes_[m] == 0 && here_[m]) f(m);
+    };
+    for (const std::uint32_t c : g_.written(n)) {
+      if (--controls_[c] == 0) std::ranges::for_each(g_.readers(c), done);
+    }
+    std::ranges::for_each(g_.after(n), done);
+  }
+
+ private:
+  const Graph& g_;
+  std::vector<bool> here_;
+  std::vector<std::uint32_t> nodes_, controls_;
+};
+
 // In: nodes  ascending; others are taken as done
-Order order_of(const Graph& g, const std::vector<std::uint32_t>& nodes) {
-  std::vector<bool> here(g.size(), false);
-  for (const std::uint32_t n : nodes) here[n] = true;
-  std::vector<std::vector<std::uint32_t>> users(g.size());
-  std::vector<std::uint32_t> waiting(g.size(), 0);
+Order order_of(const Graph& g, std::vector<std::uint32_t> nodes) {
+  nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());  // a file may list one twice
+  Waiting waiting(g, nodes);
   std::priority_queue<std::uint32_t, std::vector<std::uint32_t>, std::greater<>> ready;
   for (const std::uint32_t n : nodes) {
-    for (const std::uint32_t m : g.before(n)) {
-      if (!here[m]) continue;
-      users[m].push_back(n);
-      ++waiting[n];
-    }
-    if (waiting[n] == 0) ready.push(n);
+    if (waiting.is_ready(n)) ready.push(n);
   }
   Order order;
   while (!ready.empty()) {
     const std::uint32_t n = ready.top();
     ready.pop();
     order.sorted.push_back(n);
-    for (const std::uint32_t user : users[n]) {
-      if (--waiting[user] == 0) ready.push(user);
-    }
+    waiting.finish(n, [&](std::uint32_t m) { ready.push(m); });
   }
-  for (const std::uint32_t n : nodes) {
-    if (waiting[n] > 0) order.cyclic.push_back(n);
-  }
+  std::ranges::copy_if(nodes, std::back_inserter(order.cyclic),
+                       [&](std::uint32_t n) { return !waiting.is_ready(n); });
   return order;
 }
 
-// Operations and solvers that need no corrective, directly or not.
-std::vector<bool> early_nodes(const Graph& g) {
-  std::vector<bool> early(g.size(), false);
-  std::vector<std::uint32_t> all;
-  for (std::uint32_t n = 0; n < g.size(); ++n) all.push_back(n);
-  // In an order where all of what a node needs was looked at: a cycle is never early.
-  for (const std::uint32_t n : order_of(g, all).sorted) {
-    const auto& before = g.before(n);
-    early[n] = !g.is_psd(n) && std::ranges::all_of(before, [&](auto m) { return early[m]; });
+// Operations and solvers that need no corrective, directly or not, and no cycle.
+struct Early {
+  std::vector<bool> nodes;
+  std::vector<bool> controls;  // all that writes them is early
+};
+
+Early find_early(const Graph& g) {
+  Early early{std::vector<bool>(g.size(), true), std::vector<bool>(g.control_count(), true)};
+  std::vector<std::uint32_t> all(g.size());
+  std::iota(all.begin(), all.end(), 0u);
+  const auto delay = [&](std::uint32_t n) {
+    early.nodes[n] = false;
+    for (const std::uint32_t c : g.written(n)) {
+      if (!early.controls[c]) continue;
+      early.controls[c] = false;
+      for (const std::uint32_t m : g.readers(c)) early.nodes[m] = false;
+    }
+    for (const std::uint32_t m : g.after(n)) early.nodes[m] = false;
+  };
+  const Order order = order_of(g, all);
+  for (const std::uint32_t n : order.cyclic) delay(n);
+  for (const std::uint32_t n : order.sorted) {
+    if (g.is_psd(n) || !early.nodes[n]) delay(n);
   }
   return early;
 }
 
 // Which factor watches each corrective; kNone where a factor may change after the watchers looked.
-std::vector<std::uint32_t> choose_watchers(const RigData& r, const Graph& g,
-                                           const std::vector<bool>& early) {
+std::vector<std::uint32_t> choose_watchers(const RigData& r, const Early& early) {
   std::vector<std::uint32_t> load(r.control_count, 0), watchers;
   const auto late = [&](std::uint16_t control) {
-    return detail::is_corrective(r, control) ||
-           std::ranges::any_of(g.writers(control), [&](auto n) { return !early[n]; });
+    return detail::is_corrective(r, control) || !early.controls[control];
   };
   for (const rig::Psd& p : r.psds) {
     std::uint32_t watcher = rig::kNone;
@@ -256,31 +358,82 @@ void sort_correctives(RigData& r) {
   }
 }
 
+// What running each operation and solver once takes.
+class Costs {
+ public:
+  explicit Costs(const RigData& r) : r_(r), layers_(1, 0), segments_(1, 0), poses_(1, 0) {
+    for (const rig::MlLayer& l : r.ml_layers) {
+      layers_.push_back(layers_.back() + (std::uint64_t{l.columns} + 1) * l.rows);
+    }
+    for (const rig::MlSegment& s : r.ml_segments) segments_.push_back(segments_.back() + s.count);
+    for (const rig::RbfPose& p : r.rbf_poses) {
+      poses_.push_back(poses_.back() + p.input_count + p.output_count);
+    }
+  }
+  std::uint64_t of_operation(std::uint32_t i) const {
+    const MlOperation& op = r_.ml_operations[i];
+    const std::uint64_t layers =
+        op.kind == MlOperation::kMlp ? sum(layers_, op.items_begin, op.item_count) : 0;
+    return op.value_count + layers + sum(segments_, op.segments_begin, op.segment_count);
+  }
+  std::uint64_t of_solver(std::uint32_t i) const {
+    const rig::RbfSolver& s = r_.rbf_solvers[i];
+    const std::uint64_t poses = s.pose_count;
+    return poses * (s.input_count + std::uint64_t{1} + (s.interpolative != 0 ? poses : 0)) +
+           sum(poses_, s.poses_begin, s.pose_count);
+  }
+
+ private:
+  static std::uint64_t sum(const std::vector<std::uint64_t>& ends, std::size_t begin,
+                           std::size_t count) {
+    return ends[begin + count] - ends[begin];
+  }
+
+  const RigData& r_;
+  std::vector<std::uint64_t> layers_, segments_, poses_;  // sums up to each
+};
+
+// A LOD may list a step any number of times.
+Status take_steps_of_lists(const RigData& r, const StepLods& lods, Budget& budget) {
+  const Costs costs(r);
+  std::uint64_t operations = 0, solvers = 0;
+  for (std::uint32_t lod = 0; lod < r.lod_count; ++lod) {
+    for (const std::uint32_t i : lods.operations[lod]) operations += costs.of_operation(i);
+    for (const std::uint32_t i : lods.solvers[lod]) solvers += costs.of_solver(i);
+  }
+  if (Status s = budget.take_steps(operations, "machine_learned_behavior_ext.types"); !s) return s;
+  return budget.take_steps(solvers, "rbf_behavior.lod_solver_mapping");
+}
+
 }  // namespace
 
-void detail::schedule(const Used& used, const StepLods& lods, RigData& r) {
-  const Graph g(r);
-  const std::vector<bool> early = early_nodes(g);
-  const std::vector<std::uint32_t> watchers = choose_watchers(r, g, early);
+Status detail::schedule(const Used& used, const StepLods& lods, Budget& budget, RigData& r) {
+  if (Status s = take_steps_of_lists(r, lods, budget); !s) return s;
+  const auto graph = Graph::make(r, budget);
+  if (!graph) return core::Unexpected{graph.error()};
+  const Graph& g = *graph;
+  const Early early = find_early(g);
+  const std::vector<std::uint32_t> watchers = choose_watchers(r, early);
   r.step_begins.push_back(0);
   for (std::uint32_t lod = 0; lod < r.lod_count; ++lod) {
     add_watched(used[lod], watchers, r);
     std::vector<std::uint32_t> reference, first, rest;
     for (const std::uint32_t i : lods.operations[lod]) reference.push_back(g.operation(i));
     for (const std::uint32_t i : lods.solvers[lod]) reference.push_back(g.solver(i));
-    for (const std::uint32_t n : reference) (early[n] ? first : rest).push_back(n);
+    for (const std::uint32_t n : reference) (early.nodes[n] ? first : rest).push_back(n);
     std::ranges::sort(first);
     std::ranges::sort(rest);
     for (std::uint32_t p = 0; p < r.psds.size(); ++p) {
       if (used[lod][r.psds[p].output] && watchers[p] == rig::kNone) rest.push_back(g.psd(p));
     }
-    const Order order = order_of(g, rest);
-    add_list(g, order_of(g, first).sorted, r);
+    const Order order = order_of(g, std::move(rest));
+    add_list(g, order_of(g, std::move(first)).sorted, r);
     add_list(g, order.sorted, r);
     add_list(g, order.cyclic, r);
     add_list(g, reference, r);
   }
   sort_correctives(r);
+  return core::ok();
 }
 
 }  // namespace risorius::compile

@@ -4,11 +4,13 @@
 #include <malloc.h>
 
 #include <algorithm>
+#include <cerrno>
 
 extern "C" {
 void* __libc_malloc(std::size_t);
 void* __libc_calloc(std::size_t, std::size_t);
 void* __libc_realloc(void*, std::size_t);
+void* __libc_memalign(std::size_t, std::size_t);
 void __libc_free(void*);
 }
 
@@ -33,6 +35,16 @@ bool is_mapped(void* p) { return (static_cast<std::size_t*>(p)[-1] & 2) != 0; }
 extern "C" {
 void* malloc(std::size_t size) { return added(__libc_malloc(size)); }
 void* calloc(std::size_t n, std::size_t size) { return added(__libc_calloc(n, size)); }
+void* aligned_alloc(std::size_t alignment, std::size_t size) {
+  return added(__libc_memalign(alignment, size));
+}
+void* memalign(std::size_t alignment, std::size_t size) {
+  return added(__libc_memalign(alignment, size));
+}
+int posix_memalign(void** out, std::size_t alignment, std::size_t size) {
+  *out = added(__libc_memalign(alignment, size));
+  return *out == nullptr ? ENOMEM : 0;
+}
 void free(void* p) {
   now -= size_of(p);
   __libc_free(p);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // What a piece of code takes from the heap. Only with glibc and without a sanitizer: see
-// tests/dna/CMakeLists.txt.
+// tests/support/CMakeLists.txt.
 #pragma once
 
 #include <cstddef>

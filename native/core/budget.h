@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: MIT
+// What a stage may take in proportion to its input: bytes and steps, counted and not timed.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <utility>
+
+#include "core/result.h"
+
+namespace risorius::core {
+
+/// Handed through a stage, which asks before it stores or does what grows faster than its input.
+/// Plain copies of the input are not asked for.
+class Budget {
+ public:
+  static constexpr std::uint64_t kUnlimited = ~std::uint64_t{0};
+
+  /// In: stage  begins the message, e.g. "compiling"
+  Budget(std::string stage, std::uint64_t most_bytes, std::uint64_t most_steps)
+      : stage_(std::move(stage)), most_bytes_(most_bytes), most_steps_(most_steps) {}
+
+  /// Fails: kLimitExceeded with the field, what was asked for in all, and the limit.
+  Status take_bytes(std::uint64_t count, const std::string& where) {
+    return take(count, bytes_, most_bytes_, "bytes", where);
+  }
+  Status take_steps(std::uint64_t count, const std::string& where) {
+    return take(count, steps_, most_steps_, "steps", where);
+  }
+  std::uint64_t bytes() const { return bytes_; }
+  std::uint64_t steps() const { return steps_; }
+
+ private:
+  Status take(std::uint64_t count, std::uint64_t& taken, std::uint64_t most, const char* unit,
+              const std::string& where) const {
+    taken = count > kUnlimited - taken ? kUnlimited : taken + count;
+    if (taken <= most) return ok();
+    return fail(ErrorCode::kLimitExceeded, where,
+                stage_ + " takes at least " + std::to_string(taken) + " " + unit +
+                    ", the limit for an input of this size is " + std::to_string(most));
+  }
+
+  std::string stage_;
+  std::uint64_t most_bytes_, most_steps_, bytes_ = 0, steps_ = 0;
+};
+
+}  // namespace risorius::core
