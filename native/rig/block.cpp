@@ -155,11 +155,17 @@ Result<Rig> make_rig(const RigData& data, const simd::Kernels& kernels) {
   h.byte_order = kByteOrder;
   h.header_size = sizeof(BlockHeader);
   h.rig = data;
-  std::size_t size = aligned(sizeof(BlockHeader)), i = 0;
+  std::size_t size = aligned(sizeof(BlockHeader)), longest = 0, i = 0;
   for_each_array(data, [&](const auto& array) {
     h.places[i++] = {size, array.size()};
     size = aligned(size + array.size() * sizeof(array[0]));
+    longest = std::max(longest, array.size());
   });
+  if (longest > UINT32_MAX) {
+    return fail(
+        ErrorCode::kLimitExceeded, "rig",
+        "a list of " + number(longest) + " elements, an index reaches " + number(UINT32_MAX));
+  }
   h.size = size;
   const std::shared_ptr<std::uint8_t> block = core::allocate_pages(size);
   const std::span<std::uint8_t> bytes(block.get(), size);
@@ -171,7 +177,13 @@ Result<Rig> make_rig(const RigData& data, const simd::Kernels& kernels) {
   });
   std::memcpy(bytes.data(), &h, sizeof(h));
   seal_block(bytes);
-  return open_rig(bytes, block, BlockCheck::kHeader, kernels);
+  auto rig = open_rig(bytes, block, BlockCheck::kHeader, kernels);
+  if (rig && !detail::scratch_fits(*rig)) {
+    return fail(ErrorCode::kLimitExceeded, "machine_learned_behavior",
+                number(data.operation_values) + " values and " + number(data.mask_count) +
+                    " regions of networks, more than 64 times the compiled face");
+  }
+  return rig;
 }
 
 }  // namespace risorius::rig

@@ -262,10 +262,7 @@ void check_operation(const Rig& r, const MlOperation& op, IndexCheck& c) {
 
 void check_networks(const Rig& r, IndexCheck& c) {
   for (const MlOperation& op : r.ml_operations) check_operation(r, op, c);
-  // Scratch is no larger than what fills it.
-  std::uint64_t values = 0;
-  for (const MlOperation& op : r.ml_operations) values += op.value_count;
-  c.demand("header", r.operation_values <= values && r.mask_count <= 0x1000000);
+  c.demand("header", detail::scratch_fits(r));
   for (const MlSegment& s : r.ml_segments) {
     c.demand("ml_segments", inside(s.begin, s.count, r.operation_values));
   }
@@ -277,7 +274,8 @@ void check_networks(const Rig& r, IndexCheck& c) {
   for (std::size_t i = 0; i < r.ml_layers.size() && c.status(); ++i) {
     const MlLayer& l = r.ml_layers[i];
     const std::uint64_t weights = (std::uint64_t{l.columns} + 1) * l.rows + simd::kWidest;
-    c.demand("ml_layers", inside(l.weights_begin, weights, r.ml_weights.size()));
+    c.demand("ml_layers", inside(l.weights_begin, weights, r.ml_weights.size()) &&
+                              (l.rows > 0 || l.columns == 0));
     widest = std::max({widest, l.rows, l.columns});
     for (std::uint32_t lod = 0; lod < r.lod_count; ++lod) {
       c.demand("ml_layer_rows", r.ml_layer_rows[i * r.lod_count + lod] <= l.rows);
@@ -320,6 +318,14 @@ void check_table(const char* where, View<ConditionalRow> rows, std::uint64_t inp
 }
 
 }  // namespace
+
+bool detail::scratch_fits(const Rig& r) {
+  std::uint64_t values = 0;
+  for (const MlOperation& op : r.ml_operations) values += op.value_count;
+  const std::uint64_t most = (std::uint64_t{1} << 20) + 64 * std::uint64_t{r.block().size()};
+  return r.operation_values <= values &&
+         sizeof(float) * (std::uint64_t{r.operation_values} + r.mask_count) <= most;
+}
 
 Status detail::check_everything(const Rig& r) {
   IndexCheck c;

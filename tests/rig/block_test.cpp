@@ -2,6 +2,7 @@
 // A compiled face as bytes: whatever is done to them, they are a face or an error.
 #include <gtest/gtest.h>
 
+#include <cstddef>
 #include <cstring>
 #include <random>
 
@@ -209,6 +210,17 @@ TEST(Block, RowsOfGroupsFollowEachOther) {
   Bytes rows = bytes_of(rig);
   first_of(rows, rig, std::span(rig.joint_groups)).rows_begin = 1;
   EXPECT_EQ(refused_field(rows), "rig.joint_groups");
+}
+
+// Counts that no array backs: a small block must not ask for a large workspace.
+TEST(Block, ScratchIsHeldAgainstTheBlock) {
+  const Rig rig = must_compile(face_with_everything());
+  constexpr std::size_t kRigHeader = 32;  // behind magic, byte order, sizes and hash
+  Bytes forged = bytes_of(rig);
+  const std::uint32_t regions = 0x00FFFFFF;  // 64 MB of masks
+  std::memcpy(forged.data() + kRigHeader + offsetof(RigHeader, mask_count), &regions,
+              sizeof(regions));
+  EXPECT_EQ(refused_field(forged), "rig.header");
 }
 
 TEST(Block, BytesThatAreNotAlignedAreRefused) {
