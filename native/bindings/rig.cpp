@@ -211,8 +211,8 @@ std::shared_ptr<const void> keep(py::buffer buffer, const void* address) {
           }};
 }
 
-// Nobody can change a read-only buffer under a Rig; any other is copied, and so is one that does
-// not lie on 64 bytes.
+// Nobody can change a bytes object under a Rig. Any other buffer is copied, a read-only view as
+// well: what it shows may be written by its owner. So are bytes that do not lie on 64.
 std::shared_ptr<rig::Rig> rig_from_bytes(const py::buffer& buffer, bool trusted,
                                          const std::optional<std::string>& simd) {
   const py::buffer_info info = buffer.request();
@@ -222,7 +222,8 @@ std::shared_ptr<rig::Rig> rig_from_bytes(const py::buffer& buffer, bool trusted,
   const auto size = static_cast<std::size_t>(info.size * info.itemsize);
   const auto* data = static_cast<const std::uint8_t*>(info.ptr);
   std::shared_ptr<const void> owner;
-  if (info.readonly && reinterpret_cast<std::uintptr_t>(data) % 64 == 0) {
+  const bool is_constant = PyBytes_CheckExact(buffer.ptr()) != 0;
+  if (is_constant && reinterpret_cast<std::uintptr_t>(data) % 64 == 0) {
     owner = keep(buffer, data);
   } else {
     auto copy = std::make_shared<core::AlignedVector<std::uint8_t>>(data, data + size);
@@ -347,11 +348,12 @@ void bind_rig_class(py::module_& m) {
       m, "Rig", "A compiled face: turns raw controls into a Pose. Immutable, shared freely.")
       .def(py::init(&make_rig), py::arg("dna"), py::kw_only(), py::arg("precision") = "float32",
            py::arg("rotation") = "euler", py::arg("simd") = py::none())
-      .def_static("from_bytes", &rig_from_bytes, py::arg("bytes"), py::arg("trusted") = false,
-                  py::arg("simd") = py::none(),
-                  "A Rig from what to_bytes or block gave, of this version and byte order. A "
-                  "read-only buffer on a multiple of 64 bytes is used in place and kept, any other "
-                  "is copied. trusted leaves out the hash and the check of every index.")
+      .def_static(
+          "from_bytes", &rig_from_bytes, py::arg("bytes"), py::arg("trusted") = false,
+          py::arg("simd") = py::none(),
+          "A Rig from what to_bytes or block gave, of this version and byte order. A "
+          "bytes object whose data lies on a multiple of 64 is used in place and kept, any "
+          "other buffer is copied. trusted leaves out the hash and the check of every index.")
       .def(
           "to_bytes",
           [](const rig::Rig& r) {

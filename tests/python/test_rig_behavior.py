@@ -390,6 +390,20 @@ def test_bytes_are_the_rig(rotation):
     np.testing.assert_array_equal(shared.evaluate(raw).joints, wanted.joints)
 
 
+def test_a_read_only_view_of_what_others_may_write_is_copied():
+    dna = risorius.load(GOLDEN / "tiny_v28.dna")
+    rig = risorius.Rig(dna)
+    raw = random_raw(np.random.default_rng(3), dna)
+    data = np.frombuffer(rig.to_bytes(), np.uint8)
+    space = np.empty(len(data) + 64, np.uint8)
+    owner = space[-space.ctypes.data % 64 :][: len(data)]  # where a view could be used in place
+    owner[:] = data
+    again = risorius.Rig.from_bytes(memoryview(owner).toreadonly())
+    owner[:] = 0
+    np.testing.assert_array_equal(again.evaluate(raw).joints, rig.evaluate(raw).joints)
+    assert again.to_bytes() == rig.to_bytes()
+
+
 def test_damaged_bytes_are_refused():
     data = bytearray(risorius.Rig(risorius.load(GOLDEN / "core.dna")).to_bytes())
     data[-1] ^= 1
