@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Dna from and to bytes, files and JSON, and what changes one as a whole.
+#include <charconv>
+
 #include "bindings/fields.h"
 #include "core/file_write.h"
 #include "core/path_text.h"
@@ -124,6 +126,21 @@ void bind_writing(DnaClass& c) {
       py::arg("text"), py::arg("limits") = dna::Limits{}, "What to_json wrote.");
 }
 
+// "1.0" as two halves of 16 bits.
+std::uint32_t layer_version(const std::string& text) {
+  std::uint16_t major = 0, minor = 0;
+  const char *begin = text.data(), *end = begin + text.size();
+  const auto first = std::from_chars(begin, end, major);
+  if (first.ec == std::errc{} && first.ptr != end && *first.ptr == '.') {
+    const auto second = std::from_chars(first.ptr + 1, end, minor);
+    if (second.ec == std::errc{} && second.ptr == end) {
+      return std::uint32_t{major} << 16 | minor;
+    }
+  }
+  throw py::value_error("unknown_layers: a version from 0.0 to 65535.65535 was expected, found '" +
+                        text + "'");
+}
+
 void bind_layers(DnaClass& c) {
   c.def_property(
       "unknown_layers",
@@ -141,13 +158,12 @@ void bind_layers(DnaClass& c) {
         std::vector<dna::UnknownLayer> out;
         for (const auto& [id, version, bytes] : layers) {
           dna::UnknownLayer layer;
-          const std::size_t dot = version.find('.');
-          if (id.size() != 4 || dot == std::string::npos) {
-            throw py::value_error("unknown_layers: (id of 4 letters, '1.0', bytes) was expected");
+          if (id.size() != 4) {
+            throw py::value_error("unknown_layers: an id of 4 letters was expected, found " +
+                                  std::to_string(id.size()));
           }
           std::copy(id.begin(), id.end(), layer.id.begin());
-          layer.version = static_cast<std::uint32_t>(std::stoul(version.substr(0, dot)) << 16 |
-                                                     std::stoul(version.substr(dot + 1)));
+          layer.version = layer_version(version);
           layer.bytes.assign(bytes.begin(), bytes.end());
           out.push_back(std::move(layer));
         }

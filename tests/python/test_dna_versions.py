@@ -139,6 +139,19 @@ def test_newer_layers_can_be_left_out(target):
     assert missing | {"abcd"} <= named <= missing | {"abcd", "behavior"}
 
 
+@pytest.mark.parametrize(
+    "version", ["1.65536", "65536.0", "-1.0", "x.1", "1.x", "1", "1.", " 1.0", ""]
+)
+def test_versions_of_layers_are_two_numbers_of_16_bits(version):
+    dna = risorius.Dna()
+    dna.unknown_layers = [("abcd", "65535.65535", b"1")]
+    with pytest.raises(
+        ValueError, match=f"from 0.0 to 65535.65535 was expected, found '{version}'"
+    ):
+        dna.unknown_layers = [("abcd", version, b"")]
+    assert dna.unknown_layers == [("abcd", "65535.65535", b"1")]
+
+
 def test_unknown_layers_are_kept_or_dropped_by_choice():
     dna = risorius.load(GOLDEN / "tiny_v28.dna")
     dna.unknown_layers = [("abcd", "1.0", b"12345"), ("mlbh", "9.0", b"")]
