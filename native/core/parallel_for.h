@@ -3,13 +3,16 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <exception>
+#include <mutex>
 #include <thread>
 #include <vector>
 
 namespace risorius::core {
 
 /// Calls body(begin, end) on ranges that cover [0, n), on up to `threads` threads (0: all cores,
-/// and never more than 256). The body may not throw.
+/// and never more than 256). What a body throws, such as bad_alloc, is thrown again when all
+/// threads have ended; of several the first.
 template <class Body>
 void parallel_for(std::size_t n, std::size_t threads, const Body& body) {
   if (threads == 0) threads = std::max(1u, std::thread::hardware_concurrency());
@@ -18,11 +21,22 @@ void parallel_for(std::size_t n, std::size_t threads, const Body& body) {
     body(std::size_t{0}, n);
     return;
   }
-  std::vector<std::jthread> workers;
-  workers.reserve(threads);
-  for (std::size_t t = 0; t < threads; ++t) {
-    workers.emplace_back([&body, n, t, threads] { body(n * t / threads, n * (t + 1) / threads); });
+  std::mutex lock;
+  std::exception_ptr failure;
+  const auto work = [&](std::size_t t) {
+    try {
+      body(n * t / threads, n * (t + 1) / threads);
+    } catch (...) {  // beyond the thread it would end the process
+      const std::lock_guard held(lock);
+      if (!failure) failure = std::current_exception();
+    }
+  };
+  {
+    std::vector<std::jthread> workers;
+    workers.reserve(threads);
+    for (std::size_t t = 0; t < threads; ++t) workers.emplace_back(work, t);
   }
+  if (failure) std::rethrow_exception(failure);
 }
 
 }  // namespace risorius::core

@@ -145,5 +145,16 @@ TEST(OneRig, MayBeLetGoByThreadsInAnyOrder) {
   EXPECT_EQ(wrong, 0);
 }
 
+// Not of the tsan preset's OneRig: exceptions pass between threads.
+TEST(Parallel, WhatAThreadThrowsIsTheCallers) {
+  std::atomic<std::size_t> done = 0;
+  const auto body = [&](std::size_t begin, std::size_t end) {
+    if (begin > 0) throw std::bad_alloc();
+    done += end - begin;
+  };
+  EXPECT_THROW(core::parallel_for(8, 4, body), std::bad_alloc);
+  EXPECT_EQ(done, 2u);
+}
+
 }  // namespace
 }  // namespace risorius::rig
