@@ -248,6 +248,38 @@ def test_toml_nested_without_end_is_one_sentence(deep, tmp_path):
         read_jobs(path)
 
 
+def test_a_mapping_that_makes_a_thousand_of_each_curve_is_refused(tmp_path):
+    path = tmp_path / "m.toml"
+    many = ", ".join(f"c{i} = 1.0" for i in range(3000))
+    path.write_text(f"[rows]\njawOpen = {{ {many} }}\n")
+    clip = Clip(["jawOpen"], np.ones((1, 20_000)), 60.0)
+    found = importing.Imported(clip, "csv", "", "take.csv")
+    peak, error = peak_of(lambda: found.apply(path))
+    assert isinstance(error, BudgetError)
+    assert "mapping m: " in str(error)
+    assert peak <= BASE_BYTES + BYTES_PER_BYTE * clip.curves.nbytes
+    patterns = "\n".join(f'"*x{i}" = {{ "y{i}*" = 1.0 }}' for i in range(1000))
+    path.write_text(f"[rows]\n{patterns}\n")
+    names = [f"name{i}" for i in range(1000)]
+    found = importing.Imported(Clip(names, np.ones((1000, 2)), 60.0), "csv", "", "take.csv")
+    with pytest.raises(BudgetError, match="1000 patterns"):
+        found.apply(path)
+
+
+def test_reading_an_fbx_needs_nothing_from_elsewhere(tmp_path, monkeypatch):
+    def refuse(*_arguments, **_options):
+        raise AssertionError
+
+    monkeypatch.setattr("socket.socket", refuse)
+    monkeypatch.setattr("subprocess.Popen", refuse)
+    curve = fbx_files.curve(7, [0.0, 1.0], [0.0, 1.0])
+    path = tmp_path / "take.fbx"
+    path.write_bytes(
+        fbx_files.animation([("Model/Null", "face", "jawOpen", {"d|jawOpen": curve}, 0)])
+    )
+    assert importing.read(path).clip.names == ("jawOpen",)
+
+
 def test_toml_as_people_write_it_is_not_deep(tmp_path):
     path = tmp_path / "m.toml"
     rows = "\n".join(f'"a.b.c.{i}" = {{ jawOpen = 1.0 }}' for i in range(200))

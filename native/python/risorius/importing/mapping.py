@@ -21,6 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .. import arkit, expressions, toml
+from ..budget import Budget
 from ..clip import Clip
 from ..regions import expand_sides
 from .errors import AnimationFileError
@@ -34,6 +35,7 @@ _KEYS = {
     "name", "description", "base", "prefix", "strip", "matching", "gui", "ignore", "rows",
     "controls", "metadata",
 }  # fmt: skip
+_PATTERN_STEPS = 50  # of a budget, to look whether a pattern fits a name
 _SIDE = re.compile(r"(?:(?<=[a-z])(?=[LR]$)|(?<=[._\- ])(?=[LlRr]$))")
 
 
@@ -145,7 +147,13 @@ def apply_rows(mapping: Mapping, clip: Clip) -> Mapped:
 
     Curves that move one control are added up, weighted; then the control is adjusted. A curve that
     is one control with weight 1, not adjusted, keeps its bits.
+
+    Raises:
+        BudgetError: a mapping of so many controls or patterns that the clip cannot be worth them.
     """
+    budget, place = Budget.of(clip.curves.nbytes), f"mapping {mapping.name}"
+    patterns = sum("*" in key for key in mapping.rows) * (1 + len(mapping.strip))
+    budget.work(len(clip.names) * patterns * _PATTERN_STEPS, f"{place}: {patterns} patterns")
     find = mapping.finder()
     sums: dict[str, Doubles] = {}
     out = Mapped(clip, {}, [], [], [], [])
@@ -166,11 +174,16 @@ def apply_rows(mapping: Mapping, clip: Clip) -> Mapped:
             continue
         out.mapped[name] = tuple(row)
         for control, weight in row.items():
+            if control not in sums:
+                budget.hold(12 * clip.frame_count, f"{place}: {len(sums) + 1} controls")
+            budget.work(clip.frame_count + 1, f"{place}: {len(sums) + 1} controls")
             part = weight * curve.astype(np.float64)
             sums[control] = sums[control] + part if control in sums else part
     out.absent = [
         key for key, row in mapping.rows.items() if key not in used and row and "*" not in key
     ]
+    adjustments = len(sums) * len(mapping.controls)
+    budget.work(adjustments * _PATTERN_STEPS, f"{place}: {len(mapping.controls)} in controls")
     curves = np.zeros((len(sums), clip.frame_count), np.float32)
     for i, (control, values) in enumerate(sums.items()):
         what = mapping.adjustment(control)
