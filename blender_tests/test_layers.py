@@ -590,6 +590,19 @@ def test_layers_become_strips_that_show_the_same(rig):
         np.testing.assert_allclose(_raw(rig, frame), raw, atol=1e-6)
 
 
+@pytest.mark.parametrize(("fade_in", "fade_out"), [(3.0, 9.0), (9.0, 3.0), (0.0, 6.0), (6.0, 0.0)])
+def test_fades_of_a_strip_lie_at_their_own_ends(rig, fade_in, fade_out):
+    held = _action(rig, "Held", "LINEAR", jawOpen={1: 0.8, 21: 0.8})
+    _entry(rig, action=held, fade_in=fade_in, fade_out=fade_out, extend="NOTHING")
+    frames = np.arange(1.0, 21.01, 0.5)
+    up = (frames - 1) / fade_in if fade_in else np.ones(len(frames))
+    down = (21 - frames) / fade_out if fade_out else np.ones(len(frames))
+    wanted = 0.8 * np.minimum(1.0, np.minimum(up, down))
+    np.testing.assert_allclose([_value(rig, f, JAW) for f in frames], wanted, atol=1e-6)
+    assert bpy.ops.risorius.layers_to_nla() == {"FINISHED"}
+    np.testing.assert_allclose([_value(rig, f, JAW) for f in frames], wanted, atol=1e-6)
+
+
 def test_what_no_strip_can_say_stays_a_layer_and_all_above_it(rig):
     controls = scene.controls(rig)
     wave = _wave(rig)
