@@ -169,3 +169,12 @@ def test_a_deleted_character_with_a_material_without_nodes_leaves_the_file(rig, 
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "gone.blend"))
     assert not [o for o in bpy.data.objects if "risorius_controls" in o]
     assert not bpy.data.meshes
+
+
+def test_a_copy_of_the_controls_alone_says_that_it_moves_nothing(rig, dna_file):
+    controls = scene.controls(rig)
+    copy = controls.copy()
+    bpy.context.scene.collection.objects.link(copy)
+    bpy.context.view_layer.update()
+    assert f"{copy.name} is a copy of the controls alone" in " ".join(_said(copy).split())
+    assert "copy of the controls" not in " ".join(_said(controls).split())

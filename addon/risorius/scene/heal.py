@@ -85,6 +85,11 @@ def missing(item):
         return ["The deforming armature of this face was deleted; undo brings it back."] * lost
     controls = rig.get(parts.CONTROLS)
     found = []
+    if item is not None and item.type == "ARMATURE" and item not in (rig, controls):
+        found.append(
+            f"{item.name} is a copy of the controls alone and moves nothing: delete it. To copy a "
+            f"face, duplicate all objects of its collection."
+        )
     if controls is None:
         found.append("The control armature was deleted; undo brings it back.")
     elif parts.FACE not in controls.pose.bones:
