@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A face stands where its control armature stands, and that may hang on a body."""
 
+import itertools
+
 import bpy
 import numpy as np
 import pytest
@@ -199,3 +201,24 @@ def test_everything_visible_selected_and_duplicated_is_a_face(mode, dna_file):
     raw = scene.raw_of(copy, dna_file)
     assert scene.error_against_oracle(copy, dna_file, raw) < scene.TOLERANCE
     np.testing.assert_array_equal(scene.snapshot(rig), still)
+
+
+def test_faces_are_imported_side_by_side(dna_file):
+    rigs = [scene.load(dna_file, "LIVE") for _ in range(3)]
+    rigs += [scene.load(dna_file, "KEYS", lods=(False, True, *[False] * 6))]
+    spans = []
+    for rig in rigs:
+        points = scene.snapshot(rig)
+        spans.append((points[:, 0].min(), points[:, 0].max()))
+        middle = scene.controls(rig).matrix_world.translation
+        assert tuple(middle)[1:] == (0.0, 0.0)
+        raw = scene.raw_of(rig, dna_file)
+        lod = next(iter(scene.meshes(rig).values()))["dna_lods"][0]
+        assert scene.error_against_oracle(rig, dna_file, raw, lod) < scene.TOLERANCE
+    assert tuple(scene.controls(rigs[0]).location) == (0.0, 0.0, 0.0)
+    for (_left, right), (left, _right) in itertools.pairwise(spans):
+        assert left > right
+    # A face that was moved away leaves its spot to the next.
+    scene.controls(rigs[0]).location = (0.0, 5.0, 0.0)
+    bpy.context.view_layer.update()
+    assert tuple(scene.controls(scene.load(dna_file, "LIVE")).location) == (0.0, 0.0, 0.0)

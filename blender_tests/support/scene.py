@@ -77,14 +77,18 @@ def raw_of(rig, path):
 
 
 def error_against_oracle(rig, path, raw, lod=0, unit_scale=1.0):
-    """Largest distance between Blender's vertices and the oracle's, over the mesh's size."""
+    """Largest distance between Blender's vertices and the oracle's, over the mesh's size.
+
+    The face may stand anywhere.
+    """
+    place = np.array(rig.matrix_world)
     dna = risorius.load(str(path))
     pose = risorius.Rig(dna).evaluate(np.asarray(raw, np.float32), lod)
     worst = 0.0
     for index, item in meshes(rig).items():
         if lod not in list(item["dna_lods"]):
             continue
-        wanted = oracle.vertices(dna, index, pose, unit_scale)
+        wanted = oracle.vertices(dna, index, pose, unit_scale) @ place[:3, :3].T + place[:3, 3]
         size = np.ptp(wanted, axis=0).max()
         worst = max(worst, float(np.abs(evaluated(item) - wanted).max() / size))
     return worst

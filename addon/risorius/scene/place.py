@@ -7,11 +7,12 @@ Neither is the other's parent: a parent's edit would make Blender deform the mes
 import re
 
 import numpy as np
-from mathutils import Quaternion
+from mathutils import Quaternion, Vector
 
 from . import parts, runtime
 
 CONSTRAINT = "Risorius Body"
+_GAP = 1.25  # from face to face, in widths of one
 _NEAR = 1e-6  # of the largest number of the matrix: what decomposing in float32 leaves
 
 
@@ -31,6 +32,35 @@ def follow(rig, seen):
     if runtime.outputs.get(key) != state or not near:
         runtime.outputs[key] = state
         rig.matrix_basis = seen.matrix_world
+
+
+def put_beside(scene, rig):
+    """Move a new face to the right until it stands on no other one's spot.
+
+    Args:
+        scene: the others are those of it, linked ones too.
+        rig: the deforming armature, at the origin.
+
+    Returns:
+        Whether it was moved.
+    """
+    others = [r for r in parts.rigs(linked=True) if r != rig and scene in r.users_scene]
+    there = [c.matrix_world.translation for c in map(parts.controls_of, others) if c is not None]
+    step = _GAP * _width(rig)
+    spot = parts.controls_of(rig).location
+    free = next(n for n in range(len(there) + 1) if not _taken(there, spot, n * step, step / 2))
+    spot.x += free * step
+    return free > 0
+
+
+def _taken(there, spot, shift, reach):
+    return any((at - spot - Vector((shift, 0.0, 0.0))).length < reach for at in there)
+
+
+def _width(rig):
+    """How wide the meshes of a face are, in units of the scene."""
+    ends = [corner[0] for item in parts.meshes_of(rig) for corner in item.bound_box]
+    return max(ends, default=0.0) - min(ends, default=0.0)
 
 
 def find_bones(body):

@@ -9,7 +9,7 @@ from bpy_extras.io_utils import ImportHelper
 
 from .. import native
 from ..logic import names
-from ..scene import build, parts
+from ..scene import build, evaluate, parts, place
 from . import framing, words
 
 MODES = (
@@ -71,6 +71,8 @@ def import_character(operator, context, path, options, show=False):
     except native.user_errors() as error:
         operator.report({"ERROR"}, explain(path, error))
         return {"CANCELLED"}
+    if place.put_beside(context.scene, rig):
+        evaluate.bring_up(context, rig)
     if show and not bpy.app.background:
         framing.frame(context, rig)
     for warning in warnings[:5]:
