@@ -6,6 +6,7 @@ from bpy.app.handlers import persistent
 
 from .. import native
 from . import (
+    applied,
     copies,
     evaluate,
     heal,
@@ -20,7 +21,8 @@ from . import (
     timing,
 )
 
-_state = {"objects": frozenset(), "busy": False}  # objects: session uids of those seen
+# objects: session uids of those seen; mended: of characters that were mended at the last update.
+_state = {"objects": frozenset(), "busy": False, "mended": set()}
 
 
 @persistent
@@ -58,7 +60,9 @@ def _updated(_scene, depsgraph):
     try:
         _notice_copies(depsgraph.updates)
         _say(sharing.separate())
+        waiting, _state["mended"] = _state["mended"], set()
         edited = _edited(depsgraph)
+        edited += [rig for rig in parts.rigs() if rig.session_uid in waiting and rig not in edited]
         if edited:
             timing.begin()
         for rig in edited:
@@ -73,8 +77,13 @@ def _mend(rig):
     done = heal.heal(rig)
     _say(done)
     if done:
-        parts.controls_of(rig).update_tag()
-    return bool(done)
+        _note_mended(rig)
+    return rig.session_uid in _state["mended"]
+
+
+def _note_mended(rig):
+    _state["mended"].add(rig.session_uid)
+    rig[parts.CONTROLS].update_tag()
 
 
 def _notice_copies(updates):
@@ -112,7 +121,8 @@ def _edited(depsgraph):
             camera_moved |= camera is not None and item == camera.original
     if bones_edited:
         runtime.forget_outputs()
-        heal.heal_all()
+        for rig in heal.heal_all():
+            _note_mended(rig)
     layers.note_edits(actions)
     return [rig for rig in parts.rigs() if _concerned(rig, armatures, actions, camera_moved)]
 
@@ -152,6 +162,7 @@ def _restored(*_arguments):
     """
     runtime.forget_outputs()
     layers.forget()
+    applied.forget()
     _state["objects"] = frozenset()
     if native.problem():
         return
@@ -203,7 +214,7 @@ _HANDLERS = (
 
 def register():
     """Add the handlers, and bring up what is already there."""
-    _state.update(objects=frozenset(), busy=False)
+    _state.update(objects=frozenset(), busy=False, mended=set())
     for name, handler in _HANDLERS:
         present = getattr(bpy.app.handlers, name)
         if handler not in present:

@@ -9,11 +9,11 @@ given back.
 import bpy
 
 from ..logic import plans
-from . import armatures, meshes, parts, runtime
+from . import applied, armatures, meshes, parts, runtime
 
 
 def heal(rig):
-    """Give control bones and sliders of a character their names back.
+    """Give control bones and sliders of a character their names back, and their place.
 
     Args:
         rig: its deforming armature, of this file.
@@ -24,14 +24,22 @@ def heal(rig):
     controls = rig.get(parts.CONTROLS)
     if not isinstance(controls, bpy.types.Object) or controls.type != "ARMATURE":
         return []
-    return [*_bone_names(controls), *_sliders(rig)]
+    return [*_bone_names(controls), *_sliders(rig), *applied.take_back(controls)]
 
 
 def heal_all():
-    """Mend every character of this file; what was mended goes to the console."""
+    """Mend every character of this file; what was mended goes to the console.
+
+    Returns:
+        The deforming armatures of those that were mended.
+    """
+    mended = []
     for rig in parts.rigs():
-        for sentence in heal(rig):
+        done = heal(rig)
+        for sentence in done:
             print(f"Risorius: {sentence}")
+        mended += [rig] * bool(done)
+    return mended
 
 
 def _bone_names(controls):
