@@ -40,6 +40,7 @@ def test_an_old_character_is_brought_up_once_and_it_is_said(capsys, tmp_path, ho
     assert "older file" in line
     assert "need Risorius" in line
     scene.update(controls)
+    past.open_it(LAYERS, tmp_path)
     past.save_and_open(LAYERS, tmp_path)
     bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath)  # what was just saved
     assert len(_lines(capsys)) == 1  # of opening LAYERS

@@ -59,9 +59,15 @@ def open_it(path, _folder):
     bpy.ops.wm.open_mainfile(filepath=str(path))
 
 
+def _open_if_needed(path, folder):
+    """Open it, unless it is open and has only been played: most of the time goes into opening."""
+    if bpy.data.filepath != str(path) or "touched" in bpy.context.scene:
+        open_it(path, folder)
+
+
 def save_and_open(path, folder):
     """Opened, saved under another name and opened again."""
-    open_it(path, folder)
+    _open_if_needed(path, folder)
     again = folder / f"again_{path.name}"
     bpy.ops.wm.save_as_mainfile(filepath=str(again))
     open_it(again, folder)
@@ -103,7 +109,7 @@ def override(path, folder):
 def undo(path, folder):
     """Opened, changed, and the change undone."""
     bpy.context.preferences.edit.use_global_undo = True
-    open_it(path, folder)
+    _open_if_needed(path, folder)
     bpy.ops.ed.undo_push(message="as it was")
     for item in controls():
         item.pose.bones["face"]["CTRL_expressions.jawOpen"] = 0.77
@@ -118,11 +124,11 @@ def undo(path, folder):
 
 ROUTES = {
     "open": open_it,
+    "undo": undo,
     "save": save_and_open,
     "append": append,
     "link": link,
     "override": override,
-    "undo": undo,
 }
 # Overrides of a library are not appended or linked once more.
 NOT_OVERRIDDEN = ("append", "link", "override")
@@ -136,6 +142,8 @@ def routes_of(name):
 
 def prepare(play):
     """What is done with the open file before it plays."""
+    if play != AS_SAVED:
+        bpy.context.scene["touched"] = True
     for rig, item in [(r, r["risorius_controls"]) for r in rigs()]:
         if item.library is not None:
             continue  # it stands as it was saved
@@ -220,8 +228,8 @@ def films(folder, name, work, routes=None):
         "name/route/play" and its film.
     """
     for route in routes or routes_of(name):
+        ROUTES[route](folder / f"{name}.blend", work)
         for play in PLAYS[name]:
-            ROUTES[route](folder / f"{name}.blend", work)
             prepare(play)
             yield f"{name}/{route}/{play}", film()
 
