@@ -174,3 +174,13 @@ def test_a_file_has_the_right_names_although_others_bear_them(tmp_path):
     names = [n["name"] for n in tree["nodes"]]
     assert {"Small", "head_lod0_mesh"} <= set(names)
     assert not {"Small.001", "head_lod0_mesh.001"} & set(names)
+
+
+def test_a_mesh_without_a_uv_map_gets_one_with_its_colours(tmp_path):
+    rig = scene.load(_face(tmp_path))
+    animate(rig)
+    eye = next(m for m in scene.meshes(rig).values() if "eyeLeft" in m.name).data
+    eye.uv_layers.remove(eye.uv_layers[0])
+    found = _read("GLTF", _export("GLTF", tmp_path, texture_size=512))
+    assert len(eye.uv_layers) == 0
+    _has_colors("GLTF", found)
