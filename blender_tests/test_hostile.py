@@ -332,7 +332,7 @@ def test_files_with_odd_names_of_their_own(name, tmp_path):
     bad.write_bytes(b"nothing of the kind")
     with pytest.raises(RuntimeError) as caught:
         bpy.ops.risorius.import_dna(filepath=str(bad))
-    text = str(caught.value).removeprefix("Error: ").strip()
+    text = str(caught.value).removeprefix("Error: ").rstrip()
     assert "Traceback" not in text
     assert text.isprintable()
     assert bad.name.replace("\n", " ") in text
