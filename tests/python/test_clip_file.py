@@ -136,7 +136,7 @@ def test_what_a_recording_refuses(tmp_path):
         ClipWriter(tmp_path / "a.rzc", ["x", "x"])
     with pytest.raises(ClipError, match="rate above 0"):
         ClipWriter(tmp_path / "a.rzc", ["x"], 0)
-    with pytest.raises(ClipError, match="No such file"):
+    with pytest.raises(ClipError, match=r"a\.rzc: its folder is not there"):
         ClipWriter(tmp_path / "none" / "a.rzc", ["x"])
     take = ClipWriter(tmp_path / "a.rzc", ["x", "y"], has_times=True)
     with pytest.raises(ValueError, match=r"\(n, 2\)"):
@@ -208,9 +208,11 @@ def test_after_a_write_that_failed_nothing_more_is_written(tmp_path):
 
 def test_a_name_that_cannot_be_taken_is_said_each_time(tmp_path):
     path = tmp_path / "take.rzc"
-    path.mkdir()
     writer = ClipWriter(path, ["a"], 60.0)
     writer.append(np.ones((3, 1), np.float32))
+    path.mkdir()  # while it records; a folder that is there already is refused at once
+    with pytest.raises(ClipError, match="Is a directory"):
+        ClipWriter(path, ["a"], 60.0)
     for _ in range(2):
         with pytest.raises(ClipError, match="cannot write"):
             writer.close()

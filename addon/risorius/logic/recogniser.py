@@ -24,12 +24,12 @@ _CERTIFICATE = re.compile(r"certificate verify failed: ([^(]+) \(_ssl")
 _NO_FILE = re.compile(r"No matching distribution|Could not find a version")
 
 
-def requirements():
+def requirements() -> str:
     """What pip installs: the text of a file of requirements, a hash for each wheel."""
     return " ".join([PACKAGE, *(f"--hash=sha256:{value}" for value in HASHES)]) + "\n"
 
 
-def reason(said, running):
+def reason(said: str, running: str) -> str:
     """Why pip failed. What it says last is often only what followed from it.
 
     Args:
