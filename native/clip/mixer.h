@@ -89,9 +89,9 @@ class LayerCurves {
 
 /// A layer: curves, when and how much. Times in seconds; of the scene unless it says clip.
 /// Without a warp the clip's part [first, last] begins at start, lasts (last - first) * scale and
-/// is played repeat times; end is derived. With a warp its ends are start and end; scale, repeat and
-/// reverse are not read then, and a warp that falls plays backwards. Of a single frame nothing is
-/// played: it stands from start to end, by default always.
+/// is played repeat times; end is derived. With a warp its ends are start and end; scale, repeat
+/// and reverse are not read then, and a warp that falls plays backwards. Of a single frame nothing
+/// is played: it stands from start to end, by default always.
 struct Layer {
   static constexpr double kAlways = std::numeric_limits<double>::infinity();
 
