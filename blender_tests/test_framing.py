@@ -79,7 +79,9 @@ def test_the_head_is_whole_and_large(window, unit, tmp_path):
 
 
 def test_a_view_that_shows_it_or_looks_through_a_camera_stays(window, dna_file):
-    scene.load(dna_file)
+    first = scene.load(dna_file)
+    scene.controls(first).location.y = 50.0  # the next one stands where it stood
+    scene.update()
     view = _view()
     view.view_distance *= 1.3
     view.view_location.x += 0.01
@@ -93,6 +95,19 @@ def test_a_view_that_shows_it_or_looks_through_a_camera_stays(window, dna_file):
     view.view_perspective = "ORTHO"
     scene.load(dna_file)
     assert view.view_distance < 5.0
+
+
+def test_a_solid_view_in_default_colours_shows_the_textures(window, dna_file):
+    shading = _area().spaces.active.shading
+    shading.type = "SOLID"
+    for before, option, after in (
+        ("MATERIAL", False, "MATERIAL"),
+        ("OBJECT", True, "OBJECT"),
+        ("MATERIAL", True, "TEXTURE"),
+    ):
+        shading.color_type = before
+        scene.load(dna_file, use_frame_view=option)
+        assert shading.color_type == after
 
 
 def test_not_when_it_is_not_wanted_or_several_come(window, dna_file, tmp_path):

@@ -11,8 +11,9 @@ from ..scene import parts
 def frame(context, rig):
     """Let the 3D views of the user's window show a face from where they look.
 
-    A view through a camera is left alone, and one that shows the face well already. Views are no
-    part of undo: it takes the face away and leaves the view.
+    A view through a camera is left alone, and one that shows the face well already. A solid view in
+    Blender's default colours, one a material, shows the textures' from now on: iris, lips and brows
+    are in them. Views are no part of undo: it takes the face away and leaves the view.
 
     Args:
         context: a Blender context; without a window nothing happens.
@@ -21,7 +22,13 @@ def frame(context, rig):
     screen = context.window.screen if context.window is not None else None
     for area in screen.areas if screen is not None else ():
         if area.type == "VIEW_3D":
+            _show_textures(area.spaces.active.shading)
             _frame(area, *_ball(rig))
+
+
+def _show_textures(shading):
+    if shading.type == "SOLID" and shading.color_type == "MATERIAL":
+        shading.color_type = "TEXTURE"
 
 
 def _frame(area, middle, radius):

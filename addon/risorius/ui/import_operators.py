@@ -20,8 +20,8 @@ MODES = (
 
 FRAME_VIEW = bpy.props.BoolProperty(
     name="Frame the View",
-    description="Move the 3D views of this window to the face; not where several are imported, and "
-    "not a view through a camera",
+    description="Move the 3D views of this window to the face, and let Solid show its textures; "
+    "not where several are imported, and not a view through a camera",
     default=True,
 )
 
