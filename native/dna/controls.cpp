@@ -52,16 +52,6 @@ Array<T> renumbered(const IndexMap& map, const Array<T>& indices) {
   return out;
 }
 
-// Lists in order of LOD: the first lods[l] entries count at LOD l.
-void shorten(const std::vector<bool>& keep, Array<std::uint16_t>& lods) {
-  Indices out;
-  for (const std::uint16_t n : lods) {
-    const auto end = keep.begin() + std::min<std::ptrdiff_t>(n, std::ssize(keep));
-    out.push_back(static_cast<std::uint16_t>(std::count(keep.begin(), end, true)));
-  }
-  lods = std::move(out);
-}
-
 class Forgetting {
  public:
   Forgetting(const IndexMap& map, Dna& dna) : map_(map), dna_(dna) {}
@@ -124,7 +114,7 @@ class Forgetting {
     BlendShapeChannels& c = dna_.behavior.blend_shape_channels;
     const std::vector<bool> keep = entries(c.input_indices);
     if (keep.empty()) return;
-    shorten(keep, c.lods);
+    drop_rows(keep, c.lods);
     c.output_indices = only(c.output_indices, keep);
     inputs(keep, c.input_indices);
   }
@@ -132,7 +122,7 @@ class Forgetting {
     Conditionals& t = dna_.behavior.animated_maps.conditionals;
     const std::vector<bool> keep = entries(t.input_indices);
     if (keep.empty()) return;
-    shorten(keep, dna_.behavior.animated_maps.lods);
+    drop_rows(keep, dna_.behavior.animated_maps.lods);
     t.output_indices = only(t.output_indices, keep);
     for (Array<float>* values : {&t.from_values, &t.to_values, &t.slope_values, &t.cut_values}) {
       *values = only(*values, keep);

@@ -170,17 +170,6 @@ void apply_to_definition(const LodPlan& plan, Definition& d) {
   d.neutral_joint_rotations = select(d.neutral_joint_rotations, joints);
 }
 
-// Rows [0, lods[l]) are used at LOD l: dropping row r lowers every count above it.
-void drop_rows(const std::vector<bool>& keep, Array<std::uint16_t>& lods) {
-  Indices out(lods.begin(), lods.end());
-  for (std::uint16_t& count : out) {
-    const std::size_t n = std::min<std::size_t>(count, keep.size());
-    count = static_cast<std::uint16_t>(
-        std::count(keep.begin(), keep.begin() + static_cast<std::ptrdiff_t>(n), true));
-  }
-  lods = std::move(out);
-}
-
 void apply_to_joint_group(const LodPlan& plan, const Where& where, Lookup& lookup, JointGroup& g) {
   const std::size_t columns = g.input_indices.size();
   const std::size_t rows = g.output_indices.size();

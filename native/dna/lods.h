@@ -2,9 +2,11 @@
 // Which LODs are kept, and what that leaves of each index space.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/result.h"
@@ -66,6 +68,22 @@ std::vector<bool> needed(const LodPlan& plan, const LodMapping& mapping, std::si
 /// Adds the networks that operations of kept LODs run.
 void add_networks_of_operations(const LodPlan& plan, const MachineLearnedBehaviorExt& ext,
                                 std::vector<bool>& keep);
+
+/// Rows [0, lods[l]) are used at LOD l: dropping row r lowers every count above it. Each row is
+/// looked at once, of however many entries lods is.
+template <class Keep>
+void drop_rows(const Keep& keep, core::Array<std::uint16_t>& lods) {
+  std::vector<std::uint16_t> kept_before{0};
+  for (std::size_t r = 0; r < keep.size() && r < 65535; ++r) {
+    kept_before.push_back(static_cast<std::uint16_t>(kept_before.back() + (keep[r] ? 1 : 0)));
+  }
+  std::vector<std::uint16_t> out;
+  out.reserve(lods.size());
+  for (const std::uint16_t n : lods) {
+    out.push_back(kept_before[std::min<std::size_t>(n, kept_before.size() - 1)]);
+  }
+  lods = std::move(out);
+}
 
 /// Leading rows that the finest kept LOD uses. Out: lods and output_indices cut to the plan.
 std::size_t cut_rows(const LodPlan& plan, JointGroup& group);

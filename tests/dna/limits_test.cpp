@@ -8,6 +8,7 @@
 
 #include "dna/io.h"
 #include "dna/json.h"
+#include "dna/lods.h"
 #include "support/full_face.h"
 
 namespace risorius::dna {
@@ -197,6 +198,47 @@ TEST(DnaJson, KeepsTheSmallestAndLargestFloats) {
   const auto again = from_json(*to_json(dna));
   ASSERT_TRUE(again.has_value()) << again.error().describe();
   EXPECT_TRUE(again->behavior.joint_groups[0].values == core::Array<float>(values));
+}
+
+// ---- steps
+
+// Rows of which every third is dropped; counts how often one is asked for.
+class CountingRows {
+ public:
+  explicit CountingRows(std::size_t size) : size_(size) {}
+  std::size_t size() const { return size_; }
+  bool operator[](std::size_t row) const {
+    ++asked_;
+    return row % 3 != 1;
+  }
+  std::size_t asked() const { return asked_; }
+
+ private:
+  std::size_t size_;
+  mutable std::size_t asked_ = 0;
+};
+
+// A file may list any number of LODs, and each of them all rows.
+TEST(DnaSteps, OfDroppingRowsDoNotGrowWithTheListOfLods) {
+  constexpr std::uint16_t kMost = 65535;
+  for (const std::size_t entries : {1u, 5000u}) {
+    for (const std::uint16_t rows : {std::uint16_t{7}, std::uint16_t{2000}, kMost}) {
+      const CountingRows keep(rows);
+      core::Array<std::uint16_t> lods = std::vector<std::uint16_t>(entries, kMost);
+      detail::drop_rows(keep, lods);
+      EXPECT_LE(keep.asked(), rows);
+      ASSERT_EQ(lods.size(), entries);
+      EXPECT_EQ(lods[entries - 1], rows - (rows + 1) / 3) << rows;
+    }
+  }
+}
+
+TEST(DnaSteps, OfDroppingRowsLeaveTheCountsOfTheKept) {
+  core::Array<std::uint16_t> lods = {5, 4, 3, 2, 1, 0, 9};
+  detail::drop_rows(std::vector<bool>{true, false, true, false, true}, lods);
+  EXPECT_TRUE(lods == (core::Array<std::uint16_t>{3, 2, 2, 1, 1, 0, 3}));
+  detail::drop_rows(std::vector<bool>{}, lods);
+  EXPECT_TRUE(lods == (core::Array<std::uint16_t>{0, 0, 0, 0, 0, 0, 0}));
 }
 
 }  // namespace
