@@ -21,7 +21,7 @@ esac
 
 build_targets() {
   (cd "$project" && cmake --preset fuzz -DCMAKE_CXX_COMPILER_LAUNCHER=ccache &&
-    cmake --build --preset fuzz -j"$(nproc)" --target make_seeds planted_fuzz \
+    cmake --build --preset fuzz -j"$(nproc)" --target make_seeds planted_fuzz greedy_fuzz \
       "${targets[@]/%/_fuzz}") > "$logs/build.log" 2>&1 ||
     { tail -n 30 "$logs/build.log" && return 1; }
 }
@@ -30,7 +30,7 @@ build_targets() {
 # ones take a fourth of the time, and a find is run again anyway.
 run_target() {
   local longest=4400
-  case $1 in json) longest=8192 ;; rig) longest=14000 ;; esac
+  case $1 in json | evaluate) longest=8192 ;; rig) longest=14000 ;; esac
   mkdir -p "$corpora/$1" "$corpora/seeds/$1"
   ASAN_OPTIONS=malloc_context_size=4:quarantine_size_mb=32 nice -n 10 "$programs/$1_fuzz" \
     -max_total_time="$2" -timeout=5 -rss_limit_mb=2048 -max_len=$longest -print_final_stats=1 \
@@ -39,10 +39,10 @@ run_target() {
 }
 
 # A target with a mistake in it must be found out, or the silence of the others means nothing.
-find_planted() {
-  rm -f "$finds"/planted-*
-  ! run_target planted 60 && [ -n "$(ls "$finds"/planted-* 2> /dev/null)" ] &&
-    grep -q 'broken promise: planted' "$logs/planted.log" && rm -f "$finds"/planted-*
+find_planted() { # find_planted TARGET WORDS
+  rm -f "$finds/$1"-*
+  ! run_target "$1" 60 && [ -n "$(ls "$finds/$1"-* 2> /dev/null)" ] &&
+    grep -q "broken promise: $2" "$logs/$1.log" && rm -f "$finds/$1"-*
 }
 
 number() { grep -oE "stat::$2: +[0-9]+" "$logs/$1.log" | grep -oE '[0-9]+$' || echo 0; }
@@ -62,7 +62,10 @@ step "fuzz targets" && build_targets || exit 1
 rm -rf "$corpora/seeds"
 "$programs/make_seeds" "$corpora/seeds" "$project"/tests/data/golden/*.dna || exit 1
 step "self-test"
-find_planted || { echo "the planted mistake was not found: $logs/planted.log" >&2 && exit 1; }
+for planted in "planted planted" "greedy [0-9]* bytes take [0-9]* bytes of the heap"; do
+  find_planted "${planted%% *}" "${planted#* }" && continue
+  echo "the planted mistake was not found: $logs/${planted%% *}.log" >&2 && exit 1
+done
 step "${#targets[@]} targets, $each s each, $at_a_time at a time"
 for target in "${targets[@]}"; do
   while [ "$(jobs -rp | wc -l)" -ge "$at_a_time" ]; do wait -n; done

@@ -8,6 +8,7 @@ using namespace risorius;
 using fuzz::demand;
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const risorius::fuzz::HeapBound bound(size, 64, 8u << 20);
   if (size < 4) return 0;
   const clip::View rest(data + 4, size - 4);
   const std::size_t controls = 1 + data[1] % 32u;

@@ -6,6 +6,7 @@ namespace promises = risorius::promises;
 using risorius::fuzz::demand;
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const risorius::fuzz::HeapBound bound(size, 64, 64u << 10);
   if (size < promises::kOptionBytes) return 0;
   const promises::View bytes{data, size};
   const auto dna = promises::parse(bytes.subspan(promises::kOptionBytes));

@@ -6,9 +6,14 @@ namespace promises = risorius::promises;
 using risorius::fuzz::demand;
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  risorius::fuzz::HeapBound bound(size, 64, 2u << 20);
   if (size < 4) return 0;
   const auto dna = promises::parse({data + 4, size - 4});
   if (!dna) return 0;
+  // Correctives are a number in the file: lists of all controls for each LOD and each frame.
+  constexpr std::size_t kFrames = 64;
+  const std::size_t lods = dna->descriptor.lod_count;
+  bound.allow(16 * (lods + kFrames) * dna->behavior.psd_count);
   std::uint32_t seed = 0;
   for (int i = 0; i < 4; ++i) seed = seed << 8 | data[i];
   demand(promises::evaluation(*dna, seed));

@@ -6,6 +6,7 @@ namespace promises = risorius::promises;
 using risorius::fuzz::demand;
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const risorius::fuzz::HeapBound bound(size, 128, 256u << 10);
   demand(promises::filtering({data, size}));
   return 0;
 }

@@ -6,6 +6,7 @@ namespace promises = risorius::promises;
 using risorius::fuzz::demand;
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const risorius::fuzz::HeapBound bound(size, 192, 64u << 10);
   demand(promises::json_text({reinterpret_cast<const char*>(data), size}));
   return 0;
 }

@@ -9,6 +9,7 @@
 #include "compile/compile.h"
 #include "dna/json.h"
 #include "dna/layers.h"
+#include "support/bombs.h"
 #include "support/clips.h"
 #include "support/full_face.h"
 #include "support/promises.h"
@@ -20,6 +21,7 @@ namespace dna = risorius::dna;
 namespace fs = std::filesystem;
 
 constexpr std::size_t kLargestSeed = 4400;  // larger ones make every run slow
+constexpr std::size_t kLargestBomb = 8000;
 constexpr std::size_t kOptions = risorius::promises::kOptionBytes;
 
 // What a target expects before the file; several of them make several seeds.
@@ -57,6 +59,14 @@ class Seeds {
     add_rig(name, *read);
   }
 
+  /// Lists that multiply each other: for what compiles, larger than other seeds.
+  void add_bomb(const std::string& name, const Bytes& file) {
+    put_each("evaluate", name, kControls, file, kLargestBomb);
+  }
+
+  /// For the target with a mistake in it, which one run of this finds.
+  void add_greedy() { put("greedy", "zeros", {}, Bytes(kLargestSeed, 0)); }
+
   void add_clips() {
     namespace clip = risorius::clip;
     for (const std::size_t frames : {0u, 1u, 40u, 90u}) {
@@ -86,15 +96,17 @@ class Seeds {
     }
   }
   void put_each(const std::string& target, const std::string& name,
-                const std::vector<Bytes>& options, const Bytes& file) {
+                const std::vector<Bytes>& options, const Bytes& file,
+                std::size_t largest = kLargestSeed) {
     for (std::size_t i = 0; i < options.size(); ++i) {
-      put(target, name + "-" + std::to_string(i), options[i], file);
+      put(target, name + "-" + std::to_string(i), options[i], file, largest);
     }
   }
-  void put(const std::string& target, const std::string& name, Bytes bytes, const Bytes& file) {
+  void put(const std::string& target, const std::string& name, Bytes bytes, const Bytes& file,
+           std::size_t largest = kLargestSeed) {
     bytes.insert(bytes.end(), file.begin(), file.end());
     // Blocks of rigs are padded.
-    if (bytes.size() > (target == "rig" ? 4 : 1) * (kLargestSeed + kOptions)) return;
+    if (bytes.size() > (target == "rig" ? 4 : 1) * (largest + kOptions)) return;
     fs::create_directories(folder_ / target);
     std::ofstream out(folder_ / target / name, std::ios::binary);
     out.write(reinterpret_cast<const char*>(bytes.data()),
@@ -129,6 +141,16 @@ void add_parts(Seeds& seeds) {
   seeds.add("unknown", *dna::write(unknown, {8, true}, warnings));
 }
 
+// Each as large as a seed may be, and so that its n * n steps take no second.
+void add_bombs(Seeds& seeds) {
+  for (const risorius::testing_support::Bomb& bomb : risorius::testing_support::kBombs) {
+    std::uint16_t n = 16;
+    const auto next = [&] { return static_cast<std::uint16_t>(n + 16); };
+    while (n < 352 && written(bomb.make(next()), 8).size() <= kLargestBomb) n = next();
+    seeds.add_bomb(std::string("bomb-") + bomb.name, written(bomb.make(n), 8));
+  }
+}
+
 Bytes read_file(const fs::path& path) {
   std::ifstream in(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
@@ -150,6 +172,8 @@ int main(int argc, char** argv) {
   }
   add_parts(seeds);
   seeds.add_clips();
+  seeds.add_greedy();
+  add_bombs(seeds);
   for (int i = 2; i < argc; ++i) {
     const fs::path path = argv[i];
     seeds.add(path.stem().string(), read_file(path));

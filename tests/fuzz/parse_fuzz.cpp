@@ -6,6 +6,7 @@ namespace promises = risorius::promises;
 using risorius::fuzz::demand;
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const risorius::fuzz::HeapBound bound(size, 32, 64u << 10);
   const auto dna = promises::parse({data, size});
   demand(promises::reading({data, size}, dna));
   // Reads the file up to four times.

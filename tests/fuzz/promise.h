@@ -1,7 +1,12 @@
 // SPDX-License-Identifier: MIT
-// A broken promise ends a fuzz target as a crash does.
+// A broken promise ends a fuzz target as a crash does: also the one that an input takes no more of
+// the heap than a few times its bytes.
 #pragma once
 
+#include <sanitizer/allocator_interface.h>
+
+#include <algorithm>
+#include <cstddef>
 #include <cstdio>
 #include <cstdlib>
 #include <string>
@@ -15,5 +20,48 @@ inline void demand(const std::string& broken_promise) {
   std::fprintf(stderr, "broken promise: %s\n", broken_promise.c_str());
   std::abort();
 }
+
+namespace heap {
+
+// One thread allocates; what was there before an input is not counted.
+inline std::ptrdiff_t now = 0, most = 0;
+
+inline void added(const volatile void*, std::size_t size) {
+  now += static_cast<std::ptrdiff_t>(size);
+  most = std::max(most, now);
+}
+inline void freed(const volatile void* p) {
+  // Of what it does not own the sanitizer would say so and end.
+  auto* block = const_cast<void*>(p);
+  if (__sanitizer_get_ownership(block) == 0) return;
+  now -= static_cast<std::ptrdiff_t>(__sanitizer_get_allocated_size(block));
+}
+inline const int kInstalled = __sanitizer_install_malloc_and_free_hooks(added, freed);
+
+}  // namespace heap
+
+/// Demands of one input that its peak stays below beside + times * its size.
+class HeapBound {
+ public:
+  HeapBound(std::size_t size, std::size_t times, std::size_t beside)
+      : size_(size), most_(times * size + beside) {
+    heap::now = heap::most = 0;
+  }
+  HeapBound(const HeapBound&) = delete;
+  HeapBound& operator=(const HeapBound&) = delete;
+  ~HeapBound() {
+    const auto peak = static_cast<std::size_t>(heap::most);
+    if (heap::kInstalled == 0) demand("the heap is counted");
+    if (peak <= most_) return;
+    demand(std::to_string(size_) + " bytes take " + std::to_string(peak) +
+           " bytes of the heap, at most " + std::to_string(most_) + " were expected");
+  }
+
+  /// For what an input announces by numbers that no list backs.
+  void allow(std::size_t bytes) { most_ += bytes; }
+
+ private:
+  std::size_t size_, most_;
+};
 
 }  // namespace risorius::fuzz

@@ -7,6 +7,7 @@ namespace promises = risorius::promises;
 using risorius::fuzz::demand;
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const risorius::fuzz::HeapBound bound(size, 64, 24u << 20);
   if (size < 4) return 0;
   std::uint32_t seed = 0;
   for (int i = 0; i < 4; ++i) seed = seed << 8 | data[i];

@@ -7,6 +7,7 @@ namespace promises = risorius::promises;
 using risorius::fuzz::demand;
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const risorius::fuzz::HeapBound bound(size, 256, 64u << 10);
   const auto dna = promises::parse({data, size});
   if (!dna) return 0;
   const std::uint8_t choice = data[size - 1];
