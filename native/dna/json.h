@@ -20,7 +20,7 @@ namespace risorius::dna {
 core::Result<std::string> to_json(const Dna& dna);
 
 /// The members of an object may come in any order, each once; "signature", "size" and "offset" are
-/// passed over, any other member that is not known is an error. Allocates at most some 30 times the
+/// passed over, any other member that is not known is an error. Allocates at most some 64 times the
 /// text. Fails: kNotDna (not JSON, with the byte), kInvalidValue (a member that is missing, there
 /// twice, of another type or out of range, with its path), kLimitExceeded, and as validate.
 core::Result<Dna> from_json(std::string_view text, const Limits& limits = {});

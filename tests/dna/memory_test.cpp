@@ -3,6 +3,9 @@
 #include <cstdio>
 #include <filesystem>
 
+#include "dna/json.h"
+#include "dna/lods.h"
+#include "dna/size.h"
 #include "support/head.h"
 #include "support/heap.h"
 
@@ -112,46 +115,145 @@ TEST(Memory, AFileThatAnnouncesMuchGetsLittle) {
   }
 }
 
+using Fill = void (*)(Dna&, std::size_t);
+
+// Lists of elements without anything in them.
+const Fill kFills[] = {
+    [](Dna& d, std::size_t n) { d.definition.raw_control_names.resize(n); },
+    [](Dna& d, std::size_t n) { d.descriptor.metadata.resize(n); },
+    [](Dna& d, std::size_t n) { d.definition.lod_joint_mapping.rows.resize(n); },
+    [](Dna& d, std::size_t n) { d.behavior.joint_groups = std::vector<JointGroup>(n); },
+    [](Dna& d, std::size_t n) { d.geometry.meshes = std::vector<Mesh>(n); },
+    [](Dna& d, std::size_t n) {
+      d.definition.blend_shape_channel_names = {"shape"};
+      d.definition.mesh_names = {"mesh"};
+      d.geometry.meshes = std::vector<Mesh>(1);
+      d.geometry.meshes[0].blend_shape_targets = std::vector<BlendShapeTarget>(n);
+    },
+    [](Dna& d, std::size_t n) {
+      d.machine_learned_behavior.neural_networks = std::vector<NeuralNetwork>(n);
+    },
+    [](Dna& d, std::size_t n) {
+      d.machine_learned_behavior.region_names.resize(n);
+      d.machine_learned_behavior.region_network_indices.resize(n);
+    },
+    [](Dna& d, std::size_t n) {
+      std::vector<MlType> types(1);
+      types[0].lod_operation_mappings.resize(n);
+      types[0].operations = std::vector<List<MlOperation>>(n);
+      d.machine_learned_behavior_ext.types = std::move(types);
+    },
+    [](Dna& d, std::size_t n) { d.rbf_behavior.solvers = std::vector<RbfSolver>(n); },
+    [](Dna& d, std::size_t n) { d.rbf_behavior_ext.poses = std::vector<RbfPoseControls>(n); },
+    [](Dna& d, std::size_t n) { d.twist_swing_behavior.twists = std::vector<TwistSwingSetup>(n); }};
+
 TEST(Memory, ManyEmptyElementsTakeAFewTimesTheirBytes) {
-  using Fill = void (*)(Dna&, std::size_t);
-  const Fill fills[] = {
-      [](Dna& d, std::size_t n) { d.definition.raw_control_names.resize(n); },
-      [](Dna& d, std::size_t n) { d.descriptor.metadata.resize(n); },
-      [](Dna& d, std::size_t n) { d.definition.lod_joint_mapping.rows.resize(n); },
-      [](Dna& d, std::size_t n) { d.behavior.joint_groups = std::vector<JointGroup>(n); },
-      [](Dna& d, std::size_t n) { d.geometry.meshes = std::vector<Mesh>(n); },
-      [](Dna& d, std::size_t n) {
-        d.definition.blend_shape_channel_names = {"shape"};
-        d.definition.mesh_names = {"mesh"};
-        d.geometry.meshes = std::vector<Mesh>(1);
-        d.geometry.meshes[0].blend_shape_targets = std::vector<BlendShapeTarget>(n);
-      },
-      [](Dna& d, std::size_t n) {
-        d.machine_learned_behavior.neural_networks = std::vector<NeuralNetwork>(n);
-      },
-      [](Dna& d, std::size_t n) {
-        d.machine_learned_behavior.region_names.resize(n);
-        d.machine_learned_behavior.region_network_indices.resize(n);
-      },
-      [](Dna& d, std::size_t n) {
-        std::vector<MlType> types(1);
-        types[0].lod_operation_mappings.resize(n);
-        types[0].operations = std::vector<List<MlOperation>>(n);
-        d.machine_learned_behavior_ext.types = std::move(types);
-      },
-      [](Dna& d, std::size_t n) { d.rbf_behavior.solvers = std::vector<RbfSolver>(n); },
-      [](Dna& d, std::size_t n) { d.rbf_behavior_ext.poses = std::vector<RbfPoseControls>(n); },
-      [](Dna& d, std::size_t n) {
-        d.twist_swing_behavior.twists = std::vector<TwistSwingSetup>(n);
-      }};
-  for (const Fill& fill : fills) {
+  for (const Fill& fill : kFills) {
     Dna dna;
     fill(dna, 5000);
     const Bytes bytes = write_head(dna, 8);
     bool read = false;
     const std::size_t peak = peak_of(bytes, &read);
-    EXPECT_TRUE(read) << &fill - fills;
-    EXPECT_LE(peak, kTimesTheBytes * bytes.size() + kBeside) << &fill - fills;
+    EXPECT_TRUE(read) << &fill - kFills;
+    EXPECT_LE(peak, kTimesTheBytes * bytes.size() + kBeside) << &fill - kFills;
+  }
+}
+
+// Numbers of elements that a list which doubles has no room for: it holds both lists while it
+// grows.
+constexpr std::size_t kSizes[] = {4097, 8193};
+// Windows, messages, and the stack of what is open.
+constexpr std::size_t kBesideOthers = 64 * 1024;
+// The factors stand in native/README.md.
+constexpr std::size_t kTimesToJson = 48, kTimesFromJson = 64, kTimesFiltered = 24;
+
+std::size_t size_of(const Dna& dna) { return static_cast<std::size_t>(size_in_bytes(dna)); }
+
+std::string compact(std::string json) {
+  std::erase_if(json, [](char c) { return c == ' ' || c == '\n'; });
+  return json;
+}
+
+class ManyElements : public testing::TestWithParam<std::size_t> {
+ protected:
+  static Dna make(std::size_t n) {
+    Dna dna;
+    dna.descriptor.lod_count = 2;
+    kFills[GetParam()](dna, n);
+    return dna;
+  }
+};
+
+TEST_P(ManyElements, TakeAFewTimesTheirSizeOnTheWayToJson) {
+  for (const std::size_t n : kSizes) {
+    const Dna dna = make(n);
+    const HeapCount heap;
+    ASSERT_TRUE(to_json(dna).has_value());
+    EXPECT_LE(heap.peak(), kTimesToJson * size_of(dna) + kBesideOthers) << n;
+  }
+}
+
+TEST_P(ManyElements, TakeAFewTimesTheirTextOnTheWayFromJson) {
+  for (const std::size_t n : kSizes) {
+    const std::string text = compact(*to_json(make(n)));
+    const HeapCount heap;
+    ASSERT_TRUE(from_json(text).has_value());
+    EXPECT_LE(heap.peak(), kTimesFromJson * text.size() + kBesideOthers) << n;
+  }
+}
+
+TEST_P(ManyElements, TakeAFewTimesTheirSizeInTheLodFilter) {
+  for (const std::size_t n : kSizes) {
+    const Dna dna = make(n);
+    const HeapCount heap;
+    ASSERT_TRUE(filter_lods(dna, {{1}}).has_value());
+    EXPECT_LE(heap.peak(), kTimesFiltered * size_of(dna) + kBesideOthers) << n;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Every, ManyElements, testing::Range(std::size_t{0}, std::size(kFills)));
+
+TEST(Memory, OfTheLodFilterOfAHeadIsAtMostTwiceTheHead) {
+  for (const std::uint32_t vertices : {6000u, 12000u}) {
+    const Dna dna = make_head({.vertices = vertices});
+    const HeapCount heap;
+    ASSERT_TRUE(filter_lods(dna, {{0}}).has_value());
+    EXPECT_LE(heap.peak(), 2 * size_of(dna) + kBesideOthers) << vertices;
+  }
+}
+
+// Numbers and texts that are longer as text than as bytes.
+TEST(Memory, OfJsonGrowsWithItsNumbersAndTexts) {
+  for (const std::size_t n : {std::size_t{30'000}, std::size_t{60'000}}) {
+    Dna dna;
+    NeuralNetworkLayer layer;
+    layer.activation_parameters = std::vector<float>(n, -1.17549435e-38f);
+    NeuralNetwork network;
+    network.layers = std::vector<NeuralNetworkLayer>{layer};
+    dna.machine_learned_behavior.neural_networks = std::vector<NeuralNetwork>{network};
+    dna.descriptor.name = std::string(n, '\x01');
+    dna.behavior.blend_shape_channels.lods = std::vector<std::uint16_t>(n, 0);
+    dna.unknown_layers = {{{'n', 'e', 'w', '!'}, 0x10000, std::vector<std::uint8_t>(n, 0xFF)}};
+    const HeapCount writing;
+    const auto text = to_json(dna);
+    ASSERT_TRUE(text.has_value()) << text.error().describe();
+    EXPECT_LE(writing.peak(), kTimesToJson * size_of(dna) + kBesideOthers) << n;
+    const HeapCount reading;
+    ASSERT_TRUE(from_json(*text).has_value());
+    EXPECT_LE(reading.peak(), kTimesFromJson * text->size() + kBesideOthers) << n;
+  }
+}
+
+TEST(Memory, OfJsonThatIsNoFaceGrowsWithTheText) {
+  for (const char* element : {"0,", "{},", "[],", "\"\",", "[{}],", "[[]],", "{\"\":{}},"}) {
+    for (const std::size_t n : {std::size_t{16'385}, std::size_t{32'769}}) {
+      std::string text = "[";
+      for (std::size_t i = 1; i < n; ++i) text += element;
+      text += "0]";
+      const HeapCount heap;
+      EXPECT_FALSE(from_json(text).has_value());
+      EXPECT_LE(heap.peak(), kTimesFromJson * text.size() + kBesideOthers) << element << n;
+    }
   }
 }
 

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: MIT
+// What a clip's reader and writer take from the heap.
+#include <gtest/gtest.h>
+
+#include "clip/codec.h"
+#include "support/clips.h"
+#include "support/heap.h"
+
+namespace risorius::clip {
+namespace {
+
+using namespace testing_support;
+
+// What lies in a clip: values, times, names and events.
+std::size_t size_of(const Clip& clip) {
+  std::size_t size = 4 * clip.curves.size() + 8 * clip.times.size();
+  for (const std::string& name : clip.head.names) size += name.size();
+  for (const Event& e : clip.events) size += 18 + e.name.size() + e.value.size();
+  return size;
+}
+
+// The factors stand in native/README.md. Beside: of a writer the frames of a block.
+constexpr std::size_t kTimesTheClip = 4, kTimesTheFile = 16, kBeside = 64 * 1024;
+
+TEST(ClipMemory, OfWritingGrowsWithTheClip) {
+  for (const std::size_t frames : {20'000u, 40'000u}) {
+    const Clip clip = make_full_clip(frames);
+    const HeapCount heap;
+    const auto bytes = encode(clip);
+    ASSERT_TRUE(bytes.has_value());
+    EXPECT_LE(heap.peak(), kTimesTheClip * size_of(clip) + kBeside);
+  }
+}
+
+TEST(ClipMemory, OfReadingGrowsWithWhatIsRead) {
+  for (const std::size_t frames : {20'000u, 40'000u}) {
+    const Clip clip = make_full_clip(frames);
+    const Bytes bytes = *encode(clip);
+    const HeapCount heap;
+    ASSERT_TRUE(decode(bytes).has_value());
+    EXPECT_LE(heap.peak(), kTimesTheClip * size_of(clip) + kBeside);
+  }
+}
+
+// Curves that rest and names that repeat the one before are a few bytes of the file each. A reader
+// that is open has the head and the index, and of one block what is not yet a value.
+TEST(ClipMemory, OfAnOpenReaderGrowsWithTheFile) {
+  for (const std::size_t count : {5'000u, 10'000u}) {
+    Clip clip = make_clip(count, 20);
+    for (std::size_t i = 0; i < count; ++i) {
+      clip.head.names[i] = std::string(1, static_cast<char>(1 + i / 100 % 100));
+      clip.head.names[i] += static_cast<char>(1 + i % 100);
+      clip.events.push_back({0.0, "", 0.0, ""});
+    }
+    const Bytes bytes = *encode(clip);
+    const HeapCount heap;
+    auto reader = Reader::open(std::make_unique<core::SpanSource>(bytes));
+    ASSERT_TRUE(reader.has_value()) << reader.error().describe();
+    std::vector<float> values(count);
+    std::vector<std::uint32_t> moving;
+    ASSERT_TRUE(reader->resting(0, values, moving).has_value());
+    EXPECT_LE(heap.peak(), kTimesTheFile * bytes.size() + kBeside);
+  }
+}
+
+}  // namespace
+}  // namespace risorius::clip
