@@ -68,9 +68,7 @@ def test_the_head_is_whole_and_large(window, unit, tmp_path):
     looks.set_meshes(face, {"head_lod0_mesh": face.meshes[0], "body_lod0_mesh": body})
     path = tmp_path / "face.dna"
     face.save(str(path))
-    turned = _view().view_rotation.copy()
     rig = scene.load(path)
-    assert _view().view_rotation == turned
     seen = _on_screen(_corners(scene.meshes(rig)[0]))
     assert seen.min() > 0.0
     assert seen.max() < 1.0
@@ -95,6 +93,25 @@ def test_a_view_that_shows_it_or_looks_through_a_camera_stays(window, dna_file):
     view.view_perspective = "ORTHO"
     scene.load(dna_file)
     assert view.view_distance < 5.0
+
+
+def test_a_profile_is_shown_from_the_front_and_a_straight_view_keeps_its_direction(
+    window, dna_file
+):
+    view = _view()
+    front = Vector((0.0, -1.0, 0.0))
+    for perspective, direction, kept in (
+        ("PERSP", (1.0, 0.0, 0.3), False),  # about where a fresh Blender looks from
+        ("PERSP", (-0.4, -1.0, 0.3), True),
+        ("ORTHO", (1.0, 0.0, 0.0), True),
+    ):
+        view.view_perspective, view.view_location = perspective, (50.0, 0.0, 0.0)
+        view.view_rotation = Vector(direction).to_track_quat("Z", "Y")
+        before = view.view_rotation @ Vector((0.0, 0.0, 1.0))
+        scene.load(dna_file)
+        after = view.view_rotation @ Vector((0.0, 0.0, 1.0))
+        assert (after == before) is kept
+        assert kept or after.dot(front) > 0.9
 
 
 def test_a_solid_view_in_default_colours_shows_the_textures(window, dna_file):

@@ -7,9 +7,13 @@ from mathutils import Vector
 from ..logic import views
 from ..scene import parts
 
+_FRONT = Vector((0.0, -1.0, 0.0))  # where an imported face looks
+_THREE_QUARTER = Vector((0.36, -0.92, 0.16))  # whence a face is seen best
+_SIDE = 0.77  # cosine of 40 degrees: whoever looks from farther aside sees a profile
+
 
 def frame(context, rig):
-    """Let the 3D views of the user's window show a face from where they look.
+    """Let the 3D views of the user's window show a face; one in profile is shown from the front.
 
     A view through a camera is left alone, and one that shows the face well already. A solid view in
     Blender's default colours, one a material, shows the textures' from now on: iris, lips and brows
@@ -23,7 +27,7 @@ def frame(context, rig):
     for area in screen.areas if screen is not None else ():
         if area.type == "VIEW_3D":
             _show_textures(area.spaces.active.shading)
-            _frame(area, *_ball(rig))
+            _frame(area, *_ball(rig), parts.controls_of(rig).matrix_world.to_quaternion())
 
 
 def _show_textures(shading):
@@ -31,7 +35,7 @@ def _show_textures(shading):
         shading.color_type = "TEXTURE"
 
 
-def _frame(area, middle, radius):
+def _frame(area, middle, radius, turn):
     space = area.spaces.active
     region = next((r for r in area.regions if r.type == "WINDOW"), None)
     locked = space.lock_object is not None or space.lock_cursor
@@ -43,8 +47,13 @@ def _frame(area, middle, radius):
         perspective = view.view_perspective == "PERSP"
         far = views.distance(radius, space.lens, (region.width, region.height), perspective)
         held = view.view_location[:]
-        if not views.is_well_in_view(middle, radius, far, held, view.view_distance):
-            view.view_location, view.view_distance = middle, far
+        if views.is_well_in_view(middle, radius, far, held, view.view_distance):
+            continue
+        view.view_location, view.view_distance = middle, far
+        # Straight views (front, side, top) are chosen with a key and keep their direction.
+        seen_from = view.view_rotation @ Vector((0.0, 0.0, 1.0))
+        if perspective and seen_from.dot(turn @ _FRONT) < _SIDE:
+            view.view_rotation = (turn @ _THREE_QUARTER).to_track_quat("Z", "Y")
 
 
 def _ball(rig):
