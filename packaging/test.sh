@@ -101,7 +101,7 @@ run_blender() { # run_blender NAME COMMAND...
   shift
   # A throw-away user folder: a Blender program reads it before the tests could set it.
   user=$(mktemp -d)
-  BLENDER_USER_RESOURCES="$user" timeout -s KILL 1200 "$@" > "$log" 2>&1
+  BLENDER_USER_RESOURCES="$user" timeout -s KILL 2400 "$@" > "$log" 2>&1
   code=$?
   rm -rf "$user"
   tail -n 12 "$log"
