@@ -95,7 +95,10 @@ from support import looks
 folder = Path({folder!r})
 plain = scene.load(folder / "plain" / "face.dna")
 items = {{-i - 1: item for i, item in scene.meshes(plain).items()}}
-items.update(scene.meshes(scene.load(folder / "face.dna")))
+rig = scene.load(folder / "face.dna")
+items.update(scene.meshes(rig))
+scene.controls(rig).location = scene.controls(plain).location  # it was put beside the other
+scene.update(scene.controls(rig))
 setup, _ = looks.stage([items[1]], 32, "CYCLES")
 setup.render.engine = "BLENDER_WORKBENCH"
 setup.render.film_transparent = True
