@@ -1,75 +1,217 @@
 # SPDX-License-Identifier: MIT
-"""Reads include and import lines against the allowed edges between folders."""
+"""Reads the include and import lines of a part of the project against its rooms in rooms.toml."""
 
 from __future__ import annotations
 
 import ast
 import re
-from pathlib import Path
+import sys
+import tomllib
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from fnmatch import fnmatch
+from functools import lru_cache
+from graphlib import CycleError, TopologicalSorter
+from pathlib import Path, PurePosixPath
+from typing import NamedTuple
 
-NATIVE = {
-    "core": set(),
-    "dna": {"core"},
-    "simd": {"core"},
-    "rig": {"core", "simd"},
-    "compile": {"core", "dna", "simd", "rig"},
-    "edit": {"core", "dna", "simd", "rig", "compile"},
-    "author": {"core", "dna", "edit", "simd", "rig", "compile"},
-    "clip": {"core"},
-}
-NATIVE["bindings"] = set(NATIVE)
-ADDON = {"logic": set(), "scene": {"logic"}, "ui": {"logic", "scene"}}
-INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.MULTILINE)
-INTRINSICS = re.compile(r"(immintrin|emmintrin|arm_neon|x86intrin|intrin)\.h$")
+ROOMS = tomllib.loads((Path(__file__).parent / "rooms.toml").read_text(encoding="utf-8"))
+INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*(?:"([^"\n]+)"|<([^>\n]+)>|(\S+))', re.MULTILINE)
+CODE_FROM_TEXT = {"exec", "eval", "run_module", "run_path"}
 
 
-def native_violations(root: Path) -> list[str]:
-    """One line for each include under root/native that its folder is not allowed."""
-    found = []
-    for path in sorted((root / "native").rglob("*")):
-        if path.suffix not in (".h", ".cpp"):
-            continue
-        folder = path.relative_to(root / "native").parts[0]
-        for mark, name in INCLUDE.findall(path.read_text(encoding="utf-8")):
-            target = name.split("/")[0]
-            local = mark == '"' and target in NATIVE
-            bad = local and target != folder and target not in NATIVE[folder]
-            bad |= name.startswith("pybind11/") and folder != "bindings"
-            bad |= bool(INTRINSICS.search(name)) and folder != "simd"
-            if bad:
-                found.append(f"{path.relative_to(root)}: {folder} may not include {name}")
+class Use(NamedTuple):
+    """One import or include: a file of this part, something from outside it, or unreadable."""
+
+    kind: str  # "inside", "outside" or "unreadable"
+    name: str  # the file's path, the outside name, or the line as it is written
+
+
+def sources(root: Path, part: str) -> dict[str, str]:
+    """The text of each file of a part of the project by its path inside the part's folder."""
+    plan = ROOMS[part]
+    base = root / plan["folder"]
+    found = {}
+    for path in sorted(base.rglob("*")):
+        name = path.relative_to(base)
+        if path.suffix in plan["kinds"] and name.parts[0] not in plan.get("without", ()):
+            found[name.as_posix()] = path.read_text(encoding="utf-8")
     return found
 
 
-def imported(tree: ast.AST, package: tuple[str, ...]) -> list[str]:
-    """Absolute dotted names of everything that a module imports."""
-    out = []
-    for node in ast.walk(tree):
+def room_of(path: str, rooms: Mapping[str, object]) -> str | None:
+    """The room of a file: the file itself, or its folder; None where rooms has neither."""
+    folder = PurePosixPath(path).parent.as_posix()
+    return next((room for room in (path, folder) if room in rooms), None)
+
+
+def included(path: str, text: str, files: frozenset[str]) -> Iterator[Use]:
+    """What a C++ file includes; a quoted name is looked for beside the file, then under native/."""
+    for quoted, angled, other in _includes(text):
+        name = quoted or angled
+        places = [_joined(PurePosixPath(path).parent, name)] if quoted else []
+        inside = next(
+            (place for place in [*places, _joined(PurePosixPath(), name)] if place in files), ""
+        )
+        if other or (quoted and not inside):
+            yield Use("unreadable", f"#include {other or name}")
+        elif inside:
+            yield Use("inside", inside)
+        elif "/" in name or "." in name:
+            yield Use("outside", name)
+
+
+@lru_cache(maxsize=1000)
+def _includes(text: str) -> list[tuple[str, str, str]]:
+    return INCLUDE.findall(text)
+
+
+def _joined(folder: PurePosixPath, name: str) -> str:
+    parts: list[str] = []
+    for part in (folder / name).parts:
+        if part == ".." and parts:
+            parts.pop()
+        else:
+            parts.append(part)
+    return "/".join(parts)
+
+
+def imported(path: str, text: str, name: str, files: frozenset[str]) -> Iterator[Use]:
+    """What a Python file imports, in functions, under TYPE_CHECKING and by import_module too."""
+    package = (name, *PurePosixPath(path).parts[:-1])
+    for module, member in _imports(text, package):
+        if module is None:
+            yield Use("unreadable", member)
+        elif module[0] == name:
+            both = (*module[1:], *(member.split(".") if member else ()))
+            found = _file_of(both, files) or _file_of(module[1:], files)
+            yield Use("inside", found) if found else Use("unreadable", ".".join((*module, member)))
+        elif module[0] not in sys.stdlib_module_names:
+            yield Use("outside", module[0])
+
+
+def _file_of(words: tuple[str, ...], files: frozenset[str]) -> str | None:
+    stem = "/".join(words)
+    places = (f"{stem}.py", f"{stem}.pyi", f"{stem}/__init__.py".lstrip("/"))
+    return next((place for place in places if place in files), None)
+
+
+@lru_cache(maxsize=1000)
+def _imports(text: str, package: tuple[str, ...]) -> list[tuple[tuple[str, ...] | None, str]]:
+    return list(_names(list(ast.walk(ast.parse(text))), package))
+
+
+def _names(
+    nodes: list[ast.AST], package: tuple[str, ...]
+) -> Iterator[tuple[tuple[str, ...] | None, str]]:
+    """(module, member) of each import; (None, the line) of one whose name is not written down."""
+    importers = {"import_module", "__import__"}
+    for node in nodes:
+        if isinstance(node, ast.ImportFrom) and node.module == "importlib":
+            importers |= {a.asname for a in node.names if a.name == "import_module" and a.asname}
+    for node in nodes:
         if isinstance(node, ast.Import):
-            out += [alias.name for alias in node.names]
+            yield from ((tuple(alias.name.split(".")), "") for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
-            base = package[: len(package) - node.level + 1] if node.level else ()
-            stem = ".".join([*base, *((node.module or "").split(".") if node.module else [])])
-            out += [f"{stem}.{alias.name}" for alias in node.names]
+            module = _absolute("." * node.level + (node.module or ""), package)
+            yield from ((module, alias.name) for alias in node.names)
+        elif isinstance(node, ast.Call):
+            called = getattr(node.func, "attr", getattr(node.func, "id", ""))
+            if called in importers:
+                text, whole = _literal([*node.args, *(k.value for k in node.keywords)][0])
+                module = _absolute(text, package)
+                known = whole or (module[0] != package[0] and "." in text)
+                yield (module, "") if known else (None, ast.unparse(node))
+            elif called in CODE_FROM_TEXT and not (called == "eval" and hasattr(node.func, "attr")):
+                yield None, ast.unparse(node)
+
+
+def _literal(node: ast.expr) -> tuple[str, bool]:
+    """The text that an expression begins with, and whether that is all of it."""
+    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        return node.value, True
+    if isinstance(node, ast.JoinedStr) and isinstance(node.values[0], ast.Constant):
+        return str(node.values[0].value), False
+    return "", False
+
+
+def _absolute(name: str, package: tuple[str, ...]) -> tuple[str, ...]:
+    level = len(name) - len(name.lstrip("."))
+    base = package[: len(package) - level + 1] if level else ()
+    return (*base, *(word for word in name.lstrip(".").split(".") if word)) or ("",)
+
+
+def uses(part: str, files: Mapping[str, str]) -> dict[str, list[Use]]:
+    """What each file of a part uses."""
+    known = frozenset(files)
+    out = {}
+    for path, text in files.items():
+        if path.endswith((".h", ".cpp")):
+            out[path] = list(included(path, text, known))
+        elif path.endswith((".py", ".pyi")):
+            out[path] = list(imported(path, text, ROOMS[part]["name"], known))
     return out
 
 
-def addon_violations(root: Path) -> list[str]:
-    """One line for each import under root/addon/risorius that its folder is not allowed."""
-    found = []
-    base = root / "addon" / "risorius"
-    for path in sorted(base.rglob("*.py")):
-        parts = path.relative_to(base).parts
-        folder = parts[0] if len(parts) > 1 else ""
-        package = ("addon", *parts[:-1])
-        for name in imported(ast.parse(path.read_text(encoding="utf-8")), package):
-            words = name.split(".")
-            bad = words[0] == "risorius" and parts[-1] != "native.py"
-            if folder == "logic":
-                bad |= words[0] in ("bpy", "bmesh", "mathutils", "risorius")
-                bad |= words[:2] == ["addon", "native"]
-            if folder in ADDON and words[0] == "addon" and len(words) > 1 and words[1] in ADDON:
-                bad |= words[1] != folder and words[1] not in ADDON[folder]
-            if bad:
-                found.append(f"{path.relative_to(root)}: may not import {name}")
-    return found
+def violations(part: str, files: Mapping[str, str]) -> list[str]:
+    """One sentence for each file, import or folder of a part that the plan does not allow."""
+    plan = ROOMS[part]
+    used = uses(part, files)
+    found = [
+        f"{path}: its folder is no room of the plan"
+        for path in files
+        if not room_of(path, plan["rooms"])
+    ]
+    for path, targets in used.items():
+        found += [
+            f"{path}: {reason}" for target in targets if (reason := _refused(path, target, plan))
+        ]
+    return found + _circle(used) + _crowded(files, plan) + _disordered(plan["rooms"])
+
+
+def _refused(path: str, use: Use, plan: dict) -> str:
+    room = room_of(path, plan["rooms"])
+    if use.kind == "unreadable":
+        allowed = path in plan.get("dynamic", {})
+    elif use.kind == "outside":
+        homes = next((plan["outside"][p] for p in plan["outside"] if fnmatch(use.name, p)), [])
+        allowed = bool({"*", room} & set(homes))
+    else:
+        target = room_of(use.name, plan["rooms"])
+        allowed = target == room or target in plan["rooms"].get(room, ())
+    if allowed:
+        return ""
+    if use.kind == "unreadable":
+        return f"no one can read what this uses: {use.name}"
+    return f"{room} may not use {use.name}"
+
+
+def _circle(used: dict[str, list[Use]]) -> list[str]:
+    graph = {
+        path: {use.name for use in targets if use.kind == "inside"}
+        for path, targets in used.items()
+    }
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        return ["files in a circle: " + " <- ".join(error.args[1])]
+    return []
+
+
+def _crowded(files: Mapping[str, str], plan: dict) -> list[str]:
+    counts = Counter(
+        PurePosixPath(path).parent.as_posix() for path in files if not path.endswith("__init__.py")
+    )
+    larger = plan.get("larger", {})
+    most = {folder: larger.get(folder, {"files": plan["limit"]})["files"] for folder in counts}
+    return [f"{f}: {n} files, and {most[f]} are the most" for f, n in counts.items() if n > most[f]]
+
+
+def _disordered(rooms: Mapping[str, list[str]]) -> list[str]:
+    order = list(rooms)
+    return [
+        f"{room}: {known} is not written above it in the plan"
+        for room, below in rooms.items()
+        for known in below
+        if known not in order[: order.index(room)]
+    ]

@@ -1,49 +1,114 @@
 # SPDX-License-Identifier: MIT
-"""The folders know only those before them, and the check can fail."""
+"""The files keep to the plan of rooms.toml, and each rule of the check can fail."""
 
-import shutil
+from functools import lru_cache
 from pathlib import Path
 
 import pytest
-from layers import addon_violations, native_violations
+from layers import ROOMS, sources, violations
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def test_native_includes_follow_the_layers():
-    assert native_violations(ROOT) == []
+@lru_cache
+def files_of(part):
+    return sources(ROOT, part)
 
 
-def test_addon_imports_follow_the_layers():
-    assert addon_violations(ROOT) == []
+def planted(part, path, text):
+    """What the check says, but for the size of folders, where a part gets one more file or line."""
+    files = dict(files_of(part))
+    files[path] = files.get(path, "") + "\n" + text + "\n"
+    return [line for line in violations(part, files) if "are the most" not in line]
 
 
-@pytest.mark.parametrize(
-    ("file", "line"),
-    [
-        ("native/dna/planted.h", '#include "rig/rig.h"'),
-        ("native/rig/planted.cpp", "#include <immintrin.h>"),
-        ("native/core/planted.cpp", "#include <pybind11/pybind11.h>"),
-        ("native/rig/planted.h", '#include "compile/compile.h"'),
-    ],
-)
-def test_a_planted_include_is_found(tmp_path, file, line):
-    shutil.copytree(ROOT / "native", tmp_path / "native")
-    (tmp_path / file).write_text(line + "\n")
-    assert len(native_violations(tmp_path)) == 1
+@pytest.mark.parametrize("part", ROOMS)
+def test_every_file_keeps_to_the_plan(part):
+    assert len(files_of(part)) > 10
+    assert violations(part, files_of(part)) == []
 
 
 @pytest.mark.parametrize(
-    ("file", "line"),
+    ("path", "line", "said"),
     [
-        ("logic/planted.py", "import bpy"),
-        ("logic/planted.py", "from ..native import module"),
-        ("scene/planted.py", "from ..ui import panels"),
-        ("scene/planted.py", "from risorius import Rig"),
-        ("logic/planted.py", "from ..scene import build"),
+        ("dna/planted.h", '#include "rig/rig.h"', "dna may not use rig/rig.h"),
+        ("dna/planted.h", '#include "../rig/rig.h"', "dna may not use rig/rig.h"),
+        ("dna/planted.cpp", "  #  include <rig/rig.h>", "dna may not use rig/rig.h"),
+        ("dna/planted.cpp", '#include "rig/gone.h"', "no one can read"),
+        ("dna/planted.cpp", "#include RISORIUS_HEADER", "no one can read"),
+        ("rig/planted.h", '#include "compile/compile.h"', "rig may not use compile/compile.h"),
+        ("rig/planted.cpp", "#include <immintrin.h>", "rig may not use immintrin.h"),
+        ("core/planted.cpp", "#include <pybind11/pybind11.h>", "core may not use pybind11"),
+        ("core/planted.cpp", "#include <boost/any.hpp>", "core may not use boost/any.hpp"),
+        ("bindings/planted.cpp", "#include <unistd.h>", "bindings may not use unistd.h"),
+        ("rig/rig.h", '#include "rig/file.h"', "files in a circle"),
+        ("attic/planted.h", "", "no room of the plan"),
+        ("rig/attic/planted.h", "", "no room of the plan"),
+        ("planted.h", "", "no room of the plan"),
     ],
 )
-def test_a_planted_import_is_found(tmp_path, file, line):
-    shutil.copytree(ROOT / "addon", tmp_path / "addon")
-    (tmp_path / "addon" / "risorius" / file).write_text(line + "\n")
-    assert len(addon_violations(tmp_path)) == 1
+def test_a_planted_include_is_found(path, line, said):
+    found = planted("native", path, line)
+    assert len(found) == 1
+    assert said in found[0]
+
+
+@pytest.mark.parametrize(
+    ("path", "line", "said"),
+    [
+        ("logic/planted.py", "import bpy", "logic may not use bpy"),
+        ("logic/planted.py", "import bpy.types as t", "logic may not use bpy"),
+        ("logic/planted.py", "def late():\n    import bmesh", "logic may not use bmesh"),
+        ("logic/planted.py", "__import__('mathutils')", "logic may not use mathutils"),
+        ("logic/planted.py", "import scipy", "logic may not use scipy"),
+        ("logic/planted.py", "from ..native import module", "logic may not use native.py"),
+        ("logic/planted.py", "from .. import native", "logic may not use native.py"),
+        ("logic/planted.py", "from ..scene.parts import x", "logic may not use scene/parts.py"),
+        (
+            "logic/planted.py",
+            "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from ..scene import parts",
+            "logic may not use scene/parts.py",
+        ),
+        (
+            "logic/planted.py",
+            "import importlib\nimportlib.import_module('..scene.parts', __package__)",
+            "logic may not use scene/parts.py",
+        ),
+        (
+            "logic/planted.py",
+            "from importlib import import_module as load\nload('risorius.rigs')",
+            "logic may not use risorius",
+        ),
+        ("logic/planted.py", "__import__(f'risorius.{name}')", "logic may not use risorius"),
+        ("logic/planted.py", "__import__(name='bpy')", "logic may not use bpy"),
+        ("logic/planted.py", "__import__(name)", "no one can read"),
+        ("logic/planted.py", "__import__(f'..scene.{name}')", "no one can read"),
+        ("logic/planted.py", "exec('import bpy')", "no one can read"),
+        ("logic/planted.py", "from .gone import x", "no one can read"),
+        ("scene/planted.py", "from ..ui import panels", "scene may not use ui"),
+        ("scene/planted.py", "from risorius import Rig", "scene may not use risorius"),
+        ("logic/names.py", "from .maps import x\nfrom . import names", "files in a circle"),
+        ("attic/planted.py", "", "no room of the plan"),
+        ("scene/attic/planted.py", "", "no room of the plan"),
+        ("planted.py", "", "no room of the plan"),
+    ],
+)
+def test_a_planted_import_is_found(path, line, said):
+    found = planted("addon", path, line)
+    assert len(found) == 1
+    assert said in found[0]
+
+
+@pytest.mark.parametrize("part", ROOMS)
+def test_a_folder_that_grows_too_large_is_found(part):
+    plan = ROOMS[part]
+    folder = next(iter(plan["rooms"]))
+    more = {f"{folder}/planted{n}{plan['kinds'][0]}": "" for n in range(plan["limit"])}
+    assert any("are the most" in line for line in violations(part, {**files_of(part), **more}))
+
+
+def test_a_plan_that_runs_backwards_is_found(monkeypatch):
+    monkeypatch.setitem(ROOMS["native"]["rooms"], "core", ["bindings"])
+    assert any(
+        "bindings is not written above" in line for line in violations("native", files_of("native"))
+    )
