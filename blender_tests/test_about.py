@@ -62,7 +62,7 @@ def test_a_slider_moves_the_face_in_every_mode(mode, dna_file, item, state):
 
 
 def test_the_overlay_tells_the_stages_of_the_last_frames(dna_file):
-    timing = scene.submodule("scene.timing")
+    timing = scene.submodule("scene.frame.timing")
     rigs = [scene.load(dna_file), scene.load(dna_file)]
     timing.frames.clear()
     timing.begin()

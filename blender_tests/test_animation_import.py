@@ -36,7 +36,7 @@ def _clip(**changes):
 
 
 def _made(rig, clip, start=10.0, keep_clock=False, fps=24, fps_base=1.0):
-    clips = scene.submodule("scene.clips")
+    clips = scene.submodule("scene.animation.clip_actions")
     render = bpy.context.scene.render
     render.fps, render.fps_base = fps, fps_base
     timing = clips.timing_of(clip, bpy.context.scene, start, keep_clock)
@@ -44,7 +44,7 @@ def _made(rig, clip, start=10.0, keep_clock=False, fps=24, fps_base=1.0):
 
 
 def _curves(action):
-    return list(scene.submodule("scene.compat").curves_of(action))
+    return list(scene.submodule("scene.base.compat").curves_of(action))
 
 
 @pytest.mark.parametrize(("fps", "base"), [(24, 1.0), (30, 1.001), (60, 1.0), (25, 1.0)])
@@ -86,7 +86,7 @@ def test_samples_that_are_no_numbers_are_left_out(rig):
 
 
 def test_a_clip_for_another_thing_is_refused(rig):
-    logic = scene.submodule("logic.clips")
+    logic = scene.submodule("logic.animation.clip_units")
     clip = _clip().selected(["stranger"])
     with pytest.raises(logic.ClipError, match="none of its 1 curves"):
         _made(rig, clip)
@@ -113,7 +113,10 @@ def _saved(dna, tmp_path):
 
 
 def _back(rig, action, frames):
-    clips, live = scene.submodule("scene.clips"), scene.submodule("scene.runtime").of(rig)
+    clips, live = (
+        scene.submodule("scene.animation.clip_actions"),
+        scene.submodule("scene.character.runtime").of(rig),
+    )
     clip = clips.clip_of_action(scene.controls(rig), live, action, frames, 24.0)
     return clip.replaced(names=clips.dna_names(live, clip.names))
 
@@ -125,7 +128,7 @@ def _played(rig, frame):
 
 
 def test_it_plays_as_the_active_action(rig):
-    clips = scene.submodule("scene.clips")
+    clips = scene.submodule("scene.animation.clip_actions")
     clip = _clip()
     first = _made(rig, clip).action
     assert clips.play(rig, first) is None
@@ -139,7 +142,7 @@ def test_it_plays_as_the_active_action(rig):
 
 
 def test_it_plays_as_a_strip_where_its_keys_are(rig):
-    clips = scene.submodule("scene.clips")
+    clips = scene.submodule("scene.animation.clip_actions")
     clip = _clip()
     strip = clips.add_strip(rig, _made(rig, clip, start=10.4).action)
     assert strip.frame_start == pytest.approx(10.4)
@@ -151,7 +154,10 @@ def test_it_plays_as_a_strip_where_its_keys_are(rig):
 
 @pytest.mark.parametrize("rotation_mode", ["QUATERNION", "XYZ", "ZYX", "AXIS_ANGLE"])
 def test_the_head_turns_as_the_clip_says(rig, rotation_mode):
-    clips, place = scene.submodule("scene.clips"), scene.submodule("scene.place")
+    clips, place = (
+        scene.submodule("scene.animation.clip_actions"),
+        scene.submodule("scene.character.rig_placement"),
+    )
     controls = scene.controls(rig)
     controls.pose.bones["head"].rotation_mode = rotation_mode
     yaw, pitch, roll = np.linspace(0, 0.9, 25), np.linspace(0, 0.4, 25), np.linspace(0, -0.5, 25)
@@ -363,9 +369,9 @@ def test_a_capture_as_a_strip_or_a_layer(rig, capture, target):
     )
     bpy.context.scene.frame_set(21)
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    live = scene.submodule("scene.runtime").of(rig)
+    live = scene.submodule("scene.character.runtime").of(rig)
     seen = scene.controls(rig).evaluated_get(depsgraph)
-    raw, turns = scene.submodule("scene.inputs").read_inputs(seen, live, depsgraph)
+    raw, turns = scene.submodule("scene.frame.inputs").read_inputs(seen, live, depsgraph)
     assert raw[0] == pytest.approx(0.20, abs=1e-5)
     assert turns["head"].angle == pytest.approx(0.1, abs=1e-5)
 
@@ -429,7 +435,7 @@ def voice(tmp_path):
 
 
 def _is_heard_from(frame):
-    (strip,) = scene.submodule("scene.compat").strips_of(bpy.context.scene)
+    (strip,) = scene.submodule("scene.base.compat").strips_of(bpy.context.scene)
     assert strip.type == "SOUND"
     assert strip.frame_final_start == frame
 
@@ -455,7 +461,7 @@ def test_a_face_speaks_and_is_heard(rig, voice):
 
 
 def test_speech_beside_blender_is_the_same_and_can_be_cancelled(rig, voice, tmp_path):
-    listening = scene.submodule("scene.listening")
+    listening = scene.submodule("scene.animation.speech_task")
     task = listening.Task(str(voice), WORDS, seed=3)
     task.start()
     task.wait()
@@ -480,7 +486,9 @@ def test_speech_beside_blender_is_the_same_and_can_be_cancelled(rig, voice, tmp_
 def test_speech_needs_nothing_of_what_this_blender_has_loaded(rig, voice, monkeypatch):
     """A Blender that holds another libpocketsphinx cannot load the recogniser: nor does it."""
     monkeypatch.setitem(sys.modules, "pocketsphinx", None)
-    monkeypatch.setattr(scene.submodule("scene.listening"), "has_recogniser", lambda: True)
+    monkeypatch.setattr(
+        scene.submodule("scene.animation.speech_task"), "has_recogniser", lambda: True
+    )
     assert bpy.ops.risorius.speak(filepath=str(voice), transcript=WORDS, use_sound=False) == {
         "FINISHED"
     }
@@ -489,7 +497,7 @@ def test_speech_needs_nothing_of_what_this_blender_has_loaded(rig, voice, monkey
 
 
 def test_speech_without_the_recogniser_says_what_to_do(rig, voice, monkeypatch):
-    listening = scene.submodule("scene.listening")
+    listening = scene.submodule("scene.animation.speech_task")
     monkeypatch.setattr(listening, "has_recogniser", lambda: False)
     with pytest.raises(RuntimeError, match="PocketSphinx: install it by the button"):
         bpy.ops.risorius.speak(filepath=str(voice))
@@ -509,7 +517,7 @@ class Labels:
 
 
 def test_the_preferences_say_in_words_why_the_button_is_grey(monkeypatch):
-    listening = scene.submodule("scene.listening")
+    listening = scene.submodule("scene.animation.speech_task")
     monkeypatch.setattr(listening, "has_recogniser", lambda: False)
     layout = Labels()
     scene.submodule("ui.speech_operators").draw_preferences(layout)
@@ -531,7 +539,7 @@ def shelf(tmp_path, monkeypatch):
     monkeypatch.setenv("PIP_CONFIG_FILE", os.devnull)
     monkeypatch.setenv("PIP_NO_INDEX", "1")
     monkeypatch.setenv("PIP_FIND_LINKS", str(folder))
-    listening = scene.submodule("scene.listening")
+    listening = scene.submodule("scene.animation.speech_task")
     monkeypatch.setattr(listening, "packages_folder", lambda: tmp_path / "packages")
     return folder
 
@@ -553,7 +561,7 @@ def put_wheel(shelf):
 
 
 def test_only_the_files_that_are_known_are_installed(shelf, tmp_path, monkeypatch):
-    listening = scene.submodule("scene.listening")
+    listening = scene.submodule("scene.animation.speech_task")
     version = f"Python {sys.version_info.major}.{sys.version_info.minor}"
     with pytest.raises(RuntimeError, match=f"there is no file of it for {version} on "):
         listening.install_recogniser()
@@ -561,7 +569,7 @@ def test_only_the_files_that_are_known_are_installed(shelf, tmp_path, monkeypatc
     with pytest.raises(RuntimeError, match="not the file that this add-on knows"):
         listening.install_recogniser()
     assert not (tmp_path / "packages").exists()
-    monkeypatch.setattr(scene.submodule("logic.recogniser"), "HASHES", (digest,))
+    monkeypatch.setattr(scene.submodule("logic.animation.recogniser"), "HASHES", (digest,))
     listening.install_recogniser()
     assert (tmp_path / "packages" / "pocketsphinx" / "__init__.py").exists()
 
@@ -570,7 +578,7 @@ def test_without_a_network_the_button_says_so(shelf, monkeypatch):
     monkeypatch.delenv("PIP_NO_INDEX")
     monkeypatch.setenv("PIP_INDEX_URL", "http://127.0.0.1:9/simple")  # nobody listens there
     with pytest.raises(RuntimeError, match=r"could not be reached \(Connection refused\)"):
-        scene.submodule("scene.listening").install_recogniser()
+        scene.submodule("scene.animation.speech_task").install_recogniser()
 
 
 def test_a_file_that_is_no_sound(rig, voice, tmp_path):
@@ -582,18 +590,18 @@ def test_a_file_that_is_no_sound(rig, voice, tmp_path):
 
 
 def test_eye_angles_turn_the_eye_bones_when_asked(rig):
-    clips = scene.submodule("scene.clips")
+    clips = scene.submodule("scene.animation.clip_actions")
     clip = risorius.Clip(["eyeL.yaw", "eyeL.pitch"], [[0.2, 0.2], [0.1, 0.1]], 24.0)
     timing = clips.timing_of(clip, bpy.context.scene, 1.0)
-    logic = scene.submodule("logic.clips")
+    logic = scene.submodule("logic.animation.clip_units")
     with pytest.raises(logic.ClipError):
         clips.make_action(rig, clip, timing, "Eyes", with_eyes=False)
     clips.play(rig, clips.make_action(rig, clip, timing, "Eyes").action)
     _played(rig, 1)
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    live = scene.submodule("scene.runtime").of(rig)
+    live = scene.submodule("scene.character.runtime").of(rig)
     seen = scene.controls(rig).evaluated_get(depsgraph)
-    raw = scene.submodule("scene.inputs").read_inputs(seen, live, depsgraph)[0]
+    raw = scene.submodule("scene.frame.inputs").read_inputs(seen, live, depsgraph)[0]
     asked = {n: v for n, v in zip(live.labels, raw, strict=True) if v > 1e-4}
     assert set(asked) == {"CTRL_expressions.eyeLookLeftL", "CTRL_expressions.eyeLookUpL"}
     index = live.labels.index("CTRL_expressions.eyeLookLeftL")

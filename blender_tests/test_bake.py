@@ -203,7 +203,7 @@ def _add_layers(rig):
     controls.animation_data.action = own
     for name in ("browDownL", "mouthCornerPullR"):
         scene.face(rig)[f"CTRL_expressions.{name}"] = 0.0
-    layers = scene.submodule("scene.layers")
+    layers = scene.submodule("scene.animation.layers")
     layer = layers.add_action(controls, action, blend="ADD")
     for frame, weight in ((1, 1.0), (10, 0.2)):
         layer.weight = weight
@@ -376,7 +376,7 @@ def test_left_out_keys_stay_within_the_error(dna_file):
 
 
 def test_reduction_holds_its_bound_on_any_curve():
-    curves = scene.submodule("logic.curves")
+    curves = scene.submodule("logic.animation.key_reduction")
     random = np.random.default_rng(3)
     frames = np.cumsum(random.uniform(0.2, 2.0, 400))
     values = np.cumsum(random.normal(0, 0.1, (400, 60)), axis=0).astype(np.float32)
@@ -396,7 +396,7 @@ def test_reduction_holds_its_bound_on_any_curve():
 
 
 def test_where_float32_is_coarser_than_the_bound_all_keys_stay():
-    curves = scene.submodule("logic.curves")
+    curves = scene.submodule("logic.animation.key_reduction")
     frames = np.arange(400.0)
     values = (frames[:, None] * [1.0, 1000.5]).astype(np.float32)  # lines, exactly
     keep = curves.reduce_keys(frames, values, 1e-4)
@@ -408,7 +408,7 @@ def test_where_float32_is_coarser_than_the_bound_all_keys_stay():
 
 
 def test_signs_of_quaternions_follow_each_other():
-    curves = scene.submodule("logic.curves")
+    curves = scene.submodule("logic.animation.key_reduction")
     turns = np.float32(
         [[[1, 0, 0, 0]], [[-0.9, -0.1, 0, 0]], [[-0.8, 0.2, 0, 0]], [[0.9, 0, 0, 0]]]
     )
@@ -461,7 +461,7 @@ class _Event:
 def test_with_a_window_it_shows_progress_and_esc_ends_it(ended, dna_file):
     rig = _face(dna_file)
     before, counts = _state(rig), scene.counts()
-    bake = scene.submodule("scene.bake")
+    bake = scene.submodule("scene.bake.bake_face")
     scene.submodule("ui.bake_operators")._SLICE = 0.0
     window = _Window(bake.bake(bpy.context, [rig], bake.BakeOptions(end=10)))
     assert window.modal("MOUSEMOVE") == {"RUNNING_MODAL"}
@@ -488,7 +488,7 @@ def test_when_blender_ends_it_nothing_is_left(how, whole_scene, dna_file, tmp_pa
     rig = bpy.data.objects["Small_rig"]
     bpy.context.scene.frame_set(7)
     before, counts = _state(rig), scene.counts()
-    bake = scene.submodule("scene.bake")
+    bake = scene.submodule("scene.bake.bake_face")
     scene.submodule("ui.bake_operators")._SLICE = 0.0
     window = _Window(bake.bake(bpy.context, [rig], bake.BakeOptions(end=10)))
     assert window.modal("TIMER") == {"RUNNING_MODAL"}
@@ -512,7 +512,7 @@ def test_sampling_is_frame_stepping_and_touches_nothing(hidden, dna_file):
     values, counts = dict(scene.face(rig).items()), scene.counts()
     posed = [tuple(b.rotation_quaternion) for b in rig.pose.bones]
     frames = np.array([1.0, 2.5, 4.0, 10.0])
-    sampling, inputs = scene.submodule("scene.sampling"), scene.submodule("scene.inputs")
+    sampling, inputs = scene.submodule("scene.bake.sampling"), scene.submodule("scene.frame.inputs")
     job = sampling.sample(bpy.context, [rig], frames)
     while True:
         try:
@@ -524,7 +524,7 @@ def test_sampling_is_frame_stepping_and_touches_nothing(hidden, dna_file):
     assert dict(scene.face(rig).items()) == values
     assert [tuple(b.rotation_quaternion) for b in rig.pose.bones] == posed
     assert scene.counts() == counts
-    live = scene.submodule("scene.runtime").of(rig)
+    live = scene.submodule("scene.character.runtime").of(rig)
     for number, frame in enumerate(frames):
         bpy.context.scene.frame_set(int(frame), subframe=frame % 1)
         depsgraph = bpy.context.evaluated_depsgraph_get()
@@ -540,7 +540,7 @@ def test_sampling_is_frame_stepping_and_touches_nothing(hidden, dna_file):
 def test_a_bake_that_is_ended_changes_nothing(dna_file):
     rig = _face(dna_file)
     before, counts = _state(rig), scene.counts()
-    bake = scene.submodule("scene.bake")
+    bake = scene.submodule("scene.bake.bake_face")
     job = bake.bake(bpy.context, [rig], bake.BakeOptions(end=10))
     assert 0 < next(job) < 1
     assert next(job) < 1

@@ -82,7 +82,7 @@ def test_head_bone_turns_the_head_joint_on_top(mode, dna_file):
 def test_eye_bone_turns_the_eye_by_its_own_angle(dna_file, degrees):
     # The eye's neutral is oblique, so its look controls turn it by their own measured response.
     rig = scene.load(dna_file)
-    runtime = scene.submodule("scene.runtime").of(rig)
+    runtime = scene.submodule("scene.character.runtime").of(rig)
     bone = scene.controls(rig).pose.bones["eye_L"]
     bone.rotation_mode = "XYZ"
     _control, yaw_at_one, _pitch = next(c for c in runtime.look["L"] if c[1] > 0)
@@ -203,12 +203,12 @@ def test_layers_and_expressions_leave_a_rotation_its_sign(turning):
     for name, value in zip(TURN, (-0.48, 0.6, -0.64, -0.0), strict=True):
         bone[name] = value
     scene.update(controls)
-    layers = scene.submodule("scene.layers")
+    layers = scene.submodule("scene.animation.layers")
     layers.add(controls, "EXPRESSION", "Joy", expression="joy", weight=0.5)
-    live = scene.submodule("scene.runtime").of(turning)
+    live = scene.submodule("scene.character.runtime").of(turning)
     depsgraph = bpy.context.evaluated_depsgraph_get()
     seen = controls.evaluated_get(depsgraph)
-    raw = scene.submodule("scene.inputs").read_inputs(seen, live, depsgraph)[0]
+    raw = scene.submodule("scene.frame.inputs").read_inputs(seen, live, depsgraph)[0]
     np.testing.assert_array_equal(raw[7:], np.float32([-0.48, 0.6, -0.64, 0.0]))
     assert raw[1] > 0.1  # the layer plays
     given = {"expression": "joy", "strength": 0.5, "only": True}

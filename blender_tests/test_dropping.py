@@ -42,12 +42,12 @@ def test_the_handler_is_for_dna_files_over_views_that_show_objects():
 
 def test_one_file(two_files):
     assert _drop(two_files[0]) == {"FINISHED"}
-    assert [r.name for r in scene.submodule("scene.parts").rigs()] == ["One_rig"]
+    assert [r.name for r in scene.submodule("scene.base.parts").rigs()] == ["One_rig"]
 
 
 def test_several_files_at_once(two_files):
     assert _drop(*two_files) == {"FINISHED"}
-    assert {r.name for r in scene.submodule("scene.parts").rigs()} == {"One_rig", "Two_rig"}
+    assert {r.name for r in scene.submodule("scene.base.parts").rigs()} == {"One_rig", "Two_rig"}
 
 
 def test_a_bad_file_among_good_ones_is_named_and_the_others_come_in(two_files):
@@ -55,10 +55,10 @@ def test_a_bad_file_among_good_ones_is_named_and_the_others_come_in(two_files):
     bad.write_bytes(b"nothing of the kind")
     with pytest.raises(RuntimeError, match="bad.dna"):
         _drop(two_files[0], bad, two_files[1])
-    assert {r.name for r in scene.submodule("scene.parts").rigs()} == {"One_rig", "Two_rig"}
+    assert {r.name for r in scene.submodule("scene.base.parts").rigs()} == {"One_rig", "Two_rig"}
 
 
 def test_the_next_import_by_path_does_not_remember_the_drop(two_files):
     _drop(two_files[0])
     scene.load(two_files[1])
-    assert {r.name for r in scene.submodule("scene.parts").rigs()} == {"One_rig", "Two_rig"}
+    assert {r.name for r in scene.submodule("scene.base.parts").rigs()} == {"One_rig", "Two_rig"}

@@ -65,7 +65,7 @@ def test_untouched_golden_files(tmp_path):
         seen += 1
         bpy.context.view_layer.objects.active = rig
         assert _export(tmp_path).read_bytes() == source.read_bytes(), source.name
-        scene.submodule("scene.build").remove(rig)
+        scene.submodule("scene.character.build").remove(rig)
     assert seen >= 3
 
 
@@ -199,7 +199,7 @@ def test_edited_joints(tmp_path):
         source = tmp_path / f"{number}.dna"
         small_face(**conventions).save(str(source))
         rig = scene.load(source)
-        armatures = scene.submodule("scene.armatures")
+        armatures = scene.submodule("scene.character.armatures")
         bone = rig.data.bones[EYE]
         size = 100.0 if "translation_unit" in conventions else 1.0
         with armatures.edit_armature(bpy.context, rig.data) as bones:

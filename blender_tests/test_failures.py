@@ -54,7 +54,7 @@ def test_bad_files_leave_nothing_behind(tmp_path, mode):
 
 def test_a_failure_half_way_leaves_nothing_behind(dna_file, mode, monkeypatch, tracebacks):
     before = scene.counts()
-    meshes = scene.submodule("scene.meshes")
+    meshes = scene.submodule("scene.character.meshes")
 
     def fail(*_arguments):
         raise MemoryError("planted")
@@ -88,7 +88,7 @@ def test_wheel_of_another_version_is_said_in_words(monkeypatch):
 
 
 def test_no_permission_gets_a_sentence(dna_file, monkeypatch):
-    build = scene.submodule("scene.build")
+    build = scene.submodule("scene.character.build")
 
     class Refusing(type(build.Path())):
         def read_bytes(self):
@@ -122,7 +122,7 @@ def test_a_file_that_changes_while_it_is_read_is_one_file(dna_file, monkeypatch,
     scene.set_controls(rig, jawOpen=0.5)
     assert calls == ["load", "Rig"]
     monkeypatch.undo()
-    assert scene.submodule("scene.storage").content(rig["risorius_dna"]) == whole
+    assert scene.submodule("scene.base.storage").content(rig["risorius_dna"]) == whole
     dna_file.write_bytes(whole)
     raw = scene.raw_of(rig, dna_file)
     assert scene.error_against_oracle(rig, dna_file, raw) < scene.TOLERANCE
@@ -139,9 +139,9 @@ def test_an_exception_in_a_handler_does_not_pass_unseen(
     def fail(*_arguments, **_options):
         raise LookupError("planted")
 
-    monkeypatch.setattr(scene.submodule("scene.evaluate"), "evaluate_all", fail)
-    monkeypatch.setattr(scene.submodule("scene.evaluate"), "evaluate", fail)
-    monkeypatch.setattr(scene.submodule("scene.heal"), "remove_dead", fail)
+    monkeypatch.setattr(scene.submodule("scene.frame.evaluate"), "evaluate_all", fail)
+    monkeypatch.setattr(scene.submodule("scene.frame.evaluate"), "evaluate", fail)
+    monkeypatch.setattr(scene.submodule("scene.life.repair"), "remove_dead", fail)
     assert not tracebacks
     if handler == "frame":
         bpy.context.scene.frame_set(3)
@@ -179,7 +179,7 @@ def test_damaged_data_in_the_blend_is_said_once(dna_file, mode, capsys):
     rig = scene.load(dna_file, mode)
     text = rig["risorius_dna"]
     text["risorius_bytes"] = b"damaged"
-    scene.submodule("scene.runtime").forget()
+    scene.submodule("scene.character.runtime").forget()
     for frame in (2, 3, 4):
         bpy.context.scene.frame_set(frame)
     assert capsys.readouterr().out.count("cannot be read") == 1
@@ -227,8 +227,8 @@ def test_a_texture_that_is_missing_is_a_warning(tmp_path):
     face.metadata = {"texture:head_lod0_mesh:color": "gone.png", "licence": "CC0"}
     path = tmp_path / "textured.dna"
     face.save(str(path))
-    rig, warnings = scene.submodule("scene.build").import_file(
-        bpy.context, path, scene.submodule("scene.build").BuildOptions()
+    rig, warnings = scene.submodule("scene.character.build").import_file(
+        bpy.context, path, scene.submodule("scene.character.build").BuildOptions()
     )
     assert "The texture gone.png was not found beside the file." in warnings
     assert scene.controls(rig).data["dna_licence"] == "CC0"

@@ -30,7 +30,7 @@ def _one_sentence(text, path):
 
 def _take_out():
     """Remove what was imported."""
-    build, parts = scene.submodule("scene.build"), scene.submodule("scene.parts")
+    build, parts = scene.submodule("scene.character.build"), scene.submodule("scene.base.parts")
     for rig in parts.rigs():
         build.remove(rig)
 
@@ -117,7 +117,7 @@ def test_a_large_file_that_is_refused_again_and_again_costs_no_memory(tmp_path):
 
 def test_a_face_that_left_is_not_kept(tmp_path):
     content = small_face().to_bytes()
-    runtime = scene.submodule("scene.runtime")
+    runtime = scene.submodule("scene.character.runtime")
     for number in range(12):
         path = tmp_path / "left.dna"
         path.write_bytes(content.replace(b"Small", b"Sma%02d" % number))
@@ -171,9 +171,9 @@ def test_odd_but_well_formed_files(name, mode, tmp_path, capsys):
     except RuntimeError as error:
         _one_sentence(str(error).removeprefix("Error: ").strip(), path)
     else:
-        rig = scene.submodule("scene.parts").rigs()[0]
+        rig = scene.submodule("scene.base.parts").rigs()[0]
         bone = scene.face(rig)
-        for label in scene.submodule("scene.runtime").of(rig).labels:
+        for label in scene.submodule("scene.character.runtime").of(rig).labels:
             bone[label] = 0.7
         scene.update(scene.controls(rig))
         for frame in (2, 3):
@@ -263,7 +263,7 @@ def test_a_blend_whose_dna_was_tampered_with(how, dna_file, mode, tmp_path, caps
         _tamper(rig["risorius_dna"], how)
     blend = str(tmp_path / "tampered.blend")
     bpy.ops.wm.save_as_mainfile(filepath=blend)
-    scene.submodule("scene.runtime").forget()
+    scene.submodule("scene.character.runtime").forget()
     bpy.ops.wm.open_mainfile(filepath=blend)
     rig = bpy.data.objects["Small_rig"]
     bpy.context.view_layer.objects.active = rig
@@ -300,7 +300,7 @@ def test_a_small_stream_that_unfolds_to_a_thousand_times_its_size(said, begins, 
     if said in length:
         text["risorius_length"] = length[said]
     del whole
-    scene.submodule("scene.runtime").forget()
+    scene.submodule("scene.character.runtime").forget()
     tracemalloc.start()
     bpy.context.scene.frame_set(2)
     peak = tracemalloc.get_traced_memory()[1]
@@ -323,7 +323,7 @@ def test_a_dna_that_packs_to_almost_nothing_is_kept_whole(length, tmp_path):
     rig = scene.load(path)
     if not length:
         del rig["risorius_dna"]["risorius_length"]
-    assert scene.submodule("scene.storage").content(rig["risorius_dna"]) == path.read_bytes()
+    assert scene.submodule("scene.base.storage").content(rig["risorius_dna"]) == path.read_bytes()
 
 
 @pytest.mark.parametrize("name", ["two\nlines", "é\U0001f600", "x" * 200, "a. b", "%s{0}\\", " "])

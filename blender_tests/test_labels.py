@@ -86,16 +86,16 @@ def test_a_slider_whose_name_is_short_has_one_line():
 
 def test_layers_and_reactions_can_be_read(rig):
     panel, controls = ui("layer_panel"), scene.controls(rig)
-    props = scene.submodule("scene.layer_props")
+    props = scene.submodule("scene.animation.layer_properties")
     for kind in ("IDLE", "EXPRESSION"):
-        known = next(iter(scene.submodule("scene.poses").all_expressions()))
+        known = next(iter(scene.submodule("scene.animation.expressions").all_expressions()))
         bpy.ops.risorius.layer_add(kind=kind, source=known if kind == "EXPRESSION" else "")
         layer = controls.risorius_layers[-1]
         layout = Part()
         panel._draw_layer(layout, controls, layer)
         assert layout.cut(SIDEBAR) == []
     assert "0: without an end" in texts(layout)
-    for name, reaction in scene.submodule("scene.layers").known_reactions().items():
+    for name, reaction in scene.submodule("scene.animation.layers").known_reactions().items():
         layout = Part()
         item = SimpleNamespace(name=name, bl_rna=props.RISORIUS_PG_reaction.bl_rna)
         panel.RISORIUS_UL_reactions.draw_item(None, None, layout, None, item, 0, None, "")

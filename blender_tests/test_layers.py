@@ -19,7 +19,7 @@ def rig(dna_file):
 
 
 def _layers():
-    return scene.submodule("scene.layers")
+    return scene.submodule("scene.animation.layers")
 
 
 def _action(rig, name="Wave", interpolation="BEZIER", **curves):
@@ -53,14 +53,14 @@ def _wave(rig, **options):
 def _raw(rig, frame):
     """What the evaluator gets at a frame: float32[controls]."""
     bpy.context.scene.frame_set(int(np.floor(frame)), subframe=float(frame % 1))
-    live = scene.submodule("scene.runtime").of(rig)
+    live = scene.submodule("scene.character.runtime").of(rig)
     depsgraph = bpy.context.evaluated_depsgraph_get()
     seen = scene.controls(rig).evaluated_get(depsgraph)
-    return scene.submodule("scene.inputs").read_inputs(seen, live, depsgraph)[0]
+    return scene.submodule("scene.frame.inputs").read_inputs(seen, live, depsgraph)[0]
 
 
 def _value(rig, frame, name):
-    live = scene.submodule("scene.runtime").of(rig)
+    live = scene.submodule("scene.character.runtime").of(rig)
     return _raw(rig, frame)[live.labels.index(name)]
 
 
@@ -173,7 +173,7 @@ def _mixer(rig, rules):
     """The same by risorius.Mixer alone, its times in seconds."""
     import risorius
 
-    names = scene.submodule("scene.runtime").of(rig).labels
+    names = scene.submodule("scene.character.runtime").of(rig).labels
     frames = np.array([1.0, 7.0, 12.0, 21.0])
     jaw = np.interp(np.arange(1, 22), frames, [0.0, 0.9, 0.2, 0.6])
     pull = np.interp(np.arange(1, 22), [3.0, 15.0], [0.7, 0.1])
@@ -249,8 +249,8 @@ def test_a_render_shows_what_the_viewport_shows(blinker, tmp_path):
     layers = _layers()
 
     def note(_scene, depsgraph):
-        runtime = scene.submodule("scene.runtime")
-        inputs = scene.submodule("scene.inputs")
+        runtime = scene.submodule("scene.character.runtime")
+        inputs = scene.submodule("scene.frame.inputs")
         face = scene.controls(blinker).evaluated_get(depsgraph)
         frame = depsgraph.scene.frame_current_final
         seen[frame] = inputs.read_inputs(face, runtime.of(blinker), depsgraph)[0]
@@ -437,7 +437,7 @@ def test_an_edit_of_an_action_is_seen_at_once(rig):
     _entry(rig, action=action)
     assert _value(rig, 10, JAW) == pytest.approx(0.25)
     before = scene.snapshot(rig)
-    for curve in scene.submodule("scene.compat").curves_of(action):
+    for curve in scene.submodule("scene.base.compat").curves_of(action):
         for key in curve.keyframe_points:
             key.co[1] = key.handle_left[1] = key.handle_right[1] = 0.75
         curve.update()
@@ -473,7 +473,7 @@ def test_warp_points_pin_what_is_shown(rig):
 
 
 def test_the_head_of_a_layer_replaces_or_adds(rig):
-    clips = scene.submodule("scene.clips")
+    clips = scene.submodule("scene.animation.clip_actions")
     import risorius
 
     clip = risorius.Clip(["head.yaw"], [[0.4, 0.4]], 24.0)
@@ -488,8 +488,8 @@ def test_the_head_of_a_layer_replaces_or_adds(rig):
         bpy.context.scene.frame_set(0)
         depsgraph = bpy.context.evaluated_depsgraph_get()
         seen = scene.controls(rig).evaluated_get(depsgraph)
-        live = scene.submodule("scene.runtime").of(rig)
-        turn = scene.submodule("scene.inputs").read_inputs(seen, live, depsgraph)[1]["head"]
+        live = scene.submodule("scene.character.runtime").of(rig)
+        turn = scene.submodule("scene.frame.inputs").read_inputs(seen, live, depsgraph)[1]["head"]
         assert turn.angle == pytest.approx(wanted, abs=1e-5)
 
 
@@ -570,7 +570,7 @@ def test_layers_on_an_override(rig, tmp_path):
 def test_layers_become_strips_that_show_the_same(rig):
     controls = scene.controls(rig)
     base = _action(rig, "Base", "LINEAR", jawOpen={1: 0.2, 40: 0.5}, browDownL={1: 0.1, 2: 0.1})
-    scene.submodule("scene.clips").play(rig, base)
+    scene.submodule("scene.animation.clip_actions").play(rig, base)
     wave = _wave(rig)
     _entry(rig, action=wave, start=4.0, scale=1.5, regions={"JAW", "MOUTH"}, extend="NOTHING")
     _entry(rig, action=wave, blend="ADD", reverse=True, repeat=2.0)
@@ -617,7 +617,7 @@ def test_operators_and_panel(rig):
     from support.layout import Recorder
 
     controls = scene.controls(rig)
-    play = scene.submodule("scene.clips").play
+    play = scene.submodule("scene.animation.clip_actions").play
     play(rig, _wave(rig))
     assert bpy.ops.risorius.layer_add(kind="ACTION") == {"FINISHED"}
     assert controls.animation_data.action is None
@@ -708,7 +708,9 @@ def test_idle_life_with_a_length_becomes_a_strip(blinker):
 
 def test_keys_of_weights_outlive_their_action(rig, tmp_path):
     controls = scene.controls(rig)
-    scene.submodule("scene.clips").play(rig, _action(rig, "First", jawOpen={1: 0.5, 9: 0.5}))
+    scene.submodule("scene.animation.clip_actions").play(
+        rig, _action(rig, "First", jawOpen={1: 0.5, 9: 0.5})
+    )
     _entry(rig, kind="EXPRESSION", expression="joy")
     for frame, value in ((1, 0.0), (11, 1.0)):
         controls.risorius_layers[0].weight = value
@@ -731,7 +733,7 @@ def test_undo_of_an_edited_action(rig):
     _entry(rig, action=action)
     bpy.ops.ed.undo_push(message="as it was")
     assert _value(rig, 5, JAW) == pytest.approx(0.25)
-    for curve in scene.submodule("scene.compat").curves_of(action):
+    for curve in scene.submodule("scene.base.compat").curves_of(action):
         for key in curve.keyframe_points:
             key.co[1] = 0.75
         curve.update()

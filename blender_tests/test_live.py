@@ -44,7 +44,7 @@ def port():
 
 @pytest.fixture(autouse=True)
 def no_recordings_of_other_tests(addon):
-    module = scene.submodule("scene.live")
+    module = scene.submodule("scene.live.capture")
     for recording in module.waiting():
         module.discard(recording)
 
@@ -64,12 +64,12 @@ def send(port, *steps):
 
 
 def session_of(rig):
-    return scene.submodule("scene.live").of(scene.controls(rig))
+    return scene.submodule("scene.live.capture").of(scene.controls(rig))
 
 
 def tick_until(rig, frames):
     """Let the timer beat until so many faces of the subject have come."""
-    module, ends = scene.submodule("scene.live"), monotonic() + 20.0
+    module, ends = scene.submodule("scene.live.capture"), monotonic() + 20.0
     session = session_of(rig)
     while True:
         newest = session.receiver.latest(session.subject)
@@ -111,7 +111,7 @@ def test_only_new_faces_are_written(dna_file, port):
     send(port, packet(1, _17=0.5))
     tick_until(rig, 1)
     scene.face(rig)[JAW_OPEN] = 0.75  # by hand, while the phone is silent
-    module = scene.submodule("scene.live")
+    module = scene.submodule("scene.live.capture")
     assert module._tick() == module.INTERVAL
     assert scene.face(rig)[JAW_OPEN] == 0.75
     assert module.show(session_of(rig), scene.controls(rig)) is False
@@ -289,12 +289,12 @@ def listens(port):
 
 
 def test_it_ends_with_the_face_the_file_and_the_addon(dna_file, port, tmp_path):
-    module = scene.submodule("scene.live")
+    module = scene.submodule("scene.live.capture")
     rig = scene.load(dna_file)
     bpy.ops.risorius.live_start()
     assert listens(port)
     name = scene.controls(rig).name
-    for item in scene.submodule("scene.parts").members_of(rig):
+    for item in scene.submodule("scene.base.parts").members_of(rig):
         bpy.data.objects.remove(item)
     scene.controls(scene.load(dna_file)).name = name  # another face of the same name
     assert module._tick() is None
@@ -346,13 +346,13 @@ def jaw_keys(rig):
 
 def only_recording(faces):
     """The one that waits, with so many faces."""
-    (recording,) = scene.submodule("scene.live").waiting()
+    (recording,) = scene.submodule("scene.live.capture").waiting()
     assert len(recording.take) == faces
     return recording
 
 
 def test_an_error_ends_it_and_is_shown(dna_file, port, monkeypatch):
-    module = scene.submodule("scene.live")
+    module = scene.submodule("scene.live.capture")
     rig = scene.load(dna_file)
     scene.set_controls(rig, jawOpen=0.25)
     before = sliders(rig)
@@ -418,10 +418,10 @@ def test_a_recording_beyond_the_last_frame_waits(dna_file, port):
 
 
 def test_the_recording_of_a_face_that_went_away_and_of_a_file_that_was_closed(dna_file, port):
-    module = scene.submodule("scene.live")
+    module = scene.submodule("scene.live.capture")
     rig = scene.load(dna_file)
     begin_recording(rig, packet(1, _17=0.5))
-    for item in scene.submodule("scene.parts").members_of(rig):
+    for item in scene.submodule("scene.base.parts").members_of(rig):
         bpy.data.objects.remove(item)
     assert module._tick() is None
     only_recording(1)

@@ -317,7 +317,7 @@ def test_a_broken_texture_is_a_sentence(tmp_path):
     path = _save(tmp_path, small_face())
     (tmp_path / "Maps").mkdir()
     (tmp_path / "Maps" / "head_color_map.png").write_bytes(b"no picture at all")
-    build = scene.submodule("scene.build")
+    build = scene.submodule("scene.character.build")
     before = len(bpy.data.images)
     rig, warnings = build.import_file(bpy.context, path, build.BuildOptions())
     assert "The texture head_color_map.png cannot be read." in warnings
@@ -329,8 +329,8 @@ def test_a_very_large_texture_stays_outside(tmp_path, monkeypatch):
     path = _save(tmp_path, small_face())
     (tmp_path / "Maps").mkdir()
     looks.write_image(tmp_path / "Maps" / "head_color_map.png", np.ones((4, 4, 3), np.float32))
-    monkeypatch.setattr(scene.submodule("scene.textures"), "PACK_LIMIT", 10)
-    build = scene.submodule("scene.build")
+    monkeypatch.setattr(scene.submodule("scene.material.image_loading"), "PACK_LIMIT", 10)
+    build = scene.submodule("scene.character.build")
     _rig, warnings = build.import_file(bpy.context, path, build.BuildOptions())
     said = "The texture head_color_map.png is large and stays outside the .blend file."
     assert said in warnings
@@ -345,7 +345,7 @@ def test_a_name_from_the_file_never_leads_out_of_the_folder(tmp_path):
     names = ("../secret.png", str(tmp_path / "secret.png"), "..\\secret.png", "", "face.dna")
     for name in names:
         face.metadata = {"texture:head_lod0_mesh:color": name}
-        build = scene.submodule("scene.build")
+        build = scene.submodule("scene.character.build")
         path = _save(folder, face)
         _rig, warnings = build.import_file(bpy.context, path, build.BuildOptions())
         assert f"The texture {name} was not found beside the file." in warnings
@@ -468,9 +468,9 @@ def _corner_normals(item):
 
 
 def test_map_drivers_are_plain_sums(tmp_path):
-    """What scene/copies.py gives to the maps of a duplicate; no Python expression."""
+    """What scene/life/duplicates.py gives to the maps of a duplicate; no Python expression."""
     rig = scene.load(_save(tmp_path, _mapped("head_wm2_normal.head_wm2_browsDown_L")))
-    drivers = list(scene.submodule("scene.materials").map_drivers(_materials(rig)["head"]))
+    drivers = list(scene.submodule("scene.material.materials").map_drivers(_materials(rig)["head"]))
     assert len(drivers) == 2
     assert {c.driver.type for c in drivers} == {"SUM"}
     assert {t.data_path for c in drivers for v in c.driver.variables for t in v.targets} == {

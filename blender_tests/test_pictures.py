@@ -17,7 +17,9 @@ FORMATS = ("PNG", "JPEG", "BMP", "TARGA", "TARGA_RAW", "TIFF", "OPEN_EXR", "WEBP
 
 
 def _size(content):
-    return scene.submodule("logic.pictures").size_of(lambda at, count: content[at : at + count])
+    return scene.submodule("logic.material.image_size").size_of(
+        lambda at, count: content[at : at + count]
+    )
 
 
 def _picture(path, file_format, width=WIDTH, height=HEIGHT):
@@ -72,7 +74,7 @@ def _face(tmp_path, names):
 
 
 def _import(path):
-    build = scene.submodule("scene.build")
+    build = scene.submodule("scene.character.build")
     return build.import_file(bpy.context, path, build.BuildOptions())[1]
 
 
@@ -115,7 +117,7 @@ def test_many_pictures_have_a_bound_together(tmp_path, monkeypatch):
     for name in names.values():
         _picture(folder / name, "PNG")
     one = WIDTH * HEIGHT * 4
-    textures = scene.submodule("scene.textures")
+    textures = scene.submodule("scene.material.image_loading")
     monkeypatch.setattr(textures, "_ALL_IMAGES", 2 * one)
     monkeypatch.setattr(textures, "_MOST_TIMES", 0)
     warnings = _import(path)
@@ -127,7 +129,7 @@ def test_many_pictures_have_a_bound_together(tmp_path, monkeypatch):
 
 def test_a_large_flat_picture_is_taken(tmp_path):
     """8192 pixels a side, as masks have, pack to a thousandth."""
-    textures = scene.submodule("scene.textures")
+    textures = scene.submodule("scene.material.image_loading")
     path = tmp_path / "flat.png"
     path.write_bytes(_bomb(8192, 8192))
     assert textures._room_for(path) == 8192 * 8192 * 4

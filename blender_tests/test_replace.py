@@ -108,7 +108,7 @@ def test_keys_of_a_control_that_is_gone_stay(dna_file, other_file):
     scene.face(rig).keyframe_insert(f'["{PREFIX}browDownL"]', frame=1)
     action = scene.controls(rig).animation_data.action
     _replace(other_file)
-    curves = scene.submodule("scene.compat").curves_of(action)
+    curves = scene.submodule("scene.base.compat").curves_of(action)
     assert path in [c.data_path for c in curves]
     assert f"{PREFIX}browDownL" in scene.face(rig)
     assert "browDownL is gone; its keys and drivers are kept" in _report()
@@ -336,7 +336,7 @@ def test_renamed_bones_stay_renamed(mode, dna_file, other_file):
 
 def test_own_bones_follow_their_joints(dna_file, other_file):
     rig = scene.load(dna_file)
-    armatures = scene.submodule("scene.armatures")
+    armatures = scene.submodule("scene.character.armatures")
     with armatures.edit_armature(bpy.context, rig.data) as bones:
         for name, parent in (("horn", "head"), ("tail", "user_joint.001")):
             bone = bones.new(name)
@@ -377,7 +377,7 @@ def test_a_control_that_is_gone_but_drives_something_stays(dna_file, other_file)
 def test_an_edited_joint_stays_edited(dna_file, other_file):
     clean = scene.load(other_file)
     rig = scene.load(dna_file)
-    armatures = scene.submodule("scene.armatures")
+    armatures = scene.submodule("scene.character.armatures")
     with armatures.edit_armature(bpy.context, rig.data) as bones:
         bones["FACIAL_L_Eye"].head.x += 0.01
         bones["FACIAL_L_Eye"].tail.x += 0.01
@@ -478,7 +478,7 @@ def test_a_failure_while_building_changes_nothing(
     def fail(*_arguments):
         raise MemoryError("planted")
 
-    monkeypatch.setattr(scene.submodule("scene.meshes"), "set_mode", fail)
+    monkeypatch.setattr(scene.submodule("scene.character.meshes"), "set_mode", fail)
     with pytest.raises(RuntimeError, match="planted"):
         bpy.ops.risorius.replace_dna(filepath=str(other_file))
     assert [text.splitlines()[-1] for text in tracebacks] == ["MemoryError: planted"]
@@ -743,5 +743,5 @@ def test_a_replaced_face_outlasts_the_file(mode, dna_file, other_file, tmp_path)
     bpy.ops.wm.open_mainfile(filepath=str(blend))
     rig = bpy.data.objects["Small_rig"]
     np.testing.assert_array_equal(scene.snapshot(rig), before)
-    assert scene.submodule("scene.storage").content(rig["risorius_dna"]) == content
+    assert scene.submodule("scene.base.storage").content(rig["risorius_dna"]) == content
     _still_decorated(rig)

@@ -242,7 +242,7 @@ def test_shapes_of_one_are_its_own(textured, tmp_path):
 def test_one_that_is_removed_takes_nothing_from_the_others(textured, tmp_path):
     before = scene.counts()
     rigs = [scene.load(textured) for _ in range(3)]
-    build = scene.submodule("scene.build")
+    build = scene.submodule("scene.character.build")
     build.remove(rigs[0])
     _held_once(rigs[1:])
     for item in [o for o in bpy.data.objects if o.name.startswith(rigs[1].name[:9])]:
@@ -348,6 +348,6 @@ def test_what_only_says_to_be_equal_is_not_shared(textured, tmp_path):
 
 def test_a_head_like_the_sample_has_one_live_key():
     """92 real keys of 17,465 vertices are 19 MB in a .blend, and again for every equal face."""
-    chosen = scene.submodule("scene.meshes").automatic_mode
+    chosen = scene.submodule("scene.character.meshes").automatic_mode
     assert chosen(92, 17465, 135) == "LIVE"
     assert chosen(28, 864, 135) == "KEYS"

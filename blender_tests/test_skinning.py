@@ -39,7 +39,7 @@ class _Face:
     def __init__(self, path, mode, levels=range(8)):
         self.rig = scene.load(path, mode, lods=tuple(i in levels for i in range(8)))
         self.dna = risorius.load(str(path))
-        self.labels = scene.submodule("logic.names").unique_labels(self.dna.raw_control_names)
+        self.labels = scene.submodule("logic.base.names").unique_labels(self.dna.raw_control_names)
 
     def wanted(self, raw, lod):
         """Mesh index -> float64[V, 3] at raw controls float64[R]."""
@@ -76,7 +76,7 @@ class _Face:
                     f'["{bpy.utils.escape_identifier(label)}"]', frame=frame, group="Face"
                 )
         curves = {c.data_path: c for c in scene.curves(scene.controls(self.rig))}
-        path = scene.submodule("scene.parts").property_path
+        path = scene.submodule("scene.base.parts").property_path
         return lambda frame: np.array([curves[path(n)].evaluate(frame) for n in self.labels])
 
 

@@ -13,7 +13,7 @@ def test_vertices_equal_the_oracle_for_random_controls(mode, dna_file, seed):
     rig = scene.load(dna_file, mode)
     raw = np.random.default_rng(seed).random(len(CONTROLS)).astype(np.float32)
     bone = scene.face(rig)
-    labels = scene.submodule("logic.names").unique_labels(CONTROLS)
+    labels = scene.submodule("logic.base.names").unique_labels(CONTROLS)
     for label, value in zip(labels, raw, strict=True):
         bone[label] = float(value)
     scene.update(scene.controls(rig))

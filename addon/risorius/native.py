@@ -7,7 +7,7 @@ from functools import cache
 from importlib import import_module
 from pathlib import Path
 
-from .logic.errors import FaceError
+from .logic.base.errors import FaceError
 
 try:
     import risorius as _risorius

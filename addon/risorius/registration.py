@@ -4,7 +4,9 @@
 import bpy
 
 from . import native
-from .scene import handlers, layer_props, live
+from .scene.animation import layer_properties
+from .scene.life import handlers
+from .scene.live import capture
 from .ui import (
     about,
     animation_operators,
@@ -26,7 +28,7 @@ from .ui import (
 )
 
 CLASSES = (
-    *layer_props.CLASSES,
+    *layer_properties.CLASSES,
     *about.CLASSES,
     *import_operators.CLASSES,
     *file_operators.CLASSES,
@@ -58,7 +60,7 @@ def register():
     """Register classes, menus and handlers; without the native module only words."""
     for cls in CLASSES:
         bpy.utils.register_class(cls)
-    layer_props.register()
+    layer_properties.register()
     bpy.types.WindowManager.risorius_search = _search_property()
     bpy.types.WindowManager.risorius_show_timing = overlay.show_property()
     bpy.types.WindowManager.risorius_live = bpy.props.PointerProperty(
@@ -73,7 +75,7 @@ def register():
     if trouble:
         print(f"Risorius: {trouble}")
     handlers.register()
-    live.register()
+    capture.register()
     bpy.app.timers.register(_refresh_once, first_interval=0.0)
 
 
@@ -86,7 +88,7 @@ def unregister():
     """Undo `register` in reverse."""
     if bpy.app.timers.is_registered(_refresh_once):
         bpy.app.timers.unregister(_refresh_once)
-    live.unregister()
+    capture.unregister()
     handlers.unregister()
     overlay.stop()
     bpy.types.VIEW3D_MT_add.remove(import_operators.draw_add)
@@ -97,6 +99,6 @@ def unregister():
     del bpy.types.WindowManager.risorius_test
     del bpy.types.WindowManager.risorius_live
     del bpy.types.WindowManager.risorius_search
-    layer_props.unregister()
+    layer_properties.unregister()
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

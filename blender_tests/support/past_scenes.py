@@ -77,7 +77,7 @@ def _key_weight(item, place, keys):
 
 def _three_layers(rig):
     """An action, an expression and idle life; nothing plays on the sliders below them."""
-    item, layers_module = scene.controls(rig), scene.submodule("scene.layers")
+    item, layers_module = scene.controls(rig), scene.submodule("scene.animation.layers")
     item.risorius_layer_rules = False
     wave = _empty_action(item, f"Wave of {rig.name}")
     _key_sliders(item, jawOpen={1: 0.1, 8: 0.9, 20: 0.3}, eyeBlinkL={2: 0.0, 6: 0.8, 12: 0.1})
@@ -312,7 +312,7 @@ def _overridden(dna, folder, mode):
     rig = next(o for o in bpy.data.objects if "risorius_controls" in o and not o.library)
     item = scene.controls(rig)
     _empty_action(item, "Own")
-    scene.submodule("scene.layers").add(item, "EXPRESSION", "Fear", expression="fear")
+    scene.submodule("scene.animation.layers").add(item, "EXPRESSION", "Fear", expression="fear")
     _key_weight(item, 0, {1: 0.0, 20: 1.0})
     _key_weight(item, 1, {1: 0.8, 16: 0.2})
     _key_weight(item, 3, {1: 0.0, 14: 0.5})

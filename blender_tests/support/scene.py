@@ -72,7 +72,7 @@ def evaluated(item):
 
 def raw_of(rig, path):
     """The raw controls that the sliders ask for now, by index."""
-    labels = submodule("logic.names").unique_labels(risorius.load(str(path)).raw_control_names)
+    labels = submodule("logic.base.names").unique_labels(risorius.load(str(path)).raw_control_names)
     return np.array([float(face(rig)[n]) for n in labels], np.float32)
 
 

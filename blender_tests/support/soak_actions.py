@@ -129,7 +129,7 @@ class World:
     def lod(self):
         rig = self._rig()
         self._activate(rig)
-        levels = scene.submodule("scene.lods").built(rig)
+        levels = scene.submodule("scene.character.lods").built(rig)
         bpy.ops.risorius.set_lod(lod=self.random.choice(levels))
 
     def lod_by_distance(self):
@@ -252,7 +252,7 @@ class World:
         bpy.ops.object.duplicate(linked=self.random.random() < 0.3)
         layer.update()
         for rig in self.rigs():  # levels that were hidden are hidden again
-            scene.submodule("scene.lods").show(rig)
+            scene.submodule("scene.character.lods").show(rig)
         layer.update()
 
     def delete(self):
@@ -432,7 +432,7 @@ class World:
         worst = 0.0
         for rig in rigs:
             error, where = self._error(rig)
-            if not error < scene.TOLERANCE and scene.submodule("scene.evaluate").refused(rig):
+            if not error < scene.TOLERANCE and scene.submodule("scene.frame.evaluate").refused(rig):
                 # Blender has locked an override: the panel says so and has a button.
                 self._activate(rig)
                 bpy.ops.risorius.make_override()
@@ -448,7 +448,7 @@ class World:
         dna, evaluator, _ = self._oracles[rig["risorius_dna"]["risorius_hash"]]
         depsgraph = bpy.context.evaluated_depsgraph_get()
         bone = rig["risorius_controls"].evaluated_get(depsgraph).pose.bones["face"]
-        labels = scene.submodule("logic.names").unique_labels(dna.raw_control_names)
+        labels = scene.submodule("logic.base.names").unique_labels(dna.raw_control_names)
         raw = np.array([float(bone[n]) for n in labels], np.float32)
         lod = int(rig["risorius_lod"])
         pose = evaluator.evaluate(raw, lod)

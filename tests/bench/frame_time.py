@@ -111,7 +111,7 @@ def step(frames):
 
 def own_time(package, frames):
     """Median ms of the add-on's own stages over one pass, as its overlay counts them."""
-    timing = sys.modules[f"{package}.scene.timing"]
+    timing = sys.modules[f"{package}.scene.frame.timing"]
     stages = []
     for frame in range(2, frames + 1):
         bpy.context.scene.frame_set(frame)
@@ -126,7 +126,7 @@ def plain_way(controls, rig, path, loops):
 
     dna = risorius.load(str(path))
     compiled = risorius.Rig(dna)
-    live = sys.modules["bl_ext.user_default.risorius.scene.runtime"].of(rig)
+    live = sys.modules["bl_ext.user_default.risorius.scene.character.runtime"].of(rig)
     bones = live.bone_space([b.bone["dna_joint"] for b in rig.pose.bones])
     labels = list(live.labels)
     bpy.ops.preferences.addon_disable(module="bl_ext.user_default.risorius")

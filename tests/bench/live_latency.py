@@ -67,7 +67,7 @@ def _measure(rig, options):
     import bpy
     from support import scene
 
-    live = scene.submodule("scene.live")
+    live = scene.submodule("scene.live.capture")
     settings = live.Settings(port=0, everywhere=False)
     session = live.start(rig, settings)
     port = session.receiver.port

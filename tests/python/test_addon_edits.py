@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from test_addon_logic import importlib, space  # registers the package of the logic
 
-edits: Any = importlib.import_module("risorius_addon_logic.edits")
+edits: Any = importlib.import_module("risorius_addon_logic.character.user_edits")
 RANDOM = np.random.default_rng(11)
 
 

@@ -32,15 +32,15 @@ def _load_logic() -> ModuleType:
 
 
 _load_logic()
-names = importlib.import_module("risorius_addon_logic.names")
-regions = importlib.import_module("risorius_addon_logic.regions")
-space = importlib.import_module("risorius_addon_logic.space")
-plans = importlib.import_module("risorius_addon_logic.plans")
-recogniser = importlib.import_module("risorius_addon_logic.recogniser")
+names = importlib.import_module("risorius_addon_logic.base.names")
+regions = importlib.import_module("risorius_addon_logic.character.regions")
+space = importlib.import_module("risorius_addon_logic.base.space")
+plans = importlib.import_module("risorius_addon_logic.character.plans")
+recogniser = importlib.import_module("risorius_addon_logic.animation.recogniser")
 
 
 def test_logic_needs_neither_blender_nor_the_native_module() -> None:
-    for path in LOGIC.glob("*.py"):
+    for path in LOGIC.rglob("*.py"):
         lines = path.read_text(encoding="utf-8").splitlines()
         imports = [line for line in lines if line.startswith(("import ", "from "))]
         assert not [line for line in imports if "bpy" in line or "risorius" in line], path.name

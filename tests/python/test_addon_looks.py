@@ -12,9 +12,9 @@ import pytest
 import test_addon_logic  # loads the package of the add-on's logic under its own name
 
 assert test_addon_logic.LOGIC.is_dir()
-textures = importlib.import_module("risorius_addon_logic.textures")
-maps = importlib.import_module("risorius_addon_logic.maps")
-folds = importlib.import_module("risorius_addon_logic.folds")
+textures = importlib.import_module("risorius_addon_logic.material.texture_search")
+maps = importlib.import_module("risorius_addon_logic.material.animated_maps")
+folds = importlib.import_module("risorius_addon_logic.material.skin_folds")
 
 MESHES = [
     ("head", "skin"),

@@ -8,7 +8,8 @@ import bpy
 import numpy as np
 
 from .. import native
-from ..scene import meshes, parts, runtime
+from ..scene.base import parts
+from ..scene.character import meshes, runtime
 from . import speech_operators
 from .operators import FaceOperator
 

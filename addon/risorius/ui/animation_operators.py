@@ -8,10 +8,13 @@ import bpy
 from bpy_extras.io_utils import ImportHelper
 
 from .. import native
-from ..logic.clips import ClipError
-from ..logic.errors import FaceError
-from ..logic.names import printable
-from ..scene import actions, clips, evaluate, layers, parts, retarget, runtime
+from ..logic.animation.clip_units import ClipError
+from ..logic.base.errors import FaceError
+from ..logic.base.names import printable
+from ..scene.animation import actions, clip_actions, layers, retarget_shape_keys
+from ..scene.base import parts
+from ..scene.character import runtime
+from ..scene.frame import evaluate
 from . import words
 from .import_operators import explain, shown_progress
 from .operators import has_face
@@ -96,19 +99,21 @@ class PlacesClip:
         trouble = actions.busy(parts.controls_of(rig))
         if trouble:
             raise ClipError(trouble)
-        timing = clips.timing_of(clip, context.scene, self.start, keep_clock=True, whole=whole)
-        made = clips.make_action(rig, clip, timing, name, with_eyes)
+        timing = clip_actions.timing_of(
+            clip, context.scene, self.start, keep_clock=True, whole=whole
+        )
+        made = clip_actions.make_action(rig, clip, timing, name, with_eyes)
         notes = [*notes, *made.notes]
         if self.target == "ACTION":
-            before = clips.play(rig, made.action)
+            before = clip_actions.play(rig, made.action)
             layers.keep_weights(parts.controls_of(rig), before)
             if before is not None:
                 notes.append(f"The action {before.name} was kept.")
         elif self.target == "STRIP":
-            clips.add_strip(rig, made.action)
+            clip_actions.add_strip(rig, made.action)
         else:
             layers.add_action(parts.controls_of(rig), made.action)
-        clips.set_range(context.scene, made, self.scene_range)
+        clip_actions.set_range(context.scene, made, self.scene_range)
         evaluate.bring_up(context, rig)
         self._report_on(made, notes)
         return made.action
@@ -366,24 +371,28 @@ class RISORIUS_OT_import_arkit_rig(PlacesClip, bpy.types.Operator):
     def poll(cls, context):
         if not has_face(cls, context):
             return False
-        if not retarget.sources(context):
+        if not retarget_shape_keys.sources(context):
             cls.poll_message_set("No other object of this scene has animated shape keys.")
             return False
         return True
 
     def invoke(self, context, _event):
-        found = retarget.source_of(context)
+        found = retarget_shape_keys.source_of(context)
         self.source = found.name if found is not None else ""
         return context.window_manager.invoke_props_dialog(self)
 
     def execute(self, context):
-        item = bpy.data.objects.get(self.source) if self.source else retarget.source_of(context)
-        if item not in retarget.sources(context):
+        item = (
+            bpy.data.objects.get(self.source)
+            if self.source
+            else retarget_shape_keys.source_of(context)
+        )
+        if item not in retarget_shape_keys.sources(context):
             self.report({"ERROR"}, "Select the object whose shape keys are animated.")
             return {"CANCELLED"}
         live = runtime.of(parts.active_rig(context))
         try:
-            keys = retarget.clip_of(context, item)
+            keys = retarget_shape_keys.clip_of(context, item)
             times = keys.frame_times()
             clip, report = native.part("importing").import_curves(
                 {name: (times, curve) for name, curve in zip(keys.names, keys.curves, strict=True)},

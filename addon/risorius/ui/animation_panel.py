@@ -3,7 +3,7 @@
 
 import bpy
 
-from ..scene import parts
+from ..scene.base import parts
 from .animation_operators import (
     RISORIUS_OT_import_animation,
     RISORIUS_OT_import_arkit_rig,

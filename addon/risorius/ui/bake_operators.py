@@ -7,7 +7,9 @@ import traceback
 import bpy
 
 from .. import native
-from ..scene import bake, parts, runtime
+from ..scene.bake import bake_face
+from ..scene.base import parts
+from ..scene.character import runtime
 from . import words
 from .import_operators import usable
 from .operators import FaceOperator
@@ -53,7 +55,7 @@ class FacesOperator(FaceOperator):
         """
         found = selected_rigs(context, self.every)
         if not found:
-            raise bake.BakeError("No face is selected.")
+            raise bake_face.BakeError("No face is selected.")
         return found
 
     @classmethod
@@ -114,8 +116,8 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, bpy.types.Operator):
     kind: bpy.props.EnumProperty(
         name="Bake",
         items=(
-            (bake.RESULT, "Bones, Shapes, Maps", "The face itself: plays without the add-on"),
-            (bake.CONTROLS, "Controls", "Sliders and control bones: one clean action"),
+            (bake_face.RESULT, "Bones, Shapes, Maps", "The face itself: plays without the add-on"),
+            (bake_face.CONTROLS, "Controls", "Sliders and control bones: one clean action"),
         ),
     )
     wanted: bpy.props.EnumProperty(
@@ -152,7 +154,7 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, bpy.types.Operator):
         layout.use_property_split = True
         layout.prop(self, "kind")
         self.draw_range(layout)
-        if self.kind == bake.RESULT:
+        if self.kind == bake_face.RESULT:
             layout.prop(self, "wanted")
             self.draw_lod(layout)
         words.prop_or(layout, self, "error", 0.0, "0: a key at every step")
@@ -163,7 +165,7 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, bpy.types.Operator):
         # Adjusting the last operation calls this again, on the same operator: without a dialog.
         interactive, self._interactive = self._interactive, False
         start, end = self.frames(context)
-        options = bake.BakeOptions(
+        options = bake_face.BakeOptions(
             self.kind,
             start,
             end,
@@ -174,7 +176,7 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, bpy.types.Operator):
             self.strip,
         )
         try:
-            job = bake.bake(context, self.faces(context), options)
+            job = bake_face.bake(context, self.faces(context), options)
         except native.user_errors() as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
@@ -256,7 +258,7 @@ class RISORIUS_OT_unbake(FacesOperator, bpy.types.Operator):
 
     def execute(self, context):
         faces = selected_rigs(context, self.every)
-        back = [rig for rig in faces if bake.unbake(context, rig)]
+        back = [rig for rig in faces if bake_face.unbake(context, rig)]
         if not back:
             self.report({"WARNING"}, "Nothing of the selected faces is baked.")
             return {"CANCELLED"}
@@ -271,7 +273,7 @@ def draw_state(layout, rig, write):
         rig: deforming armature.
         write: function (layout, text, icon) that writes a sentence.
     """
-    text = bake.words(rig)
+    text = bake_face.words(rig)
     if text:
         box = layout.box()
         write(box, text, "ACTION")

@@ -7,7 +7,9 @@ import bpy
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from .. import native
-from ..scene import evaluate, export, parts, replace
+from ..scene.base import parts
+from ..scene.file import export_dna, replace_dna
+from ..scene.frame import evaluate
 from .import_operators import explain, shown_progress, usable
 
 
@@ -36,8 +38,8 @@ def _replace(operator, context, path):
     rig = parts.active_rig(context)
     try:
         with shown_progress(context) as progress:
-            sentences = replace.replace_file(context, rig, path, progress)
-    except replace.ReplaceError as error:
+            sentences = replace_dna.replace_file(context, rig, path, progress)
+    except replace_dna.ReplaceError as error:
         operator.report({"ERROR"}, str(error))
         return {"CANCELLED"}
     except native.user_errors() as error:
@@ -138,15 +140,15 @@ class RISORIUS_OT_export_dna(bpy.types.Operator, ExportHelper):
 
     def execute(self, context):
         rig = parts.active_rig(context)
-        options = export.ExportOptions(
+        options = export_dna.ExportOptions(
             self.use_shapes, self.use_neutral, self.use_joints, self.use_weights
         )
         fileio = native.part("fileio")
         try:
             fileio.check_writable(self.filepath)
-            content, sentences = export.export(context, rig, options)
+            content, sentences = export_dna.export(context, rig, options)
             fileio.write_bytes(self.filepath, content)
-        except export.ExportError as error:
+        except export_dna.ExportError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         except native.user_errors() as error:

@@ -4,8 +4,8 @@
 import numpy as np
 from mathutils import Vector
 
-from ..logic import views
-from ..scene import parts
+from ..logic.character import view_fit
+from ..scene.base import parts
 
 _FRONT = Vector((0.0, -1.0, 0.0))  # where an imported face looks
 _THREE_QUARTER = Vector((0.36, -0.92, 0.16))  # whence a face is seen best
@@ -45,9 +45,9 @@ def _frame(area, middle, radius, turn):
         if view is None or view.view_perspective == "CAMERA":
             continue
         perspective = view.view_perspective == "PERSP"
-        far = views.distance(radius, space.lens, (region.width, region.height), perspective)
+        far = view_fit.distance(radius, space.lens, (region.width, region.height), perspective)
         held = view.view_location[:]
-        if views.is_well_in_view(middle, radius, far, held, view.view_distance):
+        if view_fit.is_well_in_view(middle, radius, far, held, view.view_distance):
             continue
         view.view_location, view.view_distance = middle, far
         # Straight views (front, side, top) are chosen with a key and keep their direction.

@@ -8,8 +8,10 @@ import bpy
 from bpy_extras.io_utils import ImportHelper
 
 from .. import native
-from ..logic import names
-from ..scene import build, evaluate, parts, place
+from ..logic.base import names
+from ..scene.base import parts
+from ..scene.character import build, rig_placement
+from ..scene.frame import evaluate
 from . import framing, words
 
 MODES = (
@@ -71,7 +73,7 @@ def import_character(operator, context, path, options, show=False):
     except native.user_errors() as error:
         operator.report({"ERROR"}, explain(path, error))
         return {"CANCELLED"}
-    if place.put_beside(context.scene, rig):
+    if rig_placement.put_beside(context.scene, rig):
         evaluate.bring_up(context, rig)
     if show and not bpy.app.background:
         framing.frame(context, rig)

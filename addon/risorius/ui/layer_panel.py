@@ -3,8 +3,11 @@
 
 import bpy
 
-from ..logic import layers as logic
-from ..scene import evaluate, layer_props, layers, layers_nla, parts, poses, runtime
+from ..logic.animation import layer_rules as logic
+from ..scene.animation import expressions, layer_properties, layers, layers_nla
+from ..scene.base import parts
+from ..scene.character import runtime
+from ..scene.frame import evaluate
 from . import words
 from .operators import FaceOperator
 from .panels import FaceOnlyPanel, write
@@ -44,7 +47,7 @@ class RISORIUS_OT_layer_add(FaceOperator, bpy.types.Operator):
     bl_label = "Add Layer"
 
     kind: bpy.props.EnumProperty(
-        name="Source", items=layer_props.KINDS, options={"SKIP_SAVE"}, default="ACTION"
+        name="Source", items=layer_properties.KINDS, options={"SKIP_SAVE"}, default="ACTION"
     )
     source: bpy.props.StringProperty(
         name="Name",
@@ -59,7 +62,7 @@ class RISORIUS_OT_layer_add(FaceOperator, bpy.types.Operator):
         if self.kind == "ACTION":
             return self._add_action(context, rig, controls)
         if self.kind == "EXPRESSION":
-            known = poses.all_expressions()
+            known = expressions.all_expressions()
             if self.source not in known:
                 self.report({"ERROR"}, f"There is no expression {self.source}.")
                 return {"CANCELLED"}
@@ -218,13 +221,13 @@ class RISORIUS_OT_expression(FaceOperator, bpy.types.Operator):
 
     def execute(self, context):
         rig = parts.active_rig(context)
-        found = poses.all_expressions().get(self.expression)
+        found = expressions.all_expressions().get(self.expression)
         if found is None:
             self.report({"ERROR"}, f"There is no expression {self.expression}.")
             return {"CANCELLED"}
-        names = poses.apply(rig, found, self.strength, self.only)
+        names = expressions.apply(rig, found, self.strength, self.only)
         if self.key:
-            poses.key(rig, names, context.scene.frame_current)
+            expressions.key(rig, names, context.scene.frame_current)
         evaluate.bring_up(context, rig)
         return {"FINISHED"}
 
@@ -236,7 +239,7 @@ class RISORIUS_OT_make_pose_assets(FaceOperator, bpy.types.Operator):
     bl_label = "Expressions as Pose Assets"
 
     def execute(self, context):
-        made, notes = poses.make_assets(parts.active_rig(context))
+        made, notes = expressions.make_assets(parts.active_rig(context))
         for note in notes:
             self.report({"WARNING"}, note)
         self.report({"INFO"}, f"{len(made)} pose assets")
@@ -244,7 +247,7 @@ class RISORIUS_OT_make_pose_assets(FaceOperator, bpy.types.Operator):
 
 
 def _expressions_of(group):
-    return [(e.name, e.label) for e in poses.groups().get(group, ())]
+    return [(e.name, e.label) for e in expressions.groups().get(group, ())]
 
 
 def _expression_menu(group, title, operator):
@@ -386,7 +389,7 @@ class RISORIUS_PT_layers(FaceOnlyPanel, bpy.types.Panel):
             controls,
             logic.COLLECTION,
             controls,
-            layer_props.INDEX,
+            layer_properties.INDEX,
             rows=4,
         )
         _draw_side(row.column(align=True))
@@ -427,7 +430,7 @@ def _draw_layer(layout, controls, layer):
     header.label(text="Mask")
     if body is not None:
         grid = body.grid_flow(columns=3, align=True, even_columns=True)
-        for region in layer_props.REGIONS:
+        for region in layer_properties.REGIONS:
             grid.prop_enum(layer, "regions", region[0])
         body.prop(layer, "controls")
 
@@ -467,9 +470,9 @@ def _draw_reactions(layout, controls):
         "RISORIUS_UL_reactions",
         "",
         controls,
-        layer_props.REACTIONS,
+        layer_properties.REACTIONS,
         controls,
-        f"{layer_props.REACTIONS}_index",
+        f"{layer_properties.REACTIONS}_index",
         rows=2,
     )
     row.operator(RISORIUS_OT_unfire.bl_idname, text="", icon="REMOVE")

@@ -6,7 +6,9 @@ import textwrap
 import bpy
 
 from .. import native
-from ..scene import evaluate, heal, migrate, overrides, parts
+from ..scene.base import parts
+from ..scene.frame import evaluate
+from ..scene.life import library_overrides, migrations, repair
 from .import_operators import usable
 
 SHAPES = (
@@ -17,7 +19,9 @@ SHAPES = (
 
 def _broken_override(context):
     rig = parts.active_rig(context)
-    return rig if rig is not None and rig.override_library and overrides.trouble(rig) else None
+    return (
+        rig if rig is not None and rig.override_library and library_overrides.trouble(rig) else None
+    )
 
 
 class RISORIUS_OT_make_override(bpy.types.Operator):
@@ -35,7 +39,7 @@ class RISORIUS_OT_make_override(bpy.types.Operator):
     def poll(cls, context):
         if not usable(cls):
             return False
-        if overrides.linked_rig(context) is None and _broken_override(context) is None:
+        if library_overrides.linked_rig(context) is None and _broken_override(context) is None:
             cls.poll_message_set("Select a linked face first.")
             return False
         return True
@@ -45,9 +49,11 @@ class RISORIUS_OT_make_override(bpy.types.Operator):
         rig = _broken_override(context)
         try:
             if rig is not None:
-                done = overrides.repair(context, rig, local)
+                done = library_overrides.repair(context, rig, local)
             else:
-                rig, done = overrides.make_override(context, overrides.linked_rig(context), local)
+                rig, done = library_overrides.make_override(
+                    context, library_overrides.linked_rig(context), local
+                )
         except native.user_errors() as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
@@ -55,7 +61,7 @@ class RISORIUS_OT_make_override(bpy.types.Operator):
         evaluate.bring_up(context, rig)
         for sentence in done:
             self.report({"INFO"}, sentence)
-        left = overrides.trouble(rig)
+        left = library_overrides.trouble(rig)
         if left:
             self.report({"WARNING"}, left)
         return {"FINISHED"}
@@ -73,7 +79,7 @@ class RISORIUS_OT_bring_back(bpy.types.Operator):
         return usable(cls) and context.object is not None
 
     def execute(self, context):
-        back = heal.bring_back(context.object, context.scene)
+        back = repair.bring_back(context.object, context.scene)
         if not back:
             self.report({"ERROR"}, "No deleted part of this face is in the file.")
             return {"CANCELLED"}
@@ -88,18 +94,18 @@ def draw_trouble(layout, context):
     Returns:
         Whether the panel need not say anything more.
     """
-    shown = overrides.linked_rig(context) or parts.active_rig(context)
-    if shown is not None and migrate.newer(shown):
-        _say(layout, migrate.newer(shown), "INFO")
-    if overrides.linked_rig(context) is not None:
+    shown = library_overrides.linked_rig(context) or parts.active_rig(context)
+    if shown is not None and migrations.newer(shown):
+        _say(layout, migrations.newer(shown), "INFO")
+    if library_overrides.linked_rig(context) is not None:
         _say(layout, "Linked: make an override to animate.", "LINKED")
         layout.operator_menu_enum(RISORIUS_OT_make_override.bl_idname, "shapes")
         return True
     rig = _broken_override(context)
     if rig is not None:
-        _say(layout, overrides.trouble(rig), "ERROR")
+        _say(layout, library_overrides.trouble(rig), "ERROR")
         layout.operator(RISORIUS_OT_make_override.bl_idname, text="Repair Override")
-    lost = heal.missing(context.object or parts.active_rig(context))
+    lost = repair.missing(context.object or parts.active_rig(context))
     for sentence in lost:
         _say(layout, sentence, "ERROR")
     if any("still in the file" in sentence for sentence in lost):

@@ -4,8 +4,9 @@
 import bpy
 
 from .. import native
-from ..logic import names
-from ..scene import live, parts
+from ..logic.base import names
+from ..scene.base import parts
+from ..scene.live import capture
 from . import words
 from .import_operators import usable
 from .panels import FaceOnlyPanel, write
@@ -22,9 +23,9 @@ def _source_changed(self, _context):
 
 
 def _changed(_self, context):
-    session = live.of(_controls(context))
+    session = capture.of(_controls(context))
     if session is not None:
-        live.apply_settings(session, settings_of(context))
+        capture.apply_settings(session, settings_of(context))
 
 
 class RISORIUS_PG_live(bpy.types.PropertyGroup):
@@ -83,9 +84,9 @@ class RISORIUS_PG_live(bpy.types.PropertyGroup):
 
 
 def settings_of(context):
-    """The choices as scene/live.py takes them."""
+    """The choices as scene/live/capture.py takes them."""
     chosen = context.window_manager.risorius_live
-    return live.Settings(
+    return capture.Settings(
         chosen.source,
         chosen.port,
         chosen.everywhere,
@@ -109,7 +110,7 @@ class _Running:
     def poll(cls, context):
         if not usable(cls):
             return False
-        if live.of(_controls(context)) is None:
+        if capture.of(_controls(context)) is None:
             cls.poll_message_set("Start live capture first.")
             return False
         return True
@@ -132,7 +133,7 @@ class RISORIUS_OT_live_start(bpy.types.Operator):
 
     def execute(self, context):
         try:
-            live.start(parts.active_rig(context), settings_of(context))
+            capture.start(parts.active_rig(context), settings_of(context))
         except native.user_errors() as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
@@ -147,10 +148,10 @@ class RISORIUS_OT_live_stop(_Running, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context):
-        session = live.of(_controls(context))
+        session = capture.of(_controls(context))
         if session.recording is not None:
-            _finish(self, context, lambda *where: live.finish_take(session, *where))
-        live.stop(_controls(context))
+            _finish(self, context, lambda *where: capture.finish_take(session, *where))
+        capture.stop(_controls(context))
         return {"FINISHED"}
 
 
@@ -162,11 +163,11 @@ class RISORIUS_OT_live_record(_Running, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context):
-        session = live.of(_controls(context))
+        session = capture.of(_controls(context))
         if session.recording is None:
-            live.begin_take(session, float(context.scene.frame_current))
+            capture.begin_take(session, float(context.scene.frame_current))
             return {"FINISHED"}
-        done = _finish(self, context, lambda *where: live.finish_take(session, *where))
+        done = _finish(self, context, lambda *where: capture.finish_take(session, *where))
         return {"FINISHED"} if done else {"CANCELLED"}
 
 
@@ -181,14 +182,14 @@ class _Waiting:
     def poll(cls, _context):
         if not usable(cls):
             return False
-        if not live.waiting():
+        if not capture.waiting():
             cls.poll_message_set("No recording waits to be finished.")
             return False
         return True
 
     def recording(self):
         """The Recording that is meant, or None."""
-        found = live.waiting()
+        found = capture.waiting()
         if not 0 <= self.index < len(found):
             self.report({"ERROR"}, f"There is no recording {self.index}: {len(found)} wait.")
             return None
@@ -223,7 +224,7 @@ class RISORIUS_OT_live_finish(_Waiting, bpy.types.Operator):
             return {"CANCELLED"}
         if self.at_current:
             recording.frame = float(context.scene.frame_current)
-        done = _finish(self, context, lambda *where: live.finish(recording, *where))
+        done = _finish(self, context, lambda *where: capture.finish(recording, *where))
         return {"FINISHED"} if done else {"CANCELLED"}
 
 
@@ -240,7 +241,7 @@ class RISORIUS_OT_live_discard(_Waiting, bpy.types.Operator):
         recording = self.recording()
         if recording is None:
             return {"CANCELLED"}
-        live.discard(recording)
+        capture.discard(recording)
         return {"FINISHED"}
 
 
@@ -255,10 +256,10 @@ class RISORIUS_OT_live_neutral(_Running, bpy.types.Operator):
     )
 
     def execute(self, context):
-        session = live.of(_controls(context))
+        session = capture.of(_controls(context))
         if self.forget:
-            live.forget_neutral(session)
-        elif not live.neutral_now(session):
+            capture.forget_neutral(session)
+        elif not capture.neutral_now(session):
             self.report({"ERROR"}, "No face was received yet.")
             return {"CANCELLED"}
         return {"FINISHED"}
@@ -314,7 +315,7 @@ class RISORIUS_PT_live(FaceOnlyPanel, bpy.types.Panel):
     def draw(self, context):
         layout = self.layout
         chosen = context.window_manager.risorius_live
-        session = live.of(_controls(context))
+        session = capture.of(_controls(context))
         column = layout.column()
         column.enabled = session is None
         column.prop(chosen, "source", text="")
@@ -329,8 +330,8 @@ class RISORIUS_PT_live(FaceOnlyPanel, bpy.types.Panel):
         _draw_waiting(layout)
         if session is None:
             layout.operator("risorius.live_start", icon="PLAY")
-            if live.last_error():
-                write(layout, live.last_error(), "ERROR")
+            if capture.last_error():
+                write(layout, capture.last_error(), "ERROR")
             return
         row = layout.row(align=True)
         row.operator("risorius.live_stop", icon="SNAP_FACE")
@@ -347,13 +348,13 @@ def _where(chosen):
     """What to type into the app."""
     if not chosen.everywhere:
         return f"Hears this computer only, at 127.0.0.1, port {chosen.port}."
-    address = live.address() or "this computer's address"
+    address = capture.address() or "this computer's address"
     return f"In the app: {address}, port {chosen.port}."
 
 
 def _draw_waiting(layout):
     """The recordings that are no action yet."""
-    for index, recording in enumerate(live.waiting()):
+    for index, recording in enumerate(capture.waiting()):
         box = layout.box()
         words = f"{recording.face}: {len(recording.take)} faces wait"
         box.label(text=names.printable(words, 60), icon="REC")

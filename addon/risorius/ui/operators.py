@@ -3,8 +3,11 @@
 
 import bpy
 
-from ..logic import regions
-from ..scene import armatures, build, copies, evaluate, overrides, parts, runtime
+from ..logic.character import regions
+from ..scene.base import parts
+from ..scene.character import armatures, build, runtime
+from ..scene.frame import evaluate
+from ..scene.life import duplicates, library_overrides
 from .import_operators import MODES, usable
 
 
@@ -121,7 +124,7 @@ class RISORIUS_OT_set_shape_mode(FaceOperator, bpy.types.Operator):
         if any(item.mode == "EDIT" for item in parts.meshes_of(rig)):
             self.report({"ERROR"}, "Leave edit mode first.")
             return {"CANCELLED"}
-        if overrides.unlock_shapes(rig):
+        if library_overrides.unlock_shapes(rig):
             self.report({"INFO"}, "The linked meshes were copied into this file.")
         for sentence in build.change_mode(rig, self.mode):
             self.report({"WARNING"}, sentence)
@@ -158,7 +161,7 @@ class RISORIUS_OT_separate(FaceOperator, bpy.types.Operator):
     bl_label = "Make Independent"
 
     def execute(self, context):
-        for sentence in copies.separate(parts.active_rig(context)):
+        for sentence in duplicates.separate(parts.active_rig(context)):
             self.report({"INFO"}, sentence)
         context.view_layer.update()
         return {"FINISHED"}

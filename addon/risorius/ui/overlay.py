@@ -4,7 +4,7 @@
 import blf
 import bpy
 
-from ..scene import timing
+from ..scene.frame import timing
 
 _handles = []
 

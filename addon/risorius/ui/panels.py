@@ -6,8 +6,9 @@ import textwrap
 import bpy
 
 from .. import native
-from ..logic import plans, regions
-from ..scene import lods, parts, place, runtime
+from ..logic.character import plans, regions
+from ..scene.base import parts
+from ..scene.character import lods, rig_placement, runtime
 from . import bake_operators, life_operators, words
 
 _ICONS = {
@@ -194,7 +195,7 @@ class RISORIUS_PT_options(FaceOnlyPanel, bpy.types.Panel):
         rig = parts.active_rig(context)
         on = bool(parts.controls_of(rig).get(parts.OVERDRIVE))
         layout.operator("risorius.set_overdrive", depress=on).enable = not on
-        attached = place.body_of(parts.controls_of(rig))
+        attached = rig_placement.body_of(parts.controls_of(rig))
         body = "risorius.detach_body" if attached else "risorius.attach_body"
         layout.operator(body, icon="ARMATURE_DATA")
         layout.operator("risorius.separate", icon="UNLINKED")

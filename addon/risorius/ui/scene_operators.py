@@ -3,7 +3,9 @@
 
 import bpy
 
-from ..scene import evaluate, lods, parts, place
+from ..scene.base import parts
+from ..scene.character import lods, rig_placement
+from ..scene.frame import evaluate
 from .operators import FaceOperator
 
 
@@ -103,7 +105,7 @@ class RISORIUS_OT_attach_body(FaceOperator, bpy.types.Operator):
         if not self.body and bodies:
             chosen = next((o for o in bodies if o.select_get()), bodies[0])
             self.body = chosen.name
-            self.base, self.neck, self.head = place.find_bones(chosen)
+            self.base, self.neck, self.head = rig_placement.find_bones(chosen)
         return context.window_manager.invoke_props_dialog(self)
 
     def draw(self, context):
@@ -122,7 +124,7 @@ class RISORIUS_OT_attach_body(FaceOperator, bpy.types.Operator):
         if body is None or not _is_body(None, body):
             self.report({"ERROR"}, f"'{self.body}' is no armature of a body.")
             return {"CANCELLED"}
-        found = place.find_bones(body)
+        found = rig_placement.find_bones(body)
         base, neck, head = (
             given or (auto if not (self.base or self.neck or self.head) else "")
             for given, auto in zip((self.base, self.neck, self.head), found, strict=True)
@@ -133,7 +135,7 @@ class RISORIUS_OT_attach_body(FaceOperator, bpy.types.Operator):
             what = f"no bone '{missing[0]}'" if missing else "no bone named head or neck"
             self.report({"ERROR"}, f"'{body.name}' has {what}: choose the bones.")
             return {"CANCELLED"}
-        place.attach(parts.controls_of(rig), body, base, neck, head, self.fit)
+        rig_placement.attach(parts.controls_of(rig), body, base, neck, head, self.fit)
         evaluate.bring_up(context, rig)
         self.report({"INFO"}, f"The face follows {body.name}: {base}, {neck}, {head}")
         return {"FINISHED"}
@@ -147,7 +149,7 @@ class RISORIUS_OT_detach_body(FaceOperator, bpy.types.Operator):
 
     def execute(self, context):
         rig = parts.active_rig(context)
-        place.detach(parts.controls_of(rig))
+        rig_placement.detach(parts.controls_of(rig))
         evaluate.bring_up(context, rig)
         return {"FINISHED"}
 

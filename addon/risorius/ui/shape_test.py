@@ -3,7 +3,9 @@
 
 import bpy
 
-from ..scene import build, evaluate, parts, runtime, testing
+from ..scene.base import parts
+from ..scene.character import build, runtime
+from ..scene.frame import channel_preview, evaluate
 from .import_operators import usable
 from .panels import FaceOnlyPanel
 
@@ -13,9 +15,9 @@ _items = []  # Blender reads the strings later: they must stay alive
 def _test(context, rig, channel, value):
     """Set the override of a face, or end it where the value is None, and show it."""
     if value is None:
-        testing.clear(rig)
+        channel_preview.clear(rig)
     else:
-        testing.set_override(rig, channel, value)
+        channel_preview.set_override(rig, channel, value)
     evaluate.bring_up(context, rig)
 
 
@@ -88,13 +90,13 @@ class RISORIUS_OT_test_channel(bpy.types.Operator):
 
 
 def _get_weight(_manager):
-    now = testing.current(parts.active_rig(bpy.context))
+    now = channel_preview.current(parts.active_rig(bpy.context))
     return now[1] if now else 0.0
 
 
 def _set_weight(_manager, value):
     rig = parts.active_rig(bpy.context)
-    now = testing.current(rig)
+    now = channel_preview.current(rig)
     if now is not None:
         _test(bpy.context, rig, now[0], value)
 
@@ -121,7 +123,7 @@ class RISORIUS_PT_shape_test(FaceOnlyPanel, bpy.types.Panel):
     def draw(self, context):
         layout = self.layout
         rig = parts.active_rig(context)
-        live, now = runtime.of(rig), testing.current(rig)
+        live, now = runtime.of(rig), channel_preview.current(rig)
         if live is None:
             return
         name = build.channel_labels(live.dna)[now[0]] if now else "Choose a Shape"

@@ -7,10 +7,10 @@ import bpy
 from bpy_extras.io_utils import ExportHelper
 
 from .. import native
-from ..logic.errors import FaceError
-from ..scene import flatten, ship
-from ..scene.clips import frame_rate
-from ..scene.quiet import quiet
+from ..logic.base.errors import FaceError
+from ..scene.animation.clip_actions import frame_rate
+from ..scene.export import export_animation, plain_materials
+from ..scene.export.quiet import quiet
 from . import words
 from .bake_operators import FacesOperator, FrameRange, selected_rigs
 
@@ -233,11 +233,13 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, bpy.
             self.report({"ERROR"}, trouble)
             return {"CANCELLED"}
         start, end = self.frames(context)
-        options = ship.ShipOptions(
+        options = export_animation.ShipOptions(
             start, end, self.step, self.lod, frozenset(self.wanted), self.all_shapes
         )
         try:
-            characters = _run(context, ship.sampled(context, self.faces(context), options))
+            characters = _run(
+                context, export_animation.sampled(context, self.faces(context), options)
+            )
             written = self._write(context, characters, options)
         except native.user_errors() as error:
             self.report({"ERROR"}, _one_sentence(self.filepath, error))
@@ -252,16 +254,18 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, bpy.
             if len(characters) > 1:
                 raise FaceError("a file holds the controls of one face: select one")
             scene = context.scene
-            clip = ship.clip(*characters[0], frame_rate(scene), scene.frame_start, self.maps)
+            clip = export_animation.clip(
+                *characters[0], frame_rate(scene), scene.frame_start, self.maps
+            )
             _write_csv(clip, path) if self.format == "CSV" else clip.save(path)
         else:
-            with ship.copies(context, characters, options) as (override, loans):
+            with export_animation.copies(context, characters, options) as (override, loans):
                 if self.bake_materials:
-                    _run(context, flatten.flatten(override, loans, self.texture_size))
+                    _run(context, plain_materials.flatten(override, loans, self.texture_size))
                 _export(self, override, path)
                 if self.bake_materials and self.format == "ALEMBIC":
                     folder = path.with_name(path.stem + "_textures")
-                    flatten.write_images(override["scene"], folder)
+                    plain_materials.write_images(override["scene"], folder)
         return f"{path.name}: {frames} frames, {path.stat().st_size:,} bytes"
 
 

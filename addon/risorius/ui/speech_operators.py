@@ -7,8 +7,9 @@ import bpy
 from bpy_extras.io_utils import ImportHelper
 
 from .. import native
-from ..logic.clips import ClipError
-from ..scene import clips, listening, parts
+from ..logic.animation.clip_units import ClipError
+from ..scene.animation import clip_actions, speech_task
+from ..scene.base import parts
 from . import words
 from .animation_operators import SOUNDS, PlacesClip
 from .import_operators import explain, usable
@@ -60,14 +61,14 @@ class RISORIUS_OT_speak(PlacesClip, bpy.types.Operator, ImportHelper):
         return ImportHelper.invoke(self, context, event)
 
     def execute(self, context):
-        if not listening.has_recogniser():
+        if not speech_task.has_recogniser():
             self.report({"ERROR"}, _MISSING)
             return {"CANCELLED"}
         text = bpy.data.texts.get(self.transcript_text) if self.transcript_text else None
         if self.transcript_text and text is None:
             self.report({"ERROR"}, f"There is no text {self.transcript_text}.")
             return {"CANCELLED"}
-        self._task = listening.Task(
+        self._task = speech_task.Task(
             self.filepath,
             text.as_string() if text is not None else self.transcript,
             intensity=self.intensity,
@@ -75,7 +76,7 @@ class RISORIUS_OT_speak(PlacesClip, bpy.types.Operator, ImportHelper):
             blinks=self.use_blinks,
             accents=self.use_accents,
             # Made for these frames, not sampled at them: lips that meet shall meet on one.
-            rate=clips.frame_rate(context.scene) if self.use_whole_frames else 60.0,
+            rate=clip_actions.frame_rate(context.scene) if self.use_whole_frames else 60.0,
         )
         self._face = parts.active_rig(context).session_uid
         # Adjusting the last operation calls this again, on the same operator.
@@ -139,7 +140,7 @@ class RISORIUS_OT_speak(PlacesClip, bpy.types.Operator, ImportHelper):
         if not self.use_sound:
             return
         try:
-            clips.add_sound(context.scene, self.filepath, self.start)
+            clip_actions.add_sound(context.scene, self.filepath, self.start)
         except ClipError as error:  # the face speaks all the same
             self.report({"WARNING"}, explain(self.filepath, error))
 
@@ -178,7 +179,7 @@ class RISORIUS_OT_install_speech(bpy.types.Operator):
 
     def execute(self, _context):
         try:
-            listening.install_recogniser()
+            speech_task.install_recogniser()
         except native.user_errors() as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
@@ -188,7 +189,7 @@ class RISORIUS_OT_install_speech(bpy.types.Operator):
 
 def draw_preferences(layout):
     """Whether speech works, and the button that makes it work."""
-    if listening.has_recogniser():
+    if speech_task.has_recogniser():
         layout.label(text="Speak from Audio is ready.", icon="CHECKMARK")
         return
     layout.label(text="Speak from Audio needs the package PocketSphinx (28 MB).", icon="INFO")

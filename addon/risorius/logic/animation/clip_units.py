@@ -1,0 +1,245 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From a clip's seconds and radians to Blender's frames and quaternions, and back."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.errors import FaceError
+
+Float = NDArray[np.float64]
+HEAD = ("head.yaw", "head.pitch", "head.roll")
+EYES = {"L": ("eyeL.yaw", "eyeL.pitch"), "R": ("eyeR.yaw", "eyeR.pitch")}
+LAST_FRAME = 1_048_574  # Blender's own limit of a scene
+
+
+class ClipError(FaceError):
+    """A clip that cannot become an action, or an action that has nothing for this face."""
+
+
+@dataclass(frozen=True)
+class Timing:
+    """Where a clip's time lies on Blender's frames.
+
+    Attributes:
+        rate: frames per second of the scene, fps / fps_base.
+        start: the scene's frame at which the time `origin` lies.
+        origin: seconds on the clip's clock.
+        whole: whether keys lie on whole frames only, see onto_frames.
+    """
+
+    rate: float
+    start: float = 1.0
+    origin: float = 0.0
+    whole: bool = False
+
+    def frames(self, seconds: Float) -> Float:
+        """Frames of the scene, with their subframes, for seconds on the clip's clock."""
+        return self.start + (np.asarray(seconds, np.float64) - self.origin) * self.rate
+
+    def seconds(self, frames: Float) -> Float:
+        """The inverse of `frames`."""
+        return self.origin + (np.asarray(frames, np.float64) - self.start) / self.rate
+
+    def placed(self, frames: Float, values: Float) -> tuple[Float, Float]:
+        """Keys where they lie in the scene: as they are, or on whole frames."""
+        return onto_frames(frames, values) if self.whole else (frames, values)
+
+
+def onto_frames(frames: Float, values: Float) -> tuple[Float, Float]:
+    """Keys on whole frames for samples anywhere.
+
+    Each sample has a key on the frame before it and on the one after it. So there are at most
+    twice as many keys as samples, however long the pauses are, and the straight lines between the
+    keys meet every whole frame where those between the samples do.
+
+    Args:
+        frames: float64[n], ascending; a ten thousandth of a frame beside a whole one is that one.
+        values: float64[n] or float64[n, width].
+
+    Returns:
+        Whole frames float64[m] and the values there; the first and the last value are held.
+    """
+    near = np.rint(frames)
+    frames = np.where(np.abs(frames - near) < 1e-4, near, frames)
+    whole = np.unique(np.concatenate([np.floor(frames), np.ceil(frames)]))
+    columns = [np.interp(whole, frames, column) for column in values.reshape(len(frames), -1).T]
+    return whole, np.stack(columns, axis=1).reshape(len(whole), *values.shape[1:])
+
+
+@dataclass
+class Curve:
+    """Keys of one F-curve: frames float64[n] and values float64[n]; one key where constant."""
+
+    name: str
+    frames: Float
+    values: Float
+
+
+@dataclass
+class Keys:
+    """What an action of a clip consists of.
+
+    Attributes:
+        controls: keys of the sliders, by their property names.
+        turns: bone -> frames float64[n] and quaternions float64[n, 4], w first, in the axes of the
+            control armature.
+        unknown: names of the clip that this face has no control for.
+        dropped: how many samples were no numbers.
+    """
+
+    controls: list[Curve] = field(default_factory=list)
+    turns: dict[str, tuple[Float, Float]] = field(default_factory=dict)
+    unknown: list[str] = field(default_factory=list)
+    dropped: int = 0
+
+
+def property_names(dna_names: Sequence[str], labels: Sequence[str]) -> dict[str, str]:
+    """The slider of each name that a curve may have: the DNA's own, and Blender's cut one.
+
+    Where the DNA has a name twice, it means the first.
+    """
+    found = dict(zip(reversed(dna_names), reversed(labels), strict=True))
+    found.update(zip(labels, labels, strict=True))
+    return found
+
+
+def keys_of(
+    names: Sequence[str],
+    curves: NDArray[np.float32],
+    times: Float,
+    timing: Timing,
+    sliders: dict[str, str],
+    with_eyes: bool = True,
+) -> Keys:
+    """Arrange a clip as keys.
+
+    Args:
+        names: of the clip's curves.
+        curves: float32[names, frames].
+        times: float64[frames], seconds, ascending.
+        timing: where they lie in the scene.
+        sliders: curve name -> property name, see property_names.
+        with_eyes: take curves of eye rotation too.
+
+    Returns:
+        Keys. Samples that are no numbers are left out; a curve without any sample has no keys.
+
+    Raises:
+        ClipError: it lies beyond what Blender can play.
+    """
+    frames = timing.frames(times)
+    if frames.size and not np.abs(frames).max() <= LAST_FRAME:
+        worst = frames[np.argmax(np.abs(frames))]
+        raise ClipError(f"frame {worst:.0f} is beyond what Blender can play ({LAST_FRAME})")
+    keys = Keys()
+    turned = [HEAD, *EYES.values()]
+    angles = {name for group in turned for name in group}
+    for name, values in zip(names, curves, strict=True):
+        if name in sliders:
+            curve = _curve(sliders[name], frames, values, timing, keys)
+            if curve is not None:
+                keys.controls.append(curve)
+        elif name not in angles:
+            keys.unknown.append(name)
+    _add_turns(keys, names, curves, frames, timing, with_eyes)
+    return keys
+
+
+def _curve(
+    name: str, frames: Float, values: NDArray[np.float32], timing: Timing, keys: Keys
+) -> Curve | None:
+    good = np.isfinite(values)
+    if not good.all():
+        keys.dropped += int(len(values) - good.sum())
+        frames, values = frames[good], values[good]
+    if not len(values):
+        return None
+    if (values == values[0]).all():
+        frames, values = frames[:1], values[:1]
+        return Curve(name, np.floor(frames) if timing.whole else frames, values.astype(np.float64))
+    return Curve(name, *timing.placed(frames, values.astype(np.float64)))
+
+
+def _add_turns(
+    keys: Keys,
+    names: Sequence[str],
+    curves: NDArray[np.float32],
+    frames: Float,
+    timing: Timing,
+    with_eyes: bool,
+) -> None:
+    rows = dict(zip(names, curves, strict=True))
+    groups = {"head": HEAD, **({f"eye_{s}": n for s, n in EYES.items()} if with_eyes else {})}
+    for bone, group in groups.items():
+        if not len(frames) or not any(name in rows for name in group):
+            continue
+        nothing = np.zeros(len(frames), np.float32)
+        angles = np.stack([rows.get(n, nothing) for n in group], axis=1).astype(np.float64)
+        good = np.isfinite(angles).all(axis=1)
+        keys.dropped += int(len(good) - good.sum())
+        if good.any():
+            moving = good if (angles[good] != angles[good][0]).any() else np.flatnonzero(good)[:1]
+            at, turns = timing.placed(frames[moving], quaternions(angles[moving]))
+            if timing.whole:  # on a straight line between two turns, which is shorter than either
+                turns /= np.linalg.norm(turns, axis=1, keepdims=True)
+            keys.turns[bone] = at, turns
+
+
+def quaternions(angles: Float) -> Float:
+    """Turns of a head or an eye.
+
+    Args:
+        angles: float64[n, 2 or 3], radians: yaw to the face's own left, pitch up, and roll towards
+            its own left shoulder; the face looks along -y, z is up.
+
+    Returns:
+        float64[n, 4], w first; neighbours have the sign that makes them near.
+    """
+    half = np.zeros((len(angles), 3))
+    half[:, : angles.shape[1]] = angles / 2
+    yaw = _about(2, half[:, 0])
+    pitch = _about(0, -half[:, 1])
+    roll = _about(1, half[:, 2])
+    return near_signs(multiply(multiply(yaw, pitch), roll))
+
+
+def angles_of(turns: Float) -> Float:
+    """The inverse of `quaternions`. Returns: float64[n, 3], yaw, pitch, roll in radians."""
+    w, x, y, z = np.moveaxis(np.asarray(turns, np.float64), -1, 0)
+    pitch = -np.arcsin(np.clip(2 * (w * x + y * z), -1.0, 1.0))
+    yaw = np.arctan2(-2 * (x * y - w * z), 1 - 2 * (x * x + z * z))
+    roll = np.arctan2(-2 * (x * z - w * y), 1 - 2 * (x * x + y * y))
+    return np.stack([yaw, pitch, roll], axis=-1)
+
+
+def multiply(a: Float, b: Float) -> Float:
+    """The turns b, then a: float64[n or 1, 4], w first."""
+    aw, ax, ay, az = np.moveaxis(a, -1, 0)
+    bw, bx, by, bz = np.moveaxis(b, -1, 0)
+    return np.stack(
+        [
+            aw * bw - ax * bx - ay * by - az * bz,
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+        ],
+        axis=-1,
+    )
+
+
+def near_signs(turns: Float) -> Float:
+    """The same turns, each with the sign that is nearest to the one before."""
+    flips = np.where((turns[1:] * turns[:-1]).sum(axis=1) < 0.0, -1.0, 1.0)
+    signs = np.concatenate([[1.0], np.cumprod(flips)]) if len(turns) else np.ones(0)
+    return turns * signs[:, None]
+
+
+def _about(axis: int, half: Float) -> Float:
+    turn = np.zeros((len(half), 4))
+    turn[:, 0], turn[:, axis + 1] = np.cos(half), np.sin(half)
+    return turn

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Baked values to keys: which frames a curve needs so that straight lines stay near all of them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..base.errors import FaceError
+
+Floats = NDArray[np.float32]
+Times = NDArray[np.float64]
+Kept = NDArray[np.bool_]
+_EPS = float(np.finfo(np.float32).eps)
+
+
+def frame_list(start: float, end: float, step: float) -> Times:
+    """The frames to bake, float64[N]: from start in steps, none after the end.
+
+    Raises:
+        ValueError: the end lies before the start, or the step is not above 0.
+    """
+    if end < start:
+        raise FaceError(f"The range ends at frame {end:g}, before it starts at {start:g}.")
+    if not step > 0:
+        raise FaceError(f"A step above 0 was expected, found {step:g}.")
+    return start + step * np.arange(int(np.floor((end - start) / step + 1e-9)) + 1)
+
+
+def continuous(quaternions: Floats) -> Floats:
+    """Quaternions whose signs follow each other, so that lines between them turn the short way.
+
+    Args:
+        quaternions: float32[frames, ..., 4].
+    """
+    dots = (quaternions[1:] * quaternions[:-1]).sum(axis=-1, keepdims=True)
+    signs = np.cumprod(np.where(dots < 0.0, np.float32(-1), np.float32(1)), axis=0)
+    return np.concatenate([quaternions[:1], quaternions[1:] * signs])
+
+
+def reduce_keys(frames: ArrayLike, values: ArrayLike, error: float = 0.0) -> Kept:
+    """The keys that curves need.
+
+    All curves are walked at once: from the last key of each a cone of slopes is kept that pass all
+    later values within the error; where a value lies outside, the one before becomes a key.
+
+    Args:
+        frames: float[N], ascending.
+        values: float32[N, curves], finite.
+        error: how far a line between two keys may be from any value, absolute. 0 keeps every key
+            of a curve that moves.
+
+    Returns:
+        bool[N, curves]. A curve that stays within the error of its first value has one key.
+    """
+    times = np.asarray(frames, np.float64)
+    values = np.asarray(values, np.float32)
+    keep = np.ones(values.shape, bool)
+    still = np.abs(values - values[:1]).max(axis=0, initial=0.0) <= error
+    if error > 0.0 and len(times) > 2:
+        keep = _cones(times, values.astype(np.float64), error)
+        # Where float32 lines are coarser than the error, all keys stay.
+        keep[:, np.abs(rebuilt(times, values, keep) - values).max(axis=0) > error] = True
+    keep[1:, still] = False
+    return keep
+
+
+def _cones(frames: Times, values: Times, error: float) -> Kept:
+    inner = np.maximum(error - 4 * _EPS * np.abs(values).max(axis=0), 0.0)
+    keep = np.zeros(values.shape, bool)
+    keep[[0, -1]] = True
+    count = values.shape[1]
+    time, value = np.full(count, frames[0]), values[0].copy()
+    low, high = np.full(count, -np.inf), np.full(count, np.inf)
+    for i in range(1, len(frames)):
+        slope = (values[i] - value) / (frames[i] - time)
+        outside = np.flatnonzero((slope < low) | (slope > high))
+        if outside.size:
+            keep[i - 1, outside] = True
+            time[outside], value[outside] = frames[i - 1], values[i - 1, outside]
+            low[outside], high[outside] = -np.inf, np.inf
+        passed = frames[i] - time
+        low = np.maximum(low, (values[i] - inner - value) / passed)
+        high = np.minimum(high, (values[i] + inner - value) / passed)
+    return keep
+
+
+def rebuilt(frames: Times, values: Floats, keep: Kept) -> Floats:
+    """What straight lines between the keys give at every frame.
+
+    Args:
+        frames: float[N].
+        values: float32[N, curves].
+        keep: bool[N, curves]; before the first and after the last key it is held.
+
+    Returns:
+        float32[N, curves], computed as Blender does, in float32.
+    """
+    count = len(frames)
+    rows = np.arange(count)[:, None]
+    before = np.maximum.accumulate(np.where(keep, rows, -1), axis=0)
+    after = np.minimum.accumulate(np.where(keep, rows, count)[::-1], axis=0)[::-1]
+    before = np.where(before < 0, after, before)
+    after = np.where(after == count, before, after)
+    times = np.asarray(frames, np.float32)
+    span = times[after] - times[before]
+    part = np.where(span > 0, (times[:, None] - times[before]) / np.where(span > 0, span, 1), 0)
+    low = np.take_along_axis(values, before, axis=0)
+    high = np.take_along_axis(values, after, axis=0)
+    return (low + part.astype(np.float32) * (high - low)).astype(np.float32)

@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Layers of animation without Blender: what a layer moves, and when it reads its source."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..character import regions
+
+Float = NDArray[np.float64]
+COLLECTION = "risorius_layers"
+_PATH = re.compile(rf"^{COLLECTION}\[(\d+)\]")
+_LIMIT = 100_000  # samples of one source
+_NEAR = 1e-7  # frames
+
+
+def masked(controls: Iterable[str], chosen: Iterable[str], words: str = "") -> list[str]:
+    """The controls that a layer may move, in their order.
+
+    Args:
+        controls: names.
+        chosen: regions; none means all.
+        words: names or patterns, separated by spaces or commas: `jawOpen mouth*`, without their
+            prefix and in any case. One that begins with `-` is taken out again. Where all begin
+            with it, they are taken out of everything.
+    """
+    wanted = set(chosen)
+    patterns = [w.lower() for w in re.split(r"[\s,;]+", words) if w.strip("-")]
+    taken = [p for p in patterns if not p.startswith("-")]
+    left_out = [p[1:] for p in patterns if p.startswith("-")]
+    kept = []
+    for control in controls:
+        if wanted and _region(control) not in wanted:
+            continue
+        names = (control.lower(), regions.short_name(control).lower())
+        if taken and not any(fnmatchcase(n, p) for n in names for p in taken):
+            continue
+        if not any(fnmatchcase(n, p) for n in names for p in left_out):
+            kept.append(control)
+    return kept
+
+
+def _region(control: str) -> str:
+    """The region of a control; that of head.yaw stands before the dot."""
+    region = regions.region_of(control)
+    return region if region != "other" else regions.region_of(control.partition(".")[0])
+
+
+@dataclass(frozen=True)
+class Span:
+    """When a layer plays its source, in frames of the scene and of the source.
+
+    Attributes:
+        start: where the scene shows the source's frame `first`, or `last` of a reversed one.
+        first, last: of the source that are played.
+        scale: how much longer than the source it is; 2 is half as fast.
+        repeat: how often.
+        reverse: from last to first.
+        warp: float64[n] frames of the scene and of the source, instead of all that; or None.
+    """
+
+    start: float
+    first: float
+    last: float
+    scale: float = 1.0
+    repeat: float = 1.0
+    reverse: bool = False
+    warp: tuple[Float, Float] | None = None
+
+    @property
+    def period(self) -> float:
+        """Frames of the scene that the source takes once."""
+        return (self.last - self.first) * self.scale
+
+    def scene_range(self) -> tuple[float, float]:
+        """Frames of the scene in which it plays."""
+        if self.warp is not None:
+            return float(self.warp[0][0]), float(self.warp[0][-1])
+        return self.start, self.start + self.period * self.repeat
+
+    def source(self, frames: Float) -> Float:
+        """The source's frames that are shown at frames of the scene."""
+        if self.warp is not None:
+            return np.interp(frames, *self.warp)
+        if not self.period > 0.0:
+            return np.full(len(frames), self.first)
+        gone = np.mod(frames - self.start, self.period) / self.scale
+        return self.last - gone if self.reverse else self.first + gone
+
+
+def sample_frames(span: Span, keys: Float, bent: bool) -> Float:
+    """At which of its own frames a source is sampled so that straight lines between them are it.
+
+    What the scene shows at its whole frames is always exact. Curves that bend between their keys
+    are sampled four times as often, for subframes.
+
+    Args:
+        span: when it plays.
+        keys: float64[n], frames of all its keys.
+        bent: whether a curve has handles, steps or modifiers.
+
+    Returns:
+        float64[n], ascending; at least one.
+    """
+    first, last = span.first, span.last
+    if not last > first:
+        return np.array([first])
+    grid = np.asarray(keys, np.float64)
+    grid = grid[(grid > first) & (grid < last)]
+    if bent:
+        begin, end = span.scene_range()
+        count = int(min(max(end - np.floor(begin), 0.0) * 4, _LIMIT)) + 1
+        shown = span.source(np.floor(begin) + np.arange(count) * 0.25)
+        grid = np.concatenate([grid, shown[(shown > first) & (shown < last)]])
+    every = np.unique(np.concatenate([[first], grid, [last]]))
+    # What is a rounding apart is one: times must ascend.
+    return every[np.concatenate([[True], np.diff(every) > _NEAR])]
+
+
+def place_of(path: str) -> int | None:
+    """The place of the layer that a data path leads into, as `risorius_layers[2].weight`."""
+    found = _PATH.match(path)
+    return int(found.group(1)) if found else None

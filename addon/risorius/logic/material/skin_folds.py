@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where a face folds, from its shape: soft areas and coordinates for materials without maps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .animated_maps import AREAS
+
+Float32 = NDArray[np.float32]
+
+# Area: ellipses as (x, z, half width, half height), x mirrored to both sides. x and z count from
+# between the eyes; x in eye distances, z in eye distances above and mouth distances below.
+_SPOTS: dict[str, tuple[tuple[float, float, float, float], ...]] = {
+    "forehead": ((0.0, 0.82, 0.75, 0.42),),
+    "glabella": ((0.0, 0.36, 0.26, 0.32),),
+    "eye": ((1.0, 0.0, 0.26, 0.34),),
+    "nose": ((0.16, -0.22, 0.24, 0.22),),
+    "smile": ((0.50, -0.80, 0.26, 0.40),),
+    "lips": ((0.0, -1.0, 0.46, 0.24),),
+    "chin": ((0.0, -1.45, 0.34, 0.22),),
+    "neck": ((0.0, -2.6, 1.3, 0.75),),
+}
+_NEVER_BEHIND = {"neck"}  # areas that reach farther back than the eyes
+
+
+@dataclass(frozen=True)
+class FaceFrame:
+    """Where a face is, in Blender units: it looks along -y, z is up, its left is +x.
+
+    Attributes:
+        origin: float64[3] between the eyes' centres.
+        unit: distance of the eyes' centres.
+        drop: from the eyes down to the mouth.
+    """
+
+    origin: NDArray[np.float64]
+    unit: float
+    drop: float
+
+
+def find_frame(
+    eyes: Sequence[NDArray[Any]], head: NDArray[Any], mouth: NDArray[Any] | None
+) -> FaceFrame:
+    """The frame of a face.
+
+    Args:
+        eyes: centres of one eye or both; none where they are not known.
+        head: float[V, 3] vertices of the head.
+        mouth: a point inside the mouth, or None.
+    """
+    low, high = head.min(axis=0).astype(float), head.max(axis=0).astype(float)
+    middle, size = (low + high) / 2, np.maximum(high - low, 1e-9)
+    unit = 2 * float(np.mean([abs(e[0] - middle[0]) for e in eyes])) if len(eyes) else 0.0
+    if not 0.15 * size[0] < unit < 0.8 * size[0]:
+        unit = 0.36 * float(size[0])
+        eyes = []
+    if eyes:
+        eye = np.mean(np.asarray(eyes, float), axis=0)
+        origin = np.array([middle[0], eye[1], eye[2]])
+    else:
+        origin = np.array([middle[0], low[1] + 0.25 * size[1], high[2] - 1.75 * unit])
+    drop = float(origin[2] - mouth[2]) if mouth is not None else 0.0
+    if not 0.6 * unit < drop < 2.0 * unit:
+        drop = 1.12 * unit
+    return FaceFrame(origin, unit, drop)
+
+
+def face_coordinates(points: NDArray[Any], frame: FaceFrame) -> NDArray[np.float64]:
+    """float64[V, 3]: x, depth and height of points, measured from between the eyes."""
+    local = (np.asarray(points, float) - frame.origin) / frame.unit
+    below = local[:, 2] < 0
+    local[below, 2] *= frame.unit / frame.drop
+    return local
+
+
+def area_masks(points: NDArray[Any], frame: FaceFrame) -> dict[str, Float32]:
+    """How much each vertex belongs to each area.
+
+    Args:
+        points: float[V, 3] in Blender units.
+        frame: of the face.
+
+    Returns:
+        Area -> float32[V], 0 to 1, soft at the border.
+    """
+    local = face_coordinates(points, frame)
+    x, depth, z = np.abs(local[:, 0]), local[:, 1], local[:, 2]
+    masks = {}
+    for area in AREAS:
+        reach = 1.2 if area in _NEVER_BEHIND else 0.55
+        front = _smooth((reach + 0.3 - depth) / 0.3)
+        mask = np.zeros(len(local))
+        for cx, cz, wide, high in _SPOTS[area]:
+            away = np.hypot((x - cx) / wide, (z - cz) / high)
+            mask = np.maximum(mask, _smooth((1.35 - away) / 0.85))
+        masks[area] = (mask * front).astype(np.float32)
+    # The lips themselves do not fold across the eyes' rims, nor does the nose's tip.
+    masks["eye"] *= 1 - masks["nose"]
+    return masks
+
+
+def fold_coordinates(points: NDArray[Any], frame: FaceFrame) -> Float32:
+    """float32[V, 3]: x and height of face_coordinates, and the distance from the mouth."""
+    local = face_coordinates(points, frame)
+    x, z = local[:, 0], local[:, 2]
+    return np.stack([x, z, np.hypot(x, (z + 1.0) * 0.8)], axis=1).astype(np.float32)
+
+
+def left_share(points: NDArray[Any], frame: FaceFrame) -> Float32:
+    """float32[V]: 1 on the character's left, 0 on its right, soft between."""
+    x = face_coordinates(points, frame)[:, 0]
+    return _smooth(x / 0.3 + 0.5).astype(np.float32)
+
+
+def _smooth(values: NDArray[Any]) -> NDArray[Any]:
+    """The usual step from 0 to 1 with level ends."""
+    t = np.clip(values, 0.0, 1.0)
+    return t * t * (3 - 2 * t)

@@ -1,0 +1,366 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Actions with baked curves, and what an object was animated by before it played one."""
+
+import hashlib
+import json
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ...logic.animation import key_reduction as reduction
+from ...logic.animation import track_matching
+from ..base import compat
+
+BEFORE = "risorius_before"  # on what plays a baked action: what animated it before
+BAKED_ACTION = "risorius_baked_action"  # on an action that was baked: removed on the way back
+_DIGEST = "risorius_digest"  # on the same: of its keys as they were baked
+_LINEAR = 1
+_AT_ONCE = 1 << 21  # values that are reduced in one go
+
+
+@dataclass
+class Track:
+    """Baked values of one property.
+
+    Attributes:
+        path: its data path.
+        group: name of the group that its curves are shown in.
+        values: float32[frames, width].
+        now: what the property holds on the original, [width]; a property that holds one value
+            through the range and has it already needs no curve. None keys it in any case.
+        first: array index of the first column.
+        indexed: whether the property is an array.
+    """
+
+    path: str
+    group: str
+    values: object
+    now: object = None
+    first: int = 0
+    indexed: bool = True
+
+
+@dataclass
+class Counts:
+    """What the reduction of keys did: keys written, keys without it, largest error."""
+
+    keys: int = 0
+    all_keys: int = 0
+    error: float = 0.0
+    curves: int = 0
+
+    def sentence(self):
+        """For a report."""
+        return (
+            f"{self.curves:,} curves, {self.keys:,} of {self.all_keys:,} keys, "
+            f"largest error {self.error:.3g}"
+        )
+
+
+def write(name, owner, frames, tracks, error, counts):
+    """A new action with one curve for each value that moves.
+
+    Args:
+        name: of the action.
+        owner: the datablock that will play it.
+        frames: float64[N].
+        tracks: Tracks.
+        error: see reduce_keys; 0 keeps a key at every frame.
+        counts: Counts, added to.
+
+    Returns:
+        The Action and its slot (None before Blender 4.4).
+    """
+    action = bpy.data.actions.new(name)
+    action[BAKED_ACTION] = True
+    action.use_frame_range = True
+    action.frame_start, action.frame_end = float(frames[0]), float(frames[-1])
+    bag = compat.add_curves(action, owner)
+    times = np.asarray(frames, np.float32)
+    moving = [t for t in tracks if t.now is None or (t.values != _flat(t.now)).any()]
+    for track, values, keep in _reduced(frames, moving, error, counts):
+        for column in range(values.shape[1]):
+            curve = _new_curve(bag, track, track.first + column if track.indexed else 0)
+            _fill(curve, times[keep[:, column]], values[keep[:, column], column])
+    stamp(action)
+    return action, compat.slot_for(action, owner)
+
+
+def _flat(value):
+    return np.atleast_1d(np.asarray(value, np.float32))
+
+
+def _reduced(frames, tracks, error, counts):
+    """Each track with its values and keys; many tracks are reduced at once."""
+    most = max(_AT_ONCE // len(frames), 16)  # columns
+    waiting, width = [], 0
+    for number, track in enumerate(tracks):
+        waiting.append(track)
+        width += track.values.shape[1]
+        if width < most and number + 1 < len(tracks):
+            continue
+        values = np.concatenate([t.values for t in waiting], axis=1, dtype=np.float32)
+        keep = reduction.reduce_keys(frames, values, error)
+        if error > 0.0:
+            off = np.abs(reduction.rebuilt(frames, values, keep) - values).max(initial=0.0)
+            counts.error = max(counts.error, float(off))
+        counts.curves += width
+        counts.keys += int(keep.sum())
+        counts.all_keys += keep.size
+        ends = np.cumsum([t.values.shape[1] for t in waiting])[:-1]
+        yield from zip(waiting, np.split(values, ends, 1), np.split(keep, ends, 1), strict=True)
+        waiting, width = [], 0
+
+
+def _new_curve(bag, track, index):
+    words = bag.fcurves.bl_rna.functions["new"].parameters.keys()
+    for word in ("action_group", "group_name"):  # up to 4.3; since 5.0
+        if word in words:
+            return bag.fcurves.new(track.path, index=index, **{word: track.group})
+    curve = bag.fcurves.new(track.path, index=index)
+    group = bag.groups.get(track.group)
+    curve.group = group if group is not None else bag.groups.new(track.group)
+    return curve
+
+
+def _fill(curve, times, values):
+    points = curve.keyframe_points
+    points.add(len(times))
+    places = np.stack([times, values], axis=1).ravel()
+    # Straight lines need no handles; computing them would cost most of the time.
+    for name in ("co", "handle_left", "handle_right"):
+        points.foreach_set(name, places)
+    points.foreach_set("interpolation", np.full(len(times), _LINEAR, np.int32))
+
+
+def was_edited(action):
+    """Whether somebody edited an action since `stamp`. One without a stamp is somebody's."""
+    return action.get(_DIGEST) != _digest(action)
+
+
+def stamp(action):
+    """Note what an action holds."""
+    action[_DIGEST] = _digest(action)
+
+
+def _digest(action):
+    """What tells whether an action was edited since."""
+    found = hashlib.sha1(usedforsecurity=False)
+    for curve in compat.curves_of(action):
+        places = np.empty(len(curve.keyframe_points) * 2, np.float32)
+        curve.keyframe_points.foreach_get("co", places)
+        found.update(f"{curve.data_path} {curve.array_index}".encode())
+        found.update(places.tobytes())
+    return found.hexdigest()
+
+
+def play(owner, action, slot, muted=(), strip=False):
+    """Let a datablock play a baked action and nothing else; what it played before is kept.
+
+    Args:
+        owner: object or Key, see `restore`.
+        action, slot: from `write`.
+        muted: data paths whose drivers are muted, since they are baked.
+        strip: put the action on a new NLA track instead of making it the active one.
+    """
+    keep(owner)
+    data = owner.animation_data
+    silenced = [c for c in data.drivers if c.data_path in muted and not c.mute]
+    for curve in silenced:
+        curve.mute = True
+    held = owner[BEFORE]
+    held["drivers"] = [f"{c.array_index} {c.data_path}" for c in silenced]
+    data.action_influence, data.action_blend_type = 1.0, "REPLACE"
+    data.action_extrapolation = "HOLD"
+    if not strip:
+        data.use_nla = False
+        compat.assign_action(data, action, slot)
+        return
+    held["tracks"] = [_noted(track, track.mute, track.is_solo) for track in data.nla_tracks]
+    for track in data.nla_tracks:
+        track.is_solo = False
+        track.mute = True
+    data.action = None
+    data.use_nla = True
+    track = data.nla_tracks.new()
+    track.name = action.name
+    made = track.strips.new(action.name, int(np.floor(action.frame_start)), action)
+    if slot is not None:
+        made.action_slot = slot
+    made.frame_start_ui = made.action_frame_start
+    held["track"], held["baked"] = track.name, action
+
+
+def keep(owner):
+    """Note on a datablock what animates it now, unless that is noted; give it animation data."""
+    if BEFORE in owner:
+        return
+    had = owner.animation_data is not None
+    data = owner.animation_data or owner.animation_data_create()
+    state = {
+        "had": int(had),
+        "use_nla": int(data.use_nla),
+        "influence": data.action_influence,
+        "blend": data.action_blend_type,
+        "extrapolation": data.action_extrapolation,
+    }
+    if data.action is not None:
+        state["action"] = data.action
+        if getattr(data, "action_slot", None) is not None:
+            state["slot"] = data.action_slot.identifier
+    owner[BEFORE] = state
+
+
+def note_values(owner, paths):
+    """Note what properties hold that are not animated, or else than by what `play` plays.
+
+    Args:
+        owner: object that plays a baked action from now on.
+        paths: data paths, which an action sets and nobody else sets back.
+    """
+    lines = []
+    for path in paths:
+        value = owner.path_resolve(path)
+        numbers = [value] if isinstance(value, (bool, int, float)) else list(value)
+        lines.append(json.dumps([path, numbers]))
+    owner[BEFORE]["values"] = lines
+
+
+def _set_back(owner, lines):
+    for line in lines:
+        path, numbers = json.loads(line)
+        try:
+            value = owner.path_resolve(path)
+        except ValueError:
+            continue  # it is gone
+        if isinstance(value, (bool, int, float)):
+            _set(owner, path, numbers[0])
+        else:
+            for i, number in enumerate(numbers):
+                value[i] = number
+
+
+def _set(owner, path, number):
+    """Set a property by its path: a custom property in brackets, or an attribute."""
+    if path.endswith('"]'):
+        where, key = path[:-2].rsplit('["', 1)
+        item = owner.path_resolve(where) if where else owner
+        item[bpy.utils.unescape_identifier(key)] = number
+    else:
+        where, _dot, key = path.rpartition(".")
+        setattr(owner.path_resolve(where) if where else owner, key, number)
+
+
+def restore(owner):
+    """Let a datablock be animated again as it was before `play`.
+
+    What was baked goes, unless somebody else uses it, or the user protected or edited it; an action
+    that the user gave it meanwhile stays in the file.
+    """
+    state = owner.get(BEFORE)
+    if state is None:
+        return
+    data = owner.animation_data or owner.animation_data_create()
+    baked = [data.action]
+    if data.action is not None and data.action != state.get("action"):
+        data.action.use_fake_user |= not data.action.get(BAKED_ACTION)
+    if "track" in state:
+        baked += _remove_track(owner, state)
+    for curve in data.drivers:
+        if f"{curve.array_index} {curve.data_path}" in list(state.get("drivers", ())):
+            curve.mute = False
+    action = state.get("action")
+    data.action = action
+    if action is not None and "slot" in state:
+        slot = next((s for s in action.slots if s.identifier == state["slot"]), None)
+        if slot is not None:
+            data.action_slot = slot
+    data.action_influence, data.action_blend_type = state["influence"], state["blend"]
+    data.action_extrapolation = state["extrapolation"]
+    data.use_nla = bool(state["use_nla"])
+    _set_back(owner, list(state.get("values", ())))
+    if not state["had"] and not (action or data.drivers or data.nla_tracks):
+        owner.animation_data_clear()
+    del owner[BEFORE]
+    for made in baked:
+        if made is None or not made.get(BAKED_ACTION) or _is_used(made):
+            continue
+        if not was_edited(made):
+            bpy.data.actions.remove(made)
+        else:
+            made.use_fake_user = True
+
+
+def _is_used(action):
+    """Blender 4.3 counts a user too many of an action that was duplicated with its object."""
+    return bool(
+        action.users and (action.use_fake_user or bpy.data.user_map(subset=[action])[action])
+    )
+
+
+def _noted(track, mute, solo):
+    """What is kept of a track while a baked one is played: flags, and what it is known by."""
+    return json.dumps([bool(mute), bool(solo), track.name, [s.name for s in track.strips]])
+
+
+def note_tracks_by_name(owner):
+    """Write what is kept of tracks in the present way: up to form 0 it was by their order.
+
+    Returns:
+        Whether there was anything to write.
+    """
+    state = owner.get(BEFORE)
+    lines = list(state.get("tracks", ())) if state is not None else []
+    if not lines or lines[0].startswith("["):
+        return False
+    data = owner.animation_data
+    own = data.nla_tracks.get(state["track"])
+    others = [track for track in data.nla_tracks if track != own]
+    pairs = [(t, *(int(w) for w in x.split())) for t, x in zip(others, lines, strict=False)]
+    state["tracks"] = [_noted(*pair) for pair in pairs]
+    if own is not None and len(own.strips) and own.strips[0].action is not None:
+        state["baked"] = own.strips[0].action
+    return True
+
+
+def _remove_track(owner, state):
+    """Take the baked strip away and give the other tracks their flags. Returns: its actions."""
+    note_tracks_by_name(owner)
+    data = owner.animation_data
+    own = _baked_strips(data, state)
+    played = [action for _track, strip in own for action in compat.actions_in([strip])]
+    for track, strip in own:
+        track.strips.remove(strip)
+    for track in {track.name: track for track, _strip in own}.values():
+        if not len(track.strips):
+            data.nla_tracks.remove(track)
+    noted = [json.loads(line) for line in state.get("tracks", ())]
+    there = [(track.name, [s.name for s in track.strips]) for track in data.nla_tracks]
+    pairs = track_matching.matched([(name, strips) for _mute, _solo, name, strips in noted], there)
+    for at, before in pairs.items():
+        data.nla_tracks[at].mute = noted[before][0]
+    for at, before in pairs.items():
+        if noted[before][1]:
+            data.nla_tracks[at].is_solo = True
+    return played
+
+
+def _baked_strips(data, state):
+    """Track and strip of what `play` put there, also where it was renamed or moved."""
+    strips = [(track, strip) for track in data.nla_tracks for strip in track.strips]
+    baked = state.get("baked")
+    own = [(t, s) for t, s in strips if baked and set(compat.actions_in([s])) == {baked}]
+    if own:
+        return own
+    # A copy of the object may play a copy of the action.
+    marked = [(t, s) for t, s in strips if s.action is not None and s.action.get(BAKED_ACTION)]
+    return [(t, s) for t, s in marked if t.name == state["track"]]
+
+
+def busy(owner):
+    """Why the animation of a datablock cannot be exchanged now; empty when it can."""
+    data = owner.animation_data
+    if data is not None and data.use_tweak_mode:
+        return f"{owner.name} is in the tweak mode of the NLA editor: leave it first."
+    return ""

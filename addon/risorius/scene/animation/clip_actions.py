@@ -1,0 +1,362 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Clips become actions of a character's controls, and actions become clips again."""
+
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Euler, Quaternion
+
+from ... import native
+from ...logic.animation import clip_units
+from ..base import compat, parts
+from ..character import armatures, runtime
+
+LINEAR = 1  # the number of the interpolation "LINEAR"
+_ROTATIONS = {"QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle"}
+
+
+@dataclass
+class Report:
+    """What became of a clip.
+
+    Attributes:
+        action: the action that was made.
+        first, last: the frames that it spans.
+        curves: how many controls and bones it moves.
+        unknown: names of the clip that this face has no control for.
+        notes: sentences for the user.
+    """
+
+    action: object
+    first: float = 0.0
+    last: float = 0.0
+    curves: int = 0
+    unknown: list = field(default_factory=list)
+    notes: list = field(default_factory=list)
+
+
+def frame_rate(scene):
+    """Frames per second of a scene."""
+    return scene.render.fps / scene.render.fps_base
+
+
+def timing_of(clip, scene, start, keep_clock=False, whole=False):
+    """Where a clip lies in a scene.
+
+    Args:
+        clip: risorius.Clip.
+        scene: gives the rate.
+        start: the frame of the clip's first sample, or, with keep_clock, of its second 0.
+        keep_clock: count from the clip's own second 0, as for tracks that belong together.
+        whole: whether keys lie on whole frames only.
+    """
+    origin = 0.0 if keep_clock else float(clip.start)
+    return clip_units.Timing(frame_rate(scene), float(start), origin, whole)
+
+
+def sliders_of(live):
+    """The property of each control name. Args: live  the character's Runtime."""
+    return clip_units.property_names(live.dna.raw_control_names, live.labels)
+
+
+def make_action(rig, clip, timing, name, with_eyes=True):
+    """Make an action of a clip; nothing plays it yet.
+
+    Args:
+        rig: the character's deforming armature.
+        clip: risorius.Clip; "head.yaw" and its like turn the head and eye bones.
+        timing: see timing_of.
+        name: of the action.
+        with_eyes: also turn the eye bones, where the clip has eye rotation.
+
+    Returns:
+        Report.
+
+    Raises:
+        clips.ClipError: nothing in it is for this face, or it lies beyond what Blender can play.
+    """
+    controls, live = parts.controls_of(rig), runtime.of(rig)
+    times = clip.frame_times()
+    keys = clip_units.keys_of(clip.names, clip.curves, times, timing, sliders_of(live), with_eyes)
+    if not keys.controls and not keys.turns:
+        what = f"none of its {len(clip.names)} curves has the name of a control of this face"
+        raise clip_units.ClipError(what if clip.frame_count and clip.names else "it has no frames")
+    action = bpy.data.actions.new(name)
+    bag = compat.add_curves(action, controls)
+    groups = _Groups(bag)
+    for curve in keys.controls:
+        group = groups.named(armatures.key_group(curve.name))
+        _add(bag, group, parts.property_path(curve.name), 0, curve.frames, curve.values)
+    for bone, (frames, turns) in keys.turns.items():
+        if bone in controls.pose.bones:
+            _add_turn(bag, groups.named(bone), controls.pose.bones[bone], frames, turns)
+        else:
+            keys.unknown.extend(n for n in clip.names if n.partition(".")[0] == bone)
+    first, last = _span(timing.frames(times), timing.whole)
+    report = Report(action, first, last, len(keys.controls) + len(keys.turns), keys.unknown)
+    if keys.dropped:
+        report.notes.append(f"{keys.dropped} samples that are no numbers were left out.")
+    return report
+
+
+class _Groups:
+    """Groups of F-curves, each made when first asked for."""
+
+    def __init__(self, bag):
+        self.bag = bag
+        self.made = {}
+
+    def named(self, name):
+        if name not in self.made:
+            self.made[name] = self.bag.groups.new(name)
+        return self.made[name]
+
+
+def _span(frames, whole):
+    if not len(frames):
+        return 0.0, 0.0
+    if whole:
+        frames, _ = clip_units.onto_frames(frames[[0, -1]], np.zeros(2))
+    return float(frames[0]), float(frames[-1])
+
+
+def set_range(scene, report, mode):
+    """Let a scene last as long as what was imported.
+
+    Args:
+        scene: its range is changed.
+        report: Report.
+        mode: "EXTEND" ends it where the animation ends, if that is later; "FIT" begins and ends it
+            with the animation; "KEEP" leaves it.
+    """
+    first, last = math.floor(report.first + 1e-4), math.ceil(report.last - 1e-4)
+    if mode == "FIT":
+        scene.frame_start, scene.frame_end = max(0, first), max(0, last)
+    elif mode == "EXTEND":
+        scene.frame_end = max(scene.frame_end, last)
+
+
+def _add(bag, group, path, index, frames, values):
+    """One F-curve with straight lines between its keys."""
+    curve = bag.fcurves.new(path, index=index)
+    curve.group = group
+    points = np.empty((len(frames), 2), np.float32)
+    points[:, 0], points[:, 1] = frames, values
+    curve.keyframe_points.add(len(frames))
+    curve.keyframe_points.foreach_set("co", points.ravel())
+    curve.keyframe_points.foreach_set("interpolation", np.full(len(frames), LINEAR, np.int32))
+    curve.update()
+
+
+def _add_turn(bag, group, bone, frames, turns):
+    """The rotation of a bone, in the way that the bone is turned."""
+    own = clip_units.near_signs(_into_bone(bone, turns))
+    path = f'pose.bones["{bpy.utils.escape_identifier(bone.name)}"].{rotation_path(bone)}'
+    for index, values in enumerate(_as_rotation(bone, own).T):
+        _add(bag, group, path, index, frames, values)
+
+
+def rotation_path(bone):
+    """The property that turns a pose bone."""
+    return _ROTATIONS.get(bone.rotation_mode, "rotation_euler")
+
+
+def _into_bone(bone, turns):
+    """Turns in the armature's axes as turns in the bone's own."""
+    rest = np.array(bone.bone.matrix_local.to_quaternion())[None]
+    back = rest * [1.0, -1.0, -1.0, -1.0]
+    return clip_units.multiply(clip_units.multiply(back, turns), rest)
+
+
+def _as_rotation(bone, turns):
+    """float64[n, 3 or 4] as the bone's rotation mode writes it."""
+    if bone.rotation_mode == "QUATERNION":
+        return turns
+    if bone.rotation_mode == "AXIS_ANGLE":
+        pairs = [Quaternion(turn).to_axis_angle() for turn in turns]
+        return np.array([(angle, *axis) for axis, angle in pairs])
+    eulers = []
+    for turn in turns:
+        before = (eulers[-1],) if eulers else ()
+        eulers.append(Quaternion(turn).to_euler(bone.rotation_mode, *before))
+    return np.array([tuple(e) for e in eulers])
+
+
+def play(rig, action):
+    """Let a character play an action as its active one.
+
+    Returns:
+        The action that it played before, now kept by a fake user; None where there was none.
+    """
+    controls = parts.controls_of(rig)
+    data = controls.animation_data_create()
+    before = data.action
+    if before is not None and before != action:
+        before.use_fake_user = True
+    compat.assign_action(data, action, compat.slot_for(action, controls))
+    return before if before != action else None
+
+
+def add_strip(rig, action, name=""):
+    """Play an action as a strip of a new NLA track, where its keys are. Returns: the strip."""
+    controls = parts.controls_of(rig)
+    track = controls.animation_data_create().nla_tracks.new()
+    track.name = name or action.name
+    first, last = action.frame_range
+    strip = track.strips.new(track.name, int(np.floor(first)), action)
+    if hasattr(strip, "action_slot"):
+        strip.action_slot = compat.slot_for(action, controls)
+    strip.action_frame_start, strip.action_frame_end = first, max(last, first + 1.0)
+    strip.frame_start, strip.frame_end = first, max(last, first + 1.0)
+    strip.extrapolation = "HOLD_FORWARD"
+    return strip
+
+
+def clip_of_action(controls, live, action, frames, rate):
+    """Sample an action as a clip.
+
+    Args:
+        controls: the control armature that would play it.
+        live: the character's Runtime.
+        action: the action.
+        frames: float64[n], ascending, of the action's own clock.
+        rate: frames per second of the scene; frame 0 is second 0 of the clip.
+
+    Returns:
+        risorius.Clip of the sliders that it moves, by their property names, and "head.yaw" and its
+        like where it turns the head bone. See dna_names.
+    """
+    frames = np.asarray(frames, np.float64)
+    curves = {(c.data_path, c.array_index): c for c in playing_curves(action, controls)}
+    rows, found = [], []
+    for label in live.labels:
+        curve = curves.get((parts.property_path(label), 0))
+        if curve is not None:
+            found.append(label)
+            rows.append(sampled(curve, frames))
+    head = _head_rows(controls, curves, frames)
+    if head is not None:
+        found += clip_units.HEAD
+        rows += list(head)
+    return native.module().Clip(
+        found,
+        np.array(rows, np.float32).reshape(len(rows), len(frames)),
+        rate,
+        times=frames / rate,
+        metadata={"source": action.name},
+    )
+
+
+def dna_names(live, names):
+    """The names that other characters know: the DNA's instead of Blender's cut ones.
+
+    A slider keeps Blender's where the DNA has a name twice; what is no slider keeps its own.
+    """
+    own = {}
+    for label, name in zip(live.labels, live.dna.raw_control_names, strict=True):
+        own[label] = label if name in own.values() else name
+    return [own.get(name, name) for name in names]
+
+
+def sampled(curve, frames):
+    """float64[n]: the values of an F-curve at frames."""
+    if is_bent(curve) or not len(curve.keyframe_points):
+        return np.array([curve.evaluate(frame) for frame in frames])
+    return np.interp(frames, *key_points(curve))  # fifty times as fast
+
+
+def key_points(curve):
+    """Frames and values of an F-curve's keys, float32[2, keys]."""
+    points = np.empty(len(curve.keyframe_points) * 2, np.float32)
+    curve.keyframe_points.foreach_get("co", points)
+    return points.reshape(-1, 2).T
+
+
+def is_bent(curve):
+    """Whether an F-curve is anything else than straight lines from key to key, held outside."""
+    if len(curve.modifiers) or curve.extrapolation != "CONSTANT":
+        return True
+    kinds = np.empty(len(curve.keyframe_points), np.int32)
+    curve.keyframe_points.foreach_get("interpolation", kinds)
+    return bool((kinds[:-1] != LINEAR).any())
+
+
+def playing_curves(action, owner):
+    """The F-curves by which an action moves a datablock, without those that are muted."""
+    return [
+        c for c in compat.curves_for(action, owner) if not (c.mute or (c.group and c.group.mute))
+    ]
+
+
+def _head_rows(controls, curves, frames):
+    """float64[3, n]: how the head bone is turned, or None where it is not."""
+    bone = controls.pose.bones.get("head")
+    if bone is None:
+        return None
+    # Its own way first: an action of another face may turn the head in another way.
+    for mode in (bone.rotation_mode, "QUATERNION", "XYZ", "AXIS_ANGLE"):
+        path = f'pose.bones["head"].{_ROTATIONS.get(mode, "rotation_euler")}'
+        rest = {"QUATERNION": (1.0, 0.0, 0.0, 0.0), "AXIS_ANGLE": (0.0, 0.0, 1.0, 0.0)}.get(
+            mode, (0.0, 0.0, 0.0)
+        )
+        found = [curves.get((path, i)) for i in range(len(rest))]
+        if any(found):
+            break
+    else:
+        return None
+    values = [
+        np.full(len(frames), still) if curve is None else sampled(curve, frames)
+        for curve, still in zip(found, rest, strict=True)
+    ]
+    turns = _from_bone(bone, _from_rotation(mode, np.stack(values, axis=1)))
+    return clip_units.angles_of(turns).T
+
+
+def _from_rotation(mode, values):
+    if mode == "QUATERNION":
+        return values / np.linalg.norm(values, axis=1, keepdims=True).clip(1e-12)
+    if mode == "AXIS_ANGLE":
+        return np.array([tuple(Quaternion(v[1:], v[0])) for v in values])
+    return np.array([tuple(Euler(v, mode).to_quaternion()) for v in values])
+
+
+def _from_bone(bone, turns):
+    rest = np.array(bone.bone.matrix_local.to_quaternion())[None]
+    return clip_units.multiply(clip_units.multiply(rest, turns), rest * [1.0, -1.0, -1.0, -1.0])
+
+
+def add_sound(scene, path, frame, name=""):
+    """Put a sound strip into the sequencer, on the first channel that is free there.
+
+    Args:
+        scene: the scene.
+        path: of the sound file.
+        frame: where its first sample is heard; strips lie on whole frames.
+        name: of the strip; empty for the file's.
+
+    Returns:
+        The strip.
+
+    Raises:
+        clips.ClipError: Blender cannot read the file.
+    """
+    strips = compat.strips_of(scene)
+    start = round(frame)
+    try:
+        strip = strips.new_sound(name or Path(path).stem, str(path), _free(strips, start), start)
+    except RuntimeError as error:
+        said = str(error).strip().removeprefix("Error: ")
+        raise clip_units.ClipError(f"no sound strip: {said}") from error
+    if strip.frame_final_duration <= 1 and not strip.sound.samplerate:
+        strips.remove(strip)
+        raise clip_units.ClipError("no sound strip: Blender cannot read it")
+    return strip
+
+
+def _free(strips, start):
+    """The first channel on which nothing lies at or after a frame."""
+    taken = {s.channel for s in strips if s.frame_final_end > start}
+    return next(c for c in range(1, 129) if c not in taken or c == 128)

@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Expressions on the sliders: set, keyed, or as pose assets in a catalogue of the file."""
+
+import uuid
+from pathlib import Path
+
+import bpy
+
+from ... import native
+from ...logic.animation import clip_units as clip_logic
+from ...logic.character import regions
+from ..base import parts
+from ..character import armatures, runtime
+from . import actions, clip_actions
+
+CATALOG = "Faces"
+_NAMESPACE = uuid.UUID("6f0a5c9e-2f0b-4d2e-9a3b-0d9f6f0b7a11")
+_CATALOG_FILE = "blender_assets.cats.txt"
+_HEADER = "# Asset catalogues of Blender\n\nVERSION 1\n\n"
+
+
+def all_expressions():
+    """Name -> risorius Expression, in the order of their files."""
+    return native.part("expressions").load()
+
+
+def groups():
+    """Group -> its expressions, in their order."""
+    found = {}
+    for expression in all_expressions().values():
+        found.setdefault(expression.group, []).append(expression)
+    return found
+
+
+def weights_for(live, expression):
+    """The sliders of an expression: property name -> value, without those the face lacks."""
+    sliders = clip_actions.sliders_of(live)
+    return {sliders[n]: float(w) for n, w in expression.weights.items() if n in sliders}
+
+
+def apply(rig, expression, strength, others_to_rest=False):
+    """Move the sliders towards an expression.
+
+    Args:
+        rig: the character.
+        expression: risorius Expression.
+        strength: 1 sets it, 0 changes nothing.
+        others_to_rest: bring all other sliders to rest by the same share.
+
+    Returns:
+        The property names of the sliders that it concerns.
+    """
+    live, face, controls = runtime.of(rig), parts.face_bone(rig), parts.controls_of(rig)
+    goals = weights_for(live, expression)
+    if others_to_rest:
+        goals = {**dict(zip(live.labels, live.rests, strict=True)), **goals}
+    maximum, lowest = parts.maximum_of(controls), dict(zip(live.labels, live.lowest, strict=True))
+    goals = {name: goal for name, goal in goals.items() if name in face}
+    for name, goal in goals.items():
+        value = float(face[name]) * (1.0 - strength) + goal * strength
+        face[name] = min(max(value, lowest[name]), maximum)
+    controls.update_tag()
+    return list(goals)
+
+
+def key(rig, names, frame):
+    """Insert keys on sliders at a frame."""
+    controls = parts.controls_of(rig)
+    for name in names:
+        path = parts.property_path(name)
+        controls.keyframe_insert(path, frame=frame, group=armatures.key_group(name))
+
+
+def make_assets(rig):
+    """Make a pose asset of every expression that this face can show.
+
+    An asset holds all sliders of the regions that its expression moves, so that it looks the same
+    whatever the face did before; one that is there already is made anew, unless it was edited.
+
+    Args:
+        rig: the character.
+
+    Returns:
+        The actions, and sentences for the user.
+    """
+    live = runtime.of(rig)
+    made, left_out = [], []
+    for expression in all_expressions().values():
+        weights = weights_for(live, expression)
+        if expression.weights and not weights:
+            left_out.append(expression.label)
+            continue
+        made.append(_asset(rig, live, expression, weights))
+    notes = _write_catalogs({e.group for e in all_expressions().values()})
+    if left_out:
+        notes.append(f"This face has no control of: {', '.join(left_out)}.")
+    return made, notes
+
+
+def _asset(rig, live, expression, weights):
+    held = regions_of(expression, weights)
+    pose = {
+        label: rest
+        for label, rest in zip(live.labels, live.rests, strict=True)
+        if regions.region_of(label) in held
+    }
+    pose.update(weights)
+    clip = native.module().Clip(list(pose), [[value] for value in pose.values()])
+    name = f"Face {expression.label}"
+    old = bpy.data.actions.get(name)
+    if old is not None and old.library is None and not actions.was_edited(old):
+        bpy.data.actions.remove(old)
+    action = clip_actions.make_action(rig, clip, clip_logic.Timing(24.0), name).action
+    actions.stamp(action)
+    action.asset_mark()
+    action.asset_data.catalog_id = str(catalog_id(expression.group))
+    action.asset_data.description = expression.description
+    action.asset_data.tags.new(expression.group, skip_if_exists=True)
+    return action
+
+
+def regions_of(expression, weights):
+    """The regions that an expression moves; a viseme always the whole mouth."""
+    held = {regions.region_of(name) for name in weights}
+    return held | {"mouth", "jaw", "tongue"} if expression.group == "viseme" else held
+
+
+def catalog_id(group):
+    """The number of a group's catalogue, the same in every file."""
+    return uuid.uuid5(_NAMESPACE, group)
+
+
+def _write_catalogs(wanted):
+    """Name the catalogues in the file beside the .blend, where Blender keeps them.
+
+    Returns:
+        Sentences for the user.
+    """
+    if not bpy.data.filepath:
+        return ["Save the file and run this again to sort the poses into a catalogue."]
+    path = Path(bpy.path.abspath("//")) / _CATALOG_FILE
+    try:
+        _add_catalogs(path, wanted)
+    except (OSError, ValueError) as error:
+        return [f"The poses have no catalogue, {path} cannot be changed: {error}"]
+    return []
+
+
+def _add_catalogs(path, wanted):
+    text = path.read_text(encoding="utf-8") if path.is_file() else _HEADER
+    for group in sorted(wanted):
+        number = str(catalog_id(group))
+        if number not in text:
+            title = f"{group[:1].upper()}{group[1:]}s"
+            text = f"{text.rstrip()}\n{number}:{CATALOG}/{title}:{CATALOG}-{title}\n"
+    # The file belongs to every .blend of the folder: it is whole at all times.
+    native.part("fileio").write_text(path, text)

@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The layers of a character as properties of its control armature: saved, copied and overridden."""
+
+import bpy
+
+from ...logic.animation import layer_rules
+from ...logic.character import regions
+
+KINDS = (
+    ("ACTION", "Action", "Keys of the controls, as of an import or of your own hand"),
+    ("EXPRESSION", "Expression", "A built-in pose that stands still"),
+    ("IDLE", "Idle Life", "Blinks, glances and small movements from a seed"),
+)
+BLENDS = (
+    ("OVERRIDE", "Override", "Replaces what lies below"),
+    ("ADD", "Add", "Is added to what lies below"),
+    ("MAXIMUM", "Maximum", "Counts where it is higher than what lies below"),
+)
+EXTENDS = (
+    ("HOLD", "Hold", "Its first and last frames last"),
+    ("HOLD_FORWARD", "Hold Forward", "Nothing before it, its last frame lasts"),
+    ("NOTHING", "Nothing", "It moves nothing before its start and after its end"),
+    ("REPEAT", "Repeat", "Over and over, before and after"),
+)
+REGIONS = tuple((r.upper(), regions.TITLES[r], "") for r in regions.REGIONS)
+INDEX = f"{layer_rules.COLLECTION}_index"
+REACTIONS = "risorius_reactions"
+_OVERRIDE = {"LIBRARY_OVERRIDABLE"}
+
+
+def _changed(self, _context):
+    """Let Blender evaluate the character; what is compiled is compared, and made anew."""
+    self.id_data.update_tag()
+
+
+def _still(kind, options=frozenset(), **given):
+    """A property that has no keys. Args: kind  of bpy.props, given  its own options."""
+    return kind(options=set(options), override=_OVERRIDE, update=_changed, **given)
+
+
+class RISORIUS_PG_warp(bpy.types.PropertyGroup):
+    """A frame of the scene and the frame of the source that is shown there."""
+
+    frame: _still(bpy.props.FloatProperty, name="Frame", description="Of the scene")
+    source: _still(bpy.props.FloatProperty, name="Shows", description="Frame of the source")
+
+
+class RISORIUS_PG_reaction(bpy.types.PropertyGroup):
+    """A reaction that is fired at a frame."""
+
+    name: _still(bpy.props.StringProperty, name="Reaction")
+    frame: _still(bpy.props.FloatProperty, name="Frame", description="When it is fired")
+    strength: _still(
+        bpy.props.FloatProperty, name="Strength", default=1.0, min=0.0, max=1.0, subtype="FACTOR"
+    )
+
+
+class RISORIUS_PG_layer(bpy.types.PropertyGroup):
+    """A layer of animation above the keys of the sliders."""
+
+    name: bpy.props.StringProperty(name="Name", override=_OVERRIDE)
+    kind: _still(bpy.props.EnumProperty, name="Source", items=KINDS)
+    action: _still(
+        bpy.props.PointerProperty,
+        type=bpy.types.Action,
+        name="Action",
+        description="What the layer plays",
+    )
+    expression: _still(bpy.props.StringProperty, name="Expression")
+    seed: _still(
+        bpy.props.IntProperty, name="Seed", description="Another seed is another life", min=0
+    )
+    blend: _still(bpy.props.EnumProperty, name="Blend", items=BLENDS)
+    weight: bpy.props.FloatProperty(
+        name="Weight",
+        description="How much the layer counts; can have keys",
+        default=1.0,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+        override=_OVERRIDE,
+        update=_changed,
+    )
+    regions: _still(
+        bpy.props.EnumProperty,
+        name="Regions",
+        description="The parts of the face that it moves; none chosen: all",
+        items=REGIONS,
+        options={"ENUM_FLAG"},
+    )
+    controls: _still(
+        bpy.props.StringProperty,
+        name="Controls",
+        description="Only these: names or patterns as jawOpen mouth*; -name leaves one out",
+    )
+    start: _still(bpy.props.FloatProperty, name="Start", default=1.0, description="Frame")
+    scale: _still(
+        bpy.props.FloatProperty,
+        name="Time Scale",
+        description="2 is half as fast",
+        default=1.0,
+        min=0.01,
+        max=100.0,
+    )
+    trim_start: _still(
+        bpy.props.FloatProperty, name="Skip", description="Frames left out at its begin", min=0.0
+    )
+    trim_end: _still(
+        bpy.props.FloatProperty, name="Cut", description="Frames left out at its end", min=0.0
+    )
+    length: _still(
+        bpy.props.FloatProperty,
+        name="Length",
+        description="Frames; 0: always, from the start on",
+        min=0.0,
+    )
+    repeat: _still(bpy.props.FloatProperty, name="Repeat", default=1.0, min=0.01, max=1000.0)
+    extend: _still(bpy.props.EnumProperty, name="Extend", items=EXTENDS)
+    reverse: _still(bpy.props.BoolProperty, name="Reverse")
+    fade_in: _still(bpy.props.FloatProperty, name="Fade In", description="Frames", min=0.0)
+    fade_out: _still(bpy.props.FloatProperty, name="Fade Out", description="Frames", min=0.0)
+    mute: _still(bpy.props.BoolProperty, name="Mute")
+    solo: _still(bpy.props.BoolProperty, name="Solo", description="Only this and other solo layers")
+    # Keys and drivers name a layer by its place, also Blender's own buttons: so places stay, and
+    # order and removal are settings.
+    rank: _still(bpy.props.IntProperty, options={"HIDDEN"})
+    removed: _still(bpy.props.BoolProperty, options={"HIDDEN"})
+    warp: bpy.props.CollectionProperty(
+        type=RISORIUS_PG_warp, override={*_OVERRIDE, "USE_INSERTION"}
+    )
+
+
+CLASSES = (RISORIUS_PG_warp, RISORIUS_PG_reaction, RISORIUS_PG_layer)
+
+
+def register():
+    """Add the collections to objects; the classes are there."""
+    insertable = {*_OVERRIDE, "USE_INSERTION"}
+    for name, kind in (
+        (layer_rules.COLLECTION, RISORIUS_PG_layer),
+        (REACTIONS, RISORIUS_PG_reaction),
+    ):
+        collection = bpy.props.CollectionProperty(type=kind, override=insertable)
+        setattr(bpy.types.Object, name, collection)
+        index = bpy.props.IntProperty(options=set(), override=_OVERRIDE)
+        setattr(bpy.types.Object, f"{name}_index", index)
+    bpy.types.Object.risorius_layer_rules = _still(
+        bpy.props.BoolProperty,
+        name="Exclude Opposites",
+        description="Where there are layers, controls that undo each other give way: closed lips "
+        "hold the jaw, a blink the wide lids",
+        default=True,
+    )
+
+
+def unregister():
+    """Take them away; what files hold of them stays."""
+    for name in (layer_rules.COLLECTION, REACTIONS):
+        delattr(bpy.types.Object, name)
+        delattr(bpy.types.Object, f"{name}_index")
+    del bpy.types.Object.risorius_layer_rules

@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Layers as tracks of Blender's own NLA, as far as it can say the same."""
+
+from ...logic.animation import clip_units as clip_logic
+from ...logic.animation import layer_rules as logic
+from ..base import compat, parts
+from ..character import runtime
+from . import clip_actions, layers
+
+_BLENDS = {"OVERRIDE": "REPLACE", "ADD": "ADD"}
+
+
+def push(scene, rig):
+    """Make strips of the layers, bottom to top, up to the first that no strip can say.
+
+    The NLA lies below all layers, so what is above that one must stay a layer too. Layers that
+    were pushed are muted; the active action becomes the lowest of the new strips.
+
+    Args:
+        scene: its rate and range count.
+        rig: the character.
+
+    Returns:
+        How many layers were pushed, and sentences for the user.
+    """
+    controls, live = parts.controls_of(rig), runtime.of(rig)
+    settings = layers.of(controls)
+    playing = [layer for layer in settings if not layer.mute]
+    if any(layer.solo for layer in playing):
+        playing = [layer for layer in playing if layer.solo]
+    curves = [_weight_curve(controls, layer) for layer in playing]  # of the action as it plays
+    notes, count = [], 0
+    for place, layer in enumerate(playing):
+        trouble = obstacle(controls, layer, curves[place])
+        if trouble:
+            kept = "stays a layer" if layer == playing[-1] else "and those above it stay layers"
+            notes.append(f"{layer.name} {kept}: {trouble}.")
+            break
+        if place == 0:
+            _push_down(controls, rig)
+        _add_strip(scene, rig, live, layer, curves[place])
+        count += 1
+    for layer in playing[:count]:
+        layer.mute = True
+    if len(layers.reactions_of(controls)):
+        notes.append("Reactions stay: no strip mixes as they do.")
+    if count and controls.risorius_layer_rules:
+        notes.append("Controls that exclude each other do not give way in the NLA.")
+    controls.update_tag()
+    return count, notes
+
+
+def obstacle(controls, layer, curve=None):
+    """Why a strip cannot say the same as a layer; empty where it can.
+
+    Args:
+        controls: control armature.
+        layer: settings of a layer.
+        curve: the F-curve of its weight, or None.
+    """
+    fades = layer.fade_in or layer.fade_out
+    reasons = (
+        (layer.blend == "MAXIMUM", "the NLA has no maximum"),
+        (layer.kind == "IDLE" and not layer.length, "idle life without a length never ends"),
+        (layer.extend == "REPEAT", "a strip does not repeat for ever"),
+        (len(layer.warp) > 1, "a strip has no warp points"),
+        (_weight_driver(controls, layer) is not None, "its weight has a driver"),
+        (curve is not None and fades, "a strip either fades or has keys of its influence"),
+        (layer.kind == "ACTION" and layer.action is None, "it has no action"),
+    )
+    return next((words for holds, words in reasons if holds), "")
+
+
+def _weight_path(controls, layer):
+    return f"{logic.COLLECTION}[{layers.place_of(controls, layer)}].weight"
+
+
+def _weight_driver(controls, layer):
+    data = controls.animation_data
+    return data.drivers.find(_weight_path(controls, layer)) if data is not None else None
+
+
+def _weight_curve(controls, layer):
+    data = controls.animation_data
+    bag = compat.bag_for(data.action, controls) if data and data.action else None
+    return bag.fcurves.find(_weight_path(controls, layer)) if bag is not None else None
+
+
+def _push_down(controls, rig):
+    """The active action as a strip, as Blender's own Push Down Action makes it."""
+    data = controls.animation_data
+    if data is None or data.action is None:
+        return
+    action = data.action
+    blend, extrapolation, influence = (
+        data.action_blend_type,
+        data.action_extrapolation,
+        data.action_influence,
+    )
+    data.action = None
+    strip = clip_actions.add_strip(rig, action)
+    strip.blend_type, strip.extrapolation = blend, extrapolation
+    if influence != 1.0:
+        _set_influence(strip, influence)
+
+
+def _add_strip(scene, rig, live, layer, curve):
+    action, still = _action_of(scene, rig, live, layer)
+    strip = clip_actions.add_strip(rig, action, layer.name)
+    strip.use_auto_blend = False
+    strip.blend_type = _BLENDS[layer.blend]
+    if still:
+        strip.extrapolation = "NOTHING" if layer.length else "HOLD"
+        strip.frame_start = layer.start
+        strip.frame_end = layer.start + (layer.length or 1.0)
+    else:
+        _place_strip(strip, layers.span_of(layer, action))
+        strip.extrapolation = layer.extend
+    strip.use_reverse = layer.reverse
+    if curve is not None:
+        strip.use_animated_influence = True
+        own = strip.fcurves.find("influence")
+        own.keyframe_points.clear()
+        layers.copy_keys(curve, own)
+    elif layer.weight != 1.0:
+        _set_influence(strip, layer.weight, layer.fade_in, layer.fade_out)
+    else:
+        strip.blend_in, strip.blend_out = layer.fade_in, layer.fade_out
+
+
+def _place_strip(strip, span):
+    strip.action_frame_start, strip.action_frame_end = span.first, span.last
+    strip.scale, strip.repeat = span.scale, span.repeat
+    strip.frame_start = span.start
+    strip.frame_end = span.scene_range()[1]
+
+
+def _set_influence(strip, value, fade_in=0.0, fade_out=0.0):
+    """A constant influence; with it a strip does not fade of itself, so its keys do."""
+    strip.use_animated_influence = True
+    strip.influence = value
+    start, end = strip.frame_start, strip.frame_end
+    # Where the fades meet they make a peak: min((t - start) / in, (end - t) / out).
+    top = min(1.0, (end - start) / max(fade_in + fade_out, 1e-9))
+    keys = {start + fade_in * top: value * top, end - fade_out * top: value * top}
+    if fade_in:
+        keys[start] = 0.0
+    if fade_out:
+        keys[end] = 0.0
+    points = strip.fcurves.find("influence").keyframe_points
+    points.clear()
+    for frame, height in sorted(keys.items()):
+        points.insert(frame, height, options={"FAST"}).interpolation = "LINEAR"
+    strip.fcurves.find("influence").update()
+
+
+def _action_of(scene, rig, live, layer):
+    """An action with what the layer lets through: its own where that is all. Returns: it, still."""
+    controls = parts.controls_of(rig)
+    if layer.kind == "ACTION":
+        first, last = layer.action.frame_range
+        names = layers.allowed_names(live, layer)
+        allowed = {n if n in clip_logic.HEAD else parts.property_path(n) for n in names}
+        return _masked(controls, layer, allowed), not last > first
+    made = layers.native_layer(controls, live, layer, clip_actions.frame_rate(scene))
+    clip = made.clip()
+    kept = [n for n in clip.names if n in layers.allowed_names(live, layer)]
+    timing = clip_logic.Timing(clip_actions.frame_rate(scene), layer.start, float(clip.start))
+    made = clip_actions.make_action(rig, clip.selected(kept), timing, layer.name)
+    return made.action, clip.frame_count < 2
+
+
+def _masked(controls, layer, allowed):
+    curves = compat.curves_for(layer.action, controls)
+    others = [c for c in curves if _is_left_out(c.data_path, allowed)]
+    if not others:
+        return layer.action
+    copy = layer.action.copy()
+    copy.name = f"{layer.action.name} {layer.name}"
+    bag = compat.bag_for(copy, controls)
+    gone = {(c.data_path, c.array_index) for c in others}
+    for curve in list(bag.fcurves):
+        if (curve.data_path, curve.array_index) in gone:
+            bag.fcurves.remove(curve)
+    return copy
+
+
+def _is_left_out(path, allowed):
+    """Whether a layer does not move what an F-curve moves."""
+    if path.startswith('pose.bones["head"].rotation_'):
+        return not allowed.intersection(clip_logic.HEAD)
+    return path not in allowed

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Shape-key animation of another rig as a clip of its own names, to be mapped to a face."""
+
+import bpy
+import numpy as np
+
+from ... import native
+from ...logic.animation.clip_units import ClipError
+from ..base import parts
+from . import clip_actions
+
+
+def sources(context):
+    """Mesh objects of the scene whose shape keys move and that are no part of a face."""
+    return [
+        item
+        for item in context.scene.objects
+        if item.type == "MESH" and parts.rig_of(item) is None and _moves(item)
+    ]
+
+
+def source_of(context):
+    """The one to take from: a selected one, else the only one of the scene, else None."""
+    there = sources(context)
+    chosen = [item for item in context.selected_objects if item in there]
+    if chosen:
+        return chosen[0]
+    return there[0] if len(there) == 1 else None
+
+
+def _moves(item):
+    keys = item.data.shape_keys
+    data = keys.animation_data if keys is not None else None
+    if data is None:
+        return False
+    return bool(data.action or len(data.drivers) or any(len(t.strips) for t in data.nla_tracks))
+
+
+def clip_of(context, item, first=None, last=None):
+    """The shape keys of an object over time.
+
+    An action alone is read as it is; NLA strips and drivers are stepped through, frame by frame.
+
+    Args:
+        context: scene and view layer.
+        item: a mesh object.
+        first, last: frames; None for what its action spans, or the scene.
+
+    Returns:
+        risorius.Clip, one curve per shape key that moves or is not 0; frame 0 is second 0.
+
+    Raises:
+        ClipError: nothing of it moves.
+    """
+    keys = item.data.shape_keys
+    data = keys.animation_data
+    stacked = len(data.drivers) or any(len(t.strips) for t in data.nla_tracks)
+    span = (context.scene.frame_start, context.scene.frame_end)
+    if data.action is not None and not stacked:
+        span = tuple(data.action.frame_range)
+    begin = span[0] if first is None else first
+    end = span[1] if last is None else last
+    frames = np.arange(np.floor(begin), np.floor(end) + 1.0)
+    table = _stepped(context, keys, frames) if stacked else _read(keys, frames)
+    moving = {n: v for n, v in table.items() if (v != v[0]).any() or v[0]}
+    if not moving:
+        raise ClipError(f"no shape key of {item.name} moves from frame {begin:g} to {end:g}")
+    rate = clip_actions.frame_rate(context.scene)
+    return native.module().Clip(
+        list(moving),
+        np.array(list(moving.values()), np.float32),
+        rate,
+        start=float(frames[0]) / rate,
+        metadata={"source": item.name},
+    )
+
+
+def _blocks(keys):
+    return [b for b in keys.key_blocks if b != keys.reference_key]
+
+
+def _read(keys, frames):
+    curves = {c.data_path: c for c in clip_actions.playing_curves(keys.animation_data.action, keys)}
+    table = {}
+    for block in _blocks(keys):
+        path = f'key_blocks["{bpy.utils.escape_identifier(block.name)}"].value'
+        curve = curves.get(path)
+        table[block.name] = (
+            np.full(len(frames), block.value)
+            if curve is None
+            else clip_actions.sampled(curve, frames)
+        )
+    return table
+
+
+def _stepped(context, keys, frames):
+    scene = context.scene
+    before = scene.frame_current, scene.frame_subframe
+    rows = []
+    try:
+        for frame in frames:
+            scene.frame_set(int(frame))
+            seen = keys.evaluated_get(context.evaluated_depsgraph_get())
+            rows.append([seen.key_blocks[b.name].value for b in _blocks(keys)])
+    finally:
+        scene.frame_set(before[0], subframe=before[1])
+    columns = np.array(rows).reshape(len(frames), -1).T
+    return {b.name: column for b, column in zip(_blocks(keys), columns, strict=True)}

@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Speech from a sound file, computed in a process beside Blender; and the recogniser's package."""
+
+import importlib.util
+import os
+import platform
+import subprocess
+import sys
+import tempfile
+import threading
+from pathlib import Path
+
+import bpy
+
+from ... import native
+from ...logic.animation import recogniser
+from ...logic.base.errors import FaceError
+
+
+class Task:
+    """A clip of speech on its way.
+
+    Attributes:
+        share: 0 to 1, how far it is.
+        clip: risorius.Clip when it is done.
+        error: what went wrong, or None.
+    """
+
+    def __init__(self, path, transcript, **options):
+        """Args: as of risorius.speech.speak."""
+        self.share, self.clip, self.error = 0.0, None, None
+        self._arguments = (path, transcript or None)
+        self._options = options
+        self._cancelled = threading.Event()
+        self._thread = threading.Thread(target=self.run, daemon=True)
+
+    def start(self):
+        """Begin in a thread, which waits for the process and touches nothing of Blender's."""
+        self._thread.start()
+
+    def run(self):
+        """Do it now, waiting in this thread."""
+        try:
+            self.clip = native.part("speech.apart").speak_apart(
+                *self._arguments,
+                progress=self._progress,
+                cancel=self._cancelled.is_set,
+                **self._options,
+            )
+        except Exception as error:  # noqa: BLE001  a thread's error is told by who waits for it
+            self.error = error
+
+    def _progress(self, share):
+        self.share = float(share)
+
+    def is_running(self):
+        """Whether the thread still works."""
+        return self._thread.is_alive()
+
+    def wait(self):
+        """Until the thread ends."""
+        if self.is_running():
+            self._thread.join()
+
+    def cancel(self):
+        """End the process, and wait for that."""
+        self._cancelled.set()
+        self.wait()
+
+
+def has_recogniser():
+    """Whether the recogniser can be imported; what was installed for the add-on counts."""
+    folder = str(packages_folder())
+    if folder not in sys.path:
+        sys.path.append(folder)
+    importlib.invalidate_caches()
+    return importlib.util.find_spec("pocketsphinx") is not None
+
+
+def packages_folder():
+    """Where packages lie that the user installed for the add-on."""
+    package = __package__.rpartition(".")[0]
+    return Path(bpy.utils.extension_path_user(package, path="packages", create=True))
+
+
+class InstallError(FaceError, RuntimeError):
+    """pip could not install the recogniser; the sentence says why."""
+
+
+def install_recogniser():
+    """Install the recogniser with pip into the extension's own user folder.
+
+    Raises:
+        InstallError: pip failed; the sentence says why. ValueError: there is no Python to run it.
+    """
+    python = native.part("speech.apart").python_program()
+    options = ["--no-deps", "--only-binary", ":all:", "--require-hashes"]
+    options += ["--retries", "1", "--timeout", "20"]  # with fewer it does not say what it retries
+    environment = {**os.environ, "PYTHONPATH": _bundled_pip()}
+    with tempfile.TemporaryDirectory() as folder:
+        wanted = Path(folder) / "recogniser.txt"
+        wanted.write_text(recogniser.requirements(), encoding="ascii")
+        target = ["--target", str(packages_folder()), "--upgrade", "-r", str(wanted)]
+        command = [python, "-m", "pip", "install", *options, *target]
+        done = subprocess.run(
+            command, env=environment, capture_output=True, text=True, errors="replace", check=False
+        )
+    if done.returncode:
+        running = f"Python {sys.version_info.major}.{sys.version_info.minor}"
+        running += f" on {platform.system()} {platform.machine()}"
+        why = recogniser.reason(f"{done.stdout}\n{done.stderr}", running)
+        raise InstallError(f"{recogniser.PACKAGE} could not be installed: {why}.")
+
+
+def _bundled_pip():
+    """The wheel of pip that Python carries, which runs as it lies; "" where pip is installed."""
+    if importlib.util.find_spec("pip") is not None:
+        return ""
+    found = importlib.util.find_spec("ensurepip")
+    folder = Path(found.origin).parent / "_bundled" if found is not None else Path()
+    return str(next(iter(sorted(folder.glob("pip-*.whl"))), ""))

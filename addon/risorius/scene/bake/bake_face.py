@@ -1,0 +1,287 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A face's animation as plain actions, and back to live.
+
+A baked face is moved by its actions alone: the evaluator leaves it, so nothing is driven twice,
+and the file looks the same in a Blender without the add-on. What animated each part before is kept
+on the part itself, in the file.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...logic.animation import key_reduction
+from ...logic.base.errors import FaceError
+from ..animation import actions
+from ..base import parts
+from ..character import lods, runtime
+from ..frame import channel_preview, evaluate
+from . import baked_shape_keys, baked_tracks, sampling
+
+RESULT, CONTROLS = "RESULT", "CONTROLS"
+_CONSTRAINTS = "constraints"
+
+
+class BakeError(FaceError, RuntimeError):
+    """Why a face cannot be baked, in one sentence."""
+
+
+@dataclass(frozen=True)
+class BakeOptions:
+    """What is baked.
+
+    Attributes:
+        kind: RESULT: bones, shape keys and maps; CONTROLS: sliders and control bones.
+        start, end, step: frames; the step may be a part of one.
+        lod: level of detail of a RESULT; -1 for the one that the viewport shows.
+        wanted: of a RESULT: some of "BONES", "SHAPES", "MAPS"; the rest stays as it stands.
+        error: keys are left out while straight lines stay within it, see curves.reduce_keys.
+        strip: put the actions onto new NLA tracks.
+    """
+
+    kind: str = RESULT
+    start: float = 1
+    end: float = 250
+    step: float = 1
+    lod: int = -1
+    wanted: frozenset = frozenset(("BONES", "SHAPES", "MAPS"))
+    error: float = 0.0
+    strip: bool = False
+
+
+def baked(rig):
+    """What of a character is baked: RESULT, CONTROLS or "" for live."""
+    if parts.BAKED in rig:
+        return RESULT
+    controls = parts.controls_of(rig)
+    return CONTROLS if controls is not None and parts.BAKED in controls else ""
+
+
+def words(rig):
+    """What the panel says of a baked character; empty for a live one."""
+    kind = baked(rig)
+    if not kind:
+        return ""
+    state = (rig if kind == RESULT else parts.controls_of(rig))[parts.BAKED]
+    what = "Baked: it plays its actions"
+    if kind == CONTROLS:
+        what = "The controls are baked; layers, NLA and drivers rest"
+    return f"{what}, frames {state['start']:g} to {state['end']:g}."
+
+
+def refusal(rig, kind):
+    """Why a character cannot be baked now, in one sentence; empty when it can."""
+    if baked(rig) in (RESULT, kind):
+        return f"{rig.name} is baked already: choose Back to Live first."
+    controls = parts.controls_of(rig)
+    owners = [controls]
+    if kind == RESULT:
+        if rig.override_library:
+            return f"{rig.name} is linked: bake its controls, or the face in its own file."
+        items = parts.meshes_of(rig)
+        if any(item.mode == "EDIT" for item in (rig, *items)):
+            return f"{rig.name}: leave edit mode first."
+        linked = next((i for i in items if i.data.library or i.data.override_library), None)
+        if linked is not None:
+            return f"{linked.name} has a linked mesh: bake the face in its own file."
+        owners = [rig, *(i.data.shape_keys for i in items if i.data.shape_keys)]
+    return next(filter(None, map(actions.busy, owners)), "")
+
+
+def bake(context, rigs, options):
+    """Bake characters; a generator, so that it can show progress and be ended without damage.
+
+    Args:
+        context: scene and view layer.
+        rigs: deforming armatures.
+        options: BakeOptions.
+
+    Yields:
+        The share that is done, 0 to 1. Nothing is changed before the last one.
+
+    Returns:
+        Sentences for a report, one for each character.
+
+    Raises:
+        BakeError: one of them cannot be baked; none was.
+        ValueError: the range is none.
+    """
+    for rig in rigs:
+        trouble = refusal(rig, options.kind)
+        if trouble:
+            raise BakeError(trouble)
+        channel_preview.clear(rig)
+    frames = key_reduction.frame_list(options.start, options.end, options.step)
+    levels = {rig: level_of(rig, options.lod) for rig in rigs}
+    keys = []
+    if options.kind == RESULT:
+        keys = [k for rig in rigs for k in animated_keys(rig, levels[rig])]
+    sampled = yield from sampling.sample(context, rigs, frames, keys)
+    write = _write_result if options.kind == RESULT else _write_controls
+    with runtime.paused():
+        try:
+            done = [write(r, s, levels[r], options) for r, s in zip(rigs, sampled, strict=True)]
+        except Exception:
+            for rig in rigs:
+                _take_back(rig, options.kind)
+            raise
+    runtime.forget_outputs()
+    for rig in rigs:
+        evaluate.bring_up(context, rig)
+    return done
+
+
+def level_of(rig, lod):
+    """The level that is baked.
+
+    Raises:
+        BakeError: it was not built.
+    """
+    level = lods.viewport_level(rig) if lod < 0 else lod
+    there = lods.built(rig)
+    if there and level not in there:
+        raise BakeError(f"Level {level} was not built for {rig.name}.")
+    return min(level, max(runtime.of(rig).rig.lod_count - 1, 0))
+
+
+def shown(rig, level):
+    """The meshes that a level shows."""
+    return [m for m in parts.meshes_of(rig) if level in list(m.get(parts.LODS, [level]))]
+
+
+def animated_keys(rig, level):
+    """(mesh, data paths) of shape keys that actions of the user's move."""
+    found = []
+    for item in shown(rig, level):
+        key = item.data.shape_keys
+        paths = sampling.animated_paths(key, drivers=False) if key else []
+        if paths:
+            found.append((item, paths))
+    return found
+
+
+def _write_result(rig, samples, level, options):
+    live, counts = runtime.of(rig), actions.Counts()
+    pose = baked_tracks.evaluate(live, samples, level)
+    name = rig.name.removesuffix("_rig")
+    state = {
+        "start": float(samples.frames[0]),
+        "end": float(samples.frames[-1]),
+        "levels": [int(rig.get(k, -1)) for k in (parts.LOD, parts.LOD_RENDER)],
+        "by_distance": int(lods.by_distance(rig)),
+    }
+    tracks = baked_tracks.rig_tracks(rig, live, samples, pose, options.wanted)
+    _play(rig, f"{name}_baked", samples.frames, tracks, options, counts)
+    if "SHAPES" in options.wanted:
+        for item in shown(rig, level):
+            _write_keys(item, live, samples, pose.blend_shapes, options, counts)
+    lods.follow_camera(rig, False)
+    lods.show(rig, level, lods.SAME)
+    rig[parts.BAKED] = state
+    rig.update_tag(refresh={"OBJECT", "TIME"})
+    return f"{name}: {len(samples.frames)} frames, {counts.sentence()}"
+
+
+def _write_keys(item, live, samples, weights, options, counts):
+    key = item.data.shape_keys
+    if key is None:
+        return
+    used = np.flatnonzero(weights.any(axis=0)).tolist()
+    names = baked_shape_keys.opened(item, live, used)
+    tracks = baked_tracks.key_tracks(key, names, weights, samples.others.get(key))
+    if tracks:
+        _play(key, f"{item.name}_baked", samples.frames, tracks, options, counts)
+
+
+def _play(owner, name, frames, tracks, options, counts):
+    action, slot = actions.write(name, owner, frames, tracks, options.error, counts)
+    actions.play(owner, action, slot, {t.path for t in tracks}, options.strip)
+
+
+def _write_controls(rig, samples, _level, options):
+    controls, counts = parts.controls_of(rig), actions.Counts()
+    tracks = baked_tracks.control_tracks(controls, runtime.of(rig), samples)
+    name = rig.name.removesuffix("_rig")
+    _play(controls, f"{name}_controls_baked", samples.frames, tracks, options, counts)
+    actions.note_values(controls, [t.path for t in tracks])
+    held = []
+    for bone_name in samples.basis:
+        for constraint in controls.pose.bones[bone_name].constraints:
+            if not constraint.mute:
+                constraint.mute = True
+                held.append(f"{bone_name}\n{constraint.name}")
+    controls[parts.BAKED] = {
+        "start": float(samples.frames[0]),
+        "end": float(samples.frames[-1]),
+        _CONSTRAINTS: held,
+    }
+    controls.update_tag(refresh={"OBJECT", "TIME"})
+    return f"{name}: controls, {len(samples.frames)} frames, {counts.sentence()}"
+
+
+def unbake(context, rig):
+    """Back to live: what was before the last bake moves the character again.
+
+    Args:
+        context: scene and view layer.
+        rig: the deforming armature.
+
+    Returns:
+        Whether it was baked.
+    """
+    kind = baked(rig)
+    if not kind:
+        return False
+    if kind == CONTROLS:
+        _restore_controls(parts.controls_of(rig))
+    else:
+        _restore_result(rig)
+    runtime.forget_outputs()
+    context.view_layer.update()
+    evaluate.bring_up(context, rig)
+    return True
+
+
+def _take_back(rig, kind):
+    """Undo what a bake that failed has written on a character: all of it, or a part."""
+    controls = parts.controls_of(rig)
+    if kind == CONTROLS and parts.BAKED in controls:
+        _restore_controls(controls)
+    elif kind == CONTROLS:
+        actions.restore(controls)
+    elif parts.BAKED in rig:
+        _restore_result(rig)
+    else:
+        _restore_animation(rig)
+
+
+def _restore_animation(rig):
+    actions.restore(rig)
+    for item in parts.meshes_of(rig):
+        if item.data.shape_keys is not None:
+            actions.restore(item.data.shape_keys)
+            baked_shape_keys.close(item, rig, runtime.of(rig))
+
+
+def _restore_result(rig):
+    state = rig[parts.BAKED]
+    _restore_animation(rig)
+    (viewport, render), by_distance = list(state["levels"]), bool(state["by_distance"])
+    del rig[parts.BAKED]
+    rig[parts.LOD], rig[parts.LOD_RENDER] = max(viewport, 0), render
+    rig[parts.LOD_BY_DISTANCE] = by_distance
+    lods.show(rig)
+    rig.update_tag(refresh={"OBJECT", "TIME"})
+
+
+def _restore_controls(controls):
+    state = controls[parts.BAKED]
+    actions.restore(controls)
+    for line in list(state[_CONSTRAINTS]):
+        bone_name, name = line.split("\n")
+        bone = controls.pose.bones.get(bone_name)
+        constraint = bone.constraints.get(name) if bone is not None else None
+        if constraint is not None:
+            constraint.mute = False
+    del controls[parts.BAKED]
+    controls.update_tag(refresh={"OBJECT", "TIME"})

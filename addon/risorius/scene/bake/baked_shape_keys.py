@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Shape keys that bear baked values: those of a mesh in LIVE mode are made for it and go again."""
+
+from ..base import parts
+from ..character import build, meshes
+
+OPENED = "risorius_opened"  # on a Key: names of the keys that were made for a bake
+
+
+def opened(item, live, used):
+    """The real keys of a mesh by channel; a mesh in LIVE mode gets those that the bake needs.
+
+    Args:
+        item: mesh object.
+        live: its character's Runtime.
+        used: channels that are not zero all through the bake.
+
+    Returns:
+        Channel -> key name; empty where the mesh has other vertices than its file.
+    """
+    dna_mesh = live.dna.meshes[item[parts.MESH]]
+    key = item.data.shape_keys
+    if key is None or len(item.data.vertices) != len(dna_mesh.positions):
+        return {}
+    found = {channel: name for name, channel in meshes.real_channels(item).items()}
+    block = meshes.live_block(item)
+    if block is None:
+        return found
+    active, added, labels = item.active_shape_key_index, [], build.channel_labels(live.dna)
+    deltas = meshes.deltas_by_channel(dna_mesh, live.space.delta_matrix)
+    for channel in sorted(set(deltas) & set(used) - set(found)):
+        made = meshes.add_key(item, labels[channel], deltas[channel])
+        found[channel] = made.name
+        added.append(f"{channel} {made.name}")
+    key[OPENED] = added
+    block.mute = True
+    item.active_shape_key_index = active
+    return found
+
+
+def close(item, rig, live):
+    """Take the keys away that a bake needed; what was edited stays a real, driven key.
+
+    Args:
+        item: mesh object, whose baked action is gone.
+        rig: its deforming armature.
+        live: its Runtime.
+    """
+    key = item.data.shape_keys
+    if key is None or OPENED not in key:
+        return
+    active, kept = item.active_shape_key, list(key.get(parts.REAL, ()))
+    name = active.name if active is not None else ""
+    dna_mesh = live.dna.meshes[item[parts.MESH]]
+    basis = meshes.imported_basis(dna_mesh, live.space)
+    deltas = meshes.deltas_by_channel(dna_mesh, live.space.delta_matrix)
+    same = len(item.data.vertices) == len(dna_mesh.positions)
+    for words in list(key[OPENED]):
+        channel, label = words.split(" ", 1)
+        block = key.key_blocks.get(label)
+        if block is None:
+            continue
+        if same and meshes.touched(key, block, basis, deltas[int(channel)]):
+            meshes.drive_key(key, block, rig, int(channel))
+            kept.append(int(channel))
+        else:
+            item.shape_key_remove(block)
+    if kept:
+        key[parts.REAL] = kept
+    del key[OPENED]
+    block = meshes.live_block(item)
+    if block is not None:
+        block.mute = False
+    if name in key.key_blocks:
+        item.active_shape_key_index = key.key_blocks.find(name)

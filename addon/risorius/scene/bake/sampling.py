@@ -1,0 +1,246 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What moves a face, frame by frame over a range, without disturbing the scene.
+
+Blender itself evaluates actions, NLA, drivers, constraints and bodies, in a scene of our own that
+has only the face's two armatures and what they depend on: so every frame is what frame stepping
+gives, the rest of the user's scene costs nothing, and its frame never changes.
+"""
+
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from ..animation import layers
+from ..base import compat, parts
+from ..character import rig_placement, runtime
+from ..frame import inputs
+
+_CHANNELS = {"location": 3, "rotation_quaternion": 4, "rotation_euler": 3, "scale": 3}
+_BONES = ("neck", "head", "eyes", "eye_L", "eye_R")
+
+
+@dataclass
+class Samples:
+    """What was read of one face.
+
+    Attributes:
+        frames: float64[N].
+        raw: float32[N, R] raw controls as the rig is evaluated with them.
+        sliders: float32[N, R] the same before the eye bones add to the look controls; both with
+            the layers.
+        turns: per frame "neck", "head" -> Quaternion, as inputs.read_inputs gives them.
+        basis: control bone -> float64[N, 4, 4], local to its rest, after constraints and layers.
+        places: float64[N, 4, 4] of the control armature in the world.
+        bones: "location", ... -> float32[N, bones, width] of the deforming armature's bones as
+            they are without the evaluator; None where nothing animates them.
+        others: id -> {(path, first index): list of values} of what else is animated on it.
+    """
+
+    frames: object
+    raw: object = None
+    sliders: object = None
+    turns: list = field(default_factory=list)
+    basis: dict = field(default_factory=dict)
+    places: object = None
+    bones: dict | None = None
+    others: dict = field(default_factory=dict)
+
+
+def sample(context, rigs, frames, keys=()):
+    """Read the inputs of faces over a range; a generator, so that it can show progress and end.
+
+    Args:
+        context: its scene gives the frame rate; it is stepped itself only where it must be.
+        rigs: deforming armatures.
+        frames: float64[N].
+        keys: (mesh object, data paths) whose shape keys are animated by more than the face.
+
+    Yields:
+        The share that is done, 0 to 1.
+
+    Returns:
+        The Samples of each rig, in order.
+    """
+    readers = [
+        _Reader(rig, frames, [k for k in keys if k[0].get(parts.RIG) == rig]) for rig in rigs
+    ]
+    items = [o for r in readers for o in r.objects]
+    with _stage(context, rigs, items) as scene:
+        depsgraph = None
+        for number, frame in enumerate(frames):
+            whole = int(np.floor(frame))
+            with runtime.paused():
+                scene.frame_set(whole, subframe=float(frame) - whole)
+            depsgraph = scene.view_layers[0].depsgraph if scene != context.scene else None
+            depsgraph = depsgraph or context.evaluated_depsgraph_get()
+            for reader in readers:
+                reader.read(number, depsgraph)
+            yield (number + 1) / len(frames)
+    return [reader.samples for reader in readers]
+
+
+@contextmanager
+def _stage(context, rigs, items):
+    """A scene to step through."""
+    if _needs_whole_scene(context.scene, rigs):
+        with _whole_scene(context.scene) as scene:
+            yield scene
+        return
+    own, user = bpy.data.scenes.new("Risorius"), context.scene
+    own.render.fps, own.render.fps_base = user.render.fps, user.render.fps_base
+    own.render.frame_map_old = user.render.frame_map_old
+    own.render.frame_map_new = user.render.frame_map_new
+    own.frame_start, own.frame_end = user.frame_start, user.frame_end
+    try:
+        for item in dict.fromkeys(items):
+            own.collection.objects.link(item)
+        yield own
+    finally:
+        if _is_there(own):
+            bpy.data.scenes.remove(own)
+
+
+@contextmanager
+def _whole_scene(scene):
+    before = scene.frame_current, scene.frame_subframe
+    try:
+        yield scene
+    finally:
+        if _is_there(scene):
+            scene.frame_set(before[0], subframe=before[1])
+
+
+def _is_there(scene):
+    """Whether a scene is still in the file: another file may have been opened meanwhile."""
+    try:
+        return scene in bpy.data.scenes[:]
+    except ReferenceError:
+        return False
+
+
+def _needs_whole_scene(scene, rigs):
+    """Whether something asks for the scene itself: simulated bodies, drivers by context, and what
+    is hidden everywhere, which Blender evaluates only for what is seen with it.
+    """
+    if scene.rigidbody_world is not None:
+        return True
+    for rig in rigs:
+        controls = parts.controls_of(rig)
+        hold = rig_placement.body_of(controls)
+        for item in (rig, controls, hold.target if hold else None):
+            if item is not None and item.hide_viewport:
+                return True
+            data = item.animation_data if item else None
+            for curve in data.drivers if data else ():
+                if any(v.type == "CONTEXT_PROP" for v in curve.driver.variables):
+                    return True
+    return False
+
+
+class _Reader:
+    """Reads one face at each frame."""
+
+    def __init__(self, rig, frames, keys):
+        self.rig, self.controls, self.live = rig, parts.controls_of(rig), runtime.of(rig)
+        count, width = len(frames), len(self.live.labels)
+        bones = [n for n in _BONES if n in self.controls.pose.bones]
+        self.samples = Samples(
+            frames=frames,
+            raw=np.empty((count, width), np.float32),
+            sliders=np.empty((count, width), np.float32),
+            basis={n: np.empty((count, 4, 4)) for n in bones},
+            places=np.empty((count, 4, 4)),
+        )
+        self.layered = layers.has_any(self.controls)
+        self.maximum = parts.maximum_of(self.controls)
+        self.objects = [self.controls, rig, *(item for item, _paths in keys)]
+        hold = rig_placement.body_of(self.controls)
+        if hold is not None:
+            # All of its bones: of what nothing visible depends on Blender evaluates nothing.
+            self.objects.append(hold.target)
+        if _animated(rig):
+            size = len(rig.pose.bones)
+            self.samples.bones = {
+                n: np.empty((count, size, w), np.float32) for n, w in _CHANNELS.items()
+            }
+        own = {parts.property_path(label) for label in self.live.labels}
+        self.paths = {
+            self.controls: [p for p in animated_paths(self.controls) if p not in own],
+            rig: [p for p in animated_paths(rig) if p != f'["{parts.PULL}"]'],
+            **{item.data.shape_keys: paths for item, paths in keys},
+        }
+        self.samples.others = {owner: {} for owner in self.paths}
+
+    def read(self, number, depsgraph):
+        got, seen = self.samples, self.controls.evaluated_get(depsgraph)
+        raw, own = inputs.read_mixed(seen, self.live, depsgraph, self.maximum)
+        got.sliders[number] = raw
+        got.raw[number], turns = inputs.complete(seen, self.live, depsgraph, self.maximum, raw, own)
+        got.turns.append(turns)
+        got.places[number] = seen.matrix_world
+        self._read_control_bones(number, seen, own["head"])
+        if got.bones is not None:
+            moved = self.rig.evaluated_get(depsgraph).pose.bones
+            for name, values in got.bones.items():
+                moved.foreach_get(name, values[number].ravel())
+        for owner, paths in self.paths.items():
+            evaluated = owner.evaluated_get(depsgraph) if paths else None
+            for path in paths:
+                value = _value(evaluated, path)
+                if value is not None:
+                    got.others[owner].setdefault(path, []).append(value)
+
+    def _read_control_bones(self, number, seen, head):
+        """Args: head  how it is turned with the layers, in the armature's axes; or None."""
+        basis = self.samples.basis
+        for name, matrices in basis.items():
+            bone = seen.pose.bones[name]
+            matrices[number] = (
+                seen.convert_space(
+                    pose_bone=bone, matrix=bone.matrix, from_space="POSE", to_space="LOCAL"
+                )
+                if bone.constraints
+                else bone.matrix_basis
+            )
+        if self.layered and head is not None and "head" in basis:
+            matrix = Matrix(basis["head"][number].tolist())
+            rest = self.controls.data.bones["head"].matrix_local.to_quaternion()
+            basis["head"][number] = Matrix.LocRotScale(
+                matrix.to_translation(), rest.inverted() @ head @ rest, matrix.to_scale()
+            )
+
+
+def _value(owner, path):
+    """The numbers at a path, or None where it leads nowhere or to words."""
+    try:
+        value = owner.path_resolve(path)
+    except ValueError:
+        return None
+    if isinstance(value, (bool, int, float)):
+        return [float(value)]
+    try:
+        return [float(v) for v in value]
+    except (TypeError, ValueError):
+        return None
+
+
+def _animated(owner):
+    data = owner.animation_data
+    return data is not None and bool(
+        data.action
+        or data.nla_tracks
+        or any(c.data_path != f'["{parts.PULL}"]' for c in data.drivers)
+    )
+
+
+def animated_paths(owner, drivers=True):
+    """The data paths that an action, an NLA strip or a driver moves on a datablock, in order."""
+    data = owner.animation_data
+    if data is None:
+        return []
+    curves = [c for action in compat.played_actions(owner) for c in compat.curves_of(action)]
+    curves += list(data.drivers) if drivers else []
+    return list(dict.fromkeys(c.data_path for c in curves))

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Drivers and F-curves anywhere in the file that lead to a character."""
+
+import re
+
+import bpy
+
+from ...logic.base import names
+from . import compat, parts
+
+_ENTRY = re.compile(r'^\["(channels|maps)"\]\[(\d+)\]$')
+_GONE = re.compile(r'^\["(gone (channels|maps): .*)"\]$')
+# What has a node tree of its own inside; a scene has one up to Blender 4.5.
+_WITH_NODES = (
+    bpy.types.Material,
+    bpy.types.World,
+    bpy.types.Light,
+    bpy.types.Scene,
+    bpy.types.Texture,
+    bpy.types.FreestyleLineStyle,
+)
+
+
+def owners():
+    """Every datablock that can bear drivers, node trees inside others too."""
+    for kind in bpy.data.bl_rna.properties:
+        if kind.type != "COLLECTION":
+            continue
+        for item in getattr(bpy.data, kind.identifier):
+            if not isinstance(item, bpy.types.ID):
+                continue
+            yield item
+            inner = getattr(item, "node_tree", None) if isinstance(item, _WITH_NODES) else None
+            if inner is not None:
+                yield inner
+
+
+def targets_at(item):
+    """All driver targets of the file that point at a datablock, each with its curve's owner."""
+    for owner in owners():
+        data = getattr(owner, "animation_data", None)
+        for curve in data.drivers if data else ():
+            for variable in curve.driver.variables:
+                for target in variable.targets:
+                    if target.id == item:
+                        yield owner, target
+
+
+class Entries:
+    """Moves drivers of single channels and maps to the places that these have now.
+
+    Args:
+        rig: deforming armature.
+        labels: "channels" and "maps" -> (old labels, new labels).
+    """
+
+    def __init__(self, rig, labels):
+        self._rig = rig
+        self._moves = []
+        self.gone = []
+        for _owner, target in targets_at(rig):
+            found = self._label(target.data_path, labels)
+            if found is None:
+                continue
+            array, label = found
+            if label in labels[array][1]:
+                path = f'["{array}"][{labels[array][1].index(label)}]'
+            else:
+                path = self._stand_in(array, label)
+            if path != target.data_path:
+                self._moves.append((target, path))
+
+    def _label(self, path, labels):
+        entry, gone = _ENTRY.match(path), _GONE.match(path)
+        if entry and int(entry.group(2)) < len(labels[entry.group(1)][0]):
+            return entry.group(1), labels[entry.group(1)][0][int(entry.group(2))]
+        if gone:  # perhaps it is back
+            array, key = gone.group(2), bpy.utils.unescape_identifier(gone.group(1))
+            back = next((x for x in labels[array][1] if _gone_key(array, x) == key), None)
+            return (array, back) if back is not None else None
+        return None
+
+    def _stand_in(self, array, label):
+        """A property of value 0 in place of what is gone, so that drivers stay valid."""
+        key = _gone_key(array, label)
+        self._rig[key] = 0.0
+        if label not in self.gone:
+            self.gone.append(label)
+        return f'["{bpy.utils.escape_identifier(key)}"]'
+
+    def move(self):
+        """Point the drivers at their new places; what they read must have been evaluated."""
+        for target, path in self._moves:
+            target.data_path = path
+
+
+def _gone_key(array, label):
+    return names.cut(f"gone {array}: {label}")
+
+
+def used_controls(controls, labels):
+    """Those control properties that an F-curve of any action or a driver uses.
+
+    Args:
+        controls: control armature.
+        labels: property names.
+    """
+    paths = {parts.property_path(label): label for label in labels}
+    used = {
+        paths[curve.data_path]
+        for action in bpy.data.actions
+        for curve in compat.curves_of(action)
+        if curve.data_path in paths
+    }
+    data = controls.animation_data
+    used.update(paths[c.data_path] for c in (data.drivers if data else ()) if c.data_path in paths)
+    used.update(paths[t.data_path] for _owner, t in targets_at(controls) if t.data_path in paths)
+    return used

@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The DNA file inside the .blend: compressed bytes on a Text datablock.
+
+On a Text, because Blender copies the custom properties of scene objects at each update.
+"""
+
+import hashlib
+import zlib
+
+import bpy
+
+from ...logic.base.errors import FaceError
+
+_BYTES = "risorius_bytes"
+_HASH = "risorius_hash"
+_LENGTH = "risorius_length"  # of the unpacked file; Texts of older versions have none
+# Whatever a .blend says, what is unpacked is at most so many times what the .blend holds, and a
+# little more. DNA files pack to a half or a fifth; one that packs better is kept as it is.
+_MOST_TIMES = 32
+_ALWAYS = 1 << 16  # bytes
+_PIECE = 1 << 20  # bytes
+_SIGNATURE = b"DNA"  # what the first bytes of every DNA file are
+
+
+class ContentError(FaceError):
+    """What a Text holds is not the DNA file that was put there; the text goes on after a colon."""
+
+
+def store(name, content, made):
+    """Put the bytes of a file into a Text datablock: a new one, or that which has them already.
+
+    Args:
+        name: the character's name.
+        content: bytes of the DNA file.
+        made: list that a new datablock is put on.
+
+    Returns:
+        The Text. Nothing ever writes into it again: characters of one file share it.
+    """
+    there = _holding(content)
+    if there is not None:
+        return there
+    text = bpy.data.texts.new(f"{name}.dna")
+    made.append(text)
+    text.use_fake_user = False  # the armature's pointer keeps it
+    text.write(
+        f"The DNA file of {name} ({len(content):,} bytes) is kept in this datablock.\n"
+        "The character needs it; it is not meant to be edited.\n"
+    )
+    text[_BYTES] = _packed(content)
+    text[_HASH] = hash_of(content)
+    text[_LENGTH] = str(len(content))  # words: Blender's integers end at 2 GiB
+    return text
+
+
+def _holding(wanted):
+    """A Text of this .blend that holds these bytes, unpacked and not believed; or None."""
+    digest = hash_of(wanted)
+    for text in bpy.data.texts:
+        if text.library is None and content_hash(text) == digest and _holds(text, wanted):
+            return text
+    return None
+
+
+def _holds(text, wanted):
+    try:
+        return content(text) == wanted
+    except ContentError:
+        return False
+
+
+def same(one, other):
+    """Whether two Texts hold the same packed bytes of a DNA file."""
+    return one == other or (
+        content_hash(one) == content_hash(other) and one.get(_BYTES) == other.get(_BYTES)
+    )
+
+
+def _packed(content):
+    """The bytes of a file as a zlib stream, within the bound of those that are unpacked."""
+    packed = zlib.compress(content, 6)
+    return packed if len(content) <= _most(packed) else zlib.compress(content, 0)
+
+
+def _most(packed):
+    return _MOST_TIMES * len(packed) + _ALWAYS
+
+
+def hash_of(content):
+    """The hash of the bytes of a file, as it is kept beside them."""
+    return hashlib.sha256(content).hexdigest()
+
+
+def content_hash(text):
+    """The hash of what a Text holds; empty where it holds no DNA or is no Text at all."""
+    digest = text.get(_HASH) if isinstance(text, bpy.types.Text) else None
+    return digest if isinstance(digest, str) else ""
+
+
+def content(text):
+    """The bytes of the DNA file that a Text holds.
+
+    Raises:
+        ContentError: they were tampered with or damaged.
+    """
+    packed = text.get(_BYTES)
+    if not isinstance(packed, bytes):
+        raise ContentError("the Text holds no bytes of a DNA file")
+    content = _unpack(packed, _limit(text, packed))
+    if hash_of(content) != content_hash(text):
+        raise ContentError("its bytes are not those that were imported")
+    return content
+
+
+def _limit(text, packed):
+    """The bytes that may be unpacked: what was said when they were packed, within the bound."""
+    said = text.get(_LENGTH)
+    if said is None:
+        return _most(packed)
+    if not isinstance(said, str) or not said.isdecimal() or len(said) > 15:
+        raise ContentError("the length of its file is no number")
+    if int(said) > _most(packed):
+        raise ContentError(
+            f"its file is said to have {int(said):,} bytes, "
+            f"{_most(packed):,} can be in the {len(packed):,} that are there"
+        )
+    return int(said)
+
+
+def _unpack(packed, limit):
+    """Unpack piece by piece: a few kilobytes of zeros would unfold to any size."""
+    unpacking = zlib.decompressobj()
+    pieces, count, rest = [], 0, packed
+    while not unpacking.eof:
+        try:
+            piece = unpacking.decompress(rest, min(_PIECE, limit - count + 1))
+        except zlib.error as error:
+            raise ContentError("its bytes cannot be unpacked") from error
+        rest = unpacking.unconsumed_tail
+        count += len(piece)
+        if not pieces and not piece.startswith(_SIGNATURE[: len(piece)]):
+            raise ContentError(f"its bytes begin with {piece[:3]!r} instead of {_SIGNATURE!r}")
+        if count > limit:
+            raise ContentError(f"its bytes unpack to more than {limit:,}")
+        if not piece and not rest and not unpacking.eof:
+            raise ContentError("its bytes end too early")
+        pieces.append(piece)
+    return b"".join(pieces)

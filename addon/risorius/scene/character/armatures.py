@@ -1,0 +1,281 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The deforming armature and the control armature."""
+
+import math
+from contextlib import contextmanager
+
+import bpy
+import numpy as np
+from mathutils import Matrix, Vector
+
+from ...logic.character import regions
+from ..base import parts
+
+SHELF = "Joints"  # the bone collection of the deforming bones, not shown
+LIVE_PROPERTIES = (parts.MAPS, parts.CHANNELS)
+
+
+@contextmanager
+def _edit_bones(context, item, collection):
+    """The edit bones of an armature object, which must not be linked anywhere yet.
+
+    Edit bones exist only in edit mode, and only an operator enters it: the one place in
+    scene/ that calls some.
+    """
+    layer = context.view_layer
+    previous = layer.objects.active
+    if previous is not None and previous.mode != "OBJECT":
+        bpy.ops.object.mode_set(mode="OBJECT")
+    collection.objects.link(item)
+    layer.objects.active = item
+    with context.temp_override(active_object=item, object=item, selected_objects=[item]):
+        bpy.ops.object.mode_set(mode="EDIT")
+        try:
+            yield item.data.edit_bones
+        finally:
+            bpy.ops.object.mode_set(mode="OBJECT")
+            layer.objects.active = previous
+            collection.objects.unlink(item)
+
+
+@contextmanager
+def edit_armature(context, data):
+    """The edit bones of an armature that is in use, whether its objects are hidden or not."""
+    workshop = bpy.data.collections.new("bones")
+    item = bpy.data.objects.new("bones", data)
+    context.scene.collection.children.link(workshop)
+    try:
+        with _edit_bones(context, item, workshop) as edit_bones:
+            yield edit_bones
+    finally:
+        bpy.data.batch_remove([item, workshop])
+
+
+@contextmanager
+def kept_selection(context):
+    """Restore the active object, its mode and the selection after building beside them."""
+    layer = context.view_layer
+    active = layer.objects.active
+    mode = active.mode if active is not None else "OBJECT"
+    selected = [o for o in layer.objects if o.select_get(view_layer=layer)]
+    try:
+        yield
+    finally:
+        layer.update()  # the list still has places of removed objects
+        there = {o for o in layer.objects if o is not None}
+        for item in there:
+            item.select_set(item in selected, view_layer=layer)
+        layer.objects.active = active if active in there else None
+        if active in there and active.mode != mode:
+            with context.temp_override(active_object=active, object=active):
+                bpy.ops.object.mode_set(mode=mode)
+
+
+def build_rig(context, plan, made, workshop):
+    """Build the deforming armature in its neutral pose.
+
+    Args:
+        context: a Blender context with a view layer.
+        plan: the CharacterPlan.
+        made: list that every new datablock is put on.
+        workshop: a linked collection in which bones are edited.
+
+    Returns:
+        The armature object; each bone bears its DNA index.
+    """
+    data = bpy.data.armatures.new(f"{plan.name}_rig")
+    made.append(data)
+    rig = bpy.data.objects.new(f"{plan.name}_rig", data)
+    made.append(rig)
+    armature = plan.armature
+    with _edit_bones(context, rig, workshop) as edit_bones:
+        made_bones = {}
+        for joint in armature.order:
+            bone = edit_bones.new(armature.labels[joint])
+            bone.head = (0.0, 0.0, 0.0)
+            bone.tail = (0.0, armature.lengths[joint], 0.0)
+            bone.matrix = Matrix(armature.rest[joint].tolist())
+            if armature.parents[joint] >= 0:
+                bone.parent = made_bones[armature.parents[joint]]
+            made_bones[joint] = bone
+    for joint, label in enumerate(armature.labels):
+        data.bones[label][parts.JOINT] = joint
+    data.display_type = "STICK"
+    # Bones that are not shown, and an object that is: so Select All and Duplicate take it along.
+    shelf = data.collections.new(SHELF)
+    for bone in data.bones:
+        shelf.assign(bone)
+    shelf.is_visible = False
+    # It follows the control armature (place.py); moved together with it, it would go twice as far.
+    lock_place(rig)
+    rig[parts.MAPS] = [0.0] * max(1, len(plan.map_labels))
+    rig[parts.CHANNELS] = [0.0] * max(1, plan.channel_count)
+    rig[parts.PULL] = 0.0
+    for name in LIVE_PROPERTIES:
+        rig.property_overridable_library_set(f'["{name}"]', True)
+    return rig
+
+
+def pull_controls(rig, controls):
+    """Let Blender evaluate the controls wherever the rig is, also where they are hidden.
+
+    Without a dependency Blender leaves out what is hidden in viewport or render, and the face
+    would stand still there. The drivers read the bones, because Blender evaluates only those
+    components of a hidden object that something visible depends on.
+
+    Args:
+        rig: the deforming armature.
+        controls: the control armature; its evaluated copy has its bones already.
+    """
+    data = rig.animation_data
+    path = f'["{parts.PULL}"]'
+    curve = data.drivers.find(path) if data else None
+    if curve is None:
+        curve = rig.driver_add(path)
+        curve.driver.type = "SUM"
+        for bone in controls.pose.bones:
+            variable = curve.driver.variables.new()
+            variable.type = "TRANSFORMS"
+            target = variable.targets[0]
+            target.id, target.bone_target = controls, bone.name
+            target.transform_type, target.transform_space = "SCALE_X", "LOCAL_SPACE"
+    for variable in curve.driver.variables:
+        if variable.targets[0].id != controls:
+            variable.targets[0].id = controls
+
+
+def lock_place(item):
+    """Let the user's hand not move an object by accident."""
+    item.lock_location = item.lock_rotation = item.lock_scale = (True, True, True)
+    item.lock_rotation_w = True
+
+
+def build_controls(context, plan, made, workshop):
+    """Build the small control armature with the sliders and the bones that turn things.
+
+    Args: see build_rig.
+
+    Returns:
+        The armature object.
+    """
+    data = bpy.data.armatures.new(f"{plan.name}_controls")
+    made.append(data)
+    controls = bpy.data.objects.new(f"{plan.name}_controls", data)
+    made.append(controls)
+    places = control_places(plan)
+    with _edit_bones(context, controls, workshop) as edit_bones:
+        for name, (position, axis, length, _parent) in places.items():
+            bone = edit_bones.new(name)
+            bone.head = position
+            bone.tail = Vector(position) + Vector(axis) * length
+            bone.use_deform = False
+        for name, (_position, _axis, _length, parent) in places.items():
+            if parent:
+                edit_bones[name].parent = edit_bones[parent]
+    circle = _circle(made, plan.name)
+    for name in places:
+        data.bones[name][parts.PART] = name
+        bone = controls.pose.bones[name]
+        bone.custom_shape = circle
+        bone.use_custom_shape_bone_size = True
+        bone.lock_scale = (True, True, True)
+        if name != "eyes":
+            bone.lock_location = (True, True, True)
+        if name in ("face", "eyes"):
+            bone.lock_rotation = (True, True, True)
+        _shape(bone, name)
+    data.bones.active = data.bones[parts.FACE]
+    controls.show_in_front = True
+    controls[parts.OVERDRIVE] = False
+    controls.property_overridable_library_set(f'["{parts.OVERDRIVE}"]', True)
+    add_properties(controls.pose.bones[parts.FACE], plan.controls)
+    return controls
+
+
+def control_places(plan):
+    """Where the control bones stand: name -> (position, axis, length, parent)."""
+    rest, anchors, size = plan.armature.rest, plan.anchors, plan.size
+    points = np.concatenate([m.positions for m in plan.meshes]).astype(float)
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle = (low + high) / 2
+    head = rest[anchors.head][:3, 3] if anchors.head is not None else middle
+    neck = (
+        rest[anchors.neck[0]][:3, 3] if anchors.neck else np.array([middle[0], middle[1], low[2]])
+    )
+    up, ahead = (0.0, 0.0, 1.0), (0.0, -1.0, 0.0)
+    places = {
+        "neck": (tuple(neck), up, size * 0.2, ""),
+        "head": (tuple(head), up, size * 0.4, "neck"),
+    }
+    eyes = {}
+    for side, sign in (("L", 1.0), ("R", -1.0)):
+        if side in anchors.eyes:
+            eyes[side] = rest[anchors.eyes[side]][:3, 3]
+        else:
+            eyes[side] = middle + np.array([sign * size * 0.13, -size * 0.25, 0.0])
+        places[f"eye_{side}"] = (tuple(eyes[side]), ahead, size * 0.12, "head")
+    target = (eyes["L"] + eyes["R"]) / 2 + np.array([0.0, -size * 1.6, 0.0])
+    places["eyes"] = (tuple(target), ahead, size * 0.12, "head")
+    places["face"] = ((high[0] + size * 0.25, middle[1], middle[2]), up, size * 0.12, "head")
+    return places
+
+
+def add_properties(bone, controls, maximum=1.0):
+    """Give a pose bone the float property of each ControlPlan: limits, default, words."""
+    for control in controls:
+        bone[control.label] = control.rest
+        describe_property(bone, control, maximum)
+
+
+def describe_property(bone, control, maximum):
+    """Set limits, default and words of one control property. Args: control  its ControlPlan."""
+    name = control.label
+    bone.id_properties_ui(name).update(
+        min=control.lowest,
+        max=maximum,
+        soft_min=control.lowest,
+        soft_max=1.0,
+        default=control.rest,
+        step=1.0,
+        precision=3,
+        description=control.description,
+    )
+    bone.property_overridable_library_set(f'["{bpy.utils.escape_identifier(name)}"]', True)
+
+
+def key_group(name):
+    """The F-curve group that keys of a control go to."""
+    return regions.TITLES[regions.region_of(name)]
+
+
+def _shape(bone, name):
+    """Turn and size the wire circle so that it surrounds what the bone turns."""
+    if name in ("neck", "head"):  # circle around the upright bone
+        bone.custom_shape_scale_xyz = (1.4, 1.4, 1.4) if name == "head" else (1.7, 1.7, 1.7)
+        bone.custom_shape_rotation_euler = (math.pi / 2, 0.0, 0.0)
+        if name == "head":
+            bone.custom_shape_translation = (0.0, bone.length * 1.6, 0.0)
+            bone.custom_shape_scale_xyz = (0.9, 0.9, 0.9)
+    elif name == "face":  # a disc beside the face, seen from the front
+        bone.custom_shape_scale_xyz = (0.5, 0.5, 0.5)
+    else:  # discs that look ahead
+        scale = 0.7 if name == "eyes" else 0.5
+        bone.custom_shape_scale_xyz = (scale, scale, scale)
+        bone.custom_shape_rotation_euler = (math.pi / 2, 0.0, 0.0)
+        if name != "eyes":
+            bone.custom_shape_translation = (0.0, bone.length * 1.5, 0.0)
+
+
+def _circle(made, name):
+    """A wire circle of radius 1 in the xy plane, in no collection: only bones show it."""
+    count = 32
+    mesh = bpy.data.meshes.new(f"{name}_circle")
+    made.append(mesh)
+    corners = [
+        (math.cos(2 * math.pi * i / count), math.sin(2 * math.pi * i / count), 0.0)
+        for i in range(count)
+    ]
+    mesh.from_pydata(corners, [(i, (i + 1) % count) for i in range(count)], [])
+    item = bpy.data.objects.new(f"{name}_circle", mesh)
+    made.append(item)
+    return item

@@ -1,0 +1,271 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From the bytes of a DNA file to a character in the scene, or to nothing at all."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from ... import native
+from ...logic.base import names
+from ...logic.character import plans
+from ...logic.material import texture_search
+from ..base import compat, parts, sharing, storage
+from ..life import migrations
+from ..material import materials
+from . import armatures, lods, meshes, runtime
+
+
+@dataclass(frozen=True)
+class BuildOptions:
+    """What the user chose.
+
+    Attributes:
+        lods: levels whose meshes are built.
+        mode: LIVE, KEYS or AUTO.
+        normals: keep the file's normals.
+        materials: build materials.
+        textures: load the textures that lie beside the file.
+        texture_folder: looked into first; empty for none.
+        simple_materials: without subsurface, relief and animated maps.
+        unit: metres per Blender unit; None takes the scene's.
+        nearest_lods: where the file has none of the levels, build its finest instead.
+    """
+
+    lods: tuple[int, ...] = (0,)
+    mode: str = "AUTO"
+    normals: bool = True
+    materials: bool = True
+    textures: bool = True
+    texture_folder: str = ""
+    simple_materials: bool = False
+    unit: float | None = None
+    nearest_lods: bool = False
+
+
+@dataclass(frozen=True)
+class _File:
+    """What was read and compiled once.
+
+    Attributes:
+        path: of the file.
+        content: its bytes.
+        dna: what was read from them.
+        rig: the risorius.Rig of it.
+    """
+
+    path: Path
+    content: bytes
+    dna: Any
+    rig: Any
+
+
+def _read(path):
+    # One read: a file that is just being written may be another at a second look.
+    risorius = native.module()
+    content = Path(path).read_bytes()
+    dna = risorius.load(content)
+    return _File(Path(path), content, dna, risorius.Rig(dna))
+
+
+def import_file(context, path, options, progress=lambda _share: None):
+    """Build a character from a file.
+
+    Args:
+        context: a Blender context with scene and view layer.
+        path: of the DNA file.
+        options: BuildOptions.
+        progress: called with 0..1.
+
+    Returns:
+        The deforming armature, and warnings as sentences.
+
+    Raises:
+        DnaError: the file is bad or cannot be read.
+        PlanError, SpaceError: there is no character in it.
+    """
+    file = _read(path)
+    dna = file.dna
+    progress(0.15)
+    unit = options.unit or context.scene.unit_settings.scale_length
+    options = replace(options, unit=unit)
+    if options.nearest_lods:
+        options = replace(options, lods=plans.existing_lods(dna, options.lods))
+    rests = file.rig.initial_raw_controls
+    plan = plans.plan_character(dna, file.path.stem, options.lods, unit, rests)
+    plan = replace(plan, name=names.unique_labels([plan.name], bpy.data.collections.keys())[0])
+    progress(0.25)
+    made = []
+    try:
+        rig, warnings = _build(context, plan, file, options, made, progress)
+    except BaseException:
+        _remove(made)
+        runtime.forget_unused(parts.rigs())
+        raise
+    return rig, [*dna.warnings, *warnings, *plans.layer_warnings(file.rig.ignored_layers)]
+
+
+def _build(context, plan, file, options, made, progress):
+    text = storage.store(plan.name, file.content, made)
+    workshop = bpy.data.collections.new(f"{plan.name} (in the making)")
+    made.append(workshop)
+    context.scene.collection.children.link(workshop)
+    rig = armatures.build_rig(context, plan, made, workshop)
+    controls = armatures.build_controls(context, plan, made, workshop)
+    _connect(plan, rig, controls, text, file.path, options.unit)
+    runtime.take(rig, file.dna, file.rig)
+    progress(0.4)
+    built = []
+    for number, mesh_plan in enumerate(plan.meshes):
+        item = meshes.build_mesh(plan, mesh_plan, rig, made, options.normals)
+        parts.point(rig, f"{parts.MESH_PREFIX}{number:03d}", item)
+        built.append(item)
+        progress(0.4 + 0.3 * (number + 1) / len(plan.meshes))
+    warnings = []
+    # Drivers are made only after the properties that they read have reached the evaluated
+    # copies: one that was evaluated before stays invalid for ever.
+    objects = [rig, controls, *built]
+    for item in objects:
+        workshop.objects.link(item)
+    settle(context, rig, controls)
+    armatures.pull_controls(rig, controls)
+    if options.materials:
+        found = _find_textures(plan, file.path, options)
+        simple = options.simple_materials
+        warnings = materials.build_materials(plan, rig, built, made, found, simple)
+        rig[parts.TEXTURES] = found.summary()
+    progress(0.8)
+    _add_shapes(plan, file.dna, rig, built, options.mode)
+    for item in built:
+        made.append(item.data.shape_keys)
+    progress(0.95)
+    _into_place(context, plan, workshop, rig, controls)
+    lods.show(rig, _first(plan))
+    return rig, warnings
+
+
+def _first(plan):
+    return min(lod for mesh in plan.meshes for lod in mesh.lods)
+
+
+def settle(context, *items):
+    """Bring new custom properties to the evaluated copies."""
+    for item in items:
+        item.update_tag()
+    context.view_layer.update()
+
+
+def _connect(plan, rig, controls, text, path, unit):
+    parts.point(controls, parts.RIG, rig)
+    parts.point(rig, parts.CONTROLS, controls)
+    parts.point(rig, parts.DNA, text)
+    migrations.be_born(controls)
+    rig[parts.UNIT] = unit
+    rig[parts.LOD] = 0
+    rig[parts.LOD_RENDER] = lods.SAME
+    rig[parts.FOLLOW] = True
+    for key in (parts.LOD, parts.LOD_RENDER, parts.FOLLOW):
+        rig.property_overridable_library_set(f'["{key}"]', True)
+    rig[parts.SOURCE] = _source(path)
+    for key, value in plan.origin.items():
+        controls.data[names.cut(f"dna_{key}")] = value
+
+
+def _source(path):
+    """The path as kept for Reload: relative where the .blend has a place."""
+    try:
+        return bpy.path.relpath(str(path)) if bpy.data.filepath else str(path)
+    except ValueError:  # another drive
+        return str(path)
+
+
+def _find_textures(plan, path, options):
+    """The textures beside the file and in the chosen folder; none where none are wanted."""
+    if not options.textures:
+        return texture_search.TexturePlan()
+    chosen = bpy.path.abspath(options.texture_folder) if options.texture_folder else ""
+    folders = texture_search.folders_of(Path(path), chosen)
+    return texture_search.find(plan.textures, [(m.base, m.kind) for m in plan.meshes], folders)
+
+
+def _add_shapes(plan, dna, rig, built, mode):
+    labels = channel_labels(dna)
+    total = sum(len(m.channels) for m in plan.meshes)
+    for item, mesh_plan in zip(built, plan.meshes, strict=True):
+        count = len(mesh_plan.channels)
+        chosen = mode
+        if mode == "AUTO":
+            chosen = meshes.automatic_mode(count, len(mesh_plan.positions), total)
+        meshes.set_mode(item, rig, dna.meshes[mesh_plan.index], plan.space, labels, chosen)
+
+
+def channel_labels(dna):
+    """Names of the real shape keys, by channel."""
+    return names.unique_labels(dna.blend_shape_channel_names, ["Basis", plans.LIVE_KEY])
+
+
+def _into_place(context, plan, workshop, rig, controls):
+    """Name the collection; select the controls."""
+    workshop.name = plan.name
+    compat.deselect_all(context.view_layer)
+    controls.select_set(True, view_layer=context.view_layer)
+    context.view_layer.objects.active = controls
+
+
+def change_mode(rig, mode):
+    """Switch the meshes of a character to LIVE or KEYS shapes; AUTO chooses by size.
+
+    Returns:
+        Sentences on meshes that could not be switched.
+    """
+    live = runtime.of(rig)
+    trouble = []
+    items = parts.meshes_of(rig)
+    total = sum(len(live.dna.meshes[i[parts.MESH]].blend_shape_targets) for i in items)
+    for item in items:
+        dna_mesh = live.dna.meshes[item[parts.MESH]]
+        chosen = mode
+        if mode == "AUTO":
+            chosen = meshes.automatic_mode(
+                len(dna_mesh.blend_shape_targets), len(dna_mesh.positions), total
+            )
+        labels = channel_labels(live.dna)
+        if not meshes.set_mode(item, rig, dna_mesh, live.space, labels, chosen):
+            trouble.append(
+                f"{item.name} has not as many vertices as in its file: its shapes stay as they are."
+            )
+    runtime.forget_outputs()
+    return trouble
+
+
+def remove(rig):
+    """Take a character and all that belongs to it out of the file."""
+    controls = parts.controls_of(rig)
+    text = rig.get(parts.DNA)
+    items = parts.meshes_of(rig)
+    data = [i.data for i in (*items, rig, controls) if i is not None]
+    used = [m for i in items for m in i.data.materials if m is not None]
+    collections = [c for c in bpy.data.collections if rig.name in c.objects]
+    circles = {b.custom_shape for b in controls.pose.bones if b.custom_shape} if controls else ()
+    data += [c.data for c in circles]
+    images = [n.image for n in sharing.nodes_of(rig)]
+    _remove([i for i in (*items, rig, controls, *circles) if i is not None])
+    for left in (data, used, images):
+        _remove([d for d in dict.fromkeys(left) if d.users == 0])
+    if text is not None and not any(r.get(parts.DNA) == text for r in parts.rigs()):
+        _remove([text])
+    _remove([c for c in collections if not c.all_objects])
+
+
+def _remove(made):
+    """Remove those datablocks that still live."""
+    alive = []
+    for item in dict.fromkeys(made):
+        try:
+            if item is not None and item.name and not isinstance(item, bpy.types.Key):
+                alive.append(item)  # a Key leaves with its mesh
+        except ReferenceError:
+            continue
+    if alive:
+        bpy.data.batch_remove(alive)

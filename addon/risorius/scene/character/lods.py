@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Levels of detail: in the viewport, in renders, and by the distance to the camera."""
+
+from ...logic.character import lod_distance as rules
+from ..base import parts
+
+SAME = -1  # as the level of renders: that of the viewport
+
+
+def built(rig):
+    """The levels that a character has meshes for, in order."""
+    return sorted({int(v) for m in parts.meshes_of(rig) for v in m.get(parts.LODS, [])})
+
+
+def viewport_level(rig):
+    """The level that the viewport shows."""
+    return int(rig.get(parts.LOD, 0))
+
+
+def render_level(rig):
+    """The level that renders show, where the distance does not choose it."""
+    level = int(rig.get(parts.LOD_RENDER, SAME))
+    return viewport_level(rig) if level == SAME else level
+
+
+def by_distance(rig):
+    """Whether the distance to the camera chooses the level."""
+    return bool(rig.get(parts.LOD_BY_DISTANCE))
+
+
+def show(rig, viewport=None, render=None):
+    """Choose levels by hand.
+
+    Args:
+        rig: the deforming armature.
+        viewport: level of the viewport; None leaves it.
+        render: level of renders, SAME to follow the viewport; None leaves it.
+    """
+    if viewport is not None:
+        rig[parts.LOD] = int(viewport)
+    if render is not None:
+        rig[parts.LOD_RENDER] = int(render)
+    _hide(rig, viewport_level(rig), "hide_viewport")
+    _hide(rig, render_level(rig), "hide_render")
+    rig.update_tag()
+
+
+def follow_camera(rig, enable, size=None):
+    """Let the distance to the scene's camera choose the level, or no longer.
+
+    Args:
+        rig: the deforming armature.
+        enable: whether it shall.
+        size: of the face in Blender units, for the distances where there are none yet.
+    """
+    if enable and not len(rig.get(parts.LOD_DISTANCES, ())):
+        levels = built(rig)
+        rig[parts.LOD_DISTANCES] = rules.default_distances(levels[-1] + 1, size or 0.25)
+        rig.property_overridable_library_set(f'["{parts.LOD_DISTANCES}"]', True)
+    rig[parts.LOD_BY_DISTANCE] = bool(enable)
+    show(rig)
+
+
+def choose(rig, seen, depsgraph):
+    """The level to evaluate for a dependency graph; shows it where the distance asks for it.
+
+    Renders get a function of the frame alone; hysteresis is for the viewport only.
+
+    Args:
+        rig: the deforming armature, the original.
+        seen: the evaluated control armature.
+        depsgraph: the evaluated dependency graph.
+    """
+    rendering = depsgraph.mode == "RENDER"
+    kept = render_level(rig) if rendering else viewport_level(rig)
+    camera = depsgraph.scene.camera if by_distance(rig) else None
+    levels = built(rig) if camera is not None else ()
+    if not levels:
+        return kept
+    level = rules.level_at(
+        _distance(seen, camera.evaluated_get(depsgraph)),
+        list(rig.get(parts.LOD_DISTANCES, ())),
+        levels,
+        None if rendering else kept,
+    )
+    if not rendering and level != kept:
+        rig[parts.LOD] = level
+    _hide(rig, level, "hide_render" if rendering else "hide_viewport")
+    return level
+
+
+def _distance(seen, camera):
+    bone = seen.pose.bones.get("head")
+    place = seen.matrix_world @ (bone.head if bone else seen.matrix_world.translation * 0)
+    return (place - camera.matrix_world.translation).length
+
+
+def _hide(rig, level, flag):
+    """Hide what the level does not show; what the user hid stays hidden.
+
+    A flag that is not what was last written here was set by the user.
+    """
+    for item in parts.meshes_of(rig):
+        written, users = f"{parts.HIDDEN_PREFIX}{flag}", f"{parts.HIDDEN_PREFIX}user_{flag}"
+        now = getattr(item, flag)
+        if bool(item.get(written, now)) != now:
+            item[users] = now
+        hidden = level not in list(item.get(parts.LODS, [level])) or bool(item.get(users))
+        if now != hidden:
+            setattr(item, flag, hidden)
+        if item.get(written) != hidden:
+            item[written] = hidden
+            # An override would give it back at load, and take its own flag for the user's.
+            item.property_overridable_library_set(f'["{written}"]', True)

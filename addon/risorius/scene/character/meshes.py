@@ -1,0 +1,317 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Meshes with their weights, and their shape keys in both modes."""
+
+import re
+
+import bmesh
+import bpy
+import numpy as np
+
+from ...logic.character import user_edits
+from ...logic.character.plans import AUTO_KEYS, AUTO_LIMIT, LIVE_KEY
+from ..base import parts
+from .armatures import lock_place
+
+_DRIVEN = re.compile(r'^\["channels"\]\[(\d+)\]$')
+_KEY_VALUE = re.compile(r'^key_blocks\["(.*)"\]\.value$')
+_LIVE_MARK = "KEY_BSPLINE"
+
+
+def build_mesh(plan, mesh_plan, rig, made, normals=True):
+    """Build one mesh object: faces, UVs, custom normals, vertex groups, armature modifier.
+
+    Args:
+        plan: the CharacterPlan.
+        mesh_plan: the MeshPlan.
+        rig: the deforming armature object.
+        made: list that every new datablock is put on.
+        normals: whether the file's normals are kept as custom normals.
+
+    Returns:
+        The mesh object, not linked anywhere.
+    """
+    name = f"{plan.name}_{mesh_plan.label}"
+    mesh = bpy.data.meshes.new(name)
+    made.append(mesh)
+    mesh.vertices.add(len(mesh_plan.positions))
+    mesh.vertices.foreach_set("co", mesh_plan.positions.ravel())
+    mesh.loops.add(len(mesh_plan.corners))
+    mesh.loops.foreach_set("vertex_index", mesh_plan.corners)
+    mesh.polygons.add(len(mesh_plan.face_starts))
+    mesh.polygons.foreach_set("loop_start", mesh_plan.face_starts)
+    mesh.update(calc_edges=True)
+    item = bpy.data.objects.new(name, mesh)
+    made.append(item)
+    _add_weights(item, mesh_plan, plan.armature.labels)
+    mesh.polygons.foreach_set("use_smooth", np.ones(len(mesh.polygons), bool))
+    if mesh_plan.uvs is not None:
+        layer = mesh.uv_layers.new(name="UVMap", do_init=False)
+        layer.uv.foreach_set("vector", mesh_plan.uvs.ravel())
+    if normals and mesh_plan.normals is not None:
+        mesh.normals_split_custom_set(mesh_plan.normals)
+    modifier = item.modifiers.new("Armature", "ARMATURE")
+    modifier.object = rig
+    item.parent = rig
+    lock_place(item)
+    parts.point(item, parts.RIG, rig)
+    item[parts.MESH] = mesh_plan.index
+    item[parts.LODS] = list(mesh_plan.lods)
+    item[parts.MODE] = "KEYS"
+    item.property_overridable_library_set(f'["{parts.MODE}"]', True)
+    return item
+
+
+def _add_weights(item, mesh_plan, labels):
+    """Vertex groups of the joints that this mesh uses, filled through the deform layer."""
+    used = np.unique(mesh_plan.skin_joints)
+    group_of = {int(j): item.vertex_groups.new(name=labels[int(j)]).index for j in used}
+    edit = bmesh.new()
+    try:
+        edit.from_mesh(item.data)
+        layer = edit.verts.layers.deform.verify()
+        offsets = mesh_plan.skin_offsets.tolist()
+        groups = [group_of[j] for j in mesh_plan.skin_joints.tolist()]
+        weights = mesh_plan.skin_weights.tolist()
+        for vertex, begin, end in zip(edit.verts, offsets[:-1], offsets[1:], strict=True):
+            held = vertex[layer]
+            for i in range(begin, end):
+                # A joint may stand twice at a vertex: its weights add up.
+                held[groups[i]] = held.get(groups[i], 0.0) + weights[i]
+        edit.to_mesh(item.data)
+    finally:
+        edit.free()
+
+
+def automatic_mode(target_count, vertex_count, all_targets):
+    """KEYS where real keys are cheap enough each frame, else LIVE.
+
+    Args:
+        target_count, vertex_count: of the mesh.
+        all_targets: of all meshes of the character.
+    """
+    few = target_count * vertex_count < AUTO_LIMIT and all_targets <= AUTO_KEYS
+    return "KEYS" if few else "LIVE"
+
+
+def real_channels(item):
+    """Shape key name -> channel, of the keys of a mesh that are ours: found by their drivers.
+
+    A key that the user drives by a channel is the user's: our variable's name tells. Where a
+    driver was copied onto another key, the first key of the list is ours.
+    """
+    key = item.data.shape_keys
+    driven = {}
+    for curve in key.animation_data.drivers if key and key.animation_data else ():
+        name = _KEY_VALUE.match(curve.data_path)
+        for variable in curve.driver.variables if name else ():
+            match = _DRIVEN.match(variable.targets[0].data_path)
+            if match and variable.name == parts.CHANNEL_VARIABLE:
+                driven[bpy.utils.unescape_identifier(name.group(1))] = int(match.group(1))
+    found, seen = {}, set()
+    for block in key.key_blocks if driven else ():
+        channel = driven.get(block.name)
+        if channel is not None and channel not in seen:
+            found[block.name] = channel
+            seen.add(channel)
+    return found
+
+
+def live_block(item):
+    """The key that bears the channel sum, also after it was renamed; None without one.
+
+    It is marked by its interpolation, which has no meaning for relative keys and survives
+    renames, reordering, copies and files; the name is only the short way to it.
+    """
+    key = item.data.shape_keys
+    if key is None:
+        return None
+    block = key.key_blocks.get(LIVE_KEY)
+    if block is None and item.get(parts.MODE) == "LIVE":
+        block = next((b for b in key.key_blocks if b.interpolation == _LIVE_MARK), None)
+    return block
+
+
+def set_mode(item, rig, dna_mesh, space, labels, mode):
+    """Bring a mesh's shapes into LIVE or KEYS mode; the same vertices in both.
+
+    What the user changed in a real key stays: such a key is kept as a real one in LIVE mode.
+    Keys of the user's own are not touched.
+
+    Args:
+        item: mesh object.
+        rig: its deforming armature.
+        dna_mesh: the Mesh of the Dna.
+        space: the Space of the Dna.
+        labels: shape key names by channel.
+        mode: LIVE or KEYS.
+
+    Returns:
+        Whether it could: a mesh with another number of vertices than its file stays as it is.
+    """
+    if not dna_mesh.blend_shape_targets:
+        item[parts.MODE] = mode
+        return True
+    if len(item.data.vertices) != len(dna_mesh.positions):
+        return False
+    if item.data.shape_keys is None:
+        item.shape_key_add(name="Basis", from_mix=False)
+    deltas = deltas_by_channel(dna_mesh, space.delta_matrix)
+    if mode == "KEYS":
+        _to_keys(item, rig, deltas, labels)
+    else:
+        _to_live(item, deltas, imported_basis(dna_mesh, space), labels)
+    item[parts.MODE] = mode
+    return True
+
+
+def imported_basis(dna_mesh, space):
+    """The neutral mesh as an import gives it, float32[V, 3] in Blender units."""
+    return np.ascontiguousarray(space.points(dna_mesh.positions), np.float32)
+
+
+def deltas_by_channel(dna_mesh, matrix):
+    """Channel -> (vertex indices, float32[K, 3] deltas); targets of one channel are joined."""
+    joined = {}
+    for target in dna_mesh.blend_shape_targets:
+        indices = np.asarray(target.vertex_indices, np.int64)
+        moved = np.asarray(target.deltas, np.float32).reshape(-1, 3) @ matrix.T
+        joined.setdefault(int(target.blend_shape_channel_index), []).append((indices, moved))
+    return {
+        channel: (np.concatenate([i for i, _ in pairs]), np.concatenate([d for _, d in pairs]))
+        for channel, pairs in joined.items()
+    }
+
+
+def points_of(block):
+    """Coordinates of a shape key, float32[V, 3]."""
+    flat = np.empty(len(block.points) * 3, np.float32)
+    block.points.foreach_get("co", flat)
+    return flat.reshape(-1, 3)
+
+
+def basis_of(item):
+    """Coordinates of the neutral mesh as it is now, float32[V, 3]."""
+    key = item.data.shape_keys
+    if key is not None:
+        return points_of(key.reference_key)
+    flat = np.empty(len(item.data.vertices) * 3, np.float32)
+    item.data.vertices.foreach_get("co", flat)
+    return flat.reshape(-1, 3)
+
+
+def edits_of(block, imported, deltas):
+    """What the user changed in the shape of a real key.
+
+    Args:
+        block: the key.
+        imported: float32[V, 3], see imported_basis.
+        deltas: (vertex indices, float32[K, 3]) of its channel.
+
+    Returns:
+        See edits.key_edits.
+    """
+    base = points_of(block.relative_key)
+    return user_edits.key_edits(base, points_of(block), imported, user_edits.shaped(base, *deltas))
+
+
+def add_key(item, name, deltas):
+    """A real key of value 0. Args: deltas  (vertex indices, float32[K, 3])."""
+    block = item.shape_key_add(name=name, from_mix=False)
+    block.slider_min, block.slider_max = -10.0, 10.0
+    block.value = 0.0
+    points = user_edits.shaped(points_of(item.data.shape_keys.reference_key), *deltas)
+    block.points.foreach_set("co", points.ravel())
+    return block
+
+
+def add_channel_key(item, rig, channel, name, deltas):
+    """A real, driven key of a channel."""
+    block = add_key(item, name, deltas)
+    drive_key(item.data.shape_keys, block, rig, channel)
+    return block
+
+
+def remove_channel_key(item, block):
+    """Take one of our keys away, its driver too."""
+    path = f'key_blocks["{bpy.utils.escape_identifier(block.name)}"].value'
+    item.data.shape_keys.driver_remove(path)
+    item.shape_key_remove(block)
+
+
+def _to_keys(item, rig, deltas, labels):
+    key = item.data.shape_keys
+    there = set(real_channels(item).values())
+    given = dict(key.get(parts.KEY_NAMES, {}))
+    order = [c for c in key.get(parts.KEY_ORDER, []) if c in deltas]
+    for channel in dict.fromkeys([*order, *deltas]):
+        if channel not in there:
+            name = given.get(str(channel), labels[channel])
+            add_channel_key(item, rig, channel, name, deltas[channel])
+    live = live_block(item)
+    if live is not None:
+        item.shape_key_remove(live)
+    for name in (parts.REAL, parts.KEY_NAMES, parts.KEY_ORDER):
+        if name in key:
+            del key[name]
+
+
+def _to_live(item, deltas, imported, labels):
+    key = item.data.shape_keys
+    if item.get(parts.MODE) == "KEYS":
+        _remember_keys(item, labels)
+    kept = []
+    for name, channel in real_channels(item).items():
+        block = key.key_blocks[name]
+        if channel not in deltas or touched(key, block, imported, deltas[channel]):
+            kept.append(channel)
+        else:
+            remove_channel_key(item, block)
+    if kept:
+        key[parts.REAL] = kept
+    elif parts.REAL in key:
+        del key[parts.REAL]
+    if live_block(item) is None:
+        block = item.shape_key_add(name=LIVE_KEY, from_mix=False)
+        block.value = 1.0
+        block.interpolation = _LIVE_MARK
+        # What is edited in it is lost at the next change of a control: nobody shall get there
+        # by entering edit mode.
+        block.lock_shape = True
+        if item.active_shape_key == block:
+            item.active_shape_key_index = 0
+
+
+def touched(key, block, imported, deltas):
+    """Whether a key of ours bears something that the channel sum cannot."""
+    if block.mute or block.vertex_group or block.relative_key != key.reference_key:
+        return True
+    return bool(edits_of(block, imported, deltas)[0].any())
+
+
+def _remember_keys(item, labels):
+    """Keep the user's names and order of our keys while they are away."""
+    key, channels = item.data.shape_keys, real_channels(item)
+    renamed = {str(c): name for name, c in channels.items() if name != labels[c]}
+    if renamed:
+        key[parts.KEY_NAMES] = renamed
+    order = [channels[b.name] for b in key.key_blocks if b.name in channels]
+    if order != sorted(order):
+        key[parts.KEY_ORDER] = order
+
+
+def drive_key(key, block, rig, channel):
+    """Drive a key's value by its channel through a plain SUM driver."""
+    name = bpy.utils.escape_identifier(block.name)
+    curve = key.driver_add(f'key_blocks["{name}"].value')
+    plain_driver(curve, rig, f'["{parts.CHANNELS}"][{channel}]', parts.CHANNEL_VARIABLE)
+
+
+def plain_driver(curve, rig, data_path, name="var"):
+    """Make an F-curve follow one property of the rig, without any expression."""
+    curve.driver.type = "SUM"
+    variable = curve.driver.variables.new()
+    variable.name = name
+    variable.type = "SINGLE_PROP"
+    variable.targets[0].id_type = "OBJECT"
+    variable.targets[0].id = rig
+    variable.targets[0].data_path = data_path

@@ -1,0 +1,219 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where a face stands: the rig follows the control armature, that follows a body.
+
+Neither is the other's parent: a parent's edit would make Blender deform the meshes twice.
+"""
+
+import re
+
+import numpy as np
+from mathutils import Quaternion, Vector
+
+from ..base import parts
+from . import runtime
+
+CONSTRAINT = "Risorius Body"
+_GAP = 1.25  # from face to face, in widths of one
+_NEAR = 1e-6  # of the largest number of the matrix: what decomposing in float32 leaves
+
+
+def follow(rig, seen):
+    """Put the rig where the control armature is, unless the user gave it a place of its own.
+
+    Args:
+        rig: the deforming armature, the original.
+        seen: the evaluated control armature.
+    """
+    if not rig.get(parts.FOLLOW) or rig.parent or rig.constraints:
+        return
+    wanted = np.array(seen.matrix_world)
+    key, state = ("place", rig.session_uid), wanted.tobytes()
+    near = np.abs(np.array(rig.matrix_basis) - wanted).max() <= _NEAR * np.abs(wanted).max()
+    # Also what is only a rounding away is written: a frame shall not keep the one before it.
+    if runtime.outputs.get(key) != state or not near:
+        runtime.outputs[key] = state
+        rig.matrix_basis = seen.matrix_world
+
+
+def put_beside(scene, rig):
+    """Move a new face to the right until it stands on no other one's spot.
+
+    Args:
+        scene: the others are those of it, linked ones too.
+        rig: the deforming armature, at the origin.
+
+    Returns:
+        Whether it was moved.
+    """
+    others = [r for r in parts.rigs(linked=True) if r != rig and scene in r.users_scene]
+    there = [c.matrix_world.translation for c in map(parts.controls_of, others) if c is not None]
+    step = _GAP * _width(rig)
+    spot = parts.controls_of(rig).location
+    free = next(n for n in range(len(there) + 1) if not _taken(there, spot, n * step, step / 2))
+    spot.x += free * step
+    return free > 0
+
+
+def _taken(there, spot, shift, reach):
+    return any((at - spot - Vector((shift, 0.0, 0.0))).length < reach for at in there)
+
+
+def _width(rig):
+    """How wide the meshes of a face are, in units of the scene."""
+    ends = [corner[0] for item in parts.meshes_of(rig) for corner in item.bound_box]
+    return max(ends, default=0.0) - min(ends, default=0.0)
+
+
+def find_bones(body):
+    """The neck, head and base bones of a body by their names, in any naming scheme.
+
+    Args:
+        body: an armature object.
+
+    Returns:
+        (base, neck, head): bone names, "" where there is none. The base is what the neck hangs
+        from, so that the seam at the neck stays closed when the neck bends.
+    """
+    bones = list(body.data.bones)
+    head = _named(bones, "head")
+    neck = _named(bones, "neck")
+    first = body.data.bones.get(neck or head)
+    base = first.parent.name if neck and first is not None and first.parent else (neck or head)
+    return base, neck, head
+
+
+def _named(bones, word):
+    """The bone nearest to the root whose name has the word standing alone, or ""."""
+    pattern = re.compile(rf"(?:^|[^a-z]){word}(?![a-z])", re.IGNORECASE)
+    found = [b for b in bones if pattern.search(_split(b.name))]
+    found.sort(key=lambda b: (len(b.parent_recursive), b.name))
+    return found[0].name if found else ""
+
+
+def _split(name):
+    """`mixamorigHead` as `mixamorig Head`."""
+    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", " ", name)
+
+
+def attach(controls, body, base, neck="", head="", fit="MOVE"):
+    """Hang a face on a body.
+
+    Args:
+        controls: the control armature.
+        body: an armature object, at any scale.
+        base: the bone that carries the whole face.
+        neck, head: the body's bones that turn the face's own neck and head; "" for none.
+        fit: NONE leaves the face where it is; MOVE puts its head (else its neck) on the body's
+            as both rest; SCALE also makes its neck as long as the body's.
+    """
+    detach(controls)
+    if fit != "NONE":
+        _fit(controls, body, neck, head, fit == "SCALE")
+    hold = controls.constraints.new("CHILD_OF")
+    hold.name = CONSTRAINT
+    hold.target, hold.subtarget = body, base
+    # As the body rests: a body that is posed at this moment carries the face along.
+    rest = body.matrix_world @ body.data.bones[base].matrix_local
+    hold.inverse_matrix = rest.inverted_safe()
+    hold.set_inverse_pending = False
+    controls[parts.BODY_NECK] = "\n".join(_neck_chain(body, base, neck, head))
+    controls[parts.BODY_HEAD] = head if head != base else ""
+    controls.update_tag()
+
+
+def _neck_chain(body, base, neck, head):
+    """The bones from the neck bone up to below the head: a body may have several."""
+    if not neck:
+        return []
+    bone = body.data.bones.get(head)
+    above = [b.name for b in bone.parent_recursive] if bone is not None else []
+    chain = above[: above.index(neck) + 1][::-1] if neck in above else [neck]
+    return [name for name in chain if name != base]
+
+
+def body_of(controls):
+    """The constraint by which a face hangs on a body, or None."""
+    hold = controls.constraints.get(CONSTRAINT)
+    return hold if hold is not None and hold.type == "CHILD_OF" and hold.target else None
+
+
+def body_turns(controls, depsgraph):
+    """What a body's bones ask of the face's own neck and head, beyond what the base does.
+
+    Constraints between bones copy local rotations as if both armatures stood alike; bodies from
+    other programs are turned and scaled objects.
+
+    Args:
+        controls: the control armature, the original.
+        depsgraph: the evaluated dependency graph.
+
+    Returns:
+        "neck" and "head" -> Quaternion in the control armature's axes, without straight ones.
+    """
+    hold = body_of(controls)
+    rest = hold.target.data.bones.get(hold.subtarget) if hold is not None else None
+    if rest is None or hold.mute:
+        return {}
+    seen = hold.target.evaluated_get(depsgraph)
+    # From the control armature's space to the body's while the body rests.
+    axes = (rest.matrix_local @ hold.inverse_matrix @ controls.matrix_basis).to_quaternion()
+    turns = {}
+    for own, key in (("neck", parts.BODY_NECK), ("head", parts.BODY_HEAD)):
+        total = Quaternion()
+        for name in controls.get(key, "").split("\n"):
+            bone = seen.pose.bones.get(name)
+            if bone is not None:
+                total = total @ own_turn(seen, bone)
+        if total.angle:
+            turns[own] = axes.inverted() @ total @ axes
+    return turns
+
+
+def own_turn(seen, bone):
+    """A bone's own rotation after its constraints, in the axes of its armature."""
+    local = seen.convert_space(
+        pose_bone=bone, matrix=bone.matrix, from_space="POSE", to_space="LOCAL"
+    )
+    rest = bone.bone.matrix_local.to_quaternion()
+    return rest @ local.to_quaternion() @ rest.inverted()
+
+
+def _fit(controls, body, neck, head, scale):
+    """Move (and scale) the face so that its resting bones meet the body's."""
+    own = controls.data.bones
+    pairs = [
+        (
+            controls.matrix_world @ own[name].head_local,
+            body.matrix_world @ body.data.bones[b].head_local,
+        )
+        for name, b in (("head", head), ("neck", neck))
+        if b and name in own
+    ]
+    if not pairs:
+        return
+    matrix = controls.matrix_world.copy()
+    if scale and len(pairs) == 2:
+        length = (pairs[0][0] - pairs[1][0]).length
+        factor = (pairs[0][1] - pairs[1][1]).length / length if length else 1.0
+        if factor:
+            anchor = pairs[0][0]
+            matrix.translation = anchor + (matrix.translation - anchor) * factor
+            for axis in range(3):
+                for row in range(3):
+                    matrix[row][axis] *= factor
+    matrix.translation += pairs[0][1] - pairs[0][0]
+    controls.matrix_world = matrix
+
+
+def detach(controls):
+    """Take a face off its body; it stays where it stands."""
+    holds = [c for c in controls.constraints if c.name == CONSTRAINT]
+    if holds:
+        where = controls.matrix_world.copy()
+        for hold in holds:
+            controls.constraints.remove(hold)
+        controls.matrix_world = where
+    for key in (parts.BODY_NECK, parts.BODY_HEAD):
+        if key in controls:
+            del controls[key]
+    controls.update_tag()

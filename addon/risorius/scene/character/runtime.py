@@ -1,0 +1,228 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is compiled from a character's DNA, kept by the hash of its content.
+
+Holds no Blender object: it is found anew, or rebuilt, after load, undo, append and enable.
+"""
+
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ... import native
+from ...logic.base import names
+from ...logic.base.space import SpaceError, world_matrices, yaw_pitch
+from ...logic.character import plans
+from ..base import parts, storage
+
+DEFAULT_EYE_ANGLE = np.radians(30.0)
+
+
+@dataclass
+class Runtime:
+    """Compiled data of one DNA at one unit scale.
+
+    Attributes:
+        dna: the file; rig: its risorius.Rig; space: its Space.
+        labels: property names of the raw controls, by index.
+        rests: their values at rest.
+        lowest: the least that they can be: parts of rotations go below 0.
+        owned: the joints that the evaluator writes.
+        rest: float64[J, 4, 4] neutral joints.
+        anchors: joints of neck, head and eyes.
+        look: control name -> yaw or pitch (radians) that a value of 1 gives; by side.
+        morphs: mesh index -> risorius.Morph.
+    """
+
+    dna: object
+    rig: object
+    space: object
+    labels: list
+    rests: list
+    lowest: list
+    owned: frozenset
+    rest: object
+    anchors: object
+    look: dict
+    morphs: dict = field(default_factory=dict)
+
+    def morph(self, mesh_index):
+        """The compiled shapes of a mesh, made when first asked for."""
+        if mesh_index not in self.morphs:
+            self.morphs[mesh_index] = native.module().Morph(
+                self.dna, mesh_index, matrix=self.space.delta_matrix
+            )
+        return self.morphs[mesh_index]
+
+    def bone_space(self, joints):
+        """The native conversion of poses for bones that stand for these joints."""
+        space = self.space
+        return native.module().BoneSpace(
+            self.dna.neutral_joint_rotations,
+            joints,
+            axes=space.axes,
+            scale=space.scale,
+            radians=space.radians,
+            sequence=space.sequence,
+            signs=space.signs,
+        )
+
+
+_cache = {}
+_pauses = []
+outputs = {}  # (what, session uid) -> what was last written there
+
+
+@contextmanager
+def paused():
+    """While this lasts no frame and no update brings a face up: what is read is read by others."""
+    _pauses.append(True)
+    try:
+        yield
+    finally:
+        _pauses.pop()
+
+
+def is_paused():
+    return bool(_pauses)
+
+
+def of(rig):
+    """The Runtime of a character.
+
+    Args:
+        rig: its deforming armature.
+
+    Returns:
+        Runtime, or None where the armature has lost its DNA.
+    """
+    text = rig.get(parts.DNA)
+    digest = storage.content_hash(text)
+    if not digest:
+        return None
+    key = (digest, unit_of(rig))
+    if key not in _cache:
+        try:
+            _cache[key] = _compile(storage.content(text), key[1])
+        except (native.dna_error(), SpaceError, ValueError, LookupError) as error:
+            # Said once, not at every frame; the panel says that the data is lost.
+            words = names.printable(str(error)).rstrip(".")
+            print(f"Risorius: the data of {rig.name} cannot be read: {words}.")
+            _cache[key] = None
+    return _cache[key]
+
+
+def take(armature, dna, rig):
+    """Keep what was read and compiled at an import: it is not done again for the same bytes.
+
+    Args:
+        armature: the deforming armature, which has its Text and its unit.
+        dna: what was read from the bytes in that Text.
+        rig: the risorius.Rig that was compiled of it.
+
+    Raises:
+        PlanError: the file cannot be evaluated.
+    """
+    key = (storage.content_hash(armature.get(parts.DNA)), unit_of(armature))
+    if _cache.get(key) is None:
+        try:
+            _cache[key] = _runtime(dna, rig, key[1])
+        except (native.dna_error(), SpaceError, ValueError, LookupError) as error:
+            raise plans.PlanError("The file cannot be evaluated.") from error
+
+
+def unit_of(rig):
+    """Metres per Blender unit at import."""
+    unit = rig.get(parts.UNIT)
+    usable = isinstance(unit, int | float) and np.isfinite(unit) and unit > 0
+    return float(unit) if usable else 1.0
+
+
+def forget_unused(rigs):
+    """Drop compiled data of characters that are gone. Args: rigs  those that are there."""
+    used = {storage.content_hash(rig.get(parts.DNA)) for rig in rigs}
+    for key in [k for k in _cache if k[0] not in used]:
+        del _cache[key]
+    outputs.clear()
+
+
+def _compile(content, unit):
+    risorius = native.module()
+    dna = risorius.load(content)
+    return _runtime(dna, risorius.Rig(dna), unit)
+
+
+def _runtime(dna, rig, unit):
+    space = plans.space_of(dna, unit)
+    anchors = plans.find_anchors(dna.joint_names)
+    owned = {int(j) for j in rig.joint_indices_written} | set(anchors.neck)
+    if anchors.head is not None:
+        owned.add(anchors.head)
+    rest = world_matrices(
+        space.rotations(dna.neutral_joint_rotations),
+        space.points(dna.neutral_joint_translations),
+        np.asarray(dna.joint_parents),
+    )
+    sliders = plans.plan_controls(dna.raw_control_names, rig.initial_raw_controls)
+    runtime = Runtime(
+        dna=dna,
+        rig=rig,
+        space=space,
+        labels=[slider.label for slider in sliders],
+        rests=[slider.rest for slider in sliders],
+        lowest=[slider.lowest for slider in sliders],
+        owned=frozenset(owned),
+        rest=rest,
+        anchors=anchors,
+        look={},
+    )
+    runtime.look = _measure_look(runtime)
+    return runtime
+
+
+def _measure_look(runtime):
+    """How far each look control turns its eye: side -> list of (control, yaw, pitch) at 1."""
+    found = {}
+    where = {name.rsplit(".", 1)[-1]: i for i, name in enumerate(runtime.dna.raw_control_names)}
+    for side in "LR":
+        turns = []
+        for direction, yaw, pitch in (
+            ("Left", 1.0, 0.0),
+            ("Right", -1.0, 0.0),
+            ("Up", 0.0, 1.0),
+            ("Down", 0.0, -1.0),
+        ):
+            control = where.get(f"eyeLook{direction}{side}")
+            if control is not None:
+                angle = _response(runtime, control, side, bool(yaw))
+                turns.append((control, yaw * angle, pitch * angle))
+        found[side] = turns
+    return found
+
+
+def _response(runtime, control, side, horizontal):
+    """The angle in radians that a look control turns its eye by at full value."""
+    joint = runtime.anchors.eyes.get(side)
+    if joint is None:
+        return DEFAULT_EYE_ANGLE
+    raw = np.array(runtime.rests, np.float32)
+    raw[control] = 1.0
+    delta = runtime.rig.evaluate(raw).joints[joint, 3:6]
+    neutral = np.asarray(runtime.dna.neutral_joint_rotations, np.float64)[joint]
+    before, after = runtime.space.rotations(np.stack([neutral, neutral + delta]))
+    parent = runtime.rest[joint][:3, :3] @ before.T
+    turned = parent @ after @ before.T @ parent.T @ np.array([0.0, -1.0, 0.0])
+    yaw, pitch = yaw_pitch(turned)
+    angle = abs(yaw if horizontal else pitch)
+    return angle if angle > np.radians(2.0) else DEFAULT_EYE_ANGLE
+
+
+def forget_outputs():
+    """Let the next evaluation write everything: after undo, load and changes of shape mode."""
+    outputs.clear()
+
+
+def forget():
+    """Drop all compiled data."""
+    _cache.clear()
+    outputs.clear()

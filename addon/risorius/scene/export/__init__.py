@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Animation and plain materials for other programs: glTF, FBX, USD, Alembic."""

@@ -1,0 +1,244 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A face's animation for other programs: a baked copy for Blender's exporters, or its controls.
+
+The copy lives in a scene of its own for as long as an exporter needs it; the character itself, its
+scene and the frame that it shows are never touched.
+"""
+
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from mathutils import Quaternion
+
+from ... import native
+from ...logic.animation import clip_units, key_reduction
+from ...logic.base.names import unique_labels
+from ..animation import actions
+from ..bake import bake_face, baked_shape_keys, baked_tracks, sampling
+from ..base import compat, parts
+from ..character import meshes, runtime
+from .lent_names import Loans
+
+
+@dataclass(frozen=True)
+class ShipOptions:
+    """What goes out.
+
+    Attributes:
+        start, end, step: frames.
+        lod: level of detail; -1 for the one that the viewport shows.
+        wanted: some of "BONES", "SHAPES".
+        all_shapes: keep shape keys that the range does not use.
+    """
+
+    start: float = 1
+    end: float = 250
+    step: float = 1
+    lod: int = -1
+    wanted: frozenset = frozenset(("BONES", "SHAPES"))
+    all_shapes: bool = False
+
+
+def sampled(context, rigs, options):
+    """Sample characters for `copies` or `clip`; a generator like sampling.sample.
+
+    Returns:
+        (rig, level, Samples) of each.
+
+    Raises:
+        BakeError: a character is baked: what it plays is no longer what its controls say.
+        ValueError: the range is none.
+    """
+    for rig in rigs:
+        if bake_face.baked(rig) == bake_face.RESULT:
+            raise bake_face.BakeError(f"{rig.name} is baked: choose Back to Live first.")
+    frames = key_reduction.frame_list(options.start, options.end, options.step)
+    levels = [bake_face.level_of(rig, options.lod) for rig in rigs]
+    keys = [k for rig, n in zip(rigs, levels, strict=True) for k in bake_face.animated_keys(rig, n)]
+    found = yield from sampling.sample(context, rigs, frames, keys)
+    return list(zip(rigs, levels, found, strict=True))
+
+
+@contextmanager
+def copies(context, characters, options):
+    """Baked copies of characters, selected, alone in a scene that is shown meanwhile.
+
+    Args:
+        context: with the window whose scene is exchanged.
+        characters: from `sampled`.
+        options: ShipOptions.
+
+    Yields:
+        The context override for an exporter, as a dict, and the Loans of names: the copies bear the
+        names that the file shall have, and whoever has them waits under others.
+    """
+    window, user = context.window, context.scene
+    before, loans = _everything(), Loans()
+    shown = window.scene if window is not None else None
+    with runtime.paused():
+        try:
+            stage = _stage(user, characters[0][2].frames)
+            loans.take("scenes", stage, _name(characters[0][0]))  # a take's name, in some formats
+            for rig, level, samples in characters:
+                _copy(stage, rig, level, samples, options, loans)
+            layer = stage.view_layers[0]
+            if window is not None:
+                window.scene = stage
+            stage.frame_set(stage.frame_start)
+            for item in layer.objects:
+                item.select_set(True, view_layer=layer)
+            layer.objects.active = layer.objects[0]
+            selected = layer.objects[:]
+            yield {"scene": stage, "view_layer": layer, "selected_objects": selected}, loans
+        finally:
+            if shown is not None:
+                window.scene = shown
+            _remove_all_but(before)
+            loans.give_back()
+            runtime.forget_outputs()
+
+
+def _stage(user, frames):
+    stage = bpy.data.scenes.new("Risorius Export")
+    for name in ("fps", "fps_base"):
+        setattr(stage.render, name, getattr(user.render, name))
+    for name in ("system", "scale_length", "length_unit"):
+        setattr(stage.unit_settings, name, getattr(user.unit_settings, name))
+    stage.frame_start = int(np.floor(frames[0]))
+    stage.frame_end = int(np.ceil(frames[-1]))
+    return stage
+
+
+def _name(rig):
+    """What a character is called in a file."""
+    return rig.name.removesuffix("_rig")
+
+
+def _copy(stage, rig, level, samples, options, loans):
+    """One character: armature, meshes of the level, and their actions."""
+    live = runtime.of(rig)
+    pose = baked_tracks.evaluate(live, samples, level)
+    copy = rig.copy()
+    copy.animation_data_clear()
+    loans.take("objects", copy, _name(rig))
+    stage.collection.objects.link(copy)
+    _show(copy)
+    if "BONES" in options.wanted:
+        tracks = baked_tracks.rig_tracks(rig, live, samples, pose, {"BONES"}, copy)
+        _play(copy, samples.frames, tracks)
+    for item in bake_face.shown(rig, level):
+        made = _copy_mesh(stage, item, copy, live, loans)
+        weights = pose.blend_shapes if "SHAPES" in options.wanted else pose.blend_shapes * 0.0
+        _shapes(made, item, live, samples, weights, options)
+        _forget(made)
+    _forget(copy)
+
+
+def _copy_mesh(stage, item, rig_copy, live, loans):
+    made = item.copy()
+    made.data = item.data.copy()
+    made.animation_data_clear()
+    name = live.dna.mesh_names[item[parts.MESH]]
+    loans.take("objects", made, name)
+    loans.take("meshes", made.data, name)
+    made.parent = rig_copy
+    for modifier in made.modifiers:
+        if modifier.type == "ARMATURE":
+            modifier.object = rig_copy
+    stage.collection.objects.link(made)
+    _show(made)
+    return made
+
+
+def _shapes(made, item, live, samples, weights, options):
+    """Real keys with values that are animated, and no others of ours."""
+    key = made.data.shape_keys
+    if key is None:
+        return
+    used = set(np.flatnonzero(weights.any(axis=0)).tolist())
+    wanted = set(range(weights.shape[1])) if options.all_shapes else used
+    names = baked_shape_keys.opened(made, live, wanted)
+    key.animation_data_clear()
+    live_block = meshes.live_block(made)
+    if live_block is not None:
+        made.shape_key_remove(live_block)
+    for channel in set(names) - wanted:
+        made.shape_key_remove(key.key_blocks[names.pop(channel)])
+    if len(key.key_blocks) < 2:
+        return  # a Key taken off a copied mesh would stay in the file for ever
+    others = samples.others.get(item.data.shape_keys)
+    _play(key, samples.frames, baked_tracks.key_tracks(key, names, weights, others))
+
+
+def _play(owner, frames, tracks):
+    action, slot = actions.write(owner.name, owner, frames, tracks, 0.0, actions.Counts())
+    compat.assign_action(owner.animation_data_create(), action, slot)
+
+
+def _show(item):
+    item.hide_viewport = item.hide_render = item.hide_select = False
+    item.lock_location = item.lock_rotation = item.lock_scale = (False, False, False)
+
+
+def _forget(item):
+    """Take off what makes an object a part of a character."""
+    for name in list(item.keys()):
+        if name.startswith(("risorius_", "dna_")) or name in (parts.MAPS, parts.CHANNELS):
+            del item[name]
+
+
+def _everything():
+    """Every datablock of the file, by kind."""
+    return {
+        kind.identifier: set(getattr(bpy.data, kind.identifier))
+        for kind in bpy.data.bl_rna.properties
+        if kind.type == "COLLECTION" and kind.identifier not in ("all_ids", "shape_keys")
+    }
+
+
+def _remove_all_but(before):
+    """Remove what was made since: by us, and by an exporter that failed half-way."""
+    new = [
+        item
+        for kind, there in before.items()
+        for item in getattr(bpy.data, kind)
+        if isinstance(item, bpy.types.ID) and item not in there
+    ]
+    if new:
+        bpy.data.batch_remove(new)
+
+
+def clip(rig, level, samples, rate, origin, maps=False):
+    """The raw controls of a range, and how the head was turned.
+
+    Args:
+        rig: deforming armature.
+        level: of detail, for the maps.
+        samples: its Samples.
+        rate: frames per second of the scene.
+        origin: the frame of the scene that is the clip's second 0; an import puts it there again.
+        maps: add the values of the animated maps, each by its name in the DNA.
+
+    Returns:
+        risorius.Clip, names as in the DNA (Blender's where the DNA has one twice).
+    """
+    live, names = runtime.of(rig), []
+    for label, name in zip(live.labels, live.dna.raw_control_names, strict=True):
+        names.append(label if name in names else name)
+    rows = samples.raw.T
+    if any("head" in turns for turns in samples.turns):
+        names += clip_units.HEAD
+        heads = np.array([turns.get("head", Quaternion()) for turns in samples.turns])
+        rows = np.concatenate([rows, clip_units.angles_of(heads).T])
+    if maps:
+        labels = unique_labels(live.dna.animated_map_names, names)
+        names += labels
+        rows = np.concatenate([rows, baked_tracks.evaluate(live, samples, level).animated_maps.T])
+    frames = samples.frames
+    step = float(frames[1] - frames[0]) if len(frames) > 1 else 1.0
+    start = (float(frames[0]) - origin) / rate
+    return native.module().Clip(
+        names, rows, rate / step, start=start, metadata={"source": rig.name}
+    )

@@ -1,0 +1,482 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Materials that every exporter understands: one plain shader with one image for each input.
+
+Exporters look for a single image at each input of a Principled shader. What a node tree paints is
+baked, by Cycles and on the CPU, into such images; an image that reaches an input unchanged stays
+that image. Relief that nodes paint is left out: it is finer than the images are. Works on the
+copies of an export, whose materials, meshes and scene go again.
+"""
+
+from dataclasses import dataclass, field
+from pathlib import PurePath
+
+import bpy
+import numpy as np
+
+from ... import native
+from ...logic.base.errors import FaceError
+from ...logic.material import uv_grid
+from ..base import compat
+from ..material import image_loading
+from . import shader_inputs
+from .quiet import quiet
+
+_INPUTS = {"color": ("Base Color", "Color"), "alpha": ("Alpha",), "roughness": ("Roughness",)}
+_MASKS = ("alpha", "roughness")  # baked together
+_SOCKETS = {"color": "Base Color", "roughness": "Roughness", "normal": "Normal"}
+# Numbers that glTF and USD hold as well; what feeds them is left out.
+_NUMBERS = ("Metallic", "Specular IOR Level", "IOR", "Coat Weight", "Coat Roughness", "Coat IOR")
+_FILM = 0.05  # opacity of a wet film: it must show the iris; most programs fade its shine with it
+_LAYER = "risorius_flat"
+_WET = 0.08  # roughness of such a film
+
+
+@dataclass
+class _Flat:
+    """A material on its way.
+
+    Attributes:
+        material: what the user made.
+        name: that it had before it lent it.
+        work: a copy of it that is baked; None where it has no nodes.
+        users: (mesh object, slot number) that show it.
+        shader: the node of the copy that gives the colour; None for a film.
+        clear: light passes somewhere.
+        sources: input -> flat_trees.Source.
+        images: input -> image, taken over or baked; "normal" too.
+        baked: inputs that are baked.
+        mean: the roughness becomes one number, because faces lie on each other in the UV map.
+    """
+
+    material: object
+    name: str
+    work: object = None
+    users: list = field(default_factory=list)
+    shader: object = None
+    clear: bool = False
+    sources: dict = field(default_factory=dict)
+    images: dict = field(default_factory=dict)
+    baked: set = field(default_factory=set)
+    mean: bool = False
+
+
+def flatten(override, loans, size):
+    """Replace the materials of copied meshes; a generator.
+
+    Args:
+        override: context override of the export, from ship.copies.
+        loans: loans.Loans for the names of the materials.
+        size: pixels of a side of what is baked.
+
+    Yields:
+        The share that is done, 0 to 1.
+
+    Raises:
+        FaceError: Cycles is needed and not there, or a mesh has no room for a UV map.
+    """
+    items = [o for o in override["scene"].objects if o.type == "MESH"]
+    for item in items:
+        _join_slots(item)
+    flats = _gather(items)
+    for flat in flats:
+        _read(flat)
+        _lay_out(flat)
+    if any(flat.baked for flat in flats):
+        yield from _bake(override, items, flats, size)
+    made = [_build(flat, loans) for flat in flats]
+    for flat, material in zip(flats, made, strict=True):
+        for item, slot in flat.users:
+            item.material_slots[slot].material = material
+    for item in items:
+        _keep_one_layout(item.data)
+    yield 1.0
+
+
+def _join_slots(item):
+    """Faces that look the same get one material: an eye has two for the solid view."""
+    slots = item.data.materials
+    for number in range(len(slots) - 1, 0, -1):
+        one, other = slots[number - 1], slots[number]
+        trees = [m.node_tree for m in (one, other) if m is not None and m.node_tree is not None]
+        if len(trees) == 2 and shader_inputs.alike(*trees):
+            slots.pop(index=number)  # its faces go to the slot before it
+
+
+def _gather(items):
+    found = {}
+    for item in items:
+        for number, slot in enumerate(item.material_slots):
+            if slot.material is not None:
+                flat = found.setdefault(slot.material, _Flat(slot.material, slot.material.name))
+                flat.users.append((item, number))
+    return list(found.values())
+
+
+# --- what is taken over, what is baked ---------------------------------------------------------
+
+
+def _read(flat):
+    """Sort the inputs of a material."""
+    if flat.material.node_tree is None:
+        return
+    flat.work = flat.material.copy()
+    tree = flat.work.node_tree
+    shader_inputs.rest_maps(tree)
+    flat.shader, flat.clear = shader_inputs.shader_of(tree)
+    if flat.shader is None:
+        return
+    flat.sources = {n: shader_inputs.source(flat.shader, *i) for n, i in _INPUTS.items()}
+    color, alpha = flat.sources["color"], flat.sources["alpha"]
+    mapped = all(item.data.uv_layers for item, _ in flat.users)
+    whole = alpha.socket is None or alpha.is_alpha_of(color)
+    if mapped and color.is_picture() and whole:
+        flat.images["color"] = color.node.image
+    if mapped and flat.sources["roughness"].is_picture():
+        flat.images["roughness"] = flat.sources["roughness"].node.image
+    normal = shader_inputs.normal_image(flat.shader) if mapped else None
+    if normal is not None:
+        flat.images["normal"] = normal.image
+    flat.baked = {n for n, s in flat.sources.items() if s.socket and n not in flat.images}
+    if "color" in flat.images:
+        flat.baked.discard("alpha")  # it is the same image's
+    elif "alpha" in flat.baked:
+        flat.baked.add("color")  # may be a number, but its image bears the opacity
+
+
+def _lay_out(flat):
+    """Where the pictures of a material lie on its meshes; meshes get a layer where that is new."""
+    if not flat.baked:
+        return
+    users = [(item, *_corners(item, slot)) for item, slot in flat.users]
+    old = [_coordinates(item)[corners] for item, corners, _ in users]
+    totals = np.concatenate([t for _, _, t in users])
+    joined = np.concatenate(old)
+    mapped = all(item.data.uv_layers for item, _ in flat.users)
+    alone = not flat.images
+    on_itself = mapped and uv_grid.overlaps(joined, totals)
+    painted = [flat.sources[n].socket for n in flat.baked & {"color", "alpha"}]
+    placed = any(s is not None and shader_inputs.by_place(s) for s in painted)
+    new = None
+    if alone and (not mapped or (on_itself and placed)):
+        new, on_itself = uv_grid.cells(totals), False
+    elif alone:
+        new = uv_grid.spread(joined)
+    flat.mean = on_itself and "roughness" in flat.baked
+    if new is not None:
+        for (item, corners, _), part in zip(users, np.split(new, _ends(old)), strict=True):
+            _write(item.data, corners, part)
+
+
+def _ends(parts):
+    return np.cumsum([len(p) for p in parts])[:-1]
+
+
+def _corners(item, slot):
+    """Numbers of the corners of the faces of a slot, and how many each of these faces has."""
+    mesh = item.data
+    index, total = np.empty(len(mesh.polygons), np.int32), np.empty(len(mesh.polygons), np.int32)
+    mesh.polygons.foreach_get("material_index", index)
+    mesh.polygons.foreach_get("loop_total", total)
+    shown = np.minimum(index, len(item.material_slots) - 1) == slot
+    return np.flatnonzero(np.repeat(shown, total)), total[shown]
+
+
+def _coordinates(item):
+    """float32[corners, 2] of the UV map that renders show."""
+    mesh = item.data
+    flat = np.zeros(len(mesh.loops) * 2, np.float32)
+    layer = _shown_layer(mesh)
+    if layer is not None:
+        layer.uv.foreach_get("vector", flat)
+    return flat.reshape(-1, 2)
+
+
+def _shown_layer(mesh):
+    return next((y for y in mesh.uv_layers if y.active_render), None)
+
+
+def _write(mesh, corners, part):
+    """Put coordinates into the layer that is baked to, which begins as a copy of the shown one."""
+    shown, layer = _shown_layer(mesh), mesh.uv_layers.get(_LAYER)
+    values = np.zeros(len(mesh.loops) * 2, np.float32)
+    if shown is not None or layer is not None:
+        (layer or shown).uv.foreach_get("vector", values)
+    layer = layer or mesh.uv_layers.new(name=_LAYER, do_init=False)
+    if layer is None:
+        raise FaceError(f"{mesh.name} has eight UV maps: remove one to bake its materials.")
+    values.reshape(-1, 2)[corners] = part
+    layer.uv.foreach_set("vector", values)
+
+
+def _keep_one_layout(mesh):
+    """What was baked by becomes the UV map that renders show."""
+    layer, shown = mesh.uv_layers.get(_LAYER), _shown_layer(mesh)
+    if layer is None:
+        return
+    if shown is None or shown.name == _LAYER:
+        layer.name = "UVMap"
+        return
+    values = np.empty(len(mesh.loops) * 2, np.float32)
+    layer.uv.foreach_get("vector", values)
+    shown.uv.foreach_set("vector", values)
+    mesh.uv_layers.remove(layer)
+
+
+# --- baking ------------------------------------------------------------------------------------
+
+
+def _bake(override, items, flats, size):
+    """All that is painted: colours, then opacity and roughness together."""
+    _prepare(override["scene"], size)
+    spare = bpy.data.images.new("Spare", 4, 4)
+    jobs = [
+        (item, inputs)
+        for inputs in (("color",), _MASKS)
+        for item in items
+        if any(flat.baked & set(inputs) for flat in _shown_on(item, flats))
+    ]
+    targets = {}
+    for number, (item, inputs) in enumerate(jobs):
+        yield number / len(jobs)
+        for flat in _shown_on(item, flats):
+            wanted = [n for n in inputs if n in flat.baked]
+            key = (flat.material, inputs)
+            if wanted and key not in targets:
+                targets[key] = _new_image(flat, inputs[0], size)
+            _aim(flat, wanted, targets.get(key, spare))
+        _bake_one(override, items, item)
+    bpy.data.images.remove(spare)
+    for item in items:
+        item.hide_render = False
+    _select(override, items)
+    for flat in flats:
+        _read_back(flat, *(targets.get((flat.material, i)) for i in (("color",), _MASKS)))
+
+
+def _prepare(stage, size):
+    """Cycles on the CPU, one sample: what is baked has no light in it."""
+    try:
+        stage.render.engine = "CYCLES"
+    except TypeError:
+        raise FaceError(
+            "Cycles bakes the materials: enable its add-on, or switch Bake Materials off"
+        ) from None
+    stage.cycles.device, stage.cycles.samples = "CPU", 1
+    stage.cycles.use_denoising = stage.cycles.use_adaptive_sampling = False
+    settings = stage.render.bake
+    settings.margin, settings.margin_type = max(size // 64, 4), "EXTEND"
+    settings.use_clear = settings.use_selected_to_active = False
+    settings.target = "IMAGE_TEXTURES"
+
+
+def _shown_on(item, flats):
+    return [flat for flat in flats if any(user == item for user, _ in flat.users)]
+
+
+def _new_image(flat, name, size):
+    """An empty image; what is baked coarsely is smooth or will be one number."""
+    if name != "color" and "alpha" not in flat.baked:
+        size = 64 if flat.mean else max(size // 4, 64)
+    image = bpy.data.images.new(f"{flat.name}_{name}", size, size, alpha=True)
+    image.generated_color = (0.0, 0.0, 0.0, 0.0)
+    image_loading.set_color_space(image, name != "color")
+    return image
+
+
+def _aim(flat, wanted, image):
+    """Let the copy of a material glow with some of its inputs, and be baked into an image."""
+    if flat.work is None:
+        flat.work = flat.material.copy()
+        compat.make_node_tree(flat.work)
+    tree = flat.work.node_tree
+    for item, slot in flat.users:
+        item.material_slots[slot].material = flat.work
+    target = tree.nodes.get(_LAYER) or tree.nodes.new("ShaderNodeTexImage")
+    target.name, target.image = _LAYER, image
+    for node in tree.nodes:
+        node.select = node == target
+    tree.nodes.active = target
+    if not wanted:
+        return
+    glow = tree.nodes.new("ShaderNodeEmission")
+    if wanted == ["color"]:
+        _feed(tree, flat.sources["color"], glow.inputs["Color"])
+    else:
+        both = tree.nodes.new("ShaderNodeCombineColor")
+        for name, socket in zip(_MASKS, both.inputs, strict=False):
+            _feed(tree, flat.sources[name], socket)
+        tree.links.new(both.outputs[0], glow.inputs["Color"])
+    output = tree.get_output_node("CYCLES") or tree.get_output_node("ALL")
+    tree.links.new(glow.outputs[0], output.inputs["Surface"])
+
+
+def _feed(tree, source, socket):
+    if source.socket is not None:
+        tree.links.new(source.socket, socket)
+    elif source.value is not None:
+        socket.default_value = source.value
+
+
+def _bake_one(override, items, item):
+    """Bake one mesh, alone: Cycles reads the whole scene for each."""
+    for other in items:
+        other.hide_render = other != item
+    layer = item.data.uv_layers.get(_LAYER) or _shown_layer(item.data)
+    layer.active = True
+    _select(override, [item])
+    alone = {**override, "selected_objects": [item], "active_object": item, "object": item}
+    with bpy.context.temp_override(**alone), quiet():
+        bpy.ops.object.bake(type="EMIT")
+
+
+def _select(override, items):
+    layer = override["view_layer"]
+    for item in override["scene"].objects:
+        item.select_set(item in items, view_layer=layer)
+    layer.objects.active = items[0]
+
+
+def _read_back(flat, color, masks):
+    """The images of a material, of what was baked."""
+    values = _pixels(masks) if masks is not None else None
+    if color is not None:
+        _finish_color(color, values[..., 0] if "alpha" in flat.baked else None)
+        flat.images["color"] = color
+    if "roughness" not in flat.baked:
+        return
+    if flat.mean:
+        seen = values[..., 3] > 0
+        flat.mean = float(values[seen, 1].mean()) if seen.any() else 0.5
+        return
+    values[..., :3], values[..., 3] = values[..., 1:2], 1.0
+    masks.name = f"{flat.name}_roughness"
+    _store(masks, values, "NONE")
+    flat.images["roughness"] = masks
+
+
+def _finish_color(image, alpha):
+    """Put the opacity in; an opaque image has no alpha that could be taken for one."""
+    values = _pixels(image)
+    seen = values[..., 3] > 0
+    if seen.any():  # small copies of an image, as engines show from afar, mix in what lies around
+        values[~seen, :3] = values[seen, :3].mean(axis=0)
+    values[..., 3] = 1.0 if alpha is None else alpha
+    _store(image, values, "NONE" if alpha is None else "STRAIGHT")
+
+
+def _store(image, values, alpha_mode):
+    image.alpha_mode = alpha_mode
+    image.pixels.foreach_set(values.ravel())
+    image.update()
+
+
+def _pixels(image):
+    """float32[height, width, 4] of the stored numbers."""
+    values = np.empty(image.size[0] * image.size[1] * 4, np.float32)
+    image.pixels.foreach_get(values)
+    return values.reshape(image.size[1], image.size[0], 4)
+
+
+# --- the plain material ------------------------------------------------------------------------
+
+
+def _build(flat, loans):
+    """The plain material of one of the user's, under its name."""
+    user = flat.material
+    material = bpy.data.materials.new(flat.name)
+    loans.take("materials", material, flat.name)
+    material.diffuse_color = user.diffuse_color
+    material.use_backface_culling = user.use_backface_culling
+    compat.make_node_tree(material)
+    nodes = material.node_tree.nodes
+    shader = next(n for n in nodes if n.type == "BSDF_PRINCIPLED")
+    if flat.shader is None:
+        _plain_look(flat, shader)
+    else:
+        _take_numbers(flat, shader)
+        _take_images(flat, material, shader)
+    if flat.clear or shader.inputs["Alpha"].is_linked or shader.inputs["Alpha"].default_value < 1:
+        material.surface_render_method = "BLENDED"
+    return material
+
+
+def _plain_look(flat, shader):
+    """A film, or what the solid view shows of a material that has no shader."""
+    color = tuple(flat.material.diffuse_color)
+    if flat.clear:
+        shader.inputs["Base Color"].default_value = (0.0, 0.0, 0.0, 1.0)
+        shader.inputs["Alpha"].default_value = _FILM
+        shader.inputs["Roughness"].default_value = _WET
+        return
+    shader.inputs["Base Color"].default_value = (*color[:3], 1.0)
+    shader.inputs["Roughness"].default_value = flat.material.roughness
+
+
+def _take_numbers(flat, shader):
+    for name in _NUMBERS:
+        if name in flat.shader.inputs and name in shader.inputs:
+            shader.inputs[name].default_value = flat.shader.inputs[name].default_value
+    for name, (socket, *_) in _INPUTS.items():
+        value = flat.sources[name].value
+        if name == "roughness" and flat.mean:
+            value = flat.mean
+        if value is not None:
+            shader.inputs[socket].default_value = value
+
+
+def _take_images(flat, material, shader):
+    tree = material.node_tree
+    for name, image in flat.images.items():
+        node = tree.nodes.new("ShaderNodeTexImage")
+        node.image = _packed(flat, name, image)
+        socket, feeding = shader.inputs[_SOCKETS[name]], node.outputs["Color"]
+        if name == "normal":
+            between = tree.nodes.new("ShaderNodeNormalMap")
+            tree.links.new(feeding, between.inputs["Color"])
+            feeding = between.outputs["Normal"]
+        tree.links.new(feeding, socket)
+        if name == "color" and flat.sources["alpha"].socket is not None:
+            tree.links.new(node.outputs["Alpha"], shader.inputs["Alpha"])
+
+
+def write_images(scene, folder):
+    """The images of a stage as files, for formats that hold no materials.
+
+    Args:
+        scene: the export's, after `flatten`.
+        folder: made where an image needs it.
+
+    Returns:
+        How many files were written.
+    """
+    slots = [s for o in scene.objects if o.type == "MESH" for s in o.material_slots if s.material]
+    trees = {s.material.node_tree for s in slots} - {None}
+    images = {n.image for t in trees for n in t.nodes if n.type == "TEX_IMAGE" and n.image}
+    write_bytes = native.part("fileio").write_bytes
+    for image in images:
+        folder.mkdir(exist_ok=True)
+        write_bytes(folder / PurePath(image.filepath_raw).name, image.packed_file.data)
+    return len(images)
+
+
+def _packed(flat, name, image):
+    """An image that exporters write from memory, under a name of its own."""
+    taken = name not in flat.baked
+    if taken:
+        image = image.copy()
+        image.name = f"{flat.name}_{name}"
+        if image.packed_file is None:
+            image.pack()
+    ending = PurePath(image.filepath_raw).suffix if taken else ""
+    # Exporters tell images apart by their paths, and no path of this machine goes out.
+    image.filepath_raw = f"//{_file_name(image.name)}{ending or '.png'}"
+    if taken:
+        data = image.packed_file.data  # packed anew: USD writes it under the path it was packed by
+        image.pack(data=data, data_len=len(data))
+    else:
+        image.pack()
+    return image
+
+
+def _file_name(name):
+    return "".join(c if c.isalnum() or c in "-_." else "_" for c in name)

@@ -1,0 +1,178 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a node tree gives to each input of a plain shader: a number, one image, or more than that.
+
+Animated maps rest at 0 here: a file for another program has one picture of a face, the neutral.
+"""
+
+from dataclasses import dataclass
+
+from ..material import skin_material
+
+_COLORED = ("BSDF_PRINCIPLED", "BSDF_DIFFUSE", "EMISSION", "SUBSURFACE_SCATTERING", "BSDF_TOON")
+_CLEAR = ("BSDF_TRANSPARENT", "BSDF_GLASS", "BSDF_REFRACTION")
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where an input's values come from.
+
+    Attributes:
+        value: of an input that nothing feeds, else None.
+        node: the one image texture that feeds it unchanged, or None.
+        channel: of that image: "Color" or "Alpha".
+        socket: what has to be baked, or None.
+    """
+
+    value: object = None
+    node: object = None
+    channel: str = ""
+    socket: object = None
+
+    def is_picture(self):
+        """Whether it is an image's colour, unchanged."""
+        return self.node is not None and self.channel == "Color"
+
+    def is_alpha_of(self, other):
+        """Whether it is the alpha of the image that another is the colour of."""
+        return (
+            self.node is not None
+            and self.channel == "Alpha"
+            and other.is_picture()
+            and self.node.image == other.node.image
+        )
+
+
+def rest_maps(tree):
+    """Take the drivers off a copied tree, and let its animated maps rest."""
+    tree.animation_data_clear()
+    for node in tree.nodes:
+        if node.type == "VALUE" and node.name.startswith(skin_material.MAP_PREFIX):
+            node.outputs[0].default_value = 0.0
+
+
+def alike(tree, other):
+    """Whether two trees paint the same, as those of an eye and of its iris that nobody edited."""
+    return _told(tree) == _told(other)
+
+
+def _told(tree):
+    nodes = []
+    for node in tree.nodes:
+        values = [getattr(s, "default_value", None) for s in (*node.inputs, *node.outputs)]
+        plain = [tuple(v) if hasattr(v, "__len__") else v for v in values]
+        ramp = getattr(node, "color_ramp", None)
+        stops = [(e.position, tuple(e.color)) for e in ramp.elements] if ramp else []
+        nodes.append((node.name, node.bl_idname, getattr(node, "image", None), plain, stops))
+    links = {(x.from_socket.path_from_id(), x.to_socket.path_from_id()) for x in tree.links}
+    return nodes, links
+
+
+def shader_of(tree):
+    """The node that gives a surface its colour; None for films that one looks through.
+
+    Returns:
+        The node, and whether anything at all lets light through unchanged.
+    """
+    output = tree.get_output_node("ALL")
+    found = _upstream(output.inputs["Surface"]) if output is not None else []
+    clear = any(node.type in _CLEAR for node in found)
+    for kind in _COLORED:
+        for node in found:
+            if node.type == kind:
+                return node, clear
+    return None, clear
+
+
+def _upstream(socket):
+    """The nodes that feed an input, nearest first."""
+    found, todo = [], [socket]
+    while todo:
+        for link in todo.pop(0).links:
+            if link.from_node not in found:
+                found.append(link.from_node)
+                todo.extend(link.from_node.inputs)
+    return found
+
+
+def source(shader, *names):
+    """The Source of the first of some inputs that a shader has."""
+    socket = next((shader.inputs[n] for n in names if n in shader.inputs), None)
+    if socket is None:
+        return Source()
+    feeding = _feeding(socket)
+    if feeding is None:
+        value = socket.default_value
+        return Source(value=tuple(value) if socket.type in ("RGBA", "VECTOR") else value)
+    node = feeding.node
+    if node.type == "TEX_IMAGE" and _plain(node):
+        return Source(node=node, channel=feeding.name, socket=feeding)
+    return Source(socket=feeding)
+
+
+def normal_image(shader):
+    """The node of the normal map of a shader, also under relief that nodes add; or None."""
+    socket = shader.inputs.get("Normal")
+    while socket is not None and (feeding := _feeding(socket)) is not None:
+        node = feeding.node
+        if node.type == "NORMAL_MAP":
+            below = _feeding(node.inputs["Color"])
+            found = below.node if below is not None else None
+            return found if found and found.type == "TEX_IMAGE" and _plain(found) else None
+        socket = node.inputs["Normal"] if node.type == "BUMP" else None
+    return None
+
+
+def by_place(socket):
+    """Whether what is baked depends on where the surface is, and not on its UV map alone."""
+    for node in [socket.node, *(n for s in socket.node.inputs for n in _upstream(s))]:
+        if node.type in ("ATTRIBUTE", "NEW_GEOMETRY", "VERTEX_COLOR"):
+            return True
+        if node.type == "TEX_COORD" and any(o.is_linked for o in node.outputs if o.name != "UV"):
+            return True
+    return False
+
+
+def _plain(node):
+    """Whether an image texture shows a whole image by the mesh's UV map."""
+    image = node.image
+    whole = image is not None and image.size[0] > 0 and image.source != "TILED"
+    return whole and not node.inputs["Vector"].is_linked and node.projection == "FLAT"
+
+
+def _feeding(socket):
+    """The output that feeds an input, past mixes that mix nothing in; or None."""
+    while socket.is_linked:
+        feeding = socket.links[0].from_socket
+        node = feeding.node
+        if node.type == "REROUTE":
+            socket = node.inputs[0]
+        elif node.type == "MIX" and _zero(_enabled(node, "Factor_Float")):
+            socket = _enabled(node, f"A_{'Color' if node.data_type == 'RGBA' else 'Float'}")
+        else:
+            return feeding
+    return None
+
+
+def _enabled(node, identifier):
+    return next(s for s in node.inputs if s.identifier == identifier)
+
+
+def _zero(socket):
+    """Whether an input is 0 wherever one looks, because every map that it depends on rests."""
+    if not socket.is_linked:
+        return socket.type == "VALUE" and socket.default_value == 0.0
+    node = socket.links[0].from_node
+    if node.type == "VALUE":
+        return node.outputs[0].default_value == 0.0
+    if node.type != "MATH":
+        return node.type == "MIX" and all(_zero(_enabled(node, n)) for n in ("A_Float", "B_Float"))
+    zeros = [_zero(s) for s in node.inputs[:2]]
+    return all(zeros) if node.operation == "ADD" else _vanishes(node.operation, zeros, node)
+
+
+def _vanishes(operation, zeros, node):
+    if operation == "MULTIPLY":
+        return any(zeros)
+    other = node.inputs[1]
+    limit = not other.is_linked and other.default_value >= 0.0
+    return operation == "MINIMUM" and zeros[0] and limit

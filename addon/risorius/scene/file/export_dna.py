@@ -1,0 +1,240 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A character's file with what the user edited, and every other byte as it was imported."""
+
+import warnings
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ... import native
+from ...logic.base.errors import FaceError
+from ...logic.character import plans, user_edits
+from ..base import parts, storage
+from ..character import armatures, lods, runtime, skin_weights
+from . import refit_joints, refit_meshes
+
+
+class ExportError(FaceError):
+    """A character that cannot be written; the text is one sentence for users."""
+
+
+@dataclass(frozen=True)
+class ExportOptions:
+    """Which edits are written."""
+
+    shapes: bool = True
+    neutral: bool = True
+    joints: bool = True
+    weights: bool = True
+
+
+def export(context, rig, options=None):
+    """The bytes of a character's DNA file.
+
+    Args:
+        context: a Blender context with scene and view layer.
+        rig: deforming armature of the character.
+        options: ExportOptions; None writes every edit.
+
+    Returns:
+        bytes, and sentences on what was changed by how much. Where nothing was edited the bytes
+        are those that were imported.
+
+    Raises:
+        ExportError: a mesh has other faces than its file, or the character has lost its data.
+    """
+    options = options or ExportOptions()
+    live = runtime.of(rig)
+    if live is None:
+        raise ExportError(f"{rig.name} has lost the data of its file.")
+    try:
+        content = storage.content(rig[parts.DNA])
+    except storage.ContentError as error:
+        raise ExportError(f"{rig.name} has lost the data of its file: {error}.") from error
+    unit = runtime.unit_of(rig)
+    levels = tuple(lods.built(rig)) or (0,)
+    plan = plans.plan_character(live.dna, rig.name, levels, unit, live.rests)
+    written = native.module().load(content)  # the Runtime's own must stay as it is
+    job = _Job(rig, live, plan, written, unit)
+    names_of_bones = refit_joints.bones_by_joint(rig)
+    labels = [names_of_bones.get(j, label) for j, label in enumerate(plan.armature.labels)]
+    plan_of = {m.index: m for m in plan.meshes}
+    for item in parts.meshes_of(rig):
+        mesh_plan = plan_of.get(item[parts.MESH])
+        if mesh_plan is None:
+            continue
+        _check(item, mesh_plan)
+        job.mesh(item, mesh_plan, options)
+        if options.weights:
+            job.weights(item, mesh_plan, labels)
+    if options.joints:
+        with armatures.kept_selection(context):
+            job.joints(refit_joints.joint_edits(context, rig, plan))
+    if job.edited:
+        content = job.content()
+    else:
+        job.report.insert(0, "Nothing was edited: the file is what was imported, byte for byte.")
+    _keep_report(rig, job.report)
+    return content, job.report
+
+
+def _check(item, mesh_plan):
+    if item.mode == "EDIT":
+        raise ExportError(f"{item.name} is in edit mode: leave that first.")
+    if not refit_meshes.has_faces_of(item.data, mesh_plan):
+        raise ExportError(
+            f"{item.name} has other vertices or faces than in its file, so it cannot be exported."
+        )
+
+
+class _Job:
+    """One export: puts edits into a Dna and words for them into a report.
+
+    Args:
+        rig: deforming armature.
+        live: its Runtime.
+        plan: its CharacterPlan.
+        dna: a Dna of its own that is edited.
+        unit: metres per Blender unit.
+    """
+
+    def __init__(self, rig, live, plan, dna, unit):
+        self._rig, self._live, self._plan, self._dna, self._unit = rig, live, plan, dna, unit
+        self._space = live.space
+        self.report = []
+        self.edited = False
+
+    def content(self):
+        """The edited file in the version of the imported one."""
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always")
+            content = self._dna.to_bytes(version=f"2.{self._live.dna.version}")
+        self.report += [str(warning.message) for warning in said]
+        return content
+
+    def _say(self, what, moves):
+        count, largest, mean = user_edits.sizes(moves, self._unit)
+        self.edited = True
+        self.report.append(
+            f"{what}: {count} vertices, at most {largest:.3f} mm, {mean:.3f} mm in the mean."
+        )
+
+    def mesh(self, item, mesh_plan, options):
+        """Neutral vertices and shapes of one mesh."""
+        shape = refit_meshes.read_shape(self._live, item, mesh_plan, known=True)
+        dna_mesh = self._dna.meshes[mesh_plan.index]
+        name = self._dna.mesh_names[mesh_plan.index]
+        if options.neutral and shape.moved.any():
+            self._neutral(dna_mesh, shape, mesh_plan)
+            rows = np.any(shape.moved != 0, axis=1)
+            self._say(f"{name}, neutral", shape.moved[rows])
+        if options.shapes:
+            for key, difference in shape.edits.items():
+                self._shape(dna_mesh, shape, key, difference)
+                rows = np.any(difference != 0, axis=1)
+                channel = self._dna.blend_shape_channel_names[shape.channels[key]]
+                self._say(f"{name}, shape {channel}", difference[rows])
+        if shape.own:
+            self.report.append(f"{name}: keys of your own are not written: {', '.join(shape.own)}.")
+        for key in shape.channels:
+            block = item.data.shape_keys.key_blocks[key]
+            if block.mute or block.vertex_group:
+                self.report.append(f"{name}: the mute or mask of the key {key} is not written.")
+
+    def _neutral(self, dna_mesh, shape, mesh_plan):
+        """Only coordinates that differ from the imported ones are converted back."""
+        moved = user_edits.changed(shape.points, mesh_plan.positions)
+        # The axes are exchanged and mirrored, never mixed: a coordinate of ours is one of theirs.
+        theirs = moved @ (np.abs(self._space.axes) > 0.5)
+        positions = dna_mesh.positions.copy()
+        positions[theirs] = self._space.file_points(shape.points)[theirs]
+        dna_mesh.positions = positions
+
+    def _shape(self, dna_mesh, shape, key, difference):
+        """Only the edited vertices' deltas are written."""
+        vertices = np.flatnonzero(np.any(difference != 0, axis=1))
+        base = shape.keys[shape.relative[key]]
+        delta = shape.keys[key][vertices].astype(np.float64) - base[vertices]
+        totals = self._space.file_points(delta).astype(np.float32)
+        channel = shape.channels[key]
+        targets = [
+            t for t in dna_mesh.blend_shape_targets if t.blend_shape_channel_index == channel
+        ]
+        written = user_edits.replace_totals(
+            [(t.vertex_indices, t.deltas.reshape(-1, 3)) for t in targets], vertices, totals
+        )
+        for target, (indices, deltas) in zip(targets, written, strict=True):
+            target.vertex_indices, target.deltas = indices, deltas
+
+    def weights(self, item, mesh_plan, labels):
+        """Skin weights of the vertices where they were painted; the others bit for bit."""
+        present = skin_weights.read(item)
+        painted = skin_weights.edited_vertices(present, skin_weights.file_pairs(mesh_plan, labels))
+        ours = {name: joint for joint, name in reversed(list(enumerate(labels)))}
+        known = {name for name in ours if name in present}
+        used = {labels[j] for j in np.unique(mesh_plan.skin_joints)}
+        for name in known - used:  # groups of joints that this mesh had no weights of
+            painted.update(present[name])
+        if not painted:
+            return
+        dna_mesh = self._dna.meshes[mesh_plan.index]
+        bounds = mesh_plan.skin_offsets
+        rows = []
+        for vertex in range(len(mesh_plan.positions)):
+            begin, end = int(bounds[vertex]), int(bounds[vertex + 1])
+            if vertex in painted:
+                rows.append(_normalised(present, known, ours, vertex))
+            else:
+                joints = mesh_plan.skin_joints[begin:end]
+                rows.append((joints, mesh_plan.skin_weights[begin:end]))
+        counts = [len(joints) for joints, _ in rows]
+        dna_mesh.skin_offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.uint32)
+        dna_mesh.skin_joint_indices = np.concatenate([r[0] for r in rows]).astype(np.uint16)
+        dna_mesh.skin_weights = np.concatenate([r[1] for r in rows]).astype(np.float32)
+        most = max(dna_mesh.maximum_influence_per_vertex, *counts)
+        dna_mesh.maximum_influence_per_vertex = most
+        self.edited = True
+        name = self._dna.mesh_names[mesh_plan.index]
+        self.report.append(f"{name}: weights of {len(painted)} vertices.")
+
+    def joints(self, found):
+        """Neutral joints that were moved or turned."""
+        offsets = self._dna.neutral_joint_translations.copy()
+        angles = self._dna.neutral_joint_rotations.copy()
+        for joint, edit in found.items():
+            if edit.moved:
+                change = self._space.file_points(edit.after[None, :3, 3])[0]
+                before = self._space.file_points(edit.before[None, :3, 3])[0]
+                # What did not move along an axis keeps its bits.
+                far = np.abs(change - before) > 1e-6 * np.abs(before).max(initial=1e-9)
+                offsets[joint][far] = change[far]
+            if edit.turned:
+                near = angles[joint : joint + 1].astype(np.float64)
+                angles[joint] = self._space.file_rotations(edit.after[None, :3, :3], near)[0]
+            self.edited = True
+            self.report.append(
+                f"Joint {self._dna.joint_names[joint]}: "
+                f"{edit.distance * self._unit * 1000:.3f} mm, {np.degrees(edit.angle):.3f} degrees."
+            )
+        if found:
+            self._dna.neutral_joint_translations = offsets
+            self._dna.neutral_joint_rotations = angles
+
+
+def _normalised(present, known, ours, vertex):
+    """Joints and weights of one vertex, the largest first, their sum 1."""
+    held = [(present[n][vertex], ours[n]) for n in known if present[n].get(vertex, 0.0) > 0.0]
+    held.sort(key=lambda pair: (-pair[0], pair[1]))
+    total = sum(weight for weight, _ in held)
+    joints = np.array([joint for _, joint in held], np.int64)
+    return joints, np.array([weight / total for weight, _ in held], np.float32)
+
+
+def _keep_report(rig, sentences):
+    """The report as a Text, and on the console."""
+    title = f"{rig.name.removesuffix('_rig')} export report"
+    text = bpy.data.texts.get(title) or bpy.data.texts.new(title)
+    text.from_string("\n".join(sentences) + "\n")
+    for sentence in sentences:
+        print(f"Risorius: {sentence}")

@@ -1,0 +1,299 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Joints of one file become joints of another in the same armature; edits of joints are found."""
+
+from dataclasses import dataclass, replace
+
+import bpy
+import numpy as np
+from mathutils import Matrix, Vector
+
+from ...logic.character import user_edits
+from ..base import parts
+from ..character import armatures
+
+_EPS = float(np.finfo(np.float32).eps)
+
+
+@dataclass(frozen=True)
+class JointEdit:
+    """How a user moved a joint's rest.
+
+    Attributes:
+        before, after: parent-relative matrices float64[4, 4], Blender units.
+        moved, turned: which of both it was.
+    """
+
+    before: object
+    after: object
+    moved: bool
+    turned: bool
+
+    @property
+    def change(self):
+        """What is applied after the file's own local matrix."""
+        return np.linalg.inv(self.before) @ self.after
+
+    @property
+    def distance(self):
+        """In Blender units."""
+        return float(np.linalg.norm(self.after[:3, 3] - self.before[:3, 3]))
+
+    @property
+    def angle(self):
+        """In radians."""
+        return _angle(self.change)
+
+
+def _angle(matrix):
+    turn = matrix[:3, :3]
+    twice = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
+    return float(np.arctan2(np.linalg.norm(twice), np.trace(turn) - 1.0))
+
+
+def bones_by_joint(rig):
+    """Joint -> bone name; of bones that bear the same joint the first is the file's."""
+    found = {}
+    for bone in rig.data.bones:
+        joint = bone.get(parts.JOINT)
+        if joint is not None:
+            found.setdefault(int(joint), bone.name)
+    return found
+
+
+def joint_edits(context, rig, plan):
+    """The joints whose rest a user moved or turned in edit mode.
+
+    Args:
+        context: a Blender context with a view layer.
+        rig: deforming armature.
+        plan: CharacterPlan of its file.
+
+    Returns:
+        Joint -> JointEdit. Compared with a fresh armature of the same plan, bit for bit; entering
+        edit mode computes roll and tail anew, so a difference counts from what float32 positions
+        of a bone's ends can make of its direction.
+    """
+    wanted = _fresh_rest(context, plan)
+    names = bones_by_joint(rig)
+    present = {
+        j: np.array(rig.data.bones[n].matrix_local, np.float64)
+        for j, n in names.items()
+        if j < len(wanted)
+    }
+    reach = float(np.max(np.abs(wanted[:, :3, 3]), initial=0.0))
+    found = {}
+    for joint, now in present.items():
+        parent = plan.armature.parents[joint]
+        above = parent if parent in present else -1
+        same = np.array_equal(now, wanted[joint])
+        if same and (above < 0 or np.array_equal(present[above], wanted[above])):
+            continue
+        before = _relative(wanted, joint, above)
+        after = _relative(present, joint, above)
+        shortest = min(plan.armature.lengths[j] for j in (joint, above) if j >= 0)
+        turn = 16 * _EPS * (reach + shortest) / shortest
+        move = 8 * _EPS * reach
+        if above >= 0:
+            move += turn * float(np.linalg.norm(before[:3, 3]))
+        edit = JointEdit(before, after, False, False)
+        edit = replace(edit, moved=edit.distance > move, turned=edit.angle > turn)
+        if edit.moved or edit.turned:
+            found[joint] = edit
+    return found
+
+
+def _relative(world, joint, parent):
+    return world[joint] if parent < 0 else np.linalg.inv(world[parent]) @ world[joint]
+
+
+def _fresh_rest(context, plan):
+    """Rest matrices of all joints as an import gives them, float64[J, 4, 4]."""
+    made = []
+    workshop = bpy.data.collections.new("rest")
+    context.scene.collection.children.link(workshop)
+    try:
+        rig = armatures.build_rig(context, plan, made, workshop)
+        bones = rig.data.bones
+        return np.array([bones[n].matrix_local for n in plan.armature.labels], np.float64)
+    finally:
+        bpy.data.batch_remove([*made, workshop])
+
+
+def replace_joints(context, change):
+    """Give the armature the joints of the new file; bones are kept by the names of joints.
+
+    Args:
+        context: a Blender context with a view layer.
+        change: replace.Change; its bone names are filled in.
+    """
+    rig, old, new = change.rig, change.old.armature, change.new.armature
+    if rig.data.users > 1:
+        rig.data = rig.data.copy()
+    moved = user_edits.index_map(old.labels, new.labels)
+    there = bones_by_joint(rig)
+    change.old_bones = [there.get(j, label) for j, label in enumerate(old.labels)]
+    edited = joint_edits(context, rig, change.old)
+    kept = {moved[j]: n for j, n in there.items() if j < len(moved) and moved[j] >= 0}
+    gone = {n: j for j, n in there.items() if j >= len(moved) or moved[j] < 0}
+    rest, changed = _new_rest(old, new, moved, edited)
+    if changed or gone or len(kept) < len(new.labels):
+        with armatures.edit_armature(context, rig.data) as edit_bones:
+            change.new_bones = _edit(edit_bones, change, kept, gone, rest, changed)
+    else:
+        change.new_bones = [kept[k] for k in range(len(new.labels))]
+    _number(rig, change.new_bones, moved)
+    shelf = rig.data.collections.get(armatures.SHELF)
+    for joint, name in enumerate(change.new_bones):
+        if joint not in kept and shelf is not None:
+            shelf.assign(rig.data.bones[name])
+    _release(change, moved)
+    for label in (old.labels[j] for j in gone.values() if j < len(old.labels)):
+        change.report.append(f"The joint {label} is gone.")
+    added = [label for k, label in enumerate(new.labels) if k not in kept]
+    if added:
+        change.report.append(f"New joints: {', '.join(added)}.")
+    for joint in edited:
+        if moved[joint] >= 0:
+            change.report.append(f"Your edit of the joint {old.labels[joint]} was carried over.")
+
+
+def _new_rest(old, new, moved, edited):
+    """Rest matrices of the new joints with the user's edits, and the joints that must move."""
+    back = {k: j for j, k in enumerate(moved) if k >= 0}
+    rest, changed = {}, set()
+    bent = set()  # joints at or below an edited one: no longer where the file has them
+    for joint in new.order:
+        parent = new.parents[joint]
+        former = back.get(joint)
+        local = _relative(new.rest, joint, parent)
+        if former in edited:
+            local = local @ edited[former].change
+            bent.add(joint)
+        if parent in bent:
+            bent.add(joint)
+        if joint not in bent:
+            rest[joint] = new.rest[joint]
+        else:
+            rest[joint] = local if parent < 0 else rest[parent] @ local
+        above = old.parents[former] if former is not None else -1
+        same_parent = former is not None and (moved[above] if above >= 0 else -1) == parent
+        if not (
+            same_parent
+            and parent not in changed
+            and np.array_equal(old.rest[former], new.rest[joint])
+            and old.lengths[former] == new.lengths[joint]
+        ):
+            changed.add(joint)
+    return rest, changed
+
+
+def _edit(edit_bones, change, kept, gone, rest, changed):
+    """Do it in edit mode. Returns the bone name of each new joint."""
+    old, new = change.old.armature, change.new.armature
+    follow = _followers(edit_bones, kept, gone)
+    for name in gone:
+        edit_bones.remove(edit_bones[name])
+    bones = {joint: edit_bones[name] for joint, name in kept.items()}
+    back = {k: j for j, k in enumerate(user_edits.index_map(old.labels, new.labels)) if k >= 0}
+    for joint in new.order:
+        fresh = joint not in bones
+        if fresh:
+            bones[joint] = edit_bones.new(new.labels[joint])
+        elif joint not in changed:
+            continue
+        bone = bones[joint]
+        bone.use_connect = False
+        length = new.lengths[joint]
+        if not fresh and abs(bone.length - old.lengths[back[joint]]) > 1e-4 * bone.length:
+            length = bone.length  # the user's
+        bone.head, bone.tail, bone.roll = (0, 0, 0), (0, length, 0), 0.0
+        bone.matrix = Matrix(rest[joint].tolist())
+        parent = new.parents[joint]
+        bone.parent = bones[parent] if parent >= 0 else None
+    for name, above, offset in follow:
+        bone = edit_bones[name]
+        if above is not None:
+            bone.parent = edit_bones[above]
+        if bone.parent is not None and offset is not None:
+            bone.matrix = bone.parent.matrix @ offset
+    return [bones[k].name for k in range(len(new.labels))]
+
+
+def _followers(edit_bones, kept, gone):
+    """Bones of the user's own: (name, bone to be hung under or None, place under it), so that
+    they go where their joints go; parents first."""
+    ours = set(kept.values()) | set(gone)
+    found = []
+    for bone in edit_bones:
+        if bone.name in ours or bone.parent is None:
+            continue
+        above = bone.parent
+        while above is not None and above.name in gone:
+            above = above.parent
+        offset = above.matrix.inverted() @ bone.matrix if above is not None else None
+        lost = above is not bone.parent and above is not None
+        found.append((bone.name, above.name if lost else None, offset, _depth(bone)))
+    return [f[:3] for f in sorted(found, key=lambda f: f[3])]
+
+
+def _depth(bone):
+    return len(bone.parent_recursive)
+
+
+def _number(rig, names, moved):
+    """The new joint numbers on the bones, also on copies that the user made of them."""
+    by_name = {name: joint for joint, name in enumerate(names)}
+    for bone in rig.data.bones:
+        former = bone.get(parts.JOINT)
+        if bone.name in by_name:
+            bone[parts.JOINT] = by_name[bone.name]
+        elif former is not None:
+            there = moved[former] if former < len(moved) else -1
+            if there >= 0:
+                bone[parts.JOINT] = there
+            else:
+                del bone[parts.JOINT]
+
+
+def _release(change, moved):
+    """Joints that the new file no longer moves go back to rest: nobody else holds them."""
+    owned = change.after.owned
+    for joint in change.before.owned:
+        there = moved[joint]
+        if there >= 0 and there not in owned:
+            change.rig.pose.bones[change.new_bones[there]].matrix_basis.identity()
+
+
+def rename_groups(change, item):
+    """Vertex groups of a mesh that was built apart, named as the bones are named here."""
+    labels = change.new.armature.labels
+    real = {label: change.new_bones[k] for k, label in enumerate(labels)}
+    for group in item.vertex_groups:
+        wanted = real.get(group.name, group.name)
+        if wanted != group.name:
+            group.name = wanted
+
+
+def replace_control_places(context, change):
+    """Move the bones of the control armature to the new face, unless the user moved them."""
+    old = armatures.control_places(change.old)
+    new = armatures.control_places(change.new)
+    controls = parts.controls_of(change.rig)
+    near = change.old.size * 1e-5
+    movable = [
+        name
+        for name, (position, *_rest) in old.items()
+        if name in controls.data.bones
+        and not np.allclose(old[name][0], new[name][0], atol=1e-9)
+        and np.allclose(controls.data.bones[name].head_local, position, atol=near)
+    ]
+    if not movable:
+        return
+    if controls.data.users > 1:
+        controls.data = controls.data.copy()
+    with armatures.edit_armature(context, controls.data) as edit_bones:
+        for name in movable:
+            position, axis, length, _parent = new[name]
+            bone = edit_bones[name]
+            bone.head = position
+            bone.tail = Vector(position) + Vector(axis) * length

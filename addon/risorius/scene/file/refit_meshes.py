@@ -1,0 +1,451 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Meshes and shape keys of one file become those of another, in the same objects and datablocks."""
+
+from dataclasses import dataclass, field
+
+import bmesh
+import bpy
+import numpy as np
+
+from ...logic.character import user_edits
+from ..base import parts
+from ..character import build, meshes, runtime, skin_weights
+from . import transfer
+
+_BOUND = {
+    "HOOK",
+    "SURFACE_DEFORM",
+    "MESH_DEFORM",
+    "LAPLACIANDEFORM",
+    "CORRECTIVE_SMOOTH",
+    "MULTIRES",
+}
+
+
+@dataclass
+class Shape:
+    """Positions of a mesh object as the user left them.
+
+    Attributes:
+        points: float32[V, 3] the basis.
+        moved: float64[V, 3] the user's edit of the basis.
+        keys: key name -> float32[V, 3]; without those of ours that are as in the file.
+        relative: key name -> name of the key it is relative to.
+        channels: name of a key of ours -> its old channel.
+        edits: name of an edited key of ours -> float64[V, 3].
+        own: the user's keys.
+    """
+
+    points: object
+    moved: object
+    keys: dict = field(default_factory=dict)
+    relative: dict = field(default_factory=dict)
+    channels: dict = field(default_factory=dict)
+    edits: dict = field(default_factory=dict)
+    own: list = field(default_factory=list)
+
+
+def replace_meshes(change, fresh_meshes):
+    """Move the new file's meshes into the objects that are there.
+
+    Args:
+        change: replace.Change.
+        fresh_meshes: new mesh number -> the object that was built for it.
+
+    Returns:
+        The new mesh numbers that have found an object.
+    """
+    moved = change.mesh_map()
+    old_plans = {m.index: m for m in change.old.meshes}
+    new_plans = {m.index: m for m in change.new.meshes}
+    kept, done = set(), []
+    for item in [m for m in parts.meshes_pointing_at(change.rig) if parts.MESH in m]:
+        index = item[parts.MESH]
+        old = old_plans.get(index)
+        there = moved[index] if index < len(moved) else -1
+        if there not in fresh_meshes or old is None:
+            _leave(change, item, old)
+            continue
+        new = new_plans[there]
+        if item.data not in done:
+            _refit(change, item, old, new, fresh_meshes[there])
+            done.append(item.data)
+        _relabel(item, new)
+        kept.add(there)
+    return kept
+
+
+def _relabel(item, new):
+    item[parts.MESH] = new.index
+    if list(item.get(parts.LODS, [])) != list(new.lods):
+        item[parts.LODS] = list(new.lods)
+
+
+def _faces_of(mesh):
+    corners, starts = np.empty(len(mesh.loops), np.int32), np.empty(len(mesh.polygons), np.int32)
+    mesh.loops.foreach_get("vertex_index", corners)
+    mesh.polygons.foreach_get("loop_start", starts)
+    return corners, starts
+
+
+def has_faces_of(mesh, plan):
+    """Whether a mesh has the vertices and faces of a MeshPlan."""
+    corners, starts = _faces_of(mesh)
+    return (
+        len(mesh.vertices) == len(plan.positions)
+        and np.array_equal(corners, plan.corners)
+        and np.array_equal(starts, plan.face_starts)
+    )
+
+
+def _refit(change, item, old, new, fresh):
+    """One mesh: faces, weights, layers, then shapes."""
+    mesh = item.data
+    known = len(mesh.vertices) == len(old.positions)
+    same = has_faces_of(mesh, old) and has_faces_of(mesh, new)
+    counted = known and len(old.positions) == len(new.positions)
+    shape = read_shape(change.before, item, old, known)
+    if same:
+        bearer = transfer.SameVertices()
+        _refit_weights(change, item, old, new)
+        _refit_corners(change, item, old, new, fresh)
+    else:
+        _back_up(change, item, old, shape, known)
+        base = old.positions if known else shape.points
+        surface = transfer.OldSurface(mesh, base)
+        if counted or not surface.usable:
+            bearer = transfer.SameVertices() if counted else _Nothing(len(new.positions))
+        else:
+            where = np.asarray(new.positions, np.float64)
+            bearer = transfer.Nearest(surface.points, surface.triangles, where)
+        _rebuild(change, item, new, fresh, surface, bearer)
+    _refit_shape(change, item, shape, new, bearer)
+    mesh.update()
+
+
+class _Nothing:
+    """There is no surface that anything could be carried from."""
+
+    def __init__(self, count):
+        self._count = count
+
+    def vertices(self, values):
+        """Zeros."""
+        return np.zeros((self._count, *np.shape(values)[1:]))
+
+    def nearest_vertices(self, indices):
+        """The same numbers, as far as there are that many."""
+        return [min(i, self._count - 1) for i in indices]
+
+
+def read_shape(live, item, old, known):
+    """What the user made of a mesh's positions, told from what the old file gives.
+
+    Args:
+        live: Runtime of the old file.
+        item: mesh object.
+        old: its MeshPlan in the old file.
+        known: whether it still has as many vertices as in the file.
+    """
+    points = meshes.basis_of(item)
+    shape = Shape(points, np.zeros(points.shape))
+    if known:
+        mask = user_edits.changed(points, old.positions)
+        shape.moved[mask] = points.astype(np.float64)[mask] - old.positions[mask]
+    key = item.data.shape_keys
+    if key is None:
+        return shape
+    dna_mesh = live.dna.meshes[old.index]
+    deltas = meshes.deltas_by_channel(dna_mesh, live.space.delta_matrix)
+    shape.channels = meshes.real_channels(item)
+    summed = meshes.live_block(item)
+    bases = {block.relative_key.name for block in key.key_blocks}
+    for block in key.key_blocks:
+        shape.relative[block.name] = block.relative_key.name
+        channel = shape.channels.get(block.name)
+        if channel is None:
+            if block not in (summed, key.reference_key):
+                shape.own.append(block.name)
+        elif known:
+            nothing = (np.zeros(0, np.int64), np.zeros((0, 3), np.float32))
+            mask, difference = meshes.edits_of(block, old.positions, deltas.get(channel, nothing))
+            if mask.any():
+                shape.edits[block.name] = difference
+        edited = block.name in shape.edits or block.vertex_group
+        if channel is None or edited or block.name in bases or not known:
+            shape.keys[block.name] = meshes.points_of(block)
+    return shape
+
+
+def _own_groups(change, item):
+    ours = set(change.old_bones) | set(change.new_bones)
+    return [g.name for g in item.vertex_groups if g.name not in ours]
+
+
+def _things(change, item, old, shape, known):
+    """Words for what the user has put onto a mesh."""
+    layers, lost = transfer.own_attributes(item.data)
+    things = {
+        "its own faces": not known or (old is not None and not has_faces_of(item.data, old)),
+        "an edited neutral": bool(shape.moved.any()),
+        "edited shape keys": bool(shape.edits),
+        "own shape keys": bool(shape.own),
+        "own layers": bool(layers or lost),
+        "own vertex groups": bool(_own_groups(change, item)),
+    }
+    if old is not None and known:
+        wanted = skin_weights.file_pairs(old, change.old_bones)
+        things["edited weights"] = bool(
+            skin_weights.edited_vertices(skin_weights.read(item), wanted)
+        )
+    return [words for words, there in things.items() if there]
+
+
+def _back_up(change, item, old, shape, known):
+    """Keep a copy of a mesh that bears something of the user's and gets other faces."""
+    things = _things(change, item, old, shape, known)
+    bound = [m.name for m in item.modifiers if m.type in _BOUND]
+    if bound:
+        change.report.append(f"{item.name} has new faces: bind {', '.join(bound)} again.")
+    if not things:
+        return
+    copy = item.data.copy()
+    copy.name = f"{item.data.name} before replace"
+    copy.use_fake_user = True
+    change.report.append(
+        f"{item.name} has new faces: {', '.join(things)} were carried over by the nearest point "
+        f"as far as that goes; the mesh {copy.name} keeps them as they were."
+    )
+
+
+def _leave(change, item, old):
+    """A mesh that the new file has not: away with it, unless it bears something of the user's."""
+    label = item.name
+    known = old is not None and len(item.data.vertices) == len(old.positions)
+    things = ["its unknown origin"]
+    if old is not None:
+        shape = read_shape(change.before, item, old, known)
+        things = _things(change, item, old, shape, known)
+    things += [m.name for m in item.modifiers if m.type != "ARMATURE"]
+    things += [c.name for c in (*item.constraints, *item.children)]
+    if item.animation_data is not None:
+        things.append("its animation")
+    if not things:
+        data = item.data
+        bpy.data.objects.remove(item)
+        if data.users == 0:
+            bpy.data.meshes.remove(data)
+        change.report.append(f"The mesh {label} is gone.")
+        return
+    live = meshes.live_block(item)
+    if live is not None:
+        live.value = 0.0
+    for key in (parts.RIG, parts.MESH, parts.LODS, parts.MODE):
+        item.pop(key, None)
+    item.hide_viewport = item.hide_render = True
+    change.report.append(
+        f"The mesh {label} is gone from the file; it stays, hidden, for {', '.join(things)}."
+    )
+
+
+def _refit_weights(change, item, old, new):
+    """The new file's weights, except at vertices where the user painted."""
+    before = skin_weights.file_pairs(old, change.old_bones)
+    after = skin_weights.file_pairs(new, change.new_bones)
+    if before == after:
+        return
+    present = skin_weights.read(item)
+    painted = skin_weights.edited_vertices(present, before)
+    masks = _masks(item)
+    groups = {}
+    for name in {*before, *after} - masks:
+        groups[name] = {v: w for v, w in after.get(name, {}).items() if v not in painted}
+        groups[name].update({v: w for v, w in present.get(name, {}).items() if v in painted})
+    skin_weights.write(item, groups)
+    for name in [n for n in groups if not groups[n] and n not in after]:
+        item.vertex_groups.remove(item.vertex_groups[name])
+    if painted:
+        change.report.append(f"{item.name} keeps your weights at {len(painted)} vertices.")
+
+
+def _masks(item):
+    """Vertex groups that modifiers and keys use by their names."""
+    used = {m.vertex_group for m in item.modifiers if getattr(m, "vertex_group", "")}
+    key = item.data.shape_keys
+    used.update(b.vertex_group for b in key.key_blocks if b.vertex_group) if key else None
+    return used
+
+
+def _refit_corners(change, item, old, new, fresh):
+    """UVs, normals and the materials' attributes, where the files differ."""
+    mesh = item.data
+    layer = mesh.uv_layers.get("UVMap")
+    if new.uvs is not None and not _equal(old.uvs, new.uvs):
+        flat = np.empty(len(mesh.loops) * 2, np.float32)
+        if layer is not None:
+            layer.uv.foreach_get("vector", flat)
+        if layer is None or _equal(flat.reshape(-1, 2), old.uvs):
+            layer = layer or mesh.uv_layers.new(name="UVMap", do_init=False)
+            layer.uv.foreach_set("vector", new.uvs.ravel())
+        else:
+            change.report.append(f"{item.name} keeps your UV map; the file has another now.")
+    if not _equal(old.positions, new.positions):
+        _copy_attributes(mesh, fresh.data)
+    if _equal(old.normals, new.normals) and _equal(old.positions, new.positions):
+        return
+    if mesh.has_custom_normals and new.normals is not None:
+        mesh.normals_split_custom_set(new.normals)
+
+
+def _equal(a, b):
+    return (a is None and b is None) or (a is not None and b is not None and np.array_equal(a, b))
+
+
+def _copy_attributes(mesh, source):
+    """The attributes that our materials read."""
+    for theirs in [a for a in source.attributes if a.name.startswith(transfer.OUR_PREFIX)]:
+        kind = (theirs.name, theirs.data_type, theirs.domain)
+        ours = mesh.attributes.get(theirs.name) or mesh.attributes.new(*kind)
+        flat = np.empty(len(theirs.data) * 3, np.float32)
+        theirs.data.foreach_get("vector", flat)
+        ours.data.foreach_set("vector", flat)
+
+
+def _rebuild(change, item, new, fresh, surface, bearer):
+    """Exchange the faces inside the datablock: keys, drivers and pointers to it stay."""
+    mesh = item.data
+    own = {n: v for n, v in skin_weights.read(item).items() if n in _own_groups(change, item)}
+    count = len(mesh.vertices)
+    parents = [o for o in item.children if o.parent_type in {"VERTEX", "VERTEX_3"}]
+    edit = bmesh.new()
+    try:
+        edit.from_mesh(fresh.data, use_shape_key=False)
+        deform = edit.verts.layers.deform.active
+        if deform is not None:
+            edit.verts.layers.deform.remove(deform)  # its numbers are of other groups
+        edit.to_mesh(mesh)
+    finally:
+        edit.free()
+    if fresh.data.has_custom_normals and new.normals is not None:
+        mesh.normals_split_custom_set(new.normals)
+    after = skin_weights.file_pairs(new, change.new_bones)
+    for name, values in own.items():
+        dense = np.zeros(count)
+        dense[list(values)] = list(values.values())
+        given = bearer.vertices(dense)
+        after[name] = {int(v): float(given[v]) for v in np.flatnonzero(given > 1e-6)}
+    skin_weights.write(item, after)
+    for name in set(change.old_bones) - set(after) - _masks(item):
+        group = item.vertex_groups.get(name)
+        if group is not None:
+            item.vertex_groups.remove(group)
+    surface.give(mesh, new.positions, bearer)
+    for child in parents:
+        child.parent_vertices = bearer.nearest_vertices(list(child.parent_vertices))
+
+
+def _refit_shape(change, item, shape, new, bearer):
+    """The new neutral with the user's edits, and every key on top of it."""
+    channel_map = change.channel_map()
+    dna_mesh = change.after.dna.meshes[new.index]
+    deltas = meshes.deltas_by_channel(dna_mesh, change.after.space.delta_matrix)
+    basis = _added(new.positions, bearer.vertices(shape.moved))
+    item.data.vertices.foreach_set("co", basis.ravel())
+    key = item.data.shape_keys
+    if key is None:
+        return
+    _drop_gone_keys(change, item, shape, channel_map, deltas)
+    done = {key.reference_key.name: basis}
+    bases = set(shape.relative.values())
+    for block in key.key_blocks:
+        points = _points(block.name, shape, done, deltas, channel_map, bearer)
+        block.points.foreach_set("co", points.ravel())
+        if block.name not in bases:
+            del done[block.name]  # hundreds of keys would fill the memory
+    _renumber(key, channel_map)
+
+
+def _added(points, moves):
+    """Float32 positions with moves on top; those without a move bit for bit as they were."""
+    result = points.copy()
+    rows = np.any(moves != 0, axis=1)
+    result[rows] = (points[rows].astype(np.float64) + moves[rows]).astype(np.float32)
+    return result
+
+
+def _points(name, shape, done, deltas, channel_map, bearer):
+    """New coordinates of a key, its relative key's first; kept in `done`."""
+    if name in done:
+        return done[name]
+    above = shape.relative[name]
+    done[name] = None  # a circle of relative keys ends here
+    base = _points(above, shape, done, deltas, channel_map, bearer)
+    if base is None:
+        base = next(p for p in done.values() if p is not None)
+    channel = shape.channels.get(name)
+    there = channel_map[channel] if channel is not None and channel < len(channel_map) else -1
+    if there >= 0 and there in deltas:
+        points = user_edits.shaped(base, *deltas[there])
+        if name in shape.edits:
+            points = _added(points, bearer.vertices(shape.edits[name]))
+    else:
+        delta = shape.keys[name].astype(np.float64) - shape.keys[above]
+        points = _added(base, bearer.vertices(delta))
+    done[name] = points
+    return points
+
+
+def _drop_gone_keys(change, item, shape, channel_map, deltas):
+    """Our keys of channels that are gone: away, or the user's from now on if edited."""
+    key = item.data.shape_keys
+    needed = {above for name, above in shape.relative.items() if name in shape.own}
+    for name, channel in shape.channels.items():
+        if channel < len(channel_map) and channel_map[channel] in deltas:
+            continue
+        block = key.key_blocks[name]
+        if name in shape.edits or name in needed or block.vertex_group:
+            path = f'key_blocks["{bpy.utils.escape_identifier(name)}"].value'
+            key.driver_remove(path)
+            block.value = 0.0
+            shape.edits.pop(name, None)
+            change.report.append(
+                f"The shape {name} of {item.name} is gone from the file; your edited key stays."
+            )
+        else:
+            meshes.remove_channel_key(item, block)
+
+
+def _renumber(key, channel_map):
+    """Lists of channels that a Key keeps."""
+
+    def there(channel):
+        return channel_map[channel] if channel < len(channel_map) else -1
+
+    for name in (parts.REAL, parts.KEY_ORDER):
+        if name in key:
+            moved = [there(int(c)) for c in key[name] if there(int(c)) >= 0]
+            if moved:
+                key[name] = moved
+            else:
+                del key[name]
+    if parts.KEY_NAMES in key:
+        given = dict(key[parts.KEY_NAMES])
+        key[parts.KEY_NAMES] = {
+            str(there(int(c))): n for c, n in given.items() if there(int(c)) >= 0
+        }
+
+
+def finish_shapes(change):
+    """Make the keys that are new, or the channel sum, once all drivers are in their places."""
+    live = runtime.of(change.rig)
+    labels = build.channel_labels(live.dna)
+    there = parts.meshes_of(change.rig)
+    built = {m[parts.MESH] for m in there}
+    known = {i for i in change.mesh_map() if i >= 0}
+    modes = [m.get(parts.MODE) for m in there if m[parts.MESH] in known & built]
+    usual = max(set(modes), key=modes.count) if modes else "LIVE"
+    for item in there:
+        mode = item.get(parts.MODE, usual) if item[parts.MESH] in known else usual
+        meshes.set_mode(
+            item, change.rig, live.dna.meshes[item[parts.MESH]], live.space, labels, mode
+        )

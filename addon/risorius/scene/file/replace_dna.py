@@ -1,0 +1,285 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Another file takes the place of a character's file, in the same objects.
+
+The new character is built beside the old one first, so that a bad file changes nothing. Then its
+numbers move into the objects, meshes, keys and bones that are there: whatever points at them
+stays, and so does everything that is not the file's.
+"""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import bpy
+
+from ...logic.base import names
+from ...logic.base.errors import FaceError
+from ...logic.character import plans, user_edits
+from ..base import drivers, parts
+from ..character import armatures, build, lods, runtime
+from ..life import duplicates
+from . import refit_joints, refit_meshes
+
+
+class ReplaceError(FaceError):
+    """A character that cannot be replaced; the text is one sentence for users."""
+
+
+@dataclass
+class Change:
+    """What replaces what.
+
+    Attributes:
+        rig: the deforming armature that stays.
+        before, after: Runtimes of the two files.
+        old, new: CharacterPlans of the two files.
+        bone_names: name of the bone of each joint of the old, then of the new file.
+        report: sentences.
+    """
+
+    rig: object
+    before: object
+    after: object
+    old: object
+    new: object
+    old_bones: list = field(default_factory=list)
+    new_bones: list = field(default_factory=list)
+    report: list = field(default_factory=list)
+
+    def channel_map(self):
+        """New channel of each old one, -1 where it is gone."""
+        return user_edits.index_map(
+            *(build.channel_labels(r.dna) for r in (self.before, self.after))
+        )
+
+    def mesh_map(self):
+        """New mesh of each old one, -1 where it is gone."""
+        return user_edits.index_map(
+            *(names.unique_labels(r.dna.mesh_names) for r in (self.before, self.after))
+        )
+
+
+def replace_file(context, rig, path, progress=lambda _share: None):
+    """Put a DNA file in the place of a character's file.
+
+    Args:
+        context: a Blender context with scene and view layer.
+        rig: deforming armature of the character.
+        path: of the DNA file; may be the same as before.
+        progress: called with 0..1.
+
+    Returns:
+        Sentences on what is new, what is gone, and where the user's things are now.
+
+    Raises:
+        ReplaceError: the character cannot be changed now.
+        DnaError, PlanError, SpaceError: the file is bad; nothing was changed.
+    """
+    _check(rig)
+    with armatures.kept_selection(context):
+        before = runtime.of(rig)
+        unit = runtime.unit_of(rig)
+        levels = tuple(lods.built(rig)) or (0,)
+        old = plans.plan_character(before.dna, rig.name, levels, unit, before.rests)
+        fresh, warnings = build.import_file(
+            context, path, _options(rig, levels, unit), lambda share: progress(share * 0.7)
+        )
+        after = runtime.of(fresh)
+        now = tuple(lods.built(fresh))
+        new = plans.plan_character(after.dna, rig.name, now, unit, after.rests)
+        change = Change(rig, before, after, old, new, report=list(warnings))
+        _exchange(context, change, fresh)
+        progress(0.95)
+    context.view_layer.update()
+    _keep_report(change)
+    return change.report
+
+
+def _check(rig):
+    controls = parts.controls_of(rig)
+    if runtime.of(rig) is None or controls is None:
+        raise ReplaceError(f"{rig.name} has lost its data or its control armature.")
+    for item in (rig, controls, *parts.meshes_of(rig)):
+        if item.library or item.override_library or item.data.library:
+            raise ReplaceError(f"{item.name} is linked: replace it in the file that it is from.")
+        if item.mode == "EDIT":
+            raise ReplaceError(f"{item.name} is in edit mode: leave that first.")
+
+
+def _options(rig, levels, unit):
+    meshes = parts.meshes_of(rig)
+    return build.BuildOptions(
+        lods=levels,
+        mode="LIVE",
+        normals=any(m.data.has_custom_normals for m in meshes) or not meshes,
+        unit=unit,
+        nearest_lods=True,
+    )
+
+
+def _exchange(context, change, fresh):
+    """Move everything of the new character into the old one, and take the rest away."""
+    rig = change.rig
+    refit_joints.replace_joints(context, change)
+    fresh_meshes = {m[parts.MESH]: m for m in parts.meshes_of(fresh)}
+    kept = refit_meshes.replace_meshes(change, fresh_meshes)
+    _take_properties(change, fresh)
+    _sliders(change)
+    entries = drivers.Entries(rig, _array_labels(change))
+    build.settle(context, rig, parts.controls_of(rig))
+    entries.move()
+    _report_entries(change, entries)
+    for index in [i for i in fresh_meshes if i not in kept]:
+        _adopt(change, fresh, fresh_meshes[index])
+    refit_meshes.finish_shapes(change)
+    _number_meshes(rig)
+    lods.show(rig)
+    refit_joints.replace_control_places(context, change)
+    build.remove(fresh)
+    lods.show(rig)
+    runtime.forget_outputs()
+    for item in (rig, parts.controls_of(rig), *parts.meshes_of(rig)):
+        item.update_tag()
+
+
+def _array_labels(change):
+    runs = (change.before, change.after)
+    return {
+        parts.CHANNELS: tuple(build.channel_labels(r.dna) for r in runs),
+        parts.MAPS: tuple(names.unique_labels(r.dna.animated_map_names) for r in runs),
+    }
+
+
+def _report_entries(change, entries):
+    gone = set(entries.gone)
+    for array, what in ((parts.CHANNELS, "blend shape"), (parts.MAPS, "animated map")):
+        old, new = _array_labels(change)[array]
+        for label in [x for x in old if x not in new]:
+            tail = ": what it drove reads 0 now" if label in gone else ""
+            change.report.append(f"The {what} {label} is gone{tail}.")
+        added = [x for x in new if x not in old]
+        if added:
+            change.report.append(f"New {what}s: {', '.join(added)}.")
+
+
+def _take_properties(change, fresh):
+    """The file itself, its arrays, and what the armatures say about it."""
+    rig, controls = change.rig, parts.controls_of(change.rig)
+    text, former = fresh[parts.DNA], rig[parts.DNA]
+    label = former.name
+    parts.point(rig, parts.DNA, text)
+    rig[parts.SOURCE] = fresh[parts.SOURCE]
+    # The new character loses its pointer, or its removal would take the Text along.
+    del fresh[parts.DNA]
+    used = [r.get(parts.DNA) for r in parts.rigs()]
+    if former not in used:
+        bpy.data.texts.remove(former)
+        if used.count(text) == 1:  # a Text that others share keeps its name
+            text.name = label
+    for name in armatures.LIVE_PROPERTIES:
+        if len(rig[name]) != len(fresh[name]):
+            del rig[name]  # an overridable array keeps its length
+            rig[name] = [0.0] * len(fresh[name])
+        rig.property_overridable_library_set(f'["{name}"]', True)
+    levels = sorted({lod for mesh in change.new.meshes for lod in mesh.lods})
+    for key in (parts.LOD, parts.LOD_RENDER):
+        if rig.get(key, lods.SAME) not in (*levels, lods.SAME):
+            rig[key] = levels[0]
+    # Bones, channels and maps have other numbers now: nothing that was written before counts.
+    runtime.forget_outputs()
+    for key in change.old.origin:
+        controls.data.pop(names.cut(f"dna_{key}"), None)
+    for key, value in change.new.origin.items():
+        controls.data[names.cut(f"dna_{key}")] = value
+
+
+def _adopt(change, fresh, item):
+    """Let a mesh that is new in the file join the character."""
+    rig = change.rig
+    label = next(m.label for m in change.new.meshes if m.index == item[parts.MESH])
+    was = {names.unique_labels(change.before.dna.mesh_names)[m.index] for m in change.old.meshes}
+    if label in was:
+        change.report.append(f"The mesh {label} was deleted here and stays away.")
+        return
+    for key in [k for k in fresh.keys() if fresh[k] == item]:  # noqa: SIM118  no dict
+        del fresh[key]
+    parts.point(item, parts.RIG, rig)
+    parts.point(rig, f"{parts.MESH_PREFIX}new{item[parts.MESH]:03d}", item)
+    item.parent = rig
+    for modifier in item.modifiers:
+        if modifier.type == "ARMATURE":
+            modifier.object = rig
+    refit_joints.rename_groups(change, item)
+    home = next((m for m in parts.meshes_of(rig) if m != item), rig)
+    for collection in item.users_collection:
+        collection.objects.unlink(item)
+    for collection in home.users_collection:
+        collection.objects.link(item)
+    item.name = item.data.name = f"{rig.name.removesuffix('_rig')}_{label}"
+    duplicates.retarget_materials(item, rig)
+    _share_materials(change, item)
+    change.report.append(f"The mesh {label} is new.")
+
+
+def _share_materials(change, item):
+    """A new level of a part that is there wears that part's material."""
+    by_index = {m.index: m for m in change.new.meshes}
+    base = by_index[item[parts.MESH]].base
+    for other in parts.meshes_of(change.rig):
+        plan = by_index.get(other[parts.MESH])
+        worn = [m for m in other.data.materials if m is not None]
+        if other != item and plan is not None and plan.base == base and worn:
+            for slot in range(len(item.data.materials)):
+                item.data.materials[slot] = worn[slot] if slot < len(worn) else worn[0]
+            return
+
+
+def _number_meshes(rig):
+    """The rig's pointers to its meshes, in the order of the file."""
+    there = sorted(parts.meshes_of(rig), key=lambda m: (m[parts.MESH], m.name))
+    for key in [k for k in rig.keys() if k.startswith(parts.MESH_PREFIX)]:  # noqa: SIM118
+        del rig[key]
+    for number, item in enumerate(there):
+        parts.point(rig, f"{parts.MESH_PREFIX}{number:03d}", item)
+
+
+def _sliders(change):
+    """Sliders of the new file; those that are gone leave, unless something is keyed on them."""
+    controls = parts.controls_of(change.rig)
+    face = controls.pose.bones[parts.FACE]
+    maximum = parts.maximum_of(controls)
+    old = {c.label: c for c in change.old.controls}
+    new = {c.label: c for c in change.new.controls}
+    for label, control in new.items():
+        before = old.get(label)
+        if label not in face:
+            armatures.add_properties(face, [control], maximum)
+        elif before is None or (before.rest, before.lowest) != (control.rest, control.lowest):
+            if before is not None and float(face[label]) == before.rest:
+                face[label] = control.rest
+            armatures.describe_property(face, control, maximum)
+    added = [label for label in new if label not in old]
+    if added:
+        change.report.append(f"New controls: {', '.join(added)}.")
+    gone = [label for label in old if label not in new and label in face]
+    used = drivers.used_controls(controls, gone)
+    for label in gone:
+        if label in used:
+            words = "Not in the present file; its keys are kept"
+            face.id_properties_ui(label).update(description=words)
+            change.report.append(f"The control {label} is gone; its keys and drivers are kept.")
+        else:
+            del face[label]
+            change.report.append(f"The control {label} is gone.")
+
+
+def _keep_report(change):
+    """The report as a Text, and on the console."""
+    name = change.rig.name.removesuffix("_rig")
+    if not change.report:
+        return
+    title = f"{name} replace report"
+    text = bpy.data.texts.get(title) or bpy.data.texts.new(title)
+    lines = [f"{name} is now {Path(change.rig[parts.SOURCE]).name}.", *change.report]
+    text.from_string("\n".join(lines) + "\n")
+    for line in lines:
+        print(f"Risorius: {line}")

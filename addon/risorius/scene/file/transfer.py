@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What users put onto a mesh, carried to another topology by the nearest point of the surface."""
+
+import numpy as np
+from mathutils.bvhtree import BVHTree
+
+from ...logic.character import user_edits
+
+# Attributes that a build makes itself, and Blender's own.
+_OURS = {"position", "UVMap", "custom_normal", "material_index"}
+_SHADING = {"sharp_edge", "sharp_face"}
+OUR_PREFIX = "risorius_"  # of attributes that materials read
+_FIELDS = {
+    "FLOAT": ("value", 1, np.float32),
+    "INT": ("value", 1, np.int32),
+    "BOOLEAN": ("value", 1, bool),
+    "FLOAT2": ("vector", 2, np.float32),
+    "FLOAT_VECTOR": ("vector", 3, np.float32),
+    "FLOAT_COLOR": ("color", 4, np.float32),
+    "BYTE_COLOR": ("color", 4, np.float32),
+}
+
+
+class SameVertices:
+    """Vertex i stays vertex i."""
+
+    def vertices(self, values):
+        """Values per vertex, [V, ...]."""
+        return values
+
+    def nearest_vertices(self, indices):
+        """The vertices that take the place of these."""
+        return indices
+
+
+class Nearest:
+    """Weights of the old surface's vertices for each new vertex.
+
+    Args:
+        old: float64[V, 3] old neutral vertices.
+        triangles: int[T, 3] vertices of the old mesh's triangles.
+        new: float64[W, 3] new neutral vertices.
+    """
+
+    def __init__(self, old, triangles, new):
+        self._old, self._new, self._triangles = old, new, triangles
+        where, weights = nearest_triangles(old, triangles, new)
+        self._corners, self._weights = triangles[where], weights
+
+    def vertices(self, values):
+        """Values per old vertex to values per new vertex, float64[W, ...]."""
+        values = np.asarray(values, np.float64)
+        shape = (len(self._weights), 3) + (1,) * (values.ndim - 1)
+        return np.sum(values[self._corners] * self._weights.reshape(shape), axis=1)
+
+    def nearest_vertices(self, indices):
+        """The new vertices nearest to old ones."""
+        return [
+            int(np.argmin(np.sum((self._new - self._old[i]) ** 2, axis=1))) if i >= 0 else i
+            for i in indices
+        ]
+
+
+def nearest_triangles(points, triangles, queries):
+    """The nearest triangle of each query point, int[n], and barycentric weights float64[n, 3]."""
+    tree = BVHTree.FromPolygons(points.tolist(), triangles.tolist())
+    found = [tree.find_nearest(query) for query in queries.tolist()]
+    where = np.array([hit[2] or 0 for hit in found], np.int64)
+    spots = np.array([hit[0] if hit[0] is not None else (0, 0, 0) for hit in found], np.float64)
+    return where, user_edits.barycentric(spots.reshape(-1, 3), points[triangles[where]])
+
+
+def triangles_of(mesh):
+    """Triangles of a mesh: vertices int[T, 3], corners int[T, 3], face int[T]."""
+    mesh.calc_loop_triangles()
+    count = len(mesh.loop_triangles)
+    result = []
+    for name, width in (("vertices", 3), ("loops", 3), ("polygon_index", 1)):
+        flat = np.empty(count * width, np.int32)
+        mesh.loop_triangles.foreach_get(name, flat)
+        result.append(flat.reshape(-1, width) if width > 1 else flat)
+    return tuple(result)
+
+
+def own_attributes(mesh):
+    """The user's layers of a mesh: (name, type, domain, values) of those that can be carried,
+    and the names of the others."""
+    kept, other = [], []
+    for layer in mesh.attributes:
+        internal = layer.is_internal or layer.name.startswith((".", OUR_PREFIX))
+        if internal or layer.name in _OURS | _SHADING:
+            continue
+        if layer.data_type in _FIELDS and layer.domain in {"POINT", "CORNER", "FACE"}:
+            field, width, kind = _FIELDS[layer.data_type]
+            flat = np.empty(len(layer.data) * width, kind)
+            layer.data.foreach_get(field, flat)
+            kept.append((layer.name, layer.data_type, layer.domain, flat.reshape(-1, width)))
+        else:
+            other.append(layer.name)
+    return kept, other
+
+
+class OldSurface:
+    """What is needed of a mesh before its faces are exchanged.
+
+    Args:
+        mesh: a Mesh, still as it was.
+        points: float32[V, 3] its neutral vertices.
+    """
+
+    def __init__(self, mesh, points):
+        self.points = points.astype(np.float64)
+        self.triangles, self.corners, self.faces = triangles_of(mesh)
+        self.layers, self.lost = own_attributes(mesh)
+        self.materials = np.zeros(len(mesh.polygons), np.int32)
+        mesh.polygons.foreach_get("material_index", self.materials)
+        uvs = mesh.uv_layers
+        self.active = uvs.active.name if uvs.active else ""
+        self.rendered = next((u.name for u in uvs if u.active_render), "")
+        self.colour = mesh.color_attributes.active_color_name
+
+    @property
+    def usable(self):
+        """Whether there is a surface to be near to."""
+        return len(self.triangles) > 0
+
+    def give(self, mesh, points, carry):
+        """Put the user's layers and the faces' materials onto the new faces.
+
+        Args:
+            mesh: the Mesh with its new faces.
+            points: float32[W, 3] its neutral vertices.
+            carry: SameVertices or Nearest.
+        """
+        if not self.usable or not len(mesh.polygons):
+            return
+        points = points.astype(np.float64)
+        corner = np.empty(len(mesh.loops), np.int32)
+        mesh.loops.foreach_get("vertex_index", corner)
+        sizes = np.empty(len(mesh.polygons), np.int32)
+        mesh.polygons.foreach_get("loop_total", sizes)
+        face = np.repeat(np.arange(len(sizes)), sizes)
+        middle = np.zeros((len(sizes), 3))
+        np.add.at(middle, face, points[corner])
+        middle /= sizes[:, None]
+        if self.materials.any():
+            where, _ = nearest_triangles(self.points, self.triangles, middle)
+            mesh.polygons.foreach_set("material_index", self.materials[self.faces[where]])
+        spots = None
+        for name, kind, domain, values in self.layers:
+            if domain == "POINT":
+                given = carry.vertices(values)
+            elif domain == "FACE":
+                where, _ = nearest_triangles(self.points, self.triangles, middle)
+                given = values[self.faces[where]]
+            else:
+                if spots is None:  # a little inside its face, so that seams stay seams
+                    inside = points[corner] * 0.98 + middle[face] * 0.02
+                    spots = nearest_triangles(self.points, self.triangles, inside)
+                given = np.sum(values[self.corners[spots[0]]] * spots[1][..., None], axis=1)
+            _write_layer(mesh, name, kind, domain, given)
+        self._activate(mesh)
+
+    def _activate(self, mesh):
+        if self.active in mesh.uv_layers:
+            mesh.uv_layers.active = mesh.uv_layers[self.active]
+        if self.rendered in mesh.uv_layers:
+            mesh.uv_layers[self.rendered].active_render = True
+        if self.colour and self.colour in mesh.color_attributes:
+            mesh.color_attributes.active_color_name = self.colour
+
+
+def _write_layer(mesh, name, kind, domain, values):
+    field, _width, dtype = _FIELDS[kind]
+    layer = mesh.attributes.get(name) or mesh.attributes.new(name, kind, domain)
+    if dtype is bool:
+        values = np.asarray(values, np.float64) > 0.5
+    elif dtype is np.int32:
+        values = np.rint(values)
+    layer.data.foreach_set(field, np.ascontiguousarray(values, dtype).ravel())

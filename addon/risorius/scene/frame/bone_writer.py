@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A pose's joints to the bones of the deforming armature, in bulk."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from mathutils import Matrix, Quaternion
+
+from ..base import parts
+from ..character import runtime
+
+
+@dataclass
+class Writer:
+    """What writing to the bones of one armature needs, until its bones change.
+
+    Attributes:
+        count: of its bones.
+        where: int64[n] the positions of those that the evaluator owns.
+        space: risorius.BoneSpace of these, in the same order.
+        turning: (name of the control bone, row in these, share of the turn, rest rotation).
+        buffers: channel -> float32 for all bones; None where the evaluator owns every bone.
+    """
+
+    count: int
+    where: object
+    space: object
+    turning: list
+    buffers: dict | None
+
+
+_WIDTHS = {"location": 3, "rotation_quaternion": 4, "scale": 3, "rotation_euler": 3}
+
+
+def write(rig, live, deltas, turns, depsgraph):
+    """Write the joints that the evaluator owns; all others keep what the user gave them.
+
+    Args:
+        rig: the deforming armature, the original.
+        live: its Runtime.
+        deltas: float32[J, 9] of a Pose.
+        turns: "neck" and "head" -> Quaternion in the armature's axes, added on top.
+        depsgraph: where the animated values of all other bones are read.
+
+    Returns:
+        Whether Blender took them: it refuses bulk writes to overrides without a word.
+    """
+    bones = rig.pose.bones
+    writer = writer_of(rig, live)
+    owned = pose_of(writer, deltas, turns)
+    if writer.buffers is None:
+        for name, values in owned.items():
+            bones.foreach_set(name, values.ravel())
+        return _taken(rig, {n: v.ravel() for n, v in owned.items()})
+    # A bulk write that leaves out the animated values of the others would undo them.
+    seen = rig.evaluated_get(depsgraph).pose.bones
+    source = seen if len(seen) == writer.count else bones
+    for name, flat in writer.buffers.items():
+        source.foreach_get(name, flat)
+        if name in owned:
+            flat.reshape(-1, _WIDTHS[name])[writer.where] = owned[name]
+        bones.foreach_set(name, flat)
+    return _taken(rig, writer.buffers)
+
+
+def pose_of(writer, deltas, turns):
+    """The channels of the bones that the evaluator owns.
+
+    Args:
+        writer: see writer_of.
+        deltas, turns: as for `write`.
+
+    Returns:
+        "location", "rotation_quaternion", "scale" -> float32[n, width].
+    """
+    location, rotation, scale = writer.space.evaluate(deltas)
+    for name, row, share, rest in writer.turning:
+        if name in turns:
+            part = Quaternion().slerp(turns[name], share) if share < 1.0 else turns[name]
+            rotation[row] = (rest.inverted() @ part @ rest) @ Quaternion(rotation[row])
+    return {"location": location, "rotation_quaternion": rotation, "scale": scale}
+
+
+def _taken(rig, written):
+    if not rig.override_library:
+        return True
+    return all(is_there(rig.pose.bones, name, flat) for name, flat in written.items())
+
+
+def is_there(values, name, wanted):
+    """Whether a bulk read gives what was written. Args: values  a collection of properties."""
+    got = np.empty_like(wanted)
+    values.foreach_get(name, got)
+    return np.array_equal(got, wanted)
+
+
+def writer_of(rig, live):
+    """The Writer of an armature as it is now."""
+    key = ("bones", rig.session_uid)
+    kept = runtime.outputs.get(key)
+    if kept is None or kept.count != len(rig.pose.bones):
+        kept = runtime.outputs[key] = _make_writer(rig, live)
+    return kept
+
+
+def _make_writer(rig, live):
+    kept = rig.data.bones  # by name: after undo PoseBone.bone may point into freed memory
+    joints = [kept[b.name].get(parts.JOINT, -1) if b.name in kept else -1 for b in rig.pose.bones]
+    where = [i for i, joint in enumerate(joints) if joint in live.owned]
+    row_of = {joints[i]: row for row, i in enumerate(where)}
+    shares = [("neck", joint, 1.0 / len(live.anchors.neck)) for joint in live.anchors.neck]
+    if live.anchors.head is not None:
+        shares.append(("head", live.anchors.head, 1.0))
+    turning = [
+        (name, row_of[joint], share, Matrix(live.rest[joint][:3, :3].tolist()).to_quaternion())
+        for name, joint, share in shares
+        if joint in row_of
+    ]
+    buffers = None
+    if len(where) < len(joints):
+        buffers = {n: np.empty(len(joints) * w, np.float32) for n, w in _WIDTHS.items()}
+    return Writer(
+        count=len(joints),
+        where=np.array(where, np.int64),
+        space=live.bone_space([joints[i] for i in where]),
+        turning=turning,
+        buffers=buffers,
+    )

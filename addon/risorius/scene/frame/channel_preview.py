@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A channel's test override: one blend shape set by hand, until anything else happens.
+
+It lives on the deforming armature together with what it was set under: the frame and the
+controls' values. Where either is another one it is over, so that no frame ever depends on a test
+that was forgotten; saving, rendering and loading end it too.
+"""
+
+import hashlib
+
+from ..base import parts
+from ..character import runtime
+
+
+def set_override(rig, channel, value):
+    """Override the weight of one channel; the caller evaluates afterwards.
+
+    Args:
+        rig: deforming armature.
+        channel: index of the channel.
+        value: its weight.
+    """
+    rig[parts.TEST] = {"channel": int(channel), "value": float(value), "under": ""}
+
+
+def clear(rig):
+    """End the override of a character. Returns whether there was one."""
+    if parts.TEST not in rig:
+        return False
+    del rig[parts.TEST]
+    return True
+
+
+def clear_all():
+    """End the overrides of all characters and bring the faces up without them."""
+    ended = [rig for rig in parts.rigs() if clear(rig)]
+    for rig in ended:
+        runtime.forget_outputs()
+        controls = parts.controls_of(rig)
+        if controls is not None:
+            controls.update_tag()
+    return bool(ended)
+
+
+def current(rig):
+    """The override: (channel, value), or None."""
+    kept = rig.get(parts.TEST) if rig is not None else None
+    return (int(kept["channel"]), float(kept["value"])) if kept is not None else None
+
+
+def override(rig, raw, scene):
+    """The override that holds for this evaluation; ends one whose time is over.
+
+    Args:
+        rig: deforming armature.
+        raw: float32[R] raw controls.
+        scene: the evaluated scene.
+
+    Returns:
+        (channel, value), or None.
+    """
+    kept = rig.get(parts.TEST)
+    if kept is None:
+        return None
+    digest = hashlib.sha1(raw.tobytes(), usedforsecurity=False).hexdigest()
+    under = f"{scene.frame_current_final:.6f} {digest}"
+    if not kept["under"]:
+        kept["under"] = under
+    elif kept["under"] != under:
+        clear(rig)
+        return None
+    return int(kept["channel"]), float(kept["value"])
+
+
+def apply(test, weights):
+    """Write an override into a pose's channel weights, in place; None changes nothing."""
+    if test is not None and test[0] < len(weights):
+        weights[test[0]] = test[1]

@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Controls -> pose -> scene. Every frame is a function of the controls at that frame alone.
+
+Values are read from the evaluated objects of the depsgraph that is passed in (the originals
+are stale while an animation renders) and written to the originals, in bulk.
+"""
+
+from time import perf_counter
+
+from ... import native
+from ..base import parts
+from ..character import lods, meshes, rig_placement, runtime
+from . import bone_writer, channel_preview, inputs, timing
+
+
+def evaluate_all(depsgraph, force=False):
+    """Bring every character of this file up to its controls.
+
+    Args:
+        depsgraph: the evaluated dependency graph to read from.
+        force: write also what seems unchanged.
+    """
+    if native.problem() or runtime.is_paused():
+        return
+    for rig in parts.rigs():
+        evaluate(rig, depsgraph, force)
+
+
+def evaluate(rig, depsgraph, force=False):
+    """Bring one character up to its controls.
+
+    Args:
+        rig: its deforming armature, the original.
+        depsgraph: the evaluated dependency graph to read from.
+        force: write also what seems unchanged.
+
+    Returns:
+        Whether there was anything to write.
+    """
+    controls = None if parts.BAKED in rig else parts.controls_of(rig)  # baked: its actions move it
+    live = runtime.of(rig) if controls is not None else None
+    if live is None:
+        return False
+    times = [perf_counter()]
+    seen = controls.evaluated_get(depsgraph)
+    if not seen.is_evaluated and not rig.evaluated_get(depsgraph).is_evaluated:
+        return False  # it is not in this scene
+    if parts.FACE not in seen.pose.bones:
+        return False  # renamed a moment ago, and not evaluated since
+    raw, turns = inputs.read_inputs(seen, live, depsgraph, parts.maximum_of(controls))
+    rig_placement.follow(rig, seen)
+    lod = min(max(lods.choose(rig, seen, depsgraph), 0), max(live.rig.lod_count - 1, 0))
+    test = channel_preview.override(rig, raw, depsgraph.scene)
+    state = (raw.tobytes(), lod, test, *((name, *turn) for name, turn in turns.items()))
+    if not _changed(rig, "inputs", state) and not force:
+        return False
+    times.append(perf_counter())
+    pose = live.rig.evaluate(raw, lod)
+    channel_preview.apply(test, pose.blend_shapes)
+    times.append(perf_counter())
+    taken = bone_writer.write(rig, live, pose.joints, turns, depsgraph)
+    note_refusal(rig, taken)
+    if not taken:
+        return False  # channels and maps shall not move without the bones
+    _write_values(rig, pose)
+    times.append(perf_counter())
+    for item in parts.meshes_of(rig):
+        if lod in list(item.get(parts.LODS, [lod])):
+            _write_shape(item, live, pose.blend_shapes, force)
+    rig.update_tag(refresh={"OBJECT"})
+    times.append(perf_counter())
+    timing.add(times)
+    return True
+
+
+def bring_up(context, rig):
+    """Show a change that an operator made: bring one character up and evaluate the scene."""
+    context.view_layer.update()
+    evaluate(rig, context.evaluated_depsgraph_get(), force=True)
+    context.view_layer.update()
+
+
+def _changed(item, what, state):
+    key = (what, item.session_uid)
+    if runtime.outputs.get(key) == state:
+        return False
+    runtime.outputs[key] = state
+    return True
+
+
+def note_refusal(item, taken):
+    """Note whether Blender took what was written to an object: it refuses without a word."""
+    key = ("refused", item.session_uid)
+    if taken:
+        runtime.outputs.pop(key, None)
+    else:
+        runtime.outputs[key] = True
+
+
+def refused(rig):
+    """Objects of a character, an override, that Blender lets nobody write to."""
+    return [
+        item
+        for item in (rig, *parts.meshes_of(rig))
+        if ("refused", item.session_uid) in runtime.outputs
+    ]
+
+
+def _write_values(rig, pose):
+    """Write channels and maps to the array properties that drivers read."""
+    for name, values in ((parts.MAPS, pose.animated_maps), (parts.CHANNELS, pose.blend_shapes)):
+        if len(values) and len(rig.get(name, ())) == len(values):
+            rig[name][:] = values.tolist()
+
+
+def _write_shape(item, live, weights, force):
+    """Write the sum of all channels to the live key of a mesh, where it has one."""
+    key = item.data.shape_keys
+    block = meshes.live_block(item)
+    if block is None or item.mode == "EDIT":
+        return
+    index = item.get(parts.MESH, -1)
+    if not 0 <= index < len(live.dna.meshes):
+        return  # the data in the .blend is another file's
+    morph = live.morph(index)
+    if morph.vertex_count != len(block.points):
+        return  # the user changed the topology
+    if parts.REAL in key:
+        weights = weights.copy()
+        weights[list(key[parts.REAL])] = 0.0
+    if not _changed(key, "weights", weights[morph.channel_indices].tobytes()) and not force:
+        return
+    basis = meshes.points_of(key.reference_key)
+    points = morph.evaluate(weights, base=basis)
+    block.points.foreach_set("co", points.ravel())
+    if item.data.library or item.data.override_library:
+        note_refusal(item, bone_writer.is_there(block.points, "co", points.ravel()))
+    key.update_tag()
+    item.data.update_tag()

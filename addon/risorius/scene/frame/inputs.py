@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the animator asks for: sliders, head, neck and eye bones of the control armature."""
+
+import numpy as np
+from mathutils import Matrix, Quaternion, Vector
+
+from ...logic.base.space import yaw_pitch
+from ..animation import layers
+from ..base import parts
+from ..character import rig_placement
+
+_STRAIGHT = Matrix.Identity(4)
+_AHEAD = Vector((0.0, -1.0, 0.0))
+
+
+def read_inputs(seen, live, depsgraph, maximum=1.0):
+    """Read the sliders and bones of an evaluated control armature, with its layers above them.
+
+    Args:
+        seen: the evaluated control armature object.
+        live: the character's Runtime.
+        depsgraph: where the body's bones are read, if the face hangs on one.
+        maximum: what the look controls are clamped to after the eye bones are added.
+
+    Returns:
+        float32[R] raw controls, and joint turns: "neck" and "head" -> Quaternion in the
+        armature's axes, without those that are straight.
+    """
+    raw, own = read_mixed(seen, live, depsgraph, maximum)
+    return complete(seen, live, depsgraph, maximum, raw, own)
+
+
+def read_mixed(seen, live, depsgraph, maximum=1.0):
+    """Read the sliders and the head's bones with the layers above them.
+
+    Args:
+        seen, live, depsgraph, maximum: as of `read_inputs`.
+
+    Returns:
+        float32[R], before the eye bones add to the look controls; and "neck", "head" ->
+        Quaternion in the armature's axes or None, without the body's.
+    """
+    bones = seen.pose.bones
+    raw = read_sliders(seen, live)
+    own = {name: _turn(seen, bones.get(name)) for name in ("neck", "head")}
+    raw, own["head"] = layers.mix(seen, live, raw, own["head"], depsgraph, maximum)
+    return raw, own
+
+
+def complete(seen, live, depsgraph, maximum, raw, own):
+    """Add what the body and the eye bones ask for. Changes raw. Returns: as `read_inputs`."""
+    turns = rig_placement.body_turns(seen.original, depsgraph)
+    for name, turn in own.items():
+        if turn is not None:
+            turns[name] = turns[name] @ turn if name in turns else turn
+    _add_look(seen, live, raw, maximum)
+    return raw, turns
+
+
+def read_sliders(seen, live):
+    """Read the sliders alone, float32[R]; what is no number counts as 0 or rest."""
+    values = dict(seen.pose.bones[parts.FACE].items())
+    rests = live.rests
+    raw = np.array([values.get(label, rests[i]) for i, label in enumerate(live.labels)], np.float32)
+    if not np.isfinite(raw).all():
+        np.nan_to_num(raw, copy=False, nan=0.0, posinf=0.0, neginf=0.0)
+    return raw
+
+
+def _rests(bone):
+    return bone is None or (not bone.constraints and bone.matrix_basis == _STRAIGHT)
+
+
+def _turn(seen, bone):
+    """A bone's own rotation in the armature's axes, or None where it is straight."""
+    if _rests(bone):
+        return None
+    turn = rig_placement.own_turn(seen, bone)
+    return turn if turn.angle else None
+
+
+def _moved(seen, target):
+    """How far the eyes' target was moved, in the armature's axes."""
+    if _rests(target):
+        return Vector()
+    local = seen.convert_space(
+        pose_bone=target, matrix=target.matrix, from_space="POSE", to_space="LOCAL"
+    )
+    return target.bone.matrix_local.to_3x3() @ local.translation
+
+
+def _add_look(seen, live, raw, maximum):
+    """Add what the eye bones and their target ask for to the look controls."""
+    bones = seen.pose.bones
+    target = bones.get("eyes")
+    moved = _moved(seen, target)
+    for side, controls in live.look.items():
+        bone = bones.get(f"eye_{side}")
+        turn = _turn(seen, bone)
+        if bone is None or (turn is None and not moved.length_squared > 1e-18):
+            continue
+        start = target.bone.head_local - bone.bone.head_local if target else _AHEAD
+        before, after = yaw_pitch(start), yaw_pitch(start + moved)
+        own = yaw_pitch((turn or Quaternion()) @ _AHEAD)
+        yaw, pitch = after[0] - before[0] + own[0], after[1] - before[1] + own[1]
+        for index, yaw_at_one, pitch_at_one in controls:
+            asked = yaw / yaw_at_one if yaw_at_one else pitch / pitch_at_one
+            if asked > 1e-6:
+                raw[index] = min(raw[index] + asked, max(maximum, raw[index]))

@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A duplicated character gets materials, shape keys and drivers of its own."""
+
+import bpy
+
+from ..base import parts
+from ..character import armatures, meshes, runtime
+from ..material import materials
+
+
+def separate_all():
+    """Separate every character from those it was copied from.
+
+    Returns:
+        Sentences on what was changed, for a report.
+    """
+    done = []
+    for rig in parts.rigs():
+        done += separate(rig)
+    return done
+
+
+def separate(rig):
+    """Give a character what it still shares with another.
+
+    Args:
+        rig: its deforming armature.
+
+    Returns:
+        Sentences on what was changed.
+    """
+    done = []
+    controls = parts.controls_of(rig)
+    if controls is not None and controls.get(parts.RIG) not in (rig, None):
+        other = controls.get(parts.RIG)
+        if isinstance(other, bpy.types.Object) and other.get(parts.CONTROLS) == controls:
+            done.append(f"{rig.name} follows the controls of {other.name}.")
+    if controls is not None and parts.PULL in rig and not rig.override_library:
+        armatures.pull_controls(rig, controls)
+    copied = {}
+    for item in parts.meshes_pointing_at(rig):
+        done += _own_mesh(item)
+        _own_key_drivers(item, rig)
+        _own_materials(item, rig, copied)
+        modifier = next((m for m in item.modifiers if m.type == "ARMATURE"), None)
+        if modifier is not None and modifier.object is None:
+            modifier.object = rig
+    if copied:
+        done.append(f"{rig.name} was given materials of its own.")
+    return done
+
+
+def _own_mesh(item):
+    """A mesh datablock of its own, where it has shapes that another object shows too."""
+    if item.data.users < 2 or item.data.shape_keys is None:
+        return []
+    users = [o for o in bpy.data.objects if o.data == item.data]
+    if len(users) < 2 or users[0] == item or item.library or item.data.library:
+        return []
+    item.data = item.data.copy()
+    return [f"{item.name} was given a mesh of its own: two faces cannot share live shapes."]
+
+
+def _retarget(curves, rig):
+    changed = False
+    for curve in curves:
+        for variable in curve.driver.variables:
+            for target in variable.targets:
+                if target.id != rig and variable.type == "SINGLE_PROP":
+                    target.id = rig
+                    changed = True
+    return changed
+
+
+def _own_key_drivers(item, rig):
+    key = item.data.shape_keys
+    if key is None or key.animation_data is None:
+        return
+    names = meshes.real_channels(item)
+    paths = {f'key_blocks["{bpy.utils.escape_identifier(n)}"].value' for n in names}
+    if _retarget([c for c in key.animation_data.drivers if c.data_path in paths], rig):
+        runtime.forget_outputs()
+
+
+def retarget_materials(item, rig):
+    """Let the animated maps of a mesh's materials follow another rig."""
+    for slot in item.material_slots:
+        if slot.material is not None:
+            _retarget(materials.map_drivers(slot.material), rig)
+
+
+def _own_materials(item, rig, copied):
+    for slot in item.material_slots:
+        material = slot.material
+        if material is None:
+            continue
+        curves = list(materials.map_drivers(material))
+        foreign = any(t.id != rig for c in curves for v in c.driver.variables for t in v.targets)
+        if not foreign or not curves:
+            continue
+        # The name stays the key while copies are made: a datablock cannot be hashed safely.
+        if material.name not in copied:
+            copied[material.name] = material.copy() if material.users > 1 else material
+        own = copied[material.name]
+        _retarget(materials.map_drivers(own), rig)
+        slot.material = own
+        copied[own.name] = own

@@ -1,0 +1,222 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""When characters are brought up to their controls."""
+
+import bpy
+from bpy.app.handlers import persistent
+
+from ... import native
+from ..animation import layers
+from ..base import parts, sharing
+from ..character import lods, rig_placement, runtime
+from ..frame import channel_preview, evaluate, timing
+from . import applied_transforms, duplicates, migrations, repair
+
+# objects: session uids of those seen; mended: of characters that were mended at the last update.
+_state = {"objects": frozenset(), "busy": False, "mended": set()}
+
+
+@persistent
+def _frame_changes(*_arguments):
+    timing.begin()
+
+
+@persistent
+def _frame_changed(_scene, depsgraph=None):
+    if depsgraph is not None:
+        timing.animated()
+        evaluate.evaluate_all(depsgraph)
+
+
+@persistent
+def _render_ended(*_arguments):
+    """The viewport shows its own level of detail again."""
+    for rig in parts.rigs():
+        controls = parts.controls_of(rig)
+        apart = lods.by_distance(rig) or lods.render_level(rig) != lods.viewport_level(rig)
+        if apart and controls is not None:
+            runtime.forget_outputs()
+            controls.update_tag()
+
+
+@persistent
+def _updated(_scene, depsgraph):
+    """React to edits of control armatures; writes here tag the rig only, so it ends at once."""
+    # While a render runs beside the interface, only its own frames are written.
+    if _state["busy"] or bpy.app.is_job_running("RENDER") or native.problem():
+        return
+    if runtime.is_paused():
+        return
+    _state["busy"] = True
+    try:
+        _notice_copies(depsgraph.updates)
+        _say(sharing.separate())
+        waiting, _state["mended"] = _state["mended"], set()
+        edited = _edited(depsgraph)
+        edited += [rig for rig in parts.rigs() if rig.session_uid in waiting and rig not in edited]
+        if edited:
+            timing.begin()
+        for rig in edited:
+            if _mend(rig):
+                continue  # the evaluated copy knows of it only after the next update
+            evaluate.evaluate(rig, depsgraph)
+    finally:
+        _state["busy"] = False
+
+
+def _mend(rig):
+    done = repair.heal(rig)
+    _say(done)
+    if done:
+        _note_mended(rig)
+    return rig.session_uid in _state["mended"]
+
+
+def _note_mended(rig):
+    _state["mended"].add(rig.session_uid)
+    rig[parts.CONTROLS].update_tag()
+
+
+def _notice_copies(updates):
+    # Their number alone does not tell: as many may go as come in one step.
+    known = _state["objects"]
+    seen = (u.id.original for u in updates if isinstance(u.id, bpy.types.Object))
+    new = any(item.session_uid not in known for item in seen)
+    if new or len(bpy.data.objects) != len(known):
+        _state["objects"] = {item.session_uid for item in bpy.data.objects}
+        runtime.forget_unused(parts.rigs())
+        layers.forget_unused(map(parts.controls_of, parts.rigs()))
+        _say(migrations.bring_up_all())
+        _say(duplicates.separate_all())
+        sharing.keep()
+
+
+def _say(sentences):
+    for sentence in sentences:
+        print(f"Risorius: {sentence}")
+
+
+def _edited(depsgraph):
+    """The characters that the updates concern: by their controls, their body or the camera."""
+    armatures, actions, bones_edited, camera_moved = set(), set(), False, False
+    camera = depsgraph.scene.camera
+    for update in depsgraph.updates:
+        item = update.id.original
+        if isinstance(item, bpy.types.Armature):
+            bones_edited = True
+        elif isinstance(item, bpy.types.Action):
+            actions.add(item)
+        elif isinstance(item, bpy.types.Object):
+            if item.type == "ARMATURE":
+                armatures.add(item)
+            camera_moved |= camera is not None and item == camera.original
+    if bones_edited:
+        runtime.forget_outputs()
+        for rig in repair.heal_all():
+            _note_mended(rig)
+    layers.note_edits(actions)
+    return [rig for rig in parts.rigs() if _concerned(rig, armatures, actions, camera_moved)]
+
+
+def _concerned(rig, armatures, actions, camera_moved):
+    controls = parts.controls_of(rig)
+    hold = rig_placement.body_of(controls) if controls is not None else None
+    return (
+        controls in armatures
+        or (hold is not None and hold.target in armatures)
+        or (camera_moved and lods.by_distance(rig))
+        or (bool(actions) and controls is not None and layers.plays(controls, actions))
+    )
+
+
+@persistent
+def _loaded(*_arguments):
+    """After load: Blender calls no update handler when it evaluates a file for the first time."""
+    layer = bpy.context.view_layer
+    migrations.forget()
+    if not native.problem():
+        _say(migrations.bring_up_all())
+    if layer is not None and not native.problem() and parts.rigs():
+        layer.update()
+        repair.heal_all()
+        runtime.forget_outputs()
+        refresh()
+    _restored()
+
+
+@persistent
+def _restored(*_arguments):
+    """After load, undo and redo: what was written before says nothing about what is there.
+
+    Nothing is read here: until the next update the pose bones of objects that undo brought back
+    point to bones that are no more, and Blender dies of a look at them.
+    """
+    runtime.forget_outputs()
+    layers.forget()
+    applied_transforms.forget()
+    _state["objects"] = frozenset()
+    if native.problem():
+        return
+    for rig in parts.rigs():
+        controls = parts.controls_of(rig)
+        if controls is not None:
+            controls.update_tag()
+
+
+@persistent
+def _before_save(*_arguments):
+    if native.problem():
+        return
+    duplicates.separate_all()
+    _end_tests()
+    repair.remove_dead()
+    _say(sharing.share())
+
+
+@persistent
+def _end_tests(*_arguments):
+    if not native.problem() and channel_preview.clear_all():
+        refresh()
+
+
+def refresh():
+    """Bring all characters up to their controls now, each in the scenes that it is in."""
+    if native.problem() or not parts.rigs():
+        return
+    for scene in bpy.data.scenes:
+        for layer in scene.view_layers:
+            if layer.depsgraph is not None:
+                evaluate.evaluate_all(layer.depsgraph)
+
+
+_HANDLERS = (
+    ("frame_change_pre", _frame_changes),
+    ("frame_change_post", _frame_changed),
+    ("depsgraph_update_post", _updated),
+    ("load_post", _loaded),
+    ("undo_post", _restored),
+    ("redo_post", _restored),
+    ("save_pre", _before_save),
+    ("render_init", _end_tests),
+    ("render_complete", _render_ended),
+    ("render_cancel", _render_ended),
+)
+
+
+def register():
+    """Add the handlers, and bring up what is already there."""
+    _state.update(objects=frozenset(), busy=False, mended=set())
+    for name, handler in _HANDLERS:
+        present = getattr(bpy.app.handlers, name)
+        if handler not in present:
+            present.append(handler)
+
+
+def unregister():
+    """Remove the handlers and drop all compiled data."""
+    for name, handler in reversed(_HANDLERS):
+        present = getattr(bpy.app.handlers, name)
+        if handler in present:
+            present.remove(handler)
+    layers.forget()
+    sharing.forget()
+    runtime.forget()

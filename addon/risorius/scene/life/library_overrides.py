@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Linked characters: an override that can be animated.
+
+Blender refuses bulk writes to linked data and to overrides that are not editable, and to the
+shape keys of every override. So the override is made fully editable, and shapes are either real
+keys, which drivers move without any write, or meshes of this file.
+"""
+
+import bpy
+
+from ...logic.base.errors import FaceError
+from ..base import compat, parts
+from ..character import meshes, runtime
+from ..frame import evaluate
+from . import duplicates
+
+
+def linked_rig(context):
+    """The linked character that the active object shows or belongs to, or None."""
+    item = context.object
+    if item is None:
+        return None
+    if item.instance_type == "COLLECTION" and item.instance_collection is not None:
+        inside = item.instance_collection.all_objects
+        return next((o for o in inside if o.library and parts.is_rig(o)), None)
+    rig = parts.rig_of(item)
+    return rig if rig is not None and rig.library is not None else None
+
+
+def make_override(context, rig, local_meshes=False):
+    """Override a linked character so that it can be animated here.
+
+    Args:
+        context: scene and view layer that get it, and the active object that shows it.
+        rig: the linked deforming armature.
+        local_meshes: copy the meshes into this file; else their real keys are driven.
+
+    Returns:
+        The override's deforming armature, and sentences for a report.
+
+    Raises:
+        FaceError: Blender made no override; the text says of what.
+    """
+    shown = _instance_of(context, rig)
+    root = shown.instance_collection if shown else _linked_root(rig)
+    before = {o.session_uid for o in bpy.data.objects}
+    root.override_hierarchy_create(
+        context.scene, context.view_layer, reference=shown, do_fully_editable=True
+    )
+    new = next(
+        (r for r in parts.rigs() if r.session_uid not in before and _overrides(r, rig)), None
+    )
+    if new is None:
+        raise FaceError(f"Blender made no override of {rig.name}.")
+    if shown is not None:
+        _take_place(shown, new, root)
+    elif isinstance(root, bpy.types.Collection):
+        _unlink(context.scene, root)
+    _show(context, new)
+    return new, own_shapes(new, local_meshes)
+
+
+def repair(context, rig, local_meshes=False):
+    """Make an override that Blender made by itself fully editable.
+
+    Args: see make_override; rig is the override's deforming armature.
+
+    Returns:
+        Sentences for a report.
+    """
+    root = rig.override_library.hierarchy_root
+    kinds = ("objects", "meshes", "armatures", "materials", "collections", "shape_keys")
+    for kind in kinds:
+        for item in getattr(bpy.data, kind):
+            held = item.override_library
+            if held is not None and held.hierarchy_root == root:
+                held.is_system_override = False
+    context.view_layer.update()
+    return own_shapes(rig, local_meshes)
+
+
+def own_shapes(rig, local_meshes):
+    """Let shapes of an override move: meshes of this file where keys cannot be driven.
+
+    Args:
+        rig: the override's deforming armature.
+        local_meshes: for all meshes, not only for those with a live key.
+
+    Returns:
+        Sentences for a report.
+    """
+    done, owned = [], {}
+    for item in parts.meshes_of(rig):
+        live = meshes.live_block(item) is not None
+        if not is_locked(item) or not (live or local_meshes):
+            continue
+        _localize(item, owned)
+        if live and not local_meshes:
+            done.append(f"{item.name} has a live key: its mesh was copied into this file.")
+    duplicates.separate(rig)
+    runtime.forget_outputs()
+    return done
+
+
+def is_locked(item):
+    """Whether the shapes of a mesh object belong to another file."""
+    return item.data.library is not None or item.data.override_library is not None
+
+
+def unlock_shapes(rig):
+    """Copy all meshes whose shapes are locked into this file, before their mode is switched."""
+    owned = {}
+    locked = [item for item in parts.meshes_of(rig) if is_locked(item)]
+    for item in locked:
+        _localize(item, owned)
+    if locked:
+        duplicates.separate(rig)
+    return bool(locked)
+
+
+def trouble(rig):
+    """What Blender refused to let us write on an override; empty when all is well."""
+    names = [item.name for item in evaluate.refused(rig)]
+    if rig.override_library is not None and rig.override_library.is_system_override:
+        names = names or [rig.name]
+    if not names:
+        return ""
+    return f"Blender's override of {', '.join(names)} cannot be written: the face stands still."
+
+
+def _localize(item, owned):
+    """A mesh of this file, with its own copies of those materials that are overrides.
+
+    Without the mesh they would stand outside the override's hierarchy, and Blender would delete
+    them when the library changes. Args: owned  override material's name -> copy, filled here.
+    """
+    left = [item.data, *item.data.materials]
+    item.data = _local_copy(item.data)
+    for index, material in enumerate(item.data.materials):
+        if material is None or material.override_library is None:
+            continue
+        if material.name not in owned:
+            owned[material.name] = _local_copy(material)
+        item.data.materials[index] = owned[material.name]
+    # 5.2 calls overrides that are saved without their hierarchy an error when the file is opened.
+    for old in dict.fromkeys(left):
+        if old is not None and old.override_library is not None and old.users == 0:
+            bpy.data.batch_remove([old])
+
+
+def _local_copy(item):
+    own = item.copy()
+    return own.make_local(clear_liboverride=True) if own.override_library is not None else own
+
+
+def _overrides(item, linked):
+    held = item.override_library
+    return held is not None and held.reference == linked
+
+
+def _instance_of(context, rig):
+    """The active object, where it is an instance of the collection that holds the rig."""
+    item = context.object
+    if item is None or item.library or item.instance_type != "COLLECTION":
+        return None
+    held = item.instance_collection
+    return item if held is not None and rig in held.all_objects[:] else None
+
+
+def _linked_root(rig):
+    """The linked collection that local ones hold, with this rig in it; else the rig itself."""
+    homes = [s.collection for s in bpy.data.scenes if s.library is None]
+    homes += [c for c in bpy.data.collections if c.library is None]
+    for home in homes:
+        for child in home.children:
+            if child.library is not None and rig in child.all_objects[:]:
+                return child
+    return rig
+
+
+def _unlink(scene, collection):
+    """Take a linked collection out of a scene: its override stands there instead."""
+    for home in (scene.collection, *scene.collection.children_recursive):
+        if home.library is None and collection in home.children[:]:
+            home.children.unlink(collection)
+
+
+def _take_place(shown, rig, collection):
+    """Put an override where its instance stood, and let the instance show nothing."""
+    place = shown.matrix_world.copy()
+    shown.instance_collection = None
+    shown.instance_type = "NONE"
+    for item in (rig, parts.controls_of(rig)):
+        if item is not None and item.parent is None:
+            item.matrix_world = place @ item.matrix_world
+    if not shown.children and shown.users == len(shown.users_collection):
+        bpy.data.objects.remove(shown)
+
+
+def _show(context, rig):
+    """Select the controls, as after an import."""
+    layer, controls = context.view_layer, parts.controls_of(rig)
+    compat.deselect_all(layer)
+    if controls is not None and controls.name in layer.objects:
+        controls.select_set(True, view_layer=layer)
+        layer.objects.active = controls

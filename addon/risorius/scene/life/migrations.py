@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Characters of older files are brought to the present form, one step for each number.
+
+Nothing is done to linked ones, which cannot be written: what reads them understands every form.
+Nothing is brought down: a character of a newer form plays as far as this version knows it.
+"""
+
+from ..animation import actions
+from ..base import parts
+
+VERSION = "risorius_version"  # on the control armature: the number of its form
+PRESENT = 1
+NEEDS = "Needs Risorius"  # on the same: words for those who open the file without the add-on
+_WORDS = (
+    "Its sliders and bones move the face by this add-on; without it the face keeps its last pose"
+)
+
+_said = set()  # session uids of newer characters
+
+
+def be_born(controls):
+    """Give a new character the present form. Args: controls  its control armature."""
+    controls[VERSION] = PRESENT
+    controls[NEEDS] = _WORDS
+
+
+def version_of(controls):
+    """The number of a character's form; 0 from before there were numbers."""
+    found = controls.get(VERSION)
+    return found if isinstance(found, int) and found > 0 else 0
+
+
+def bring_up_all():
+    """Bring every character of this file to the present form.
+
+    Returns:
+        Sentences on what was changed, and on characters of newer forms.
+    """
+    done = []
+    for rig in parts.rigs(linked=True):
+        controls = parts.controls_of(rig)
+        if controls is None:
+            continue
+        if version_of(controls) > PRESENT:
+            done += _say_once(rig, controls)
+        elif version_of(controls) < PRESENT and rig.library is None:
+            done += _bring_up(rig, controls)
+    return done
+
+
+def _bring_up(rig, controls):
+    changed = []
+    for step in _STEPS[version_of(controls) :]:
+        changed += step(rig, controls)
+    if VERSION in controls:
+        del controls[VERSION]  # it may be no number
+    # Of an override of an older library it is lost when the file is saved: it is brought up anew.
+    controls[VERSION] = PRESENT
+    return [f"{rig.name} is of an older file: {', '.join(changed)}."] if changed else []
+
+
+def _say_once(rig, controls):
+    if rig.session_uid in _said:
+        return []
+    _said.add(rig.session_uid)
+    return [newer(rig)]
+
+
+def newer(rig):
+    """A sentence where a character is of a newer form than this version knows, else empty."""
+    controls = parts.controls_of(rig)
+    found = version_of(controls) if controls is not None else 0
+    if found <= PRESENT:
+        return ""
+    return (
+        f"{rig.name} was saved by a newer Risorius (form {found}, this one knows {PRESENT}): "
+        "it plays and is left as it is; install the newer add-on to edit it."
+    )
+
+
+def forget():
+    """After load session uids may mean others."""
+    _said.clear()
+
+
+def _to_1(rig, controls):
+    """It says what it needs; a baked one keeps what it silenced by name."""
+    changed = []
+    if not controls.override_library:
+        controls[NEEDS] = _WORDS
+        changed.append("its controls now say that they need Risorius")
+    keys = [item.data.shape_keys for item in parts.meshes_of(rig)]
+    owners = [rig, controls, *(key for key in keys if key is not None and key.library is None)]
+    if any([actions.note_tracks_by_name(owner) for owner in owners]):
+        changed.append("the NLA tracks that its bake silenced are known by name now")
+    return changed
+
+
+_STEPS = (_to_1,)

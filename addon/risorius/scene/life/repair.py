@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a rename or a deletion took away: mended where that is safe, said in words where not.
+
+Objects, meshes, materials, collections, actions and joints' bones may have any name. The names
+of control bones and sliders are a contract with actions, pose assets and scripts, so they are
+given back.
+"""
+
+import bpy
+
+from ...logic.character import plans
+from ..base import parts
+from ..character import armatures, meshes, runtime
+from . import applied_transforms
+
+
+def heal(rig):
+    """Give control bones and sliders of a character their names back, and their place.
+
+    Args:
+        rig: its deforming armature, of this file.
+
+    Returns:
+        Sentences on what was mended.
+    """
+    controls = rig.get(parts.CONTROLS)
+    if not isinstance(controls, bpy.types.Object) or controls.type != "ARMATURE":
+        return []
+    return [*_bone_names(controls), *_sliders(rig), *applied_transforms.take_back(controls)]
+
+
+def heal_all():
+    """Mend every character of this file; what was mended goes to the console.
+
+    Returns:
+        The deforming armatures of those that were mended.
+    """
+    mended = []
+    for rig in parts.rigs():
+        done = heal(rig)
+        for sentence in done:
+            print(f"Risorius: {sentence}")
+        mended += [rig] * bool(done)
+    return mended
+
+
+def _bone_names(controls):
+    """Rename control bones back; their curves follow, as at any rename."""
+    bones = controls.data.bones
+    if controls.data.library is not None or controls.mode == "EDIT":
+        return []
+    done = []
+    for bone in bones:
+        wanted = bone.get(parts.PART)
+        if wanted and wanted != bone.name and wanted not in bones:
+            done.append(f"The bone {bone.name} of {controls.name} was named {wanted} again.")
+            bone.name = wanted
+    return done
+
+
+def _sliders(rig):
+    """Make sliders that are gone or of another type anew as floats."""
+    face, live = parts.face_bone(rig), runtime.of(rig)
+    if face is None or live is None:
+        return []
+    wrong = [i for i, label in enumerate(live.labels) if not isinstance(face.get(label), float)]
+    if not wrong:
+        return []
+    planned = plans.plan_controls(live.dna.raw_control_names, live.rests)
+    maximum = parts.maximum_of(parts.controls_of(rig))
+    done = []
+    for i in wrong:
+        label, held = live.labels[i], face.get(live.labels[i])
+        if held is None:
+            done.append(f"The slider {label} of {rig.name} was gone and was made anew.")
+        else:
+            del face[label]
+        face[label] = float(held) if isinstance(held, (int, bool)) else planned[i].rest
+        armatures.describe_property(face, planned[i], maximum)
+    return done
+
+
+def missing(item):
+    """What the character that an object belongs to has lost.
+
+    Args:
+        item: any object, or None.
+
+    Returns:
+        Sentences; empty where all is there or where the object is no part of a character.
+    """
+    rig = _rig_of_ruin(item)
+    if rig is None:
+        lost = item is not None and parts.RIG in item and item.get(parts.RIG) is None
+        return ["The deforming armature of this face was deleted; undo brings it back."] * lost
+    controls = rig.get(parts.CONTROLS)
+    found = []
+    if item is not None and item.type == "ARMATURE" and item not in (rig, controls):
+        found.append(
+            f"{item.name} is a copy of the controls alone and moves nothing: delete it. To copy a "
+            f"face, duplicate all objects of its collection."
+        )
+    if controls is None:
+        found.append("The control armature was deleted; undo brings it back.")
+    elif parts.FACE not in controls.pose.bones:
+        found.append(f"{controls.name} has lost its bone {parts.FACE}, which bears the sliders.")
+    if not runtime.of(rig):
+        text = rig.get(parts.DNA)
+        what = (
+            f"what {text.name} holds is no DNA file any more"
+            if isinstance(text, bpy.types.Text)
+            else "the text that holds the DNA was deleted"
+        )
+        found.append(f"This face has lost its data: {what}; undo brings it back.")
+    gone = [k for k in rig.keys() if k.startswith(parts.MESH_PREFIX) and not rig[k]]  # noqa: SIM118
+    if gone:
+        found.append(f"{len(gone)} of the meshes were deleted.")
+    out = [o.name for o in outside(rig)]
+    if out:
+        found.append(f"{', '.join(out)}: deleted from the scene, still in the file.")
+    for mesh in parts.meshes_of(rig):
+        key = mesh.data.shape_keys
+        if mesh.get(parts.MODE) == "LIVE" and key is not None and not meshes.live_block(mesh):
+            found.append(f"{mesh.name} has lost its key {plans.LIVE_KEY}: choose Live again.")
+    return found
+
+
+def _rig_of_ruin(item):
+    """The deforming armature, also of a character that has lost its controls."""
+    if item is None:
+        return None
+    if item.type == "ARMATURE" and parts.CONTROLS in item:
+        return item
+    rig = item.get(parts.RIG)
+    return rig if isinstance(rig, bpy.types.Object) and parts.CONTROLS in rig else None
+
+
+def outside(rig):
+    """Parts of a character that are in no collection: Blender's Delete leaves them in the file,
+    because the other parts point to them.
+    """
+    return [o for o in parts.members_of(rig) if not o.users_collection]
+
+
+def bring_back(item, scene):
+    """Put deleted parts back into the collection of those that are left.
+
+    Args:
+        item: an object of the character.
+        scene: where they go if no part is in a collection.
+
+    Returns:
+        The objects that were brought back.
+    """
+    rig = _rig_of_ruin(item)
+    if rig is None:
+        return []
+    lost = outside(rig)
+    homes = [o.users_collection[0] for o in parts.members_of(rig) if o.users_collection]
+    home = homes[0] if homes else scene.collection
+    for one in lost:
+        home.objects.link(one)
+    return lost
+
+
+def remove_dead():
+    """Remove characters whose parts were all deleted.
+
+    The parts point to each other, so Blender would keep them, and save them, for ever.
+
+    Returns:
+        How many were removed.
+    """
+    from ..character import build  # build imports this module's callers
+
+    dead = [rig for rig in parts.rigs() if _is_dead(rig)]
+    for rig in dead:
+        build.remove(rig)
+    return len(dead)
+
+
+def _is_dead(rig):
+    held = parts.members_of(rig)
+    if any(o.users_collection or o.use_fake_user or o.library for o in held):
+        return False
+    ours = {o.as_pointer() for o in held}
+    used = bpy.data.user_map(subset=held)
+    owners = {u.as_pointer(): u for users in used.values() for u in users}
+    strangers = [u for p, u in owners.items() if p not in ours]
+    # Scenes: not by a collection, which was looked at above.
+    lesser = (bpy.types.Material, bpy.types.Key, bpy.types.Scene)
+    return all(isinstance(u, lesser) for u in strangers)

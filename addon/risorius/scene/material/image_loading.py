@@ -1,0 +1,210 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Images: loaded once, packed, and read in the colour space that their role asks for."""
+
+import bpy
+import numpy as np
+
+from ...logic.material import image_size
+from ..base import sharing
+
+# Names of one and the same space in the configurations that people use: Blender's own, ACES 1,
+# ACES CG and studio configurations, Filmic ones. The first that the running one knows is taken.
+COLOR_SPACES = (
+    "sRGB",
+    "sRGB - Texture",
+    "Utility - sRGB - Texture",
+    "sRGB Encoded Rec.709 (sRGB)",
+    "srgb_texture",
+    "srgb_tx",
+    "Input - Generic - sRGB - Texture",
+    "Utility - Curve - sRGB",
+    "sRGB OETF",
+)
+DATA_SPACES = ("Non-Color", "Raw", "Utility - Raw", "raw", "Generic Data", "Non-Colour Data")
+PACK_LIMIT = 64 << 20  # bytes; larger files stay outside, or a .blend would grow to gigabytes
+# What one image may take when it is unfolded, and all of an import together: this much, and so
+# many times their files. A flat picture of 8192 pixels packs to almost nothing and is taken.
+_ONE_IMAGE, _ALL_IMAGES, _MOST_TIMES = 256 << 20, 1 << 30, 64
+TILE = 512  # pixels of one tile of the mask atlas, each side
+
+
+def set_color_space(image, data):
+    """Say whether an image holds colours or numbers; no name of a space needs to exist.
+
+    Args:
+        image: a loaded image.
+        data: numbers, such as normals or masks, that no colour management may touch.
+    """
+    settings = image.colorspace_settings
+    if not data and image.is_float:
+        return  # linear, as Blender assumes by the configuration's role for floats
+    known = [item.identifier for item in settings.bl_rna.properties["name"].enum_items]
+    words = ("raw", "non-col", "data") if data else ("srgb",)
+    alike = [n for n in known if any(w in n.lower() for w in words)]
+    for name in (*(DATA_SPACES if data else COLOR_SPACES), *alike):
+        try:
+            settings.name = name
+        except TypeError:  # an enum without that name: another configuration
+            continue
+        return
+    if data:
+        settings.is_data = True  # at least the configuration's own role for data
+
+
+def _room_for(path):
+    """Bytes that an image takes when it is unfolded.
+
+    Raises:
+        ValueError: it is no picture, or takes too much for its file.
+        OSError: it cannot be read.
+    """
+    with path.open("rb") as file:
+
+        def read(offset, count):
+            file.seek(min(offset, 1 << 62))
+            return file.read(count)
+
+        found = image_size.size_of(read)
+    if found is None:
+        raise ValueError(f"The texture {path.name} cannot be read.")
+    width, height, depth = found
+    room, limit = width * height * depth, _ONE_IMAGE + _MOST_TIMES * path.stat().st_size
+    if room > limit:
+        raise ValueError(
+            f"The texture {path.name} of {width:,} x {height:,} pixels stays away: "
+            f"it takes {room:,} bytes, at most {limit:,} are given to a file of its size."
+        )
+    return room
+
+
+class Images:
+    """Loads each file once for each role and packs it into the .blend; `troubles` are sentences."""
+
+    def __init__(self, made):
+        self.made = made
+        self.troubles = []
+        self._loaded = {}
+        self._room, self._files = 0, 0  # bytes, of all images that were loaded
+
+    def load(self, path, data=False):
+        """The image of a file, or None where there is none or it cannot be read."""
+        if path is None:
+            return None
+        key = (str(path), data)
+        if key not in self._loaded:
+            self._loaded[key] = self._read(path, data)
+        return self._loaded[key]
+
+    def _read(self, path, data):
+        try:
+            self._make_room(path)
+            content = path.read_bytes() if path.stat().st_size <= PACK_LIMIT else None
+            there = sharing.find(content, data) if content is not None else None
+            if there is not None:
+                return there
+            image = bpy.data.images.load(str(path), check_existing=False)
+        except (RuntimeError, OSError):
+            self._complain(f"The texture {path.name} cannot be read.")
+            return None
+        except ValueError as error:
+            self._complain(str(error))
+            return None
+        self.made.append(image)
+        set_color_space(image, data)
+        if not image.size[0]:  # read lazily: a file of another kind shows itself only now
+            self._complain(f"The texture {path.name} cannot be read.")
+            self.made.remove(image)
+            bpy.data.images.remove(image)
+            return None
+        if content is not None:
+            image.pack(data=content, data_len=len(content))
+            sharing.mark(image)
+        else:
+            self._complain(f"The texture {path.name} is large and stays outside the .blend file.")
+        return image
+
+    def _make_room(self, path):
+        room, size = _room_for(path), path.stat().st_size
+        limit = _ALL_IMAGES + _MOST_TIMES * (self._files + size)
+        if self._room + room > limit:
+            raise ValueError(
+                f"The texture {path.name} stays away: with those before it it takes "
+                f"{self._room + room:,} bytes, at most {limit:,} are given to files of their size."
+            )
+        self._room, self._files = self._room + room, self._files + size
+
+    def _complain(self, sentence):
+        if sentence not in self.troubles:
+            self.troubles.append(sentence)
+
+    def atlas(self, name, masks):
+        """One image with the masks of many regions, three to a tile: an engine has few samplers.
+
+        Args:
+            name: of the image.
+            masks: region -> textures.Mask.
+
+        Returns:
+            The image or None, and region -> (column, row, channel, tiles in a row).
+        """
+        held = {r: m for r, m in masks.items() if m.path.is_file()}
+        if not held:
+            return None, {}
+        side = int(np.ceil(np.sqrt(np.ceil(len(held) / 3))))
+        pixels = np.zeros((side * TILE, side * TILE, 4), np.float32)
+        pixels[..., 3] = 1.0
+        places = {}
+        for path in dict.fromkeys(m.path for m in held.values()):
+            source = _small_copy(path)
+            for region, mask in held.items() if source is not None else ():
+                if mask.path == path:
+                    number, channel = divmod(len(places), 3)
+                    row, column = divmod(number, side)
+                    tile = pixels[row * TILE :, column * TILE :]
+                    tile[:TILE, :TILE, channel] = source[..., mask.channel]
+                    places[region] = (column, row, channel, side)
+        if not places:
+            return None, {}
+        image = bpy.data.images.new(name, side * TILE, side * TILE, alpha=False)
+        self.made.append(image)
+        set_color_space(image, True)
+        image.pixels.foreach_set(pixels.ravel())
+        image.update()
+        image.pack()
+        return self._shared(image), places
+
+    def _shared(self, image):
+        """An image of this .blend with the same packed bytes in the place of a new one."""
+        there = sharing.find(bytes(image.packed_file.data), True)
+        if there is None:
+            sharing.mark(image)
+            return image
+        self.made.remove(image)
+        bpy.data.images.remove(image)
+        return there
+
+
+def _small_copy(path):
+    """float32[TILE, TILE, 4] of a file's stored numbers, or None where it cannot be read."""
+    try:
+        _room_for(path)
+        image = bpy.data.images.load(str(path), check_existing=False)
+    except (RuntimeError, OSError, ValueError):
+        return None
+    try:
+        set_color_space(image, True)
+        image.alpha_mode = "CHANNEL_PACKED"  # the alpha is a mask like the others
+        if not image.size[0]:
+            return None
+        image.scale(TILE, TILE)
+        flat = np.empty(TILE * TILE * 4, np.float32)
+        image.pixels.foreach_get(flat)
+        return flat.reshape(TILE, TILE, 4)
+    finally:
+        bpy.data.images.remove(image)
+
+
+def mean_of(path):
+    """float32[4] mean of a file's stored numbers; used to tell offsets from whole maps."""
+    small = _small_copy(path)
+    return None if small is None else small.mean(axis=(0, 1))

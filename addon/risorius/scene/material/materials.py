@@ -1,0 +1,270 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One material per kind of mesh; animated maps as driven inputs of its nodes."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ...logic.material import animated_maps, skin_folds, texture_search
+from . import eye_mouth_materials, nodes, skin_material
+from .image_loading import Images
+
+# What the solid view shows. Lashes are cards: opaque ones would cover the lids with black bands.
+_VIEW_COLORS = {
+    "skin": (0.62, 0.36, 0.27, 1.0),
+    "eyes": (0.75, 0.70, 0.66, 1.0),
+    "teeth": (0.72, 0.66, 0.55, 1.0),
+    "tongue": (0.45, 0.12, 0.11, 1.0),
+    "gum": (0.50, 0.17, 0.15, 1.0),
+    "lashes": (0.03, 0.02, 0.015, 0.3),
+    "wet": (1.0, 1.0, 1.0, 0.0),
+}
+_IRIS_COLOR = (0.035, 0.02, 0.012, 1.0)
+_IRIS_RADIUS = 0.47  # of the eye's: where its limbus ends, see looks.eyes
+_WIDE = 1.6  # a mesh wider than this times its height holds both eyes
+
+
+@dataclass
+class Look:
+    """What the builder of one material knows.
+
+    Attributes:
+        kind: as in MeshPlan.
+        base: mesh name without LOD.
+        rig: the deforming armature, whose `maps` array drives the map values.
+        extent: float64[3] size of the mesh in Blender units.
+        unit: distance of the eyes, in Blender units: the measure of all patterns.
+        vertices: of the finest mesh.
+        has_uvs: whether it has a UV map.
+        simple: leave out subsurface, relief and maps.
+        uses: what the animated maps do.
+        areas: areas of a face that this mesh has.
+        found: textures.TexturePlan.
+        images: loads them.
+        atlas, places: image with the wrinkle masks, and where in it each region's is.
+        offsets: role -> whether that wrinkle map holds differences; filled when asked.
+    """
+
+    kind: str
+    base: str
+    rig: Any
+    extent: Any
+    unit: float
+    vertices: int
+    has_uvs: bool
+    simple: bool
+    uses: list
+    areas: set
+    found: texture_search.TexturePlan
+    images: Images
+    atlas: Any = None
+    places: dict = field(default_factory=dict)
+    offsets: dict = field(default_factory=dict)
+
+    def image(self, role, data=False):
+        """The image of a role, or None."""
+        return self.images.load(self.found.of(self.base, role), data)
+
+    def is_offset(self, role):
+        """Whether the wrinkle map of this role holds differences about 0.5."""
+        if role not in self.offsets:
+            self.offsets[role] = skin_material.offsets_in(self.found.of(self.base, role))
+        return self.offsets[role]
+
+
+def build_materials(plan, rig, built, made, found=None, simple=False):
+    """Build the materials of a character, one per mesh base, and put them on its meshes.
+
+    Args:
+        plan: the CharacterPlan.
+        rig: the deforming armature, whose `maps` array drives the map values.
+        built: mesh objects, in the order of the plan's meshes.
+        made: list that every new datablock is put on.
+        found: logic.textures.TexturePlan; None for no textures.
+        simple: build the cheap variant: no subsurface, relief or maps.
+
+    Returns:
+        Sentences about textures that are missing, cannot be read or stay outside the .blend.
+    """
+    found = found if found is not None else texture_search.TexturePlan()
+    images = Images(made)
+    frame = _face_frame(plan)
+    uses = animated_maps.uses_of(plan.map_labels)
+    by_base = {}
+    for mesh, item in zip(plan.meshes, built, strict=True):
+        areas = _add_attributes(item.data, mesh, frame)
+        if mesh.base not in by_base:
+            look = _look(plan, mesh, rig, frame, uses, areas, found, images, simple)
+            by_base[mesh.base] = _build(plan, look, made)
+        for material in by_base[mesh.base]:
+            item.data.materials.append(material)
+        if mesh.kind == "eyes" and eye_mouth_materials.EYES in item.data.attributes:
+            _give_iris(item.data)
+    return [*found.missing, *images.troubles]
+
+
+def _look(plan, mesh, rig, frame, uses, areas, found, images, simple):
+    same = [m for m in plan.meshes if m.base == mesh.base]
+    extent = np.ptp(mesh.positions, axis=0) if len(mesh.positions) else np.ones(3)
+    look = Look(
+        kind=mesh.kind,
+        base=mesh.base,
+        rig=rig,
+        extent=np.maximum(extent, 1e-6),
+        unit=frame.unit if frame else plan.size * 0.2,
+        vertices=max(len(m.positions) for m in same),
+        has_uvs=mesh.uvs is not None,
+        simple=simple,
+        uses=uses,
+        areas=areas,
+        found=found,
+        images=images,
+    )
+    if mesh.kind == "skin" and areas and found.masks and not simple:
+        wanted = {u.region for u in uses} & set(found.masks)
+        masks = {r: found.masks[r] for r in sorted(wanted)}
+        look.atlas, look.places = images.atlas(f"{plan.name}_masks", masks)
+    return look
+
+
+def _build(plan, look, made):
+    """The materials of a mesh base, by slot."""
+    material = bpy.data.materials.new(f"{plan.name}_{look.base}")
+    made.append(material)
+    material.diffuse_color = _VIEW_COLORS[look.kind]
+    graph = nodes.Graph(material)
+    if look.kind == "skin":
+        skin_material.Skin(graph, look).build()
+    else:
+        eye_mouth_materials.build(graph, look)
+    graph.tidy()
+    _choose_picture(look, graph)
+    if look.kind != "eyes":
+        return [material]
+    # The same surface in a second slot: the solid view has one colour for each material, and
+    # without an iris nobody sees where an eye looks.
+    iris = material.copy()
+    made.append(iris)
+    iris.name, iris.diffuse_color = f"{material.name}_iris", _IRIS_COLOR
+    return [material, iris]
+
+
+def _choose_picture(look, graph):
+    """Make the colour's image active: the solid view's *Texture* shows the active one.
+
+    Without one a pattern is active, for which it shows the material's colour; else it would take
+    the first image that there is, such as a mask.
+    """
+    pictures = [n for n in graph.tree.nodes if n.type == "TEX_IMAGE" and n.image is not None]
+    colors = [n for n in pictures if n.image == look.image("color")]
+    if look.kind == "lashes":  # cards: without alpha they would hide the eyes
+        colors = [n for n in colors if n.image.channels == 4]
+    patterns = [n for n in graph.tree.nodes if n.type in ("TEX_NOISE", "TEX_VORONOI")]
+    graph.tree.nodes.active = next(iter([*colors, *patterns]), None)
+
+
+def _give_iris(mesh):
+    """Put the faces of the iris and the pupil into the second slot."""
+    flat = np.empty(len(mesh.vertices) * 3, np.float32)
+    mesh.attributes[eye_mouth_materials.EYES].data.foreach_get("vector", flat)
+    places = flat.reshape(-1, 3)
+    away = np.hypot(places[:, 0], places[:, 1]) + 2.0 * (1.0 - places[:, 2])
+    corners = np.empty(len(mesh.loops), np.int32)
+    mesh.loops.foreach_get("vertex_index", corners)
+    starts = np.empty(len(mesh.polygons), np.int32)
+    mesh.polygons.foreach_get("loop_start", starts)
+    if len(starts):
+        counts = np.diff(np.append(starts, len(corners)))
+        inside = np.add.reduceat(away[corners], starts) / counts < _IRIS_RADIUS
+        mesh.polygons.foreach_set("material_index", inside.astype(np.int32))
+
+
+# --- mesh attributes that materials read -----------------------------------------------------
+
+
+def _face_frame(plan):
+    """The FaceFrame, or None where no skin is among the meshes."""
+    skins = [m for m in plan.meshes if m.kind == "skin" and len(m.positions)]
+    heads = [m for m in skins if "head" in m.base.lower() or "face" in m.base.lower()]
+    if not skins:
+        return None
+    rest = plan.armature.rest
+    eyes = [rest[j][:3, 3] for j in plan.anchors.eyes.values()]
+    teeth = next((m for m in plan.meshes if m.kind == "teeth" and len(m.positions)), None)
+    mouth = None
+    if teeth is not None:
+        mouth = (teeth.positions.min(axis=0) + teeth.positions.max(axis=0)) / 2
+    return skin_folds.find_frame(eyes, (heads or skins)[0].positions, mouth)
+
+
+def _add_attributes(mesh, plan, frame):
+    """Write what the material of this kind reads; returns the areas that a skin has."""
+    if not len(plan.positions):
+        return set()
+    if plan.kind == "eyes":
+        _add(mesh, eye_mouth_materials.EYES, _eye_coordinates(plan.positions))
+    elif plan.kind == "teeth":
+        unit = frame.unit if frame else float(np.ptp(plan.positions[:, 0]))
+        _add(mesh, eye_mouth_materials.TEETH, _tooth_coordinates(plan.positions, unit))
+    elif plan.kind == "skin" and frame is not None:
+        return _add_areas(mesh, plan.positions, frame)
+    return set()
+
+
+def _add(mesh, name, values):
+    attribute = mesh.attributes.new(name, "FLOAT_VECTOR", "POINT")
+    attribute.data.foreach_set("vector", np.ascontiguousarray(values, np.float32).ravel())
+
+
+def _add_areas(mesh, points, frame):
+    masks = skin_folds.area_masks(points, frame)
+    there = {area for area, mask in masks.items() if float(mask.max()) > 0.3}
+    if not there:
+        return there
+    columns = [masks[a] for a in animated_maps.AREAS] + [skin_folds.left_share(points, frame)]
+    for number, name in enumerate(skin_material.AREAS):
+        _add(mesh, name, np.stack(columns[3 * number : 3 * number + 3], axis=1))
+    _add(mesh, skin_material.FOLDS, skin_folds.fold_coordinates(points, frame))
+    return there
+
+
+def _eye_coordinates(points):
+    """float64[V, 3]: x and height from the eye's axis over its radius; 1 on its front half."""
+    points = points.astype(np.float64)
+    middle = (points[:, 0].min() + points[:, 0].max()) / 2
+    wide = np.ptp(points[:, 0]) > _WIDE * np.ptp(points[:, 2])
+    left = points[:, 0] > middle if wide else np.ones(len(points), bool)
+    values = np.zeros((len(points), 3))
+    for side in (left, ~left):
+        if not side.any():
+            continue
+        own = points[side]
+        center = (own.min(axis=0) + own.max(axis=0)) / 2
+        radius = max(float(np.ptp(own[:, 2])) / 2, 1e-9)
+        values[side, 0] = (own[:, 0] - center[0]) / radius
+        values[side, 1] = (own[:, 2] - center[2]) / radius
+        values[side, 2] = own[:, 1] < center[1]
+    return values
+
+
+def _tooth_coordinates(points, unit):
+    """float64[V, 3]: pi for each tooth along the arch, height from the bite over its reach, 0."""
+    points = points.astype(np.float64)
+    low, high = points.min(axis=0), points.max(axis=0)
+    half = max((high[0] - low[0]) / 2, 1e-9)
+    across = (points[:, 0] - (low[0] + high[0]) / 2) / half
+    # Along a half circle: the length of the arch, not its width, carries the teeth.
+    along = np.arcsin(np.clip(across, -1, 1)) * half
+    width = 0.125 * unit  # an upper front tooth is about an eighth of the eyes' distance
+    height = (points[:, 2] - (low[2] + high[2]) / 2) / max((high[2] - low[2]) / 2, 1e-9)
+    return np.stack([np.pi * along / width, height, np.zeros(len(points))], axis=1)
+
+
+def map_drivers(material):
+    """The driver curves of the animated maps of a material, with their map index."""
+    data = material.node_tree.animation_data if material and material.node_tree else None
+    for curve in data.drivers if data else ():
+        if skin_material.MAP_PREFIX in curve.data_path:
+            yield curve

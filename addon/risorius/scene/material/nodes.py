@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Short words for building node trees, the same for all versions of Blender."""
+
+from ..base import compat
+
+
+class Graph:
+    """The tree of one material.
+
+    Sockets and plain numbers are both allowed as inputs. Sockets are found by number or
+    identifier where their names differ between versions.
+    """
+
+    def __init__(self, material):
+        compat.make_node_tree(material)
+        self.material, self.tree = material, material.node_tree
+        self.shader = next(n for n in self.tree.nodes if n.type == "BSDF_PRINCIPLED")
+        self.output = next(n for n in self.tree.nodes if n.type == "OUTPUT_MATERIAL")
+
+    def node(self, kind, label=""):
+        """A new node of the type `ShaderNode<kind>`."""
+        node = self.tree.nodes.new(f"ShaderNode{kind}")
+        node.label = label
+        return node
+
+    def put(self, value, socket):
+        """Link a socket to an input, or set its value; None leaves it."""
+        if value is None:
+            return
+        if hasattr(value, "is_output"):
+            self.tree.links.new(value, socket)
+        elif isinstance(value, tuple) and len(value) == 3 and socket.type == "RGBA":
+            socket.default_value = (*value, 1.0)
+        else:
+            socket.default_value = value
+
+    def set(self, **values):
+        """Set inputs of the Principled shader, `_` for the space in their names."""
+        for name, value in values.items():
+            self.put(value, self.shader.inputs[name.replace("_", " ").replace("Ior", "IOR")])
+
+    def math(self, operation, *values, clamp=False):
+        """A Math node."""
+        node = self.node("Math")
+        node.operation, node.use_clamp = operation, clamp
+        for value, socket in zip(values, node.inputs, strict=False):
+            self.put(value, socket)
+        return node.outputs[0]
+
+    def total(self, values, clamp=False):
+        """The sum of sockets; 0 for none."""
+        result = values[0] if values else 0.0
+        for value in values[1:]:
+            result = self.math("ADD", result, value)
+        return self.math("ADD", result, 0.0, clamp=True) if clamp and values else result
+
+    def vector(self, operation, *values):
+        """A Vector Math node; its vector output."""
+        node = self.node("VectorMath")
+        node.operation = operation
+        for value, socket in zip(values, node.inputs, strict=False):
+            self.put(value, socket)
+        return node.outputs[1 if operation in ("LENGTH", "DISTANCE", "DOT_PRODUCT") else 0]
+
+    def mix(self, factor, a, b, blend="MIX"):
+        """Mix two colours."""
+        node = self.node("Mix")
+        node.data_type, node.blend_type = "RGBA", blend
+        node.clamp_factor = True
+        self._mix_inputs(node, factor, a, b, "Color")
+        return next(s for s in node.outputs if s.identifier == "Result_Color")
+
+    def mix_number(self, factor, a, b):
+        """Mix two numbers."""
+        node = self.node("Mix")
+        node.data_type = "FLOAT"
+        self._mix_inputs(node, factor, a, b, "Float")
+        return next(s for s in node.outputs if s.identifier == "Result_Float")
+
+    def _mix_inputs(self, node, factor, a, b, kind):
+        where = {s.identifier: s for s in node.inputs}
+        self.put(factor, where["Factor_Float"])
+        self.put(a, where[f"A_{kind}"])
+        self.put(b, where[f"B_{kind}"])
+
+    def ramp(self, factor, *stops):
+        """A colour ramp; stops are (position, (r, g, b))."""
+        node = self.node("ValToRGB")
+        elements = node.color_ramp.elements
+        while len(elements) < len(stops):
+            elements.new(1.0)
+        for element, (position, color) in zip(elements, stops, strict=True):
+            element.position, element.color = position, (*color, 1.0)
+        self.put(factor, node.inputs["Fac"] if "Fac" in node.inputs else node.inputs[0])
+        return node.outputs[0]
+
+    def noise(self, vector, scale, detail=2.0, roughness=0.5):
+        """Noise from 0 to 1, its mean near 0.5."""
+        node = self.node("TexNoise")
+        self.put(vector, node.inputs["Vector"])
+        node.inputs["Scale"].default_value = scale
+        node.inputs["Detail"].default_value = detail
+        node.inputs["Roughness"].default_value = roughness
+        return node.outputs[0]
+
+    def cells(self, vector, scale, feature="F1"):
+        """Distance of Voronoi cells."""
+        node = self.node("TexVoronoi")
+        node.feature = feature
+        self.put(vector, node.inputs["Vector"])
+        node.inputs["Scale"].default_value = scale
+        return node.outputs["Distance"]
+
+    def attribute(self, name):
+        """Vector of a mesh attribute; zero on meshes that have none."""
+        node = self.node("Attribute", name)
+        node.attribute_name = name
+        return node.outputs["Vector"]
+
+    def split(self, vector):
+        """Three numbers of a vector."""
+        node = self.node("SeparateXYZ")
+        self.put(vector, node.inputs[0])
+        return tuple(node.outputs[:3])
+
+    def split_color(self, color):
+        """Three numbers of a colour."""
+        node = self.node("SeparateColor")
+        self.put(color, node.inputs[0])
+        return tuple(node.outputs[:3])
+
+    def rest_points(self, size):
+        """Places on the undeformed mesh, in Blender units: patterns that move with the skin."""
+        generated = self.node("TexCoord").outputs["Generated"]
+        return self.vector("MULTIPLY", generated, tuple(float(s) for s in size))
+
+    def uv(self):
+        """The UV map's coordinates."""
+        return self.node("TexCoord").outputs["UV"]
+
+    def image(self, image, vector=None, label="", clamp=False):
+        """An image texture node."""
+        node = self.node("TexImage", label)
+        node.image = image
+        if clamp:
+            node.extension = "EXTEND"  # repeated, its far edge would mix into the near one
+        self.put(vector, node.inputs["Vector"])
+        return node
+
+    def bump(self, height, distance, normal=None, strength=1.0):
+        """A normal that a height field gives."""
+        node = self.node("Bump")
+        node.inputs["Strength"].default_value = strength
+        node.inputs["Distance"].default_value = distance
+        self.put(height, node.inputs["Height"])
+        self.put(normal, node.inputs["Normal"])
+        return node.outputs["Normal"]
+
+    def tidy(self):
+        """Lay the nodes out in columns by their distance from the output."""
+        column = {}
+        for node in reversed(self._sources_first()):
+            place = column.setdefault(node, 0)
+            for source in _sources(node):
+                column[source] = max(column.get(source, 0), place + 1)
+        rows = {}
+        for node in self.tree.nodes:
+            place = column.get(node, 1)
+            node.location = (400 - 240 * place, 300 - 220 * rows.get(place, 0))
+            rows[place] = rows.get(place, 0) + 1
+
+    def _sources_first(self):
+        """Nodes that reach the output, each after all those that feed it."""
+        order, seen, stack = [], {self.output}, [(self.output, iter(_sources(self.output)))]
+        while stack:
+            node, rest = stack[-1]
+            source = next((s for s in rest if s not in seen), None)
+            if source is None:
+                order.append(node)
+                stack.pop()
+            else:
+                seen.add(source)
+                stack.append((source, iter(_sources(source))))
+        return order
+
+
+def _sources(node):
+    return [link.from_node for socket in node.inputs for link in socket.links]

@@ -1,0 +1,318 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The skin: subsurface, pores, and what the animated maps do to colour and normals."""
+
+from ...logic.material import animated_maps
+from ..base import parts
+from ..character.meshes import plain_driver
+from . import image_loading
+
+MAP_PREFIX = "risorius_map_"
+AREAS = tuple(f"risorius_areas_{i}" for i in (1, 2, 3))  # mesh attributes: three areas each
+FOLDS = "risorius_folds"  # mesh attribute: x, height, distance from the mouth
+_FRAME = "Animated maps"
+_TONE, _DARK, _RED = (0.60, 0.35, 0.25), (0.50, 0.26, 0.18), (0.54, 0.22, 0.16)
+_FLUSH = (1.0, 0.42, 0.38)
+_CREASE = (0.66, 0.49, 0.45)
+# Radians for each eye distance: how close the folds lie.
+_PITCH = {"level": 19.0, "upright": 24.0, "rays": 20.0, "arc": 6.0}
+_FLUSH_SHARE = 0.22  # of an area's map: without a painted mask a blush must stay faint
+_PORE_DEPTH = 0.032
+_FOLD_DEPTH = {"level": 0.45, "upright": 0.45, "rays": 0.35, "arc": 1.8, "dimples": 0.6}
+
+
+class Skin:
+    """Builds one skin material; what its steps share is held here.
+
+    Args:
+        graph: nodes.Graph of the material.
+        look: materials.Look of the mesh base: sizes, textures, areas.
+    """
+
+    def __init__(self, graph, look):
+        self.graph, self.look = graph, look
+        self.points = graph.rest_points(look.extent)
+        self.areas = self._areas()
+        self.folds = None
+        self.flush, self.tints, self.creases = [], [], []
+        self.bumps, self.wrinkles = {}, {}
+
+    def build(self):
+        """Fill the tree."""
+        graph, look = self.graph, self.look
+        graph.set(
+            Subsurface_Weight=0.0 if look.simple else 1.0,
+            Subsurface_Radius=(1.0, 0.36, 0.2),
+            Subsurface_Scale=look.unit * 0.045,
+            Specular_Ior_Level=0.42,
+        )
+        if not look.simple:
+            self._read_maps()
+        color = self._color()
+        graph.set(Base_Color=color, Roughness=self._roughness())
+        if not look.simple:
+            self._specular()
+            graph.set(Normal=self._normal())
+
+    def _areas(self):
+        """Area -> socket, and `left`; empty for a mesh that has no face."""
+        if not self.look.areas:
+            return {}
+        found = {}
+        for number, name in enumerate(AREAS):
+            three = self.graph.split(self.graph.attribute(name))
+            found.update(zip((*animated_maps.AREAS, "left")[3 * number :], three, strict=False))
+        return found
+
+    # --- animated maps -------------------------------------------------------------------
+
+    def _read_maps(self):
+        """Value nodes for the maps that show on this mesh, and what they are summed into."""
+        frame = None
+        groups = {}
+        for use in self.look.uses:
+            targets = self._targets(use)
+            if not targets:
+                continue
+            if frame is None:
+                frame = self.graph.tree.nodes.new("NodeFrame")
+                frame.label = frame.name = _FRAME
+            value = self._value(use, frame)
+            for target in targets:
+                groups.setdefault(target, []).append((use.side, value))
+        sums = {}
+        for (bucket, mask), members in groups.items():
+            sums.setdefault(bucket, []).append(self._masked(bucket, mask, members))
+        for bucket, amounts in sums.items():
+            self._file(bucket, amounts)
+
+    def _targets(self, use):
+        """What a map acts on here: pairs of bucket and mask; none where nobody would see it."""
+        look = self.look
+        own = look.image(f"map:{use.label}", data=True)
+        if own is not None:
+            return [(("flush", ""), ("own", use.index))]
+        mask = ("atlas", use.region) if use.region in look.places else ("area", use.area)
+        if mask[0] == "area" and use.area != "all" and use.area not in look.areas:
+            return []
+        found = []
+        if use.color:
+            whole = use.number and look.image(f"color:{use.number}") is not None
+            found.append((("color", use.number) if whole else ("flush", ""), mask))
+        if use.normal:
+            whole = use.number and look.image(f"normal:{use.number}", data=True) is not None
+            kind = animated_maps.FOLDS[use.area]
+            found.append((("normal", use.number) if whole else ("bump", kind), mask))
+        return found
+
+    def _value(self, use, frame):
+        value = self.graph.tree.nodes.new("ShaderNodeValue")
+        value.name, value.label = f"{MAP_PREFIX}{use.index:03d}", use.label
+        value.parent = frame
+        path = f'nodes["{value.name}"].outputs[0].default_value'
+        driver = self.graph.tree.driver_add(path)
+        plain_driver(driver, self.look.rig, f'["{parts.MAPS}"][{use.index}]')
+        return value.outputs[0]
+
+    def _masked(self, bucket, mask, members):
+        """The sum of some maps' values, each side on its own half, times their mask."""
+        graph = self.graph
+        kind, name = mask
+        if kind == "own":
+            use = self.look.uses[name]
+            mask = self.look.image(f"map:{use.label}", data=True)
+            picture = graph.image(mask, label=use.label, clamp=True)
+            return graph.math("MULTIPLY", members[0][1], picture.outputs["Color"])
+        if kind == "atlas":
+            amount = graph.total([v for _, v in members])
+            return graph.math("MULTIPLY", amount, self._atlas_channel(name))
+        share = _FLUSH_SHARE if bucket[0] == "flush" else 1.0
+        amount = graph.math("MINIMUM", self._sided(members), 1.0)
+        amount = graph.math("MULTIPLY", amount, share)
+        return amount if name == "all" else graph.math("MULTIPLY", amount, self.areas[name])
+
+    def _sided(self, members):
+        left = [v for side, v in members if side != "R"]
+        right = [v for side, v in members if side != "L"]
+        if len(left) == len(right) == len(members) or "left" not in self.areas:
+            return self.graph.total([v for _, v in members])
+        a, b = self.graph.total(right), self.graph.total(left)
+        return self.graph.mix_number(self.areas["left"], a, b)
+
+    def _atlas_channel(self, region):
+        column, row, channel, side = self.look.places[region]
+        cache = self.__dict__.setdefault("_tiles", {})
+        if (column, row) not in cache:
+            graph, rim = self.graph, 0.5 / image_loading.TILE  # no neighbour's tile at the edges
+            inside = graph.vector("MAXIMUM", graph.uv(), (rim, rim, 0.0))
+            inside = graph.vector("MINIMUM", inside, (1 - rim, 1 - rim, 0.0))
+            small = graph.vector("SCALE", inside)
+            small.node.inputs["Scale"].default_value = 1 / side
+            place = graph.vector("ADD", small, (column / side, row / side, 0.0))
+            picture = graph.image(self.look.atlas, place, "Wrinkle masks")
+            cache[column, row] = graph.split_color(picture.outputs["Color"])
+        return cache[column, row][channel]
+
+    def _file(self, bucket, amounts):
+        kind, name = bucket
+        amount = self.graph.total(amounts, clamp=kind != "flush")
+        if kind == "flush":
+            self.flush = amounts
+        elif kind == "color":
+            self.tints.append((name, amount))
+        elif kind == "normal":
+            self.wrinkles[name] = amount
+        else:
+            self.bumps[name] = amount
+
+    # --- colour --------------------------------------------------------------------------
+
+    def _color(self):
+        graph, look = self.graph, self.look
+        base = look.image("color")
+        if base is not None:
+            color = graph.image(base, label="Colour").outputs["Color"]
+        else:
+            color = self._tone()
+        for number, amount in self.tints:
+            color = self._tint(color, number, amount)
+        for amount in self.flush:
+            color = graph.mix(amount, color, _FLUSH, blend="MULTIPLY")
+        creases = self._creases()
+        if creases is not None:
+            color = graph.mix(creases, color, _CREASE, blend="MULTIPLY")
+        cavity = look.image("cavity", data=True)
+        if cavity is not None and not look.simple:
+            picture = graph.image(cavity, label="Cavity").outputs["Color"]
+            color = graph.mix(0.5, color, picture, blend="MULTIPLY")
+        return color
+
+    def _tone(self):
+        """Skin without a texture: blotches, and blood where a face has more of it."""
+        graph, unit = self.graph, self.look.unit
+        blotches = graph.noise(self.points, 1.1 / unit, detail=6.0, roughness=0.6)
+        color = graph.ramp(blotches, (0.32, _DARK), (0.68, _TONE))
+        for area, most in (("nose", 0.45), ("smile", 0.35), ("chin", 0.2), ("lips", 0.5)):
+            if area in self.areas:
+                amount = graph.math("MULTIPLY", self.areas[area], most)
+                color = graph.mix(amount, color, _RED)
+        return color
+
+    def _tint(self, color, number, amount):
+        """Towards the set's colours; sets of newer exports hold differences about 0.5."""
+        graph = self.graph
+        picture = graph.image(self.look.image(f"color:{number}"), label=f"Colour {number}")
+        other = picture.outputs["Color"]
+        if not self.look.is_offset(f"color:{number}"):
+            return graph.mix(amount, color, other)
+        # Differences were made between encoded values: add them to encoded ones.
+        gamma = graph.node("Gamma")
+        graph.put(color, gamma.inputs[0])
+        gamma.inputs[1].default_value = 1 / 2.2
+        stored = graph.node("Gamma")
+        graph.put(other, stored.inputs[0])
+        stored.inputs[1].default_value = 1 / 2.2
+        half = graph.math("MULTIPLY", amount, 0.5)  # linear light adds twice the difference
+        summed = graph.mix(half, gamma.outputs[0], stored.outputs[0], blend="LINEAR_LIGHT")
+        back = graph.node("Gamma")
+        graph.put(graph.vector("MAXIMUM", summed, (0.0, 0.0, 0.0)), back.inputs[0])
+        back.inputs[1].default_value = 2.2
+        return back.outputs[0]
+
+    # --- relief --------------------------------------------------------------------------
+
+    def _ridges(self):
+        """Kind of fold -> height between 0 in the creases and 1, once for all maps."""
+        if self.folds is not None:
+            return self.folds
+        graph = self.graph
+        self.folds = {}
+        if not self.bumps:
+            return self.folds
+        x, z, away = graph.split(graph.attribute(FOLDS))
+        wander = graph.noise(self.points, 2.2 / self.look.unit, detail=3.0)
+        for kind in self.bumps:
+            if kind == "dimples" or not self.look.areas:
+                cells = graph.cells(self.points, 9.0 / self.look.unit)
+                self.folds[kind] = graph.math("MINIMUM", cells, 1.0)
+                continue
+            if kind == "rays":  # from the outer half of the eye, like a crow's foot
+                aside = graph.math("SUBTRACT", graph.math("ABSOLUTE", x), 0.45)
+                turn = graph.math("ARCTAN2", z, graph.math("MAXIMUM", aside, 0.001))
+                along = graph.math("MULTIPLY", turn, 0.5)
+            else:
+                along = {"level": z, "upright": x, "arc": away}[kind]
+            sway = 0.03 if kind == "arc" else 0.13
+            bent = graph.math("MULTIPLY_ADD", wander, sway, along)
+            wave = graph.math("SINE", graph.math("MULTIPLY", bent, _PITCH[kind]))
+            self.folds[kind] = graph.math("ABSOLUTE", wave)
+        return self.folds
+
+    def _creases(self):
+        """How deep in a crease a place is: creases are darker and redder."""
+        graph = self.graph
+        deep = []
+        for kind, ridge in self._ridges().items():
+            sharp = graph.math("POWER", graph.math("SUBTRACT", 1.0, ridge), 5.0)
+            deep.append(graph.math("MULTIPLY", sharp, self.bumps[kind]))
+        return graph.math("MULTIPLY", graph.total(deep), 0.42, clamp=True) if deep else None
+
+    def _normal(self):
+        """Pores and folds as one height field: engines work each one out three times."""
+        graph, look = self.graph, self.look
+        normal = self._normal_map()
+        pores = graph.cells(self.points, 75.0 / look.unit)
+        grain = graph.noise(self.points, 34.0 / look.unit, detail=2.0, roughness=0.65)
+        deep = _PORE_DEPTH * (0.35 if normal else 1.0)  # a texture has pores of its own
+        heights = [graph.math("MULTIPLY", graph.math("ADD", pores, grain), deep)]
+        for kind, ridge in self._ridges().items():
+            height = graph.math("MULTIPLY", self.bumps[kind], _FOLD_DEPTH[kind])
+            heights.append(graph.math("MULTIPLY", ridge, height))
+        return graph.bump(graph.total(heights), look.unit * 0.03, normal)
+
+    def _normal_map(self):
+        """The normal of the textures, wrinkle sets mixed in by their masks; None without."""
+        graph, look = self.graph, self.look
+        base = look.image("normal", data=True)
+        if base is None and not self.wrinkles:
+            return None
+        flat = (0.5, 0.5, 1.0)
+        color = flat
+        if base is not None:
+            color = graph.image(base, label="Normal").outputs["Color"]
+        for number, amount in sorted(self.wrinkles.items()):
+            role = f"normal:{number}"
+            picture = graph.image(look.image(role, data=True), label=f"Normal {number}")
+            if look.is_offset(role):
+                half = graph.vector("SUBTRACT", picture.outputs["Color"], (0.5, 0.5, 0.5))
+                scaled = graph.vector("SCALE", half)
+                graph.put(amount, scaled.node.inputs["Scale"])
+                color = graph.vector("ADD", color, scaled)
+            else:
+                color = graph.mix(amount, color, picture.outputs["Color"])
+        node = graph.node("NormalMap")
+        graph.put(color, node.inputs["Color"])
+        return node.outputs["Normal"]
+
+    def _roughness(self):
+        graph, look = self.graph, self.look
+        picture = look.image("roughness", data=True)
+        if picture is not None:
+            return graph.image(picture, label="Roughness").outputs["Color"]
+        uneven = graph.noise(self.points, 7.0 / look.unit, detail=4.0)
+        rough = graph.math("MULTIPLY_ADD", uneven, 0.22, 0.40)
+        for area, less in (("nose", 0.10), ("forehead", 0.06), ("lips", 0.14)):
+            if area in self.areas:
+                rough = graph.math("MULTIPLY_ADD", self.areas[area], -less, rough)
+        return rough
+
+    def _specular(self):
+        picture = self.look.image("specular", data=True)
+        if picture is not None:
+            node = self.graph.image(picture, label="Specular")
+            self.graph.set(Specular_Ior_Level=node.outputs["Color"])
+
+
+def offsets_in(path):
+    """Whether a wrinkle map holds differences about 0.5 instead of whole colours or normals."""
+    mean = image_loading.mean_of(path)
+    return mean is not None and bool(abs(mean[:3] - 0.5).max() < 0.06)
