@@ -50,12 +50,18 @@ _SYSTEM = {
 
 
 def compare(a: risorius.Dna, b: risorius.Dna, everything: bool = False) -> list[Difference]:
-    """Everything that differs; an empty list says that both hold the same.
+    """Everything that differs between two faces; an empty list says that both hold the same.
 
-    Rigs of different axes or units are compared in those of A, and so but for rounding.
+    Faces of different axes or units are compared in those of A, so only but for rounding. Where B
+    cannot be converted to them, that is reported and the numbers are compared as they stand.
 
     Args:
-        everything: lists of names are not shortened.
+        a: the face before.
+        b: the face after.
+        everything: lists of names are spelled out in full; otherwise long ones are shortened.
+
+    Returns:
+        Differences in the order of the layers of the format.
     """
     report = Report(everything)
     as_they_are = Comparison(a, b, report)

@@ -15,19 +15,26 @@ _MILLIMETRES = {"cm": 10.0, "m": 1000.0}
 
 
 def differs(a: Floats, b: Floats) -> Bools:
-    """Where the bits differ: a NaN is equal to itself, 0 and -0 are not equal."""
+    """bool[...]: where two float32 arrays a and b of one shape differ in a bit.
+
+    A NaN is equal to itself; 0 and -0 are not equal.
+    """
     return a.view(np.uint32) != b.view(np.uint32)
 
 
 def near(a: Floats, b: Floats) -> Bools:
-    """Where the numbers are equal but for rounding."""
+    """bool[...]: where two float32 arrays a and b of one shape are equal but for rounding.
+
+    The bound is 1e-5 times the size of the number in a, and 1e-5 for numbers below 1. A NaN is near
+    nothing.
+    """
     with np.errstate(invalid="ignore", over="ignore"):
         wide = a.astype(np.float64)
         return np.abs(wide - b) <= 1e-5 * np.maximum(1.0, np.abs(wide))
 
 
 def largest(a: Floats, b: Floats) -> float:
-    """The largest difference; infinite where one is not finite."""
+    """The largest |a - b| of float32 arrays of one shape; infinite where either is not finite."""
     with np.errstate(invalid="ignore", over="ignore"):
         apart = np.abs(a.astype(np.float64) - b.astype(np.float64))
     apart = np.where(np.isnan(apart), np.inf, apart)
@@ -35,7 +42,12 @@ def largest(a: Floats, b: Floats) -> float:
 
 
 def length(amount: float, unit: str) -> str:
-    """A length of the file's translation unit, e.g. "0.3 mm"."""
+    """A length in words, e.g. "0.3 mm".
+
+    Args:
+        amount: in the translation unit of the file.
+        unit: that unit, "cm" or "m"; for another one the number is given without a unit.
+    """
     if unit not in _MILLIMETRES:
         return f"{amount:.3g}"
     millimetres = amount * _MILLIMETRES[unit]
@@ -45,13 +57,25 @@ def length(amount: float, unit: str) -> str:
 
 
 def angle(amount: float, unit: str) -> str:
-    """An angle of the file's rotation unit, e.g. "0.5 degrees"."""
+    """An angle in words, e.g. "0.5 degrees".
+
+    Args:
+        amount: in the rotation unit of the file.
+        unit: that unit, "degrees" or "radians".
+    """
     degrees = math.degrees(amount) if unit == "radians" else amount
     return f"{degrees:.3g} degree{'' if degrees == 1 else 's'}"
 
 
 def by(amount: float, words: str, several: bool) -> str:
-    """E.g. "by up to 0.3 mm"."""
+    """How much changed as the end of a sentence, e.g. "by up to 0.3 mm".
+
+    Args:
+        amount: the largest change; 0 where only the sign of a zero changed, infinite where a number
+            is not finite.
+        words: the amount in words, of `length` or `angle`.
+        several: whether more than one number changed, which makes it "up to".
+    """
     if amount == 0:
         return "only from 0 to -0 or back"
     if math.isinf(amount):

@@ -25,7 +25,12 @@ class Place:
         self.c, self.layer, self.field, self.what = c, layer, field, what
 
     def at(self, name: str, what: str = "") -> Place:
-        """A field inside this one."""
+        """The place of a field inside this one.
+
+        Args:
+            name: of the field, put behind a dot; "": the same field.
+            what: words that stand before each text from there, behind those of this place.
+        """
         field = ".".join(part for part in (self.field, name) if part)
         return Place(self.c, self.layer, field, ", ".join(w for w in (self.what, what) if w))
 
@@ -35,13 +40,24 @@ class Place:
 
 
 def value(place: Place, a: Any, b: Any) -> None:
-    """One value, e.g. a text, a number or a choice."""
+    """Report one value (a text, a whole number, a tuple) where a is not equal to b.
+
+    Args:
+        place: where the difference is reported.
+        a, b: the value in each face.
+    """
     if a != b:
         place.say(f"{_shown(a)} -> {_shown(b)}")
 
 
 def choice(place: Place, words: Sequence[str], a: int, b: int) -> None:
-    """A number that stands for a word."""
+    """Report a number that stands for a word where it differs.
+
+    Args:
+        place: where the difference is reported.
+        words: the word of each number; a number beyond the list is called unknown.
+        a, b: the number in each face, from 0.
+    """
     if a != b:
         place.say(" -> ".join(words[n] if n < len(words) else f"unknown value {n}" for n in (a, b)))
 
@@ -55,14 +71,26 @@ def _shown(x: Any) -> str:
 
 
 def real(place: Place, a: float, b: float) -> None:
-    """One float."""
+    """Report one float where it differs.
+
+    Args:
+        place: where the difference is reported.
+        a, b: the number in each face; compared as float32.
+    """
     x, y = np.array([a], np.float32), np.array([b], np.float32)
     if place.c.changed(x, y).any():
         place.say(f"{x[0]!s} -> {y[0]!s}")
 
 
 def reals(place: Place, noun: str, a: Floats, b: Floats, kind: str = "number") -> None:
-    """Floats that are known by their place."""
+    """Report two lists of floats, number by number, or their lengths where these differ.
+
+    Args:
+        place: where the difference is reported.
+        noun: what one number is, e.g. "weight".
+        a, b: float32[n], float32[m].
+        kind: "length", "angle" or "number": in which unit the amount is said.
+    """
     if len(a) != len(b):
         place.say(f"{counted(len(a), noun)} -> {len(b):,}")
         return
@@ -73,13 +101,25 @@ def reals(place: Place, noun: str, a: Floats, b: Floats, kind: str = "number") -
 
 
 def order(place: Place, pairs: Pairs, noun: str) -> None:
-    """Whether partners stand in another order."""
+    """Report whether partners stand in another order.
+
+    Args:
+        place: where the difference is reported.
+        pairs: which element of A is which element of B.
+        noun: what the elements are called, in the plural.
+    """
     if pairs.reordered:
         place.say(f"the {noun} stand in another order")
 
 
 def members(place: Place, space: Space, a: npt.ArrayLike, b: npt.ArrayLike) -> None:
-    """A list of indices into a space."""
+    """Report the difference of two lists of indices.
+
+    Args:
+        place: where the difference is reported.
+        space: what the indices count.
+        a, b: int[n], int[m], indices into the elements of A and of B.
+    """
     x, y = space.in_a(a), space.in_b(b)
     text = more_and_less(place, pair(x, y), space, x, y)
     if text:
@@ -87,7 +127,14 @@ def members(place: Place, space: Space, a: npt.ArrayLike, b: npt.ArrayLike) -> N
 
 
 def more_and_less(place: Place, pairs: Pairs, space: Space, a: Any, b: Any) -> str:
-    """E.g. "3 joints more: x, y, z"; "" for equal lists."""
+    """The difference of two lists in words, e.g. "3 joints more: x, y, z"; "" for equal lists.
+
+    Args:
+        place: whose report shortens lists of names.
+        pairs: which entry of a is which entry of b.
+        space: what the numbers count.
+        a, b: int64[n], int64[m], common numbers of the space.
+    """
     listed = place.c.report.listed
     parts = []
     for word, left, numbers in (("more", pairs.only_b, b), ("fewer", pairs.only_a, a)):
@@ -100,14 +147,27 @@ def more_and_less(place: Place, pairs: Pairs, space: Space, a: Any, b: Any) -> s
 
 
 def rows_per_lod(place: Place, a: npt.NDArray[Any], b: npt.NDArray[Any]) -> None:
-    """How many leading rows each LOD uses."""
+    """Report how many leading rows each LOD uses, where it differs.
+
+    Args:
+        place: where the difference is reported.
+        a, b: int[LODs of A], int[LODs of B].
+    """
     if not np.array_equal(a, b):
         rows = [" ".join(map(str, x.tolist())) or "none" for x in (a, b)]
         place.say(f"rows per LOD {rows[0]} -> {rows[1]}")
 
 
 def lod_mapping(place: Place, space: Space, a: risorius.LodMapping, b: risorius.LodMapping) -> None:
-    """Which elements each LOD lists."""
+    """Report which elements each LOD lists, where it differs.
+
+    Lists that are equal but stored or shared in another way are reported as such.
+
+    Args:
+        place: where the difference is reported.
+        space: what the lists hold indices of.
+        a, b: the LODs' lists of each face.
+    """
     found = len(place.c.report.differences)
     for lod in range(max(len(a), len(b))):
         lists = [_list(mapping, lod) for mapping in (a, b)]
@@ -145,7 +205,13 @@ def _same_storage(space: Space, a: risorius.LodMapping, b: risorius.LodMapping) 
 
 
 def only_in(place: Place, space: Space, pairs: Pairs) -> None:
-    """Elements that one rig has and the other has not."""
+    """Report the elements that one face has and the other has not.
+
+    Args:
+        place: where the difference is reported.
+        space: the elements of both faces.
+        pairs: which element of A is which element of B.
+    """
     for side, left, numbers in (("A", pairs.only_a, space.a), ("B", pairs.only_b, space.b)):
         if len(left):
             names = place.c.report.listed(space.labels(numbers[left]))
@@ -153,7 +219,13 @@ def only_in(place: Place, space: Space, pairs: Pairs) -> None:
 
 
 def cut(values: Floats, rows: Ints, columns: Ints) -> Floats:
-    """Some rows and columns of a matrix."""
+    """float32[len(rows), len(columns)] of a matrix; the matrix itself where that is all of it.
+
+    Args:
+        values: float32[n, m].
+        rows: int64, which rows, in the order wanted.
+        columns: int64, which columns, in the order wanted.
+    """
     if values.shape == (len(rows), len(columns)) and _all(rows) and _all(columns):
         return values
     return values[np.ix_(rows, columns)]

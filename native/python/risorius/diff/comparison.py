@@ -35,23 +35,41 @@ class Comparison:
     # ---- numbers
 
     def changed(self, a: Floats, b: Floats) -> Bools:
-        """Where two arrays of one shape differ."""
+        """bool[...]: where float32 arrays a and b of one shape differ.
+
+        They differ in a bit if the comparison is exact, else by more than rounding.
+        """
         different = amounts.differs(a, b)
         return different if self.exact else different & ~amounts.near(a, b)
 
     def by(self, a: Floats, b: Floats, kind: str = "number") -> str:
-        """By how much: "by up to 0.3 mm". kind: length, angle or number."""
+        """How much numbers changed, e.g. "by up to 0.3 mm".
+
+        Args:
+            a, b: float32[...] of one shape.
+            kind: "length" or "angle", in the units of A, or "number".
+        """
         amount = amounts.largest(a, b)
         return amounts.by(amount, self.measure(amount, kind), a.size > 1)
 
     def distance(self, a: Floats, b: Floats) -> str:
-        """By how far points float32[n, 3] moved: "by up to 0.3 mm"."""
+        """How far points moved, e.g. "by up to 0.3 mm".
+
+        Args:
+            a, b: float32[n, 3], in the translation unit of A.
+        """
         with np.errstate(invalid="ignore", over="ignore"):
             apart = np.linalg.norm(a.astype(np.float64) - b, axis=1)
         apart = float(np.max(np.where(np.isnan(apart), np.inf, apart), initial=0.0))
         return amounts.by(apart, self.measure(apart, "length"), len(a) > 1)
 
     def measure(self, amount: float, kind: str) -> str:
+        """An amount in words.
+
+        Args:
+            amount: in the units of A.
+            kind: "length", "angle" or "number".
+        """
         if kind == "length":
             return amounts.length(amount, self.a.translation_unit)
         if kind == "angle":
@@ -142,16 +160,32 @@ class Comparison:
         return Space("network", [""] * len(a), [""] * len(b), pairs)
 
     def rows_in_a(self, outputs: npt.ArrayLike, stride: int = 9) -> Ints:
-        """Numbers of joint attributes, joint number * stride + attribute."""
+        """Common numbers of attributes of A's joints: the joint's number * stride + attribute.
+
+        Args:
+            outputs: int[n], joint index * stride + attribute, as the joint groups of A store it.
+            stride: attributes of a joint; 9 with Euler angles, 10 with quaternions.
+        """
         joint, attribute = np.divmod(integers(outputs), stride)
         return self.joints.in_a(joint) * stride + attribute
 
     def rows_in_b(self, outputs: npt.ArrayLike, stride: int = 9) -> Ints:
+        """Common numbers of attributes of B's joints, see `rows_in_a`.
+
+        Args:
+            outputs: int[n], joint index * stride + attribute, as the joint groups of B store it.
+            stride: attributes of a joint; 9 with Euler angles, 10 with quaternions.
+        """
         joint, attribute = np.divmod(integers(outputs), stride)
         return self.joints.in_b(joint) * stride + attribute
 
     def row_labels(self, numbers: Ints, stride: int = 9) -> list[str]:
-        """E.g. "FACIAL_C_Jaw.tx"."""
+        """Attributes of joints for people, e.g. "FACIAL_C_Jaw.tx".
+
+        Args:
+            numbers: int64[n], of `rows_in_a` or `rows_in_b`.
+            stride: attributes of a joint, the same as there.
+        """
         names = ATTRIBUTES if stride == 9 else QUATERNION_ATTRIBUTES
         joint, attribute = np.divmod(numbers, stride)
         return [

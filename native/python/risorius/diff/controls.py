@@ -32,7 +32,14 @@ def compare(c: Comparison) -> None:
 def table(
     place: Place, inputs: Space, outputs: Space, a: risorius.Conditionals, b: risorius.Conditionals
 ) -> None:
-    """Rows of a table of conditionals, matched by what they read and write."""
+    """Report rows of a table of conditionals, matched by what they read and write.
+
+    Args:
+        place: where the difference is reported.
+        inputs: the controls that the rows read.
+        outputs: what the rows write.
+        a, b: the table of each face.
+    """
     rows_a = (inputs.in_a(a.input_indices), outputs.in_a(a.output_indices))
     rows_b = (inputs.in_b(b.input_indices), outputs.in_b(b.output_indices))
     pairs = pair_rows(rows_a, rows_b)

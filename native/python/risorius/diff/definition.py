@@ -36,7 +36,12 @@ def compare(c: Comparison) -> None:
 
 
 def names(place: Place, space: Space) -> None:
-    """Elements that are new, gone, renamed or in another order."""
+    """Report elements that are new, gone, renamed or in another order.
+
+    Args:
+        place: where the difference is reported.
+        space: the elements of both faces.
+    """
     pairs = space.pairs
     only_in(place, space, pairs)
     for i, j in zip(pairs.a.tolist(), pairs.b.tolist(), strict=True):

@@ -16,7 +16,7 @@ _DEEPEST = 8  # correctives of correctives that are spelled out
 
 
 def padded(names: Sequence[str], count: int) -> list[str]:
-    """At least so many names; what a list has more than names has an empty one."""
+    """The names, with empty ones behind them until there are count of them."""
     return [*names, *[""] * (count - len(names))]
 
 
@@ -63,7 +63,11 @@ def _products(factors: list[list[tuple[int, str]]]) -> list[str]:
 
 
 def joint_pairs(a: risorius.Dna, b: risorius.Dna) -> Pairs:
-    """Joints of one name, and renamed ones: one parent and neutral, or one place and neutral."""
+    """Which joint of face a is which joint of face b.
+
+    Joints of one name are the same. Of the others those that have the same parent and neutral pose,
+    then those that have the same index and neutral pose, are taken for renamed.
+    """
     pairs = pair_names(a.joint_names, b.joint_names)
     neutral_a, neutral_b = _neutral(a), _neutral(b)
     parents_a, parents_b = _parents(a), _parents(b)

@@ -91,7 +91,11 @@ def together(parts: Sequence[Ints]) -> Ints:
 
 
 def pair_rows(a: Sequence[Ints], b: Sequence[Ints]) -> Pairs:
-    """As pair, for rows of several numbers given column by column."""
+    """Pairs equal rows of several numbers, as `pair` does with single numbers.
+
+    Args:
+        a, b: the columns of each list, the same number of them: int64[n] each, int64[m] each.
+    """
     if all(len(x) == len(y) and np.array_equal(x, y) for x, y in zip(a, b, strict=True)):
         return pair(np.arange(len(a[0])), np.arange(len(b[0])))
     keys = np.zeros(len(a[0]) + len(b[0]), np.int64)
@@ -102,14 +106,19 @@ def pair_rows(a: Sequence[Ints], b: Sequence[Ints]) -> Pairs:
 
 
 def pair_names(a: Sequence[str], b: Sequence[str]) -> Pairs:
-    """As pair, for texts."""
+    """Pairs equal texts of the lists a and b, as `pair` does with numbers."""
     number: dict[str, int] = {}
     numbered = [integers([number.setdefault(name, len(number)) for name in x]) for x in (a, b)]
     return pair(*numbered)
 
 
 def with_renamed(pairs: Pairs, extra_a: Ints, extra_b: Ints) -> Pairs:
-    """Pairs with further ones: extra_a[i] is extra_b[i]."""
+    """Pairs with further ones.
+
+    Args:
+        pairs: those that are known.
+        extra_a, extra_b: int64[n], positions without a partner so far: extra_a[i] is extra_b[i].
+    """
     a, b = np.concatenate([pairs.a, extra_a]), np.concatenate([pairs.b, extra_b])
     order = np.argsort(a)
     return Pairs(
@@ -118,7 +127,12 @@ def with_renamed(pairs: Pairs, extra_a: Ints, extra_b: Ints) -> Pairs:
 
 
 def pair_in_place(pairs: Pairs, count_a: int, count_b: int) -> Pairs:
-    """What has no partner of its name and stands at the same place in equally long lists."""
+    """Pairs, and further ones: what has no partner in either list and stands at the same position.
+
+    Args:
+        pairs: those that are known.
+        count_a, count_b: how long the lists are; nothing is added unless they are equally long.
+    """
     if count_a != count_b:
         return pairs
     both = np.intersect1d(pairs.only_a, pairs.only_b)

@@ -28,6 +28,7 @@ class Report:
         self.everything = everything
 
     def add(self, layer: str, field: str, text: str) -> None:
+        """Add a difference; the layer, field and text are those of `Difference`."""
         self.differences.append(Difference(layer, field, text))
 
     def listed(self, names: Sequence[str]) -> str:
@@ -47,7 +48,13 @@ def plural(noun: str) -> str:
 
 
 def counted(number: int, noun: str, several: str | None = None) -> str:
-    """E.g. "1 vertex", "1,203 vertices"."""
+    """A number with its noun, e.g. "1 vertex" or "1,203 vertices".
+
+    Args:
+        number: how many.
+        noun: in the singular.
+        several: in the plural; None: as `plural` makes it.
+    """
     return f"{number:,} {noun if number == 1 else several or plural(noun)}"
 
 

@@ -13,6 +13,12 @@ from .report import counted
 
 
 def compare_skin(place: Place, a: risorius.Mesh, b: risorius.Mesh) -> None:
+    """Report skin weights, matched by joint within each vertex.
+
+    Args:
+        place: where the differences are reported.
+        a, b: the same mesh of each face.
+    """
     count_a, count_b = (max(0, len(mesh.skin_offsets) - 1) for mesh in (a, b))
     if count_a != count_b:
         text = f"skin weights of {counted(count_a, 'vertex', 'vertices')} -> {count_b:,}"

@@ -60,7 +60,14 @@ def _look_up(numbers: Ints, indices: Ints) -> Ints:
 
 
 def chain(noun: str, parts: Sequence[Space]) -> Space:
-    """Several spaces after one another, as the controls are: raw, corrective, network, RBF pose."""
+    """Several spaces after one another as one.
+
+    So the controls are numbered: raw controls, correctives, outputs of networks, RBF poses.
+
+    Args:
+        noun: what an element of the whole is.
+        parts: the spaces in their order.
+    """
     first_a = np.cumsum([0] + [len(part.a) for part in parts])
     first_b = np.cumsum([0] + [len(part.b) for part in parts])
     pairs = Pairs(

@@ -13,6 +13,12 @@ from .report import counted
 
 
 def compare_targets(place: Place, a: risorius.Mesh, b: risorius.Mesh) -> None:
+    """Report blend shape targets, matched by their channel, and their deltas, matched by vertex.
+
+    Args:
+        place: where the differences are reported.
+        a, b: the same mesh of each face.
+    """
     c = place.c
     targets_a, targets_b = a.blend_shape_targets, b.blend_shape_targets
     channels_a = c.channels.in_a([t.blend_shape_channel_index for t in targets_a])

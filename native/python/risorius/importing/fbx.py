@@ -116,6 +116,12 @@ class Parser:
         self.head = struct.Struct("<QQQB" if self.version >= 7500 else "<IIIB")
 
     def fail(self, at: int, message: str) -> AnimationFileError:
+        """An AnimationFileError that names the file and a byte of it.
+
+        Args:
+            at: offset in the file, bytes.
+            message: what was expected and what was found.
+        """
         return AnimationFileError(self.name, f"byte {at}: {message}")
 
     def top(self) -> dict[str, Node]:
@@ -218,11 +224,14 @@ def read(data: bytes, name: str, take: str | None = None, budget: Budget | None 
     name begins with CTRL_ is a slider of a face board: its place gives CTRL_C_jaw.tx, .ty, .tz.
 
     Args:
+        data: the whole file.
+        name: what errors call the file.
         take: name or number of a stack; None: the first that moves any of that.
-        budget: of the file; None: by its size.
+        budget: bounds memory and work; None: by the size of the file.
 
     Raises:
         AnimationFileError: no FBX that can be read, no such stack, nothing of that animated.
+        BudgetError: the file unfolds to far more than its size.
     """
     scene = _scene(Parser(data, name, budget or Budget.of(len(data))))
     stacks, components = scene.of_kind("AnimationStack"), _components(scene)

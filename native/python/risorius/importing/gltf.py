@@ -45,10 +45,25 @@ class Document:
         self._numbers: dict[int, Doubles] = {}
 
     def fail(self, place: str, message: str) -> AnimationFileError:
+        """An AnimationFileError that names the file and the place in its JSON, e.g. "accessors[3]".
+
+        Args:
+            place: where in the JSON.
+            message: what was expected and what was found.
+        """
         return AnimationFileError(self.name, f"{place}: {message}")
 
     def item(self, kind: str, index: object, place: str) -> dict[str, Any]:
-        """`kind[index]`. Raises: AnimationFileError: not there, or no table."""
+        """The table `kind[index]` of the JSON.
+
+        Args:
+            kind: a list at the top of the JSON, e.g. "accessors".
+            index: position in it, as the file gives it; it may be of any type.
+            place: what errors name: where the index stands.
+
+        Raises:
+            AnimationFileError: no index, nothing there, or no table there.
+        """
         rows = self.json.get(kind)
         if not isinstance(rows, list) or isinstance(index, bool) or not isinstance(index, int):
             raise self.fail(place, f"an index of {kind} was expected, found {index!r}")
@@ -57,6 +72,17 @@ class Document:
         return rows[index]
 
     def whole(self, table: Mapping[str, Any], key: str, place: str, default: int = 0) -> int:
+        """A whole number of 0 or more out of a table of the JSON.
+
+        Args:
+            table: where it stands.
+            key: what it is called there.
+            place: what errors call the table.
+            default: the number where the table has no such key.
+
+        Raises:
+            AnimationFileError: something else is there.
+        """
         value = table.get(key, default)
         if isinstance(value, bool) or not isinstance(value, int) or value < 0:
             raise self.fail(f"{place}.{key}", f"a whole number was expected, found {value!r}")
@@ -66,6 +92,15 @@ class Document:
         """float64[count] of a scalar accessor; whole numbers as the fractions they stand for.
 
         Who asks again gets the same array: a thousand channels may share one.
+
+        Args:
+            index: of the accessor, as the file gives it.
+            place: what errors name: where the index stands.
+
+        Raises:
+            AnimationFileError: no such accessor, one of a kind that is not read, one that reaches
+                beyond its buffer, numbers that are not finite.
+            BudgetError: more numbers than a file of this size may hold.
         """
         if isinstance(index, int) and not isinstance(index, bool) and index in self._numbers:
             return self._numbers[index]
@@ -132,7 +167,16 @@ def is_glb(data: bytes) -> bool:
 
 
 def open_glb(path: Path, data: bytes, budget: Budget | None = None) -> Document:
-    """Raises: AnimationFileError: no GLB of version 2, or a cut one; with the byte."""
+    """A GLB, the binary form of glTF.
+
+    Args:
+        path: of the file; its buffers are looked for beside it, and errors name it.
+        data: the whole file.
+        budget: bounds memory and work; None: by the size of the file.
+
+    Raises:
+        AnimationFileError: no GLB of version 2, or a cut one; with the byte.
+    """
     budget = budget or Budget.of(len(data))
     name = str(path)
     if len(data) < 20:
@@ -178,7 +222,17 @@ def is_gltf(document: object) -> bool:
 def open_gltf(
     path: Path, document: object, binary: bytes | None = None, budget: Budget | None = None
 ) -> Document:
-    """Raises: AnimationFileError: no glTF of version 2."""
+    """A glTF whose JSON is parsed.
+
+    Args:
+        path: of the file; its buffers are looked for beside it, and errors name it.
+        document: the parsed JSON.
+        binary: the binary chunk of a GLB; None: there is none.
+        budget: bounds memory and work; None: that of a small file.
+
+    Raises:
+        AnimationFileError: no glTF of version 2.
+    """
     if not is_gltf(document) or not isinstance(document, dict):
         raise AnimationFileError(str(path), "asset.version of a glTF was expected")
     version = str(document["asset"]["version"])
@@ -198,6 +252,7 @@ def read(document: Document, take: str | None = None) -> Take:
     is taken once.
 
     Args:
+        document: of `open_glb` or `open_gltf`.
         take: name or number of an animation; None: the first that moves any of that.
 
     Raises:

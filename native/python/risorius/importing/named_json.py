@@ -51,10 +51,24 @@ class Reader:
         self.notes: list[str] = []
 
     def fail(self, message: str, place: str | None = None) -> AnimationFileError:
+        """An AnimationFileError that names the file.
+
+        Args:
+            message: what was expected and what was found.
+            place: where in the JSON, e.g. "frames[3]"; None: the whole of it.
+        """
         return AnimationFileError(self.name, f"{place}: {message}" if place else message)
 
     def number(self, value: object, place: str) -> float:
-        """Raises: AnimationFileError: no finite number that a float32 holds."""
+        """A finite number that a float32 holds; some software writes numbers as text.
+
+        Args:
+            value: a value of the JSON.
+            place: what errors call it.
+
+        Raises:
+            AnimationFileError: it is none.
+        """
         found = math.nan
         if isinstance(value, int | float | str) and not isinstance(value, bool):
             try:  # some write numbers as text
@@ -66,11 +80,29 @@ class Reader:
         raise self.fail(f"a finite number was expected, found {_shown(value)}", place)
 
     def numbers(self, values: object, place: str) -> list[float]:
+        """A list of finite numbers.
+
+        Args:
+            values: a value of the JSON.
+            place: what errors call it.
+
+        Raises:
+            AnimationFileError: it is no list, or something in it is no such number.
+        """
         if not isinstance(values, list):
             raise self.fail(f"a list of numbers was expected, found {_kind(values)}", place)
         return [self.number(value, f"{place}[{i}]") for i, value in enumerate(values)]
 
     def strings(self, values: object, place: str) -> list[str]:
+        """A list of names.
+
+        Args:
+            values: a value of the JSON.
+            place: what errors call it.
+
+        Raises:
+            AnimationFileError: it is no list, or something in it is no text.
+        """
         if not isinstance(values, list) or not all(isinstance(v, str) for v in values):
             raise self.fail(f"a list of names was expected, found {_kind(values)}", place)
         return values
@@ -85,6 +117,15 @@ class Reader:
         return None
 
     def frames_a_second(self, value: object, place: str) -> float:
+        """A rate from SLOWEST to FASTEST frames a second.
+
+        Args:
+            value: a value of the JSON.
+            place: what errors call it.
+
+        Raises:
+            AnimationFileError: it is no number, or outside that range.
+        """
         rate = self.number(value, place)
         if not SLOWEST <= rate <= FASTEST:
             raise self.fail(
@@ -95,7 +136,17 @@ class Reader:
         return rate
 
     def times(self, given: object, count: int, rate: float | None, place: str) -> Doubles:
-        """Times of `count` frames: as given, else by the rate."""
+        """float64[count] seconds of frames: as given, else by the rate from 0 on.
+
+        Args:
+            given: a list of seconds out of the JSON, or None.
+            count: how many frames there are.
+            rate: frames a second; None: unknown.
+            place: what errors call the times.
+
+        Raises:
+            AnimationFileError: another number of times, or neither times nor a rate.
+        """
         if given is not None:
             times = np.array(self.numbers(given, place))
             if times.size != count:
@@ -108,7 +159,17 @@ class Reader:
     def take(
         self, names: Sequence[str], rows: npt.ArrayLike, times: Doubles, rate: float | None = None
     ) -> Take:
-        """From curves [controls, frames]."""
+        """A Take of curves; frames whose time does not ascend are left out and noted.
+
+        Args:
+            names: of the curves, each once.
+            rows: float[controls, frames].
+            times: float64[frames], seconds.
+            rate: frames a second; None: told from the times.
+
+        Raises:
+            AnimationFileError: a name that stands there twice.
+        """
         if len(set(names)) != len(names):
             twice = next(name for name in names if list(names).count(name) > 1)
             raise self.fail(f"{twice!r} was expected once, found it twice")
@@ -118,7 +179,15 @@ class Reader:
 
 
 def parse(text: str, name: str) -> object:
-    """Raises: AnimationFileError: no JSON, with line and column; nested too deeply."""
+    """The document that a JSON text holds.
+
+    Args:
+        text: of the file.
+        name: what errors call the file.
+
+    Raises:
+        AnimationFileError: no JSON, with line and column; nested too deeply.
+    """
     try:
         return json.loads(text)
     except json.JSONDecodeError as error:
@@ -138,11 +207,13 @@ def read(
 
     Args:
         document: parsed JSON.
+        name: what errors call the file.
         rate: frames a second, where the file does not say it; it wins if it does.
-        budget: of the file; None: that of a small one.
+        budget: bounds memory and work; None: that of a small file.
 
     Raises:
         AnimationFileError: none of the shapes, or one that does not hold together.
+        BudgetError: far more curves and frames than a file of this size may hold.
     """
     reader = Reader(name, rate, budget or Budget.of(0))
     for shape in (
@@ -164,7 +235,15 @@ def read(
 
 
 def own_clip(reader: Reader, document: object) -> Take | None:
-    """What `importing.write_json` writes."""
+    """The shape that `importing.write_json` writes, or None where the document has another shape.
+
+    Args:
+        reader: of the file, for its errors.
+        document: parsed JSON.
+
+    Raises:
+        AnimationFileError: it has that shape and does not hold together.
+    """
     if not isinstance(document, dict) or "risorius_clip" not in document:
         return None
     curves = document.get("curves")
@@ -208,7 +287,15 @@ def _own_events(reader: Reader, rows: object) -> list[Event]:
 def matrix(reader: Reader, document: object) -> Take | None:
     """{names: [...], frames: [[...], ...]}, as Audio2Face exports {facsNames, weightMat}.
 
-    A frame may be a table with the values under "weights" and a time.
+    A frame may be a table with the values under "weights" and a time. None where the document has
+    another shape.
+
+    Args:
+        reader: of the file, for its errors.
+        document: parsed JSON.
+
+    Raises:
+        AnimationFileError: it has that shape and does not hold together.
     """
     if not isinstance(document, dict):
         return None
@@ -251,7 +338,17 @@ def matrix(reader: Reader, document: object) -> Take | None:
 
 
 def neurosync(reader: Reader, document: object) -> Take | None:
-    """{"blendshapes": [[61 or 68 values], ...]}, as the NeuroSync service returns."""
+    """{"blendshapes": [[61 or 68 values], ...]}, as the NeuroSync service returns.
+
+    None where the document has another shape.
+
+    Args:
+        reader: of the file, for its errors and its notes.
+        document: parsed JSON.
+
+    Raises:
+        AnimationFileError: it has that shape and does not hold together.
+    """
     rows = document.get("blendshapes") if isinstance(document, dict) else None
     if not isinstance(rows, list) or not rows or not all(isinstance(row, list) for row in rows):
         return None
@@ -274,7 +371,18 @@ def neurosync(reader: Reader, document: object) -> Take | None:
 
 
 def frame_tables(reader: Reader, document: object) -> Take | None:
-    """A list of frames {time, name: value, ...}, the values under a key of their own or not."""
+    """A list of frames {time, name: value, ...}, the values under a key of their own or not.
+
+    None where the document has another shape.
+
+    Args:
+        reader: of the file, for its errors and its budget.
+        document: parsed JSON.
+
+    Raises:
+        AnimationFileError: it has that shape and does not hold together.
+        BudgetError: far more curves and frames than a file of this size may hold.
+    """
     frames: object = document
     outer: dict[str, Any] = {}
     if isinstance(document, dict):
@@ -328,7 +436,15 @@ def _frame_time(reader: Reader, frame: Mapping[str, Any], place: str) -> float |
 
 
 def curve_table(reader: Reader, document: object) -> Take | None:
-    """Unreal's curve table: [{"Name": curve, "0": value, "0.033": value}, ...]."""
+    """Unreal's curve table: [{"Name": curve, "0": value, "0.033": value}, ...]; None: other shape.
+
+    Args:
+        reader: of the file, for its errors.
+        document: parsed JSON; the keys beside "Name" are seconds.
+
+    Raises:
+        AnimationFileError: a value that is no finite number.
+    """
     if not _is_tables(document) or not isinstance(document, list):
         return None
     curves = {}
@@ -346,7 +462,15 @@ def curve_table(reader: Reader, document: object) -> Take | None:
 def keyed_curves(reader: Reader, document: object) -> Take | None:
     """Curves with keys {Time, Value}, wherever in the document they stand.
 
-    So an Unreal animation's FloatCurves are written, [{CurveName, FloatCurve: {Keys: [...]}}].
+    So an Unreal animation's FloatCurves are written, [{CurveName, FloatCurve: {Keys: [...]}}]. None
+    where there are no such curves.
+
+    Args:
+        reader: of the file, for its errors and its notes.
+        document: parsed JSON; times are seconds.
+
+    Raises:
+        AnimationFileError: a key without a time or a value.
     """
     found: dict[str, Keys] = {}
     is_cubic = False
@@ -400,7 +524,17 @@ def _keyed(reader: Reader, curves: dict[str, Keys]) -> Take:
 
 
 def lists_by_name(reader: Reader, document: object) -> Take | None:
-    """{name: [values], ...}, or the same under "curves", with a rate or a list of times."""
+    """{name: [values], ...}, or the same under "curves", with a rate or a list of times.
+
+    None where the document has another shape.
+
+    Args:
+        reader: of the file, for its errors.
+        document: parsed JSON.
+
+    Raises:
+        AnimationFileError: lists of different lengths, a value that is no number, no time.
+    """
     if not isinstance(document, dict):
         return None
     inner = next((document[k] for k in WEIGHT_KEYS if isinstance(document.get(k), dict)), None)

@@ -25,7 +25,11 @@ _MIRRORED_ANGLES = ("yaw", "roll")
 
 
 def resample(clip: Clip, rate: float) -> Clip:
-    """Frames `rate` a second from the first frame to the last; straight lines between frames.
+    """The clip at even times from its first frame to its last; straight lines between its frames.
+
+    Args:
+        clip: any clip.
+        rate: frames a second of the result, above 0.
 
     Raises:
         ValueError: a rate that is not above 0.
@@ -68,6 +72,7 @@ def adjust(
     """Each control as gain * value + offset.
 
     Args:
+        clip: any clip.
         gains: pattern of control names -> factor; of several that fit, all are multiplied.
         offsets: pattern -> what is added after that; of several, all are added.
 
@@ -91,7 +96,8 @@ def calibrate(clip: Clip, first: int, last: int | None = None) -> Clip:
     and the control never was. Of the head and the eyes the angles are subtracted only.
 
     Args:
-        first: frame of the neutral face.
+        clip: a capture with a stretch of neutral face in it.
+        first: frame of the neutral face, from 0.
         last: last frame, if it is the mean of several; included.
 
     Raises:
@@ -115,16 +121,17 @@ def smooth(clip: Clip, window: float, *, order: int = 3) -> Clip:
     """Savitzky-Golay: fit a polynomial around each frame; peaks keep their height and their time.
 
     Polynomials up to `order` pass unchanged, at the ends too; nothing is delayed; no curve leaves
-    the range that it had. A clip with
-    times of its own is smoothed by frame, as captures are taken at even times but for what was
-    dropped.
+    the range that it had. A clip with times of its own is smoothed by frame, as captures are taken
+    at even times but for what was dropped.
 
     Args:
-        window: seconds of frames that each fit takes.
-        order: degree of the polynomial.
+        clip: any clip; one with fewer frames than the window is returned as it is.
+        window: seconds of frames that each fit takes, above 0.
+        order: degree of the polynomial, 0 or more.
 
     Raises:
-        ValueError: a window or an order that is not above 0.
+        ValueError: a window or an order that makes no sense.
+        BudgetError: a window of so many frames that the fit would fill the memory.
     """
     if not window > 0.0 or order < 0:
         raise ArgumentError(f"a window above 0 s was expected, found {window:g} s, degree {order}")
@@ -155,6 +162,7 @@ def gaussian(clip: Clip, width: float) -> Clip:
     """A weighted mean around each frame: softer than `smooth`, and lowers short peaks.
 
     Args:
+        clip: any clip.
         width: standard deviation in seconds; the weights fall off over the frames' own times.
 
     Raises:
@@ -223,7 +231,13 @@ def _share(cutoff: float | Doubles, step: float) -> Doubles:
 
 
 def one_euro(clip: Clip, cutoff: float = 1.5, beta: float = 5.0) -> Clip:
-    """What a live viewer would have seen: OneEuro over the frames, one after the other."""
+    """What a live viewer would have seen: OneEuro over the frames, one after the other.
+
+    Args:
+        clip: any clip.
+        cutoff: of `OneEuro`, Hz: how much a face at rest is smoothed.
+        beta: of `OneEuro`: how quickly movement lifts the cutoff.
+    """
     running = OneEuro(cutoff, beta)
     rows = [running(t, v) for t, v in zip(clip.frame_times(), clip.curves.T, strict=True)]
     return clip.replaced(curves=np.array(rows).reshape(clip.frame_count, -1).T)

@@ -294,7 +294,9 @@ def import_file(
 ) -> tuple[Clip, Report]:
     """A file as a clip of raw controls, and what became of each of its curves.
 
-    Args: as of `read` and `Imported.apply`.
+    Args:
+        path, kind, rate, timecode_rate, take: as of `read`.
+        rig_names, mapping, rig, rotations: as of `Imported.apply`.
 
     Raises:
         ValueError: as they do.

@@ -84,6 +84,10 @@ def read_bytes(path: Path) -> bytes:
 def refuse_other_kinds(data: bytes, name: str) -> None:
     """Say what a file is that is no animation, where its first bytes tell.
 
+    Args:
+        data: the file, or its first bytes.
+        name: what errors call the file.
+
     Raises:
         AnimationFileError: a sound, a picture, a film, an archive, a scene, a face.
     """
@@ -94,6 +98,10 @@ def refuse_other_kinds(data: bytes, name: str) -> None:
 
 def decode(data: bytes, name: str) -> str:
     """Text of a file: UTF-8 with or without a byte order mark, UTF-16 with one.
+
+    Args:
+        data: the whole file.
+        name: what errors call the file.
 
     Raises:
         AnimationFileError: another encoding, with the line and column of the first bad byte.
@@ -138,9 +146,17 @@ def make_clip(
     events: Sequence[Event] = (),
     metadata: Mapping[str, str] | None = None,
 ) -> Clip:
-    """A clip of curves [controls, frames] at ascending times; evenly timed where the times are.
+    """A clip that is evenly timed where its times are even.
 
     Even means that no frame is further than a microsecond from start + i / rate.
+
+    Args:
+        names: of the curves, each once.
+        curves: float[controls, frames].
+        times: float64[frames], seconds, ascending.
+        rate: frames a second; None: told from the times.
+        events: of the clip.
+        metadata: of the clip.
     """
     chosen = rate or frame_rate(times)
     start = float(times[0]) if times.size else 0.0
@@ -158,7 +174,13 @@ def make_clip(
 
 
 def number(text: str, name: str, line: int, column: int | str) -> float:
-    """A finite float32's worth of a cell.
+    """The finite number in a cell of a table or a word of a line.
+
+    Args:
+        text: the cell.
+        name: what errors call the file.
+        line: from 1, for errors.
+        column: from 1, or what heads it, for errors.
 
     Raises:
         AnimationFileError: no number, NaN, infinite or outside float32.
@@ -178,7 +200,15 @@ def number(text: str, name: str, line: int, column: int | str) -> float:
 
 
 def keep_ascending(times: Doubles, notes: list[str]) -> npt.NDArray[np.intp]:
-    """Indices of the frames whose time comes after all times before; the others are noted."""
+    """Indices of the frames whose time comes after all times before; the others are noted.
+
+    Args:
+        times: float64[frames], seconds.
+        notes: gets a sentence where frames are left out.
+
+    Returns:
+        int[kept frames].
+    """
     highest = np.maximum.accumulate(times) if times.size else times
     good = np.ones(times.size, bool)
     good[1:] = times[1:] > highest[:-1]

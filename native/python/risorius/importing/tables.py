@@ -64,7 +64,15 @@ class Table:
     delimiter: str
 
     def cell(self, row: int, column: int) -> float:
-        """Raises: AnimationFileError: no finite number."""
+        """The number in a cell.
+
+        Args:
+            row: from 0, without the header.
+            column: from 0.
+
+        Raises:
+            AnimationFileError: no finite number.
+        """
         text = self.rows[row][column].strip()
         if self.delimiter == ";" and "." not in text:
             text = text.replace(",", ".")  # a decimal comma, as spreadsheets of many lands write
@@ -102,6 +110,10 @@ def sniff(text: str) -> str:
 
 def read_table(text: str, name: str) -> Table:
     """A table with a header.
+
+    Args:
+        text: of the file; commas, semicolons or tabs stand between the cells.
+        name: what errors call the file.
 
     Raises:
         AnimationFileError: no header, a name twice, a row of another length, no row, bad quotes.
@@ -272,6 +284,11 @@ def read_plain(table: Table, rate: float | None = None, timecode_rate: float | N
     Time is the column that is headed so (seconds, milliseconds, timecodes, or frame numbers at
     `rate`), else the row number at `rate`. An empty cell is a value that is not there: the curve
     goes straight across, or keeps its first or last value.
+
+    Args:
+        table: of `read_table`.
+        rate: frames a second of frame and row numbers; None: unknown.
+        timecode_rate: frames a second of timecodes; None: told from them.
 
     Raises:
         AnimationFileError: no time and no rate, a cell that is no number, no curve.

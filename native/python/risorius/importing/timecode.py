@@ -28,7 +28,17 @@ class Timecode(NamedTuple):
 
 
 def parse(text: str, name: str, line: int, column: int | str) -> Timecode:
-    """Raises: AnimationFileError: another form, 60 minutes or seconds."""
+    """A timecode HH:MM:SS:FF, the frame with a fraction or none.
+
+    Args:
+        text: the cell; ; or , before the frame says drop-frame.
+        name: what errors call the file.
+        line: from 1, for errors.
+        column: from 1, or what heads it, for errors.
+
+    Raises:
+        AnimationFileError: another form, 60 minutes or seconds.
+    """
     match = _FORM.fullmatch(text.strip())
     if match is None:
         raise AnimationFileError(
@@ -82,8 +92,12 @@ def seconds_of(
     """Seconds of each timecode since midnight of the first, with midnights counted.
 
     Args:
+        codes: of `parse`, in the order of the frames.
         base: frames that the timecode counts a second: 30 of 29.97.
         is_true_rate: False where a second of timecode lasts 1.001 s: 23.976, 29.97, 59.94.
+
+    Returns:
+        float64[codes].
     """
     hours, minutes, secs, frames, dropped = np.array(codes, np.float64).reshape(-1, 5).T
     count = (3600.0 * hours + 60.0 * minutes + secs) * base + frames

@@ -133,7 +133,11 @@ def is_rhubarb_tsv(text: str) -> bool:
 
 
 def read_rhubarb_tsv(text: str, name: str) -> Take:
-    """Lines "0.32<tab>B"; the last one tells the end.
+    """Rhubarb's lines "0.32<tab>B", seconds and a shape; the last one tells the end.
+
+    Args:
+        text: of the file.
+        name: what errors call the file.
 
     Raises:
         AnimationFileError: a line of another form, times that do not ascend.
@@ -164,7 +168,11 @@ def _check_order(starts: Sequence[tuple[float, str]], name: str, line: int) -> N
 
 
 def read_rhubarb_xml(text: str, name: str) -> Take:
-    """<rhubarbResult> with <mouthCue start end>.
+    """Rhubarb's <rhubarbResult> with <mouthCue start end>, in seconds.
+
+    Args:
+        text: of the file.
+        name: what errors call the file.
 
     Raises:
         AnimationFileError: no such XML, or XML with declarations of its own.
@@ -211,7 +219,11 @@ def _refuse_declarations(text: str, name: str) -> None:
 
 
 def read_rhubarb_json(document: dict[str, object], name: str) -> Take:
-    """{"metadata": ..., "mouthCues": [{"start", "end", "value"}]}.
+    """Rhubarb's {"metadata": ..., "mouthCues": [{"start", "end", "value"}]}, in seconds.
+
+    Args:
+        document: parsed JSON.
+        name: what errors call the file.
 
     Raises:
         AnimationFileError: cues of another form.
@@ -253,6 +265,8 @@ def read_dat(text: str, name: str, rate: float | None = None) -> Take:
     """Moho's switch data: MohoSwitch1, then lines of a frame, counted from 1, and a shape.
 
     Args:
+        text: of the file.
+        name: what errors call the file.
         rate: frames a second; None: what an FPS line says, else DAT_RATE, noted.
 
     Raises:
@@ -308,7 +322,15 @@ class Lines:
         return AnimationFileError(self.name, message, line=self.at)
 
     def count(self, text: str, what: str) -> int:
-        """A whole number, and as many as there are lines left at most where it counts lines."""
+        """The whole number of up to nine digits that a line holds; it may be negative.
+
+        Args:
+            text: the line.
+            what: the number stands for, for errors.
+
+        Raises:
+            AnimationFileError: the line holds something else.
+        """
         if not re.fullmatch(r"-?\d{1,9}", text):
             raise self.fail(f"{what} was expected, found {text[:40]!r}")
         return int(text)
@@ -325,6 +347,10 @@ class Word(NamedTuple):
 
 def read_pgo(text: str, name: str) -> Take:
     """Papagayo's own file, as text: voices of phrases of words of phonemes.
+
+    Args:
+        text: of the file.
+        name: what errors call the file.
 
     Raises:
         AnimationFileError: a line of another form, or too few.
@@ -366,6 +392,10 @@ def _pgo_word(lines: Lines) -> Word:
 
 def read_pgo_json(document: dict[str, object], name: str) -> Take:
     """Papagayo-NG's own file of version 2.
+
+    Args:
+        document: parsed JSON.
+        name: what errors call the file.
 
     Raises:
         AnimationFileError: tables of another form.

@@ -58,7 +58,15 @@ def json_text(clip: Clip) -> str:
 
 
 def write_text(text: str, path: str | os.PathLike[str]) -> None:
-    """Write a file whole or not at all, see fileio. Raises: OSError."""
+    """Write a file whole or not at all.
+
+    Args:
+        text: the new content, written as UTF-8.
+        path: of the file; a link is followed.
+
+    Raises:
+        OSError: the file cannot be written; what was there before stays.
+    """
     fileio.write_text(path, text)
 
 

@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: MIT
+"""Finds public functions whose docstring does not say what their arguments and errors are."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+
+Function = ast.FunctionDef | ast.AsyncFunctionDef
+
+
+def public_functions(tree: ast.Module) -> Iterator[tuple[str, Function]]:
+    """(dotted name, definition) of the functions of a module and the methods of its classes.
+
+    Names that begin with an underscore, and what lies in them, are not public. Overloads are left
+    to the definition behind them.
+    """
+    for node in tree.body:
+        if isinstance(node, Function) and _shown(node):
+            yield node.name, node
+        elif isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+            for inner in node.body:
+                if isinstance(inner, Function) and _shown(inner):
+                    yield f"{node.name}.{inner.name}", inner
+
+
+def _shown(node: Function) -> bool:
+    overload = any(ast.unparse(mark).endswith("overload") for mark in node.decorator_list)
+    return not node.name.startswith("_") and not overload
+
+
+def arguments(node: Function) -> list[str]:
+    """The names of a function's arguments without self and cls."""
+    given = node.args
+    plain = [*given.posonlyargs, *given.args]
+    stars = [star for star in (given.vararg, given.kwarg) if star]
+    names = [argument.arg for argument in (*plain, *given.kwonlyargs, *stars)]
+    return [name for name in names if name not in ("self", "cls")]
+
+
+def unsaid(node: Function) -> list[str]:
+    """What the docstring of a function with two arguments or more leaves out.
+
+    Each argument has to be named in it, and errors where the function raises some itself: under
+    Args and Raises, or in sentences where these say enough.
+    """
+    names = arguments(node)
+    if len(names) < 2:
+        return []
+    text = ast.get_docstring(node) or ""
+    words = set(re.findall(r"\w+", text))
+    raises = any(isinstance(inner, ast.Raise) and inner.exc for inner in ast.walk(node))
+    errors = ["Raises"] if raises and "raises" not in text.lower() else []
+    return [name for name in names if name not in words] + errors
