@@ -24,7 +24,7 @@ def _lines(capsys):
 
 def test_a_new_character_is_of_the_present_form_and_says_what_it_needs(dna_file, capsys):
     controls = scene.controls(scene.load(dna_file))
-    assert controls[VERSION] == scene.submodule("scene.life.migrations").PRESENT == 1
+    assert controls[VERSION] == scene.submodule("scene.base.form").PRESENT == 1
     assert "add-on" in controls["Needs Risorius"]
     bpy.context.view_layer.update()
     assert _lines(capsys) == []
@@ -106,7 +106,7 @@ def test_a_form_that_is_no_number_counts_as_none(rubbish):
     bpy.ops.wm.open_mainfile(filepath=str(LAYERS))
     del past.controls()[0][VERSION]
     past.controls()[0][VERSION] = rubbish
-    assert scene.submodule("scene.life.migrations").version_of(past.controls()[0]) == 0
+    assert scene.submodule("scene.base.form").version_of(past.controls()[0]) == 0
     scene.submodule("scene.life.migrations").bring_up_all()
     assert past.controls()[0][VERSION] == 1
 

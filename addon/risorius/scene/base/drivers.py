@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Drivers and F-curves anywhere in the file that lead to a character."""
+"""Drivers that follow a character: how one is made, and where in the file others lead to it."""
 
 import re
 
@@ -116,3 +116,14 @@ def used_controls(controls, labels):
     used.update(paths[c.data_path] for c in (data.drivers if data else ()) if c.data_path in paths)
     used.update(paths[t.data_path] for _owner, t in targets_at(controls) if t.data_path in paths)
     return used
+
+
+def plain_driver(curve, rig, data_path, name="var"):
+    """Make an F-curve follow one property of the rig, without any expression."""
+    curve.driver.type = "SUM"
+    variable = curve.driver.variables.new()
+    variable.name = name
+    variable.type = "SINGLE_PROP"
+    variable.targets[0].id_type = "OBJECT"
+    variable.targets[0].id = rig
+    variable.targets[0].data_path = data_path

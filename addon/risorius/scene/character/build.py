@@ -11,8 +11,7 @@ from ... import native
 from ...logic.base import names
 from ...logic.character import plans
 from ...logic.material import texture_search
-from ..base import compat, parts, sharing, storage
-from ..life import migrations
+from ..base import compat, form, parts, sharing, storage
 from ..material import materials
 from . import armatures, lods, meshes, runtime
 
@@ -160,7 +159,7 @@ def _connect(plan, rig, controls, text, path, unit):
     parts.point(controls, parts.RIG, rig)
     parts.point(rig, parts.CONTROLS, controls)
     parts.point(rig, parts.DNA, text)
-    migrations.be_born(controls)
+    form.be_born(controls)
     rig[parts.UNIT] = unit
     rig[parts.LOD] = 0
     rig[parts.LOD_RENDER] = lods.SAME

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...logic.character import user_edits
 from ...logic.character.plans import AUTO_KEYS, AUTO_LIMIT, LIVE_KEY
-from ..base import parts
+from ..base import drivers, parts
 from .armatures import lock_place
 
 _DRIVEN = re.compile(r'^\["channels"\]\[(\d+)\]$')
@@ -303,15 +303,4 @@ def drive_key(key, block, rig, channel):
     """Drive a key's value by its channel through a plain SUM driver."""
     name = bpy.utils.escape_identifier(block.name)
     curve = key.driver_add(f'key_blocks["{name}"].value')
-    plain_driver(curve, rig, f'["{parts.CHANNELS}"][{channel}]', parts.CHANNEL_VARIABLE)
-
-
-def plain_driver(curve, rig, data_path, name="var"):
-    """Make an F-curve follow one property of the rig, without any expression."""
-    curve.driver.type = "SUM"
-    variable = curve.driver.variables.new()
-    variable.name = name
-    variable.type = "SINGLE_PROP"
-    variable.targets[0].id_type = "OBJECT"
-    variable.targets[0].id = rig
-    variable.targets[0].data_path = data_path
+    drivers.plain_driver(curve, rig, f'["{parts.CHANNELS}"][{channel}]', parts.CHANNEL_VARIABLE)

@@ -6,28 +6,9 @@ Nothing is brought down: a character of a newer form plays as far as this versio
 """
 
 from ..animation import actions
-from ..base import parts
-
-VERSION = "risorius_version"  # on the control armature: the number of its form
-PRESENT = 1
-NEEDS = "Needs Risorius"  # on the same: words for those who open the file without the add-on
-_WORDS = (
-    "Its sliders and bones move the face by this add-on; without it the face keeps its last pose"
-)
+from ..base import form, parts
 
 _said = set()  # session uids of newer characters
-
-
-def be_born(controls):
-    """Give a new character the present form. Args: controls  its control armature."""
-    controls[VERSION] = PRESENT
-    controls[NEEDS] = _WORDS
-
-
-def version_of(controls):
-    """The number of a character's form; 0 from before there were numbers."""
-    found = controls.get(VERSION)
-    return found if isinstance(found, int) and found > 0 else 0
 
 
 def bring_up_all():
@@ -41,21 +22,21 @@ def bring_up_all():
         controls = parts.controls_of(rig)
         if controls is None:
             continue
-        if version_of(controls) > PRESENT:
+        if form.version_of(controls) > form.PRESENT:
             done += _say_once(rig, controls)
-        elif version_of(controls) < PRESENT and rig.library is None:
+        elif form.version_of(controls) < form.PRESENT and rig.library is None:
             done += _bring_up(rig, controls)
     return done
 
 
 def _bring_up(rig, controls):
     changed = []
-    for step in _STEPS[version_of(controls) :]:
+    for step in _STEPS[form.version_of(controls) :]:
         changed += step(rig, controls)
-    if VERSION in controls:
-        del controls[VERSION]  # it may be no number
+    if form.VERSION in controls:
+        del controls[form.VERSION]  # it may be no number
     # Of an override of an older library it is lost when the file is saved: it is brought up anew.
-    controls[VERSION] = PRESENT
+    controls[form.VERSION] = form.PRESENT
     return [f"{rig.name} is of an older file: {', '.join(changed)}."] if changed else []
 
 
@@ -69,11 +50,11 @@ def _say_once(rig, controls):
 def newer(rig):
     """A sentence where a character is of a newer form than this version knows, else empty."""
     controls = parts.controls_of(rig)
-    found = version_of(controls) if controls is not None else 0
-    if found <= PRESENT:
+    found = form.version_of(controls) if controls is not None else 0
+    if found <= form.PRESENT:
         return ""
     return (
-        f"{rig.name} was saved by a newer Risorius (form {found}, this one knows {PRESENT}): "
+        f"{rig.name} was saved by a newer Risorius (form {found}, this one knows {form.PRESENT}): "
         "it plays and is left as it is; install the newer add-on to edit it."
     )
 
@@ -87,7 +68,7 @@ def _to_1(rig, controls):
     """It says what it needs; a baked one keeps what it silenced by name."""
     changed = []
     if not controls.override_library:
-        controls[NEEDS] = _WORDS
+        controls[form.NEEDS] = form.WORDS
         changed.append("its controls now say that they need Risorius")
     keys = [item.data.shape_keys for item in parts.meshes_of(rig)]
     owners = [rig, controls, *(key for key in keys if key is not None and key.library is None)]

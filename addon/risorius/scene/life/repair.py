@@ -10,7 +10,7 @@ import bpy
 
 from ...logic.character import plans
 from ..base import parts
-from ..character import armatures, meshes, runtime
+from ..character import armatures, build, meshes, runtime
 from . import applied_transforms
 
 
@@ -171,8 +171,6 @@ def remove_dead():
     Returns:
         How many were removed.
     """
-    from ..character import build  # build imports this module's callers
-
     dead = [rig for rig in parts.rigs() if _is_dead(rig)]
     for rig in dead:
         build.remove(rig)

@@ -2,8 +2,7 @@
 """The skin: subsurface, pores, and what the animated maps do to colour and normals."""
 
 from ...logic.material import animated_maps
-from ..base import parts
-from ..character.meshes import plain_driver
+from ..base import drivers, parts
 from . import image_loading
 
 MAP_PREFIX = "risorius_map_"
@@ -110,7 +109,7 @@ class Skin:
         value.parent = frame
         path = f'nodes["{value.name}"].outputs[0].default_value'
         driver = self.graph.tree.driver_add(path)
-        plain_driver(driver, self.look.rig, f'["{parts.MAPS}"][{use.index}]')
+        drivers.plain_driver(driver, self.look.rig, f'["{parts.MAPS}"][{use.index}]')
         return value.outputs[0]
 
     def _masked(self, bucket, mask, members):
