@@ -41,7 +41,15 @@ class Budget:
         return cls(BASE_BYTES + BYTES_PER_BYTE * size, BASE_STEPS + STEPS_PER_BYTE * size)
 
     def hold(self, count: float, place: str) -> None:
-        """Before `count` bytes are held. Raises: BudgetError."""
+        """Take `count` bytes of the budget, before they are held.
+
+        Args:
+            count: bytes.
+            place: what the error calls what would take them.
+
+        Raises:
+            BudgetError: fewer are left.
+        """
         if not count <= self.bytes:
             taken = self._bytes - self.bytes
             raise BudgetError(
@@ -51,7 +59,15 @@ class Budget:
         self.bytes -= int(count)
 
     def work(self, count: float, place: str) -> None:
-        """Before `count` steps are done. Raises: BudgetError."""
+        """Take `count` steps of the budget, before they are done.
+
+        Args:
+            count: steps, about one per number that is looked at.
+            place: what the error calls what would take them.
+
+        Raises:
+            BudgetError: fewer are left.
+        """
         if not count <= self.steps:
             taken = self._steps - self.steps
             raise BudgetError(

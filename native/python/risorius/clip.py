@@ -270,7 +270,12 @@ class Clip:
         frames: tuple[int, int] | None = None,
         controls: Sequence[str] | None = None,
     ) -> Clip:
-        """Read a .rzc file, or the frames begin to end - 1 or some controls of it.
+        """Read a .rzc file, or some of its frames or controls.
+
+        Args:
+            source: path, or the bytes of such a file.
+            frames: first and end (not included), from 0; None: all.
+            controls: names of curves, in the order wanted; None: all.
 
         Raises:
             ClipError: no .rzc file, cut, damaged, of another version; or it cannot be opened.

@@ -66,13 +66,29 @@ class _Named(io.FileIO):
 
 
 def write_bytes(path: _Path, data: ReadableBuffer) -> None:
-    """Write a file as replacing() does. Raises: OSError."""
+    """Write a file as replacing() does.
+
+    Args:
+        path: of a file in a folder that is there.
+        data: its bytes.
+
+    Raises:
+        OSError: it cannot be written; the error names path.
+    """
     with replacing(path) as file:
         file.write(data)
 
 
 def write_text(path: _Path, text: str) -> None:
-    """Write UTF-8, lines ending as they do in text, as replacing() does. Raises: OSError."""
+    """Write a file as replacing() does.
+
+    Args:
+        path: of a file in a folder that is there.
+        text: written as UTF-8, its lines ending as they do in it.
+
+    Raises:
+        OSError: it cannot be written; the error names path.
+    """
     write_bytes(path, text.encode())
 
 

@@ -194,7 +194,15 @@ def _exp(x: float) -> float:
 def make_blinks(
     seed: int, length: float, life: Life, loop: bool, saccades: list[Saccade]
 ) -> list[Blink]:
-    """By ascending start, none during another."""
+    """Blinks by ascending start, none during another.
+
+    Args:
+        seed: 0 or more; the same one gives the same blinks.
+        length: seconds to fill.
+        life: how often.
+        loop: the end is to fit the beginning, so the eyes are open at both.
+        saccades: of the same face; some of the large ones bring a blink.
+    """
     dice = _Dice(seed, 1)
     wanted = []
     if life.blinks_per_minute > 0.0:
@@ -263,7 +271,14 @@ def _close_lids(
 
 
 def make_saccades(seed: int, length: float, life: Life, loop: bool) -> list[Saccade]:
-    """By ascending start, each from where the last one ended; a loop's end where they began."""
+    """Saccades by ascending start, each from where the last one ended.
+
+    Args:
+        seed: 0 or more; the same one gives the same saccades.
+        length: seconds to fill.
+        life: how far the gaze wanders; at a gaze of 0 there are none.
+        loop: the last one ends where the first one began.
+    """
     if life.gaze == 0.0:
         return []
     dice = _Dice(seed, 2)

@@ -151,13 +151,23 @@ class Mixer:
         self._set([(layer, self._curves(layer)) for layer in layers])
 
     def add(self, source: Layer | Clip | Mapping[str, float] | str, **settings: Any) -> int:
-        """Put a layer on top, e.g. add(clip, blend="additive"); returns its place."""
+        """Put a layer on top, e.g. add(clip, blend="additive"); returns its place, from 0 at the bottom.
+
+        Args:
+            source: a layer, or the source of a new one.
+            settings: fields of Layer.
+        """
         layer = source if isinstance(source, Layer) else Layer(source)
         self.layers = (*self.layers, replace(layer, **settings))
         return len(self._layers) - 1
 
     def change(self, place: int, **settings: Any) -> None:
-        """Change settings of a layer: cheap, unless it is its source or mask."""
+        """Change settings of a layer: cheap, unless it is its source or mask.
+
+        Args:
+            place: of the layer, from 0 at the bottom.
+            settings: fields of Layer.
+        """
         layers = list(self.layers)
         layers[place] = replace(layers[place], **settings)
         self.layers = tuple(layers)
@@ -198,8 +208,12 @@ class Mixer:
         return self._core.fire(self._reaction_index[name], time, strength)
 
     def fire_events(self, events: Iterable[Event], offset: float = 0.0) -> int:
-        """Fire every event that bears a reaction's name; its value is the strength if it is a
-        number. Returns how many were fired."""
+        """Fire every event that bears a reaction's name; how many were fired.
+
+        Args:
+            events: of a clip; the value of one is the strength if it is a number.
+            offset: seconds that are added to the times of the events.
+        """
         count = 0
         for event in events:
             if event.name in self.reactions:
@@ -238,7 +252,13 @@ class Mixer:
         return self._core.evaluate_batch(times, base)
 
     def bake(self, start: float, end: float, rate: float = 60.0) -> Clip:
-        """What the mixer gives from start to end, as a clip of all its controls."""
+        """What the mixer gives from start to end, as a clip of all its controls.
+
+        Args:
+            start: seconds, of the first frame.
+            end: seconds; the last frame is at it or less than a frame before it.
+            rate: frames a second.
+        """
         count = max(math.floor((end - start) * rate + 1e-6) + 1, 0)
         frames = self.evaluate_batch(start + np.arange(count) / rate)
         return Clip(self.names, frames.T, rate, start=start)

@@ -143,6 +143,11 @@ def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
 def named_weights(table: Mapping[str, Any], prefix: str, where: str) -> dict[str, float]:
     """{control: weight} with both sides of what ends in *; a name given in full counts more.
 
+    Args:
+        table: name -> weight, out of a TOML file.
+        prefix: stands before the name of each control in the result.
+        where: what errors call the table.
+
     Raises:
         ValueError: a weight that is no number in [0, 1].
     """

@@ -68,6 +68,10 @@ class Face:
 def load_face(path: Path, *, quaternions: bool = False) -> Face:
     """The character of a DNA file, compiled or from this user's cache of compiled faces.
 
+    Args:
+        path: of the DNA file.
+        quaternions: rotations of joints are quaternions; else Euler angles in the file's unit.
+
     Raises:
         DnaError: it is none.
     """
@@ -135,7 +139,7 @@ class Chunk(NamedTuple):
 
 
 def missing(clip: risorius.Clip, face: Face) -> list[str]:
-    """The curves that move nothing because the character has no control of their name."""
+    """The names of the curves of clip that move nothing: face has no raw control so named."""
     have = set(face.rig.raw_control_names)
     return [name for name in clip.names if name not in have]
 
@@ -144,6 +148,12 @@ def played(clip: risorius.Clip, face: Face, lod: int, threads: int = 1) -> Itera
     """The poses of every frame, in chunks of a size that depends on the character only.
 
     Controls without a curve are at rest. A frame is Rig.evaluate of its controls, bit for bit.
+
+    Args:
+        clip: curves of raw controls; those that the character has no control for are passed over.
+        face: of `load_face`.
+        lod: from 0, below the character's number of LODs.
+        threads: that evaluate at once; a chunk has as many times more frames.
     """
     place = {name: i for i, name in enumerate(face.rig.raw_control_names)}
     rows = [i for i, name in enumerate(clip.names) if name in place]

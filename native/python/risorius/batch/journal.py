@@ -96,7 +96,15 @@ class Journal:
             return file.read(record.size)
 
     def add(self, job: Job, outcome: Outcome) -> None:
-        """A job is done. Raises: OSError."""
+        """A job is done: its line is on the disk when this returns.
+
+        Args:
+            job: whose files are whole.
+            outcome: its stamp and facts are kept.
+
+        Raises:
+            OSError: the journal cannot be written; the error names it.
+        """
         files = _files(job)
         line = _line(
             {"name": job.name, "stamp": outcome.stamp, "files": files, "facts": outcome.facts}

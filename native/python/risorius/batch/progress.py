@@ -32,7 +32,13 @@ class Progress:
         self._drawn = False
 
     def update(self, done: int, frames: int = 0, note: str = "") -> None:
-        """So much is done, with so many frames in all."""
+        """So much is done; drawn anew now and then only.
+
+        Args:
+            done: of the total.
+            frames: how many in all so far; 0: no speed is shown.
+            note: stands at the end of the line.
+        """
         self.done, self.frames = done, frames
         now = time.monotonic()
         if now - self._shown >= (_REDRAW_SECONDS if self._terminal else _LINE_SECONDS):
@@ -40,7 +46,12 @@ class Progress:
             self._draw(self.text(now - self._started, note))
 
     def text(self, elapsed: float, note: str = "") -> str:
-        """E.g. "[####......] 40 of 100 jobs, 2,100 frames/s, 1:12 left"."""
+        """The line, e.g. "[####......] 40 of 100 jobs, 2,100 frames/s, 1:12 left".
+
+        Args:
+            elapsed: seconds since the beginning.
+            note: stands at its end.
+        """
         part = self.done / self.total if self.total else 1.0
         words = [f"{self.done:,} of {self.total:,} {self.noun}"]
         if self.frames and elapsed > 0:

@@ -56,7 +56,13 @@ class Report:
 
 
 def pending(plan: Plan, journal: Journal, report: Report) -> list[Job]:
-    """The jobs that are to be done; the report takes those that are."""
+    """The jobs that are still to be done.
+
+    Args:
+        plan: all jobs.
+        journal: of earlier runs.
+        report: takes those that are done already.
+    """
     out = []
     for job in plan.jobs:
         if journal.is_done(job):

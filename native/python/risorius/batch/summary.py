@@ -28,7 +28,14 @@ Rows = Iterator[dict[str, Any]]
 
 
 def rows(plan: Plan, outcomes: Mapping[str, Outcome], reused: set[str], journal: Journal) -> Rows:
-    """A row a job, in the plan's order: done, kept (from an earlier run), failed or not done."""
+    """A row a job, in the plan's order: done, kept (from an earlier run), failed or not done.
+
+    Args:
+        plan: all jobs.
+        outcomes: name of a job -> what became of it.
+        reused: names of the jobs that an earlier run did.
+        journal: has the facts of the jobs that are done.
+    """
     for job in plan.jobs:
         outcome = outcomes.get(job.name)
         state = "not done"
@@ -47,7 +54,15 @@ def rows(plan: Plan, outcomes: Mapping[str, Outcome], reused: set[str], journal:
 
 
 def write(plan: Plan, table: Callable[[], Rows]) -> None:
-    """Write the summary in each form that is asked for, row by row. Raises: OSError."""
+    """Write the summary in each form that is asked for, row by row.
+
+    Args:
+        plan: names the files.
+        table: begins the rows anew; called once a file.
+
+    Raises:
+        OSError: a file cannot be written.
+    """
     for path in plan.summary:
         path.parent.mkdir(parents=True, exist_ok=True)
         with replacing(path) as file:

@@ -42,6 +42,12 @@ class Kept(Generic[_Value]):
         self._values: OrderedDict[object, _Value] = OrderedDict()
 
     def get(self, key: object, make: Callable[[], _Value]) -> _Value:
+        """The value of a key; made where it is not among the last ones, while other threads wait.
+
+        Args:
+            key: hashable.
+            make: makes the value; what it raises is raised.
+        """
         with self._lock:
             if key not in self._values:
                 self._values[key] = make()

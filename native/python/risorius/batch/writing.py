@@ -108,7 +108,17 @@ class NpzWriter:
 def about(
     clip: risorius.Clip, face: Face, lod: int, parts: Sequence[str]
 ) -> dict[str, npt.NDArray[Any]]:
-    """What stands in an .npz beside the arrays of frames."""
+    """What stands in an .npz beside the arrays of frames.
+
+    Args:
+        clip: that is baked.
+        face: of `load_face`.
+        lod: that is baked, from 0.
+        parts: which of PARTS are baked; their names are among it.
+
+    Returns:
+        Name in the .npz -> array; times are seconds.
+    """
     out: dict[str, Any] = {
         "times": clip.frame_times(),
         "rate": clip.rate,
@@ -138,7 +148,16 @@ def about(
 
 
 def find_moving(face: Face, chunks: Iterable[Chunk], parts: Sequence[str]) -> dict[str, Any]:
-    """Part -> the flat indices of its numbers that are not at rest in some frame."""
+    """Part -> the flat indices of its numbers that are not at rest in some frame.
+
+    Args:
+        face: of `load_face`.
+        chunks: all frames.
+        parts: which of PARTS.
+
+    Returns:
+        int64[moving] for each part.
+    """
     rests = {part: face.rest(part) for part in parts}
     moving = {part: np.zeros(rest.shape, bool) for part, rest in rests.items()}
     for chunk in chunks:

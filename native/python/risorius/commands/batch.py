@@ -69,7 +69,13 @@ def run(args: argparse.Namespace) -> int:
 
 
 def dry_run(plan: Plan, *, restart: bool, as_json: bool) -> int:
-    """Print the jobs, and which of them are done."""
+    """Print the jobs, and which of them are done; 0, the exit code.
+
+    Args:
+        plan: all jobs.
+        restart: none counts as done.
+        as_json: for programs.
+    """
     report, journal = Report(plan), Journal(plan.journal)
     if not restart:
         journal.read()
@@ -95,7 +101,12 @@ def dry_run(plan: Plan, *, restart: bool, as_json: bool) -> int:
 
 
 def tell(report: Report, *, as_json: bool) -> int:
-    """Print what became of a batch; the exit code."""
+    """Print what became of a batch; the exit code, 1 where a job failed.
+
+    Args:
+        report: of the batch.
+        as_json: for programs.
+    """
     failed = report.failed()
     if as_json:
         print(json.dumps(report.facts(), indent=2))

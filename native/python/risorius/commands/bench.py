@@ -58,6 +58,14 @@ def program() -> Path | None:
 def export_frames(source: Path, raw_count: int, folder: Path) -> list[str]:
     """The frames of an .npz as files for the benchmark.
 
+    Args:
+        source: the .npz.
+        raw_count: raw controls of the face, so columns of its frames.
+        folder: where the files go.
+
+    Returns:
+        The names of the files, in the order of FRAMES.
+
     Raises:
         InputError: no .npz, or an array that is missing or has another shape.
     """

@@ -61,7 +61,12 @@ def check_dna(name: str) -> tuple[risorius.Dna | None, list[risorius.Finding]]:
 
 
 def examine(name: str, strict: bool) -> dict[str, Any]:
-    """Everything that the command prints of one file, as plain values."""
+    """Everything that the command prints of one file, as plain values.
+
+    Args:
+        name: of the file; one that ends in .json is read as JSON, else as DNA.
+        strict: warnings make it not ok too.
+    """
     dna, found = (check_json if name.lower().endswith(".json") else check_dna)(name)
     errors = sum(finding.is_error for finding in found)
     return {

@@ -124,7 +124,12 @@ def warnings_as_lines(name: str) -> Iterator[None]:
 
 
 def cut(dna: risorius.Dna, args: argparse.Namespace) -> risorius.Dna:
-    """The layers and LODs that were asked for."""
+    """The layers and LODs of dna that the options in args ask for.
+
+    Raises:
+        DnaError: the layers that are left make no file.
+        CommandLineError: layers or LODs that are not there.
+    """
     if args.layers is not None or args.unknown_layers == "ignore":
         names = [name.strip() for name in (args.layers or "all").split(",")]
         bytes_ = dna.to_bytes(version=f"2.{_writable(dna.version)}")
@@ -149,7 +154,13 @@ def _writable(minor: int) -> int:
 
 
 def version_of(source: risorius.Dna, result: risorius.Dna, turned: bool) -> str:
-    """The version to write when none was asked for; a word where it is not the source's own."""
+    """The version to write when none was asked for; a word is printed where it is not the source's.
+
+    Args:
+        source: the file that was read.
+        result: what is to be written.
+        turned: whether its axes or units were changed.
+    """
     minor = _writable(result.version)
     signed = result.rotation_sequence != "xyz" or -1 in result.rotation_signs
     needed = 8 if result.face_winding_order != "ccw" else 7 if signed else 1
@@ -162,6 +173,10 @@ def version_of(source: risorius.Dna, result: risorius.Dna, turned: bool) -> str:
 
 def convert(source: risorius.Dna, args: argparse.Namespace) -> tuple[risorius.Dna, bytes]:
     """The result as it is when read back, and its bytes as a DNA file.
+
+    Args:
+        source: the file that was read.
+        args: the options of the command.
 
     Raises:
         InputError: the result could not be read back.
@@ -183,7 +198,12 @@ def convert(source: risorius.Dna, args: argparse.Namespace) -> tuple[risorius.Dn
 
 
 def json_text(dna: risorius.Dna, indent: int | None) -> bytes:
-    """Dna.to_json with so many spaces per level."""
+    """The JSON of dna in UTF-8, each level indented by so many spaces; None: as Dna.to_json does.
+
+    Args:
+        dna: any.
+        indent: spaces per level, 0 or more.
+    """
     text = dna.to_json()
     if indent is not None and indent != 1:
         # Dna.to_json begins each line with one space per level, and no text holds a line's end.
@@ -192,7 +212,11 @@ def json_text(dna: risorius.Dna, indent: int | None) -> bytes:
 
 
 def write(name: str, data: bytes) -> None:
-    """A file whole or not at all; devices and pipes take the bytes as they come.
+    """Write a file whole or not at all; devices and pipes take the bytes as they come.
+
+    Args:
+        name: of the file; "-": the standard output.
+        data: its bytes.
 
     Raises:
         InputError: it cannot be written.

@@ -15,7 +15,11 @@ _LINES = 8  # of one kind that are printed
 
 
 def same_but_for(a: str, b: str) -> Difference | None:
-    """Where two DNA files of one content differ: bytes that no layer reads."""
+    """Where the bytes of two DNA files of one content differ, which no layer reads; None: nowhere.
+
+    Args:
+        a, b: names of the files.
+    """
     data = [Path(name).read_bytes() for name in (a, b)]
     if data[0] == data[1]:
         return None
@@ -28,7 +32,12 @@ def same_but_for(a: str, b: str) -> Difference | None:
 
 
 def page(found: list[Difference], everything: bool) -> str:
-    """The differences for a person, by layer and field, long lists shortened."""
+    """The differences for a person, by layer and field.
+
+    Args:
+        found: of `diff.compare`.
+        everything: lists are not shortened.
+    """
     layers: dict[str, dict[str, list[str]]] = {}
     for layer, field, text in found:
         layers.setdefault(layer, {}).setdefault(field, []).append(text)
@@ -44,7 +53,12 @@ def page(found: list[Difference], everything: bool) -> str:
 
 
 def run(a: str, b: str, *, everything: bool, as_json: bool) -> int:
-    """Prints what differs. Returns: 0 nothing, 1 something.
+    """Print what differs; the exit code, 0 for nothing and 1 for something.
+
+    Args:
+        a, b: names of the files, .dna or .json.
+        everything: lists are not shortened.
+        as_json: for programs.
 
     Raises:
         CommandLineError: a file cannot be used.

@@ -151,7 +151,12 @@ def _sizes(sizes: edit.GroupSizes) -> dict[str, int]:
 
 
 def facts_of(report: edit.RegroupReport, dna: risorius.Dna) -> dict[str, Any]:
-    """Everything that the command prints, as plain values."""
+    """Everything that the command prints, as plain values.
+
+    Args:
+        report: of the regrouping.
+        dna: the face, for the names of its joints.
+    """
     changes = {
         key: {name: getattr(getattr(report, key), name) for name in
               ("value", "joint", "expression", "lod")}

@@ -103,7 +103,13 @@ def parse_controls(texts: list[str], names: list[str], rest: Floats) -> Floats:
 
 
 def raw_of_gui(dna: risorius.Dna, rig: risorius.Rig, gui: Floats) -> Floats:
-    """Raw controls of GUI controls; what the table does not write is at rest."""
+    """float32[raw controls] of GUI controls; what the table does not write is at rest.
+
+    Args:
+        dna: the face.
+        rig: compiled of it.
+        gui: float32[GUI controls].
+    """
     raw = rig.gui_to_raw(gui)
     beside = np.ones(len(raw), bool)
     beside[dna.gui_to_raw.output_indices] = False
@@ -112,7 +118,13 @@ def raw_of_gui(dna: risorius.Dna, rig: risorius.Rig, gui: Floats) -> Floats:
 
 
 def active(values: Floats, names: list[str], first: int = 0) -> list[dict[str, Any]]:
-    """Name, index and value of what is not 0; names that run out are control numbers."""
+    """Name, index and value of what is not 0.
+
+    Args:
+        values: float32[n].
+        names: of the values; where they run out, "control" and its number stand in.
+        first: the control number of the first value.
+    """
     return [
         {
             "name": names[i] if i < len(names) else f"control {first + i}",
@@ -129,7 +141,14 @@ def shortest(value: np.float32) -> float:
 
 
 def describe(dna: risorius.Dna, rig: risorius.Rig, raw: Floats, lod: int) -> dict[str, Any]:
-    """Everything that the command prints, as plain values."""
+    """Everything that the command prints, as plain values.
+
+    Args:
+        dna: the face.
+        rig: compiled of it.
+        raw: float32[raw controls].
+        lod: from 0.
+    """
     pose = rig.evaluate(raw, lod=lod)
     joints = [
         {"name": dna.joint_names[j], "index": int(j)}

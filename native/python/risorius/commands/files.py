@@ -31,12 +31,22 @@ class CommandLineError(RisoriusError):
 
 
 def label(name: str, standard: str = "<stdin>") -> str:
-    """A file's name as messages show it."""
+    """A file's name as messages show it.
+
+    Args:
+        name: as the user typed it.
+        standard: stands for "-".
+    """
     return standard if name == "-" else name
 
 
 def kind_of(name: str, asked: str | None, option: str) -> str:
     """ "dna" or "json": as asked, else by the suffix.
+
+    Args:
+        name: of the file.
+        asked: what an option says; None: nothing.
+        option: what the error names beside a suffix.
 
     Raises:
         CommandLineError: neither says it.
@@ -48,10 +58,14 @@ def kind_of(name: str, asked: str | None, option: str) -> str:
 
 
 def refuse_same_file(source: str, target: str) -> None:
-    """Names of one file, by whatever path; "-" is none.
+    """Refuse an output that is the input, by whatever path; "-" is no file.
+
+    Args:
+        source: name of the input.
+        target: name of the output.
 
     Raises:
-        CommandLineError: they are.
+        CommandLineError: they are one file.
     """
     if "-" in (source, target):
         return
@@ -64,7 +78,16 @@ def refuse_same_file(source: str, target: str) -> None:
 
 
 def require_suffix(path: Path, kinds: Sequence[str], option: str) -> None:
-    """Raises CommandLineError for a name of an output that ends otherwise."""
+    """Refuse the name of an output that ends otherwise.
+
+    Args:
+        path: of the output.
+        kinds: suffixes with their dots, two or more.
+        option: that names the output.
+
+    Raises:
+        CommandLineError: another suffix.
+    """
     if path.suffix.lower() not in kinds:
         *most, last = kinds
         listed = f"{', '.join(most)} or {last}"
@@ -74,9 +97,10 @@ def require_suffix(path: Path, kinds: Sequence[str], option: str) -> None:
 
 
 def require_writable(*names: str | Path | None, parents: bool = False) -> None:
-    """Before long work: what will be written has a place; "-" and None need none.
+    """Before long work: what will be written has a place.
 
     Args:
+        names: of outputs; "-" and None need no place.
         parents: folders that are not there will be made.
 
     Raises:
@@ -121,7 +145,11 @@ def from_json(name: str) -> risorius.Dna:
 
 
 def read(name: str, kind: str) -> risorius.Dna:
-    """A whole Dna from a file of that kind, or from the standard input for "-".
+    """A whole Dna.
+
+    Args:
+        name: of the file; "-": the standard input.
+        kind: "dna" or "json".
 
     Raises:
         InputError: it cannot be used.
@@ -144,5 +172,5 @@ def summary(dna: risorius.Dna) -> str:
 
 
 def counted(number: int, noun: str) -> str:
-    """E.g. "1 joint", "1,203 joints"."""
+    """A number with its noun, e.g. "1 joint" or "1,203 joints"; the plural has an s."""
     return f"{number:,} {noun}{'' if number == 1 else 's'}"

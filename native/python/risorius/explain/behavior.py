@@ -23,7 +23,16 @@ Facts = dict[str, Any]
 def table_hits(
     table: risorius.Conditionals, rows: int, inputs: Doubles
 ) -> dict[int, list[tuple[int, Facts]]]:
-    """output -> (input, interval and what it gives) of the rows that count."""
+    """The rows of a table of conditionals that count for some inputs.
+
+    Args:
+        table: of the face.
+        rows: how many leading rows are used.
+        inputs: float64[n], values of what input_indices count.
+
+    Returns:
+        Output -> list of (input, its value, the interval and what the row gives).
+    """
     out: dict[int, list[tuple[int, Facts]]] = {}
     matched = None
     for r in range(rows):
@@ -45,7 +54,15 @@ def table_hits(
 def explain_raw(
     dna: risorius.Dna, raw: Doubles, rest: Doubles, gui: Doubles | None, names: ControlNames
 ) -> list[Facts]:
-    """Raw controls that are not at rest, and the GUI controls that made them."""
+    """Raw controls that are not at rest, and the GUI controls that made them.
+
+    Args:
+        dna: the face.
+        raw: float64[raw controls].
+        rest: float64[raw controls], at rest.
+        gui: float64[GUI controls]; None: the raw controls were given themselves.
+        names: of the controls.
+    """
     hits: dict[int, list[tuple[int, Facts]]] = {}
     if gui is not None:
         hits = table_hits(dna.gui_to_raw, len(dna.gui_to_raw.input_indices), gui)
@@ -72,7 +89,12 @@ def explain_raw(
 
 
 def used_controls(dna: risorius.Dna, lod: int) -> set[int]:
-    """Controls that something reads at a LOD: correctives that nothing reads rest there."""
+    """Controls that something reads at a LOD; correctives that nothing reads rest there.
+
+    Args:
+        dna: the face.
+        lod: from 0.
+    """
     used: set[int] = set()
     for group in dna.joint_groups:
         rows = int(group.lods[lod]) if lod < len(group.lods) else 0
@@ -95,7 +117,14 @@ def _count(table: risorius.BlendShapeChannels | risorius.AnimatedMaps, lod: int)
 def explain_correctives(
     dna: risorius.Dna, controls: Doubles, lod: int, names: ControlNames
 ) -> Facts:
-    """Correctives that fire, those that lack one factor, and those that nothing reads."""
+    """Correctives that fire, those that lack one factor, and those that nothing reads.
+
+    Args:
+        dna: the face.
+        controls: float64[controls], of a pose.
+        lod: from 0, the pose's.
+        names: of the controls.
+    """
     rows = np.asarray(dna.psds.rows)
     used = used_controls(dna, lod)
     fires, lacking, unread = [], [], []
@@ -156,7 +185,14 @@ def _near_miss(facts: Facts, missing: int, names: ControlNames) -> Facts:
 def explain_networks(
     dna: risorius.Dna, controls: Doubles, lod: int, names: ControlNames
 ) -> list[Facts]:
-    """The networks that run at a LOD, in their order."""
+    """The networks that run at a LOD, in their order.
+
+    Args:
+        dna: the face.
+        controls: float64[controls], of a pose.
+        lod: from 0, the pose's.
+        names: of the controls.
+    """
     ml = dna.machine_learned_behavior
     regions = _regions(dna)
     out = []
@@ -209,7 +245,13 @@ def _on(indices: Sequence[int], controls: Doubles, names: ControlNames) -> list[
 
 
 def explain_setups(dna: risorius.Dna, controls: Doubles, names: ControlNames) -> list[Facts]:
-    """Twists and swings that are not at rest: how far they turn, and which joints."""
+    """Twists and swings that are not at rest: how far they turn, in degrees, and which joints.
+
+    Args:
+        dna: the face.
+        controls: float64[controls], of a pose.
+        names: of the controls.
+    """
     layer = dna.twist_swing_behavior
     out = []
     for kind, setups in (("swing", layer.swings), ("twist", layer.twists)):
@@ -259,6 +301,15 @@ def _twist_and_swing(q: Doubles, axis: int) -> tuple[float, float]:
 def explain_shapes(
     dna: risorius.Dna, values: Doubles, controls: Doubles, lod: int, names: ControlNames
 ) -> list[Facts]:
+    """Blend shape channels that are on and the control of each, the largest value first.
+
+    Args:
+        dna: the face.
+        values: float64[channels], of a pose.
+        controls: float64[controls], of the same pose.
+        lod: from 0, the pose's.
+        names: of the controls.
+    """
     channels = dna.blend_shape_channels
     count = _count(channels, lod)
     by = dict(
@@ -288,7 +339,16 @@ def explain_maps(
     lod: int,
     names: ControlNames,
 ) -> list[Facts]:
-    """Maps that are on, the one farthest from its value at rest first."""
+    """Animated maps that are on, the one farthest from its value at rest first.
+
+    Args:
+        dna: the face.
+        values: float64[maps], of a pose.
+        at_rest: float64[maps].
+        controls: float64[controls], of the same pose.
+        lod: from 0, the pose's.
+        names: of the controls.
+    """
     table = dna.animated_maps.conditionals
     hits = table_hits(table, _count(dna.animated_maps, lod), controls)
     rows = [

@@ -41,6 +41,10 @@ def find_controls(text: str, names: Sequence[str]) -> Meaning:
     their side only (..L and ..R, ..Left and ..Right) are one meaning. The first of these that gives
     anything decides, and only if it gives one meaning.
 
+    Args:
+        text: as a person typed it.
+        names: of all controls.
+
     Raises:
         UnknownControlError: nothing, or several meanings; the message lists them.
     """
@@ -83,7 +87,13 @@ def _sides_as_one(
 
 
 def named(names: Sequence[str], index: int, kind: str) -> str:
-    """The name where the file has one, else e.g. "joint 7"."""
+    """The name of an element, or e.g. "joint 7" where the file has none.
+
+    Args:
+        names: of the file.
+        index: of the element; it may lie beyond the names.
+        kind: what the element is, e.g. "joint".
+    """
     return (names[index] if index < len(names) else "") or f"{kind} {index}"
 
 

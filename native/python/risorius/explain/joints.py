@@ -29,6 +29,15 @@ def contributions(
     Rows of joint groups add up control by control. Rotations that are products of quaternions do
     not: a control's part is by how much the Euler angles change when its column is multiplied, in
     the order in which they are. What a twist, a swing or a network's quaternion gives is one part.
+
+    Args:
+        dna: the face.
+        pose: of its rig, with Euler angles.
+        lod: from 0, the pose's.
+        names: of the controls.
+
+    Returns:
+        Joint -> what moves it -> float64[9], in the units of the file.
     """
     controls = np.asarray(pose.controls, float)
     out = _linear(dna, controls, lod)
@@ -234,6 +243,12 @@ def explain_joints(
     and the change of scale. The bone's length is the median of the file's. A control's share is the
     part of its contribution that points along the whole; the shares of a joint add up to 1, and one
     that works against the whole is negative.
+
+    Args:
+        dna: the face.
+        pose: of its rig, with Euler angles.
+        lod: from 0, the pose's.
+        names: of the controls.
     """
     parts = contributions(dna, pose, lod, names)
     convention = Convention.of(dna)

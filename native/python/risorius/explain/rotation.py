@@ -63,7 +63,11 @@ def product(a: Doubles, b: Doubles) -> Doubles:
 
 
 def angle_degrees(a: Doubles, b: Doubles) -> float:
-    """How far the one rotation is from the other, 0 to 180."""
+    """How far the rotation b is from the rotation a, 0 to 180 degrees.
+
+    Args:
+        a, b: float64[4], unit quaternions (x, y, z, w).
+    """
     apart = product(a * [-1, -1, -1, 1], b)
     return math.degrees(2 * math.atan2(float(np.linalg.norm(apart[:3])), abs(float(apart[3]))))
 

@@ -22,7 +22,11 @@ def explain_solvers(
     """The solvers of a LOD; of each the poses, those with the greatest weight first.
 
     Args:
+        dna: the face.
+        rig: compiled of it.
         controls: float64[controls], as evaluated.
+        lod: from 0, the pose's.
+        names: of the controls.
     """
     mapping = dna.rbf_behavior.lod_solver_mapping
     listed = mapping[lod].tolist() if lod < len(mapping) else []

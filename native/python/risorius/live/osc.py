@@ -55,6 +55,10 @@ def messages(data: bytes, depth: int = 0) -> Iterator[tuple[str, list[Any]]]:
 
     The sizes inside are checked here: python-osc follows a negative one back for ever.
 
+    Args:
+        data: the packet.
+        depth: how many bundles it lies in.
+
     Raises:
         LiveError: the packet is no OSC.
     """

@@ -27,7 +27,12 @@ class Roster(Generic[Key, Item]):
         return iter(self._items.values())
 
     def hear(self, key: Key, now: float) -> Item | None:
-        """What is kept of a sender that was heard just now; None for one that is not known."""
+        """What is kept of a sender that was heard just now; None for one that is not known.
+
+        Args:
+            key: of the sender.
+            now: seconds, of a clock that does not run back.
+        """
         if key not in self._items:
             return None
         self._heard[key].append(now)

@@ -12,7 +12,12 @@ from .regions import COLORS, REGIONS
 
 
 def draw(canvas: Canvas, facts: Facts) -> None:
-    """A large panel of joints, and three small ones of work per level."""
+    """A large panel of joints, and three small ones of work per level.
+
+    Args:
+        canvas: where to draw.
+        facts: of the face.
+    """
     if not facts.lods:
         canvas.say("This file has no levels of detail.")
         return

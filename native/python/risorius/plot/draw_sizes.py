@@ -10,7 +10,13 @@ from .paper import ACCENT, INK, MUTED, RULE, Canvas, heading
 
 
 def draw(canvas: Canvas, facts: Facts, with_counts: bool) -> None:
-    """Bars of bytes; the counts too when no table stands beside the picture."""
+    """Bars of bytes.
+
+    Args:
+        canvas: where to draw.
+        facts: of the face.
+        with_counts: the counts too, where no table stands beside the picture.
+    """
     high, counted = canvas.height - 0.7, 3.1 if with_counts else 0.0
     _draw_bars(canvas.place(2.35, 0.2, canvas.width - 2.7 - counted, high), facts)
     if with_counts:

@@ -89,7 +89,7 @@ def gather(dna: risorius.Dna, data: bytes, file_name: str, title: str | None = N
 
 
 def listed(mapping: risorius.LodMapping, lod: int) -> npt.NDArray[np.int64]:
-    """The indices that a mapping lists for a level, none where it has no such level."""
+    """int64[listed]: the indices that a mapping lists for a lod, none where it has no such LOD."""
     return np.asarray(mapping[lod] if lod < len(mapping) else [], np.int64)
 
 

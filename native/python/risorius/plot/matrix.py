@@ -40,7 +40,12 @@ class Block:
 
 
 def group_regions(dna: risorius.Dna, joint_regions: Sequence[str]) -> list[str]:
-    """The region of each joint group: where most of the joints lie that its rows move."""
+    """The region of each joint group: where most of the joints lie that its rows move.
+
+    Args:
+        dna: the face.
+        joint_regions: region of each joint.
+    """
     found = []
     for group in dna.joint_groups:
         moved = np.unique(np.asarray(group.output_indices, np.int64) // 9)
@@ -50,7 +55,7 @@ def group_regions(dna: risorius.Dna, joint_regions: Sequence[str]) -> list[str]:
 
 
 def shape_of(dna: risorius.Dna, controls: int) -> tuple[int, int]:
-    """Rows and columns that hold every coefficient: at least 9 a joint x `controls`."""
+    """Rows and columns that hold every coefficient of dna: at least 9 a joint x `controls`."""
     rows, columns = 9 * len(dna.joint_names), controls
     for group in dna.joint_groups:
         # As 64-bit numbers: -1 among unsigned 16-bit ones would be 65,535.
@@ -60,7 +65,12 @@ def shape_of(dna: risorius.Dna, controls: int) -> tuple[int, int]:
 
 
 def by_index(dna: risorius.Dna, controls: int) -> Cells:
-    """The matrix as it is: row 9 * joint + attribute, column = control."""
+    """The joint matrix of dna as it is: row 9 * joint + attribute, column = control.
+
+    Args:
+        dna: the face.
+        controls: how many columns it has at least.
+    """
     parts = []
     for number, group in enumerate(dna.joint_groups):
         row, column = np.nonzero(group.values)

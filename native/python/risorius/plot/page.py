@@ -22,7 +22,13 @@ _WIDTH = 12.4  # inches
 
 
 def render(facts: Facts, lod: int, dpi: int) -> bytes:
-    """The page as UTF-8 bytes."""
+    """The page as HTML in UTF-8.
+
+    Args:
+        facts: of the face.
+        lod: that is drawn, from 0.
+        dpi: dots an inch of its pictures.
+    """
     bars = 0.75 + 0.3 * len(facts.layers)
     with settings():
         sections = [

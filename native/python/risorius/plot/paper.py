@@ -80,7 +80,12 @@ class Canvas:
     height: float
 
     def place(self, left: float, bottom: float, width: float, height: float) -> Axes:
-        """Axes at inches from the lower left, with only a line below and to the left."""
+        """Axes with only a line below and to the left.
+
+        Args:
+            left, bottom: of the axes, inches from the lower left of the canvas.
+            width, height: inches.
+        """
         part = (left / self.width, bottom / self.height, width / self.width, height / self.height)
         axes = self.figure.add_axes(part)
         axes.spines[["top", "right"]].set_visible(False)
@@ -92,7 +97,13 @@ class Canvas:
 
 
 def heading(axes: Axes, text: str, under: str = "") -> None:
-    """The name of a panel, flush left above it, and a line of figures under the name."""
+    """The name of a panel, flush left above it.
+
+    Args:
+        axes: of the panel.
+        text: the name.
+        under: a line of figures under the name.
+    """
     lift = 22 if under else 8
     axes.annotate(
         text, (0, 1), (0, lift), "axes fraction", "offset points",

@@ -23,7 +23,13 @@ _EDGE = 0.35
 
 
 def render(facts: Facts, lod: int, dpi: int) -> bytes:
-    """The sheet as the bytes of a PNG file."""
+    """The sheet as the bytes of a PNG file.
+
+    Args:
+        facts: of the face.
+        lod: that is drawn, from 0.
+        dpi: dots an inch.
+    """
     with settings():
         figure = Figure(figsize=(WIDTH, HEAD + UPPER + LOWER), dpi=dpi, facecolor="white")
         FigureCanvasAgg(figure)
@@ -47,7 +53,13 @@ def render(facts: Facts, lod: int, dpi: int) -> bytes:
 def split(
     figure: FigureBase, rows: Sequence[float] = (1,), columns: Sequence[float] = (1,)
 ) -> list[SubFigure]:
-    """Parts of a figure from top to bottom, or from left to right."""
+    """Parts of a figure from top to bottom, or from left to right.
+
+    Args:
+        figure: or a part of one.
+        rows: heights, in any unit.
+        columns: widths, in any unit.
+    """
     parts = figure.subfigures(
         len(rows), len(columns), squeeze=False, height_ratios=rows, width_ratios=columns,
         hspace=0, wspace=0,
@@ -77,7 +89,14 @@ def _draw_head(figure: SubFigure, facts: Facts) -> None:
 
 
 def panel(figure: SubFigure, title: str, caption: str, width: float, height: float) -> Canvas:
-    """A heading with its caption over a place to draw in. Sizes in inches."""
+    """A heading with its caption over a place to draw in.
+
+    Args:
+        figure: the part of the sheet to fill.
+        title: the heading.
+        caption: a sentence under it, broken into lines.
+        width, height: of the part, inches.
+    """
     edge = _EDGE / width
     lines = textwrap.wrap(caption, round(width * 13))
     top = 0.68 + 0.19 * len(lines)
