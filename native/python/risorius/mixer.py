@@ -151,7 +151,7 @@ class Mixer:
         self._set([(layer, self._curves(layer)) for layer in layers])
 
     def add(self, source: Layer | Clip | Mapping[str, float] | str, **settings: Any) -> int:
-        """Put a layer on top, e.g. add(clip, blend="additive"); returns its place, from 0 at the bottom.
+        """Put a layer on top, e.g. add(clip, blend="additive"); its place, from 0 at the bottom.
 
         Args:
             source: a layer, or the source of a new one.

@@ -34,7 +34,12 @@ class Scene:
 
 
 def scene(facts: Facts, lod: int) -> Scene:
-    """The meshes and joints of a LOD of a face, turned to look at us; lod from 0, facts of the face."""
+    """The meshes and joints of one level of detail, turned to look at us.
+
+    Args:
+        facts: of the face.
+        lod: from 0.
+    """
     dna = facts.dna
     axes = skeleton.view_axes(dna)
     names, meshes = _meshes(dna, lod)
