@@ -175,7 +175,7 @@ def _refused(path: str, use: Use, plan: dict) -> str:
         allowed = path in plan.get("dynamic", {})
     elif use.kind == "outside":
         homes = next((plan["outside"][p] for p in plan["outside"] if fnmatch(use.name, p)), [])
-        allowed = bool({"*", room} & set(homes))
+        allowed = room is not None and any(fnmatch(room, home) for home in homes)
     else:
         target = room_of(use.name, plan["rooms"])
         allowed = target == room or target in plan["rooms"].get(room, ())
