@@ -92,7 +92,13 @@ def group_indices(base: BaseMesh) -> dict[str, Ints]:
 
 
 def shaped(source: Source, base: BaseMesh, person: Person) -> Floats:
-    """The base positions as the person's."""
+    """float64[V, 3]: the positions of the base mesh as the person's, decimetres.
+
+    Args:
+        source: has the shapes that the person is mixed of.
+        base: the base mesh.
+        person: names the shapes and how much of each.
+    """
     count = len(base.positions)
     out = base.positions.copy()
     for name, weight in person.shape.items():
@@ -101,7 +107,13 @@ def shaped(source: Source, base: BaseMesh, person: Person) -> Floats:
 
 
 def show_upper_teeth(positions: Floats, groups: dict[str, Ints], jaw_open: Floats) -> None:
-    """Lower the upper teeth until some millimetres show below the lip of an open mouth."""
+    """Lower the upper teeth until some millimetres show below the lip of an open mouth.
+
+    Args:
+        positions: float64[V, 3], decimetres; those of the teeth are changed in place.
+        groups: vertex indices by group of the base mesh.
+        jaw_open: float64[V, 3], displacement of the unit jawOpen: what it leaves is upper lip.
+    """
     upper = groups["helper-upper-teeth"]
     body = positions[groups["body"]]
     still = np.linalg.norm(jaw_open[groups["body"]], axis=1) < 0.03
@@ -113,7 +125,16 @@ def show_upper_teeth(positions: Floats, groups: dict[str, Ints], jaw_open: Float
 
 
 def lash_uvs(polygons: Polygons, positions: Floats, skin: Floats) -> tuple[Floats, list[list[int]]]:
-    """u along the lid, v from the root (0) to the tip (1): what a texture of lashes needs."""
+    """u along the lid, v from the root (0) to the tip (1): what a texture of lashes needs.
+
+    Args:
+        polygons: the lashes.
+        positions: float64[lash vertices, 3], decimetres.
+        skin: float64[S, 3], the vertices of the lids; the distance to them is the height of a hair.
+
+    Returns:
+        float64[lash vertices, 2], and the indices into it by face and corner.
+    """
     gap = np.empty(len(positions))
     for begin in range(0, len(positions), 256):
         rows = positions[begin : begin + 256]
@@ -153,7 +174,12 @@ def make_parts(base: BaseMesh) -> list[Part]:
 
 
 def joint_positions(positions: Floats, groups: dict[str, Ints]) -> dict[str, Floats]:
-    """World positions of the joints, in decimetres."""
+    """World positions float64[3] of the joints by name, in decimetres.
+
+    Args:
+        positions: float64[V, 3], decimetres.
+        groups: vertex indices by group of the base mesh.
+    """
 
     def middle(group: str) -> Floats:
         return np.asarray(positions[groups[group]].mean(axis=0))
@@ -173,7 +199,12 @@ def joint_positions(positions: Floats, groups: dict[str, Ints]) -> dict[str, Flo
 
 
 def spine_weights(positions: Floats, joints: dict[str, Floats]) -> Floats:
-    """Weights [V, 7] of spine_04, neck_01, neck_02 and head by height along a tilted neck."""
+    """Weights [V, 7] of spine_04, neck_01, neck_02 and head by height along a tilted neck.
+
+    Args:
+        positions: float64[V, 3], decimetres.
+        joints: positions of the joints by name.
+    """
     # Chin and nose hang before the neck, at its height: what lies in front of it is head.
     ahead = np.clip(positions[:, 2] - joints["head"][2] - 0.45, 0, None)
     height = positions[:, 1] + 0.8 * ahead
@@ -198,6 +229,12 @@ def skin_weights(
     """Weights [V, 7] of the base mesh's vertices; rows sum to 1.
 
     The jaw takes of each vertex the share of its rigid motion that the jawOpen unit shows.
+
+    Args:
+        positions: float64[V, 3], decimetres.
+        groups: vertex indices by group of the base mesh.
+        joints: positions of the joints by name.
+        jaw_open: the unit jawOpen with the motion of its joint.
     """
     weights = spine_weights(positions, joints)
     rotation, shift = jaw_open.joints["FACIAL_C_Jaw"]
@@ -222,7 +259,17 @@ def skin_weights(
 def bind_displacement(
     positions: Floats, weights: Floats, expression: ex.Expression, joints: dict[str, Floats]
 ) -> Floats:
-    """What the blend shape has to add before skinning, so that both give the whole motion."""
+    """What the blend shape has to add before skinning, so that both give the whole motion.
+
+    Args:
+        positions: float64[v, 3], decimetres.
+        weights: float64[v, 7], skin weights.
+        expression: displacements of the same vertices, and what its joints do.
+        joints: positions of the joints by name.
+
+    Returns:
+        float64[v, 3], decimetres.
+    """
     if not expression.joints:
         return expression.displacement
     matrices = np.tile(np.eye(3), (len(positions), 1, 1))
@@ -248,6 +295,12 @@ def euler_xyz(rotation: Floats) -> Floats:
 
 
 def add_skin(mesh: Mesh, weights: Floats) -> None:
+    """Give a mesh its skin weights; those of a thousandth or less are left out.
+
+    Args:
+        mesh: gets them.
+        weights: float64[v, 7].
+    """
     kept = np.where(weights > 1e-3, weights, 0)
     kept /= kept.sum(axis=1, keepdims=True)
     vertex, joint = np.nonzero(kept)
@@ -258,7 +311,15 @@ def add_skin(mesh: Mesh, weights: Floats) -> None:
 
 
 def eye_uvs(polygons: Polygons, positions: Floats) -> tuple[Floats, list[list[int]]]:
-    """Azimuthal equidistant map of an eyeball: the pupil in the middle, the back at the rim."""
+    """Azimuthal equidistant map of an eyeball: the pupil in the middle, the back at the rim.
+
+    Args:
+        polygons: the eyeball, looking along +z.
+        positions: float64[v, 3].
+
+    Returns:
+        float64[v, 2], and the indices into it by face and corner.
+    """
     ray = positions - positions.mean(axis=0)
     ray /= np.linalg.norm(ray, axis=1, keepdims=True)
     angle = np.arccos(np.clip(ray[:, 2], -1, 1)) / np.pi
@@ -268,7 +329,14 @@ def eye_uvs(polygons: Polygons, positions: Floats) -> tuple[Floats, list[list[in
 
 
 def make_mesh(part: Part, positions: Floats, skin: Floats, weights: Floats) -> Mesh:
-    """Geometry and skin of a part; skin is the body's vertices; positions in decimetres."""
+    """Geometry and skin of a part, in centimetres.
+
+    Args:
+        part: of the base mesh.
+        positions: float64[V, 3], all vertices of the base mesh, decimetres.
+        skin: float64[S, 3], the body's vertices among them.
+        weights: float64[v, 7], skin weights of the part's own vertices.
+    """
     p = part.carry(positions)
     polygons = part.polygons
     uvs, uv_faces = polygons.uvs, polygons.uv_faces
@@ -309,6 +377,16 @@ def add_definition(
     raw: list[str],
     channels: list[str],
 ) -> None:
+    """Fill the descriptor and the definition: names, the skeleton, what each LOD lists.
+
+    Args:
+        dna: is filled.
+        person: name, gender.
+        parts: the meshes, those of LOD 0 first.
+        joints: positions of the joints by name, decimetres.
+        raw: names of the raw controls without their prefix.
+        channels: names of the blend shape channels.
+    """
     names = [name for name, _ in JOINTS]
     dna.name = person.name
     dna.archetype, dna.gender, dna.age = "other", person.gender, person.age
@@ -335,6 +413,12 @@ def add_definition(
 
 
 def add_gui(dna: Dna, raw: list[str]) -> None:
+    """Fill the GUI controls and the table that turns them into raw controls.
+
+    Args:
+        dna: is filled.
+        raw: names of the raw controls without their prefix.
+    """
     table = gui_table()
     dna.gui_control_names = [gui for gui, _, _ in table]
     rows = []
@@ -363,6 +447,14 @@ def add_behavior(
     units: dict[str, ex.Expression],
     correctives: list[tuple[str, str]],
 ) -> None:
+    """Fill the correctives, joint groups, blend shape channels and animated maps.
+
+    Args:
+        dna: is filled.
+        raw: names of the raw controls without their prefix.
+        units: what each raw control does, by its name.
+        correctives: the two raw controls of each corrective.
+    """
     names = [name for name, _ in JOINTS]
     dna.psd_count = len(correctives)
     dna.psds = Psds(
@@ -409,7 +501,12 @@ def add_behavior(
 
 
 def add_targets(mesh: Mesh, deltas: list[Floats]) -> None:
-    """One target per channel that moves a vertex by more than a hundredth of a millimetre."""
+    """One target per channel that moves a vertex by more than a hundredth of a millimetre.
+
+    Args:
+        mesh: gets them.
+        deltas: float64[v, 3] of each channel, decimetres.
+    """
     targets = []
     for channel, delta in enumerate(deltas):
         moved = np.flatnonzero(np.abs(delta).max(axis=1) > 1e-4)
@@ -427,7 +524,13 @@ def add_targets(mesh: Mesh, deltas: list[Floats]) -> None:
 def assemble(
     source: Source, say: Callable[[str], None], person: Person = MAN
 ) -> tuple[Dna, list[Part], Floats, dict[str, ex.Expression]]:
-    """The whole Dna, its parts, the shaped positions and the expressions."""
+    """The whole Dna, its parts, the shaped positions and the expressions.
+
+    Args:
+        source: the data that it is made from.
+        say: is told what is being done, a sentence at a time.
+        person: whom to make.
+    """
     base = source.base_mesh()
     groups = group_indices(base)
     positions = shaped(source, base, person)

@@ -45,7 +45,14 @@ def lip_masks(jaw_open: Floats) -> dict[str, Floats]:
 
 
 def rigid_fit(before: Floats, after: Floats) -> tuple[Floats, Floats]:
-    """Rotation [3, 3] and translation of the least-squares rigid motion (Kabsch 1976)."""
+    """The least-squares rigid motion of points (Kabsch 1976).
+
+    Args:
+        before, after: float64[n, 3].
+
+    Returns:
+        Rotation [3, 3] and translation [3]: after is near rotation @ before + translation.
+    """
     a, b = before - before.mean(0), after - after.mean(0)
     u, _, vt = np.linalg.svd(a.T @ b)
     flip = np.diag([1, 1, np.sign(np.linalg.det(u @ vt))])
@@ -54,7 +61,13 @@ def rigid_fit(before: Floats, after: Floats) -> tuple[Floats, Floats]:
 
 
 def about(pivot: Floats, rotation: Floats, translation: Floats) -> tuple[Floats, Floats]:
-    """The same rigid motion as a rotation about pivot and a shift of it."""
+    """The same rigid motion as a rotation about pivot and a shift of it.
+
+    Args:
+        pivot: [3].
+        rotation: [3, 3].
+        translation: [3], of the motion as a rotation about the origin.
+    """
     return rotation, translation - pivot + rotation @ pivot
 
 
@@ -74,7 +87,12 @@ def part_rotation(rotation: Floats, share: float) -> Floats:
 
 
 def split_units(source: Source, positions: Floats) -> dict[str, Expression]:
-    """The 52 ARKit units, divided over the raw controls of their row in arkit.toml."""
+    """The 52 ARKit units, divided over the raw controls of their row in arkit.toml.
+
+    Args:
+        source: the data that the units come from.
+        positions: float64[V, 3], decimetres; they tell left from right.
+    """
     count = len(positions)
     sides = side_masks(positions)
     lips = lip_masks(source.face_unit("jawOpen", count))
@@ -94,7 +112,12 @@ def split_units(source: Source, positions: Floats) -> dict[str, Expression]:
 
 
 def extra_units(source: Source, positions: Floats) -> dict[str, Expression]:
-    """Controls beyond ARKit that the FACS-like targets of the data can show."""
+    """Controls beyond ARKit that the FACS-like targets of the data can show.
+
+    Args:
+        source: the data that they come from.
+        positions: float64[V, 3], decimetres; they tell left from right.
+    """
     count = len(positions)
     sides = side_masks(positions)
 
@@ -128,7 +151,9 @@ def add_joint_motion(
     """Give jaw and eyes their joints: the rigid motion that fits teeth and eyeballs best.
 
     Args:
+        out: the expressions by name; gets jawBack and jawOpenExtreme too.
         groups: vertex indices by group of the base mesh.
+        positions: float64[V, 3], decimetres.
         pivots: joint positions by name.
     """
     teeth = groups["helper-lower-teeth"]

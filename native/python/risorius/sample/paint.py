@@ -44,12 +44,19 @@ def png(image: Floats) -> bytes:
 
 
 def smooth(low: float, high: float, x: Floats) -> Floats:
+    """0 where x is at low, 1 where it is at high, and smoothly in between; held beyond both."""
     t = np.clip((x - low) / (high - low), 0, 1)
     return t * t * (3 - 2 * t)
 
 
 def noise(size: int, cells: int, random: np.random.Generator) -> Floats:
-    """Smooth noise [size, size] in [-1, 1]: a random grid, interpolated with smooth steps."""
+    """Smooth noise [size, size] in [-1, 1]: a random grid, interpolated with smooth steps.
+
+    Args:
+        size: texels of a side.
+        cells: of the grid along a side; more of them make the noise finer.
+        random: gives the grid.
+    """
     grid = random.uniform(-1, 1, (cells + 1, cells + 1))
     at = np.linspace(0, cells, size, endpoint=False)
     low = at.astype(int)
@@ -60,7 +67,17 @@ def noise(size: int, cells: int, random: np.random.Generator) -> Floats:
 
 
 def bake(polygons: Polygons, uvs: Floats, values: Floats, size: int) -> tuple[Floats, Floats]:
-    """Values per vertex [V, k] -> image [size, size, k] by texture space, and covered texels."""
+    """Values of vertices as an image in texture space.
+
+    Args:
+        polygons: the mesh.
+        uvs: float64[T, 2] in [0, 1].
+        values: float64[V, k].
+        size: texels of a side.
+
+    Returns:
+        float64[size, size, k], and bool[size, size]: which texels a face covers.
+    """
     image = np.zeros((size, size, values.shape[1]))
     covered = np.zeros((size, size), bool)
     for face, uv_face in zip(polygons.faces, polygons.uv_faces, strict=True):
@@ -87,7 +104,13 @@ def bake(polygons: Polygons, uvs: Floats, values: Floats, size: int) -> tuple[Fl
 
 
 def bleed(image: Floats, covered: Floats, steps: int = 8) -> Floats:
-    """Grow the painted islands, so that filtering finds no foreign colour at their rims."""
+    """Grow the painted islands, so that filtering finds no foreign colour at their rims.
+
+    Args:
+        image: float64[h, w, 3].
+        covered: bool[h, w]: what is painted.
+        steps: by how many texels; what is left then gets the mean colour.
+    """
     image, covered = image.copy(), covered.copy()
     for _ in range(steps):
         for axis, shift in ((0, 1), (0, -1), (1, 1), (1, -1)):
@@ -99,12 +122,19 @@ def bleed(image: Floats, covered: Floats, steps: int = 8) -> Floats:
 
 
 def blend(image: Floats, colour: tuple[float, float, float], mask: Floats) -> Floats:
+    """An image [h, w, 3] with a colour laid over it where a mask [h, w] says, from 0 to 1."""
     mask = np.clip(mask, 0, 1)[:, :, None]
     return image * (1 - mask) + np.array(colour) * mask
 
 
 def brow_mask(p: Floats, eye: Floats, random: np.random.Generator) -> Floats:
-    """Strands along an arched line above each eye; p is the texel's place [h, w, 3]."""
+    """Strands along an arched line above each eye, float64[h, w] from 0 to 1.
+
+    Args:
+        p: float64[h, w, 3], each texel's place on the head, decimetres.
+        eye: float64[3], the left eye's middle.
+        random: gives the strands.
+    """
     x, y = np.abs(p[:, :, 0]), p[:, :, 1] - eye[1]
     t = (x - (eye[0] - 0.19)) / 0.44  # 0 at the nose, 1 at the temple
     ridge = 0.165 + 0.055 * np.sin(np.clip(t, 0, 1.1) * 2.2) - 0.045 * np.clip(t - 0.55, 0, 1) / 0.5
@@ -121,7 +151,13 @@ def brow_mask(p: Floats, eye: Floats, random: np.random.Generator) -> Floats:
 
 
 def hair_mask(p: Floats, eye: Floats, random: np.random.Generator) -> Floats:
-    """A shaved head's shadow, with a soft natural hairline."""
+    """A shaved head's shadow, with a soft natural hairline, float64[h, w] from 0 to 1.
+
+    Args:
+        p: float64[h, w, 3], each texel's place on the head, decimetres.
+        eye: float64[3], the left eye's middle.
+        random: makes the hairline uneven.
+    """
     back = p[:, :, 2] - eye[2]
     line = np.interp(
         back,
@@ -135,9 +171,15 @@ def hair_mask(p: Floats, eye: Floats, random: np.random.Generator) -> Floats:
 
 
 def lip_mask(part: Part, p: Floats, place: Floats, units: dict[str, Expression]) -> Floats:
-    """The vermilion, from the line where the lips meet.
+    """The vermilion, from the line where the lips meet, float64[h, w] from 0 to 1.
 
     That line is where vertices that the jaw takes along touch vertices that it leaves.
+
+    Args:
+        part: the head.
+        p: float64[v, 3], positions of its vertices, decimetres.
+        place: float64[h, w, 3], each texel's place on the head, decimetres.
+        units: what each raw control does, by its name.
     """
     travel = np.linalg.norm(part.carry(units["jawOpen"].displacement), axis=1)
     mouth = np.flatnonzero(
@@ -176,7 +218,16 @@ def paint_head(
     eye: Floats,
     units: dict[str, Expression],
 ) -> tuple[Floats, Floats]:
-    """Skin colour [h, w, 3] and each texel's place [h, w, 3]; eye is the left eye's middle."""
+    """Skin colour [h, w, 3] and each texel's place [h, w, 3].
+
+    Args:
+        person: has the colours.
+        part: the head.
+        uvs: float64[T, 2] in [0, 1].
+        p: float64[v, 3], positions of its vertices, decimetres.
+        eye: float64[3], the left eye's middle.
+        units: what each raw control does, by its name.
+    """
     random = np.random.default_rng(7)
     blink = sum(
         np.linalg.norm(part.carry(units[n].displacement), axis=1)
@@ -256,7 +307,13 @@ def paint_lashes() -> Floats:
 
 
 def vessels(random: np.random.Generator, angle_limit: float) -> Floats:
-    """Fine blood vessels [EYE_SIZE, EYE_SIZE], 0 to 1: they wander in from behind and thin out."""
+    """Fine blood vessels [EYE_SIZE, EYE_SIZE], 0 to 1: they wander in from behind and thin out.
+
+    Args:
+        random: gives their ways.
+        angle_limit: how near they come to the pupil at most, as a distance in texture space; the
+            back of the eyeball is at 0.5.
+    """
     image = np.zeros((EYE_SIZE, EYE_SIZE))
     for _ in range(90):
         around, step = random.uniform(0, 2 * np.pi), 0.0
@@ -279,6 +336,12 @@ def paint_textures(
     person: Person, positions: Floats, units: dict[str, Expression], parts: list[Part]
 ) -> tuple[dict[str, bytes], dict[str, str]]:
     """The textures.
+
+    Args:
+        person: has the colours.
+        positions: float64[V, 3], all vertices of the base mesh, decimetres.
+        units: what each raw control does, by its name.
+        parts: the meshes.
 
     Returns:
         File name -> bytes of a PNG; and metadata for the DNA: texture:<mesh>:<role> -> file name;

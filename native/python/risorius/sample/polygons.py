@@ -50,7 +50,13 @@ def edges_of(faces: list[list[int]]) -> dict[tuple[int, int], list[int]]:
 def clip_below(mesh: Polygons, heights: Floats, level: float) -> tuple[Polygons, Operator]:
     """Cut a mesh by a plane: what lies under level goes, cut edges get a new vertex.
 
-    Returns the rest, its vertices compacted, and the operator from old vertices to new ones.
+    Args:
+        mesh: is left as it is.
+        heights: float64[V], of its vertices over the plane of height 0.
+        level: height of the cut.
+
+    Returns:
+        The rest, its vertices compacted, and the operator from old vertices to new ones.
     """
     rows: list[tuple[int, int, float]] = []
     number: dict[object, int] = {}
@@ -187,7 +193,12 @@ def _split_faces(
 
 
 def vertex_normals(positions: Floats, faces: list[list[int]]) -> Floats:
-    """Unit normals [V, 3], area-weighted means of the faces around."""
+    """Unit normals [V, 3], area-weighted means of the faces around.
+
+    Args:
+        positions: float64[V, 3].
+        faces: vertex indices by corner, counter-clockwise seen from outside.
+    """
     normals = np.zeros_like(positions)
     for size in {len(face) for face in faces}:
         table = np.array([face for face in faces if len(face) == size])

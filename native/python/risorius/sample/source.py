@@ -118,7 +118,12 @@ class Source:
         return mesh
 
     def target(self, name: str, vertex_count: int) -> NDArray[np.float64]:
-        """Displacement [V, 3] of a .target file ("vertex dx dy dz" a line)."""
+        """Displacement [V, 3] of a .target file ("vertex dx dy dz" a line), decimetres.
+
+        Args:
+            name: of the file in the archive; one that ends in .gz is unpacked.
+            vertex_count: V.
+        """
         data = self._zip.read(name)
         text = gzip.decompress(data) if name.endswith(".gz") else data
         rows = [r.split() for r in text.decode().splitlines() if r and not r.startswith("#")]
@@ -129,4 +134,5 @@ class Source:
         return out
 
     def face_unit(self, name: str, vertex_count: int) -> NDArray[np.float64]:
+        """Displacement [vertex_count, 3] of the ARKit unit of that name, decimetres."""
         return self.target(f"{FACE_UNITS}{name}.target", vertex_count)

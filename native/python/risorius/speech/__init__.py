@@ -34,7 +34,11 @@ def phonemes(
 ) -> list[Phoneme]:
     """The phonemes of a voice with their times, in order and without gaps; pauses are SIL.
 
-    Args and raises: as speak.
+    Args:
+        path, transcript, progress, cancel: as of speak.
+
+    Raises:
+        AudioError, MissingError, CancelledError: as speak does.
     """
     return listen(path, transcript, progress=progress, cancel=cancel).phonemes
 
@@ -91,7 +95,15 @@ def animate(
     blinks: bool = True,
     accents: bool = True,
 ) -> Clip:
-    """The clip of what was heard; arguments as of speak."""
+    """The clip of what was heard.
+
+    Args:
+        heard: of `listen`.
+        rate, seed, intensity, blinks, accents: as of speak.
+
+    Raises:
+        ValueError: a rate or an intensity that makes no sense.
+    """
     _check(rate, intensity)
     duration = len(heard.samples) / RATE
     times = np.arange(int(np.ceil((duration + _TAIL) * rate)) + 1) / rate

@@ -46,6 +46,7 @@ def viseme_weights(phonemes: Sequence[Phoneme], times: Times) -> Curves:
     """How much of each viseme is in the mouth.
 
     Args:
+        phonemes: in order, without gaps; pauses are SIL.
         times: seconds, ascending in equal steps, [frames].
 
     Returns:
@@ -91,6 +92,11 @@ def gate(phonemes: Sequence[Phoneme], viseme: str, times: Times) -> Curves:
     """float64[frames] in [0, 1]: 1 while a sound of this viseme has the lips.
 
     It is 1 for two frames at least, at any rate, so that no closure falls between frames.
+
+    Args:
+        phonemes: in order, without gaps.
+        viseme: one of GATED.
+        times: seconds, ascending in equal steps, [frames].
     """
     closed = np.zeros(len(times))
     step = float(times[1] - times[0]) if len(times) > 1 else 1.0

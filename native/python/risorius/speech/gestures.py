@@ -22,13 +22,28 @@ _NOD = 0.05  # radians down, of the strongest accent
 
 
 def bump(times: Times, begin: float, rise: float, hold: float, fall: float) -> Curves:
-    """0, smoothly up to 1, held, and smoothly back; times in seconds, begin of the rise."""
+    """0, smoothly up to 1, held, and smoothly back: float64[frames].
+
+    Args:
+        times: seconds, [frames].
+        begin: seconds, when it begins to rise.
+        rise, hold, fall: seconds that each takes.
+    """
     up = smooth_step((times - begin) / rise)
     return np.minimum(up, smooth_step((begin + rise + hold + fall - times) / fall))
 
 
 def blink_times(phonemes: Sequence[Phoneme], duration: float, seed: int) -> list[float]:
-    """When lids begin to fall: at a natural rate, and where speech pauses if it does so near."""
+    """When lids begin to fall: at a natural rate, and where speech pauses if it does so near.
+
+    Args:
+        phonemes: of the voice; pauses are SIL.
+        duration: of the voice, seconds.
+        seed: the same one gives the same times.
+
+    Returns:
+        Seconds, ascending.
+    """
     random = np.random.default_rng(seed)
     pauses = np.array([p.begin for p in phonemes if p.name == "SIL" and p.end - p.begin > 0.12])
     found: list[float] = []
@@ -46,7 +61,12 @@ def blink_times(phonemes: Sequence[Phoneme], duration: float, seed: int) -> list
 
 
 def blinks(times: Times, begins: Sequence[float]) -> dict[str, Curves]:
-    """Curves of the lids."""
+    """Curves float64[frames] of the lids by control.
+
+    Args:
+        times: seconds, [frames].
+        begins: seconds, when the lids begin to fall.
+    """
     lids = np.zeros(len(times))
     for begin in begins:
         lids = np.maximum(lids, bump(times, begin, _LID_DOWN, _LID_CLOSED, _LID_UP))
@@ -54,7 +74,13 @@ def blinks(times: Times, begins: Sequence[float]) -> dict[str, Curves]:
 
 
 def accent_curves(times: Times, found: Sequence[Accent], intensity: float) -> dict[str, Curves]:
-    """Brows that rise and a head that nods with what is stressed."""
+    """Brows that rise and a head that nods with what is stressed: float64[frames] by control.
+
+    Args:
+        times: seconds, [frames].
+        found: what is stressed.
+        intensity: 1 as usual; 0 nothing moves.
+    """
     brows, nod = np.zeros(len(times)), np.zeros(len(times))
     for accent in found:
         rise = bump(times, max(accent.time - 0.2, 0.0), 0.2, 0.08, 0.45)

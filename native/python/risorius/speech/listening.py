@@ -267,6 +267,10 @@ def with_silences(found: Sequence[Phoneme], levels: npt.NDArray[np.float64]) -> 
     """The phonemes without the pauses that a decoder counted to one of them.
 
     Silence within a word is the closure of a stop, and stays it. A phoneme keeps 30 ms at least.
+
+    Args:
+        found: phonemes of a piece, in order.
+        levels: loudness of the piece in dB, one value every STEP seconds.
     """
     quiet = np.concatenate([[False], ~speaking(levels), [False]])
     edges = np.flatnonzero(np.diff(quiet.astype(np.int8))).reshape(-1, 2) * STEP

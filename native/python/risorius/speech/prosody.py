@@ -58,7 +58,12 @@ def pitch(samples: Samples) -> Curve:
 
 
 def openness(samples: Samples, times: Curve) -> Curve:
-    """How far vowels open at each time, from loudness: about 0.6 to 1.25, without jitter."""
+    """How far vowels open at each time, from loudness: about 0.6 to 1.25, without jitter.
+
+    Args:
+        samples: of the voice, at RATE.
+        times: seconds, [frames].
+    """
     levels = loudness(samples)
     loud = levels[speaking(levels)]
     usual = float(np.median(loud)) if loud.size else 0.0
@@ -70,7 +75,13 @@ def openness(samples: Samples, times: Curve) -> Curve:
 
 
 def accents(phonemes: Sequence[Phoneme], samples: Samples, apart: float = 0.7) -> list[Accent]:
-    """The vowels that are louder, higher or longer than those around, `apart` seconds at least."""
+    """The vowels that are louder, higher or longer than those around.
+
+    Args:
+        phonemes: of the voice, in order.
+        samples: of the voice, at RATE.
+        apart: seconds that lie between two of them at least.
+    """
     levels, heights = loudness(samples), pitch(samples)
     vowels = [p for p in phonemes if viseme_of(p.name) in VOWEL_VISEMES | {"RR"}]
     vowels = [p for p in vowels if p.name not in ("R", "W", "Y")]

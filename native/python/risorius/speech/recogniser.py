@@ -83,7 +83,12 @@ class Recogniser:
         return str(found).split() if found else letters.pronounce(word)
 
     def align_words(self, samples: Samples, words: Sequence[str]) -> list[Segment] | None:
-        """The words at their times, silences in between; None if the voice does not say them."""
+        """The words at their times, silences in between; None if the voice does not say them.
+
+        Args:
+            samples: of a piece of a voice, at RATE.
+            words: in the order in which they are said.
+        """
         for kind in _ALIGNERS:
             found = self._word_pass(kind, samples, words)
             if found is not None:
@@ -91,7 +96,12 @@ class Recogniser:
         return None
 
     def align_phonemes(self, samples: Samples, words: Sequence[str]) -> list[Segment] | None:
-        """The phonemes of the words at their times; None if the voice does not say them."""
+        """The phonemes of the words at their times; None if the voice does not say them.
+
+        Args:
+            samples: of a piece of a voice, at RATE.
+            words: in the order in which they are said.
+        """
         for kind in _ALIGNERS:
             if self._word_pass(kind, samples, words) is not None:
                 found = _phone_pass(self._decoder(kind), samples)
@@ -104,6 +114,10 @@ class Recogniser:
 
         For a transcript that is not to the letter: each word may be skipped, and noise of speech
         may come before any.
+
+        Args:
+            samples: of a piece of a voice, at RATE.
+            words: in the order in which they are said.
         """
         decoder = self._decoder("one way")
         self._learn(decoder, words)
@@ -203,7 +217,15 @@ def _phone(name: str) -> str:
 
 
 def agreement(segments: Sequence[Segment], other: Sequence[Segment]) -> list[float]:
-    """Of each segment the share of its time in which the other decoder hears the same viseme."""
+    """Of each segment the share of its time in which the other decoder hears the same viseme.
+
+    Args:
+        segments: phonemes of one decoder.
+        other: phonemes of the other, on the same clock.
+
+    Returns:
+        Numbers from 0 to 1.
+    """
     shares = []
     for one in segments:
         same = sum(
@@ -218,7 +240,13 @@ def agreement(segments: Sequence[Segment], other: Sequence[Segment]) -> list[flo
 def to_phonemes(
     segments: Sequence[Segment], shares: Sequence[float], offset: float
 ) -> list[Phoneme]:
-    """Phonemes of a piece that begins at `offset` seconds; those without a duration left out."""
+    """Phonemes of a piece of a voice on the clock of the whole; those without a duration left out.
+
+    Args:
+        segments: phonemes of the piece.
+        shares: certainty of each, from 0 to 1.
+        offset: seconds, when the piece begins.
+    """
     return [
         Phoneme(s.begin + offset, s.end + offset, s.name, round(share, 3), s.word)
         for s, share in zip(segments, shares, strict=True)

@@ -34,6 +34,7 @@ def hear(recogniser: Recogniser, samples: Samples, tell: Callable[[float], None]
     """The phonemes of a piece of a voice, with the words that were made out of it.
 
     Args:
+        recogniser: whose decoders vote.
         samples: float32[n] at audio.RATE.
         tell: called with the part that is done, in [0, 1].
     """
