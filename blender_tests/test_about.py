@@ -8,7 +8,7 @@ from support import scene
 
 
 def test_the_self_test_says_that_the_module_works(monkeypatch):
-    about = scene.submodule("ui.about")
+    about = scene.submodule("ui.about.preferences")
     works, text = about.self_test()
     assert works
     assert "works" in text
@@ -32,7 +32,7 @@ def test_the_self_test_says_that_the_module_works(monkeypatch):
 
 def test_what_a_face_is_made_of(mode, dna_file):
     rig = scene.load(dna_file, mode)
-    lines = scene.submodule("ui.about").describe(rig)
+    lines = scene.submodule("ui.about.operators").describe(rig)
     assert "11 controls, 7 joints" in lines[0]
     head = next(line for line in lines if "Small_head" in line)
     real = 6 if mode == "KEYS" else 0

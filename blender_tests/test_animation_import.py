@@ -520,7 +520,7 @@ def test_the_preferences_say_in_words_why_the_button_is_grey(monkeypatch):
     listening = scene.submodule("scene.animation.speech_task")
     monkeypatch.setattr(listening, "has_recogniser", lambda: False)
     layout = Labels()
-    scene.submodule("ui.speech_operators").draw_preferences(layout)
+    scene.submodule("ui.speech.install").draw_preferences(layout)
     assert layout.words[-1] == "risorius.install_speech"
     said = any("Allow online access" in line for line in layout.words)
     assert said == (not bpy.app.online_access)

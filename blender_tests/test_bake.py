@@ -433,7 +433,7 @@ class _Window:
     def __init__(self, job):
         self.window_manager, self.scene = self, bpy.context.scene
         self._job, self._timer, self.said, self.over = job, None, [], False
-        operators = scene.submodule("ui.bake_operators")
+        operators = scene.submodule("ui.bake.operators")
         self.modal = lambda kind: operators.RISORIUS_OT_bake.modal(self, self, _Event(kind))
         self._step = lambda *rest: operators.RISORIUS_OT_bake._step(self, *rest)
         self._end = lambda context: operators.RISORIUS_OT_bake._end(self, context)
@@ -462,7 +462,7 @@ def test_with_a_window_it_shows_progress_and_esc_ends_it(ended, dna_file):
     rig = _face(dna_file)
     before, counts = _state(rig), scene.counts()
     bake = scene.submodule("scene.bake.bake_face")
-    scene.submodule("ui.bake_operators")._SLICE = 0.0
+    scene.submodule("ui.bake.operators")._SLICE = 0.0
     window = _Window(bake.bake(bpy.context, [rig], bake.BakeOptions(end=10)))
     assert window.modal("MOUSEMOVE") == {"RUNNING_MODAL"}
     if ended:
@@ -489,7 +489,7 @@ def test_when_blender_ends_it_nothing_is_left(how, whole_scene, dna_file, tmp_pa
     bpy.context.scene.frame_set(7)
     before, counts = _state(rig), scene.counts()
     bake = scene.submodule("scene.bake.bake_face")
-    scene.submodule("ui.bake_operators")._SLICE = 0.0
+    scene.submodule("ui.bake.operators")._SLICE = 0.0
     window = _Window(bake.bake(bpy.context, [rig], bake.BakeOptions(end=10)))
     assert window.modal("TIMER") == {"RUNNING_MODAL"}
     if how == "scene removed" and not whole_scene:
@@ -662,12 +662,12 @@ def _drawn(cls):
 
 def test_the_panel_shows_the_state_and_the_way_back(dna_file):
     _face(dna_file)
-    panel = scene.submodule("ui.panels").RISORIUS_PT_character
+    panel = scene.submodule("ui.face.panel").RISORIUS_PT_character
     assert "risorius.unbake" not in _drawn(panel).operators
     _bake(start=2, end=9)
     assert "it plays its actions, frames 2 to 9." in _drawn(panel).text()
     assert "risorius.unbake" in _drawn(panel).operators
-    out = _drawn(scene.submodule("ui.bake_panel").RISORIUS_PT_out)
+    out = _drawn(scene.submodule("ui.bake.panel").RISORIUS_PT_out)
     assert out.operators == ["risorius.bake", "risorius.export_animation"]
     bpy.ops.risorius.unbake()
     _bake(kind="CONTROLS")

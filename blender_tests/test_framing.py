@@ -51,7 +51,7 @@ def _corners(item):
 def window(monkeypatch):
     """The import as in a window, where somebody looks."""
     fake = SimpleNamespace(app=SimpleNamespace(background=False))
-    monkeypatch.setattr(scene.submodule("ui.import_operators"), "bpy", fake)
+    monkeypatch.setattr(scene.submodule("ui.file.import_operators"), "bpy", fake)
 
 
 def test_nothing_moves_in_the_background(dna_file):

@@ -153,7 +153,10 @@ class _Layout:
 def _draw_panels():
     """Draw every panel of the sidebar; returns the words that were shown."""
     said = []
-    for panel in scene.submodule("ui.panels").CLASSES:
+    face = "ui.face"
+    for panel in (
+        scene.submodule(f"{face}.panel").CLASSES + scene.submodule(f"{face}.controls_panel").CLASSES
+    ):
         if getattr(panel, "poll", lambda _context: True)(bpy.context):
             layout = _Layout()
             panel.draw(SimpleNamespace(layout=layout), bpy.context)

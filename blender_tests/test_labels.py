@@ -45,11 +45,11 @@ def test_the_ruler_finds_words_that_are_cut():
 
 def test_every_panel_can_be_read(rig):
     for name, kind in (
-        ("panels", "RISORIUS_PT_character"),
-        ("panels", "RISORIUS_PT_options"),
-        ("animation_panel", "RISORIUS_PT_animation"),
-        ("bake_panel", "RISORIUS_PT_out"),
-        ("live_operators", "RISORIUS_PT_live"),
+        ("face.panel", "RISORIUS_PT_character"),
+        ("face.panel", "RISORIUS_PT_options"),
+        ("animation.panel", "RISORIUS_PT_animation"),
+        ("bake.panel", "RISORIUS_PT_out"),
+        ("live.panel", "RISORIUS_PT_live"),
     ):
         layout = drawn(getattr(ui(name), kind), bpy.context)
         assert texts(layout)
@@ -57,7 +57,7 @@ def test_every_panel_can_be_read(rig):
 
 
 def test_eight_levels_of_detail_have_two_rows_that_can_be_told_apart(rig, monkeypatch):
-    panels = ui("panels")
+    panels = ui("face.panel")
     monkeypatch.setattr(panels.lods, "built", lambda _rig: list(range(8)))
     layout = drawn(panels.RISORIUS_PT_character, bpy.context)
     assert layout.cut(SIDEBAR) == []
@@ -70,7 +70,7 @@ def test_the_names_of_all_sliders_can_be_read(rig):
     """Of the standard face: 260 sliders, in one column."""
     face = {name: 0.0 for name in (STANDARD / "standard_raw.txt").read_text().split()}
     layout = Part()
-    ui("panels")._draw_sliders(bpy.context, layout, face, list(face))
+    ui("face.controls_panel")._draw_sliders(bpy.context, layout, face, list(face))
     assert layout.cut(SIDEBAR) == []
     words = texts(layout)
     assert {"Upper Lip Towards Teeth", "Lower Lip Depress", "Dimple"} <= set(words)
@@ -79,13 +79,13 @@ def test_the_names_of_all_sliders_can_be_read(rig):
 def test_a_slider_whose_name_is_short_has_one_line():
     face = dict.fromkeys(("CTRL_expressions.jawOpen", "CTRL_expressions.jawChinRaiseDL"), 0.0)
     layout = Part()
-    ui("panels")._draw_sliders(bpy.context, layout, face, list(face))
+    ui("face.controls_panel")._draw_sliders(bpy.context, layout, face, list(face))
     (column,) = layout.children
     assert [part.kind for part in column.children] == ["split", "split"]
 
 
 def test_layers_and_reactions_can_be_read(rig):
-    panel, controls = ui("layer_panel"), scene.controls(rig)
+    panel, controls = ui("layers.panel"), scene.controls(rig)
     props = scene.submodule("scene.animation.layer_properties")
     for kind in ("IDLE", "EXPRESSION"):
         known = next(iter(scene.submodule("scene.animation.expressions").all_expressions()))
@@ -98,26 +98,28 @@ def test_layers_and_reactions_can_be_read(rig):
     for name, reaction in scene.submodule("scene.animation.layers").known_reactions().items():
         layout = Part()
         item = SimpleNamespace(name=name, bl_rna=props.RISORIUS_PG_reaction.bl_rna)
-        panel.RISORIUS_UL_reactions.draw_item(None, None, layout, None, item, 0, None, "")
+        ui("layers.lists").RISORIUS_UL_reactions.draw_item(
+            None, None, layout, None, item, 0, None, ""
+        )
         assert reaction.label in texts(layout)
         assert layout.cut(SIDEBAR - 36) == []  # beside the button, within the list's frame
 
 
 @pytest.mark.parametrize("choices", [{}, {"mapping": "FILE", "use_neutral": True}])
 def test_the_import_of_animation_can_be_read(rig, choices):
-    layout = Operator(ui("animation_operators").RISORIUS_OT_import_animation, **choices).draw(None)
+    layout = Operator(ui("animation.operators").RISORIUS_OT_import_animation, **choices).draw(None)
     assert layout.cut(FILE_BROWSER) == []
     assert {"0: as the file says", "as *jawOpen=1.3 *Blink*=1.1", "0: none"} <= set(texts(layout))
 
 
 def test_the_import_of_a_face_can_be_read():
-    layout = Operator(ui("import_operators").RISORIUS_OT_import_dna).draw(None)
+    layout = Operator(ui("file.import_operators").RISORIUS_OT_import_dna).draw(None)
     assert layout.cut(FILE_BROWSER) == []
     assert "Levels of Detail" in texts(layout)
 
 
 def test_speech_can_be_read(rig):
-    layout = Operator(ui("speech_operators").RISORIUS_OT_speak).draw(None)
+    layout = Operator(ui("speech.operators").RISORIUS_OT_speak).draw(None)
     assert layout.cut(FILE_BROWSER) == []
     assert "Empty: it is listened for" in texts(layout)
 
@@ -125,7 +127,7 @@ def test_speech_can_be_read(rig):
 @pytest.mark.parametrize("choice", ["GLTF", "FBX", "USD", "ALEMBIC", "RZC", "CSV"])
 @pytest.mark.parametrize("frames", ["SCENE", "CUSTOM"])
 def test_the_export_of_animation_can_be_read(rig, choice, frames):
-    kind = ui("ship_operators").RISORIUS_OT_export_animation
+    kind = ui("export.operators").RISORIUS_OT_export_animation
     layout = Operator(kind, format=choice, range=frames).draw(None)
     assert layout.cut(FILE_BROWSER) == []
     if choice not in ("RZC", "CSV"):
@@ -134,15 +136,15 @@ def test_the_export_of_animation_can_be_read(rig, choice, frames):
 
 
 def test_dialogs_can_be_read(rig):
-    layout = Operator(ui("bake_operators").RISORIUS_OT_bake).draw(None)
+    layout = Operator(ui("bake.operators").RISORIUS_OT_bake).draw(None)
     assert layout.cut(DIALOG) == []
     assert {"-1: as in the viewport", "0: a key at every step"} <= set(texts(layout))
-    kind = ui("animation_operators").RISORIUS_OT_import_arkit_rig
+    kind = ui("animation.operators").RISORIUS_OT_import_arkit_rig
     assert Operator(kind, source="").draw(bpy.context).cut(DIALOG) == []
 
 
 def test_a_value_that_was_chosen_needs_no_words(rig):
-    layout = Operator(ui("bake_operators").RISORIUS_OT_bake, lod=2, error=0.1).draw(None)
+    layout = Operator(ui("bake.operators").RISORIUS_OT_bake, lod=2, error=0.1).draw(None)
     assert not any(text.startswith(("-1:", "0:")) for text in texts(layout))
 
 

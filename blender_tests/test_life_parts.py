@@ -21,8 +21,9 @@ def rig(dna_file, mode):
 def _said(active):
     bpy.context.view_layer.objects.active = active
     layout = Recorder()
-    panels = scene.submodule("ui.panels")
-    for panel in (panels.RISORIUS_PT_character, panels.RISORIUS_PT_controls):
+    for name in ("panel.RISORIUS_PT_character", "controls_panel.RISORIUS_PT_controls"):
+        module, _, cls = name.partition(".")
+        panel = getattr(scene.submodule(f"ui.face.{module}"), cls)
         if not hasattr(panel, "poll") or panel.poll(bpy.context):
             panel.draw(_Drawn(layout), bpy.context)
     return layout.text()
@@ -39,7 +40,7 @@ def _use(active):
     for frame in (2, 3):
         bpy.context.scene.frame_set(frame)
     bpy.context.view_layer.objects.active = active
-    operators = scene.submodule("ui.operators").CLASSES
+    operators = scene.submodule("ui.face.operators").CLASSES
     for cls in operators:
         group, name = cls.bl_idname.split(".")
         operator = getattr(getattr(bpy.ops, group), name)

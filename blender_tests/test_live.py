@@ -488,7 +488,7 @@ class Layout:
 def drawn():
     """The words of the panel as it is now."""
     layout = Layout()
-    panel = scene.submodule("ui.live_operators").RISORIUS_PT_live
+    panel = scene.submodule("ui.live.panel").RISORIUS_PT_live
     panel.draw(SimpleNamespace(layout=layout), bpy.context)
     return " | ".join(layout.words)
 

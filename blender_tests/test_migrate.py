@@ -14,7 +14,7 @@ VERSION = "risorius_version"
 
 def _said():
     layout = Recorder()
-    scene.submodule("ui.life_operators").draw_trouble(layout, bpy.context)
+    scene.submodule("ui.life.panel").draw_trouble(layout, bpy.context)
     return layout.text()
 
 

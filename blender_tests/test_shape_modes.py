@@ -279,7 +279,7 @@ def test_the_panel_draws_with_and_without_a_test(dna_file):
     from support.layout import Recorder
 
     scene.load(dna_file)
-    panel = scene.submodule("ui.shape_test").RISORIUS_PT_shape_test
+    panel = scene.submodule("ui.face.channel_preview").RISORIUS_PT_shape_test
     assert panel.poll(bpy.context)
     for value, buttons in ((None, 1), (0.5, 2)):
         if value is not None:
@@ -291,7 +291,7 @@ def test_the_panel_draws_with_and_without_a_test(dna_file):
 
 def test_only_shapes_that_move_something_are_offered(dna_file):
     rig = scene.load(dna_file)
-    items = scene.submodule("ui.shape_test")._channels(None, bpy.context)
+    items = scene.submodule("ui.face.channel_preview")._channels(None, bpy.context)
     assert [i[1] for i in items] == [b.name for b in _keys(rig)[1:]]
     with pytest.raises(TypeError):
         bpy.ops.risorius.test_channel(channel="17", value=1.0)

@@ -7,44 +7,28 @@ from . import native
 from .scene.animation import layer_properties
 from .scene.life import handlers
 from .scene.live import capture
-from .ui import (
-    about,
-    animation_operators,
-    animation_panel,
-    bake_operators,
-    bake_panel,
-    file_operators,
-    import_operators,
-    layer_panel,
-    life_operators,
-    live_operators,
-    operators,
-    overlay,
-    panels,
-    scene_operators,
-    shape_test,
-    ship_operators,
-    speech_operators,
-)
+from .ui import about, animation, bake, export, expressions, face, file, layers, life, live, speech
+from .ui.about import timing_overlay
+from .ui.animation import operators as animation_operators
+from .ui.face import channel_preview
+from .ui.file import import_operators
+from .ui.file import operators as file_operators
+from .ui.live import properties as live_properties
 
+# Panels of one bl_order stand in the order in which they are registered.
 CLASSES = (
     *layer_properties.CLASSES,
     *about.CLASSES,
-    *import_operators.CLASSES,
-    *file_operators.CLASSES,
-    *operators.CLASSES,
-    *life_operators.CLASSES,
-    *scene_operators.CLASSES,
-    *bake_operators.CLASSES,
-    *ship_operators.CLASSES,
-    *panels.CLASSES,
-    *bake_panel.CLASSES,
-    *shape_test.CLASSES,
-    *animation_operators.CLASSES,
-    *speech_operators.CLASSES,
-    *animation_panel.CLASSES,
-    *layer_panel.CLASSES,
-    *live_operators.CLASSES,
+    *file.CLASSES,
+    *life.CLASSES,
+    *bake.CLASSES,
+    *export.CLASSES,
+    *face.CLASSES,
+    *animation.CLASSES,
+    *speech.CLASSES,
+    *expressions.CLASSES,
+    *layers.CLASSES,
+    *live.CLASSES,
 )
 
 
@@ -62,11 +46,11 @@ def register():
         bpy.utils.register_class(cls)
     layer_properties.register()
     bpy.types.WindowManager.risorius_search = _search_property()
-    bpy.types.WindowManager.risorius_show_timing = overlay.show_property()
+    bpy.types.WindowManager.risorius_show_timing = timing_overlay.show_property()
     bpy.types.WindowManager.risorius_live = bpy.props.PointerProperty(
-        type=live_operators.RISORIUS_PG_live
+        type=live_properties.RISORIUS_PG_live
     )
-    bpy.types.WindowManager.risorius_test = shape_test.weight_property()
+    bpy.types.WindowManager.risorius_test = channel_preview.weight_property()
     bpy.types.TOPBAR_MT_file_import.append(import_operators.draw_import)
     bpy.types.TOPBAR_MT_file_import.append(animation_operators.draw_import)
     bpy.types.TOPBAR_MT_file_export.append(file_operators.draw_export)
@@ -90,7 +74,7 @@ def unregister():
         bpy.app.timers.unregister(_refresh_once)
     capture.unregister()
     handlers.unregister()
-    overlay.stop()
+    timing_overlay.stop()
     bpy.types.VIEW3D_MT_add.remove(import_operators.draw_add)
     bpy.types.TOPBAR_MT_file_export.remove(file_operators.draw_export)
     bpy.types.TOPBAR_MT_file_import.remove(animation_operators.draw_import)

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Words in panels and dialogs: whether they fit, and what a number or an empty field stands for."""
 
+import textwrap
+
 import blf
 
 _SIDEBAR = 280  # pixels that Blender gives the sidebar at first
@@ -49,3 +51,11 @@ def prop_or(layout, owner, name, empty, meaning):
         row = layout.row()
         row.alignment, row.active = "RIGHT", False
         row.label(text=meaning)
+
+
+def write(layout, text, icon="NONE"):
+    """A sentence in as many lines as a narrow sidebar needs."""
+    column = layout.column(align=True)
+    column.scale_y = 0.8
+    for number, line in enumerate(textwrap.wrap(text, 38)):
+        column.label(text=line, icon=icon if number == 0 else "BLANK1")

@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a face is made of, as a list."""
+
+import bpy
+import numpy as np
+
+from ...scene.base import parts
+from ...scene.character import meshes, runtime
+from ..common import FaceOperator
+
+
+def describe(rig):
+    """What a face is made of, a line per mesh: shapes that move nothing are named.
+
+    Args:
+        rig: its deforming armature.
+
+    Returns:
+        Lines of text.
+    """
+    live = runtime.of(rig)
+    names = live.dna.blend_shape_channel_names
+    lines = [
+        f"{len(live.labels)} controls, {live.rig.joint_count} joints, {len(live.owned)} of them "
+        f"moved by the file, {len(names)} channels, {len(live.dna.animated_map_names)} maps.",
+        "Hair, clothes and grooms are not in DNA files.",
+    ]
+    for item in parts.meshes_of(rig):
+        targets = live.dna.meshes[item[parts.MESH]].blend_shape_targets
+        real = len(meshes.real_channels(item))
+        still = [
+            names[t.blend_shape_channel_index] for t in targets if not np.any(np.asarray(t.deltas))
+        ]
+        levels = ", ".join(str(level) for level in item[parts.LODS])
+        lines.append(
+            f"{item.name}: level {levels}, {len(item.data.vertices):,} vertices, "
+            f"{len(targets)} channels move it, {real} of them as real keys."
+        )
+        if still:
+            lines.append(f"    Move nothing: {', '.join(still)}")
+    return lines
+
+
+class RISORIUS_OT_describe(FaceOperator, bpy.types.Operator):
+    """List what the active face is made of, mesh by mesh"""
+
+    bl_idname = "risorius.describe"
+    bl_label = "What Is in It"
+    baked_too = True
+    bl_options = {"REGISTER"}
+
+    def execute(self, context):
+        lines = describe(parts.active_rig(context))
+        for line in lines:
+            self.report({"INFO"}, line)
+        if not bpy.app.background:
+            context.window_manager.popup_menu(
+                lambda menu, _context: [menu.layout.label(text=line) for line in lines],
+                title="What is in this face",
+                icon="INFO",
+            )
+        return {"FINISHED"}
+
+
+CLASSES = (RISORIUS_OT_describe,)

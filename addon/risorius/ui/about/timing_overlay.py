@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The optional overlay of the 3D view: milliseconds per stage of a frame."""
+
+import blf
+import bpy
+
+from ...scene.frame import timing
+
+_handles = []
+
+
+def show_property():
+    """The switch, on the window manager: no part of the file."""
+    return bpy.props.BoolProperty(
+        name="Show Timing",
+        description="Milliseconds of each stage of a frame, in the corner of the 3D view",
+        options={"SKIP_SAVE"},
+        update=_switched,
+    )
+
+
+def _switched(manager, context):
+    stop()
+    if manager.risorius_show_timing:
+        view = bpy.types.SpaceView3D
+        _handles.append(view.draw_handler_add(timing.drawing_begins, (), "WINDOW", "PRE_VIEW"))
+        _handles.append(view.draw_handler_add(_draw, (), "WINDOW", "POST_PIXEL"))
+    for area in context.screen.areas if context.screen else ():
+        if area.type == "VIEW_3D":
+            area.tag_redraw()
+
+
+def stop():
+    """Take the overlay away."""
+    while _handles:
+        bpy.types.SpaceView3D.draw_handler_remove(_handles.pop(), "WINDOW")
+
+
+def _draw():
+    timing.drawing_ends()
+    size = round(12 * bpy.context.preferences.system.ui_scale)
+    x = 20 + _width(bpy.context.area, "TOOLS")
+    y = 20
+    for text in reversed(timing.lines()):
+        blf.size(0, size)
+        blf.enable(0, blf.SHADOW)
+        blf.shadow(0, 3, 0.0, 0.0, 0.0, 0.9)
+        blf.color(0, 1.0, 1.0, 1.0, 1.0)
+        blf.position(0, x, y, 0)
+        blf.draw(0, text)
+        blf.disable(0, blf.SHADOW)
+        y += round(size * 1.5)
+
+
+def _width(area, kind):
+    return next((r.width for r in area.regions if r.type == kind), 0) if area else 0

@@ -1,0 +1,322 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators that bring animation in from files and from other rigs."""
+
+from functools import cache
+from pathlib import Path
+
+import bpy
+from bpy_extras.io_utils import ImportHelper
+
+from ... import native
+from ...logic.base.errors import FaceError
+from ...logic.base.names import printable
+from ...scene.animation import retarget_shape_keys
+from ...scene.base import parts
+from ...scene.character import runtime
+from .. import words
+from ..common import explain, has_face, shown_progress
+from .place_clip import PlacesClip
+
+RATES = (
+    (
+        "FRAMES",
+        "Whole Frames",
+        "Keys lie on the scene's frames, where hands and eyes look for them",
+    ),
+    ("TIME", "Every Sample", "A key for each sample at its time, between frames where need be"),
+    ("SCENE", "Set Scene Rate", "The scene takes over the rate of the file; a key for each sample"),
+)
+EXTENSIONS = (
+    ".csv",
+    ".tsv",
+    ".txt",
+    ".json",
+    ".xml",
+    ".dat",
+    ".pgo",
+    ".glb",
+    ".gltf",
+    ".fbx",
+    ".rzc",
+)
+CLIP_EXTENSION = ".rzc"
+SOUNDS = (".wav", ".mp3", ".flac", ".ogg", ".m4a", ".aac", ".opus", ".mp4", ".mov", ".mkv")
+
+
+@cache
+def _kinds():
+    kinds = native.part("importing").KINDS.items()
+    return [("AUTO", "Automatic", "Told from the file"), *((k, t, "") for k, t in kinds)]
+
+
+@cache
+def _mappings():
+    names = native.part("importing").mapping_names()
+    return [
+        ("AUTO", "Automatic", "The one that knows the file's names"),
+        ("FILE", "File", "A mapping of your own, a TOML file"),
+        *((n, n.replace("_", " ").title(), "") for n in names),
+    ]
+
+
+class RISORIUS_OT_import_animation(PlacesClip, bpy.types.Operator, ImportHelper):
+    """Bring a capture, a table of curves, a viseme track or a clip onto the active face"""
+
+    bl_idname = "risorius.import_animation"
+    bl_label = "Import Animation"
+    bl_options = {"REGISTER", "UNDO", "PRESET"}
+
+    filter_glob: bpy.props.StringProperty(
+        default=";".join(f"*{e}" for e in EXTENSIONS), options={"HIDDEN"}
+    )
+    kind: bpy.props.EnumProperty(
+        name="Kind", description="What kind of file it is", items=lambda _s, _c: _kinds()
+    )
+    mapping: bpy.props.EnumProperty(
+        name="Mapping",
+        description="Which controls the file's curves move",
+        items=lambda _s, _c: _mappings(),
+    )
+    mapping_file: bpy.props.StringProperty(
+        name="Mapping File", description="A TOML file", subtype="FILE_PATH"
+    )
+    rate_mode: bpy.props.EnumProperty(
+        name="Keys", description="Where the file's samples become keys", items=RATES
+    )
+    file_rate: bpy.props.FloatProperty(
+        name="File Rate",
+        description="Frames per second of a file that does not say it; 0: as found",
+        min=0.0,
+        soft_max=240.0,
+    )
+    gain: bpy.props.FloatProperty(
+        name="Gain", description="Factor of all controls", default=1.0, min=0.0, soft_max=2.0
+    )
+    gains: bpy.props.StringProperty(
+        name="Single Gains",
+        description="Factors of single controls or patterns of their names, as "
+        "CTRL_expressions.jawOpen=1.3 *Blink*=1.1",
+    )
+    smoothing: bpy.props.FloatProperty(
+        name="Smoothing",
+        description="Seconds around each sample that are smoothed together; 0: none",
+        min=0.0,
+        soft_max=0.5,
+    )
+    use_neutral: bpy.props.BoolProperty(
+        name="Calibrate", description="Make the face of some frames of the file the neutral one"
+    )
+    neutral_first: bpy.props.IntProperty(
+        name="Neutral From", description="Sample of the file, from 0", min=0
+    )
+    neutral_last: bpy.props.IntProperty(
+        name="Neutral To", description="Last of these samples", min=0
+    )
+    use_eyes: bpy.props.BoolProperty(
+        name="Turn Eye Bones",
+        description="Where the file has the eyes' angles, turn the eye bones too",
+    )
+
+    def invoke(self, context, event):
+        self.start_with(context.scene)
+        if self.properties.is_property_set("filepath"):  # dropped onto the window
+            return self.execute(context)
+        return ImportHelper.invoke(self, context, event)
+
+    def execute(self, context):
+        if _is_sound(self.filepath):
+            name = printable(Path(self.filepath).name)
+            self.report({"ERROR"}, f"{name}: this is a sound: use Speak from Audio.")
+            return {"CANCELLED"}
+        live, render = runtime.of(parts.active_rig(context)), context.scene.render
+        rate = render.fps, render.fps_base
+        try:
+            with shown_progress(context) as progress:
+                clip, notes = self._read(live)
+                progress(0.4)
+                clip = self._adjusted(clip)
+                if self.rate_mode == "SCENE":
+                    render.fps = max(1, round(clip.rate))
+                    render.fps_base = render.fps / clip.rate
+                progress(0.6)
+                name, whole = Path(self.filepath).stem, self.rate_mode == "FRAMES"
+                self.place(context, clip, name, notes, self.use_eyes, whole)
+        except native.user_errors() as error:
+            render.fps, render.fps_base = rate
+            self.report({"ERROR"}, explain(self.filepath, error))
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+    def _read(self, live):
+        """The file as a clip of raw controls, and lines on what became of its curves."""
+        if Path(self.filepath).suffix.lower() == CLIP_EXTENSION:
+            return native.module().Clip.load(self.filepath), []
+        mapping = None if self.mapping == "AUTO" else self.mapping
+        if mapping == "FILE":
+            mapping = bpy.path.abspath(self.mapping_file)
+        clip, report = native.part("importing").import_file(
+            self.filepath,
+            live.dna.raw_control_names,
+            kind=None if self.kind == "AUTO" else self.kind,
+            mapping=mapping,
+            rate=self.file_rate or None,
+            rig=live.rig,
+            rotations="all" if self.use_eyes else "head",
+        )
+        return clip, lines_of(report)
+
+    def _adjusted(self, clip):
+        """Calibrated, smoothed and multiplied."""
+        process = native.part("importing.process")
+        if self.use_neutral:
+            last = max(self.neutral_first, self.neutral_last)
+            clip = process.calibrate(clip, self.neutral_first, last)
+        if self.smoothing > 0.0:
+            clip = process.smooth(clip, self.smoothing)
+        gains = {} if self.gain == 1.0 else dict.fromkeys(_sliders(clip), self.gain)
+        if gains:
+            clip = process.adjust(clip, gains)
+        single = _gains(self.gains)
+        return process.adjust(clip, single) if single else clip
+
+    def draw(self, _context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        self.draw_place(layout)
+        for name in ("kind", "mapping"):
+            layout.prop(self, name)
+        if self.mapping == "FILE":
+            layout.prop(self, "mapping_file")
+        layout.prop(self, "rate_mode")
+        words.prop_or(layout, self, "file_rate", 0.0, "0: as the file says")
+        layout.prop(self, "gain")
+        words.prop_or(layout, self, "gains", "", "as *jawOpen=1.3 *Blink*=1.1")
+        words.prop_or(layout, self, "smoothing", 0.0, "0: none")
+        layout.prop(self, "use_eyes")
+        layout.prop(self, "use_neutral")
+        if self.use_neutral:
+            layout.prop(self, "neutral_first")
+            layout.prop(self, "neutral_last")
+
+
+def _is_sound(path):
+    """Whether a file is one that Speak from Audio takes, by its name or its first bytes."""
+    if Path(path).suffix.lower() in SOUNDS:
+        return True
+    try:
+        with Path(path).open("rb") as file:
+            head = file.read(12)
+    except OSError:
+        return False  # said by who reads it
+    return head[:4] == b"RIFF" and head[8:] == b"WAVE"
+
+
+def _sliders(clip):
+    """The names of a clip's curves that are no angles."""
+    return [n for n in clip.names if n.partition(".")[0] not in ("head", "eyeL", "eyeR")]
+
+
+def _gains(text):
+    """`jawOpen=1.2 mouth*=0.8` as a table. Raises: FaceError."""
+    table = {}
+    for word in text.replace(",", " ").split():
+        name, _, value = word.rpartition("=")
+        try:
+            table[name] = float(value)
+        except ValueError:
+            name = ""
+        if not name:
+            raise FaceError(f"gains: name=factor was expected, found {word}")
+    return table
+
+
+def lines_of(report):
+    """What a report of risorius.importing has to say, a line each."""
+    lines = [f"{len(report.mapped)} curves mapped by {report.mapping}."]
+    told = [(head, names) for head, names in report.lists() if names != report.absent]
+    lines += [f"{head[:1].upper()}{head[1:]}: {', '.join(names)}." for head, names in told]
+    return [*lines, *(f"{note[:1].upper()}{note[1:].rstrip('.')}." for note in report.notes)]
+
+
+class RISORIUS_FH_animation(bpy.types.FileHandler):
+    """Drop a file of animation onto the 3D view"""
+
+    bl_idname = "RISORIUS_FH_animation"
+    bl_label = "Face Animation"
+    bl_import_operator = "risorius.import_animation"
+    bl_file_extensions = ".csv;.tsv;.json;.xml;.dat;.pgo;.rzc"
+
+    @classmethod
+    def poll_drop(cls, context):
+        area = context.area
+        return area is not None and area.type == "VIEW_3D" and parts.active_rig(context) is not None
+
+
+class RISORIUS_OT_import_arkit_rig(PlacesClip, bpy.types.Operator):
+    """Take over the shape-key animation of a selected object: action, NLA strips and drivers"""
+
+    bl_idname = "risorius.import_arkit_rig"
+    bl_label = "From ARKit Rig"
+    bl_options = {"REGISTER", "UNDO"}
+
+    start: bpy.props.FloatProperty(
+        name="Start Frame", description="Where frame 0 of the other rig's animation lies"
+    )
+    source: bpy.props.StringProperty(
+        name="Object",
+        description="A mesh whose shape keys move; empty: the selected one, else the only one",
+        options={"SKIP_SAVE"},
+    )
+
+    @classmethod
+    def poll(cls, context):
+        if not has_face(cls, context):
+            return False
+        if not retarget_shape_keys.sources(context):
+            cls.poll_message_set("No other object of this scene has animated shape keys.")
+            return False
+        return True
+
+    def invoke(self, context, _event):
+        found = retarget_shape_keys.source_of(context)
+        self.source = found.name if found is not None else ""
+        return context.window_manager.invoke_props_dialog(self)
+
+    def execute(self, context):
+        item = (
+            bpy.data.objects.get(self.source)
+            if self.source
+            else retarget_shape_keys.source_of(context)
+        )
+        if item not in retarget_shape_keys.sources(context):
+            self.report({"ERROR"}, "Select the object whose shape keys are animated.")
+            return {"CANCELLED"}
+        live = runtime.of(parts.active_rig(context))
+        try:
+            keys = retarget_shape_keys.clip_of(context, item)
+            times = keys.frame_times()
+            clip, report = native.part("importing").import_curves(
+                {name: (times, curve) for name, curve in zip(keys.names, keys.curves, strict=True)},
+                live.dna.raw_control_names,
+                source=item.name,
+            )
+            self.place(context, clip, item.name, lines_of(report))
+        except native.user_errors() as error:
+            self.report({"ERROR"}, explain(item.name, error))
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.prop_search(self, "source", context.scene, "objects")
+        self.draw_place(layout)
+
+
+def draw_import(self, _context):
+    """Entry of File > Import."""
+    self.layout.operator(RISORIUS_OT_import_animation.bl_idname, text="Face Animation")
+
+
+CLASSES = (RISORIUS_OT_import_animation, RISORIUS_FH_animation, RISORIUS_OT_import_arkit_rig)

@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The panel from which animation comes in, with what the last import had to say."""
+
+import bpy
+
+from ...scene.base import parts
+from .. import words
+from ..common import FaceOnlyPanel
+from ..expressions.menus import RISORIUS_MT_expressions
+from .operators import RISORIUS_OT_import_animation, RISORIUS_OT_import_arkit_rig
+from .place_clip import report_of
+
+
+class RISORIUS_PT_animation(FaceOnlyPanel, bpy.types.Panel):
+    bl_idname = "RISORIUS_PT_animation"
+    bl_label = "Animation"
+    bl_order = 1
+
+    def draw(self, context):
+        layout = self.layout
+        column = layout.column(align=True)
+        column.operator_context = "INVOKE_DEFAULT"
+        column.operator(RISORIUS_OT_import_animation.bl_idname, icon="IMPORT")
+        column.operator(RISORIUS_OT_import_arkit_rig.bl_idname, icon="SHAPEKEY_DATA")
+        column.operator("risorius.speak", icon="SPEAKER")
+        column.menu(RISORIUS_MT_expressions.bl_idname, icon="USER")
+        data = parts.controls_of(parts.active_rig(context)).animation_data
+        lines = report_of(data.action) if data is not None else []
+        if not lines:
+            return
+        header, body = layout.panel("RISORIUS_PT_import_report", default_closed=True)
+        header.label(text=f"Import of {data.action.name}")
+        for line in lines if body is not None else ():
+            words.write(body, line)
+
+
+CLASSES = (RISORIUS_PT_animation,)

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How an operator puts a clip onto the active face, and what it reports."""
+
+import bpy
+
+from ...logic.animation.clip_units import ClipError
+from ...logic.base.names import printable
+from ...scene.animation import actions, clip_actions, layers
+from ...scene.base import parts
+from ...scene.frame import evaluate
+from ..common import has_face
+
+TARGETS = (
+    ("ACTION", "Action", "As the face's active action; the one before is kept"),
+    ("STRIP", "NLA Strip", "On a new NLA track"),
+    ("LAYER", "Layer", "As a layer above what the face does already"),
+)
+RANGES = (
+    ("EXTEND", "Extend", "The scene ends where the animation ends, if that is later"),
+    ("FIT", "Fit", "The scene begins and ends with the animation"),
+    ("KEEP", "Keep", "The scene's range stays as it is"),
+)
+_REPORT = "risorius_report"  # on an action: words on what became of the file
+_SHOWN = 6
+
+
+class PlacesClip:
+    """Properties of all operators that end with a clip on the active face."""
+
+    target: bpy.props.EnumProperty(
+        name="As", description="How the animation is played", items=TARGETS
+    )
+    start: bpy.props.FloatProperty(
+        name="Start Frame",
+        description="Where the time 0 of the animation lies: its first frame, or its sound's begin",
+        default=1.0,
+    )
+    scene_range: bpy.props.EnumProperty(
+        name="Scene Range", description="First and last frame of the scene", items=RANGES
+    )
+
+    @classmethod
+    def poll(cls, context):
+        return has_face(cls, context)
+
+    def start_with(self, scene):
+        """Begin where the scene begins, unless it was said where."""
+        if not self.properties.is_property_set("start"):
+            self.start = float(scene.frame_start)
+
+    def place(self, context, clip, name, notes=(), with_eyes=True, whole=False):
+        """Put a clip onto the active face and report on it.
+
+        Args:
+            context: has the face and the scene.
+            clip: risorius.Clip.
+            name: of the action.
+            notes: lines for the report.
+            with_eyes: whether to turn the eye bones too.
+            whole: whether keys lie on whole frames only.
+
+        Returns:
+            Its action.
+        """
+        rig = parts.active_rig(context)
+        trouble = actions.busy(parts.controls_of(rig))
+        if trouble:
+            raise ClipError(trouble)
+        timing = clip_actions.timing_of(
+            clip, context.scene, self.start, keep_clock=True, whole=whole
+        )
+        made = clip_actions.make_action(rig, clip, timing, name, with_eyes)
+        notes = [*notes, *made.notes]
+        if self.target == "ACTION":
+            before = clip_actions.play(rig, made.action)
+            layers.keep_weights(parts.controls_of(rig), before)
+            if before is not None:
+                notes.append(f"The action {before.name} was kept.")
+        elif self.target == "STRIP":
+            clip_actions.add_strip(rig, made.action)
+        else:
+            layers.add_action(parts.controls_of(rig), made.action)
+        clip_actions.set_range(context.scene, made, self.scene_range)
+        evaluate.bring_up(context, rig)
+        self._report_on(made, notes)
+        return made.action
+
+    def _report_on(self, made, notes):
+        if made.unknown:
+            notes.append(f"No control of this face: {', '.join(made.unknown)}.")
+        made.action[_REPORT] = "\n".join(printable(note, 4000) for note in notes)
+        for note in notes[:_SHOWN]:
+            self.report({"INFO"}, printable(note))
+        if len(notes) > _SHOWN:
+            self.report({"INFO"}, f"and {len(notes) - _SHOWN} more lines in the panel Animation")
+        span = f"frame {made.first:g} to {made.last:g}"
+        self.report({"INFO"}, f"{made.action.name}: {made.curves} curves, {span}")
+
+    def draw_place(self, layout):
+        """The properties of this class."""
+        for name in ("target", "start", "scene_range"):
+            layout.prop(self, name)
+
+
+def report_of(action):
+    """What was said when an action was imported: lines."""
+    text = action.get(_REPORT, "") if action is not None else ""
+    return text.split("\n") if isinstance(text, str) and text else []

@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators that bake faces to plain actions and bring them back to live."""
+
+import time
+import traceback
+
+import bpy
+
+from ... import native
+from ...scene.bake import bake_face
+from .. import words
+from .selection import FacesOperator, FrameRange, selected_rigs
+
+_SLICE = 0.05  # seconds of baking between two looks at the keyboard
+
+
+class RISORIUS_OT_bake(FrameRange, FacesOperator, bpy.types.Operator):
+    """Write the animation of the selected faces into plain actions; the way back stays open"""
+
+    bl_idname = "risorius.bake"
+    bl_label = "Bake Face"
+
+    kind: bpy.props.EnumProperty(
+        name="Bake",
+        items=(
+            (bake_face.RESULT, "Bones, Shapes, Maps", "The face itself: plays without the add-on"),
+            (bake_face.CONTROLS, "Controls", "Sliders and control bones: one clean action"),
+        ),
+    )
+    wanted: bpy.props.EnumProperty(
+        name="Parts",
+        description="What is baked; the rest stays as it stands now",
+        items=(
+            ("BONES", "Bones", "Bones of the deforming armature, and its place"),
+            ("SHAPES", "Shapes", "Shape keys of the meshes"),
+            ("MAPS", "Maps", "Values of the animated maps, which materials read"),
+        ),
+        options={"ENUM_FLAG"},
+        default={"BONES", "SHAPES", "MAPS"},
+    )
+    error: bpy.props.FloatProperty(
+        name="Largest Error",
+        description="Leave keys out while lines between the others stay within this of every "
+        "baked value, in the units of each curve; 0 keeps a key at every frame",
+        default=0.0,
+        min=0.0,
+        soft_max=0.01,
+        precision=6,
+    )
+    strip: bpy.props.BoolProperty(
+        name="Onto NLA Track", description="Put the actions onto new NLA tracks", default=False
+    )
+    _interactive = False
+
+    def invoke(self, context, _event):
+        self._interactive = True
+        return context.window_manager.invoke_props_dialog(self)
+
+    def draw(self, _context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.prop(self, "kind")
+        self.draw_range(layout)
+        if self.kind == bake_face.RESULT:
+            layout.prop(self, "wanted")
+            self.draw_lod(layout)
+        words.prop_or(layout, self, "error", 0.0, "0: a key at every step")
+        layout.prop(self, "strip")
+        layout.prop(self, "every")
+
+    def execute(self, context):
+        # Adjusting the last operation calls this again, on the same operator: without a dialog.
+        interactive, self._interactive = self._interactive, False
+        start, end = self.frames(context)
+        options = bake_face.BakeOptions(
+            self.kind,
+            start,
+            end,
+            self.step,
+            self.lod,
+            frozenset(self.wanted),
+            self.error,
+            self.strip,
+        )
+        try:
+            job = bake_face.bake(context, self.faces(context), options)
+        except native.user_errors() as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        if interactive and not bpy.app.background:
+            return self._begin(context, job)
+        return self._run(context, job)
+
+    def _run(self, context, job):
+        """Bake without looking up: from scripts and headless."""
+        manager = context.window_manager
+        manager.progress_begin(0, 100)
+        try:
+            while not self._step(context, job, seconds=1.0):
+                if bpy.app.background:
+                    print(f"Risorius: baking, {self._share:.0%}", flush=True)
+        finally:
+            manager.progress_end()
+        return self._result
+
+    def _begin(self, context, job):
+        manager = context.window_manager
+        self._job = job
+        self._timer = manager.event_timer_add(0.01, window=context.window)
+        manager.progress_begin(0, 100)
+        manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context, event):
+        if event.type == "ESC":
+            self._job.close()
+            self.report({"INFO"}, "Baking was ended; nothing was changed.")
+            self._result = {"CANCELLED"}
+        elif event.type != "TIMER" or not self._step(context, self._job, _SLICE):
+            return {"RUNNING_MODAL"}
+        self._end(context)
+        return self._result
+
+    def cancel(self, context):
+        """Blender ends it: its window was closed, or another file is being opened."""
+        self._job.close()
+        self._end(context)
+
+    def _end(self, context):
+        manager = context.window_manager
+        manager.event_timer_remove(self._timer)
+        manager.progress_end()
+
+    def _step(self, context, job, seconds):
+        """Bake for a while. Returns whether it is over."""
+        end = time.monotonic() + seconds
+        self._result = {"FINISHED"}
+        try:
+            self._share = next(job)
+            while time.monotonic() < end:
+                self._share = next(job)
+        except StopIteration as finished:
+            for sentence in finished.value or ():
+                self.report({"INFO"}, sentence)
+            return True
+        except native.user_errors() as error:
+            self.report({"ERROR"}, str(error))
+            self._result = {"CANCELLED"}
+            return True
+        except Exception as error:  # noqa: BLE001  an operator that raises would stay for ever
+            traceback.print_exc()
+            self.report({"ERROR"}, f"Baking failed, and the faces are as before: {error!r}.")
+            self._result = {"CANCELLED"}
+            return True
+        context.window_manager.progress_update(self._share * 100)
+        return False
+
+
+class RISORIUS_OT_unbake(FacesOperator, bpy.types.Operator):
+    """Let the controls move the selected faces again, as before they were baked. What was baked is
+    removed, except actions that you protected or use elsewhere"""
+
+    bl_idname = "risorius.unbake"
+    bl_label = "Back to Live"
+
+    def execute(self, context):
+        faces = selected_rigs(context, self.every)
+        back = [rig for rig in faces if bake_face.unbake(context, rig)]
+        if not back:
+            self.report({"WARNING"}, "Nothing of the selected faces is baked.")
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
+CLASSES = (RISORIUS_OT_bake, RISORIUS_OT_unbake)

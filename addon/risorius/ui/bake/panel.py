@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The panel Bake and Export, and what the panel Face says of a baked face."""
+
+import bpy
+
+from ...scene.bake import bake_face
+from ..common import FaceOnlyPanel
+from .operators import RISORIUS_OT_unbake
+
+
+class RISORIUS_PT_out(FaceOnlyPanel, bpy.types.Panel):
+    bl_idname = "RISORIUS_PT_out"
+    bl_label = "Bake and Export"
+    bl_order = 3
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, _context):
+        column = self.layout.column(align=True)
+        # A dialog for each; the defaults are those of the last time.
+        column.operator_context = "INVOKE_DEFAULT"
+        column.operator("risorius.bake", icon="ACTION")
+        column.operator("risorius.export_animation", icon="EXPORT")
+
+
+def draw_state(layout, rig, write):
+    """What the panel says of a baked face, and the way back.
+
+    Args:
+        layout: of the panel.
+        rig: deforming armature.
+        write: function (layout, text, icon) that writes a sentence.
+    """
+    text = bake_face.words(rig)
+    if text:
+        box = layout.box()
+        write(box, text, "ACTION")
+        box.operator(RISORIUS_OT_unbake.bl_idname, icon="LOOP_BACK")
+
+
+CLASSES = (RISORIUS_PT_out,)

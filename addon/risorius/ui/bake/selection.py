@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which faces and which frames a bake or an export works on."""
+
+import bpy
+
+from ...scene.bake import bake_face
+from ...scene.base import parts
+from ...scene.character import runtime
+from .. import words
+from ..common import FaceOperator, usable
+
+RANGES = (
+    ("SCENE", "Scene", "The frame range of the scene"),
+    ("PREVIEW", "Preview", "The preview range, where one is set; else that of the scene"),
+    ("CUSTOM", "Custom", "Frames of your choice"),
+)
+
+
+def selected_rigs(context, every=False):
+    """The characters of the selected objects, else the active one; linked ones are left out.
+
+    Args:
+        context: scene and selection.
+        every: all characters of the scene instead.
+    """
+    items = context.scene.objects if every else context.selected_objects
+    found = [parts.rig_of(item) for item in items]
+    found = list(dict.fromkeys(r for r in found if r is not None and r.library is None))
+    if not found and parts.active_rig(context) is not None:
+        found = [parts.active_rig(context)]
+    return [r for r in found if parts.controls_of(r) is not None and runtime.of(r) is not None]
+
+
+class FacesOperator(FaceOperator):
+    """What operators on all selected faces share."""
+
+    every: bpy.props.BoolProperty(
+        name="All Faces",
+        description="All faces of the scene, whatever is selected",
+        options={"SKIP_SAVE"},
+    )
+
+    def faces(self, context):
+        """The characters to work on.
+
+        Raises:
+            BakeError: there are none.
+        """
+        found = selected_rigs(context, self.every)
+        if not found:
+            raise bake_face.BakeError("No face is selected.")
+        return found
+
+    @classmethod
+    def poll(cls, context):
+        if not usable(cls):
+            return False
+        if not (selected_rigs(context) or selected_rigs(context, every=True)):
+            cls.poll_message_set("Select a face first.")
+            return False
+        return True
+
+
+class FrameRange:
+    """The frames, and the level of detail, that an operator works on."""
+
+    range: bpy.props.EnumProperty(name="Range", items=RANGES)
+    start: bpy.props.FloatProperty(name="Start", default=1)
+    end: bpy.props.FloatProperty(name="End", default=250)
+    step: bpy.props.FloatProperty(
+        name="Step", description="Frames from key to key", default=1, min=0.01, soft_min=1
+    )
+    lod: bpy.props.IntProperty(
+        name="Detail",
+        description="-1 is the level that the viewport shows",
+        default=-1,
+        min=-1,
+        max=31,
+    )
+
+    def frames(self, context):
+        """(start, end) that were chosen."""
+        scene = context.scene
+        if self.range == "CUSTOM":
+            return self.start, self.end
+        if self.range == "PREVIEW" and scene.use_preview_range:
+            return scene.frame_preview_start, scene.frame_preview_end
+        return scene.frame_start, scene.frame_end
+
+    def draw_lod(self, layout):
+        """The level, and that the lowest number is none."""
+        words.prop_or(layout, self, "lod", -1, "-1: as in the viewport")
+
+    def draw_range(self, layout):
+        """The rows of a dialog."""
+        layout.prop(self, "range")
+        if self.range == "CUSTOM":
+            layout.prop(self, "start")
+            layout.prop(self, "end")
+        layout.prop(self, "step")

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What operators and panels of all features share: when they are usable, how they report."""
+
+from contextlib import contextmanager
+from pathlib import Path
+
+from .. import native
+from ..logic.base import names
+from ..scene.base import parts
+from ..scene.character import runtime
+
+EXTENSION = __package__.rpartition(".")[0]  # what Blender calls the add-on
+MODES = (
+    ("AUTO", "Automatic", "Real shape keys where a mesh has few, else the live sum"),
+    ("LIVE", "Live Sum", "One shape key per mesh that is summed natively: fast"),
+    ("KEYS", "Shape Keys", "Every channel is a real, driven shape key: editable, exportable"),
+)
+
+
+def explain(path, error):
+    """One sentence for what is wrong with a file."""
+    reason = error.strerror if isinstance(error, OSError) else None
+    text = names.printable(reason or str(error)).strip().rstrip(".")
+    name = names.printable(Path(path).name)
+    return f"{text}." if name in text else f"{name}: {text}."
+
+
+def usable(cls):
+    """Poll: whether the native module is there; says why when it is not."""
+    trouble = native.problem()
+    if trouble:
+        cls.poll_message_set(trouble)
+    return not trouble
+
+
+@contextmanager
+def shown_progress(context):
+    manager = context.window_manager
+    manager.progress_begin(0, 100)
+    try:
+        yield lambda share: manager.progress_update(round(share * 100))
+    finally:
+        manager.progress_end()
+
+
+def has_face(cls, context):
+    """Poll: whether there is a face to work on; says why when there is not."""
+    if not usable(cls):
+        return False
+    rig = parts.active_rig(context)
+    if rig is None or parts.controls_of(rig) is None:
+        cls.poll_message_set("Select a face first.")
+        return False
+    if runtime.of(rig) is None:
+        cls.poll_message_set("This face has lost the text that holds its DNA.")
+        return False
+    if parts.BAKED in rig and not getattr(cls, "baked_too", False):
+        cls.poll_message_set("This face is baked: choose Back to Live first.")
+        return False
+    return True
+
+
+class FaceOperator:
+    """What all operators on a face share."""
+
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        return has_face(cls, context)
+
+
+class FacePanel:
+    """What all panels of the tab share."""
+
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Face"
+
+
+class FaceOnlyPanel(FacePanel):
+    """A panel that is there only with a face."""
+
+    @classmethod
+    def poll(cls, context):
+        rig = None if native.problem() else parts.active_rig(context)
+        return rig is not None and parts.controls_of(rig) is not None

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender's own exporters: the settings that each is called with."""
+
+import bpy
+
+from ...logic.base.errors import FaceError
+from ...scene.export.quiet import quiet
+
+FORMATS = (
+    ("GLTF", "glTF", "Bones and shape keys, one binary .glb file"),
+    ("FBX", "FBX", "Bones and shape keys"),
+    ("USD", "USD", "Bones and shape keys"),
+    ("ALEMBIC", "Alembic", "Vertices of every frame, no bones"),
+    ("RZC", "Clip (.rzc)", "The controls, without loss and small, for any face"),
+    ("CSV", "CSV", "The controls as a plain table"),
+)
+_OPERATORS = {
+    "GLTF": ("export_scene", "gltf"),
+    "FBX": ("export_scene", "fbx"),
+    "USD": ("wm", "usd_export"),
+    "ALEMBIC": ("wm", "alembic_export"),
+}
+
+
+def _gltf(operator, stage):
+    return {
+        "export_format": "GLB",
+        "use_active_scene": True,
+        "export_animations": True,
+        "export_animation_mode": "ACTIVE_ACTIONS",
+        # Else a lone armature gets every action of the file that moves bones of these names.
+        "export_anim_single_armature": False,
+        "export_nla_strips_merged_animation_name": stage.objects[0].name,
+        "export_frame_range": True,
+        "export_frame_step": whole_step(operator),
+        "export_force_sampling": True,
+        "export_optimize_animation_size": False,
+        # Its quicker way of hiding other objects gave wrong bones with two armatures (4.5).
+        "export_optimize_disable_viewport": False,
+        "export_skins": True,
+        "export_all_influences": operator.influences == 0,
+        "export_influence_nb": max(operator.influences, 1),
+        "export_morph": True,
+        "export_morph_normal": False,
+        "export_rest_position_armature": True,
+        "export_apply": False,
+    }
+
+
+def _fbx(operator, _stage):
+    return {
+        "object_types": {"ARMATURE", "MESH"},
+        "add_leaf_bones": False,
+        "use_armature_deform_only": False,
+        "bake_anim": True,
+        "bake_anim_use_all_bones": True,
+        "bake_anim_use_nla_strips": False,
+        "bake_anim_use_all_actions": False,
+        "bake_anim_force_startend_keying": True,
+        "bake_anim_step": float(whole_step(operator)),
+        "bake_anim_simplify_factor": 0.0,
+        "apply_scale_options": operator.fbx_units,
+        "path_mode": "COPY",
+        "embed_textures": True,
+        # With a modifier applied Blender drops the shape keys.
+        "use_mesh_modifiers": False,
+        "mesh_smooth_type": "FACE",
+    }
+
+
+def _usd(_operator, _stage):
+    return {
+        "export_animation": True,
+        "export_armatures": True,
+        "export_shapekeys": True,
+        "only_deform_bones": False,
+        "export_hair": False,
+        "export_materials": True,
+        "evaluation_mode": "RENDER",
+    }
+
+
+def _alembic(_operator, stage):
+    return {
+        "start": stage.frame_start,
+        "end": stage.frame_end,
+        "xsamples": 1,
+        "gsamples": 1,
+        "uvs": True,
+        "normals": True,
+        "face_sets": True,
+        "as_background_job": False,
+        "evaluation_mode": "RENDER",
+    }
+
+
+# What Blender's exporter of each format is told; what a version does not know is left out.
+_SETTINGS = {"GLTF": _gltf, "FBX": _fbx, "USD": _usd, "ALEMBIC": _alembic}
+
+
+def whole_step(operator):
+    """Exporters step by whole frames."""
+    return max(1, round(operator.step))
+
+
+def missing(kind):
+    """Why this Blender cannot write a format, in one sentence; empty when it can."""
+    if kind not in _OPERATORS:
+        return ""
+    group, name = _OPERATORS[kind]
+    if name in dir(getattr(bpy.ops, group)):
+        return ""
+    label = next(f[1] for f in FORMATS if f[0] == kind)
+    return f"This Blender has no {label} exporter: enable its add-on, or use another build."
+
+
+def export(operator, override, path):
+    group, name = _OPERATORS[operator.format]
+    function = getattr(getattr(bpy.ops, group), name)
+    known = set(function.get_rna_type().properties.keys())
+    settings = _SETTINGS[operator.format](operator, override["scene"])
+    with bpy.context.temp_override(**override), quiet():
+        try:
+            done = function(filepath=str(path), **{k: v for k, v in settings.items() if k in known})
+        except RuntimeError as error:  # what Blender's exporter says of the file or the scene
+            raise FaceError(str(error).strip().removeprefix("Error: ")) from error
+    if "FINISHED" not in done or not path.exists():
+        raise FaceError(f"Blender's exporter wrote nothing to {path.name}.")

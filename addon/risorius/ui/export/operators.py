@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Export of a face's animation through Blender's own exporters, and of its controls."""
+
+from pathlib import Path
+
+import bpy
+from bpy_extras.io_utils import ExportHelper
+
+from ... import native
+from ...logic.base.errors import FaceError
+from ...scene.animation.clip_actions import frame_rate
+from ...scene.export import export_animation, plain_materials
+from .. import words
+from ..bake.selection import FacesOperator, FrameRange, selected_rigs
+from .exporters import FORMATS, export, missing
+
+_ENDINGS = {
+    "GLTF": ".glb",
+    "FBX": ".fbx",
+    "USD": ".usdc",
+    "ALEMBIC": ".abc",
+    "RZC": ".rzc",
+    "CSV": ".csv",
+}
+_KNOWN = {*_ENDINGS.values(), ".usd", ".usda", ".usdz", ".gltf"}
+
+
+class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, bpy.types.Operator):
+    """Write the animation of the selected faces to a file: baked, from a copy; the scene stays as
+    it is"""
+
+    bl_idname = "risorius.export_animation"
+    bl_label = "Export Animation"
+    bl_options = {"PRESET"}
+
+    filename_ext = ".glb"
+    check_extension = None  # set by the format
+    filter_glob: bpy.props.StringProperty(
+        default="*.glb;*.fbx;*.usd;*.usdc;*.usda;*.usdz;*.abc;*.rzc;*.csv", options={"HIDDEN"}
+    )
+    format: bpy.props.EnumProperty(name="Format", items=FORMATS)
+    wanted: bpy.props.EnumProperty(
+        name="Parts",
+        items=(
+            ("BONES", "Bones", "Animation of the bones"),
+            ("SHAPES", "Shapes", "Shape keys and their animation"),
+        ),
+        options={"ENUM_FLAG"},
+        default={"BONES", "SHAPES"},
+    )
+    all_shapes: bpy.props.BoolProperty(
+        name="All Shapes",
+        description="Write also shape keys that this range does not use",
+        default=False,
+    )
+    influences: bpy.props.IntProperty(
+        name="Influences",
+        description="Joints that move a vertex. Engines take 4 or 8; 0 writes all, which is what "
+        "Blender shows",
+        default=0,
+        min=0,
+        max=32,
+    )
+    fbx_units: bpy.props.EnumProperty(
+        name="Units",
+        description="Where an FBX file says that a Blender unit is a metre",
+        items=(
+            ("FBX_SCALE_NONE", "On Objects", "Objects are scaled by 100: as Unreal expects it"),
+            ("FBX_SCALE_ALL", "In the File", "Objects have scale 1: as Unity expects it"),
+        ),
+    )
+    bake_materials: bpy.props.BoolProperty(
+        name="Bake Materials",
+        description="Give the file plain materials with one image each for colour, roughness and "
+        "normals: other programs do not read node trees. Animated maps rest",
+        default=True,
+    )
+    texture_size: bpy.props.IntProperty(
+        name="Texture Size",
+        description="Pixels of a side of the images that are baked; images that a material shows "
+        "unchanged keep their own size",
+        default=1024,
+        min=64,
+        max=8192,
+    )
+    maps: bpy.props.BoolProperty(
+        name="With Maps",
+        description="Write also the values of the animated maps, which no other format can hold",
+        default=False,
+    )
+
+    def invoke(self, context, event):
+        rigs = selected_rigs(context)
+        if not self.filepath and rigs:
+            self.filepath = rigs[0].name.removesuffix("_rig") + _ENDINGS[self.format]
+        return ExportHelper.invoke(self, context, event)
+
+    def check(self, _context):
+        """Give the file the ending of its format while the dialog is open."""
+        if self.format == "USD" and self.filepath.endswith((".usd", ".usda", ".usdz")):
+            return False
+        path = Path(self.filepath)
+        # A dot may be part of a name: shot.v02.
+        stem = path.stem if path.suffix.lower() in _KNOWN else path.name
+        changed = str(path.with_name(stem + _ENDINGS[self.format])) if stem else self.filepath
+        if Path(self.filepath).name in ("", ".") or changed == self.filepath:
+            return False
+        self.filepath = changed
+        return True
+
+    def draw(self, _context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.prop(self, "format")
+        self.draw_range(layout)
+        if self.format not in ("RZC", "CSV"):
+            self.draw_lod(layout)
+            layout.prop(self, "bake_materials")
+            if self.bake_materials:
+                layout.prop(self, "texture_size")
+        if self.format in ("GLTF", "FBX", "USD"):
+            layout.prop(self, "wanted")
+            layout.prop(self, "all_shapes")
+        if self.format == "GLTF":
+            words.prop_or(layout, self, "influences", 0, "0: all joints")
+        if self.format == "FBX":
+            layout.prop(self, "fbx_units")
+        if self.format in ("RZC", "CSV"):
+            layout.prop(self, "maps")
+        layout.prop(self, "every")
+
+    def execute(self, context):
+        if not Path(self.filepath).name:
+            self.report({"ERROR"}, "Say into which file: there is no name.")
+            return {"CANCELLED"}
+        trouble = missing(self.format)
+        if trouble:
+            self.report({"ERROR"}, trouble)
+            return {"CANCELLED"}
+        start, end = self.frames(context)
+        options = export_animation.ShipOptions(
+            start, end, self.step, self.lod, frozenset(self.wanted), self.all_shapes
+        )
+        try:
+            characters = _run(
+                context, export_animation.sampled(context, self.faces(context), options)
+            )
+            written = self._write(context, characters, options)
+        except native.user_errors() as error:
+            self.report({"ERROR"}, _one_sentence(self.filepath, error))
+            return {"CANCELLED"}
+        self.report({"INFO"}, written)
+        return {"FINISHED"}
+
+    def _write(self, context, characters, options):
+        path = Path(bpy.path.abspath(self.filepath))
+        frames = len(characters[0][2].frames)
+        if self.format in ("RZC", "CSV"):
+            if len(characters) > 1:
+                raise FaceError("a file holds the controls of one face: select one")
+            scene = context.scene
+            clip = export_animation.clip(
+                *characters[0], frame_rate(scene), scene.frame_start, self.maps
+            )
+            _write_csv(clip, path) if self.format == "CSV" else clip.save(path)
+        else:
+            with export_animation.copies(context, characters, options) as (override, loans):
+                if self.bake_materials:
+                    _run(context, plain_materials.flatten(override, loans, self.texture_size))
+                export(self, override, path)
+                if self.bake_materials and self.format == "ALEMBIC":
+                    folder = path.with_name(path.stem + "_textures")
+                    plain_materials.write_images(override["scene"], folder)
+        return f"{path.name}: {frames} frames, {path.stat().st_size:,} bytes"
+
+
+def _run(context, job):
+    """Run a generator to its end, with progress. Returns what it returns."""
+    manager = context.window_manager
+    manager.progress_begin(0, 100)
+    try:
+        while True:
+            manager.progress_update(next(job) * 100)
+    except StopIteration as finished:
+        return finished.value
+    finally:
+        manager.progress_end()
+
+
+def _write_csv(clip, path):
+    writing = native.part("importing.writing")
+    writing.write_text(writing.csv_text(clip), path)
+
+
+def _one_sentence(path, error):
+    """What went wrong; of an exporter's traceback only the last line."""
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    useful = [x for x in lines if not x.startswith(("Location:", "File ", "Traceback"))]
+    text = (useful or ["it failed without a word"])[-1].removeprefix("Error: ").rstrip(".")
+    return f"{Path(path).name}: {text}."
+
+
+CLASSES = (RISORIUS_OT_export_animation,)

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators that set the sliders to an expression, and make pose assets of expressions."""
+
+import bpy
+
+from ...scene.animation import expressions
+from ...scene.base import parts
+from ...scene.frame import evaluate
+from ..common import FaceOperator
+
+
+class RISORIUS_OT_expression(FaceOperator, bpy.types.Operator):
+    """Move the sliders to an expression"""
+
+    bl_idname = "risorius.expression"
+    bl_label = "Expression"
+
+    expression: bpy.props.StringProperty(name="Expression")
+    strength: bpy.props.FloatProperty(
+        name="Strength", default=1.0, min=0.0, max=1.0, subtype="FACTOR"
+    )
+    only: bpy.props.BoolProperty(name="Rest of the Face at Rest", default=True)
+    key: bpy.props.BoolProperty(name="Key", description="At the current frame")
+
+    def execute(self, context):
+        rig = parts.active_rig(context)
+        found = expressions.all_expressions().get(self.expression)
+        if found is None:
+            self.report({"ERROR"}, f"There is no expression {self.expression}.")
+            return {"CANCELLED"}
+        names = expressions.apply(rig, found, self.strength, self.only)
+        if self.key:
+            expressions.key(rig, names, context.scene.frame_current)
+        evaluate.bring_up(context, rig)
+        return {"FINISHED"}
+
+
+class RISORIUS_OT_make_pose_assets(FaceOperator, bpy.types.Operator):
+    """Make a pose asset of every expression, for Blender's pose library"""
+
+    bl_idname = "risorius.make_pose_assets"
+    bl_label = "Expressions as Pose Assets"
+
+    def execute(self, context):
+        made, notes = expressions.make_assets(parts.active_rig(context))
+        for note in notes:
+            self.report({"WARNING"}, note)
+        self.report({"INFO"}, f"{len(made)} pose assets")
+        return {"FINISHED"}
+
+
+CLASSES = (RISORIUS_OT_expression, RISORIUS_OT_make_pose_assets)

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators that hang a face on a body's armature, and take it off."""
+
+import bpy
+
+from ...scene.base import parts
+from ...scene.character import rig_placement
+from ...scene.frame import evaluate
+from ..common import FaceOperator
+
+
+def _is_body(_self, item):
+    return item.type == "ARMATURE" and not (item.get(parts.CONTROLS) or item.get(parts.RIG))
+
+
+class RISORIUS_OT_attach_body(FaceOperator, bpy.types.Operator):
+    """Hang the face on a body's armature: it follows the body's neck and head"""
+
+    bl_idname = "risorius.attach_body"
+    bl_label = "Attach to Body"
+
+    body: bpy.props.StringProperty(name="Body", description="The body's armature")
+    base: bpy.props.StringProperty(
+        name="Base", description="The bone that carries the whole face; empty finds it"
+    )
+    neck: bpy.props.StringProperty(
+        name="Neck", description="The bone that turns the face's neck; empty finds it"
+    )
+    head: bpy.props.StringProperty(
+        name="Head", description="The bone that turns the face's head; empty finds it"
+    )
+    fit: bpy.props.EnumProperty(
+        name="Place",
+        items=(
+            ("MOVE", "On the Head", "Put the face's head joint on the body's"),
+            ("SCALE", "On the Head, to Size", "The same, and as large as the body's neck is long"),
+            ("NONE", "Where It Is", "Leave the face where it stands"),
+        ),
+    )
+
+    def invoke(self, context, _event):
+        bodies = [o for o in context.scene.objects if _is_body(None, o)]
+        if not self.body and bodies:
+            chosen = next((o for o in bodies if o.select_get()), bodies[0])
+            self.body = chosen.name
+            self.base, self.neck, self.head = rig_placement.find_bones(chosen)
+        return context.window_manager.invoke_props_dialog(self)
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.prop_search(self, "body", context.scene, "objects")
+        body = bpy.data.objects.get(self.body)
+        if body is not None and body.type == "ARMATURE":
+            for name in ("base", "neck", "head"):
+                layout.prop_search(self, name, body.data, "bones")
+        layout.prop(self, "fit")
+
+    def execute(self, context):
+        rig = parts.active_rig(context)
+        body = bpy.data.objects.get(self.body)
+        if body is None or not _is_body(None, body):
+            self.report({"ERROR"}, f"'{self.body}' is no armature of a body.")
+            return {"CANCELLED"}
+        found = rig_placement.find_bones(body)
+        base, neck, head = (
+            given or (auto if not (self.base or self.neck or self.head) else "")
+            for given, auto in zip((self.base, self.neck, self.head), found, strict=True)
+        )
+        base = base or neck or head
+        missing = [n for n in (base, neck, head) if n and n not in body.data.bones]
+        if missing or not base:
+            what = f"no bone '{missing[0]}'" if missing else "no bone named head or neck"
+            self.report({"ERROR"}, f"'{body.name}' has {what}: choose the bones.")
+            return {"CANCELLED"}
+        rig_placement.attach(parts.controls_of(rig), body, base, neck, head, self.fit)
+        evaluate.bring_up(context, rig)
+        self.report({"INFO"}, f"The face follows {body.name}: {base}, {neck}, {head}")
+        return {"FINISHED"}
+
+
+class RISORIUS_OT_detach_body(FaceOperator, bpy.types.Operator):
+    """Take the face off its body; it stays where it stands"""
+
+    bl_idname = "risorius.detach_body"
+    bl_label = "Detach from Body"
+
+    def execute(self, context):
+        rig = parts.active_rig(context)
+        rig_placement.detach(parts.controls_of(rig))
+        evaluate.bring_up(context, rig)
+        return {"FINISHED"}
+
+
+CLASSES = (RISORIUS_OT_attach_body, RISORIUS_OT_detach_body)

@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Trying one blend shape by hand: a search, a slider, a way back."""
+
+import bpy
+
+from ...scene.base import parts
+from ...scene.character import build, runtime
+from ...scene.frame import channel_preview, evaluate
+from ..common import FaceOnlyPanel, usable
+
+_items = []  # Blender reads the strings later: they must stay alive
+
+
+def _test(context, rig, channel, value):
+    """Set the override of a face, or end it where the value is None, and show it."""
+    if value is None:
+        channel_preview.clear(rig)
+    else:
+        channel_preview.set_override(rig, channel, value)
+    evaluate.bring_up(context, rig)
+
+
+def _channels(_operator, context):
+    """Enum items: the channels that move a mesh of the active face."""
+    rig = parts.active_rig(context)
+    live = runtime.of(rig) if rig is not None else None
+    _items.clear()
+    if live is None:
+        return _items
+    moved = set()
+    for item in parts.meshes_of(rig):
+        targets = live.dna.meshes[item[parts.MESH]].blend_shape_targets
+        moved.update(int(t.blend_shape_channel_index) for t in targets)
+    labels = build.channel_labels(live.dna)
+    _items.extend((str(c), labels[c], live.dna.blend_shape_channel_names[c]) for c in sorted(moved))
+    return _items
+
+
+class RISORIUS_OT_test_channel(bpy.types.Operator):
+    """Show one blend shape at a weight of your own; it ends with the next frame, edit or save"""
+
+    bl_idname = "risorius.test_channel"
+    bl_label = "Test a Shape"
+    bl_options = {"REGISTER", "UNDO"}
+    bl_property = "channel"
+
+    channel: bpy.props.EnumProperty(
+        name="Shape", description="The blend shape that is tried", items=_channels
+    )
+    value: bpy.props.FloatProperty(
+        name="Weight",
+        description="Its weight while it is tried",
+        default=1.0,
+        min=-10.0,
+        max=10.0,
+        soft_min=0.0,
+        soft_max=1.0,
+    )
+    end: bpy.props.BoolProperty(
+        name="End", description="End the test instead", options={"SKIP_SAVE", "HIDDEN"}
+    )
+
+    @classmethod
+    def poll(cls, context):
+        if not usable(cls):
+            return False
+        rig = parts.active_rig(context)
+        if rig is None or parts.controls_of(rig) is None or runtime.of(rig) is None:
+            cls.poll_message_set("Select a face first.")
+            return False
+        return True
+
+    def execute(self, context):
+        rig = parts.active_rig(context)
+        if self.end:
+            _test(context, rig, 0, None)
+            return {"FINISHED"}
+        if not self.channel:
+            self.report({"ERROR"}, f"{rig.name} has no blend shapes.")
+            return {"CANCELLED"}
+        _test(context, rig, int(self.channel), self.value)
+        return {"FINISHED"}
+
+    def invoke(self, context, _event):
+        if self.end:
+            return self.execute(context)
+        context.window_manager.invoke_search_popup(self)
+        return {"RUNNING_MODAL"}
+
+
+def _get_weight(_manager):
+    now = channel_preview.current(parts.active_rig(bpy.context))
+    return now[1] if now else 0.0
+
+
+def _set_weight(_manager, value):
+    rig = parts.active_rig(bpy.context)
+    now = channel_preview.current(rig)
+    if now is not None:
+        _test(bpy.context, rig, now[0], value)
+
+
+def weight_property():
+    """The slider: it shows and sets the override of the active face, and keeps nothing."""
+    return bpy.props.FloatProperty(
+        name="Weight",
+        description="Weight of the shape that is tried",
+        soft_min=0.0,
+        soft_max=1.0,
+        get=_get_weight,
+        set=_set_weight,
+        options={"SKIP_SAVE"},
+    )
+
+
+class RISORIUS_PT_shape_test(FaceOnlyPanel, bpy.types.Panel):
+    bl_idname = "RISORIUS_PT_shape_test"
+    bl_label = "Test a Shape"
+    bl_order = 3
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layout = self.layout
+        rig = parts.active_rig(context)
+        live, now = runtime.of(rig), channel_preview.current(rig)
+        if live is None:
+            return
+        name = build.channel_labels(live.dna)[now[0]] if now else "Choose a Shape"
+        layout.operator("risorius.test_channel", text=name, icon="VIEWZOOM")
+        if now:
+            row = layout.row(align=True)
+            row.prop(context.window_manager, "risorius_test", slider=True)
+            row.operator("risorius.test_channel", text="", icon="X").end = True
+
+
+CLASSES = (RISORIUS_OT_test_channel, RISORIUS_PT_shape_test)

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The panel Controls: one slider per control, grouped by region."""
+
+import bpy
+
+from ...logic.character import regions
+from ...scene.base import parts
+from ...scene.character import runtime
+from .. import words
+from ..common import FaceOnlyPanel
+
+_ICONS = {
+    "brow": "MOD_CURVE",
+    "eye": "HIDE_OFF",
+    "nose": "MONKEY",
+    "cheek": "MATSPHERE",
+    "mouth": "USER",
+    "jaw": "MOD_SIMPLEDEFORM",
+    "tongue": "MOD_SMOOTH",
+    "teeth": "SNAP_FACE",
+    "neck": "ARMATURE_DATA",
+    "ear": "SPEAKER",
+    "other": "DOT",
+}
+_OPEN = {"brow", "eye", "mouth", "jaw"}
+_TITLE = 0.5  # of the width, for the names of sliders
+
+
+class RISORIUS_PT_controls(FaceOnlyPanel, bpy.types.Panel):
+    bl_idname = "RISORIUS_PT_controls"
+    bl_label = "Controls"
+    bl_order = 1
+
+    def draw(self, context):
+        layout = self.layout
+        rig = parts.active_rig(context)
+        live, face = runtime.of(rig), parts.face_bone(rig)
+        if live is None:
+            return
+        search = context.window_manager.risorius_search
+        layout.prop(context.window_manager, "risorius_search", text="", icon="VIEWZOOM")
+        shown = [n for n in live.labels if n in face and regions.matches(n, search)]
+        for region, indices in regions.group_controls(shown).items():
+            names = [shown[i] for i in indices]
+            if search:
+                _draw_region_header(layout.row(), region)
+                _draw_sliders(context, layout, face, names)
+                continue
+            header, body = layout.panel(
+                f"RISORIUS_PT_region_{region}", default_closed=region not in _OPEN
+            )
+            _draw_region_header(header, region)
+            if body is not None:
+                _draw_sliders(context, body, face, names)
+        if not shown:
+            words.write(layout, "No control has these words in its name.", "INFO")
+
+
+def _draw_region_header(layout, region):
+    layout.label(text=regions.TITLES[region], icon=_ICONS[region])
+    row = layout.row(align=True)
+    row.emboss = "NONE"
+    row.operator("risorius.reset", text="", icon="LOOP_BACK").region = region
+    row.operator("risorius.key", text="", icon="KEY_HLT").region = region
+
+
+def _draw_sliders(context, layout, face, names):
+    """One line per control; a left and its right control share it, a long name stands above."""
+    column = layout.column(align=True)
+    there = set(names)
+    for name in names:
+        left, right = f"{name[:-1]}L", f"{name[:-1]}R"
+        if name == right and left in there:
+            continue
+        paired = name == left and right in there
+        title = regions.title_in_region(name, sided=not paired)
+        if words.fits(context, title, _TITLE):
+            line = column.split(factor=_TITLE, align=True)
+            line.label(text=title)
+        else:
+            column.label(text=title)
+            line = column
+        row = line.row(align=True)
+        for one, text in ((left, "L"), (right, "R")) if paired else ((name, ""),):
+            quoted = bpy.utils.escape_identifier(one)
+            row.prop(face, f'["{quoted}"]', text=text, slider=True)
+
+
+CLASSES = (RISORIUS_PT_controls,)

@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators that choose the level of detail, in the viewport and in renders."""
+
+import bpy
+
+from ...scene.base import parts
+from ...scene.character import lods
+from ...scene.frame import evaluate
+from ..common import FaceOperator
+
+
+class RISORIUS_OT_set_lod(FaceOperator, bpy.types.Operator):
+    """Show the meshes of one level of detail"""
+
+    bl_idname = "risorius.set_lod"
+    bl_label = "Level of Detail"
+
+    lod: bpy.props.IntProperty(
+        name="Level",
+        description="0 is the finest; for renders -1 follows the viewport",
+        min=-1,
+        max=31,
+        options={"SKIP_SAVE"},
+    )
+    target: bpy.props.EnumProperty(
+        name="Where",
+        items=(
+            ("BOTH", "Everywhere", "In the viewport, and renders follow it"),
+            ("VIEWPORT", "Viewport", "In the viewport; renders keep a level of their own"),
+            ("RENDER", "Render", "In renders only"),
+        ),
+        options={"SKIP_SAVE"},
+    )
+
+    def execute(self, context):
+        rig = parts.active_rig(context)
+        follows = self.lod == lods.SAME and self.target == "RENDER"
+        if not follows and self.lod not in lods.built(rig):
+            self.report({"ERROR"}, f"Level {self.lod} was not built for this face.")
+            return {"CANCELLED"}
+        lods.follow_camera(rig, False)
+        if self.target == "BOTH":
+            lods.show(rig, self.lod, lods.SAME)
+        elif self.target == "RENDER":
+            lods.show(rig, render=self.lod)
+        else:
+            lods.show(rig, self.lod, lods.render_level(rig))
+        evaluate.bring_up(context, rig)
+        return {"FINISHED"}
+
+
+class RISORIUS_OT_set_lod_by_distance(FaceOperator, bpy.types.Operator):
+    """Let the distance to the scene's camera choose the level of detail"""
+
+    bl_idname = "risorius.set_lod_by_distance"
+    bl_label = "By Distance"
+
+    enable: bpy.props.BoolProperty(name="By Distance", default=True, options={"SKIP_SAVE"})
+
+    def execute(self, context):
+        rig = parts.active_rig(context)
+        if self.enable and context.scene.camera is None:
+            self.report({"WARNING"}, "The scene has no camera yet: the level stays as it is.")
+        lods.follow_camera(rig, self.enable, _size(rig))
+        evaluate.bring_up(context, rig)
+        return {"FINISHED"}
+
+
+def _size(rig):
+    """The longest side of the largest mesh, in Blender units."""
+    return max((max(m.dimensions) for m in parts.meshes_of(rig)), default=0.25)
+
+
+CLASSES = (RISORIUS_OT_set_lod, RISORIUS_OT_set_lod_by_distance)

@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators on a face that is there: reset, keys, level of detail, shapes, overdrive."""
+
+import bpy
+
+from ...logic.character import regions
+from ...scene.base import parts
+from ...scene.character import armatures, build, runtime
+from ...scene.frame import evaluate
+from ...scene.life import duplicates, library_overrides
+from ..common import MODES, FaceOperator
+
+
+def _labels(rig, region=""):
+    live = runtime.of(rig)
+    face = parts.face_bone(rig)
+    return [
+        label
+        for label in (live.labels if live else [])
+        if label in face and (not region or regions.region_of(label) == region)
+    ]
+
+
+class RISORIUS_OT_reset(FaceOperator, bpy.types.Operator):
+    """Set controls to rest and the head, neck and eye bones straight"""
+
+    bl_idname = "risorius.reset"
+    bl_label = "Reset"
+
+    region: bpy.props.StringProperty(
+        name="Region", description="Only this region; empty for all", options={"SKIP_SAVE"}
+    )
+
+    def execute(self, context):
+        rig = parts.active_rig(context)
+        controls, face = parts.controls_of(rig), parts.face_bone(rig)
+        live = runtime.of(rig)
+        rests = dict(zip(live.labels, live.rests, strict=True)) if live else {}
+        for label in _labels(rig, self.region):
+            face[label] = rests[label]
+        if not self.region:
+            for bone in controls.pose.bones:
+                bone.matrix_basis.identity()
+        controls.update_tag()
+        context.view_layer.update()
+        return {"FINISHED"}
+
+
+class RISORIUS_OT_key(FaceOperator, bpy.types.Operator):
+    """Insert keyframes on the controls at the current frame"""
+
+    bl_idname = "risorius.key"
+    bl_label = "Key"
+
+    region: bpy.props.StringProperty(
+        name="Region", description="Only this region; empty for all", options={"SKIP_SAVE"}
+    )
+
+    def execute(self, context):
+        rig = parts.active_rig(context)
+        controls = parts.controls_of(rig)
+        labels = _labels(rig, self.region)
+        frame = context.scene.frame_current
+        for label in labels:
+            controls.keyframe_insert(
+                parts.property_path(label), frame=frame, group=armatures.key_group(label)
+            )
+        if not self.region:
+            self._key_bones(controls, frame)
+        self.report({"INFO"}, f"{len(labels)} controls keyed at frame {frame}")
+        return {"FINISHED"}
+
+    @staticmethod
+    def _key_bones(controls, frame):
+        for name in ("neck", "head", "eye_L", "eye_R"):
+            bone = controls.pose.bones.get(name)
+            if bone is not None:
+                euler = bone.rotation_mode not in {"QUATERNION", "AXIS_ANGLE"}
+                path = "rotation_euler" if euler else f"rotation_{bone.rotation_mode.lower()}"
+                bone.keyframe_insert(path, frame=frame, group=name)
+        if "eyes" in controls.pose.bones:
+            controls.pose.bones["eyes"].keyframe_insert("location", frame=frame, group="eyes")
+
+
+class RISORIUS_OT_set_shape_mode(FaceOperator, bpy.types.Operator):
+    """Switch between the live sum and real shape keys; edited keys are kept"""
+
+    bl_idname = "risorius.set_shape_mode"
+    bl_label = "Shapes"
+
+    mode: bpy.props.EnumProperty(
+        name="Shapes", description="How blend shapes are kept", items=MODES
+    )
+
+    def execute(self, context):
+        rig = parts.active_rig(context)
+        if any(item.mode == "EDIT" for item in parts.meshes_of(rig)):
+            self.report({"ERROR"}, "Leave edit mode first.")
+            return {"CANCELLED"}
+        if library_overrides.unlock_shapes(rig):
+            self.report({"INFO"}, "The linked meshes were copied into this file.")
+        for sentence in build.change_mode(rig, self.mode):
+            self.report({"WARNING"}, sentence)
+        rig.update_tag()
+        evaluate.bring_up(context, rig)
+        return {"FINISHED"}
+
+
+class RISORIUS_OT_set_overdrive(FaceOperator, bpy.types.Operator):
+    """Let the controls of this face go up to 1.5"""
+
+    bl_idname = "risorius.set_overdrive"
+    bl_label = "Overdrive"
+
+    enable: bpy.props.BoolProperty(name="Overdrive", default=True, options={"SKIP_SAVE"})
+
+    def execute(self, context):
+        rig = parts.active_rig(context)
+        controls, face = parts.controls_of(rig), parts.face_bone(rig)
+        controls[parts.OVERDRIVE] = self.enable
+        maximum = parts.maximum_of(controls)
+        for label in _labels(rig):
+            face.id_properties_ui(label).update(max=maximum, soft_max=maximum)
+            face[label] = min(float(face[label]), maximum)
+        controls.update_tag()
+        context.view_layer.update()
+        return {"FINISHED"}
+
+
+class RISORIUS_OT_separate(FaceOperator, bpy.types.Operator):
+    """Give a copied face materials, shapes and drivers of its own"""
+
+    bl_idname = "risorius.separate"
+    bl_label = "Make Independent"
+
+    def execute(self, context):
+        for sentence in duplicates.separate(parts.active_rig(context)):
+            self.report({"INFO"}, sentence)
+        context.view_layer.update()
+        return {"FINISHED"}
+
+
+CLASSES = (
+    RISORIUS_OT_reset,
+    RISORIUS_OT_key,
+    RISORIUS_OT_set_shape_mode,
+    RISORIUS_OT_set_overdrive,
+    RISORIUS_OT_separate,
+)

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The panels Face and Options of the sidebar tab `Face`."""
+
+import bpy
+
+from ... import native
+from ...logic.character import plans
+from ...scene.base import parts
+from ...scene.character import lods, rig_placement, runtime
+from .. import words
+from ..bake.panel import draw_state
+from ..common import FaceOnlyPanel, FacePanel
+from ..life.panel import draw_trouble
+
+
+class RISORIUS_PT_character(FacePanel, bpy.types.Panel):
+    bl_idname = "RISORIUS_PT_character"
+    bl_label = "Face"
+    bl_order = 0
+
+    def draw(self, context):
+        layout = self.layout
+        trouble = native.problem()
+        if trouble:
+            words.write(layout, trouble, "ERROR")
+            return
+        if draw_trouble(layout, context):
+            return
+        rig = parts.active_rig(context)
+        if rig is None:
+            _draw_start(layout)
+            return
+        live = runtime.of(rig)
+        controls = parts.controls_of(rig)
+        if live is None or controls is None:
+            return  # said above
+        layout.label(text=rig.name.removesuffix("_rig"), icon="USER")
+        draw_state(layout, rig, words.write)
+        _draw_detail(layout, rig)
+        _draw_shapes(layout, rig)
+        row = layout.row(align=True)
+        row.operator("risorius.reset", icon="LOOP_BACK").region = ""
+        row.operator("risorius.key", text="Key All", icon="KEYFRAME_HLT").region = ""
+        for warning in plans.layer_warnings(live.rig.ignored_layers):
+            words.write(layout, warning, "INFO")
+
+
+def _draw_start(layout):
+    words.write(layout, "No face is selected.", "INFO")
+    layout.operator("risorius.add_character", text="Add a Face", icon="USER")
+    layout.operator("risorius.import_dna", text="Import DNA", icon="IMPORT")
+
+
+def _draw_detail(layout, rig):
+    levels = lods.built(rig)
+    if len(levels) < 2:
+        return
+    column = layout.column(align=True)
+    auto = lods.by_distance(rig)
+    for target, text, shown in (
+        ("VIEWPORT", "Detail in the Viewport", lods.viewport_level(rig)),
+        ("RENDER", "Detail in Renders", lods.render_level(rig)),
+    ):
+        # On a line of its own: beside eight levels there is no room for words.
+        column.label(text=text)
+        row = column.row(align=True)
+        row.active = not auto
+        for level in levels:
+            button = row.operator("risorius.set_lod", text=str(level), depress=level == shown)
+            button.lod, button.target = level, target
+    column.operator("risorius.set_lod_by_distance", depress=auto).enable = not auto
+    if auto:
+        for level in range(min(len(rig[parts.LOD_DISTANCES]), levels[-1])):
+            column.prop(
+                rig, f'["{parts.LOD_DISTANCES}"]', index=level, text=f"LOD {level + 1} from"
+            )
+
+
+def _draw_shapes(layout, rig):
+    modes = {m.get(parts.MODE) for m in parts.meshes_of(rig)}
+    row = layout.row(align=True)
+    row.label(text="Shapes")
+    for mode, text in (("LIVE", "Live"), ("KEYS", "Keys")):
+        row.operator("risorius.set_shape_mode", text=text, depress=mode in modes).mode = mode
+
+
+class RISORIUS_PT_options(FaceOnlyPanel, bpy.types.Panel):
+    bl_idname = "RISORIUS_PT_options"
+    bl_label = "Options"
+    bl_order = 2
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layout = self.layout
+        rig = parts.active_rig(context)
+        on = bool(parts.controls_of(rig).get(parts.OVERDRIVE))
+        layout.operator("risorius.set_overdrive", depress=on).enable = not on
+        attached = rig_placement.body_of(parts.controls_of(rig))
+        body = "risorius.detach_body" if attached else "risorius.attach_body"
+        layout.operator(body, icon="ARMATURE_DATA")
+        layout.operator("risorius.separate", icon="UNLINKED")
+        layout.operator("risorius.reload", icon="FILE_REFRESH")
+        layout.operator("risorius.replace_dna", icon="FILEBROWSER")
+        layout.operator("risorius.export_dna", icon="EXPORT")
+        layout.operator("risorius.describe", icon="INFO")
+        layout.prop(context.window_manager, "risorius_show_timing")
+        render = context.scene.render
+        if not render.use_lock_interface:
+            layout.prop(render, "use_lock_interface", text="Lock Interface in Renders")
+        live = runtime.of(rig)
+        if live is not None:
+            column = layout.column(align=True)
+            column.scale_y = 0.8
+            column.label(text=f"{len(live.labels)} controls, {live.rig.joint_count} joints")
+            column.label(text=f"{live.rig.blend_shape_count} shapes, {live.rig.simd}")
+
+
+CLASSES = (RISORIUS_PT_character, RISORIUS_PT_options)

@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""After an import the 3D views show the face: it is a speck in a view of the default scene."""
+
+import numpy as np
+from mathutils import Vector
+
+from ...logic.character import view_fit
+from ...scene.base import parts
+
+_FRONT = Vector((0.0, -1.0, 0.0))  # where an imported face looks
+_THREE_QUARTER = Vector((0.36, -0.92, 0.16))  # whence a face is seen best
+_SIDE = 0.77  # cosine of 40 degrees: whoever looks from farther aside sees a profile
+
+
+def frame(context, rig):
+    """Let the 3D views of the user's window show a face; one in profile is shown from the front.
+
+    A view through a camera is left alone, and one that shows the face well already. A solid view in
+    Blender's default colours, one a material, shows the textures' from now on: iris, lips and brows
+    are in them. Views are no part of undo: it takes the face away and leaves the view.
+
+    Args:
+        context: a Blender context; without a window nothing happens.
+        rig: deforming armature of the face.
+    """
+    screen = context.window.screen if context.window is not None else None
+    for area in screen.areas if screen is not None else ():
+        if area.type == "VIEW_3D":
+            _show_textures(area.spaces.active.shading)
+            _frame(area, *_ball(rig), parts.controls_of(rig).matrix_world.to_quaternion())
+
+
+def _show_textures(shading):
+    if shading.type == "SOLID" and shading.color_type == "MATERIAL":
+        shading.color_type = "TEXTURE"
+
+
+def _frame(area, middle, radius, turn):
+    space = area.spaces.active
+    region = next((r for r in area.regions if r.type == "WINDOW"), None)
+    locked = space.lock_object is not None or space.lock_cursor
+    if region is None or locked:
+        return
+    for view in (space.region_3d, *space.region_quadviews):
+        if view is None or view.view_perspective == "CAMERA":
+            continue
+        perspective = view.view_perspective == "PERSP"
+        far = view_fit.distance(radius, space.lens, (region.width, region.height), perspective)
+        held = view.view_location[:]
+        if view_fit.is_well_in_view(middle, radius, far, held, view.view_distance):
+            continue
+        view.view_location, view.view_distance = middle, far
+        # Straight views (front, side, top) are chosen with a key and keep their direction.
+        seen_from = view.view_rotation @ Vector((0.0, 0.0, 1.0))
+        if perspective and seen_from.dot(turn @ _FRONT) < _SIDE:
+            view.view_rotation = (turn @ _THREE_QUARTER).to_track_quat("Z", "Y")
+
+
+def _ball(rig):
+    """Middle and radius of the head, else of all meshes of the finest level that is built."""
+    items = parts.meshes_of(rig)
+    first = min((min(item[parts.LODS]) for item in items), default=0)
+    shown = [item for item in items if first in list(item[parts.LODS])]
+    heads = [item for item in shown if "head" in item.data.name.rpartition("_lod")[0].lower()]
+    corners = np.array(
+        [item.matrix_world @ Vector(c) for item in heads or shown for c in item.bound_box]
+    )
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    return ((low + high) / 2).tolist(), float(np.linalg.norm(high - low)) / 2

@@ -1,0 +1,235 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators that bring faces in: from a file, and the sample."""
+
+from pathlib import Path
+
+import bpy
+from bpy_extras.io_utils import ImportHelper
+
+from ... import native
+from ...logic.base import names
+from ...scene.base import parts
+from ...scene.character import build, rig_placement
+from ...scene.frame import evaluate
+from .. import words
+from ..common import EXTENSION, MODES, explain, shown_progress, usable
+from . import framing
+
+FRAME_VIEW = bpy.props.BoolProperty(
+    name="Frame the View",
+    description="Move the 3D views of this window to the face, and let Solid show its textures; "
+    "not where several are imported, and not a view through a camera",
+    default=True,
+)
+
+
+def import_character(operator, context, path, options, show=False):
+    """Build a character and report on it.
+
+    Args:
+        operator: reports through it.
+        context: Blender context.
+        path: of the DNA file.
+        options: build.BuildOptions.
+        show: let the 3D views of the user's window show it.
+
+    Returns:
+        What `execute` returns.
+    """
+    try:
+        with shown_progress(context) as progress:
+            rig, warnings = build.import_file(context, path, options, progress)
+    except native.user_errors() as error:
+        operator.report({"ERROR"}, explain(path, error))
+        return {"CANCELLED"}
+    if rig_placement.put_beside(context.scene, rig):
+        evaluate.bring_up(context, rig)
+    if show and not bpy.app.background:
+        framing.frame(context, rig)
+    for warning in warnings[:5]:
+        operator.report({"WARNING"}, names.printable(str(warning)))
+    if len(warnings) > 5:
+        operator.report({"WARNING"}, f"and {len(warnings) - 5} more warnings")
+    count = len(parts.meshes_of(rig))
+    found = rig.get(parts.TEXTURES, "")
+    if found:
+        operator.report({"INFO"}, f"Textures of {found}")
+    operator.report({"INFO"}, f"{Path(path).name}: {count} meshes, ready to move")
+    return {"FINISHED"}
+
+
+class RISORIUS_OT_import_dna(bpy.types.Operator, ImportHelper):
+    """Build a face from a MetaHuman DNA file"""
+
+    bl_idname = "risorius.import_dna"
+    bl_label = "Import DNA"
+    bl_options = {"REGISTER", "UNDO", "PRESET"}
+
+    filename_ext = ".dna"
+    filter_glob: bpy.props.StringProperty(default="*.dna", options={"HIDDEN"})
+    # Several files, from the file browser or dropped together.
+    directory: bpy.props.StringProperty(subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})
+    files: bpy.props.CollectionProperty(
+        type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"}
+    )
+    lods: bpy.props.BoolVectorProperty(
+        name="Levels of Detail",
+        description="Levels whose meshes are built; 0 is the finest",
+        size=8,
+        default=(True, False, False, False, False, False, False, False),
+    )
+    shape_mode: bpy.props.EnumProperty(
+        name="Shapes", description="How blend shapes are kept", items=MODES, default="AUTO"
+    )
+    use_normals: bpy.props.BoolProperty(
+        name="Custom Normals", description="Keep the file's own normals", default=True
+    )
+    use_materials: bpy.props.BoolProperty(
+        name="Materials", description="Build skin, eyes, teeth and lashes", default=True
+    )
+    use_textures: bpy.props.BoolProperty(
+        name="Textures",
+        description="Load the textures that lie beside the file, and pack them",
+        default=True,
+    )
+    texture_folder: bpy.props.StringProperty(
+        name="Texture Folder",
+        description="Where the textures lie, by MetaHuman's names; empty: beside the file",
+        subtype="DIR_PATH",
+    )
+    use_simple_materials: bpy.props.BoolProperty(
+        name="Simple Materials",
+        description="Cheap to draw: no subsurface, no pores, no wrinkles or flush",
+        default=False,
+    )
+    use_frame_view: FRAME_VIEW
+
+    @classmethod
+    def poll(cls, context):
+        return usable(cls)
+
+    def execute(self, context):
+        options = build.BuildOptions(
+            lods=tuple(i for i, chosen in enumerate(self.lods) if chosen) or (0,),
+            mode=self.shape_mode,
+            normals=self.use_normals,
+            materials=self.use_materials,
+            textures=self.use_materials and self.use_textures,
+            texture_folder=self.texture_folder,
+            simple_materials=self.use_simple_materials,
+        )
+        named = [str(Path(self.directory, item.name)) for item in self.files if item.name]
+        paths = named or [self.filepath]
+        show = self.use_frame_view and len(paths) == 1
+        results = [import_character(self, context, path, options, show) for path in paths]
+        return {"FINISHED"} if {"FINISHED"} in results else {"CANCELLED"}
+
+    def invoke(self, context, event):
+        given = self.properties.is_property_set
+        if given("filepath") or given("files"):  # dropped onto the window
+            return self.execute(context)
+        return ImportHelper.invoke(self, context, event)
+
+    def draw(self, _context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layout.label(text="Levels of Detail")
+        row = layout.row(align=True)
+        row.use_property_split = False
+        for level in range(8):
+            row.prop(self, "lods", index=level, text=str(level), toggle=True)
+        layout.prop(self, "shape_mode")
+        column = layout.column(heading="Keep")
+        column.prop(self, "use_normals")
+        column.prop(self, "use_materials")
+        row = column.row()
+        row.active = self.use_materials
+        row.prop(self, "use_textures")
+        row = column.row()
+        row.active = self.use_materials
+        row.prop(self, "use_simple_materials")
+        row = layout.row()
+        row.active = self.use_materials and self.use_textures
+        words.prop_or(row.column(), self, "texture_folder", "", "Empty: beside the file")
+        layout.prop(self, "use_frame_view")
+
+
+class RISORIUS_FH_dna(bpy.types.FileHandler):
+    """Drop a DNA file onto the 3D view"""
+
+    bl_idname = "RISORIUS_FH_dna"
+    bl_label = "MetaHuman DNA"
+    bl_import_operator = "risorius.import_dna"
+    bl_file_extensions = ".dna"
+
+    @classmethod
+    def poll_drop(cls, context):
+        return context.area is not None and context.area.type in {"VIEW_3D", "OUTLINER"}
+
+
+class RISORIUS_OT_add_character(bpy.types.Operator):
+    """Add a free sample face; its data (48 MB) is downloaded the first time"""
+
+    bl_idname = "risorius.add_character"
+    bl_label = "Face"
+    bl_options = {"REGISTER", "UNDO"}
+
+    person: bpy.props.EnumProperty(
+        name="Person",
+        description="Who",
+        items=[("man", "Man", "A young man"), ("woman", "Woman", "A young woman")],
+        default="man",
+    )
+    shape_mode: bpy.props.EnumProperty(
+        name="Shapes", description="How blend shapes are kept", items=MODES, default="AUTO"
+    )
+    use_frame_view: FRAME_VIEW
+
+    @classmethod
+    def poll(cls, context):
+        return usable(cls)
+
+    def execute(self, context):
+        folder = Path(bpy.utils.extension_path_user(EXTENSION, path="sample", create=True))
+        path = folder / f"{self.person}-{native.addon_version()}.dna"
+        if not path.is_file():
+            trouble = _build_sample(path, folder, self.person)
+            if trouble:
+                self.report({"ERROR"}, trouble)
+                return {"CANCELLED"}
+        options = build.BuildOptions(mode=self.shape_mode)
+        return import_character(self, context, path, options, self.use_frame_view)
+
+
+def _build_sample(path, folder, person):
+    """Build a sample person's DNA; returns a sentence where it cannot be built."""
+    sample = native.sample_module()
+    wheels = sorted(folder.glob("*.whl"))
+    online = bpy.app.online_access
+    try:
+        sample.build_sample(
+            path,
+            person=sample.PEOPLE[person],
+            data=wheels[0] if wheels else None,
+            offline=not online,
+        )
+    except native.user_errors() as error:
+        advice = "" if online else " Allow online access in the preferences (System) first."
+        return f"The sample face could not be built: {str(error).rstrip('.')}.{advice}"
+    return ""
+
+
+def draw_import(self, _context):
+    """Entry of File > Import."""
+    self.layout.operator(RISORIUS_OT_import_dna.bl_idname, text="MetaHuman DNA (.dna)")
+
+
+def draw_add(self, _context):
+    """Entry of the 3D view's Add menu."""
+    self.layout.operator_menu_enum(
+        RISORIUS_OT_add_character.bl_idname, "person", text="Face", icon="USER"
+    )
+
+
+CLASSES = (RISORIUS_OT_import_dna, RISORIUS_FH_dna, RISORIUS_OT_add_character)

@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators between a face and its file: replace it, read it again."""
+
+from pathlib import Path
+
+import bpy
+from bpy_extras.io_utils import ExportHelper, ImportHelper
+
+from ... import native
+from ...scene.base import parts
+from ...scene.file import export_dna, replace_dna
+from ...scene.frame import evaluate
+from ..common import explain, shown_progress, usable
+
+
+def has_face(cls, context):
+    """Poll: whether there is a face; says why when there is not."""
+    if not usable(cls):
+        return False
+    if parts.active_rig(context) is None:
+        cls.poll_message_set("Select a face first.")
+        return False
+    if parts.BAKED in parts.active_rig(context):
+        cls.poll_message_set("This face is baked: choose Back to Live first.")
+        return False
+    return True
+
+
+def report_all(operator, sentences, shown=8):
+    """Report sentences, the last of many as a number."""
+    for sentence in sentences[:shown]:
+        operator.report({"INFO"}, sentence)
+    if len(sentences) > shown:
+        operator.report({"INFO"}, f"and {len(sentences) - shown} more: see the report's text")
+
+
+def _replace(operator, context, path):
+    rig = parts.active_rig(context)
+    try:
+        with shown_progress(context) as progress:
+            sentences = replace_dna.replace_file(context, rig, path, progress)
+    except replace_dna.ReplaceError as error:
+        operator.report({"ERROR"}, str(error))
+        return {"CANCELLED"}
+    except native.user_errors() as error:
+        operator.report({"ERROR"}, explain(path, error))
+        return {"CANCELLED"}
+    evaluate.bring_up(context, rig)
+    report_all(operator, sentences)
+    operator.report({"INFO"}, f"{rig.name.removesuffix('_rig')} is now {Path(path).name}")
+    return {"FINISHED"}
+
+
+class RISORIUS_OT_replace_dna(bpy.types.Operator, ImportHelper):
+    """Let another DNA file take this face's place; keys, edits and materials stay"""
+
+    bl_idname = "risorius.replace_dna"
+    bl_label = "Replace DNA"
+    bl_options = {"REGISTER", "UNDO"}
+
+    filename_ext = ".dna"
+    filter_glob: bpy.props.StringProperty(default="*.dna", options={"HIDDEN"})
+
+    @classmethod
+    def poll(cls, context):
+        return has_face(cls, context)
+
+    def execute(self, context):
+        return _replace(self, context, self.filepath)
+
+
+class RISORIUS_OT_reload(bpy.types.Operator):
+    """Read the face's file again; asks for it where it is no longer in its place"""
+
+    bl_idname = "risorius.reload"
+    bl_label = "Reload from Source"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        return has_face(cls, context)
+
+    @staticmethod
+    def _path(context):
+        return bpy.path.abspath(parts.active_rig(context).get(parts.SOURCE, ""))
+
+    def invoke(self, context, _event):
+        path = self._path(context)
+        if not path or not Path(path).is_file():
+            bpy.ops.risorius.replace_dna("INVOKE_DEFAULT")
+            return {"CANCELLED"}  # the file selector does the work
+        return self.execute(context)
+
+    def execute(self, context):
+        path = self._path(context)
+        if not path or not Path(path).is_file():
+            name = Path(path).name or "of this face"
+            self.report(
+                {"ERROR"}, f"The file {name} is not in its place any more: use Replace DNA."
+            )
+            return {"CANCELLED"}
+        return _replace(self, context, path)
+
+
+class RISORIUS_OT_export_dna(bpy.types.Operator, ExportHelper):
+    """Write this face's DNA file: byte for byte as imported, with your edits of shape keys,
+    neutral vertices, joints and weights"""
+
+    bl_idname = "risorius.export_dna"
+    bl_label = "Export DNA"
+    bl_options = {"PRESET"}
+
+    filename_ext = ".dna"
+    filter_glob: bpy.props.StringProperty(default="*.dna", options={"HIDDEN"})
+    use_shapes: bpy.props.BoolProperty(
+        name="Shape Keys",
+        description="Write edited shapes of the file; keys of your own are never written",
+        default=True,
+    )
+    use_neutral: bpy.props.BoolProperty(
+        name="Neutral Mesh", description="Write vertices moved in the basis", default=True
+    )
+    use_joints: bpy.props.BoolProperty(
+        name="Neutral Joints",
+        description="Write joints moved or turned in the rig's edit mode",
+        default=True,
+    )
+    use_weights: bpy.props.BoolProperty(
+        name="Weights", description="Write painted skin weights", default=True
+    )
+
+    @classmethod
+    def poll(cls, context):
+        return has_face(cls, context)
+
+    def invoke(self, context, event):
+        if not self.filepath:
+            self.filepath = parts.active_rig(context).name.removesuffix("_rig") + ".dna"
+        return ExportHelper.invoke(self, context, event)
+
+    def execute(self, context):
+        rig = parts.active_rig(context)
+        options = export_dna.ExportOptions(
+            self.use_shapes, self.use_neutral, self.use_joints, self.use_weights
+        )
+        fileio = native.part("fileio")
+        try:
+            fileio.check_writable(self.filepath)
+            content, sentences = export_dna.export(context, rig, options)
+            fileio.write_bytes(self.filepath, content)
+        except export_dna.ExportError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        except native.user_errors() as error:
+            self.report({"ERROR"}, explain(self.filepath, error))
+            return {"CANCELLED"}
+        report_all(self, sentences)
+        self.report({"INFO"}, f"{Path(self.filepath).name}: {len(content):,} bytes")
+        return {"FINISHED"}
+
+
+def draw_export(self, _context):
+    """Entry of File > Export."""
+    self.layout.operator(RISORIUS_OT_export_dna.bl_idname, text="MetaHuman DNA (.dna)")
+
+
+CLASSES = (RISORIUS_OT_replace_dna, RISORIUS_OT_reload, RISORIUS_OT_export_dna)

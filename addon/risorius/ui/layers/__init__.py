@@ -1,0 +1,6 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Layers and reactions: their list, operators, menus."""
+
+from . import lists, menus, operators, panel
+
+CLASSES = (*operators.CLASSES, *menus.CLASSES, *lists.CLASSES, *panel.CLASSES)

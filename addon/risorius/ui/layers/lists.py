@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Lists of the panel Layers: a line per layer, a line per fired reaction."""
+
+import bpy
+
+from ...scene.animation import layers
+from .menus import ICONS
+
+
+class RISORIUS_UL_layers(bpy.types.UIList):
+    """One line per layer, the highest first."""
+
+    def draw_item(self, _context, layout, _data, item, _icon, _active, _property):
+        row = layout.row(align=True)
+        row.active = not item.mute
+        row.prop(item, "name", text="", emboss=False, icon=ICONS[item.kind])
+        part = row.row(align=True)
+        part.scale_x = 0.7
+        part.prop(item, "weight", text="")
+        row.prop(item, "solo", text="", emboss=False, icon="SOLO_ON" if item.solo else "SOLO_OFF")
+        icon = "CHECKBOX_DEHLT" if item.mute else "CHECKBOX_HLT"
+        row.prop(item, "mute", text="", emboss=False, icon=icon, invert_checkbox=True)
+
+    def filter_items(self, _context, data, _name):
+        there = layers.of(data)
+        shown = [0 if layer.removed else self.bitflag_filter_item for layer in layers.places(data)]
+        order = [0] * len(shown)
+        lines = [*reversed(there), *(y for y in layers.places(data) if y.removed)]
+        for line, layer in enumerate(lines):
+            order[layers.place_of(data, layer)] = line
+        return shown, order
+
+
+class RISORIUS_UL_reactions(bpy.types.UIList):
+    """One line per fired reaction."""
+
+    def draw_item(self, _context, layout, _data, item, _icon, _active, _property):
+        known = layers.known_reactions().get(item.name)
+        split = layout.split(factor=0.52, align=True)
+        split.label(text=known.label if known else item.name)
+        row = split.row(align=True)
+        row.prop(item, "frame", text="", emboss=False)
+        row.prop(item, "strength", text="", emboss=False)
+
+
+CLASSES = (RISORIUS_UL_layers, RISORIUS_UL_reactions)

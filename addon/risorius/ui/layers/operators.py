@@ -1,0 +1,212 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators on the layers and the reactions of a face."""
+
+import bpy
+
+from ...scene.animation import expressions, layer_properties, layers, layers_nla
+from ...scene.base import parts
+from ...scene.frame import evaluate
+from ..common import FaceOperator
+
+
+def active_controls(context):
+    return parts.controls_of(parts.active_rig(context))
+
+
+class LayerOperator(FaceOperator):
+    """What all operators on the active layer share."""
+
+    @classmethod
+    def poll(cls, context):
+        if not super().poll(context):
+            return False
+        if not len(layers.of(active_controls(context))):
+            cls.poll_message_set("This face has no layers.")
+            return False
+        return True
+
+    @staticmethod
+    def place(controls):
+        """The active layer's place; the highest one's where none is active."""
+        place, count = controls.risorius_layers_index, len(layers.places(controls))
+        if 0 <= place < count and not layers.places(controls)[place].removed:
+            return place
+        return layers.place_of(controls, layers.of(controls)[-1])
+
+
+class RISORIUS_OT_layer_add(FaceOperator, bpy.types.Operator):
+    """Add a layer on top of the others, at the current frame"""
+
+    bl_idname = "risorius.layer_add"
+    bl_label = "Add Layer"
+
+    kind: bpy.props.EnumProperty(
+        name="Source", items=layer_properties.KINDS, options={"SKIP_SAVE"}, default="ACTION"
+    )
+    source: bpy.props.StringProperty(
+        name="Name",
+        description="Of the action or expression; empty: the face's active action, which then is "
+        "no longer played by itself",
+        options={"SKIP_SAVE"},
+    )
+
+    def execute(self, context):
+        rig = parts.active_rig(context)
+        controls, frame = parts.controls_of(rig), context.scene.frame_current
+        if self.kind == "ACTION":
+            return self._add_action(context, rig, controls)
+        if self.kind == "EXPRESSION":
+            known = expressions.all_expressions()
+            if self.source not in known:
+                self.report({"ERROR"}, f"There is no expression {self.source}.")
+                return {"CANCELLED"}
+            layers.add(controls, "EXPRESSION", known[self.source].label, expression=self.source)
+        else:
+            layers.add(controls, "IDLE", "Idle Life", start=frame, blend="MAXIMUM")
+        evaluate.bring_up(context, rig)
+        return {"FINISHED"}
+
+    def _add_action(self, context, rig, controls):
+        action = bpy.data.actions.get(self.source) if self.source else None
+        data = controls.animation_data
+        if action is None and not self.source and data is not None:
+            action, data.action = data.action, None
+            layers.keep_weights(controls, action)
+        if action is None:
+            self.report({"ERROR"}, f"There is no action {self.source or 'to make a layer of'}.")
+            return {"CANCELLED"}
+        layers.add_action(controls, action)
+        evaluate.bring_up(context, rig)
+        return {"FINISHED"}
+
+
+class RISORIUS_OT_layer_remove(LayerOperator, bpy.types.Operator):
+    """Remove the active layer and the keys of its weight; its action stays"""
+
+    bl_idname = "risorius.layer_remove"
+    bl_label = "Remove Layer"
+
+    def execute(self, context):
+        controls = active_controls(context)
+        layers.remove(controls, self.place(controls))
+        evaluate.bring_up(context, parts.active_rig(context))
+        return {"FINISHED"}
+
+
+class RISORIUS_OT_layer_move(LayerOperator, bpy.types.Operator):
+    """Move the active layer up or down; higher layers lie over lower ones"""
+
+    bl_idname = "risorius.layer_move"
+    bl_label = "Move Layer"
+
+    up: bpy.props.BoolProperty(name="Up", options={"SKIP_SAVE"})
+
+    def execute(self, context):
+        controls = active_controls(context)
+        if not layers.move(controls, self.place(controls), self.up):
+            return {"CANCELLED"}
+        evaluate.bring_up(context, parts.active_rig(context))
+        return {"FINISHED"}
+
+
+class RISORIUS_OT_layer_duplicate(LayerOperator, bpy.types.Operator):
+    """Put a copy of the active layer right above it"""
+
+    bl_idname = "risorius.layer_duplicate"
+    bl_label = "Duplicate Layer"
+
+    def execute(self, context):
+        controls = active_controls(context)
+        layers.duplicate(controls, self.place(controls))
+        evaluate.bring_up(context, parts.active_rig(context))
+        return {"FINISHED"}
+
+
+class RISORIUS_OT_layer_warp(LayerOperator, bpy.types.Operator):
+    """Pin what the active layer shows now to the current frame, or take all pins away"""
+
+    bl_idname = "risorius.layer_warp"
+    bl_label = "Warp Point"
+
+    clear: bpy.props.BoolProperty(name="Clear", options={"SKIP_SAVE"})
+
+    def execute(self, context):
+        controls = active_controls(context)
+        layer = layers.places(controls)[self.place(controls)]
+        if self.clear:
+            layer.warp.clear()
+        elif layer.kind != "ACTION" or layer.action is None:
+            self.report({"ERROR"}, "Only a layer with an action has a time to warp.")
+            return {"CANCELLED"}
+        else:
+            layers.add_warp_point(layer, context.scene.frame_current_final)
+        controls.update_tag()
+        evaluate.bring_up(context, parts.active_rig(context))
+        return {"FINISHED"}
+
+
+class RISORIUS_OT_fire(FaceOperator, bpy.types.Operator):
+    """Fire a reaction at the current frame"""
+
+    bl_idname = "risorius.fire"
+    bl_label = "Fire"
+
+    reaction: bpy.props.StringProperty(name="Reaction", default="flash", options={"SKIP_SAVE"})
+    strength: bpy.props.FloatProperty(
+        name="Strength", default=1.0, min=0.0, max=1.0, subtype="FACTOR"
+    )
+
+    def execute(self, context):
+        if self.reaction not in layers.known_reactions():
+            self.report({"ERROR"}, f"There is no reaction {self.reaction}.")
+            return {"CANCELLED"}
+        frame = context.scene.frame_current_final
+        layers.fire(active_controls(context), self.reaction, frame, self.strength)
+        evaluate.bring_up(context, parts.active_rig(context))
+        return {"FINISHED"}
+
+
+class RISORIUS_OT_unfire(FaceOperator, bpy.types.Operator):
+    """Take the active reaction away"""
+
+    bl_idname = "risorius.unfire"
+    bl_label = "Remove Reaction"
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and bool(len(layers.reactions_of(active_controls(context))))
+
+    def execute(self, context):
+        controls = active_controls(context)
+        count = len(layers.reactions_of(controls))
+        layers.unfire(controls, min(max(controls.risorius_reactions_index, 0), count - 1))
+        evaluate.bring_up(context, parts.active_rig(context))
+        return {"FINISHED"}
+
+
+class RISORIUS_OT_layers_to_nla(LayerOperator, bpy.types.Operator):
+    """Make NLA strips of the layers, as far as the NLA can say the same"""
+
+    bl_idname = "risorius.layers_to_nla"
+    bl_label = "Push Layers to NLA"
+
+    def execute(self, context):
+        rig = parts.active_rig(context)
+        count, notes = layers_nla.push(context.scene, rig)
+        evaluate.bring_up(context, rig)
+        for note in notes:
+            self.report({"WARNING"}, note)
+        self.report({"INFO"}, f"{count} layers are NLA strips now")
+        return {"FINISHED"} if count else {"CANCELLED"}
+
+
+CLASSES = (
+    RISORIUS_OT_layer_add,
+    RISORIUS_OT_layer_remove,
+    RISORIUS_OT_layer_move,
+    RISORIUS_OT_layer_duplicate,
+    RISORIUS_OT_layer_warp,
+    RISORIUS_OT_fire,
+    RISORIUS_OT_unfire,
+    RISORIUS_OT_layers_to_nla,
+)

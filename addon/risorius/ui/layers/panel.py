@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The panel Layers."""
+
+import bpy
+
+from ...logic.animation import layer_rules as logic
+from ...scene.animation import layer_properties, layers
+from ...scene.base import parts
+from ...scene.character import runtime
+from .. import words
+from ..common import FaceOnlyPanel
+from .menus import RISORIUS_MT_fire, RISORIUS_MT_layer_add, RISORIUS_MT_layer_more
+from .operators import (
+    LayerOperator,
+    RISORIUS_OT_layer_move,
+    RISORIUS_OT_layer_remove,
+    RISORIUS_OT_unfire,
+)
+
+
+class RISORIUS_PT_layers(FaceOnlyPanel, bpy.types.Panel):
+    bl_idname = "RISORIUS_PT_layers"
+    bl_label = "Layers"
+    bl_order = 1
+
+    def draw(self, context):
+        layout = self.layout
+        rig = parts.active_rig(context)
+        controls, live = parts.controls_of(rig), runtime.of(rig)
+        if live is None:
+            return
+        row = layout.row()
+        row.template_list(
+            "RISORIUS_UL_layers",
+            "",
+            controls,
+            logic.COLLECTION,
+            controls,
+            layer_properties.INDEX,
+            rows=4,
+        )
+        _draw_side(row.column(align=True))
+        if len(layers.of(controls)):
+            _draw_layer(layout, controls, layers.places(controls)[LayerOperator.place(controls)])
+            for sentence in layers.problems(controls, live, context.scene):
+                words.write(layout, sentence, "ERROR")
+        _draw_reactions(layout, controls)
+        if len(layers.of(controls)) or len(layers.reactions_of(controls)):
+            layout.prop(controls, "risorius_layer_rules")
+
+
+def _draw_side(column):
+    column.menu(RISORIUS_MT_layer_add.bl_idname, text="", icon="ADD")
+    column.operator(RISORIUS_OT_layer_remove.bl_idname, text="", icon="REMOVE")
+    column.menu(RISORIUS_MT_layer_more.bl_idname, text="", icon="DOWNARROW_HLT")
+    column.operator(RISORIUS_OT_layer_move.bl_idname, text="", icon="TRIA_UP").up = True
+    column.operator(RISORIUS_OT_layer_move.bl_idname, text="", icon="TRIA_DOWN").up = False
+
+
+def _draw_layer(layout, controls, layer):
+    column = layout.column()
+    column.use_property_split = True
+    column.use_property_decorate = False
+    if layer.kind == "ACTION":
+        column.prop(layer, "action")
+    elif layer.kind == "IDLE":
+        column.prop(layer, "seed")
+    column.prop(layer, "blend")
+    row = column.row()
+    row.use_property_decorate = True
+    row.prop(layer, "weight")
+    header, body = layout.panel("RISORIUS_PT_layer_time", default_closed=True)
+    header.label(text="Time")
+    if body is not None:
+        _draw_time(body, layer)
+    header, body = layout.panel("RISORIUS_PT_layer_mask", default_closed=True)
+    header.label(text="Mask")
+    if body is not None:
+        grid = body.grid_flow(columns=3, align=True, even_columns=True)
+        for region in layer_properties.REGIONS:
+            grid.prop_enum(layer, "regions", region[0])
+        body.prop(layer, "controls")
+
+
+def _draw_time(layout, layer):
+    column = layout.column(align=True)
+    column.use_property_split = True
+    column.use_property_decorate = False
+    warped = len(layer.warp) > 1
+    if layer.kind == "ACTION" and not warped:
+        column.prop(layer, "start")
+        column.prop(layer, "trim_start")
+        column.prop(layer, "trim_end")
+        column.prop(layer, "scale")
+        column.prop(layer, "repeat")
+        column.prop(layer, "reverse")
+    elif not warped:
+        column.prop(layer, "start")
+        words.prop_or(column, layer, "length", 0.0, "0: without an end")
+    for point in layer.warp:
+        row = column.row(align=True)
+        row.use_property_split = False
+        row.prop(point, "frame")
+        row.prop(point, "source")
+    column.prop(layer, "extend")
+    column.prop(layer, "fade_in")
+    column.prop(layer, "fade_out")
+
+
+def _draw_reactions(layout, controls):
+    row = layout.row(align=True)
+    row.menu(RISORIUS_MT_fire.bl_idname, text="Fire a Reaction", icon="LIGHT_SUN")
+    if not len(layers.reactions_of(controls)):
+        return
+    row = layout.row()
+    row.template_list(
+        "RISORIUS_UL_reactions",
+        "",
+        controls,
+        layer_properties.REACTIONS,
+        controls,
+        f"{layer_properties.REACTIONS}_index",
+        rows=2,
+    )
+    row.operator(RISORIUS_OT_unfire.bl_idname, text="", icon="REMOVE")
+
+
+CLASSES = (RISORIUS_PT_layers,)

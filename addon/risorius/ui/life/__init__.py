@@ -1,0 +1,6 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Faces that are linked from other files or have lost parts."""
+
+from . import operators
+
+CLASSES = (*operators.CLASSES,)

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators and words for faces that are linked from other files or have lost parts."""
+
+import bpy
+
+from ... import native
+from ...scene.base import parts
+from ...scene.frame import evaluate
+from ...scene.life import library_overrides, repair
+from ..common import usable
+
+SHAPES = (
+    ("DRIVEN", "Driven Keys", "The library's shape keys, moved by drivers: follows its edits"),
+    ("LOCAL", "Local Meshes", "Meshes copied into this file: live sum and edits are possible"),
+)
+
+
+def broken_override(context):
+    rig = parts.active_rig(context)
+    return (
+        rig if rig is not None and rig.override_library and library_overrides.trouble(rig) else None
+    )
+
+
+class RISORIUS_OT_make_override(bpy.types.Operator):
+    """Make a linked face, or an override of one that stands still, ready to animate"""
+
+    bl_idname = "risorius.make_override"
+    bl_label = "Make Override"
+    bl_options = {"REGISTER", "UNDO"}
+
+    shapes: bpy.props.EnumProperty(
+        name="Shapes", description="How its shapes are moved", items=SHAPES
+    )
+
+    @classmethod
+    def poll(cls, context):
+        if not usable(cls):
+            return False
+        if library_overrides.linked_rig(context) is None and broken_override(context) is None:
+            cls.poll_message_set("Select a linked face first.")
+            return False
+        return True
+
+    def execute(self, context):
+        local = self.shapes == "LOCAL"
+        rig = broken_override(context)
+        try:
+            if rig is not None:
+                done = library_overrides.repair(context, rig, local)
+            else:
+                rig, done = library_overrides.make_override(
+                    context, library_overrides.linked_rig(context), local
+                )
+        except native.user_errors() as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        rig.update_tag()
+        evaluate.bring_up(context, rig)
+        for sentence in done:
+            self.report({"INFO"}, sentence)
+        left = library_overrides.trouble(rig)
+        if left:
+            self.report({"WARNING"}, left)
+        return {"FINISHED"}
+
+
+class RISORIUS_OT_bring_back(bpy.types.Operator):
+    """Put deleted parts of the active face, which are still in the file, back into the scene"""
+
+    bl_idname = "risorius.bring_back"
+    bl_label = "Bring Back Deleted Parts"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        return usable(cls) and context.object is not None
+
+    def execute(self, context):
+        back = repair.bring_back(context.object, context.scene)
+        if not back:
+            self.report({"ERROR"}, "No deleted part of this face is in the file.")
+            return {"CANCELLED"}
+        context.view_layer.update()
+        self.report({"INFO"}, f"Brought back: {', '.join(o.name for o in back)}")
+        return {"FINISHED"}
+
+
+CLASSES = (RISORIUS_OT_make_override, RISORIUS_OT_bring_back)

@@ -1,0 +1,225 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators of live capture: start and stop, record, neutral face, subject."""
+
+import bpy
+
+from ... import native
+from ...logic.base import names
+from ...scene.base import parts
+from ...scene.live import capture
+from ..common import usable
+from .properties import active_controls, settings_of
+
+
+class _Running:
+    """What operators share that need a capture of the active face."""
+
+    @classmethod
+    def poll(cls, context):
+        if not usable(cls):
+            return False
+        if capture.of(active_controls(context)) is None:
+            cls.poll_message_set("Start live capture first.")
+            return False
+        return True
+
+
+class RISORIUS_OT_live_start(bpy.types.Operator):
+    """Let the active face follow a capture app, until it is stopped"""
+
+    bl_idname = "risorius.live_start"
+    bl_label = "Start"
+
+    @classmethod
+    def poll(cls, context):
+        if not usable(cls):
+            return False
+        if active_controls(context) is None:
+            cls.poll_message_set("Select a face first.")
+            return False
+        return True
+
+    def execute(self, context):
+        try:
+            capture.start(parts.active_rig(context), settings_of(context))
+        except native.user_errors() as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
+class RISORIUS_OT_live_stop(_Running, bpy.types.Operator):
+    """Stop following; a recording is finished, or waits; the sliders go back to where they were"""
+
+    bl_idname = "risorius.live_stop"
+    bl_label = "Stop"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context):
+        session = capture.of(active_controls(context))
+        if session.recording is not None:
+            _finish(self, context, lambda *where: capture.finish_take(session, *where))
+        capture.stop(active_controls(context))
+        return {"FINISHED"}
+
+
+class RISORIUS_OT_live_record(_Running, bpy.types.Operator):
+    """Begin a recording at the current frame, or end it as an action of the face"""
+
+    bl_idname = "risorius.live_record"
+    bl_label = "Record"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context):
+        session = capture.of(active_controls(context))
+        if session.recording is None:
+            capture.begin_take(session, float(context.scene.frame_current))
+            return {"FINISHED"}
+        done = _finish(self, context, lambda *where: capture.finish_take(session, *where))
+        return {"FINISHED"} if done else {"CANCELLED"}
+
+
+class _Waiting:
+    """What operators share that need a recording that waits."""
+
+    index: bpy.props.IntProperty(
+        name="Recording", description="Which one of those that wait", options={"SKIP_SAVE"}
+    )
+
+    @classmethod
+    def poll(cls, _context):
+        if not usable(cls):
+            return False
+        if not capture.waiting():
+            cls.poll_message_set("No recording waits to be finished.")
+            return False
+        return True
+
+    def recording(self):
+        """The Recording that is meant, or None."""
+        found = capture.waiting()
+        if not 0 <= self.index < len(found):
+            self.report({"ERROR"}, f"There is no recording {self.index}: {len(found)} wait.")
+            return None
+        return found[self.index]
+
+
+class RISORIUS_OT_live_finish(_Waiting, bpy.types.Operator):
+    """Let the active face play a recording that waits"""
+
+    bl_idname = "risorius.live_finish"
+    bl_label = "Finish"
+    bl_options = {"REGISTER", "UNDO"}
+
+    at_current: bpy.props.BoolProperty(
+        name="At Current Frame",
+        description="Begin at the scene's frame of now, not where the recording began",
+        options={"SKIP_SAVE"},
+    )
+
+    @classmethod
+    def poll(cls, context):
+        if not super().poll(context):
+            return False
+        if active_controls(context) is None:
+            cls.poll_message_set("Select a face first.")
+            return False
+        return True
+
+    def execute(self, context):
+        recording = self.recording()
+        if recording is None:
+            return {"CANCELLED"}
+        if self.at_current:
+            recording.frame = float(context.scene.frame_current)
+        done = _finish(self, context, lambda *where: capture.finish(recording, *where))
+        return {"FINISHED"} if done else {"CANCELLED"}
+
+
+class RISORIUS_OT_live_discard(_Waiting, bpy.types.Operator):
+    """Throw away a recording that waits; this cannot be undone"""
+
+    bl_idname = "risorius.live_discard"
+    bl_label = "Throw Away"
+
+    def invoke(self, context, event):
+        return context.window_manager.invoke_confirm(self, event)
+
+    def execute(self, _context):
+        recording = self.recording()
+        if recording is None:
+            return {"CANCELLED"}
+        capture.discard(recording)
+        return {"FINISHED"}
+
+
+class RISORIUS_OT_live_neutral(_Running, bpy.types.Operator):
+    """Take the face of this moment as the face at rest: it is subtracted from what comes"""
+
+    bl_idname = "risorius.live_neutral"
+    bl_label = "Neutral Now"
+
+    forget: bpy.props.BoolProperty(
+        name="Forget", description="Take what comes as it is again", options={"SKIP_SAVE"}
+    )
+
+    def execute(self, context):
+        session = capture.of(active_controls(context))
+        if self.forget:
+            capture.forget_neutral(session)
+        elif not capture.neutral_now(session):
+            self.report({"ERROR"}, "No face was received yet.")
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
+class RISORIUS_OT_live_subject(_Running, bpy.types.Operator):
+    """Follow this subject"""
+
+    bl_idname = "risorius.live_subject"
+    bl_label = "Follow"
+
+    name: bpy.props.StringProperty(name="Subject", options={"SKIP_SAVE"})
+
+    def execute(self, context):
+        context.window_manager.risorius_live.subject = self.name
+        return {"FINISHED"}
+
+
+def _finish(operator, context, finish):
+    """End a recording as an action.
+
+    Args:
+        operator: reports how it went.
+        context: has the face and the scene.
+        finish: called with both.
+
+    Returns:
+        Whether there is an action. Where there is none, what was recorded waits.
+    """
+    rig = parts.active_rig(context)
+    try:
+        report = finish(rig, context.scene)
+    except native.user_errors() as error:
+        why = names.printable(str(error)).rstrip(".")
+        operator.report({"ERROR"}, f"{why}. The recording waits: finish it in the panel.")
+        return False
+    if report is None:
+        operator.report({"WARNING"}, "Nothing was received: there is no recording.")
+        return False
+    length = f"{report.curves} curves, frames {report.first:.0f} to {report.last:.0f}"
+    operator.report({"INFO"}, f"{report.action.name}: {length}")
+    for note in report.notes:
+        operator.report({"WARNING"}, note)
+    return True
+
+
+CLASSES = (
+    RISORIUS_OT_live_start,
+    RISORIUS_OT_live_stop,
+    RISORIUS_OT_live_record,
+    RISORIUS_OT_live_finish,
+    RISORIUS_OT_live_discard,
+    RISORIUS_OT_live_neutral,
+    RISORIUS_OT_live_subject,
+)

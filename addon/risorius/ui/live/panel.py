@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The panel Live Capture."""
+
+import bpy
+
+from ...logic.base import names
+from ...scene.live import capture
+from .. import words
+from ..common import FaceOnlyPanel
+from .properties import active_controls
+
+
+class RISORIUS_PT_live(FaceOnlyPanel, bpy.types.Panel):
+    bl_idname = "RISORIUS_PT_live"
+    bl_label = "Live Capture"
+    bl_order = 1
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layout = self.layout
+        chosen = context.window_manager.risorius_live
+        session = capture.of(active_controls(context))
+        column = layout.column()
+        column.enabled = session is None
+        column.prop(chosen, "source", text="")
+        column.prop(chosen, "port")
+        column.prop(chosen, "everywhere")
+        words.write(column, _where(chosen))
+        words.prop_or(column, chosen, "mapping", "", "Empty: names of ARKit and VRM")
+        words.prop_or(layout, chosen, "subject", "", "Empty: the first heard")
+        column = layout.column(align=True)
+        for name in ("smoothing", "gain", "head_gain"):
+            column.prop(chosen, name)
+        _draw_waiting(layout)
+        if session is None:
+            layout.operator("risorius.live_start", icon="PLAY")
+            if capture.last_error():
+                words.write(layout, capture.last_error(), "ERROR")
+            return
+        row = layout.row(align=True)
+        row.operator("risorius.live_stop", icon="SNAP_FACE")
+        recording = session.recording is not None
+        text = "Finish Recording" if recording else "Record"
+        row.operator("risorius.live_record", text=text, icon="REC", depress=recording)
+        row = layout.row(align=True)
+        row.operator("risorius.live_neutral")
+        row.operator("risorius.live_neutral", text="", icon="X").forget = True
+        _draw_status(layout, session)
+
+
+def _where(chosen):
+    """What to type into the app."""
+    if not chosen.everywhere:
+        return f"Hears this computer only, at 127.0.0.1, port {chosen.port}."
+    address = capture.address() or "this computer's address"
+    return f"In the app: {address}, port {chosen.port}."
+
+
+def _draw_waiting(layout):
+    """The recordings that are no action yet."""
+    for index, recording in enumerate(capture.waiting()):
+        box = layout.box()
+        words = f"{recording.face}: {len(recording.take)} faces wait"
+        box.label(text=names.printable(words, 60), icon="REC")
+        row = box.row(align=True)
+        row.operator("risorius.live_finish").index = index
+        here = row.operator("risorius.live_finish", text="Finish Here")
+        here.index, here.at_current = index, True
+        row.operator("risorius.live_discard", text="", icon="TRASH").index = index
+
+
+def _draw_status(layout, session):
+    status = session.receiver.status(session.subject)
+    column = layout.column(align=True)
+    column.scale_y = 0.8
+    if not status.subject:
+        heard = "no face in what comes" if status.packets else "nothing heard yet"
+        column.label(text=f"Port {session.receiver.port}: {heard}", icon="INFO")
+    else:
+        column.label(text=f"{status.subject}: {status.per_second:.0f} a second", icon="USER")
+        column.label(text=f"Last face {status.age * 1000:.0f} ms ago", icon="BLANK1")
+    if session.recording is not None:
+        column.label(text=f"Recording: {len(session.recording.take)} faces", icon="REC")
+    for count, what in (
+        (status.lost, "Lost on the way"),
+        (status.late, "Late, left out"),
+        (status.refused, "Packets refused"),
+        (status.floods, "Floods"),
+    ):
+        if count:
+            column.label(text=f"{what}: {count}", icon="ERROR")
+    if status.reasons:
+        words.write(layout, names.printable(status.reasons[0][0], 120))
+    missed = session.shaper.unmapped
+    if missed:
+        words.write(layout, f"Not mapped: {names.printable(', '.join(missed), 120)}")
+    others = [s for s in status.subjects if s != status.subject]
+    for name in others[:8]:
+        layout.operator("risorius.live_subject", text=name, icon="USER").name = name
+
+
+CLASSES = (RISORIUS_PT_live,)

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the user chose for live capture."""
+
+import bpy
+
+from ... import native
+from ...scene.base import parts
+from ...scene.live import capture
+
+SOURCES = (
+    ("livelink", "Live Link Face", "Epic's app for iPhones and iPads, in its ARKit mode"),
+    ("osc", "VMC / OSC", "VMC performers, Face Cap, iFacialMocap by OSC, or plain /name value"),
+)
+PORTS = {"livelink": 11111, "osc": 39539}
+
+
+def _source_changed(self, _context):
+    self.port = PORTS[self.source]
+
+
+def _changed(_self, context):
+    session = capture.of(active_controls(context))
+    if session is not None:
+        capture.apply_settings(session, settings_of(context))
+
+
+class RISORIUS_PG_live(bpy.types.PropertyGroup):
+    """What the user chose; it goes with the window."""
+
+    source: bpy.props.EnumProperty(
+        name="Source", description="Who sends", items=SOURCES, update=_source_changed
+    )
+    port: bpy.props.IntProperty(
+        name="Port",
+        description="UDP port to listen at, the one that the app sends to",
+        default=PORTS["livelink"],
+        min=1,
+        max=65535,
+    )
+    everywhere: bpy.props.BoolProperty(
+        name="From the Network",
+        description="Hear any device of the network, as a phone needs; off: programs of this "
+        "computer alone. In a network that is not your own, others could move the face",
+        default=False,
+    )
+    subject: bpy.props.StringProperty(
+        name="Subject",
+        description="Whom to follow, by the name that the app sends; empty for the first heard",
+        update=_changed,
+    )
+    mapping: bpy.props.StringProperty(
+        name="Mapping",
+        description="File that says which controls a name moves; empty for ARKit's names and VRM's",
+        subtype="FILE_PATH",
+    )
+    smoothing: bpy.props.FloatProperty(
+        name="Smoothing",
+        description="Hold a still face still; a recording keeps what was sent",
+        default=0.3,
+        min=0.0,
+        max=1.0,
+        update=_changed,
+    )
+    gain: bpy.props.FloatProperty(
+        name="Gain",
+        description="Factor on all units of the face",
+        default=1.0,
+        min=0.0,
+        max=3.0,
+        update=_changed,
+    )
+    head_gain: bpy.props.FloatProperty(
+        name="Head",
+        description="Factor on the head's turn: 0 leaves the head alone, -1 turns it around",
+        default=1.0,
+        min=-2.0,
+        max=2.0,
+        update=_changed,
+    )
+
+
+def settings_of(context):
+    """The choices as scene/live/capture.py takes them."""
+    chosen = context.window_manager.risorius_live
+    return capture.Settings(
+        chosen.source,
+        chosen.port,
+        chosen.everywhere,
+        chosen.subject,
+        chosen.smoothing,
+        chosen.gain,
+        chosen.head_gain,
+        bpy.path.abspath(chosen.mapping) or "arkit",
+    )
+
+
+def active_controls(context):
+    rig = None if native.problem() else parts.active_rig(context)
+    return parts.controls_of(rig) if rig is not None else None
+
+
+CLASSES = (RISORIUS_PG_live,)

@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whether speech can be used: the package it needs, and the button that installs it."""
+
+import bpy
+
+from ... import native
+from ...scene.animation import speech_task
+from ..common import usable
+
+_OFFLINE = "Allow online access first: Preferences, System, Network."
+
+
+class RISORIUS_OT_install_speech(bpy.types.Operator):
+    """Download PocketSphinx (28 MB, with its model of English) for Speak from Audio"""
+
+    bl_idname = "risorius.install_speech"
+    bl_label = "Install PocketSphinx"
+
+    @classmethod
+    def poll(cls, _context):
+        if not usable(cls):
+            return False
+        if not bpy.app.online_access:
+            cls.poll_message_set(_OFFLINE)
+            return False
+        return True
+
+    def execute(self, _context):
+        try:
+            speech_task.install_recogniser()
+        except native.user_errors() as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        self.report({"INFO"}, "PocketSphinx is installed.")
+        return {"FINISHED"}
+
+
+def draw_preferences(layout):
+    """Whether speech works, and the button that makes it work."""
+    if speech_task.has_recogniser():
+        layout.label(text="Speak from Audio is ready.", icon="CHECKMARK")
+        return
+    layout.label(text="Speak from Audio needs the package PocketSphinx (28 MB).", icon="INFO")
+    if not bpy.app.online_access:
+        layout.label(text=_OFFLINE, icon="ERROR")
+    layout.operator(RISORIUS_OT_install_speech.bl_idname, icon="IMPORT")
+
+
+CLASSES = (RISORIUS_OT_install_speech,)

@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Speech: a sound file becomes movement of the face, and a strip that is heard with it."""
+
+from pathlib import Path
+
+import bpy
+from bpy_extras.io_utils import ImportHelper
+
+from ... import native
+from ...logic.animation.clip_units import ClipError
+from ...scene.animation import clip_actions, speech_task
+from ...scene.base import parts
+from .. import words
+from ..animation.operators import SOUNDS
+from ..animation.place_clip import PlacesClip
+from ..common import explain
+
+_MISSING = (
+    "Speech needs the package PocketSphinx: install it by the button in the add-on's preferences."
+)
+
+
+class RISORIUS_OT_speak(PlacesClip, bpy.types.Operator, ImportHelper):
+    """Let the active face say what is heard in a sound file; better with the words typed in"""
+
+    bl_idname = "risorius.speak"
+    bl_label = "Speak from Audio"
+    bl_options = {"REGISTER", "UNDO", "PRESET"}
+
+    filter_glob: bpy.props.StringProperty(
+        default=";".join(f"*{e}" for e in SOUNDS), options={"HIDDEN"}
+    )
+    transcript: bpy.props.StringProperty(
+        name="Transcript", description="What is said, in English; empty: listen for it"
+    )
+    transcript_text: bpy.props.StringProperty(
+        name="Text", description="A text of this file that holds the transcript"
+    )
+    intensity: bpy.props.FloatProperty(
+        name="Intensity", description="Of mouth and brows", default=1.0, min=0.0, max=4.0
+    )
+    seed: bpy.props.IntProperty(name="Seed", description="Of the blinks")
+    use_blinks: bpy.props.BoolProperty(name="Blinks", default=True)
+    use_accents: bpy.props.BoolProperty(
+        name="Accents", description="Brows and head follow what is stressed", default=True
+    )
+    use_whole_frames: bpy.props.BoolProperty(
+        name="Whole Frames",
+        description="A key at each frame of the scene; off: 60 a second, between frames",
+        default=True,
+    )
+    use_sound: bpy.props.BoolProperty(
+        name="Sound Strip", description="Add the sound to the sequencer", default=True
+    )
+
+    def invoke(self, context, event):
+        self._asynchronous = not bpy.app.background
+        self.start_with(context.scene)
+        if self.properties.is_property_set("filepath"):
+            return self.execute(context)
+        return ImportHelper.invoke(self, context, event)
+
+    def execute(self, context):
+        if not speech_task.has_recogniser():
+            self.report({"ERROR"}, _MISSING)
+            return {"CANCELLED"}
+        text = bpy.data.texts.get(self.transcript_text) if self.transcript_text else None
+        if self.transcript_text and text is None:
+            self.report({"ERROR"}, f"There is no text {self.transcript_text}.")
+            return {"CANCELLED"}
+        self._task = speech_task.Task(
+            self.filepath,
+            text.as_string() if text is not None else self.transcript,
+            intensity=self.intensity,
+            seed=self.seed,
+            blinks=self.use_blinks,
+            accents=self.use_accents,
+            # Made for these frames, not sampled at them: lips that meet shall meet on one.
+            rate=clip_actions.frame_rate(context.scene) if self.use_whole_frames else 60.0,
+        )
+        self._face = parts.active_rig(context).session_uid
+        # Adjusting the last operation calls this again, on the same operator.
+        asynchronous, self._asynchronous = getattr(self, "_asynchronous", False), False
+        if not asynchronous:
+            self._task.run()
+            return self._finish(context)
+        self._task.start()
+        manager = context.window_manager
+        manager.progress_begin(0, 100)
+        self._timer = manager.event_timer_add(0.1, window=context.window)
+        manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context, event):
+        if event.type == "ESC":
+            self.cancel(context)
+            self.report({"WARNING"}, "Speech was cancelled.")
+            return {"CANCELLED"}
+        if event.type == "TIMER":
+            share = round(self._task.share * 100)
+            context.window_manager.progress_update(share)
+            words = f"Listening to {Path(self.filepath).name}: {share} %, Esc cancels"
+            context.workspace.status_text_set(words)
+            if not self._task.is_running():
+                self._end(context)
+                return self._finish(context)
+        return {"PASS_THROUGH"}
+
+    def cancel(self, context):
+        """Blender calls this too, when it closes."""
+        self._task.cancel()
+        self._end(context)
+
+    def _end(self, context):
+        manager = context.window_manager
+        manager.event_timer_remove(self._timer)
+        manager.progress_end()
+        context.workspace.status_text_set(None)
+
+    def _finish(self, context):
+        """Put what was made onto the face. It may have gone while the thread worked."""
+        task = self._task
+        try:
+            if task.error is not None:
+                raise task.error
+            if not type(self).poll(context) or parts.active_rig(context).session_uid != self._face:
+                words = "The face that was to speak is no longer the active one: speak again."
+                self.report({"ERROR"}, words)
+                return {"CANCELLED"}
+            notes = [n for n in task.clip.metadata.get("notes", "").split("; ") if n]
+            name = Path(self.filepath).stem
+            self.place(context, task.clip, name, notes, whole=self.use_whole_frames)
+        except native.user_errors() as error:
+            self.report({"ERROR"}, explain(self.filepath, error))
+            return {"CANCELLED"}
+        self._add_sound(context)
+        return {"FINISHED"}
+
+    def _add_sound(self, context):
+        if not self.use_sound:
+            return
+        try:
+            clip_actions.add_sound(context.scene, self.filepath, self.start)
+        except ClipError as error:  # the face speaks all the same
+            self.report({"WARNING"}, explain(self.filepath, error))
+
+    def draw(self, _context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        self.draw_place(layout)
+        words.prop_or(layout, self, "transcript", "", "Empty: it is listened for")
+        layout.prop_search(self, "transcript_text", bpy.data, "texts")
+        for name in (
+            "intensity",
+            "seed",
+            "use_blinks",
+            "use_accents",
+            "use_sound",
+            "use_whole_frames",
+        ):
+            layout.prop(self, name)
+
+
+CLASSES = (RISORIUS_OT_speak,)
