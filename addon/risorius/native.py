@@ -18,6 +18,7 @@ else:
     _reason = ""
 
 _HERE = Path(__file__).parent
+ADDON = __package__  # what Blender calls this add-on, whatever folder asks
 
 
 @cache

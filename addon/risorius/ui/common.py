@@ -9,7 +9,6 @@ from ..logic.base import names
 from ..scene.base import parts
 from ..scene.character import runtime
 
-EXTENSION = __package__.rpartition(".")[0]  # what Blender calls the add-on
 MODES = (
     ("AUTO", "Automatic", "Real shape keys where a mesh has few, else the live sum"),
     ("LIVE", "Live Sum", "One shape key per mesh that is summed natively: fast"),

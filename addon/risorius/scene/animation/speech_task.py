@@ -79,8 +79,7 @@ def has_recogniser():
 
 def packages_folder():
     """Where packages lie that the user installed for the add-on."""
-    package = __package__.rpartition(".")[0]
-    return Path(bpy.utils.extension_path_user(package, path="packages", create=True))
+    return Path(bpy.utils.extension_path_user(native.ADDON, path="packages", create=True))
 
 
 class InstallError(FaceError, RuntimeError):

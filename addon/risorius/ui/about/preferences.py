@@ -8,7 +8,6 @@ import bpy
 import numpy as np
 
 from ... import native
-from ..common import EXTENSION
 from ..speech.install import draw_preferences
 
 
@@ -33,7 +32,7 @@ def self_test():
 
 
 class RISORIUS_Preferences(bpy.types.AddonPreferences):
-    bl_idname = EXTENSION
+    bl_idname = native.ADDON
 
     def draw(self, _context):
         works, text = self_test()

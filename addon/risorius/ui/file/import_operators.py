@@ -12,7 +12,7 @@ from ...scene.base import parts
 from ...scene.character import build, rig_placement
 from ...scene.frame import evaluate
 from .. import words
-from ..common import EXTENSION, MODES, explain, shown_progress, usable
+from ..common import MODES, explain, shown_progress, usable
 from . import framing
 
 FRAME_VIEW = bpy.props.BoolProperty(
@@ -191,7 +191,7 @@ class RISORIUS_OT_add_character(bpy.types.Operator):
         return usable(cls)
 
     def execute(self, context):
-        folder = Path(bpy.utils.extension_path_user(EXTENSION, path="sample", create=True))
+        folder = Path(bpy.utils.extension_path_user(native.ADDON, path="sample", create=True))
         path = folder / f"{self.person}-{native.addon_version()}.dna"
         if not path.is_file():
             trouble = _build_sample(path, folder, self.person)
