@@ -9,6 +9,7 @@ import subprocess
 import sys
 import wave
 import zipfile
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -572,6 +573,23 @@ def test_only_the_files_that_are_known_are_installed(shelf, tmp_path, monkeypatc
     monkeypatch.setattr(scene.submodule("logic.animation.recogniser"), "HASHES", (digest,))
     listening.install_recogniser()
     assert (tmp_path / "packages" / "pocketsphinx" / "__init__.py").exists()
+
+
+def test_what_was_installed_for_the_add_on_is_found_and_changes_no_search_path(monkeypatch):
+    listening = scene.submodule("scene.animation.speech_task")
+    folder = listening.packages_folder()
+    assert folder.parts[-4:] == (".user", "user_default", "risorius", "packages")
+    assert folder.is_dir()
+    outside = [place for place in sys.path if not (Path(place) / "pocketsphinx").is_dir()]
+    monkeypatch.setattr(sys, "path", outside)
+    assert not listening.has_recogniser()
+    (folder / "pocketsphinx").mkdir()
+    try:
+        (folder / "pocketsphinx" / "__init__.py").touch()
+        assert listening.has_recogniser()
+    finally:
+        shutil.rmtree(folder / "pocketsphinx")
+    assert sys.path == outside
 
 
 def test_without_a_network_the_button_says_so(shelf, monkeypatch):

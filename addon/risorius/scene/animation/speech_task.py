@@ -8,6 +8,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+from importlib.machinery import PathFinder
 from pathlib import Path
 
 import bpy
@@ -33,6 +34,9 @@ class Task:
         self._options = options
         self._cancelled = threading.Event()
         self._thread = threading.Thread(target=self.run, daemon=True)
+        folder = str(packages_folder())
+        if folder not in sys.path:
+            sys.path.append(folder)  # the process looks for packages where this one does
 
     def start(self):
         """Begin in a thread, which waits for the process and touches nothing of Blender's."""
@@ -70,11 +74,9 @@ class Task:
 
 def has_recogniser():
     """Whether the recogniser can be imported; what was installed for the add-on counts."""
-    folder = str(packages_folder())
-    if folder not in sys.path:
-        sys.path.append(folder)
     importlib.invalidate_caches()
-    return importlib.util.find_spec("pocketsphinx") is not None
+    places = [*sys.path, str(packages_folder())]
+    return PathFinder.find_spec("pocketsphinx", places) is not None
 
 
 def packages_folder():
