@@ -18,7 +18,7 @@ namespace risorius::bindings {
 namespace py = pybind11;
 
 void throw_error(const core::Error& error, const std::string& file = "", PyObject* type = nullptr);
-// A new class of errors below risorius.errors.RisoriusError; the caller keeps it for ever.
+// A new class of errors below risorius.base.errors.RisoriusError; the caller keeps it for ever.
 PyObject* new_error_type(const char* name, const char* doc);
 
 template <class T>

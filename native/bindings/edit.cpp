@@ -68,7 +68,7 @@ void bind_edit(py::module_& m) {
   m.def("regroup", &regroup, py::arg("dna"), py::kw_only(), py::arg("regions"),
         py::arg("translation_mm"), py::arg("rotation_degrees"), py::arg("scale"),
         py::arg("foreign_share"), py::arg("combinations"), py::arg("seed"), py::arg("timed"),
-        "(Dna, RegroupReport): see risorius.edit.regroup.");
+        "(Dna, RegroupReport): see risorius.rigs.edit.regroup.");
 }
 
 }  // namespace risorius::bindings

@@ -20,7 +20,7 @@ PyObject* dna_error_type = nullptr;
 }  // namespace
 
 PyObject* new_error_type(const char* name, const char* doc) {
-  const py::object family = py::module_::import("risorius.errors").attr("RisoriusError");
+  const py::object family = py::module_::import("risorius.base.errors").attr("RisoriusError");
   return PyErr_NewExceptionWithDoc(name, doc, family.ptr(), nullptr);
 }
 

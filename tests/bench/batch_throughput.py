@@ -23,8 +23,8 @@ from pathlib import Path
 
 import numpy as np
 import risorius
-from risorius.batch.baking import bake
-from risorius.batch.face import Face, load_face, played
+from risorius.baking.bake import bake
+from risorius.baking.face import Face, load_face, played
 from risorius.batch.jobs import read_jobs
 from risorius.batch.pool import default_workers
 from risorius.batch.running import run

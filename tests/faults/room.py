@@ -16,7 +16,8 @@ import numpy as np
 import risorius
 from bombs import MiB
 from conftest import GOLDEN
-from risorius import fileio, importing
+from risorius import importing
+from risorius.base import fileio
 
 CORE = GOLDEN / "core.dna"
 # A command that says when it listens to signals: before, Python itself would answer them.

@@ -25,7 +25,7 @@ from pathlib import Path
 import numpy as np
 import risorius
 from numpy.typing import NDArray
-from risorius import arkit
+from risorius.controls import arkit
 
 Floats = NDArray[np.float32]
 Ints = NDArray[np.int64]

@@ -18,12 +18,12 @@ import numpy as np
 import pytest
 import risorius
 from conftest import GOLDEN, PROJECT, no_room
-from risorius import fileio
+from risorius.baking.progress import Progress, clock
+from risorius.base import fileio
 from risorius.batch.cluster import Cluster
 from risorius.batch.jobs import JobsError, read_jobs
 from risorius.batch.journal import Journal
 from risorius.batch.pool import Pool, PoolError
-from risorius.batch.progress import Progress, clock
 from risorius.batch.work import run_job, stamp
 from risorius.cli import main
 from test_eval_clip import write_clip
@@ -626,7 +626,7 @@ class Terminal:
 
 def test_progress(monkeypatch):
     now = [0.0]
-    monkeypatch.setattr("risorius.batch.progress.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("risorius.baking.progress.time.monotonic", lambda: now[0])
     for terminal in (True, False):
         now[0] = 0.0
         shown = Terminal(terminal)

@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 import risorius
 from risorius import Clip, ClipError, importing
+from risorius.base.budget import BASE_BYTES, BYTES_PER_BYTE, Budget, BudgetError
 from risorius.batch.jobs import JobsError, read_jobs
-from risorius.budget import BASE_BYTES, BYTES_PER_BYTE, Budget, BudgetError
 from risorius.cli import main
 from risorius.importing import AnimationFileError, MappingError, process
 
@@ -330,7 +330,7 @@ def test_a_window_longer_than_any_face_needs_is_refused():
 
 
 def test_a_clip_that_unfolds_without_end_is_read_in_parts(monkeypatch):
-    monkeypatch.setattr(risorius.clip_file, "MOST_BYTES", MB)
+    monkeypatch.setattr(risorius.anim.clip_file, "MOST_BYTES", MB)
     packed = Clip([f"c{i}" for i in range(100)], np.zeros((100, 10_000)), 60.0).to_bytes()
     assert len(packed) * 32 < 2 * MB
     peak, error = peak_of(lambda: Clip.load(packed))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import risorius
 from risorius import cli
-from risorius.commands import bench
+from risorius.cli import bench
 
 MEDIUM = Path(__file__).parents[1] / "data" / "golden" / "medium.dna"
 

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from animation_files import COLUMNS, capture, live_link_face
 from conftest import GOLDEN
-from risorius import arkit, importing
+from risorius import importing
 from risorius.cli import main
+from risorius.controls import arkit
 
 RIG = "CTRL_expressions."
 

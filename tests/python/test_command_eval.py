@@ -8,7 +8,7 @@ import pytest
 import risorius
 from conftest import GOLDEN
 from risorius.cli import main
-from risorius.commands.eval import ATTRIBUTES
+from risorius.cli.eval import ATTRIBUTES
 
 FILE = str(GOLDEN / "core.dna")
 JAW = "CTRL_expressions.jawOpen"

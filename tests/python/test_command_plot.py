@@ -16,9 +16,10 @@ import pytest
 import risorius
 from conftest import GOLDEN, no_room
 from risorius.cli import main
-from risorius.commands.info import describe
-from risorius.plot import layers, matrix, regions, shade, skeleton
-from risorius.plot.facts import Facts, counts, gather
+from risorius.cli.info import describe
+from risorius.plot.content import layers, matrix, regions
+from risorius.plot.content.facts import Facts, counts, gather
+from risorius.plot.drawing import shade, skeleton
 
 FILES = sorted(path for path in GOLDEN.glob("*.dna"))
 NAMES = [path.stem for path in FILES]

@@ -16,8 +16,9 @@ import oracle
 import pytest
 import risorius
 from conftest import GOLDEN, SHARED, require_extra
-from risorius import _native, edit
+from risorius import _native
 from risorius.cli import main
+from risorius.rigs import edit
 from test_rig_random import assert_near, random_face, random_group, random_raw
 
 FILES = sorted(GOLDEN.glob("*.dna"))

@@ -8,8 +8,8 @@ import pkgutil
 import pytest
 import risorius
 from risorius import RisoriusError, cli
-from risorius.commands import info
-from risorius.commands.files import CommandLineError, InputError
+from risorius.cli import info
+from risorius.cli.files import CommandLineError, InputError
 from risorius.importing import AnimationFileError
 
 OLD_BASES = {

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import risorius
 from conftest import GOLDEN
-from risorius.batch import face as faces
+from risorius.baking import face as faces
 from risorius.cli import main
 
 FIELDS = {
@@ -88,7 +88,7 @@ def test_the_same_clip_gives_the_same_bytes(tmp_path):
 
 
 def test_large_arrays_wait_in_a_file(tmp_path, monkeypatch):
-    from risorius.batch import writing
+    from risorius.baking import writing
 
     monkeypatch.setattr(writing, "_SPOOL_BYTES", 1000)
     dna, rig, raw = random_clip(tmp_path / "clip.csv")

@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from risorius import expressions
+from risorius.anim.reactions import load_exclusives, load_reactions
 from risorius.expressions import VISEMES, Expression, Lack
-from risorius.reactions import load_exclusives, load_reactions
 
 EMOTIONS = {"joy", "sadness", "anger", "fear", "disgust", "surprise"}
 MORE = set(

@@ -12,7 +12,7 @@ import textwrap
 
 import pytest
 from conftest import no_room
-from risorius import fileio
+from risorius.base import fileio
 
 posix = pytest.mark.skipif(os.name == "nt", reason="of POSIX")
 
@@ -116,7 +116,7 @@ def test_rights_and_links_stay_and_the_mask_is_the_systems(tmp_path):
     path, link = tmp_path / "a", tmp_path / "link"
     done = run(
         "import os, sys; os.umask(0o027)\n"
-        "from risorius import fileio; fileio.write_text(sys.argv[1], 'new')",
+        "from risorius.base import fileio; fileio.write_text(sys.argv[1], 'new')",
         path,
     )
     assert done.returncode == 0, done.stderr

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from risorius import Layer, Mixer
-from risorius.idle import Life, idle, lid, make_blinks, make_saccades
+from risorius.anim.idle import Life, idle, lid, make_blinks, make_saccades
 
 P = "CTRL_expressions."
 EVENTS = [2.627142, 4.442169, 5.256676, 6.696148, 7.151234, 12.052773, 15.843215, 19.376299]

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 import risorius
 from conftest import GOLDEN
-from risorius import Clip, arkit, expressions, importing
+from risorius import Clip, expressions, importing
+from risorius.controls import arkit
 from risorius.importing.mapping import Mapping, apply_rows, loose_name, parse_mapping
 
 RIG = "CTRL_expressions."

@@ -76,7 +76,7 @@ def test_frames_of_live_link_face_arrive_with_their_times():
 
 def test_every_curve_of_a_packet_has_its_name():
     # The order of the packet, and the control that Apple's unit of that place is mapped to.
-    units = risorius.arkit.mapping()
+    units = risorius.controls.arkit.mapping()
     assert sorted(livelink.NAMES[:52]) == sorted(units)
     assert livelink.NAMES[15:17] == ("jawLeft", "jawRight")
     values = [(n + 1) / 100.0 for n in range(61)]
@@ -251,7 +251,7 @@ def test_vmc_applies_a_whole_face_at_once():
 
 
 def test_units_of_perfect_sync_are_not_doubled_by_vrm():
-    units = {n: 0.0 for n in list(risorius.arkit.mapping())[:20]} | {"JawOpen": 0.5}
+    units = {n: 0.0 for n in list(risorius.controls.arkit.mapping())[:20]} | {"JawOpen": 0.5}
     clip, _ = record("osc", ["bundle", vmc({**units, "A": 0.8, "mouthSmile_L": 0.25})])
     assert clip.curve("CTRL_expressions.jawOpen").tolist() == [0.5]
     assert clip.curve("CTRL_expressions.mouthCornerPullL").tolist() == [0.25]

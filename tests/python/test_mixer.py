@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 import risorius
 from risorius import Clip, Event, Layer, Mixer
-from risorius.mixer import load_exclusives, load_reactions
-from risorius.reactions import Exclusives, Reaction, ReactionPart, Yield
-from risorius.regions import REGIONS, mask, region_of
+from risorius.anim.mixer import load_exclusives, load_reactions
+from risorius.anim.reactions import Exclusives, Reaction, ReactionPart, Yield
+from risorius.controls.regions import REGIONS, mask, region_of
 from test_addon_logic import regions as addon_regions
 
 NAMES = ["CTRL_expressions.jawOpen", "browDownL", "browDownR", "mouthLeft", "mouthRight", "spare"]

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 import risorius
 from conftest import GOLDEN, PROJECT
-from risorius import Clip, arkit, cli
+from risorius import Clip, cli
+from risorius.controls import arkit
 
 SLOW = ("plot", "edit", "speech", "live", "sample", "bench")  # parsed, and tested elsewhere
 BLOCKS = re.findall(r"^```(\w*)\n(.*?)^```", (PROJECT / "README.md").read_text(), re.M | re.S)

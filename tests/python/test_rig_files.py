@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import risorius
 from conftest import GOLDEN
-from risorius import cache
+from risorius.rigs import cache
 
 FILE = GOLDEN / "core.dna"
 JAW = "CTRL_expressions.jawOpen"

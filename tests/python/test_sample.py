@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import risorius
 from conftest import _not_run, no_room
-from risorius.arkit import mapping
 from risorius.cli import main
+from risorius.controls.arkit import mapping
 from risorius.sample import build, expressions, people, polygons, source
 
 ARKIT = """browDownLeft browDownRight browInnerUp browOuterUpLeft browOuterUpRight cheekPuff
@@ -36,7 +36,7 @@ def test_the_mapping_holds_the_52_units_with_weights_up_to_one():
     for row in mapping().values():
         assert all(name.startswith("CTRL_expressions.") for name in row)
         assert all(0 < weight <= 1 for weight in row.values())
-    text = resources.files("risorius").joinpath("arkit.toml").read_text()
+    text = resources.files("risorius.controls").joinpath("arkit.toml").read_text()
     assert tomllib.loads(text)["prefix"] == "CTRL_expressions."
 
 

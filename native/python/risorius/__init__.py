@@ -50,11 +50,11 @@ from ._native import (
     parse_bytes,
     parse_file,
 )
-from .clip import Clip, Event
-from .clip_file import ClipError, ClipReader, ClipWriter
-from .errors import ArgumentError, RisoriusError
-from .idle import Life, idle
-from .mixer import Layer, Mixer
+from .anim.clip import Clip, Event
+from .anim.clip_file import ClipError, ClipReader, ClipWriter
+from .anim.idle import Life, idle
+from .anim.mixer import Layer, Mixer
+from .base.errors import ArgumentError, RisoriusError
 
 __version__ = "0.1.0"
 __all__ = [
@@ -211,4 +211,4 @@ def check(source: str | os.PathLike[str] | bytes, *, limits: Limits | None = Non
     return [Finding(*finding) for finding in found]
 
 
-from .cache import compile_cached  # noqa: E402  (it uses load)
+from .rigs.cache import compile_cached  # noqa: E402  (it uses load)

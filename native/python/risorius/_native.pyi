@@ -11,7 +11,7 @@ from typing import Any, SupportsFloat, SupportsIndex, SupportsInt, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from .errors import RisoriusError
+from .base.errors import RisoriusError
 
 _F32: TypeAlias = npt.NDArray[np.float32]
 _F64: TypeAlias = npt.NDArray[np.float64]
@@ -1114,7 +1114,7 @@ def regroup(
     seed: _Int,
     timed: _Int,
 ) -> tuple[Dna, RegroupReport]:
-    """(Dna, RegroupReport): see risorius.edit.regroup."""
+    """(Dna, RegroupReport): see risorius.rigs.edit.regroup."""
 
 class LayerCurves:
     """The curves of a layer, made ready for a list of controls."""

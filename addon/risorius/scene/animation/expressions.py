@@ -154,4 +154,4 @@ def _add_catalogs(path, wanted):
             title = f"{group[:1].upper()}{group[1:]}s"
             text = f"{text.rstrip()}\n{number}:{CATALOG}/{title}:{CATALOG}-{title}\n"
     # The file belongs to every .blend of the folder: it is whole at all times.
-    native.part("fileio").write_text(path, text)
+    native.part("base.fileio").write_text(path, text)

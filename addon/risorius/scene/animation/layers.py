@@ -355,7 +355,7 @@ def _idle_source(_controls, live, layer, rate):
     """Idle life of its length, or in a long loop that goes on for ever."""
     endless = not layer.length
     seconds = _IDLE_LOOP if endless else layer.length / rate
-    clip = native.part("idle").idle(layer.seed, seconds, loop=endless)
+    clip = native.part("anim.idle").idle(layer.seed, seconds, loop=endless)
     sliders = clip_actions.sliders_of(live)
     clip = clip.selected([name for name in clip.names if name in sliders])
     times = {"start": layer.start / rate}
@@ -376,7 +376,7 @@ def problems(controls, live, scene):
 
 def known_reactions():
     """Name -> what can be fired."""
-    return native.part("reactions").load_reactions()
+    return native.part("anim.reactions").load_reactions()
 
 
 def fits(controls, action):

@@ -452,7 +452,7 @@ def write_images(scene, folder):
     slots = [s for o in scene.objects if o.type == "MESH" for s in o.material_slots if s.material]
     trees = {s.material.node_tree for s in slots} - {None}
     images = {n.image for t in trees for n in t.nodes if n.type == "TEX_IMAGE" and n.image}
-    write_bytes = native.part("fileio").write_bytes
+    write_bytes = native.part("base.fileio").write_bytes
     for image in images:
         folder.mkdir(exist_ok=True)
         write_bytes(folder / PurePath(image.filepath_raw).name, image.packed_file.data)

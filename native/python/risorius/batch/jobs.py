@@ -13,11 +13,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from risorius import importing, toml
-from risorius.errors import RisoriusError
+from risorius import importing
+from risorius.base import toml
+from risorius.base.errors import RisoriusError
 
-from .baking import DEFAULT_PARTS, KINDS
-from .face import PARTS
+from ..baking.bake import DEFAULT_PARTS, KINDS
+from ..baking.face import PARTS
 
 FIELDS = ("clip", "character", "lod", "folder", "character_folder")
 DEFAULT_NAME = "{character}/lod{lod}/{folder}/{clip}"

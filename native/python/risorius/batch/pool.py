@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..errors import RisoriusError
+from ..base.errors import RisoriusError
 from .jobs import Job
 from .outcome import Outcome
 

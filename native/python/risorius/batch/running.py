@@ -13,15 +13,15 @@ from typing import Any
 
 import risorius
 
-from .. import fileio
-from ..locking import locked
+from ..baking.progress import Progress, clock
+from ..base import fileio
+from ..base.locking import locked
 from . import summary
 from .cluster import Cluster
 from .jobs import Job, Plan
 from .journal import Journal
 from .outcome import Outcome
 from .pool import Pool, default_workers
-from .progress import Progress, clock
 from .work import run_job
 
 

@@ -16,12 +16,12 @@ from typing import Generic, TypeVar
 
 import risorius
 from risorius._native import compile_version, rig_block_version
-from risorius.errors import sentence
+from risorius.base.errors import sentence
 
-from .baking import bake
-from .clips import Performance, load_performance
-from .face import Face, load_face, prepared
-from .files import digest
+from ..baking.bake import bake
+from ..baking.clips import Performance, load_performance
+from ..baking.face import Face, load_face, prepared
+from ..baking.files import digest
 from .jobs import Job
 from .outcome import Outcome
 

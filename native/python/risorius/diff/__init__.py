@@ -11,7 +11,7 @@ import warnings
 
 import risorius
 
-from . import (
+from .layers import (
     container,
     controls,
     definition,
@@ -23,8 +23,8 @@ from . import (
     rbf,
     rotations,
 )
-from .comparison import Comparison
-from .report import Difference, Report
+from .pairing.comparison import Comparison
+from .pairing.report import Difference, Report
 
 __all__ = ["Difference", "compare"]
 

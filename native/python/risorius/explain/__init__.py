@@ -13,8 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 import risorius
-from risorius.errors import ArgumentError
+from risorius.base.errors import ArgumentError
 
+from ..controls.control_names import ControlNames, Meaning, UnknownControlError, find_controls
 from .behavior import (
     explain_correctives,
     explain_maps,
@@ -23,7 +24,6 @@ from .behavior import (
     explain_setups,
     explain_shapes,
 )
-from .control_names import ControlNames, Meaning, UnknownControlError, find_controls
 from .joints import bone_length, explain_joints
 from .solvers import explain_solvers
 from .words import page

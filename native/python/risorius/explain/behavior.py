@@ -11,8 +11,8 @@ import numpy as np
 
 import risorius
 
-from .control_names import ControlNames, named
-from .rotation import Doubles
+from ..controls.control_names import ControlNames, named
+from ..rigs.rotation import Doubles
 
 Facts = dict[str, Any]
 

@@ -12,8 +12,8 @@ import numpy.typing as npt
 import risorius
 from risorius import _native
 
-from .control_names import ControlNames, named
-from .rotation import SEQUENCES, Convention, Doubles, angle_degrees, product
+from ..controls.control_names import ControlNames, named
+from ..rigs.rotation import SEQUENCES, Convention, Doubles, angle_degrees, product
 
 # Key of a contribution: a control's index, or what moves a joint by several controls at once.
 Key = int | str

@@ -10,8 +10,8 @@ import numpy as np
 
 import risorius
 
-from .control_names import ControlNames
-from .rotation import Doubles
+from ..controls.control_names import ControlNames
+from ..rigs.rotation import Doubles
 
 _METHODS = ("euclidean", "quaternion", "swing angle", "twist angle")
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
-from .control_names import last_part
+from ..controls.control_names import last_part
 
 Facts = dict[str, Any]
 T = TypeVar("T")

@@ -17,9 +17,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from .. import toml
-from ..errors import ArgumentError
-from ..reactions import named_weights, read_toml
+from ..anim.reactions import named_weights, read_toml
+from ..base import toml
+from ..base.errors import ArgumentError
 
 FILES = ("emotions.toml", "visemes.toml", "faces.toml")
 VISEMES = ("sil", "PP", "FF", "TH", "DD", "kk", "CH", "SS", "nn", "RR", "aa", "E", "I", "O", "U")

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from ..errors import RisoriusError
+from ..base.errors import RisoriusError
 
 
 class AnimationFileError(RisoriusError):

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..budget import Budget
+from ..base.budget import Budget
 from .errors import AnimationFileError
 from .keys import CONSTANT, CUBIC, LINEAR, Keys, on_one_clock
 from .source import Take, keep_ascending, make_clip

@@ -15,7 +15,7 @@ from urllib.parse import unquote
 import numpy as np
 import numpy.typing as npt
 
-from ..budget import Budget
+from ..base.budget import Budget
 from . import named_json
 from .errors import AnimationFileError
 from .keys import CONSTANT, CUBIC, LINEAR, Keys, on_one_clock

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from ..budget import Budget
+from ..base.budget import Budget
 
 Doubles = npt.NDArray[np.float64]
 Bytes = npt.NDArray[np.uint8]

@@ -20,10 +20,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .. import arkit, expressions, toml
-from ..budget import Budget
-from ..clip import Clip
-from ..regions import expand_sides
+from .. import expressions
+from ..anim.clip import Clip
+from ..base import toml
+from ..base.budget import Budget
+from ..controls import arkit
+from ..controls.regions import expand_sides
 from .errors import AnimationFileError
 
 Doubles = npt.NDArray[np.float64]
@@ -321,7 +323,7 @@ def parse_mapping(text: str, where: str, name: str = "") -> Mapping:
 
 
 def _base(table: Table[str, Any], where: str) -> Mapping:
-    """The mapping whose rows come first; "arkit units" are those of risorius/arkit.toml."""
+    """The mapping whose rows come first; "arkit units" are those of controls/arkit.toml."""
     base = _text(table, "base", where)
     if not base:
         return Mapping("")

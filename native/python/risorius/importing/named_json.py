@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..budget import Budget
-from ..clip import Event
+from ..anim.clip import Event
+from ..base.budget import Budget
 from .errors import AnimationFileError
 from .keys import VALUE_BYTES, Keys, on_one_clock
 from .source import Take, keep_ascending, make_clip

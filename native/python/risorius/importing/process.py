@@ -9,9 +9,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from ..budget import Budget
-from ..clip import Clip, Event
-from ..errors import ArgumentError
+from ..anim.clip import Clip, Event
+from ..base.budget import Budget
+from ..base.errors import ArgumentError
 from .mapping import ANGLES, fits
 
 Doubles = npt.NDArray[np.float64]

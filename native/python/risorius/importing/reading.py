@@ -12,9 +12,9 @@ from typing import NamedTuple, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from ..budget import Budget
-from ..clip import Clip
-from ..errors import ArgumentError
+from ..anim.clip import Clip
+from ..base.budget import Budget
+from ..base.errors import ArgumentError
 from . import fbx, gltf, named_json, tables, visemes
 from .errors import AnimationFileError
 from .keys import Keys, on_one_clock

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from ..clip import Clip, Event
+from ..anim.clip import Clip, Event
 from .errors import AnimationFileError
 
 Doubles = npt.NDArray[np.float64]

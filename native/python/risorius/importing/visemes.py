@@ -13,8 +13,8 @@ from xml.parsers import expat
 import numpy as np
 import numpy.typing as npt
 
-from ..budget import Budget
-from ..clip import Clip, Event
+from ..anim.clip import Clip, Event
+from ..base.budget import Budget
 from .errors import AnimationFileError
 from .keys import VALUE_BYTES
 from .source import Take, number

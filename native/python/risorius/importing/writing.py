@@ -10,9 +10,9 @@ import os
 
 import numpy as np
 
-from .. import fileio
-from ..clip import Clip
-from ..errors import ArgumentError
+from ..anim.clip import Clip
+from ..base import fileio
+from ..base.errors import ArgumentError
 
 
 def csv_text(clip: Clip) -> str:

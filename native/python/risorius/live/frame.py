@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ..errors import RisoriusError
+from ..base.errors import RisoriusError
 
 Floats = npt.NDArray[np.float32]
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .. import toml
+from ..base import toml
 from ..importing import Mapping, load_mapping
 from .frame import Floats, Frame
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..clip import Clip
+from ..anim.clip import Clip
 from .frame import Frame
 from .shaping import Plan, Shaper
 

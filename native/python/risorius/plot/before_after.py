@@ -9,10 +9,10 @@ import textwrap
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure, SubFigure
 
-from . import draw_matrix
-from .facts import Facts
-from .paper import INK, MUTED, settings
-from .regions import COLORS
+from .content.facts import Facts
+from .content.regions import COLORS
+from .drawing import draw_matrix
+from .drawing.paper import INK, MUTED, settings
 from .sheet import panel, split
 
 # Inches.

@@ -11,11 +11,12 @@ from collections.abc import Callable
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
-from . import draw_face, draw_lods, draw_matrix, draw_sizes, words
-from .facts import Facts, counts, descriptor
+from .content import words
+from .content.facts import Facts, counts, descriptor
+from .content.regions import COLORS
+from .drawing import draw_face, draw_lods, draw_matrix, draw_sizes
+from .drawing.paper import ACCENT, INK, MUTED, RULE, Canvas, settings
 from .page_parts import SCRIPT, STYLE
-from .paper import ACCENT, INK, MUTED, RULE, Canvas, settings
-from .regions import COLORS
 
 _VARIABLES = {INK: "--ink", MUTED: "--muted", RULE: "--rule", ACCENT: "--accent"}
 _WIDTH = 12.4  # inches

@@ -11,10 +11,11 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure, FigureBase, SubFigure
 
-from . import draw_face, draw_lods, draw_matrix, draw_sizes, words
-from .facts import Facts, descriptor
-from .paper import INK, MUTED, RULE, Canvas, settings
-from .regions import COLORS
+from .content import words
+from .content.facts import Facts, descriptor
+from .content.regions import COLORS
+from .drawing import draw_face, draw_lods, draw_matrix, draw_sizes
+from .drawing.paper import INK, MUTED, RULE, Canvas, settings
 
 # Inches. The face is as wide as two views of a head at the height of the matrix.
 WIDTH, HEAD, UPPER, LOWER = 22.0, 1.15, 9.6, 5.9

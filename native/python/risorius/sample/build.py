@@ -18,8 +18,8 @@ from .. import (
     JointGroup,
     Mesh,
     Psds,
-    fileio,
 )
+from ..base import fileio
 from . import expressions as ex
 from .controls import gui_table
 from .paint import paint_textures

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..arkit import mapping
+from ..controls.arkit import mapping
 from .polygons import Floats
 from .source import TARGETS, Source
 

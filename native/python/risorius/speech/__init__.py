@@ -12,8 +12,8 @@ import os
 
 import numpy as np
 
-from ..clip import Clip, Event
-from ..errors import ArgumentError
+from ..anim.clip import Clip, Event
+from ..base.errors import ArgumentError
 from . import articulation, gestures, prosody
 from .audio import RATE, AudioError
 from .listening import Cancel, CancelledError, Heard, Progress, listen

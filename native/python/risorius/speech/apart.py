@@ -30,8 +30,8 @@ from typing import IO, Any
 
 import numpy as np
 
-from ..clip import Clip, Event
-from ..errors import ArgumentError, RisoriusError
+from ..anim.clip import Clip, Event
+from ..base.errors import ArgumentError, RisoriusError
 from . import speak
 from .audio import AudioError
 from .listening import Cancel, CancelledError, Progress

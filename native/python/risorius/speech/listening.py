@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ..errors import ArgumentError, RisoriusError
+from ..base.errors import ArgumentError, RisoriusError
 from . import text, voting
 from .audio import RATE, Samples, read_audio, resample
 from .phones import Phoneme

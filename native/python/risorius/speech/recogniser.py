@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import RisoriusError
+from ..base.errors import RisoriusError
 from . import letters
 from .audio import RATE, Samples
 from .phones import Phoneme, viseme_of

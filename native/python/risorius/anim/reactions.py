@@ -1,0 +1,202 @@
+# SPDX-License-Identifier: MIT
+"""Reactions that a Mixer fires and rules of controls that exclude each other, read from TOML."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..base import toml
+from ..base.errors import ArgumentError
+from ..controls.regions import expand_sides
+
+Index = Mapping[str, int]
+_Part = tuple[npt.NDArray[np.uint32], npt.NDArray[np.float32], float, float, float, float]
+_Yield = tuple[npt.NDArray[np.uint32], npt.NDArray[np.uint32], str, float]
+
+
+@dataclass(frozen=True)
+class ReactionPart:
+    """Controls that go the same way in time; see Reaction."""
+
+    weights: Mapping[str, float]
+    """By control, in [0, 1]: the share of the way to 1, or to its upper limit if that is less."""
+    delay: float = 0.0
+    """Seconds from the firing; so are the others."""
+    attack: float = 0.1
+    hold: float = 0.0
+    release: float = 0.3
+
+
+@dataclass(frozen=True)
+class Reaction:
+    """Something a face does by itself and takes back; up and down it goes x * x * (3 - 2 * x)."""
+
+    name: str
+    parts: tuple[ReactionPart, ...]
+    label: str = ""
+    description: str = ""
+
+    @property
+    def duration(self) -> float:
+        """Seconds until everything is at rest again."""
+        return max((p.delay + p.attack + p.hold + p.release for p in self.parts), default=0.0)
+
+    def parts_of(self, index: Index) -> list[_Part]:
+        """The parts as the native mixer takes them, without the controls that are not there."""
+        out = []
+        for p in self.parts:
+            there = {index[name]: weight for name, weight in p.weights.items() if name in index}
+            controls = np.array(list(there), np.uint32)
+            weights = np.array(list(there.values()), np.float32)
+            out.append((controls, weights, p.delay, p.attack, p.hold, p.release))
+        return out
+
+
+@dataclass(frozen=True)
+class Yield:
+    """While `by` are on, `of` are taken down: of *= 1 - amount * measure(by)."""
+
+    name: str
+    by: tuple[str, ...]
+    of: tuple[str, ...]
+    measure: str = "max"
+    """ "max", "min" or "mean" of `by`, each first clamped to [0, 1]."""
+    amount: float = 1.0
+
+
+@dataclass(frozen=True)
+class Exclusives:
+    """Rules of controls that exclude each other."""
+
+    yields: tuple[Yield, ...] = ()
+    opposites: tuple[tuple[str, str], ...] = field(default=())
+    """Pairs: what both have is taken from both."""
+
+    def rules_of(self, index: Index) -> tuple[list[_Yield], list[tuple[int, int]]]:
+        """The rules as the native mixer takes them, without the controls that are not there."""
+
+        def there(names: tuple[str, ...]) -> npt.NDArray[np.uint32]:
+            return np.array([index[name] for name in names if name in index], np.uint32)
+
+        yields = [(there(y.by), there(y.of), y.measure, y.amount) for y in self.yields]
+        pairs = [(index[a], index[b]) for a, b in self.opposites if a in index and b in index]
+        return [y for y in yields if len(y[0]) and len(y[1])], pairs
+
+
+def load_reactions(path: str | os.PathLike[str] | None = None) -> dict[str, Reaction]:
+    """Reactions by name, from a file such as risorius/anim/reactions.toml, which is the default.
+
+    Raises:
+        ValueError: the file, what was found and what was expected.
+    """
+    table, where = _read(path, "reactions.toml")
+    prefix = table.get("prefix", "")
+    rows = {name: row for name, row in table.items() if name != "prefix"}
+    return {name: _reaction(name, row, prefix, where) for name, row in rows.items()}
+
+
+def load_exclusives(path: str | os.PathLike[str] | None = None) -> Exclusives:
+    """Rules from a file such as risorius/anim/exclusives.toml, which is the default.
+
+    Raises:
+        ValueError: the file, what was found and what was expected.
+    """
+    table, where = _read(path, "exclusives.toml")
+    prefix = table.get("prefix", "")
+    try:
+        yields = tuple(
+            Yield(
+                row.get("name", ""),
+                _names(row["by"], prefix),
+                _names(row["of"], prefix),
+                row.get("measure", "max"),
+                float(row.get("amount", 1.0)),
+            )
+            for row in table.get("yields", [])
+        )
+        rows = table.get("opposites", {}).get("pairs", [])
+        pairs = tuple((prefix + a, prefix + b) for a, b in rows)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise ArgumentError(
+            f"{where}: yields with by and of, and pairs of opposites were expected: {error!r}"
+        ) from None
+    return Exclusives(yields, pairs)
+
+
+def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """A TOML file. Raises: ValueError with the file's name; OSError."""
+    try:
+        return toml.parse(Path(path).read_text(encoding="utf-8"))
+    except (toml.TomlError, UnicodeDecodeError) as error:
+        raise ArgumentError(f"{os.fspath(path)}: a TOML file was expected: {error}") from None
+
+
+def named_weights(table: Mapping[str, Any], prefix: str, where: str) -> dict[str, float]:
+    """{control: weight} with both sides of what ends in *; a name given in full counts more.
+
+    Args:
+        table: name -> weight, out of a TOML file.
+        prefix: stands before the name of each control in the result.
+        where: what errors call the table.
+
+    Raises:
+        ValueError: a weight that is no number in [0, 1].
+    """
+    out: dict[str, float] = {}
+    for name in sorted(table, key=lambda name: -name.count("*")):
+        weight = table[name]
+        if isinstance(weight, bool) or not isinstance(weight, int | float) or not 0 <= weight <= 1:
+            raise ArgumentError(
+                f"{where}: {name}: a weight from 0 to 1 was expected, found {weight!r}"
+            )
+        for control in expand_sides(name):
+            out[prefix + control] = float(weight)
+    return out
+
+
+def _read(path: str | os.PathLike[str] | None, own: str) -> tuple[dict[str, Any], str]:
+    return (_own(own), own) if path is None else (read_toml(path), os.fspath(path))
+
+
+@cache
+def _own(file: str) -> dict[str, Any]:
+    """Read once: every new mixer asks for it."""
+    text = resources.files(__package__).joinpath(file).read_text(encoding="utf-8")
+    return toml.parse(text)
+
+
+def _names(names: list[str], prefix: str) -> tuple[str, ...]:
+    return tuple(prefix + full for name in names for full in expand_sides(name))
+
+
+def _reaction(name: str, row: Any, prefix: str, where: str) -> Reaction:
+    if not isinstance(row, dict) or not row.get("parts"):
+        raise ArgumentError(f"{where}: {name}: a table with parts was expected, found {row!r}")
+    parts = []
+    for number, part in enumerate(row["parts"]):
+        place = f"{where}: {name}.parts[{number}]"
+        times = {key: part[key] for key in ("delay", "attack", "hold", "release") if key in part}
+        for key, seconds in times.items():
+            lowest = "above 0" if key in ("attack", "release") else "from 0"
+            number_given = isinstance(seconds, int | float) and not isinstance(seconds, bool)
+            if not number_given or seconds < 0 or (lowest == "above 0" and seconds == 0):
+                raise ArgumentError(
+                    f"{place}.{key}: seconds {lowest} were expected, found {seconds!r}"
+                )
+        unknown = set(part) - set(times) - {"weights"}
+        if unknown or not part.get("weights"):
+            found = sorted(unknown)[0] if unknown else "no weights"
+            raise ArgumentError(
+                f"{place}: delay, attack, hold, release and weights were expected, found {found}"
+            )
+        parts.append(ReactionPart(named_weights(part["weights"], prefix, place), **times))
+    return Reaction(name, tuple(parts), row.get("label", name), row.get("description", ""))

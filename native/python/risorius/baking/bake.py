@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: MIT
+"""A clip on a character, evaluated and written."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, Protocol
+
+import risorius
+
+from ..base.fileio import replacing
+from ..batch.measure import Measure
+from .face import PARTS, Chunk, Face, played
+from .writing import CsvWriter, NpzWriter, about, find_moving
+
+KINDS = ("npz", "csv", "rzc")
+DEFAULT_PARTS = PARTS[:3]
+
+
+class Sink(Protocol):
+    """What takes the frames in their order."""
+
+    def add(self, chunk: Chunk) -> None: ...
+    def finish(self) -> None: ...
+
+
+def bake(
+    clip: risorius.Clip,
+    face: Face,
+    lod: int,
+    outputs: dict[str, Path],
+    *,
+    parts: Sequence[str] = DEFAULT_PARTS,
+    compress: bool = False,
+    threads: int = 1,
+    progress: Callable[[int], None] = lambda frame: None,
+) -> dict[str, Any]:
+    """Evaluate every frame, in bounded memory, and write what is asked for, whole or not at all.
+
+    Args:
+        clip: already resampled and cut, see prepared.
+        face, lod: of whom.
+        outputs: "npz", "csv" or "rzc" (the clip itself) -> path; none for the facts only. What
+            killed processes left beside them stays, see fileio.sweep.
+        parts: of PARTS, what the files shall hold.
+        compress: make an .npz smaller, and several times slower.
+        threads: that evaluate; 0 is all cores.
+        progress: called with the number of frames that are done.
+
+    Returns:
+        The facts of Measure, and "evaluation_seconds", the time that the evaluator itself took.
+
+    Raises:
+        ValueError: the character has no such LOD.
+        OSError: a file cannot be written.
+    """
+    face.check_lod(lod)
+    measure = Measure(clip, face)
+    evaluation = 0.0
+    with contextlib.ExitStack() as stack:
+        sinks: list[Sink] = [measure]
+        for kind, path in outputs.items():
+            path.parent.mkdir(parents=True, exist_ok=True)
+            file = stack.enter_context(replacing(path, sweep=False))
+            if kind == "npz":
+                npz = NpzWriter(file, about(clip, face, lod, parts), face, parts, compress)
+                sinks.append(stack.enter_context(npz))
+            elif kind == "csv":
+                moving = find_moving(face, played(clip, face, lod, threads), parts)
+                sinks.append(CsvWriter(file, face, clip.frame_times(), moving))
+            else:
+                file.write(clip.to_bytes())
+        chunks = played(clip, face, lod, threads)
+        while True:
+            started = time.perf_counter()
+            chunk = next(chunks, None)
+            evaluation += time.perf_counter() - started
+            if chunk is None:
+                break
+            for sink in sinks:
+                sink.add(chunk)
+            progress(chunk.first + len(chunk.pose.joints))
+        for sink in sinks:
+            sink.finish()
+    return measure.facts() | {"evaluation_seconds": evaluation}

@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: MIT
+"""A character as an animation is computed for it, and the clip made ready for it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+import risorius
+from risorius.base.errors import ArgumentError
+from risorius.controls.control_names import ControlNames
+
+Floats = npt.NDArray[np.float32]
+PARTS = ("joints", "shapes", "maps", "controls")
+FIELDS = {
+    "joints": "joints",
+    "shapes": "blend_shapes",
+    "maps": "animated_maps",
+    "controls": "controls",
+}
+"""What users call the parts of a Pose -> its fields."""
+_LAYERS = ("behavior", "machine_learned_behavior", "rbf_behavior")
+_CHUNK_BYTES = 8 << 20  # poses that stay in a processor's cache are several times as fast to use
+
+
+@dataclass(frozen=True)
+class Face:
+    """A compiled character with the names of all that a pose of it holds."""
+
+    name: str
+    rig: risorius.Rig
+    names: dict[str, list[str]]
+    """By part: one for each joint, channel, map and control; each once in its list."""
+    translation_unit: str
+    rotation_unit: str
+    psd_range: tuple[int, int]
+    """Of the correctives among the controls: first, end."""
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """What a joint's numbers are."""
+        turn = ("qx", "qy", "qz", "qw") if self.rig.rotation == "quaternion" else ("rx", "ry", "rz")
+        return ("tx", "ty", "tz", *turn, "sx", "sy", "sz")
+
+    def rest(self, part: str) -> Floats:
+        """What a part is when nothing moves: float32[joints, columns] or [count]."""
+        if part == "joints":
+            joint = np.array([name == "qw" for name in self.columns], np.float32)
+            return np.tile(joint, (self.rig.joint_count, 1))
+        rest = np.zeros(len(self.names[part]), np.float32)
+        if part == "controls":
+            raw = self.rig.initial_raw_controls
+            rest[: len(raw)] = raw
+        return rest
+
+    def check_lod(self, lod: int) -> None:
+        """Raises: ValueError: the character has no such LOD."""
+        last = max(1, self.rig.lod_count) - 1
+        if not 0 <= lod <= last:
+            raise ArgumentError(f"{self.name}: a LOD from 0 to {last} was expected, found {lod}")
+
+
+def load_face(path: Path, *, quaternions: bool = False) -> Face:
+    """The character of a DNA file, compiled or from this user's cache of compiled faces.
+
+    Args:
+        path: of the DNA file.
+        quaternions: rotations of joints are quaternions; else Euler angles in the file's unit.
+
+    Raises:
+        DnaError: it is none.
+    """
+    rig = risorius.compile_cached(path, rotation="quaternion" if quaternions else "euler")
+    dna = risorius.load(path, layers=_LAYERS)
+    controls = ControlNames(dna)
+    names = {
+        "joints": _each_once(dna.joint_names, rig.joint_count, "joint"),
+        "shapes": _each_once(dna.blend_shape_channel_names, rig.blend_shape_count, "channel"),
+        "maps": _each_once(dna.animated_map_names, rig.animated_map_count, "map"),
+        "controls": _each_once(controls.names, rig.control_count, "control"),
+    }
+    psds = (controls.psd_begin, controls.psd_end)
+    return Face(path.stem, rig, names, dna.translation_unit, dna.rotation_unit, psds)
+
+
+def _each_once(names: list[str], count: int, kind: str) -> list[str]:
+    """Names of all things of a kind; one without a name or with another's gets its index."""
+    out: list[str] = []
+    seen: set[str] = set()
+    for index in range(count):
+        name = (names[index] if index < len(names) else "") or f"{kind} {index}"
+        name = f"{name}#{index}" if name in seen else name
+        seen.add(name)
+        out.append(name)
+    return out
+
+
+def prepared(
+    clip: risorius.Clip, rate: float | None, frames: tuple[int | None, int | None]
+) -> risorius.Clip:
+    """The frames of a clip that are asked for.
+
+    Args:
+        clip: any.
+        rate: frames per second to resample it to; None leaves it as it is.
+        frames: first and end (not included), counted from 0 after resampling; what lies beyond the
+            clip's end is not there.
+
+    Raises:
+        ValueError: no frame is left.
+    """
+    found = clip.frame_count
+    if rate is not None:
+        clip = clip.resampled(rate)
+    part = slice(*frames)
+    if part != slice(None):
+        times = clip.frame_times()[part]
+        clip = clip.replaced(
+            curves=clip.curves[:, part],
+            times=None if clip.times is None else times,
+            start=float(times[0]) if times.size else clip.start,
+        )
+    if not clip.frame_count:
+        raise ArgumentError(f"a clip with frames was expected, found {found}, of them 0 asked for")
+    return clip
+
+
+class Chunk(NamedTuple):
+    """Some frames in a row."""
+
+    first: int
+    pose: risorius.Pose
+    """Each field has a leading [frames]."""
+
+
+def missing(clip: risorius.Clip, face: Face) -> list[str]:
+    """The names of the curves of clip that move nothing: face has no raw control so named."""
+    have = set(face.rig.raw_control_names)
+    return [name for name in clip.names if name not in have]
+
+
+def played(clip: risorius.Clip, face: Face, lod: int, threads: int = 1) -> Iterator[Chunk]:
+    """The poses of every frame, in chunks of a size that depends on the character only.
+
+    Controls without a curve are at rest. A frame is Rig.evaluate of its controls, bit for bit.
+
+    Args:
+        clip: curves of raw controls; those that the character has no control for are passed over.
+        face: of `load_face`.
+        lod: from 0, below the character's number of LODs.
+        threads: that evaluate at once; a chunk has as many times more frames.
+    """
+    place = {name: i for i, name in enumerate(face.rig.raw_control_names)}
+    rows = [i for i, name in enumerate(clip.names) if name in place]
+    columns = [place[clip.names[i]] for i in rows]
+    rest = face.rig.initial_raw_controls
+    size = chunk_frames(face) * max(1, threads)
+    raw = np.tile(rest, (min(size, clip.frame_count), 1))
+    for first in range(0, clip.frame_count, size):
+        count = min(size, clip.frame_count - first)
+        raw[:count, columns] = clip.curves[rows, first : first + count].T
+        yield Chunk(first, face.rig.evaluate_batch(raw[:count], lod=lod, threads=threads))
+
+
+def chunk_frames(face: Face) -> int:
+    """Frames that are evaluated at a time by a thread."""
+    numbers = face.rig.joint_count * len(face.columns) + face.rig.control_count
+    numbers += face.rig.blend_shape_count + face.rig.animated_map_count
+    return int(np.clip(_CHUNK_BYTES // (4 * max(1, numbers)), 16, 1024))

@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: MIT
+"""The command line, and the one place that prints errors: a sentence on the standard error.
+
+Exit codes: 0 done, 1 the input is bad, 2 the command line is bad, 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import errno
+import io
+import os
+import sys
+from collections.abc import Sequence
+
+from .. import __version__
+from ..base.errors import RisoriusError, sentence
+from . import (
+    batch,
+    bench,
+    check,
+    clip,
+    convert,
+    edit,
+    info,
+    live,
+    plot,
+    sample,
+    speech,
+)
+from . import eval as evaluate
+from .files import CommandLineError
+
+INTERRUPTED = 130
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command. Args: the arguments, else those of the process. Returns: the exit code."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # names need not be text that a terminal can show
+            stream.reconfigure(errors="backslashreplace")
+    try:
+        args = parse(arguments)
+        code = int(args.func(args))
+        sys.stdout.flush()
+    except BrokenPipeError:  # who read has enough
+        _drop_output()
+        return 0
+    except KeyboardInterrupt as interrupt:
+        return _say(str(interrupt) or "interrupted", INTERRUPTED)
+    except (RisoriusError, OSError, MemoryError) as error:
+        place = ""
+        if isinstance(error, OSError) and error.filename is None and error.errno == errno.ENOSPC:
+            place = "<stdout>: "  # the writers of files say their names
+            _drop_output()
+        return _say(place + sentence(error), 2 if isinstance(error, CommandLineError) else 1)
+    return code
+
+
+def _say(text: str, code: int) -> int:
+    with contextlib.suppress(OSError):  # there may be nobody to say it to
+        print(f"risorius: {text}", file=sys.stderr, flush=True)
+    return code
+
+
+def _drop_output() -> None:
+    """Let nothing that is still buffered fail again when the interpreter ends."""
+    with contextlib.suppress(OSError, ValueError):  # a stream that is no file has no such end
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
+    """What was typed; `func` is the command. Raises: SystemExit: it makes no sense."""
+    parser = argparse.ArgumentParser(prog="risorius", description="Face rigs from DNA files.")
+    parser.add_argument("--version", action="version", version=__version__)
+    subparsers = parser.add_subparsers(dest="command", required=True)
+    commands = (
+        info,
+        check,
+        convert,
+        evaluate,
+        sample,
+        plot,
+        bench,
+        edit,
+        clip,
+        speech,
+        live,
+        batch,
+    )
+    for command in commands:
+        command.add_parser(subparsers)
+    args, rest = parser.parse_known_args(arguments)
+    # argparse ends a list of operands at the first option: FILE --json NAME=1.
+    operands: list[str] | None = getattr(args, "controls", getattr(args, "files", None))
+    if any(text.startswith("-") for text in rest) or (rest and operands is None):
+        parser.error(f"unrecognized arguments: {' '.join(rest)}")
+    if operands is not None:
+        operands += rest
+    return args

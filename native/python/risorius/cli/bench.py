@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: MIT
+"""risorius bench: how fast this machine evaluates a face."""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+import tempfile
+import zipfile
+from pathlib import Path
+
+import numpy as np
+
+import risorius
+from risorius.base.errors import RisoriusError
+
+from .files import InputError
+
+FRAMES = ("active_20", "active_60", "active_260")
+
+LEGEND = """
+us         microseconds for one face and one frame, median
+csr        a plain sparse matrix (compressed sparse rows) times the controls: the yardstick
+times csr  how many times faster than that; asked: how many were aimed at for a face of full size
+active     controls that are not 0; one face: as an animation plays it, from warm caches
+cold       from memory, after other work has had the caches; crowd, clip: many poses in one call
+"""
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = subparsers.add_parser(
+        "bench",
+        help="how fast this machine evaluates a face",
+        description="Measures the evaluator against a plain sparse matrix (CSR) in the same run: "
+        "medians, one core, never the same frame twice in a row. Takes about a minute; close what "
+        "else runs.",
+    )
+    parser.add_argument("file", type=Path)
+    parser.add_argument(
+        "--frames",
+        type=Path,
+        metavar="FRAMES.npz",
+        help=f"float32[frames, raw controls] as {', '.join(FRAMES)}; otherwise their like is made",
+    )
+    parser.add_argument("--sweep", action="store_true", help="how cost grows, as CSV")
+    parser.add_argument("--quick", action="store_true", help="seconds, not a minute, and less sure")
+    parser.set_defaults(func=run)
+
+
+def program() -> Path | None:
+    """The benchmark that this wheel was built with, if it was."""
+    folder = Path(risorius.__file__).parent
+    found = [folder / name for name in ("rig_bench", "rig_bench.exe")]
+    return next((path for path in found if path.is_file()), None)
+
+
+def export_frames(source: Path, raw_count: int, folder: Path) -> list[str]:
+    """The frames of an .npz as files for the benchmark.
+
+    Args:
+        source: the .npz.
+        raw_count: raw controls of the face, so columns of its frames.
+        folder: where the files go.
+
+    Returns:
+        The names of the files, in the order of FRAMES.
+
+    Raises:
+        InputError: no .npz, or an array that is missing or has another shape.
+    """
+    try:
+        return _export_frames(source, raw_count, folder)
+    except RisoriusError:
+        raise
+    except (ValueError, EOFError, zipfile.BadZipFile) as error:  # of NumPy
+        raise InputError(f"{source}: an .npz of arrays was expected: {error}") from error
+
+
+def _export_frames(source: Path, raw_count: int, folder: Path) -> list[str]:
+    paths = []
+    with np.load(source) as arrays:
+        for name in FRAMES:
+            if name not in arrays:
+                raise InputError(f"{source}: an array {name!r} was expected")
+            frames = np.asarray(arrays[name], "<f4")
+            if frames.ndim != 2 or frames.shape[1] != raw_count or len(frames) < 2:
+                raise InputError(
+                    f"{source}: {name}: [2 or more frames, {raw_count} raw controls] were "
+                    f"expected, found {list(frames.shape)}"
+                )
+            path = folder / f"{name}.f32"
+            path.write_bytes(frames.tobytes())
+            paths.append(str(path))
+    return paths
+
+
+def run(args: argparse.Namespace) -> int:
+    path = program()
+    if path is None:
+        raise InputError("this wheel was built without Google Benchmark, which bench runs on")
+    dna = risorius.load(args.file, layers="definition")
+    with tempfile.TemporaryDirectory() as folder:
+        raw = len(dna.raw_control_names)
+        frames = export_frames(args.frames, raw, Path(folder)) if args.frames else []
+        command = [str(path), str(args.file), *frames]
+        if args.sweep:
+            command.append("--sweep")
+        if sys.stderr.isatty():
+            command.append("--progress")
+        if args.quick:
+            command += ["--benchmark_min_time=0.002", "--benchmark_repetitions=3"]
+        sys.stdout.flush()
+        code = subprocess.run(command, check=False).returncode
+    if code == 0 and not args.sweep:
+        print(LEGEND)
+    return code

@@ -1,0 +1,256 @@
+# SPDX-License-Identifier: MIT
+"""risorius convert: a DNA file as JSON and back, of another version, cut, in other axes."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import re
+import sys
+import warnings
+from collections.abc import Iterator
+from typing import Any
+
+import risorius
+
+from ..base import fileio
+from .files import (
+    KINDS,
+    CommandLineError,
+    InputError,
+    counted,
+    kind_of,
+    label,
+    read,
+    refuse_same_file,
+    require_writable,
+    summary,
+)
+
+_NEWEST = 8
+_DESCRIPTION = """\
+Reads INPUT and writes OUTPUT: .dna or .json by the suffix of each, "-" is the standard input or
+output. OUTPUT may be there already and is replaced as a whole or, after an error, not at all."""
+# Options and the arguments of Dna.convert that they are.
+_SYSTEM = {
+    "axes": "axes",
+    "rotation_sequence": "rotation_sequence",
+    "rotation_signs": "rotation_signs",
+    "winding": "face_winding_order",
+    "translation_unit": "translation_unit",
+    "rotation_unit": "rotation_unit",
+}
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = subparsers.add_parser(
+        "convert", help="to and from JSON, another version, other axes", description=_DESCRIPTION
+    )
+    parser.add_argument("input", metavar="INPUT")
+    parser.add_argument("output", metavar="OUTPUT")
+    parser.add_argument("--from", dest="input_kind", choices=KINDS, help="what INPUT is")
+    parser.add_argument("--to", dest="output_kind", choices=KINDS, help="what OUTPUT becomes")
+    parser.add_argument(
+        "--version",
+        choices=[f"2.{minor}" for minor in range(1, _NEWEST + 1)],
+        help="of the file (default: that of INPUT)",
+    )
+    parser.add_argument("--layers", metavar="NAMES", help="only these, e.g. behavior,geometry")
+    parser.add_argument("--lods", metavar="LODS", help="only these, e.g. 0 or 0-2 or 0,3,5")
+    parser.add_argument(
+        "--unknown-layers",
+        choices=("preserve", "ignore"),
+        default="preserve",
+        help="layers that Risorius or the version does not know (default: preserve)",
+    )
+    parser.add_argument("--indent", type=int, metavar="N", help="spaces per level of JSON, 0 to 8")
+    parser.add_argument("--force", action="store_true", help="OUTPUT may be INPUT itself")
+    _add_system(parser.add_argument_group("coordinates of the result (default: those of INPUT)"))
+    parser.set_defaults(func=run)
+
+
+def _add_system(group: argparse._ArgumentGroup) -> None:
+    directions = ("left", "right", "up", "down", "front", "back")
+    group.add_argument(
+        "--axes", nargs=3, choices=directions, metavar=("X", "Y", "Z"), help="e.g. right up front"
+    )
+    group.add_argument("--rotation-sequence", choices=("xyz", "xzy", "yxz", "yzx", "zxy", "zyx"))
+    group.add_argument(
+        "--rotation-signs", nargs=3, type=int, choices=(1, -1), metavar=("X", "Y", "Z")
+    )
+    group.add_argument("--winding", choices=("ccw", "cw"), help="of the faces")
+    group.add_argument("--translation-unit", choices=("cm", "m"))
+    group.add_argument("--rotation-unit", choices=("degrees", "radians"))
+
+
+def parse_lods(text: str) -> list[int]:
+    """LOD numbers from a text such as "0", "0-2" or "0,3,5".
+
+    Raises:
+        CommandLineError: a text of another form.
+    """
+    lods: set[int] = set()
+    for part in text.split(","):
+        match = re.fullmatch(r"\s*(\d{1,5})(?:-(\d{1,5}))?\s*", part, re.ASCII)
+        first, last = (int(match[1]), int(match[2] or match[1])) if match else (1, 0)
+        if not first <= last <= 0xFFFF:
+            raise CommandLineError(f"--lods: 0 or 0-2 or 0,3,5 was expected, found {text!r}")
+        lods.update(range(first, last + 1))
+    return sorted(lods)
+
+
+def complain(args: argparse.Namespace) -> None:
+    """Raises CommandLineError for what is wrong before the file is looked at."""
+    if args.indent is not None and args.output_kind != "json":
+        raise CommandLineError("--indent: only JSON is indented")
+    if args.indent is not None and not 0 <= args.indent <= 8:
+        raise CommandLineError(f"--indent: 0 to 8 was expected, found {args.indent}")
+    if not args.force:
+        refuse_same_file(args.input, args.output)
+    require_writable(args.output)
+
+
+def _say(text: str) -> None:
+    print(f"risorius: {text}", file=sys.stderr)
+
+
+@contextlib.contextmanager
+def warnings_as_lines(name: str) -> Iterator[None]:
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        yield
+    for text in dict.fromkeys(str(warning.message) for warning in caught):
+        _say(f"warning: {name}: {text}")
+
+
+def cut(dna: risorius.Dna, args: argparse.Namespace) -> risorius.Dna:
+    """The layers and LODs of dna that the options in args ask for.
+
+    Raises:
+        DnaError: the layers that are left make no file.
+        CommandLineError: layers or LODs that are not there.
+    """
+    if args.layers is not None or args.unknown_layers == "ignore":
+        names = [name.strip() for name in (args.layers or "all").split(",")]
+        bytes_ = dna.to_bytes(version=f"2.{_writable(dna.version)}")
+        try:
+            dna = risorius.load(bytes_, layers=names, unknown_layers=args.unknown_layers)
+        except risorius.DnaError:
+            raise
+        except ValueError as error:
+            raise CommandLineError(f"--{error}") from error
+    if args.lods is not None:
+        lods = parse_lods(args.lods)
+        if lods[-1] >= dna.lod_count:
+            raise CommandLineError(
+                f"--lods: LOD {lods[-1]} is not there, the file has {counted(dna.lod_count, 'LOD')}"
+            )
+        dna = dna.filter_lods(lods)
+    return dna
+
+
+def _writable(minor: int) -> int:
+    return minor if 1 <= minor <= _NEWEST else _NEWEST
+
+
+def version_of(source: risorius.Dna, result: risorius.Dna, turned: bool) -> str:
+    """The version to write when none was asked for; a word is printed where it is not the source's.
+
+    Args:
+        source: the file that was read.
+        result: what is to be written.
+        turned: whether its axes or units were changed.
+    """
+    minor = _writable(result.version)
+    signed = result.rotation_sequence != "xyz" or -1 in result.rotation_signs
+    needed = 8 if result.face_winding_order != "ccw" else 7 if signed else 1
+    if turned and minor < needed:
+        minor = _NEWEST
+    if minor != source.version:
+        _say(f"{source.generation}.{source.version} becomes 2.{minor}")
+    return f"2.{minor}"
+
+
+def convert(source: risorius.Dna, args: argparse.Namespace) -> tuple[risorius.Dna, bytes]:
+    """The result as it is when read back, and its bytes as a DNA file.
+
+    Args:
+        source: the file that was read.
+        args: the options of the command.
+
+    Raises:
+        InputError: the result could not be read back.
+    """
+    dna = cut(source, args)
+    target: dict[str, Any] = {
+        argument: getattr(args, option)
+        for option, argument in _SYSTEM.items()
+        if getattr(args, option) is not None
+    }
+    if target:
+        dna = dna.convert(**target)
+    version = args.version or version_of(source, dna, bool(target))
+    data = dna.to_bytes(version=version, unknown_layers=args.unknown_layers)
+    try:
+        return risorius.load(data), data
+    except risorius.DnaError as error:
+        raise InputError(f"{label(args.input)}: the result cannot be read: {error}") from error
+
+
+def json_text(dna: risorius.Dna, indent: int | None) -> bytes:
+    """The JSON of dna in UTF-8, each level indented by so many spaces; None: as Dna.to_json does.
+
+    Args:
+        dna: any.
+        indent: spaces per level, 0 or more.
+    """
+    text = dna.to_json()
+    if indent is not None and indent != 1:
+        # Dna.to_json begins each line with one space per level, and no text holds a line's end.
+        text = re.sub(r"^ +", lambda spaces: spaces[0] * indent, text, flags=re.MULTILINE)
+    return text.encode()
+
+
+def write(name: str, data: bytes) -> None:
+    """Write a file whole or not at all; devices and pipes take the bytes as they come.
+
+    Args:
+        name: of the file; "-": the standard output.
+        data: its bytes.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    try:
+        if name == "-":
+            sys.stdout.buffer.write(data)
+            sys.stdout.buffer.flush()
+        else:
+            fileio.write_bytes(name, data)
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        name = label(name, "<stdout>")
+        raise InputError(f"{name}: cannot write it: {error.strerror}") from error
+
+
+def run(args: argparse.Namespace) -> int:
+    args.input_kind = kind_of(args.input, args.input_kind, "--from")
+    args.output_kind = kind_of(args.output, args.output_kind, "--to")
+    complain(args)
+    source = read(args.input, args.input_kind)
+    try:
+        with warnings_as_lines(label(args.input)):
+            dna, data = convert(source, args)
+        if args.output_kind == "json":
+            data = json_text(dna, args.indent)
+    except risorius.DnaError as error:
+        kind_of_error = CommandLineError if error.code == "invalid_argument" else InputError
+        raise kind_of_error(f"{label(args.input)}: {error}") from error
+    write(args.output, data)
+    kind = ", JSON" if args.output_kind == "json" else ""
+    print(
+        f"{label(args.output, '<stdout>')}: {summary(dna)}, {counted(len(data), 'byte')}{kind}",
+        file=sys.stderr if args.output == "-" else sys.stdout,
+    )
+    return 0

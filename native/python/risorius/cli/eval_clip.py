@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: MIT
+"""risorius eval CLIP DNA -o OUT: the animation that a clip gives."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+from pathlib import Path
+from typing import Any
+
+from risorius import importing
+from risorius.baking.bake import DEFAULT_PARTS, bake
+from risorius.baking.clips import load_performance
+from risorius.baking.face import PARTS, load_face, prepared
+from risorius.baking.progress import Progress
+from risorius.base import fileio
+from risorius.base.errors import ArgumentError
+
+from .files import CommandLineError, counted, refuse_same_file, require_writable
+
+OPTIONS = ("mapping", "rate", "frames", "what", "quaternions", "compress")
+SUFFIXES = {".npz": "npz", ".csv": "csv"}
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """What CLIP DNA -o OUT takes beside --lod and --json."""
+    group = parser.add_argument_group("every frame of a clip: CLIP DNA -o OUT")
+    group.add_argument(
+        "-o",
+        dest="out",
+        type=Path,
+        metavar="OUT",
+        help="OUT.npz: joints, blend_shapes, animated_maps, controls as float32[frames, ...] with "
+        "names, times in seconds and units, all numbers; OUT.csv: a row a frame, its time and the "
+        "numbers that are not at rest throughout",
+    )
+    group.add_argument(
+        "--mapping",
+        metavar="NAME|FILE.toml",
+        help="how the clip's curves become raw controls; else the mapping that fits, for .rzc none",
+    )
+    group.add_argument("--rate", metavar="R", help="resample to R frames per second first")
+    group.add_argument(
+        "--frames",
+        metavar="A:B",
+        help="frames A to B - 1 only, counted from 0 after --rate; A: and :B go to the ends",
+    )
+    group.add_argument(
+        "--what",
+        metavar="LIST",
+        help=f"which of {','.join(PARTS)} to write ({','.join(DEFAULT_PARTS)})",
+    )
+    group.add_argument(
+        "--quaternions", action="store_true", help="joint rotations as qx qy qz qw, not as angles"
+    )
+    group.add_argument(
+        "--compress", action="store_true", help="a smaller .npz, written several times slower"
+    )
+
+
+def parse_frames(text: str) -> tuple[int | None, int | None]:
+    """ "A:B" -> (A, B). Raises: ValueError."""
+    first, colon, end = text.partition(":")
+    if not (colon and all(t == "" or (t.isascii() and t.isdigit()) for t in (first, end))):
+        raise ArgumentError(f"A:B was expected, e.g. 0:240, found {text!r}")
+    out = (int(first) if first else None, int(end) if end else None)
+    if out[1] is not None and (out[0] or 0) >= out[1]:
+        raise ArgumentError(f"A:B with A below B was expected, found {text!r}")
+    return out
+
+
+def parse_parts(texts: list[str]) -> tuple[str, ...]:
+    """Parts in the order of PARTS. Raises: ValueError: an unknown one, one twice, none."""
+    for text in texts:
+        if text not in PARTS:
+            raise ArgumentError(f"some of {', '.join(PARTS)} were expected, found {text!r}")
+    if not texts or len(set(texts)) != len(texts):
+        raise ArgumentError(f"some of {', '.join(PARTS)} were expected, each once")
+    return tuple(part for part in PARTS if part in texts)
+
+
+def parse_rate(text: str) -> float:
+    """Frames per second. Raises: ValueError."""
+    try:
+        rate = float(text)
+    except ValueError:
+        rate = math.nan
+    if not 0 < rate <= 1e6:
+        raise ArgumentError(f"frames per second above 0 were expected, found {text!r}")
+    return rate
+
+
+def _option(name: str, parse: Any, text: str | None, default: Any) -> Any:
+    if text is None:
+        return default
+    try:
+        return parse(text)
+    except ValueError as error:
+        raise CommandLineError(f"--{name}: {error}") from None
+
+
+def _target(args: argparse.Namespace) -> tuple[str, Path]:
+    """Kind and path of what is written."""
+    kind = SUFFIXES.get(args.out.suffix.lower())
+    if kind is None:
+        raise CommandLineError(f"-o: a name ending in .npz or .csv was expected, found {args.out}")
+    if args.compress and kind != "npz":
+        raise CommandLineError("--compress: only an .npz is compressed")
+    if len(args.controls) != 1:
+        raise CommandLineError(
+            f"-o writes the frames of a clip: CLIP DNA were expected, found {args.file} and "
+            f"{counted(len(args.controls), 'more operand')}"
+        )
+    for source in (str(args.file), args.controls[0]):
+        refuse_same_file(source, str(args.out))
+    return kind, args.out
+
+
+def page(facts: dict[str, Any]) -> str:
+    """The facts for a person, e.g. one line for a log."""
+    move = f"{facts['largest_move']:.4g} {facts['translation_unit']}"
+    joint = facts["largest_move_joint"]
+    where = f" ({joint}, frame {facts['largest_move_frame']})" if joint else ""
+    return (
+        f"{facts['output']}: {counted(facts['frames'], 'frame')}, {facts['seconds']:.3f} s; "
+        f"largest joint move {move}{where}; {facts['correctives_fired']:,} of "
+        f"{counted(facts['correctives'], 'corrective')} at work"
+    )
+
+
+def complaints(facts: dict[str, Any]) -> list[str]:
+    """What one should know of the clip on this character, in sentences."""
+    out = []
+    for key, kind, what in (
+        ("unmapped_curves", "curve", "of the clip that is no control and not mapped"),
+        ("missing_controls", "control", "of the clip that the character does not have"),
+        ("out_of_range", "control", "outside 0 to 1 in some frame"),
+    ):
+        names = facts[key]
+        if names:
+            more = f" and {len(names) - 8:,} more" if len(names) > 8 else ""
+            out.append(f"{counted(len(names), kind)} {what}: {', '.join(names[:8])}{more}")
+    if facts["not_finite"]:
+        out.append(f"{counted(facts['not_finite'], 'value')} of the clip that is no finite number")
+    if facts["ignored_layers"]:
+        out.append(f"not evaluated by this version: {', '.join(facts['ignored_layers'])}")
+    return out
+
+
+def run(args: argparse.Namespace) -> int:
+    """Raises: CommandLineError."""
+    rate = _option("rate", parse_rate, args.rate, None)
+    frames = _option("frames", parse_frames, args.frames, (None, None))
+    parts = _option("what", lambda text: parse_parts(text.split(",")), args.what, DEFAULT_PARTS)
+    _option("mapping", importing.load_mapping, args.mapping, None)
+    kind, out = _target(args)
+    require_writable(out, parents=True)
+    face = load_face(Path(args.controls[0]), quaternions=args.quaternions)
+    performance = load_performance(args.file, face, args.mapping)
+    clip = prepared(performance.clip, rate, frames)
+    try:
+        face.check_lod(args.lod)
+    except ArgumentError as error:
+        raise CommandLineError(f"--lod: {error}") from None
+    progress = Progress(clip.frame_count, "frames")
+    facts = bake(
+        clip, face, args.lod, {kind: out}, parts=parts, compress=args.compress, threads=0,
+        progress=lambda done: progress.update(done, done),
+    )  # fmt: skip
+    fileio.sweep([out.parent])
+    progress.close()
+    facts["mapping"] = performance.mapping
+    facts["unmapped_curves"] = list(performance.unmapped)
+    facts["output"] = str(out)
+    for text in complaints(facts):
+        print(f"risorius: {text}", file=sys.stderr)
+    print(json.dumps(facts, indent=2) if args.json else page(facts))
+    return 0

@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: MIT
+"""What the commands that read .dna and .json alike have in common."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import risorius
+from risorius.base import fileio
+from risorius.base.errors import RisoriusError
+
+KINDS = ("dna", "json")
+
+
+class InputError(RisoriusError):
+    """Input that cannot be used: one line that names the file and the place.
+
+    offset: byte offset, where it is known and no DnaError is the cause.
+    """
+
+    code = "input"
+
+
+class CommandLineError(RisoriusError):
+    """What was typed makes no sense."""
+
+    code = "command_line"
+
+
+def label(name: str, standard: str = "<stdin>") -> str:
+    """A file's name as messages show it.
+
+    Args:
+        name: as the user typed it.
+        standard: stands for "-".
+    """
+    return standard if name == "-" else name
+
+
+def kind_of(name: str, asked: str | None, option: str) -> str:
+    """ "dna" or "json": as asked, else by the suffix.
+
+    Args:
+        name: of the file.
+        asked: what an option says; None: nothing.
+        option: what the error names beside a suffix.
+
+    Raises:
+        CommandLineError: neither says it.
+    """
+    suffix = Path(name).suffix.lower().removeprefix(".")
+    if kind := asked or (suffix if suffix in KINDS else None):
+        return kind
+    raise CommandLineError(f"{name}: a name ending in .dna or .json was expected, or {option}")
+
+
+def refuse_same_file(source: str, target: str) -> None:
+    """Refuse an output that is the input, by whatever path; "-" is no file.
+
+    Args:
+        source: name of the input.
+        target: name of the output.
+
+    Raises:
+        CommandLineError: they are one file.
+    """
+    if "-" in (source, target):
+        return
+    try:
+        same = os.path.samefile(source, target)
+    except OSError:  # one of them is not there
+        return
+    if same:
+        raise CommandLineError(f"{target}: OUTPUT is INPUT itself; --force replaces it")
+
+
+def require_suffix(path: Path, kinds: Sequence[str], option: str) -> None:
+    """Refuse the name of an output that ends otherwise.
+
+    Args:
+        path: of the output.
+        kinds: suffixes with their dots, two or more.
+        option: that names the output.
+
+    Raises:
+        CommandLineError: another suffix.
+    """
+    if path.suffix.lower() not in kinds:
+        *most, last = kinds
+        listed = f"{', '.join(most)} or {last}"
+        raise CommandLineError(
+            f"{option}: a name ending in {listed} was expected, found {path.name!r}"
+        )
+
+
+def require_writable(*names: str | Path | None, parents: bool = False) -> None:
+    """Before long work: what will be written has a place.
+
+    Args:
+        names: of outputs; "-" and None need no place.
+        parents: folders that are not there will be made.
+
+    Raises:
+        InputError: no folder, or one that may not be written to.
+    """
+    for name in names:
+        if name is None or str(name) == "-":
+            continue
+        try:
+            fileio.check_writable(name, parents=parents)
+        except OSError as error:
+            raise InputError(f"{name}: cannot write it: {error.strerror}") from error
+
+
+def read_bytes(name: str) -> bytes:
+    """A file's bytes, or those of the standard input for "-".
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    try:
+        return sys.stdin.buffer.read() if name == "-" else Path(name).read_bytes()
+    except OSError as error:
+        raise InputError(f"{label(name)}: cannot read it: {error.strerror}") from error
+
+
+def from_json(name: str) -> risorius.Dna:
+    """A Dna from a file of JSON.
+
+    Raises:
+        InputError: not UTF-8, not JSON, not a Dna; with the place.
+    """
+    try:
+        return risorius.Dna.from_json(read_bytes(name).decode())
+    except UnicodeDecodeError as error:
+        found = error.object[error.start]
+        bad = InputError(f"{label(name)}: not JSON: {found:#04x} is not UTF-8 (byte {error.start})")
+        bad.offset = error.start
+        raise bad from error
+    except risorius.DnaError as error:
+        raise InputError(f"{label(name)}: {error}") from error
+
+
+def read(name: str, kind: str) -> risorius.Dna:
+    """A whole Dna.
+
+    Args:
+        name: of the file; "-": the standard input.
+        kind: "dna" or "json".
+
+    Raises:
+        InputError: it cannot be used.
+    """
+    if kind == "json":
+        return from_json(name)
+    try:
+        return risorius.load(read_bytes(name) if name == "-" else name)
+    except risorius.DnaError as error:
+        # load(path) has named the file already.
+        raise InputError(f"{label(name)}: {error}" if name == "-" else str(error)) from error
+
+
+def summary(dna: risorius.Dna) -> str:
+    """Version and sizes, e.g. "2.4, 8 LODs, 870 joints"."""
+    return (
+        f"{dna.generation}.{dna.version}, {counted(dna.lod_count, 'LOD')}, "
+        f"{counted(len(dna.joint_names), 'joint')}"
+    )
+
+
+def counted(number: int, noun: str) -> str:
+    """A number with its noun, e.g. "1 joint" or "1,203 joints"; the plural has an s."""
+    return f"{number:,} {noun}{'' if number == 1 else 's'}"

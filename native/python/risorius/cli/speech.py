@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: MIT
+"""risorius speech: a voice as animation."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+from ..anim.clip import Clip
+from ..importing import writing
+from ..speech import Heard, Phoneme, animate, listen
+from ..speech.listening import confidence
+from .files import CommandLineError, InputError, read_bytes, require_suffix, require_writable
+
+_KINDS = (".rzc", ".csv", ".json")
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = subparsers.add_parser(
+        "speech",
+        help="a voice as animation",
+        description="Moves a face to a voice: phonemes with their times, lips and jaw, blinks, "
+        "brows and nods. English. Much better with the text of what is said. "
+        "Needs risorius[speech].",
+    )
+    parser.add_argument("voice", type=Path, help="a WAV file, or what an ffmpeg on PATH can read")
+    parser.add_argument(
+        "-o", "--out", type=Path, required=True, metavar="OUT", help="clip.rzc, .csv or .json"
+    )
+    known = parser.add_mutually_exclusive_group()
+    known.add_argument("--text", help="what is said")
+    known.add_argument("--transcript", metavar="FILE", help="a text file of what is said")
+    parser.add_argument("--rate", type=float, default=60.0, metavar="FPS", help="(default 60)")
+    parser.add_argument(
+        "--intensity", type=float, default=1.0, metavar="X", help="of the shapes, 0 to 4"
+    )
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the blinks")
+    parser.add_argument("--no-blinks", action="store_true")
+    parser.add_argument("--no-accents", action="store_true", help="brows and head keep still")
+    parser.add_argument(
+        "--phonemes", type=Path, metavar="OUT.tsv", help="also write the phonemes with their times"
+    )
+    parser.add_argument("--json", action="store_true", help="report as JSON")
+    parser.set_defaults(func=run)
+
+
+def complain(args: argparse.Namespace) -> None:
+    """Raises CommandLineError for what is wrong before the voice is listened to."""
+    require_suffix(args.out, _KINDS, "-o")
+    require_writable(args.out, args.phonemes)
+    if not 1.0 <= args.rate <= 1000.0:
+        raise CommandLineError(f"--rate: 1 to 1000 was expected, found {args.rate:g}")
+    if not 0.0 <= args.intensity <= 4.0:
+        raise CommandLineError(f"--intensity: 0 to 4 was expected, found {args.intensity:g}")
+    if args.seed < 0:
+        raise CommandLineError(f"--seed: 0 or more was expected, found {args.seed}")
+
+
+def run(args: argparse.Namespace) -> int:
+    complain(args)
+    heard, clip = _spoken(args)
+    _save(clip, args.out)
+    if args.phonemes is not None:
+        writing.write_text(phoneme_table(heard.phonemes), args.phonemes)
+    for note in heard.notes:
+        print(f"risorius: {args.voice}: {note}", file=sys.stderr)
+    print(json.dumps(_report(heard, clip), indent=1) if args.json else _summary(heard, clip, args))
+    return 0
+
+
+def _spoken(args: argparse.Namespace) -> tuple[Heard, Clip]:
+    """Raises: InputError, ValueError."""
+    said = args.text
+    if args.transcript is not None:
+        try:
+            said = read_bytes(args.transcript).decode("utf-8-sig")
+        except UnicodeDecodeError as error:
+            raise InputError(f"{args.transcript}: not UTF-8 (byte {error.start})") from error
+    shown = sys.stderr.isatty()
+
+    def progress(part: float) -> None:
+        print(f"\rlistening {part:4.0%}", end="\n" if part >= 1.0 else "", file=sys.stderr)
+
+    heard = listen(args.voice, said, progress=progress if shown else None)
+    clip = animate(
+        heard, rate=args.rate, seed=args.seed, intensity=args.intensity,
+        blinks=not args.no_blinks, accents=not args.no_accents,
+    )  # fmt: skip
+    metadata = {**clip.metadata, "source": args.voice.name}
+    if said is not None:
+        metadata["transcript"] = said
+    return heard, clip.replaced(metadata=metadata)
+
+
+def phoneme_table(found: list[Phoneme]) -> str:
+    """Tab separated: begin and end in seconds, phoneme, confidence, the word that begins."""
+    rows = ["begin\tend\tphoneme\tconfidence\tword"]
+    rows += [f"{p.begin:.3f}\t{p.end:.3f}\t{p.name}\t{p.confidence:.3f}\t{p.word}" for p in found]
+    return "\n".join(rows) + "\n"
+
+
+def _report(heard: Heard, clip: Clip) -> dict[str, object]:
+    return {
+        "speech": clip.metadata["speech"],
+        "seconds": round(clip.duration, 3),
+        "frames": clip.frame_count,
+        "rate": clip.rate,
+        "controls": len(clip.names),
+        "words": sum(event.name == "word" for event in clip.events),
+        "phonemes": sum(p.name != "SIL" for p in heard.phonemes),
+        "confidence": round(confidence(heard.phonemes), 3),
+        "notes": heard.notes,
+    }
+
+
+def _summary(heard: Heard, clip: Clip, args: argparse.Namespace) -> str:
+    report = _report(heard, clip)
+    return (
+        f"{args.out}: {report['frames']} frames at {clip.rate:g} fps, {report['controls']} "
+        f"controls; {report['words']} words, {report['phonemes']} phonemes {report['speech']}, "
+        f"confidence {report['confidence']:.0%}"
+    )
+
+
+def _save(clip: Clip, path: Path) -> None:
+    """Write a clip whole or not at all. Raises: OSError, ValueError."""
+    suffix = path.suffix.lower()
+    if suffix == ".csv":
+        writing.write_text(writing.csv_text(clip), path)
+    elif suffix == ".json":
+        writing.write_text(writing.json_text(clip), path)
+    else:
+        clip.save(path)

@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: MIT
+"""Controls by the names that people type, and names for the controls that have none."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import risorius
+from risorius.base.errors import RisoriusError
+from risorius.controls import arkit
+
+
+class UnknownControlError(RisoriusError):
+    """No control, or more than one, goes by what was typed."""
+
+    code = "unknown_control"
+
+
+@dataclass(frozen=True)
+class Meaning:
+    """What a typed name was taken for: name of a control -> factor of the value."""
+
+    controls: dict[str, float]
+    is_exact: bool
+
+
+def last_part(name: str) -> str:
+    """jawOpen of CTRL_expressions.jawOpen; what follows in brackets stays whole."""
+    own, bracket, rest = name.partition(" (")
+    return own.rpartition(".")[2] + bracket + rest
+
+
+def find_controls(text: str, names: Sequence[str]) -> Meaning:
+    """The controls that are meant by a name, or by a part of it.
+
+    In this order: the name itself; what follows its last point; an ARKit unit, if the file has its
+    controls; any part of a name, then of an ARKit unit, whatever its case. Two names that differ in
+    their side only (..L and ..R, ..Left and ..Right) are one meaning. The first of these that gives
+    anything decides, and only if it gives one meaning.
+
+    Args:
+        text: as a person typed it.
+        names: of all controls.
+
+    Raises:
+        UnknownControlError: nothing, or several meanings; the message lists them.
+    """
+    if text in names:
+        return Meaning({text: 1.0}, True)
+    for candidates in _by_rank(text, names):
+        if len(candidates) == 1:
+            return Meaning(next(iter(candidates.values())), False)
+        if candidates:
+            listed = ", ".join(list(candidates)[:12])
+            more = f" and {len(candidates) - 12} more" if len(candidates) > 12 else ""
+            raise UnknownControlError(f"{text!r} may be any of: {listed}{more}")
+    by_part = {last_part(n).lower(): n for n in names}
+    near = difflib.get_close_matches(text.lower(), list(by_part), 3, 0.5)
+    hint = f"; near it: {', '.join(by_part[n] for n in near)}" if near else ""
+    raise UnknownControlError(f"there is no control {text!r}{hint}")
+
+
+def _by_rank(text: str, names: Sequence[str]) -> Iterator[dict[str, dict[str, float]]]:
+    """Meanings by what each is called, the best kind of match first."""
+    known = set(names)
+    units = {u: row for u, row in arkit.mapping().items() if known.issuperset(row)}
+    wanted = text.lower()
+    yield {n: {n: 1.0} for n in names if last_part(n) == text}
+    yield {n: {n: 1.0} for n in names if last_part(n).lower() == wanted}
+    yield {u: row for u, row in units.items() if u.lower() == wanted}
+    ours = {n: {n: 1.0} for n in names if wanted in n.lower()}
+    yield _sides_as_one(ours, lambda n: re.sub(r"[LR]$", "?", n))
+    theirs = {u: row for u, row in units.items() if wanted in u.lower()}
+    yield _sides_as_one(theirs, lambda u: re.sub(r"(Left|Right)$", "?", u))
+
+
+def _sides_as_one(
+    meanings: dict[str, dict[str, float]], without_side: Callable[[str], str]
+) -> dict[str, dict[str, float]]:
+    out: dict[str, dict[str, float]] = {}
+    for name, controls in meanings.items():
+        out.setdefault(without_side(name), {}).update(controls)
+    return out
+
+
+def named(names: Sequence[str], index: int, kind: str) -> str:
+    """The name of an element, or e.g. "joint 7" where the file has none.
+
+    Args:
+        names: of the file.
+        index: of the element; it may lie beyond the names.
+        kind: what the element is, e.g. "joint".
+    """
+    return (names[index] if index < len(names) else "") or f"{kind} {index}"
+
+
+def _shapes_of_controls(dna: risorius.Dna) -> dict[int, str]:
+    """Control -> the blend shape channel that it drives, in brackets."""
+    table, names = dna.blend_shape_channels, dna.blend_shape_channel_names
+    driven: dict[int, list[int]] = {}
+    for control, channel in zip(
+        table.input_indices.tolist(), table.output_indices.tolist(), strict=True
+    ):
+        driven.setdefault(control, []).append(channel)
+    return {
+        control: f" ({named(names, channels[0], 'shape')}{', ...' if len(channels) > 1 else ''})"
+        for control, channels in driven.items()
+    }
+
+
+class ControlNames:
+    """Names of the control vector raw | corrective | network | RBF pose of a file."""
+
+    def __init__(self, dna: risorius.Dna) -> None:
+        raw = dna.raw_control_names
+        self.psd_begin = len(raw)
+        self.psd_end = self.psd_begin + dna.psd_count
+        ml = dna.machine_learned_behavior.ml_control_names
+        poses = dna.rbf_behavior_ext.pose_control_names
+        if (
+            not poses and not dna.rbf_behavior_ext.poses
+        ):  # 2.4: a pose writes the control of its name
+            poses = [p.name for p in dna.rbf_behavior.poses]
+        shapes = _shapes_of_controls(dna)
+        correctives = [
+            f"corrective {i}{shapes.get(i, '')}" for i in range(self.psd_begin, self.psd_end)
+        ]
+        self.names = [*raw, *correctives, *ml, *poses]
+        self.ml_end = self.psd_end + len(ml)
+        parts = [last_part(n) for n in self.names]
+        seen: dict[str, int] = {}
+        for part in parts:
+            seen[part] = seen.get(part, 0) + 1
+        self._short = [
+            p if p and seen[p] == 1 else n for p, n in zip(parts, self.names, strict=True)
+        ]
+
+    def name(self, index: int) -> str:
+        return named(self.names, index, "control")
+
+    def short(self, index: int) -> str:
+        """The part behind the last point where that says which one it is."""
+        return named(self._short, index, "control")
+
+    def kind(self, index: int) -> str:
+        if index < self.psd_begin:
+            return "raw"
+        if index < self.psd_end:
+            return "corrective"
+        return "network" if index < self.ml_end else "pose"

@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: MIT
+"""The file around the layers: its version, its index, layers that are only kept as bytes."""
+
+from __future__ import annotations
+
+from ..pairing.common import Place
+from ..pairing.comparison import Comparison
+from ..pairing.pairs import pair_names
+from ..pairing.report import counted
+
+
+def compare(c: Comparison) -> None:
+    file = Place(c, "file")
+    versions = [f"{dna.generation}.{dna.version}" for dna in (c.a, c.b)]
+    if versions[0] != versions[1]:
+        file.at("version", "version").say(" -> ".join(versions))
+    names_a, names_b = c.a.layers, c.b.layers
+    pairs = pair_names(names_a, names_b)
+    layers = file.at("layers")
+    for side, left, names in (("A", pairs.only_a, names_a), ("B", pairs.only_b, names_b)):
+        for i in left.tolist():
+            layers.say(f"layer {names[i]} only in {side}")
+    if pairs.reordered:
+        layers.say("the layers stand in another order in the file")
+    _unknown_layers(c, file.at("unknown_layers"))
+
+
+def _unknown_layers(c: Comparison, place: Place) -> None:
+    a, b = c.a.unknown_layers, c.b.unknown_layers
+    names_a, names_b = ([f"{id_} {version}" for id_, version, _ in side] for side in (a, b))
+    pairs = pair_names(names_a, names_b)
+    for side, left, names in (("A", pairs.only_a, names_a), ("B", pairs.only_b, names_b)):
+        for i in left.tolist():
+            place.say(f"unknown layer {names[i]} only in {side}")
+    for i, j in zip(pairs.a.tolist(), pairs.b.tolist(), strict=True):
+        old, new = a[i][2], b[j][2]
+        if old != new:
+            sizes = f"{counted(len(old), 'byte')} -> {len(new):,}"
+            place.say(f"unknown layer {names_a[i]}: other bytes ({sizes})")
+    if pairs.reordered:
+        place.say("the unknown layers stand in another order")

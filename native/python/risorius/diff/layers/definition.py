@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: MIT
+"""Layer defn: names, the skeleton, what each LOD lists."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..pairing.amounts import Floats
+from ..pairing.common import Place, lod_mapping, only_in, order
+from ..pairing.comparison import Comparison
+from ..pairing.pairs import Ints, pair_rows
+from ..pairing.report import counted
+from ..pairing.spaces import Space
+
+
+def compare(c: Comparison) -> None:
+    place = Place(c, "definition")
+    for field, space in (
+        ("gui_control_names", c.gui),
+        ("raw_control_names", c.raw),
+        ("joint_names", c.joints),
+        ("blend_shape_channel_names", c.channels),
+        ("animated_map_names", c.maps),
+        ("mesh_names", c.meshes),
+    ):
+        names(place.at(field), space)
+    _joints(c, place)
+    for field, space in (
+        ("lod_joint_mapping", c.joints),
+        ("lod_blend_shape_mapping", c.channels),
+        ("lod_animated_map_mapping", c.maps),
+        ("lod_mesh_mapping", c.meshes),
+    ):
+        lod_mapping(place.at(field), space, getattr(c.a, field), getattr(c.b, field))
+    _mesh_channels(c, place.at("mesh_blend_shape_channel_mapping"))
+
+
+def names(place: Place, space: Space) -> None:
+    """Report elements that are new, gone, renamed or in another order.
+
+    Args:
+        place: where the difference is reported.
+        space: the elements of both faces.
+    """
+    pairs = space.pairs
+    only_in(place, space, pairs)
+    for i, j in zip(pairs.a.tolist(), pairs.b.tolist(), strict=True):
+        old, new = space.names[i], space.names[len(space.a) + j]
+        if old != new:
+            place.say(f"{space.noun} {old or i} renamed to {new or j}")
+    order(place, pairs, space.plural)
+
+
+def _joints(c: Comparison, place: Place) -> None:
+    pairs, labels = c.joints.pairs, c.joints.labels(c.joints.pairs.a)
+    _parents(c, place.at("joint_parents"), labels)
+    for field, verb, kind in (
+        ("neutral_joint_translations", "moved", "length"),
+        ("neutral_joint_rotations", "turned", "angle"),
+    ):
+        a, b = getattr(c.a, field), getattr(c.b, field)
+        inside = (pairs.a < len(a)) & (pairs.b < len(b))
+        x, y = a[pairs.a[inside]], b[pairs.b[inside]]
+        changed = np.flatnonzero(c.changed(x, y).any(axis=1))
+        _moved(place.at(field), verb, kind, [labels[i] for i in changed], x[changed], y[changed])
+
+
+def _moved(place: Place, verb: str, kind: str, labels: list[str], a: Floats, b: Floats) -> None:
+    """A line for each joint, those that moved most first."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        apart = np.linalg.norm(a.astype(np.float64) - b, axis=1)
+    for i in np.argsort(-np.nan_to_num(apart, nan=np.inf), kind="stable").tolist():
+        x, y = a[i : i + 1], b[i : i + 1]
+        amount = place.c.distance(x, y) if kind == "length" else place.c.by(x, y, kind)
+        place.say(f"joint {labels[i]} {verb} {amount}")
+
+
+def _parents(c: Comparison, place: Place, labels: list[str]) -> None:
+    pairs = c.joints.pairs
+    a, b = c.joints.in_a(c.a.joint_parents), c.joints.in_b(c.b.joint_parents)
+    for label, i, j in zip(labels, pairs.a.tolist(), pairs.b.tolist(), strict=True):
+        if i < len(a) and j < len(b) and a[i] != b[j]:
+            old, new = (
+                "none" if parent == c.joints.a[i] else c.joints.label(int(parent))
+                for parent in (a[i], b[j])
+            )
+            place.say(f"joint {label} has another parent: {new} instead of {old}")
+
+
+def _mesh_channels(c: Comparison, place: Place) -> None:
+    a, b = c.a.mesh_blend_shape_channel_mapping, c.b.mesh_blend_shape_channel_mapping
+    rows_a = (c.meshes.in_a(a[:, 0]), c.channels.in_a(a[:, 1]))
+    rows_b = (c.meshes.in_b(b[:, 0]), c.channels.in_b(b[:, 1]))
+    pairs = pair_rows(rows_a, rows_b)
+
+    def label(meshes: Ints, channels: Ints) -> list[str]:
+        both = zip(c.meshes.labels(meshes), c.channels.labels(channels), strict=True)
+        return [f"{mesh} has {channel}" for mesh, channel in both]
+
+    for side, left, rows in (("A", pairs.only_a, rows_a), ("B", pairs.only_b, rows_b)):
+        if len(left):
+            listed = c.report.listed(label(rows[0][left], rows[1][left]))
+            pairs_of = counted(len(left), "pair of mesh and channel", "pairs of mesh and channel")
+            place.say(f"{pairs_of} only in {side}: {listed}")
+    order(place, pairs, "pairs of mesh and channel")

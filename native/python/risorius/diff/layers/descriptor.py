@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: MIT
+"""Layers desc and dsce: what the character is and how its numbers are meant."""
+
+from __future__ import annotations
+
+from ..pairing.common import Place, value
+from ..pairing.comparison import Comparison
+
+_VALUES = (
+    "name",
+    "archetype",
+    "gender",
+    "age",
+    "translation_unit",
+    "rotation_unit",
+    "coordinate_system",
+    "rotation_sequence",
+    "rotation_signs",
+    "face_winding_order",
+    "lod_count",
+    "max_lod",
+    "complexity",
+    "db_name",
+)
+
+
+def compare(c: Comparison) -> None:
+    place = Place(c, "descriptor")
+    for name in _VALUES:
+        value(place.at(name, name.replace("_", " ")), getattr(c.a, name), getattr(c.b, name))
+    _metadata(c, place.at("metadata"))
+
+
+def _metadata(c: Comparison, place: Place) -> None:
+    a, b = c.a.metadata, c.b.metadata
+    for key, old in a.items():
+        if key not in b:
+            place.say(f"metadata key {key} only in A: {old!r}")
+        elif b[key] != old:
+            place.say(f"metadata key {key}: {old!r} -> {b[key]!r}")
+    for key, new in b.items():
+        if key not in a:
+            place.say(f"metadata key {key} only in B: {new!r}")
+    if [key for key in a if key in b] != [key for key in b if key in a]:
+        place.say("the metadata keys stand in another order")

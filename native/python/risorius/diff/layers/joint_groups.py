@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: MIT
+"""Layer bhvr: the joint matrix, group by group."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import risorius
+
+from ..pairing.amounts import Floats
+from ..pairing.common import Place, cut, members, order, rows_per_lod, value
+from ..pairing.comparison import Comparison
+from ..pairing.pairs import Bools, Ints, Pairs, pair, pair_sets
+from ..pairing.report import counted, joined
+
+
+def compare(c: Comparison) -> None:
+    place = Place(c, "behavior")
+    for field in ("joint_row_count", "joint_column_count"):
+        value(place.at(field, field.replace("_", " ")), getattr(c.a, field), getattr(c.b, field))
+    groups = place.at("joint_groups")
+    a, b = c.a.joint_groups, c.b.joint_groups
+    pairs = pair_sets(
+        [c.rows_in_a(group.output_indices) for group in a],
+        [c.rows_in_b(group.output_indices) for group in b],
+    )
+    for side, left, side_groups in (("A", pairs.only_a, a), ("B", pairs.only_b, b)):
+        for i in left.tolist():
+            rows = counted(len(side_groups[i].output_indices), "row")
+            groups.say(f"joint group {i} only in {side} ({rows})")
+    order(groups, pairs, "joint groups")
+    for i, j in zip(pairs.a.tolist(), pairs.b.tolist(), strict=True):
+        name = f"joint group {i}" if i == j else f"joint group {i} ({j} in B)"
+        _group(groups.at("", name), a[i], b[j])
+
+
+def _group(place: Place, a: risorius.JointGroup, b: risorius.JointGroup) -> None:
+    c = place.c
+    rows_a, rows_b = c.rows_in_a(a.output_indices), c.rows_in_b(b.output_indices)
+    columns_a, columns_b = c.controls.in_a(a.input_indices), c.controls.in_b(b.input_indices)
+    rows, columns = pair(rows_a, rows_b), pair(columns_a, columns_b)
+    rows_per_lod(place.at("lods"), a.lods, b.lods)
+    members(place.at("input_indices", "inputs"), c.controls, a.input_indices, b.input_indices)
+    outputs = place.at("output_indices")
+    for side, left, numbers in (("A", rows.only_a, rows_a), ("B", rows.only_b, rows_b)):
+        if len(left):
+            listed = c.report.listed(c.row_labels(numbers[left]))
+            outputs.say(f"{counted(len(left), 'row')} only in {side}: {listed}")
+    order(outputs, rows, "rows")
+    members(place.at("joint_indices", "joints"), c.joints, a.joint_indices, b.joint_indices)
+    if a.values.ndim == b.values.ndim == 2:
+        _values(place.at("values"), a.values, b.values, rows, columns, rows_a)
+
+
+def _values(place: Place, a: Floats, b: Floats, rows: Pairs, columns: Pairs, numbers: Ints) -> None:
+    """Values by joint attribute and control, wherever they stand."""
+    x, y = cut(a, rows.a, columns.a), cut(b, rows.b, columns.b)
+    changed = place.c.changed(x, y)
+    if not changed.any():
+        return
+    numbers = numbers[rows.a]
+    touched = np.unique(numbers[changed.any(axis=1)] // 9)
+    joints = place.c.report.listed(place.c.joints.labels(touched))
+    place.say(
+        f"{np.count_nonzero(changed):,} of {counted(x.size, 'value')} changed "
+        f"{_amounts(place.c, x, y, changed, numbers % 9 // 3)} (of {joints})"
+    )
+
+
+def _amounts(c: Comparison, a: Floats, b: Floats, changed: Bools, kinds: Ints) -> str:
+    """E.g. "by up to 0.3 mm and by up to 2 degrees": translations, rotations, scales."""
+    parts = []
+    for kind, measure in enumerate(("length", "angle", "number")):
+        mask = changed & (kinds == kind)[:, None]
+        if mask.any():
+            parts.append(c.by(a[mask], b[mask], measure) + (" of scale" if kind == 2 else ""))
+    return joined(parts)

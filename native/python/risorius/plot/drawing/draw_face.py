@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: MIT
+"""The face in neutral from the front and the side, with its joints and bones."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+
+import risorius
+
+from ..content.facts import Facts, listed
+from . import shade, skeleton
+from .paper import MUTED, Canvas, heading, rgb
+
+Floats = npt.NDArray[np.float64]
+
+# Clear films and lashes, which a renderer draws see-through: as clay they would hide the eyes.
+_FILMS = ("eyeshell", "eyeedge", "eyelash", "saliva", "cartilage")
+_MARGIN = 0.04
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What the two views share, in view axes: right, up, front; file units."""
+
+    shape: shade.Surface
+    joints: Floats
+    shown: npt.NDArray[np.int64]
+    bones: npt.NDArray[np.int64]
+
+
+def scene(facts: Facts, lod: int) -> Scene:
+    """The meshes and joints of one level of detail, turned to look at us.
+
+    Args:
+        facts: of the face.
+        lod: from 0.
+    """
+    dna = facts.dna
+    axes = skeleton.view_axes(dna)
+    names, meshes = _meshes(dna, lod)
+    joints = skeleton.world_positions(dna) @ axes
+    shown = listed(dna.lod_joint_mapping, lod)
+    shown = shown[shown < len(joints)] if len(shown) else np.arange(len(joints))
+    above = skeleton.parents(dna)
+    bones = shown[(above[shown] != shown) & np.isin(above[shown], shown)]
+    pairs = np.stack([above[bones], bones], axis=1)
+    paints = [_paint(name, mesh, axes) for name, mesh in zip(names, meshes, strict=True)]
+    shape = shade.surface(meshes, paints, axes)
+    return Scene(shape, joints, shown, pairs)
+
+
+def _meshes(dna: risorius.Dna, lod: int) -> tuple[list[str], list[risorius.Mesh]]:
+    """The meshes of a level without the clear films, unless there is nothing else."""
+    wanted = listed(dna.lod_mesh_mapping, lod).tolist()
+    found = [(dna.mesh_names[i], dna.meshes[i]) for i in wanted if i < len(dna.meshes)]
+    solid = [(name, mesh) for name, mesh in found if not name.lower().startswith(_FILMS)]
+    chosen = solid or found
+    return [name for name, _ in chosen], [mesh for _, mesh in chosen]
+
+
+def _paint(name: str, mesh: risorius.Mesh, axes: Floats) -> Floats:
+    """The lightness of each vertex: float64[V]. An eyeball looks at us by an iris and a pupil."""
+    points = np.asarray(mesh.positions, float).reshape(-1, 3) @ axes
+    tone = np.ones(len(points))
+    if not name.lower().startswith("eye") or not len(points):
+        return tone
+    low, high = points.min(axis=0), points.max(axis=0)
+    radius = max(float((high - low)[:2].max()) / 2, 1e-9)
+    off = np.linalg.norm((points - (low + high) / 2)[:, :2], axis=1) / radius
+    ahead = points[:, 2] > (low + high)[2] / 2
+    tone[:] = 1.12
+    tone[ahead & (off < 0.5)] = 0.62
+    tone[ahead & (off < 0.22)] = 0.2
+    return tone
+
+
+def draw(canvas: Canvas, facts: Facts, lod: int, dpi: int) -> None:
+    """Both views, to one scale.
+
+    Args:
+        canvas: to fill.
+        facts: of the rig.
+        lod: the level of detail of meshes and joints.
+        dpi: of the images.
+    """
+    seen = scene(facts, lod)
+    if not len(seen.joints) and not len(seen.shape.triangles):
+        canvas.say("This file has neither meshes nor joints.")
+        return
+    # From the side the right of the picture is the back of the head.
+    side = _turned(seen, np.array([[0, 0, 1], [0, 1, 0], [-1, 0, 0]], float))
+    frames = [frame_of(seen), frame_of(side)]
+    bottom, top = min(f[2] for f in frames), max(f[3] for f in frames)
+    widths = [f[1] - f[0] for f in frames]
+    gap, edge, head = 0.3, 0.35, 0.6
+    high = canvas.height - head - 0.15
+    scale = min(high / (top - bottom), (canvas.width - 2 * edge - gap) / sum(widths))
+    spare = canvas.width - 2 * edge - sum(widths) * scale - gap
+    left, tall = edge + spare / 2, (top - bottom) * scale
+    for title, view, frame in zip(("Front", "Side"), (seen, side), frames, strict=True):
+        wide = (frame[1] - frame[0]) * scale
+        axes = canvas.place(left, canvas.height - head - tall, wide, tall)
+        _draw_view(axes, facts, view, (frame[0], frame[1], bottom, top), round(tall * dpi))
+        heading(axes, title, _words(seen) if view is seen else "from the face's left")
+        left += wide + gap
+
+
+def _turned(seen: Scene, turn: Floats) -> Scene:
+    shape = shade.Surface(
+        seen.shape.points @ turn, seen.shape.normals @ turn, seen.shape.triangles, seen.shape.paint
+    )
+    return Scene(shape, seen.joints @ turn, seen.shown, seen.bones)
+
+
+def _words(seen: Scene) -> str:
+    joints = f"{len(seen.shown):,} joints" if len(seen.shown) else "no joints in this file"
+    if not len(seen.shape.triangles):
+        return f"{joints}, no meshes at this level"
+    return f"{joints}, {len(seen.shape.triangles):,} triangles"
+
+
+def frame_of(seen: Scene) -> tuple[float, float, float, float]:
+    """Left, right, bottom, top that hold the meshes, and the joints that are not far from them."""
+    used = seen.shape.points[np.unique(seen.shape.triangles)]
+    joints = seen.joints[seen.shown]
+    if len(used):
+        low, high = used[:, :2].min(axis=0), used[:, :2].max(axis=0)
+        # The root of a spine may lie metres below a head; the face is the subject.
+        reach = 0.1 * float((high - low).max())
+        near = np.all((joints[:, :2] > low - reach) & (joints[:, :2] < high + reach), axis=1)
+        # Most joints elsewhere: then it is no face, and all of it is shown.
+        used = np.concatenate([used, joints[near] if 2 * near.sum() >= len(near) else joints])
+    else:
+        used = joints
+    low, high = used[:, :2].min(axis=0), used[:, :2].max(axis=0)
+    # A lone joint, or joints on one line, still get a picture with two sides.
+    size = max(float((high - low).max()), 1e-3)
+    pad = np.maximum(_MARGIN * size, (0.3 * size - (high - low)) / 2)
+    (left, bottom), (right, top) = (low - pad).tolist(), (high + pad).tolist()
+    return left, right, bottom, top
+
+
+def _draw_view(
+    axes: Axes, facts: Facts, seen: Scene, frame: tuple[float, float, float, float], pixels: int
+) -> None:
+    left, right, bottom, top = frame
+    if len(seen.shape.triangles):
+        picture = shade.render(seen.shape, frame, pixels)
+        axes.imshow(picture, extent=frame, aspect="auto", interpolation="none")
+    axes.set(xlim=(left, right), ylim=(bottom, top))
+    axes.set_axis_off()
+    _draw_joints(axes, facts, seen)
+
+
+def _draw_joints(axes: Axes, facts: Facts, seen: Scene) -> None:
+    """Far joints first and fainter, so that the near side of the head can be told."""
+    if not len(seen.shown):
+        return
+    order = seen.shown[np.argsort(seen.joints[seen.shown, 2], kind="stable")]
+    points = seen.joints[order]
+    depth = points[:, 2] - points[:, 2].min()
+    near = 1 - 0.75 * (1 - depth / max(float(depth.max()), 1e-9))
+    many = len(order) > 100
+    # Hundreds of bones start in one root: as strong as a few they would hide the face.
+    width, alpha = (0.4, 0.3) if many else (1.4, 0.6)
+    lines = [seen.joints[pair][:, :2] for pair in seen.bones]
+    axes.add_collection(
+        LineCollection(lines, colors=MUTED, linewidths=width, alpha=alpha),
+        autolim=False,
+    )
+    size = float(np.clip(9000 / len(order), 12, 90))
+    shade_of = np.array([rgb(facts.joint_regions[j]) for j in order.tolist()])
+    axes.scatter(
+        points[:, 0],
+        points[:, 1],
+        s=size,
+        c=np.column_stack([shade_of, near if many else np.ones(len(order))]),
+        edgecolors=[(1.0, 1.0, 1.0, alpha) for alpha in near.tolist()],
+        linewidths=0.3 if many else 0.9,
+        zorder=3,
+    )

@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: MIT
+"""The look that all drawings share, without touching Matplotlib's global state for good."""
+
+from __future__ import annotations
+
+import logging
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import matplotlib
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
+from matplotlib.figure import FigureBase
+
+from ..content.regions import COLORS
+
+# These exact values are found again in the SVG text and become variables of the page's theme.
+INK = "#1d232b"
+MUTED = "#66707d"
+RULE = "#d4dae1"
+ACCENT = "#4076b8"
+
+_SETTINGS: dict[Any, Any] = {
+    "font.family": ["DejaVu Sans"],
+    "font.size": 10.0,
+    "text.color": INK,
+    "axes.labelcolor": MUTED,
+    "axes.edgecolor": RULE,
+    "axes.facecolor": "none",
+    "axes.linewidth": 0.8,
+    "axes.labelsize": 9.5,
+    "xtick.color": MUTED,
+    "ytick.color": MUTED,
+    "xtick.labelsize": 9.0,
+    "ytick.labelsize": 9.0,
+    "xtick.major.size": 0.0,
+    "ytick.major.size": 0.0,
+    "figure.facecolor": "none",
+    "savefig.facecolor": "none",
+    "svg.fonttype": "path",
+    "svg.hashsalt": "risorius",  # the same rig gives the same page
+    "image.composite_image": False,
+    "text.parse_math": False,  # names from files may hold dollar signs
+}
+
+
+@contextmanager
+def settings() -> Iterator[None]:
+    """Our look inside, the caller's settings again outside."""
+    log = logging.getLogger("matplotlib.font_manager")
+    level = log.level
+    with matplotlib.rc_context(), warnings.catch_warnings():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(_SETTINGS)
+        # A character's name may be in letters that the font lacks: a box is drawn, no warning.
+        warnings.filterwarnings("ignore", "Glyph")
+        log.setLevel(logging.ERROR)
+        try:
+            yield
+        finally:
+            log.setLevel(level)
+
+
+def rgb(region: str) -> npt.NDArray[np.float64]:
+    """The colour of a region: float64[3] in 0..1."""
+    return np.array(to_rgb(COLORS[region]))
+
+
+@dataclass(frozen=True)
+class Canvas:
+    """A figure, or a part of one, of a known size in inches: text keeps its distances."""
+
+    figure: FigureBase
+    width: float
+    height: float
+
+    def place(self, left: float, bottom: float, width: float, height: float) -> Axes:
+        """Axes with only a line below and to the left.
+
+        Args:
+            left, bottom: of the axes, inches from the lower left of the canvas.
+            width, height: inches.
+        """
+        part = (left / self.width, bottom / self.height, width / self.width, height / self.height)
+        axes = self.figure.add_axes(part)
+        axes.spines[["top", "right"]].set_visible(False)
+        return axes
+
+    def say(self, sentence: str) -> None:
+        """A sentence where there is nothing to draw."""
+        self.figure.text(0.5, 0.5, sentence, ha="center", va="center", color=MUTED, fontsize=12)
+
+
+def heading(axes: Axes, text: str, under: str = "") -> None:
+    """The name of a panel, flush left above it.
+
+    Args:
+        axes: of the panel.
+        text: the name.
+        under: a line of figures under the name.
+    """
+    lift = 22 if under else 8
+    axes.annotate(
+        text, (0, 1), (0, lift), "axes fraction", "offset points",
+        fontsize=11, fontweight="bold", va="bottom", annotation_clip=False,
+    )  # fmt: skip
+    if under:
+        axes.annotate(
+            under, (0, 1), (0, 7), "axes fraction", "offset points",
+            fontsize=9.5, color=MUTED, va="bottom", annotation_clip=False,
+        )  # fmt: skip
+
+
+def compact(value: float) -> str:
+    """A count in few figures: 940, 5.2k, 1.08M."""
+    if value < 1000:
+        return f"{value:.0f}"
+    if value < 100_000:
+        return f"{value / 1000:.1f}k".replace(".0k", "k")
+    if value < 999_500:
+        return f"{value / 1000:.0f}k"
+    return f"{value / 1_000_000:.2f}M"

@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: MIT
+"""Where the joints are in the neutral pose, and the file's axes turned so that a face looks at us.
+
+Row vectors as everywhere in DNA files: v' = v * M.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+import risorius
+from risorius.rigs.rotation import Convention
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+# right, up, front: x to the right of who looks at the face, y up, z out of the picture.
+_DIRECTIONS = {
+    "left": (-1, 0, 0),
+    "right": (1, 0, 0),
+    "up": (0, 1, 0),
+    "down": (0, -1, 0),
+    "front": (0, 0, 1),
+    "back": (0, 0, -1),
+}
+
+
+def view_axes(dna: risorius.Dna) -> Floats:
+    """The matrix from file axes to (right, up, front): float64[3, 3], a point is p @ matrix."""
+    matrix = np.array([_DIRECTIONS.get(a, (0, 0, 0)) for a in dna.coordinate_system], float)
+    # Axes that fold space flat say nothing; the usual y up is then the best guess.
+    return matrix if abs(np.linalg.det(matrix)) > 0.5 else np.eye(3)
+
+
+def rotations(dna: risorius.Dna) -> Floats:
+    """The neutral rotation of each joint against its parent: float64[J, 3, 3], row vectors."""
+    convention = Convention.of(dna)
+    angles = _rows(dna.neutral_joint_rotations, len(dna.joint_names))
+    angles = angles * convention.radians * convention.signs
+    product = np.broadcast_to(np.eye(3), (len(angles), 3, 3))
+    for axis in convention.order:
+        product = product @ _about(axis, angles[:, axis])
+    return np.asarray(product)
+
+
+def _rows(values: npt.NDArray[np.float32], count: int) -> Floats:
+    """float64[count, 3], zero where the file has fewer rows than joints."""
+    rows = np.zeros((count, 3))
+    given = np.asarray(values, float).reshape(-1, 3)[:count]
+    rows[: len(given)] = np.nan_to_num(given, posinf=0.0, neginf=0.0)
+    return rows
+
+
+def _about(axis: int, angles: Floats) -> Floats:
+    """Turns about one axis, radians: float64[J, 3, 3]."""
+    one, two = (axis + 1) % 3, (axis + 2) % 3
+    turn = np.zeros((len(angles), 3, 3))
+    turn[:, axis, axis] = 1
+    turn[:, one, one] = turn[:, two, two] = np.cos(angles)
+    turn[:, one, two], turn[:, two, one] = np.sin(angles), -np.sin(angles)
+    return turn
+
+
+def parents(dna: risorius.Dna) -> Ints:
+    """int64[J]; a joint with no usable parent is its own, as a root is in the file."""
+    count = len(dna.joint_names)
+    own = np.arange(count)
+    found = np.asarray(dna.joint_parents, np.int64)[:count]
+    full = own.copy()
+    full[: len(found)] = found
+    return np.where(full < count, full, own)
+
+
+def world_positions(dna: risorius.Dna) -> Floats:
+    """Joint positions in the neutral pose: float64[J, 3], file units and file axes.
+
+    From: neutral translations and rotations, composed from the roots down.
+    """
+    above = parents(dna)
+    positions, turns = _rows(dna.neutral_joint_translations, len(above)), rotations(dna)
+    done = above == np.arange(len(above))
+    while not done.all():
+        # A whole generation at a time: the depth of a face is small, its width is not.
+        ready = ~done & done[above]
+        if not ready.any():
+            break  # a ring of parents; what hangs from it stays at its local place
+        up = above[ready]
+        positions[ready] = np.einsum("ni,nij->nj", positions[ready], turns[up]) + positions[up]
+        turns[ready] = turns[ready] @ turns[up]
+        done |= ready
+    return positions

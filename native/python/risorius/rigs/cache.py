@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: MIT
+"""Compiled faces kept between runs of a program."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import sys
+from pathlib import Path
+
+import risorius
+
+from .._native import DnaError, Rig, compile_version, rig_block_version
+
+
+def cache_folder() -> Path:
+    """Where this user's programs keep what can be made again."""
+    if sys.platform == "win32":
+        given = os.environ.get("LOCALAPPDATA", "")
+        base = Path(given) if given else Path.home() / "AppData" / "Local"
+    elif sys.platform == "darwin":
+        base = Path.home() / "Library" / "Caches"
+    else:
+        given = os.environ.get("XDG_CACHE_HOME", "")
+        base = Path(given) if Path(given).is_absolute() else Path.home() / ".cache"
+    return base / "risorius" / "rigs"
+
+
+def compile_cached(
+    path: str | os.PathLike[str],
+    cache_dir: str | os.PathLike[str] | None = None,
+    *,
+    precision: str = "float32",
+    rotation: str = "euler",
+    simd: str | None = None,
+) -> Rig:
+    """Rig(load(path)), from a cache if it was compiled before.
+
+    The file of the cache is named by a hash of the DNA's bytes, the options, this version and the
+    byte order: an edited DNA is another one. Its hash is checked each time; one that is damaged,
+    were it by a single bit, is replaced. A folder that cannot be written costs the time to compile
+    and is no error. Nothing is ever deleted, but may be.
+
+    Args:
+        path: of a DNA file.
+        cache_dir: else a folder among the user's caches; made if it is not there. What others may
+            write there is checked as DNA files are, see Rig.load: a hash finds damage, not forgery.
+        precision, rotation, simd: as of Rig.
+
+    Raises:
+        DnaError: as load(path) and Rig.
+        ValueError: an unknown option.
+    """
+    try:
+        data = Path(path).read_bytes()
+    except OSError:  # load says it in its own words
+        dna = risorius.load(path)
+        return Rig(dna, precision=precision, rotation=rotation, simd=simd)
+    file = Path(cache_dir) if cache_dir is not None else cache_folder()
+    file /= _key(data, precision, rotation)
+    with contextlib.suppress(DnaError):
+        return Rig.load(file, trusted=None, simd=simd)
+    try:
+        dna = risorius.load(data)
+    except DnaError:
+        dna = risorius.load(path)  # names the file
+    rig = Rig(dna, precision=precision, rotation=rotation, simd=simd)
+    with contextlib.suppress(OSError, DnaError):
+        file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        rig.save(file)
+    return rig
+
+
+def _key(data: bytes, precision: str, rotation: str) -> str:
+    what = hashlib.sha256(data)  # CPUs have instructions for it: twice as fast as blake2b
+    versions = (risorius.__version__, rig_block_version(), compile_version())
+    about = (*versions, sys.byteorder, precision, rotation)
+    what.update(repr(about).encode())
+    return what.hexdigest() + ".rig"
