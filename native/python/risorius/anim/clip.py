@@ -162,7 +162,7 @@ class Clip:
             place = np.interp(wanted, self.times, np.arange(count, dtype=np.float64))
         else:
             place = np.clip((wanted - self.start) * self.rate, 0.0, count - 1.0)
-            near = np.rint(place)  # what the division lost: a frame's own time is that frame
+            near = np.rint(place)  # the division rounds; the time of a frame has to give that frame
             place = np.where(np.abs(place - near) < 1e-9 * np.maximum(near, 1.0), near, place)
         place = np.nan_to_num(place, nan=0.0)  # a time that is no number is the first frame's
         first = np.minimum(place.astype(np.int64), count - 1)

@@ -49,7 +49,7 @@ class NpzWriter:
         self._parts = sorted(parts, key=lambda part: -face.rest(part).size)
         self._waiting: dict[str, IO[bytes]] = {}
         for part in self._parts[1:]:
-            # Closed by the stack, however this ends.
+            # The stack closes the file, also after an exception.
             spool = tempfile.SpooledTemporaryFile(_SPOOL_BYTES)  # noqa: SIM115
             self._waiting[part] = self._stack.enter_context(spool)
         self._shapes = {part: (frames, *face.rest(part).shape) for part in self._parts}
@@ -62,7 +62,7 @@ class NpzWriter:
         try:
             if self._first is not None:
                 self._first.close()
-        finally:  # it fails where there is no room for the rest, and the others are closed too
+        finally:  # closing fails on a full disk; the other files are closed nevertheless
             self._stack.close()
 
     def _member(self, part: str) -> IO[bytes]:
@@ -73,7 +73,7 @@ class NpzWriter:
         return member
 
     def _open(self, name: str) -> IO[bytes]:
-        info = zipfile.ZipInfo(f"{name}.npy")  # of 1980: the same animation is the same bytes
+        info = zipfile.ZipInfo(f"{name}.npy")  # dated 1980: the same animation gives the same bytes
         info.compress_type = self._method
         return self._zip.open(info, "w", force_zip64=True)
 
@@ -85,7 +85,7 @@ class NpzWriter:
             try:
                 file.write(values.data.cast("B") if values.size else b"")
             except OSError as error:
-                if error.filename is None:  # of a spool, which nobody knows by a name
+                if error.filename is None:  # a temporary file, whose name means nothing to a user
                     raise OSError(error.errno, error.strerror, tempfile.gettempdir()) from None
                 raise
 

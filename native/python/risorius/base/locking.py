@@ -42,7 +42,7 @@ def locked(folder: Path) -> Iterator[None]:
         os.write(handle, _about_this_process())
         yield
     finally:
-        # Whoever waits for the name opens another file; see _open.
+        # A process that waits for the lock by its name opens another file; see _open.
         if sys.platform != "win32":
             _remove(folder)
         os.close(handle)
@@ -65,7 +65,7 @@ def _open(folder: Path) -> int:
             raise OSError(error.errno, error.strerror, str(folder)) from None
         try:
             _take(handle, folder)
-            # The one before may have removed the file between our opening and our locking it.
+            # The last holder may have removed the file between our opening and our locking it.
             with contextlib.suppress(FileNotFoundError):
                 if os.path.samestat(os.fstat(handle), os.stat(path)):
                     return handle
@@ -78,7 +78,7 @@ def _open(folder: Path) -> int:
 if sys.platform == "win32":
     import msvcrt
 
-    _FAR = 1 << 30  # bytes that are locked cannot be read, and who has the lock is to be read
+    _FAR = 1 << 30  # Windows hides locked bytes from readers, and the holder's name is to be read
 
     def _take(handle: int, folder: Path) -> None:
         os.lseek(handle, _FAR, os.SEEK_SET)
@@ -99,7 +99,7 @@ else:
         except OSError as error:
             if error.errno not in _UNKNOWN:
                 raise
-            # A file system without locks: what the file says must do.
+            # A file system without locks: the holder's number in the file decides.
             holder = _holder(handle)
             if _may_live(holder):
                 raise LockedError(_refusal(folder, holder)) from None

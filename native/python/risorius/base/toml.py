@@ -11,7 +11,7 @@ from .errors import RisoriusError
 
 MOST_BYTES = 16 << 20
 DEEPEST = 64
-# A dotted key of more parts than that: the parser's time grows with their square.
+# Dotted keys may have so many parts: the parser's time grows with the square of their number.
 _DEEP_KEY = re.compile(rf"""(?<![\w"'-])(?:[\w"'-]+[ \t]*\.[ \t]*){{{DEEPEST}}}""")
 
 

@@ -42,7 +42,7 @@ class Cluster:
                 "--scheduler needs the package distributed: pip install 'risorius[cluster]'"
             ) from error
         self._work, self.address = work, address
-        # What it says of lost connections, with tracebacks, is our one sentence.
+        # Dask logs lost connections with tracebacks; we report them in one sentence.
         logging.getLogger("distributed").setLevel(logging.CRITICAL)
         try:
             self._dask.comm.get_address_host_port(address)

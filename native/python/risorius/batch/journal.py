@@ -44,7 +44,7 @@ class Journal:
         try:
             with open(self.path, "rb") as file:
                 if _parsed(next(file, b"")) != _HEAD:
-                    return  # of another version: everything is to be done again
+                    return  # a journal of another version: every job is done again
                 offset = file.tell()
                 for line in iter(file.readline, b""):
                     self._take(line, offset)
@@ -117,7 +117,7 @@ class Journal:
                     rest = rest[file.write(rest) :]
                 os.fsync(file.fileno())
             except OSError as error:
-                with contextlib.suppress(OSError):  # half a line would spoil the next one
+                with contextlib.suppress(OSError):  # half a line would make the next one unreadable
                     file.truncate(offset)
                 raise OSError(error.errno, error.strerror, str(self.path)) from None
         self._records[job.name] = _Record(outcome.stamp, files, offset, len(line))

@@ -80,7 +80,7 @@ class _Worker:
 
     def give(self, job: Job) -> None:
         self.job = self.last = job
-        with contextlib.suppress(OSError):  # it has died: noticed by who waits for it
+        with contextlib.suppress(OSError):  # the worker has died; whoever waits for it notices
             self.connection.send(job)
 
     def end(self) -> str:

@@ -110,7 +110,7 @@ def _run(plan: Plan, workers: int | None, scheduler: str | None, restart: bool) 
             _gather(results, jobs, report, journal, progress)
     finally:
         progress.close()
-        fileio.sweep(folders)  # of workers that were killed
+        fileio.sweep(folders)  # temporary files of workers that were killed
         report.seconds = time.monotonic() - started
         summary.write(plan, lambda: summary.rows(plan, report.outcomes, report.reused, journal))
     return report
@@ -147,7 +147,7 @@ def _gather(
             failed += 1
             progress.say(f"{outcome.name}: {outcome.error}")
         else:
-            # First, so that whatever the report knows is in the journal, Ctrl-C or not.
+            # The journal comes first: after Ctrl-C it holds all that the report knows.
             journal.add(by_name[outcome.name], outcome)
             report.frames += int(outcome.facts.get("frames", 0))
         report.outcomes[outcome.name] = dataclasses.replace(outcome, facts={})

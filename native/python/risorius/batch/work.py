@@ -25,7 +25,7 @@ from ..baking.files import digest
 from .jobs import Job
 from .outcome import Outcome
 
-_FORMAT = 1  # of the outputs: another number makes all that is there out of date
+_FORMAT = 1  # version of the outputs: raising it makes all existing ones out of date
 _Value = TypeVar("_Value")
 
 

@@ -44,7 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         args = parse(arguments)
         code = int(args.func(args))
         sys.stdout.flush()
-    except BrokenPipeError:  # who read has enough
+    except BrokenPipeError:  # the reader of the pipe has closed it
         _drop_output()
         return 0
     except KeyboardInterrupt as interrupt:
@@ -52,7 +52,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (RisoriusError, OSError, MemoryError) as error:
         place = ""
         if isinstance(error, OSError) and error.filename is None and error.errno == errno.ENOSPC:
-            place = "<stdout>: "  # the writers of files say their names
+            place = "<stdout>: "  # errors of other files have the file's name already
             _drop_output()
         return _say(place + sentence(error), 2 if isinstance(error, CommandLineError) else 1)
     return code
@@ -66,7 +66,7 @@ def _say(text: str, code: int) -> int:
 
 def _drop_output() -> None:
     """Let nothing that is still buffered fail again when the interpreter ends."""
-    with contextlib.suppress(OSError, ValueError):  # a stream that is no file has no such end
+    with contextlib.suppress(OSError, ValueError):  # sys.stdout may have no file descriptor
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 

@@ -73,7 +73,7 @@ def export_frames(source: Path, raw_count: int, folder: Path) -> list[str]:
         return _export_frames(source, raw_count, folder)
     except RisoriusError:
         raise
-    except (ValueError, EOFError, zipfile.BadZipFile) as error:  # of NumPy
+    except (ValueError, EOFError, zipfile.BadZipFile) as error:  # raised by NumPy
         raise InputError(f"{source}: an .npz of arrays was expected: {error}") from error
 
 

@@ -31,7 +31,7 @@ _NEWEST = 8
 _DESCRIPTION = """\
 Reads INPUT and writes OUTPUT: .dna or .json by the suffix of each, "-" is the standard input or
 output. OUTPUT may be there already and is replaced as a whole or, after an error, not at all."""
-# Options and the arguments of Dna.convert that they are.
+# Options of the command -> arguments of Dna.convert.
 _SYSTEM = {
     "axes": "axes",
     "rotation_sequence": "rotation_sequence",

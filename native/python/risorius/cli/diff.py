@@ -11,7 +11,7 @@ import numpy as np
 from ..diff import Difference, compare
 from .files import CommandLineError, InputError, counted, kind_of, read, summary
 
-_LINES = 8  # of one kind that are printed
+_LINES = 8  # so many lines for one field are printed
 
 
 def same_but_for(a: str, b: str) -> Difference | None:

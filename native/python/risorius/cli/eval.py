@@ -20,7 +20,7 @@ from . import eval_clip
 from .files import CommandLineError
 
 ATTRIBUTES = ("tx", "ty", "tz", "rx", "ry", "rz", "sx", "sy", "sz")
-_NOISE = 1e-9  # cm, m, degrees, radians or of a size: smaller than anything that shows
+_NOISE = 1e-9  # cm, m, degrees, radians or of a size: too small to be visible
 Floats = npt.NDArray[np.float32]
 
 
@@ -189,7 +189,7 @@ def page(facts: dict[str, Any]) -> str:
         f"\njoints, as difference from the neutral pose ({facts['translation_unit']}, "
         f"{facts['rotation_unit']}; sx sy sz are added to 1)"
     )
-    # What is left of a sum in float32 is no movement; --json has every digit.
+    # Rounding errors of float32 sums are no movement; --json has every digit.
     joints = [row for row in facts["joints"] if any(_moved(row[a]) for a in ATTRIBUTES)]
     if not joints:
         return "\n".join([*out, "  none"])

@@ -90,7 +90,7 @@ def _in_system(
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             converted = b.convert(**target)
-    except ValueError as error:  # DnaError as well: a system that makes no sense
+    except ValueError as error:  # DnaError as well: axes or units that make no sense
         report.add("file", "", f"numbers are compared as they stand: {error}")
         return b, report, True
     report.add("file", "", "numbers are compared in the axes and units of A, but for rounding")

@@ -21,7 +21,7 @@ from .source import Take, keep_ascending, make_clip
 Doubles = npt.NDArray[np.float64]
 
 MAGIC = b"Kaydara FBX Binary  \x00\x1a\x00"
-# Of a key's time in a second; FBX 8000 counts coarser.
+# Units of a key's time in a second; FBX 8000 counts in larger ones.
 TICKS = 46186158000
 TICKS_8000 = 141120000
 # GlobalSettings.TimeMode -> frames a second.
@@ -31,12 +31,12 @@ TIME_MODES = {
     17: 60000 / 1001, 18: 120000 / 1001,
 }  # fmt: skip
 _TOP = {"GlobalSettings", "Objects", "Connections"}
-# What is skipped unread: the bulk of a file.
+# Nodes that are skipped unread: they are most of a file's bytes.
 _BULK = {"Geometry", "Video", "Texture", "Material", "Pose", "Implementation"}
 _SCALARS = {"Y": "<h", "C": "<?", "B": "<?", "I": "<i", "F": "<f", "D": "<d", "L": "<q"}
 _ARRAYS = {"f": "<f4", "d": "<f8", "l": "<i8", "i": "<i4", "b": "<u1", "c": "<u1"}
 _DEEPEST = 32
-# What a record and a value of it take in memory, on the safe side; and a key of a curve.
+# Bytes of memory that a record, one of its values and a key of a curve take, rounded up.
 _NODE_BYTES, _VALUE_BYTES, _KEY_BYTES = 300, 48, 120
 # KeyAttrFlags.
 _CONSTANT, _CUBIC, _AUTO, _TCB, _CLAMP, _WEIGHTED = 0x2, 0x8, 0x100, 0x200, 0x5000, 0x3000000
@@ -414,7 +414,7 @@ def _attributes(node: Node, count: int) -> tuple[npt.NDArray[np.int64], Doubles]
     runs = node.array("KeyAttrRefCount").astype(np.int64)
     data = node.array("KeyAttrDataFloat").astype(np.float64)
     good = 0 < flags.size <= count and flags.size == runs.size
-    # No run is longer than the curve: else a sum of them might wrap.
+    # No run may be longer than the curve: the sum of the runs would overflow.
     if not good or (runs < 0).any() or (runs > count).any() or runs.sum() != count:
         return np.full(count, 4, np.int64), np.zeros((count, 2))
     table = np.zeros((flags.size, 4))

@@ -153,11 +153,11 @@ class Document:
             except (binascii.Error, ValueError) as error:
                 raise self.fail(place, f"base64 was expected: {error}") from error
         file = unquote(uri)
-        # A file may bring its own neighbours, nothing else of the disk.
+        # A glTF may name files in its own folder, and no others on the disk.
         if re.match(r"[a-zA-Z]+:|[/\\]", file) or ".." in re.split(r"[/\\]", file):
             raise self.fail(place, f"a file beside this one was expected, found {uri[:80]!r}")
         data = read_bytes(self.path.parent / file)
-        # A buffer of its own file is input too; but a name costs little, and may be given often.
+        # A buffer in a file of its own counts as input; but a short JSON may name that file often.
         self.budget.hold(len(data), place)
         return data
 
@@ -351,7 +351,7 @@ def _names(document: Document, target: Mapping[str, Any], place: str) -> list[st
                 place, f"a weight of {len(names)} was expected, found {path[:80]!r}"
             )
         return [names[int(parts[3])]]
-    # Colours, places and the like are no curves of a face; what an author put into extras may be.
+    # Colours, positions and the like are no curves of a face; properties in extras may be.
     return [parts[-1]] if "extras" in parts and parts[-1] != "extras" else []
 
 

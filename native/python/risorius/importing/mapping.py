@@ -301,7 +301,7 @@ def parse_mapping(text: str, where: str, name: str = "") -> Mapping:
     prefix = _text(table, "prefix", where)
     rows = {key: _row(key, row, prefix, where) for key, row in _table(table, "rows", where).items()}
     rows |= {key: {} for key in _texts(table, "ignore", where)}
-    for key in mapping.rows:  # of the base: a row of its own replaces it, however it is spelled
+    for key in mapping.rows:  # a row of the base is replaced under its exact spelling only
         if key not in rows and loose_name(key) in {loose_name(own) for own in rows}:
             raise MappingError(where, f"rows: {key} is in the base with another spelling")
     controls = {

@@ -29,14 +29,14 @@ RATE_KEYS = ("exportFps", "fps", "rate", "frameRate", "framerate", "frame_rate",
 TIME_KEYS = ("time", "timeCode", "timecode", "timestamp", "t", "seconds")
 TIMES_KEYS = ("times", "timeCodes", "timecodes", "timestamps", "time")
 WEIGHT_KEYS = ("weights", "values", "blendShapes", "blendshapes", "curves", "shapes")
-# What NeuroSync returns has no names: Live Link Face's columns, and seven emotions after them.
+# NeuroSync returns rows without names: Live Link Face's columns, and seven emotions after them.
 NEUROSYNC_EMOTIONS = ("Angry", "Disgusted", "Fearful", "Happy", "Neutral", "Sad", "Surprised")
 NEUROSYNC_RATE = 60.0
 KEYS_KEYS = ("Keys", "keys")
 CURVE_NAME_KEYS = ("CurveName", "Name", "name", "curveName")
 INNER_CURVE_KEYS = ("FloatCurve", "Curve", "curve", "floatCurve")
 DEEPEST = 64
-# Frames a second; what is slower or faster is a number gone wrong.
+# Frames a second; a rate outside this range is taken for a damaged number.
 SLOWEST, FASTEST = 0.01, 1e6
 _LARGEST = float(np.finfo(np.float32).max)
 

@@ -16,11 +16,11 @@ from .mapping import ANGLES, fits
 
 Doubles = npt.NDArray[np.float64]
 
-# Below this, what is left above a neutral value is noise that would only be blown up.
+# Where the neutral value leaves a smaller range than this, stretching would only amplify noise.
 LEAST_RANGE = 0.05
 _SIDES = {"L": "R", "R": "L"}
 _WORDS = {"Left": "Right", "Right": "Left"}
-# Turning to the other side is the negative angle.
+# Mirroring a face negates these angles.
 _MIRRORED_ANGLES = ("yaw", "roll")
 
 

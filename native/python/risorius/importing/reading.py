@@ -216,7 +216,7 @@ def read(
         found = _read_kind(file, data, Options(kind, rate, timecode_rate, take, budget))
     except AnimationFileError:
         raise
-    except (ValueError, ArithmeticError) as error:  # numbers that the file has and nobody expects
+    except (ValueError, ArithmeticError) as error:  # numbers in the file that no reader expects
         raise AnimationFileError(str(path), str(error)) from error
     except RecursionError as error:
         raise AnimationFileError(str(path), "nested too deeply to be read") from error

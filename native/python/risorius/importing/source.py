@@ -16,9 +16,9 @@ from .errors import AnimationFileError
 
 Doubles = npt.NDArray[np.float64]
 
-# More than any take; a file beyond it is a mistake, and would only fill the memory.
+# No recorded take is as large; a larger file is a mistake and would only fill the memory.
 MAX_BYTES = 1 << 30
-# Below this, times are those of keys, not of frames.
+# Times that lie further apart than this rate gives are times of keys, not of frames.
 LEAST_RATE = 8.0
 USUAL_RATE = 60.0
 RATES = (12.0, 23.976, 24.0, 25.0, 29.97, 30.0, 48.0, 50.0, 59.94, 60.0, 90.0, 100.0, 120.0, 240.0)
@@ -128,7 +128,7 @@ def frame_rate(times: Doubles) -> float:
     measured = 1.0 / step if step > 0.0 else USUAL_RATE
     if measured < LEAST_RATE:
         return USUAL_RATE
-    # Nearest first: 29.97 and 30 lie within 1 % of each other.
+    # The nearest rate is tried first: 29.97 and 30 lie within 1 % of each other.
     near = min(RATES, key=lambda rate: abs(rate - measured))
     if abs(near - measured) > 0.01 * near:
         return measured

@@ -42,7 +42,7 @@ BrowOuterUpLeft BrowOuterUpRight CheekPuff CheekSquintLeft CheekSquintRight Nose
 NoseSneerRight TongueOut HeadYaw HeadPitch HeadRoll LeftEyeYaw LeftEyePitch LeftEyeRoll RightEyeYaw
 RightEyePitch RightEyeRoll""".split()
 )
-# Columns that count, and are no curve.
+# Columns that tell how many blend shapes there are; they hold no curve.
 COUNTS = ("blendshapecount",)
 
 
@@ -88,7 +88,7 @@ class Table:
         cells = self.columns[column]
         if rows is not None:
             cells = tuple(cells[row] for row in rows)
-        try:  # at once; what is wrong with a cell is found out cell by cell
+        try:  # the whole column at once; where that fails, each cell by itself finds the error
             values = np.array(list(map(float, cells)))
         except ValueError:
             values = np.full(len(cells), np.nan)
@@ -147,7 +147,7 @@ def _check(table: Table, line: int) -> None:
             "a header with the names of the curves was expected, found numbers",
             line=line,
         )
-    # A line that ends in a delimiter has one empty column more; so have its rows, or not.
+    # A header that ends in a delimiter has one more empty column; its rows may have it or not.
     if len(table.header) > 1 and not table.header[-1]:
         table.header.pop()
         for row in table.rows:

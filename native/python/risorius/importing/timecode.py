@@ -80,7 +80,7 @@ def infer_base(codes: Sequence[Timecode]) -> int | None:
     usual = (30, 60) if largest < 60 else (100, 120)
     if largest >= 30:
         return next((base for base in (*usual, 1000) if base > largest), None)
-    # Frame 29 was reached; at 60 a take this long would have passed it.
+    # Frame 29 is the highest in a take so long that at 60 frames a second it would pass 29.
     if len(codes) > 1 and largest == 29 and seconds[-1] - seconds[0] >= 2:
         return 30
     return None
@@ -105,7 +105,7 @@ def seconds_of(
     total = 60.0 * hours + minutes
     count -= dropped * (base // 15) * (total - np.floor(total / 10.0))
     seconds = count / base * (1.0 if is_true_rate and not dropped.any() else 1.001)
-    # Hours back is midnight; less is a row out of order, which is not ours to move.
+    # A step back by hours is midnight; a smaller one is a row out of order and stays one.
     wraps = np.concatenate([[0.0], np.diff(seconds) < -0.5 * DAY])
     length = DAY if not dropped.any() else float((24 * 60 * 60 * base - 2592 * (base // 30)) / base)
     return seconds + np.cumsum(wraps) * (length if not dropped.any() else length * 1.001)

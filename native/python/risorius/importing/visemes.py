@@ -27,7 +27,7 @@ RATE = 60.0
 BLEND = 0.12
 # Moho and Papagayo count frames of a film; a .dat does not say how many a second.
 DAT_RATE = 24.0
-# Seconds; a file that asks for more frames than this takes has a number wrong.
+# Seconds; a file that is longer has a wrong number in it.
 LONGEST = 7200.0
 # A mouth that never closes for an M shows at once; that a D was cut short nobody sees. 1: held back
 # for no neighbour; 0: neighbours may reach all through it.
@@ -37,7 +37,7 @@ DOMINANCE = {
     "rest": 0.3,
 }  # fmt: skip
 RHUBARB = frozenset("ABCDEFGHX")
-# The name of Papagayo's ten that no shape of Rhubarb has tells the two apart; E and X say nothing.
+# Names that only Papagayo's ten mouth shapes have tell its files from Rhubarb's; E is in both.
 PAPAGAYO = frozenset(("AI", "E", "etc", "FV", "L", "MBP", "O", "rest", "U", "WQ"))
 _TSV = re.compile(r"\d+(\.\d+)?\t\S+")
 
@@ -78,7 +78,7 @@ def flowing_curves(
     for i in range(1, len(cues)):
         border = cues[i].start
         half = min(0.5 * blend, reach[i - 1], reach[i])
-        # No window reaches beyond the cue after it; later borders settle what lies further on.
+        # A window ends with the next cue at the latest; the borders of later cues follow in turn.
         beyond = cues[i + 1].end if i + 1 < len(cues) else np.inf
         first, last = np.searchsorted(times, [border - half, beyond])
         at = times[first:last]

@@ -45,7 +45,7 @@ _SHAPES = 52
 _SIGNS = np.array([1.0] * _SHAPES + [-1.0, -1.0, 1.0] * 3, np.float32)
 _COUNTS = (len(CURVES), _SHAPES, _SHAPES - 1)
 _LONGEST_TEXT = 256
-_LARGEST = 100.0  # no unit and no angle of a face is beyond it
+_LARGEST = 100.0  # no blend shape and no angle of a face is larger
 
 
 class NoFace(LiveError):  # noqa: N818  not an error of the sender

@@ -160,7 +160,7 @@ class _Face:
     def __init__(self, sender: str) -> None:
         self.sender = sender
         self.values: dict[str, float] = {}
-        self._age: dict[str, int] = {}  # of each name the number of the face that it came for last
+        self._age: dict[str, int] = {}  # name -> number of the last face that had a value for it
         self._number = 0
         self.bones: dict[str, tuple[float, ...]] = {}
         self.fresh: set[str] = set()
@@ -271,7 +271,7 @@ def _head_quaternion(face: _Face, values: list[Any]) -> tuple[str, dict[str, flo
 
 def _head_degrees(face: _Face, values: list[Any]) -> tuple[str, dict[str, float]]:
     x, y, z = (math.radians(v) for v in _numbers(values, 3))
-    if face.quaternion:  # which says the same without an order of angles
+    if face.quaternion:  # the same rotation, without an order of angles
         return "HR", {}
     return "HR", {"head.yaw": y, "head.pitch": -x, "head.roll": -z}
 

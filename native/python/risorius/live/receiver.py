@@ -23,13 +23,13 @@ from .take import Take
 SOURCES = ("livelink", "osc")
 PORTS = {"livelink": livelink.PORT, "osc": osc.PORT}
 THIS_MACHINE, EVERYWHERE = "127.0.0.1", "0.0.0.0"
-_SILENCE = 0.004  # seconds that end a face whose sender does not say where it ends
+_SILENCE = 0.004  # seconds without a packet that end a face whose sender does not mark its end
 _WINDOW = 0.05  # seconds over which a flood is counted
-_MOST_PACKETS = {"livelink": 100, "osc": 1000}  # of one window: far beyond what phones send
-_BUSIEST = 0.02  # seconds of one window that reading packets may take: large ones are few
-_BACK = 1.0  # a packet that is older by less came late; by more, the sender's clock was set
+_MOST_PACKETS = {"livelink": 100, "osc": 1000}  # in one window: far more than phones send
+_BUSIEST = 0.02  # seconds of one window in which packets may be read: large packets take long
+_BACK = 1.0  # seconds; a packet older by less came late, by more: the sender's clock was set back
 _AHEAD = 2.0  # seconds that a sender's clock may get ahead of ours and still be believed
-_DRIFT = 0.001  # and this share of the time since its first face: no two clocks run alike
+_DRIFT = 0.001  # and this share of the time since its first face, as clocks run unevenly
 _DAY = 86400.0
 
 
@@ -254,7 +254,7 @@ class Receiver:
             except TimeoutError:
                 self._keep(self._decoder.flush(), monotonic())
                 continue
-            except OSError:  # Windows reports here that an answer of ours was refused
+            except OSError:  # Windows reports here that a packet we sent was refused
                 continue
             now = monotonic()
             if now - window >= _WINDOW:
@@ -262,8 +262,8 @@ class Receiver:
             self._take_in(data, sender[0], now)
             seen, spent = seen + 1, spent + monotonic() - now
             if seen >= _MOST_PACKETS[self.source] or spent >= _BUSIEST:
-                # What comes meanwhile waits, and then is dropped, in the system's buffer: so a
-                # flood costs nothing of the time that the viewport needs.
+                # Packets that come meanwhile wait in the system's buffer and are dropped when it is
+                # full: so a flood takes no time from the viewport.
                 self._counts["floods"] += 1
                 self._stop.wait(max(0.0, window + _WINDOW - monotonic()))
         self._keep(self._decoder.flush(), monotonic())
@@ -315,7 +315,7 @@ class Receiver:
             if any(s.label == label for s in self._subjects):
                 label = f"{label} ({packet.device[:8]})"
             subject = _Subject(label)
-            # Forgotten and heard again it would begin anew, with its clock, within the take.
+            # A sender that is being recorded is kept: its clock would restart within the take.
             recorded = {take.subject for take in self._takes}
             added = self._subjects.add(key, subject, now, lambda s: s.label in recorded)
         return subject if added else None
@@ -325,7 +325,7 @@ def own_address() -> str:
     """The address at which the devices of the network find this machine; "" without a network."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
-            probe.connect(("192.0.2.1", 9))  # of no machine; nothing is sent, only the way is asked
+            probe.connect(("192.0.2.1", 9))  # nothing is sent, only the route is looked up
         except OSError:
             return ""
         found = str(probe.getsockname()[0])

@@ -54,7 +54,7 @@ def compile_cached(
     """
     try:
         data = Path(path).read_bytes()
-    except OSError:  # load says it in its own words
+    except OSError:  # load() below fails as well, and its error names the file
         dna = risorius.load(path)
         return Rig(dna, precision=precision, rotation=rotation, simd=simd)
     file = Path(cache_dir) if cache_dir is not None else cache_folder()

@@ -161,7 +161,7 @@ def make_parts(base: BaseMesh) -> list[Part]:
                 base.uvs,
                 count,
             )
-            # Clipping at the neck also drops what is not used; the small parts lie above it.
+            # Clipping at the neck drops the body below it; the small parts all lie above.
             aside = np.hypot(base.positions[:, 0], 0.35)  # round in front, no point
             height = base.positions[:, 1] - NECK_SLOPE * aside
             polygons, operator = clip_below(polygons, height, NECK_CUT)
@@ -205,7 +205,7 @@ def spine_weights(positions: Floats, joints: dict[str, Floats]) -> Floats:
         positions: float64[V, 3], decimetres.
         joints: positions of the joints by name.
     """
-    # Chin and nose hang before the neck, at its height: what lies in front of it is head.
+    # Chin and nose are as high as the neck and lie in front of it; they belong to the head.
     ahead = np.clip(positions[:, 2] - joints["head"][2] - 0.45, 0, None)
     height = positions[:, 1] + 0.8 * ahead
     levels = [joints[n][1] for n in ("spine_04", "neck_01", "neck_02", "head")]

@@ -79,7 +79,7 @@ def speak_apart(
         "transcript": transcript,
         "options": options,
     }
-    # Its errors go into a file: a pipe that nobody empties would stop it.
+    # Error messages of the process go into a file: a full pipe that nobody reads would block it.
     with tempfile.TemporaryFile() as said, _started(said) as process:
         try:
             _write(process, task)
@@ -99,7 +99,7 @@ def speak_apart(
 def _started(said: IO[bytes]) -> subprocess.Popen[bytes]:
     python = python_program()
     options = ["-I", "-B"] if sys.dont_write_bytecode else ["-I"]
-    quiet = getattr(subprocess, "CREATE_NO_WINDOW", 0)  # of Windows, where one would flash up
+    quiet = getattr(subprocess, "CREATE_NO_WINDOW", 0)  # on Windows a console window would flash up
     try:
         return subprocess.Popen(
             [python, *options, "-c", _BEGIN],
@@ -138,7 +138,7 @@ def _write(process: subprocess.Popen[bytes], task: dict[str, Any]) -> None:
         process.stdin.write(json.dumps(task).encode() + b"\n")
         process.stdin.flush()
     except OSError:
-        pass  # it is gone already: how, is said by who waits for its words
+        pass  # the process has ended; the reader of its messages reports how
 
 
 def _messages(process: subprocess.Popen[bytes], cancel: Cancel | None) -> Iterator[dict[str, Any]]:
@@ -168,7 +168,7 @@ def _hand_over(pipe: IO[bytes], lines: queue.SimpleQueue[bytes]) -> None:
         for line in pipe:
             lines.put(line)
     except (OSError, ValueError):
-        pass  # closed here while it was read
+        pass  # the parent closed the pipe while this thread was reading it
     lines.put(b"")
 
 
@@ -195,7 +195,7 @@ def _clip_of(message: dict[str, Any]) -> Clip:
 
 def serve(task: dict[str, Any]) -> None:
     """The other end: do what the line says, and end the process."""
-    # What a library prints must not get between the lines.
+    # Text that a library prints must not get between the lines of the protocol.
     words = os.fdopen(os.dup(1), "w", encoding="ascii")
     os.dup2(2, 1)
 
@@ -203,7 +203,7 @@ def serve(task: dict[str, Any]) -> None:
         words.write(json.dumps(message) + "\n")
         words.flush()
 
-    with contextlib.suppress(ImportError):  # first: Windows loads nothing while a pipe is read
+    with contextlib.suppress(ImportError):  # before a pipe is read: Windows waits
         importlib.import_module("pocketsphinx")
     threading.Thread(target=_end_with_parent, daemon=True).start()
     try:

@@ -50,7 +50,7 @@ def pitch(samples: Samples) -> Curve:
         block = (block - block.mean(axis=1, keepdims=True)) * shape
         power = np.fft.irfft(np.square(np.abs(np.fft.rfft(block, size))))
         score = power[:, lags] / np.maximum(power[:, :1], 1e-9) * (own[0] / own[lags])
-        best = np.argmax(score - 0.002 * lags, axis=1)  # of like peaks the first is the period
+        best = np.argmax(score - 0.002 * lags, axis=1)  # the first of equal peaks is the period
         voiced = (score[np.arange(len(block)), best] > _VOICED) & (power[:, 0] > 1e-6)
         heights = 12.0 * np.log2(_PITCH_RATE / lags[best] / 100.0)
         found[first : first + len(block)] = np.where(voiced, heights, np.nan)
@@ -88,7 +88,7 @@ def accents(phonemes: Sequence[Phoneme], samples: Samples, apart: float = 0.7) -
     if len(vowels) < 3:
         return []
     rows = np.array([_measure(p, levels, heights) for p in vowels])
-    # Of those without a pitch the usual one is assumed.
+    # Vowels without a measurable pitch get the median pitch.
     usual = np.nanmedian(rows[:, 1]) if np.isfinite(rows[:, 1]).any() else 0.0
     rows[:, 1] = np.where(np.isfinite(rows[:, 1]), rows[:, 1], usual)
     spread = np.maximum(rows.std(axis=0), (1.0, 0.5, 0.02))

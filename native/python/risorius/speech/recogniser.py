@@ -29,8 +29,8 @@ _SAID, _SKIPPED, _OTHER = 0.98, 0.002, 0.01  # likelihoods within a transcript t
 _PHONE_OPTIONS: dict[str, Any] = {"beam": 1e-20, "pbeam": 1e-20, "lw": 1.0}
 # One pass with narrow beams: three quick hearings together are better than a thorough one.
 _WORD_OPTIONS: dict[str, Any] = {"fwdflat": False, "maxhmmpf": 3000, "beam": 1e-40, "wbeam": 1e-20}
-# Tried in turn: the way through the lattice of words that is the best is not always one on which
-# the phonemes, too, come to an end.
+# Tried in turn: on the best path through the lattice of words the alignment of the phonemes
+# sometimes does not reach the end of the sound.
 _ALIGNERS: dict[str, dict[str, Any]] = {
     "narrow": {},
     "one way": {"bestpath": False},
@@ -197,7 +197,7 @@ def _phone_pass(decoder: Any, samples: Samples) -> list[Segment] | None:
 
 
 def _segments(decoder: Any, count: int) -> list[Segment]:
-    # hyp() first: of a phoneme decoder it frees what a seg() made before it still points to.
+    # hyp() comes first: called later it would free memory that the segments of seg() still use.
     if decoder.hyp() is None:
         return []
     found = decoder.seg() or ()

@@ -18,7 +18,7 @@ from .targets import compare_targets
 
 Numbers = npt.NDArray[np.uint32]
 
-# Of each array: what one element is, what happens to it, and in which unit.
+# For each array: what one element is, the verb for its change, and its unit.
 _POINTS = (
     ("positions", "vertex", "moved", "length"),
     ("texture_coordinates", "UV", "changed", "number"),

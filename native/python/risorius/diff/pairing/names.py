@@ -12,7 +12,7 @@ import risorius
 from .pairs import Ints, Pairs, integers, pair_names, with_renamed
 from .spaces import Space, chain
 
-_DEEPEST = 8  # correctives of correctives that are spelled out
+_DEEPEST = 8  # so many levels of correctives of correctives are spelled out
 
 
 def padded(names: Sequence[str], count: int) -> list[str]:
@@ -30,7 +30,7 @@ def correctives(
         raw, ml, pose_controls: the controls around the correctives.
     """
     count, first = dna.psd_count, len(dna.raw_control_names)
-    # Numbers of their own for the correctives: they are not matched yet.
+    # Correctives are not matched yet, so those of A and B get different numbers.
     nothing = integers([])
     alone = Pairs(nothing, nothing, np.arange(count), nothing)
     own = Space("corrective", [""] * count, [], alone)

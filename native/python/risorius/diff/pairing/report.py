@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-_NAMES = 5  # of a list that are spelled out
+_NAMES = 5  # so many names of a list are spelled out
 
 
 class Difference(NamedTuple):
@@ -38,7 +38,7 @@ class Report:
         return f"{', '.join(names[:_NAMES])} and {len(names) - _NAMES:,} more"
 
 
-# What does not get a plain s.
+# Plurals that are not made by adding an s.
 _PLURALS = {"vertex": "vertices", "index": "indices", "bias": "biases", "mesh": "meshes"}
 
 

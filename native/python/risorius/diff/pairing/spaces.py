@@ -11,7 +11,7 @@ import numpy.typing as npt
 from .pairs import Ints, Pairs, integers
 from .report import plural
 
-_OUTSIDE = 1 << 40  # numbers of indices that no list holds
+_OUTSIDE = 1 << 40  # indices beyond a list get numbers from here on
 
 
 class Space:

@@ -72,5 +72,5 @@ def majority(indices: Iterable[int], regions: Sequence[str]) -> str:
     """
     votes = Counter(regions[i] for i in indices if 0 <= i < len(regions))
     named = [region for region in REGIONS[:-1] if votes[region]]
-    # One root joint among lips does not make them "other": it wins only with no named region.
+    # "other" wins only where no joint has a named region: one root joint among lips does not count.
     return max(named, key=lambda region: votes[region]) if named else "other"

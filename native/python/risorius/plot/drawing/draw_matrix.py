@@ -106,7 +106,7 @@ def _draw_row_owners(axes: Axes, facts: Facts, rows: int) -> None:
         lines.append([(0, 9 * first), (axes.get_xlim()[1], 9 * first)])
     patches = PatchCollection(stripes, facecolor=colors, edgecolor="none", clip_on=False)
     axes.add_collection(patches, autolim=False)
-    # With interleaved groups the lines would hide what they are to part.
+    # Where joint groups interleave, the lines between them would hide the coefficients.
     if len(lines) <= 100:
         axes.add_collection(LineCollection(lines, colors=MUTED, linewidths=0.35), autolim=False)
     axes.tick_params(axis="y", pad=9)

@@ -29,7 +29,7 @@ _DIRECTIONS = {
 def view_axes(dna: risorius.Dna) -> Floats:
     """The matrix from file axes to (right, up, front): float64[3, 3], a point is p @ matrix."""
     matrix = np.array([_DIRECTIONS.get(a, (0, 0, 0)) for a in dna.coordinate_system], float)
-    # Axes that fold space flat say nothing; the usual y up is then the best guess.
+    # Axes that are not independent give no frame; the usual y up is then the best guess.
     return matrix if abs(np.linalg.det(matrix)) > 0.5 else np.eye(3)
 
 
@@ -84,7 +84,7 @@ def world_positions(dna: risorius.Dna) -> Floats:
         # A whole generation at a time: the depth of a face is small, its width is not.
         ready = ~done & done[above]
         if not ready.any():
-            break  # a ring of parents; what hangs from it stays at its local place
+            break  # parents in a circle: their joints keep their local positions
         up = above[ready]
         positions[ready] = np.einsum("ni,nij->nj", positions[ready], turns[up]) + positions[up]
         turns[ready] = turns[ready] @ turns[up]
