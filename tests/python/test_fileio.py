@@ -95,7 +95,7 @@ def test_a_full_device_is_an_error_of_that_name():
 def test_what_a_killed_writer_left_goes_with_the_next_one_and_a_live_ones_stays(tmp_path):
     code = """
         import os, signal, sys
-        from risorius import fileio
+        from risorius.base import fileio
         with fileio.replacing(sys.argv[1]) as file:
             file.write(b"half")
             file.flush()
@@ -176,7 +176,7 @@ def test_a_folder_that_may_not_be_written_is_known_before(tmp_path):
     done = run(
         """
         import os, sys
-        from risorius import fileio
+        from risorius.base import fileio
         if os.getuid() == 0: os.setgid(65534); os.setuid(65534)
         for name in ("a", "b/c"):
             try:
