@@ -145,6 +145,7 @@ run_style() {
   check "mypy of the package" "$venv/bin/mypy" --no-error-summary -p risorius
   check "mypy of addon/logic" "$venv/bin/mypy" --no-error-summary --explicit-package-bases \
     --follow-imports=silent addon/risorius/logic
+  check "pyright of the add-on" "$venv/bin/pyright"
 }
 python_lane() {
   local version blender

@@ -2,14 +2,14 @@
 """Risorius: faces from DNA files in Blender. Delegates to registration."""
 
 
-def register():
+def register() -> None:
     """Add everything to Blender."""
     from . import registration
 
     registration.register()
 
 
-def unregister():
+def unregister() -> None:
     """Take everything out of Blender again."""
     from . import registration
 

@@ -1,20 +1,32 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The single door to the `risorius` wheel that the extension bundles."""
 
+from __future__ import annotations
+
 import re
 import sys
 from functools import cache
 from importlib import import_module
 from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING
 
 from .logic.base.errors import FaceError
 
+if TYPE_CHECKING:  # names for annotations: nothing else may import the wheel
+    from risorius import BoneSpace, Clip, Dna, Layer, Mesh, Mixer, Morph, Pose, Rig  # noqa: F401
+    from risorius.expressions import Expression  # noqa: F401
+    from risorius.live import Receiver, Shaper, Take  # noqa: F401
+    from risorius.reactions import Reaction  # noqa: F401
+
+_risorius: ModuleType | None
 try:
-    import risorius as _risorius
+    import risorius as _found
 except ImportError as _error:
     _risorius = None
     _reason = str(_error)
 else:
+    _risorius = _found
     _reason = ""
 
 _HERE = Path(__file__).parent
@@ -49,19 +61,19 @@ def problem() -> str:
     return ""
 
 
-def module():
+def module() -> ModuleType:
     """The `risorius` package.
 
     Raises:
         UnusableError: it is missing or of another version; the text says so.
     """
     trouble = problem()
-    if trouble:
+    if trouble or _risorius is None:
         raise UnusableError(trouble)
     return _risorius
 
 
-def sample_module():
+def sample_module() -> ModuleType:
     """The module `risorius.sample`, loaded only when a sample is built.
 
     Raises:
@@ -73,7 +85,7 @@ def sample_module():
     return sample
 
 
-def part(name: str):
+def part(name: str) -> ModuleType:
     """A module of the `risorius` package that is loaded only where it is used.
 
     Args:

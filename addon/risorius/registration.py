@@ -32,7 +32,7 @@ CLASSES = (
 )
 
 
-def _search_property():
+def _search_property() -> None:
     return bpy.props.StringProperty(
         name="Search",
         description="Show only the controls whose name has these words",
@@ -40,7 +40,7 @@ def _search_property():
     )
 
 
-def register():
+def register() -> None:
     """Register classes, menus and handlers; without the native module only words."""
     for cls in CLASSES:
         bpy.utils.register_class(cls)
@@ -63,12 +63,12 @@ def register():
     bpy.app.timers.register(_refresh_once, first_interval=0.0)
 
 
-def _refresh_once():
+def _refresh_once() -> None:
     """Data cannot be touched while an add-on registers, so faces are brought up after it."""
     handlers.refresh()
 
 
-def unregister():
+def unregister() -> None:
     """Undo `register` in reverse."""
     if bpy.app.timers.is_registered(_refresh_once):
         bpy.app.timers.unregister(_refresh_once)

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +14,7 @@ from ..base.errors import FaceError
 from ..base.space import Float, Space, make_space, world_matrices
 from ..material import texture_search
 from . import regions
+from .dna_data import DnaData, MeshData
 
 LIVE_KEY = "<channel sum>"
 # Keys x vertices of a mesh, above which real keys cost too much: time in every frame from two
@@ -153,7 +153,7 @@ def layer_warnings(layers: Sequence[str]) -> list[str]:
     return [f"Not evaluated yet: {word}" for word in words]
 
 
-def space_of(dna: Any, unit_scale: float) -> Space:
+def space_of(dna: DnaData, unit_scale: float) -> Space:
     """The Space of a Dna in a scene of `unit_scale` metres per unit."""
     return make_space(
         dna.coordinate_system,
@@ -185,7 +185,7 @@ def find_anchors(joint_names: Sequence[str]) -> Anchors:
 
 
 def plan_character(
-    dna: Any,
+    dna: DnaData,
     fallback_name: str,
     lods: Sequence[int] = (0,),
     unit_scale: float = 1.0,
@@ -242,7 +242,7 @@ def plan_character(
     )
 
 
-def _mesh_lods(dna: Any) -> list[tuple[int, ...]]:
+def _mesh_lods(dna: DnaData) -> list[tuple[int, ...]]:
     count = min(len(dna.meshes), len(dna.mesh_names))
     levels: list[list[int]] = [[] for _ in range(count)]
     for lod in range(len(dna.lod_mesh_mapping)):
@@ -254,7 +254,7 @@ def _mesh_lods(dna: Any) -> list[tuple[int, ...]]:
     return [tuple(level) for level in levels]
 
 
-def existing_lods(dna: Any, wanted: Sequence[int]) -> tuple[int, ...]:
+def existing_lods(dna: DnaData, wanted: Sequence[int]) -> tuple[int, ...]:
     """Those levels of `wanted` that have meshes in a file, else its finest one."""
     there = sorted({level for levels in _mesh_lods(dna) for level in levels})
     return tuple(level for level in wanted if level in there) or tuple(there[:1])
@@ -286,7 +286,7 @@ def plan_controls(raw_names: Sequence[str], rests: Sequence[float] = ()) -> list
     ]
 
 
-def _plan_armature(dna: Any, space: Space) -> ArmaturePlan:
+def _plan_armature(dna: DnaData, space: Space) -> ArmaturePlan:
     parents = np.asarray(dna.joint_parents)
     count = len(dna.joint_names)
     offsets, angles = dna.neutral_joint_translations, dna.neutral_joint_rotations
@@ -330,18 +330,18 @@ def _parents_first(parents: Sequence[int]) -> list[int]:
     return order
 
 
-def _check(indices: NDArray[Any], limit: int, what: str) -> None:
+def _check(indices: NDArray[np.int64], limit: int, what: str) -> None:
     if len(indices) and int(indices.max()) >= limit:
         raise PlanError(f"The file's {what} leads to number {int(indices.max())} of {limit}.")
 
 
-def _check_finite(values: NDArray[Any], what: str) -> None:
+def _check_finite(values: NDArray[np.float32], what: str) -> None:
     if not np.isfinite(values).all():
         raise PlanError(f"The file's {what} are not all finite numbers.")
 
 
 def _plan_mesh(
-    dna: Any,
+    dna: DnaData,
     index: int,
     label: str,
     lods: tuple[int, ...],
@@ -391,7 +391,7 @@ def _plan_mesh(
 
 
 def _faces(
-    mesh: Any, layouts: NDArray[np.int64], flip: bool
+    mesh: MeshData, layouts: NDArray[np.int64], flip: bool
 ) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
     """Face starts and the layout of each corner; faces that have no area are left out."""
     bounds = np.asarray(mesh.face_offsets, np.int64)

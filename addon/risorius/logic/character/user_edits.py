@@ -9,7 +9,6 @@ rounding of those two float32 additions allowed for.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +23,7 @@ def changed(present: Float32, imported: Float32) -> Mask:
     return np.asarray(present != imported)
 
 
-def shaped(basis: Float32, indices: NDArray[Any], deltas: Float32) -> Float32:
+def shaped(basis: Float32, indices: NDArray[np.int64], deltas: Float32) -> Float32:
     """Coordinates of a shape key as the import makes them: the basis plus sparse deltas."""
     points = basis.copy()
     np.add.at(points, indices, deltas)

@@ -5,14 +5,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .animated_maps import AREAS
 
+Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
+Points = Float | Float32
 
 # Area: ellipses as (x, z, half width, half height), x mirrored to both sides. x and z count from
 # between the eyes; x in eye distances, z in eye distances above and mouth distances below.
@@ -44,9 +45,7 @@ class FaceFrame:
     drop: float
 
 
-def find_frame(
-    eyes: Sequence[NDArray[Any]], head: NDArray[Any], mouth: NDArray[Any] | None
-) -> FaceFrame:
+def find_frame(eyes: Sequence[Float], head: Points, mouth: Points | None) -> FaceFrame:
     """The frame of a face.
 
     Args:
@@ -71,7 +70,7 @@ def find_frame(
     return FaceFrame(origin, unit, drop)
 
 
-def face_coordinates(points: NDArray[Any], frame: FaceFrame) -> NDArray[np.float64]:
+def face_coordinates(points: Points, frame: FaceFrame) -> NDArray[np.float64]:
     """float64[V, 3]: x, depth and height of points, measured from between the eyes."""
     local = (np.asarray(points, float) - frame.origin) / frame.unit
     below = local[:, 2] < 0
@@ -79,7 +78,7 @@ def face_coordinates(points: NDArray[Any], frame: FaceFrame) -> NDArray[np.float
     return local
 
 
-def area_masks(points: NDArray[Any], frame: FaceFrame) -> dict[str, Float32]:
+def area_masks(points: Points, frame: FaceFrame) -> dict[str, Float32]:
     """How much each vertex belongs to each area.
 
     Args:
@@ -105,20 +104,20 @@ def area_masks(points: NDArray[Any], frame: FaceFrame) -> dict[str, Float32]:
     return masks
 
 
-def fold_coordinates(points: NDArray[Any], frame: FaceFrame) -> Float32:
+def fold_coordinates(points: Points, frame: FaceFrame) -> Float32:
     """float32[V, 3]: x and height of face_coordinates, and the distance from the mouth."""
     local = face_coordinates(points, frame)
     x, z = local[:, 0], local[:, 2]
     return np.stack([x, z, np.hypot(x, (z + 1.0) * 0.8)], axis=1).astype(np.float32)
 
 
-def left_share(points: NDArray[Any], frame: FaceFrame) -> Float32:
+def left_share(points: Points, frame: FaceFrame) -> Float32:
     """float32[V]: 1 on the character's left, 0 on its right, soft between."""
     x = face_coordinates(points, frame)[:, 0]
     return _smooth(x / 0.3 + 0.5).astype(np.float32)
 
 
-def _smooth(values: NDArray[Any]) -> NDArray[Any]:
+def _smooth(values: Float) -> Float:
     """The usual step from 0 to 1 with level ends."""
     t = np.clip(values, 0.0, 1.0)
     return t * t * (3 - 2 * t)

@@ -3,18 +3,17 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 Float32 = NDArray[np.float32]
+Totals = NDArray[np.int32] | NDArray[np.int64]
 
 _FULL = 0.5  # of the square: a layout whose bounds cover this much is kept as it is
 _RIM = 0.08  # of a cell, left free on each side: no face shows its neighbour's colour
 
 
-def spread(points: NDArray[Any]) -> Float32 | None:
+def spread(points: Float32) -> Float32 | None:
     """A UV layout that uses little of the unit square, or leaves it, stretched over all of it.
 
     Args:
@@ -31,7 +30,7 @@ def spread(points: NDArray[Any]) -> Float32 | None:
     return ((points - low) / size).astype(np.float32)
 
 
-def overlaps(points: NDArray[Any], totals: NDArray[Any]) -> bool:
+def overlaps(points: Float32, totals: Totals) -> bool:
     """Whether faces must lie on each other: they are larger than the rectangle around them.
 
     Args:
@@ -50,7 +49,7 @@ def overlaps(points: NDArray[Any], totals: NDArray[Any]) -> bool:
     return area > 1.02 * float(np.ptp(points, axis=0).astype(np.float64).prod())
 
 
-def cells(totals: NDArray[Any]) -> Float32:
+def cells(totals: Totals) -> Float32:
     """A layout for a mesh that has none: every face as a regular polygon in a cell of its own.
 
     Args:
