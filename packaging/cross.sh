@@ -110,7 +110,7 @@ run_programs() {
 
 # scalar_bits NAME COMPILER FLAGS...: the program of tests/rig with the arithmetic of `sources`
 # compiled so; the rest of it comes from the preset dev.
-sources=("$project"/native/rig/*.cpp "$project"/native/simd/kernels_scalar.cpp
+sources=("$project"/native/rig/*.cpp "$project"/native/rig/*/*.cpp "$project"/native/simd/kernels_scalar.cpp
   "$project"/native/compile/compile.cpp "$project"/tests/rig/scalar_bits.cpp)
 scalar_bits() {
   local folder="$out/bits-$1" compiler=$2
@@ -120,7 +120,7 @@ scalar_bits() {
     folder=$1; file=$2; shift 2
     ccache "$@" -c "$file" -o "$folder/$(basename "$file" .cpp).o"' \
     sh "$folder" {} "$compiler" -std=c++20 -ffp-contract=off -I"$project/native" "$@" &&
-    "$compiler" "$folder"/*.o $dev/librisorius_{compile,rig,simd,dna,core}.a -pthread \
+    "$compiler" "$folder"/*.o $dev/librisorius_{compile,rig,dna,bytes,simd,core}.a -pthread \
       -o "$folder/program" &&
     "$folder/program" > "$folder/hash"
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Files that Python writes and that appear as a whole.
-#include "bindings/arrays.h"
-#include "core/file_write.h"
-#include "core/path_text.h"
+#include "bindings/numpy_arrays.h"
+#include "bytes/file_write.h"
+#include "bytes/path_text.h"
 
 namespace risorius::bindings {
 

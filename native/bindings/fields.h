@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "bindings/arrays.h"
+#include "bindings/numpy_arrays.h"
 #include "dna/dna.h"
 
 namespace risorius::bindings {

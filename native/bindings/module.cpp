@@ -2,7 +2,7 @@
 // risorius._native: arrays in, arrays out, errors. No arithmetic.
 #include <pybind11/pybind11.h>
 
-#include "bindings/arrays.h"
+#include "bindings/numpy_arrays.h"
 
 namespace risorius::bindings {
 

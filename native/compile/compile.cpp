@@ -13,8 +13,10 @@
 #include <tuple>
 
 #include "compile/parts.h"
-#include "dna/io.h"
+#include "dna/controls.h"
 #include "dna/size.h"
+#include "dna/validate.h"
+#include "rig/block.h"
 #include "simd/half.h"
 
 namespace risorius::compile {

@@ -10,7 +10,7 @@
 #include "core/budget.h"
 #include "core/result.h"
 #include "dna/dna.h"
-#include "rig/morph.h"
+#include "rig/outputs/morph.h"
 #include "rig/rig.h"
 
 namespace risorius::compile {

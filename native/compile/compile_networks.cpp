@@ -6,6 +6,7 @@
 #include <map>
 
 #include "compile/parts.h"
+#include "dna/controls.h"
 #include "simd/kernels.h"
 
 namespace risorius::compile {

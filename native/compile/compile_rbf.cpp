@@ -4,7 +4,8 @@
 #include <cmath>
 
 #include "compile/parts.h"
-#include "rig/rbf.h"
+#include "dna/controls.h"
+#include "rig/stages/rbf.h"
 
 namespace risorius::compile {
 

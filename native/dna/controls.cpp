@@ -3,10 +3,34 @@
 
 #include <algorithm>
 
+#include "dna/index_map.h"
 #include "dna/layers.h"
-#include "dna/lods.h"
 
-namespace risorius::dna::detail {
+namespace risorius::dna {
+
+ControlCounts control_counts(const Dna& dna) {
+  const auto size = [](const auto& list) { return static_cast<std::uint32_t>(list.size()); };
+  ControlCounts n;
+  n.raw = size(dna.definition.raw_control_names);
+  n.psd = dna.behavior.psd_count + dna.unread_controls.psd;
+  n.ml = size(dna.machine_learned_behavior.ml_control_names) + dna.unread_controls.ml;
+  n.rbf_pose = size(dna.rbf_behavior_ext.pose_control_names);
+  if (n.rbf_pose == 0 && dna.rbf_behavior_ext.poses.empty()) {
+    n.rbf_pose = size(dna.rbf_behavior.poses);
+  }
+  n.rbf_pose += dna.unread_controls.rbf_pose;
+  return n;
+}
+
+std::uint16_t ml_joint_stride(const MlJoints& joints) {
+  const std::size_t n = std::min(joints.parameter_keys.size(), joints.parameter_values.size());
+  for (std::size_t i = 0; i < n; ++i) {
+    if (joints.parameter_keys[i] == 1 && joints.parameter_values[i] == 1) return 10;
+  }
+  return 9;
+}
+
+namespace detail {
 
 namespace {
 
@@ -181,4 +205,6 @@ core::Result<std::size_t> forget_unread_controls(Dna& dna) {
   return Forgetting(map, dna).run();
 }
 
-}  // namespace risorius::dna::detail
+}  // namespace detail
+
+}  // namespace risorius::dna

@@ -1,15 +1,29 @@
 // SPDX-License-Identifier: MIT
-// The control space raw | corrective | network | RBF pose, when some of its layers go. Private to
-// native/dna.
+// The control space raw | corrective | network | RBF pose: how many of each, and what is left when
+// some of the layers that provide them go.
 #pragma once
 
 #include <cstddef>
-#include <string>
+#include <cstdint>
+#include <string_view>
 
 #include "core/result.h"
 #include "dna/dna.h"
 
-namespace risorius::dna::detail {
+namespace risorius::dna {
+
+/// Sizes of the four parts of the control space, in its order. The poses of a 2.4 file, which has
+/// no layer rbfe, are controls of their own.
+struct ControlCounts {
+  std::uint32_t raw = 0, psd = 0, ml = 0, rbf_pose = 0;
+  std::uint32_t total() const { return raw + psd + ml + rbf_pose; }
+};
+ControlCounts control_counts(const Dna& dna);
+
+/// Attributes per joint in the output indices of MlJoints: 9, or 10 with quaternions.
+std::uint16_t ml_joint_stride(const MlJoints& joints);
+
+namespace detail {
 
 /// Takes the layer of this id ("mlbh" ...) out, its controls still counted as unread.
 void drop_layer(std::string_view id, Dna& dna);
@@ -20,4 +34,5 @@ void drop_layer(std::string_view id, Dna& dna);
 /// Fails: kInvalidArgument (a network, a pose or a setup reads or writes an unread control).
 core::Result<std::size_t> forget_unread_controls(Dna& dna);
 
-}  // namespace risorius::dna::detail
+}  // namespace detail
+}  // namespace risorius::dna

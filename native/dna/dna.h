@@ -309,15 +309,4 @@ struct Dna {
   std::vector<Warning> warnings;
 };
 
-/// Sizes of the four parts of the control space, in its order. The poses of a 2.4 file, which has
-/// no layer rbfe, are controls of their own.
-struct ControlCounts {
-  std::uint32_t raw = 0, psd = 0, ml = 0, rbf_pose = 0;
-  std::uint32_t total() const { return raw + psd + ml + rbf_pose; }
-};
-ControlCounts control_counts(const Dna& dna);
-
-/// Attributes per joint in the output indices of MlJoints: 9, or 10 with quaternions.
-std::uint16_t ml_joint_stride(const MlJoints& joints);
-
 }  // namespace risorius::dna

@@ -12,6 +12,7 @@
 #include "core/parallel_for.h"
 #include "edit/positions.h"
 #include "edit/units.h"
+#include "rig/stages/evaluate.h"
 #include "simd/kernels.h"
 
 namespace risorius::edit::detail {

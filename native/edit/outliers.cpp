@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 
+#include "dna/controls.h"
 #include "edit/units.h"
 
 namespace risorius::edit::detail {

@@ -8,6 +8,7 @@
 #include <map>
 #include <span>
 
+#include "dna/controls.h"
 #include "edit/positions.h"
 #include "edit/units.h"
 

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "compile/compile.h"
-#include "dna/io.h"
+#include "dna/validate.h"
 #include "edit/units.h"
 
 namespace risorius::edit {

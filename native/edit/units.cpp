@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "compile/compile.h"
+#include "dna/controls.h"
 
 namespace risorius::edit::detail {
 

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: MIT
+#include "rig/block.h"
+
 #include <algorithm>
 #include <bit>
 #include <cstddef>
 #include <cstring>
 
-#include "rig/rig.h"
-#include "rig/stages.h"
+#include "core/aligned.h"
+#include "rig/check.h"
 
 namespace risorius::rig {
 

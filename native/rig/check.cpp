@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: MIT
 // Every index of a block of bytes against what it counts in.
+#include "rig/check.h"
+
 #include <algorithm>
 #include <bit>
 #include <numeric>
 #include <utility>
-
-#include "rig/rig.h"
-#include "rig/stages.h"
 
 namespace risorius::rig {
 

@@ -7,10 +7,11 @@
 #include <filesystem>
 
 #include "bench/machine.h"
+#include "bytes/source.h"
 #include "compile/compile.h"
-#include "core/source.h"
-#include "dna/io.h"
-#include "rig/file.h"
+#include "dna/file/parse.h"
+#include "rig/rig_file.h"
+#include "rig/stages/evaluate.h"
 
 namespace {
 

@@ -18,11 +18,13 @@
 
 #include "bench/frames.h"
 #include "bench/machine.h"
-#include "clip/codec.h"
-#include "clip/player.h"
+#include "bytes/source.h"
+#include "clip/file/encoder.h"
+#include "clip/file/player.h"
+#include "clip/file/reader.h"
 #include "compile/compile.h"
-#include "core/source.h"
-#include "dna/io.h"
+#include "dna/file/parse.h"
+#include "rig/stages/evaluate.h"
 
 namespace {
 

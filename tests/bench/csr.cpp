@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "dna/controls.h"
+
 namespace risorius::bench {
 
 namespace {

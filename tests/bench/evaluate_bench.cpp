@@ -10,9 +10,10 @@
 #include <string>
 #include <vector>
 
+#include "bytes/source.h"
 #include "compile/compile.h"
-#include "core/source.h"
-#include "dna/io.h"
+#include "dna/file/parse.h"
+#include "rig/stages/evaluate.h"
 
 namespace {
 

@@ -5,7 +5,7 @@
 
 #include <random>
 
-#include "clip/mixer.h"
+#include "clip/mixer/mixer.h"
 
 namespace {
 

@@ -20,8 +20,8 @@
 #endif
 
 #include "bench/machine.h"
-#include "core/source.h"
-#include "dna/io.h"
+#include "bytes/source.h"
+#include "dna/file/parse.h"
 
 namespace {
 

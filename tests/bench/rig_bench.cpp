@@ -20,9 +20,12 @@
 #include "bench/csr.h"
 #include "bench/frames.h"
 #include "bench/machine.h"
+#include "bytes/source.h"
 #include "compile/compile.h"
-#include "core/source.h"
-#include "dna/io.h"
+#include "dna/file/parse.h"
+#include "rig/block.h"
+#include "rig/stages/evaluate.h"
+#include "rig/stages/instance.h"
 
 namespace {
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
 // Whole files: back as they were, in parts, cut, damaged.
-#include "clip/codec.h"
-
 #include <gtest/gtest.h>
 
 #include <numeric>
 
-#include "clip/player.h"
+#include "clip/file/encoder.h"
+#include "clip/file/player.h"
+#include "clip/file/reader.h"
 #include "support/clips.h"
 #include "support/files.h"
 

@@ -4,7 +4,7 @@
 
 #include <cfenv>
 
-#include "clip/predict.h"
+#include "clip/codec/predict.h"
 #include "support/clips.h"
 
 namespace risorius::clip {

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: MIT
 // A clip that is recorded into a file.
-#include "clip/file.h"
-
 #include <gtest/gtest.h>
 
 #include <cerrno>
 #include <fstream>
 #include <random>
 
+#include "clip/file/file_writer.h"
 #include "support/clips.h"
 #include "support/files.h"
 

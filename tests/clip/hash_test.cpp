@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
 // The checksum and the codes, against what is known of them.
-#include "clip/hash.h"
+#include "clip/codec/hash.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <string>
 
-#include "clip/huffman.h"
+#include "clip/codec/huffman.h"
 
 namespace risorius::clip {
 namespace {

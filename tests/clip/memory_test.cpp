@@ -2,7 +2,8 @@
 // What a clip's reader and writer take from the heap.
 #include <gtest/gtest.h>
 
-#include "clip/codec.h"
+#include "clip/file/encoder.h"
+#include "clip/file/reader.h"
 #include "support/clips.h"
 #include "support/heap.h"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Playing a mixer takes no memory and throws nothing; what it is made of is checked.
-#include "clip/mixer.h"
+#include "clip/mixer/mixer.h"
 
 #include <gtest/gtest.h>
 

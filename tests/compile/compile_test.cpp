@@ -5,6 +5,7 @@
 #include <functional>
 #include <ostream>
 
+#include "rig/block.h"
 #include "support/face.h"
 
 namespace risorius::compile {

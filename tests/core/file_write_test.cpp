@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Files that are whole or as they were, whatever call of the system fails.
-#include "core/file_write.h"
+#include "bytes/file_write.h"
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Conversion against matrices multiplied out here: a row vector v goes to v C, a matrix R to
 // transpose(C) R C, with C = (axes of the source) * transpose(axes of the target).
-#include "dna/coordinates.h"
+#include "dna/convert/coordinates.h"
 
 #include <gtest/gtest.h>
 
@@ -13,7 +13,9 @@
 #include <numbers>
 #include <random>
 
-#include "dna/io.h"
+#include "dna/file/parse.h"
+#include "dna/file/write.h"
+#include "dna/validate.h"
 
 namespace risorius::dna {
 namespace {

@@ -7,7 +7,8 @@
 #include <iostream>
 #include <sstream>
 
-#include "core/source.h"
+#include "bytes/source.h"
+#include "dna/file/write.h"
 #include "dna/layers.h"
 #include "support/files.h"
 #include "support/full_face.h"

@@ -6,9 +6,11 @@
 #include <algorithm>
 #include <string>
 
-#include "dna/io.h"
-#include "dna/json.h"
-#include "dna/lods.h"
+#include "dna/convert/lods.h"
+#include "dna/file/json.h"
+#include "dna/file/parse.h"
+#include "dna/file/write.h"
+#include "dna/index_map.h"
 #include "support/full_face.h"
 
 namespace risorius::dna {

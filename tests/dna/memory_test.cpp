@@ -3,8 +3,8 @@
 #include <cstdio>
 #include <filesystem>
 
-#include "dna/json.h"
-#include "dna/lods.h"
+#include "dna/convert/lods.h"
+#include "dna/file/json.h"
 #include "dna/size.h"
 #include "support/head.h"
 #include "support/heap.h"

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: MIT
 // Bytes worked out by hand from the format, so that parser and writer are not only each other's
 // witnesses; and the promises about hostile input that need native code to see.
+#include "dna/file/parse.h"
+
 #include <gtest/gtest.h>
 
 #include <cstring>
 #include <limits>
 
-#include "dna/io.h"
+#include "dna/file/write.h"
+#include "dna/validate.h"
 
 namespace risorius::dna {
 namespace {

@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "compile/compile.h"
-#include "dna/json.h"
+#include "dna/file/json.h"
 #include "support/files.h"
 #include "support/promises.h"
 

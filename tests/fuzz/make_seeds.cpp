@@ -6,8 +6,10 @@
 #include <iostream>
 #include <iterator>
 
+#include "clip/file/encoder.h"
 #include "compile/compile.h"
-#include "dna/json.h"
+#include "dna/file/json.h"
+#include "dna/file/write.h"
 #include "dna/layers.h"
 #include "support/bombs.h"
 #include "support/clips.h"

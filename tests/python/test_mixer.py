@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The mixer against a second one in NumPy, written from the comment in native/clip/mixer.h."""
+"""The mixer against a second one in NumPy, written from the comment in clip/mixer/mixer.h."""
 
 from __future__ import annotations
 

@@ -4,6 +4,8 @@
 #include <ostream>
 #include <type_traits>
 
+#include "rig/stages/evaluate.h"
+#include "rig/stages/instance.h"
 #include "support/counted_new.h"
 #include "support/face.h"
 #include "support/full_face.h"

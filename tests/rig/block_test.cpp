@@ -1,11 +1,16 @@
 // SPDX-License-Identifier: MIT
 // A compiled face as bytes: whatever is done to them, they are a face or an error.
+#include "rig/block.h"
+
 #include <gtest/gtest.h>
 
 #include <cstddef>
 #include <cstring>
 #include <random>
 
+#include "rig/stages/evaluate.h"
+#include "rig/stages/instance.h"
+#include "rig/stages/rbf.h"
 #include "support/face.h"
 
 namespace risorius::rig {

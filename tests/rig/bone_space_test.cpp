@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
-#include "rig/bone_space.h"
+#include "rig/outputs/bone_space.h"
 
 #include <gtest/gtest.h>
+
+#include "rig/stages/evaluate.h"
 
 namespace risorius::rig {
 namespace {

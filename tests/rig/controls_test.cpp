@@ -4,6 +4,9 @@
 
 #include <limits>
 
+#include "rig/finite_controls.h"
+#include "rig/pose.h"
+#include "rig/stages/rbf.h"
 #include "support/face.h"
 
 namespace risorius::rig {

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: MIT
 // The semantics of each stage on faces small enough to be worked out by hand.
+#include "rig/stages/evaluate.h"
+
 #include <cmath>
 #include <limits>
 
+#include "rig/stages/instance.h"
 #include "support/face.h"
 
 namespace risorius::rig {

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: MIT
 // A compiled face in a file, by whoever it was written.
-#include "rig/file.h"
-
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -9,11 +7,14 @@
 #include <fstream>
 #include <random>
 
+#include "rig/rig_file.h"
+
 #ifndef _WIN32
 #include <sys/stat.h>
 #include <unistd.h>
 #endif
 
+#include "rig/block.h"
 #include "support/face.h"
 
 namespace risorius::rig {

@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: MIT
+#include "rig/stages/instance.h"
+
+#include "rig/stages/evaluate.h"
 #include "support/face.h"
 
 namespace risorius::rig {

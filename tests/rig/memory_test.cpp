@@ -6,6 +6,8 @@
 
 #include "compile/compile.h"
 #include "core/aligned.h"
+#include "rig/block.h"
+#include "rig/pose.h"
 #include "support/bombs.h"
 #include "support/heap.h"
 

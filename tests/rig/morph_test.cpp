@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "rig/morph.h"
+#include "rig/outputs/morph.h"
 
 #include "support/face.h"
 

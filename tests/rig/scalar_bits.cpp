@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "compile/compile.h"
+#include "rig/stages/evaluate.h"
 
 namespace {
 

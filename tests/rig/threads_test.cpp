@@ -7,6 +7,8 @@
 #include <thread>
 
 #include "core/parallel_for.h"
+#include "rig/stages/evaluate.h"
+#include "rig/stages/instance.h"
 #include "support/face.h"
 #include "support/full_face.h"
 

@@ -10,10 +10,11 @@
 #include <string>
 #include <vector>
 
-#include "clip/block.h"
-#include "clip/codec.h"
-#include "clip/hash.h"
-#include "clip/layout.h"
+#include "clip/codec/block.h"
+#include "clip/codec/hash.h"
+#include "clip/file/encoder.h"
+#include "clip/file/layout.h"
+#include "clip/file/reader.h"
 
 namespace risorius::testing_support {
 

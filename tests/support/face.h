@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "compile/compile.h"
+#include "rig/stages/evaluate.h"
 #include "support/bare_face.h"
 
 namespace risorius::testing_support {

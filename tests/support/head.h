@@ -9,7 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "dna/io.h"
+#include "dna/file/parse.h"
+#include "dna/file/write.h"
 #include "support/face.h"
 
 namespace risorius::testing_support {

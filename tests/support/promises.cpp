@@ -9,10 +9,15 @@
 #include <limits>
 #include <utility>
 
+#include "bytes/source.h"
 #include "compile/compile.h"
 #include "core/aligned.h"
-#include "core/source.h"
-#include "dna/json.h"
+#include "dna/controls.h"
+#include "dna/file/json.h"
+#include "dna/file/write.h"
+#include "rig/block.h"
+#include "rig/stages/evaluate.h"
+#include "rig/stages/instance.h"
 
 namespace risorius::promises {
 

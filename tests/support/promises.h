@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "core/result.h"
-#include "dna/coordinates.h"
-#include "dna/io.h"
+#include "dna/convert/coordinates.h"
+#include "dna/file/parse.h"
 
 namespace risorius::promises {
 

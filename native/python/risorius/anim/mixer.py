@@ -94,7 +94,7 @@ class Mixer:
     """Layers, reactions and rules of one face -> its controls at a time.
 
     A function of the time, the layers, and what was fired: any frame alone gives the same. Its
-    arithmetic is written down in native/clip/mixer.h; layers equal Blender's NLA.
+    arithmetic is written down in native/clip/mixer/mixer.h; layers equal Blender's NLA.
 
     Attributes:
         names: the controls, in the order of what evaluate gives.

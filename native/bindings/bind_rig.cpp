@@ -1,0 +1,560 @@
+// SPDX-License-Identifier: MIT
+#include <bit>
+#include <functional>
+#include <set>
+
+#include "bindings/numpy_arrays.h"
+#include "compile/compile.h"
+#include "core/parallel_for.h"
+#include "dna/validate.h"
+#include "rig/block.h"
+#include "rig/finite_controls.h"
+#include "rig/outputs/bone_space.h"
+#include "rig/outputs/morph.h"
+#include "rig/rig_file.h"
+#include "rig/stages/evaluate.h"
+#include "rig/stages/instance.h"
+#include "rig/stages/rbf.h"
+
+namespace risorius::bindings {
+
+namespace {
+
+using FloatArray = py::array_t<float, py::array::c_style | py::array::forcecast>;
+using RigPtr = std::shared_ptr<const rig::Rig>;
+
+struct PoseArrays {
+  FloatArray joints, blend_shapes, animated_maps, controls;
+};
+
+struct PyInstance {
+  RigPtr rig;
+  rig::Instance instance;
+};
+
+FloatArray vector_argument(const py::object& object, const char* name, std::size_t length) {
+  FloatArray array = FloatArray::ensure(object);
+  if (!array) throw py::value_error(std::string(name) + ": an array of numbers was expected");
+  if (array.ndim() != 1 || static_cast<std::size_t>(array.shape(0)) != length) {
+    shape_error(name, "(" + std::to_string(length) + ",)", array);
+  }
+  return array;
+}
+
+// Exponents of all ones are infinities and NaN; without an early exit the compiler vectorises.
+void require_finite(const FloatArray& array, const char* name) {
+  constexpr std::uint32_t kExponent = 0x7f800000u;
+  const float* begin = array.data();
+  std::uint32_t spoiled = 0;
+  for (py::ssize_t i = 0; i < array.size(); ++i) {
+    spoiled |= (std::bit_cast<std::uint32_t>(begin[i]) & kExponent) == kExponent ? 1u : 0u;
+  }
+  if (spoiled != 0) throw py::value_error(std::string(name) + ": finite numbers were expected");
+}
+
+py::list quaternion_column_orders(const dna::Dna& dna) {
+  std::vector<dna::Warning> warnings;
+  unwrap(dna::validate(dna, warnings));
+  const std::vector<bool> joints = compile::quaternion_joints(dna);
+  py::list out;
+  for (const dna::JointGroup& g : dna.behavior.joint_groups) {
+    const auto order = compile::quaternion_column_order(g, dna.descriptor.lod_count, joints);
+    out.append(py::array_t<std::uint32_t>(static_cast<py::ssize_t>(order.size()), order.data()));
+  }
+  return out;
+}
+
+FloatArray matrix_argument(const py::object& object, const char* name, py::ssize_t rows) {
+  FloatArray array = FloatArray::ensure(object);
+  if (!array) throw py::value_error(std::string(name) + ": an array of numbers was expected");
+  if (array.ndim() != 2 || array.shape(0) != rows || array.shape(1) != 3) {
+    shape_error(name, "(" + std::to_string(rows) + ", 3)", array);
+  }
+  require_finite(array, name);
+  return array;
+}
+
+// A caller's array is written in place, or a new one is made.
+py::array_t<float> output_argument(const py::object& object, py::ssize_t rows, const float* base) {
+  if (object.is_none()) return py::array_t<float>({rows, py::ssize_t{3}});
+  if (!py::isinstance<py::array_t<float, py::array::c_style>>(object)) {
+    throw py::value_error("out: a C-contiguous float32 array was expected");
+  }
+  auto out = object.cast<py::array_t<float>>();
+  if (out.ndim() != 2 || out.shape(0) != rows || out.shape(1) != 3) {
+    shape_error("out", "(" + std::to_string(rows) + ", 3)", out);
+  }
+  if (!out.writeable()) throw py::value_error("out: the array is read-only");
+  const std::less<const float*> before;
+  if (base != nullptr && before(base, out.data() + rows * 3) &&
+      before(out.data(), base + rows * 3)) {
+    throw py::value_error("out: an array that does not overlap base was expected");
+  }
+  return out;
+}
+
+py::array evaluate_morph(const rig::Morph& morph, const py::object& weights, const py::object& base,
+                         const py::object& out) {
+  const FloatArray w = vector_argument(weights, "blend_shapes", morph.channel_count);
+  require_finite(w, "blend_shapes");
+  const auto vertices = static_cast<py::ssize_t>(morph.vertex_count);
+  const FloatArray from = base.is_none() ? FloatArray() : matrix_argument(base, "base", vertices);
+  const float* start = base.is_none() ? nullptr : from.data();
+  py::array_t<float> to = output_argument(out, vertices, start);
+  rig::evaluate_morph(morph, w.data(), start, to.mutable_data());
+  return to;
+}
+
+rig::SpaceConvention space_argument(const py::object& axes, float scale, float radians,
+                                    const std::array<int, 3>& sequence,
+                                    const std::array<float, 3>& signs) {
+  rig::SpaceConvention convention;
+  const FloatArray rows = matrix_argument(axes, "axes", 3);
+  std::copy(rows.data(), rows.data() + 9, convention.axes.begin());
+  convention.scale = scale;
+  if (std::set<int>(sequence.begin(), sequence.end()) != std::set<int>{0, 1, 2}) {
+    throw py::value_error("sequence: the numbers 0, 1 and 2 in some order were expected");
+  }
+  for (std::size_t i = 0; i < 3; ++i) {
+    convention.euler.order[i] = static_cast<std::uint8_t>(sequence[i]);
+  }
+  convention.euler.signs = signs;
+  convention.euler.radians_per_unit = radians;
+  return convention;
+}
+
+std::shared_ptr<rig::BoneSpace> make_bone_space(const py::object& neutral_rotations,
+                                                const std::vector<std::uint32_t>& bones,
+                                                const py::object& axes, float scale, float radians,
+                                                const std::array<int, 3>& sequence,
+                                                const std::array<float, 3>& signs) {
+  const FloatArray neutral = FloatArray::ensure(neutral_rotations);
+  if (!neutral || neutral.ndim() != 2 || neutral.shape(1) != 3) {
+    throw py::value_error("neutral_rotations: an array of shape (joints, 3) was expected");
+  }
+  const auto joints = static_cast<std::uint32_t>(neutral.shape(0));
+  for (const std::uint32_t joint : bones) {
+    if (joint >= joints) {
+      throw py::value_error("bones: joint " + std::to_string(joint) + " of " +
+                            std::to_string(joints));
+    }
+  }
+  const rig::SpaceConvention convention = space_argument(axes, scale, radians, sequence, signs);
+  return std::make_shared<rig::BoneSpace>(
+      rig::make_bone_space(convention, neutral.data(), joints, bones));
+}
+
+py::tuple evaluate_bones(const rig::BoneSpace& space, const py::object& joints) {
+  const FloatArray deltas = FloatArray::ensure(joints);
+  if (!deltas || deltas.ndim() != 2 || deltas.shape(0) != space.joint_count ||
+      deltas.shape(1) != 9) {
+    throw py::value_error("joints: an array of shape (" + std::to_string(space.joint_count) +
+                          ", 9) was expected");
+  }
+  const auto count = static_cast<py::ssize_t>(space.bones.size());
+  py::array_t<float> location({count, py::ssize_t{3}});
+  py::array_t<float> rotation({count, py::ssize_t{4}});
+  py::array_t<float> scale({count, py::ssize_t{3}});
+  rig::evaluate_bones(space, deltas.data(), location.mutable_data(), rotation.mutable_data(),
+                      scale.mutable_data());
+  return py::make_tuple(location, rotation, scale);
+}
+
+py::array_t<float> copied(std::span<const float> values, std::vector<py::ssize_t> shape) {
+  py::array_t<float> out(std::move(shape));
+  std::copy(values.begin(), values.end(), out.mutable_data());
+  return out;
+}
+
+py::ssize_t stride_of(const rig::Rig& rig) { return static_cast<py::ssize_t>(rig.joint_stride); }
+
+PoseArrays to_arrays(const rig::Rig& rig, const rig::Pose& pose) {
+  const auto size = [](const std::vector<float>& v) { return static_cast<py::ssize_t>(v.size()); };
+  return {copied(pose.joints, {static_cast<py::ssize_t>(rig.joint_count), stride_of(rig)}),
+          copied(pose.blend_shapes, {size(pose.blend_shapes)}),
+          copied(pose.animated_maps, {size(pose.animated_maps)}),
+          copied(pose.controls, {size(pose.controls)})};
+}
+
+// One of two names, or a ValueError.
+bool is_second(const char* name, const std::string& given, const char* first, const char* second) {
+  if (given == second) return true;
+  if (given == first) return false;
+  throw py::value_error(std::string(name) + ": " + first + " or " + second +
+                        " was expected, found " + given);
+}
+
+const simd::Kernels& kernels_argument(const std::optional<std::string>& simd) {
+  const simd::Kernels* kernels = simd::find_kernels(simd ? simd->c_str() : nullptr);
+  if (kernels != nullptr) return *kernels;
+  throw py::value_error("simd: " + simd.value_or("RISORIUS_SIMD") +
+                        " is not available here; there are: " + simd::available_kernels());
+}
+
+std::shared_ptr<rig::Rig> make_rig(const dna::Dna& dna, const std::string& precision,
+                                   const std::string& rotation,
+                                   const std::optional<std::string>& simd) {
+  compile::CompileOptions options;
+  if (is_second("precision", precision, "float32", "float16")) {
+    options.precision = compile::Precision::kFloat16;
+  }
+  if (is_second("rotation", rotation, "euler", "quaternion")) {
+    options.rotation = compile::Rotation::kQuaternion;
+  }
+  if (simd) options.kernels = &kernels_argument(simd);
+  return std::make_shared<rig::Rig>(unwrap(compile::compile(dna, options)));
+}
+
+// Keeps a buffer of Python's; whoever lets go of it last may not hold the interpreter.
+std::shared_ptr<const void> keep(py::buffer buffer, const void* address) {
+  auto* held = new py::buffer_info(buffer.request());
+  return {address, [held](const void*) {
+            const py::gil_scoped_acquire acquired;
+            delete held;
+          }};
+}
+
+// Nobody can change a bytes object under a Rig. Any other buffer is copied, a read-only view as
+// well: what it shows may be written by its owner. So are bytes that do not lie on 64.
+std::shared_ptr<rig::Rig> rig_from_bytes(const py::buffer& buffer, bool trusted,
+                                         const std::optional<std::string>& simd) {
+  const py::buffer_info info = buffer.request();
+  if (!PyBuffer_IsContiguous(info.view(), 'C')) {
+    throw py::value_error("bytes: a contiguous buffer was expected");
+  }
+  const auto size = static_cast<std::size_t>(info.size * info.itemsize);
+  const auto* data = static_cast<const std::uint8_t*>(info.ptr);
+  std::shared_ptr<const void> owner;
+  const bool is_constant = PyBytes_CheckExact(buffer.ptr()) != 0;
+  if (is_constant && reinterpret_cast<std::uintptr_t>(data) % 64 == 0) {
+    owner = keep(buffer, data);
+  } else {
+    auto copy = std::make_shared<core::AlignedVector<std::uint8_t>>(data, data + size);
+    data = copy->data();
+    owner = std::move(copy);
+  }
+  const rig::BlockCheck check = trusted ? rig::BlockCheck::kHeader : rig::BlockCheck::kFull;
+  return std::make_shared<rig::Rig>(
+      unwrap(rig::open_rig({data, size}, std::move(owner), check, kernels_argument(simd))));
+}
+
+// A buffer that keeps its Rig.
+py::memoryview block_of(const py::object& self) {
+  const auto& block = self.cast<const rig::Rig&>().block();
+  py::array_t<std::uint8_t> view({static_cast<py::ssize_t>(block.size())}, {py::ssize_t{1}},
+                                 block.data(), self);
+  view.attr("flags").attr("writeable") = false;
+  return py::memoryview(view);
+}
+
+void save_rig(const rig::Rig& rig, const std::filesystem::path& path) {
+  const auto write = [&] {
+    const py::gil_scoped_release released;
+    return rig::save_rig(rig, path);
+  };
+  unwrap(write());
+}
+
+std::shared_ptr<rig::Rig> load_rig(const std::filesystem::path& path, std::optional<bool> trusted,
+                                   const std::optional<std::string>& simd, bool mapped) {
+  const simd::Kernels& kernels = kernels_argument(simd);
+  rig::Trust trust = rig::Trust::kOwner;
+  if (trusted) trust = *trusted ? rig::Trust::kCaller : rig::Trust::kNobody;
+  const auto open = [&] {
+    const py::gil_scoped_release released;
+    return rig::open_rig_file(path, trust, mapped ? core::ReadBy::kMap : core::ReadBy::kCopy,
+                              kernels);
+  };
+  return std::make_shared<rig::Rig>(unwrap(open()));
+}
+
+// float32[R] or float32[N, R].
+FloatArray frames_argument(const rig::Rig& rig, const py::object& raw) {
+  FloatArray in = FloatArray::ensure(raw);
+  if (!in) throw py::value_error("raw: an array of numbers was expected");
+  const py::ssize_t n = in.ndim();
+  if ((n != 1 && n != 2) || static_cast<std::size_t>(in.shape(n - 1)) != rig.raw_count) {
+    const std::string count = std::to_string(rig.raw_count);
+    shape_error("raw", "(" + count + ",) or (n, " + count + ")", in);
+  }
+  return in;
+}
+
+// [(frame, name, value)]
+py::list find_non_finite(const rig::Rig& rig, const py::object& raw) {
+  const FloatArray in = frames_argument(rig, raw);
+  const auto frames = static_cast<std::size_t>(in.ndim() == 1 ? 1 : in.shape(0));
+  const std::vector<std::string> names = rig.raw_control_names();
+  py::list out;
+  for (const rig::NonFinite& f : rig::find_non_finite(rig, in.data(), frames)) {
+    out.append(py::make_tuple(f.frame, to_python(names[f.control]), f.value));
+  }
+  return out;
+}
+
+// (distances, weights) of a solver's poses.
+py::tuple solver_poses(const rig::Rig& rig, std::uint32_t index, const py::object& controls) {
+  if (index >= rig.rbf_solvers.size()) {
+    throw py::index_error("index: a solver below " + std::to_string(rig.rbf_solvers.size()) +
+                          " was expected, found " + std::to_string(index));
+  }
+  const FloatArray in = vector_argument(controls, "controls", rig.control_count);
+  const auto poses = static_cast<py::ssize_t>(rig.rbf_solvers[index].pose_count);
+  py::array_t<double> distances(poses);
+  py::array_t<float> weights(poses);
+  rig::Workspace work = rig::make_workspace(rig);
+  rig::solver_poses(rig, index, in.data(), work, distances.mutable_data(), weights.mutable_data());
+  return py::make_tuple(distances, weights);
+}
+
+PoseArrays evaluate(const rig::Rig& rig, const py::object& raw, std::uint32_t lod, bool settle,
+                    bool check) {
+  const FloatArray in = vector_argument(raw, "raw", rig.raw_count);
+  if (check) unwrap(rig::check_finite(rig, in.data(), 1));
+  rig::Workspace work = rig::make_workspace(rig);
+  rig::Pose pose = rig::make_pose(rig);
+  rig::evaluate(rig, in.data(), lod, settle, work, pose);
+  return to_arrays(rig, pose);
+}
+
+PoseArrays evaluate_batch(const rig::Rig& rig, const py::object& raw, std::uint32_t lod,
+                          std::size_t threads, bool settle, bool check) {
+  const FloatArray in = FloatArray::ensure(raw);
+  if (!in || in.ndim() != 2 || static_cast<std::size_t>(in.shape(1)) != rig.raw_count) {
+    if (!in) throw py::value_error("raw: an array of numbers was expected");
+    shape_error("raw", "(n, " + std::to_string(rig.raw_count) + ")", in);
+  }
+  const auto n = in.shape(0);
+  if (check) unwrap(rig::check_finite(rig, in.data(), static_cast<std::size_t>(n)));
+  const auto columns = [](std::uint32_t v) { return static_cast<py::ssize_t>(v); };
+  PoseArrays out{FloatArray({n, columns(rig.joint_count), stride_of(rig)}),
+                 FloatArray({n, columns(rig.blend_shape_count)}),
+                 FloatArray({n, columns(rig.animated_map_count)}),
+                 FloatArray({n, columns(rig.control_count)})};
+  const rig::PoseView all{out.joints.mutable_data(), out.blend_shapes.mutable_data(),
+                          out.animated_maps.mutable_data(), out.controls.mutable_data()};
+  const float* rows = in.data();
+  py::gil_scoped_release released;
+  core::parallel_for(static_cast<std::size_t>(n), threads, [&](std::size_t begin, std::size_t end) {
+    rig::Workspace work = rig::make_batch_workspace(rig);
+    const rig::PoseView part{all.joints + begin * rig.joint_count * rig.joint_stride,
+                             all.blend_shapes + begin * rig.blend_shape_count,
+                             all.animated_maps + begin * rig.animated_map_count,
+                             all.controls + begin * rig.control_count};
+    rig::evaluate_frames(rig, rows + begin * rig.raw_count, end - begin, lod, settle, work, part);
+  });
+  return out;
+}
+
+void bind_rig_class(py::module_& m) {
+  py::class_<rig::Rig, std::shared_ptr<rig::Rig>>(
+      m, "Rig", "A compiled face: turns raw controls into a Pose. Immutable, shared freely.")
+      .def(py::init(&make_rig), py::arg("dna"), py::kw_only(), py::arg("precision") = "float32",
+           py::arg("rotation") = "euler", py::arg("simd") = py::none())
+      .def_static(
+          "from_bytes", &rig_from_bytes, py::arg("bytes"), py::arg("trusted") = false,
+          py::arg("simd") = py::none(),
+          "A Rig from what to_bytes or block gave, of this version and byte order. A "
+          "bytes object whose data lies on a multiple of 64 is used in place and kept, any "
+          "other buffer is copied. trusted leaves out the hash and the check of every index.")
+      .def(
+          "to_bytes",
+          [](const rig::Rig& r) {
+            return py::bytes(reinterpret_cast<const char*>(r.block().data()), r.block().size());
+          },
+          "The compiled face as bytes, a cache for from_bytes.")
+      .def("save", &save_rig, py::arg("path"),
+           "Writes to_bytes() to a file, a cache for load; an old file is whole until the new one "
+           "is.")
+      .def_static("load", &load_rig, py::arg("path"), py::arg("trusted") = false,
+                  py::arg("simd") = py::none(), py::kw_only(), py::arg("mapped") = false,
+                  "A Rig from a file of save, of this version and byte order. Its hash and every "
+                  "index are checked. trusted=None leaves out the indices where the file is this "
+                  "user's and nobody else may write it (never so on Windows): what was downloaded "
+                  "or unpacked is so as well, therefore None is for folders that only this program "
+                  "fills. The hash finds damage, not forgery. trusted=True leaves out both: one "
+                  "flipped bit may then end the process. mapped uses the pages of a trusted file "
+                  "in place: they may only be replaced as a whole file and not be written to or "
+                  "cut while the Rig lives. Raises DnaError.")
+      .def("block", &block_of, "The same without a copy: a read-only memoryview of uint8.")
+      .def_property_readonly("raw_control_names",
+                             [](const rig::Rig& r) {
+                               py::list out;
+                               for (const auto& n : r.raw_control_names()) out.append(to_python(n));
+                               return out;
+                             })
+      .def_property_readonly("gui_control_names",
+                             [](const rig::Rig& r) {
+                               py::list out;
+                               for (const auto& n : r.gui_control_names()) out.append(to_python(n));
+                               return out;
+                             })
+      .def_readonly("joint_count", &rig::Rig::joint_count)
+      .def_readonly("blend_shape_count", &rig::Rig::blend_shape_count)
+      .def_readonly("animated_map_count", &rig::Rig::animated_map_count)
+      .def_readonly("lod_count", &rig::Rig::lod_count)
+      .def_readonly("control_count", &rig::Rig::control_count)
+      .def_property_readonly("ignored_layers",
+                             [](const rig::Rig& r) {
+                               py::list out;
+                               for (const auto& id : r.ignored_layers()) out.append(to_python(id));
+                               return out;
+                             })
+      .def_property_readonly("memory_bytes", &rig::Rig::memory_bytes)
+      .def_property_readonly("simd", [](const rig::Rig& r) { return r.kernels->name; })
+      .def_property_readonly("neutral_joints",
+                             [](const rig::Rig& r) {
+                               return copied(
+                                   r.neutral_joints,
+                                   {static_cast<py::ssize_t>(r.joint_count), stride_of(r)});
+                             })
+      .def_property_readonly("rotation",
+                             [](const rig::Rig& r) {
+                               return std::string(r.joint_stride == 10 ? "quaternion" : "euler");
+                             })
+      .def_property_readonly(
+          "initial_raw_controls",
+          [](const rig::Rig& r) {
+            return copied(r.initial_controls.first(r.raw_count),
+                          {static_cast<py::ssize_t>(r.raw_count)});
+          },
+          "float32[R]: 0, but 1 for the w of each rotation that solvers and setups read.")
+      .def_property_readonly("joint_indices_written",
+                             [](const rig::Rig& r) {
+                               return py::array_t<std::uint16_t>(
+                                   static_cast<py::ssize_t>(r.joints_written.size()),
+                                   r.joints_written.data());
+                             })
+      .def(
+          "gui_to_raw",
+          [](const rig::Rig& r, const py::object& gui) {
+            const FloatArray in = vector_argument(gui, "gui", r.gui_count);
+            py::array_t<float> raw(static_cast<py::ssize_t>(r.raw_count));
+            rig::gui_to_raw(r, in.data(), raw.mutable_data());
+            return raw;
+          },
+          py::arg("gui"), "float32[G] -> float32[R] in [0, 1]")
+      .def(
+          "raw_to_gui",
+          [](const rig::Rig& r, const py::object& raw) {
+            const FloatArray in = vector_argument(raw, "raw", r.raw_count);
+            py::array_t<float> gui(static_cast<py::ssize_t>(r.gui_count));
+            rig::raw_to_gui(r, in.data(), gui.mutable_data());
+            return gui;
+          },
+          py::arg("raw"), "float32[R] -> float32[G], where the table can be reversed")
+      .def("evaluate", &evaluate, py::arg("raw"), py::arg("lod") = 0, py::arg("settle") = true,
+           py::arg("check") = false,
+           "float32[R] -> Pose; a function of raw alone when settle is true. Values outside [0, 1] "
+           "are taken as they are: joints and shapes go on, correctives clamp their factors, maps "
+           "rest outside their intervals. NaN or infinity spoils what its control drives and "
+           "nothing else, and no later pose; with check it is a DnaError that names the control.")
+      .def("evaluate_batch", &evaluate_batch, py::arg("raw"), py::arg("lod") = 0,
+           py::arg("threads") = 0, py::arg("settle") = true, py::arg("check") = false,
+           "float32[N, R] -> Pose whose fields have a leading N; threads 0 is all cores. "
+           "check names the first frame and control that is not finite.")
+      .def("find_non_finite", &find_non_finite, py::arg("raw"),
+           "float32[R] or float32[N, R] -> [(frame, name, value)] of all that is NaN or infinite.")
+      .def("solver_poses", &solver_poses, py::arg("index"), py::arg("controls"),
+           "Of an RBF solver and a Pose's controls: (float64[poses] distances from its inputs, in "
+           "radians where they are angles; float32[poses] weights, 0 below the threshold).")
+      .def("instance",
+           [](const std::shared_ptr<rig::Rig>& r) { return PyInstance{r, rig::Instance(*r)}; });
+}
+
+void bind_morph(py::module_& m) {
+  py::class_<rig::Morph, std::shared_ptr<rig::Morph>>(
+      m, "Morph", "The blend shape targets of one mesh, compiled for summing.")
+      .def(py::init([](const dna::Dna& dna, std::size_t mesh_index, const py::object& matrix) {
+             std::array<float, 9> rows{1, 0, 0, 0, 1, 0, 0, 0, 1};
+             if (!matrix.is_none()) {
+               const FloatArray given = matrix_argument(matrix, "matrix", 3);
+               std::copy(given.data(), given.data() + 9, rows.begin());
+             }
+             return std::make_shared<rig::Morph>(
+                 unwrap(compile::compile_morph(dna, mesh_index, rows)));
+           }),
+           py::arg("dna"), py::arg("mesh_index"), py::kw_only(), py::arg("matrix") = py::none())
+      .def_readonly("vertex_count", &rig::Morph::vertex_count)
+      .def_property_readonly("channel_indices",
+                             [](const rig::Morph& s) {
+                               return py::array_t<std::uint16_t>(
+                                   static_cast<py::ssize_t>(s.channels.size()), s.channels.data());
+                             })
+      .def_property_readonly("memory_bytes", &rig::Morph::memory_bytes)
+      .def("evaluate", &evaluate_morph, py::arg("blend_shapes"), py::arg("base") = py::none(),
+           py::arg("out") = py::none(),
+           "float32[B] -> float32[V, 3]: base + sum of weight * delta.");
+}
+
+void bind_bone_space(py::module_& m) {
+  py::class_<rig::BoneSpace, std::shared_ptr<rig::BoneSpace>>(
+      m, "BoneSpace",
+      "Poses of joints to what another program keeps on bones that rest in the neutral pose, in "
+      "axes and units of its own.")
+      .def(py::init(&make_bone_space), py::arg("neutral_rotations"), py::arg("bones"),
+           py::kw_only(), py::arg("axes"), py::arg("scale") = 1.0f, py::arg("radians") = 1.0f,
+           py::arg("sequence") = std::array<int, 3>{0, 1, 2},
+           py::arg("signs") = std::array<float, 3>{1, 1, 1},
+           "neutral_rotations float32[J, 3]; bones: the joint of each; v' = scale * axes @ v; "
+           "radians per unit of angle; sequence: axes in the order of rotation; signs of angles.")
+      .def("evaluate", &evaluate_bones, py::arg("joints"),
+           "float32[J, 9] of a Pose -> (location[n, 3], rotation[n, 4] w x y z, scale[n, 3]).");
+}
+
+}  // namespace
+
+void bind_rig(py::module_& m) {
+  py::class_<PoseArrays>(m, "Pose",
+                         "joints float32[J, 9]: tx ty tz rx ry rz sx sy sz deltas from neutral in "
+                         "the file's units and axes, or with rotation='quaternion' [J, 10]: tx ty "
+                         "tz qx qy qz qw sx sy sz; blend_shapes[B]; animated_maps[A] in [0, 1]; "
+                         "controls[raw + corrective + ...]")
+      .def_readonly("joints", &PoseArrays::joints)
+      .def_readonly("blend_shapes", &PoseArrays::blend_shapes)
+      .def_readonly("animated_maps", &PoseArrays::animated_maps)
+      .def_readonly("controls", &PoseArrays::controls);
+  py::class_<PyInstance>(m, "Instance",
+                         "One face through time, with the reference's one-frame latencies.")
+      .def_property(
+          "lod", [](const PyInstance& s) { return s.instance.lod(); },
+          [](PyInstance& s, std::uint32_t lod) { s.instance.set_lod(lod); })
+      .def_property(
+          "masks",
+          [](const PyInstance& s) {
+            const auto masks = s.instance.masks();
+            return copied(masks, {static_cast<py::ssize_t>(masks.size())});
+          },
+          [](PyInstance& s, const py::object& masks) {
+            const FloatArray in = vector_argument(masks, "masks", s.instance.masks().size());
+            for (py::ssize_t i = 0; i < in.size(); ++i) {
+              s.instance.set_mask(static_cast<std::size_t>(i), in.data()[i]);
+            }
+          },
+          "float32, one per region of each mesh, mesh after mesh; at 0 the region's networks rest. "
+          "A copy: assign all of it.")
+      .def(
+          "evaluate",
+          [](PyInstance& s, const py::object& raw, bool check) {
+            const FloatArray in = vector_argument(raw, "raw", s.rig->raw_count);
+            if (check) unwrap(rig::check_finite(*s.rig, in.data(), 1));
+            return to_arrays(*s.rig, s.instance.evaluate(in.data()));
+          },
+          py::arg("raw"), py::arg("check") = false,
+          "float32[R] -> Pose; check is a DnaError for what is not finite, and no frame then.");
+  bind_rig_class(m);
+  bind_morph(m);
+  bind_bone_space(m);
+  m.def("rig_block_version", &rig::block_version, "Of Rig.to_bytes; others are refused.");
+  m.def(
+      "compile_version", [] { return compile::kVersion; },
+      "Of what Rig makes of a DNA; counted up where the poses of an old file change.");
+  m.def("quaternion_column_orders", &quaternion_column_orders, py::arg("dna"),
+        "Of each joint group the columns that turn quaternion joints, uint32[n], in the order in "
+        "which their rotations are multiplied.");
+  m.def(
+      "available_simd", [] { return std::string(simd::available_kernels()); },
+      "The instruction sets that this processor has, as simd= takes them, apart by blanks.");
+}
+
+}  // namespace risorius::bindings

@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: MIT
+// A checked big-endian reader over a Source. Every error of a parser comes from here or goes
+// through fail() here, so that it has an offset and a field.
+#pragma once
+
+#include <bit>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "bytes/source.h"
+#include "core/array.h"
+#include "core/buffer.h"
+
+namespace risorius::core {
+
+/// Reads numbers one after the other. After the first failure every read gives zero or an empty
+/// list and error() stays as it was: a parser checks once per struct, not once per number.
+/// A file is read through a window that never reaches beyond end() and begins small after a jump,
+/// so that what is skipped is not read; of memory nothing is copied but into the lists.
+class ByteReader {
+ public:
+  /// end   reading stops here (the file's size or a layer's end)
+  explicit ByteReader(Source& source);
+
+  ByteReader(const ByteReader&) = delete;
+  ByteReader& operator=(const ByteReader&) = delete;
+
+  std::uint64_t position() const {
+    return window_begin_ + static_cast<std::uint64_t>(at_ - first_);
+  }
+  std::uint64_t end() const { return end_; }
+  std::uint64_t left() const { return end_ > position() ? end_ - position() : 0; }
+  bool failed() const { return error_.has_value(); }
+  const Error& error() const { return *error_; }
+  Unexpected take_error() { return Unexpected{*error_}; }
+  /// After this, enter() reads on somewhere else.
+  void clear_error();
+  /// No list may have more elements, whatever the bytes would allow.
+  void set_max_count(std::uint32_t n) { max_count_ = n; }
+  void fail_at(std::uint64_t offset, ErrorCode code, std::string message);
+
+  /// Restricts reading to [offset, offset + size). Fails when that is outside the source.
+  bool enter(std::uint64_t offset, std::uint64_t size);
+  /// The window begins small again, as after a jump: little of what comes next may be wanted.
+  void read_small() { next_read_ = 0; }
+
+  std::uint8_t u8() { return number<std::uint8_t>(); }
+  std::uint16_t u16() { return number<std::uint16_t>(); }
+  std::uint32_t u32() { return number<std::uint32_t>(); }
+  float f32() { return std::bit_cast<float>(u32()); }
+  /// A count is believed only if count * element_size bytes are left.
+  std::uint32_t count(std::uint32_t element_size) {
+    if (ready_ - at_ >= 4) {
+      const std::uint32_t n = load<std::uint32_t>(at_);
+      if (n <= max_count_ && std::uint64_t{n} * element_size <= left() - 4) {
+        at_ += 4;
+        return n;
+      }
+    }
+    return count_slowly(element_size);
+  }
+  /// The number at offset, if it lies between here and end(). Reading goes on where it was.
+  std::optional<std::uint16_t> peek_u16(std::uint64_t offset);
+  std::string str();
+  std::vector<std::uint8_t> bytes(std::uint64_t size);
+  void skip(std::uint64_t size);
+  /// all_finite   becomes false when a value is infinite or no number; is never made true
+  Array<float> f32_list(bool* all_finite = nullptr);
+  Array<std::uint16_t> u16_list();
+  /// largest      grows to the largest value
+  Array<std::uint32_t> u32_list(std::uint32_t* largest = nullptr);
+  /// Reads n values without a count, straight into out. In: n already checked by count(). What is
+  /// in out after a failure is not defined.
+  void read_f32(float* out, std::size_t n, bool* all_finite = nullptr);
+  void read_u16(std::uint16_t* out, std::size_t n);
+  void read_u32(std::uint32_t* out, std::size_t n, std::uint32_t* largest = nullptr);
+
+  /// Field path of what is being read, for errors: push on entry, pop on exit (see Field).
+  std::string where() const;
+
+ private:
+  friend class Field;
+  struct PathPart {
+    const char* name;
+    std::int64_t index;
+  };
+  template <class T>
+  static T load(const std::uint8_t* bytes) {
+    T v = 0;
+    for (std::size_t i = 0; i < sizeof(T); ++i) {
+      v = static_cast<T>(v | static_cast<T>(bytes[i]) << (8 * (sizeof(T) - 1 - i)));
+    }
+    return v;
+  }
+  template <class T>
+  T number() {
+    if (ready_ - at_ < static_cast<std::ptrdiff_t>(sizeof(T)) && !need(sizeof(T))) return 0;
+    const T v = load<T>(at_);
+    at_ += sizeof(T);
+    return v;
+  }
+  std::uint32_t count_slowly(std::uint32_t element_size);
+  /// take(at, n) gets every value once, in runs as long as the window has.
+  template <std::size_t kSize, class Take>
+  bool for_runs(std::size_t n, const Take& take);
+  bool check_left(std::uint64_t bytes);
+  bool need(std::size_t n);
+  bool refill(std::size_t n, std::uint64_t wanted);
+  void move_to(std::uint64_t offset);
+  void bound();
+
+  Source* source_;
+  std::uint64_t end_ = 0;
+  std::uint32_t max_count_ = 0xFFFFFFFF;
+  // [first_, loaded_) are the bytes from window_begin_ on: the window's, or all of a source in
+  // memory. [at_, ready_) of them may be read: they are inside the region, and nothing failed.
+  std::uint64_t window_begin_ = 0;
+  const std::uint8_t* first_ = nullptr;
+  const std::uint8_t* at_ = nullptr;
+  const std::uint8_t* ready_ = nullptr;
+  const std::uint8_t* loaded_ = nullptr;
+  Buffer<std::uint8_t> window_;
+  std::size_t next_read_ = 0;
+  std::vector<PathPart> path_;
+  std::optional<Error> error_;
+};
+
+/// Names the field while it is in scope: Field f(reader, "joint_groups", i);
+class Field {
+ public:
+  Field(ByteReader& reader, const char* name, std::int64_t index = -1) : reader_(reader) {
+    reader_.path_.push_back({name, index});
+  }
+  ~Field() { reader_.path_.pop_back(); }
+  Field(const Field&) = delete;
+  Field& operator=(const Field&) = delete;
+
+ private:
+  ByteReader& reader_;
+};
+
+}  // namespace risorius::core

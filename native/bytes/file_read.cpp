@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: MIT
+#include "bytes/file_read.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <string>
+#include <system_error>
+
+#include "bytes/path_text.h"
+#include "bytes/source.h"
+#include "core/aligned.h"
+
+#ifndef _WIN32
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#endif
+
+namespace risorius::core {
+
+namespace {
+
+using std::filesystem::path;
+
+Unexpected cut_short(const path& file) {
+  return fail(ErrorCode::kIoRead, "", utf8(file) + " was cut while it was read");
+}
+
+}  // namespace
+
+#ifdef _WIN32
+
+Result<FileBytes> read_file(const path& file, ReadBy) {
+  auto source = open_file(file);
+  if (!source) return std::move(source).propagate();
+  const auto size = static_cast<std::size_t>((*source)->size());
+  const std::shared_ptr<std::uint8_t> bytes = allocate_pages(size, Fill::kNothing);
+  if ((*source)->read(0, {bytes.get(), size}) != size) return cut_short(file);
+  return FileBytes{{bytes.get(), size}, bytes, false};
+}
+
+#else
+
+namespace {
+
+Unexpected failure(ErrorCode code, const char* verb, const path& file, int reason) {
+  return fail(code, "",
+              std::string("cannot ") + verb + " " + utf8(file) + ": " +
+                  std::generic_category().message(reason));
+}
+
+class Descriptor {
+ public:
+  explicit Descriptor(int number) : number_(number) {}
+  ~Descriptor() {
+    if (number_ >= 0) ::close(number_);
+  }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  int number() const { return number_; }
+
+ private:
+  int number_;
+};
+
+bool read_all(int file, std::span<std::uint8_t> out) {
+  constexpr std::size_t kMost = std::size_t{1} << 30;  // macOS refuses 2 GiB and more
+  std::size_t done = 0;
+  while (done < out.size()) {
+    const ssize_t n = ::pread(file, out.data() + done, std::min(out.size() - done, kMost),
+                              static_cast<off_t>(done));
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) return false;
+    done += static_cast<std::size_t>(n);
+  }
+  return true;
+}
+
+// Nothing where the system refuses.
+std::shared_ptr<const void> mapped(int file, std::size_t size) {
+  void* memory = ::mmap(nullptr, size, PROT_READ, MAP_PRIVATE, file, 0);
+  if (memory == MAP_FAILED) return nullptr;
+  return {memory, [size](const void* p) { ::munmap(const_cast<void*>(p), size); }};
+}
+
+}  // namespace
+
+Result<FileBytes> read_file(const path& name, ReadBy by) {
+  // A pipe without a writer would wait for one.
+  const Descriptor file(::open(name.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  if (file.number() < 0) return failure(ErrorCode::kIoOpen, "open", name, errno);
+  struct stat about = {};
+  if (::fstat(file.number(), &about) != 0) {
+    return failure(ErrorCode::kIoRead, "read the size of", name, errno);
+  }
+  if (!S_ISREG(about.st_mode)) {
+    return fail(ErrorCode::kIoOpen, "",
+                utf8(name) + (S_ISDIR(about.st_mode) ? " is a folder" : " is no plain file") +
+                    ", a file was expected");
+  }
+  const auto size = static_cast<std::size_t>(about.st_size);
+  const bool own = about.st_uid == ::geteuid() && (about.st_mode & (S_IWGRP | S_IWOTH)) == 0;
+  if (by == ReadBy::kMap && size > 0) {
+    if (auto map = mapped(file.number(), size)) {
+      return FileBytes{{static_cast<const std::uint8_t*>(map.get()), size}, map, own};
+    }
+  }
+  const std::shared_ptr<std::uint8_t> bytes = allocate_pages(size, Fill::kNothing);
+  errno = 0;
+  if (!read_all(file.number(), {bytes.get(), size})) {
+    return errno == 0 ? cut_short(name) : failure(ErrorCode::kIoRead, "read", name, errno);
+  }
+  return FileBytes{{bytes.get(), size}, bytes, own};
+}
+
+#endif
+
+}  // namespace risorius::core

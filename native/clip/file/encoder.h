@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: MIT
+// Clips -> .rzc files, without a bit lost. FORMAT.md describes them.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "clip/clip.h"
+#include "clip/codec/little_endian.h"
+#include "core/result.h"
+
+namespace risorius::clip {
+
+inline constexpr std::size_t kDefaultBlockFrames = 512;
+
+/// Turns frames into the bytes of a file, as they come.
+class Encoder {
+ public:
+  /// In: block_frames, 1 to 4096, that are compressed, and read again, together.
+  /// Fails: kInvalidArgument with the field; a name twice, a rate that is not above 0.
+  static core::Result<Encoder> create(Head head, std::size_t block_frames = kDefaultBlockFrames);
+
+  /// In: frames [n, controls]; times [n] when the clip has them, else empty: finite and ascending.
+  core::Status append(std::span<const float> frames, std::span<const double> times);
+  void add(Event event) { pending_.push_back(std::move(event)); }
+  /// All that was given is in the bytes; the encoder takes no more.
+  void finish();
+
+  /// The bytes that are ready and were not taken yet.
+  Bytes take();
+  const Head& head() const { return head_; }
+  std::uint64_t frame_count() const { return frames_ + filled_; }
+
+ private:
+  friend core::Result<Bytes> encode(const Clip& clip, std::size_t block_frames);
+  struct Block {
+    std::uint64_t offset;
+    std::uint32_t size, frames;
+  };
+  void put_block(const float* curves, std::size_t stride, std::span<const double> times,
+                 std::size_t frames);
+
+  Head head_;
+  std::size_t block_frames_ = 0, filled_ = 0;
+  std::uint64_t frames_ = 0, written_ = 0;
+  std::vector<float> curves_;  // [controls, block_frames], of which filled_ are there
+  std::vector<double> times_;
+  double last_time_ = 0.0;
+  std::vector<Event> pending_, events_;
+  std::vector<Block> blocks_;
+  Bytes out_;
+};
+
+/// A clip as a file. Fails: kInvalidArgument with the field.
+core::Result<Bytes> encode(const Clip& clip, std::size_t block_frames = kDefaultBlockFrames);
+
+}  // namespace risorius::clip

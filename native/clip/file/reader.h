@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: MIT
+// .rzc files -> clips, whole or piece by piece. FORMAT.md describes them.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "bytes/source.h"
+#include "clip/clip.h"
+#include "clip/codec/little_endian.h"
+#include "core/result.h"
+
+namespace risorius::clip {
+
+/// What a file may ask for at most.
+struct Limits {
+  std::uint32_t controls = 1u << 16;
+  std::uint64_t frames = std::uint64_t{1} << 32;
+  std::uint64_t head_bytes = std::uint64_t{1} << 24;
+  std::uint64_t metadata = std::uint64_t{1} << 18;
+  std::uint64_t values = std::uint64_t{1} << 29;  // in one read: controls * frames
+};
+
+/// How a file without a good end is taken: one that was cut while it was recorded.
+enum class Ends { kMustBeWhole, kMayBeCut };
+
+/// A file that is read piece by piece. Reading from several threads needs a Reader each.
+class Reader {
+ public:
+  /// Reads the head and the index, no curve.
+  /// Fails: kNotClip, kUnsupportedGeneration, kTruncated, kInvalidValue, kLimitExceeded.
+  static core::Result<Reader> open(std::unique_ptr<core::Source> source,
+                                   Ends ends = Ends::kMustBeWhole, const Limits& limits = {});
+
+  const Head& head() const { return head_; }
+  std::uint64_t frame_count() const { return frames_; }
+  const std::vector<Event>& events() const { return events_; }
+  /// Of the file that were read; more follow only where it was cut.
+  std::uint64_t byte_count() const { return end_; }
+  /// First frame of each block, and the frame behind the last.
+  const std::vector<std::uint64_t>& block_starts() const { return starts_; }
+
+  /// What read() would refuse before it reads anything: to be asked before memory is made for it.
+  core::Status may_read(std::uint64_t begin, std::uint64_t end,
+                        std::span<const std::uint32_t> controls) const;
+
+  /// Writes the curves of controls to out [controls.size(), end - begin], and with out_times the
+  /// times to it [end - begin]. A block that has been read last is not read again.
+  /// In: begin <= end <= frame_count(), controls below their number.
+  /// Fails: kInvalidArgument, kLimitExceeded, kInvalidValue, kTruncated, kIoRead.
+  core::Status read(std::uint64_t begin, std::uint64_t end, std::span<const std::uint32_t> controls,
+                    float* out, double* out_times);
+
+  /// Of a block's controls, those that rest, as their values in `values` [controls]; appends the
+  /// others to `moving`. Fails: as read.
+  core::Status resting(std::size_t block, std::span<float> values,
+                       std::vector<std::uint32_t>& moving);
+
+ private:
+  struct Block {
+    std::uint64_t offset;
+    std::uint32_t size, frames;
+  };
+  struct Loaded;
+  core::Status read_head(const Limits& limits);
+  core::Status read_names(View body, const Limits& limits);
+  core::Status read_index();
+  core::Status read_blocks(View index, std::uint64_t offset);
+  void find_blocks();
+  bool take_block(std::uint64_t offset, Block& block);
+  core::Status load(std::size_t block);
+  core::Status read_block(std::size_t block, std::uint64_t begin, std::uint64_t end,
+                          std::span<const std::uint32_t> controls, float* out, std::size_t stride,
+                          double* out_times);
+
+  std::shared_ptr<core::Source> source_;
+  Limits limits_;
+  Head head_;
+  std::uint64_t frames_ = 0, first_block_ = 0, end_ = 0;
+  std::vector<Block> blocks_;
+  std::vector<std::uint64_t> starts_;
+  std::vector<Event> events_;
+  std::shared_ptr<Loaded> loaded_;
+};
+
+/// A whole file. Fails: as Reader.
+core::Result<Clip> decode(View bytes, Ends ends = Ends::kMustBeWhole, const Limits& limits = {});
+
+}  // namespace risorius::clip

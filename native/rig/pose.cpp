@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: MIT
+#include "rig/pose.h"
+
+namespace risorius::rig {
+
+Pose make_pose(const Rig& rig) {
+  Pose pose;
+  pose.joints.resize(std::size_t{rig.joint_count} * rig.joint_stride);
+  pose.blend_shapes.resize(rig.blend_shape_count);
+  pose.animated_maps.resize(rig.animated_map_count);
+  pose.controls.resize(rig.control_count);
+  return pose;
+}
+
+Workspace make_workspace(const Rig& rig) {
+  Workspace work;
+  work.active.resize(std::size_t{rig.control_count} + 1);  // one is written past the last
+  work.candidates.resize(rig.psds.size() + 1);
+  work.psd_bits.resize((std::size_t{rig.psd_count} + 63) / 64);
+  work.column_begins.resize(rig.joint_groups.size() + 2);
+  work.columns.resize(rig.joint_columns.size());
+  work.rows.resize(detail::rows_size(rig));
+  work.last_controls.resize(rig.control_count);
+  work.products.resize(rig.quaternion_joints.size());
+  work.quaternion_bits.resize((rig.quaternion_columns.size() + 63) / 64);
+  work.solver.resize(std::size_t{rig.solver_inputs} + 2 * std::size_t{rig.solver_poses});
+  work.masks.assign(rig.mask_count, 1.0f);
+  work.operation_values.resize(rig.operation_values);
+  for (auto& layer : work.layers) layer.resize(simd::rounded_up(rig.widest_layer));
+  work.layer_columns.resize(std::size_t{rig.widest_layer} + 1);
+  return work;
+}
+
+Workspace make_batch_workspace(const Rig& rig) {
+  Workspace work = make_workspace(rig);
+  // One more: kernels begin at a pointer even where there is nothing to read.
+  work.column_offsets.resize(rig.joint_columns.size() + 1);
+  work.column_weights.resize((rig.joint_columns.size() + 1) * simd::kFrames);
+  work.rows.resize(detail::rows_size(rig) * simd::kFrames);
+  work.frame_weights.resize(std::size_t{rig.control_count} * simd::kFrames);
+  work.union_bits.resize((std::size_t{rig.control_count} + 63) / 64);
+  return work;
+}
+
+}  // namespace risorius::rig

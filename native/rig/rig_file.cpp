@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: MIT
+#include "rig/rig_file.h"
+
+#include "bytes/file_write.h"
+#include "bytes/path_text.h"
+#include "rig/block.h"
+
+namespace risorius::rig {
+
+core::Status save_rig(const Rig& rig, const std::filesystem::path& path) {
+  return core::write_file_atomically(path, rig.block());
+}
+
+core::Result<Rig> open_rig_file(const std::filesystem::path& path, Trust trust, core::ReadBy by,
+                                const simd::Kernels& kernels) {
+  if (trust == Trust::kNobody) by = core::ReadBy::kCopy;
+  auto file = core::read_file(path, by);
+  const auto trusted = [&] {
+    return trust == Trust::kCaller || (trust == Trust::kOwner && file->is_own);
+  };
+  if (file && by == core::ReadBy::kMap && !trusted()) file = core::read_file(path);
+  if (!file) return std::move(file).propagate();
+  // A disk may have changed a bit of any file: only the caller's word spares the hash.
+  const BlockCheck own = trust == Trust::kCaller ? BlockCheck::kHeader : BlockCheck::kHash;
+  const BlockCheck check = trusted() ? own : BlockCheck::kFull;
+  auto rig = open_rig(file->bytes, file->owner, check, kernels);
+  if (rig) return rig;
+  core::Error error = rig.error();
+  error.message = core::utf8(path) + ": " + error.message;
+  return core::Unexpected{std::move(error)};
+}
+
+}  // namespace risorius::rig

@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <bit>
+
+#include "rig/stages/evaluate.h"
+#include "rig/stages/stages.h"
+
+namespace risorius::rig {
+
+namespace {
+
+using simd::kFrames;
+
+// A block takes the time of three to four frames, however few it has.
+constexpr std::size_t kFewest = 4;
+
+PoseView frame_of(const Rig& rig, const PoseView& first, std::size_t n) {
+  return {first.joints + n * rig.joint_count * rig.joint_stride,
+          first.blend_shapes + n * rig.blend_shape_count,
+          first.animated_maps + n * rig.animated_map_count, first.controls + n * rig.control_count};
+}
+
+// Up to kFrames frames that share one pass over the matrices.
+class Block {
+ public:
+  Block(const Rig& rig, Workspace& work, const PoseView& first, std::size_t count)
+      : rig_(rig), work_(work), first_(first), count_(count) {}
+
+  void joints(std::uint32_t lod) noexcept {
+    list_columns(rig_.live_groups[lod]);
+    const std::size_t stride = detail::rows_size(rig_);
+    for (std::size_t i = 0; i < rig_.live_groups[lod]; ++i) {
+      const std::uint32_t rows = rig_.joint_group_lods[i * rig_.lod_count + lod];
+      if (rows == 0) continue;
+      const std::size_t begin = work_.column_begins[i];
+      const std::size_t columns = work_.column_begins[i + 1] - begin;
+      const std::uint32_t* offsets = work_.column_offsets.data() + begin;
+      const float* weights = work_.column_weights.data() + begin * kFrames;
+      float* out = work_.rows.data() + rig_.joint_groups[i].rows_begin;
+      if (rig_.is_half()) {
+        rig_.kernels->batch_half_columns(rig_.joint_halves.data(), offsets, weights, columns, out,
+                                         stride, rows);
+      } else {
+        rig_.kernels->batch_columns(rig_.joint_values.data(), offsets, weights, columns, out,
+                                    stride, rows);
+      }
+    }
+    for (std::size_t f = 0; f < count_; ++f) {
+      detail::place_rows(rig_, lod, work_.rows.data() + f * stride,
+                         first_.joints + f * rig_.joint_count * rig_.joint_stride);
+    }
+  }
+
+  /// Adds a frame's controls to those of the block.
+  void take(std::size_t f) noexcept {
+    const float* controls = first_.controls + f * rig_.control_count;
+    for (std::size_t a = 0; a < work_.active_count; ++a) {
+      const std::uint16_t control = work_.active[a];
+      work_.union_bits[control / 64u] |= std::uint64_t{1} << (control % 64u);
+      work_.frame_weights[control * kFrames + f] = controls[control];
+    }
+  }
+
+ private:
+  // As for one frame, of every control that any of the frames uses. Leaves the weights clear.
+  void list_columns(std::uint32_t live) noexcept {
+    const std::size_t n = list_union();
+    const std::span active(work_.active.data(), n);
+    detail::count_columns(rig_, live, active, work_.column_begins.data());
+    std::uint32_t* next = work_.column_begins.data() + 1;
+    for (const std::uint16_t control : active) {
+      float* weights = work_.frame_weights.data() + std::size_t{control} * kFrames;
+      detail::for_columns(rig_, control, live, [&](const JointColumn& column) {
+        const std::size_t at = next[column.group]++;
+        work_.column_offsets[at] = column.offset;
+        std::copy(weights, weights + kFrames, work_.column_weights.data() + at * kFrames);
+      });
+      std::fill(weights, weights + kFrames, 0.0f);
+    }
+  }
+  std::size_t list_union() noexcept {
+    std::size_t n = 0;
+    for (std::size_t word = 0; word < work_.union_bits.size(); ++word) {
+      for (std::uint64_t bits = work_.union_bits[word]; bits != 0; bits &= bits - 1) {
+        work_.active[n++] = static_cast<std::uint16_t>(
+            word * 64 + static_cast<std::size_t>(std::countr_zero(bits)));
+      }
+      work_.union_bits[word] = 0;
+    }
+    return n;
+  }
+
+  const Rig& rig_;
+  Workspace& work_;
+  PoseView first_;
+  std::size_t count_;
+};
+
+void evaluate_block(const Rig& rig, const float* raw, std::size_t count, std::uint32_t lod,
+                    bool settle, Workspace& work, const PoseView& first) noexcept {
+  Block block(rig, work, first, count);
+  for (std::size_t f = 0; f < count; ++f) {
+    const PoseView pose = frame_of(rig, first, f);
+    detail::begin(rig, raw + f * rig.raw_count, lod, settle, work, pose.controls);
+    block.take(f);
+    detail::channels_and_maps(rig, lod, pose);
+  }
+  block.joints(lod);
+  for (std::size_t f = 0; f < count; ++f) {
+    detail::rotations(rig, lod, work, frame_of(rig, first, f));
+  }
+}
+
+}  // namespace
+
+void evaluate_frames(const Rig& rig, const float* raw, std::size_t count, std::uint32_t lod,
+                     bool settle, Workspace& work, const PoseView& pose) noexcept {
+  const std::uint32_t level = detail::clamp_lod(rig, lod);
+  for (std::size_t n = 0; n < count; n += kFrames) {
+    const PoseView first = frame_of(rig, pose, n);
+    const float* from = raw + n * rig.raw_count;
+    if (rig.lod_count == 0 || count - n < kFewest) {
+      for (std::size_t f = 0; f < std::min(kFrames, count - n); ++f) {
+        evaluate(rig, from + f * rig.raw_count, level, settle, work, frame_of(rig, first, f));
+      }
+    } else {
+      evaluate_block(rig, from, std::min(kFrames, count - n), level, settle, work, first);
+    }
+  }
+}
+
+}  // namespace risorius::rig

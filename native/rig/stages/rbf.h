@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: MIT
+// Radial solvers: their arithmetic, shared with the compiler that turns over their targets, and
+// what they see in a pose.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "rig/pose.h"
+
+namespace risorius::rig {
+
+enum RbfDistance : std::uint32_t { kEuclidean, kQuaternion, kSwingAngle, kTwistAngle };
+
+/// Reduces each quaternion (x y z w) of values to its swing or twist about the axis, in place;
+/// other distances leave them as they are.
+void convert_rbf_inputs(std::uint32_t distance, std::uint32_t axis, double* values,
+                        std::size_t count) noexcept;
+/// Between two converted inputs: length of the difference, or root of the sum of squared arcs.
+double rbf_distance(std::uint32_t distance, const double* a, const double* b,
+                    std::size_t count) noexcept;
+/// In: function as in the file: 0 Gaussian 1 exponential 2 linear 3 cubic 4 quintic. A radius of 0
+/// is the limit: 1 at distance 0, else 0.
+double rbf_kernel(std::uint32_t function, double distance, double radius) noexcept;
+
+/// How near a solver's inputs are to each of its poses. For people who ask why; evaluate() does the
+/// same on its way.
+/// In:  index     below the number of solvers
+///      controls  float32[controls] of an evaluated pose
+///      work      of make_workspace
+/// Out: distances, weights  [poses of the solver]: distances in radians where they are angles;
+///      weights as they are written, 0 for what is not above the threshold
+void solver_poses(const Rig& rig, std::uint32_t index, const float* controls, Workspace& work,
+                  double* distances, float* weights) noexcept;
+
+}  // namespace risorius::rig
