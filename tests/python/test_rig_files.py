@@ -127,7 +127,7 @@ def no_compiling(monkeypatch):
         def load(_):
             raise CompiledError
 
-        monkeypatch.setattr(risorius, "load", load)
+        monkeypatch.setattr(cache, "load", load)
 
     return arm
 
@@ -154,7 +154,7 @@ def test_another_file_option_or_version_is_another_face(tmp_path, monkeypatch, n
     for module, name, value in (
         (cache, "rig_block_version", lambda: 0),
         (cache, "compile_version", lambda: 1),  # quaternion columns in the order of the file
-        (risorius, "__version__", "0.0.0"),
+        (cache.version, "__version__", "0.0.0"),
         (sys, "byteorder", "middle"),
     ):
         with monkeypatch.context() as patch:

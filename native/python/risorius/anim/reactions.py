@@ -8,7 +8,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import resources
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +16,7 @@ import numpy.typing as npt
 from ..base import toml
 from ..base.errors import ArgumentError
 from ..controls.regions import expand_sides
+from ..controls.weights import named_weights
 
 Index = Mapping[str, int]
 _Part = tuple[npt.NDArray[np.uint32], npt.NDArray[np.float32], float, float, float, float]
@@ -132,39 +132,8 @@ def load_exclusives(path: str | os.PathLike[str] | None = None) -> Exclusives:
     return Exclusives(yields, pairs)
 
 
-def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """A TOML file. Raises: ValueError with the file's name; OSError."""
-    try:
-        return toml.parse(Path(path).read_text(encoding="utf-8"))
-    except (toml.TomlError, UnicodeDecodeError) as error:
-        raise ArgumentError(f"{os.fspath(path)}: a TOML file was expected: {error}") from None
-
-
-def named_weights(table: Mapping[str, Any], prefix: str, where: str) -> dict[str, float]:
-    """{control: weight} with both sides of what ends in *; a name given in full counts more.
-
-    Args:
-        table: name -> weight, out of a TOML file.
-        prefix: stands before the name of each control in the result.
-        where: what errors call the table.
-
-    Raises:
-        ValueError: a weight that is no number in [0, 1].
-    """
-    out: dict[str, float] = {}
-    for name in sorted(table, key=lambda name: -name.count("*")):
-        weight = table[name]
-        if isinstance(weight, bool) or not isinstance(weight, int | float) or not 0 <= weight <= 1:
-            raise ArgumentError(
-                f"{where}: {name}: a weight from 0 to 1 was expected, found {weight!r}"
-            )
-        for control in expand_sides(name):
-            out[prefix + control] = float(weight)
-    return out
-
-
 def _read(path: str | os.PathLike[str] | None, own: str) -> tuple[dict[str, Any], str]:
-    return (_own(own), own) if path is None else (read_toml(path), os.fspath(path))
+    return (_own(own), own) if path is None else (toml.read(path), os.fspath(path))
 
 
 @cache

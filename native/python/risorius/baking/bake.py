@@ -12,8 +12,8 @@ from typing import Any, Protocol
 import risorius
 
 from ..base.fileio import replacing
-from ..batch.measure import Measure
 from .face import PARTS, Chunk, Face, played
+from .measure import Measure
 from .writing import CsvWriter, NpzWriter, about, find_moving
 
 KINDS = ("npz", "csv", "rzc")

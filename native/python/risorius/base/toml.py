@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
+import os
 import re
 import tomllib
+from pathlib import Path
 from typing import Any
 
-from .errors import RisoriusError
+from .errors import ArgumentError, RisoriusError
 
 MOST_BYTES = 16 << 20
 DEEPEST = 64
@@ -41,6 +43,14 @@ def parse(text: str) -> dict[str, Any]:
     if _is_deep(table):
         raise TomlError(f"values {deep}")
     return table
+
+
+def read(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """A TOML file. Raises: ValueError with the file's name; OSError."""
+    try:
+        return parse(Path(path).read_text(encoding="utf-8"))
+    except (TomlError, UnicodeDecodeError) as error:
+        raise ArgumentError(f"{os.fspath(path)}: a TOML file was expected: {error}") from None
 
 
 def _is_deep(table: dict[str, Any]) -> bool:

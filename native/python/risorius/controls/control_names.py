@@ -8,9 +8,9 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-import risorius
-from risorius.base.errors import RisoriusError
-from risorius.controls import arkit
+from .._native import Dna
+from ..base.errors import RisoriusError
+from . import arkit
 
 
 class UnknownControlError(RisoriusError):
@@ -97,7 +97,7 @@ def named(names: Sequence[str], index: int, kind: str) -> str:
     return (names[index] if index < len(names) else "") or f"{kind} {index}"
 
 
-def _shapes_of_controls(dna: risorius.Dna) -> dict[int, str]:
+def _shapes_of_controls(dna: Dna) -> dict[int, str]:
     """Control -> the blend shape channel that it drives, in brackets."""
     table, names = dna.blend_shape_channels, dna.blend_shape_channel_names
     driven: dict[int, list[int]] = {}
@@ -114,7 +114,7 @@ def _shapes_of_controls(dna: risorius.Dna) -> dict[int, str]:
 class ControlNames:
     """Names of the control vector raw | corrective | network | RBF pose of a file."""
 
-    def __init__(self, dna: risorius.Dna) -> None:
+    def __init__(self, dna: Dna) -> None:
         raw = dna.raw_control_names
         self.psd_begin = len(raw)
         self.psd_end = self.psd_begin + dna.psd_count

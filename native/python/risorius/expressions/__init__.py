@@ -17,9 +17,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ..anim.reactions import named_weights, read_toml
 from ..base import toml
 from ..base.errors import ArgumentError
+from ..controls.weights import named_weights
 
 FILES = ("emotions.toml", "visemes.toml", "faces.toml")
 VISEMES = ("sil", "PP", "FF", "TH", "DD", "kk", "CH", "SS", "nn", "RR", "aa", "E", "I", "O", "U")
@@ -58,7 +58,7 @@ def load(path: str | os.PathLike[str] | None = None) -> dict[str, Expression]:
     """
     if path is None:
         return dict(_own())
-    return _parsed(read_toml(path), os.fspath(path))
+    return _parsed(toml.read(path), os.fspath(path))
 
 
 def get(name: str) -> Expression:

@@ -9,9 +9,9 @@ import os
 import sys
 from pathlib import Path
 
-import risorius
-
 from .._native import DnaError, Rig, compile_version, rig_block_version
+from ..base import version
+from .load import load
 
 
 def cache_folder() -> Path:
@@ -55,16 +55,16 @@ def compile_cached(
     try:
         data = Path(path).read_bytes()
     except OSError:  # load() below fails as well, and its error names the file
-        dna = risorius.load(path)
+        dna = load(path)
         return Rig(dna, precision=precision, rotation=rotation, simd=simd)
     file = Path(cache_dir) if cache_dir is not None else cache_folder()
     file /= _key(data, precision, rotation)
     with contextlib.suppress(DnaError):
         return Rig.load(file, trusted=None, simd=simd)
     try:
-        dna = risorius.load(data)
+        dna = load(data)
     except DnaError:
-        dna = risorius.load(path)  # names the file
+        dna = load(path)  # names the file
     rig = Rig(dna, precision=precision, rotation=rotation, simd=simd)
     with contextlib.suppress(OSError, DnaError):
         file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -74,7 +74,7 @@ def compile_cached(
 
 def _key(data: bytes, precision: str, rotation: str) -> str:
     what = hashlib.sha256(data)  # CPUs have instructions for it: twice as fast as blake2b
-    versions = (risorius.__version__, rig_block_version(), compile_version())
+    versions = (version.__version__, rig_block_version(), compile_version())
     about = (*versions, sys.byteorder, precision, rotation)
     what.update(repr(about).encode())
     return what.hexdigest() + ".rig"

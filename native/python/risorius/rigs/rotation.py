@@ -8,10 +8,9 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-import risorius
+from .._native import Dna
 
 Doubles = npt.NDArray[np.float64]
-
 
 SEQUENCES = ("xyz", "xzy", "yxz", "yzx", "zxy", "zyx")
 
@@ -27,7 +26,7 @@ class Convention:
         self.radians = 1.0 if unit == "radians" else math.pi / 180
 
     @classmethod
-    def of(cls, dna: risorius.Dna) -> Convention:
+    def of(cls, dna: Dna) -> Convention:
         return cls(dna.rotation_sequence, dna.rotation_signs, dna.rotation_unit)
 
     def quaternion(self, angles: Doubles) -> Doubles:

@@ -9,7 +9,7 @@ import numpy as np
 
 import risorius
 
-from ..baking.face import Chunk, Face, Floats, missing
+from .face import Chunk, Face, Floats, missing
 
 
 class Measure:

@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: MIT
+"""From the bytes of a DNA file to a Dna, and to the list of everything that is wrong in it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+from .._native import (
+    Dna,
+    Limits,
+    ParseOptions,
+    check_bytes,
+    check_file,
+    parse_bytes,
+    parse_file,
+)
+from ..base.errors import ArgumentError
+
+# What each name of `layers` brings, as in the format's own data layers.
+_LAYERS = {
+    "descriptor": set[str](),
+    "definition": {"definition"},
+    "behavior": {"definition", "behavior"},
+    "geometry": {"definition", "geometry", "blend_shapes"},
+    "geometry_without_blend_shapes": {"definition", "geometry"},
+    "machine_learned_behavior": {"definition", "machine_learned_behavior"},
+    "rbf_behavior": {"definition", "behavior", "rbf_behavior"},
+    "joint_behavior_metadata": {"definition", "joint_behavior_metadata"},
+    "twist_swing_behavior": {"definition", "twist_swing_behavior"},
+}
+_LAYERS["all"] = {"unknown_layers"}.union(*_LAYERS.values())
+
+
+class Finding(NamedTuple):
+    """One thing that is wrong (an error: the file is refused) or odd (a warning) in a file."""
+
+    is_error: bool
+    code: str
+    where: str
+    """The DNA field, e.g. behavior.joint_groups[3].values[7]."""
+    offset: int | None
+    """Byte offset in the file."""
+    message: str
+
+    def __str__(self) -> str:
+        place = "" if self.offset is None else f" (byte {self.offset})"
+        kind = "error" if self.is_error else "warning"
+        return f"{kind}: {self.where or 'file'}{place}: {self.message}"
+
+
+def load(
+    source: str | os.PathLike[str] | bytes,
+    *,
+    layers: str | Iterable[str] = "all",
+    lods: tuple[int, int] | Sequence[int] | None = None,
+    unknown_layers: str = "preserve",
+    limits: Limits | None = None,
+) -> Dna:
+    """Read a DNA file of version 2.1 to 2.8 (or a newer minor version).
+
+    Args:
+        source: a path, or the bytes of a file.
+        layers: one name or several of "all", "descriptor", "definition", "behavior",
+            "geometry", "geometry_without_blend_shapes", "machine_learned_behavior",
+            "rbf_behavior", "joint_behavior_metadata", "twist_swing_behavior"; each brings what it
+            depends on. What is not asked for is not read.
+        lods: a tuple (max_lod, min_lod), e.g. (0, 2) for the three finest, or a list of LODs; LOD
+            0 is the most detailed. Every index counts in what is left, see Dna.filter_lods.
+        unknown_layers: "preserve" keeps layers that this version does not know as bytes,
+            "ignore" leaves them out and with them, as the format says, the blend shape channels
+            that no loaded layer drives.
+        limits: what the file may ask for at most.
+
+    Returns:
+        A Dna. Its arrays are read-only NumPy views: assign a new array to change one.
+
+    Raises:
+        DnaError: not a DNA file, cut short, a newer generation, anything that does not fit
+            together; with .code, .offset and .where. Also for a file that cannot be opened.
+        ValueError: an unknown name in layers or unknown_layers.
+    """
+    names = [layers] if isinstance(layers, str) else list(layers)
+    wanted: set[str] = set()
+    for name in names:
+        if name not in _LAYERS:
+            raise ArgumentError(f"layers: one of {', '.join(_LAYERS)} was expected, found {name!r}")
+        wanted |= _LAYERS[name]
+    if unknown_layers not in ("preserve", "ignore"):
+        raise ArgumentError(
+            f"unknown_layers: preserve or ignore was expected, found {unknown_layers!r}"
+        )
+    options = ParseOptions()
+    for part in _LAYERS["all"]:
+        setattr(options, part, part in wanted)
+    if unknown_layers == "ignore":
+        options.unknown_layers = options.unreferenced_blend_shapes = False
+    if limits is not None:
+        options.limits = limits
+    options.set_lods(lods)
+    if isinstance(source, bytes | bytearray | memoryview):
+        return parse_bytes(bytes(source), options)
+    return parse_file(os.fspath(source), options)
+
+
+def check(source: str | os.PathLike[str] | bytes, *, limits: Limits | None = None) -> list[Finding]:
+    """Everything that is wrong or odd in a file, in its order; a bad layer hides no other.
+
+    Args:
+        source: a path, or the bytes of a file.
+        limits: what the file may ask for at most.
+
+    Raises:
+        DnaError: the file cannot be opened.
+    """
+    limits = limits or Limits()
+    if isinstance(source, bytes | bytearray | memoryview):
+        found = check_bytes(bytes(source), limits)
+    else:
+        found = check_file(os.fspath(source), limits)
+    return [Finding(*finding) for finding in found]
