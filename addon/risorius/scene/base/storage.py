@@ -37,7 +37,8 @@ def store(name, content, made):
     Returns:
         The Text. Nothing ever writes into it again: characters of one file share it.
     """
-    there = _holding(content)
+    digest = hash_of(content)
+    there = _holding(content, digest)
     if there is not None:
         return there
     text = bpy.data.texts.new(f"{name}.dna")
@@ -48,14 +49,13 @@ def store(name, content, made):
         "The character needs it; it is not meant to be edited.\n"
     )
     text[_BYTES] = _packed(content)
-    text[_HASH] = hash_of(content)
+    text[_HASH] = digest
     text[_LENGTH] = str(len(content))  # words: Blender's integers end at 2 GiB
     return text
 
 
-def _holding(wanted):
+def _holding(wanted, digest):
     """A Text of this .blend that holds these bytes, unpacked and not believed; or None."""
-    digest = hash_of(wanted)
     for text in bpy.data.texts:
         if text.library is None and content_hash(text) == digest and _holds(text, wanted):
             return text

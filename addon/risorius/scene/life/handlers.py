@@ -49,7 +49,8 @@ def _updated(_scene, depsgraph):
     _state["busy"] = True
     try:
         _notice_copies(depsgraph.updates)
-        _say(sharing.separate())
+        # A change of a colour space is among the updates, one of pixels is not.
+        _say(sharing.separate(spaces=depsgraph.id_type_updated("IMAGE")))
         waiting, _state["mended"] = _state["mended"], set()
         edited = _edited(depsgraph)
         edited += [rig for rig in parts.rigs() if rig.session_uid in waiting and rig not in edited]

@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 
 from ...logic.material import image_size
-from ..base import sharing
+from ..base import sharing, storage
 
 # Names of one and the same space in the configurations that people use: Blender's own, ACES 1,
 # ACES CG and studio configurations, Filmic ones. The first that the running one knows is taken.
@@ -99,7 +99,8 @@ class Images:
         try:
             self._make_room(path)
             content = path.read_bytes() if path.stat().st_size <= PACK_LIMIT else None
-            there = sharing.find(content, data) if content is not None else None
+            digest = storage.hash_of(content) if content is not None else ""
+            there = sharing.find(content, digest, data) if digest else None
             if there is not None:
                 return there
             image = bpy.data.images.load(str(path), check_existing=False)
@@ -118,7 +119,7 @@ class Images:
             return None
         if content is not None:
             image.pack(data=content, data_len=len(content))
-            sharing.mark(image)
+            sharing.mark(image, digest)
         else:
             self._complain(f"The texture {path.name} is large and stays outside the .blend file.")
         return image
@@ -175,9 +176,11 @@ class Images:
 
     def _shared(self, image):
         """An image of this .blend with the same packed bytes in the place of a new one."""
-        there = sharing.find(bytes(image.packed_file.data), True)
+        content = bytes(image.packed_file.data)
+        digest = storage.hash_of(content)
+        there = sharing.find(content, digest, True)
         if there is None:
-            sharing.mark(image)
+            sharing.mark(image, digest)
             return image
         self.made.remove(image)
         bpy.data.images.remove(image)
