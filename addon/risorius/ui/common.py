@@ -34,6 +34,7 @@ def usable(cls):
 
 @contextmanager
 def shown_progress(context):
+    """Show progress at the mouse; gives a function that takes the share that is done, 0 to 1."""
     manager = context.window_manager
     manager.progress_begin(0, 100)
     try:
@@ -42,31 +43,35 @@ def shown_progress(context):
         manager.progress_end()
 
 
-def has_face(cls, context):
-    """Poll: whether there is a face to work on; says why when there is not."""
-    if not usable(cls):
-        return False
-    rig = parts.active_rig(context)
-    if rig is None or parts.controls_of(rig) is None:
-        cls.poll_message_set("Select a face first.")
-        return False
-    if runtime.of(rig) is None:
-        cls.poll_message_set("This face has lost the text that holds its DNA.")
-        return False
-    if parts.BAKED in rig and not getattr(cls, "baked_too", False):
-        cls.poll_message_set("This face is baked: choose Back to Live first.")
-        return False
-    return True
+def active_controls(context):
+    """The control armature of the active face, or None; never without the native module."""
+    rig = None if native.problem() else parts.active_rig(context)
+    return parts.controls_of(rig) if rig is not None else None
 
 
 class FaceOperator:
-    """What all operators on a face share."""
+    """What all operators on a face share; a class says by its attributes which faces will do."""
 
     bl_options = {"REGISTER", "UNDO"}
+    whole_face = True  # the face must have its controls and its DNA
+    baked_too = False  # a face that plays baked actions will do
 
     @classmethod
     def poll(cls, context):
-        return has_face(cls, context)
+        """Whether there is a face to work on; says why when there is not."""
+        if not usable(cls):
+            return False
+        rig = parts.active_rig(context)
+        if rig is None or (cls.whole_face and parts.controls_of(rig) is None):
+            cls.poll_message_set("Select a face first.")
+            return False
+        if cls.whole_face and runtime.of(rig) is None:
+            cls.poll_message_set("This face has lost the text that holds its DNA.")
+            return False
+        if parts.BAKED in rig and not cls.baked_too:
+            cls.poll_message_set("This face is baked: choose Back to Live first.")
+            return False
+        return True
 
 
 class FacePanel:
@@ -82,5 +87,4 @@ class FaceOnlyPanel(FacePanel):
 
     @classmethod
     def poll(cls, context):
-        rig = None if native.problem() else parts.active_rig(context)
-        return rig is not None and parts.controls_of(rig) is not None
+        return active_controls(context) is not None

@@ -14,7 +14,7 @@ from ...scene.animation import retarget_shape_keys
 from ...scene.base import parts
 from ...scene.character import runtime
 from .. import words
-from ..common import explain, has_face, shown_progress
+from ..common import explain, shown_progress
 from .place_clip import PlacesClip
 
 RATES = (
@@ -258,7 +258,6 @@ class RISORIUS_OT_import_arkit_rig(PlacesClip, bpy.types.Operator):
 
     bl_idname = "risorius.import_arkit_rig"
     bl_label = "From ARKit Rig"
-    bl_options = {"REGISTER", "UNDO"}
 
     start: bpy.props.FloatProperty(
         name="Start Frame", description="Where frame 0 of the other rig's animation lies"
@@ -271,7 +270,7 @@ class RISORIUS_OT_import_arkit_rig(PlacesClip, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if not has_face(cls, context):
+        if not super().poll(context):
             return False
         if not retarget_shape_keys.sources(context):
             cls.poll_message_set("No other object of this scene has animated shape keys.")

@@ -8,7 +8,7 @@ from ...logic.base.names import printable
 from ...scene.animation import actions, clip_actions, layers
 from ...scene.base import parts
 from ...scene.frame import evaluate
-from ..common import has_face
+from ..common import FaceOperator
 
 TARGETS = (
     ("ACTION", "Action", "As the face's active action; the one before is kept"),
@@ -24,7 +24,7 @@ _REPORT = "risorius_report"  # on an action: words on what became of the file
 _SHOWN = 6
 
 
-class PlacesClip:
+class PlacesClip(FaceOperator):
     """Properties of all operators that end with a clip on the active face."""
 
     target: bpy.props.EnumProperty(
@@ -38,10 +38,6 @@ class PlacesClip:
     scene_range: bpy.props.EnumProperty(
         name="Scene Range", description="First and last frame of the scene", items=RANGES
     )
-
-    @classmethod
-    def poll(cls, context):
-        return has_face(cls, context)
 
     def start_with(self, scene):
         """Begin where the scene begins, unless it was said where."""

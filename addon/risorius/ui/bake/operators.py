@@ -9,6 +9,7 @@ import bpy
 from ... import native
 from ...scene.bake import bake_face
 from .. import words
+from ..common import shown_progress
 from .selection import FacesOperator, FrameRange, selected_rigs
 
 _SLICE = 0.05  # seconds of baking between two looks at the keyboard
@@ -93,14 +94,10 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, bpy.types.Operator):
 
     def _run(self, context, job):
         """Bake without looking up: from scripts and headless."""
-        manager = context.window_manager
-        manager.progress_begin(0, 100)
-        try:
+        with shown_progress(context):
             while not self._step(context, job, seconds=1.0):
                 if bpy.app.background:
                     print(f"Risorius: baking, {self._share:.0%}", flush=True)
-        finally:
-            manager.progress_end()
         return self._result
 
     def _begin(self, context, job):

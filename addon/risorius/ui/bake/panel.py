@@ -4,6 +4,7 @@
 import bpy
 
 from ...scene.bake import bake_face
+from .. import words
 from ..common import FaceOnlyPanel
 from .operators import RISORIUS_OT_unbake
 
@@ -22,18 +23,17 @@ class RISORIUS_PT_out(FaceOnlyPanel, bpy.types.Panel):
         column.operator("risorius.export_animation", icon="EXPORT")
 
 
-def draw_state(layout, rig, write):
+def draw_state(layout, rig):
     """What the panel says of a baked face, and the way back.
 
     Args:
         layout: of the panel.
         rig: deforming armature.
-        write: function (layout, text, icon) that writes a sentence.
     """
     text = bake_face.words(rig)
     if text:
         box = layout.box()
-        write(box, text, "ACTION")
+        words.write(box, text, "ACTION")
         box.operator(RISORIUS_OT_unbake.bl_idname, icon="LOOP_BACK")
 
 

@@ -12,6 +12,7 @@ from ...scene.animation.clip_actions import frame_rate
 from ...scene.export import export_animation, plain_materials
 from .. import words
 from ..bake.selection import FacesOperator, FrameRange, selected_rigs
+from ..common import shown_progress
 from .exporters import FORMATS, export, missing
 
 _ENDINGS = {
@@ -176,15 +177,12 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, bpy.
 
 def _run(context, job):
     """Run a generator to its end, with progress. Returns what it returns."""
-    manager = context.window_manager
-    manager.progress_begin(0, 100)
-    try:
-        while True:
-            manager.progress_update(next(job) * 100)
-    except StopIteration as finished:
-        return finished.value
-    finally:
-        manager.progress_end()
+    with shown_progress(context) as progress:
+        try:
+            while True:
+                progress(next(job))
+        except StopIteration as finished:
+            return finished.value
 
 
 def _write_csv(clip, path):

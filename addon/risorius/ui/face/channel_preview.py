@@ -6,7 +6,7 @@ import bpy
 from ...scene.base import parts
 from ...scene.character import build, runtime
 from ...scene.frame import channel_preview, evaluate
-from ..common import FaceOnlyPanel, usable
+from ..common import FaceOnlyPanel, FaceOperator
 
 _items = []  # Blender reads the strings later: they must stay alive
 
@@ -36,13 +36,13 @@ def _channels(_operator, context):
     return _items
 
 
-class RISORIUS_OT_test_channel(bpy.types.Operator):
+class RISORIUS_OT_test_channel(FaceOperator, bpy.types.Operator):
     """Show one blend shape at a weight of your own; it ends with the next frame, edit or save"""
 
     bl_idname = "risorius.test_channel"
     bl_label = "Test a Shape"
-    bl_options = {"REGISTER", "UNDO"}
     bl_property = "channel"
+    baked_too = True
 
     channel: bpy.props.EnumProperty(
         name="Shape", description="The blend shape that is tried", items=_channels
@@ -59,16 +59,6 @@ class RISORIUS_OT_test_channel(bpy.types.Operator):
     end: bpy.props.BoolProperty(
         name="End", description="End the test instead", options={"SKIP_SAVE", "HIDDEN"}
     )
-
-    @classmethod
-    def poll(cls, context):
-        if not usable(cls):
-            return False
-        rig = parts.active_rig(context)
-        if rig is None or parts.controls_of(rig) is None or runtime.of(rig) is None:
-            cls.poll_message_set("Select a face first.")
-            return False
-        return True
 
     def execute(self, context):
         rig = parts.active_rig(context)

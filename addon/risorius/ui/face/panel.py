@@ -35,7 +35,7 @@ class RISORIUS_PT_character(FacePanel, bpy.types.Panel):
         if live is None or controls is None:
             return  # said above
         layout.label(text=rig.name.removesuffix("_rig"), icon="USER")
-        draw_state(layout, rig, words.write)
+        draw_state(layout, rig)
         _draw_detail(layout, rig)
         _draw_shapes(layout, rig)
         row = layout.row(align=True)

@@ -10,20 +10,7 @@ from ... import native
 from ...scene.base import parts
 from ...scene.file import export_dna, replace_dna
 from ...scene.frame import evaluate
-from ..common import explain, shown_progress, usable
-
-
-def has_face(cls, context):
-    """Poll: whether there is a face; says why when there is not."""
-    if not usable(cls):
-        return False
-    if parts.active_rig(context) is None:
-        cls.poll_message_set("Select a face first.")
-        return False
-    if parts.BAKED in parts.active_rig(context):
-        cls.poll_message_set("This face is baked: choose Back to Live first.")
-        return False
-    return True
+from ..common import FaceOperator, explain, shown_progress
 
 
 def report_all(operator, sentences, shown=8):
@@ -51,34 +38,30 @@ def _replace(operator, context, path):
     return {"FINISHED"}
 
 
-class RISORIUS_OT_replace_dna(bpy.types.Operator, ImportHelper):
+class _FileOperator(FaceOperator):
+    """Operators on a face that may have lost its controls or its DNA: a file brings them back."""
+
+    whole_face = False
+
+
+class RISORIUS_OT_replace_dna(_FileOperator, bpy.types.Operator, ImportHelper):
     """Let another DNA file take this face's place; keys, edits and materials stay"""
 
     bl_idname = "risorius.replace_dna"
     bl_label = "Replace DNA"
-    bl_options = {"REGISTER", "UNDO"}
 
     filename_ext = ".dna"
     filter_glob: bpy.props.StringProperty(default="*.dna", options={"HIDDEN"})
-
-    @classmethod
-    def poll(cls, context):
-        return has_face(cls, context)
 
     def execute(self, context):
         return _replace(self, context, self.filepath)
 
 
-class RISORIUS_OT_reload(bpy.types.Operator):
+class RISORIUS_OT_reload(_FileOperator, bpy.types.Operator):
     """Read the face's file again; asks for it where it is no longer in its place"""
 
     bl_idname = "risorius.reload"
     bl_label = "Reload from Source"
-    bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context):
-        return has_face(cls, context)
 
     @staticmethod
     def _path(context):
@@ -102,7 +85,7 @@ class RISORIUS_OT_reload(bpy.types.Operator):
         return _replace(self, context, path)
 
 
-class RISORIUS_OT_export_dna(bpy.types.Operator, ExportHelper):
+class RISORIUS_OT_export_dna(_FileOperator, bpy.types.Operator, ExportHelper):
     """Write this face's DNA file: byte for byte as imported, with your edits of shape keys,
     neutral vertices, joints and weights"""
 
@@ -128,10 +111,6 @@ class RISORIUS_OT_export_dna(bpy.types.Operator, ExportHelper):
     use_weights: bpy.props.BoolProperty(
         name="Weights", description="Write painted skin weights", default=True
     )
-
-    @classmethod
-    def poll(cls, context):
-        return has_face(cls, context)
 
     def invoke(self, context, event):
         if not self.filepath:

@@ -4,6 +4,7 @@
 import bpy
 
 from ...scene.animation import layers
+from ..common import active_controls
 from ..expressions.menus import GROUPS, expression_menu
 from .operators import (
     RISORIUS_OT_fire,
@@ -11,7 +12,6 @@ from .operators import (
     RISORIUS_OT_layer_duplicate,
     RISORIUS_OT_layer_warp,
     RISORIUS_OT_layers_to_nla,
-    active_controls,
 )
 
 ICONS = {"ACTION": "ACTION", "EXPRESSION": "USER", "IDLE": "HIDE_OFF"}

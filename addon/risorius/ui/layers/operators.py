@@ -6,11 +6,7 @@ import bpy
 from ...scene.animation import expressions, layer_properties, layers, layers_nla
 from ...scene.base import parts
 from ...scene.frame import evaluate
-from ..common import FaceOperator
-
-
-def active_controls(context):
-    return parts.controls_of(parts.active_rig(context))
+from ..common import FaceOperator, active_controls
 
 
 class LayerOperator(FaceOperator):

@@ -7,8 +7,8 @@ from ... import native
 from ...logic.base import names
 from ...scene.base import parts
 from ...scene.live import capture
-from ..common import usable
-from .properties import active_controls, settings_of
+from ..common import active_controls, usable
+from .properties import settings_of
 
 
 class _Running:
@@ -24,6 +24,14 @@ class _Running:
         return True
 
 
+def _has_controls(cls, context):
+    """Poll: whether a face is active; says so when there is none."""
+    if active_controls(context) is None:
+        cls.poll_message_set("Select a face first.")
+        return False
+    return True
+
+
 class RISORIUS_OT_live_start(bpy.types.Operator):
     """Let the active face follow a capture app, until it is stopped"""
 
@@ -32,12 +40,7 @@ class RISORIUS_OT_live_start(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if not usable(cls):
-            return False
-        if active_controls(context) is None:
-            cls.poll_message_set("Select a face first.")
-            return False
-        return True
+        return usable(cls) and _has_controls(cls, context)
 
     def execute(self, context):
         try:
@@ -119,12 +122,7 @@ class RISORIUS_OT_live_finish(_Waiting, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if not super().poll(context):
-            return False
-        if active_controls(context) is None:
-            cls.poll_message_set("Select a face first.")
-            return False
-        return True
+        return super().poll(context) and _has_controls(cls, context)
 
     def execute(self, context):
         recording = self.recording()

@@ -6,8 +6,7 @@ import bpy
 from ...logic.base import names
 from ...scene.live import capture
 from .. import words
-from ..common import FaceOnlyPanel
-from .properties import active_controls
+from ..common import FaceOnlyPanel, active_controls
 
 
 class RISORIUS_PT_live(FaceOnlyPanel, bpy.types.Panel):
@@ -60,8 +59,8 @@ def _draw_waiting(layout):
     """The recordings that are no action yet."""
     for index, recording in enumerate(capture.waiting()):
         box = layout.box()
-        words = f"{recording.face}: {len(recording.take)} faces wait"
-        box.label(text=names.printable(words, 60), icon="REC")
+        text = f"{recording.face}: {len(recording.take)} faces wait"
+        box.label(text=names.printable(text, 60), icon="REC")
         row = box.row(align=True)
         row.operator("risorius.live_finish").index = index
         here = row.operator("risorius.live_finish", text="Finish Here")

@@ -3,9 +3,8 @@
 
 import bpy
 
-from ... import native
-from ...scene.base import parts
 from ...scene.live import capture
+from ..common import active_controls
 
 SOURCES = (
     ("livelink", "Live Link Face", "Epic's app for iPhones and iPads, in its ARKit mode"),
@@ -92,11 +91,6 @@ def settings_of(context):
         chosen.head_gain,
         bpy.path.abspath(chosen.mapping) or "arkit",
     )
-
-
-def active_controls(context):
-    rig = None if native.problem() else parts.active_rig(context)
-    return parts.controls_of(rig) if rig is not None else None
 
 
 CLASSES = (RISORIUS_PG_live,)
