@@ -152,7 +152,22 @@ def test_words_are_measured_for_the_width_that_the_sidebar_has():
     words = ui("words")
     long = "Upper Lip Towards Teeth"
     context = SimpleNamespace(preferences=bpy.context.preferences, region=None)
-    assert not words.fits(context, long, 0.5)
-    assert words.width_of(long, bpy.context.preferences.ui_styles[0]) == measured.width_of(long)
+    assert not words.Ruler(context, 0.5).fits(long)
+    points = bpy.context.preferences.ui_styles[0].widget.points
+    assert words.width_of(long, points) == measured.width_of(long)
     context.region = SimpleNamespace(type="UI", width=500)
-    assert words.fits(context, long, 0.5)
+    assert words.Ruler(context, 0.5).fits(long)
+
+
+def test_words_are_measured_once(rig, monkeypatch):
+    """260 sliders are drawn with each redraw of the sidebar."""
+    words, asked = ui("words"), []
+    real = words.blf.dimensions
+    fake = SimpleNamespace(size=words.blf.size, dimensions=lambda *a: asked.append(a) or real(*a))
+    monkeypatch.setattr(words, "blf", fake)
+    words.width_of.cache_clear()
+    for _ in range(2):
+        drawn(ui("face.controls_panel").RISORIUS_PT_controls, bpy.context)
+    names = [text for _font, text in asked]
+    assert names
+    assert len(names) == len(set(names))

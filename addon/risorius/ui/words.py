@@ -2,6 +2,7 @@
 """Words in panels and dialogs: whether they fit, and what a number or an empty field stands for."""
 
 import textwrap
+from functools import lru_cache
 
 import blf
 
@@ -10,31 +11,35 @@ _EDGES = 36  # of them the tabs and the panel's margins
 _MARGIN = 12  # around the text of a label
 
 
-def width_of(text, style):
+class Ruler:
+    """Tells which labels can be read whole in a share of the sidebar's width."""
+
+    def __init__(self, context, share):
+        """Args: context  has the region, else the sidebar is a new one; share  0 to 1."""
+        preferences, region = context.preferences, context.region
+        is_sidebar = region is not None and region.type == "UI" and region.width > 1
+        scale = preferences.system.ui_scale or 1.0  # 0 without a window
+        width = region.width / scale if is_sidebar else _SIDEBAR
+        self._room = (width - _EDGES) * share - _MARGIN
+        self._points = preferences.ui_styles[0].widget.points
+        self._font = preferences.view.font_path_ui
+
+    def fits(self, text):
+        """Whether a label can be read whole."""
+        return width_of(text, self._points, self._font) <= self._room
+
+
+@lru_cache(maxsize=2048)  # a panel asks for the names of all sliders each time it is drawn
+def width_of(text, points, font=""):
     """Pixels that a text takes in buttons and labels, at an interface scale of 1.
 
     Args:
         text: the words.
-        style: a bpy.types.ThemeStyle, of the preferences.
+        points: size of the letters, of the preferences' style.
+        font: path of the interface's font: with another one the text is measured anew.
     """
-    blf.size(0, style.widget.points)
+    blf.size(0, points)
     return blf.dimensions(0, text)[0]
-
-
-def fits(context, text, share):
-    """Whether a label can be read whole in a share of the sidebar's width.
-
-    Args:
-        context: has the region; without one the width is that of a new sidebar.
-        text: the label.
-        share: 0 to 1.
-    """
-    preferences = context.preferences
-    region = context.region
-    is_sidebar = region is not None and region.type == "UI" and region.width > 1
-    scale = preferences.system.ui_scale or 1.0  # 0 without a window
-    width = region.width / scale if is_sidebar else _SIDEBAR
-    return width_of(text, preferences.ui_styles[0]) + _MARGIN <= (width - _EDGES) * share
 
 
 def prop_or(layout, owner, name, empty, meaning):

@@ -67,6 +67,7 @@ def _draw_region_header(layout, region):
 def _draw_sliders(context, layout, face, names):
     """One line per control; a left and its right control share it, a long name stands above."""
     column = layout.column(align=True)
+    ruler = words.Ruler(context, _TITLE)
     there = set(names)
     for name in names:
         left, right = f"{name[:-1]}L", f"{name[:-1]}R"
@@ -74,7 +75,7 @@ def _draw_sliders(context, layout, face, names):
             continue
         paired = name == left and right in there
         title = regions.title_in_region(name, sided=not paired)
-        if words.fits(context, title, _TITLE):
+        if ruler.fits(title):
             line = column.split(factor=_TITLE, align=True)
             line.label(text=title)
         else:

@@ -24,10 +24,14 @@ def frame(context, rig):
         rig: deforming armature of the face.
     """
     screen = context.window.screen if context.window is not None else None
-    for area in screen.areas if screen is not None else ():
-        if area.type == "VIEW_3D":
-            _show_textures(area.spaces.active.shading)
-            _frame(area, *_ball(rig), parts.controls_of(rig).matrix_world.to_quaternion())
+    areas = [a for a in screen.areas if a.type == "VIEW_3D"] if screen is not None else []
+    if not areas:
+        return
+    middle, radius = _ball(rig)
+    turn = parts.controls_of(rig).matrix_world.to_quaternion()
+    for area in areas:
+        _show_textures(area.spaces.active.shading)
+        _frame(area, middle, radius, turn)
 
 
 def _show_textures(shading):

@@ -15,11 +15,11 @@ SHAPES = (
 )
 
 
-def broken_override(context):
-    rig = parts.active_rig(context)
-    return (
-        rig if rig is not None and rig.override_library and library_overrides.trouble(rig) else None
-    )
+def override_trouble(rig):
+    """Why a face that is an override stands still; empty for all others, and for None."""
+    if rig is None or not rig.override_library:
+        return ""
+    return library_overrides.trouble(rig)
 
 
 class RISORIUS_OT_make_override(bpy.types.Operator):
@@ -37,16 +37,17 @@ class RISORIUS_OT_make_override(bpy.types.Operator):
     def poll(cls, context):
         if not usable(cls):
             return False
-        if library_overrides.linked_rig(context) is None and broken_override(context) is None:
+        broken = override_trouble(parts.active_rig(context))
+        if library_overrides.linked_rig(context) is None and not broken:
             cls.poll_message_set("Select a linked face first.")
             return False
         return True
 
     def execute(self, context):
         local = self.shapes == "LOCAL"
-        rig = broken_override(context)
+        rig = parts.active_rig(context)
         try:
-            if rig is not None:
+            if override_trouble(rig):
                 done = library_overrides.repair(context, rig, local)
             else:
                 rig, done = library_overrides.make_override(

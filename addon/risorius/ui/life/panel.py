@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Words and buttons of the panel Face for what keeps a face from moving."""
 
-import textwrap
-
 from ...scene.base import parts
 from ...scene.life import library_overrides, migrations, repair
-from .operators import RISORIUS_OT_bring_back, RISORIUS_OT_make_override, broken_override
+from .. import words
+from .operators import RISORIUS_OT_bring_back, RISORIUS_OT_make_override, override_trouble
 
 
 def draw_trouble(layout, context):
@@ -14,27 +13,22 @@ def draw_trouble(layout, context):
     Returns:
         Whether the panel need not say anything more.
     """
-    shown = library_overrides.linked_rig(context) or parts.active_rig(context)
-    if shown is not None and migrations.newer(shown):
-        _say(layout, migrations.newer(shown), "INFO")
-    if library_overrides.linked_rig(context) is not None:
-        _say(layout, "Linked: make an override to animate.", "LINKED")
+    linked, active = library_overrides.linked_rig(context), parts.active_rig(context)
+    shown = linked or active
+    newer = migrations.newer(shown) if shown is not None else ""
+    if newer:
+        words.write(layout, newer, "INFO")
+    if linked is not None:
+        words.write(layout, "Linked: make an override to animate.", "LINKED")
         layout.operator_menu_enum(RISORIUS_OT_make_override.bl_idname, "shapes")
         return True
-    rig = broken_override(context)
-    if rig is not None:
-        _say(layout, library_overrides.trouble(rig), "ERROR")
+    broken = override_trouble(active)
+    if broken:
+        words.write(layout, broken, "ERROR")
         layout.operator(RISORIUS_OT_make_override.bl_idname, text="Repair Override")
-    lost = repair.missing(context.object or parts.active_rig(context))
+    lost = repair.missing(context.object or active)
     for sentence in lost:
-        _say(layout, sentence, "ERROR")
+        words.write(layout, sentence, "ERROR")
     if any("still in the file" in sentence for sentence in lost):
         layout.operator(RISORIUS_OT_bring_back.bl_idname)
-    return bool(lost) and parts.active_rig(context) is None
-
-
-def _say(layout, text, icon):
-    column = layout.column(align=True)
-    column.scale_y = 0.8
-    for number, line in enumerate(textwrap.wrap(text, 38)):
-        column.label(text=line, icon=icon if number == 0 else "BLANK1")
+    return bool(lost) and active is None
