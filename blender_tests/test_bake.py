@@ -549,6 +549,30 @@ def test_a_bake_that_is_ended_changes_nothing(dna_file):
     assert not bake.baked(rig)
 
 
+@pytest.mark.parametrize("kind", ["RESULT", "CONTROLS"])
+def test_a_bake_that_fails_while_it_writes_takes_back_what_it_wrote(kind, dna_file, monkeypatch):
+    rigs = [_face(dna_file), _face(dna_file)]
+    before, films = [_state(r) for r in rigs], [_film(r) for r in rigs]
+    bake = scene.submodule("scene.bake.bake_face")
+    play, played = bake.actions.play, []
+
+    def fails(owner, *others):
+        if rigs[1] in played or owner == scene.controls(rigs[1]):
+            raise MemoryError("a planted one")
+        played.append(owner)
+        play(owner, *others)
+
+    monkeypatch.setattr(bake.actions, "play", fails)
+    job = bake.bake(bpy.context, rigs, bake.BakeOptions(kind=kind, end=3))
+    with pytest.raises(MemoryError, match="planted"):
+        list(job)
+    assert rigs[0] in played or scene.controls(rigs[0]) in played
+    assert not any(bake.baked(rig) for rig in rigs)
+    assert [_state(r) for r in rigs] == before
+    for rig, film in zip(rigs, films, strict=True):
+        _assert_same(_film(rig), film, near=0)
+
+
 def test_another_level_of_detail(mode, dna_file):
     rig = _face(dna_file, mode, lods=(True, True, *[False] * 6))
     bpy.ops.risorius.set_lod(lod=1)

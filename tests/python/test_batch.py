@@ -5,6 +5,7 @@ import contextlib
 import csv
 import json
 import os
+import re
 import shutil
 import signal
 import socket
@@ -101,6 +102,12 @@ def test_every_job_is_done_and_the_summary_says_so(tmp_path, capsys):
     ]
     assert {row["state"] for row in rows} == {"done"}
     assert {row["frames"] for row in rows} == {"12"}
+    text = (PROJECT / "docs" / "batch.md").read_text(encoding="utf-8")
+    assert list(rows[0]) == re.search("The summary's columns: `(.+?)`", text).group(1).split()
+    folder = jobs.parent
+    assert (rows[0]["clip"], rows[0]["character"], rows[0]["error"], rows[0]["mapping"]) == (
+        str(folder / "clips" / "take0.csv"), str(folder / "faces" / "core.dna"), "", "controls"
+    )  # fmt: skip
     assert "12 jobs: 12 done; 144 frames" in capsys.readouterr().out
 
 
@@ -161,6 +168,7 @@ def test_clips_are_mapped_and_resampled_to_clips(tmp_path, monkeypatch):
     assert main(["batch", str(jobs), "--workers", "1"]) == 0
     clip = risorius.Clip.load(jobs.parent / "out" / "core" / "lod0" / "take0.rzc")
     assert clip.rate == 60
+    assert table_of(jobs)[0]["mapping"] == "own"
     np.testing.assert_array_equal(
         clip.curve("CTRL_expressions.jawOpen"), np.float32([0, 0.125, 0.25, 0.375, 0.5])
     )

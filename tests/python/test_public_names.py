@@ -1,0 +1,22 @@
+# SPDX-License-Identifier: MIT
+"""What `from risorius import *` gives: each class of the native module that callers meet."""
+
+import inspect
+
+import risorius
+import risorius._native as native
+
+# The readers that `load` and `check` are made of.
+BENEATH = {"ParseOptions", "parse_bytes", "parse_file", "check_bytes", "check_file"}
+
+
+def test_every_name_is_there_once():
+    assert len(set(risorius.__all__)) == len(risorius.__all__)
+    assert [name for name in risorius.__all__ if not hasattr(risorius, name)] == []
+
+
+def test_every_class_that_callers_are_handed_is_named():
+    classes = {n: v for n, v in vars(risorius).items() if inspect.isclass(v)}
+    handed = {n for n, v in classes.items() if v.__module__ == native.__name__}
+    assert handed - BENEATH <= set(risorius.__all__)
+    assert len(handed) > 30
