@@ -330,7 +330,7 @@ def test_a_window_longer_than_any_face_needs_is_refused():
 
 
 def test_a_clip_that_unfolds_without_end_is_read_in_parts(monkeypatch):
-    monkeypatch.setattr(risorius.anim.clip_file, "MOST_BYTES", MB)
+    monkeypatch.setattr(risorius.anim.clip, "MOST_BYTES", MB)
     packed = Clip([f"c{i}" for i in range(100)], np.zeros((100, 10_000)), 60.0).to_bytes()
     assert len(packed) * 32 < 2 * MB
     peak, error = peak_of(lambda: Clip.load(packed))

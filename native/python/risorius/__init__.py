@@ -12,6 +12,7 @@ from ._native import (
     BlendShapeChannels,
     BlendShapeTarget,
     BoneSpace,
+    ClipError,
     Conditionals,
     Dna,
     DnaError,
@@ -41,8 +42,8 @@ from ._native import (
     TwistSwingSetup,
     available_simd,
 )
-from .anim.clip import Clip, Event
-from .anim.clip_file import ClipError, ClipReader, ClipWriter
+from .anim.clip import Clip, ClipReader, Event
+from .anim.clip_writer import ClipWriter
 from .anim.idle import Life, idle
 from .anim.mixer import Layer, Mixer
 from .base.errors import RisoriusError

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Control animation: named curves over time, for any character whose rig has controls so named."""
+"""Control animation: named curves over time, for any character whose rig has controls so named;
+.rzc files of them, read as a whole or in parts."""
 
 from __future__ import annotations
 
@@ -10,11 +11,13 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from .._native import encode_clip, write_clip
-from ..base.budget import Budget, BudgetError
+from .._native import ClipError, ClipFile, encode_clip, write_clip
+from ..base.budget import BYTES_PER_BYTE, Budget, BudgetError
 from ..base.errors import ArgumentError
 
 _AT_ONCE = 4096  # frames
+# What may be read at once however small the file: 75 minutes of 1,000 controls that stand still.
+MOST_BYTES = 1 << 30
 
 Floats = npt.NDArray[np.float32]
 Times = npt.NDArray[np.float64]
@@ -281,8 +284,6 @@ class Clip:
             ClipError: no .rzc file, cut, damaged, of another version; or it cannot be opened.
             KeyError: a control that is not there.
         """
-        from .clip_file import ClipReader
-
         return ClipReader(source).read(frames, controls)
 
     def raw_controls(self, rig_names: Sequence[str]) -> tuple[Floats, list[str]]:
@@ -304,6 +305,94 @@ class Clip:
             else:
                 unknown.append(name)
         return raw, unknown
+
+
+class ClipReader:
+    """A .rzc file of which one reads what one needs. Frames are decoded in blocks, and the block
+    read last is kept compressed: to play, read some hundred frames at a time.
+
+    Attributes:
+        names: the controls.
+        rate, start: as of a Clip.
+        has_times: the frames have times of their own.
+        frame_count: frames in the file.
+        byte_count: bytes of the file that hold them; fewer than it has only after a recovery.
+        block_starts: the first frame of each block, and the frame behind the last.
+        events, metadata: as of a Clip.
+    """
+
+    def __init__(self, source: str | os.PathLike[str] | bytes, *, recover: bool = False) -> None:
+        """Read the head and the index.
+
+        Args:
+            source: a path, or the bytes of a file.
+            recover: take also a file that was cut while it was recorded, up to its last whole
+                block.
+
+        Raises:
+            ClipError: no .rzc file, cut, damaged, of another version; or it cannot be opened.
+        """
+        if isinstance(source, bytearray | memoryview):
+            source = bytes(source)
+        self._file = ClipFile(source if isinstance(source, bytes) else os.fspath(source), recover)
+        self._size = len(source) if isinstance(source, bytes) else os.path.getsize(source)
+        self.names: tuple[str, ...] = self._file.names
+        self.rate: float = self._file.rate
+        self.start: float = self._file.start
+        self.has_times: bool = self._file.has_times
+        self.frame_count: int = self._file.frame_count
+        self.byte_count: int = self._file.byte_count
+        self.block_starts: list[int] = self._file.block_starts
+        self.metadata: dict[str, str] = self._file.metadata
+        self.events = tuple(Event(*event) for event in self._file.events)
+        self._index = {name: i for i, name in enumerate(self.names)}
+
+    def read(
+        self, frames: tuple[int, int] | None = None, controls: Sequence[str] | None = None
+    ) -> Clip:
+        """Frames begin to end - 1 of some controls, or of all.
+
+        Returns:
+            A clip that starts when its first frame does. It has those events whose time it spans;
+            the whole clip has all.
+
+        Raises:
+            ClipError: frames that are not there, a damaged block, more at once than a file of this
+                size may take.
+            KeyError: a control that is not there.
+        """
+        begin, end = frames if frames is not None else (0, self.frame_count)
+        if begin < 0 or end < begin or end > self.frame_count:
+            raise ClipError(
+                f"frames from 0 to {self.frame_count} were expected, found {begin} to {end}"
+            )
+        count = len(self.names if controls is None else controls)
+        needed = (end - begin) * (4 * count + 8)
+        if needed > MOST_BYTES + BYTES_PER_BYTE * self._size:
+            raise ClipError(
+                f"{count:,} controls of {end - begin:,} frames take {needed:,} bytes, at most "
+                f"{MOST_BYTES + BYTES_PER_BYTE * self._size:,} were expected of a file of "
+                f"{self._size:,}: read it in parts (frames, controls)"
+            )
+        wanted = None if controls is None else [self._index[name] for name in controls]
+        curves, times = self._file.read(begin, end, wanted)
+        events = self.events
+        if (begin, end) != (0, self.frame_count):
+            first = float(times[0]) if times is not None and end > begin else self._at(begin)
+            last = float(times[-1]) if times is not None and end > begin else self._at(end - 1)
+            events = tuple(e for e in events if first <= e.time <= last)
+        return Clip(
+            self.names if controls is None else controls,
+            curves,
+            self.rate,
+            start=self._at(begin),
+            times=times,
+            events=events,
+            metadata=self.metadata,
+        )
+
+    def _at(self, frame: int) -> float:
+        return self.start + frame / self.rate
 
 
 def _frozen(array: npt.NDArray) -> npt.NDArray:  # type: ignore[type-arg]

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -23,11 +22,11 @@ from ..base import fileio
 from . import expressions as ex
 from .controls import gui_table
 from .paint import paint_textures
+from .part import Part
 from .people import MAN, Person
 from .polygons import (
     Floats,
     Ints,
-    Operator,
     Polygons,
     clip_below,
     compact_uvs,
@@ -67,20 +66,6 @@ METADATA = {
     "source_sha256": SHA256,
     "generator": "risorius sample build",
 }
-
-
-@dataclass
-class Part:
-    """One mesh at one LOD."""
-
-    name: str
-    polygons: Polygons
-    operators: list[Operator]  # from the base mesh's vertices to this mesh's, in order
-
-    def carry(self, values: Floats) -> Floats:
-        for operator in self.operators:
-            values = operator.apply(values)
-        return values
 
 
 def group_indices(base: BaseMesh) -> dict[str, Ints]:

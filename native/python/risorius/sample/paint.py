@@ -8,16 +8,13 @@ from __future__ import annotations
 
 import struct
 import zlib
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .expressions import Expression
+from .part import Part
 from .people import Person
 from .polygons import Floats, Polygons
-
-if TYPE_CHECKING:
-    from .build import Part
-    from .expressions import Expression
 
 HEAD_SIZE = 2048
 EYE_SIZE = 1024
