@@ -129,3 +129,21 @@ def test_a_plan_that_runs_backwards_is_found(monkeypatch):
     assert any(
         "bindings is not written above" in line for line in violations("native", files_of("native"))
     )
+
+
+@pytest.mark.parametrize(
+    ("path", "line", "said"),
+    [
+        ("base/planted.py", "from ..rigs.load import load", "base may not use rigs/load.py"),
+        ("rigs/planted.py", "import risorius", "rigs may not use __init__.py"),
+        ("anim/planted.py", "def late():\n    from ..batch import jobs", "anim may not use batch"),
+        ("baking/planted.py", "from risorius.cli import main", "baking may not use cli"),
+        ("explain/planted.py", "import matplotlib", "explain may not use matplotlib"),
+        ("anim/clip.py", "from .mixer import Mixer", "files in a circle"),
+        ("attic/planted.py", "", "no room of the plan"),
+    ],
+)
+def test_a_planted_import_of_the_package_is_found(path, line, said):
+    found = planted("package", path, line)
+    assert len(found) == 1
+    assert said in found[0]

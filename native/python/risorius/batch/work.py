@@ -21,7 +21,6 @@ from risorius.base.errors import sentence
 from ..baking.bake import bake
 from ..baking.clips import Performance, load_performance
 from ..baking.face import Face, load_face, prepared
-from ..baking.files import digest
 from .jobs import Job
 from .outcome import Outcome
 
@@ -65,7 +64,12 @@ _digests: Kept[str] = Kept(4096)
 def file_digest(path: Path) -> str:
     """SHA-256 of a file, remembered while its size and time stay. Raises: OSError."""
     about = path.stat()
-    return _digests.get((path, about.st_size, about.st_mtime_ns), lambda: digest(path))
+    return _digests.get((path, about.st_size, about.st_mtime_ns), lambda: _digest(path))
+
+
+def _digest(path: Path) -> str:
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def stamp(job: Job) -> str:

@@ -1,14 +1,267 @@
 # SPDX-License-Identifier: MIT
-"""risorius edit: a DNA file made into another one."""
+"""risorius edit: a DNA file made into another one. regroup: its joint groups made anew."""
 
 from __future__ import annotations
 
 import argparse
+import json
+import math
+import sys
+from pathlib import Path
+from typing import Any
 
-from . import edit_regroup
+import risorius
+
+from ..base import toml
+from ..rigs import edit
+from .convert import json_text, version_of, warnings_as_lines, write
+from .files import (
+    CommandLineError,
+    InputError,
+    counted,
+    kind_of,
+    label,
+    read,
+    read_bytes,
+    refuse_same_file,
+    require_writable,
+    summary,
+)
+
+_DESCRIPTION = """\
+Joints that the same controls drive come together in dense joint groups, whatever the groups of
+INPUT are, and small coefficients that a control has among joints foreign to it are taken out.
+Prints what that changed: sizes, the largest change of any joint with every raw control at 1 and in
+random combinations, the time of an evaluation.
+.dna or .json by the suffix, "-" is a .dna on the standard input or output. OUTPUT may be there
+already and is replaced as a whole or, after an error, not at all."""
+_CHANGES = {
+    "translation_mm": ("a joint against its parent", "mm"),
+    "rotation_degrees": ("a joint's rotation", "degrees"),
+    "scale": ("a joint's scale", ""),
+    "position_mm": ("a joint in the face", "mm"),
+}
+_PLOTS = (".png", ".svg")
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    edit = subparsers.add_parser("edit", help="make a DNA file into another one")
-    kinds = edit.add_subparsers(dest="kind", required=True)
-    edit_regroup.add_parser(kinds)
+    edits = subparsers.add_parser("edit", help="make a DNA file into another one")
+    _add_regroup(edits.add_subparsers(dest="kind", required=True))
+
+
+def _add_regroup(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = subparsers.add_parser(
+        "regroup", help="dense joint groups without outliers", description=_DESCRIPTION
+    )
+    parser.add_argument("input", metavar="INPUT")
+    parser.add_argument("output", metavar="OUTPUT")
+    parser.add_argument(
+        "--threshold",
+        default="0",
+        metavar="T",
+        help="coefficients with less effect are small: T mm, T degrees, T per cent of scale; or "
+        "MM,DEGREES,SCALE (default 0: none is, the face stays exactly as it was)",
+    )
+    parser.add_argument(
+        "--foreign-share",
+        type=float,
+        default=0.25,
+        metavar="S",
+        help="a control is foreign to a region of which it moves at most this share (0.25)",
+    )
+    parser.add_argument(
+        "--regions",
+        metavar="FILE",
+        help="JSON or TOML: a list of joint names for each region (default: found from what "
+        "drives the joints, as for joints that the file leaves out)",
+    )
+    parser.add_argument(
+        "--combinations", type=int, default=200, metavar="N", help="random poses to compare (200)"
+    )
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of those poses")
+    parser.add_argument("--plot", metavar="PICTURE", help="before and after, .png or .svg")
+    parser.add_argument("--dpi", type=int, default=150, help="of the picture, 40 to 600")
+    parser.add_argument("--json", action="store_true", help="the report for a program")
+    parser.add_argument("--force", action="store_true", help="OUTPUT may be INPUT itself")
+    parser.set_defaults(func=run)
+
+
+def parse_threshold(text: str) -> float | list[float]:
+    """One number, or three.
+
+    Raises:
+        CommandLineError: a text of another form.
+    """
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) not in (1, 3) or not all(math.isfinite(n) and n >= 0 for n in numbers):
+        raise CommandLineError(
+            f"--threshold: a number from 0 or MM,DEGREES,SCALE was expected, found {text!r}"
+        )
+    return numbers[0] if len(numbers) == 1 else numbers
+
+
+def complain(args: argparse.Namespace) -> None:
+    """Raises CommandLineError for what is wrong before the file is looked at."""
+    if args.plot is not None and Path(args.plot).suffix.lower() not in _PLOTS:
+        raise CommandLineError(
+            f"--plot: a name ending in {' or '.join(_PLOTS)} was expected, found {args.plot!r}"
+        )
+    if not 40 <= args.dpi <= 600:
+        raise CommandLineError(f"--dpi: 40 to 600 was expected, found {args.dpi}")
+    if not 0 <= args.combinations <= 1_000_000:
+        raise CommandLineError(
+            f"--combinations: 0 to 1000000 was expected, found {args.combinations}"
+        )
+    if not 0 <= args.seed < 1 << 64:
+        raise CommandLineError(f"--seed: a number from 0 was expected, found {args.seed}")
+    if not 0 <= args.foreign_share <= 1:
+        raise CommandLineError(f"--foreign-share: 0 to 1 was expected, found {args.foreign_share}")
+    if not args.force:
+        refuse_same_file(args.input, args.output)
+    require_writable(args.output, args.plot)
+
+
+def read_regions(name: str) -> edit.Regions:
+    """Joint names or indices of each region, from {"eye": ["FACIAL_L_Eye", ...], ...}, also below
+    a lone key "regions", or without names [["FACIAL_L_Eye", ...], ...].
+
+    Raises:
+        InputError: not JSON or TOML, or of another form.
+    """
+    data = read_bytes(name)
+    try:
+        text = data.decode()
+        found = toml.parse(text) if name.lower().endswith(".toml") else json.loads(text)
+    except RecursionError as error:
+        raise InputError(f"{label(name)}: not JSON that can be read: nested too deeply") from error
+    except ValueError as error:  # of UTF-8, JSON or TOML
+        raise InputError(f"{label(name)}: {error}") from error
+    if isinstance(found, dict) and list(found) == ["regions"]:
+        found = found["regions"]
+    if not isinstance(found, dict | list) or not found:
+        raise InputError(f"{label(name)}: a list of joints for each region was expected")
+    named = found.items() if isinstance(found, dict) else enumerate(found)
+    for region, joints in named:
+        if not isinstance(joints, list) or not all(
+            isinstance(joint, str | int) and not isinstance(joint, bool) for joint in joints
+        ):
+            raise InputError(f"{label(name)}: {region}: a list of joints was expected")
+    return found
+
+
+def _sizes(sizes: edit.GroupSizes) -> dict[str, int]:
+    return {key: int(getattr(sizes, key)) for key in ("groups", "rows", "coefficients", "nonzero")}
+
+
+def facts_of(report: edit.RegroupReport, dna: risorius.Dna) -> dict[str, Any]:
+    """Everything that the command prints, as plain values.
+
+    Args:
+        report: of the regrouping.
+        dna: the face, for the names of its joints.
+    """
+    changes = {
+        key: {name: getattr(getattr(report, key), name) for name in
+              ("value", "joint", "expression", "lod")}
+        for key in _CHANGES
+    }  # fmt: skip
+    return {
+        "before": _sizes(report.before),
+        "after": _sizes(report.after),
+        "removed": report.removed,
+        "regions": [[dna.joint_names[j] for j in joints] for joints in report.regions],
+        "expressions": report.expressions,
+        "combinations": report.combinations,
+        "largest_changes": changes,
+        "microseconds": {"before": report.microseconds_before, "after": report.microseconds_after},
+    }
+
+
+def page(facts: dict[str, Any]) -> str:
+    """The facts for a person."""
+    out = [f"{'':<22}{'before':>12}{'after':>12}"]
+    titles = {"groups": "joint groups", "rows": "rows", "coefficients": "coefficients stored",
+              "nonzero": "coefficients not 0"}  # fmt: skip
+    for key, title in titles.items():
+        out.append(f"{title:<22}{facts['before'][key]:>12,}{facts['after'][key]:>12,}")
+    times = facts["microseconds"]
+    out.append(f"{'evaluation, us':<22}{times['before']:>12.1f}{times['after']:>12.1f}")
+    if facts["before"] == facts["after"] and not facts["removed"]:
+        out.append("\nnothing to do: the joint groups are as dense as they get with this threshold")
+    out.append(f"\ntaken out: {counted(facts['removed'], 'coefficient')}")
+    out.append(
+        f"largest changes at any LOD, {counted(facts['expressions'], 'expression')} and "
+        f"{counted(facts['combinations'], 'combination')}:"
+    )
+    for key, (title, unit) in _CHANGES.items():
+        change = facts["largest_changes"][key]
+        amount = f"{change['value']:.6g} {unit}".rstrip()
+        where = f", {change['joint']}, {change['expression']}, LOD {change['lod']}"
+        out.append(f"  {title}: {amount if change['value'] else 'none'}"
+                   f"{where if change['value'] else ''}")  # fmt: skip
+    return "\n".join(out)
+
+
+def _plot(args: argparse.Namespace, before: risorius.Dna, after: bytes) -> None:
+    """Writes the picture.
+
+    Raises:
+        InputError: no Matplotlib, or the file cannot be written.
+    """
+    from ..plot import before_after
+    from ..plot.content.facts import gather
+
+    name = Path(label(args.input)).name
+    data = before.to_bytes(version=f"2.{min(max(before.version, 1), 8)}")
+    kind = Path(args.plot).suffix.lower().removeprefix(".")
+    old, new = gather(before, data, name), gather(risorius.load(after), after, name)
+    write(args.plot, before_after.render(old, new, kind, args.dpi))
+
+
+def _require_plot() -> None:
+    try:
+        import matplotlib  # noqa: F401
+    except ImportError as error:
+        raise InputError(
+            "--plot draws with Matplotlib, which is not installed: pip install risorius[plot]"
+        ) from error
+
+
+def run(args: argparse.Namespace) -> int:
+    threshold = parse_threshold(args.threshold)
+    complain(args)
+    kinds = [
+        kind_of(name, "dna" if name == "-" else None, "-") for name in (args.input, args.output)
+    ]
+    if args.plot is not None:
+        _require_plot()
+    regions = None if args.regions is None else read_regions(args.regions)
+    source = read(args.input, kinds[0])
+    try:
+        dna, report = edit.regroup(
+            source,
+            regions=regions,
+            threshold=threshold,
+            foreign_share=args.foreign_share,
+            combinations=args.combinations,
+            seed=args.seed,
+        )
+    except ValueError as error:
+        where = getattr(error, "where", "regions")
+        name = args.regions if args.regions and where.startswith("regions") else args.input
+        raise InputError(f"{label(name)}: {error}") from error
+    with warnings_as_lines(label(args.input)):
+        data = dna.to_bytes(version=version_of(source, dna, False))
+    write(args.output, json_text(dna, None) if kinds[1] == "json" else data)
+    if args.plot is not None:
+        _plot(args, source, data)
+    facts = facts_of(report, dna)
+    out = sys.stderr if args.output == "-" else sys.stdout
+    if not args.json:
+        print(f"{label(args.output, '<stdout>')}: {summary(dna)}, {counted(len(data), 'byte')}\n",
+              file=out)  # fmt: skip
+    print(json.dumps(facts, indent=2) if args.json else page(facts), file=out)
+    return 0
