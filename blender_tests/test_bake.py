@@ -176,6 +176,7 @@ def test_baked_controls_are_one_clean_action(mode, dna_file):
     _bake(kind="CONTROLS")
     data = scene.controls(rig).animation_data
     assert not data.use_nla
+    assert tuple(data.action.frame_range) == (1.0, 10.0)  # of what was baked
     assert all(c.mute for c in data.drivers)
     paths = {c.data_path for c in scene.curves(scene.controls(rig))}
     assert 'pose.bones["face"]["CTRL_expressions.browDownL"]' in paths
