@@ -1,0 +1,190 @@
+# SPDX-License-Identifier: MIT
+"""Mutants of source lines: universalmutator's rules make them, a seed draws them."""
+
+from __future__ import annotations
+
+import ast
+import contextlib
+import io
+import random
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+RULES = {
+    ".py": ["universal.rules", "python.rules"],
+    ".cpp": ["universal.rules", "c_like.rules", "cpp.rules"],
+}
+RULES[".h"] = RULES[".cpp"]
+NO_CODE = ("#", "using ", "namespace ", "struct ", "class ", "template")
+SIGNATURE = re.compile(r"[\w:<>,&*\s]+[ *&][\w:]+\((const |bool |float |double |std::)")
+OPERATORS = "+-*/%<>=&|!"
+STATEMENT = re.compile(r"\*?[\w:.>\[\]()-]+(\s*[-+|&*/^]?=|\().*;$")
+# Words that a rule puts another in the place of.
+WORDS = {"min", "max", "begin", "end", "any_of", "all_of", "none_of", "front_inserter",
+         "back_inserter", "min_element", "max_element", "break", "continue"}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """One line of one file, written otherwise."""
+
+    path: str  # from the root of the project
+    line: int  # counted from 1
+    before: str
+    after: str
+
+    def applied(self, source: str) -> str:
+        """The whole source with the one line replaced."""
+        lines = source.splitlines(keepends=True)
+        if lines[self.line - 1] != self.before:
+            raise ValueError(f"{self.path}:{self.line} is no longer {self.before.strip()!r}")
+        lines[self.line - 1] = self.after
+        return "".join(lines)
+
+
+def drawn(root: Path, paths: list[str], seed: int) -> Iterator[Mutant]:
+    """Mutants without end of use: every line that has any, in an order that the seed gives, and one
+    of its mutants.
+
+    Args:
+        root: The project.
+        paths: Source files, from the root.
+        seed: Another seed draws other lines.
+    """
+    choose = random.Random(seed)
+    lines = []
+    for path in sorted(paths):
+        source = (root / path).read_text(encoding="utf-8").splitlines(keepends=True)
+        lines += [(path, number) for number, line in enumerate(source, 1) if line.strip()]
+    choose.shuffle(lines)
+    tables: dict[str, dict[int, list[str]]] = {}
+    for path, number in lines:
+        text = (root / path).read_text(encoding="utf-8")
+        source = text.splitlines(keepends=True)
+        if path not in tables:
+            tables[path] = _mutants(source, RULES[Path(path).suffix])
+        found = sorted(tables[path].get(number, []))
+        choose.shuffle(found)
+        for after in found:
+            mutant = Mutant(path, number, source[number - 1], after)
+            if not _whole_words(source[number - 1], after):
+                continue
+            if not path.endswith(".py") and not _may_build(source, number, after):
+                continue
+            if _differs(path, text, mutant.applied(text)):
+                yield mutant
+                break
+
+
+def _mutants(source: list[str], rules: list[str]) -> dict[int, list[str]]:
+    from universalmutator import mutator
+
+    with contextlib.redirect_stdout(io.StringIO()):  # it tells which rules it reads
+        found = mutator.mutants_regexp(source, ruleFiles=rules, ignorePatterns=[])
+    table: dict[int, list[str]] = {}
+    for number, after, *_ in found:
+        table.setdefault(number, []).append(after)
+    return table
+
+
+def _differs(path: str, before: str, after: str) -> bool:
+    """Whether a mutant is another program: more than a comment, docstring or annotation."""
+    if not path.endswith(".py"):
+        return _bare(before) != _bare(after)
+    try:
+        compile(after, path, "exec", dont_inherit=True)  # sees a `continue` outside of a loop too
+        return _tree(after) != _tree(before)
+    except (SyntaxError, ValueError):
+        return False
+
+
+def _same(before: str, after: str) -> int:
+    """How many characters both begin with."""
+    pairs = enumerate(zip(before, after, strict=False))
+    return next((i for i, (a, b) in pairs if a != b), min(len(before), len(after)))
+
+
+def _whole_words(before: str, after: str) -> bool:
+    """Whether no name is cut: the rules find `end` in `blend`, and a name that is not there dies at
+    once."""
+    same = _same(before, after)
+    words = [w for w in re.finditer(r"[A-Za-z_]\w*", before) if w.start() < same < w.end()]
+    return not words or words[0].group() in WORDS
+
+
+def _may_build(lines: list[str], number: int, after: str) -> bool:
+    """Whether a line of C++ may be one still: the rules know neither words nor types.
+
+    An operator is what clang-format has put between spaces, a statement is taken out whole, and
+    only a loop is left or gone on with.
+
+    Args:
+        lines: The source.
+        number: The line's, from 1.
+        after: What the line becomes.
+    """
+    before = lines[number - 1]
+    code = before.split("//")[0].strip()
+    if not code or code.startswith(NO_CODE) or SIGNATURE.match(code):
+        return False
+    if after.lstrip().startswith("/*"):
+        return bool(STATEMENT.match(code)) and _brackets(code) == 0
+    if after.startswith(before) and after.strip().endswith(("break;", "continue;")):
+        return code.endswith(";") and _brackets(code) == 0 and _in_loop(lines, number)
+    same = next(i for i, (a, b) in enumerate(zip(before, after, strict=False)) if a != b)
+    word = next(
+        (w for w in re.finditer(r"[A-Za-z_]\w*", before) if w.start() < same < w.end()), None
+    )
+    if word is not None and word.group() not in WORDS:
+        return False
+    if _brackets(before) != _brackets(after):
+        return False
+    start = same
+    while before[start - 1] in OPERATORS:
+        start -= 1
+    operator = re.match(r"[-+*/%<>=&|!]*", before[start:]).group()
+    spaced = before[start - 1] == " " == before[start + len(operator)]
+    stepped = operator in ("++", "--") and after[start : start + 2] in ("++", "--")
+    return not operator or operator == "!" or spaced or stepped
+
+
+def _in_loop(lines: list[str], number: int) -> bool:
+    """By indentation: whether a line that encloses this one begins a loop."""
+    inner = len(lines[number - 1]) - len(lines[number - 1].lstrip())
+    for line in reversed(lines[: number - 1]):
+        indent = len(line) - len(line.lstrip())
+        if line.strip() and indent < inner:
+            inner = indent
+            if re.match(r"(for|while|do)\b", line.strip()):
+                return True
+    return False
+
+
+def _brackets(code: str) -> int:
+    return sum(code.count(c) for c in "([{") - sum(code.count(c) for c in ")]}")
+
+
+def _bare(source: str) -> str:
+    """C++ without comments and white space."""
+    return re.sub(r"\s+", "", re.sub(r"//[^\n]*|/\*.*?\*/", "", source, flags=re.DOTALL))
+
+
+def _tree(source: str) -> str:
+    tree = ast.parse(source)
+    for node in ast.walk(tree):
+        for part in ("body", "orelse", "finalbody"):
+            if isinstance(getattr(node, part, None), list):
+                setattr(node, part, [n for n in getattr(node, part) if not _says_nothing(n)])
+        if isinstance(node, ast.FunctionDef):
+            node.returns = None
+        if isinstance(node, ast.arg):
+            node.annotation = None
+    return ast.dump(tree)
+
+
+def _says_nothing(node: ast.AST) -> bool:
+    """Whether a statement is a docstring, a text that stands alone or `pass`."""
+    text = isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
+    return text or isinstance(node, ast.Pass)

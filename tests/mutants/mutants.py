@@ -1,0 +1,283 @@
+# SPDX-License-Identifier: MIT
+"""Which small faults does a test see? Draws mutants by a seed, tries each in a copy of the project.
+
+    packaging/mutants.sh native|package|scene [--count N] [--seed N] [--list] [--survivors]
+
+A mutant is killed by the first test that fails, or that takes far longer than it does without it;
+tests.toml says which tests stand for which file, the quickest first. One that does not build is
+not counted, another is drawn for it. What is found is kept in build/mutants: a run that was ended
+goes on where it was; --survivors tries once more those that lived, with the tests of now.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import fnmatch
+import importlib.util
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import tomllib
+from collections import Counter
+from dataclasses import asdict
+from pathlib import Path
+
+from draw import Mutant, drawn
+
+HERE = Path(__file__).resolve().parent
+PROJECT = HERE.parents[1]
+SEED = 15
+COUNTS = {"native": 80, "package": 60, "scene": 60}
+# Headers stay out: each is a build of all that includes it. Bindings are tables of names.
+SOURCES = {
+    "native": (["native/**/*.cpp", "native/simd/*_body.h"], ["native/bindings/*"]),
+    "package": (["native/python/risorius/**/*.py"], []),
+    "scene": (["addon/risorius/logic/**/*.py", "addon/risorius/scene/**/*.py"], []),
+}
+SLOW = 900  # seconds for a test of which it is not yet known how long it takes
+OPTIONS = [
+    "-DCMAKE_CXX_COMPILER_LAUNCHER=ccache", "-DCMAKE_INTERPROCEDURAL_OPTIMIZATION=OFF",
+    "-DRISORIUS_BUILD_BINDINGS=ON", "-DCMAKE_DISABLE_FIND_PACKAGE_benchmark=ON",
+    f"-DPython_EXECUTABLE={sys.executable}",
+    f"-DCMAKE_PROJECT_risorius_INCLUDE={HERE / 'bindings.cmake'}",
+]  # fmt: skip
+
+
+def sources(root: Path, part: str) -> list[str]:
+    """The files of a part that mutants are made of, from the root."""
+    patterns, left_out = SOURCES[part]
+    found = {str(p.relative_to(root)) for pattern in patterns for p in root.glob(pattern)}
+    return sorted(f for f in found if not any(fnmatch.fnmatch(f, pattern) for pattern in left_out))
+
+
+def tests_of(path: str, table: dict[str, list[str]]) -> list[str]:
+    """Tests that stand for a file, the quickest first: those of every pattern that fits it."""
+    found: list[str] = []
+    for pattern, tests in table.items():
+        if fnmatch.fnmatch(path, pattern):
+            found += [test for test in tests if test not in found]
+    return found
+
+
+class Copy:
+    """A copy of the project's files in build/mutants, in which mutants are tried."""
+
+    def __init__(self, part: str):
+        self.part = part
+        self.root = PROJECT / "build" / "mutants" / part
+        self.usual: dict[str, float] = {}  # seconds that a test takes when nothing is wrong
+        self._fresh = False  # whether the Python module is that of the present sources
+
+    def refresh(self) -> None:
+        """Bring changed files over; those that are as they were keep their time, for Ninja."""
+        listed = subprocess.run(
+            ["git", "ls-files", "-co", "--exclude-standard"],
+            cwd=PROJECT, check=True, capture_output=True, text=True,
+        ).stdout.splitlines()  # fmt: skip
+        for name in listed:
+            here, there = PROJECT / name, self.root / name
+            if here.exists() and not (there.exists() and _same(here, there)):
+                there.parent.mkdir(parents=True, exist_ok=True)
+                shutil.copyfile(here, there)
+        for folder in ("native", "addon", "tests", "blender_tests"):
+            for old in (self.root / folder).rglob("*"):
+                gone = (
+                    old.suffix in (".py", ".cpp", ".h")
+                    and not (PROJECT / old.relative_to(self.root)).exists()
+                )
+                if gone:
+                    old.unlink()
+        if self.part != "native":
+            package = importlib.util.find_spec("risorius")
+            if package is None or package.origin is None:
+                sys.exit("the wheel is not installed: packaging/demo.sh builds it")
+            self._copy_module(next(Path(package.origin).parent.glob("_native.*.so")))
+            compiled = ["compileall", "-q", "--invalidation-mode", "checked-hash", "native/python"]
+            self._checked([sys.executable, "-m", *compiled])
+            return
+        if not (self.root / "build" / "dev" / "build.ninja").exists():
+            self._checked(["cmake", "--preset", "dev", *OPTIONS])
+        self._checked(["cmake", "--build", "build/dev", "-j2"])
+
+    def _built(self) -> Path:
+        return next((self.root / "build" / "dev").rglob("_native.*.so"))
+
+    def _copy_module(self, module: Path) -> None:
+        shutil.copyfile(module, self.root / "native" / "python" / "risorius" / module.name)
+        self._fresh = True
+
+    def _checked(self, command: list[str]) -> None:
+        code, _, text = self._run(command, 3600)
+        if code != 0:
+            sys.exit(f"{' '.join(command)}\n{text[-2000:]}")
+
+    def try_one(self, mutant: Mutant, tests: list[str]) -> tuple[str, str]:
+        """(killed, slow, survived, unbuildable or unsure; which test said it)."""
+        place = self.root / mutant.path
+        source = place.read_text(encoding="utf-8")
+        place.write_text(mutant.applied(source), encoding="utf-8")
+        self._fresh = self.part != "native"
+        try:
+            for test in tests:
+                outcome, said = self.outcome(test)
+                if outcome in ("killed", "slow") and not self._passes(test, said, mutant, source):
+                    return "unsure", f"{test} fails without it too: {said}"
+                if outcome != "passed":
+                    return outcome, f"{test} {said}".strip()
+            return "survived", ""
+        finally:
+            place.write_text(source, encoding="utf-8")
+            if self.part == "native":
+                os.utime(place)
+
+    def _passes(self, test: str, said: str, mutant: Mutant, source: str) -> bool:
+        """Whether the test that failed passes without the mutant; only then does it count."""
+        named = re.search(r"(?:FAILED|ERROR) (\S+::.+?)(?: - |$)|\[ *FAILED *\] (\S+)", said)
+        if named and named.group(1):
+            test = named.group(1)
+        elif named:
+            test = f"{test.partition(':')[0]}:{named.group(2).rstrip(',')}"
+        if test in self.usual:
+            return True
+        place = self.root / mutant.path
+        place.write_text(source, encoding="utf-8")
+        os.utime(place)
+        self._fresh = self.part != "native"
+        return self.outcome(test)[0] == "passed"
+
+    def outcome(self, test: str) -> tuple[str, str]:
+        """What one test says of the sources as they are: passed, killed, slow or unbuildable."""
+        if "/" not in test.partition(":")[0]:
+            target = test.partition(":")[0]
+            if self._run(["cmake", "--build", "build/dev", "--target", target], 1200)[0] != 0:
+                return "unbuildable", ""
+            program = next(p for p in (self.root / "build/dev/tests").rglob(target) if p.is_file())
+            command = [str(program), "--gtest_fail_fast", "--gtest_brief=1"]
+            command += [f"--gtest_filter={test.partition(':')[2]}"] if ":" in test else []
+        else:
+            if not self._fresh:
+                build = ["cmake", "--build", "build/dev", "--target", "_native"]
+                if self._run(build, 1200)[0] != 0:
+                    return "unbuildable", ""
+                self._copy_module(self._built())
+            command = [sys.executable, "-m", "pytest", "-q", "-x", test]
+            if test.startswith("blender_tests/"):
+                command = [sys.executable, "blender_tests/run.py", "--", "-x", test]
+        limit = max(60, 6 * self.usual[test]) if test in self.usual else SLOW
+        code, seconds, text = self._run(command, limit)
+        if code == 0:
+            self.usual[test] = max(seconds, self.usual.get(test, 0))
+            return "passed", ""
+        if code is None:
+            return "slow", f"{limit:.0f} s"
+        lines = [line for line in text.splitlines() if "FAILED" in line or line.startswith("ERROR")]
+        return "killed", lines[-1] if lines else f"exit {code}"
+
+    def _run(self, command: list[str], limit: float) -> tuple[int | None, float, str]:
+        """Exit code, None if the time was over; seconds; what was printed."""
+        began = time.monotonic()
+        with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as room:
+            environment = {
+                **os.environ, "TMPDIR": room, "XDG_CACHE_HOME": f"{room}/cache",
+                "BLENDER_USER_RESOURCES": f"{room}/blender", "PYTHONDONTWRITEBYTECODE": "1",
+                "PYTHONPATH": str(self.root / "native" / "python"),
+            }  # fmt: skip
+            with open(f"{room}/printed", "w+b") as printed:
+                process = subprocess.Popen(
+                    command, cwd=self.root, env=environment, stdin=subprocess.DEVNULL,
+                    stdout=printed, stderr=subprocess.STDOUT, start_new_session=True,
+                )  # fmt: skip
+                try:
+                    code = process.wait(limit)
+                except subprocess.TimeoutExpired:
+                    code = None
+                finally:
+                    _kill_group(process)
+                printed.seek(0)
+                text = printed.read().decode(errors="replace")
+        return code, time.monotonic() - began, text
+
+
+def _kill_group(process: subprocess.Popen[bytes]) -> None:
+    """The test and every process that it started."""
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+
+
+def _same(one: Path, other: Path) -> bool:
+    return one.stat().st_size == other.stat().st_size and one.read_bytes() == other.read_bytes()
+
+
+def told(mutant: Mutant, outcome: str, said: str) -> str:
+    """One mutant in three lines."""
+    head = f"{outcome}: {mutant.path}:{mutant.line} {said}"
+    return f"{head}\n    - {mutant.before.strip()}\n    + {mutant.after.strip()}"
+
+
+def summary(outcomes: list[str]) -> str:
+    """The last line."""
+    counts = Counter(outcomes)
+    tried = sum(counts.values()) - counts["unbuildable"]
+    return (
+        f"{tried} mutants: {counts['killed'] + counts['slow']} killed ({counts['slow']} by the "
+        f"clock), {counts['survived']} survived, {counts['unsure']} unsure; "
+        f"{counts['unbuildable']} more do not build"
+    )
+
+
+def main() -> None:
+    """Draw, try, count."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("part", choices=SOURCES)
+    parser.add_argument("--count", type=int)
+    parser.add_argument("--seed", type=int, default=SEED)
+    parser.add_argument("--list", action="store_true", help="draw only")
+    parser.add_argument("--survivors", action="store_true", help="try again those that lived")
+    parser.add_argument("--programs", action="store_true", help="GoogleTest alone, for a first run")
+    options = parser.parse_args()
+    # A shell's background job ignores it, and so would the programs that tests interrupt.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    part, wanted = options.part, options.count or COUNTS[options.part]
+    order = drawn(PROJECT, sources(PROJECT, part), options.seed)
+    if options.list:
+        for mutant, _ in zip(order, range(wanted), strict=False):
+            print(told(mutant, "drawn", ""))
+        return
+    copy = Copy(part)
+    copy.root.mkdir(parents=True, exist_ok=True)
+    table = tomllib.loads((HERE / "tests.toml").read_text(encoding="utf-8"))[part]
+    kept = PROJECT / "build" / "mutants" / f"{part}-{options.seed}.jsonl"
+    before = [json.loads(line) for line in kept.read_text().splitlines()] if kept.exists() else []
+    known = {(b["path"], b["line"], b["after"]): b["outcome"] for b in before}
+    copy.refresh()
+    outcomes: list[str] = []
+    for mutant in order:
+        if sum(o != "unbuildable" for o in outcomes) == wanted:
+            break
+        name = (mutant.path, mutant.line, mutant.after)
+        outcome = known.get(name)
+        if outcome is None or (options.survivors and outcome == "survived"):
+            began = time.monotonic()
+            tests = tests_of(mutant.path, table)
+            tests = [t for t in tests if not (options.programs and t.endswith(".py"))]
+            outcome, said = copy.try_one(mutant, tests)
+            print(told(mutant, outcome, said), flush=True)
+            line = {**asdict(mutant), "outcome": outcome, "by": said}
+            line["seconds"] = round(time.monotonic() - began)
+            if outcome != "unsure":  # the next run tries it again
+                with kept.open("a") as file:
+                    file.write(json.dumps(line) + "\n")
+        outcomes.append(outcome)
+    print(summary(outcomes))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: MIT
+"""Every source file has tests that stand for it, and the drawing of mutants knows nonsense."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import mutants
+import pytest
+
+PROJECT = Path(__file__).resolve().parents[2]
+TABLE = tomllib.loads((Path(__file__).parent / "tests.toml").read_text(encoding="utf-8"))
+PROGRAMS = set(
+    re.findall(
+        r"risorius_test\((\w+)",
+        "".join(p.read_text() for p in (PROJECT / "tests").glob("*/CMakeLists.txt")),
+    )
+)
+
+
+@pytest.mark.parametrize("part", mutants.SOURCES)
+def test_every_source_has_tests(part):
+    files = mutants.sources(PROJECT, part)
+    assert len(files) > 30
+    assert [f for f in files if not mutants.tests_of(f, TABLE[part])] == []
+
+
+@pytest.mark.parametrize("part", mutants.SOURCES)
+def test_what_the_table_names_is_there(part):
+    named = {test for tests in TABLE[part].values() for test in tests}
+    programs = {test.partition(":")[0] for test in named if not test.endswith(".py")}
+    assert programs <= PROGRAMS
+    assert [t for t in named if t.endswith(".py") and not (PROJECT / t).is_file()] == []
+
+
+@pytest.mark.parametrize("part", mutants.SOURCES)
+def test_every_pattern_fits_a_file(part):
+    files = mutants.sources(PROJECT, part)
+    alone = {p: [f for f in files if mutants.tests_of(f, {p: ["x"]})] for p in TABLE[part]}
+    assert [pattern for pattern, fits in alone.items() if not fits] == []
