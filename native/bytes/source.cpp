@@ -37,7 +37,7 @@ Handle open_for_reading(const std::filesystem::path& path) {
   return file;
 }
 bool is_open(Handle file) { return file != nullptr; }
-void close_file(Handle file) { std::fclose(file); }
+void close_handle(Handle file) { std::fclose(file); }
 
 std::size_t read_at(Handle file, std::uint64_t offset, std::span<std::uint8_t> out) {
   if (_fseeki64(file, static_cast<long long>(offset), SEEK_SET) != 0) return 0;
@@ -52,7 +52,7 @@ Handle open_for_reading(const std::filesystem::path& path) {
   return ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
 }
 bool is_open(Handle file) { return file >= 0; }
-void close_file(Handle file) { ::close(file); }
+void close_handle(Handle file) { ::close(file); }
 
 // One call of the system per read: no position to move first. It may give less than there is.
 std::size_t read_at(Handle file, std::uint64_t offset, std::span<std::uint8_t> out) {
@@ -73,7 +73,7 @@ std::size_t read_at(Handle file, std::uint64_t offset, std::span<std::uint8_t> o
 class FileSource final : public Source {
  public:
   FileSource(Handle file, std::uint64_t size) : file_(file), size_(size) {}
-  ~FileSource() override { close_file(file_); }
+  ~FileSource() override { close_handle(file_); }
   FileSource(const FileSource&) = delete;
   FileSource& operator=(const FileSource&) = delete;
   std::uint64_t size() const override { return size_; }
@@ -101,7 +101,7 @@ Result<std::unique_ptr<Source>> open_file(const std::filesystem::path& path) {
   }
   const std::uint64_t size = std::filesystem::file_size(path, error);
   if (error) {
-    close_file(file);
+    close_handle(file);
     return fail(ErrorCode::kIoRead, "", "cannot read the size of " + name + ": " + error.message());
   }
   return std::unique_ptr<Source>(std::make_unique<FileSource>(file, size));

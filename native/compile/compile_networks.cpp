@@ -17,13 +17,12 @@ using core::ErrorCode;
 using core::fail;
 using core::ok;
 using core::Status;
+using detail::count_of;
 using detail::is_corrective;
 using detail::listed;
 using detail::StepLods;
 using rig::MlOperation;
 using rig::RigData;
-
-std::uint32_t count_of(const auto& list) { return static_cast<std::uint32_t>(list.size()); }
 
 // Files without layer mlbe: each network gathers its inputs and scatters its outputs.
 dna::MlType synthesized(const dna::MachineLearnedBehavior& ml) {

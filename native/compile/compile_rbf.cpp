@@ -15,10 +15,9 @@ using core::ErrorCode;
 using core::fail;
 using core::ok;
 using core::Status;
+using detail::count_of;
 using detail::is_corrective;
 using rig::RigData;
-
-std::uint32_t count_of(const auto& list) { return static_cast<std::uint32_t>(list.size()); }
 
 // Of two targets, by number.
 double distance(const RigData& r, const rig::RbfSolver& s, std::uint32_t a, std::uint32_t b) {

@@ -30,6 +30,9 @@ struct StepLods {
   std::vector<std::vector<std::uint32_t>> operations, solvers;
 };
 
+/// As a Rig writes counts and places in its arrays.
+inline std::uint32_t count_of(const auto& list) { return static_cast<std::uint32_t>(list.size()); }
+
 /// Fails: kInvalidIndex where one is not below limit.
 Status check_controls(const Array<std::uint16_t>& indices, std::uint32_t limit,
                       const std::string& where);

@@ -17,7 +17,7 @@ namespace risorius::rig {
 namespace {
 
 using namespace testing_support;
-using Bytes = core::AlignedVector<std::uint8_t>;
+using BlockBytes = core::AlignedVector<std::uint8_t>;
 
 dna::Dna face_with_everything() {
   dna::Dna dna = make_face(3, 2, 4, 2);
@@ -82,15 +82,15 @@ dna::Dna face_that_learns() {
   return dna;
 }
 
-Bytes bytes_of(const Rig& rig) { return Bytes(rig.block().begin(), rig.block().end()); }
+BlockBytes bytes_of(const Rig& rig) { return BlockBytes(rig.block().begin(), rig.block().end()); }
 
-core::Result<Rig> opened(const Bytes& bytes, BlockCheck check) {
+core::Result<Rig> opened(const BlockBytes& bytes, BlockCheck check) {
   return open_rig(bytes, nullptr, check, simd::scalar_kernels());
 }
 
 TEST(Block, EvaluatesAsTheRigThatItCameFrom) {
   const Rig rig = must_compile(face_with_everything());
-  const Bytes bytes = bytes_of(rig);
+  const BlockBytes bytes = bytes_of(rig);
   for (const BlockCheck check : {BlockCheck::kHeader, BlockCheck::kFull}) {
     const auto again = open_rig(bytes, nullptr, check, *rig.kernels);
     ASSERT_TRUE(again.has_value()) << again.error().describe();
@@ -108,23 +108,23 @@ TEST(Block, EqualFacesAreEqualBytes) {
   const auto dirty = [](int value) {
     volatile unsigned char stack[65536];
     for (auto& byte : stack) byte = static_cast<unsigned char>(value);
-    std::vector<Bytes> heap;
+    std::vector<BlockBytes> heap;
     for (std::size_t size = 16; size < 65536; size *= 2) {
       heap.emplace_back(size, static_cast<std::uint8_t>(value));
     }
   };
   for (const dna::Dna& dna : {face_with_everything(), face_that_learns()}) {
     dirty(0xAA);
-    const Bytes first = bytes_of(must_compile(dna));
+    const BlockBytes first = bytes_of(must_compile(dna));
     dirty(0x55);
     EXPECT_EQ(first, bytes_of(must_compile(dna)));
   }
 }
 
 TEST(Block, EveryPrefixIsRefused) {
-  const Bytes whole = bytes_of(must_compile(face_with_everything()));
+  const BlockBytes whole = bytes_of(must_compile(face_with_everything()));
   for (std::size_t size = 0; size < whole.size(); ++size) {
-    const Bytes cut(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size));
+    const BlockBytes cut(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size));
     for (const BlockCheck check : {BlockCheck::kHeader, BlockCheck::kFull}) {
       ASSERT_FALSE(opened(cut, check).has_value()) << size;
     }
@@ -132,21 +132,21 @@ TEST(Block, EveryPrefixIsRefused) {
 }
 
 TEST(Block, EveryChangedByteIsFoundByTheFullCheck) {
-  const Bytes whole = bytes_of(must_compile(face_with_everything()));
+  const BlockBytes whole = bytes_of(must_compile(face_with_everything()));
   for (std::size_t at = 0; at < whole.size(); ++at) {
     for (const int change : {0x01, 0x80, 0xFF}) {
-      Bytes changed = whole;
+      BlockBytes changed = whole;
       changed[at] = static_cast<std::uint8_t>(changed[at] ^ change);
       ASSERT_FALSE(opened(changed, BlockCheck::kFull).has_value()) << at;
     }
   }
 }
 
-int damage_each_byte(const Bytes& whole) {
+int damage_each_byte(const BlockBytes& whole) {
   int refused = 0;
   for (std::size_t at = 0; at < whole.size(); ++at) {
     for (const int value : {0x00, 0x01, 0x7F, 0xFF}) {
-      Bytes changed = whole;
+      BlockBytes changed = whole;
       changed[at] = static_cast<std::uint8_t>(value);
       seal_block(changed);
       const auto rig = opened(changed, BlockCheck::kFull);
@@ -189,12 +189,12 @@ TEST(Block, ChangedBytesUnderARightHashDoNoHarm) {
 
 // The first element of one of a Rig's arrays, in a copy of its block.
 template <class T>
-T& first_of(Bytes& copy, const Rig& rig, std::span<const T> array) {
+T& first_of(BlockBytes& copy, const Rig& rig, std::span<const T> array) {
   const auto at = reinterpret_cast<const std::uint8_t*>(array.data()) - rig.block().data();
   return *reinterpret_cast<T*>(copy.data() + at);
 }
 
-std::string refused_field(Bytes& changed) {
+std::string refused_field(BlockBytes& changed) {
   seal_block(changed);
   const auto rig = opened(changed, BlockCheck::kFull);
   return rig ? "taken" : rig.error().where;
@@ -203,7 +203,7 @@ std::string refused_field(Bytes& changed) {
 // Rows that a LOD places without having computed them would be those of an earlier frame.
 TEST(Block, RowsThatNothingComputesAreRefused) {
   const Rig rig = must_compile(face_with_everything());
-  Bytes level = bytes_of(rig);
+  BlockBytes level = bytes_of(rig);
   first_of(level, rig, std::span(rig.joint_group_lods)) -= 1;
   EXPECT_EQ(refused_field(level), "rig.joint_pieces");
 }
@@ -212,7 +212,7 @@ TEST(Block, RowsOfGroupsFollowEachOther) {
   dna::Dna dna = face_with_everything();
   dna.behavior.joint_groups = std::vector{make_probe({0}), make_probe({3, 4})};
   const Rig rig = must_compile(dna);
-  Bytes rows = bytes_of(rig);
+  BlockBytes rows = bytes_of(rig);
   first_of(rows, rig, std::span(rig.joint_groups)).rows_begin = 1;
   EXPECT_EQ(refused_field(rows), "rig.joint_groups");
 }
@@ -221,7 +221,7 @@ TEST(Block, RowsOfGroupsFollowEachOther) {
 TEST(Block, ScratchIsHeldAgainstTheBlock) {
   const Rig rig = must_compile(face_with_everything());
   constexpr std::size_t kRigHeader = 32;  // behind magic, byte order, sizes and hash
-  Bytes forged = bytes_of(rig);
+  BlockBytes forged = bytes_of(rig);
   const std::uint32_t regions = 0x00FFFFFF;  // 64 MB of masks
   std::memcpy(forged.data() + kRigHeader + offsetof(RigHeader, mask_count), &regions,
               sizeof(regions));
@@ -229,8 +229,8 @@ TEST(Block, ScratchIsHeldAgainstTheBlock) {
 }
 
 TEST(Block, BytesThatAreNotAlignedAreRefused) {
-  const Bytes whole = bytes_of(must_compile(face_with_everything()));
-  Bytes shifted(whole.size() + 1);
+  const BlockBytes whole = bytes_of(must_compile(face_with_everything()));
+  BlockBytes shifted(whole.size() + 1);
   std::copy(whole.begin(), whole.end(), shifted.begin() + 1);
   const auto rig =
       open_rig(std::span(shifted).subspan(1), nullptr, BlockCheck::kHeader, simd::scalar_kernels());

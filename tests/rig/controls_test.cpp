@@ -14,7 +14,6 @@ namespace {
 
 using namespace testing_support;
 
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 TEST(CheckControls, FiniteValuesPassHoweverLarge) {

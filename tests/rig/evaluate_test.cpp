@@ -13,8 +13,6 @@ namespace {
 
 using namespace testing_support;
 
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-
 // ---- joints
 
 TEST(EvaluateJoints, MatrixTimesControlsUnclamped) {

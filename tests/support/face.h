@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -14,6 +15,8 @@
 #include "support/bare_face.h"
 
 namespace risorius::testing_support {
+
+inline constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
 inline dna::JointGroup make_group(std::vector<std::uint16_t> lods,
                                   std::vector<std::uint16_t> inputs,
