@@ -81,7 +81,7 @@ configure() { # configure TARGET FLAGS [OPTION...]
   cmake -S "$project" -B "$out/$target" -G Ninja --toolchain "$project/packaging/cross/toolchain.cmake" \
     -DRISORIUS_TARGET="$target" -DRISORIUS_TOOLS="$tools" -DRISORIUS_PREFIX="$prefix" \
     -DRISORIUS_BUILD_BINDINGS=OFF -DRISORIUS_WARNINGS_AS_ERRORS=ON -DCMAKE_BUILD_TYPE=None \
-    -DCMAKE_CXX_FLAGS="$flags" -DCMAKE_CXX_COMPILER_LAUNCHER=ccache "$@"
+    -DCMAKE_CXX_FLAGS="$flags" -DCMAKE_CXX_COMPILER_LAUNCHER=ccache -DCMAKE_UNITY_BUILD=ON "$@"
 }
 # Warnings need no optimisation, and zig's own checks of undefined behavior would only take time. -c
 # reaches the program that tells CMake what the compiler is: to link it takes minutes.
@@ -109,8 +109,9 @@ run_programs() {
 }
 
 # scalar_bits NAME COMPILER FLAGS...: the program of tests/rig with the arithmetic of `sources`
-# compiled so; the rest of it comes from the preset dev.
-sources=("$project"/native/rig/*.cpp "$project"/native/rig/*/*.cpp "$project"/native/simd/kernels_scalar.cpp
+# compiled so; the rest of it comes from the preset tests. What is of one folder is compiled at once.
+rig="$out/rig.cpp"
+sources=("$rig" "$project"/native/simd/kernels_scalar.cpp
   "$project"/native/compile/compile.cpp "$project"/tests/rig/scalar_bits.cpp)
 scalar_bits() {
   local folder="$out/bits-$1" compiler=$2
@@ -120,14 +121,15 @@ scalar_bits() {
     folder=$1; file=$2; shift 2
     ccache "$@" -c "$file" -o "$folder/$(basename "$file" .cpp).o"' \
     sh "$folder" {} "$compiler" -std=c++20 -ffp-contract=off -I"$project/native" "$@" &&
-    "$compiler" "$folder"/*.o $dev/librisorius_{compile,rig,dna,bytes,simd,core}.a -pthread \
+    "$compiler" "$folder"/*.o $built/librisorius_{compile,rig,dna,bytes,simd,core}.a -pthread \
       -o "$folder/program" &&
     "$folder/program" > "$folder/hash"
 }
-dev="$project/build/dev/native"
-build_dev() {
-  (cd "$project" && cmake --preset dev -DCMAKE_CXX_COMPILER_LAUNCHER=ccache \
-    -DRISORIUS_BUILD_BINDINGS=OFF && cmake --build --preset dev -j"$jobs" --target risorius_compile)
+built="$project/build/tests/native"
+build_rest() {
+  find "$project/native/rig" -name '*.cpp' | sort | sed 's/.*/#include "&"/' > "$rig"
+  (cd "$project" && cmake --preset tests -DCMAKE_CXX_COMPILER_LAUNCHER=ccache &&
+    cmake --build --preset tests -j"$jobs" --target risorius_compile)
 }
 same_bits() {
   local way wanted hash
@@ -161,7 +163,7 @@ unset CCACHE_COMPILERCHECK
 step "aarch64-linux-gnu"
 works "GoogleTest for aarch64 builds" aarch64 build_programs && step "emulator" && run_programs
 step "scalar bits"
-works "scalar library" dev build_dev
+works "scalar library" rest build_rest
 works "scalar bits: gcc -O0 -O3, clang, aarch64" bits same_bits
 works "scalar bits differ when fused" fused other_bits
 step ""

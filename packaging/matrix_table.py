@@ -13,22 +13,21 @@ from __future__ import annotations
 import sys
 from collections import Counter, defaultdict
 from pathlib import Path
-from xml.etree import ElementTree
 
-PASSED, FAILED, NOT_RUN = "passed", "failed", "not run"
-_OUTCOMES = {"failure": FAILED, "error": FAILED, "skipped": NOT_RUN}
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE))
+
+import results  # noqa: E402
+from results import FAILED, NOT_RUN, PASSED  # noqa: E402
 
 
 def read(report: Path) -> dict[str, Counter[str]]:
     """Test file -> how many tests passed, failed and were not run; empty without a report."""
     counts: dict[str, Counter[str]] = defaultdict(Counter)
-    if not report.is_file():
-        return counts
-    for case in ElementTree.parse(report).iter("testcase"):
-        parts = (case.get("classname") or case.get("name") or "").split(".")
+    for case in results.read(report):
+        parts = (case.module or case.name).split(".")
         group = next((p for p in parts if p.startswith("test_")), parts[-1])
-        found = [_OUTCOMES[child.tag] for child in case if child.tag in _OUTCOMES]
-        counts[group][FAILED if FAILED in found else found[0] if found else PASSED] += 1
+        counts[group][case.outcome] += 1
     return counts
 
 

@@ -13,9 +13,26 @@ unset PYTHONPATH
 _begin=$SECONDS
 _last=$SECONDS
 _title=
+_cpu=0
+stages= # a file: where `step` writes a row `time` for each stage, if it is named
+# cpu_seconds: into `_now`, of this shell and of all that it waited for. `times` speaks of the shell
+# that runs it, so it cannot stand in a substitution.
+cpu_seconds() {
+  local file
+  file=$(mktemp)
+  times > "$file"
+  _now=$(tr 'ms' '  ' < "$file" | awk '{ t += $1 * 60 + $2 + $3 * 60 + $4 } END { print int(t) }')
+  rm -f "$file"
+}
 step() {
-  [ -n "$_title" ] && echo "--- $_title: $((SECONDS - _last)) s"
+  cpu_seconds
+  if [ -n "$_title" ]; then
+    echo "--- $_title: $((SECONDS - _last)) s"
+    [ -z "$stages" ] ||
+      printf 'time\t%s\t%d\t%d\n' "$_title" $((SECONDS - _last)) $((_now - _cpu)) >> "$stages"
+  fi
   _last=$SECONDS
+  _cpu=$_now
   _title=$1
   [ -n "$1" ] && echo "=== $1 (at $((SECONDS - _begin)) s)"
   return 0
