@@ -82,3 +82,23 @@ def test_the_overlay_tells_the_stages_of_the_last_frames(dna_file):
     assert len(played) == 6
     assert all(frame.stages[stage] > 0 for frame in played for stage in timing.STAGES)
     assert bpy.context.window_manager.risorius_show_timing is False
+
+
+def test_times_of_a_frame_are_those_of_the_clock(monkeypatch):
+    timing = scene.submodule("scene.frame.timing")
+    clock = [10.0]
+    monkeypatch.setattr(timing, "perf_counter", lambda: clock[0])
+    timing.frames.clear()
+    timing.begin()
+    clock[0] = 10.001
+    timing.animated()
+    for start in (10.002, 10.020):  # two characters: stages of 1, 2, 3 and 4 ms
+        timing.add([start, start + 0.001, start + 0.003, start + 0.006, start + 0.010])
+    clock[0] = 10.035
+    timing.drawing_begins()
+    clock[0] = 10.041
+    timing.drawing_ends()
+    frame = timing.frames[-1]
+    assert [frame.stages[s] for s in timing.STAGES] == pytest.approx([2, 4, 6, 8])
+    assert (frame.ours, frame.characters) == (pytest.approx(20), 2)
+    assert (frame.animation, frame.deform, frame.drawing) == pytest.approx((1, 5, 6))
