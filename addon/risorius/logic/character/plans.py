@@ -189,7 +189,7 @@ def plan_character(
     fallback_name: str,
     lods: Sequence[int] = (0,),
     unit_scale: float = 1.0,
-    rests: Sequence[float] = (),
+    rests: Sequence[float] | NDArray[np.float32] = (),
 ) -> CharacterPlan:
     """Describe the character of a file.
 
@@ -260,7 +260,9 @@ def existing_lods(dna: DnaData, wanted: Sequence[int]) -> tuple[int, ...]:
     return tuple(level for level in wanted if level in there) or tuple(there[:1])
 
 
-def plan_controls(raw_names: Sequence[str], rests: Sequence[float] = ()) -> list[ControlPlan]:
+def plan_controls(
+    raw_names: Sequence[str], rests: Sequence[float] | NDArray[np.float32] = ()
+) -> list[ControlPlan]:
     """The sliders of a file's raw controls, in index order.
 
     Args:

@@ -1,16 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Actions with baked curves, and what an object was animated by before it played one."""
 
+from __future__ import annotations
+
 import hashlib
 import json
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import bpy
 import numpy as np
+import numpy.typing as npt
+from numpy.typing import NDArray
 
 from ...logic.animation import key_reduction as reduction
 from ...logic.animation import track_matching
 from ..base import compat
+from ..base.blender_types import Animated
 
 BEFORE = "risorius_before"  # on what plays a baked action: what animated it before
 BAKED_ACTION = "risorius_baked_action"  # on an action that was baked: removed on the way back
@@ -35,8 +42,8 @@ class Track:
 
     path: str
     group: str
-    values: object
-    now: object = None
+    values: NDArray[np.float32]
+    now: npt.ArrayLike | None = None
     first: int = 0
     indexed: bool = True
 
@@ -50,7 +57,7 @@ class Counts:
     error: float = 0.0
     curves: int = 0
 
-    def sentence(self):
+    def sentence(self) -> str:
         """For a report."""
         return (
             f"{self.curves:,} curves, {self.keys:,} of {self.all_keys:,} keys, "
@@ -58,7 +65,14 @@ class Counts:
         )
 
 
-def write(name, owner, frames, tracks, error, counts):
+def write(
+    name: str,
+    owner: Animated,
+    frames: NDArray[np.float64],
+    tracks: Sequence[Track],
+    error: float,
+    counts: Counts,
+) -> tuple[bpy.types.Action, bpy.types.ActionSlot | None]:
     """A new action with one curve for each value that moves.
 
     Args:
@@ -87,11 +101,13 @@ def write(name, owner, frames, tracks, error, counts):
     return action, compat.slot_for(action, owner)
 
 
-def _flat(value):
+def _flat(value: npt.ArrayLike) -> NDArray[np.float32]:
     return np.atleast_1d(np.asarray(value, np.float32))
 
 
-def _reduced(frames, tracks, error, counts):
+def _reduced(
+    frames: NDArray[np.float64], tracks: Sequence[Track], error: float, counts: Counts
+) -> Iterator[tuple[Track, NDArray[np.float32], NDArray[np.bool_]]]:
     """Each track with its values and keys; many tracks are reduced at once."""
     most = max(_AT_ONCE // len(frames), 16)  # columns
     waiting, width = [], 0
@@ -113,8 +129,9 @@ def _reduced(frames, tracks, error, counts):
         waiting, width = [], 0
 
 
-def _new_curve(bag, track, index):
-    words = bag.fcurves.bl_rna.functions["new"].parameters.keys()
+def _new_curve(bag: bpy.types.ActionChannelbag, track: Track, index: int) -> bpy.types.FCurve:
+    rna: Any = bag.fcurves.bl_rna
+    words = rna.functions["new"].parameters.keys()
     for word in ("action_group", "group_name"):  # up to 4.3; since 5.0
         if word in words:
             return bag.fcurves.new(track.path, index=index, **{word: track.group})
@@ -124,7 +141,7 @@ def _new_curve(bag, track, index):
     return curve
 
 
-def _fill(curve, times, values):
+def _fill(curve: bpy.types.FCurve, times: NDArray[np.float32], values: NDArray[np.float32]) -> None:
     points = curve.keyframe_points
     points.add(len(times))
     places = np.stack([times, values], axis=1).ravel()
@@ -134,17 +151,17 @@ def _fill(curve, times, values):
     points.foreach_set("interpolation", np.full(len(times), _LINEAR, np.int32))
 
 
-def was_edited(action):
+def was_edited(action: bpy.types.Action) -> bool:
     """Whether somebody edited an action since `stamp`. One without a stamp is somebody's."""
     return action.get(_DIGEST) != _digest(action)
 
 
-def stamp(action):
+def stamp(action: bpy.types.Action) -> None:
     """Note what an action holds."""
     action[_DIGEST] = _digest(action)
 
 
-def _digest(action):
+def _digest(action: bpy.types.Action) -> str:
     """What tells whether an action was edited since."""
     found = hashlib.sha1(usedforsecurity=False)
     for curve in compat.curves_of(action):
@@ -155,7 +172,13 @@ def _digest(action):
     return found.hexdigest()
 
 
-def play(owner, action, slot, muted=(), strip=False):
+def play(
+    owner: Animated,
+    action: bpy.types.Action,
+    slot: bpy.types.ActionSlot | None,
+    muted: Collection[str] = (),
+    strip: bool = False,
+) -> None:
     """Let a datablock play a baked action and nothing else; what it played before is kept.
 
     Args:
@@ -166,6 +189,7 @@ def play(owner, action, slot, muted=(), strip=False):
     """
     keep(owner)
     data = owner.animation_data
+    assert data is not None
     silenced = [c for c in data.drivers if c.data_path in muted and not c.mute]
     for curve in silenced:
         curve.mute = True
@@ -192,13 +216,13 @@ def play(owner, action, slot, muted=(), strip=False):
     held["track"], held["baked"] = track.name, action
 
 
-def keep(owner):
+def keep(owner: Animated) -> None:
     """Note on a datablock what animates it now, unless that is noted; give it animation data."""
     if BEFORE in owner:
         return
     had = owner.animation_data is not None
     data = owner.animation_data or owner.animation_data_create()
-    state = {
+    state: dict[str, Any] = {
         "had": int(had),
         "use_nla": int(data.use_nla),
         "influence": data.action_influence,
@@ -207,12 +231,13 @@ def keep(owner):
     }
     if data.action is not None:
         state["action"] = data.action
-        if getattr(data, "action_slot", None) is not None:
-            state["slot"] = data.action_slot.identifier
+        slot = getattr(data, "action_slot", None)
+        if slot is not None:
+            state["slot"] = slot.identifier
     owner[BEFORE] = state
 
 
-def note_values(owner, paths):
+def note_values(owner: Animated, paths: Iterable[str]) -> None:
     """Note what properties hold that are not animated, or else than by what `play` plays.
 
     Args:
@@ -227,7 +252,7 @@ def note_values(owner, paths):
     owner[BEFORE]["values"] = lines
 
 
-def _set_back(owner, lines):
+def _set_back(owner: Animated, lines: Iterable[str]) -> None:
     for line in lines:
         path, numbers = json.loads(line)
         try:
@@ -241,7 +266,7 @@ def _set_back(owner, lines):
                 value[i] = number
 
 
-def _set(owner, path, number):
+def _set(owner: Animated, path: str, number: float) -> None:
     """Set a property by its path: a custom property in brackets, or an attribute."""
     if path.endswith('"]'):
         where, key = path[:-2].rsplit('["', 1)
@@ -252,7 +277,7 @@ def _set(owner, path, number):
         setattr(owner.path_resolve(where) if where else owner, key, number)
 
 
-def restore(owner):
+def restore(owner: Animated) -> None:
     """Let a datablock be animated again as it was before `play`.
 
     What was baked goes, unless somebody else uses it, or the user protected or edited it; an action
@@ -292,19 +317,19 @@ def restore(owner):
             made.use_fake_user = True
 
 
-def _is_used(action):
+def _is_used(action: bpy.types.Action) -> bool:
     """Blender 4.3 counts a user too many of an action that was duplicated with its object."""
     return bool(
         action.users and (action.use_fake_user or bpy.data.user_map(subset=[action])[action])
     )
 
 
-def _noted(track, mute, solo):
+def _noted(track: bpy.types.NlaTrack, mute: bool | int, solo: bool | int) -> str:
     """What is kept of a track while a baked one is played: flags, and what it is known by."""
     return json.dumps([bool(mute), bool(solo), track.name, [s.name for s in track.strips]])
 
 
-def note_tracks_by_name(owner):
+def note_tracks_by_name(owner: Animated) -> bool:
     """Write what is kept of tracks in the present way: up to form 0 it was by their order.
 
     Returns:
@@ -315,6 +340,7 @@ def note_tracks_by_name(owner):
     if not lines or lines[0].startswith("["):
         return False
     data = owner.animation_data
+    assert data is not None
     own = data.nla_tracks.get(state["track"])
     others = [track for track in data.nla_tracks if track != own]
     pairs = [(t, *(int(w) for w in x.split())) for t, x in zip(others, lines, strict=False)]
@@ -324,10 +350,11 @@ def note_tracks_by_name(owner):
     return True
 
 
-def _remove_track(owner, state):
+def _remove_track(owner: Animated, state: bpy.types.bpy_struct) -> list[bpy.types.Action]:
     """Take the baked strip away and give the other tracks their flags. Returns: its actions."""
     note_tracks_by_name(owner)
     data = owner.animation_data
+    assert data is not None
     own = _baked_strips(data, state)
     played = [action for _track, strip in own for action in compat.actions_in([strip])]
     for track, strip in own:
@@ -346,7 +373,9 @@ def _remove_track(owner, state):
     return played
 
 
-def _baked_strips(data, state):
+def _baked_strips(
+    data: bpy.types.AnimData, state: bpy.types.bpy_struct
+) -> list[tuple[bpy.types.NlaTrack, bpy.types.NlaStrip]]:
     """Track and strip of what `play` put there, also where it was renamed or moved."""
     strips = [(track, strip) for track in data.nla_tracks for strip in track.strips]
     baked = state.get("baked")
@@ -358,7 +387,7 @@ def _baked_strips(data, state):
     return [(t, s) for t, s in marked if t.name == state["track"]]
 
 
-def busy(owner):
+def busy(owner: Animated) -> str:
     """Why the animation of a datablock cannot be exchanged now; empty when it can."""
     data = owner.animation_data
     if data is not None and data.use_tweak_mode:

@@ -1,17 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Clips become actions of a character's controls, and actions become clips again."""
 
+from __future__ import annotations
+
 import math
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import cast
 
 import bpy
 import numpy as np
 from mathutils import Euler, Quaternion
+from numpy.typing import NDArray
 
 from ... import native
 from ...logic.animation import clip_units
 from ..base import compat, parts
+from ..base.blender_types import ArmatureObject
 from ..character import armatures, runtime
 
 LINEAR = 1  # the number of the interpolation "LINEAR"
@@ -30,20 +36,26 @@ class Report:
         notes: sentences for the user.
     """
 
-    action: object
+    action: bpy.types.Action
     first: float = 0.0
     last: float = 0.0
     curves: int = 0
-    unknown: list = field(default_factory=list)
-    notes: list = field(default_factory=list)
+    unknown: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
 
 
-def frame_rate(scene):
+def frame_rate(scene: bpy.types.Scene) -> float:
     """Frames per second of a scene."""
     return scene.render.fps / scene.render.fps_base
 
 
-def timing_of(clip, scene, start, keep_clock=False, whole=False):
+def timing_of(
+    clip: native.Clip,
+    scene: bpy.types.Scene,
+    start: float,
+    keep_clock: bool = False,
+    whole: bool = False,
+) -> clip_units.Timing:
     """Where a clip lies in a scene.
 
     Args:
@@ -57,12 +69,18 @@ def timing_of(clip, scene, start, keep_clock=False, whole=False):
     return clip_units.Timing(frame_rate(scene), float(start), origin, whole)
 
 
-def sliders_of(live):
+def sliders_of(live: runtime.Runtime) -> dict[str, str]:
     """The property of each control name. Args: live  the character's Runtime."""
     return clip_units.property_names(live.dna.raw_control_names, live.labels)
 
 
-def make_action(rig, clip, timing, name, with_eyes=True):
+def make_action(
+    rig: ArmatureObject,
+    clip: native.Clip,
+    timing: clip_units.Timing,
+    name: str,
+    with_eyes: bool = True,
+) -> Report:
     """Make an action of a clip; nothing plays it yet.
 
     Args:
@@ -78,7 +96,7 @@ def make_action(rig, clip, timing, name, with_eyes=True):
     Raises:
         clips.ClipError: nothing in it is for this face, or it lies beyond what Blender can play.
     """
-    controls, live = parts.controls_of(rig), runtime.of(rig)
+    controls, live = parts.controls_there(rig), runtime.there(rig)
     times = clip.frame_times()
     keys = clip_units.keys_of(clip.names, clip.curves, times, timing, sliders_of(live), with_eyes)
     if not keys.controls and not keys.turns:
@@ -105,17 +123,17 @@ def make_action(rig, clip, timing, name, with_eyes=True):
 class _Groups:
     """Groups of F-curves, each made when first asked for."""
 
-    def __init__(self, bag):
+    def __init__(self, bag: bpy.types.ActionChannelbag) -> None:
         self.bag = bag
-        self.made = {}
+        self.made: dict[str, bpy.types.ActionGroup] = {}
 
-    def named(self, name):
+    def named(self, name: str) -> bpy.types.ActionGroup:
         if name not in self.made:
             self.made[name] = self.bag.groups.new(name)
         return self.made[name]
 
 
-def _span(frames, whole):
+def _span(frames: NDArray[np.float64], whole: bool) -> tuple[float, float]:
     if not len(frames):
         return 0.0, 0.0
     if whole:
@@ -123,7 +141,7 @@ def _span(frames, whole):
     return float(frames[0]), float(frames[-1])
 
 
-def set_range(scene, report, mode):
+def set_range(scene: bpy.types.Scene, report: Report, mode: str) -> None:
     """Let a scene last as long as what was imported.
 
     Args:
@@ -139,7 +157,14 @@ def set_range(scene, report, mode):
         scene.frame_end = max(scene.frame_end, last)
 
 
-def _add(bag, group, path, index, frames, values):
+def _add(
+    bag: bpy.types.ActionChannelbag,
+    group: bpy.types.ActionGroup,
+    path: str,
+    index: int,
+    frames: NDArray[np.float64],
+    values: NDArray[np.float64],
+) -> None:
     """One F-curve with straight lines between its keys."""
     curve = bag.fcurves.new(path, index=index)
     curve.group = group
@@ -151,7 +176,13 @@ def _add(bag, group, path, index, frames, values):
     curve.update()
 
 
-def _add_turn(bag, group, bone, frames, turns):
+def _add_turn(
+    bag: bpy.types.ActionChannelbag,
+    group: bpy.types.ActionGroup,
+    bone: bpy.types.PoseBone,
+    frames: NDArray[np.float64],
+    turns: NDArray[np.float64],
+) -> None:
     """The rotation of a bone, in the way that the bone is turned."""
     own = clip_units.near_signs(_into_bone(bone, turns))
     path = f'pose.bones["{bpy.utils.escape_identifier(bone.name)}"].{rotation_path(bone)}'
@@ -159,19 +190,19 @@ def _add_turn(bag, group, bone, frames, turns):
         _add(bag, group, path, index, frames, values)
 
 
-def rotation_path(bone):
+def rotation_path(bone: bpy.types.PoseBone) -> str:
     """The property that turns a pose bone."""
     return _ROTATIONS.get(bone.rotation_mode, "rotation_euler")
 
 
-def _into_bone(bone, turns):
+def _into_bone(bone: bpy.types.PoseBone, turns: NDArray[np.float64]) -> NDArray[np.float64]:
     """Turns in the armature's axes as turns in the bone's own."""
     rest = np.array(bone.bone.matrix_local.to_quaternion())[None]
     back = rest * [1.0, -1.0, -1.0, -1.0]
     return clip_units.multiply(clip_units.multiply(back, turns), rest)
 
 
-def _as_rotation(bone, turns):
+def _as_rotation(bone: bpy.types.PoseBone, turns: NDArray[np.float64]) -> NDArray[np.float64]:
     """float64[n, 3 or 4] as the bone's rotation mode writes it."""
     if bone.rotation_mode == "QUATERNION":
         return turns
@@ -185,13 +216,13 @@ def _as_rotation(bone, turns):
     return np.array([tuple(e) for e in eulers])
 
 
-def play(rig, action):
+def play(rig: ArmatureObject, action: bpy.types.Action) -> bpy.types.Action | None:
     """Let a character play an action as its active one.
 
     Returns:
         The action that it played before, now kept by a fake user; None where there was none.
     """
-    controls = parts.controls_of(rig)
+    controls = parts.controls_there(rig)
     data = controls.animation_data_create()
     before = data.action
     if before is not None and before != action:
@@ -200,9 +231,9 @@ def play(rig, action):
     return before if before != action else None
 
 
-def add_strip(rig, action, name=""):
+def add_strip(rig: ArmatureObject, action: bpy.types.Action, name: str = "") -> bpy.types.NlaStrip:
     """Play an action as a strip of a new NLA track, where its keys are. Returns: the strip."""
-    controls = parts.controls_of(rig)
+    controls = parts.controls_there(rig)
     track = controls.animation_data_create().nla_tracks.new()
     track.name = name or action.name
     first, last = action.frame_range
@@ -215,7 +246,13 @@ def add_strip(rig, action, name=""):
     return strip
 
 
-def clip_of_action(controls, live, action, frames, rate):
+def clip_of_action(
+    controls: ArmatureObject,
+    live: runtime.Runtime,
+    action: bpy.types.Action,
+    frames: NDArray[np.float64],
+    rate: float,
+) -> native.Clip:
     """Sample an action as a clip.
 
     Args:
@@ -250,7 +287,7 @@ def clip_of_action(controls, live, action, frames, rate):
     )
 
 
-def dna_names(live, names):
+def dna_names(live: runtime.Runtime, names: Iterable[str]) -> list[str]:
     """The names that other characters know: the DNA's instead of Blender's cut ones.
 
     A slider keeps Blender's where the DNA has a name twice; what is no slider keeps its own.
@@ -261,21 +298,21 @@ def dna_names(live, names):
     return [own.get(name, name) for name in names]
 
 
-def sampled(curve, frames):
+def sampled(curve: bpy.types.FCurve, frames: NDArray[np.float64]) -> NDArray[np.float64]:
     """float64[n]: the values of an F-curve at frames."""
     if is_bent(curve) or not len(curve.keyframe_points):
         return np.array([curve.evaluate(frame) for frame in frames])
     return np.interp(frames, *key_points(curve))  # fifty times as fast
 
 
-def key_points(curve):
+def key_points(curve: bpy.types.FCurve) -> NDArray[np.float32]:
     """Frames and values of an F-curve's keys, float32[2, keys]."""
     points = np.empty(len(curve.keyframe_points) * 2, np.float32)
     curve.keyframe_points.foreach_get("co", points)
     return points.reshape(-1, 2).T
 
 
-def is_bent(curve):
+def is_bent(curve: bpy.types.FCurve) -> bool:
     """Whether an F-curve is anything else than straight lines from key to key, held outside."""
     if len(curve.modifiers) or curve.extrapolation != "CONSTANT":
         return True
@@ -284,14 +321,18 @@ def is_bent(curve):
     return bool((kinds[:-1] != LINEAR).any())
 
 
-def playing_curves(action, owner):
+def playing_curves(action: bpy.types.Action, owner: bpy.types.ID) -> list[bpy.types.FCurve]:
     """The F-curves by which an action moves a datablock, without those that are muted."""
     return [
         c for c in compat.curves_for(action, owner) if not (c.mute or (c.group and c.group.mute))
     ]
 
 
-def _head_rows(controls, curves, frames):
+def _head_rows(
+    controls: ArmatureObject,
+    curves: Mapping[tuple[str, int], bpy.types.FCurve],
+    frames: NDArray[np.float64],
+) -> NDArray[np.float64] | None:
     """float64[3, n]: how the head bone is turned, or None where it is not."""
     bone = controls.pose.bones.get("head")
     if bone is None:
@@ -315,20 +356,22 @@ def _head_rows(controls, curves, frames):
     return clip_units.angles_of(turns).T
 
 
-def _from_rotation(mode, values):
+def _from_rotation(mode: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
     if mode == "QUATERNION":
         return values / np.linalg.norm(values, axis=1, keepdims=True).clip(1e-12)
     if mode == "AXIS_ANGLE":
-        return np.array([tuple(Quaternion(v[1:], v[0])) for v in values])
-    return np.array([tuple(Euler(v, mode).to_quaternion()) for v in values])
+        return np.array([Quaternion(v[1:], v[0])[:] for v in values])
+    return np.array([Euler(v, mode).to_quaternion()[:] for v in values])
 
 
-def _from_bone(bone, turns):
+def _from_bone(bone: bpy.types.PoseBone, turns: NDArray[np.float64]) -> NDArray[np.float64]:
     rest = np.array(bone.bone.matrix_local.to_quaternion())[None]
     return clip_units.multiply(clip_units.multiply(rest, turns), rest * [1.0, -1.0, -1.0, -1.0])
 
 
-def add_sound(scene, path, frame, name=""):
+def add_sound(
+    scene: bpy.types.Scene, path: str | Path, frame: float, name: str = ""
+) -> bpy.types.SoundStrip:
     """Put a sound strip into the sequencer, on the first channel that is free there.
 
     Args:
@@ -346,17 +389,18 @@ def add_sound(scene, path, frame, name=""):
     strips = compat.strips_of(scene)
     start = round(frame)
     try:
-        strip = strips.new_sound(name or Path(path).stem, str(path), _free(strips, start), start)
+        made = strips.new_sound(name or Path(path).stem, str(path), _free(strips, start), start)
     except RuntimeError as error:
         said = str(error).strip().removeprefix("Error: ")
         raise clip_units.ClipError(f"no sound strip: {said}") from error
+    strip = cast("bpy.types.SoundStrip", made)
     if strip.frame_final_duration <= 1 and not strip.sound.samplerate:
         strips.remove(strip)
         raise clip_units.ClipError("no sound strip: Blender cannot read it")
     return strip
 
 
-def _free(strips, start):
+def _free(strips: Iterable[bpy.types.Strip], start: int) -> int:
     """The first channel on which nothing lies at or after a frame."""
     taken = {s.channel for s in strips if s.frame_final_end > start}
     return next(c for c in range(1, 129) if c not in taken or c == 128)

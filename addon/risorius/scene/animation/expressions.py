@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Expressions on the sliders: set, keyed, or as pose assets in a catalogue of the file."""
 
+from __future__ import annotations
+
 import uuid
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import bpy
@@ -10,6 +13,7 @@ from ... import native
 from ...logic.animation import clip_units as clip_logic
 from ...logic.character import regions
 from ..base import parts
+from ..base.blender_types import ArmatureObject
 from ..character import armatures, runtime
 from . import actions, clip_actions
 
@@ -19,12 +23,12 @@ _CATALOG_FILE = "blender_assets.cats.txt"
 _HEADER = "# Asset catalogues of Blender\n\nVERSION 1\n\n"
 
 
-def all_expressions():
+def all_expressions() -> dict[str, native.Expression]:
     """Name -> risorius Expression, in the order of their files."""
     return native.part("expressions").load()
 
 
-def groups():
+def groups() -> dict[str, list[native.Expression]]:
     """Group -> its expressions, in their order."""
     found = {}
     for expression in all_expressions().values():
@@ -32,13 +36,18 @@ def groups():
     return found
 
 
-def weights_for(live, expression):
+def weights_for(live: runtime.Runtime, expression: native.Expression) -> dict[str, float]:
     """The sliders of an expression: property name -> value, without those the face lacks."""
     sliders = clip_actions.sliders_of(live)
     return {sliders[n]: float(w) for n, w in expression.weights.items() if n in sliders}
 
 
-def apply(rig, expression, strength, others_to_rest=False):
+def apply(
+    rig: ArmatureObject,
+    expression: native.Expression,
+    strength: float,
+    others_to_rest: bool = False,
+) -> list[str]:
     """Move the sliders towards an expression.
 
     Args:
@@ -50,7 +59,7 @@ def apply(rig, expression, strength, others_to_rest=False):
     Returns:
         The property names of the sliders that it concerns.
     """
-    live, face, controls = runtime.of(rig), parts.face_bone(rig), parts.controls_of(rig)
+    live, face, controls = runtime.there(rig), parts.face_bone(rig), parts.controls_there(rig)
     goals = weights_for(live, expression)
     if others_to_rest:
         goals = {**dict(zip(live.labels, live.rests, strict=True)), **goals}
@@ -63,15 +72,15 @@ def apply(rig, expression, strength, others_to_rest=False):
     return list(goals)
 
 
-def key(rig, names, frame):
+def key(rig: ArmatureObject, names: Iterable[str], frame: float) -> None:
     """Insert keys on sliders at a frame."""
-    controls = parts.controls_of(rig)
+    controls = parts.controls_there(rig)
     for name in names:
         path = parts.property_path(name)
         controls.keyframe_insert(path, frame=frame, group=armatures.key_group(name))
 
 
-def make_assets(rig):
+def make_assets(rig: ArmatureObject) -> tuple[list[bpy.types.Action], list[str]]:
     """Make a pose asset of every expression that this face can show.
 
     An asset holds all sliders of the regions that its expression moves, so that it looks the same
@@ -83,7 +92,7 @@ def make_assets(rig):
     Returns:
         The actions, and sentences for the user.
     """
-    live = runtime.of(rig)
+    live = runtime.there(rig)
     made, left_out = [], []
     for expression in all_expressions().values():
         weights = weights_for(live, expression)
@@ -97,7 +106,12 @@ def make_assets(rig):
     return made, notes
 
 
-def _asset(rig, live, expression, weights):
+def _asset(
+    rig: ArmatureObject,
+    live: runtime.Runtime,
+    expression: native.Expression,
+    weights: Mapping[str, float],
+) -> bpy.types.Action:
     held = regions_of(expression, weights)
     pose = {
         label: rest
@@ -119,18 +133,18 @@ def _asset(rig, live, expression, weights):
     return action
 
 
-def regions_of(expression, weights):
+def regions_of(expression: native.Expression, weights: Iterable[str]) -> set[str]:
     """The regions that an expression moves; a viseme always the whole mouth."""
     held = {regions.region_of(name) for name in weights}
     return held | {"mouth", "jaw", "tongue"} if expression.group == "viseme" else held
 
 
-def catalog_id(group):
+def catalog_id(group: str) -> uuid.UUID:
     """The number of a group's catalogue, the same in every file."""
     return uuid.uuid5(_NAMESPACE, group)
 
 
-def _write_catalogs(wanted):
+def _write_catalogs(wanted: Iterable[str]) -> list[str]:
     """Name the catalogues in the file beside the .blend, where Blender keeps them.
 
     Returns:
@@ -146,7 +160,7 @@ def _write_catalogs(wanted):
     return []
 
 
-def _add_catalogs(path, wanted):
+def _add_catalogs(path: Path, wanted: Iterable[str]) -> None:
     text = path.read_text(encoding="utf-8") if path.is_file() else _HEADER
     for group in sorted(wanted):
         number = str(catalog_id(group))

@@ -1,10 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The layers of a character as properties of its control armature: saved, copied and overridden."""
 
+# Blender takes properties where Python has annotations:
+# pyright: reportInvalidTypeForm=false
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
 import bpy
 
 from ...logic.animation import layer_rules
 from ...logic.character import regions
+from ..base.blender_types import Context
 
 KINDS = (
     ("ACTION", "Action", "Keys of the controls, as of an import or of your own hand"),
@@ -25,15 +32,17 @@ EXTENDS = (
 REGIONS = tuple((r.upper(), regions.TITLES[r], "") for r in regions.REGIONS)
 INDEX = f"{layer_rules.COLLECTION}_index"
 REACTIONS = "risorius_reactions"
-_OVERRIDE = {"LIBRARY_OVERRIDABLE"}
+_OVERRIDE: Any = {"LIBRARY_OVERRIDABLE"}
 
 
-def _changed(self, _context):
+def _changed(self: bpy.types.PropertyGroup, _context: Context) -> None:
     """Let Blender evaluate the character; what is compiled is compared, and made anew."""
     self.id_data.update_tag()
 
 
-def _still(kind, options=frozenset(), **given):
+def _still(
+    kind: Callable[..., Any], options: Iterable[str] = frozenset(), **given: object
+) -> object:
     """A property that has no keys. Args: kind  of bpy.props, given  its own options."""
     return kind(options=set(options), override=_OVERRIDE, update=_changed, **given)
 
@@ -133,9 +142,9 @@ class RISORIUS_PG_layer(bpy.types.PropertyGroup):
 CLASSES = (RISORIUS_PG_warp, RISORIUS_PG_reaction, RISORIUS_PG_layer)
 
 
-def register():
+def register() -> None:
     """Add the collections to objects; the classes are there."""
-    insertable = {*_OVERRIDE, "USE_INSERTION"}
+    insertable: Any = {*_OVERRIDE, "USE_INSERTION"}
     for name, kind in (
         (layer_rules.COLLECTION, RISORIUS_PG_layer),
         (REACTIONS, RISORIUS_PG_reaction),
@@ -144,7 +153,7 @@ def register():
         setattr(bpy.types.Object, name, collection)
         index = bpy.props.IntProperty(options=set(), override=_OVERRIDE)
         setattr(bpy.types.Object, f"{name}_index", index)
-    bpy.types.Object.risorius_layer_rules = _still(
+    bpy.types.Object.risorius_layer_rules = _still(  # pyright: ignore[reportAttributeAccessIssue]
         bpy.props.BoolProperty,
         name="Exclude Opposites",
         description="Where there are layers, controls that undo each other give way: closed lips "
@@ -153,9 +162,9 @@ def register():
     )
 
 
-def unregister():
+def unregister() -> None:
     """Take them away; what files hold of them stays."""
     for name in (layer_rules.COLLECTION, REACTIONS):
         delattr(bpy.types.Object, name)
         delattr(bpy.types.Object, f"{name}_index")
-    del bpy.types.Object.risorius_layer_rules
+    del bpy.types.Object.risorius_layer_rules  # pyright: ignore[reportAttributeAccessIssue]

@@ -6,18 +6,26 @@ look at the settings and one native call, and nothing at all without layers. No 
 kept.
 """
 
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import bpy
 import numpy as np
 from mathutils import Quaternion
+from numpy.typing import NDArray
 
 from ... import native
 from ...logic.animation import clip_units as clip_logic
 from ...logic.animation import layer_rules as logic
 from ...logic.base.errors import FaceError
 from ..base import compat, parts
+from ..base.blender_types import ArmatureObject, Depsgraph
+from ..character import runtime
 from . import clip_actions
+from .layer_properties import REACTIONS, RISORIUS_PG_layer, RISORIUS_PG_reaction
 
 _OF_SOURCE = (
     "kind",
@@ -60,20 +68,24 @@ class Stack:
         kept: sources and masks, by what they were made of.
     """
 
-    made_of: tuple
-    mixer: object
-    layers: list = field(default_factory=list)
-    places: list = field(default_factory=list)
-    weights: tuple = ()
-    problems: dict = field(default_factory=dict)
-    kept: dict = field(default_factory=dict)
+    made_of: tuple[Any, ...]
+    mixer: native.Mixer
+    layers: list[native.Layer] = field(default_factory=list)
+    places: list[int] = field(default_factory=list)
+    weights: tuple[float, ...] = ()
+    problems: dict[int | str, str] = field(default_factory=dict)
+    kept: Kept = field(default_factory=dict)
 
 
-_stacks = {}  # session uid of a control armature -> Stack
-_versions = {}  # session uid of an action -> how often it was edited
+Times = dict[str, Any]  # keyword arguments of risorius.Layer that say when it plays
+Source = tuple[Any, Times]  # a risorius.Clip, or a pose as a dict
+Kept = dict[tuple[object, ...], Any]  # sources and masks by what they were made of
+
+_stacks: dict[int, Stack] = {}  # session uid of a control armature -> Stack
+_versions: dict[int, int] = {}  # session uid of an action -> how often it was edited
 
 
-def places(controls):
+def places(controls: bpy.types.Object) -> bpy.types.bpy_prop_collection_idprop[RISORIUS_PG_layer]:
     """The settings of all layers of a character by their places, which never change.
 
     Args:
@@ -82,51 +94,60 @@ def places(controls):
     return getattr(controls, logic.COLLECTION)
 
 
-def of(controls):
+def of(controls: bpy.types.Object) -> list[RISORIUS_PG_layer]:
     """The layers that are there, bottom to top. Args: controls  the control armature."""
     return [layer for _place, layer in _ordered(controls)]
 
 
-def _ordered(controls):
+def _ordered(controls: bpy.types.Object) -> list[tuple[int, RISORIUS_PG_layer]]:
     """Place and layer of those that are there, bottom to top."""
     there = ((i, layer) for i, layer in enumerate(places(controls)) if not layer.removed)
     return sorted(there, key=lambda pair: pair[1].rank)
 
 
-def reactions_of(controls):
+def reactions_of(
+    controls: bpy.types.Object,
+) -> bpy.types.bpy_prop_collection_idprop[RISORIUS_PG_reaction]:
     """The reactions that were fired."""
-    return controls.risorius_reactions
+    return getattr(controls, REACTIONS)
 
 
-def has_any(controls):
+def has_any(controls: ArmatureObject) -> bool:
     """Whether anything is played above the sliders."""
     return len(reactions_of(controls)) > 0 or any(not layer.mute for layer in of(controls))
 
 
-def forget():
+def forget() -> None:
     """Drop all that is compiled: after load and undo, session uids may mean others."""
     _stacks.clear()
 
 
-def forget_unused(there):
+def forget_unused(there: Iterable[ArmatureObject | None]) -> None:
     """Drop what is compiled of characters that are gone. Args: there  control armatures."""
     kept = {controls.session_uid for controls in there if controls is not None}
     for uid in [uid for uid in _stacks if uid not in kept]:
         del _stacks[uid]
 
 
-def note_edits(actions):
+def note_edits(actions: Iterable[bpy.types.Action]) -> None:
     """Note that actions were edited: what is made of them is made anew."""
     for action in actions:
         _versions[action.session_uid] = _versions.get(action.session_uid, 0) + 1
 
 
-def plays(controls, actions):
+def plays(controls: ArmatureObject, actions: Collection[bpy.types.Action]) -> bool:
     """Whether a layer of a character plays one of the actions."""
     return any(layer.action in actions for layer in of(controls) if layer.action is not None)
 
 
-def mix(seen, live, raw, head, depsgraph, maximum):
+def mix(
+    seen: ArmatureObject,
+    live: runtime.Runtime,
+    raw: NDArray[np.float32],
+    head: Quaternion | None,
+    depsgraph: Depsgraph,
+    maximum: float,
+) -> tuple[NDArray[np.float32], Quaternion | None]:
     """Mix the layers of a character over its sliders and its head bone.
 
     Args:
@@ -161,7 +182,9 @@ def mix(seen, live, raw, head, depsgraph, maximum):
     return np.ascontiguousarray(out[: len(raw)]), head
 
 
-def compiled(controls, live, scene, maximum=1.0):
+def compiled(
+    controls: ArmatureObject, live: runtime.Runtime, scene: bpy.types.Scene, maximum: float = 1.0
+) -> Stack:
     """The Stack of a character, compiled anew only where something changed."""
     rate = clip_actions.frame_rate(scene)
     made_of = (
@@ -176,11 +199,11 @@ def compiled(controls, live, scene, maximum=1.0):
     return stack
 
 
-def _get(layer, names):
+def _get(layer: RISORIUS_PG_layer, names: Iterable[str]) -> Iterator[object]:
     return (getattr(layer, name) for name in names)
 
 
-def _key(layer, rate):
+def _key(layer: RISORIUS_PG_layer, rate: float) -> tuple[tuple[object, ...], tuple[object, ...]]:
     """What a layer's curves depend on, and what its mask does."""
     action = layer.action
     uid = action.session_uid if action is not None else 0
@@ -189,7 +212,14 @@ def _key(layer, rate):
     return source, (tuple(sorted(layer.regions)), layer.controls)
 
 
-def _compile(controls, live, rate, maximum, made_of, old):
+def _compile(
+    controls: ArmatureObject,
+    live: runtime.Runtime,
+    rate: float,
+    maximum: float,
+    made_of: tuple[object, ...],
+    old: Stack | None,
+) -> Stack:
     """A new Stack. Args: old  the one before it, whose curves serve where they are the same."""
     same_face = old is not None and old.made_of[0] == made_of[0]
     stack = Stack(made_of, _mixer(controls, live, maximum) if not same_face else old.mixer)
@@ -205,7 +235,7 @@ def _compile(controls, live, rate, maximum, made_of, old):
     return stack
 
 
-def _mixer(controls, live, maximum):
+def _mixer(controls: ArmatureObject, live: runtime.Runtime, maximum: float) -> native.Mixer:
     return native.module().Mixer(
         [*live.labels, *clip_logic.HEAD],
         ranges={n: (low, maximum) for n, low in zip(live.labels, live.lowest, strict=True)},
@@ -214,7 +244,7 @@ def _mixer(controls, live, maximum):
     )
 
 
-def _fire(stack, controls, rate):
+def _fire(stack: Stack, controls: ArmatureObject, rate: float) -> None:
     """Fire all reactions, whenever they are: so each frame is the same in any order of frames."""
     stack.mixer.clear_fired()
     for reaction in reactions_of(controls):
@@ -227,7 +257,7 @@ def _fire(stack, controls, rate):
             stack.problems["Reactions"] = f"only the first {_MOST_FIRED} are shown"
 
 
-def _set_weights(stack, weights):
+def _set_weights(stack: Stack, weights: tuple[float, ...]) -> None:
     """Give the layers the weights of this frame: cheap, their curves stay."""
     stack.mixer.layers = tuple(
         replace(layer, weight=min(max(weights[place], 0.0), 1.0))
@@ -236,7 +266,14 @@ def _set_weights(stack, weights):
     stack.weights = weights
 
 
-def native_layer(controls, live, layer, rate, old=None, kept=None):
+def native_layer(
+    controls: ArmatureObject,
+    live: runtime.Runtime,
+    layer: RISORIUS_PG_layer,
+    rate: float,
+    old: Kept | None = None,
+    kept: Kept | None = None,
+) -> native.Layer:
     """A layer as risorius.Layer, at full weight.
 
     Args:
@@ -275,37 +312,41 @@ def native_layer(controls, live, layer, rate, old=None, kept=None):
     )
 
 
-def _mask(live, layer):
+def _mask(live: runtime.Runtime, layer: RISORIUS_PG_layer) -> NDArray[np.float32]:
     allowed = allowed_names(live, layer)
     names = [*live.labels, *clip_logic.HEAD]
     return np.array([name in allowed for name in names], np.float32)
 
 
-def allowed_names(live, layer):
+def allowed_names(live: runtime.Runtime, layer: RISORIUS_PG_layer) -> set[str]:
     """What a layer may move: sliders, and the head's angles, which belong to the neck's region."""
     regions = {region.lower() for region in layer.regions}
     return set(logic.masked([*live.labels, *clip_logic.HEAD], regions, layer.controls))
 
 
-def _still_times(layer, rate):
+def _still_times(layer: RISORIUS_PG_layer, rate: float) -> Times:
     """A pose stands always, or for its length from its start on."""
     if not layer.length:
         return {}
     return {"start": layer.start / rate, "end": (layer.start + layer.length) / rate}
 
 
-def _expression_source(_controls, live, layer, rate):
+def _expression_source(
+    _controls: ArmatureObject, live: runtime.Runtime, layer: RISORIUS_PG_layer, rate: float
+) -> Source:
     pose = native.part("expressions").get(layer.expression).weights
     return _for_face(live, pose), _still_times(layer, rate)
 
 
-def _for_face(live, pose):
+def _for_face(live: runtime.Runtime, pose: Mapping[str, float]) -> dict[str, float]:
     """A pose by the labels of this face's sliders; what it does not have is left out."""
     sliders = clip_actions.sliders_of(live)
     return {sliders[name]: value for name, value in pose.items() if name in sliders}
 
 
-def _action_source(controls, live, layer, rate):
+def _action_source(
+    controls: ArmatureObject, live: runtime.Runtime, layer: RISORIUS_PG_layer, rate: float
+) -> Source:
     action = layer.action
     if action is None:
         raise FaceError("choose an action")
@@ -321,13 +362,14 @@ def _action_source(controls, live, layer, rate):
     return clip, _span_times(span, rate)
 
 
-def span_of(layer, action=None):
+def span_of(layer: RISORIUS_PG_layer, action: bpy.types.Action | None = None) -> logic.Span:
     """When a layer plays its action, or another one instead."""
     first, last = (action or layer.action).frame_range
     points = sorted((point.frame, point.source) for point in layer.warp)
     warp = None
     if len(points) > 1:
-        warp = tuple(np.array(column, np.float64) for column in zip(*points, strict=True))
+        shown, own = (np.array(column, np.float64) for column in zip(*points, strict=True))
+        warp = shown, own
     return logic.Span(
         layer.start,
         min(first + layer.trim_start, last),
@@ -339,7 +381,7 @@ def span_of(layer, action=None):
     )
 
 
-def _span_times(span, rate):
+def _span_times(span: logic.Span, rate: float) -> Times:
     if span.warp is not None:
         return {"warp": (span.warp[0] / rate, span.warp[1] / rate)}
     return {
@@ -351,7 +393,9 @@ def _span_times(span, rate):
     }
 
 
-def _idle_source(_controls, live, layer, rate):
+def _idle_source(
+    _controls: ArmatureObject, live: runtime.Runtime, layer: RISORIUS_PG_layer, rate: float
+) -> Source:
     """Idle life of its length, or in a long loop that goes on for ever."""
     endless = not layer.length
     seconds = _IDLE_LOOP if endless else layer.length / rate
@@ -367,25 +411,27 @@ def _idle_source(_controls, live, layer, rate):
 _SOURCES = {"ACTION": _action_source, "EXPRESSION": _expression_source, "IDLE": _idle_source}
 
 
-def problems(controls, live, scene):
+def problems(controls: ArmatureObject, live: runtime.Runtime, scene: bpy.types.Scene) -> list[str]:
     """Sentences on layers that cannot be played, as last compiled."""
     stack = compiled(controls, live, scene, parts.maximum_of(controls))
-    names = {place: layer.name for place, layer in enumerate(places(controls))}
+    names: dict[int | str, str] = {
+        place: layer.name for place, layer in enumerate(places(controls))
+    }
     return [f"{names.get(place, place)}: {words}." for place, words in stack.problems.items()]
 
 
-def known_reactions():
+def known_reactions() -> dict[str, native.Reaction]:
     """Name -> what can be fired."""
     return native.part("anim.reactions").load_reactions()
 
 
-def fits(controls, action):
+def fits(controls: ArmatureObject, action: bpy.types.Action) -> bool:
     """Whether an action has keys of a slider of a character."""
     path = parts.property_path("")[:-3]
     return any(c.data_path.startswith(path) for c in compat.curves_for(action, controls))
 
 
-def add_warp_point(layer, frame):
+def add_warp_point(layer: RISORIUS_PG_layer, frame: float) -> None:
     """Pin what a layer with an action shows at a frame of the scene to that frame.
 
     The first time its two ends are pinned too, so that nothing else changes.
@@ -401,12 +447,12 @@ def add_warp_point(layer, frame):
         _add_point(layer, frame, shown)
 
 
-def _add_point(layer, frame, source):
+def _add_point(layer: RISORIUS_PG_layer, frame: float, source: float) -> None:
     point = layer.warp.add()
     point.frame, point.source = frame, source
 
 
-def add(controls, kind, name, **settings):
+def add(controls: ArmatureObject, kind: str, name: str, **settings: object) -> RISORIUS_PG_layer:
     """Put a new layer on top of the others and make it the active one.
 
     Args:
@@ -430,24 +476,26 @@ def add(controls, kind, name, **settings):
     return layer
 
 
-def _free_name(name, taken):
+def _free_name(name: str, taken: Collection[str]) -> str:
     if name not in taken:
         return name
     return next(n for n in (f"{name}.{i:03d}" for i in range(1, 10_000)) if n not in taken)
 
 
-def add_action(controls, action, **settings):
+def add_action(
+    controls: ArmatureObject, action: bpy.types.Action, **settings: object
+) -> RISORIUS_PG_layer:
     """A layer that plays an action where its keys are. Returns: the layer."""
     first = action.frame_range[0]
     return add(controls, "ACTION", action.name, action=action, start=first, **settings)
 
 
-def place_of(controls, layer):
+def place_of(controls: ArmatureObject, layer: RISORIUS_PG_layer) -> int:
     """The place of a layer: what its keys and drivers call it by."""
     return list(places(controls)).index(layer)
 
 
-def remove(controls, place):
+def remove(controls: ArmatureObject, place: int) -> None:
     """Remove a layer, and the keys of its weight where no other character plays them.
 
     Its place stays empty while an action has keys for it, so that they move no other layer.
@@ -466,7 +514,7 @@ def remove(controls, place):
     controls.update_tag()
 
 
-def _trim(controls):
+def _trim(controls: ArmatureObject) -> None:
     """Take empty places from the end that no action of the file has keys for."""
     curves = (c for action in bpy.data.actions for c in compat.curves_of(action))
     keyed = {logic.place_of(c.data_path) for c in curves}
@@ -476,7 +524,7 @@ def _trim(controls):
         last -= 1
 
 
-def move(controls, place, up):
+def move(controls: ArmatureObject, place: int, up: bool) -> bool:
     """Put a layer one higher or lower; its place, and with it its keys, stay.
 
     Returns:
@@ -493,13 +541,13 @@ def move(controls, place, up):
     return True
 
 
-def _rank(there):
+def _rank(there: Sequence[RISORIUS_PG_layer]) -> None:
     for rank, layer in enumerate(there):
         if layer.rank != rank:
             layer.rank = rank
 
 
-def duplicate(controls, place):
+def duplicate(controls: ArmatureObject, place: int) -> RISORIUS_PG_layer:
     """Put a copy of a layer, with the keys of its weight, right above it. Returns: the copy."""
     source = places(controls)[place]
     name, kind = source.name, source.kind
@@ -518,7 +566,7 @@ def duplicate(controls, place):
     return copy
 
 
-def _own_curve_lists(controls):
+def _own_curve_lists(controls: ArmatureObject) -> Iterator[Any]:
     """The lists of F-curves that move a control armature and nothing else, its drivers too."""
     played = [action for action in compat.played_actions(controls) if action.library is None]
     users = bpy.data.user_map(subset=played) if played else {}
@@ -530,7 +578,7 @@ def _own_curve_lists(controls):
         yield controls.animation_data.drivers
 
 
-def _copy_curves(controls, place, to):
+def _copy_curves(controls: ArmatureObject, place: int, to: int) -> None:
     for curves in _own_curve_lists(controls):
         if not hasattr(curves, "new") or curves == controls.animation_data.drivers:
             continue
@@ -539,7 +587,7 @@ def _copy_curves(controls, place, to):
             copy_keys(curve, curves.new(path, index=curve.array_index))
 
 
-def copy_keys(source, target):
+def copy_keys(source: bpy.types.FCurve, target: bpy.types.FCurve) -> None:
     """Give an F-curve without keys those of another."""
     target.keyframe_points.add(len(source.keyframe_points))
     for new, old in zip(target.keyframe_points, source.keyframe_points, strict=True):
@@ -548,7 +596,7 @@ def copy_keys(source, target):
     target.update()
 
 
-def keep_weights(controls, before):
+def keep_weights(controls: ArmatureObject, before: bpy.types.Action | None) -> None:
     """Give the action that now plays the keys of weights that were in another one.
 
     Args:
@@ -559,18 +607,23 @@ def keep_weights(controls, before):
     curves = [c for c in old.fcurves if c.data_path.startswith(logic.COLLECTION)] if old else []
     if not curves:
         return
-    data = controls.animation_data
+    data = controls.animation_data_create()
     if data.action is None:
         action = bpy.data.actions.new(f"{controls.name} layers")
         compat.add_curves(action, controls)
         compat.assign_action(data, action, compat.slot_for(action, controls))
-    new = compat.bag_for(data.action, controls).fcurves
+    assert data.action is not None
+    bag = compat.bag_for(data.action, controls)
+    assert bag is not None
+    new = bag.fcurves
     for curve in curves:
         if new.find(curve.data_path) is None:
             copy_keys(curve, new.new(curve.data_path))
 
 
-def fire(controls, name, frame, strength=1.0):
+def fire(
+    controls: ArmatureObject, name: str, frame: float, strength: float = 1.0
+) -> RISORIUS_PG_reaction:
     """Fire a reaction at a frame. Returns: its entry in the list."""
     entry = reactions_of(controls).add()
     entry.name, entry.frame, entry.strength = name, frame, strength
@@ -579,7 +632,7 @@ def fire(controls, name, frame, strength=1.0):
     return entry
 
 
-def unfire(controls, place):
+def unfire(controls: ArmatureObject, place: int) -> None:
     """Take a fired reaction out again."""
     reactions_of(controls).remove(place)
     controls.risorius_reactions_index = max(0, min(place, len(reactions_of(controls)) - 1))

@@ -1,16 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Layers as tracks of Blender's own NLA, as far as it can say the same."""
 
+from __future__ import annotations
+
+from collections.abc import Set
+
+import bpy
+
 from ...logic.animation import clip_units as clip_logic
 from ...logic.animation import layer_rules as logic
 from ..base import compat, parts
+from ..base.blender_types import ArmatureObject
 from ..character import runtime
 from . import clip_actions, layers
+from .layer_properties import RISORIUS_PG_layer
 
 _BLENDS = {"OVERRIDE": "REPLACE", "ADD": "ADD"}
 
 
-def push(scene, rig):
+def push(scene: bpy.types.Scene, rig: ArmatureObject) -> tuple[int, list[str]]:
     """Make strips of the layers, bottom to top, up to the first that no strip can say.
 
     The NLA lies below all layers, so what is above that one must stay a layer too. Layers that
@@ -23,7 +31,7 @@ def push(scene, rig):
     Returns:
         How many layers were pushed, and sentences for the user.
     """
-    controls, live = parts.controls_of(rig), runtime.of(rig)
+    controls, live = parts.controls_there(rig), runtime.there(rig)
     settings = layers.of(controls)
     playing = [layer for layer in settings if not layer.mute]
     if any(layer.solo for layer in playing):
@@ -50,7 +58,9 @@ def push(scene, rig):
     return count, notes
 
 
-def obstacle(controls, layer, curve=None):
+def obstacle(
+    controls: ArmatureObject, layer: RISORIUS_PG_layer, curve: bpy.types.FCurve | None = None
+) -> str:
     """Why a strip cannot say the same as a layer; empty where it can.
 
     Args:
@@ -71,22 +81,22 @@ def obstacle(controls, layer, curve=None):
     return next((words for holds, words in reasons if holds), "")
 
 
-def _weight_path(controls, layer):
+def _weight_path(controls: ArmatureObject, layer: RISORIUS_PG_layer) -> str:
     return f"{logic.COLLECTION}[{layers.place_of(controls, layer)}].weight"
 
 
-def _weight_driver(controls, layer):
+def _weight_driver(controls: ArmatureObject, layer: RISORIUS_PG_layer) -> bpy.types.FCurve | None:
     data = controls.animation_data
     return data.drivers.find(_weight_path(controls, layer)) if data is not None else None
 
 
-def _weight_curve(controls, layer):
+def _weight_curve(controls: ArmatureObject, layer: RISORIUS_PG_layer) -> bpy.types.FCurve | None:
     data = controls.animation_data
     bag = compat.bag_for(data.action, controls) if data and data.action else None
     return bag.fcurves.find(_weight_path(controls, layer)) if bag is not None else None
 
 
-def _push_down(controls, rig):
+def _push_down(controls: ArmatureObject, rig: ArmatureObject) -> None:
     """The active action as a strip, as Blender's own Push Down Action makes it."""
     data = controls.animation_data
     if data is None or data.action is None:
@@ -104,7 +114,13 @@ def _push_down(controls, rig):
         _set_influence(strip, influence)
 
 
-def _add_strip(scene, rig, live, layer, curve):
+def _add_strip(
+    scene: bpy.types.Scene,
+    rig: ArmatureObject,
+    live: runtime.Runtime,
+    layer: RISORIUS_PG_layer,
+    curve: bpy.types.FCurve | None,
+) -> None:
     action, still = _action_of(scene, rig, live, layer)
     strip = clip_actions.add_strip(rig, action, layer.name)
     strip.use_auto_blend = False
@@ -128,14 +144,16 @@ def _add_strip(scene, rig, live, layer, curve):
         strip.blend_in, strip.blend_out = layer.fade_in, layer.fade_out
 
 
-def _place_strip(strip, span):
+def _place_strip(strip: bpy.types.NlaStrip, span: logic.Span) -> None:
     strip.action_frame_start, strip.action_frame_end = span.first, span.last
     strip.scale, strip.repeat = span.scale, span.repeat
     strip.frame_start = span.start
     strip.frame_end = span.scene_range()[1]
 
 
-def _set_influence(strip, value, fade_in=0.0, fade_out=0.0):
+def _set_influence(
+    strip: bpy.types.NlaStrip, value: float, fade_in: float = 0.0, fade_out: float = 0.0
+) -> None:
     """A constant influence; with it a strip does not fade of itself, so its keys do."""
     strip.use_animated_influence = True
     strip.influence = value
@@ -154,9 +172,11 @@ def _set_influence(strip, value, fade_in=0.0, fade_out=0.0):
     strip.fcurves.find("influence").update()
 
 
-def _action_of(scene, rig, live, layer):
+def _action_of(
+    scene: bpy.types.Scene, rig: ArmatureObject, live: runtime.Runtime, layer: RISORIUS_PG_layer
+) -> tuple[bpy.types.Action, bool]:
     """An action with what the layer lets through: its own where that is all. Returns: it, still."""
-    controls = parts.controls_of(rig)
+    controls = parts.controls_there(rig)
     if layer.kind == "ACTION":
         first, last = layer.action.frame_range
         names = layers.allowed_names(live, layer)
@@ -170,7 +190,9 @@ def _action_of(scene, rig, live, layer):
     return made.action, clip.frame_count < 2
 
 
-def _masked(controls, layer, allowed):
+def _masked(
+    controls: ArmatureObject, layer: RISORIUS_PG_layer, allowed: Set[str]
+) -> bpy.types.Action:
     curves = compat.curves_for(layer.action, controls)
     others = [c for c in curves if _is_left_out(c.data_path, allowed)]
     if not others:
@@ -185,7 +207,7 @@ def _masked(controls, layer, allowed):
     return copy
 
 
-def _is_left_out(path, allowed):
+def _is_left_out(path: str, allowed: Set[str]) -> bool:
     """Whether a layer does not move what an F-curve moves."""
     if path.startswith('pose.bones["head"].rotation_'):
         return not allowed.intersection(clip_logic.HEAD)

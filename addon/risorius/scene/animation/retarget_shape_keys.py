@@ -1,16 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Shape-key animation of another rig as a clip of its own names, to be mapped to a face."""
 
+from __future__ import annotations
+
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ... import native
 from ...logic.animation.clip_units import ClipError
 from ..base import parts
+from ..base.blender_types import Context, MeshObject
 from . import clip_actions
 
 
-def sources(context):
+def sources(context: Context) -> list[MeshObject]:
     """Mesh objects of the scene whose shape keys move and that are no part of a face."""
     return [
         item
@@ -19,7 +23,7 @@ def sources(context):
     ]
 
 
-def source_of(context):
+def source_of(context: Context) -> MeshObject | None:
     """The one to take from: a selected one, else the only one of the scene, else None."""
     there = sources(context)
     chosen = [item for item in context.selected_objects if item in there]
@@ -28,7 +32,7 @@ def source_of(context):
     return there[0] if len(there) == 1 else None
 
 
-def _moves(item):
+def _moves(item: MeshObject) -> bool:
     keys = item.data.shape_keys
     data = keys.animation_data if keys is not None else None
     if data is None:
@@ -36,7 +40,12 @@ def _moves(item):
     return bool(data.action or len(data.drivers) or any(len(t.strips) for t in data.nla_tracks))
 
 
-def clip_of(context, item, first=None, last=None):
+def clip_of(
+    context: Context,
+    item: MeshObject,
+    first: float | None = None,
+    last: float | None = None,
+) -> native.Clip:
     """The shape keys of an object over time.
 
     An action alone is read as it is; NLA strips and drivers are stepped through, frame by frame.
@@ -57,7 +66,7 @@ def clip_of(context, item, first=None, last=None):
     stacked = len(data.drivers) or any(len(t.strips) for t in data.nla_tracks)
     span = (context.scene.frame_start, context.scene.frame_end)
     if data.action is not None and not stacked:
-        span = tuple(data.action.frame_range)
+        span = data.action.frame_range[:]
     begin = span[0] if first is None else first
     end = span[1] if last is None else last
     frames = np.arange(np.floor(begin), np.floor(end) + 1.0)
@@ -75,11 +84,11 @@ def clip_of(context, item, first=None, last=None):
     )
 
 
-def _blocks(keys):
+def _blocks(keys: bpy.types.Key) -> list[bpy.types.ShapeKey]:
     return [b for b in keys.key_blocks if b != keys.reference_key]
 
 
-def _read(keys, frames):
+def _read(keys: bpy.types.Key, frames: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
     curves = {c.data_path: c for c in clip_actions.playing_curves(keys.animation_data.action, keys)}
     table = {}
     for block in _blocks(keys):
@@ -93,7 +102,9 @@ def _read(keys, frames):
     return table
 
 
-def _stepped(context, keys, frames):
+def _stepped(
+    context: Context, keys: bpy.types.Key, frames: NDArray[np.float64]
+) -> dict[str, NDArray[np.float64]]:
     scene = context.scene
     before = scene.frame_current, scene.frame_subframe
     rows = []

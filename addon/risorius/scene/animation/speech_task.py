@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Speech from a sound file, computed in a process beside Blender; and the recogniser's package."""
 
+from __future__ import annotations
+
 import importlib.util
 import os
 import platform
@@ -27,9 +29,11 @@ class Task:
         error: what went wrong, or None.
     """
 
-    def __init__(self, path, transcript, **options):
+    def __init__(self, path: str, transcript: str | None, **options: object) -> None:
         """Args: as of risorius.speech.speak."""
-        self.share, self.clip, self.error = 0.0, None, None
+        self.share = 0.0
+        self.clip: native.Clip | None = None
+        self.error: Exception | None = None
         self._arguments = (path, transcript or None)
         self._options = options
         self._cancelled = threading.Event()
@@ -38,11 +42,11 @@ class Task:
         if folder not in sys.path:
             sys.path.append(folder)  # the process looks for packages where this one does
 
-    def start(self):
+    def start(self) -> None:
         """Begin in a thread, which waits for the process and touches nothing of Blender's."""
         self._thread.start()
 
-    def run(self):
+    def run(self) -> None:
         """Do it now, waiting in this thread."""
         try:
             self.clip = native.part("speech.apart").speak_apart(
@@ -54,32 +58,32 @@ class Task:
         except Exception as error:  # noqa: BLE001  a thread's error is told by who waits for it
             self.error = error
 
-    def _progress(self, share):
+    def _progress(self, share: float) -> None:
         self.share = float(share)
 
-    def is_running(self):
+    def is_running(self) -> bool:
         """Whether the thread still works."""
         return self._thread.is_alive()
 
-    def wait(self):
+    def wait(self) -> None:
         """Until the thread ends."""
         if self.is_running():
             self._thread.join()
 
-    def cancel(self):
+    def cancel(self) -> None:
         """End the process, and wait for that."""
         self._cancelled.set()
         self.wait()
 
 
-def has_recogniser():
+def has_recogniser() -> bool:
     """Whether the recogniser can be imported; what was installed for the add-on counts."""
     importlib.invalidate_caches()
     places = [*sys.path, str(packages_folder())]
     return PathFinder.find_spec("pocketsphinx", places) is not None
 
 
-def packages_folder():
+def packages_folder() -> Path:
     """Where packages lie that the user installed for the add-on."""
     return Path(bpy.utils.extension_path_user(native.ADDON, path="packages", create=True))
 
@@ -88,7 +92,7 @@ class InstallError(FaceError, RuntimeError):
     """pip could not install the recogniser; the sentence says why."""
 
 
-def install_recogniser():
+def install_recogniser() -> None:
     """Install the recogniser with pip into the extension's own user folder.
 
     Raises:
@@ -113,7 +117,7 @@ def install_recogniser():
         raise InstallError(f"{recogniser.PACKAGE} could not be installed: {why}.")
 
 
-def _bundled_pip():
+def _bundled_pip() -> str:
     """The wheel of pip that Python carries, which runs as it lies; "" where pip is installed."""
     if importlib.util.find_spec("pip") is not None:
         return ""

@@ -6,14 +6,20 @@ and the file looks the same in a Blender without the add-on. What animated each 
 on the part itself, in the file.
 """
 
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 
+import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ...logic.animation import key_reduction
 from ...logic.base.errors import FaceError
 from ..animation import actions
 from ..base import parts
+from ..base.blender_types import ArmatureObject, Context, MeshObject
 from ..character import lods, runtime
 from ..frame import channel_preview, evaluate
 from . import baked_shape_keys, baked_tracks, sampling
@@ -44,12 +50,12 @@ class BakeOptions:
     end: float = 250
     step: float = 1
     lod: int = -1
-    wanted: frozenset = frozenset(("BONES", "SHAPES", "MAPS"))
+    wanted: frozenset[str] = frozenset(("BONES", "SHAPES", "MAPS"))
     error: float = 0.0
     strip: bool = False
 
 
-def baked(rig):
+def baked(rig: ArmatureObject) -> str:
     """What of a character is baked: RESULT, CONTROLS or "" for live."""
     if parts.BAKED in rig:
         return RESULT
@@ -57,23 +63,23 @@ def baked(rig):
     return CONTROLS if controls is not None and parts.BAKED in controls else ""
 
 
-def words(rig):
+def words(rig: ArmatureObject) -> str:
     """What the panel says of a baked character; empty for a live one."""
     kind = baked(rig)
     if not kind:
         return ""
-    state = (rig if kind == RESULT else parts.controls_of(rig))[parts.BAKED]
+    state = (rig if kind == RESULT else parts.controls_there(rig))[parts.BAKED]
     what = "Baked: it plays its actions"
     if kind == CONTROLS:
         what = "The controls are baked; layers, NLA and drivers rest"
     return f"{what}, frames {state['start']:g} to {state['end']:g}."
 
 
-def refusal(rig, kind):
+def refusal(rig: ArmatureObject, kind: str) -> str:
     """Why a character cannot be baked now, in one sentence; empty when it can."""
     if baked(rig) in (RESULT, kind):
         return f"{rig.name} is baked already: choose Back to Live first."
-    controls = parts.controls_of(rig)
+    controls = parts.controls_there(rig)
     owners = [controls]
     if kind == RESULT:
         if rig.override_library:
@@ -88,7 +94,9 @@ def refusal(rig, kind):
     return next(filter(None, map(actions.busy, owners)), "")
 
 
-def bake(context, rigs, options):
+def bake(
+    context: Context, rigs: Sequence[ArmatureObject], options: BakeOptions
+) -> Generator[float, None, list[str]]:
     """Bake characters; a generator, so that it can show progress and be ended without damage.
 
     Args:
@@ -131,7 +139,7 @@ def bake(context, rigs, options):
     return done
 
 
-def level_of(rig, lod):
+def level_of(rig: ArmatureObject, lod: int) -> int:
     """The level that is baked.
 
     Raises:
@@ -141,15 +149,15 @@ def level_of(rig, lod):
     there = lods.built(rig)
     if there and level not in there:
         raise BakeError(f"Level {level} was not built for {rig.name}.")
-    return min(level, max(runtime.of(rig).rig.lod_count - 1, 0))
+    return min(level, max(runtime.there(rig).rig.lod_count - 1, 0))
 
 
-def shown(rig, level):
+def shown(rig: ArmatureObject, level: int) -> list[MeshObject]:
     """The meshes that a level shows."""
     return [m for m in parts.meshes_of(rig) if level in list(m.get(parts.LODS, [level]))]
 
 
-def animated_keys(rig, level):
+def animated_keys(rig: ArmatureObject, level: int) -> list[tuple[MeshObject, list[str]]]:
     """(mesh, data paths) of shape keys that actions of the user's move."""
     found = []
     for item in shown(rig, level):
@@ -160,8 +168,10 @@ def animated_keys(rig, level):
     return found
 
 
-def _write_result(rig, samples, level, options):
-    live, counts = runtime.of(rig), actions.Counts()
+def _write_result(
+    rig: ArmatureObject, samples: sampling.Samples, level: int, options: BakeOptions
+) -> str:
+    live, counts = runtime.there(rig), actions.Counts()
     pose = baked_tracks.evaluate(live, samples, level)
     name = rig.name.removesuffix("_rig")
     state = {
@@ -182,7 +192,14 @@ def _write_result(rig, samples, level, options):
     return f"{name}: {len(samples.frames)} frames, {counts.sentence()}"
 
 
-def _write_keys(item, live, samples, weights, options, counts):
+def _write_keys(
+    item: MeshObject,
+    live: runtime.Runtime,
+    samples: sampling.Samples,
+    weights: NDArray[np.float32],
+    options: BakeOptions,
+    counts: actions.Counts,
+) -> None:
     key = item.data.shape_keys
     if key is None:
         return
@@ -193,14 +210,23 @@ def _write_keys(item, live, samples, weights, options, counts):
         _play(key, f"{item.name}_baked", samples.frames, tracks, options, counts)
 
 
-def _play(owner, name, frames, tracks, options, counts):
+def _play(
+    owner: bpy.types.ID,
+    name: str,
+    frames: NDArray[np.float64],
+    tracks: Sequence[actions.Track],
+    options: BakeOptions,
+    counts: actions.Counts,
+) -> None:
     action, slot = actions.write(name, owner, frames, tracks, options.error, counts)
     actions.play(owner, action, slot, {t.path for t in tracks}, options.strip)
 
 
-def _write_controls(rig, samples, _level, options):
-    controls, counts = parts.controls_of(rig), actions.Counts()
-    tracks = baked_tracks.control_tracks(controls, runtime.of(rig), samples)
+def _write_controls(
+    rig: ArmatureObject, samples: sampling.Samples, _level: int, options: BakeOptions
+) -> str:
+    controls, counts = parts.controls_there(rig), actions.Counts()
+    tracks = baked_tracks.control_tracks(controls, runtime.there(rig), samples)
     name = rig.name.removesuffix("_rig")
     _play(controls, f"{name}_controls_baked", samples.frames, tracks, options, counts)
     actions.note_values(controls, [t.path for t in tracks])
@@ -219,7 +245,7 @@ def _write_controls(rig, samples, _level, options):
     return f"{name}: controls, {len(samples.frames)} frames, {counts.sentence()}"
 
 
-def unbake(context, rig):
+def unbake(context: Context, rig: ArmatureObject) -> bool:
     """Back to live: what was before the last bake moves the character again.
 
     Args:
@@ -233,7 +259,7 @@ def unbake(context, rig):
     if not kind:
         return False
     if kind == CONTROLS:
-        _restore_controls(parts.controls_of(rig))
+        _restore_controls(parts.controls_there(rig))
     else:
         _restore_result(rig)
     runtime.forget_outputs()
@@ -242,9 +268,9 @@ def unbake(context, rig):
     return True
 
 
-def _take_back(rig, kind):
+def _take_back(rig: ArmatureObject, kind: str) -> None:
     """Undo what a bake that failed has written on a character: all of it, or a part."""
-    controls = parts.controls_of(rig)
+    controls = parts.controls_there(rig)
     if kind == CONTROLS and parts.BAKED in controls:
         _restore_controls(controls)
     elif kind == CONTROLS:
@@ -255,15 +281,15 @@ def _take_back(rig, kind):
         _restore_animation(rig)
 
 
-def _restore_animation(rig):
+def _restore_animation(rig: ArmatureObject) -> None:
     actions.restore(rig)
     for item in parts.meshes_of(rig):
         if item.data.shape_keys is not None:
             actions.restore(item.data.shape_keys)
-            baked_shape_keys.close(item, rig, runtime.of(rig))
+            baked_shape_keys.close(item, rig, runtime.there(rig))
 
 
-def _restore_result(rig):
+def _restore_result(rig: ArmatureObject) -> None:
     state = rig[parts.BAKED]
     _restore_animation(rig)
     (viewport, render), by_distance = list(state["levels"]), bool(state["by_distance"])
@@ -274,7 +300,7 @@ def _restore_result(rig):
     rig.update_tag(refresh={"OBJECT", "TIME"})
 
 
-def _restore_controls(controls):
+def _restore_controls(controls: ArmatureObject) -> None:
     state = controls[parts.BAKED]
     actions.restore(controls)
     for line in list(state[_CONSTRAINTS]):

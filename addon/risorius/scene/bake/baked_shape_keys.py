@@ -1,13 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Shape keys that bear baked values: those of a mesh in LIVE mode are made for it and go again."""
 
+from __future__ import annotations
+
+from collections.abc import Iterable
+
 from ..base import parts
-from ..character import build, meshes
+from ..base.blender_types import ArmatureObject, MeshObject
+from ..character import build, meshes, runtime
 
 OPENED = "risorius_opened"  # on a Key: names of the keys that were made for a bake
 
 
-def opened(item, live, used):
+def opened(item: MeshObject, live: runtime.Runtime, used: Iterable[int]) -> dict[int, str]:
     """The real keys of a mesh by channel; a mesh in LIVE mode gets those that the bake needs.
 
     Args:
@@ -38,7 +43,7 @@ def opened(item, live, used):
     return found
 
 
-def close(item, rig, live):
+def close(item: MeshObject, rig: ArmatureObject, live: runtime.Runtime) -> None:
     """Take the keys away that a bake needed; what was edited stays a real, driven key.
 
     Args:

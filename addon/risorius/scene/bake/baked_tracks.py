@@ -1,29 +1,43 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Samples of a face to the values of every property that they move."""
 
+from __future__ import annotations
+
 import re
+from collections.abc import Collection, Iterable, Iterator, Mapping
 
 import bpy
 import numpy as np
 from mathutils import Matrix
+from numpy.typing import NDArray
 
+from ... import native
 from ...logic.animation import key_reduction
 from ..animation.actions import Track
 from ..base import drivers, parts
-from ..character import armatures
+from ..base.blender_types import ArmatureObject
+from ..character import armatures, runtime
 from ..frame import bone_writer
+from . import sampling
 
 _WIDTHS = {"location": 3, "rotation_quaternion": 4, "rotation_euler": 3, "scale": 3}
 _TURNS = {"QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle"}
 _CHANNEL = re.compile(r'^\["channels"\]\[(\d+)\]$')
 
 
-def evaluate(live, samples, lod):
+def evaluate(live: runtime.Runtime, samples: sampling.Samples, lod: int) -> native.Pose:
     """The poses of all frames. Returns: a risorius.Pose whose fields have a leading N."""
     return live.rig.evaluate_batch(samples.raw, lod)
 
 
-def rig_tracks(rig, live, samples, pose, wanted, target=None):
+def rig_tracks(
+    rig: ArmatureObject,
+    live: runtime.Runtime,
+    samples: sampling.Samples,
+    pose: native.Pose,
+    wanted: Collection[str],
+    target: ArmatureObject | None = None,
+) -> list[Track]:
     """What moves the deforming armature.
 
     Args:
@@ -51,15 +65,15 @@ def rig_tracks(rig, live, samples, pose, wanted, target=None):
     return tracks
 
 
-def _is_bone_channel(path):
+def _is_bone_channel(path: str) -> bool:
     return path.startswith("pose.bones[") and path.endswith((*_WIDTHS, "rotation_axis_angle"))
 
 
-def _is_array(path):
+def _is_array(path: str) -> bool:
     return path in (f'["{parts.MAPS}"]', f'["{parts.CHANNELS}"]')
 
 
-def _others(values, owner):
+def _others(values: Mapping[str, list[list[float]]], owner: bpy.types.ID) -> Iterator[Track]:
     """Tracks of what else is animated, sampled by its paths."""
     for path, rows in values.items():
         group = path.split('"')[1] if '"' in path else "Object Transforms"
@@ -67,7 +81,13 @@ def _others(values, owner):
         yield Track(path, group, np.array(rows, np.float32), None, 0, indexed)
 
 
-def _bones(rig, live, samples, joints, target):
+def _bones(
+    rig: ArmatureObject,
+    live: runtime.Runtime,
+    samples: sampling.Samples,
+    joints: NDArray[np.float32],
+    target: ArmatureObject,
+) -> list[Track]:
     bones, writer = rig.pose.bones, bone_writer.writer_of(rig, live)
     owned = {n: np.empty((len(joints), len(writer.where), w), np.float32) for n, w in _OWNED}
     for number, deltas in enumerate(joints):
@@ -99,7 +119,7 @@ def _bones(rig, live, samples, joints, target):
 _OWNED = (("location", 3), ("rotation_quaternion", 4), ("scale", 3))
 
 
-def _place(rig, samples, target):
+def _place(rig: ArmatureObject, samples: sampling.Samples, target: ArmatureObject) -> list[Track]:
     """Where the face stands, where it follows the control armature."""
     if not rig.get(parts.FOLLOW) or rig.parent or rig.constraints:
         return []
@@ -126,7 +146,13 @@ def _place(rig, samples, target):
     return [Track(name, "Object Transforms", values) for name, values in rows.items()]
 
 
-def _array(target, name, values, group, indices=None):
+def _array(
+    target: ArmatureObject,
+    name: str,
+    values: NDArray[np.float32],
+    group: str,
+    indices: Iterable[int] | None = None,
+) -> list[Track]:
     """Tracks of an array property, one for each entry, which gets the first frame's value."""
     if len(target.get(name, ())) != values.shape[1] or not values.shape[1]:
         return []
@@ -139,7 +165,7 @@ def _array(target, name, values, group, indices=None):
     ]
 
 
-def _read_channels(rig):
+def _read_channels(rig: ArmatureObject) -> list[int]:
     """The channels that drivers of the user's own read."""
     ours = {m.data.shape_keys for m in parts.meshes_of(rig)}
     found = set()
@@ -150,7 +176,12 @@ def _read_channels(rig):
     return sorted(found)
 
 
-def key_tracks(key, names, weights, others=None):
+def key_tracks(
+    key: bpy.types.Key,
+    names: Mapping[int, str],
+    weights: NDArray[np.float32],
+    others: Mapping[str, list[list[float]]] | None = None,
+) -> list[Track]:
     """What moves the shape keys of a mesh, whose keys get the values of the first frame.
 
     Args:
@@ -170,12 +201,14 @@ def key_tracks(key, names, weights, others=None):
     return tracks
 
 
-def key_path(name):
+def key_path(name: str) -> str:
     """The data path of a shape key's value, from its Key."""
     return f'key_blocks["{bpy.utils.escape_identifier(name)}"].value'
 
 
-def control_tracks(controls, live, samples):
+def control_tracks(
+    controls: ArmatureObject, live: runtime.Runtime, samples: sampling.Samples
+) -> list[Track]:
     """What moves the control armature: sliders, control bones, and all else animated on it.
 
     Args:
@@ -203,7 +236,7 @@ def control_tracks(controls, live, samples):
     return list(found.values())
 
 
-def _control_bone(bone, matrices):
+def _control_bone(bone: bpy.types.PoseBone, matrices: NDArray[np.float64]) -> Iterator[Track]:
     """Tracks of a control bone in its own rotation mode."""
     turn = _TURNS.get(bone.rotation_mode, "rotation_euler")
     rows = {"location": [], turn: [], "scale": []}

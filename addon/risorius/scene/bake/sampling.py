@@ -6,15 +6,20 @@ has only the face's two armatures and what they depend on: so every frame is wha
 gives, the rest of the user's scene costs nothing, and its frame never changes.
 """
 
+from __future__ import annotations
+
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import bpy
 import numpy as np
-from mathutils import Matrix
+from mathutils import Matrix, Quaternion
+from numpy.typing import NDArray
 
 from ..animation import layers
 from ..base import compat, parts
+from ..base.blender_types import ArmatureObject, Context, Depsgraph, MeshObject
 from ..character import rig_placement, runtime
 from ..frame import inputs
 
@@ -39,17 +44,22 @@ class Samples:
         others: id -> {(path, first index): list of values} of what else is animated on it.
     """
 
-    frames: object
-    raw: object = None
-    sliders: object = None
-    turns: list = field(default_factory=list)
-    basis: dict = field(default_factory=dict)
-    places: object = None
-    bones: dict | None = None
-    others: dict = field(default_factory=dict)
+    frames: NDArray[np.float64]
+    raw: NDArray[np.float32]
+    sliders: NDArray[np.float32]
+    places: NDArray[np.float64]
+    basis: dict[str, NDArray[np.float64]]
+    turns: list[inputs.Turns] = field(default_factory=list)
+    bones: dict[str, NDArray[np.float32]] | None = None
+    others: dict[bpy.types.ID, dict[str, list[list[float]]]] = field(default_factory=dict)
 
 
-def sample(context, rigs, frames, keys=()):
+def sample(
+    context: Context,
+    rigs: Sequence[ArmatureObject],
+    frames: NDArray[np.float64],
+    keys: Sequence[tuple[MeshObject, list[str]]] = (),
+) -> Generator[float, None, list[Samples]]:
     """Read the inputs of faces over a range; a generator, so that it can show progress and end.
 
     Args:
@@ -83,7 +93,9 @@ def sample(context, rigs, frames, keys=()):
 
 
 @contextmanager
-def _stage(context, rigs, items):
+def _stage(
+    context: Context, rigs: Sequence[ArmatureObject], items: Iterable[bpy.types.Object]
+) -> Iterator[bpy.types.Scene]:
     """A scene to step through."""
     if _needs_whole_scene(context.scene, rigs):
         with _whole_scene(context.scene) as scene:
@@ -104,7 +116,7 @@ def _stage(context, rigs, items):
 
 
 @contextmanager
-def _whole_scene(scene):
+def _whole_scene(scene: bpy.types.Scene) -> Iterator[bpy.types.Scene]:
     before = scene.frame_current, scene.frame_subframe
     try:
         yield scene
@@ -113,7 +125,7 @@ def _whole_scene(scene):
             scene.frame_set(before[0], subframe=before[1])
 
 
-def _is_there(scene):
+def _is_there(scene: bpy.types.Scene) -> bool:
     """Whether a scene is still in the file: another file may have been opened meanwhile."""
     try:
         return scene in bpy.data.scenes[:]
@@ -121,14 +133,14 @@ def _is_there(scene):
         return False
 
 
-def _needs_whole_scene(scene, rigs):
+def _needs_whole_scene(scene: bpy.types.Scene, rigs: Iterable[ArmatureObject]) -> bool:
     """Whether something asks for the scene itself: simulated bodies, drivers by context, and what
     is hidden everywhere, which Blender evaluates only for what is seen with it.
     """
     if scene.rigidbody_world is not None:
         return True
     for rig in rigs:
-        controls = parts.controls_of(rig)
+        controls = parts.controls_there(rig)
         hold = rig_placement.body_of(controls)
         for item in (rig, controls, hold.target if hold else None):
             if item is not None and item.hide_viewport:
@@ -143,8 +155,13 @@ def _needs_whole_scene(scene, rigs):
 class _Reader:
     """Reads one face at each frame."""
 
-    def __init__(self, rig, frames, keys):
-        self.rig, self.controls, self.live = rig, parts.controls_of(rig), runtime.of(rig)
+    def __init__(
+        self,
+        rig: ArmatureObject,
+        frames: NDArray[np.float64],
+        keys: Sequence[tuple[MeshObject, list[str]]],
+    ) -> None:
+        self.rig, self.controls, self.live = rig, parts.controls_there(rig), runtime.there(rig)
         count, width = len(frames), len(self.live.labels)
         bones = [n for n in _BONES if n in self.controls.pose.bones]
         self.samples = Samples(
@@ -174,7 +191,7 @@ class _Reader:
         }
         self.samples.others = {owner: {} for owner in self.paths}
 
-    def read(self, number, depsgraph):
+    def read(self, number: int, depsgraph: Depsgraph) -> None:
         got, seen = self.samples, self.controls.evaluated_get(depsgraph)
         raw, own = inputs.read_mixed(seen, self.live, depsgraph, self.maximum)
         got.sliders[number] = raw
@@ -193,7 +210,9 @@ class _Reader:
                 if value is not None:
                     got.others[owner].setdefault(path, []).append(value)
 
-    def _read_control_bones(self, number, seen, head):
+    def _read_control_bones(
+        self, number: int, seen: ArmatureObject, head: Quaternion | None
+    ) -> None:
         """Args: head  how it is turned with the layers, in the armature's axes; or None."""
         basis = self.samples.basis
         for name, matrices in basis.items():
@@ -213,7 +232,7 @@ class _Reader:
             )
 
 
-def _value(owner, path):
+def _value(owner: bpy.types.ID, path: str) -> list[float] | None:
     """The numbers at a path, or None where it leads nowhere or to words."""
     try:
         value = owner.path_resolve(path)
@@ -227,7 +246,7 @@ def _value(owner, path):
         return None
 
 
-def _animated(owner):
+def _animated(owner: bpy.types.Object) -> bool:
     data = owner.animation_data
     return data is not None and bool(
         data.action
@@ -236,7 +255,7 @@ def _animated(owner):
     )
 
 
-def animated_paths(owner, drivers=True):
+def animated_paths(owner: bpy.types.Object | bpy.types.Key, drivers: bool = True) -> list[str]:
     """The data paths that an action, an NLA strip or a driver moves on a datablock, in order."""
     data = owner.animation_data
     if data is None:

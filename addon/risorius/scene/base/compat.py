@@ -1,8 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What differs between Blender 4.2 and 5.2."""
 
+from __future__ import annotations
 
-def curves_of(action):
+from collections.abc import Iterable, Iterator
+from typing import cast
+
+import bpy
+
+from .blender_types import Animated
+
+
+def curves_of(action: bpy.types.Action) -> Iterator[bpy.types.FCurve]:
     """The F-curves of an action: since 4.4 it has layers and slots, since 5.0 nothing else."""
     if hasattr(action, "layers") and len(action.layers):
         for layer in action.layers:
@@ -13,13 +22,18 @@ def curves_of(action):
         yield from action.fcurves
 
 
-def make_node_tree(material):
+def _strips(layer: bpy.types.ActionLayer) -> list[bpy.types.ActionKeyframeStrip]:
+    """The strips of a layer of an action: there is only one kind of them."""
+    return cast("list[bpy.types.ActionKeyframeStrip]", layer.strips)
+
+
+def make_node_tree(material: bpy.types.Material) -> None:
     """Give a material its nodes: since 5.0 each has them and the switch only warns."""
     if material.node_tree is None:
         material.use_nodes = True
 
 
-def deselect_all(layer):
+def deselect_all(layer: bpy.types.ViewLayer) -> None:
     """Select no object of a view layer.
 
     4.2 walks its list of objects while selecting makes it anew, and dies where objects have come
@@ -30,7 +44,7 @@ def deselect_all(layer):
         item.select_set(False, view_layer=layer)
 
 
-def add_curves(action, owner):
+def add_curves(action: bpy.types.Action, owner: Animated) -> bpy.types.ActionChannelbag:
     """Where new F-curves of an action go.
 
     Args:
@@ -41,13 +55,13 @@ def add_curves(action, owner):
         What has `fcurves` and `groups`: since 4.4 the bag of a slot.
     """
     if not hasattr(action, "slots"):
-        return action
+        return cast("bpy.types.ActionChannelbag", action)
     slot = action.slots.new(id_type=owner.id_type, name=owner.name)
     strip = action.layers.new("Layer").strips.new(type="KEYFRAME")
-    return strip.channelbag(slot, ensure=True)
+    return cast("bpy.types.ActionKeyframeStrip", strip).channelbag(slot, ensure=True)
 
 
-def slot_for(action, owner):
+def slot_for(action: bpy.types.Action, owner: Animated) -> bpy.types.ActionSlot | None:
     """The slot of an action that fits a datablock, or None: before 4.4, and where none fits.
 
     The one that it plays, else the one of its name, else the first of its kind.
@@ -62,28 +76,29 @@ def slot_for(action, owner):
     return (named or slots or [None])[0]
 
 
-def bag_for(action, owner):
+def bag_for(action: bpy.types.Action, owner: Animated) -> bpy.types.ActionChannelbag | None:
     """What holds the F-curves by which an action moves a datablock, or None where there is none.
 
     Actions as one makes them have one layer with one strip.
     """
     if not hasattr(action, "slots") or not len(action.layers):
-        return action if hasattr(action, "fcurves") else None
+        own = action if hasattr(action, "fcurves") else None
+        return cast("bpy.types.ActionChannelbag | None", own)
     slot = slot_for(action, owner)
-    strips = action.layers[0].strips
+    strips = _strips(action.layers[0])
     return strips[0].channelbag(slot) if slot is not None and len(strips) else None
 
 
-def curves_for(action, owner):
+def curves_for(action: bpy.types.Action, owner: Animated) -> list[bpy.types.FCurve]:
     """The F-curves by which an action moves a datablock: of one slot, where it has slots."""
     if not hasattr(action, "slots") or not len(action.layers):
         return list(getattr(action, "fcurves", ()))
     slot = slot_for(action, owner)
-    bags = [s.channelbag(slot) for y in action.layers for s in y.strips] if slot else []
+    bags = [s.channelbag(slot) for y in action.layers for s in _strips(y)] if slot else []
     return [curve for bag in bags if bag is not None for curve in bag.fcurves]
 
 
-def played_actions(owner):
+def played_actions(owner: Animated) -> list[bpy.types.Action]:
     """The actions that a datablock plays: its active one and its strips', also in meta strips."""
     data = owner.animation_data
     if data is None:
@@ -94,7 +109,7 @@ def played_actions(owner):
     return list(dict.fromkeys(found))
 
 
-def actions_in(strips):
+def actions_in(strips: Iterable[bpy.types.NlaStrip]) -> Iterator[bpy.types.Action]:
     """The actions of NLA strips and of those inside meta strips."""
     for strip in strips:
         if strip.action is not None:
@@ -102,14 +117,18 @@ def actions_in(strips):
         yield from actions_in(strip.strips)
 
 
-def assign_action(target, action, slot=None):
+def assign_action(
+    target: bpy.types.AnimData | bpy.types.NlaStrip,
+    action: bpy.types.Action,
+    slot: bpy.types.ActionSlot | None = None,
+) -> None:
     """Let an object's animation data, or an NLA strip, play an action."""
     target.action = action
     if slot is not None:
         target.action_slot = slot
 
 
-def strips_of(scene):
+def strips_of(scene: bpy.types.Scene) -> bpy.types.StripsTopLevel:
     """The strips of a scene's sequencer, which is made where there is none."""
     editor = scene.sequence_editor or scene.sequence_editor_create()
     return editor.strips if hasattr(editor, "strips") else editor.sequences

@@ -1,12 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Drivers that follow a character: how one is made, and where in the file others lead to it."""
 
+from __future__ import annotations
+
 import re
+from collections.abc import Iterator, Mapping, Sequence
 
 import bpy
 
 from ...logic.base import names
 from . import compat, parts
+from .blender_types import ArmatureObject
 
 _ENTRY = re.compile(r'^\["(channels|maps)"\]\[(\d+)\]$')
 _GONE = re.compile(r'^\["(gone (channels|maps): .*)"\]$')
@@ -21,7 +25,7 @@ _WITH_NODES = (
 )
 
 
-def owners():
+def owners() -> Iterator[bpy.types.ID]:
     """Every datablock that can bear drivers, node trees inside others too."""
     for kind in bpy.data.bl_rna.properties:
         if kind.type != "COLLECTION":
@@ -35,7 +39,7 @@ def owners():
                 yield inner
 
 
-def targets_at(item):
+def targets_at(item: bpy.types.ID) -> Iterator[tuple[bpy.types.ID, bpy.types.DriverTarget]]:
     """All driver targets of the file that point at a datablock, each with its curve's owner."""
     for owner in owners():
         data = getattr(owner, "animation_data", None)
@@ -54,10 +58,12 @@ class Entries:
         labels: "channels" and "maps" -> (old labels, new labels).
     """
 
-    def __init__(self, rig, labels):
+    def __init__(
+        self, rig: ArmatureObject, labels: Mapping[str, tuple[Sequence[str], Sequence[str]]]
+    ) -> None:
         self._rig = rig
-        self._moves = []
-        self.gone = []
+        self._moves: list[tuple[bpy.types.DriverTarget, str]] = []
+        self.gone: list[str] = []
         for _owner, target in targets_at(rig):
             found = self._label(target.data_path, labels)
             if found is None:
@@ -70,7 +76,9 @@ class Entries:
             if path != target.data_path:
                 self._moves.append((target, path))
 
-    def _label(self, path, labels):
+    def _label(
+        self, path: str, labels: Mapping[str, tuple[Sequence[str], Sequence[str]]]
+    ) -> tuple[str, str] | None:
         entry, gone = _ENTRY.match(path), _GONE.match(path)
         if entry and int(entry.group(2)) < len(labels[entry.group(1)][0]):
             return entry.group(1), labels[entry.group(1)][0][int(entry.group(2))]
@@ -80,7 +88,7 @@ class Entries:
             return (array, back) if back is not None else None
         return None
 
-    def _stand_in(self, array, label):
+    def _stand_in(self, array: str, label: str) -> str:
         """A property of value 0 in place of what is gone, so that drivers stay valid."""
         key = _gone_key(array, label)
         self._rig[key] = 0.0
@@ -88,17 +96,17 @@ class Entries:
             self.gone.append(label)
         return f'["{bpy.utils.escape_identifier(key)}"]'
 
-    def move(self):
+    def move(self) -> None:
         """Point the drivers at their new places; what they read must have been evaluated."""
         for target, path in self._moves:
             target.data_path = path
 
 
-def _gone_key(array, label):
+def _gone_key(array: str, label: str) -> str:
     return names.cut(f"gone {array}: {label}")
 
 
-def used_controls(controls, labels):
+def used_controls(controls: ArmatureObject, labels: Sequence[str]) -> set[str]:
     """Those control properties that an F-curve of any action or a driver uses.
 
     Args:
@@ -118,7 +126,9 @@ def used_controls(controls, labels):
     return used
 
 
-def plain_driver(curve, rig, data_path, name="var"):
+def plain_driver(
+    curve: bpy.types.FCurve, rig: ArmatureObject, data_path: str, name: str = "var"
+) -> None:
     """Make an F-curve follow one property of the rig, without any expression."""
     curve.driver.type = "SUM"
     variable = curve.driver.variables.new()

@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The form of what a character saves in a .blend, as a number on its control armature."""
 
+from __future__ import annotations
+
+from .blender_types import ArmatureObject
+
 VERSION = "risorius_version"  # on the control armature: the number of its form
 PRESENT = 1
 NEEDS = "Needs Risorius"  # on the same: words for those who open the file without the add-on
@@ -9,13 +13,13 @@ WORDS = (
 )
 
 
-def be_born(controls):
+def be_born(controls: ArmatureObject) -> None:
     """Give a new character the present form. Args: controls  its control armature."""
     controls[VERSION] = PRESENT
     controls[NEEDS] = WORDS
 
 
-def version_of(controls):
+def version_of(controls: ArmatureObject) -> int:
     """The number of a character's form; 0 from before there were numbers."""
     found = controls.get(VERSION)
     return found if isinstance(found, int) and found > 0 else 0

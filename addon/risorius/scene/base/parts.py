@@ -1,7 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How the parts of a character find each other: object pointers and indices, never names."""
 
+from __future__ import annotations
+
+from typing import TypeGuard, cast
+
 import bpy
+
+from .blender_types import ArmatureObject, Context, MeshObject
 
 RIG = "risorius_rig"  # on meshes and control armature: the deforming armature
 CONTROLS = "risorius_controls"  # on the deforming armature: the control armature
@@ -36,7 +42,7 @@ PART = "risorius_part"  # on the control armature's bones: what each is, whateve
 PULL = "risorius_pull"  # on the deforming armature: its driver keeps the controls evaluated
 
 
-def rigs(linked=False):
+def rigs(linked: bool = False) -> list[ArmatureObject]:
     """The deforming armatures of all characters of this file; linked ones are not written.
 
     Args:
@@ -45,17 +51,17 @@ def rigs(linked=False):
     return [o for o in bpy.data.objects if (linked or o.library is None) and is_rig(o)]
 
 
-def is_rig(item):
+def is_rig(item: bpy.types.Object) -> TypeGuard[ArmatureObject]:
     """Whether an object is the deforming armature of a character."""
     return item.type == "ARMATURE" and _object(item, CONTROLS) is not None
 
 
-def _object(owner, key):
+def _object(owner: bpy.types.ID, key: str) -> bpy.types.Object | None:
     value = owner.get(key)
     return value if isinstance(value, bpy.types.Object) else None
 
 
-def point(owner, key, item):
+def point(owner: bpy.types.Object, key: str, item: bpy.types.ID) -> None:
     """Let a custom property point to another part, also on overrides of linked characters.
 
     Blender gives a pointer of an override back to the library at load unless it is marked so.
@@ -64,15 +70,22 @@ def point(owner, key, item):
     owner.property_overridable_library_set(f'["{key}"]', True)
 
 
-def controls_of(rig):
+def controls_of(rig: ArmatureObject) -> ArmatureObject | None:
     """The control armature of a character, or None where it was deleted."""
-    controls = _object(rig, CONTROLS)
+    controls = cast("ArmatureObject | None", _object(rig, CONTROLS))
     if controls is None or controls.type != "ARMATURE" or FACE not in controls.pose.bones:
         return None
     return controls
 
 
-def rig_of(item):
+def controls_there(rig: ArmatureObject) -> ArmatureObject:
+    """The control armature of a character that has one: whoever asks has looked."""
+    controls = controls_of(rig)
+    assert controls is not None
+    return controls
+
+
+def rig_of(item: bpy.types.Object | None) -> ArmatureObject | None:
     """The deforming armature of the character that an object belongs to, or None."""
     if item is None:
         return None
@@ -82,36 +95,36 @@ def rig_of(item):
     return rig if rig is not None and is_rig(rig) else None
 
 
-def maximum_of(controls):
+def maximum_of(controls: ArmatureObject) -> float:
     """The hard maximum of a character's sliders. Args: controls  its control armature."""
     return 1.5 if controls.get(OVERDRIVE) else 1.0
 
 
-def members_of(rig):
+def members_of(rig: ArmatureObject) -> list[bpy.types.Object]:
     """All objects of a character that are there: rig, controls, meshes; also of a ruin."""
     held = (rig, _object(rig, CONTROLS), *meshes_of(rig))
     return [item for item in held if item is not None]
 
 
-def meshes_of(rig):
+def meshes_of(rig: ArmatureObject) -> list[MeshObject]:
     """The mesh objects of a character; what points to another character is not among them."""
     found = []
     for key in rig.keys():  # noqa: SIM118  Blender's ID is no dict
         if key.startswith(MESH_PREFIX):
             item = _object(rig, key)
             if item is not None and item.type == "MESH" and item.get(RIG) == rig:
-                found.append(item)
+                found.append(cast("MeshObject", item))
     return found
 
 
-def meshes_pointing_at(rig):
+def meshes_pointing_at(rig: ArmatureObject) -> list[MeshObject]:
     """All mesh objects of a character, also linked duplicates that it does not list."""
     listed = meshes_of(rig)
     others = [o for o in bpy.data.objects if o.type == "MESH" and o.get(RIG) == rig]
-    return listed + [o for o in others if o not in listed]
+    return listed + [cast("MeshObject", o) for o in others if o not in listed]
 
 
-def active_rig(context):
+def active_rig(context: Context) -> ArmatureObject | None:
     """The character of the active object, else the only one of the scene, else None.
 
     Never a linked one: nothing on it can be changed.
@@ -124,13 +137,13 @@ def active_rig(context):
     return rig if rig is not None and rig.library is None else None
 
 
-def face_bone(rig):
+def face_bone(rig: ArmatureObject) -> bpy.types.PoseBone | None:
     """The pose bone that bears the control properties, or None."""
     controls = controls_of(rig)
     return controls.pose.bones[FACE] if controls else None
 
 
-def property_path(name):
+def property_path(name: str) -> str:
     """The data path of a control, from its armature object."""
     bone, quoted = bpy.utils.escape_identifier(FACE), bpy.utils.escape_identifier(name)
     return f'pose.bones["{bone}"]["{quoted}"]'

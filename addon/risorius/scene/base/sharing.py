@@ -5,17 +5,22 @@ An image is shared until somebody edits it, by whatever tool: then the others ar
 was. Meshes and shape keys are never shared, because the values of keys belong to one face alone.
 """
 
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+
 import bpy
 
 from . import parts, storage
+from .blender_types import ArmatureObject, Node, current_context
 
 DIGEST = "risorius_sha256"  # on an image: hash of the packed file
 STATE = "risorius_state"  # on an image: colour space, way of alpha and size of the packed file
 
-_kept = {}  # digest -> bytes of an image that several characters show
+_kept: dict[str, bytes] = {}  # digest -> bytes of an image that several characters show
 
 
-def mark(image, digest=""):
+def mark(image: bpy.types.Image, digest: str = "") -> None:
     """Remember what is packed in an image, so that it may be shared from now on.
 
     Args:
@@ -27,7 +32,7 @@ def mark(image, digest=""):
         image[DIGEST], image[STATE] = digest or storage.hash_of(content), _state(image)
 
 
-def find(content, digest, data):
+def find(content: bytes, digest: str, data: bool) -> bpy.types.Image | None:
     """An image of this .blend that holds these bytes and was not edited, or None.
 
     Args:
@@ -43,7 +48,7 @@ def find(content, digest, data):
     return None
 
 
-def nodes_of(rig):
+def nodes_of(rig: ArmatureObject) -> Iterator[Node]:
     """The image nodes in the materials of a character's meshes."""
     used = {m for item in parts.meshes_pointing_at(rig) for m in item.data.materials if m}
     for material in sorted(used, key=lambda m: m.name):
@@ -52,17 +57,18 @@ def nodes_of(rig):
                 yield node
 
 
-def keep():
+def keep() -> None:
     """Hold the bytes of the images that several characters show: what is edited is lost else."""
     shown = {i[DIGEST]: i for i, owners in _owners(parts.rigs()).items() if len(owners) > 1}
     for digest in [d for d in _kept if d not in shown]:
         del _kept[digest]
     for digest, image in shown.items():
-        if digest not in _kept and _is_whole(image, digest):
-            _kept[digest] = _packed(image)
+        content = _packed(image)
+        if digest not in _kept and content is not None and _is_whole(image, digest):
+            _kept[digest] = content
 
 
-def separate(exact=False, spaces=True):
+def separate(exact: bool = False, spaces: bool = True) -> list[str]:
     """Give characters an image as it was, where one that they share with another was edited.
 
     The edited one stays with the active character.
@@ -82,7 +88,7 @@ def separate(exact=False, spaces=True):
     return [sentence for image in edited for sentence in _separate(image, owners.get(image, []))]
 
 
-def share():
+def share() -> list[str]:
     """Before a save: what equal characters hold is held once; an edited image is its own again.
 
     Returns:
@@ -106,7 +112,7 @@ def share():
     return done
 
 
-def _share_texts(rigs):
+def _share_texts(rigs: Sequence[ArmatureObject]) -> None:
     texts = []
     for rig in rigs:
         own = rig.get(parts.DNA)
@@ -121,7 +127,7 @@ def _share_texts(rigs):
                 bpy.data.texts.remove(own)
 
 
-def _merge(equal, rigs):
+def _merge(equal: Sequence[bpy.types.Image], rigs: Sequence[ArmatureObject]) -> None:
     keeper, content = equal[0], _packed(equal[0])
     for image in equal[1:]:
         if _packed(image) != content:
@@ -131,7 +137,9 @@ def _merge(equal, rigs):
             bpy.data.images.remove(image)
 
 
-def _show_instead(rigs, image, other):
+def _show_instead(
+    rigs: Iterable[ArmatureObject], image: bpy.types.Image, other: bpy.types.Image
+) -> None:
     """Let the materials of characters show another image in the place of one."""
     for rig in rigs:
         for node in nodes_of(rig):
@@ -139,10 +147,10 @@ def _show_instead(rigs, image, other):
                 node.image = other
 
 
-def _separate(image, owners):
+def _separate(image: bpy.types.Image, owners: Sequence[ArmatureObject]) -> list[str]:
     digest, state = image[DIGEST], image[STATE]
     del image[DIGEST], image[STATE]
-    active = parts.rig_of(bpy.context.view_layer.objects.active)
+    active = parts.rig_of(current_context().view_layer.objects.active)
     keeper = active if active in owners else next(iter(owners), None)
     others = [rig for rig in owners if rig != keeper]
     if not others:
@@ -155,7 +163,7 @@ def _separate(image, owners):
     return [f"The image {image.name} was edited: the other faces keep it as it was."]
 
 
-def _image_of(content, image, state):
+def _image_of(content: bytes, image: bpy.types.Image, state: str) -> bpy.types.Image:
     """A new image of packed bytes, with the settings that another had."""
     space, alpha, _ = state.split("\n")
     fresh = bpy.data.images.new(image.name, 1, 1)
@@ -167,12 +175,12 @@ def _image_of(content, image, state):
     return fresh
 
 
-def _images(rigs):
+def _images(rigs: Iterable[ArmatureObject]) -> list[bpy.types.Image]:
     """The images that these characters show, each once."""
     return list(dict.fromkeys(node.image for rig in rigs for node in nodes_of(rig)))
 
 
-def _owners(rigs):
+def _owners(rigs: Iterable[ArmatureObject]) -> dict[bpy.types.Image, list[ArmatureObject]]:
     """Image that may be shared -> the characters that show it."""
     found = {}
     for rig in rigs:
@@ -182,28 +190,28 @@ def _owners(rigs):
     return found
 
 
-def _packed(image):
+def _packed(image: bpy.types.Image) -> bytes | None:
     """The bytes that are packed in an image, or None."""
     return bytes(image.packed_file.data) if image.packed_file is not None else None
 
 
-def _is_whole(image, digest=None):
+def _is_whole(image: bpy.types.Image, digest: str | None = None) -> bool:
     """Whether what is packed is what was marked."""
     content = _packed(image)
     return content is not None and storage.hash_of(content) == (digest or image[DIGEST])
 
 
-def _state(image, space=""):
+def _state(image: bpy.types.Image, space: str = "") -> str:
     size = image.packed_file.size if image.packed_file is not None else 0
     return f"{space or image.colorspace_settings.name}\n{image.alpha_mode}\n{size}"
 
 
-def _edited(image, spaces=True):
+def _edited(image: bpy.types.Image, spaces: bool = True) -> bool:
     noted = str(image.get(STATE))
     space = "" if spaces else noted.partition("\n")[0]
     return image.is_dirty or noted != _state(image, space)
 
 
-def forget():
+def forget() -> None:
     """Drop the bytes that are held."""
     _kept.clear()

@@ -4,6 +4,8 @@
 On a Text, because Blender copies the custom properties of scene objects at each update.
 """
 
+from __future__ import annotations
+
 import hashlib
 import zlib
 
@@ -26,7 +28,7 @@ class ContentError(FaceError):
     """What a Text holds is not the DNA file that was put there; the text goes on after a colon."""
 
 
-def store(name, content, made):
+def store(name: str, content: bytes, made: list[bpy.types.ID]) -> bpy.types.Text:
     """Put the bytes of a file into a Text datablock: a new one, or that which has them already.
 
     Args:
@@ -54,7 +56,7 @@ def store(name, content, made):
     return text
 
 
-def _holding(wanted, digest):
+def _holding(wanted: bytes, digest: str) -> bpy.types.Text | None:
     """A Text of this .blend that holds these bytes, unpacked and not believed; or None."""
     for text in bpy.data.texts:
         if text.library is None and content_hash(text) == digest and _holds(text, wanted):
@@ -62,42 +64,42 @@ def _holding(wanted, digest):
     return None
 
 
-def _holds(text, wanted):
+def _holds(text: bpy.types.Text, wanted: bytes) -> bool:
     try:
         return content(text) == wanted
     except ContentError:
         return False
 
 
-def same(one, other):
+def same(one: bpy.types.Text, other: bpy.types.Text) -> bool:
     """Whether two Texts hold the same packed bytes of a DNA file."""
     return one == other or (
         content_hash(one) == content_hash(other) and one.get(_BYTES) == other.get(_BYTES)
     )
 
 
-def _packed(content):
+def _packed(content: bytes) -> bytes:
     """The bytes of a file as a zlib stream, within the bound of those that are unpacked."""
     packed = zlib.compress(content, 6)
     return packed if len(content) <= _most(packed) else zlib.compress(content, 0)
 
 
-def _most(packed):
+def _most(packed: bytes) -> int:
     return _MOST_TIMES * len(packed) + _ALWAYS
 
 
-def hash_of(content):
+def hash_of(content: bytes) -> str:
     """The hash of the bytes of a file, as it is kept beside them."""
     return hashlib.sha256(content).hexdigest()
 
 
-def content_hash(text):
+def content_hash(text: object) -> str:
     """The hash of what a Text holds; empty where it holds no DNA or is no Text at all."""
     digest = text.get(_HASH) if isinstance(text, bpy.types.Text) else None
     return digest if isinstance(digest, str) else ""
 
 
-def content(text):
+def content(text: bpy.types.Text) -> bytes:
     """The bytes of the DNA file that a Text holds.
 
     Raises:
@@ -112,7 +114,7 @@ def content(text):
     return content
 
 
-def _limit(text, packed):
+def _limit(text: bpy.types.Text, packed: bytes) -> int:
     """The bytes that may be unpacked: what was said when they were packed, within the bound."""
     said = text.get(_LENGTH)
     if said is None:
@@ -127,7 +129,7 @@ def _limit(text, packed):
     return int(said)
 
 
-def _unpack(packed, limit):
+def _unpack(packed: bytes, limit: int) -> bytes:
     """Unpack piece by piece: a few kilobytes of zeros would unfold to any size."""
     unpacking = zlib.decompressobj()
     pieces, count, rest = [], 0, packed

@@ -1,22 +1,31 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The deforming armature and the control armature."""
 
+from __future__ import annotations
+
 import math
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
 import bpy
 import numpy as np
 from mathutils import Matrix, Vector
 
-from ...logic.character import regions
+from ...logic.character import plans, regions
 from ..base import parts
+from ..base.blender_types import ArmatureObject, Context
 
 SHELF = "Joints"  # the bone collection of the deforming bones, not shown
 LIVE_PROPERTIES = (parts.MAPS, parts.CHANNELS)
 
+Point = tuple[float, float, float]
+BonePlace = tuple[Point, Point, float, str]  # position, axis, length, name of the parent
+
 
 @contextmanager
-def _edit_bones(context, item, collection):
+def _edit_bones(
+    context: Context, item: ArmatureObject, collection: bpy.types.Collection
+) -> Iterator[bpy.types.ArmatureEditBones]:
     """The edit bones of an armature object, which must not be linked anywhere yet.
 
     Edit bones exist only in edit mode, and only an operator enters it: the one place in
@@ -39,7 +48,9 @@ def _edit_bones(context, item, collection):
 
 
 @contextmanager
-def edit_armature(context, data):
+def edit_armature(
+    context: Context, data: bpy.types.Armature
+) -> Iterator[bpy.types.ArmatureEditBones]:
     """The edit bones of an armature that is in use, whether its objects are hidden or not."""
     workshop = bpy.data.collections.new("bones")
     item = bpy.data.objects.new("bones", data)
@@ -52,7 +63,7 @@ def edit_armature(context, data):
 
 
 @contextmanager
-def kept_selection(context):
+def kept_selection(context: Context) -> Iterator[None]:
     """Restore the active object, its mode and the selection after building beside them."""
     layer = context.view_layer
     active = layer.objects.active
@@ -71,7 +82,12 @@ def kept_selection(context):
                 bpy.ops.object.mode_set(mode=mode)
 
 
-def build_rig(context, plan, made, workshop):
+def build_rig(
+    context: Context,
+    plan: plans.CharacterPlan,
+    made: list[bpy.types.ID],
+    workshop: bpy.types.Collection,
+) -> ArmatureObject:
     """Build the deforming armature in its neutral pose.
 
     Args:
@@ -116,7 +132,7 @@ def build_rig(context, plan, made, workshop):
     return rig
 
 
-def pull_controls(rig, controls):
+def pull_controls(rig: ArmatureObject, controls: ArmatureObject) -> None:
     """Let Blender evaluate the controls wherever the rig is, also where they are hidden.
 
     Without a dependency Blender leaves out what is hidden in viewport or render, and the face
@@ -144,13 +160,18 @@ def pull_controls(rig, controls):
             variable.targets[0].id = controls
 
 
-def lock_place(item):
+def lock_place(item: bpy.types.Object) -> None:
     """Let the user's hand not move an object by accident."""
     item.lock_location = item.lock_rotation = item.lock_scale = (True, True, True)
     item.lock_rotation_w = True
 
 
-def build_controls(context, plan, made, workshop):
+def build_controls(
+    context: Context,
+    plan: plans.CharacterPlan,
+    made: list[bpy.types.ID],
+    workshop: bpy.types.Collection,
+) -> ArmatureObject:
     """Build the small control armature with the sliders and the bones that turn things.
 
     Args: see build_rig.
@@ -192,7 +213,7 @@ def build_controls(context, plan, made, workshop):
     return controls
 
 
-def control_places(plan):
+def control_places(plan: plans.CharacterPlan) -> dict[str, BonePlace]:
     """Where the control bones stand: name -> (position, axis, length, parent)."""
     rest, anchors, size = plan.armature.rest, plan.anchors, plan.size
     points = np.concatenate([m.positions for m in plan.meshes]).astype(float)
@@ -220,14 +241,16 @@ def control_places(plan):
     return places
 
 
-def add_properties(bone, controls, maximum=1.0):
+def add_properties(
+    bone: bpy.types.PoseBone, controls: Iterable[plans.ControlPlan], maximum: float = 1.0
+) -> None:
     """Give a pose bone the float property of each ControlPlan: limits, default, words."""
     for control in controls:
         bone[control.label] = control.rest
         describe_property(bone, control, maximum)
 
 
-def describe_property(bone, control, maximum):
+def describe_property(bone: bpy.types.PoseBone, control: plans.ControlPlan, maximum: float) -> None:
     """Set limits, default and words of one control property. Args: control  its ControlPlan."""
     name = control.label
     bone.id_properties_ui(name).update(
@@ -243,12 +266,12 @@ def describe_property(bone, control, maximum):
     bone.property_overridable_library_set(f'["{bpy.utils.escape_identifier(name)}"]', True)
 
 
-def key_group(name):
+def key_group(name: str) -> str:
     """The F-curve group that keys of a control go to."""
     return regions.TITLES[regions.region_of(name)]
 
 
-def _shape(bone, name):
+def _shape(bone: bpy.types.PoseBone, name: str) -> None:
     """Turn and size the wire circle so that it surrounds what the bone turns."""
     if name in ("neck", "head"):  # circle around the upright bone
         bone.custom_shape_scale_xyz = (1.4, 1.4, 1.4) if name == "head" else (1.7, 1.7, 1.7)
@@ -266,7 +289,7 @@ def _shape(bone, name):
             bone.custom_shape_translation = (0.0, bone.length * 1.5, 0.0)
 
 
-def _circle(made, name):
+def _circle(made: list[bpy.types.ID], name: str) -> bpy.types.Object:
     """A wire circle of radius 1 in the xy plane, in no collection: only bones show it."""
     count = 32
     mesh = bpy.data.meshes.new(f"{name}_circle")

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """From the bytes of a DNA file to a character in the scene, or to nothing at all."""
 
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import bpy
 
@@ -12,6 +14,7 @@ from ...logic.base import names
 from ...logic.character import plans
 from ...logic.material import texture_search
 from ..base import compat, form, parts, sharing, storage
+from ..base.blender_types import ArmatureObject, Context, MeshObject
 from ..material import materials
 from . import armatures, lods, meshes, runtime
 
@@ -56,11 +59,11 @@ class _File:
 
     path: Path
     content: bytes
-    dna: Any
-    rig: Any
+    dna: native.Dna
+    rig: native.Rig
 
 
-def _read(path):
+def _read(path: str | Path) -> _File:
     # One read: a file that is just being written may be another at a second look.
     risorius = native.module()
     content = Path(path).read_bytes()
@@ -68,7 +71,12 @@ def _read(path):
     return _File(Path(path), content, dna, risorius.Rig(dna))
 
 
-def import_file(context, path, options, progress=lambda _share: None):
+def import_file(
+    context: Context,
+    path: str | Path,
+    options: BuildOptions,
+    progress: Callable[[float], object] = lambda _share: None,
+) -> tuple[ArmatureObject, list[str]]:
     """Build a character from a file.
 
     Args:
@@ -105,7 +113,14 @@ def import_file(context, path, options, progress=lambda _share: None):
     return rig, [*dna.warnings, *warnings, *plans.layer_warnings(file.rig.ignored_layers)]
 
 
-def _build(context, plan, file, options, made, progress):
+def _build(
+    context: Context,
+    plan: plans.CharacterPlan,
+    file: _File,
+    options: BuildOptions,
+    made: list[bpy.types.ID],
+    progress: Callable[[float], object],
+) -> tuple[ArmatureObject, list[str]]:
     text = storage.store(plan.name, file.content, made)
     workshop = bpy.data.collections.new(f"{plan.name} (in the making)")
     made.append(workshop)
@@ -136,26 +151,32 @@ def _build(context, plan, file, options, made, progress):
         rig[parts.TEXTURES] = found.summary()
     progress(0.8)
     _add_shapes(plan, file.dna, rig, built, options.mode)
-    for item in built:
-        made.append(item.data.shape_keys)
+    made += [key for item in built if (key := item.data.shape_keys) is not None]
     progress(0.95)
     _into_place(context, plan, workshop, rig, controls)
     lods.show(rig, _first(plan))
     return rig, warnings
 
 
-def _first(plan):
+def _first(plan: plans.CharacterPlan) -> int:
     return min(lod for mesh in plan.meshes for lod in mesh.lods)
 
 
-def settle(context, *items):
+def settle(context: Context, *items: bpy.types.Object) -> None:
     """Bring new custom properties to the evaluated copies."""
     for item in items:
         item.update_tag()
     context.view_layer.update()
 
 
-def _connect(plan, rig, controls, text, path, unit):
+def _connect(
+    plan: plans.CharacterPlan,
+    rig: ArmatureObject,
+    controls: ArmatureObject,
+    text: bpy.types.Text,
+    path: Path,
+    unit: float,
+) -> None:
     parts.point(controls, parts.RIG, rig)
     parts.point(rig, parts.CONTROLS, controls)
     parts.point(rig, parts.DNA, text)
@@ -171,7 +192,7 @@ def _connect(plan, rig, controls, text, path, unit):
         controls.data[names.cut(f"dna_{key}")] = value
 
 
-def _source(path):
+def _source(path: Path) -> str:
     """The path as kept for Reload: relative where the .blend has a place."""
     try:
         return bpy.path.relpath(str(path)) if bpy.data.filepath else str(path)
@@ -179,7 +200,9 @@ def _source(path):
         return str(path)
 
 
-def _find_textures(plan, path, options):
+def _find_textures(
+    plan: plans.CharacterPlan, path: Path, options: BuildOptions
+) -> texture_search.TexturePlan:
     """The textures beside the file and in the chosen folder; none where none are wanted."""
     if not options.textures:
         return texture_search.TexturePlan()
@@ -188,7 +211,13 @@ def _find_textures(plan, path, options):
     return texture_search.find(plan.textures, [(m.base, m.kind) for m in plan.meshes], folders)
 
 
-def _add_shapes(plan, dna, rig, built, mode):
+def _add_shapes(
+    plan: plans.CharacterPlan,
+    dna: native.Dna,
+    rig: ArmatureObject,
+    built: Sequence[MeshObject],
+    mode: str,
+) -> None:
     labels = channel_labels(dna)
     total = sum(len(m.channels) for m in plan.meshes)
     for item, mesh_plan in zip(built, plan.meshes, strict=True):
@@ -199,12 +228,18 @@ def _add_shapes(plan, dna, rig, built, mode):
         meshes.set_mode(item, rig, dna.meshes[mesh_plan.index], plan.space, labels, chosen)
 
 
-def channel_labels(dna):
+def channel_labels(dna: native.Dna) -> list[str]:
     """Names of the real shape keys, by channel."""
     return names.unique_labels(dna.blend_shape_channel_names, ["Basis", plans.LIVE_KEY])
 
 
-def _into_place(context, plan, workshop, rig, controls):
+def _into_place(
+    context: Context,
+    plan: plans.CharacterPlan,
+    workshop: bpy.types.Collection,
+    rig: ArmatureObject,
+    controls: ArmatureObject,
+) -> None:
     """Name the collection; select the controls."""
     workshop.name = plan.name
     compat.deselect_all(context.view_layer)
@@ -212,13 +247,13 @@ def _into_place(context, plan, workshop, rig, controls):
     context.view_layer.objects.active = controls
 
 
-def change_mode(rig, mode):
+def change_mode(rig: ArmatureObject, mode: str) -> list[str]:
     """Switch the meshes of a character to LIVE or KEYS shapes; AUTO chooses by size.
 
     Returns:
         Sentences on meshes that could not be switched.
     """
-    live = runtime.of(rig)
+    live = runtime.there(rig)
     trouble = []
     items = parts.meshes_of(rig)
     total = sum(len(live.dna.meshes[i[parts.MESH]].blend_shape_targets) for i in items)
@@ -238,7 +273,7 @@ def change_mode(rig, mode):
     return trouble
 
 
-def remove(rig):
+def remove(rig: ArmatureObject) -> None:
     """Take a character and all that belongs to it out of the file."""
     controls = parts.controls_of(rig)
     text = rig.get(parts.DNA)
@@ -257,7 +292,7 @@ def remove(rig):
     _remove([c for c in collections if not c.all_objects])
 
 
-def _remove(made):
+def _remove(made: Iterable[bpy.types.ID | None]) -> None:
     """Remove those datablocks that still live."""
     alive = []
     for item in dict.fromkeys(made):

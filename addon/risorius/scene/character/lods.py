@@ -1,34 +1,39 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Levels of detail: in the viewport, in renders, and by the distance to the camera."""
 
+from __future__ import annotations
+
+import bpy
+
 from ...logic.character import lod_distance as rules
 from ..base import parts
+from ..base.blender_types import ArmatureObject, Depsgraph
 
 SAME = -1  # as the level of renders: that of the viewport
 
 
-def built(rig):
+def built(rig: ArmatureObject) -> list[int]:
     """The levels that a character has meshes for, in order."""
     return sorted({int(v) for m in parts.meshes_of(rig) for v in m.get(parts.LODS, [])})
 
 
-def viewport_level(rig):
+def viewport_level(rig: ArmatureObject) -> int:
     """The level that the viewport shows."""
     return int(rig.get(parts.LOD, 0))
 
 
-def render_level(rig):
+def render_level(rig: ArmatureObject) -> int:
     """The level that renders show, where the distance does not choose it."""
     level = int(rig.get(parts.LOD_RENDER, SAME))
     return viewport_level(rig) if level == SAME else level
 
 
-def by_distance(rig):
+def by_distance(rig: ArmatureObject) -> bool:
     """Whether the distance to the camera chooses the level."""
     return bool(rig.get(parts.LOD_BY_DISTANCE))
 
 
-def show(rig, viewport=None, render=None):
+def show(rig: ArmatureObject, viewport: int | None = None, render: int | None = None) -> None:
     """Choose levels by hand.
 
     Args:
@@ -45,7 +50,7 @@ def show(rig, viewport=None, render=None):
     rig.update_tag()
 
 
-def follow_camera(rig, enable, size=None):
+def follow_camera(rig: ArmatureObject, enable: bool, size: float | None = None) -> None:
     """Let the distance to the scene's camera choose the level, or no longer.
 
     Args:
@@ -61,7 +66,7 @@ def follow_camera(rig, enable, size=None):
     show(rig)
 
 
-def choose(rig, seen, depsgraph):
+def choose(rig: ArmatureObject, seen: ArmatureObject, depsgraph: Depsgraph) -> int:
     """The level to evaluate for a dependency graph; shows it where the distance asks for it.
 
     Renders get a function of the frame alone; hysteresis is for the viewport only.
@@ -89,13 +94,13 @@ def choose(rig, seen, depsgraph):
     return level
 
 
-def _distance(seen, camera):
+def _distance(seen: ArmatureObject, camera: bpy.types.Object) -> float:
     bone = seen.pose.bones.get("head")
     place = seen.matrix_world @ (bone.head if bone else seen.matrix_world.translation * 0)
     return (place - camera.matrix_world.translation).length
 
 
-def _hide(rig, level, flag):
+def _hide(rig: ArmatureObject, level: int, flag: str) -> None:
     """Hide what the level does not show; what the user hid stays hidden.
 
     A flag that is not what was last written here was set by the user.

@@ -1,23 +1,38 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Meshes with their weights, and their shape keys in both modes."""
 
+from __future__ import annotations
+
 import re
+from collections.abc import Mapping, Sequence
 
 import bmesh
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
-from ...logic.character import user_edits
+from ... import native
+from ...logic.base.space import Space
+from ...logic.character import plans, user_edits
 from ...logic.character.plans import AUTO_KEYS, AUTO_LIMIT, LIVE_KEY
 from ..base import drivers, parts
+from ..base.blender_types import ArmatureObject, MeshObject
 from .armatures import lock_place
 
 _DRIVEN = re.compile(r'^\["channels"\]\[(\d+)\]$')
 _KEY_VALUE = re.compile(r'^key_blocks\["(.*)"\]\.value$')
 _LIVE_MARK = "KEY_BSPLINE"
 
+Deltas = tuple[NDArray[np.int64], NDArray[np.float32]]  # vertex indices, [K, 3]
 
-def build_mesh(plan, mesh_plan, rig, made, normals=True):
+
+def build_mesh(
+    plan: plans.CharacterPlan,
+    mesh_plan: plans.MeshPlan,
+    rig: ArmatureObject,
+    made: list[bpy.types.ID],
+    normals: bool = True,
+) -> MeshObject:
     """Build one mesh object: faces, UVs, custom normals, vertex groups, armature modifier.
 
     Args:
@@ -61,7 +76,7 @@ def build_mesh(plan, mesh_plan, rig, made, normals=True):
     return item
 
 
-def _add_weights(item, mesh_plan, labels):
+def _add_weights(item: MeshObject, mesh_plan: plans.MeshPlan, labels: Sequence[str]) -> None:
     """Vertex groups of the joints that this mesh uses, filled through the deform layer."""
     used = np.unique(mesh_plan.skin_joints)
     group_of = {int(j): item.vertex_groups.new(name=labels[int(j)]).index for j in used}
@@ -82,7 +97,7 @@ def _add_weights(item, mesh_plan, labels):
         edit.free()
 
 
-def automatic_mode(target_count, vertex_count, all_targets):
+def automatic_mode(target_count: int, vertex_count: int, all_targets: int) -> str:
     """KEYS where real keys are cheap enough each frame, else LIVE.
 
     Args:
@@ -93,7 +108,7 @@ def automatic_mode(target_count, vertex_count, all_targets):
     return "KEYS" if few else "LIVE"
 
 
-def real_channels(item):
+def real_channels(item: MeshObject) -> dict[str, int]:
     """Shape key name -> channel, of the keys of a mesh that are ours: found by their drivers.
 
     A key that the user drives by a channel is the user's: our variable's name tells. Where a
@@ -116,7 +131,7 @@ def real_channels(item):
     return found
 
 
-def live_block(item):
+def live_block(item: MeshObject) -> bpy.types.ShapeKey | None:
     """The key that bears the channel sum, also after it was renamed; None without one.
 
     It is marked by its interpolation, which has no meaning for relative keys and survives
@@ -131,7 +146,14 @@ def live_block(item):
     return block
 
 
-def set_mode(item, rig, dna_mesh, space, labels, mode):
+def set_mode(
+    item: MeshObject,
+    rig: ArmatureObject,
+    dna_mesh: native.Mesh,
+    space: Space,
+    labels: Sequence[str],
+    mode: str,
+) -> bool:
     """Bring a mesh's shapes into LIVE or KEYS mode; the same vertices in both.
 
     What the user changed in a real key stays: such a key is kept as a real one in LIVE mode.
@@ -164,12 +186,12 @@ def set_mode(item, rig, dna_mesh, space, labels, mode):
     return True
 
 
-def imported_basis(dna_mesh, space):
+def imported_basis(dna_mesh: native.Mesh, space: Space) -> NDArray[np.float32]:
     """The neutral mesh as an import gives it, float32[V, 3] in Blender units."""
     return np.ascontiguousarray(space.points(dna_mesh.positions), np.float32)
 
 
-def deltas_by_channel(dna_mesh, matrix):
+def deltas_by_channel(dna_mesh: native.Mesh, matrix: NDArray[np.float32]) -> dict[int, Deltas]:
     """Channel -> (vertex indices, float32[K, 3] deltas); targets of one channel are joined."""
     joined = {}
     for target in dna_mesh.blend_shape_targets:
@@ -182,14 +204,14 @@ def deltas_by_channel(dna_mesh, matrix):
     }
 
 
-def points_of(block):
+def points_of(block: bpy.types.ShapeKey) -> NDArray[np.float32]:
     """Coordinates of a shape key, float32[V, 3]."""
     flat = np.empty(len(block.points) * 3, np.float32)
     block.points.foreach_get("co", flat)
     return flat.reshape(-1, 3)
 
 
-def basis_of(item):
+def basis_of(item: MeshObject) -> NDArray[np.float32]:
     """Coordinates of the neutral mesh as it is now, float32[V, 3]."""
     key = item.data.shape_keys
     if key is not None:
@@ -199,7 +221,9 @@ def basis_of(item):
     return flat.reshape(-1, 3)
 
 
-def edits_of(block, imported, deltas):
+def edits_of(
+    block: bpy.types.ShapeKey, imported: NDArray[np.float32], deltas: Deltas
+) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
     """What the user changed in the shape of a real key.
 
     Args:
@@ -214,7 +238,7 @@ def edits_of(block, imported, deltas):
     return user_edits.key_edits(base, points_of(block), imported, user_edits.shaped(base, *deltas))
 
 
-def add_key(item, name, deltas):
+def add_key(item: MeshObject, name: str, deltas: Deltas) -> bpy.types.ShapeKey:
     """A real key of value 0. Args: deltas  (vertex indices, float32[K, 3])."""
     block = item.shape_key_add(name=name, from_mix=False)
     block.slider_min, block.slider_max = -10.0, 10.0
@@ -224,21 +248,25 @@ def add_key(item, name, deltas):
     return block
 
 
-def add_channel_key(item, rig, channel, name, deltas):
+def add_channel_key(
+    item: MeshObject, rig: ArmatureObject, channel: int, name: str, deltas: Deltas
+) -> bpy.types.ShapeKey:
     """A real, driven key of a channel."""
     block = add_key(item, name, deltas)
     drive_key(item.data.shape_keys, block, rig, channel)
     return block
 
 
-def remove_channel_key(item, block):
+def remove_channel_key(item: MeshObject, block: bpy.types.ShapeKey) -> None:
     """Take one of our keys away, its driver too."""
     path = f'key_blocks["{bpy.utils.escape_identifier(block.name)}"].value'
     item.data.shape_keys.driver_remove(path)
     item.shape_key_remove(block)
 
 
-def _to_keys(item, rig, deltas, labels):
+def _to_keys(
+    item: MeshObject, rig: ArmatureObject, deltas: Mapping[int, Deltas], labels: Sequence[str]
+) -> None:
     key = item.data.shape_keys
     there = set(real_channels(item).values())
     given = dict(key.get(parts.KEY_NAMES, {}))
@@ -255,7 +283,12 @@ def _to_keys(item, rig, deltas, labels):
             del key[name]
 
 
-def _to_live(item, deltas, imported, labels):
+def _to_live(
+    item: MeshObject,
+    deltas: Mapping[int, Deltas],
+    imported: NDArray[np.float32],
+    labels: Sequence[str],
+) -> None:
     key = item.data.shape_keys
     if item.get(parts.MODE) == "KEYS":
         _remember_keys(item, labels)
@@ -281,14 +314,16 @@ def _to_live(item, deltas, imported, labels):
             item.active_shape_key_index = 0
 
 
-def touched(key, block, imported, deltas):
+def touched(
+    key: bpy.types.Key, block: bpy.types.ShapeKey, imported: NDArray[np.float32], deltas: Deltas
+) -> bool:
     """Whether a key of ours bears something that the channel sum cannot."""
     if block.mute or block.vertex_group or block.relative_key != key.reference_key:
         return True
     return bool(edits_of(block, imported, deltas)[0].any())
 
 
-def _remember_keys(item, labels):
+def _remember_keys(item: MeshObject, labels: Sequence[str]) -> None:
     """Keep the user's names and order of our keys while they are away."""
     key, channels = item.data.shape_keys, real_channels(item)
     renamed = {str(c): name for name, c in channels.items() if name != labels[c]}
@@ -299,7 +334,9 @@ def _remember_keys(item, labels):
         key[parts.KEY_ORDER] = order
 
 
-def drive_key(key, block, rig, channel):
+def drive_key(
+    key: bpy.types.Key, block: bpy.types.ShapeKey, rig: ArmatureObject, channel: int
+) -> None:
     """Drive a key's value by its channel through a plain SUM driver."""
     name = bpy.utils.escape_identifier(block.name)
     curve = key.driver_add(f'key_blocks["{name}"].value')

@@ -4,12 +4,17 @@
 Neither is the other's parent: a parent's edit would make Blender deform the meshes twice.
 """
 
-import re
+from __future__ import annotations
 
+import re
+from collections.abc import Iterable
+
+import bpy
 import numpy as np
 from mathutils import Quaternion, Vector
 
 from ..base import parts
+from ..base.blender_types import ArmatureObject, Depsgraph
 from . import runtime
 
 CONSTRAINT = "Risorius Body"
@@ -17,7 +22,7 @@ _GAP = 1.25  # from face to face, in widths of one
 _NEAR = 1e-6  # of the largest number of the matrix: what decomposing in float32 leaves
 
 
-def follow(rig, seen):
+def follow(rig: ArmatureObject, seen: ArmatureObject) -> None:
     """Put the rig where the control armature is, unless the user gave it a place of its own.
 
     Args:
@@ -35,7 +40,7 @@ def follow(rig, seen):
         rig.matrix_basis = seen.matrix_world
 
 
-def put_beside(scene, rig):
+def put_beside(scene: bpy.types.Scene, rig: ArmatureObject) -> bool:
     """Move a new face to the right until it stands on no other one's spot.
 
     Args:
@@ -48,23 +53,23 @@ def put_beside(scene, rig):
     others = [r for r in parts.rigs(linked=True) if r != rig and scene in r.users_scene]
     there = [c.matrix_world.translation for c in map(parts.controls_of, others) if c is not None]
     step = _GAP * _width(rig)
-    spot = parts.controls_of(rig).location
+    spot = parts.controls_there(rig).location
     free = next(n for n in range(len(there) + 1) if not _taken(there, spot, n * step, step / 2))
     spot.x += free * step
     return free > 0
 
 
-def _taken(there, spot, shift, reach):
+def _taken(there: Iterable[Vector], spot: Vector, shift: float, reach: float) -> bool:
     return any((at - spot - Vector((shift, 0.0, 0.0))).length < reach for at in there)
 
 
-def _width(rig):
+def _width(rig: ArmatureObject) -> float:
     """How wide the meshes of a face are, in units of the scene."""
     ends = [corner[0] for item in parts.meshes_of(rig) for corner in item.bound_box]
     return max(ends, default=0.0) - min(ends, default=0.0)
 
 
-def find_bones(body):
+def find_bones(body: ArmatureObject) -> tuple[str, str, str]:
     """The neck, head and base bones of a body by their names, in any naming scheme.
 
     Args:
@@ -82,7 +87,7 @@ def find_bones(body):
     return base, neck, head
 
 
-def _named(bones, word):
+def _named(bones: Iterable[bpy.types.Bone], word: str) -> str:
     """The bone nearest to the root whose name has the word standing alone, or ""."""
     pattern = re.compile(rf"(?:^|[^a-z]){word}(?![a-z])", re.IGNORECASE)
     found = [b for b in bones if pattern.search(_split(b.name))]
@@ -90,12 +95,19 @@ def _named(bones, word):
     return found[0].name if found else ""
 
 
-def _split(name):
+def _split(name: str) -> str:
     """`mixamorigHead` as `mixamorig Head`."""
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", " ", name)
 
 
-def attach(controls, body, base, neck="", head="", fit="MOVE"):
+def attach(
+    controls: ArmatureObject,
+    body: ArmatureObject,
+    base: str,
+    neck: str = "",
+    head: str = "",
+    fit: str = "MOVE",
+) -> None:
     """Hang a face on a body.
 
     Args:
@@ -121,7 +133,7 @@ def attach(controls, body, base, neck="", head="", fit="MOVE"):
     controls.update_tag()
 
 
-def _neck_chain(body, base, neck, head):
+def _neck_chain(body: ArmatureObject, base: str, neck: str, head: str) -> list[str]:
     """The bones from the neck bone up to below the head: a body may have several."""
     if not neck:
         return []
@@ -131,13 +143,13 @@ def _neck_chain(body, base, neck, head):
     return [name for name in chain if name != base]
 
 
-def body_of(controls):
+def body_of(controls: ArmatureObject) -> bpy.types.ChildOfConstraint | None:
     """The constraint by which a face hangs on a body, or None."""
     hold = controls.constraints.get(CONSTRAINT)
     return hold if hold is not None and hold.type == "CHILD_OF" and hold.target else None
 
 
-def body_turns(controls, depsgraph):
+def body_turns(controls: ArmatureObject, depsgraph: Depsgraph) -> dict[str, Quaternion]:
     """What a body's bones ask of the face's own neck and head, beyond what the base does.
 
     Constraints between bones copy local rotations as if both armatures stood alike; bodies from
@@ -169,7 +181,7 @@ def body_turns(controls, depsgraph):
     return turns
 
 
-def own_turn(seen, bone):
+def own_turn(seen: ArmatureObject, bone: bpy.types.PoseBone) -> Quaternion:
     """A bone's own rotation after its constraints, in the axes of its armature."""
     local = seen.convert_space(
         pose_bone=bone, matrix=bone.matrix, from_space="POSE", to_space="LOCAL"
@@ -178,7 +190,7 @@ def own_turn(seen, bone):
     return rest @ local.to_quaternion() @ rest.inverted()
 
 
-def _fit(controls, body, neck, head, scale):
+def _fit(controls: ArmatureObject, body: ArmatureObject, neck: str, head: str, scale: bool) -> None:
     """Move (and scale) the face so that its resting bones meet the body's."""
     own = controls.data.bones
     pairs = [
@@ -205,7 +217,7 @@ def _fit(controls, body, neck, head, scale):
     controls.matrix_world = matrix
 
 
-def detach(controls):
+def detach(controls: ArmatureObject) -> None:
     """Take a face off its body; it stays where it stands."""
     holds = [c for c in controls.constraints if c.name == CONSTRAINT]
     if holds:

@@ -4,18 +4,24 @@
 Holds no Blender object: it is found anew, or rebuilt, after load, undo, append and enable.
 """
 
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ... import native
 from ...logic.base import names
-from ...logic.base.space import SpaceError, world_matrices, yaw_pitch
+from ...logic.base.space import Space, SpaceError, world_matrices, yaw_pitch
 from ...logic.character import plans
 from ..base import parts, storage
+from ..base.blender_types import ArmatureObject
 
-DEFAULT_EYE_ANGLE = np.radians(30.0)
+DEFAULT_EYE_ANGLE = float(np.radians(30.0))
 
 
 @dataclass
@@ -34,19 +40,19 @@ class Runtime:
         morphs: mesh index -> risorius.Morph.
     """
 
-    dna: object
-    rig: object
-    space: object
-    labels: list
-    rests: list
-    lowest: list
-    owned: frozenset
-    rest: object
-    anchors: object
-    look: dict
-    morphs: dict = field(default_factory=dict)
+    dna: native.Dna
+    rig: native.Rig
+    space: Space
+    labels: list[str]
+    rests: list[float]
+    lowest: list[float]
+    owned: frozenset[int]
+    rest: NDArray[np.float64]
+    anchors: plans.Anchors
+    look: dict[str, list[tuple[int, float, float]]]
+    morphs: dict[int, native.Morph] = field(default_factory=dict)
 
-    def morph(self, mesh_index):
+    def morph(self, mesh_index: int) -> native.Morph:
         """The compiled shapes of a mesh, made when first asked for."""
         if mesh_index not in self.morphs:
             self.morphs[mesh_index] = native.module().Morph(
@@ -54,7 +60,7 @@ class Runtime:
             )
         return self.morphs[mesh_index]
 
-    def bone_space(self, joints):
+    def bone_space(self, joints: Sequence[int]) -> native.BoneSpace:
         """The native conversion of poses for bones that stand for these joints."""
         space = self.space
         return native.module().BoneSpace(
@@ -68,13 +74,13 @@ class Runtime:
         )
 
 
-_cache = {}
-_pauses = []
-outputs = {}  # (what, session uid) -> what was last written there
+_cache: dict[tuple[str, float], Runtime | None] = {}
+_pauses: list[bool] = []
+outputs: dict[tuple[str, int], Any] = {}  # (what, session uid) -> what was last written there
 
 
 @contextmanager
-def paused():
+def paused() -> Iterator[None]:
     """While this lasts no frame and no update brings a face up: what is read is read by others."""
     _pauses.append(True)
     try:
@@ -83,11 +89,11 @@ def paused():
         _pauses.pop()
 
 
-def is_paused():
+def is_paused() -> bool:
     return bool(_pauses)
 
 
-def of(rig):
+def of(rig: ArmatureObject) -> Runtime | None:
     """The Runtime of a character.
 
     Args:
@@ -112,7 +118,14 @@ def of(rig):
     return _cache[key]
 
 
-def take(armature, dna, rig):
+def there(rig: ArmatureObject) -> Runtime:
+    """The Runtime of a character that has its DNA: whoever asks has looked."""
+    live = of(rig)
+    assert live is not None
+    return live
+
+
+def take(armature: ArmatureObject, dna: native.Dna, rig: native.Rig) -> None:
     """Keep what was read and compiled at an import: it is not done again for the same bytes.
 
     Args:
@@ -131,14 +144,14 @@ def take(armature, dna, rig):
             raise plans.PlanError("The file cannot be evaluated.") from error
 
 
-def unit_of(rig):
+def unit_of(rig: ArmatureObject) -> float:
     """Metres per Blender unit at import."""
     unit = rig.get(parts.UNIT)
     usable = isinstance(unit, int | float) and np.isfinite(unit) and unit > 0
     return float(unit) if usable else 1.0
 
 
-def forget_unused(rigs):
+def forget_unused(rigs: Iterable[ArmatureObject]) -> None:
     """Drop compiled data of characters that are gone. Args: rigs  those that are there."""
     used = {storage.content_hash(rig.get(parts.DNA)) for rig in rigs}
     for key in [k for k in _cache if k[0] not in used]:
@@ -146,13 +159,13 @@ def forget_unused(rigs):
     outputs.clear()
 
 
-def _compile(content, unit):
+def _compile(content: bytes, unit: float) -> Runtime:
     risorius = native.module()
     dna = risorius.load(content)
     return _runtime(dna, risorius.Rig(dna), unit)
 
 
-def _runtime(dna, rig, unit):
+def _runtime(dna: native.Dna, rig: native.Rig, unit: float) -> Runtime:
     space = plans.space_of(dna, unit)
     anchors = plans.find_anchors(dna.joint_names)
     owned = {int(j) for j in rig.joint_indices_written} | set(anchors.neck)
@@ -180,7 +193,7 @@ def _runtime(dna, rig, unit):
     return runtime
 
 
-def _measure_look(runtime):
+def _measure_look(runtime: Runtime) -> dict[str, list[tuple[int, float, float]]]:
     """How far each look control turns its eye: side -> list of (control, yaw, pitch) at 1."""
     found = {}
     where = {name.rsplit(".", 1)[-1]: i for i, name in enumerate(runtime.dna.raw_control_names)}
@@ -200,7 +213,7 @@ def _measure_look(runtime):
     return found
 
 
-def _response(runtime, control, side, horizontal):
+def _response(runtime: Runtime, control: int, side: str, horizontal: bool) -> float:
     """The angle in radians that a look control turns its eye by at full value."""
     joint = runtime.anchors.eyes.get(side)
     if joint is None:
@@ -217,12 +230,12 @@ def _response(runtime, control, side, horizontal):
     return angle if angle > np.radians(2.0) else DEFAULT_EYE_ANGLE
 
 
-def forget_outputs():
+def forget_outputs() -> None:
     """Let the next evaluation write everything: after undo, load and changes of shape mode."""
     outputs.clear()
 
 
-def forget():
+def forget() -> None:
     """Drop all compiled data."""
     _cache.clear()
     outputs.clear()

@@ -1,11 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Skin weights of a mesh object, read and written in bulk."""
 
+from __future__ import annotations
+
+from collections.abc import Sequence
+
 import bmesh
 import numpy as np
 
+from ...logic.character import plans
+from ..base.blender_types import MeshObject
 
-def file_pairs(mesh_plan, labels):
+Weights = dict[str, dict[int, float]]  # bone or vertex group -> vertex -> weight
+
+
+def file_pairs(mesh_plan: plans.MeshPlan, labels: Sequence[str]) -> Weights:
     """The weights that a file gives: {bone name: {vertex: weight}}, repeated ones summed.
 
     Args:
@@ -22,7 +31,7 @@ def file_pairs(mesh_plan, labels):
     return result
 
 
-def read(item):
+def read(item: MeshObject) -> Weights:
     """The weights of a mesh object: {vertex group name: {vertex: weight}}."""
     names = [g.name for g in item.vertex_groups]
     result = {name: {} for name in names}
@@ -33,7 +42,7 @@ def read(item):
     return result
 
 
-def write(item, groups):
+def write(item: MeshObject, groups: Weights) -> None:
     """Make these the weights of the named groups; other groups keep theirs.
 
     Args:
@@ -60,7 +69,7 @@ def write(item, groups):
         edit.free()
 
 
-def edited_vertices(present, wanted):
+def edited_vertices(present: Weights, wanted: Weights) -> set[int]:
     """The vertices at which weights differ from those of the file.
 
     Args:

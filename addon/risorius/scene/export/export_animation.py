@@ -5,12 +5,17 @@ The copy lives in a scene of its own for as long as an exporter needs it; the ch
 scene and the frame that it shows are never touched.
 """
 
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 import bpy
 import numpy as np
 from mathutils import Quaternion
+from numpy.typing import NDArray
 
 from ... import native
 from ...logic.animation import clip_units, key_reduction
@@ -18,6 +23,7 @@ from ...logic.base.names import unique_labels
 from ..animation import actions
 from ..bake import bake_face, baked_shape_keys, baked_tracks, sampling
 from ..base import compat, parts
+from ..base.blender_types import ArmatureObject, Context, MeshObject
 from ..character import meshes, runtime
 from .lent_names import Loans
 
@@ -37,11 +43,13 @@ class ShipOptions:
     end: float = 250
     step: float = 1
     lod: int = -1
-    wanted: frozenset = frozenset(("BONES", "SHAPES"))
+    wanted: frozenset[str] = frozenset(("BONES", "SHAPES"))
     all_shapes: bool = False
 
 
-def sampled(context, rigs, options):
+def sampled(
+    context: Context, rigs: Sequence[ArmatureObject], options: ShipOptions
+) -> Generator[float, None, list[tuple[ArmatureObject, int, sampling.Samples]]]:
     """Sample characters for `copies` or `clip`; a generator like sampling.sample.
 
     Returns:
@@ -62,7 +70,11 @@ def sampled(context, rigs, options):
 
 
 @contextmanager
-def copies(context, characters, options):
+def copies(
+    context: Context,
+    characters: Sequence[tuple[ArmatureObject, int, sampling.Samples]],
+    options: ShipOptions,
+) -> Iterator[tuple[dict[str, Any], Loans]]:
     """Baked copies of characters, selected, alone in a scene that is shown meanwhile.
 
     Args:
@@ -100,7 +112,7 @@ def copies(context, characters, options):
             runtime.forget_outputs()
 
 
-def _stage(user, frames):
+def _stage(user: bpy.types.Scene, frames: NDArray[np.float64]) -> bpy.types.Scene:
     stage = bpy.data.scenes.new("Risorius Export")
     for name in ("fps", "fps_base"):
         setattr(stage.render, name, getattr(user.render, name))
@@ -111,14 +123,21 @@ def _stage(user, frames):
     return stage
 
 
-def _name(rig):
+def _name(rig: ArmatureObject) -> str:
     """What a character is called in a file."""
     return rig.name.removesuffix("_rig")
 
 
-def _copy(stage, rig, level, samples, options, loans):
+def _copy(
+    stage: bpy.types.Scene,
+    rig: ArmatureObject,
+    level: int,
+    samples: sampling.Samples,
+    options: ShipOptions,
+    loans: Loans,
+) -> None:
     """One character: armature, meshes of the level, and their actions."""
-    live = runtime.of(rig)
+    live = runtime.there(rig)
     pose = baked_tracks.evaluate(live, samples, level)
     copy = rig.copy()
     copy.animation_data_clear()
@@ -136,7 +155,13 @@ def _copy(stage, rig, level, samples, options, loans):
     _forget(copy)
 
 
-def _copy_mesh(stage, item, rig_copy, live, loans):
+def _copy_mesh(
+    stage: bpy.types.Scene,
+    item: MeshObject,
+    rig_copy: ArmatureObject,
+    live: runtime.Runtime,
+    loans: Loans,
+) -> MeshObject:
     made = item.copy()
     made.data = item.data.copy()
     made.animation_data_clear()
@@ -152,7 +177,14 @@ def _copy_mesh(stage, item, rig_copy, live, loans):
     return made
 
 
-def _shapes(made, item, live, samples, weights, options):
+def _shapes(
+    made: MeshObject,
+    item: MeshObject,
+    live: runtime.Runtime,
+    samples: sampling.Samples,
+    weights: NDArray[np.float32],
+    options: ShipOptions,
+) -> None:
     """Real keys with values that are animated, and no others of ours."""
     key = made.data.shape_keys
     if key is None:
@@ -172,24 +204,28 @@ def _shapes(made, item, live, samples, weights, options):
     _play(key, samples.frames, baked_tracks.key_tracks(key, names, weights, others))
 
 
-def _play(owner, frames, tracks):
+def _play(
+    owner: bpy.types.Object | bpy.types.Key,
+    frames: NDArray[np.float64],
+    tracks: Sequence[actions.Track],
+) -> None:
     action, slot = actions.write(owner.name, owner, frames, tracks, 0.0, actions.Counts())
     compat.assign_action(owner.animation_data_create(), action, slot)
 
 
-def _show(item):
+def _show(item: bpy.types.Object) -> None:
     item.hide_viewport = item.hide_render = item.hide_select = False
     item.lock_location = item.lock_rotation = item.lock_scale = (False, False, False)
 
 
-def _forget(item):
+def _forget(item: bpy.types.Object) -> None:
     """Take off what makes an object a part of a character."""
     for name in list(item.keys()):
         if name.startswith(("risorius_", "dna_")) or name in (parts.MAPS, parts.CHANNELS):
             del item[name]
 
 
-def _everything():
+def _everything() -> dict[str, set[bpy.types.ID]]:
     """Every datablock of the file, by kind."""
     return {
         kind.identifier: set(getattr(bpy.data, kind.identifier))
@@ -198,7 +234,7 @@ def _everything():
     }
 
 
-def _remove_all_but(before):
+def _remove_all_but(before: Mapping[str, set[bpy.types.ID]]) -> None:
     """Remove what was made since: by us, and by an exporter that failed half-way."""
     new = [
         item
@@ -210,7 +246,14 @@ def _remove_all_but(before):
         bpy.data.batch_remove(new)
 
 
-def clip(rig, level, samples, rate, origin, maps=False):
+def clip(
+    rig: ArmatureObject,
+    level: int,
+    samples: sampling.Samples,
+    rate: float,
+    origin: float,
+    maps: bool = False,
+) -> native.Clip:
     """The raw controls of a range, and how the head was turned.
 
     Args:
@@ -224,7 +267,7 @@ def clip(rig, level, samples, rate, origin, maps=False):
     Returns:
         risorius.Clip, names as in the DNA (Blender's where the DNA has one twice).
     """
-    live, names = runtime.of(rig), []
+    live, names = runtime.there(rig), []
     for label, name in zip(live.labels, live.dna.raw_control_names, strict=True):
         names.append(label if name in names else name)
     rows = samples.raw.T

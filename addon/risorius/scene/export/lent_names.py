@@ -1,16 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Names that datablocks lend to copies: a file for another program bears the user's own names."""
 
+from __future__ import annotations
+
 import bpy
 
 
 class Loans:
     """What was lent; `give_back` when the copies are gone."""
 
-    def __init__(self):
-        self._lent, self._taken = [], set()
+    def __init__(self) -> None:
+        self._lent: list[tuple[bpy.types.ID, str]] = []
+        self._taken: set[tuple[str, str]] = set()
 
-    def take(self, kind, copy, name):
+    def take(self, kind: str, copy: bpy.types.ID, name: str) -> None:
         """Name a copy; who has the name waits under another, unless it is a copy too.
 
         Args:
@@ -27,7 +30,7 @@ class Loans:
         copy.name = name
         self._taken.add((kind, name))
 
-    def give_back(self):
+    def give_back(self) -> None:
         """Everyone has the name again that it had; the copies must be gone."""
         while self._lent:
             holder, name = self._lent.pop()

@@ -7,18 +7,25 @@ that image. Relief that nodes paint is left out: it is finer than the images are
 copies of an export, whose materials, meshes and scene go again.
 """
 
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from pathlib import PurePath
+from pathlib import Path, PurePath
+from typing import Any
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ... import native
 from ...logic.base.errors import FaceError
 from ...logic.material import uv_grid
 from ..base import compat
+from ..base.blender_types import MeshObject, Node, NodeTree, Socket
 from ..material import image_loading
 from . import shader_inputs
+from .lent_names import Loans
 from .quiet import quiet
 
 _INPUTS = {"color": ("Base Color", "Color"), "alpha": ("Alpha",), "roughness": ("Roughness",)}
@@ -48,19 +55,19 @@ class _Flat:
         mean: the roughness becomes one number, because faces lie on each other in the UV map.
     """
 
-    material: object
+    material: bpy.types.Material
     name: str
-    work: object = None
-    users: list = field(default_factory=list)
-    shader: object = None
+    work: bpy.types.Material | None = None
+    users: list[tuple[MeshObject, int]] = field(default_factory=list)
+    shader: Node | None = None
     clear: bool = False
-    sources: dict = field(default_factory=dict)
-    images: dict = field(default_factory=dict)
-    baked: set = field(default_factory=set)
-    mean: bool = False
+    sources: dict[str, shader_inputs.Source] = field(default_factory=dict)
+    images: dict[str, bpy.types.Image] = field(default_factory=dict)
+    baked: set[str] = field(default_factory=set)
+    mean: bool | float = False
 
 
-def flatten(override, loans, size):
+def flatten(override: dict[str, Any], loans: Loans, size: int) -> Iterator[float]:
     """Replace the materials of copied meshes; a generator.
 
     Args:
@@ -92,7 +99,7 @@ def flatten(override, loans, size):
     yield 1.0
 
 
-def _join_slots(item):
+def _join_slots(item: MeshObject) -> None:
     """Faces that look the same get one material: an eye has two for the solid view."""
     slots = item.data.materials
     for number in range(len(slots) - 1, 0, -1):
@@ -102,7 +109,7 @@ def _join_slots(item):
             slots.pop(index=number)  # its faces go to the slot before it
 
 
-def _gather(items):
+def _gather(items: Iterable[MeshObject]) -> list[_Flat]:
     found = {}
     for item in items:
         for number, slot in enumerate(item.material_slots):
@@ -115,7 +122,7 @@ def _gather(items):
 # --- what is taken over, what is baked ---------------------------------------------------------
 
 
-def _read(flat):
+def _read(flat: _Flat) -> None:
     """Sort the inputs of a material."""
     if flat.material.node_tree is None:
         return
@@ -143,7 +150,7 @@ def _read(flat):
         flat.baked.add("color")  # may be a number, but its image bears the opacity
 
 
-def _lay_out(flat):
+def _lay_out(flat: _Flat) -> None:
     """Where the pictures of a material lie on its meshes; meshes get a layer where that is new."""
     if not flat.baked:
         return
@@ -167,11 +174,11 @@ def _lay_out(flat):
             _write(item.data, corners, part)
 
 
-def _ends(parts):
+def _ends(parts: Iterable[NDArray[np.float32]]) -> NDArray[np.int64]:
     return np.cumsum([len(p) for p in parts])[:-1]
 
 
-def _corners(item, slot):
+def _corners(item: MeshObject, slot: int) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
     """Numbers of the corners of the faces of a slot, and how many each of these faces has."""
     mesh = item.data
     index, total = np.empty(len(mesh.polygons), np.int32), np.empty(len(mesh.polygons), np.int32)
@@ -181,7 +188,7 @@ def _corners(item, slot):
     return np.flatnonzero(np.repeat(shown, total)), total[shown]
 
 
-def _coordinates(item):
+def _coordinates(item: MeshObject) -> NDArray[np.float32]:
     """float32[corners, 2] of the UV map that renders show."""
     mesh = item.data
     flat = np.zeros(len(mesh.loops) * 2, np.float32)
@@ -191,11 +198,11 @@ def _coordinates(item):
     return flat.reshape(-1, 2)
 
 
-def _shown_layer(mesh):
+def _shown_layer(mesh: bpy.types.Mesh) -> bpy.types.MeshUVLoopLayer | None:
     return next((y for y in mesh.uv_layers if y.active_render), None)
 
 
-def _write(mesh, corners, part):
+def _write(mesh: bpy.types.Mesh, corners: NDArray[np.int64], part: NDArray[np.float32]) -> None:
     """Put coordinates into the layer that is baked to, which begins as a copy of the shown one."""
     shown, layer = _shown_layer(mesh), mesh.uv_layers.get(_LAYER)
     values = np.zeros(len(mesh.loops) * 2, np.float32)
@@ -208,7 +215,7 @@ def _write(mesh, corners, part):
     layer.uv.foreach_set("vector", values)
 
 
-def _keep_one_layout(mesh):
+def _keep_one_layout(mesh: bpy.types.Mesh) -> None:
     """What was baked by becomes the UV map that renders show."""
     layer, shown = mesh.uv_layers.get(_LAYER), _shown_layer(mesh)
     if layer is None:
@@ -225,7 +232,9 @@ def _keep_one_layout(mesh):
 # --- baking ------------------------------------------------------------------------------------
 
 
-def _bake(override, items, flats, size):
+def _bake(
+    override: dict[str, Any], items: Sequence[MeshObject], flats: Sequence[_Flat], size: int
+) -> Iterator[float]:
     """All that is painted: colours, then opacity and roughness together."""
     _prepare(override["scene"], size)
     spare = bpy.data.images.new("Spare", 4, 4)
@@ -253,7 +262,7 @@ def _bake(override, items, flats, size):
         _read_back(flat, *(targets.get((flat.material, i)) for i in (("color",), _MASKS)))
 
 
-def _prepare(stage, size):
+def _prepare(stage: bpy.types.Scene, size: int) -> None:
     """Cycles on the CPU, one sample: what is baked has no light in it."""
     try:
         stage.render.engine = "CYCLES"
@@ -269,11 +278,11 @@ def _prepare(stage, size):
     settings.target = "IMAGE_TEXTURES"
 
 
-def _shown_on(item, flats):
+def _shown_on(item: MeshObject, flats: Iterable[_Flat]) -> list[_Flat]:
     return [flat for flat in flats if any(user == item for user, _ in flat.users)]
 
 
-def _new_image(flat, name, size):
+def _new_image(flat: _Flat, name: str, size: int) -> bpy.types.Image:
     """An empty image; what is baked coarsely is smooth or will be one number."""
     if name != "color" and "alpha" not in flat.baked:
         size = 64 if flat.mean else max(size // 4, 64)
@@ -283,7 +292,7 @@ def _new_image(flat, name, size):
     return image
 
 
-def _aim(flat, wanted, image):
+def _aim(flat: _Flat, wanted: Sequence[str], image: bpy.types.Image) -> None:
     """Let the copy of a material glow with some of its inputs, and be baked into an image."""
     if flat.work is None:
         flat.work = flat.material.copy()
@@ -310,14 +319,14 @@ def _aim(flat, wanted, image):
     tree.links.new(glow.outputs[0], output.inputs["Surface"])
 
 
-def _feed(tree, source, socket):
+def _feed(tree: NodeTree, source: shader_inputs.Source, socket: Socket) -> None:
     if source.socket is not None:
         tree.links.new(source.socket, socket)
     elif source.value is not None:
         socket.default_value = source.value
 
 
-def _bake_one(override, items, item):
+def _bake_one(override: dict[str, Any], items: Iterable[MeshObject], item: MeshObject) -> None:
     """Bake one mesh, alone: Cycles reads the whole scene for each."""
     for other in items:
         other.hide_render = other != item
@@ -329,14 +338,14 @@ def _bake_one(override, items, item):
         bpy.ops.object.bake(type="EMIT")
 
 
-def _select(override, items):
+def _select(override: dict[str, Any], items: Sequence[MeshObject]) -> None:
     layer = override["view_layer"]
     for item in override["scene"].objects:
         item.select_set(item in items, view_layer=layer)
     layer.objects.active = items[0]
 
 
-def _read_back(flat, color, masks):
+def _read_back(flat: _Flat, color: bpy.types.Image | None, masks: bpy.types.Image | None) -> None:
     """The images of a material, of what was baked."""
     values = _pixels(masks) if masks is not None else None
     if color is not None:
@@ -354,7 +363,7 @@ def _read_back(flat, color, masks):
     flat.images["roughness"] = masks
 
 
-def _finish_color(image, alpha):
+def _finish_color(image: bpy.types.Image, alpha: NDArray[np.float32] | None) -> None:
     """Put the opacity in; an opaque image has no alpha that could be taken for one."""
     values = _pixels(image)
     seen = values[..., 3] > 0
@@ -364,13 +373,13 @@ def _finish_color(image, alpha):
     _store(image, values, "NONE" if alpha is None else "STRAIGHT")
 
 
-def _store(image, values, alpha_mode):
+def _store(image: bpy.types.Image, values: NDArray[np.float32], alpha_mode: str) -> None:
     image.alpha_mode = alpha_mode
     image.pixels.foreach_set(values.ravel())
     image.update()
 
 
-def _pixels(image):
+def _pixels(image: bpy.types.Image) -> NDArray[np.float32]:
     """float32[height, width, 4] of the stored numbers."""
     values = np.empty(image.size[0] * image.size[1] * 4, np.float32)
     image.pixels.foreach_get(values)
@@ -380,7 +389,7 @@ def _pixels(image):
 # --- the plain material ------------------------------------------------------------------------
 
 
-def _build(flat, loans):
+def _build(flat: _Flat, loans: Loans) -> bpy.types.Material:
     """The plain material of one of the user's, under its name."""
     user = flat.material
     material = bpy.data.materials.new(flat.name)
@@ -400,7 +409,7 @@ def _build(flat, loans):
     return material
 
 
-def _plain_look(flat, shader):
+def _plain_look(flat: _Flat, shader: Node) -> None:
     """A film, or what the solid view shows of a material that has no shader."""
     color = tuple(flat.material.diffuse_color)
     if flat.clear:
@@ -412,7 +421,7 @@ def _plain_look(flat, shader):
     shader.inputs["Roughness"].default_value = flat.material.roughness
 
 
-def _take_numbers(flat, shader):
+def _take_numbers(flat: _Flat, shader: Node) -> None:
     for name in _NUMBERS:
         if name in flat.shader.inputs and name in shader.inputs:
             shader.inputs[name].default_value = flat.shader.inputs[name].default_value
@@ -424,7 +433,7 @@ def _take_numbers(flat, shader):
             shader.inputs[socket].default_value = value
 
 
-def _take_images(flat, material, shader):
+def _take_images(flat: _Flat, material: bpy.types.Material, shader: Node) -> None:
     tree = material.node_tree
     for name, image in flat.images.items():
         node = tree.nodes.new("ShaderNodeTexImage")
@@ -439,7 +448,7 @@ def _take_images(flat, material, shader):
             tree.links.new(node.outputs["Alpha"], shader.inputs["Alpha"])
 
 
-def write_images(scene, folder):
+def write_images(scene: bpy.types.Scene, folder: Path) -> int:
     """The images of a stage as files, for formats that hold no materials.
 
     Args:
@@ -459,7 +468,7 @@ def write_images(scene, folder):
     return len(images)
 
 
-def _packed(flat, name, image):
+def _packed(flat: _Flat, name: str, image: bpy.types.Image) -> bpy.types.Image:
     """An image that exporters write from memory, under a name of its own."""
     taken = name not in flat.baked
     if taken:
@@ -478,5 +487,5 @@ def _packed(flat, name, image):
     return image
 
 
-def _file_name(name):
+def _file_name(name: str) -> str:
     return "".join(c if c.isalnum() or c in "-_." else "_" for c in name)

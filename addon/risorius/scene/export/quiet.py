@@ -1,15 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What Blender tells the console of its progress is kept from it while it works for us."""
 
+from __future__ import annotations
+
 import io
 import os
+from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout, suppress
 
 import bpy
 
 
 @contextmanager
-def quiet():
+def quiet() -> Iterator[None]:
     """Drop what operators write to the standard output; errors have their own way.
 
     Without a window a bake tells every step of the renderer, from C; with one it tells none.
@@ -27,7 +30,7 @@ def quiet():
                 os.close(kept)
 
 
-def _turn_away():
+def _turn_away() -> int | None:
     """Let the standard output go nowhere; returns what it was, None where there is none."""
     with suppress(OSError):  # closed, as in a service
         kept = os.dup(1)

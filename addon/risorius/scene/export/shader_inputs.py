@@ -4,8 +4,13 @@
 Animated maps rest at 0 here: a file for another program has one picture of a face, the neutral.
 """
 
-from dataclasses import dataclass
+from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ..base.blender_types import Node, NodeTree, Socket
 from ..material import skin_material
 
 _COLORED = ("BSDF_PRINCIPLED", "BSDF_DIFFUSE", "EMISSION", "SUBSURFACE_SCATTERING", "BSDF_TOON")
@@ -23,16 +28,16 @@ class Source:
         socket: what has to be baked, or None.
     """
 
-    value: object = None
-    node: object = None
+    value: Any = None
+    node: Node | None = None
     channel: str = ""
-    socket: object = None
+    socket: Socket | None = None
 
-    def is_picture(self):
+    def is_picture(self) -> bool:
         """Whether it is an image's colour, unchanged."""
         return self.node is not None and self.channel == "Color"
 
-    def is_alpha_of(self, other):
+    def is_alpha_of(self, other: Source) -> bool:
         """Whether it is the alpha of the image that another is the colour of."""
         return (
             self.node is not None
@@ -42,7 +47,7 @@ class Source:
         )
 
 
-def rest_maps(tree):
+def rest_maps(tree: NodeTree) -> None:
     """Take the drivers off a copied tree, and let its animated maps rest."""
     tree.animation_data_clear()
     for node in tree.nodes:
@@ -50,12 +55,12 @@ def rest_maps(tree):
             node.outputs[0].default_value = 0.0
 
 
-def alike(tree, other):
+def alike(tree: NodeTree, other: NodeTree) -> bool:
     """Whether two trees paint the same, as those of an eye and of its iris that nobody edited."""
     return _told(tree) == _told(other)
 
 
-def _told(tree):
+def _told(tree: NodeTree) -> tuple[list[tuple[object, ...]], set[tuple[str, str]]]:
     nodes = []
     for node in tree.nodes:
         values = [getattr(s, "default_value", None) for s in (*node.inputs, *node.outputs)]
@@ -67,7 +72,7 @@ def _told(tree):
     return nodes, links
 
 
-def shader_of(tree):
+def shader_of(tree: NodeTree) -> tuple[Node | None, bool]:
     """The node that gives a surface its colour; None for films that one looks through.
 
     Returns:
@@ -83,7 +88,7 @@ def shader_of(tree):
     return None, clear
 
 
-def _upstream(socket):
+def _upstream(socket: Socket) -> list[Node]:
     """The nodes that feed an input, nearest first."""
     found, todo = [], [socket]
     while todo:
@@ -94,7 +99,7 @@ def _upstream(socket):
     return found
 
 
-def source(shader, *names):
+def source(shader: Node, *names: str) -> Source:
     """The Source of the first of some inputs that a shader has."""
     socket = next((shader.inputs[n] for n in names if n in shader.inputs), None)
     if socket is None:
@@ -109,7 +114,7 @@ def source(shader, *names):
     return Source(socket=feeding)
 
 
-def normal_image(shader):
+def normal_image(shader: Node) -> Node | None:
     """The node of the normal map of a shader, also under relief that nodes add; or None."""
     socket = shader.inputs.get("Normal")
     while socket is not None and (feeding := _feeding(socket)) is not None:
@@ -122,7 +127,7 @@ def normal_image(shader):
     return None
 
 
-def by_place(socket):
+def by_place(socket: Socket) -> bool:
     """Whether what is baked depends on where the surface is, and not on its UV map alone."""
     for node in [socket.node, *(n for s in socket.node.inputs for n in _upstream(s))]:
         if node.type in ("ATTRIBUTE", "NEW_GEOMETRY", "VERTEX_COLOR"):
@@ -132,14 +137,14 @@ def by_place(socket):
     return False
 
 
-def _plain(node):
+def _plain(node: Node) -> bool:
     """Whether an image texture shows a whole image by the mesh's UV map."""
     image = node.image
     whole = image is not None and image.size[0] > 0 and image.source != "TILED"
     return whole and not node.inputs["Vector"].is_linked and node.projection == "FLAT"
 
 
-def _feeding(socket):
+def _feeding(socket: Socket) -> Socket | None:
     """The output that feeds an input, past mixes that mix nothing in; or None."""
     while socket.is_linked:
         feeding = socket.links[0].from_socket
@@ -153,11 +158,11 @@ def _feeding(socket):
     return None
 
 
-def _enabled(node, identifier):
+def _enabled(node: Node, identifier: str) -> Socket:
     return next(s for s in node.inputs if s.identifier == identifier)
 
 
-def _zero(socket):
+def _zero(socket: Socket) -> bool:
     """Whether an input is 0 wherever one looks, because every map that it depends on rests."""
     if not socket.is_linked:
         return socket.type == "VALUE" and socket.default_value == 0.0
@@ -170,7 +175,7 @@ def _zero(socket):
     return all(zeros) if node.operation == "ADD" else _vanishes(node.operation, zeros, node)
 
 
-def _vanishes(operation, zeros, node):
+def _vanishes(operation: str, zeros: Sequence[bool], node: Node) -> bool:
     if operation == "MULTIPLY":
         return any(zeros)
     other = node.inputs[1]

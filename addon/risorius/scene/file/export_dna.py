@@ -1,16 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A character's file with what the user edited, and every other byte as it was imported."""
 
+from __future__ import annotations
+
 import warnings
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ... import native
 from ...logic.base.errors import FaceError
 from ...logic.character import plans, user_edits
 from ..base import parts, storage
+from ..base.blender_types import ArmatureObject, Context, MeshObject
 from ..character import armatures, lods, runtime, skin_weights
 from . import refit_joints, refit_meshes
 
@@ -29,7 +34,9 @@ class ExportOptions:
     weights: bool = True
 
 
-def export(context, rig, options=None):
+def export(
+    context: Context, rig: ArmatureObject, options: ExportOptions | None = None
+) -> tuple[bytes, list[str]]:
     """The bytes of a character's DNA file.
 
     Args:
@@ -79,7 +86,7 @@ def export(context, rig, options=None):
     return content, job.report
 
 
-def _check(item, mesh_plan):
+def _check(item: MeshObject, mesh_plan: plans.MeshPlan) -> None:
     if item.mode == "EDIT":
         raise ExportError(f"{item.name} is in edit mode: leave that first.")
     if not refit_meshes.has_faces_of(item.data, mesh_plan):
@@ -99,13 +106,20 @@ class _Job:
         unit: metres per Blender unit.
     """
 
-    def __init__(self, rig, live, plan, dna, unit):
+    def __init__(
+        self,
+        rig: ArmatureObject,
+        live: runtime.Runtime,
+        plan: plans.CharacterPlan,
+        dna: native.Dna,
+        unit: float,
+    ) -> None:
         self._rig, self._live, self._plan, self._dna, self._unit = rig, live, plan, dna, unit
         self._space = live.space
         self.report = []
         self.edited = False
 
-    def content(self):
+    def content(self) -> bytes:
         """The edited file in the version of the imported one."""
         with warnings.catch_warnings(record=True) as said:
             warnings.simplefilter("always")
@@ -113,14 +127,14 @@ class _Job:
         self.report += [str(warning.message) for warning in said]
         return content
 
-    def _say(self, what, moves):
+    def _say(self, what: str, moves: NDArray[np.float64]) -> None:
         count, largest, mean = user_edits.sizes(moves, self._unit)
         self.edited = True
         self.report.append(
             f"{what}: {count} vertices, at most {largest:.3f} mm, {mean:.3f} mm in the mean."
         )
 
-    def mesh(self, item, mesh_plan, options):
+    def mesh(self, item: MeshObject, mesh_plan: plans.MeshPlan, options: ExportOptions) -> None:
         """Neutral vertices and shapes of one mesh."""
         shape = refit_meshes.read_shape(self._live, item, mesh_plan, known=True)
         dna_mesh = self._dna.meshes[mesh_plan.index]
@@ -142,7 +156,9 @@ class _Job:
             if block.mute or block.vertex_group:
                 self.report.append(f"{name}: the mute or mask of the key {key} is not written.")
 
-    def _neutral(self, dna_mesh, shape, mesh_plan):
+    def _neutral(
+        self, dna_mesh: native.Mesh, shape: refit_meshes.Shape, mesh_plan: plans.MeshPlan
+    ) -> None:
         """Only coordinates that differ from the imported ones are converted back."""
         moved = user_edits.changed(shape.points, mesh_plan.positions)
         # The axes are exchanged and mirrored, never mixed: a coordinate of ours is one of theirs.
@@ -151,7 +167,13 @@ class _Job:
         positions[theirs] = self._space.file_points(shape.points)[theirs]
         dna_mesh.positions = positions
 
-    def _shape(self, dna_mesh, shape, key, difference):
+    def _shape(
+        self,
+        dna_mesh: native.Mesh,
+        shape: refit_meshes.Shape,
+        key: str,
+        difference: NDArray[np.float64],
+    ) -> None:
         """Only the edited vertices' deltas are written."""
         vertices = np.flatnonzero(np.any(difference != 0, axis=1))
         base = shape.keys[shape.relative[key]]
@@ -167,7 +189,7 @@ class _Job:
         for target, (indices, deltas) in zip(targets, written, strict=True):
             target.vertex_indices, target.deltas = indices, deltas
 
-    def weights(self, item, mesh_plan, labels):
+    def weights(self, item: MeshObject, mesh_plan: plans.MeshPlan, labels: Sequence[str]) -> None:
         """Skin weights of the vertices where they were painted; the others bit for bit."""
         present = skin_weights.read(item)
         painted = skin_weights.edited_vertices(present, skin_weights.file_pairs(mesh_plan, labels))
@@ -198,7 +220,7 @@ class _Job:
         name = self._dna.mesh_names[mesh_plan.index]
         self.report.append(f"{name}: weights of {len(painted)} vertices.")
 
-    def joints(self, found):
+    def joints(self, found: Mapping[int, refit_joints.JointEdit]) -> None:
         """Neutral joints that were moved or turned."""
         offsets = self._dna.neutral_joint_translations.copy()
         angles = self._dna.neutral_joint_rotations.copy()
@@ -222,7 +244,9 @@ class _Job:
             self._dna.neutral_joint_rotations = angles
 
 
-def _normalised(present, known, ours, vertex):
+def _normalised(
+    present: skin_weights.Weights, known: Iterable[str], ours: Mapping[str, int], vertex: int
+) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
     """Joints and weights of one vertex, the largest first, their sum 1."""
     held = [(present[n][vertex], ours[n]) for n in known if present[n].get(vertex, 0.0) > 0.0]
     held.sort(key=lambda pair: (-pair[0], pair[1]))
@@ -231,7 +255,7 @@ def _normalised(present, known, ours, vertex):
     return joints, np.array([weight / total for weight, _ in held], np.float32)
 
 
-def _keep_report(rig, sentences):
+def _keep_report(rig: ArmatureObject, sentences: Sequence[str]) -> None:
     """The report as a Text, and on the console."""
     title = f"{rig.name.removesuffix('_rig')} export report"
     text = bpy.data.texts.get(title) or bpy.data.texts.new(title)

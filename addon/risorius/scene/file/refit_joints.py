@@ -1,15 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Joints of one file become joints of another in the same armature; edits of joints are found."""
 
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
 from mathutils import Matrix, Vector
+from numpy.typing import NDArray
 
-from ...logic.character import user_edits
+from ...logic.character import plans, user_edits
 from ..base import parts
+from ..base.blender_types import ArmatureObject, Context, MeshObject
 from ..character import armatures
+from .file_change import Change
 
 _EPS = float(np.finfo(np.float32).eps)
 
@@ -23,34 +29,34 @@ class JointEdit:
         moved, turned: which of both it was.
     """
 
-    before: object
-    after: object
+    before: NDArray[np.float64]
+    after: NDArray[np.float64]
     moved: bool
     turned: bool
 
     @property
-    def change(self):
+    def change(self) -> NDArray[np.float64]:
         """What is applied after the file's own local matrix."""
         return np.linalg.inv(self.before) @ self.after
 
     @property
-    def distance(self):
+    def distance(self) -> float:
         """In Blender units."""
         return float(np.linalg.norm(self.after[:3, 3] - self.before[:3, 3]))
 
     @property
-    def angle(self):
+    def angle(self) -> float:
         """In radians."""
         return _angle(self.change)
 
 
-def _angle(matrix):
+def _angle(matrix: NDArray[np.float64]) -> float:
     turn = matrix[:3, :3]
     twice = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
     return float(np.arctan2(np.linalg.norm(twice), np.trace(turn) - 1.0))
 
 
-def bones_by_joint(rig):
+def bones_by_joint(rig: ArmatureObject) -> dict[int, str]:
     """Joint -> bone name; of bones that bear the same joint the first is the file's."""
     found = {}
     for bone in rig.data.bones:
@@ -60,7 +66,9 @@ def bones_by_joint(rig):
     return found
 
 
-def joint_edits(context, rig, plan):
+def joint_edits(
+    context: Context, rig: ArmatureObject, plan: plans.CharacterPlan
+) -> dict[int, JointEdit]:
     """The joints whose rest a user moved or turned in edit mode.
 
     Args:
@@ -102,11 +110,13 @@ def joint_edits(context, rig, plan):
     return found
 
 
-def _relative(world, joint, parent):
+def _relative(
+    world: NDArray[np.float64] | Mapping[int, NDArray[np.float64]], joint: int, parent: int
+) -> NDArray[np.float64]:
     return world[joint] if parent < 0 else np.linalg.inv(world[parent]) @ world[joint]
 
 
-def _fresh_rest(context, plan):
+def _fresh_rest(context: Context, plan: plans.CharacterPlan) -> NDArray[np.float64]:
     """Rest matrices of all joints as an import gives them, float64[J, 4, 4]."""
     made = []
     workshop = bpy.data.collections.new("rest")
@@ -119,7 +129,7 @@ def _fresh_rest(context, plan):
         bpy.data.batch_remove([*made, workshop])
 
 
-def replace_joints(context, change):
+def replace_joints(context: Context, change: Change) -> None:
     """Give the armature the joints of the new file; bones are kept by the names of joints.
 
     Args:
@@ -157,7 +167,12 @@ def replace_joints(context, change):
             change.report.append(f"Your edit of the joint {old.labels[joint]} was carried over.")
 
 
-def _new_rest(old, new, moved, edited):
+def _new_rest(
+    old: plans.ArmaturePlan,
+    new: plans.ArmaturePlan,
+    moved: Sequence[int],
+    edited: Mapping[int, JointEdit],
+) -> tuple[dict[int, NDArray[np.float64]], set[int]]:
     """Rest matrices of the new joints with the user's edits, and the joints that must move."""
     back = {k: j for j, k in enumerate(moved) if k >= 0}
     rest, changed = {}, set()
@@ -187,7 +202,14 @@ def _new_rest(old, new, moved, edited):
     return rest, changed
 
 
-def _edit(edit_bones, change, kept, gone, rest, changed):
+def _edit(
+    edit_bones: bpy.types.ArmatureEditBones,
+    change: Change,
+    kept: Mapping[int, str],
+    gone: Collection[str],
+    rest: Mapping[int, NDArray[np.float64]],
+    changed: Collection[int],
+) -> list[str]:
     """Do it in edit mode. Returns the bone name of each new joint."""
     old, new = change.old.armature, change.new.armature
     follow = _followers(edit_bones, kept, gone)
@@ -219,7 +241,9 @@ def _edit(edit_bones, change, kept, gone, rest, changed):
     return [bones[k].name for k in range(len(new.labels))]
 
 
-def _followers(edit_bones, kept, gone):
+def _followers(
+    edit_bones: bpy.types.ArmatureEditBones, kept: Mapping[int, str], gone: Collection[str]
+) -> list[tuple[str, str | None, Matrix | None]]:
     """Bones of the user's own: (name, bone to be hung under or None, place under it), so that
     they go where their joints go; parents first."""
     ours = set(kept.values()) | set(gone)
@@ -236,11 +260,11 @@ def _followers(edit_bones, kept, gone):
     return [f[:3] for f in sorted(found, key=lambda f: f[3])]
 
 
-def _depth(bone):
+def _depth(bone: bpy.types.EditBone) -> int:
     return len(bone.parent_recursive)
 
 
-def _number(rig, names, moved):
+def _number(rig: ArmatureObject, names: Sequence[str], moved: Sequence[int]) -> None:
     """The new joint numbers on the bones, also on copies that the user made of them."""
     by_name = {name: joint for joint, name in enumerate(names)}
     for bone in rig.data.bones:
@@ -255,7 +279,7 @@ def _number(rig, names, moved):
                 del bone[parts.JOINT]
 
 
-def _release(change, moved):
+def _release(change: Change, moved: Sequence[int]) -> None:
     """Joints that the new file no longer moves go back to rest: nobody else holds them."""
     owned = change.after.owned
     for joint in change.before.owned:
@@ -264,7 +288,7 @@ def _release(change, moved):
             change.rig.pose.bones[change.new_bones[there]].matrix_basis.identity()
 
 
-def rename_groups(change, item):
+def rename_groups(change: Change, item: MeshObject) -> None:
     """Vertex groups of a mesh that was built apart, named as the bones are named here."""
     labels = change.new.armature.labels
     real = {label: change.new_bones[k] for k, label in enumerate(labels)}
@@ -274,11 +298,11 @@ def rename_groups(change, item):
             group.name = wanted
 
 
-def replace_control_places(context, change):
+def replace_control_places(context: Context, change: Change) -> None:
     """Move the bones of the control armature to the new face, unless the user moved them."""
     old = armatures.control_places(change.old)
     new = armatures.control_places(change.new)
-    controls = parts.controls_of(change.rig)
+    controls = parts.controls_there(change.rig)
     near = change.old.size * 1e-5
     movable = [
         name

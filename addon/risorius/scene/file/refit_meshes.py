@@ -1,16 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Meshes and shape keys of one file become those of another, in the same objects and datablocks."""
 
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import bmesh
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
-from ...logic.character import user_edits
+from ...logic.character import plans, user_edits
 from ..base import parts
+from ..base.blender_types import MeshObject
 from ..character import build, meshes, runtime, skin_weights
 from . import transfer
+from .file_change import Change
 
 _BOUND = {
     "HOOK",
@@ -36,16 +42,16 @@ class Shape:
         own: the user's keys.
     """
 
-    points: object
-    moved: object
-    keys: dict = field(default_factory=dict)
-    relative: dict = field(default_factory=dict)
-    channels: dict = field(default_factory=dict)
-    edits: dict = field(default_factory=dict)
-    own: list = field(default_factory=list)
+    points: NDArray[np.float32]
+    moved: NDArray[np.float64]
+    keys: dict[str, NDArray[np.float32]] = field(default_factory=dict)
+    relative: dict[str, str] = field(default_factory=dict)
+    channels: dict[str, int] = field(default_factory=dict)
+    edits: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    own: list[str] = field(default_factory=list)
 
 
-def replace_meshes(change, fresh_meshes):
+def replace_meshes(change: Change, fresh_meshes: Mapping[int, MeshObject]) -> set[int]:
     """Move the new file's meshes into the objects that are there.
 
     Args:
@@ -75,20 +81,20 @@ def replace_meshes(change, fresh_meshes):
     return kept
 
 
-def _relabel(item, new):
+def _relabel(item: MeshObject, new: plans.MeshPlan) -> None:
     item[parts.MESH] = new.index
     if list(item.get(parts.LODS, [])) != list(new.lods):
         item[parts.LODS] = list(new.lods)
 
 
-def _faces_of(mesh):
+def _faces_of(mesh: bpy.types.Mesh) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     corners, starts = np.empty(len(mesh.loops), np.int32), np.empty(len(mesh.polygons), np.int32)
     mesh.loops.foreach_get("vertex_index", corners)
     mesh.polygons.foreach_get("loop_start", starts)
     return corners, starts
 
 
-def has_faces_of(mesh, plan):
+def has_faces_of(mesh: bpy.types.Mesh, plan: plans.MeshPlan) -> bool:
     """Whether a mesh has the vertices and faces of a MeshPlan."""
     corners, starts = _faces_of(mesh)
     return (
@@ -98,7 +104,9 @@ def has_faces_of(mesh, plan):
     )
 
 
-def _refit(change, item, old, new, fresh):
+def _refit(
+    change: Change, item: MeshObject, old: plans.MeshPlan, new: plans.MeshPlan, fresh: MeshObject
+) -> None:
     """One mesh: faces, weights, layers, then shapes."""
     mesh = item.data
     known = len(mesh.vertices) == len(old.positions)
@@ -126,19 +134,19 @@ def _refit(change, item, old, new, fresh):
 class _Nothing:
     """There is no surface that anything could be carried from."""
 
-    def __init__(self, count):
+    def __init__(self, count: int) -> None:
         self._count = count
 
-    def vertices(self, values):
+    def vertices(self, values: transfer.Values) -> transfer.Values:
         """Zeros."""
         return np.zeros((self._count, *np.shape(values)[1:]))
 
-    def nearest_vertices(self, indices):
+    def nearest_vertices(self, indices: list[int]) -> list[int]:
         """The same numbers, as far as there are that many."""
         return [min(i, self._count - 1) for i in indices]
 
 
-def read_shape(live, item, old, known):
+def read_shape(live: runtime.Runtime, item: MeshObject, old: plans.MeshPlan, known: bool) -> Shape:
     """What the user made of a mesh's positions, told from what the old file gives.
 
     Args:
@@ -177,12 +185,14 @@ def read_shape(live, item, old, known):
     return shape
 
 
-def _own_groups(change, item):
+def _own_groups(change: Change, item: MeshObject) -> list[str]:
     ours = set(change.old_bones) | set(change.new_bones)
     return [g.name for g in item.vertex_groups if g.name not in ours]
 
 
-def _things(change, item, old, shape, known):
+def _things(
+    change: Change, item: MeshObject, old: plans.MeshPlan | None, shape: Shape, known: bool
+) -> list[str]:
     """Words for what the user has put onto a mesh."""
     layers, lost = transfer.own_attributes(item.data)
     things = {
@@ -201,7 +211,9 @@ def _things(change, item, old, shape, known):
     return [words for words, there in things.items() if there]
 
 
-def _back_up(change, item, old, shape, known):
+def _back_up(
+    change: Change, item: MeshObject, old: plans.MeshPlan, shape: Shape, known: bool
+) -> None:
     """Keep a copy of a mesh that bears something of the user's and gets other faces."""
     things = _things(change, item, old, shape, known)
     bound = [m.name for m in item.modifiers if m.type in _BOUND]
@@ -218,7 +230,7 @@ def _back_up(change, item, old, shape, known):
     )
 
 
-def _leave(change, item, old):
+def _leave(change: Change, item: MeshObject, old: plans.MeshPlan | None) -> None:
     """A mesh that the new file has not: away with it, unless it bears something of the user's."""
     label = item.name
     known = old is not None and len(item.data.vertices) == len(old.positions)
@@ -248,7 +260,9 @@ def _leave(change, item, old):
     )
 
 
-def _refit_weights(change, item, old, new):
+def _refit_weights(
+    change: Change, item: MeshObject, old: plans.MeshPlan, new: plans.MeshPlan
+) -> None:
     """The new file's weights, except at vertices where the user painted."""
     before = skin_weights.file_pairs(old, change.old_bones)
     after = skin_weights.file_pairs(new, change.new_bones)
@@ -268,7 +282,7 @@ def _refit_weights(change, item, old, new):
         change.report.append(f"{item.name} keeps your weights at {len(painted)} vertices.")
 
 
-def _masks(item):
+def _masks(item: MeshObject) -> set[str]:
     """Vertex groups that modifiers and keys use by their names."""
     used = {m.vertex_group for m in item.modifiers if getattr(m, "vertex_group", "")}
     key = item.data.shape_keys
@@ -276,7 +290,9 @@ def _masks(item):
     return used
 
 
-def _refit_corners(change, item, old, new, fresh):
+def _refit_corners(
+    change: Change, item: MeshObject, old: plans.MeshPlan, new: plans.MeshPlan, fresh: MeshObject
+) -> None:
     """UVs, normals and the materials' attributes, where the files differ."""
     mesh = item.data
     layer = mesh.uv_layers.get("UVMap")
@@ -297,11 +313,11 @@ def _refit_corners(change, item, old, new, fresh):
         mesh.normals_split_custom_set(new.normals)
 
 
-def _equal(a, b):
+def _equal(a: NDArray[np.float32] | None, b: NDArray[np.float32] | None) -> bool:
     return (a is None and b is None) or (a is not None and b is not None and np.array_equal(a, b))
 
 
-def _copy_attributes(mesh, source):
+def _copy_attributes(mesh: bpy.types.Mesh, source: bpy.types.Mesh) -> None:
     """The attributes that our materials read."""
     for theirs in [a for a in source.attributes if a.name.startswith(transfer.OUR_PREFIX)]:
         kind = (theirs.name, theirs.data_type, theirs.domain)
@@ -311,7 +327,14 @@ def _copy_attributes(mesh, source):
         ours.data.foreach_set("vector", flat)
 
 
-def _rebuild(change, item, new, fresh, surface, bearer):
+def _rebuild(
+    change: Change,
+    item: MeshObject,
+    new: plans.MeshPlan,
+    fresh: MeshObject,
+    surface: transfer.OldSurface,
+    bearer: transfer.Carry,
+) -> None:
     """Exchange the faces inside the datablock: keys, drivers and pointers to it stay."""
     mesh = item.data
     own = {n: v for n, v in skin_weights.read(item).items() if n in _own_groups(change, item)}
@@ -344,7 +367,9 @@ def _rebuild(change, item, new, fresh, surface, bearer):
         child.parent_vertices = bearer.nearest_vertices(list(child.parent_vertices))
 
 
-def _refit_shape(change, item, shape, new, bearer):
+def _refit_shape(
+    change: Change, item: MeshObject, shape: Shape, new: plans.MeshPlan, bearer: transfer.Carry
+) -> None:
     """The new neutral with the user's edits, and every key on top of it."""
     channel_map = change.channel_map()
     dna_mesh = change.after.dna.meshes[new.index]
@@ -365,7 +390,7 @@ def _refit_shape(change, item, shape, new, bearer):
     _renumber(key, channel_map)
 
 
-def _added(points, moves):
+def _added(points: NDArray[np.float32], moves: NDArray[np.float64]) -> NDArray[np.float32]:
     """Float32 positions with moves on top; those without a move bit for bit as they were."""
     result = points.copy()
     rows = np.any(moves != 0, axis=1)
@@ -373,7 +398,14 @@ def _added(points, moves):
     return result
 
 
-def _points(name, shape, done, deltas, channel_map, bearer):
+def _points(
+    name: str,
+    shape: Shape,
+    done: dict[str, NDArray[np.float32] | None],
+    deltas: Mapping[int, meshes.Deltas],
+    channel_map: Sequence[int],
+    bearer: transfer.Carry,
+) -> NDArray[np.float32] | None:
     """New coordinates of a key, its relative key's first; kept in `done`."""
     if name in done:
         return done[name]
@@ -395,7 +427,13 @@ def _points(name, shape, done, deltas, channel_map, bearer):
     return points
 
 
-def _drop_gone_keys(change, item, shape, channel_map, deltas):
+def _drop_gone_keys(
+    change: Change,
+    item: MeshObject,
+    shape: Shape,
+    channel_map: Sequence[int],
+    deltas: Mapping[int, meshes.Deltas],
+) -> None:
     """Our keys of channels that are gone: away, or the user's from now on if edited."""
     key = item.data.shape_keys
     needed = {above for name, above in shape.relative.items() if name in shape.own}
@@ -415,10 +453,10 @@ def _drop_gone_keys(change, item, shape, channel_map, deltas):
             meshes.remove_channel_key(item, block)
 
 
-def _renumber(key, channel_map):
+def _renumber(key: bpy.types.Key, channel_map: Sequence[int]) -> None:
     """Lists of channels that a Key keeps."""
 
-    def there(channel):
+    def there(channel: int) -> int:
         return channel_map[channel] if channel < len(channel_map) else -1
 
     for name in (parts.REAL, parts.KEY_ORDER):
@@ -435,9 +473,9 @@ def _renumber(key, channel_map):
         }
 
 
-def finish_shapes(change):
+def finish_shapes(change: Change) -> None:
     """Make the keys that are new, or the channel sum, once all drivers are in their places."""
-    live = runtime.of(change.rig)
+    live = runtime.there(change.rig)
     labels = build.channel_labels(live.dna)
     there = parts.meshes_of(change.rig)
     built = {m[parts.MESH] for m in there}

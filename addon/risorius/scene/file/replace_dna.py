@@ -6,59 +6,34 @@ numbers move into the objects, meshes, keys and bones that are there: whatever p
 stays, and so does everything that is not the file's.
 """
 
-from dataclasses import dataclass, field
+from __future__ import annotations
+
+from collections.abc import Callable
 from pathlib import Path
 
 import bpy
 
 from ...logic.base import names
 from ...logic.base.errors import FaceError
-from ...logic.character import plans, user_edits
+from ...logic.character import plans
 from ..base import drivers, parts
+from ..base.blender_types import ArmatureObject, Context, MeshObject
 from ..character import armatures, build, lods, runtime
 from ..life import duplicates
 from . import refit_joints, refit_meshes
+from .file_change import Change
 
 
 class ReplaceError(FaceError):
     """A character that cannot be replaced; the text is one sentence for users."""
 
 
-@dataclass
-class Change:
-    """What replaces what.
-
-    Attributes:
-        rig: the deforming armature that stays.
-        before, after: Runtimes of the two files.
-        old, new: CharacterPlans of the two files.
-        bone_names: name of the bone of each joint of the old, then of the new file.
-        report: sentences.
-    """
-
-    rig: object
-    before: object
-    after: object
-    old: object
-    new: object
-    old_bones: list = field(default_factory=list)
-    new_bones: list = field(default_factory=list)
-    report: list = field(default_factory=list)
-
-    def channel_map(self):
-        """New channel of each old one, -1 where it is gone."""
-        return user_edits.index_map(
-            *(build.channel_labels(r.dna) for r in (self.before, self.after))
-        )
-
-    def mesh_map(self):
-        """New mesh of each old one, -1 where it is gone."""
-        return user_edits.index_map(
-            *(names.unique_labels(r.dna.mesh_names) for r in (self.before, self.after))
-        )
-
-
-def replace_file(context, rig, path, progress=lambda _share: None):
+def replace_file(
+    context: Context,
+    rig: ArmatureObject,
+    path: str | Path,
+    progress: Callable[[float], object] = lambda _share: None,
+) -> list[str]:
     """Put a DNA file in the place of a character's file.
 
     Args:
@@ -76,14 +51,14 @@ def replace_file(context, rig, path, progress=lambda _share: None):
     """
     _check(rig)
     with armatures.kept_selection(context):
-        before = runtime.of(rig)
+        before = runtime.there(rig)
         unit = runtime.unit_of(rig)
         levels = tuple(lods.built(rig)) or (0,)
         old = plans.plan_character(before.dna, rig.name, levels, unit, before.rests)
         fresh, warnings = build.import_file(
             context, path, _options(rig, levels, unit), lambda share: progress(share * 0.7)
         )
-        after = runtime.of(fresh)
+        after = runtime.there(fresh)
         now = tuple(lods.built(fresh))
         new = plans.plan_character(after.dna, rig.name, now, unit, after.rests)
         change = Change(rig, before, after, old, new, report=list(warnings))
@@ -94,7 +69,7 @@ def replace_file(context, rig, path, progress=lambda _share: None):
     return change.report
 
 
-def _check(rig):
+def _check(rig: ArmatureObject) -> None:
     controls = parts.controls_of(rig)
     if runtime.of(rig) is None or controls is None:
         raise ReplaceError(f"{rig.name} has lost its data or its control armature.")
@@ -105,7 +80,7 @@ def _check(rig):
             raise ReplaceError(f"{item.name} is in edit mode: leave that first.")
 
 
-def _options(rig, levels, unit):
+def _options(rig: ArmatureObject, levels: tuple[int, ...], unit: float) -> build.BuildOptions:
     meshes = parts.meshes_of(rig)
     return build.BuildOptions(
         lods=levels,
@@ -116,7 +91,7 @@ def _options(rig, levels, unit):
     )
 
 
-def _exchange(context, change, fresh):
+def _exchange(context: Context, change: Change, fresh: ArmatureObject) -> None:
     """Move everything of the new character into the old one, and take the rest away."""
     rig = change.rig
     refit_joints.replace_joints(context, change)
@@ -125,7 +100,7 @@ def _exchange(context, change, fresh):
     _take_properties(change, fresh)
     _sliders(change)
     entries = drivers.Entries(rig, _array_labels(change))
-    build.settle(context, rig, parts.controls_of(rig))
+    build.settle(context, rig, parts.controls_there(rig))
     entries.move()
     _report_entries(change, entries)
     for index in [i for i in fresh_meshes if i not in kept]:
@@ -137,11 +112,11 @@ def _exchange(context, change, fresh):
     build.remove(fresh)
     lods.show(rig)
     runtime.forget_outputs()
-    for item in (rig, parts.controls_of(rig), *parts.meshes_of(rig)):
+    for item in (rig, parts.controls_there(rig), *parts.meshes_of(rig)):
         item.update_tag()
 
 
-def _array_labels(change):
+def _array_labels(change: Change) -> dict[str, tuple[list[str], list[str]]]:
     runs = (change.before, change.after)
     return {
         parts.CHANNELS: tuple(build.channel_labels(r.dna) for r in runs),
@@ -149,7 +124,7 @@ def _array_labels(change):
     }
 
 
-def _report_entries(change, entries):
+def _report_entries(change: Change, entries: drivers.Entries) -> None:
     gone = set(entries.gone)
     for array, what in ((parts.CHANNELS, "blend shape"), (parts.MAPS, "animated map")):
         old, new = _array_labels(change)[array]
@@ -161,9 +136,9 @@ def _report_entries(change, entries):
             change.report.append(f"New {what}s: {', '.join(added)}.")
 
 
-def _take_properties(change, fresh):
+def _take_properties(change: Change, fresh: ArmatureObject) -> None:
     """The file itself, its arrays, and what the armatures say about it."""
-    rig, controls = change.rig, parts.controls_of(change.rig)
+    rig, controls = change.rig, parts.controls_there(change.rig)
     text, former = fresh[parts.DNA], rig[parts.DNA]
     label = former.name
     parts.point(rig, parts.DNA, text)
@@ -192,7 +167,7 @@ def _take_properties(change, fresh):
         controls.data[names.cut(f"dna_{key}")] = value
 
 
-def _adopt(change, fresh, item):
+def _adopt(change: Change, fresh: ArmatureObject, item: MeshObject) -> None:
     """Let a mesh that is new in the file join the character."""
     rig = change.rig
     label = next(m.label for m in change.new.meshes if m.index == item[parts.MESH])
@@ -220,7 +195,7 @@ def _adopt(change, fresh, item):
     change.report.append(f"The mesh {label} is new.")
 
 
-def _share_materials(change, item):
+def _share_materials(change: Change, item: MeshObject) -> None:
     """A new level of a part that is there wears that part's material."""
     by_index = {m.index: m for m in change.new.meshes}
     base = by_index[item[parts.MESH]].base
@@ -233,7 +208,7 @@ def _share_materials(change, item):
             return
 
 
-def _number_meshes(rig):
+def _number_meshes(rig: ArmatureObject) -> None:
     """The rig's pointers to its meshes, in the order of the file."""
     there = sorted(parts.meshes_of(rig), key=lambda m: (m[parts.MESH], m.name))
     for key in [k for k in rig.keys() if k.startswith(parts.MESH_PREFIX)]:  # noqa: SIM118
@@ -242,9 +217,9 @@ def _number_meshes(rig):
         parts.point(rig, f"{parts.MESH_PREFIX}{number:03d}", item)
 
 
-def _sliders(change):
+def _sliders(change: Change) -> None:
     """Sliders of the new file; those that are gone leave, unless something is keyed on them."""
-    controls = parts.controls_of(change.rig)
+    controls = parts.controls_there(change.rig)
     face = controls.pose.bones[parts.FACE]
     maximum = parts.maximum_of(controls)
     old = {c.label: c for c in change.old.controls}
@@ -272,7 +247,7 @@ def _sliders(change):
             change.report.append(f"The control {label} is gone.")
 
 
-def _keep_report(change):
+def _keep_report(change: Change) -> None:
     """The report as a Text, and on the console."""
     name = change.rig.name.removesuffix("_rig")
     if not change.report:

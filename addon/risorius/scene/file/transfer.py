@@ -1,8 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What users put onto a mesh, carried to another topology by the nearest point of the surface."""
 
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import bpy
 import numpy as np
 from mathutils.bvhtree import BVHTree
+from numpy.typing import NDArray
 
 from ...logic.character import user_edits
 
@@ -20,15 +26,29 @@ _FIELDS = {
     "BYTE_COLOR": ("color", 4, np.float32),
 }
 
+Values = NDArray[Any]  # one row for each vertex, corner or face, of the layer's own type
+
+
+class Carry(Protocol):
+    """How values move from the old vertices to the new ones."""
+
+    def vertices(self, values: Values) -> Values:
+        """Values per old vertex to values per new vertex."""
+        ...
+
+    def nearest_vertices(self, indices: list[int]) -> list[int]:
+        """The new vertices nearest to old ones."""
+        ...
+
 
 class SameVertices:
     """Vertex i stays vertex i."""
 
-    def vertices(self, values):
+    def vertices(self, values: Values) -> Values:
         """Values per vertex, [V, ...]."""
         return values
 
-    def nearest_vertices(self, indices):
+    def nearest_vertices(self, indices: list[int]) -> list[int]:
         """The vertices that take the place of these."""
         return indices
 
@@ -42,18 +62,20 @@ class Nearest:
         new: float64[W, 3] new neutral vertices.
     """
 
-    def __init__(self, old, triangles, new):
+    def __init__(
+        self, old: NDArray[np.float64], triangles: NDArray[np.int32], new: NDArray[np.float64]
+    ) -> None:
         self._old, self._new, self._triangles = old, new, triangles
         where, weights = nearest_triangles(old, triangles, new)
         self._corners, self._weights = triangles[where], weights
 
-    def vertices(self, values):
+    def vertices(self, values: Values) -> Values:
         """Values per old vertex to values per new vertex, float64[W, ...]."""
         values = np.asarray(values, np.float64)
         shape = (len(self._weights), 3) + (1,) * (values.ndim - 1)
         return np.sum(values[self._corners] * self._weights.reshape(shape), axis=1)
 
-    def nearest_vertices(self, indices):
+    def nearest_vertices(self, indices: list[int]) -> list[int]:
         """The new vertices nearest to old ones."""
         return [
             int(np.argmin(np.sum((self._new - self._old[i]) ** 2, axis=1))) if i >= 0 else i
@@ -61,7 +83,9 @@ class Nearest:
         ]
 
 
-def nearest_triangles(points, triangles, queries):
+def nearest_triangles(
+    points: NDArray[np.float64], triangles: NDArray[np.int32], queries: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """The nearest triangle of each query point, int[n], and barycentric weights float64[n, 3]."""
     tree = BVHTree.FromPolygons(points.tolist(), triangles.tolist())
     found = [tree.find_nearest(query) for query in queries.tolist()]
@@ -70,7 +94,9 @@ def nearest_triangles(points, triangles, queries):
     return where, user_edits.barycentric(spots.reshape(-1, 3), points[triangles[where]])
 
 
-def triangles_of(mesh):
+def triangles_of(
+    mesh: bpy.types.Mesh,
+) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
     """Triangles of a mesh: vertices int[T, 3], corners int[T, 3], face int[T]."""
     mesh.calc_loop_triangles()
     count = len(mesh.loop_triangles)
@@ -82,7 +108,7 @@ def triangles_of(mesh):
     return tuple(result)
 
 
-def own_attributes(mesh):
+def own_attributes(mesh: bpy.types.Mesh) -> tuple[list[tuple[str, str, str, Values]], list[str]]:
     """The user's layers of a mesh: (name, type, domain, values) of those that can be carried,
     and the names of the others."""
     kept, other = [], []
@@ -108,7 +134,7 @@ class OldSurface:
         points: float32[V, 3] its neutral vertices.
     """
 
-    def __init__(self, mesh, points):
+    def __init__(self, mesh: bpy.types.Mesh, points: NDArray[np.float32]) -> None:
         self.points = points.astype(np.float64)
         self.triangles, self.corners, self.faces = triangles_of(mesh)
         self.layers, self.lost = own_attributes(mesh)
@@ -120,11 +146,11 @@ class OldSurface:
         self.colour = mesh.color_attributes.active_color_name
 
     @property
-    def usable(self):
+    def usable(self) -> bool:
         """Whether there is a surface to be near to."""
         return len(self.triangles) > 0
 
-    def give(self, mesh, points, carry):
+    def give(self, mesh: bpy.types.Mesh, points: NDArray[np.float32], carry: Carry) -> None:
         """Put the user's layers and the faces' materials onto the new faces.
 
         Args:
@@ -161,7 +187,7 @@ class OldSurface:
             _write_layer(mesh, name, kind, domain, given)
         self._activate(mesh)
 
-    def _activate(self, mesh):
+    def _activate(self, mesh: bpy.types.Mesh) -> None:
         if self.active in mesh.uv_layers:
             mesh.uv_layers.active = mesh.uv_layers[self.active]
         if self.rendered in mesh.uv_layers:
@@ -170,7 +196,7 @@ class OldSurface:
             mesh.color_attributes.active_color_name = self.colour
 
 
-def _write_layer(mesh, name, kind, domain, values):
+def _write_layer(mesh: bpy.types.Mesh, name: str, kind: str, domain: str, values: Values) -> None:
     field, _width, dtype = _FIELDS[kind]
     layer = mesh.attributes.get(name) or mesh.attributes.new(name, kind, domain)
     if dtype is bool:

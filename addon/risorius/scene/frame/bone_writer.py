@@ -1,12 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A pose's joints to the bones of the deforming armature, in bulk."""
 
+from __future__ import annotations
+
+from collections.abc import Mapping
 from dataclasses import dataclass
 
+import bpy
 import numpy as np
 from mathutils import Matrix, Quaternion
+from numpy.typing import NDArray
 
+from ... import native
 from ..base import parts
+from ..base.blender_types import ArmatureObject, Depsgraph
 from ..character import runtime
 
 
@@ -23,16 +30,22 @@ class Writer:
     """
 
     count: int
-    where: object
-    space: object
-    turning: list
-    buffers: dict | None
+    where: NDArray[np.int64]
+    space: native.BoneSpace
+    turning: list[tuple[str, int, float, Quaternion]]
+    buffers: dict[str, NDArray[np.float32]] | None
 
 
 _WIDTHS = {"location": 3, "rotation_quaternion": 4, "scale": 3, "rotation_euler": 3}
 
 
-def write(rig, live, deltas, turns, depsgraph):
+def write(
+    rig: ArmatureObject,
+    live: runtime.Runtime,
+    deltas: NDArray[np.float32],
+    turns: Mapping[str, Quaternion],
+    depsgraph: Depsgraph,
+) -> bool:
     """Write the joints that the evaluator owns; all others keep what the user gave them.
 
     Args:
@@ -63,7 +76,9 @@ def write(rig, live, deltas, turns, depsgraph):
     return _taken(rig, writer.buffers)
 
 
-def pose_of(writer, deltas, turns):
+def pose_of(
+    writer: Writer, deltas: NDArray[np.float32], turns: Mapping[str, Quaternion]
+) -> dict[str, NDArray[np.float32]]:
     """The channels of the bones that the evaluator owns.
 
     Args:
@@ -81,20 +96,20 @@ def pose_of(writer, deltas, turns):
     return {"location": location, "rotation_quaternion": rotation, "scale": scale}
 
 
-def _taken(rig, written):
+def _taken(rig: ArmatureObject, written: Mapping[str, NDArray[np.float32]]) -> bool:
     if not rig.override_library:
         return True
     return all(is_there(rig.pose.bones, name, flat) for name, flat in written.items())
 
 
-def is_there(values, name, wanted):
+def is_there(values: bpy.types.bpy_prop_collection, name: str, wanted: NDArray[np.float32]) -> bool:
     """Whether a bulk read gives what was written. Args: values  a collection of properties."""
     got = np.empty_like(wanted)
     values.foreach_get(name, got)
     return np.array_equal(got, wanted)
 
 
-def writer_of(rig, live):
+def writer_of(rig: ArmatureObject, live: runtime.Runtime) -> Writer:
     """The Writer of an armature as it is now."""
     key = ("bones", rig.session_uid)
     kept = runtime.outputs.get(key)
@@ -103,7 +118,7 @@ def writer_of(rig, live):
     return kept
 
 
-def _make_writer(rig, live):
+def _make_writer(rig: ArmatureObject, live: runtime.Runtime) -> Writer:
     kept = rig.data.bones  # by name: after undo PoseBone.bone may point into freed memory
     joints = [kept[b.name].get(parts.JOINT, -1) if b.name in kept else -1 for b in rig.pose.bones]
     where = [i for i, joint in enumerate(joints) if joint in live.owned]

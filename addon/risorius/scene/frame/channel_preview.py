@@ -6,13 +6,20 @@ controls' values. Where either is another one it is over, so that no frame ever 
 that was forgotten; saving, rendering and loading end it too.
 """
 
+from __future__ import annotations
+
 import hashlib
 
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
 from ..base import parts
+from ..base.blender_types import ArmatureObject
 from ..character import runtime
 
 
-def set_override(rig, channel, value):
+def set_override(rig: ArmatureObject, channel: int, value: float) -> None:
     """Override the weight of one channel; the caller evaluates afterwards.
 
     Args:
@@ -23,7 +30,7 @@ def set_override(rig, channel, value):
     rig[parts.TEST] = {"channel": int(channel), "value": float(value), "under": ""}
 
 
-def clear(rig):
+def clear(rig: ArmatureObject) -> bool:
     """End the override of a character. Returns whether there was one."""
     if parts.TEST not in rig:
         return False
@@ -31,7 +38,7 @@ def clear(rig):
     return True
 
 
-def clear_all():
+def clear_all() -> bool:
     """End the overrides of all characters and bring the faces up without them."""
     ended = [rig for rig in parts.rigs() if clear(rig)]
     for rig in ended:
@@ -42,13 +49,15 @@ def clear_all():
     return bool(ended)
 
 
-def current(rig):
+def current(rig: ArmatureObject | None) -> tuple[int, float] | None:
     """The override: (channel, value), or None."""
     kept = rig.get(parts.TEST) if rig is not None else None
     return (int(kept["channel"]), float(kept["value"])) if kept is not None else None
 
 
-def override(rig, raw, scene):
+def override(
+    rig: ArmatureObject, raw: NDArray[np.float32], scene: bpy.types.Scene
+) -> tuple[int, float] | None:
     """The override that holds for this evaluation; ends one whose time is over.
 
     Args:
@@ -72,7 +81,7 @@ def override(rig, raw, scene):
     return int(kept["channel"]), float(kept["value"])
 
 
-def apply(test, weights):
+def apply(test: tuple[int, float] | None, weights: NDArray[np.float32]) -> None:
     """Write an override into a pose's channel weights, in place; None changes nothing."""
     if test is not None and test[0] < len(weights):
         weights[test[0]] = test[1]

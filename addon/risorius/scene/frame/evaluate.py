@@ -5,15 +5,22 @@ Values are read from the evaluated objects of the depsgraph that is passed in (t
 are stale while an animation renders) and written to the originals, in bulk.
 """
 
+from __future__ import annotations
+
 from time import perf_counter
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
 
 from ... import native
 from ..base import parts
+from ..base.blender_types import ArmatureObject, Context, Depsgraph, MeshObject
 from ..character import lods, meshes, rig_placement, runtime
 from . import bone_writer, channel_preview, inputs, timing
 
 
-def evaluate_all(depsgraph, force=False):
+def evaluate_all(depsgraph: Depsgraph, force: bool = False) -> None:
     """Bring every character of this file up to its controls.
 
     Args:
@@ -26,7 +33,7 @@ def evaluate_all(depsgraph, force=False):
         evaluate(rig, depsgraph, force)
 
 
-def evaluate(rig, depsgraph, force=False):
+def evaluate(rig: ArmatureObject, depsgraph: Depsgraph, force: bool = False) -> bool:
     """Bring one character up to its controls.
 
     Args:
@@ -39,7 +46,7 @@ def evaluate(rig, depsgraph, force=False):
     """
     controls = None if parts.BAKED in rig else parts.controls_of(rig)  # baked: its actions move it
     live = runtime.of(rig) if controls is not None else None
-    if live is None:
+    if controls is None or live is None:
         return False
     times = [perf_counter()]
     seen = controls.evaluated_get(depsgraph)
@@ -73,14 +80,14 @@ def evaluate(rig, depsgraph, force=False):
     return True
 
 
-def bring_up(context, rig):
+def bring_up(context: Context, rig: ArmatureObject) -> None:
     """Show a change that an operator made: bring one character up and evaluate the scene."""
     context.view_layer.update()
     evaluate(rig, context.evaluated_depsgraph_get(), force=True)
     context.view_layer.update()
 
 
-def _changed(item, what, state):
+def _changed(item: bpy.types.ID, what: str, state: object) -> bool:
     key = (what, item.session_uid)
     if runtime.outputs.get(key) == state:
         return False
@@ -88,7 +95,7 @@ def _changed(item, what, state):
     return True
 
 
-def note_refusal(item, taken):
+def note_refusal(item: bpy.types.ID, taken: bool) -> None:
     """Note whether Blender took what was written to an object: it refuses without a word."""
     key = ("refused", item.session_uid)
     if taken:
@@ -97,7 +104,7 @@ def note_refusal(item, taken):
         runtime.outputs[key] = True
 
 
-def refused(rig):
+def refused(rig: ArmatureObject) -> list[bpy.types.Object]:
     """Objects of a character, an override, that Blender lets nobody write to."""
     return [
         item
@@ -106,14 +113,16 @@ def refused(rig):
     ]
 
 
-def _write_values(rig, pose):
+def _write_values(rig: ArmatureObject, pose: native.Pose) -> None:
     """Write channels and maps to the array properties that drivers read."""
     for name, values in ((parts.MAPS, pose.animated_maps), (parts.CHANNELS, pose.blend_shapes)):
         if len(values) and len(rig.get(name, ())) == len(values):
             rig[name][:] = values.tolist()
 
 
-def _write_shape(item, live, weights, force):
+def _write_shape(
+    item: MeshObject, live: runtime.Runtime, weights: NDArray[np.float32], force: bool
+) -> None:
     """Write the sum of all channels to the live key of a mesh, where it has one."""
     key = item.data.shape_keys
     block = meshes.live_block(item)

@@ -1,19 +1,34 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the animator asks for: sliders, head, neck and eye bones of the control armature."""
 
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TypeGuard
+
+import bpy
 import numpy as np
 from mathutils import Matrix, Quaternion, Vector
+from numpy.typing import NDArray
 
 from ...logic.base.space import yaw_pitch
 from ..animation import layers
 from ..base import parts
-from ..character import rig_placement
+from ..base.blender_types import ArmatureObject, Depsgraph
+from ..character import rig_placement, runtime
+
+Turns = dict[str, Quaternion]  # "neck", "head": in the armature's axes
 
 _STRAIGHT = Matrix.Identity(4)
 _AHEAD = Vector((0.0, -1.0, 0.0))
 
 
-def read_inputs(seen, live, depsgraph, maximum=1.0):
+def read_inputs(
+    seen: ArmatureObject,
+    live: runtime.Runtime,
+    depsgraph: Depsgraph,
+    maximum: float = 1.0,
+) -> tuple[NDArray[np.float32], Turns]:
     """Read the sliders and bones of an evaluated control armature, with its layers above them.
 
     Args:
@@ -30,7 +45,12 @@ def read_inputs(seen, live, depsgraph, maximum=1.0):
     return complete(seen, live, depsgraph, maximum, raw, own)
 
 
-def read_mixed(seen, live, depsgraph, maximum=1.0):
+def read_mixed(
+    seen: ArmatureObject,
+    live: runtime.Runtime,
+    depsgraph: Depsgraph,
+    maximum: float = 1.0,
+) -> tuple[NDArray[np.float32], dict[str, Quaternion | None]]:
     """Read the sliders and the head's bones with the layers above them.
 
     Args:
@@ -47,7 +67,14 @@ def read_mixed(seen, live, depsgraph, maximum=1.0):
     return raw, own
 
 
-def complete(seen, live, depsgraph, maximum, raw, own):
+def complete(
+    seen: ArmatureObject,
+    live: runtime.Runtime,
+    depsgraph: Depsgraph,
+    maximum: float,
+    raw: NDArray[np.float32],
+    own: Mapping[str, Quaternion | None],
+) -> tuple[NDArray[np.float32], Turns]:
     """Add what the body and the eye bones ask for. Changes raw. Returns: as `read_inputs`."""
     turns = rig_placement.body_turns(seen.original, depsgraph)
     for name, turn in own.items():
@@ -57,7 +84,7 @@ def complete(seen, live, depsgraph, maximum, raw, own):
     return raw, turns
 
 
-def read_sliders(seen, live):
+def read_sliders(seen: ArmatureObject, live: runtime.Runtime) -> NDArray[np.float32]:
     """Read the sliders alone, float32[R]; what is no number counts as 0 or rest."""
     values = dict(seen.pose.bones[parts.FACE].items())
     rests = live.rests
@@ -67,11 +94,11 @@ def read_sliders(seen, live):
     return raw
 
 
-def _rests(bone):
+def _rests(bone: bpy.types.PoseBone | None) -> TypeGuard[None]:
     return bone is None or (not bone.constraints and bone.matrix_basis == _STRAIGHT)
 
 
-def _turn(seen, bone):
+def _turn(seen: ArmatureObject, bone: bpy.types.PoseBone | None) -> Quaternion | None:
     """A bone's own rotation in the armature's axes, or None where it is straight."""
     if _rests(bone):
         return None
@@ -79,7 +106,7 @@ def _turn(seen, bone):
     return turn if turn.angle else None
 
 
-def _moved(seen, target):
+def _moved(seen: ArmatureObject, target: bpy.types.PoseBone | None) -> Vector:
     """How far the eyes' target was moved, in the armature's axes."""
     if _rests(target):
         return Vector()
@@ -89,7 +116,9 @@ def _moved(seen, target):
     return target.bone.matrix_local.to_3x3() @ local.translation
 
 
-def _add_look(seen, live, raw, maximum):
+def _add_look(
+    seen: ArmatureObject, live: runtime.Runtime, raw: NDArray[np.float32], maximum: float
+) -> None:
     """Add what the eye bones and their target ask for to the look controls."""
     bones = seen.pose.bones
     target = bones.get("eyes")

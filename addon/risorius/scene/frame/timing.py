@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How long each stage of a frame takes, for the overlay and for benchmarks."""
 
+from __future__ import annotations
+
 from collections import deque
+from collections.abc import Sequence
 from itertools import pairwise
 from statistics import median
 from time import perf_counter
@@ -13,14 +16,14 @@ _KEPT = 30  # frames that the overlay shows the median of
 class Frame:
     """Milliseconds of one frame: of our stages, and of what Blender does around them."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.begin = self.ended = perf_counter()
         self.stages = dict.fromkeys(STAGES, 0.0)
         self.animation = self.deform = self.drawing = 0.0
         self.characters = 0
 
     @property
-    def ours(self):
+    def ours(self) -> float:
         """The add-on's own time."""
         return sum(self.stages.values())
 
@@ -29,17 +32,17 @@ frames = deque([Frame()], maxlen=_KEPT)
 _drawing = [0.0]
 
 
-def begin():
+def begin() -> None:
     """A frame change, or an edit of a control, begins."""
     frames.append(Frame())
 
 
-def animated():
+def animated() -> None:
     """Blender has evaluated curves, strips and drivers."""
     frames[-1].animation = _since(frames[-1].begin)
 
 
-def add(times):
+def add(times: Sequence[float]) -> None:
     """One character was brought up. Args: times  perf_counter at the stages' ends, five."""
     for name, start, end in zip(STAGES, times[:-1], times[1:], strict=True):
         frames[-1].stages[name] += (end - start) * 1000
@@ -47,23 +50,23 @@ def add(times):
     frames[-1].ended = times[-1]
 
 
-def drawing_begins():
+def drawing_begins() -> None:
     """Blender has evaluated what was written, and begins to draw a view."""
     _drawing[0] = perf_counter()
     if not frames[-1].deform:
         frames[-1].deform = _since(frames[-1].ended)
 
 
-def drawing_ends():
+def drawing_ends() -> None:
     """Blender has told the graphics card what to draw."""
     frames[-1].drawing = _since(_drawing[0])
 
 
-def _since(moment):
+def _since(moment: float) -> float:
     return (perf_counter() - moment) * 1000
 
 
-def lines():
+def lines() -> list[str]:
     """What the overlay shows: medians of the last frames, in ms."""
     seen = [f for f in frames if f.characters]
     if not seen:

@@ -5,22 +5,28 @@ Blender moves what the object had into the bones, and the bones stay where they 
 which follows the object, would jump back to its own size and place.
 """
 
+from __future__ import annotations
+
 import numpy as np
 from mathutils import Matrix
+from numpy.typing import NDArray
 
 from ..base import parts
+from ..base.blender_types import ArmatureObject
 
 _NEAR = 1e-5  # of the largest number: what multiplying in float32 leaves
 
-_noted = {}  # session uid of a control armature -> its matrix and its bones, as last seen
+_noted: dict[
+    int, tuple[NDArray[np.float64], NDArray[np.float64]]
+] = {}  # session uid of a control armature -> its matrix and its bones, as last seen
 
 
-def forget():
+def forget() -> None:
     """After load and undo: what was seen before says nothing about what is there."""
     _noted.clear()
 
 
-def take_back(controls):
+def take_back(controls: ArmatureObject) -> list[str]:
     """Give a control armature back what was just applied to it.
 
     Args:
@@ -50,14 +56,17 @@ def take_back(controls):
     ]
 
 
-def _seen(controls):
+def _seen(controls: ArmatureObject) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """float64[4, 4] the object's own matrix, float64[4, ends] of its control bones at rest."""
     bones = [bone for bone in controls.data.bones if parts.PART in bone]
     ends = [(*end, 1.0) for bone in bones for end in (bone.head_local, bone.tail_local)]
     return np.array(controls.matrix_basis), np.array(ends).reshape(-1, 4).T
 
 
-def _was_applied(before, now):
+def _was_applied(
+    before: tuple[NDArray[np.float64], NDArray[np.float64]],
+    now: tuple[NDArray[np.float64], NDArray[np.float64]],
+) -> bool:
     """Whether the object's matrix changed, and the bones are where they were."""
     (old, rests), (new, moved) = before, now
     if rests.shape != moved.shape or not rests.size or np.array_equal(old, new):

@@ -1,14 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A duplicated character gets materials, shape keys and drivers of its own."""
 
+from __future__ import annotations
+
+from collections.abc import Iterable
+
 import bpy
 
 from ..base import parts
+from ..base.blender_types import ArmatureObject, MeshObject
 from ..character import armatures, meshes, runtime
 from ..material import materials
 
 
-def separate_all():
+def separate_all() -> list[str]:
     """Separate every character from those it was copied from.
 
     Returns:
@@ -20,7 +25,7 @@ def separate_all():
     return done
 
 
-def separate(rig):
+def separate(rig: ArmatureObject) -> list[str]:
     """Give a character what it still shares with another.
 
     Args:
@@ -50,7 +55,7 @@ def separate(rig):
     return done
 
 
-def _own_mesh(item):
+def _own_mesh(item: MeshObject) -> list[str]:
     """A mesh datablock of its own, where it has shapes that another object shows too."""
     if item.data.users < 2 or item.data.shape_keys is None:
         return []
@@ -61,7 +66,7 @@ def _own_mesh(item):
     return [f"{item.name} was given a mesh of its own: two faces cannot share live shapes."]
 
 
-def _retarget(curves, rig):
+def _retarget(curves: Iterable[bpy.types.FCurve], rig: ArmatureObject) -> bool:
     changed = False
     for curve in curves:
         for variable in curve.driver.variables:
@@ -72,7 +77,7 @@ def _retarget(curves, rig):
     return changed
 
 
-def _own_key_drivers(item, rig):
+def _own_key_drivers(item: MeshObject, rig: ArmatureObject) -> None:
     key = item.data.shape_keys
     if key is None or key.animation_data is None:
         return
@@ -82,14 +87,16 @@ def _own_key_drivers(item, rig):
         runtime.forget_outputs()
 
 
-def retarget_materials(item, rig):
+def retarget_materials(item: MeshObject, rig: ArmatureObject) -> None:
     """Let the animated maps of a mesh's materials follow another rig."""
     for slot in item.material_slots:
         if slot.material is not None:
             _retarget(materials.map_drivers(slot.material), rig)
 
 
-def _own_materials(item, rig, copied):
+def _own_materials(
+    item: MeshObject, rig: ArmatureObject, copied: dict[str, bpy.types.Material]
+) -> None:
     for slot in item.material_slots:
         material = slot.material
         if material is None:

@@ -1,34 +1,40 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """When characters are brought up to their controls."""
 
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+from typing import Any
+
 import bpy
 from bpy.app.handlers import persistent
 
 from ... import native
 from ..animation import layers
 from ..base import parts, sharing
+from ..base.blender_types import ArmatureObject, Depsgraph, current_context
 from ..character import lods, rig_placement, runtime
 from ..frame import channel_preview, evaluate, timing
 from . import applied_transforms, duplicates, migrations, repair
 
 # objects: session uids of those seen; mended: of characters that were mended at the last update.
-_state = {"objects": frozenset(), "busy": False, "mended": set()}
+_state: dict[str, Any] = {"objects": frozenset(), "busy": False, "mended": set()}
 
 
 @persistent
-def _frame_changes(*_arguments):
+def _frame_changes(*_arguments: object) -> None:
     timing.begin()
 
 
 @persistent
-def _frame_changed(_scene, depsgraph=None):
+def _frame_changed(_scene: bpy.types.Scene, depsgraph: Depsgraph | None = None) -> None:
     if depsgraph is not None:
         timing.animated()
         evaluate.evaluate_all(depsgraph)
 
 
 @persistent
-def _render_ended(*_arguments):
+def _render_ended(*_arguments: object) -> None:
     """The viewport shows its own level of detail again."""
     for rig in parts.rigs():
         controls = parts.controls_of(rig)
@@ -39,7 +45,7 @@ def _render_ended(*_arguments):
 
 
 @persistent
-def _updated(_scene, depsgraph):
+def _updated(_scene: bpy.types.Scene, depsgraph: Depsgraph) -> None:
     """React to edits of control armatures; writes here tag the rig only, so it ends at once."""
     # While a render runs beside the interface, only its own frames are written.
     if _state["busy"] or bpy.app.is_job_running("RENDER") or native.problem():
@@ -64,7 +70,7 @@ def _updated(_scene, depsgraph):
         _state["busy"] = False
 
 
-def _mend(rig):
+def _mend(rig: ArmatureObject) -> bool:
     done = repair.heal(rig)
     _say(done)
     if done:
@@ -72,12 +78,12 @@ def _mend(rig):
     return rig.session_uid in _state["mended"]
 
 
-def _note_mended(rig):
+def _note_mended(rig: ArmatureObject) -> None:
     _state["mended"].add(rig.session_uid)
     rig[parts.CONTROLS].update_tag()
 
 
-def _notice_copies(updates):
+def _notice_copies(updates: Iterable[bpy.types.DepsgraphUpdate]) -> None:
     # Their number alone does not tell: as many may go as come in one step.
     known = _state["objects"]
     seen = (u.id.original for u in updates if isinstance(u.id, bpy.types.Object))
@@ -91,12 +97,12 @@ def _notice_copies(updates):
         sharing.keep()
 
 
-def _say(sentences):
+def _say(sentences: Iterable[str]) -> None:
     for sentence in sentences:
         print(f"Risorius: {sentence}")
 
 
-def _edited(depsgraph):
+def _edited(depsgraph: Depsgraph) -> list[ArmatureObject]:
     """The characters that the updates concern: by their controls, their body or the camera."""
     armatures, actions, bones_edited, camera_moved = set(), set(), False, False
     camera = depsgraph.scene.camera
@@ -118,7 +124,12 @@ def _edited(depsgraph):
     return [rig for rig in parts.rigs() if _concerned(rig, armatures, actions, camera_moved)]
 
 
-def _concerned(rig, armatures, actions, camera_moved):
+def _concerned(
+    rig: ArmatureObject,
+    armatures: Collection[bpy.types.Object],
+    actions: Collection[bpy.types.Action],
+    camera_moved: bool,
+) -> bool:
     controls = parts.controls_of(rig)
     hold = rig_placement.body_of(controls) if controls is not None else None
     return (
@@ -130,9 +141,9 @@ def _concerned(rig, armatures, actions, camera_moved):
 
 
 @persistent
-def _loaded(*_arguments):
+def _loaded(*_arguments: object) -> None:
     """After load: Blender calls no update handler when it evaluates a file for the first time."""
-    layer = bpy.context.view_layer
+    layer = current_context().view_layer
     migrations.forget()
     if not native.problem():
         _say(migrations.bring_up_all())
@@ -145,7 +156,7 @@ def _loaded(*_arguments):
 
 
 @persistent
-def _restored(*_arguments):
+def _restored(*_arguments: object) -> None:
     """After load, undo and redo: what was written before says nothing about what is there.
 
     Nothing is read here: until the next update the pose bones of objects that undo brought back
@@ -164,7 +175,7 @@ def _restored(*_arguments):
 
 
 @persistent
-def _before_save(*_arguments):
+def _before_save(*_arguments: object) -> None:
     if native.problem():
         return
     duplicates.separate_all()
@@ -174,12 +185,12 @@ def _before_save(*_arguments):
 
 
 @persistent
-def _end_tests(*_arguments):
+def _end_tests(*_arguments: object) -> None:
     if not native.problem() and channel_preview.clear_all():
         refresh()
 
 
-def refresh():
+def refresh() -> None:
     """Bring all characters up to their controls now, each in the scenes that it is in."""
     if native.problem() or not parts.rigs():
         return
@@ -203,7 +214,7 @@ _HANDLERS = (
 )
 
 
-def register():
+def register() -> None:
     """Add the handlers, and bring up what is already there."""
     _state.update(objects=frozenset(), busy=False, mended=set())
     for name, handler in _HANDLERS:
@@ -212,7 +223,7 @@ def register():
             present.append(handler)
 
 
-def unregister():
+def unregister() -> None:
     """Remove the handlers and drop all compiled data."""
     for name, handler in reversed(_HANDLERS):
         present = getattr(bpy.app.handlers, name)

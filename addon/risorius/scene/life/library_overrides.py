@@ -6,16 +6,23 @@ shape keys of every override. So the override is made fully editable, and shapes
 keys, which drivers move without any write, or meshes of this file.
 """
 
+from __future__ import annotations
+
+from typing import TypeVar
+
 import bpy
 
 from ...logic.base.errors import FaceError
 from ..base import compat, parts
+from ..base.blender_types import ArmatureObject, Context, MeshObject
 from ..character import meshes, runtime
 from ..frame import evaluate
 from . import duplicates
 
+Owned = TypeVar("Owned", bound=bpy.types.ID)
 
-def linked_rig(context):
+
+def linked_rig(context: Context) -> ArmatureObject | None:
     """The linked character that the active object shows or belongs to, or None."""
     item = context.object
     if item is None:
@@ -27,7 +34,9 @@ def linked_rig(context):
     return rig if rig is not None and rig.library is not None else None
 
 
-def make_override(context, rig, local_meshes=False):
+def make_override(
+    context: Context, rig: ArmatureObject, local_meshes: bool = False
+) -> tuple[ArmatureObject, list[str]]:
     """Override a linked character so that it can be animated here.
 
     Args:
@@ -60,7 +69,7 @@ def make_override(context, rig, local_meshes=False):
     return new, own_shapes(new, local_meshes)
 
 
-def repair(context, rig, local_meshes=False):
+def repair(context: Context, rig: ArmatureObject, local_meshes: bool = False) -> list[str]:
     """Make an override that Blender made by itself fully editable.
 
     Args: see make_override; rig is the override's deforming armature.
@@ -79,7 +88,7 @@ def repair(context, rig, local_meshes=False):
     return own_shapes(rig, local_meshes)
 
 
-def own_shapes(rig, local_meshes):
+def own_shapes(rig: ArmatureObject, local_meshes: bool) -> list[str]:
     """Let shapes of an override move: meshes of this file where keys cannot be driven.
 
     Args:
@@ -102,12 +111,12 @@ def own_shapes(rig, local_meshes):
     return done
 
 
-def is_locked(item):
+def is_locked(item: MeshObject) -> bool:
     """Whether the shapes of a mesh object belong to another file."""
     return item.data.library is not None or item.data.override_library is not None
 
 
-def unlock_shapes(rig):
+def unlock_shapes(rig: ArmatureObject) -> bool:
     """Copy all meshes whose shapes are locked into this file, before their mode is switched."""
     owned = {}
     locked = [item for item in parts.meshes_of(rig) if is_locked(item)]
@@ -118,7 +127,7 @@ def unlock_shapes(rig):
     return bool(locked)
 
 
-def trouble(rig):
+def trouble(rig: ArmatureObject) -> str:
     """What Blender refused to let us write on an override; empty when all is well."""
     names = [item.name for item in evaluate.refused(rig)]
     if rig.override_library is not None and rig.override_library.is_system_override:
@@ -128,7 +137,7 @@ def trouble(rig):
     return f"Blender's override of {', '.join(names)} cannot be written: the face stands still."
 
 
-def _localize(item, owned):
+def _localize(item: MeshObject, owned: dict[str, bpy.types.Material]) -> None:
     """A mesh of this file, with its own copies of those materials that are overrides.
 
     Without the mesh they would stand outside the override's hierarchy, and Blender would delete
@@ -148,17 +157,17 @@ def _localize(item, owned):
             bpy.data.batch_remove([old])
 
 
-def _local_copy(item):
+def _local_copy(item: Owned) -> Owned:
     own = item.copy()
     return own.make_local(clear_liboverride=True) if own.override_library is not None else own
 
 
-def _overrides(item, linked):
+def _overrides(item: bpy.types.ID, linked: bpy.types.ID) -> bool:
     held = item.override_library
     return held is not None and held.reference == linked
 
 
-def _instance_of(context, rig):
+def _instance_of(context: Context, rig: ArmatureObject) -> bpy.types.Object | None:
     """The active object, where it is an instance of the collection that holds the rig."""
     item = context.object
     if item is None or item.library or item.instance_type != "COLLECTION":
@@ -167,7 +176,7 @@ def _instance_of(context, rig):
     return item if held is not None and rig in held.all_objects[:] else None
 
 
-def _linked_root(rig):
+def _linked_root(rig: ArmatureObject) -> bpy.types.Collection | ArmatureObject:
     """The linked collection that local ones hold, with this rig in it; else the rig itself."""
     homes = [s.collection for s in bpy.data.scenes if s.library is None]
     homes += [c for c in bpy.data.collections if c.library is None]
@@ -178,14 +187,14 @@ def _linked_root(rig):
     return rig
 
 
-def _unlink(scene, collection):
+def _unlink(scene: bpy.types.Scene, collection: bpy.types.Collection) -> None:
     """Take a linked collection out of a scene: its override stands there instead."""
     for home in (scene.collection, *scene.collection.children_recursive):
         if home.library is None and collection in home.children[:]:
             home.children.unlink(collection)
 
 
-def _take_place(shown, rig, collection):
+def _take_place(shown: bpy.types.Object, rig: ArmatureObject, collection: bpy.types.ID) -> None:
     """Put an override where its instance stood, and let the instance show nothing."""
     place = shown.matrix_world.copy()
     shown.instance_collection = None
@@ -197,7 +206,7 @@ def _take_place(shown, rig, collection):
         bpy.data.objects.remove(shown)
 
 
-def _show(context, rig):
+def _show(context: Context, rig: ArmatureObject) -> None:
     """Select the controls, as after an import."""
     layer, controls = context.view_layer, parts.controls_of(rig)
     compat.deselect_all(layer)

@@ -5,13 +5,16 @@ Nothing is done to linked ones, which cannot be written: what reads them underst
 Nothing is brought down: a character of a newer form plays as far as this version knows it.
 """
 
+from __future__ import annotations
+
 from ..animation import actions
 from ..base import form, parts
+from ..base.blender_types import ArmatureObject
 
-_said = set()  # session uids of newer characters
+_said: set[int] = set()  # session uids of newer characters
 
 
-def bring_up_all():
+def bring_up_all() -> list[str]:
     """Bring every character of this file to the present form.
 
     Returns:
@@ -29,7 +32,7 @@ def bring_up_all():
     return done
 
 
-def _bring_up(rig, controls):
+def _bring_up(rig: ArmatureObject, controls: ArmatureObject) -> list[str]:
     changed = []
     for step in _STEPS[form.version_of(controls) :]:
         changed += step(rig, controls)
@@ -40,14 +43,14 @@ def _bring_up(rig, controls):
     return [f"{rig.name} is of an older file: {', '.join(changed)}."] if changed else []
 
 
-def _say_once(rig, controls):
+def _say_once(rig: ArmatureObject, controls: ArmatureObject) -> list[str]:
     if rig.session_uid in _said:
         return []
     _said.add(rig.session_uid)
     return [newer(rig)]
 
 
-def newer(rig):
+def newer(rig: ArmatureObject) -> str:
     """A sentence where a character is of a newer form than this version knows, else empty."""
     controls = parts.controls_of(rig)
     found = form.version_of(controls) if controls is not None else 0
@@ -59,12 +62,12 @@ def newer(rig):
     )
 
 
-def forget():
+def forget() -> None:
     """After load session uids may mean others."""
     _said.clear()
 
 
-def _to_1(rig, controls):
+def _to_1(rig: ArmatureObject, controls: ArmatureObject) -> list[str]:
     """It says what it needs; a baked one keeps what it silenced by name."""
     changed = []
     if not controls.override_library:

@@ -6,15 +6,18 @@ of control bones and sliders are a contract with actions, pose assets and script
 given back.
 """
 
+from __future__ import annotations
+
 import bpy
 
 from ...logic.character import plans
 from ..base import parts
+from ..base.blender_types import ArmatureObject
 from ..character import armatures, build, meshes, runtime
 from . import applied_transforms
 
 
-def heal(rig):
+def heal(rig: ArmatureObject) -> list[str]:
     """Give control bones and sliders of a character their names back, and their place.
 
     Args:
@@ -29,7 +32,7 @@ def heal(rig):
     return [*_bone_names(controls), *_sliders(rig), *applied_transforms.take_back(controls)]
 
 
-def heal_all():
+def heal_all() -> list[ArmatureObject]:
     """Mend every character of this file; what was mended goes to the console.
 
     Returns:
@@ -44,7 +47,7 @@ def heal_all():
     return mended
 
 
-def _bone_names(controls):
+def _bone_names(controls: ArmatureObject) -> list[str]:
     """Rename control bones back; their curves follow, as at any rename."""
     bones = controls.data.bones
     if controls.data.library is not None or controls.mode == "EDIT":
@@ -58,7 +61,7 @@ def _bone_names(controls):
     return done
 
 
-def _sliders(rig):
+def _sliders(rig: ArmatureObject) -> list[str]:
     """Make sliders that are gone or of another type anew as floats."""
     face, live = parts.face_bone(rig), runtime.of(rig)
     if face is None or live is None:
@@ -67,7 +70,7 @@ def _sliders(rig):
     if not wrong:
         return []
     planned = plans.plan_controls(live.dna.raw_control_names, live.rests)
-    maximum = parts.maximum_of(parts.controls_of(rig))
+    maximum = parts.maximum_of(parts.controls_there(rig))
     done = []
     for i in wrong:
         label, held = live.labels[i], face.get(live.labels[i])
@@ -80,7 +83,7 @@ def _sliders(rig):
     return done
 
 
-def missing(item):
+def missing(item: bpy.types.Object | None) -> list[str]:
     """What the character that an object belongs to has lost.
 
     Args:
@@ -125,7 +128,7 @@ def missing(item):
     return found
 
 
-def _rig_of_ruin(item):
+def _rig_of_ruin(item: bpy.types.Object | None) -> ArmatureObject | None:
     """The deforming armature, also of a character that has lost its controls."""
     if item is None:
         return None
@@ -135,14 +138,14 @@ def _rig_of_ruin(item):
     return rig if isinstance(rig, bpy.types.Object) and parts.CONTROLS in rig else None
 
 
-def outside(rig):
+def outside(rig: ArmatureObject) -> list[bpy.types.Object]:
     """Parts of a character that are in no collection: Blender's Delete leaves them in the file,
     because the other parts point to them.
     """
     return [o for o in parts.members_of(rig) if not o.users_collection]
 
 
-def bring_back(item, scene):
+def bring_back(item: bpy.types.Object, scene: bpy.types.Scene) -> list[bpy.types.Object]:
     """Put deleted parts back into the collection of those that are left.
 
     Args:
@@ -163,7 +166,7 @@ def bring_back(item, scene):
     return lost
 
 
-def remove_dead():
+def remove_dead() -> int:
     """Remove characters whose parts were all deleted.
 
     The parts point to each other, so Blender would keep them, and save them, for ever.
@@ -177,7 +180,7 @@ def remove_dead():
     return len(dead)
 
 
-def _is_dead(rig):
+def _is_dead(rig: ArmatureObject) -> bool:
     held = parts.members_of(rig)
     if any(o.users_collection or o.use_fake_user or o.library for o in held):
         return False

@@ -10,8 +10,12 @@ A recording becomes an action when it is finished. One that cannot, whose face w
 file is closed waits in memory until it is finished or thrown away: nobody acts the same twice.
 """
 
+from __future__ import annotations
+
 import contextlib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import bpy
 from bpy.app.handlers import persistent
@@ -22,16 +26,19 @@ from ...logic.animation.clip_units import ClipError
 from ...logic.base import names
 from ..animation import actions, clip_actions, layers
 from ..base import parts
+from ..base.blender_types import ArmatureObject, current_context
 from ..character import runtime
 
 INTERVAL = 1 / 60  # seconds; faster than a phone sends helps nobody
 _REDRAW = 0.25  # seconds between redraws of the status
 _HEAD = "head"
 
-_sessions = {}  # session uid of a control armature -> Session
-_receivers = {}  # (source, port, host) -> the Receiver of all sessions that listen there
-_waiting = []  # Recordings that ended without becoming an action, the oldest first
-_last = {"error": "", "redraw": 0.0, "undone": False}
+_sessions: dict[int, Session] = {}  # session uid of a control armature -> Session
+_receivers: dict[
+    tuple[str, int, str], native.Receiver
+] = {}  # (source, port, host) -> the Receiver of all sessions that listen there
+_waiting: list[Recording] = []  # Recordings that ended without becoming an action, the oldest first
+_last: dict[str, Any] = {"error": "", "redraw": 0.0, "undone": False}
 
 
 @dataclass
@@ -66,8 +73,8 @@ class Recording:
         face: name of the control armature.
     """
 
-    take: object
-    shaper: object
+    take: native.Take
+    shaper: native.Shaper
     frame: float
     face: str = ""
 
@@ -91,21 +98,21 @@ class Session:
 
     uid: int
     name: str
-    key: tuple
-    shaper: object
+    key: tuple[str, int, str]
+    shaper: native.Shaper
     subject: str = ""
     sequence: int = 0
-    before: dict = field(default_factory=dict)
-    turn: tuple | None = None
+    before: dict[str, float] = field(default_factory=dict)
+    turn: tuple[str, tuple[float, ...]] | None = None
     recording: Recording | None = None
-    names: tuple = ()
-    sliders: tuple = ()
+    names: tuple[str, ...] = ()
+    sliders: tuple[tuple[str, int], ...] = ()
 
     @property
-    def receiver(self):
+    def receiver(self) -> native.Receiver:
         return _receivers[self.key]
 
-    def controls(self):
+    def controls(self) -> ArmatureObject | None:
         """The control armature, or None where it went away."""
         item = bpy.data.objects.get(self.name)
         if item is None or item.session_uid != self.uid:
@@ -117,17 +124,17 @@ class Session:
         return item
 
 
-def of(controls):
+def of(controls: bpy.types.Object | None) -> Session | None:
     """The Session of a control armature, or None."""
     return _sessions.get(controls.session_uid) if controls is not None else None
 
 
-def last_error():
+def last_error() -> str:
     """Why the last capture ended by itself; "" if it did not."""
     return _last["error"]
 
 
-def start(rig, settings):
+def start(rig: ArmatureObject, settings: Settings) -> Session:
     """Let a character follow a subject.
 
     Args:
@@ -143,7 +150,7 @@ def start(rig, settings):
     """
     live = native.part("live")
     shaper = live.Shaper(settings.mapping)
-    controls = parts.controls_of(rig)
+    controls = parts.controls_there(rig)
     stop(controls)
     host = live.EVERYWHERE if settings.everywhere else live.THIS_MACHINE
     key = (settings.source, settings.port, host)
@@ -160,14 +167,14 @@ def start(rig, settings):
     return session
 
 
-def apply_settings(session, settings):
+def apply_settings(session: Session, settings: Settings) -> None:
     """Take over what can change while it runs: subject, smoothing, gains."""
     session.subject = settings.subject
     session.shaper.smoothing = settings.smoothing
     session.shaper.gain, session.shaper.head_gain = settings.gain, settings.head_gain
 
 
-def stop(controls):
+def stop(controls: bpy.types.Object | None) -> bool:
     """End the capture of a character and put back what was there before.
 
     Returns:
@@ -180,7 +187,7 @@ def stop(controls):
     return True
 
 
-def stop_all():
+def stop_all() -> None:
     """End every capture; characters that are still there get their values back."""
     for session in list(_sessions.values()):
         _end(session)
@@ -188,7 +195,7 @@ def stop_all():
         bpy.app.timers.unregister(_tick)
 
 
-def _end(session):
+def _end(session: Session) -> None:
     """Close a session whatever state its character is in: nothing of the user's goes with it."""
     _lay_by(session)
     try:
@@ -199,13 +206,13 @@ def _end(session):
         _close(session)
 
 
-def _close(session):
+def _close(session: Session) -> None:
     del _sessions[session.uid]
     if not any(other.key == session.key for other in _sessions.values()):
         _receivers.pop(session.key).stop()
 
 
-def _lay_by(session):
+def _lay_by(session: Session) -> Recording | None:
     """End a session's recording; it waits, if anything was recorded. Returns: it, or None."""
     recording, session.recording = session.recording, None
     if recording is None or not len(session.receiver.finish(recording.take)):
@@ -215,7 +222,7 @@ def _lay_by(session):
     return recording
 
 
-def neutral_now(session):
+def neutral_now(session: Session) -> bool:
     """Take the face of this moment as the face at rest. Returns: whether one was there."""
     frame = session.receiver.latest(session.subject)
     if frame is None:
@@ -225,24 +232,26 @@ def neutral_now(session):
     return True
 
 
-def forget_neutral(session):
+def forget_neutral(session: Session) -> None:
     """Take what comes as it is again."""
     session.shaper.capture(None)
     session.sequence = 0
 
 
-def address():
+def address() -> str:
     """What a phone's app takes for this computer; "" where it is in no network."""
     return native.part("live").own_address()
 
 
-def begin_take(session, frame):
+def begin_take(session: Session, frame: float) -> None:
     """Record from now. Args: frame  of the scene at which the take is to begin."""
     take = session.receiver.record(session.subject)
     session.recording = Recording(take, session.shaper, frame)
 
 
-def finish_take(session, rig, scene):
+def finish_take(
+    session: Session, rig: ArmatureObject, scene: bpy.types.Scene
+) -> clip_actions.Report | None:
     """Stop recording; the character plays what was recorded.
 
     Args:
@@ -260,17 +269,19 @@ def finish_take(session, rig, scene):
     return finish(recording, rig, scene) if recording is not None else None
 
 
-def waiting():
+def waiting() -> tuple[Recording, ...]:
     """The recordings that wait to be finished: a tuple of Recordings, the oldest first."""
     return tuple(_waiting)
 
 
-def discard(recording):
+def discard(recording: Recording) -> None:
     """Throw away a recording that waits."""
     _waiting.remove(recording)
 
 
-def finish(recording, rig, scene):
+def finish(
+    recording: Recording, rig: ArmatureObject, scene: bpy.types.Scene
+) -> clip_actions.Report:
     """Let a character play a recording that waits; then it waits no more.
 
     Args:
@@ -285,7 +296,7 @@ def finish(recording, rig, scene):
         clips.ClipError: nothing of it is for this face, it is longer than Blender can play, or the
             NLA is being edited.
     """
-    controls, take = parts.controls_of(rig), recording.take
+    controls, take = parts.controls_there(rig), recording.take
     trouble = actions.busy(controls)
     if trouble:
         raise ClipError(trouble)
@@ -302,7 +313,7 @@ def finish(recording, rig, scene):
     return report
 
 
-def _tick():
+def _tick() -> float | None:
     """One beat of the timer; returns the seconds to the next, None to end."""
     try:
         return _beat()
@@ -315,12 +326,12 @@ def _tick():
         raise
 
 
-def _beat():
+def _beat() -> float | None:
     if bpy.app.is_job_running("RENDER"):
         return INTERVAL  # what a render reads is not to be written
     if _last["undone"]:
         _last["undone"] = False
-        bpy.context.view_layer.update()  # bones that undo brought back are not there before
+        current_context().view_layer.update()  # bones that undo brought back are not there before
     changed = False
     for session in list(_sessions.values()):
         controls = session.controls()
@@ -333,7 +344,7 @@ def _beat():
     return INTERVAL if _sessions else None
 
 
-def show(session, controls):
+def show(session: Session, controls: ArmatureObject) -> bool:
     """Write the newest face to a character, if it is a new one.
 
     Returns:
@@ -359,9 +370,11 @@ def show(session, controls):
     return True
 
 
-def _plan(session, controls, controlled):
+def _plan(session: Session, controls: ArmatureObject, controlled: tuple[str, ...]) -> None:
     """Which value goes to which slider of this character."""
-    live = runtime.of(parts.rig_of(controls))
+    rig = parts.rig_of(controls)
+    assert rig is not None
+    live = runtime.there(rig)
     places = {name: place for place, name in enumerate(controlled)}
     face = controls.pose.bones[parts.FACE]
     found = {}
@@ -372,7 +385,7 @@ def _plan(session, controls, controlled):
     session.names, session.sliders = controlled, tuple(found.items())
 
 
-def _turn_head(session, controls, values):
+def _turn_head(session: Session, controls: ArmatureObject, values: Mapping[str, float]) -> None:
     bone = controls.pose.bones.get(_HEAD)
     if bone is None or f"{_HEAD}.yaw" not in values:
         return
@@ -386,12 +399,12 @@ def _turn_head(session, controls, values):
     _rotate(bone, rest.inverted() @ turn @ rest)
 
 
-def _rotation(bone):
+def _rotation(bone: bpy.types.PoseBone) -> tuple[str, tuple[float, ...]]:
     """A bone's rotation mode, and its rotation as that keeps it."""
     return bone.rotation_mode, tuple(getattr(bone, clip_actions.rotation_path(bone)))
 
 
-def _as_quaternion(mode, values):
+def _as_quaternion(mode: str, values: Sequence[float]) -> Quaternion:
     """What _rotation gave, for a bone that is turned in another way by now."""
     if mode == "QUATERNION":
         return Quaternion(values).normalized()
@@ -400,7 +413,7 @@ def _as_quaternion(mode, values):
     return Euler(values, mode).to_quaternion()
 
 
-def _rotate(bone, turn):
+def _rotate(bone: bpy.types.PoseBone, turn: Quaternion) -> None:
     if bone.rotation_mode == "QUATERNION":
         bone.rotation_quaternion = turn
     elif bone.rotation_mode == "AXIS_ANGLE":
@@ -411,7 +424,7 @@ def _rotate(bone, turn):
         bone.rotation_euler = turn.to_euler(bone.rotation_mode, before)
 
 
-def _put_back(session, controls):
+def _put_back(session: Session, controls: ArmatureObject) -> None:
     """Write the values of before the capture."""
     bone = controls.pose.bones[parts.FACE]
     for slider, value in session.before.items():
@@ -429,14 +442,14 @@ def _put_back(session, controls):
     controls.update_tag()
 
 
-def _redraw(changed):
+def _redraw(changed: bool) -> None:
     """Let the views show a change at once, and the sidebars the status now and then."""
     _last["redraw"] += INTERVAL
     status = _last["redraw"] >= _REDRAW
     kinds = {"WINDOW": changed, "UI": status}
     if status:
         _last["redraw"] = 0.0
-    for window in bpy.context.window_manager.windows if changed or status else ():
+    for window in current_context().window_manager.windows if changed or status else ():
         for area in window.screen.areas:
             if area.type == "VIEW_3D":
                 for region in area.regions:
@@ -445,12 +458,12 @@ def _redraw(changed):
 
 
 @persistent
-def _before_load(*_arguments):
+def _before_load(*_arguments: object) -> None:
     stop_all()
 
 
 @persistent
-def _before_save(*_arguments):
+def _before_save(*_arguments: object) -> None:
     """The file shall keep the face as it was; the next tick goes on."""
     for session in _sessions.values():
         controls = session.controls()
@@ -459,7 +472,7 @@ def _before_save(*_arguments):
 
 
 @persistent
-def _undone(*_arguments):
+def _undone(*_arguments: object) -> None:
     _last["undone"] = True
     for session in _sessions.values():
         session.sequence = 0
@@ -473,7 +486,7 @@ _HANDLERS = (
 )
 
 
-def register():
+def register() -> None:
     """Add the handlers."""
     _last.update(error="", redraw=0.0, undone=False)
     for name, handler in _HANDLERS:
@@ -482,7 +495,7 @@ def register():
             present.append(handler)
 
 
-def unregister():
+def unregister() -> None:
     """End all captures and remove the handlers."""
     stop_all()
     for name, handler in reversed(_HANDLERS):

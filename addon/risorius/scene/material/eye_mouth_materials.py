@@ -1,6 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Eyes, teeth, tongue, gums, lashes and wet films: each varies over its surface, without maps."""
 
+from __future__ import annotations
+
+import bpy
+
+from ..base.blender_types import Socket
+from .look import Look
+from .nodes import Color, Graph, Value
+
 EYES = "risorius_eye"  # mesh attribute: x and height over the eye's radius, 1 on the front half
 TEETH = "risorius_teeth"  # mesh attribute: place along the arch in teeth, height from the bite
 
@@ -15,12 +23,12 @@ _LASH, _LASH_TIP = (0.010, 0.006, 0.004), (0.045, 0.026, 0.016)
 _COARSE = 1500  # vertices: a mesh of teeth with fewer has no single teeth
 
 
-def build(graph, look):
+def build(graph: Graph, look: Look) -> None:
     """Fill the tree of a material by the kind of its mesh."""
     _KINDS[look.kind](graph, look)
 
 
-def _textured_normal(graph, look):
+def _textured_normal(graph: Graph, look: Look) -> Socket | None:
     image = look.image("normal", data=True)
     if image is None:
         return None
@@ -29,7 +37,7 @@ def _textured_normal(graph, look):
     return node.outputs["Normal"]
 
 
-def eyes(graph, look):
+def eyes(graph: Graph, look: Look) -> None:
     """Sclera with veins, a hollow iris, a pupil; the cornea is the clear coat over them.
 
     The coat keeps the smooth normal of the ball while the iris below has its own, so that its
@@ -59,7 +67,7 @@ def eyes(graph, look):
         graph.set(Subsurface_Radius=(1.0, 0.55, 0.4))
 
 
-def _iris_and_sclera(graph, look, flat, away):
+def _iris_and_sclera(graph: Graph, look: Look, flat: Value, away: Value) -> Value:
     turned = graph.vector("NORMALIZE", flat)
     fibres = graph.noise(turned, 9.0, detail=5.0, roughness=0.75)
     iris = graph.mix(
@@ -85,20 +93,20 @@ def _iris_and_sclera(graph, look, flat, away):
     return graph.mix(outside, iris, white)
 
 
-def _gray(graph, value):
+def _gray(graph: Graph, value: Value) -> Socket:
     node = graph.node("CombineColor")
     for socket in node.inputs:
         graph.put(value, socket)
     return node.outputs[0]
 
 
-def _film(graph, look, low, high):
+def _film(graph: Graph, look: Look, low: float, high: float) -> Socket:
     """Uneven wetness: a roughness between two values."""
     uneven = graph.noise(graph.rest_points(look.extent), 14.0 / look.unit, detail=3.0)
     return graph.math("MULTIPLY_ADD", uneven, high - low, low)
 
 
-def teeth(graph, look):
+def teeth(graph: Graph, look: Look) -> None:
     """Enamel that yellows towards the gum, single teeth where the mesh has none, gums above."""
     picture = look.image("color")
     points = graph.rest_points(look.extent)
@@ -130,17 +138,17 @@ def teeth(graph, look):
         graph.set(Subsurface_Radius=(1.0, 0.8, 0.6), Normal=normal)
 
 
-def tongue(graph, look):
+def tongue(graph: Graph, look: Look) -> None:
     """Papillae, and a wet coat that breaks on them."""
     _flesh(graph, look, (_TONGUE_DARK, _TONGUE), 46.0)
 
 
-def gum(graph, look):
+def gum(graph: Graph, look: Look) -> None:
     """Wet, mottled flesh: gums, caruncles, cartilage."""
     _flesh(graph, look, (_GUM_DARK, _GUM), 26.0)
 
 
-def _flesh(graph, look, tones, grain):
+def _flesh(graph: Graph, look: Look, tones: tuple[Color, Color], grain: float) -> None:
     points = graph.rest_points(look.extent)
     picture = look.image("color")
     mottled = graph.noise(points, 6.0 / look.unit, detail=5.0, roughness=0.6)
@@ -160,7 +168,7 @@ def _flesh(graph, look, tones, grain):
     )
 
 
-def lashes(graph, look):
+def lashes(graph: Graph, look: Look) -> None:
     """Hairs on cards: by an alpha or colour texture, else strands across the UV map."""
     picture, mask = look.image("color"), look.image("alpha", data=True)
     strands = _strands(graph, look)
@@ -178,7 +186,7 @@ def lashes(graph, look):
     _transparent(graph.material, "DITHERED")
 
 
-def _strands(graph, look):
+def _strands(graph: Graph, look: Look) -> Socket:
     """Noise drawn out along the hairs."""
     where = graph.uv() if look.has_uvs else graph.rest_points(look.extent)
     reach = 1.0 if look.has_uvs else 1.0 / look.unit
@@ -186,7 +194,7 @@ def _strands(graph, look):
     return graph.noise(stretched, 4.0, detail=2.0)
 
 
-def wet(graph, look):
+def wet(graph: Graph, look: Look) -> None:
     """A film one looks through: clear, with the reflection that water has at each angle.
 
     Transparent instead of refracting, because a refracting shell keeps light from the eye under
@@ -217,7 +225,7 @@ def wet(graph, look):
     _transparent(graph.material, "BLENDED")
 
 
-def _transparent(material, method):
+def _transparent(material: bpy.types.Material, method: str) -> None:
     """How EEVEE lets things through; shadows pass the clear parts."""
     material.surface_render_method = method
     material.use_transparency_overlap = False

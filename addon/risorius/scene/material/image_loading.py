@@ -1,10 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Images: loaded once, packed, and read in the colour space that their role asks for."""
 
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
-from ...logic.material import image_size
+from ...logic.material import image_size, texture_search
 from ..base import sharing, storage
 
 # Names of one and the same space in the configurations that people use: Blender's own, ACES 1,
@@ -28,7 +34,7 @@ _ONE_IMAGE, _ALL_IMAGES, _MOST_TIMES = 256 << 20, 1 << 30, 64
 TILE = 512  # pixels of one tile of the mask atlas, each side
 
 
-def set_color_space(image, data):
+def set_color_space(image: bpy.types.Image, data: bool) -> None:
     """Say whether an image holds colours or numbers; no name of a space needs to exist.
 
     Args:
@@ -51,7 +57,7 @@ def set_color_space(image, data):
         settings.is_data = True  # at least the configuration's own role for data
 
 
-def _room_for(path):
+def _room_for(path: Path) -> int:
     """Bytes that an image takes when it is unfolded.
 
     Raises:
@@ -60,7 +66,7 @@ def _room_for(path):
     """
     with path.open("rb") as file:
 
-        def read(offset, count):
+        def read(offset: int, count: int) -> bytes:
             file.seek(min(offset, 1 << 62))
             return file.read(count)
 
@@ -80,13 +86,13 @@ def _room_for(path):
 class Images:
     """Loads each file once for each role and packs it into the .blend; `troubles` are sentences."""
 
-    def __init__(self, made):
+    def __init__(self, made: list[bpy.types.ID]) -> None:
         self.made = made
-        self.troubles = []
-        self._loaded = {}
+        self.troubles: list[str] = []
+        self._loaded: dict[tuple[str, bool], bpy.types.Image | None] = {}
         self._room, self._files = 0, 0  # bytes, of all images that were loaded
 
-    def load(self, path, data=False):
+    def load(self, path: Path | None, data: bool = False) -> bpy.types.Image | None:
         """The image of a file, or None where there is none or it cannot be read."""
         if path is None:
             return None
@@ -95,7 +101,7 @@ class Images:
             self._loaded[key] = self._read(path, data)
         return self._loaded[key]
 
-    def _read(self, path, data):
+    def _read(self, path: Path, data: bool) -> bpy.types.Image | None:
         try:
             self._make_room(path)
             content = path.read_bytes() if path.stat().st_size <= PACK_LIMIT else None
@@ -124,7 +130,7 @@ class Images:
             self._complain(f"The texture {path.name} is large and stays outside the .blend file.")
         return image
 
-    def _make_room(self, path):
+    def _make_room(self, path: Path) -> None:
         room, size = _room_for(path), path.stat().st_size
         limit = _ALL_IMAGES + _MOST_TIMES * (self._files + size)
         if self._room + room > limit:
@@ -134,11 +140,13 @@ class Images:
             )
         self._room, self._files = self._room + room, self._files + size
 
-    def _complain(self, sentence):
+    def _complain(self, sentence: str) -> None:
         if sentence not in self.troubles:
             self.troubles.append(sentence)
 
-    def atlas(self, name, masks):
+    def atlas(
+        self, name: str, masks: Mapping[str, texture_search.Mask]
+    ) -> tuple[bpy.types.Image | None, dict[str, tuple[int, int, int, int]]]:
         """One image with the masks of many regions, three to a tile: an engine has few samplers.
 
         Args:
@@ -174,7 +182,7 @@ class Images:
         image.pack()
         return self._shared(image), places
 
-    def _shared(self, image):
+    def _shared(self, image: bpy.types.Image) -> bpy.types.Image:
         """An image of this .blend with the same packed bytes in the place of a new one."""
         content = bytes(image.packed_file.data)
         digest = storage.hash_of(content)
@@ -187,7 +195,7 @@ class Images:
         return there
 
 
-def _small_copy(path):
+def _small_copy(path: Path) -> NDArray[np.float32] | None:
     """float32[TILE, TILE, 4] of a file's stored numbers, or None where it cannot be read."""
     try:
         _room_for(path)
@@ -207,7 +215,13 @@ def _small_copy(path):
         bpy.data.images.remove(image)
 
 
-def mean_of(path):
+def mean_of(path: Path) -> NDArray[np.float32] | None:
     """float32[4] mean of a file's stored numbers; used to tell offsets from whole maps."""
     small = _small_copy(path)
     return None if small is None else small.mean(axis=(0, 1))
+
+
+def offsets_in(path: Path) -> bool:
+    """Whether a wrinkle map holds differences about 0.5 instead of whole colours or normals."""
+    mean = mean_of(path)
+    return mean is not None and bool(abs(mean[:3] - 0.5).max() < 0.06)

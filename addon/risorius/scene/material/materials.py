@@ -1,15 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """One material per kind of mesh; animated maps as driven inputs of its nodes."""
 
-from dataclasses import dataclass, field
-from typing import Any
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
+from ...logic.character import plans
 from ...logic.material import animated_maps, skin_folds, texture_search
+from ..base.blender_types import ArmatureObject, MeshObject
 from . import eye_mouth_materials, nodes, skin_material
 from .image_loading import Images
+from .look import Look
+from .nodes import Graph
 
 # What the solid view shows. Lashes are cards: opaque ones would cover the lids with black bands.
 _VIEW_COLORS = {
@@ -26,55 +32,14 @@ _IRIS_RADIUS = 0.47  # of the eye's: where its limbus ends, see looks.eyes
 _WIDE = 1.6  # a mesh wider than this times its height holds both eyes
 
 
-@dataclass
-class Look:
-    """What the builder of one material knows.
-
-    Attributes:
-        kind: as in MeshPlan.
-        base: mesh name without LOD.
-        rig: the deforming armature, whose `maps` array drives the map values.
-        extent: float64[3] size of the mesh in Blender units.
-        unit: distance of the eyes, in Blender units: the measure of all patterns.
-        vertices: of the finest mesh.
-        has_uvs: whether it has a UV map.
-        simple: leave out subsurface, relief and maps.
-        uses: what the animated maps do.
-        areas: areas of a face that this mesh has.
-        found: textures.TexturePlan.
-        images: loads them.
-        atlas, places: image with the wrinkle masks, and where in it each region's is.
-        offsets: role -> whether that wrinkle map holds differences; filled when asked.
-    """
-
-    kind: str
-    base: str
-    rig: Any
-    extent: Any
-    unit: float
-    vertices: int
-    has_uvs: bool
-    simple: bool
-    uses: list
-    areas: set
-    found: texture_search.TexturePlan
-    images: Images
-    atlas: Any = None
-    places: dict = field(default_factory=dict)
-    offsets: dict = field(default_factory=dict)
-
-    def image(self, role, data=False):
-        """The image of a role, or None."""
-        return self.images.load(self.found.of(self.base, role), data)
-
-    def is_offset(self, role):
-        """Whether the wrinkle map of this role holds differences about 0.5."""
-        if role not in self.offsets:
-            self.offsets[role] = skin_material.offsets_in(self.found.of(self.base, role))
-        return self.offsets[role]
-
-
-def build_materials(plan, rig, built, made, found=None, simple=False):
+def build_materials(
+    plan: plans.CharacterPlan,
+    rig: ArmatureObject,
+    built: Sequence[MeshObject],
+    made: list[bpy.types.ID],
+    found: texture_search.TexturePlan | None = None,
+    simple: bool = False,
+) -> list[str]:
     """Build the materials of a character, one per mesh base, and put them on its meshes.
 
     Args:
@@ -105,7 +70,17 @@ def build_materials(plan, rig, built, made, found=None, simple=False):
     return [*found.missing, *images.troubles]
 
 
-def _look(plan, mesh, rig, frame, uses, areas, found, images, simple):
+def _look(
+    plan: plans.CharacterPlan,
+    mesh: plans.MeshPlan,
+    rig: ArmatureObject,
+    frame: skin_folds.FaceFrame | None,
+    uses: list[animated_maps.MapUse],
+    areas: set[str],
+    found: texture_search.TexturePlan,
+    images: Images,
+    simple: bool,
+) -> Look:
     same = [m for m in plan.meshes if m.base == mesh.base]
     extent = np.ptp(mesh.positions, axis=0) if len(mesh.positions) else np.ones(3)
     look = Look(
@@ -129,7 +104,9 @@ def _look(plan, mesh, rig, frame, uses, areas, found, images, simple):
     return look
 
 
-def _build(plan, look, made):
+def _build(
+    plan: plans.CharacterPlan, look: Look, made: list[bpy.types.ID]
+) -> list[bpy.types.Material]:
     """The materials of a mesh base, by slot."""
     material = bpy.data.materials.new(f"{plan.name}_{look.base}")
     made.append(material)
@@ -151,7 +128,7 @@ def _build(plan, look, made):
     return [material, iris]
 
 
-def _choose_picture(look, graph):
+def _choose_picture(look: Look, graph: Graph) -> None:
     """Make the colour's image active: the solid view's *Texture* shows the active one.
 
     Without one a pattern is active, for which it shows the material's colour; else it would take
@@ -165,7 +142,7 @@ def _choose_picture(look, graph):
     graph.tree.nodes.active = next(iter([*colors, *patterns]), None)
 
 
-def _give_iris(mesh):
+def _give_iris(mesh: bpy.types.Mesh) -> None:
     """Put the faces of the iris and the pupil into the second slot."""
     flat = np.empty(len(mesh.vertices) * 3, np.float32)
     mesh.attributes[eye_mouth_materials.EYES].data.foreach_get("vector", flat)
@@ -184,7 +161,7 @@ def _give_iris(mesh):
 # --- mesh attributes that materials read -----------------------------------------------------
 
 
-def _face_frame(plan):
+def _face_frame(plan: plans.CharacterPlan) -> skin_folds.FaceFrame | None:
     """The FaceFrame, or None where no skin is among the meshes."""
     skins = [m for m in plan.meshes if m.kind == "skin" and len(m.positions)]
     heads = [m for m in skins if "head" in m.base.lower() or "face" in m.base.lower()]
@@ -199,7 +176,9 @@ def _face_frame(plan):
     return skin_folds.find_frame(eyes, (heads or skins)[0].positions, mouth)
 
 
-def _add_attributes(mesh, plan, frame):
+def _add_attributes(
+    mesh: bpy.types.Mesh, plan: plans.MeshPlan, frame: skin_folds.FaceFrame | None
+) -> set[str]:
     """Write what the material of this kind reads; returns the areas that a skin has."""
     if not len(plan.positions):
         return set()
@@ -213,12 +192,16 @@ def _add_attributes(mesh, plan, frame):
     return set()
 
 
-def _add(mesh, name, values):
+def _add(
+    mesh: bpy.types.Mesh, name: str, values: NDArray[np.float32] | NDArray[np.float64]
+) -> None:
     attribute = mesh.attributes.new(name, "FLOAT_VECTOR", "POINT")
     attribute.data.foreach_set("vector", np.ascontiguousarray(values, np.float32).ravel())
 
 
-def _add_areas(mesh, points, frame):
+def _add_areas(
+    mesh: bpy.types.Mesh, points: NDArray[np.float32], frame: skin_folds.FaceFrame
+) -> set[str]:
     masks = skin_folds.area_masks(points, frame)
     there = {area for area, mask in masks.items() if float(mask.max()) > 0.3}
     if not there:
@@ -230,7 +213,7 @@ def _add_areas(mesh, points, frame):
     return there
 
 
-def _eye_coordinates(points):
+def _eye_coordinates(points: NDArray[np.float32]) -> NDArray[np.float64]:
     """float64[V, 3]: x and height from the eye's axis over its radius; 1 on its front half."""
     points = points.astype(np.float64)
     middle = (points[:, 0].min() + points[:, 0].max()) / 2
@@ -249,7 +232,7 @@ def _eye_coordinates(points):
     return values
 
 
-def _tooth_coordinates(points, unit):
+def _tooth_coordinates(points: NDArray[np.float32], unit: float) -> NDArray[np.float64]:
     """float64[V, 3]: pi for each tooth along the arch, height from the bite over its reach, 0."""
     points = points.astype(np.float64)
     low, high = points.min(axis=0), points.max(axis=0)
@@ -262,7 +245,7 @@ def _tooth_coordinates(points, unit):
     return np.stack([np.pi * along / width, height, np.zeros(len(points))], axis=1)
 
 
-def map_drivers(material):
+def map_drivers(material: bpy.types.Material | None) -> Iterator[bpy.types.FCurve]:
     """The driver curves of the animated maps of a material, with their map index."""
     data = material.node_tree.animation_data if material and material.node_tree else None
     for curve in data.drivers if data else ():

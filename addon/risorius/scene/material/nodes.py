@@ -1,7 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Short words for building node trees, the same for all versions of Blender."""
 
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
 from ..base import compat
+from ..base.blender_types import Node, Socket
+
+Color = tuple[float, ...]  # red, green, blue
+Value = Socket | float | tuple[float, ...]  # an output to link, or a value to set
 
 
 class Graph:
@@ -11,19 +23,19 @@ class Graph:
     identifier where their names differ between versions.
     """
 
-    def __init__(self, material):
+    def __init__(self, material: bpy.types.Material) -> None:
         compat.make_node_tree(material)
         self.material, self.tree = material, material.node_tree
         self.shader = next(n for n in self.tree.nodes if n.type == "BSDF_PRINCIPLED")
         self.output = next(n for n in self.tree.nodes if n.type == "OUTPUT_MATERIAL")
 
-    def node(self, kind, label=""):
+    def node(self, kind: str, label: str = "") -> Node:
         """A new node of the type `ShaderNode<kind>`."""
         node = self.tree.nodes.new(f"ShaderNode{kind}")
         node.label = label
         return node
 
-    def put(self, value, socket):
+    def put(self, value: Value | None, socket: Socket) -> None:
         """Link a socket to an input, or set its value; None leaves it."""
         if value is None:
             return
@@ -34,12 +46,12 @@ class Graph:
         else:
             socket.default_value = value
 
-    def set(self, **values):
+    def set(self, **values: Value | None) -> None:
         """Set inputs of the Principled shader, `_` for the space in their names."""
         for name, value in values.items():
             self.put(value, self.shader.inputs[name.replace("_", " ").replace("Ior", "IOR")])
 
-    def math(self, operation, *values, clamp=False):
+    def math(self, operation: str, *values: Value, clamp: bool = False) -> Socket:
         """A Math node."""
         node = self.node("Math")
         node.operation, node.use_clamp = operation, clamp
@@ -47,14 +59,14 @@ class Graph:
             self.put(value, socket)
         return node.outputs[0]
 
-    def total(self, values, clamp=False):
+    def total(self, values: Sequence[Value], clamp: bool = False) -> Value:
         """The sum of sockets; 0 for none."""
         result = values[0] if values else 0.0
         for value in values[1:]:
             result = self.math("ADD", result, value)
         return self.math("ADD", result, 0.0, clamp=True) if clamp and values else result
 
-    def vector(self, operation, *values):
+    def vector(self, operation: str, *values: Value) -> Socket:
         """A Vector Math node; its vector output."""
         node = self.node("VectorMath")
         node.operation = operation
@@ -62,7 +74,7 @@ class Graph:
             self.put(value, socket)
         return node.outputs[1 if operation in ("LENGTH", "DISTANCE", "DOT_PRODUCT") else 0]
 
-    def mix(self, factor, a, b, blend="MIX"):
+    def mix(self, factor: Value, a: Value, b: Value, blend: str = "MIX") -> Socket:
         """Mix two colours."""
         node = self.node("Mix")
         node.data_type, node.blend_type = "RGBA", blend
@@ -70,20 +82,20 @@ class Graph:
         self._mix_inputs(node, factor, a, b, "Color")
         return next(s for s in node.outputs if s.identifier == "Result_Color")
 
-    def mix_number(self, factor, a, b):
+    def mix_number(self, factor: Value, a: Value, b: Value) -> Socket:
         """Mix two numbers."""
         node = self.node("Mix")
         node.data_type = "FLOAT"
         self._mix_inputs(node, factor, a, b, "Float")
         return next(s for s in node.outputs if s.identifier == "Result_Float")
 
-    def _mix_inputs(self, node, factor, a, b, kind):
+    def _mix_inputs(self, node: Node, factor: Value, a: Value, b: Value, kind: str) -> None:
         where = {s.identifier: s for s in node.inputs}
         self.put(factor, where["Factor_Float"])
         self.put(a, where[f"A_{kind}"])
         self.put(b, where[f"B_{kind}"])
 
-    def ramp(self, factor, *stops):
+    def ramp(self, factor: Value, *stops: tuple[float, Color]) -> Socket:
         """A colour ramp; stops are (position, (r, g, b))."""
         node = self.node("ValToRGB")
         elements = node.color_ramp.elements
@@ -94,7 +106,9 @@ class Graph:
         self.put(factor, node.inputs["Fac"] if "Fac" in node.inputs else node.inputs[0])
         return node.outputs[0]
 
-    def noise(self, vector, scale, detail=2.0, roughness=0.5):
+    def noise(
+        self, vector: Value, scale: float, detail: float = 2.0, roughness: float = 0.5
+    ) -> Socket:
         """Noise from 0 to 1, its mean near 0.5."""
         node = self.node("TexNoise")
         self.put(vector, node.inputs["Vector"])
@@ -103,7 +117,7 @@ class Graph:
         node.inputs["Roughness"].default_value = roughness
         return node.outputs[0]
 
-    def cells(self, vector, scale, feature="F1"):
+    def cells(self, vector: Value, scale: float, feature: str = "F1") -> Socket:
         """Distance of Voronoi cells."""
         node = self.node("TexVoronoi")
         node.feature = feature
@@ -111,34 +125,40 @@ class Graph:
         node.inputs["Scale"].default_value = scale
         return node.outputs["Distance"]
 
-    def attribute(self, name):
+    def attribute(self, name: str) -> Socket:
         """Vector of a mesh attribute; zero on meshes that have none."""
         node = self.node("Attribute", name)
         node.attribute_name = name
         return node.outputs["Vector"]
 
-    def split(self, vector):
+    def split(self, vector: Value) -> tuple[Socket, Socket, Socket]:
         """Three numbers of a vector."""
         node = self.node("SeparateXYZ")
         self.put(vector, node.inputs[0])
         return tuple(node.outputs[:3])
 
-    def split_color(self, color):
+    def split_color(self, color: Value) -> tuple[Socket, Socket, Socket]:
         """Three numbers of a colour."""
         node = self.node("SeparateColor")
         self.put(color, node.inputs[0])
         return tuple(node.outputs[:3])
 
-    def rest_points(self, size):
+    def rest_points(self, size: NDArray[np.float64]) -> Socket:
         """Places on the undeformed mesh, in Blender units: patterns that move with the skin."""
         generated = self.node("TexCoord").outputs["Generated"]
         return self.vector("MULTIPLY", generated, tuple(float(s) for s in size))
 
-    def uv(self):
+    def uv(self) -> Socket:
         """The UV map's coordinates."""
         return self.node("TexCoord").outputs["UV"]
 
-    def image(self, image, vector=None, label="", clamp=False):
+    def image(
+        self,
+        image: bpy.types.Image,
+        vector: Value | None = None,
+        label: str = "",
+        clamp: bool = False,
+    ) -> Node:
         """An image texture node."""
         node = self.node("TexImage", label)
         node.image = image
@@ -147,7 +167,9 @@ class Graph:
         self.put(vector, node.inputs["Vector"])
         return node
 
-    def bump(self, height, distance, normal=None, strength=1.0):
+    def bump(
+        self, height: Value, distance: float, normal: Value | None = None, strength: float = 1.0
+    ) -> Socket:
         """A normal that a height field gives."""
         node = self.node("Bump")
         node.inputs["Strength"].default_value = strength
@@ -156,7 +178,7 @@ class Graph:
         self.put(normal, node.inputs["Normal"])
         return node.outputs["Normal"]
 
-    def tidy(self):
+    def tidy(self) -> None:
         """Lay the nodes out in columns by their distance from the output."""
         column = {}
         for node in reversed(self._sources_first()):
@@ -169,7 +191,7 @@ class Graph:
             node.location = (400 - 240 * place, 300 - 220 * rows.get(place, 0))
             rows[place] = rows.get(place, 0) + 1
 
-    def _sources_first(self):
+    def _sources_first(self) -> list[Node]:
         """Nodes that reach the output, each after all those that feed it."""
         order, seen, stack = [], {self.output}, [(self.output, iter(_sources(self.output)))]
         while stack:
@@ -184,5 +206,5 @@ class Graph:
         return order
 
 
-def _sources(node):
+def _sources(node: Node) -> list[Node]:
     return [link.from_node for socket in node.inputs for link in socket.links]

@@ -1,9 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The skin: subsurface, pores, and what the animated maps do to colour and normals."""
 
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
 from ...logic.material import animated_maps
 from ..base import drivers, parts
+from ..base.blender_types import Node, Socket
 from . import image_loading
+from .look import Look
+from .nodes import Graph, Value
 
 MAP_PREFIX = "risorius_map_"
 AREAS = tuple(f"risorius_areas_{i}" for i in (1, 2, 3))  # mesh attributes: three areas each
@@ -18,6 +26,10 @@ _FLUSH_SHARE = 0.22  # of an area's map: without a painted mask a blush must sta
 _PORE_DEPTH = 0.032
 _FOLD_DEPTH = {"level": 0.45, "upright": 0.45, "rays": 0.35, "arc": 1.8, "dimples": 0.6}
 
+Bucket = tuple[str, Any]  # what maps are summed into: kind, and number or fold
+Mask = tuple[str, Any]  # where they show: kind, and region, area or map
+Member = tuple[str, Value]  # side of the face, value of the map
+
 
 class Skin:
     """Builds one skin material; what its steps share is held here.
@@ -27,15 +39,17 @@ class Skin:
         look: materials.Look of the mesh base: sizes, textures, areas.
     """
 
-    def __init__(self, graph, look):
+    def __init__(self, graph: Graph, look: Look) -> None:
         self.graph, self.look = graph, look
         self.points = graph.rest_points(look.extent)
         self.areas = self._areas()
-        self.folds = None
-        self.flush, self.tints, self.creases = [], [], []
-        self.bumps, self.wrinkles = {}, {}
+        self.folds: dict[str, Value] | None = None
+        self.flush: list[Value] = []
+        self.tints: list[tuple[int, Value]] = []
+        self.bumps: dict[str, Value] = {}
+        self.wrinkles: dict[int, Value] = {}
 
-    def build(self):
+    def build(self) -> None:
         """Fill the tree."""
         graph, look = self.graph, self.look
         graph.set(
@@ -52,7 +66,7 @@ class Skin:
             self._specular()
             graph.set(Normal=self._normal())
 
-    def _areas(self):
+    def _areas(self) -> dict[str, Socket]:
         """Area -> socket, and `left`; empty for a mesh that has no face."""
         if not self.look.areas:
             return {}
@@ -64,7 +78,7 @@ class Skin:
 
     # --- animated maps -------------------------------------------------------------------
 
-    def _read_maps(self):
+    def _read_maps(self) -> None:
         """Value nodes for the maps that show on this mesh, and what they are summed into."""
         frame = None
         groups = {}
@@ -84,7 +98,7 @@ class Skin:
         for bucket, amounts in sums.items():
             self._file(bucket, amounts)
 
-    def _targets(self, use):
+    def _targets(self, use: animated_maps.MapUse) -> list[tuple[Bucket, Mask]]:
         """What a map acts on here: pairs of bucket and mask; none where nobody would see it."""
         look = self.look
         own = look.image(f"map:{use.label}", data=True)
@@ -103,7 +117,7 @@ class Skin:
             found.append((("normal", use.number) if whole else ("bump", kind), mask))
         return found
 
-    def _value(self, use, frame):
+    def _value(self, use: animated_maps.MapUse, frame: Node) -> Socket:
         value = self.graph.tree.nodes.new("ShaderNodeValue")
         value.name, value.label = f"{MAP_PREFIX}{use.index:03d}", use.label
         value.parent = frame
@@ -112,7 +126,7 @@ class Skin:
         drivers.plain_driver(driver, self.look.rig, f'["{parts.MAPS}"][{use.index}]')
         return value.outputs[0]
 
-    def _masked(self, bucket, mask, members):
+    def _masked(self, bucket: Bucket, mask: Mask, members: Sequence[Member]) -> Socket:
         """The sum of some maps' values, each side on its own half, times their mask."""
         graph = self.graph
         kind, name = mask
@@ -129,7 +143,7 @@ class Skin:
         amount = graph.math("MULTIPLY", amount, share)
         return amount if name == "all" else graph.math("MULTIPLY", amount, self.areas[name])
 
-    def _sided(self, members):
+    def _sided(self, members: Sequence[Member]) -> Value:
         left = [v for side, v in members if side != "R"]
         right = [v for side, v in members if side != "L"]
         if len(left) == len(right) == len(members) or "left" not in self.areas:
@@ -137,7 +151,7 @@ class Skin:
         a, b = self.graph.total(right), self.graph.total(left)
         return self.graph.mix_number(self.areas["left"], a, b)
 
-    def _atlas_channel(self, region):
+    def _atlas_channel(self, region: str) -> Socket:
         column, row, channel, side = self.look.places[region]
         cache = self.__dict__.setdefault("_tiles", {})
         if (column, row) not in cache:
@@ -151,7 +165,7 @@ class Skin:
             cache[column, row] = graph.split_color(picture.outputs["Color"])
         return cache[column, row][channel]
 
-    def _file(self, bucket, amounts):
+    def _file(self, bucket: Bucket, amounts: list[Value]) -> None:
         kind, name = bucket
         amount = self.graph.total(amounts, clamp=kind != "flush")
         if kind == "flush":
@@ -165,7 +179,7 @@ class Skin:
 
     # --- colour --------------------------------------------------------------------------
 
-    def _color(self):
+    def _color(self) -> Value:
         graph, look = self.graph, self.look
         base = look.image("color")
         if base is not None:
@@ -185,7 +199,7 @@ class Skin:
             color = graph.mix(0.5, color, picture, blend="MULTIPLY")
         return color
 
-    def _tone(self):
+    def _tone(self) -> Value:
         """Skin without a texture: blotches, and blood where a face has more of it."""
         graph, unit = self.graph, self.look.unit
         blotches = graph.noise(self.points, 1.1 / unit, detail=6.0, roughness=0.6)
@@ -196,7 +210,7 @@ class Skin:
                 color = graph.mix(amount, color, _RED)
         return color
 
-    def _tint(self, color, number, amount):
+    def _tint(self, color: Value, number: int, amount: Value) -> Value:
         """Towards the set's colours; sets of newer exports hold differences about 0.5."""
         graph = self.graph
         picture = graph.image(self.look.image(f"color:{number}"), label=f"Colour {number}")
@@ -219,7 +233,7 @@ class Skin:
 
     # --- relief --------------------------------------------------------------------------
 
-    def _ridges(self):
+    def _ridges(self) -> dict[str, Value]:
         """Kind of fold -> height between 0 in the creases and 1, once for all maps."""
         if self.folds is not None:
             return self.folds
@@ -246,7 +260,7 @@ class Skin:
             self.folds[kind] = graph.math("ABSOLUTE", wave)
         return self.folds
 
-    def _creases(self):
+    def _creases(self) -> Value | None:
         """How deep in a crease a place is: creases are darker and redder."""
         graph = self.graph
         deep = []
@@ -255,7 +269,7 @@ class Skin:
             deep.append(graph.math("MULTIPLY", sharp, self.bumps[kind]))
         return graph.math("MULTIPLY", graph.total(deep), 0.42, clamp=True) if deep else None
 
-    def _normal(self):
+    def _normal(self) -> Socket:
         """Pores and folds as one height field: engines work each one out three times."""
         graph, look = self.graph, self.look
         normal = self._normal_map()
@@ -268,7 +282,7 @@ class Skin:
             heights.append(graph.math("MULTIPLY", ridge, height))
         return graph.bump(graph.total(heights), look.unit * 0.03, normal)
 
-    def _normal_map(self):
+    def _normal_map(self) -> Socket | None:
         """The normal of the textures, wrinkle sets mixed in by their masks; None without."""
         graph, look = self.graph, self.look
         base = look.image("normal", data=True)
@@ -292,7 +306,7 @@ class Skin:
         graph.put(color, node.inputs["Color"])
         return node.outputs["Normal"]
 
-    def _roughness(self):
+    def _roughness(self) -> Value:
         graph, look = self.graph, self.look
         picture = look.image("roughness", data=True)
         if picture is not None:
@@ -304,14 +318,8 @@ class Skin:
                 rough = graph.math("MULTIPLY_ADD", self.areas[area], -less, rough)
         return rough
 
-    def _specular(self):
+    def _specular(self) -> None:
         picture = self.look.image("specular", data=True)
         if picture is not None:
             node = self.graph.image(picture, label="Specular")
             self.graph.set(Specular_Ior_Level=node.outputs["Color"])
-
-
-def offsets_in(path):
-    """Whether a wrinkle map holds differences about 0.5 instead of whole colours or normals."""
-    mean = image_loading.mean_of(path)
-    return mean is not None and bool(abs(mean[:3] - 0.5).max() < 0.06)

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the builder of one material knows: sizes, areas, textures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...logic.material import animated_maps, texture_search
+from ..base.blender_types import ArmatureObject
+from . import image_loading
+
+
+@dataclass
+class Look:
+    """What the builder of one material knows.
+
+    Attributes:
+        kind: as in MeshPlan.
+        base: mesh name without LOD.
+        rig: the deforming armature, whose `maps` array drives the map values.
+        extent: float64[3] size of the mesh in Blender units.
+        unit: distance of the eyes, in Blender units: the measure of all patterns.
+        vertices: of the finest mesh.
+        has_uvs: whether it has a UV map.
+        simple: leave out subsurface, relief and maps.
+        uses: what the animated maps do.
+        areas: areas of a face that this mesh has.
+        found: textures.TexturePlan.
+        images: loads them.
+        atlas, places: image with the wrinkle masks, and where in it each region's is.
+        offsets: role -> whether that wrinkle map holds differences; filled when asked.
+    """
+
+    kind: str
+    base: str
+    rig: ArmatureObject
+    extent: NDArray[np.float64]
+    unit: float
+    vertices: int
+    has_uvs: bool
+    simple: bool
+    uses: list[animated_maps.MapUse]
+    areas: set[str]
+    found: texture_search.TexturePlan
+    images: image_loading.Images
+    atlas: bpy.types.Image | None = None
+    places: dict[str, tuple[int, int, int, int]] = field(default_factory=dict)
+    offsets: dict[str, bool] = field(default_factory=dict)
+
+    def image(self, role: str, data: bool = False) -> bpy.types.Image | None:
+        """The image of a role, or None."""
+        return self.images.load(self.found.of(self.base, role), data)
+
+    def is_offset(self, role: str) -> bool:
+        """Whether the wrinkle map of this role holds differences about 0.5."""
+        if role not in self.offsets:
+            self.offsets[role] = image_loading.offsets_in(self.found.of(self.base, role))
+        return self.offsets[role]
