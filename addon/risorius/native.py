@@ -5,19 +5,21 @@ from __future__ import annotations
 
 import re
 import sys
-from functools import cache
-from importlib import import_module
+import tomllib
+from functools import cache, partial
+from importlib import import_module, resources
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from .logic.base.errors import FaceError
+from .logic.base.face_regions import FaceRegions
 
 if TYPE_CHECKING:  # names for annotations: nothing else may import the wheel
     from risorius import BoneSpace, Clip, Dna, Layer, Mesh, Mixer, Morph, Pose, Rig  # noqa: F401
+    from risorius.anim.reactions import Reaction  # noqa: F401
     from risorius.expressions import Expression  # noqa: F401
     from risorius.live import Receiver, Shaper, Take  # noqa: F401
-    from risorius.reactions import Reaction  # noqa: F401
 
 _risorius: ModuleType | None
 try:
@@ -102,6 +104,28 @@ def part(name: str) -> ModuleType:
         if error.name != f"risorius.{name}":
             raise
         raise UnusableError(f"The native module has no {name}: install the add-on anew.") from error
+
+
+@cache
+def regions() -> FaceRegions:
+    """The regions of a face; none without the native module."""
+    if problem():
+        return FaceRegions({}, lambda _: "", lambda _: "")
+    known = part("controls.regions")
+    of_slider = partial(known.region_of, by_last_part=True)
+    return FaceRegions(known.TITLES, of_slider, known.region_of)
+
+
+@cache
+def live_sources() -> dict[str, dict[str, Any]]:
+    """Who sends faces: name -> port, title, description; none without the native module.
+
+    Blender asks for them as it starts, so nothing that receives is loaded for it.
+    """
+    if problem():
+        return {}
+    file = resources.files("risorius").joinpath("live/sources.toml")
+    return tomllib.loads(file.read_text(encoding="utf-8"))
 
 
 def dna_error() -> type[Exception]:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 import risorius
+from risorius.controls.regions import region_of
 
 LOGIC = Path(__file__).resolve().parents[2] / "addon" / "risorius" / "logic"
 
@@ -33,7 +34,8 @@ def _load_logic() -> ModuleType:
 
 _load_logic()
 names = importlib.import_module("risorius_addon_logic.base.names")
-regions = importlib.import_module("risorius_addon_logic.character.regions")
+face_regions = importlib.import_module("risorius_addon_logic.base.face_regions")
+slider_words = importlib.import_module("risorius_addon_logic.character.slider_words")
 space = importlib.import_module("risorius_addon_logic.base.space")
 plans = importlib.import_module("risorius_addon_logic.character.plans")
 recogniser = importlib.import_module("risorius_addon_logic.animation.recogniser")
@@ -91,12 +93,23 @@ class TestRegions:
         ],
     )
     def test_region_by_name(self, control: str, region: str) -> None:
-        assert regions.region_of(control) == region
+        assert region_of(control) == region
+        assert region_of(control, by_last_part=True) == region
+
+    def test_a_turn_has_its_region_before_the_dot(self) -> None:
+        turns = ["head.yaw", "eyeL.pitch", "CTRL:neck_01.x"]
+        assert [region_of(turn) for turn in turns] == ["neck", "eye", "neck"]
+        assert {region_of(turn, by_last_part=True) for turn in turns} == {"other"}
 
     def test_groups_hold_every_control_once(self) -> None:
         controls = ["a.jawOpen", "a.browDownL", "zzz", "a.jawLeft"]
-        groups = regions.group_controls(controls)
-        assert groups == {"brow": [1], "jaw": [0, 3], "other": [2]}
+        regions = face_regions.FaceRegions(
+            {"jaw": "Jaw", "eye": "Eyes", "brow": "Brows", "other": "Other"},
+            lambda name: "brow" if "brow" in name else "jaw" if "jaw" in name else "other",
+            lambda _: "",
+        )
+        groups = slider_words.group_controls(controls, regions)
+        assert list(groups.items()) == [("jaw", [0, 3]), ("brow", [1]), ("other", [2])]
 
     @pytest.mark.parametrize(
         ("control", "sided", "wanted"),
@@ -109,13 +122,14 @@ class TestRegions:
         ],
     )
     def test_words_under_a_heading(self, control: str, sided: bool, wanted: str) -> None:
-        assert regions.title_in_region(control, sided) == wanted
+        region = region_of(control)
+        assert slider_words.title_in_region(control, region, sided) == wanted
 
     def test_search_looks_at_name_and_words(self) -> None:
         control = "CTRL_expressions.mouthCornerPullL"
-        assert regions.matches(control, "corner pull")
-        assert regions.matches(control, "MOUTH")
-        assert not regions.matches(control, "mouth brow")
+        assert slider_words.matches(control, "corner pull")
+        assert slider_words.matches(control, "MOUTH")
+        assert not slider_words.matches(control, "mouth brow")
 
 
 def _space(**changes: object) -> Any:

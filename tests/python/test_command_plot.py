@@ -69,7 +69,7 @@ def facts_of(name: str) -> Facts:
 
 @pytest.mark.parametrize(("joint", "region"), JOINTS.items())
 def test_region_of_a_joint(joint, region):
-    assert regions.region_of(joint) == region
+    assert regions.joint_region(joint) == region
 
 
 def test_majority_of_a_group():

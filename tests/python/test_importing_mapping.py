@@ -239,7 +239,7 @@ def test_a_take_and_the_live_stream_turn_the_same_way():
     from risorius.live import livelink
 
     rows = importing.load_mapping("live_link_face").rows
-    signs = dict(zip(livelink.CURVES, livelink._SIGNS.tolist(), strict=True))
+    signs = dict(zip(livelink.NAMES, livelink._SIGNS.tolist(), strict=True))
     for row in rows.values():
         for control, weight in row.items():
             if control in signs:

@@ -79,6 +79,8 @@ def test_every_curve_of_a_packet_has_its_name():
     units = risorius.controls.arkit.mapping()
     assert sorted(livelink.NAMES[:52]) == sorted(units)
     assert livelink.NAMES[15:17] == ("jawLeft", "jawRight")
+    assert livelink.NAMES[51:54] == ("tongueOut", "head.yaw", "head.pitch")
+    assert livelink.NAMES[60] == "eyeR.roll"
     values = [(n + 1) / 100.0 for n in range(61)]
     packet = livelink.decode(packed(v6(1, values)))
     assert np.allclose(packet.values[:52], values[:52])

@@ -12,8 +12,7 @@ import risorius
 from risorius import Clip, Event, Layer, Mixer
 from risorius.anim.mixer import load_exclusives, load_reactions
 from risorius.anim.reactions import Exclusives, Reaction, ReactionPart, Yield
-from risorius.controls.regions import REGIONS, mask, region_of
-from test_addon_logic import regions as addon_regions
+from risorius.controls.regions import REGIONS, TITLES, mask, region_of
 
 NAMES = ["CTRL_expressions.jawOpen", "browDownL", "browDownR", "mouthLeft", "mouthRight", "spare"]
 JAW, BROW_L, BROW_R, LEFT, RIGHT, SPARE = range(6)
@@ -393,11 +392,11 @@ def test_files_of_rules_and_reactions(tmp_path):
 # -- regions ---------------------------------------------------------------------------------------
 
 
-def test_regions_are_those_of_the_add_on(standard_controls):
-    assert [region_of(n) for n in standard_controls] == [
-        addon_regions.region_of(n) for n in standard_controls
-    ]
-    assert set(REGIONS) == set(addon_regions.REGIONS)
+def test_every_region_has_standard_controls_and_a_title(standard_controls):
+    """The add-on stores chosen regions by their place: the order stays."""
+    assert " ".join(REGIONS) == "brow eye nose cheek mouth jaw tongue teeth neck ear other"
+    assert {region_of(name) for name in standard_controls} == set(REGIONS) - {"other"}
+    assert TITLES["brow"] == "Brows"
     assert region_of("head.yaw") == "neck"
 
 

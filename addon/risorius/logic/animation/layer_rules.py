@@ -11,7 +11,8 @@ from fnmatch import fnmatchcase
 import numpy as np
 from numpy.typing import NDArray
 
-from ..character import regions
+from ..base.face_regions import FaceRegions
+from ..character import slider_words
 
 Float = NDArray[np.float64]
 COLLECTION = "risorius_layers"
@@ -20,12 +21,15 @@ _LIMIT = 100_000  # samples of one source
 _NEAR = 1e-7  # frames
 
 
-def masked(controls: Iterable[str], chosen: Iterable[str], words: str = "") -> list[str]:
+def masked(
+    controls: Iterable[str], regions: FaceRegions, chosen: Iterable[str], words: str = ""
+) -> list[str]:
     """The controls that a layer may move, in their order.
 
     Args:
         controls: names.
-        chosen: regions; none means all.
+        regions: of the face.
+        chosen: those of them that the layer moves; none means all.
         words: names or patterns, separated by spaces or commas: `jawOpen mouth*`, without their
             prefix and in any case. One that begins with `-` is taken out again. Where all begin
             with it, they are taken out of everything.
@@ -36,20 +40,14 @@ def masked(controls: Iterable[str], chosen: Iterable[str], words: str = "") -> l
     left_out = [p[1:] for p in patterns if p.startswith("-")]
     kept = []
     for control in controls:
-        if wanted and _region(control) not in wanted:
+        if wanted and regions.of_control(control) not in wanted:
             continue
-        names = (control.lower(), regions.short_name(control).lower())
+        names = (control.lower(), slider_words.short_name(control).lower())
         if taken and not any(fnmatchcase(n, p) for n in names for p in taken):
             continue
         if not any(fnmatchcase(n, p) for n in names for p in left_out):
             kept.append(control)
     return kept
-
-
-def _region(control: str) -> str:
-    """The region of a control; that of head.yaw stands before the dot."""
-    region = regions.region_of(control)
-    return region if region != "other" else regions.region_of(control.partition(".")[0])
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from ..base import names
 from ..base.errors import FaceError
 from ..base.space import Float, Space, make_space, world_matrices
 from ..material import texture_search
-from . import regions
+from . import slider_words
 from .dna_data import DnaData, MeshData
 
 LIVE_KEY = "<channel sum>"
@@ -101,11 +101,10 @@ class MeshPlan:
 
 @dataclass(frozen=True)
 class ControlPlan:
-    """One slider: its property name, and the words and region it is shown under."""
+    """One slider: its property name, and the words that it is shown with."""
 
     index: int
     label: str
-    region: str
     description: str
     rest: float = 0.0
     lowest: float = 0.0
@@ -279,8 +278,7 @@ def plan_controls(
         ControlPlan(
             i,
             labels[i],
-            regions.region_of(name),
-            names.printable(f"{regions.title(name)} ({name})"),
+            names.printable(f"{slider_words.title(name)} ({name})"),
             values[i],
             -1.0 if name.rpartition(".")[0] in turning else 0.0,
         )

@@ -11,7 +11,6 @@ import bpy
 
 from ... import native
 from ...logic.animation import clip_units as clip_logic
-from ...logic.character import regions
 from ..base import parts
 from ..base.blender_types import ArmatureObject
 from ..character import armatures, runtime
@@ -116,7 +115,7 @@ def _asset(
     pose = {
         label: rest
         for label, rest in zip(live.labels, live.rests, strict=True)
-        if regions.region_of(label) in held
+        if native.regions().of_slider(label) in held
     }
     pose.update(weights)
     clip = native.module().Clip(list(pose), [[value] for value in pose.values()])
@@ -135,7 +134,7 @@ def _asset(
 
 def regions_of(expression: native.Expression, weights: Iterable[str]) -> set[str]:
     """The regions that an expression moves; a viseme always the whole mouth."""
-    held = {regions.region_of(name) for name in weights}
+    held = {native.regions().of_slider(name) for name in weights}
     return held | {"mouth", "jaw", "tongue"} if expression.group == "viseme" else held
 
 

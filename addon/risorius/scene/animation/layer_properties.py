@@ -9,8 +9,8 @@ from typing import Any
 
 import bpy
 
+from ... import native
 from ...logic.animation import layer_rules
-from ...logic.character import regions
 from ..base.blender_types import Context
 
 KINDS = (
@@ -29,7 +29,7 @@ EXTENDS = (
     ("NOTHING", "Nothing", "It moves nothing before its start and after its end"),
     ("REPEAT", "Repeat", "Over and over, before and after"),
 )
-REGIONS = tuple((r.upper(), regions.TITLES[r], "") for r in regions.REGIONS)
+REGIONS = tuple((r.upper(), title, "") for r, title in native.regions().titles.items())
 INDEX = f"{layer_rules.COLLECTION}_index"
 REACTIONS = "risorius_reactions"
 _OVERRIDE: Any = {"LIBRARY_OVERRIDABLE"}

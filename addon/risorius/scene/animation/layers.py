@@ -320,8 +320,9 @@ def _mask(live: runtime.Runtime, layer: RISORIUS_PG_layer) -> NDArray[np.float32
 
 def allowed_names(live: runtime.Runtime, layer: RISORIUS_PG_layer) -> set[str]:
     """What a layer may move: sliders, and the head's angles, which belong to the neck's region."""
-    regions = {region.lower() for region in layer.regions}
-    return set(logic.masked([*live.labels, *clip_logic.HEAD], regions, layer.controls))
+    chosen = {region.lower() for region in layer.regions}
+    labels = [*live.labels, *clip_logic.HEAD]
+    return set(logic.masked(labels, native.regions(), chosen, layer.controls))
 
 
 def _still_times(layer: RISORIUS_PG_layer, rate: float) -> Times:

@@ -11,7 +11,8 @@ import bpy
 import numpy as np
 from mathutils import Matrix, Vector
 
-from ...logic.character import plans, regions
+from ... import native
+from ...logic.character import plans
 from ..base import parts
 from ..base.blender_types import ArmatureObject, Context
 
@@ -268,7 +269,8 @@ def describe_property(bone: bpy.types.PoseBone, control: plans.ControlPlan, maxi
 
 def key_group(name: str) -> str:
     """The F-curve group that keys of a control go to."""
-    return regions.TITLES[regions.region_of(name)]
+    regions = native.regions()
+    return regions.titles[regions.of_slider(name)]
 
 
 def _shape(bone: bpy.types.PoseBone, name: str) -> None:

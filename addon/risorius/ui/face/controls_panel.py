@@ -3,7 +3,8 @@
 
 import bpy
 
-from ...logic.character import regions
+from ... import native
+from ...logic.character import slider_words
 from ...scene.base import parts
 from ...scene.character import runtime
 from .. import words
@@ -37,34 +38,35 @@ class RISORIUS_PT_controls(FaceOnlyPanel, bpy.types.Panel):
         live, face = runtime.of(rig), parts.face_bone(rig)
         if live is None:
             return
+        regions = native.regions()
         search = context.window_manager.risorius_search
         layout.prop(context.window_manager, "risorius_search", text="", icon="VIEWZOOM")
-        shown = [n for n in live.labels if n in face and regions.matches(n, search)]
-        for region, indices in regions.group_controls(shown).items():
+        shown = [n for n in live.labels if n in face and slider_words.matches(n, search)]
+        for region, indices in slider_words.group_controls(shown, regions).items():
             names = [shown[i] for i in indices]
             if search:
                 _draw_region_header(layout.row(), region)
-                _draw_sliders(context, layout, face, names)
+                _draw_sliders(context, layout, face, region, names)
                 continue
             header, body = layout.panel(
                 f"RISORIUS_PT_region_{region}", default_closed=region not in _OPEN
             )
             _draw_region_header(header, region)
             if body is not None:
-                _draw_sliders(context, body, face, names)
+                _draw_sliders(context, body, face, region, names)
         if not shown:
             words.write(layout, "No control has these words in its name.", "INFO")
 
 
 def _draw_region_header(layout, region):
-    layout.label(text=regions.TITLES[region], icon=_ICONS[region])
+    layout.label(text=native.regions().titles[region], icon=_ICONS[region])
     row = layout.row(align=True)
     row.emboss = "NONE"
     row.operator("risorius.reset", text="", icon="LOOP_BACK").region = region
     row.operator("risorius.key", text="", icon="KEY_HLT").region = region
 
 
-def _draw_sliders(context, layout, face, names):
+def _draw_sliders(context, layout, face, region, names):
     """One line per control; a left and its right control share it, a long name stands above."""
     column = layout.column(align=True)
     ruler = words.Ruler(context, _TITLE)
@@ -74,7 +76,7 @@ def _draw_sliders(context, layout, face, names):
         if name == right and left in there:
             continue
         paired = name == left and right in there
-        title = regions.title_in_region(name, sided=not paired)
+        title = slider_words.title_in_region(name, region, sided=not paired)
         if ruler.fits(title):
             line = column.split(factor=_TITLE, align=True)
             line.label(text=title)

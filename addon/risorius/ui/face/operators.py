@@ -3,7 +3,7 @@
 
 import bpy
 
-from ...logic.character import regions
+from ... import native
 from ...scene.base import parts
 from ...scene.character import armatures, build, runtime
 from ...scene.frame import evaluate
@@ -17,7 +17,7 @@ def _labels(rig, region=""):
     return [
         label
         for label in (live.labels if live else [])
-        if label in face and (not region or regions.region_of(label) == region)
+        if label in face and (not region or native.regions().of_slider(label) == region)
     ]
 
 

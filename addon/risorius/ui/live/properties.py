@@ -3,14 +3,14 @@
 
 import bpy
 
+from ... import native
 from ...scene.live import capture
 from ..common import active_controls
 
-SOURCES = (
-    ("livelink", "Live Link Face", "Epic's app for iPhones and iPads, in its ARKit mode"),
-    ("osc", "VMC / OSC", "VMC performers, Face Cap, iFacialMocap by OSC, or plain /name value"),
+SOURCES = tuple(
+    (name, row["title"], row["description"]) for name, row in native.live_sources().items()
 )
-PORTS = {"livelink": 11111, "osc": 39539}
+PORTS = {name: row["port"] for name, row in native.live_sources().items()}
 
 
 def _source_changed(self, _context):
@@ -32,7 +32,7 @@ class RISORIUS_PG_live(bpy.types.PropertyGroup):
     port: bpy.props.IntProperty(
         name="Port",
         description="UDP port to listen at, the one that the app sends to",
-        default=PORTS["livelink"],
+        default=PORTS.get("livelink", 1),
         min=1,
         max=65535,
     )

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""The ARKit units in terms of raw controls, read from arkit.toml."""
+"""The ARKit units in terms of raw controls, and in the orders of others, read from arkit.toml."""
 
 from __future__ import annotations
 
 from functools import cache
 from importlib import resources
+from typing import Any
 
 from ..base import toml
 
@@ -12,10 +13,26 @@ from ..base import toml
 @cache
 def mapping() -> dict[str, dict[str, float]]:
     """ARKit unit -> {raw control name as a DNA spells it: weight in [0, 1]}; 52 units."""
-    text = resources.files(__package__).joinpath("arkit.toml").read_text(encoding="utf-8")
-    table = toml.parse(text)
+    table = _table()
     prefix = table["prefix"]
     return {
         unit: {prefix + name: float(weight) for name, weight in row.items()}
         for unit, row in table["units"].items()
     }
+
+
+def order(name: str) -> tuple[str, ...]:
+    """The 52 units in the order of a protocol.
+
+    Args:
+        name: "live_link_face_take", "live_link_face_packet" or "face_cap".
+    """
+    table = _table()
+    units = tuple(table["units"])
+    return tuple(units[index] for index in table["orders"][name])
+
+
+@cache
+def _table() -> dict[str, Any]:
+    text = resources.files(__package__).joinpath("arkit.toml").read_text(encoding="utf-8")
+    return toml.parse(text)

@@ -1,31 +1,28 @@
 # SPDX-License-Identifier: MIT
-"""Face regions of controls, read from their names; as in the add-on's sliders (a test compares)."""
+"""Face regions of controls, read from their names by the words of regions.toml."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
+from importlib import resources
 
 import numpy as np
 import numpy.typing as npt
 
+from ..base import toml
 from ..base.errors import ArgumentError
 
-# The order decides: mouthCheekBlow is a cheek, eyeCheekRaise an eye, jawChinRaise a jaw.
-_STARTS = (
-    ("brow", ("brow",)),
-    ("cheek", ("cheek", "mouthcheek")),
-    ("eye", ("eye", "lid", "lash", "pupil")),
-    ("nose", ("nose", "nostril", "naso")),
-    ("mouth", ("mouth", "lip", "smile")),
-    ("jaw", ("jaw", "chin")),
-    ("tongue", ("tongue",)),
-    ("teeth", ("teeth", "tooth")),
-    ("neck", ("neck", "throat", "head")),
-    ("ear", ("ear",)),
+_TABLE = toml.parse(
+    resources.files(__package__).joinpath("regions.toml").read_text(encoding="utf-8")
 )
-REGIONS = (*(region for region, _ in _STARTS), "other")
+TITLES: dict[str, str] = {region: row["title"] for region, row in _TABLE.items()}
+REGIONS = tuple(TITLES)
+_STARTS = sorted(
+    ((start, region) for region, row in _TABLE.items() for start in row["starts"]),
+    key=lambda pair: -len(pair[0]),
+)
 
 
 def short_name(control: str) -> str:
@@ -33,13 +30,19 @@ def short_name(control: str) -> str:
     return re.split(r"[.:|]", control)[-1] or control
 
 
-def region_of(control: str) -> str:
-    """The face region of a control, one of REGIONS."""
-    # head.yaw and eyeL.pitch have their region before the dot.
-    for word in (short_name(control), control):
+def region_of(control: str, *, by_last_part: bool = False) -> str:
+    """The face region of a control, one of REGIONS.
+
+    Args:
+        control: its name.
+        by_last_part: look at short_name alone. Else what that does not tell, the part before it
+            may: head.yaw and eyeL.pitch have their region before the dot.
+    """
+    words = [short_name(control)] if by_last_part else re.split(r"[.:|]", control)[::-1]
+    for word in words:
         lower = word.lower().removeprefix("ctrl_")
-        for region, starts in _STARTS:
-            if lower.startswith(starts):
+        for start, region in _STARTS:
+            if lower.startswith(start):
                 return region
     return "other"
 

@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from ..controls import arkit
 from . import timecode
 from .errors import AnimationFileError
 from .source import Take, keep_ascending, make_clip, number
@@ -30,17 +31,10 @@ TIME_COLUMNS = {
     "frameno": 0.0,
 }  # fmt: skip
 # Curves of a take of Live Link Face, in their order.
-LIVE_LINK_FACE = tuple(
-    """EyeBlinkLeft EyeLookDownLeft EyeLookInLeft EyeLookOutLeft EyeLookUpLeft
-EyeSquintLeft EyeWideLeft EyeBlinkRight EyeLookDownRight EyeLookInRight EyeLookOutRight
-EyeLookUpRight EyeSquintRight EyeWideRight JawForward JawRight JawLeft JawOpen MouthClose
-MouthFunnel MouthPucker MouthRight MouthLeft MouthSmileLeft MouthSmileRight MouthFrownLeft
-MouthFrownRight MouthDimpleLeft MouthDimpleRight MouthStretchLeft MouthStretchRight MouthRollLower
-MouthRollUpper MouthShrugLower MouthShrugUpper MouthPressLeft MouthPressRight MouthLowerDownLeft
-MouthLowerDownRight MouthUpperUpLeft MouthUpperUpRight BrowDownLeft BrowDownRight BrowInnerUp
-BrowOuterUpLeft BrowOuterUpRight CheekPuff CheekSquintLeft CheekSquintRight NoseSneerLeft
-NoseSneerRight TongueOut HeadYaw HeadPitch HeadRoll LeftEyeYaw LeftEyePitch LeftEyeRoll RightEyeYaw
-RightEyePitch RightEyeRoll""".split()
+LIVE_LINK_FACE = (
+    *(unit[0].upper() + unit[1:] for unit in arkit.order("live_link_face_take")),
+    *"HeadYaw HeadPitch HeadRoll LeftEyeYaw LeftEyePitch LeftEyeRoll".split(),
+    *"RightEyeYaw RightEyePitch RightEyeRoll".split(),
 )
 # Columns that tell how many blend shapes there are; they hold no curve.
 COUNTS = ("blendshapecount",)

@@ -11,7 +11,7 @@ A packet is big-endian and of one of these versions:
 
 A text is a length u32 and that many bytes of UTF-8, without a final zero. Version 6 counts frames
 from midnight. While no face is seen the app sends the head of the packet alone. The values have
-the order of CURVES; 51 or 52 of them are a face without its rotations.
+the order of NAMES; 51 or 52 of them are a face without its rotations.
 """
 
 from __future__ import annotations
@@ -21,29 +21,18 @@ from math import isfinite
 
 import numpy as np
 
+from ..controls import arkit
 from .frame import LiveError, Packet
 
-PORT = 11111
-
-CURVES = (
-    "eyeBlinkLeft eyeLookDownLeft eyeLookInLeft eyeLookOutLeft eyeLookUpLeft eyeSquintLeft "
-    "eyeWideLeft eyeBlinkRight eyeLookDownRight eyeLookInRight eyeLookOutRight eyeLookUpRight "
-    "eyeSquintRight eyeWideRight jawForward jawLeft jawRight jawOpen mouthClose mouthFunnel "
-    "mouthPucker mouthLeft mouthRight mouthSmileLeft mouthSmileRight mouthFrownLeft "
-    "mouthFrownRight mouthDimpleLeft mouthDimpleRight mouthStretchLeft mouthStretchRight "
-    "mouthRollLower mouthRollUpper mouthShrugLower mouthShrugUpper mouthPressLeft mouthPressRight "
-    "mouthLowerDownLeft mouthLowerDownRight mouthUpperUpLeft mouthUpperUpRight browDownLeft "
-    "browDownRight browInnerUp browOuterUpLeft browOuterUpRight cheekPuff cheekSquintLeft "
-    "cheekSquintRight noseSneerLeft noseSneerRight tongueOut "
-    "head.yaw head.pitch head.roll eyeL.yaw eyeL.pitch eyeL.roll eyeR.yaw eyeR.pitch eyeR.roll"
-).split()
-NAMES = tuple(CURVES)
+_TURNS = ("yaw", "pitch", "roll")
+_ANGLES = [f"{part}.{turn}" for part in ("head", "eyeL", "eyeR") for turn in _TURNS]
+NAMES = (*arkit.order("live_link_face_packet"), *_ANGLES)
 _SHAPES = 52
 # Found on a recording of the app: an eye that looks down has a positive pitch, one that looks to
 # its own right a positive yaw, and its roll has the sign that an eye has which only turns up and
 # aside. So the axes look out of the back of the head, to its own left and up; the head shares them.
 _SIGNS = np.array([1.0] * _SHAPES + [-1.0, -1.0, 1.0] * 3, np.float32)
-_COUNTS = (len(CURVES), _SHAPES, _SHAPES - 1)
+_COUNTS = (len(NAMES), _SHAPES, _SHAPES - 1)
 _LONGEST_TEXT = 256
 _LARGEST = 100.0  # no blend shape and no angle of a face is larger
 

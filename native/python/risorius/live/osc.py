@@ -22,25 +22,11 @@ from typing import Any
 
 import numpy as np
 
+from ..controls import arkit
 from .frame import LiveError, Packet, turn_angles, unit_name
 from .roster import MOST, Roster
 
-PORT = 39539
-# The order of Face Cap, which is that of ARKit's first headers.
-FACE_CAP = tuple(
-    (
-        "browInnerUp browDownLeft browDownRight browOuterUpLeft browOuterUpRight eyeLookUpLeft "
-        "eyeLookUpRight eyeLookDownLeft eyeLookDownRight eyeLookInLeft eyeLookInRight "
-        "eyeLookOutLeft eyeLookOutRight eyeBlinkLeft eyeBlinkRight eyeSquintLeft eyeSquintRight "
-        "eyeWideLeft eyeWideRight cheekPuff cheekSquintLeft cheekSquintRight noseSneerLeft "
-        "noseSneerRight jawOpen jawForward jawLeft jawRight mouthFunnel mouthPucker mouthLeft "
-        "mouthRight mouthRollUpper mouthRollLower mouthShrugUpper mouthShrugLower mouthClose "
-        "mouthSmileLeft mouthSmileRight mouthFrownLeft mouthFrownRight mouthDimpleLeft "
-        "mouthDimpleRight mouthUpperUpLeft mouthUpperUpRight mouthLowerDownLeft "
-        "mouthLowerDownRight mouthPressLeft mouthPressRight mouthStretchLeft mouthStretchRight "
-        "tongueOut"
-    ).split()
-)
+FACE_CAP = arkit.order("face_cap")
 _BUNDLE = b"#bundle\0"
 _DEEPEST = 8
 _MOST_NAMES = 512

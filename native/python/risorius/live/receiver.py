@@ -11,17 +11,20 @@ import errno
 import socket
 import threading
 from collections import Counter, deque
+from importlib import resources
 from statistics import median
 from time import monotonic
 from typing import NamedTuple
 
+from ..base import toml
 from . import livelink, osc
 from .frame import Frame, LiveError, Packet
 from .roster import MOST, Roster
 from .take import Take
 
-SOURCES = ("livelink", "osc")
-PORTS = {"livelink": livelink.PORT, "osc": osc.PORT}
+_TEXT = resources.files(__package__).joinpath("sources.toml").read_text(encoding="utf-8")
+PORTS: dict[str, int] = {name: row["port"] for name, row in toml.parse(_TEXT).items()}
+SOURCES = tuple(PORTS)
 THIS_MACHINE, EVERYWHERE = "127.0.0.1", "0.0.0.0"
 _SILENCE = 0.004  # seconds without a packet that end a face whose sender does not mark its end
 _WINDOW = 0.05  # seconds over which a flood is counted

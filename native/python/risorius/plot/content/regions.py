@@ -49,7 +49,7 @@ _STARTS = (
 _PREFIX = re.compile(r"^(?:facial_)?(?:[lrc]_)?(?:12ipv_)?", re.IGNORECASE)
 
 
-def region_of(joint: str) -> str:
+def joint_region(joint: str) -> str:
     """The face region of a joint, one of REGIONS."""
     word = _PREFIX.sub("", joint.rpartition(":")[2]).lower()
     for region, starts in _STARTS:
@@ -60,7 +60,7 @@ def region_of(joint: str) -> str:
 
 def regions_of(joints: Iterable[str]) -> list[str]:
     """The region of each joint."""
-    return [region_of(name) for name in joints]
+    return [joint_region(name) for name in joints]
 
 
 def majority(indices: Iterable[int], regions: Sequence[str]) -> str:
