@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
 # Makes real Blender programs in chroots, for packaging/matrix.sh: trixie's Blender 4.3.2 (Python
-# 3.13) and sid's, which moves (Blender 5.2.2 LTS with Python 3.14 when this was written).
-# Needs root and debootstrap on Debian; 3 minutes each on a quiet machine, 18 on two busy cores; 1.5 GB each. Not part of the default
-# tests.
+# 3.13) and sid's, which moves (Blender 5.2.2 LTS with Python 3.14 when this was written). Needs root
+# and debootstrap on Debian; 3 minutes each on a quiet machine, 18 on two busy cores; 1.5 GB each.
+# Not part of the default tests.
 #
 #   ./packaging/blenders.sh [trixie|sid|all] [PREFIX]
 #       makes PREFIX-trixie, PREFIX-sid or both and prints, one a line, the paths of programs to use

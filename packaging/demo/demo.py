@@ -7,10 +7,8 @@ demo.py -- --extension ZIP --dna FILE --out FOLDER [--frames A B] [--sheet-only]
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 import time
-import traceback
 from math import radians
 from pathlib import Path
 
@@ -144,12 +142,4 @@ def main():
 
 
 if __name__ == "__main__":
-    code = 1
-    try:
-        main()
-        code = 0
-    except BaseException:  # noqa: BLE001 - whatever it is, Blender must end
-        traceback.print_exc()
-    sys.stdout.flush()
-    sys.stderr.flush()
-    os._exit(code)  # bpy sometimes hangs at exit
+    stage.end_with(main)

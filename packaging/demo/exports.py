@@ -8,10 +8,8 @@ exports.py -- --extension ZIP --dna FILE --out FOLDER [--size PIXELS]
 from __future__ import annotations
 
 import argparse
-import os
 import subprocess
 import sys
-import traceback
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
@@ -131,12 +129,4 @@ def main():
 
 
 if __name__ == "__main__":
-    code = 1
-    try:
-        main()
-        code = 0
-    except BaseException:  # noqa: BLE001 - whatever it is, Blender must end
-        traceback.print_exc()
-    sys.stdout.flush()
-    sys.stderr.flush()
-    os._exit(code)  # bpy sometimes hangs at exit
+    stage.end_with(main)

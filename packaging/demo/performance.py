@@ -9,9 +9,7 @@ performance.py -- --extension ZIP --man DNA --woman DNA --voice WAV --text TEXT 
 from __future__ import annotations
 
 import argparse
-import os
 import sys
-import traceback
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
@@ -171,11 +169,4 @@ def main():
 
 
 if __name__ == "__main__":
-    code = 1
-    try:
-        main()
-        code = 0
-    except BaseException:  # noqa: BLE001 - whatever it is, Blender must end
-        traceback.print_exc()
-    sys.stdout.flush()
-    os._exit(code)  # bpy sometimes hangs at exit
+    stage.end_with(main)

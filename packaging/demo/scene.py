@@ -3,8 +3,28 @@
 
 from __future__ import annotations
 
+import os
+import sys
+import traceback
+
 import bpy
 from mathutils import Vector
+
+
+def end_with(main):
+    """Run `main` and end the process: exit code 0, or 1 after a traceback.
+
+    Whatever is raised, Blender must end, and the bpy module sometimes hangs when it exits.
+    """
+    code = 1
+    try:
+        main()
+        code = 0
+    except BaseException:  # noqa: BLE001
+        traceback.print_exc()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)
 
 
 def render_animation(progress):

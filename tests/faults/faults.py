@@ -243,6 +243,41 @@ def small_disk(folder: Path, size: str) -> Iterator[bool]:
             subprocess.run(["umount", "-l", str(folder)], check=False)
 
 
+def _fill(disk: Path) -> bool:
+    with contextlib.suppress(OSError), open(disk / "filler", "wb") as file:
+        file.write(bytes(64 * 1024))
+    return True
+
+
+def _forbid(disk: Path) -> bool:
+    again = ["mount", "-o", "remount,ro", str(disk)]
+    return subprocess.run(again, check=False).returncode == 0
+
+
+def _on_a_disk(kind: str, name: str, spoil: Callable[[Path], bool]) -> Row:
+    """A command whose output lies on a small disk of its own, after `spoil` made that refuse.
+
+    Args:
+        kind: of trial, as its row says.
+        name: the command, of COMMANDS.
+        spoil: is given the disk's folder; False where this machine does not let it.
+
+    Returns:
+        The trial's row, NOT RUN where no disk can be mounted.
+    """
+    row = Row(kind, name)
+    with tempfile.TemporaryDirectory() as text:
+        room = Room.make(Path(text))
+        target, words = room.arguments(name)
+        with small_disk(room.outputs, "64k") as made:
+            target.write_bytes(b"old")
+            if made and spoil(room.outputs):
+                _refused(row, room, target, finish(begin(words)), target.name)
+            else:
+                row.not_run = "no disk can be mounted here"
+    return row
+
+
 def disks(_rounds: int, names: Sequence[str] = ()) -> Iterator[Row]:
     """No room: a sentence that names the file, the old one whole, nothing left."""
     for name in names or COMMANDS:
@@ -256,19 +291,7 @@ def disks(_rounds: int, names: Sequence[str] = ()) -> Iterator[Row]:
     if names:
         return
     for name in COMMANDS:
-        row = Row("full tmpfs", name)
-        with tempfile.TemporaryDirectory() as text:
-            room = Room.make(Path(text))
-            target, words = room.arguments(name)
-            with small_disk(room.outputs, "64k") as made:
-                if not made:
-                    row.not_run = "no disk can be mounted here"
-                else:
-                    target.write_bytes(b"old")
-                    with contextlib.suppress(OSError), open(room.outputs / "filler", "wb") as file:
-                        file.write(bytes(64 * 1024))
-                    _refused(row, room, target, finish(begin(words)), target.name)
-        yield row
+        yield _on_a_disk("full tmpfs", name, _fill)
     for words in (["info", str(CORE)], ["check", str(CORE)], ["eval", str(CORE)],
                   ["convert", str(CORE), "-", "--to", "dna"]):  # fmt: skip
         row = Row("full /dev/full", words[0], 1)
@@ -306,18 +329,7 @@ def folders(_rounds: int, names: Sequence[str] = ()) -> Iterator[Row]:
     if names:
         return
     for name in COMMANDS:
-        row = Row("read-only folder", name)
-        with tempfile.TemporaryDirectory() as text:
-            room = Room.make(Path(text))
-            target, words = room.arguments(name)
-            with small_disk(room.outputs, "64k") as made:
-                target.write_bytes(b"old")
-                again = ["mount", "-o", "remount,ro", str(room.outputs)]
-                if not made or subprocess.run(again, check=False).returncode != 0:
-                    row.not_run = "no disk can be mounted here"
-                else:
-                    _refused(row, room, target, finish(begin(words)), target.name)
-        yield row
+        yield _on_a_disk("read-only folder", name, _forbid)
 
 
 def pairs(rounds: int, names: Sequence[str] = ()) -> Iterator[Row]:
