@@ -50,13 +50,7 @@ class Budget:
         Raises:
             BudgetError: fewer are left.
         """
-        if not count <= self.bytes:
-            taken = self._bytes - self.bytes
-            raise BudgetError(
-                f"{place}: {count:,.0f} bytes more than the {taken:,} taken before would be "
-                f"needed, at most {self._bytes:,} in all were expected of what has this size"
-            )
-        self.bytes -= int(count)
+        self.bytes = _left(self.bytes, self._bytes, count, f"{place}: {count:,.0f} bytes", "taken")
 
     def work(self, count: float, place: str) -> None:
         """Take `count` steps of the budget, before they are done.
@@ -68,10 +62,14 @@ class Budget:
         Raises:
             BudgetError: fewer are left.
         """
-        if not count <= self.steps:
-            taken = self._steps - self.steps
-            raise BudgetError(
-                f"{place}: {count:,.0f} steps more than the {taken:,} done before would be "
-                f"needed, at most {self._steps:,} in all were expected of what has this size"
-            )
-        self.steps -= int(count)
+        self.steps = _left(self.steps, self._steps, count, f"{place}: {count:,.0f} steps", "done")
+
+
+def _left(left: int, most: int, count: float, wanted: str, done: str) -> int:
+    """What is left once `count` is taken. Raises: BudgetError: there is not so much."""
+    if not count <= left:  # also of NaN
+        raise BudgetError(
+            f"{wanted} more than the {most - left:,} {done} before would be needed, "
+            f"at most {most:,} in all were expected of what has this size"
+        )
+    return left - int(count)

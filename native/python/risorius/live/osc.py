@@ -16,13 +16,14 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from time import monotonic
 from typing import Any
 
 import numpy as np
 
 from ..controls import arkit
+from ..rigs.rotation import product
 from .frame import LiveError, Packet, turn_angles, unit_name
 from .roster import MOST, Roster
 
@@ -239,8 +240,8 @@ def _bone(face: _Face, values: list[Any]) -> tuple[str, dict[str, float]]:
     face.bones[name] = _unit(_numbers(values[1:], 7)[3:])
     if name in ("Neck", "Head"):
         still = (0.0, 0.0, 0.0, 1.0)
-        turn = _times(face.bones.get("Neck", still), face.bones.get("Head", still))
-        yaw, pitch, roll = _angles(turn)
+        neck, head = (np.array(face.bones.get(bone, still)) for bone in ("Neck", "Head"))
+        yaw, pitch, roll = _angles(product(neck, head))
         return name, {"head.yaw": yaw, "head.pitch": pitch, "head.roll": roll}
     yaw, pitch, _ = _angles(face.bones[name])
     side = name[0]
@@ -277,17 +278,7 @@ def _unit(q: tuple[float, ...]) -> tuple[float, ...]:
     return tuple(v / length for v in q)
 
 
-def _times(a: tuple[float, ...], b: tuple[float, ...]) -> tuple[float, ...]:
-    (ax, ay, az, aw), (bx, by, bz, bw) = a, b
-    return (
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-        aw * bw - ax * bx - ay * by - az * bz,
-    )
-
-
-def _angles(q: tuple[float, ...]) -> tuple[float, float, float]:
+def _angles(q: Iterable[float]) -> tuple[float, float, float]:
     """Yaw, pitch, roll of a quaternion in the axes own right, up, ahead."""
     x, y, z, w = q
     right = np.array([1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)])

@@ -77,11 +77,6 @@ class Recogniser:
             self._decoders[kind] = self._sphinx.Decoder(loglevel="FATAL", samprate=RATE, **options)
         return self._decoders[kind]
 
-    def pronunciation(self, word: str) -> list[str]:
-        """Phonemes of a word: the dictionary's, else by rules."""
-        found = self._decoder("narrow").lookup_word(word)
-        return str(found).split() if found else letters.pronounce(word)
-
     def align_words(self, samples: Samples, words: Sequence[str]) -> list[Segment] | None:
         """The words at their times, silences in between; None if the voice does not say them.
 
