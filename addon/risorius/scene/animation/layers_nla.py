@@ -12,7 +12,7 @@ from ...logic.animation import layer_rules as logic
 from ..base import compat, parts
 from ..base.blender_types import ArmatureObject
 from ..character import runtime
-from . import clip_actions, layers
+from . import clip_actions, layer_mixing, layers
 from .layer_properties import RISORIUS_PG_layer
 
 _BLENDS = {"OVERRIDE": "REPLACE", "ADD": "ADD"}
@@ -179,12 +179,12 @@ def _action_of(
     controls = parts.controls_there(rig)
     if layer.kind == "ACTION":
         first, last = layer.action.frame_range
-        names = layers.allowed_names(live, layer)
+        names = layer_mixing.allowed_names(live, layer)
         allowed = {n if n in clip_logic.HEAD else parts.property_path(n) for n in names}
         return _masked(controls, layer, allowed), not last > first
-    made = layers.native_layer(controls, live, layer, clip_actions.frame_rate(scene))
+    made = layer_mixing.native_layer(controls, live, layer, clip_actions.frame_rate(scene))
     clip = made.clip()
-    kept = [n for n in clip.names if n in layers.allowed_names(live, layer)]
+    kept = [n for n in clip.names if n in layer_mixing.allowed_names(live, layer)]
     timing = clip_logic.Timing(clip_actions.frame_rate(scene), layer.start, float(clip.start))
     made = clip_actions.make_action(rig, clip.selected(kept), timing, layer.name)
     return made.action, clip.frame_count < 2

@@ -12,7 +12,7 @@ from mathutils import Matrix, Quaternion, Vector
 from numpy.typing import NDArray
 
 from ...logic.base.space import yaw_pitch
-from ..animation import layers
+from ..animation import layer_mixing
 from ..base import parts
 from ..base.blender_types import ArmatureObject, Depsgraph
 from ..character import rig_placement, runtime
@@ -63,7 +63,7 @@ def read_mixed(
     bones = seen.pose.bones
     raw = read_sliders(seen, live)
     own = {name: _turn(seen, bones.get(name)) for name in ("neck", "head")}
-    raw, own["head"] = layers.mix(seen, live, raw, own["head"], depsgraph, maximum)
+    raw, own["head"] = layer_mixing.mix(seen, live, raw, own["head"], depsgraph, maximum)
     return raw, own
 
 

@@ -10,7 +10,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ... import native
-from ..animation import layers
+from ..animation import layer_mixing, layers
 from ..base import parts, sharing
 from ..base.blender_types import ArmatureObject, Depsgraph, current_context
 from ..character import lods, rig_placement, runtime
@@ -91,7 +91,7 @@ def _notice_copies(updates: Iterable[bpy.types.DepsgraphUpdate]) -> None:
     if new or len(bpy.data.objects) != len(known):
         _state["objects"] = {item.session_uid for item in bpy.data.objects}
         runtime.forget_unused(parts.rigs())
-        layers.forget_unused(map(parts.controls_of, parts.rigs()))
+        layer_mixing.forget_unused(map(parts.controls_of, parts.rigs()))
         _say(migrations.bring_up_all())
         _say(duplicates.separate_all())
         sharing.keep()
@@ -120,7 +120,7 @@ def _edited(depsgraph: Depsgraph) -> list[ArmatureObject]:
         runtime.forget_outputs()
         for rig in repair.heal_all():
             _note_mended(rig)
-    layers.note_edits(actions)
+    layer_mixing.note_edits(actions)
     return [rig for rig in parts.rigs() if _concerned(rig, armatures, actions, camera_moved)]
 
 
@@ -163,7 +163,7 @@ def _restored(*_arguments: object) -> None:
     point to bones that are no more, and Blender dies of a look at them.
     """
     runtime.forget_outputs()
-    layers.forget()
+    layer_mixing.forget()
     applied_transforms.forget()
     _state["objects"] = frozenset()
     if native.problem():
@@ -229,6 +229,6 @@ def unregister() -> None:
         present = getattr(bpy.app.handlers, name)
         if handler in present:
             present.remove(handler)
-    layers.forget()
+    layer_mixing.forget()
     sharing.forget()
     runtime.forget()

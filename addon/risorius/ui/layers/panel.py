@@ -4,7 +4,7 @@
 import bpy
 
 from ...logic.animation import layer_rules as logic
-from ...scene.animation import layer_properties, layers
+from ...scene.animation import layer_mixing, layer_properties, layers
 from ...scene.base import parts
 from ...scene.character import runtime
 from .. import words
@@ -42,7 +42,7 @@ class RISORIUS_PT_layers(FaceOnlyPanel, bpy.types.Panel):
         _draw_side(row.column(align=True))
         if len(layers.of(controls)):
             _draw_layer(layout, controls, layers.places(controls)[LayerOperator.place(controls)])
-            for sentence in layers.problems(controls, live, context.scene):
+            for sentence in layer_mixing.problems(controls, live, context.scene):
                 words.write(layout, sentence, "ERROR")
         _draw_reactions(layout, controls)
         if len(layers.of(controls)) or len(layers.reactions_of(controls)):

@@ -1,0 +1,355 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The layers of a character, compiled to native curves and mixed over its sliders.
+
+What is compiled is kept by the character and compared with what it was made of: a frame costs one
+look at the settings and one native call, and nothing at all without layers. No Blender object is
+kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import bpy
+import numpy as np
+from mathutils import Quaternion
+from numpy.typing import NDArray
+
+from ... import native
+from ...logic.animation import clip_units as clip_logic
+from ...logic.animation import layer_rules as logic
+from ...logic.base.errors import FaceError
+from ..base import parts
+from ..base.blender_types import ArmatureObject, Depsgraph
+from ..character import runtime
+from . import clip_actions, layers
+from .layer_properties import RISORIUS_PG_layer
+
+_OF_SOURCE = (
+    "kind",
+    "expression",
+    "seed",
+    "start",
+    "scale",
+    "trim_start",
+    "trim_end",
+    "length",
+    "repeat",
+    "reverse",
+)
+_OF_PLAYING = ("name", "blend", "extend", "fade_in", "fade_out", "mute", "solo")
+_BLENDS = {"OVERRIDE": "override", "ADD": "additive", "MAXIMUM": "max"}
+_MOST_FIRED = 4096
+_IDLE_LOOP = 120.0  # seconds before idle life without a length comes again
+
+
+@dataclass
+class Stack:
+    """Compiled layers of a character.
+
+    Attributes:
+        made_of: what they were compiled from.
+        mixer: risorius.Mixer of the character's labels, then the head's three angles.
+        layers: risorius.Layer, bottom to top, at full weight.
+        places: of each the place among the settings.
+        weights: of all settings by place, as the mixer has them now.
+        problems: sentences on layers that cannot be played, by their place.
+        kept: sources and masks, by what they were made of.
+    """
+
+    made_of: tuple[Any, ...]
+    mixer: native.Mixer
+    layers: list[native.Layer] = field(default_factory=list)
+    places: list[int] = field(default_factory=list)
+    weights: tuple[float, ...] = ()
+    problems: dict[int | str, str] = field(default_factory=dict)
+    kept: Kept = field(default_factory=dict)
+
+
+Times = dict[str, Any]  # keyword arguments of risorius.Layer that say when it plays
+Source = tuple[Any, Times]  # a risorius.Clip, or a pose as a dict
+Kept = dict[tuple[object, ...], Any]  # sources and masks by what they were made of
+_stacks: dict[int, Stack] = {}  # session uid of a control armature -> Stack
+_versions: dict[int, int] = {}  # session uid of an action -> how often it was edited
+
+
+def forget() -> None:
+    """Drop all that is compiled: after load and undo, session uids may mean others."""
+    _stacks.clear()
+
+
+def forget_unused(there: Iterable[ArmatureObject | None]) -> None:
+    """Drop what is compiled of characters that are gone. Args: there  control armatures."""
+    kept = {controls.session_uid for controls in there if controls is not None}
+    for uid in [uid for uid in _stacks if uid not in kept]:
+        del _stacks[uid]
+
+
+def note_edits(actions: Iterable[bpy.types.Action]) -> None:
+    """Note that actions were edited: what is made of them is made anew."""
+    for action in actions:
+        _versions[action.session_uid] = _versions.get(action.session_uid, 0) + 1
+
+
+def mix(
+    seen: ArmatureObject,
+    live: runtime.Runtime,
+    raw: NDArray[np.float32],
+    head: Quaternion | None,
+    depsgraph: Depsgraph,
+    maximum: float,
+) -> tuple[NDArray[np.float32], Quaternion | None]:
+    """Mix the layers of a character over its sliders and its head bone.
+
+    Args:
+        seen: the evaluated control armature; its layers have the weights of this frame.
+        live: the character's Runtime.
+        raw: float32[R], the sliders.
+        head: Quaternion in the armature's axes by which the head bone is turned, or None.
+        depsgraph: its scene gives the time.
+        maximum: of the sliders.
+
+    Returns:
+        float32[R], and the head's turn.
+    """
+    controls = seen.original
+    if not layers.has_any(controls) or parts.BAKED in controls:
+        return raw, head  # baked controls have them in their action
+    scene = depsgraph.scene
+    stack = compiled(controls, live, scene, maximum)
+    # Where there are not as many, one was added and not evaluated since.
+    there = len(layers.places(seen)) == len(layers.places(controls))
+    weights = tuple(layer.weight for layer in layers.places(seen if there else controls))
+    if stack.weights != weights:
+        _set_weights(stack, weights)
+    base = np.zeros(len(raw) + 3, np.float32)
+    base[: len(raw)] = raw
+    if head is not None:
+        base[len(raw) :] = clip_logic.angles_of(np.array(head))
+    out = stack.mixer.evaluate(scene.frame_current_final / clip_actions.frame_rate(scene), base)
+    angles = out[len(raw) :]
+    if not np.array_equal(angles, base[len(raw) :]):
+        head = Quaternion(clip_logic.quaternions(angles[None].astype(np.float64))[0])
+    return np.ascontiguousarray(out[: len(raw)]), head
+
+
+def compiled(
+    controls: ArmatureObject, live: runtime.Runtime, scene: bpy.types.Scene, maximum: float = 1.0
+) -> Stack:
+    """The Stack of a character, compiled anew only where something changed."""
+    rate = clip_actions.frame_rate(scene)
+    made_of = (
+        (id(live), maximum, controls.risorius_layer_rules),
+        tuple((r.name, r.frame / rate, r.strength) for r in layers.reactions_of(controls)),
+        tuple((i, *_key(y, rate), *_get(y, _OF_PLAYING)) for i, y in layers.ordered(controls)),
+    )
+    stack = _stacks.get(controls.session_uid)
+    if stack is None or stack.made_of != made_of:
+        stack = _compile(controls, live, rate, maximum, made_of, stack)
+        _stacks[controls.session_uid] = stack
+    return stack
+
+
+def _get(layer: RISORIUS_PG_layer, names: Iterable[str]) -> Iterator[object]:
+    return (getattr(layer, name) for name in names)
+
+
+def _key(layer: RISORIUS_PG_layer, rate: float) -> tuple[tuple[object, ...], tuple[object, ...]]:
+    """What a layer's curves depend on, and what its mask does."""
+    action = layer.action
+    uid = action.session_uid if action is not None else 0
+    warp = tuple((point.frame, point.source) for point in layer.warp)
+    source = (rate, uid, _versions.get(uid, 0), warp, *_get(layer, _OF_SOURCE))
+    return source, (tuple(sorted(layer.regions)), layer.controls)
+
+
+def _compile(
+    controls: ArmatureObject,
+    live: runtime.Runtime,
+    rate: float,
+    maximum: float,
+    made_of: tuple[object, ...],
+    old: Stack | None,
+) -> Stack:
+    """A new Stack. Args: old  the one before it, whose curves serve where they are the same."""
+    same_face = old is not None and old.made_of[0] == made_of[0]
+    stack = Stack(made_of, _mixer(controls, live, maximum) if not same_face else old.mixer)
+    kept = old.kept if same_face else {}
+    for place, layer in layers.ordered(controls):
+        try:
+            stack.layers.append(native_layer(controls, live, layer, rate, kept, stack.kept))
+            stack.places.append(place)
+        except (ValueError, LookupError, RuntimeError) as error:
+            stack.problems[place] = str(error).rstrip(".")
+    _fire(stack, controls, rate)
+    stack.mixer.layers = stack.layers
+    return stack
+
+
+def _mixer(controls: ArmatureObject, live: runtime.Runtime, maximum: float) -> native.Mixer:
+    return native.module().Mixer(
+        [*live.labels, *clip_logic.HEAD],
+        ranges={n: (low, maximum) for n, low in zip(live.labels, live.lowest, strict=True)},
+        exclusives="default" if controls.risorius_layer_rules else None,
+        max_fired=_MOST_FIRED,
+    )
+
+
+def _fire(stack: Stack, controls: ArmatureObject, rate: float) -> None:
+    """Fire all reactions, whenever they are: so each frame is the same in any order of frames."""
+    stack.mixer.clear_fired()
+    for reaction in layers.reactions_of(controls):
+        try:
+            fired = stack.mixer.fire(reaction.name, reaction.frame / rate, reaction.strength)
+        except KeyError:
+            stack.problems[reaction.name] = "there is no such reaction"
+            continue
+        if not fired:
+            stack.problems["Reactions"] = f"only the first {_MOST_FIRED} are shown"
+
+
+def _set_weights(stack: Stack, weights: tuple[float, ...]) -> None:
+    """Give the layers the weights of this frame: cheap, their curves stay."""
+    stack.mixer.layers = tuple(
+        replace(layer, weight=min(max(weights[place], 0.0), 1.0))
+        for layer, place in zip(stack.layers, stack.places, strict=True)
+    )
+    stack.weights = weights
+
+
+def native_layer(
+    controls: ArmatureObject,
+    live: runtime.Runtime,
+    layer: RISORIUS_PG_layer,
+    rate: float,
+    old: Kept | None = None,
+    kept: Kept | None = None,
+) -> native.Layer:
+    """A layer as risorius.Layer, at full weight.
+
+    Args:
+        controls: control armature.
+        live: the character's Runtime.
+        layer: its settings.
+        rate: frames per second.
+        old: sources and masks made before, which serve again; the mixer knows them.
+        kept: where those of this layer are put.
+
+    Raises:
+        ValueError: it has nothing to play, or something that does not fit; the sentence says what.
+    """
+    old, kept = old or {}, {} if kept is None else kept
+    source_key, mask_key = _key(layer, rate)
+    if source_key not in kept:
+        made = old.get(source_key)
+        kept[source_key] = made or _SOURCES[layer.kind](controls, live, layer, rate)
+    if mask_key not in kept:
+        made = old.get(mask_key)
+        kept[mask_key] = _mask(live, layer) if made is None else made
+    source, own = kept[source_key]
+    return native.module().Layer(
+        source,
+        name=layer.name,
+        blend=_BLENDS[layer.blend],
+        mask=kept[mask_key],
+        mute=layer.mute,
+        solo=layer.solo,
+        **{
+            "extend": layer.extend.lower(),
+            "fade_in": layer.fade_in / rate,
+            "fade_out": layer.fade_out / rate,
+            **own,
+        },
+    )
+
+
+def _mask(live: runtime.Runtime, layer: RISORIUS_PG_layer) -> NDArray[np.float32]:
+    allowed = allowed_names(live, layer)
+    names = [*live.labels, *clip_logic.HEAD]
+    return np.array([name in allowed for name in names], np.float32)
+
+
+def allowed_names(live: runtime.Runtime, layer: RISORIUS_PG_layer) -> set[str]:
+    """What a layer may move: sliders, and the head's angles, which belong to the neck's region."""
+    chosen = {region.lower() for region in layer.regions}
+    labels = [*live.labels, *clip_logic.HEAD]
+    return set(logic.masked(labels, native.regions(), chosen, layer.controls))
+
+
+def _still_times(layer: RISORIUS_PG_layer, rate: float) -> Times:
+    """A pose stands always, or for its length from its start on."""
+    if not layer.length:
+        return {}
+    return {"start": layer.start / rate, "end": (layer.start + layer.length) / rate}
+
+
+def _expression_source(
+    _controls: ArmatureObject, live: runtime.Runtime, layer: RISORIUS_PG_layer, rate: float
+) -> Source:
+    pose = native.part("expressions").get(layer.expression).weights
+    return _for_face(live, pose), _still_times(layer, rate)
+
+
+def _for_face(live: runtime.Runtime, pose: Mapping[str, float]) -> dict[str, float]:
+    """A pose by the labels of this face's sliders; what it does not have is left out."""
+    sliders = clip_actions.sliders_of(live)
+    return {sliders[name]: value for name, value in pose.items() if name in sliders}
+
+
+def _action_source(
+    controls: ArmatureObject, live: runtime.Runtime, layer: RISORIUS_PG_layer, rate: float
+) -> Source:
+    action = layer.action
+    if action is None:
+        raise FaceError("choose an action")
+    span = layers.span_of(layer)
+    curves = clip_actions.playing_curves(action, controls)
+    keys = np.unique(np.concatenate([clip_actions.key_points(c)[0] for c in curves] or [[]]))
+    frames = logic.sample_frames(span, keys, any(clip_actions.is_bent(c) for c in curves))
+    clip = clip_actions.clip_of_action(controls, live, action, frames, rate)
+    if not clip.names:
+        raise FaceError(f"{action.name} has no keys of a control of this face")
+    if clip.frame_count < 2:
+        return clip, _still_times(layer, rate)
+    return clip, _span_times(span, rate)
+
+
+def _span_times(span: logic.Span, rate: float) -> Times:
+    if span.warp is not None:
+        return {"warp": (span.warp[0] / rate, span.warp[1] / rate)}
+    return {
+        "start": span.start / rate,
+        "clip_range": (span.first / rate, span.last / rate),
+        "scale": span.scale,
+        "repeat": span.repeat,
+        "reverse": span.reverse,
+    }
+
+
+def _idle_source(
+    _controls: ArmatureObject, live: runtime.Runtime, layer: RISORIUS_PG_layer, rate: float
+) -> Source:
+    """Idle life of its length, or in a long loop that goes on for ever."""
+    endless = not layer.length
+    seconds = _IDLE_LOOP if endless else layer.length / rate
+    clip = native.part("anim.idle").idle(layer.seed, seconds, loop=endless)
+    sliders = clip_actions.sliders_of(live)
+    clip = clip.selected([name for name in clip.names if name in sliders])
+    times = {"start": layer.start / rate}
+    if endless:  # its loop has no begin and no end to fade at
+        times.update(extend="repeat", fade_in=0.0, fade_out=0.0)
+    return clip.replaced(names=[sliders[name] for name in clip.names]), times
+
+
+_SOURCES = {"ACTION": _action_source, "EXPRESSION": _expression_source, "IDLE": _idle_source}
+
+
+def problems(controls: ArmatureObject, live: runtime.Runtime, scene: bpy.types.Scene) -> list[str]:
+    """Sentences on layers that cannot be played, as last compiled."""
+    stack = compiled(controls, live, scene, parts.maximum_of(controls))
+    names: dict[int | str, str] = {
+        place: layer.name for place, layer in enumerate(layers.places(controls))
+    }
+    return [f"{names.get(place, place)}: {words}." for place, words in stack.problems.items()]
