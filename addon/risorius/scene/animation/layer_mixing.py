@@ -78,13 +78,17 @@ _versions: dict[int, int] = {}  # session uid of an action -> how often it was e
 def forget() -> None:
     """Drop all that is compiled: after load and undo, session uids may mean others."""
     _stacks.clear()
+    _versions.clear()
 
 
 def forget_unused(there: Iterable[ArmatureObject | None]) -> None:
-    """Drop what is compiled of characters that are gone. Args: there  control armatures."""
+    """Drop what is kept of characters and actions that are gone. Args: there  control armatures."""
     kept = {controls.session_uid for controls in there if controls is not None}
     for uid in [uid for uid in _stacks if uid not in kept]:
         del _stacks[uid]
+    kept = {action.session_uid for action in bpy.data.actions} if _versions else set()
+    for uid in [uid for uid in _versions if uid not in kept]:
+        del _versions[uid]
 
 
 def note_edits(actions: Iterable[bpy.types.Action]) -> None:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ...logic.animation import key_reduction
 from ...logic.base.errors import FaceError
 from ..animation import actions
-from ..base import parts
+from ..base import parts, written
 from ..base.blender_types import ArmatureObject, Context, MeshObject
 from ..character import lods, runtime
 from ..frame import channel_preview, evaluate
@@ -126,14 +126,14 @@ def bake(
         keys = [k for rig in rigs for k in animated_keys(rig, levels[rig])]
     sampled = yield from sampling.sample(context, rigs, frames, keys)
     write = _write_result if options.kind == RESULT else _write_controls
-    with runtime.paused():
+    with evaluate.paused():
         try:
             done = [write(r, s, levels[r], options) for r, s in zip(rigs, sampled, strict=True)]
         except Exception:
             for rig in rigs:
                 _take_back(rig, options.kind)
             raise
-    runtime.forget_outputs()
+    written.forget()
     for rig in rigs:
         evaluate.bring_up(context, rig)
     return done
@@ -262,7 +262,7 @@ def unbake(context: Context, rig: ArmatureObject) -> bool:
         _restore_controls(parts.controls_there(rig))
     else:
         _restore_result(rig)
-    runtime.forget_outputs()
+    written.forget()
     context.view_layer.update()
     evaluate.bring_up(context, rig)
     return True

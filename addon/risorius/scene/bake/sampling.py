@@ -21,7 +21,7 @@ from ..animation import layers
 from ..base import compat, parts
 from ..base.blender_types import ArmatureObject, Context, Depsgraph, MeshObject
 from ..character import rig_placement, runtime
-from ..frame import inputs
+from ..frame import evaluate, inputs
 
 _CHANNELS = {"location": 3, "rotation_quaternion": 4, "rotation_euler": 3, "scale": 3}
 _BONES = ("neck", "head", "eyes", "eye_L", "eye_R")
@@ -82,7 +82,7 @@ def sample(
         depsgraph = None
         for number, frame in enumerate(frames):
             whole = int(np.floor(frame))
-            with runtime.paused():
+            with evaluate.paused():
                 scene.frame_set(whole, subframe=float(frame) - whole)
             depsgraph = scene.view_layers[0].depsgraph if scene != context.scene else None
             depsgraph = depsgraph or context.evaluated_depsgraph_get()

@@ -13,7 +13,7 @@ from ... import native
 from ...logic.base import names
 from ...logic.character import plans
 from ...logic.material import texture_search
-from ..base import compat, form, parts, sharing, storage
+from ..base import compat, form, parts, sharing, storage, written
 from ..base.blender_types import ArmatureObject, Context, MeshObject
 from ..material import materials
 from . import armatures, lods, meshes, runtime
@@ -269,7 +269,7 @@ def change_mode(rig: ArmatureObject, mode: str) -> list[str]:
             trouble.append(
                 f"{item.name} has not as many vertices as in its file: its shapes stay as they are."
             )
-    runtime.forget_outputs()
+    written.forget()
     return trouble
 
 

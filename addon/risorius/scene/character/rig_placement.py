@@ -13,9 +13,8 @@ import bpy
 import numpy as np
 from mathutils import Quaternion, Vector
 
-from ..base import parts
+from ..base import parts, written
 from ..base.blender_types import ArmatureObject, Depsgraph
-from . import runtime
 
 CONSTRAINT = "Risorius Body"
 _GAP = 1.25  # from face to face, in widths of one
@@ -32,11 +31,9 @@ def follow(rig: ArmatureObject, seen: ArmatureObject) -> None:
     if not rig.get(parts.FOLLOW) or rig.parent or rig.constraints:
         return
     wanted = np.array(seen.matrix_world)
-    key, state = ("place", rig.session_uid), wanted.tobytes()
     near = np.abs(np.array(rig.matrix_basis) - wanted).max() <= _NEAR * np.abs(wanted).max()
     # Also what is only a rounding away is written: a frame shall not keep the one before it.
-    if runtime.outputs.get(key) != state or not near:
-        runtime.outputs[key] = state
+    if written.is_new(written.places, rig, wanted.tobytes()) or not near:
         rig.matrix_basis = seen.matrix_world
 
 

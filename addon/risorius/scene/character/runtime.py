@@ -6,10 +6,8 @@ Holds no Blender object: it is found anew, or rebuilt, after load, undo, append 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +16,7 @@ from ... import native
 from ...logic.base import names
 from ...logic.base.space import Space, SpaceError, world_matrices, yaw_pitch
 from ...logic.character import plans
-from ..base import parts, storage
+from ..base import parts, storage, written
 from ..base.blender_types import ArmatureObject
 
 DEFAULT_EYE_ANGLE = float(np.radians(30.0))
@@ -75,22 +73,6 @@ class Runtime:
 
 
 _cache: dict[tuple[str, float], Runtime | None] = {}
-_pauses: list[bool] = []
-outputs: dict[tuple[str, int], Any] = {}  # (what, session uid) -> what was last written there
-
-
-@contextmanager
-def paused() -> Iterator[None]:
-    """While this lasts no frame and no update brings a face up: what is read is read by others."""
-    _pauses.append(True)
-    try:
-        yield
-    finally:
-        _pauses.pop()
-
-
-def is_paused() -> bool:
-    return bool(_pauses)
 
 
 def of(rig: ArmatureObject) -> Runtime | None:
@@ -156,7 +138,7 @@ def forget_unused(rigs: Iterable[ArmatureObject]) -> None:
     used = {storage.content_hash(rig.get(parts.DNA)) for rig in rigs}
     for key in [k for k in _cache if k[0] not in used]:
         del _cache[key]
-    outputs.clear()
+    written.forget()
 
 
 def _compile(content: bytes, unit: float) -> Runtime:
@@ -230,12 +212,7 @@ def _response(runtime: Runtime, control: int, side: str, horizontal: bool) -> fl
     return angle if angle > np.radians(2.0) else DEFAULT_EYE_ANGLE
 
 
-def forget_outputs() -> None:
-    """Let the next evaluation write everything: after undo, load and changes of shape mode."""
-    outputs.clear()
-
-
 def forget() -> None:
     """Drop all compiled data."""
     _cache.clear()
-    outputs.clear()
+    written.forget()

@@ -22,9 +22,10 @@ from ...logic.animation import clip_units, key_reduction
 from ...logic.base.names import unique_labels
 from ..animation import actions
 from ..bake import bake_face, baked_shape_keys, baked_tracks, sampling
-from ..base import compat, parts
+from ..base import compat, parts, written
 from ..base.blender_types import ArmatureObject, Context, MeshObject
 from ..character import meshes, runtime
+from ..frame import evaluate
 from .lent_names import Loans
 
 
@@ -89,7 +90,7 @@ def copies(
     window, user = context.window, context.scene
     before, loans = _everything(), Loans()
     shown = window.scene if window is not None else None
-    with runtime.paused():
+    with evaluate.paused():
         try:
             stage = _stage(user, characters[0][2].frames)
             loans.take("scenes", stage, _name(characters[0][0]))  # a take's name, in some formats
@@ -109,7 +110,7 @@ def copies(
                 window.scene = shown
             _remove_all_but(before)
             loans.give_back()
-            runtime.forget_outputs()
+            written.forget()
 
 
 def _stage(user: bpy.types.Scene, frames: NDArray[np.float64]) -> bpy.types.Scene:

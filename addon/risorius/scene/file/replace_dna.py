@@ -16,7 +16,7 @@ import bpy
 from ...logic.base import names
 from ...logic.base.errors import FaceError
 from ...logic.character import plans
-from ..base import drivers, parts
+from ..base import drivers, parts, written
 from ..base.blender_types import ArmatureObject, Context, MeshObject
 from ..character import armatures, build, lods, runtime
 from ..life import duplicates
@@ -111,7 +111,7 @@ def _exchange(context: Context, change: Change, fresh: ArmatureObject) -> None:
     refit_joints.replace_control_places(context, change)
     build.remove(fresh)
     lods.show(rig)
-    runtime.forget_outputs()
+    written.forget()
     for item in (rig, parts.controls_there(rig), *parts.meshes_of(rig)):
         item.update_tag()
 
@@ -160,7 +160,7 @@ def _take_properties(change: Change, fresh: ArmatureObject) -> None:
         if rig.get(key, lods.SAME) not in (*levels, lods.SAME):
             rig[key] = levels[0]
     # Bones, channels and maps have other numbers now: nothing that was written before counts.
-    runtime.forget_outputs()
+    written.forget()
     for key in change.old.origin:
         controls.data.pop(names.cut(f"dna_{key}"), None)
     for key, value in change.new.origin.items():

@@ -12,7 +12,7 @@ from mathutils import Matrix, Quaternion
 from numpy.typing import NDArray
 
 from ... import native
-from ..base import parts
+from ..base import parts, written
 from ..base.blender_types import ArmatureObject, Depsgraph
 from ..character import runtime
 
@@ -111,10 +111,9 @@ def is_there(values: bpy.types.bpy_prop_collection, name: str, wanted: NDArray[n
 
 def writer_of(rig: ArmatureObject, live: runtime.Runtime) -> Writer:
     """The Writer of an armature as it is now."""
-    key = ("bones", rig.session_uid)
-    kept = runtime.outputs.get(key)
+    kept = written.bone_writers.get(rig.session_uid)
     if kept is None or kept.count != len(rig.pose.bones):
-        kept = runtime.outputs[key] = _make_writer(rig, live)
+        kept = written.bone_writers[rig.session_uid] = _make_writer(rig, live)
     return kept
 
 

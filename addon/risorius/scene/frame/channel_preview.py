@@ -14,9 +14,8 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base import parts
+from ..base import parts, written
 from ..base.blender_types import ArmatureObject
-from ..character import runtime
 
 
 def set_override(rig: ArmatureObject, channel: int, value: float) -> None:
@@ -42,7 +41,7 @@ def clear_all() -> bool:
     """End the overrides of all characters and bring the faces up without them."""
     ended = [rig for rig in parts.rigs() if clear(rig)]
     for rig in ended:
-        runtime.forget_outputs()
+        written.forget()
         controls = parts.controls_of(rig)
         if controls is not None:
             controls.update_tag()

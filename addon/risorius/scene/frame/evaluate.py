@@ -7,6 +7,8 @@ are stale while an animation renders) and written to the originals, in bulk.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from time import perf_counter
 
 import bpy
@@ -14,10 +16,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import native
-from ..base import parts
+from ..base import parts, written
 from ..base.blender_types import ArmatureObject, Context, Depsgraph, MeshObject
 from ..character import lods, meshes, rig_placement, runtime
 from . import bone_writer, channel_preview, inputs, timing
+
+_pauses: list[bool] = []
+
+
+@contextmanager
+def paused() -> Iterator[None]:
+    """While this lasts no frame and no update brings a face up: what is read is read by others."""
+    _pauses.append(True)
+    try:
+        yield
+    finally:
+        _pauses.pop()
+
+
+def is_paused() -> bool:
+    return bool(_pauses)
 
 
 def evaluate_all(depsgraph: Depsgraph, force: bool = False) -> None:
@@ -27,7 +45,7 @@ def evaluate_all(depsgraph: Depsgraph, force: bool = False) -> None:
         depsgraph: the evaluated dependency graph to read from.
         force: write also what seems unchanged.
     """
-    if native.problem() or runtime.is_paused():
+    if native.problem() or is_paused():
         return
     for rig in parts.rigs():
         evaluate(rig, depsgraph, force)
@@ -59,14 +77,14 @@ def evaluate(rig: ArmatureObject, depsgraph: Depsgraph, force: bool = False) -> 
     lod = min(max(lods.choose(rig, seen, depsgraph), 0), max(live.rig.lod_count - 1, 0))
     test = channel_preview.override(rig, raw, depsgraph.scene)
     state = (raw.tobytes(), lod, test, *((name, *turn) for name, turn in turns.items()))
-    if not _changed(rig, "inputs", state) and not force:
+    if not written.is_new(written.inputs, rig, state) and not force:
         return False
     times.append(perf_counter())
     pose = live.rig.evaluate(raw, lod)
     channel_preview.apply(test, pose.blend_shapes)
     times.append(perf_counter())
     taken = bone_writer.write(rig, live, pose.joints, turns, depsgraph)
-    note_refusal(rig, taken)
+    written.note_refusal(rig, taken)
     if not taken:
         return False  # channels and maps shall not move without the bones
     _write_values(rig, pose)
@@ -87,30 +105,9 @@ def bring_up(context: Context, rig: ArmatureObject) -> None:
     context.view_layer.update()
 
 
-def _changed(item: bpy.types.ID, what: str, state: object) -> bool:
-    key = (what, item.session_uid)
-    if runtime.outputs.get(key) == state:
-        return False
-    runtime.outputs[key] = state
-    return True
-
-
-def note_refusal(item: bpy.types.ID, taken: bool) -> None:
-    """Note whether Blender took what was written to an object: it refuses without a word."""
-    key = ("refused", item.session_uid)
-    if taken:
-        runtime.outputs.pop(key, None)
-    else:
-        runtime.outputs[key] = True
-
-
 def refused(rig: ArmatureObject) -> list[bpy.types.Object]:
     """Objects of a character, an override, that Blender lets nobody write to."""
-    return [
-        item
-        for item in (rig, *parts.meshes_of(rig))
-        if ("refused", item.session_uid) in runtime.outputs
-    ]
+    return [item for item in (rig, *parts.meshes_of(rig)) if written.is_refused(item)]
 
 
 def _write_values(rig: ArmatureObject, pose: native.Pose) -> None:
@@ -137,12 +134,13 @@ def _write_shape(
     if parts.REAL in key:
         weights = weights.copy()
         weights[list(key[parts.REAL])] = 0.0
-    if not _changed(key, "weights", weights[morph.channel_indices].tobytes()) and not force:
+    state = weights[morph.channel_indices].tobytes()
+    if not written.is_new(written.weights, key, state) and not force:
         return
     basis = meshes.points_of(key.reference_key)
     points = morph.evaluate(weights, base=basis)
     block.points.foreach_set("co", points.ravel())
     if item.data.library or item.data.override_library:
-        note_refusal(item, bone_writer.is_there(block.points, "co", points.ravel()))
+        written.note_refusal(item, bone_writer.is_there(block.points, "co", points.ravel()))
     key.update_tag()
     item.data.update_tag()

@@ -7,9 +7,9 @@ from collections.abc import Iterable
 
 import bpy
 
-from ..base import parts
+from ..base import parts, written
 from ..base.blender_types import ArmatureObject, MeshObject
-from ..character import armatures, meshes, runtime
+from ..character import armatures, meshes
 from ..material import materials
 
 
@@ -84,7 +84,7 @@ def _own_key_drivers(item: MeshObject, rig: ArmatureObject) -> None:
     names = meshes.real_channels(item)
     paths = {f'key_blocks["{bpy.utils.escape_identifier(n)}"].value' for n in names}
     if _retarget([c for c in key.animation_data.drivers if c.data_path in paths], rig):
-        runtime.forget_outputs()
+        written.forget()
 
 
 def retarget_materials(item: MeshObject, rig: ArmatureObject) -> None:

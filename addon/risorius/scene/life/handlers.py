@@ -11,7 +11,7 @@ from bpy.app.handlers import persistent
 
 from ... import native
 from ..animation import layer_mixing, layers
-from ..base import parts, sharing
+from ..base import parts, sharing, written
 from ..base.blender_types import ArmatureObject, Depsgraph, current_context
 from ..character import lods, rig_placement, runtime
 from ..frame import channel_preview, evaluate, timing
@@ -40,7 +40,7 @@ def _render_ended(*_arguments: object) -> None:
         controls = parts.controls_of(rig)
         apart = lods.by_distance(rig) or lods.render_level(rig) != lods.viewport_level(rig)
         if apart and controls is not None:
-            runtime.forget_outputs()
+            written.forget()
             controls.update_tag()
 
 
@@ -50,7 +50,7 @@ def _updated(_scene: bpy.types.Scene, depsgraph: Depsgraph) -> None:
     # While a render runs beside the interface, only its own frames are written.
     if _state["busy"] or bpy.app.is_job_running("RENDER") or native.problem():
         return
-    if runtime.is_paused():
+    if evaluate.is_paused():
         return
     _state["busy"] = True
     try:
@@ -117,7 +117,7 @@ def _edited(depsgraph: Depsgraph) -> list[ArmatureObject]:
                 armatures.add(item)
             camera_moved |= camera is not None and item == camera.original
     if bones_edited:
-        runtime.forget_outputs()
+        written.forget()
         for rig in repair.heal_all():
             _note_mended(rig)
     layer_mixing.note_edits(actions)
@@ -150,7 +150,7 @@ def _loaded(*_arguments: object) -> None:
     if layer is not None and not native.problem() and parts.rigs():
         layer.update()
         repair.heal_all()
-        runtime.forget_outputs()
+        written.forget()
         refresh()
     _restored()
 
@@ -162,7 +162,7 @@ def _restored(*_arguments: object) -> None:
     Nothing is read here: until the next update the pose bones of objects that undo brought back
     point to bones that are no more, and Blender dies of a look at them.
     """
-    runtime.forget_outputs()
+    written.forget()
     layer_mixing.forget()
     applied_transforms.forget()
     _state["objects"] = frozenset()

@@ -13,9 +13,9 @@ from typing import TypeVar
 import bpy
 
 from ...logic.base.errors import FaceError
-from ..base import compat, parts
+from ..base import compat, parts, written
 from ..base.blender_types import ArmatureObject, Context, MeshObject
-from ..character import meshes, runtime
+from ..character import meshes
 from ..frame import evaluate
 from . import duplicates
 
@@ -107,7 +107,7 @@ def own_shapes(rig: ArmatureObject, local_meshes: bool) -> list[str]:
         if live and not local_meshes:
             done.append(f"{item.name} has a live key: its mesh was copied into this file.")
     duplicates.separate(rig)
-    runtime.forget_outputs()
+    written.forget()
     return done
 
 

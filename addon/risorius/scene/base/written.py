@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What was last written to the objects of characters: what is unchanged is not written again.
+
+All of it is keyed by session uids, so that no Blender object is kept.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+
+inputs: dict[int, Any] = {}  # deforming armature -> what its face was last evaluated from
+places: dict[int, Any] = {}  # deforming armature -> bytes of the matrix that was last written
+weights: dict[int, Any] = {}  # shape key -> bytes of the channel weights of its sum
+bone_writers: dict[
+    int, Any
+] = {}  # deforming armature -> what writing to its bones needs, until they change
+_refused: set[int] = set()  # objects of overrides that Blender lets nobody write to
+
+
+def is_new(kept: dict[int, Any], item: bpy.types.ID, state: object) -> bool:
+    """Whether a state differs from the one that is kept of a datablock; it is kept from now on.
+
+    Args:
+        kept: `inputs`, `places` or `weights`.
+        item: the datablock.
+        state: anything that compares.
+    """
+    if kept.get(item.session_uid) == state:
+        return False
+    kept[item.session_uid] = state
+    return True
+
+
+def note_refusal(item: bpy.types.ID, taken: bool) -> None:
+    """Note whether Blender took what was written to an object: it refuses without a word."""
+    if taken:
+        _refused.discard(item.session_uid)
+    else:
+        _refused.add(item.session_uid)
+
+
+def is_refused(item: bpy.types.ID) -> bool:
+    """Whether Blender refused what was last written to an object."""
+    return item.session_uid in _refused
+
+
+def forget() -> None:
+    """Let the next evaluation write everything: after undo, load and changes of shape mode."""
+    for kept in (inputs, places, weights, bone_writers):
+        kept.clear()
+    _refused.clear()
