@@ -5,6 +5,7 @@ import bpy
 
 from . import native
 from .scene.animation import layer_properties
+from .scene.base import console
 from .scene.life import handlers
 from .scene.live import capture
 from .ui import about, animation, bake, export, expressions, face, file, layers, life, live, speech
@@ -57,7 +58,7 @@ def register() -> None:
     bpy.types.VIEW3D_MT_add.append(import_operators.draw_add)
     trouble = native.problem()
     if trouble:
-        print(f"Risorius: {trouble}")
+        console.say(trouble)
     handlers.register()
     capture.register()
     bpy.app.timers.register(_refresh_once, first_interval=0.0)

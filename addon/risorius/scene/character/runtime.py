@@ -16,7 +16,7 @@ from ... import native
 from ...logic.base import names
 from ...logic.base.space import Space, SpaceError, world_matrices, yaw_pitch
 from ...logic.character import plans
-from ..base import parts, storage, written
+from ..base import console, parts, storage, written
 from ..base.blender_types import ArmatureObject
 
 DEFAULT_EYE_ANGLE = float(np.radians(30.0))
@@ -95,7 +95,7 @@ def of(rig: ArmatureObject) -> Runtime | None:
         except (native.dna_error(), SpaceError, ValueError, LookupError) as error:
             # Said once, not at every frame; the panel says that the data is lost.
             words = names.printable(str(error)).rstrip(".")
-            print(f"Risorius: the data of {rig.name} cannot be read: {words}.")
+            console.say(f"the data of {rig.name} cannot be read: {words}.")
             _cache[key] = None
     return _cache[key]
 

@@ -23,10 +23,10 @@ from ...logic.base.errors import FaceError
 from ...logic.material import uv_grid
 from ..base import compat
 from ..base.blender_types import MeshObject, Node, NodeTree, Socket
+from ..base.console import quiet
 from ..material import image_loading
 from . import shader_inputs
 from .lent_names import Loans
-from .quiet import quiet
 
 _INPUTS = {"color": ("Base Color", "Color"), "alpha": ("Alpha",), "roughness": ("Roughness",)}
 _MASKS = ("alpha", "roughness")  # baked together

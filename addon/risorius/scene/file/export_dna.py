@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ... import native
 from ...logic.base.errors import FaceError
 from ...logic.character import plans, user_edits
-from ..base import parts, storage
+from ..base import console, parts, storage
 from ..base.blender_types import ArmatureObject, Context, MeshObject
 from ..character import armatures, lods, runtime, skin_weights
 from . import refit_joints, refit_meshes
@@ -260,5 +260,4 @@ def _keep_report(rig: ArmatureObject, sentences: Sequence[str]) -> None:
     title = f"{rig.name.removesuffix('_rig')} export report"
     text = bpy.data.texts.get(title) or bpy.data.texts.new(title)
     text.from_string("\n".join(sentences) + "\n")
-    for sentence in sentences:
-        print(f"Risorius: {sentence}")
+    console.say(*sentences)

@@ -16,7 +16,7 @@ import bpy
 from ...logic.base import names
 from ...logic.base.errors import FaceError
 from ...logic.character import plans
-from ..base import drivers, parts, written
+from ..base import console, drivers, parts, written
 from ..base.blender_types import ArmatureObject, Context, MeshObject
 from ..character import armatures, build, lods, runtime
 from ..life import duplicates
@@ -256,5 +256,4 @@ def _keep_report(change: Change) -> None:
     text = bpy.data.texts.get(title) or bpy.data.texts.new(title)
     lines = [f"{name} is now {Path(change.rig[parts.SOURCE]).name}.", *change.report]
     text.from_string("\n".join(lines) + "\n")
-    for line in lines:
-        print(f"Risorius: {line}")
+    console.say(*lines)

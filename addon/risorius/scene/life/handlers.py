@@ -11,7 +11,7 @@ from bpy.app.handlers import persistent
 
 from ... import native
 from ..animation import layer_mixing, layers
-from ..base import parts, sharing, written
+from ..base import console, parts, sharing, written
 from ..base.blender_types import ArmatureObject, Depsgraph, current_context
 from ..character import lods, rig_placement, runtime
 from ..frame import channel_preview, evaluate, timing
@@ -56,7 +56,7 @@ def _updated(_scene: bpy.types.Scene, depsgraph: Depsgraph) -> None:
     try:
         _notice_copies(depsgraph.updates)
         # A change of a colour space is among the updates, one of pixels is not.
-        _say(sharing.separate(spaces=depsgraph.id_type_updated("IMAGE")))
+        console.say(*sharing.separate(spaces=depsgraph.id_type_updated("IMAGE")))
         waiting, _state["mended"] = _state["mended"], set()
         edited = _edited(depsgraph)
         edited += [rig for rig in parts.rigs() if rig.session_uid in waiting and rig not in edited]
@@ -72,7 +72,7 @@ def _updated(_scene: bpy.types.Scene, depsgraph: Depsgraph) -> None:
 
 def _mend(rig: ArmatureObject) -> bool:
     done = repair.heal(rig)
-    _say(done)
+    console.say(*done)
     if done:
         _note_mended(rig)
     return rig.session_uid in _state["mended"]
@@ -92,14 +92,9 @@ def _notice_copies(updates: Iterable[bpy.types.DepsgraphUpdate]) -> None:
         _state["objects"] = {item.session_uid for item in bpy.data.objects}
         runtime.forget_unused(parts.rigs())
         layer_mixing.forget_unused(map(parts.controls_of, parts.rigs()))
-        _say(migrations.bring_up_all())
-        _say(duplicates.separate_all())
+        console.say(*migrations.bring_up_all())
+        console.say(*duplicates.separate_all())
         sharing.keep()
-
-
-def _say(sentences: Iterable[str]) -> None:
-    for sentence in sentences:
-        print(f"Risorius: {sentence}")
 
 
 def _edited(depsgraph: Depsgraph) -> list[ArmatureObject]:
@@ -146,7 +141,7 @@ def _loaded(*_arguments: object) -> None:
     layer = current_context().view_layer
     migrations.forget()
     if not native.problem():
-        _say(migrations.bring_up_all())
+        console.say(*migrations.bring_up_all())
     if layer is not None and not native.problem() and parts.rigs():
         layer.update()
         repair.heal_all()
@@ -181,7 +176,7 @@ def _before_save(*_arguments: object) -> None:
     duplicates.separate_all()
     _end_tests()
     repair.remove_dead()
-    _say(sharing.share())
+    console.say(*sharing.share())
 
 
 @persistent

@@ -11,7 +11,7 @@ from __future__ import annotations
 import bpy
 
 from ...logic.character import plans
-from ..base import parts
+from ..base import console, parts
 from ..base.blender_types import ArmatureObject
 from ..character import armatures, build, meshes, runtime
 from . import applied_transforms
@@ -41,8 +41,7 @@ def heal_all() -> list[ArmatureObject]:
     mended = []
     for rig in parts.rigs():
         done = heal(rig)
-        for sentence in done:
-            print(f"Risorius: {sentence}")
+        console.say(*done)
         mended += [rig] * bool(done)
     return mended
 

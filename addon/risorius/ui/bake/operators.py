@@ -8,6 +8,7 @@ import bpy
 
 from ... import native
 from ...scene.bake import bake_face
+from ...scene.base import console
 from .. import words
 from ..common import shown_progress
 from .selection import FacesOperator, FrameRange, selected_rigs
@@ -97,7 +98,7 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, bpy.types.Operator):
         with shown_progress(context):
             while not self._step(context, job, seconds=1.0):
                 if bpy.app.background:
-                    print(f"Risorius: baking, {self._share:.0%}", flush=True)
+                    console.say(f"baking, {self._share:.0%}")
         return self._result
 
     def _begin(self, context, job):

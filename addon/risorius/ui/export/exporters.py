@@ -4,7 +4,7 @@
 import bpy
 
 from ...logic.base.errors import FaceError
-from ...scene.export.quiet import quiet
+from ...scene.base.console import quiet
 
 FORMATS = (
     ("GLTF", "glTF", "Bones and shape keys, one binary .glb file"),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Blender tells the console of its progress is kept from it while it works for us."""
+"""What the console is told: our own sentences, and none of Blender's while it works for us."""
 
 from __future__ import annotations
 
@@ -9,6 +9,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout, suppress
 
 import bpy
+
+
+def say(*sentences: str) -> None:
+    """Write sentences to the console."""
+    for sentence in sentences:
+        print(f"Risorius: {sentence}", flush=True)
 
 
 @contextmanager
