@@ -53,7 +53,7 @@ class Settings:
     """
 
     source: str = "livelink"
-    port: int = 11111
+    port: int = 0
     everywhere: bool = False
     subject: str = ""
     smoothing: float = 0.3

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from ..base.easing import smooth_step
 from ..base.errors import ArgumentError
 from .clip import Clip, Event
 
@@ -240,14 +241,9 @@ def _blink(dice: _Dice, start: float) -> Blink:
 def lid(blink: Blink, times: npt.ArrayLike) -> Doubles:
     """How far a blink closes the left lid at times, in [0, 1]: down fast, up slower and slower."""
     t = np.asarray(times, np.float64) - blink.start
-    down = np.clip(t / blink.close, 0.0, 1.0)
     up = np.clip((t - blink.close - blink.hold) / blink.open, 0.0, 1.0)
-    eased = up * (2.0 - up)
-    return (
-        blink.amount
-        * (down * down * (3.0 - 2.0 * down))
-        * (1.0 - eased * eased * (3.0 - 2.0 * eased))
-    )
+    down, back = smooth_step(t / blink.close), smooth_step(up * (2.0 - up))
+    return blink.amount * down * (1.0 - back)
 
 
 def _close_lids(

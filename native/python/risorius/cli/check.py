@@ -9,7 +9,8 @@ from typing import Any
 
 import risorius
 
-from .files import InputError, counted, from_json, summary
+from ..base.words import counted
+from .files import InputError, from_json, summary
 
 _DESCRIPTION = """\
 Prints a line for everything that is wrong (an error: the file is refused) or odd (a warning) in

@@ -13,7 +13,8 @@ import risorius
 from risorius import Clip, importing
 from risorius.importing import process
 
-from .files import CommandLineError, counted, refuse_same_file, require_writable
+from ..base.words import counted
+from .files import CommandLineError, refuse_same_file, require_writable
 
 OUTPUTS = (".rzc", ".csv", ".json")
 _MAPPING = (

@@ -14,11 +14,11 @@ from typing import Any
 import risorius
 
 from ..base import fileio
+from ..base.words import counted
 from .files import (
     KINDS,
     CommandLineError,
     InputError,
-    counted,
     kind_of,
     label,
     read,

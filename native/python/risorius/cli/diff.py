@@ -8,8 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from ..base.words import counted
 from ..diff import Difference, compare
-from .files import CommandLineError, InputError, counted, kind_of, read, summary
+from .files import CommandLineError, InputError, kind_of, read, summary
 
 _LINES = 8  # so many lines for one field are printed
 

@@ -13,12 +13,12 @@ from typing import Any
 import risorius
 
 from ..base import toml
+from ..base.words import counted
 from ..rigs import edit
 from .convert import json_text, version_of, warnings_as_lines, write
 from .files import (
     CommandLineError,
     InputError,
-    counted,
     kind_of,
     label,
     read,

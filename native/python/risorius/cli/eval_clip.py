@@ -18,7 +18,8 @@ from risorius.baking.progress import Progress
 from risorius.base import fileio
 from risorius.base.errors import ArgumentError
 
-from .files import CommandLineError, counted, refuse_same_file, require_writable
+from ..base.words import counted
+from .files import CommandLineError, refuse_same_file, require_writable
 
 OPTIONS = ("mapping", "rate", "frames", "what", "quaternions", "compress")
 SUFFIXES = {".npz": "npz", ".csv": "csv"}

@@ -11,6 +11,7 @@ from pathlib import Path
 import risorius
 from risorius.base import fileio
 from risorius.base.errors import RisoriusError
+from risorius.base.words import counted
 
 KINDS = ("dna", "json")
 
@@ -169,8 +170,3 @@ def summary(dna: risorius.Dna) -> str:
         f"{dna.generation}.{dna.version}, {counted(dna.lod_count, 'LOD')}, "
         f"{counted(len(dna.joint_names), 'joint')}"
     )
-
-
-def counted(number: int, noun: str) -> str:
-    """A number with its noun, e.g. "1 joint" or "1,203 joints"; the plural has an s."""
-    return f"{number:,} {noun}{'' if number == 1 else 's'}"

@@ -19,6 +19,7 @@ from .. import (
     Psds,
 )
 from ..base import fileio
+from ..base.easing import smooth_step
 from . import expressions as ex
 from .controls import gui_table
 from .paint import paint_textures
@@ -198,7 +199,7 @@ def spine_weights(positions: Floats, joints: dict[str, Floats]) -> Floats:
     out = np.zeros((len(positions), len(JOINTS)))
     rest = np.ones(len(positions))
     for k in range(3):
-        up = ex.smooth_step((height - middles[k]) / (middles[k + 1] - middles[k]))
+        up = smooth_step((height - middles[k]) / (middles[k + 1] - middles[k]))
         out[:, k] = rest * (1 - up)
         rest = rest * up
     out[:, 3] = rest

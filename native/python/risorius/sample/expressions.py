@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..base.easing import smooth_step
 from ..controls.arkit import mapping
 from .polygons import Floats
 from .source import TARGETS, Source
@@ -21,11 +22,6 @@ class Expression:
 
     displacement: Floats  # [V, 3] in decimetres: the whole motion
     joints: dict[str, tuple[Floats, Floats]] = field(default_factory=dict)  # rotation, translation
-
-
-def smooth_step(x: Floats) -> Floats:
-    t = np.clip(x, 0, 1)
-    return t * t * (3 - 2 * t)
 
 
 def side_masks(positions: Floats) -> dict[str, Floats]:

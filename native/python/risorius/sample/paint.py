@@ -11,6 +11,7 @@ import zlib
 
 import numpy as np
 
+from ..base.easing import smooth_step
 from .expressions import Expression
 from .part import Part
 from .people import Person
@@ -42,8 +43,7 @@ def png(image: Floats) -> bytes:
 
 def smooth(low: float, high: float, x: Floats) -> Floats:
     """0 where x is at low, 1 where it is at high, and smoothly in between; held beyond both."""
-    t = np.clip((x - low) / (high - low), 0, 1)
-    return t * t * (3 - 2 * t)
+    return smooth_step((x - low) / (high - low))
 
 
 def noise(size: int, cells: int, random: np.random.Generator) -> Floats:
@@ -57,8 +57,7 @@ def noise(size: int, cells: int, random: np.random.Generator) -> Floats:
     grid = random.uniform(-1, 1, (cells + 1, cells + 1))
     at = np.linspace(0, cells, size, endpoint=False)
     low = at.astype(int)
-    t = at - low
-    t = t * t * (3 - 2 * t)
+    t = smooth_step(at - low)
     rows = grid[low] * (1 - t)[:, None] + grid[low + 1] * t[:, None]
     return rows[:, low] * (1 - t) + rows[:, low + 1] * t
 

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .. import expressions
+from ..base.easing import smooth_step
 from .phones import GLIDES, VISEMES, VOWEL_VISEMES, Phoneme, viseme_of
 
 Curves = npt.NDArray[np.float64]
@@ -118,12 +119,6 @@ def gate(phonemes: Sequence[Phoneme], viseme: str, times: Times) -> Curves:
         falling = smooth_step((end + opening - t) / opening)
         closed[first:last] = np.maximum(closed[first:last], np.minimum(rising, falling))
     return closed
-
-
-def smooth_step(x: Curves) -> Curves:
-    """0 below 0, 1 above 1, and smooth in between."""
-    t = np.clip(x, 0.0, 1.0)
-    return t * t * (3.0 - 2.0 * t)
 
 
 def _smoothed(curves: Curves, times: Times) -> Curves:

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .articulation import Curves, Times, smooth_step
+from ..base.easing import smooth_step
+from .articulation import Curves, Times
 from .phones import Phoneme
 from .prosody import Accent
 

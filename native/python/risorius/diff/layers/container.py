@@ -3,10 +3,10 @@
 
 from __future__ import annotations
 
+from ...base.words import counted
 from ..pairing.common import Place
 from ..pairing.comparison import Comparison
 from ..pairing.pairs import pair_names
-from ..pairing.report import counted
 
 
 def compare(c: Comparison) -> None:

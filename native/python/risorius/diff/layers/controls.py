@@ -7,11 +7,11 @@ import numpy as np
 
 import risorius
 
+from ...base.words import counted
 from ..pairing.amounts import Floats
 from ..pairing.common import Place, only_in, order, real, rows_per_lod, value
 from ..pairing.comparison import Comparison
 from ..pairing.pairs import Ints, Pairs, pair, pair_rows
-from ..pairing.report import counted
 from ..pairing.spaces import Space
 
 _COLUMNS = ("from_values", "to_values", "slope_values", "cut_values")

@@ -5,11 +5,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...base.words import counted
 from ..pairing.amounts import Floats
 from ..pairing.common import Place, lod_mapping, only_in, order
 from ..pairing.comparison import Comparison
 from ..pairing.pairs import Ints, pair_rows
-from ..pairing.report import counted
 from ..pairing.spaces import Space
 
 

@@ -8,11 +8,11 @@ import numpy.typing as npt
 
 import risorius
 
+from ...base.words import counted
 from ..pairing.amounts import Floats
 from ..pairing.common import Place, value
 from ..pairing.comparison import Comparison
 from ..pairing.pairs import Bools, Ints, integers
-from ..pairing.report import counted
 from .skin import compare_skin
 from .targets import compare_targets
 

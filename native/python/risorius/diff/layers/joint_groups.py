@@ -7,11 +7,11 @@ import numpy as np
 
 import risorius
 
+from ...base.words import counted, joined
 from ..pairing.amounts import Floats
 from ..pairing.common import Place, cut, members, order, rows_per_lod, value
 from ..pairing.comparison import Comparison
 from ..pairing.pairs import Bools, Ints, Pairs, pair, pair_sets
-from ..pairing.report import counted, joined
 
 
 def compare(c: Comparison) -> None:

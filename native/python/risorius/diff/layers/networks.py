@@ -10,10 +10,10 @@ import numpy as np
 
 import risorius
 
+from ...base.words import counted
 from ..pairing.common import Place, choice, lod_mapping, members, only_in, order, reals
 from ..pairing.comparison import Comparison
 from ..pairing.pairs import pair_names
-from ..pairing.report import counted
 from .definition import names
 
 _ACTIVATIONS = ("linear", "relu", "leaky relu", "tanh", "sigmoid")

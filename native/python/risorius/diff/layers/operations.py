@@ -8,10 +8,10 @@ import numpy.typing as npt
 
 import risorius
 
+from ...base.words import counted
 from ..pairing.common import Place, choice, lod_mapping, order
 from ..pairing.comparison import Comparison
 from ..pairing.pairs import Ints, integers, pair, pair_in_place
-from ..pairing.report import counted
 from ..pairing.spaces import Space
 
 _TYPES = ("unspecified", "gather", "scatter", "MLP", "weighted sum")

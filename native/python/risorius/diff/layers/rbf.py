@@ -7,10 +7,10 @@ import numpy as np
 
 import risorius
 
+from ...base.words import counted
 from ..pairing.common import Place, choice, cut, lod_mapping, members, real, reals
 from ..pairing.comparison import Comparison
 from ..pairing.pairs import pair
-from ..pairing.report import counted
 from .definition import names
 
 _CHOICES = {

@@ -9,10 +9,10 @@ import numpy as np
 
 import risorius
 
+from ...base.words import counted
 from ..pairing.common import Place, choice, members, only_in, order, real
 from ..pairing.comparison import Comparison
 from ..pairing.pairs import pair, pair_sets
-from ..pairing.report import counted
 from ..pairing.spaces import Space
 
 _REPRESENTATIONS = (

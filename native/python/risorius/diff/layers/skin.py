@@ -7,9 +7,9 @@ import numpy as np
 
 import risorius
 
+from ...base.words import counted
 from ..pairing.common import Place, order
 from ..pairing.pairs import Ints, integers, pair_rows
-from ..pairing.report import counted
 
 
 def compare_skin(place: Place, a: risorius.Mesh, b: risorius.Mesh) -> None:

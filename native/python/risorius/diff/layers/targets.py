@@ -7,9 +7,9 @@ import numpy as np
 
 import risorius
 
+from ...base.words import counted
 from ..pairing.common import Place, more_and_less
 from ..pairing.pairs import integers, pair
-from ..pairing.report import counted
 
 
 def compare_targets(place: Place, a: risorius.Mesh, b: risorius.Mesh) -> None:

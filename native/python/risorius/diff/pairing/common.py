@@ -11,10 +11,10 @@ import numpy.typing as npt
 
 import risorius
 
+from ...base.words import counted
 from .amounts import Floats
 from .comparison import Comparison
 from .pairs import Ints, Pairs, pair
-from .report import counted
 from .spaces import Space
 
 

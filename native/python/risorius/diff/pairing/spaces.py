@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from ...base.words import plural
 from .pairs import Ints, Pairs, integers
-from .report import plural
 
 _OUTSIDE = 1 << 40  # indices beyond a list get numbers from here on
 
