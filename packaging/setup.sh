@@ -78,6 +78,13 @@ make_venv() {
   touch "$stamp"
 }
 
+quality_tools() { # clang-tidy, coverage.py and gcovr, which test.sh does without
+  local stamp
+  stamp="$venv/.quality-$(sha256sum "$project/packaging/quality_requirements.txt" | cut -c1-16)"
+  [ -e "$stamp" ] && return 0
+  "$python" -m pip install -q -r "$project/packaging/quality_requirements.txt" && touch "$stamp"
+}
+
 # bpy_venv VERSION [SECONDS]: prints the Python of a venv with this bpy and pytest; it is made
 # unless that takes longer. The project's own venv has the bpy of requirements.txt.
 bpy_venv() {
