@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: MIT
+"""Finds second definitions of what words.toml says is defined once."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+
+WORDS = tomllib.loads((Path(__file__).parent / "words.toml").read_text(encoding="utf-8"))
+FOLDERS = ("native", "addon")
+KINDS = (".h", ".cpp", ".py", ".toml")
+
+
+def product_files(root: Path) -> dict[str, str]:
+    """Path below root -> text of each file of native, the package and the add-on."""
+    return {
+        path.relative_to(root).as_posix(): path.read_text(encoding="utf-8")
+        for folder in FOLDERS
+        for path in sorted((root / folder).rglob("*"))
+        if path.suffix in KINDS
+    }
+
+
+def defines(word: Mapping, path: str, text: str) -> bool:
+    """Whether a file has a definition of a word: a table of words.toml."""
+    if not path.endswith(word.get("in", "")):
+        return False
+    if "words" in word:
+        return sum(name in text for name in word["words"]) > word["most"]
+    return re.search(word["is"], _code(path, text), re.MULTILINE) is not None
+
+
+def _code(path: str, text: str) -> str:
+    comment = r"//.*" if path.endswith((".h", ".cpp")) else r"^\s*#.*"
+    return re.sub(comment, "", text, flags=re.MULTILINE)
+
+
+def second_definitions(word: Mapping, files: Mapping[str, str]) -> list[str]:
+    """The files that define a word beside its home; and the home, and others that may, if not."""
+    found = {path for path, text in files.items() if defines(word, path, text)}
+    return sorted(found ^ {word["home"], *word.get("also", {})})
