@@ -8,7 +8,7 @@ import pytest
 from docstrings import public_functions, unsaid
 
 ROOT = Path(__file__).resolve().parents[2]
-FOLDERS = ["native/python/risorius"]
+FOLDERS = ["native/python/risorius", "addon/risorius/logic"]
 
 
 def found_in(source):

@@ -46,7 +46,12 @@ class Timing:
         return self.origin + (np.asarray(frames, np.float64) - self.start) / self.rate
 
     def placed(self, frames: Float, values: Float) -> tuple[Float, Float]:
-        """Keys where they lie in the scene: as they are, or on whole frames."""
+        """Keys where they lie in the scene: as they are, or on whole frames.
+
+        Args:
+            frames: float[keys], frames of the scene.
+            values: float[keys], or [keys, n].
+        """
         return onto_frames(frames, values) if self.whole else (frames, values)
 
 
@@ -102,6 +107,10 @@ def property_names(dna_names: Sequence[str], labels: Sequence[str]) -> dict[str,
     """The slider of each name that a curve may have: the DNA's own, and Blender's cut one.
 
     Where the DNA has a name twice, it means the first.
+
+    Args:
+        dna_names: of the controls, as the DNA has them.
+        labels: of the same controls, as Blender has them.
     """
     found = dict(zip(reversed(dna_names), reversed(labels), strict=True))
     found.update(zip(labels, labels, strict=True))

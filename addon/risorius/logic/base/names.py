@@ -60,6 +60,10 @@ def printable(text: str, limit: int = 400) -> str:
     """A text of a file as it may be shown: one line, and what cannot be printed as `?`.
 
     A zero byte would end the text where Blender shows it.
+
+    Args:
+        text: as the file has it.
+        limit: letters that are shown at most; a longer text ends in "...".
     """
     shown = "".join(c if c.isprintable() else " " if c.isspace() else "?" for c in text)
     return shown if len(shown) <= limit else f"{shown[: limit - 3]}..."

@@ -153,7 +153,12 @@ def layer_warnings(layers: Sequence[str]) -> list[str]:
 
 
 def space_of(dna: DnaData, unit_scale: float) -> Space:
-    """The Space of a Dna in a scene of `unit_scale` metres per unit."""
+    """The Space of a face in a scene.
+
+    Args:
+        dna: the face.
+        unit_scale: metres per unit of the scene.
+    """
     return make_space(
         dna.coordinate_system,
         dna.translation_unit,
@@ -254,7 +259,12 @@ def _mesh_lods(dna: DnaData) -> list[tuple[int, ...]]:
 
 
 def existing_lods(dna: DnaData, wanted: Sequence[int]) -> tuple[int, ...]:
-    """Those levels of `wanted` that have meshes in a file, else its finest one."""
+    """Those levels of `wanted` that have meshes in a file, else its finest one.
+
+    Args:
+        dna: the face.
+        wanted: LODs, 0 is the finest.
+    """
     there = sorted({level for levels in _mesh_lods(dna) for level in levels})
     return tuple(level for level in wanted if level in there) or tuple(there[:1])
 

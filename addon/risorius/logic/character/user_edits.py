@@ -19,12 +19,22 @@ Mask = NDArray[np.bool_]
 
 
 def changed(present: Float32, imported: Float32) -> Mask:
-    """Which coordinates of positions differ from the imported ones, bool[V, 3]."""
+    """Which coordinates of positions differ from the imported ones, bool[V, 3].
+
+    Args:
+        present, imported: float32[V, 3].
+    """
     return np.asarray(present != imported)
 
 
 def shaped(basis: Float32, indices: NDArray[np.int64], deltas: Float32) -> Float32:
-    """Coordinates of a shape key as the import makes them: the basis plus sparse deltas."""
+    """Coordinates of a shape key as the import makes them: the basis plus sparse deltas.
+
+    Args:
+        basis: float32[V, 3].
+        indices: int64[n], vertices that move.
+        deltas: float32[n, 3], by how much.
+    """
     points = basis.copy()
     np.add.at(points, indices, deltas)
     return points

@@ -64,7 +64,12 @@ class MapUse:
 
 
 def use_of(index: int, label: str) -> MapUse:
-    """What a map does: `head_cm1_color.head_wm1_blink_L` tints the left eye with set 1."""
+    """What a map does: `head_cm1_color.head_wm1_blink_L` tints the left eye with set 1.
+
+    Args:
+        index: of the map in the DNA.
+        label: name of the map.
+    """
     word = label.lower()
     found = _REGION.search(label)
     region = found.group(0).lower() if found else ""

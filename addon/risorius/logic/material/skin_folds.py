@@ -71,7 +71,12 @@ def find_frame(eyes: Sequence[Float], head: Points, mouth: Points | None) -> Fac
 
 
 def face_coordinates(points: Points, frame: FaceFrame) -> NDArray[np.float64]:
-    """float64[V, 3]: x, depth and height of points, measured from between the eyes."""
+    """float64[V, 3]: x, depth and height of points, measured from between the eyes.
+
+    Args:
+        points: float[V, 3], in the space of the frame.
+        frame: where the face is, and how large.
+    """
     local = (np.asarray(points, float) - frame.origin) / frame.unit
     below = local[:, 2] < 0
     local[below, 2] *= frame.unit / frame.drop
@@ -105,14 +110,24 @@ def area_masks(points: Points, frame: FaceFrame) -> dict[str, Float32]:
 
 
 def fold_coordinates(points: Points, frame: FaceFrame) -> Float32:
-    """float32[V, 3]: x and height of face_coordinates, and the distance from the mouth."""
+    """float32[V, 3]: x and height of face_coordinates, and the distance from the mouth.
+
+    Args:
+        points: float[V, 3], in the space of the frame.
+        frame: where the face is, and how large.
+    """
     local = face_coordinates(points, frame)
     x, z = local[:, 0], local[:, 2]
     return np.stack([x, z, np.hypot(x, (z + 1.0) * 0.8)], axis=1).astype(np.float32)
 
 
 def left_share(points: Points, frame: FaceFrame) -> Float32:
-    """float32[V]: 1 on the character's left, 0 on its right, soft between."""
+    """float32[V]: 1 on the character's left, 0 on its right, soft between.
+
+    Args:
+        points: float[V, 3], in the space of the frame.
+        frame: where the face is, and how large.
+    """
     x = face_coordinates(points, frame)[:, 0]
     return _smooth(x / 0.3 + 0.5).astype(np.float32)
 

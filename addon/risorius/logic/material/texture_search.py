@@ -116,7 +116,12 @@ class TexturePlan:
     missing: list[str] = field(default_factory=list)
 
     def of(self, base: str, role: str) -> Path | None:
-        """The file of an input of a mesh's material."""
+        """The file of an input of a mesh's material; None where none was found.
+
+        Args:
+            base: of the mesh's name, as in `files`.
+            role: of the input.
+        """
         return self.files.get((base, role))
 
     def summary(self) -> str:
@@ -210,7 +215,12 @@ def part_of(base: str, kind: str, skins: Sequence[str]) -> tuple[str, str]:
 
 
 def folders_of(dna_path: Path, chosen: str = "") -> list[Path]:
-    """Folders to look in, the user's own first; only those that are there."""
+    """Folders to look in, the user's own first; only those that are there.
+
+    Args:
+        dna_path: of the DNA file.
+        chosen: the user's own folder; "": none.
+    """
     places = [Path(chosen)] if chosen else []
     if chosen:
         places += [Path(chosen) / n for n in ("Maps", "maps", "Masks", "masks")]
