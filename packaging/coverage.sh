@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 # coverage.sh: the lines that no test runs, file by file: of native/ (gcovr) in GoogleTest and in the
 # Python tests, of the package and of the add-on (coverage.py) in those and in the Blender tests of
-# bpy 4.5. Half an hour on two cores. Leaves build/coverage/native.txt and build/coverage/python.txt.
+# bpy 4.5. No part of test.sh. Leaves build/coverage/native.txt and build/coverage/python.txt.
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"
 cd "$project"

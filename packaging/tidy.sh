@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
 # tidy.sh [FILE...]: clang-tidy (exact version in quality_requirements.txt, checks in .clang-tidy) over
-# native/, or over these files; 4 minutes of CPU. Exit code 0 only if it found nothing.
+# native/, or over these files. Exit code 0 only if it found nothing. No part of test.sh.
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"
 cd "$project"
