@@ -13,7 +13,7 @@ prefix="$out/prefix" # packages that only have headers, and GoogleTest for aarch
 tools="$out/tools"
 jobs=$(nproc)
 # Quick ones: the hostile bytes of hostile_test take minutes here and mean the same everywhere.
-programs=(core_test bytes_test simd_test rig_test compile_test dna_test dna_partial_test clip_test threads_test)
+programs=(core_test bytes_test byte_order_test simd_test rig_test compile_test dna_test dna_partial_test clip_test threads_test)
 failed=0
 
 row() { # row NAME PASSED FAILED; no test at all is a failure

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include <bit>
 #include <functional>
 #include <set>
 
 #include "bindings/numpy_arrays.h"
 #include "compile/compile.h"
+#include "core/finite.h"
 #include "core/parallel_for.h"
 #include "dna/validate.h"
 #include "rig/block.h"
@@ -41,15 +41,9 @@ FloatArray vector_argument(const py::object& object, const char* name, std::size
   return array;
 }
 
-// Exponents of all ones are infinities and NaN; without an early exit the compiler vectorises.
 void require_finite(const FloatArray& array, const char* name) {
-  constexpr std::uint32_t kExponent = 0x7f800000u;
-  const float* begin = array.data();
-  std::uint32_t spoiled = 0;
-  for (py::ssize_t i = 0; i < array.size(); ++i) {
-    spoiled |= (std::bit_cast<std::uint32_t>(begin[i]) & kExponent) == kExponent ? 1u : 0u;
-  }
-  if (spoiled != 0) throw py::value_error(std::string(name) + ": finite numbers were expected");
+  if (core::all_finite({array.data(), static_cast<std::size_t>(array.size())})) return;
+  throw py::value_error(std::string(name) + ": finite numbers were expected");
 }
 
 py::list quaternion_column_orders(const dna::Dna& dna) {

@@ -2,7 +2,6 @@
 #include "bytes/byte_reader.h"
 
 #include <algorithm>
-#include <bit>
 #include <cstring>
 
 namespace risorius::core {
@@ -12,69 +11,10 @@ namespace {
 constexpr std::size_t kFirstRead = 512;
 constexpr std::size_t kWindowBytes = 64 * 1024;  // stays in the cache between kernel and swap
 
-// Numbers from the file's byte order. What passes over every byte of a file should be as wide as
-// the machine: the functions below exist twice, compiled for any x86-64 and for AVX2.
-#if defined(__x86_64__) && defined(__GNUC__)
-#define RISORIUS_INLINE inline __attribute__((always_inline))
-#define RISORIUS_TARGET_AVX2 __attribute__((target("avx2")))
-const bool kHasAvx2 = __builtin_cpu_supports("avx2") != 0;
-#else
-#define RISORIUS_INLINE inline
-#define RISORIUS_TARGET_AVX2
-constexpr bool kHasAvx2 = false;
-#endif
-
-RISORIUS_INLINE std::uint16_t big_endian(std::uint16_t v) {
-  if constexpr (std::endian::native == std::endian::big) return v;
-  return static_cast<std::uint16_t>((v >> 8) | (v << 8));
-}
-
-RISORIUS_INLINE std::uint32_t big_endian(std::uint32_t v) {
-  if constexpr (std::endian::native == std::endian::big) return v;
-  return (v >> 24) | ((v >> 8) & 0xFF00u) | ((v << 8) & 0xFF0000u) | (v << 24);
-}
-
-struct NothingSeen {
-  template <class Word>
-  RISORIUS_INLINE void see(Word) {}
-};
-struct Largest {
-  std::uint32_t value = 0;
-  RISORIUS_INLINE void see(std::uint32_t v) { value = v > value ? v : value; }
-};
-// Bit 31 is set when an exponent is all ones: infinite or no number.
-struct Exponents {
-  std::uint32_t carries = 0;
-  RISORIUS_INLINE void see(std::uint32_t v) { carries |= (v & 0x7FFFFFFFu) + 0x00800000u; }
-};
-
-template <class Word, class T, class Seen>
-RISORIUS_INLINE Seen to_native_inline(const std::uint8_t* from, T* to, std::size_t n) {
-  Seen seen;
-  for (std::size_t i = 0; i < n; ++i) {
-    Word v;
-    std::memcpy(&v, from + sizeof(Word) * i, sizeof(Word));
-    v = big_endian(v);
-    std::memcpy(to + i, &v, sizeof(Word));
-    seen.see(v);
-  }
-  return seen;
-}
-
-template <class Word, class T, class Seen>
-RISORIUS_TARGET_AVX2 Seen to_native_avx2(const std::uint8_t* from, T* to, std::size_t n) {
-  return to_native_inline<Word, T, Seen>(from, to, n);
-}
-
-template <class Word, class Seen, class T>
-Seen to_native(const std::uint8_t* from, T* to, std::size_t n) {
-  return kHasAvx2 ? to_native_avx2<Word, T, Seen>(from, to, n)
-                  : to_native_inline<Word, T, Seen>(from, to, n);
-}
-
 }  // namespace
 
-ByteReader::ByteReader(Source& source) : source_(&source), end_(source.size()) {
+ByteReader::ByteReader(Source& source, const simd::Kernels& kernels)
+    : kernels_(&kernels), source_(&source), end_(source.size()) {
   const std::span<const std::uint8_t> view = source.view();
   if (view.size() == end_) {
     first_ = at_ = view.data();
@@ -251,26 +191,26 @@ void ByteReader::skip(std::uint64_t size) {
 }
 
 void ByteReader::read_f32(float* out, std::size_t n, bool* all_finite) {
-  Exponents seen;
+  bool finite = true;
   for_runs<4>(n, [&](const std::uint8_t* from, std::size_t run) {
-    seen.carries |= to_native<std::uint32_t, Exponents>(from, out, run).carries;
+    finite = kernels_->native_f32(from, out, run) && finite;
     out += run;
   });
-  if (all_finite != nullptr && (seen.carries >> 31) != 0) *all_finite = false;
+  if (all_finite != nullptr && !finite) *all_finite = false;
 }
 void ByteReader::read_u16(std::uint16_t* out, std::size_t n) {
   for_runs<2>(n, [&](const std::uint8_t* from, std::size_t run) {
-    to_native<std::uint16_t, NothingSeen>(from, out, run);
+    kernels_->native_u16(from, out, run);
     out += run;
   });
 }
 void ByteReader::read_u32(std::uint32_t* out, std::size_t n, std::uint32_t* largest) {
-  Largest seen;
+  std::uint32_t top = 0;
   for_runs<4>(n, [&](const std::uint8_t* from, std::size_t run) {
-    seen.see(to_native<std::uint32_t, Largest>(from, out, run).value);
+    top = std::max(top, kernels_->native_u32(from, out, run));
     out += run;
   });
-  if (largest != nullptr) *largest = std::max(*largest, seen.value);
+  if (largest != nullptr) *largest = std::max(*largest, top);
 }
 
 Array<float> ByteReader::f32_list(bool* all_finite) {

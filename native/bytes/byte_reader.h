@@ -13,6 +13,7 @@
 #include "bytes/source.h"
 #include "core/array.h"
 #include "core/buffer.h"
+#include "simd/kernels.h"
 
 namespace risorius::core {
 
@@ -22,8 +23,12 @@ namespace risorius::core {
 /// so that what is skipped is not read; of memory nothing is copied but into the lists.
 class ByteReader {
  public:
-  /// end   reading stops here (the file's size or a layer's end)
-  explicit ByteReader(Source& source);
+  /// In: source   must outlive the reader
+  ///     kernels  of which the byte order is used; RISORIUS_SIMD or the CPU chooses them
+  explicit ByteReader(Source& source, const simd::Kernels& kernels = simd::usual_kernels());
+
+  /// The name of the kernels, as Rig.simd has it.
+  const char* simd() const { return kernels_->name; }
 
   ByteReader(const ByteReader&) = delete;
   ByteReader& operator=(const ByteReader&) = delete;
@@ -112,6 +117,7 @@ class ByteReader {
   void move_to(std::uint64_t offset);
   void bound();
 
+  const simd::Kernels* kernels_;
   Source* source_;
   std::uint64_t end_ = 0;
   std::uint32_t max_count_ = 0xFFFFFFFF;

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include "bytes/file_read.h"
 
-#include <algorithm>
 #include <cerrno>
 #include <string>
 #include <system_error>
 
 #include "bytes/path_text.h"
+#include "bytes/read_at.h"
 #include "bytes/source.h"
 #include "core/aligned.h"
 
@@ -64,19 +64,6 @@ class Descriptor {
   int number_;
 };
 
-bool read_all(int file, std::span<std::uint8_t> out) {
-  constexpr std::size_t kMost = std::size_t{1} << 30;  // macOS refuses 2 GiB and more
-  std::size_t done = 0;
-  while (done < out.size()) {
-    const ssize_t n = ::pread(file, out.data() + done, std::min(out.size() - done, kMost),
-                              static_cast<off_t>(done));
-    if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) return false;
-    done += static_cast<std::size_t>(n);
-  }
-  return true;
-}
-
 // Nothing where the system refuses.
 std::shared_ptr<const void> mapped(int file, std::size_t size) {
   void* memory = ::mmap(nullptr, size, PROT_READ, MAP_PRIVATE, file, 0);
@@ -108,7 +95,7 @@ Result<FileBytes> read_file(const path& name, ReadBy by) {
   }
   const std::shared_ptr<std::uint8_t> bytes = allocate_pages(size, Fill::kNothing);
   errno = 0;
-  if (!read_all(file.number(), {bytes.get(), size})) {
+  if (detail::read_at(file.number(), 0, {bytes.get(), size}) != size) {
     return errno == 0 ? cut_short(name) : failure(ErrorCode::kIoRead, "read", name, errno);
   }
   return FileBytes{{bytes.get(), size}, bytes, own};

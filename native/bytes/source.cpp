@@ -8,6 +8,7 @@
 #include <system_error>
 
 #include "bytes/path_text.h"
+#include "bytes/read_at.h"
 
 #ifndef _WIN32
 #include <fcntl.h>
@@ -54,19 +55,7 @@ Handle open_for_reading(const std::filesystem::path& path) {
 bool is_open(Handle file) { return file >= 0; }
 void close_handle(Handle file) { ::close(file); }
 
-// One call of the system per read: no position to move first. It may give less than there is.
-std::size_t read_at(Handle file, std::uint64_t offset, std::span<std::uint8_t> out) {
-  constexpr std::size_t kMost = std::size_t{1} << 30;  // macOS refuses 2 GiB and more
-  std::size_t done = 0;
-  while (done < out.size()) {
-    const ssize_t n = ::pread(file, out.data() + done, std::min(out.size() - done, kMost),
-                              static_cast<off_t>(offset + done));
-    if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) break;
-    done += static_cast<std::size_t>(n);
-  }
-  return done;
-}
+using detail::read_at;
 
 #endif
 

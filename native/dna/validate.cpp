@@ -2,10 +2,10 @@
 #include "dna/validate.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <utility>
 
+#include "core/finite.h"
 #include "dna/controls.h"
 #include "dna/where.h"
 
@@ -21,16 +21,6 @@ using core::Status;
 using detail::Where;
 
 constexpr std::size_t kMostFindings = 1000;  // a broken file repeats itself
-
-// One bit per number, without a branch: this passes over every float of a file.
-bool all_finite(const Array<float>& values) {
-  constexpr std::uint32_t kExponent = 0x7F800000;
-  std::uint32_t bad = 0;
-  for (const float v : values) {
-    bad |= (std::bit_cast<std::uint32_t>(v) & kExponent) == kExponent ? 1u : 0u;
-  }
-  return bad == 0;
-}
 
 template <class T>
 T largest(const Array<T>& values) {
@@ -80,10 +70,10 @@ class Checker {
               space);
   }
   void finite(const Where& where, const Array<float>& values) {
-    if (known_.finite || all_finite(values)) return;
+    if (known_.finite || core::all_finite(values)) return;
     std::size_t first = 0, more = 0;
     for (std::size_t i = values.size(); i-- > 0;) {
-      if (std::isfinite(values[i])) continue;
+      if (core::is_finite(values[i])) continue;
       first = i;
       ++more;
     }

@@ -2,24 +2,12 @@
 #include "rig/finite_controls.h"
 
 #include <algorithm>
-#include <bit>
+
+#include "core/finite.h"
 
 namespace risorius::rig {
 
 namespace {
-
-// Exponents of all ones are infinities and NaN.
-bool is_non_finite(float value) noexcept {
-  constexpr std::uint32_t kExponent = 0x7f800000u;
-  return (std::bit_cast<std::uint32_t>(value) & kExponent) == kExponent;
-}
-
-// Without an early exit the compiler vectorises.
-bool has_non_finite(const float* values, std::size_t count) noexcept {
-  unsigned found = 0;
-  for (std::size_t i = 0; i < count; ++i) found |= is_non_finite(values[i]) ? 1u : 0u;
-  return found != 0;
-}
 
 const char* word_of(float value) {
   if (value != value) return "NaN";
@@ -33,10 +21,10 @@ std::vector<NonFinite> find_non_finite(const Rig& rig, const float* raw, std::si
   std::vector<NonFinite> found;
   for (std::size_t f = 0; f < count; ++f) {
     const float* frame = raw + f * rig.raw_count;
-    if (!has_non_finite(frame, rig.raw_count)) continue;
+    if (core::all_finite({frame, rig.raw_count})) continue;
     for (std::uint32_t c = 0; c < rig.raw_count; ++c) {
       if (found.size() == most) return found;
-      if (is_non_finite(frame[c])) found.push_back({f, c, frame[c]});
+      if (!core::is_finite(frame[c])) found.push_back({f, c, frame[c]});
     }
   }
   return found;
@@ -46,7 +34,8 @@ core::Status check_finite(const Rig& rig, const float* raw, std::size_t count) {
   const std::vector<NonFinite> found = find_non_finite(rig, raw, count, 1);
   if (found.empty()) return core::ok();
   const NonFinite& first = found.front();
-  const auto all = std::count_if(raw, raw + count * rig.raw_count, is_non_finite);
+  const auto all = std::count_if(raw, raw + count * rig.raw_count,
+                                 [](float value) { return !core::is_finite(value); });
   const std::string at = std::to_string(first.control);
   const std::string frame = std::to_string(first.frame);
   std::string message = rig.raw_control_names()[first.control] + " is " + word_of(first.value);

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <span>
 
 namespace risorius::rig {
 
@@ -16,6 +17,12 @@ inline Quaternion multiply(const Quaternion& a, const Quaternion& b) {  // Hamil
   return {
       a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y, a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x,
       a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w, a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z};
+}
+
+/// Of a 3x3 matrix, row after row. Negative where the matrix mirrors.
+inline float determinant(std::span<const float, 9> m) {
+  return m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) +
+         m[2] * (m[3] * m[7] - m[4] * m[6]);
 }
 
 /// How a file spells Euler angles: axes in the order of rotation, sign per axis, radians per unit.

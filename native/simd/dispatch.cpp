@@ -27,6 +27,11 @@ const Kernels* find_kernels(const char* name) {
   return found;
 }
 
+const Kernels& usual_kernels() {
+  const Kernels* found = find_kernels(nullptr);
+  return found != nullptr ? *found : scalar_kernels();
+}
+
 const char* available_kernels() {
   static const std::string names = [] {
     std::string text;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The evaluator's inner loops, one table of functions per instruction set.
+// The inner loops of the evaluator and of the reader of files, one table of functions per
+// instruction set.
 #pragma once
 
 #include <cstddef>
@@ -87,6 +88,15 @@ struct Kernels {
   ///       rotations  the angles of rotation i are at i * stride
   void (*quaternions)(const EulerTurns& turns, const std::uint16_t* which, std::size_t n,
                       float* rotations, std::size_t stride);
+
+  /// n big-endian numbers of a file in the machine's byte order.
+  /// In:   from  the bytes of the numbers, of any alignment
+  /// Out:  to    the numbers, overwritten
+  void (*native_u16)(const std::uint8_t* from, std::uint16_t* to, std::size_t n);
+  /// The same. Out: the largest number, 0 where n is 0.
+  std::uint32_t (*native_u32)(const std::uint8_t* from, std::uint32_t* to, std::size_t n);
+  /// The same. Out: whether all numbers are finite.
+  bool (*native_f32)(const std::uint8_t* from, float* to, std::size_t n);
 };
 
 /// No fused operations and a fixed order of sums: the same bits on every machine.
@@ -100,6 +110,9 @@ const Kernels* neon_kernels();
 /// The table of that name ("scalar", "sse4", "avx2", "avx512", "neon"), or nullptr. An empty name
 /// is the environment variable RISORIUS_SIMD when it is set, else the best that this CPU has.
 const Kernels* find_kernels(const char* name);
+/// find_kernels(""), or the scalar table where RISORIUS_SIMD names none that this CPU has: for what
+/// has nobody to tell of a wrong name.
+const Kernels& usual_kernels();
 /// What this CPU can run, for an error message: "scalar, sse4, avx2".
 const char* available_kernels();
 

@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <utility>
 
+#include "simd/byte_order_body.h"
 #include "simd/kernels.h"
 #include "simd/rotations_body.h"
 
@@ -119,7 +120,10 @@ constexpr Kernels make_kernels(const char* name) {
           batch_columns<std::uint16_t>,
           place,
           place_more,
-          quaternions};
+          quaternions,
+          native_u16,
+          native_u32,
+          native_f32};
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include "simd/kernels.h"
 
 #define RISORIUS_TARGET
+#include "simd/byte_order_body.h"
 #include "simd/kernels_inline.h"
 #include "simd/rotations_body.h"
 
@@ -63,7 +64,10 @@ const Kernels& scalar_kernels() {
                                    batch_columns<std::uint16_t>,
                                    place,
                                    place_more,
-                                   quaternions};
+                                   quaternions,
+                                   native_u16,
+                                   native_u32,
+                                   native_f32};
   return kernels;
 }
 

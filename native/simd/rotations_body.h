@@ -7,6 +7,7 @@
 #include <cstdint>
 
 #include "simd/kernels.h"
+#include "simd/kernels_inline.h"
 
 namespace risorius::simd {
 

@@ -53,6 +53,7 @@ TEST(SimdDispatch, EnvironmentChoosesWhenNoNameIsGiven) {
 TEST(SimdDispatch, UnknownNameInTheEnvironmentIsAnError) {
   const Environment wrong("fast");
   EXPECT_EQ(find_kernels(nullptr), nullptr);
+  EXPECT_EQ(&usual_kernels(), &scalar_kernels());
 }
 
 std::vector<std::string> names_by_the_cpu() {
@@ -71,6 +72,7 @@ TEST(SimdDispatch, BestOfTheCpuByDefault) {
   const Kernels* best = find_kernels(nullptr);
   ASSERT_NE(best, nullptr);
   EXPECT_EQ(best->name, names_by_the_cpu().back());
+  EXPECT_EQ(&usual_kernels(), best);
 }
 
 TEST(SimdDispatch, ListsWhatTheCpuHas) {

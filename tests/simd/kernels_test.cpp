@@ -119,6 +119,61 @@ TEST_P(SimdKernels, SumWithinTheRoundingOfItsTerms) {
   }
 }
 
+constexpr std::size_t kLengths[] = {0, 1, 2, 3, 7, 8, 9, 15, 16, 17, 31, 32, 33, 63, 64, 65, 200};
+
+template <class T>
+T shifted_together(const std::uint8_t* bytes) {
+  T value = 0;
+  for (std::size_t b = 0; b < sizeof(T); ++b) value = static_cast<T>(value * 256 + bytes[b]);
+  return value;
+}
+
+TEST_P(SimdKernels, BringNumbersOfAFileIntoTheOrderOfTheMachine) {
+  std::mt19937 random(7);
+  std::vector<std::uint8_t> bytes(4 * 200 + 1);
+  for (std::uint8_t& b : bytes) b = static_cast<std::uint8_t>(random());
+  for (const std::size_t n : kLengths) {
+    const std::uint8_t* from = bytes.data() + 1;  // of no alignment
+    std::vector<std::uint16_t> halves(n);
+    std::vector<std::uint32_t> wholes(n);
+    std::vector<float> floats(n);
+    kernels_.native_u16(from, halves.data(), n);
+    const std::uint32_t largest = kernels_.native_u32(from, wholes.data(), n);
+    kernels_.native_f32(from, floats.data(), n);
+    for (std::size_t i = 0; i < n; ++i) {
+      const auto whole = shifted_together<std::uint32_t>(from + 4 * i);
+      ASSERT_EQ(halves[i], shifted_together<std::uint16_t>(from + 2 * i)) << i << " of " << n;
+      ASSERT_EQ(wholes[i], whole) << i << " of " << n;
+      ASSERT_EQ(std::bit_cast<std::uint32_t>(floats[i]), whole) << i << " of " << n;
+    }
+    EXPECT_EQ(largest, n == 0 ? 0 : *std::max_element(wholes.begin(), wholes.end()));
+  }
+}
+
+TEST_P(SimdKernels, FindTheOneNumberThatIsNotFinite) {
+  const float most = std::numeric_limits<float>::max(), none = std::nanf("");
+  const float infinite = std::numeric_limits<float>::infinity();
+  for (const std::size_t n : kLengths) {
+    std::vector<std::uint8_t> bytes(4 * n);
+    std::vector<float> out(n);
+    const auto put = [&](std::size_t at, float value) {
+      const auto bits = std::bit_cast<std::uint32_t>(value);
+      for (std::size_t b = 0; b < 4; ++b) {
+        bytes[4 * at + b] = static_cast<std::uint8_t>(bits >> (24 - 8 * b));
+      }
+    };
+    for (std::size_t i = 0; i < n; ++i) put(i, i % 2 == 0 ? most : -most);
+    EXPECT_TRUE(kernels_.native_f32(bytes.data(), out.data(), n)) << n;
+    for (std::size_t i = 0; i < n; ++i) {
+      for (const float value : {none, infinite, -infinite}) {
+        put(i, value);
+        EXPECT_FALSE(kernels_.native_f32(bytes.data(), out.data(), n)) << i << " of " << n;
+      }
+      put(i, 0.0f);
+    }
+  }
+}
+
 TEST_P(SimdKernels, AFrameOfABatchHasTheBitsOfTheFrameAlone) {
   std::mt19937 random(5);
   for (const std::size_t rows : kRows) {

@@ -8,11 +8,6 @@ namespace {
 
 using Matrix = std::array<float, 9>;  // rows
 
-float determinant(const Matrix& m) {
-  return m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) +
-         m[2] * (m[3] * m[7] - m[4] * m[6]);
-}
-
 std::array<float, 3> transform(const Matrix& m, float x, float y, float z) {
   return {m[0] * x + m[1] * y + m[2] * z, m[3] * x + m[4] * y + m[5] * z,
           m[6] * x + m[7] * y + m[8] * z};

@@ -116,11 +116,6 @@ std::array<float, 3> to_our_axes(const Rig& rig, const std::array<float, 3>& v) 
   return out;
 }
 
-float determinant(const float* m) {
-  return m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) +
-         m[2] * (m[3] * m[7] - m[4] * m[6]);
-}
-
 Quaternion to_our_axes(const Rig& rig, const Quaternion& q) {
   const std::array<float, 3> axis = to_our_axes(rig, std::array{q.x, q.y, q.z});
   const float d = determinant(rig.ml_basis);
