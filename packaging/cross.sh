@@ -60,6 +60,7 @@ wrap_zig() {
 gather_packages() {
   mkdir -p "$prefix/include" "$prefix/lib" "$prefix/share/cmake" &&
     cp -rT /usr/include/nlohmann "$prefix/include/nlohmann" &&
+    cp /usr/include/xxhash.h "$prefix/include/" &&
     cp -rT /usr/share/cmake/nlohmann_json "$prefix/share/cmake/nlohmann_json" &&
     cp -rT "$google/include/gtest" "$prefix/include/gtest"
 }

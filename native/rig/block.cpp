@@ -2,11 +2,11 @@
 #include "rig/block.h"
 
 #include <algorithm>
-#include <bit>
 #include <cstddef>
 #include <cstring>
 
 #include "core/aligned.h"
+#include "core/hash.h"
 #include "rig/check.h"
 
 namespace risorius::rig {
@@ -25,7 +25,7 @@ constexpr std::size_t kArrays = [] {
   for_each_array(all, [&](const auto&) { ++n; });
   return n;
 }();
-constexpr char kMagic[8] = {'R', 'S', 'R', 'I', 'G', 0, 0, 3};  // the last one: the version
+constexpr char kMagic[8] = {'R', 'S', 'R', 'I', 'G', 0, 0, 4};  // the last one: the version
 constexpr std::uint32_t kByteOrder = 0x01020304;
 
 struct Place {
@@ -41,24 +41,6 @@ struct BlockHeader {
 };
 
 std::size_t aligned(std::size_t n) { return (n + kAlignment - 1) / kAlignment * kAlignment; }
-
-// Four lanes of multiply and rotate, as fast as memory. Finds damage, not intent.
-std::uint64_t hash(std::span<const std::uint8_t> bytes) {
-  constexpr std::uint64_t kFactor = 0x9E3779B97F4A7C15u;
-  std::uint64_t lanes[4] = {1, 2, 3, bytes.size()};
-  std::size_t i = 0;
-  for (; i + 32 <= bytes.size(); i += 32) {
-    for (int l = 0; l < 4; ++l) {
-      std::uint64_t word;
-      std::memcpy(&word, bytes.data() + i + 8 * l, 8);
-      lanes[l] = std::rotl((lanes[l] ^ word) * kFactor, 29);
-    }
-  }
-  for (; i < bytes.size(); ++i) lanes[i % 4] = (lanes[i % 4] ^ bytes[i]) * kFactor;
-  std::uint64_t all = 0;
-  for (const std::uint64_t lane : lanes) all = std::rotl((all ^ lane) * kFactor, 31);
-  return all ^ (all >> 32);
-}
 
 std::span<const std::uint8_t> hashed_part(std::span<const std::uint8_t> block) {
   return block.subspan(offsetof(BlockHeader, rig));
@@ -138,7 +120,7 @@ Result<Rig> open_rig(std::span<const std::uint8_t> bytes, std::shared_ptr<const 
   if (check == BlockCheck::kHeader) return rig;
   BlockHeader h;
   std::memcpy(&h, bytes.data(), sizeof(h));
-  if (h.hash != hash(hashed_part(bytes))) {
+  if (h.hash != core::xxh64(hashed_part(bytes))) {
     return fail(ErrorCode::kInvalidValue, "rig.hash", "the bytes were changed or cut");
   }
   if (check == BlockCheck::kHash) return rig;
@@ -147,7 +129,7 @@ Result<Rig> open_rig(std::span<const std::uint8_t> bytes, std::shared_ptr<const 
 }
 
 void seal_block(std::span<std::uint8_t> bytes) {
-  const std::uint64_t value = hash(hashed_part(bytes));
+  const std::uint64_t value = core::xxh64(hashed_part(bytes));
   std::memcpy(bytes.data() + offsetof(BlockHeader, hash), &value, sizeof(value));
 }
 

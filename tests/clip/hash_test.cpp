@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The checksum and the codes, against what is known of them.
-#include "clip/codec/hash.h"
+#include "core/hash.h"
 
 #include <gtest/gtest.h>
 
@@ -13,7 +13,7 @@ namespace risorius::clip {
 namespace {
 
 std::uint64_t hash_of(const std::string& text) {
-  return xxh64({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
+  return core::xxh64({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
 }
 
 // Values of the reference implementation, `xxhsum -H64`.

@@ -2,13 +2,13 @@
 """Compiled rigs in files and in a cache, and the opt-in check of controls."""
 
 import os
-import struct
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 import risorius
+import xxhash
 from conftest import GOLDEN
 from risorius.rigs import cache
 
@@ -22,27 +22,6 @@ def rig():
 
 
 HASH = slice(24, 32)  # of a block; what lies behind it is hashed
-FACTOR, ALL = 0x9E3779B97F4A7C15, (1 << 64) - 1
-
-
-def block_hash(data):
-    """A second telling of native/rig/block.cpp's hash: four lanes, multiplied and turned."""
-
-    def turned(value, by):
-        return (value << by | value >> (64 - by)) & ALL
-
-    lanes = [1, 2, 3, len(data)]
-    whole = len(data) // 32 * 32
-    for i, word in enumerate(struct.unpack(f"<{whole // 8}Q", data[:whole])):
-        lanes[i % 4] = turned((lanes[i % 4] ^ word) * FACTOR & ALL, 29)
-    for i in range(whole, len(data)):
-        lanes[i % 4] = (lanes[i % 4] ^ data[i]) * FACTOR & ALL
-    total = 0
-    for lane in lanes:
-        total = turned((total ^ lane) * FACTOR & ALL, 31)
-    return total ^ total >> 32
-
-
 # ---- files
 
 
@@ -84,7 +63,7 @@ def forged(rig):
     """The bytes of a rig with an index that points outside, under a right hash."""
     data = bytearray(rig.to_bytes())
     data[data.index(b"\x00\x01\x02\x00", HASH.stop)] = 9  # an axis of the rotation order
-    data[HASH] = block_hash(data[HASH.stop :]).to_bytes(8, "little")
+    data[HASH] = xxhash.xxh64_digest(data[HASH.stop :])[::-1]
     return data
 
 

@@ -11,10 +11,10 @@
 #include <vector>
 
 #include "clip/codec/block.h"
-#include "clip/codec/hash.h"
 #include "clip/file/encoder.h"
 #include "clip/file/layout.h"
 #include "clip/file/reader.h"
+#include "core/hash.h"
 
 namespace risorius::testing_support {
 
@@ -76,7 +76,7 @@ inline void seal(Bytes& bytes) {
     return value;
   };
   const auto put_hash = [&](std::size_t begin, std::size_t end, std::size_t at) {
-    const std::uint64_t hash = clip::xxh64(View(bytes).subspan(begin, end - begin));
+    const std::uint64_t hash = core::xxh64(View(bytes).subspan(begin, end - begin));
     std::memcpy(bytes.data() + at, &hash, sizeof hash);
   };
   if (bytes.size() < clip::kHeadStart) return;

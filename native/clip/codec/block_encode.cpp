@@ -6,9 +6,9 @@
 #include <unordered_map>
 
 #include "clip/codec/block.h"
-#include "clip/codec/hash.h"
 #include "clip/codec/predict.h"
 #include "clip/codec/symbols.h"
+#include "core/hash.h"
 
 namespace risorius::clip {
 
@@ -164,7 +164,7 @@ std::vector<Choice> choose(const BlockCurves& curves, std::vector<Coded>& coded)
       choices.push_back({bits_of(curve[0]) == 0 ? PartKind::kZero : PartKind::kConstant});
       continue;
     }
-    const auto [place, is_new] = known.try_emplace(xxh64(bytes), control);
+    const auto [place, is_new] = known.try_emplace(core::xxh64(bytes), control);
     if (!is_new &&
         std::memcmp(bytes.data(), curves.curve(place->second).data(), bytes.size()) == 0) {
       choices.push_back({PartKind::kRepeated, place->second});

@@ -5,10 +5,10 @@
 #include <unordered_set>
 
 #include "clip/codec/block.h"
-#include "clip/codec/hash.h"
 #include "clip/codec/predict.h"
 #include "clip/file/layout.h"
 #include "clip/file/reader.h"
+#include "core/hash.h"
 
 namespace risorius::clip {
 
@@ -79,7 +79,7 @@ void put_head(Bytes& out, const Head& head) {
   put(out, kVersion);
   put(out, static_cast<std::uint32_t>(body.size()));
   out.insert(out.end(), body.begin(), body.end());
-  put(out, xxh64(View(out).subspan(begin)));
+  put(out, core::xxh64(View(out).subspan(begin)));
 }
 
 void put_times(Bytes& out, std::span<const double> times) {
@@ -162,7 +162,7 @@ void Encoder::put_block(const float* curves, std::size_t stride, std::span<const
   if (frames > 0) encode_curves({curves, stride, head_.names.size(), frames}, out_);
   const auto size = static_cast<std::uint32_t>(out_.size() - begin - kBlockStart);
   std::memcpy(out_.data() + begin + 4, &size, sizeof size);
-  const std::uint64_t hash = xxh64(View(out_).subspan(begin));  // with 0 where it goes
+  const std::uint64_t hash = core::xxh64(View(out_).subspan(begin));  // with 0 where it goes
   std::memcpy(out_.data() + begin + kBlockStart - kHashSize, &hash, sizeof hash);
   blocks_.push_back({written_ + begin, size, static_cast<std::uint32_t>(frames)});
   frames_ += frames;
@@ -186,7 +186,7 @@ void Encoder::finish() {
   put(out_, written_ + begin);
   put(out_, static_cast<std::uint32_t>(out_.size() - 8 - begin));
   put(out_, kEndMark);
-  put(out_, xxh64(View(out_).subspan(begin)));
+  put(out_, core::xxh64(View(out_).subspan(begin)));
 }
 
 Bytes Encoder::take() {

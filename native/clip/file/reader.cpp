@@ -9,8 +9,8 @@
 #include <unordered_set>
 
 #include "clip/codec/block.h"
-#include "clip/codec/hash.h"
 #include "clip/file/layout.h"
+#include "core/hash.h"
 
 namespace risorius::clip {
 
@@ -37,7 +37,7 @@ T number_at(View bytes, std::size_t offset) {
 // Out: the last bytes are the hash of the others.
 bool is_sealed(View bytes) {
   const std::size_t size = bytes.size() - kHashSize;
-  return number_at<std::uint64_t>(bytes, size) == xxh64(bytes.first(size));
+  return number_at<std::uint64_t>(bytes, size) == core::xxh64(bytes.first(size));
 }
 
 bool get_times(Cursor& in, std::size_t frames, std::vector<double>& times) {
@@ -267,7 +267,7 @@ core::Status Reader::load(std::size_t index) {
   std::uint8_t* const hash_at = loaded->bytes.data() + kBlockStart - kHashSize;
   const auto hash = number_at<std::uint64_t>(loaded->bytes, kBlockStart - kHashSize);
   std::fill_n(hash_at, kHashSize, std::uint8_t{0});
-  if (hash != xxh64(loaded->bytes)) {
+  if (hash != core::xxh64(loaded->bytes)) {
     return refuse(ErrorCode::kInvalidValue, "", "the block is damaged: its checksum is another", 0);
   }
   const View all = loaded->bytes;

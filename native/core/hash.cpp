@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: MIT
+#include "core/hash.h"
+
+#define XXH_INLINE_ALL  // no library to link, and no symbols that another copy could meet
+#include <xxhash.h>
+
+namespace risorius::core {
+
+std::uint64_t xxh64(std::span<const std::uint8_t> bytes) {
+  return XXH64(bytes.data(), bytes.size(), 0);
+}
+
+}  // namespace risorius::core
