@@ -194,7 +194,7 @@ void transpose(const float* from, std::size_t rows, std::span<const std::uint32_
 core::Result<std::uint32_t> add_lods(const dna::JointGroup& g, const std::string& where,
                                      RigData& out) {
   if (!g.output_indices.empty()) {
-    if (Status s = check_lods(g.lods, out.lod_count, where); !s) return std::move(s).propagate();
+    RISORIUS_TRY(check_lods(g.lods, out.lod_count, where));
   }
   std::uint32_t rows = 0;
   for (std::uint32_t l = 0; l < out.lod_count; ++l) {
@@ -219,9 +219,7 @@ Groups list_groups(const dna::Dna& dna) {
 }
 
 Status compile_joint_group(const dna::JointGroup& g, const std::string& where, RigData& out) {
-  if (Status s = check_controls(g.input_indices, out.control_count, where + ".input_indices"); !s) {
-    return s;
-  }
+  RISORIUS_TRY(check_controls(g.input_indices, out.control_count, where + ".input_indices"));
   const auto rows = add_lods(g, where, out);
   if (!rows) return core::Unexpected{rows.error()};
   rig::JointGroup group;
@@ -375,7 +373,7 @@ Status compile_joint_groups(const dna::Dna& dna, const Groups& groups, RigData& 
   for (const dna::JointGroup* g : groups) {
     const auto i = g - &dna.behavior.joint_groups[0];
     const std::string where = "behavior.joint_groups[" + std::to_string(i) + "]";
-    if (Status s = compile_joint_group(*g, where, out); !s) return s;
+    RISORIUS_TRY(compile_joint_group(*g, where, out));
   }
   for (std::uint32_t l = 0; l < out.lod_count; ++l) {
     std::size_t live = groups.size();
@@ -387,12 +385,8 @@ Status compile_joint_groups(const dna::Dna& dna, const Groups& groups, RigData& 
 
 Status compile_psds(const dna::Dna& dna, RigData& out) {
   const dna::Psds& source = dna.behavior.psds;
-  if (Status s = check_controls(source.columns, out.control_count, "behavior.psds.columns"); !s) {
-    return s;
-  }
-  if (Status s = check_controls(source.rows, out.control_count, "behavior.psds.rows"); !s) {
-    return s;
-  }
+  RISORIUS_TRY(check_controls(source.columns, out.control_count, "behavior.psds.columns"));
+  RISORIUS_TRY(check_controls(source.rows, out.control_count, "behavior.psds.rows"));
   std::map<std::uint16_t, std::vector<std::size_t>> entries;  // rows may be interleaved
   for (std::size_t i = 0; i < source.rows.size(); ++i) entries[source.rows[i]].push_back(i);
   for (const auto& [output, list] : entries) {
@@ -432,21 +426,16 @@ Status compile_channels_and_maps(const dna::Dna& dna, RigData& out) {
       static_cast<std::uint32_t>(dna.definition.blend_shape_channel_names.size());
   out.animated_map_count = static_cast<std::uint32_t>(dna.definition.animated_map_names.size());
   const std::string shapes = "behavior.blend_shape_channels", maps = "behavior.animated_maps";
-  if (Status c = check_controls(s.input_indices, out.control_count, shapes + ".input_indices");
-      !c) {
-    return c;
-  }
+  RISORIUS_TRY(check_controls(s.input_indices, out.control_count, shapes + ".input_indices"));
   const auto& map_inputs = m.conditionals.input_indices;
-  if (Status c = check_controls(map_inputs, out.control_count, maps + ".input_indices"); !c) {
-    return c;
-  }
+  RISORIUS_TRY(check_controls(map_inputs, out.control_count, maps + ".input_indices"));
   if (!s.input_indices.empty()) {
-    if (Status c = check_lods(s.lods, out.lod_count, shapes); !c) return c;
+    RISORIUS_TRY(check_lods(s.lods, out.lod_count, shapes));
     out.shape_lods = row_counts(s.lods, out.lod_count);
   }
   out.map_rows = compile_table(m.conditionals);
   if (!map_inputs.empty()) {
-    if (Status c = check_lods(m.lods, out.lod_count, maps); !c) return c;
+    RISORIUS_TRY(check_lods(m.lods, out.lod_count, maps));
     out.map_lods = row_counts(m.lods, out.lod_count);
   }
   out.shape_inputs.assign(s.input_indices.begin(), s.input_indices.end());
@@ -489,33 +478,29 @@ Result<RigData> compile_parts(const dna::Dna& dna, const CompileOptions& options
     return fail(ErrorCode::kLimitExceeded, "behavior.psd_count",
                 std::to_string(controls) + " controls, the format's indices reach 65536");
   }
-  if (Status s = compile_frame(dna, budget, out); !s) return std::move(s).propagate();
+  RISORIUS_TRY(compile_frame(dna, budget, out));
   detail::StepLods lods;
   Used used(out.lod_count, std::vector<bool>(out.control_count, false));
   const Groups groups = list_groups(dna);
-  if (Status s = compile_joint_groups(dna, groups, out); !s) return std::move(s).propagate();
+  RISORIUS_TRY(compile_joint_groups(dna, groups, out));
   detail::compile_quaternion_joints(dna, groups, out);
-  if (Status s = detail::compile_solvers(dna, budget, out, lods); !s) {
-    return std::move(s).propagate();
-  }
-  if (Status s = detail::compile_networks(dna, budget, out, lods); !s) {
-    return std::move(s).propagate();
-  }
-  if (Status s = detail::compile_ml_joints(dna, out); !s) return std::move(s).propagate();
+  RISORIUS_TRY(detail::compile_solvers(dna, budget, out, lods));
+  RISORIUS_TRY(detail::compile_networks(dna, budget, out, lods));
+  RISORIUS_TRY(detail::compile_ml_joints(dna, out));
   detail::compile_twist_and_swing(dna, out);
-  if (Status s = compile_channels_and_maps(dna, out); !s) return std::move(s).propagate();
-  if (Status s = compile_psds(dna, out); !s) return std::move(s).propagate();
+  RISORIUS_TRY(compile_channels_and_maps(dna, out));
+  RISORIUS_TRY(compile_psds(dna, out));
   list_joints_written(out);
-  if (Status s = compile_columns(groups, out, used); !s) return std::move(s).propagate();
+  RISORIUS_TRY(compile_columns(groups, out, used));
   mark_channels_and_maps(out, used);
   detail::mark_ml_joints(out, used);
-  if (Status s = detail::schedule(used, lods, budget, out); !s) return std::move(s).propagate();
+  RISORIUS_TRY(detail::schedule(used, lods, budget, out));
   if (out.joint_stride == 10) {
-    if (Status s = widen_joint_rows(out); !s) return std::move(s).propagate();
+    RISORIUS_TRY(widen_joint_rows(out));
   }
   compile_pieces(groups, out);
   if (options.precision == Precision::kFloat16) {
-    if (Status s = narrow(out); !s) return std::move(s).propagate();
+    RISORIUS_TRY(narrow(out));
   }
   return out;
 }
@@ -541,7 +526,7 @@ core::Budget budget_for(const dna::Dna& dna) {
 
 Result<rig::Rig> compile(const dna::Dna& dna, const CompileOptions& options) {
   std::vector<dna::Warning> warnings;
-  if (Status s = dna::validate(dna, warnings); !s) return std::move(s).propagate();
+  RISORIUS_TRY(dna::validate(dna, warnings));
   const simd::Kernels* kernels =
       options.kernels != nullptr ? options.kernels : simd::find_kernels(nullptr);
   if (kernels == nullptr) {

@@ -95,7 +95,7 @@ class GraphCompiler {
       for (std::size_t o = 0; o < type.operations[s].size(); ++o) {
         const std::string at =
             where + ".operations[" + std::to_string(s) + "][" + std::to_string(o) + "]";
-        if (Status added = add_operation(type.operations[s][o], at); !added) return added;
+        RISORIUS_TRY(add_operation(type.operations[s][o], at));
       }
     }
     return list_lods(type, where);
@@ -107,14 +107,14 @@ class GraphCompiler {
     op.kind = source.operation_type;
     op.values_begin = out_.operation_values;
     op.segments_begin = count_of(out_.ml_segments);
-    if (Status s = add_segments(source, op, where); !s) return s;
+    RISORIUS_TRY(add_segments(source, op, where));
     switch (source.operation_type) {
       case MlOperation::kGather:
       case MlOperation::kScatter:
         add_controls(source, op);
         break;
       case MlOperation::kMlp:
-        if (Status s = add_network(source, op, where); !s) return s;
+        RISORIUS_TRY(add_network(source, op, where));
         break;
       case MlOperation::kWeightedSum:
         op.value_count = source.parameters.empty() ? 0 : source.parameters[0];
@@ -122,9 +122,7 @@ class GraphCompiler {
       default:  // does nothing
         op.kind = MlOperation::kWeightedSum;
     }
-    if (Status s = budget_.take_bytes(sizeof(float) * std::uint64_t{op.value_count}, where); !s) {
-      return s;
-    }
+    RISORIUS_TRY(budget_.take_bytes(sizeof(float) * std::uint64_t{op.value_count}, where));
     constexpr std::uint32_t kMost = 1u << 24;
     if (op.value_count > kMost || out_.operation_values > kMost) {
       return fail(ErrorCode::kLimitExceeded, where, "more than 16 million values of networks");
@@ -190,7 +188,7 @@ class GraphCompiler {
       op.items_begin = shared->second;
     } else {
       if (table && is_first) layers_.erase(shared);  // these rows are this operation's own
-      if (Status s = add_layers(source, network, number, where); !s) return s;
+      RISORIUS_TRY(add_layers(source, network, number, where));
     }
     if (op.item_count > 0) op.value_count = out_.ml_layers[op.items_begin + op.item_count - 1].rows;
     return ok();
@@ -199,7 +197,7 @@ class GraphCompiler {
   Status add_layers(const dna::MlOperation& source, const dna::NeuralNetwork& network,
                     std::uint16_t number, const std::string& where) {
     for (std::size_t l = 0; l < network.layers.size(); ++l) {
-      if (Status s = add_layer(network.layers[l], number, l, where); !s) return s;
+      RISORIUS_TRY(add_layer(network.layers[l], number, l, where));
       add_row_counts(source, l, network.layers.size());
     }
     return ok();
@@ -251,7 +249,7 @@ class GraphCompiler {
         for (const std::uint32_t o : listed(type.lod_operation_mappings[s], lod)) {
           const dna::MlOperation& op = type.operations[s][o];
           const std::uint64_t steps = 1 + op.operation_set_dependency_indices.size();
-          if (Status taken = budget_.take_steps(steps, where); !taken) return taken;
+          RISORIUS_TRY(budget_.take_steps(steps, where));
           if (!has_all(runs_here, op)) continue;
           runs_here[numbers_[s][o] - first_] = true;
           lods_.operations[lod].push_back(numbers_[s][o]);
@@ -334,11 +332,11 @@ Status detail::compile_networks(const dna::Dna& dna, Budget& budget, RigData& ou
   const bool synthesize = types.empty() && !dna.machine_learned_behavior.neural_networks.empty();
   if (synthesize) {
     const std::string where = "machine_learned_behavior";
-    if (Status s = graph.add_type(synthesized(dna.machine_learned_behavior), where); !s) return s;
+    RISORIUS_TRY(graph.add_type(synthesized(dna.machine_learned_behavior), where));
   }
   for (std::size_t t = 0; t < types.size(); ++t) {
     const std::string where = "machine_learned_behavior_ext.types[" + std::to_string(t) + "]";
-    if (Status s = graph.add_type(types[t], where); !s) return s;
+    RISORIUS_TRY(graph.add_type(types[t], where));
   }
   if (!out.ml_layers.empty()) {  // kernels read on
     out.ml_weights.resize(out.ml_weights.size() + simd::kWidest);

@@ -157,9 +157,9 @@ Status take_matrices(const dna::RbfSolver& s, const std::string& where, detail::
   const std::uint64_t inputs = s.raw_control_indices.size() + 1;
   const bool interpolates = s.solver_type == 1;
   const std::uint64_t distances = s.automatic_radius == 0 || interpolates ? n * n : 0;
-  if (Status taken = budget.take_steps(distances * inputs, where); !taken) return taken;
+  RISORIUS_TRY(budget.take_steps(distances * inputs, where));
   if (!interpolates) return ok();
-  if (Status taken = budget.take_bytes(n * n * sizeof(double), where); !taken) return taken;
+  RISORIUS_TRY(budget.take_bytes(n * n * sizeof(double), where));
   return budget.take_steps(n * n * n, where);
 }
 
@@ -187,7 +187,7 @@ Status add_solver(const dna::Dna& dna, const dna::RbfSolver& source, const std::
   s.axis = source.twist_axis < 3 ? source.twist_axis : 0;
   s.always_normalize = source.normalize_method == 1 ? 1 : 0;
   for (const std::uint16_t i : source.raw_control_indices) out.rbf_inputs.push_back(i);
-  if (Status added = add_poses(source, where, poses, budget, out); !added) return added;
+  RISORIUS_TRY(add_poses(source, where, poses, budget, out));
   add_targets(source, s, out);
   s.radius = static_cast<double>(source.radius) *
              (dna.descriptor.rotation_unit == 1 ? 1.0 : 0.017453292519943295);
@@ -212,10 +212,10 @@ Status detail::compile_solvers(const dna::Dna& dna, Budget& budget, RigData& out
   PoseLists poses(dna, out);
   for (std::size_t i = 0; i < solvers.size(); ++i) {
     const std::string where = "rbf_behavior.solvers[" + std::to_string(i) + "]";
-    if (Status s = check_solver(solvers[i], where); !s) return s;
+    RISORIUS_TRY(check_solver(solvers[i], where));
     const std::string list = where + ".pose_indices";
-    if (Status s = take_matrices(solvers[i], list, budget); !s) return s;
-    if (Status s = add_solver(dna, solvers[i], list, poses, budget, out); !s) return s;
+    RISORIUS_TRY(take_matrices(solvers[i], list, budget));
+    RISORIUS_TRY(add_solver(dna, solvers[i], list, poses, budget, out));
   }
   for (std::uint32_t lod = 0; lod < out.lod_count; ++lod) {
     lods.solvers.push_back(listed(dna.rbf_behavior.lod_solver_mapping, lod));

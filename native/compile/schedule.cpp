@@ -37,9 +37,7 @@ class Lists {
     out.begins_.assign(lists + 1, 0);
     std::uint64_t count = 0;
     each([&](std::uint32_t list, std::uint32_t) { ++out.begins_[list + std::size_t{1}], ++count; });
-    if (Status s = budget.take_bytes(4 * count, "rbf_behavior.solvers"); !s) {
-      return std::move(s).propagate();
-    }
+    RISORIUS_TRY(budget.take_bytes(4 * count, "rbf_behavior.solvers"));
     std::partial_sum(out.begins_.begin(), out.begins_.end(), out.begins_.begin());
     out.items_.resize(static_cast<std::size_t>(count));
     std::vector<std::uint32_t> next(out.begins_.begin(), out.begins_.end() - 1);
@@ -401,14 +399,14 @@ Status take_steps_of_lists(const RigData& r, const StepLods& lods, Budget& budge
     for (const std::uint32_t i : lods.operations[lod]) operations += costs.of_operation(i);
     for (const std::uint32_t i : lods.solvers[lod]) solvers += costs.of_solver(i);
   }
-  if (Status s = budget.take_steps(operations, "machine_learned_behavior_ext.types"); !s) return s;
+  RISORIUS_TRY(budget.take_steps(operations, "machine_learned_behavior_ext.types"));
   return budget.take_steps(solvers, "rbf_behavior.lod_solver_mapping");
 }
 
 }  // namespace
 
 Status detail::schedule(const Used& used, const StepLods& lods, Budget& budget, RigData& r) {
-  if (Status s = take_steps_of_lists(r, lods, budget); !s) return s;
+  RISORIUS_TRY(take_steps_of_lists(r, lods, budget));
   const auto graph = Graph::make(r, budget);
   if (!graph) return core::Unexpected{graph.error()};
   const Graph& g = *graph;

@@ -81,3 +81,10 @@ using Status = Result<Nothing>;
 inline Status ok() { return Status(Nothing{}); }
 
 }  // namespace risorius::core
+
+/// Evaluates a Status or a Result; where it failed the function that this stands in returns the
+/// failure, else nothing happens and the value is dropped.
+#define RISORIUS_TRY(expression)                                                \
+  do {                                                                          \
+    if (auto tried = (expression); !tried) return std::move(tried).propagate(); \
+  } while (false)

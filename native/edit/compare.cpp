@@ -225,7 +225,7 @@ core::Status measure_times(const dna::Dna& before, const dna::Dna& after,
 core::Status compare(const dna::Dna& before, const dna::Dna& after, const RegroupOptions& options,
                      RegroupReport& report) {
   if (before.descriptor.lod_count == 0) return core::ok();
-  if (core::Status s = measure_changes(before, after, options, report); !s) return s;
+  RISORIUS_TRY(measure_changes(before, after, options, report));
   return measure_times(before, after, options, report);
 }
 

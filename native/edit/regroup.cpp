@@ -116,8 +116,8 @@ detail::Regions settle(const dna::Dna& dna, const RegroupOptions& options,
 
 core::Result<Regrouped> regroup(const dna::Dna& dna, const RegroupOptions& options) {
   std::vector<dna::Warning> warnings;
-  if (Status s = dna::validate(dna, warnings); !s) return std::move(s).propagate();
-  if (Status s = check_options(dna, options); !s) return std::move(s).propagate();
+  RISORIUS_TRY(dna::validate(dna, warnings));
+  RISORIUS_TRY(check_options(dna, options));
   if (const auto rig = compile::compile(dna); !rig) return core::Unexpected{rig.error()};
   Regrouped out{dna, {}};
   std::vector<detail::Unit> units = detail::list_units(dna);
@@ -128,9 +128,7 @@ core::Result<Regrouped> regroup(const dna::Dna& dna, const RegroupOptions& optio
   out.report.before = sizes_of(dna);
   out.report.after = sizes_of(out.dna);
   out.report.regions = list_regions(regions);
-  if (Status s = detail::compare(dna, out.dna, options, out.report); !s) {
-    return std::move(s).propagate();
-  }
+  RISORIUS_TRY(detail::compare(dna, out.dna, options, out.report));
   return out;
 }
 

@@ -87,7 +87,7 @@ struct BlockReader {
           number(bytes.size()) + " bytes, a header of " + number(sizeof(h)) + " was expected");
     }
     std::memcpy(&h, bytes.data(), sizeof(h));
-    if (Status s = check_header(bytes, h); !s) return std::move(s).propagate();
+    RISORIUS_TRY(check_header(bytes, h));
     Rig rig;
     static_cast<RigHeader&>(rig) = h.rig;
     std::size_t i = 0;
@@ -124,7 +124,7 @@ Result<Rig> open_rig(std::span<const std::uint8_t> bytes, std::shared_ptr<const 
     return fail(ErrorCode::kInvalidValue, "rig.hash", "the bytes were changed or cut");
   }
   if (check == BlockCheck::kHash) return rig;
-  if (Status s = detail::check_everything(*rig); !s) return std::move(s).propagate();
+  RISORIUS_TRY(detail::check_everything(*rig));
   return rig;
 }
 

@@ -329,7 +329,7 @@ bool detail::scratch_fits(const Rig& r) {
 Status detail::check_everything(const Rig& r) {
   IndexCheck c;
   check_sizes(r, c);
-  if (Status sizes = c.status(); !sizes) return sizes;
+  RISORIUS_TRY(c.status());
   check_correctives(r, c);
   check_groups(r, c);
   check_pieces(r, c);

@@ -241,7 +241,7 @@ core::Result<EncodedCurves> EncodedCurves::open(View bytes, std::size_t controls
   if (!curves.read_tables(in)) {
     return fail(ErrorCode::kInvalidValue, "codes", "these are no prefix codes", in.position());
   }
-  if (auto read = curves.read_parts(in, controls); !read) return std::move(read).propagate();
+  RISORIUS_TRY(curves.read_parts(in, controls));
   return curves;
 }
 
@@ -313,12 +313,12 @@ core::Status EncodedCurves::decode(std::span<const std::uint32_t> controls, floa
       other = here;
       continue;
     }
-    if (auto decoded = decode_pair(*other, &here); !decoded) return decoded;
+    RISORIUS_TRY(decode_pair(*other, &here));
     other.reset();
   }
   for (const std::optional<Pending>& last : waiting) {
     if (!last) continue;
-    if (auto decoded = decode_pair(*last, nullptr); !decoded) return decoded;
+    RISORIUS_TRY(decode_pair(*last, nullptr));
   }
   return core::ok();
 }

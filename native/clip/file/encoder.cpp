@@ -39,7 +39,7 @@ core::Status check_sizes(const Head& head) {
 }
 
 core::Status check(const Head& head) {
-  if (auto sizes = check_sizes(head); !sizes) return sizes;
+  RISORIUS_TRY(check_sizes(head));
   std::unordered_set<std::string> seen;
   for (std::size_t i = 0; i < head.names.size(); ++i) {
     if (!seen.insert(head.names[i]).second) {
@@ -109,7 +109,7 @@ core::Status check_times(std::span<const double> times, std::uint64_t first, dou
 }  // namespace
 
 core::Result<Encoder> Encoder::create(Head head, std::size_t block_frames) {
-  if (auto checked = check(head); !checked) return std::move(checked).propagate();
+  RISORIUS_TRY(check(head));
   if (block_frames < 1 || block_frames > kMostBlockFrames) {
     return fail(ErrorCode::kInvalidArgument, "block_frames",
                 "1 to " + std::to_string(kMostBlockFrames) +
@@ -133,7 +133,7 @@ core::Status Encoder::append(std::span<const float> frames, std::span<const doub
                                 : "frames of " + std::to_string(controls) +
                                       " controls and no times were expected");
   }
-  if (auto checked = check_times(times, frame_count(), last_time_); !checked) return checked;
+  RISORIUS_TRY(check_times(times, frame_count(), last_time_));
   if (!times.empty()) last_time_ = times.back();
   curves_.resize(controls * block_frames_);
   for (std::size_t i = 0; i < count; ++i) {
@@ -204,9 +204,7 @@ core::Result<Bytes> encode(const Clip& clip, std::size_t block_frames) {
     return fail(ErrorCode::kInvalidArgument, "curves",
                 "curves and times of " + std::to_string(frames) + " frames were expected");
   }
-  if (auto checked = check_times(clip.times, 0, 0.0); !checked) {
-    return std::move(checked).propagate();
-  }
+  RISORIUS_TRY(check_times(clip.times, 0, 0.0));
   encoder.pending_ = clip.events;
   for (std::size_t first = 0; first < frames; first += block_frames) {
     const std::size_t count = std::min(block_frames, frames - first);

@@ -42,7 +42,7 @@ core::Result<FileWriter> FileWriter::create(const std::filesystem::path& path, H
     return failure(path, std::make_error_code(std::errc::is_a_directory));
   }
   if (const std::error_code error = writer.open_part(calls)) return failure(path, error);
-  if (auto written = writer.write_ready(); !written) return std::move(written).propagate();
+  RISORIUS_TRY(writer.write_ready());
   return writer;
 }
 
@@ -75,7 +75,7 @@ core::Status FileWriter::write_ready() {
 core::Status FileWriter::append(std::span<const float> frames, std::span<const double> times) {
   if (!trouble_) return trouble_;
   if (!is_open()) return fail(ErrorCode::kInvalidArgument, "", "the clip has been closed");
-  if (auto taken = encoder_.append(frames, times); !taken) return taken;
+  RISORIUS_TRY(encoder_.append(frames, times));
   return trouble_ = write_ready();
 }
 

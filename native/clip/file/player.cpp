@@ -12,11 +12,11 @@ Player::Player(Reader reader) : reader_(std::move(reader)) {
 core::Status Player::load(std::size_t block) {
   begin_ = end_ = 0;
   moving_.clear();
-  if (auto rest = reader_.resting(block, values_, moving_); !rest) return rest;
+  RISORIUS_TRY(reader_.resting(block, values_, moving_));
   const std::uint64_t begin = reader_.block_starts()[block];
   const std::uint64_t end = reader_.block_starts()[block + 1];
   curves_.resize(moving_.size() * static_cast<std::size_t>(end - begin));
-  if (auto read = reader_.read(begin, end, moving_, curves_.data(), nullptr); !read) return read;
+  RISORIUS_TRY(reader_.read(begin, end, moving_, curves_.data(), nullptr));
   begin_ = begin;
   end_ = end;
   return core::ok();
@@ -25,9 +25,7 @@ core::Status Player::load(std::size_t block) {
 core::Result<std::span<const float>> Player::frame(std::uint64_t index) {
   if (index < begin_ || index >= end_) {
     const std::vector<std::uint64_t>& starts = reader_.block_starts();
-    if (auto may = reader_.may_read(index, index == UINT64_MAX ? index : index + 1, {}); !may) {
-      return std::move(may).propagate();
-    }
+    RISORIUS_TRY(reader_.may_read(index, index == UINT64_MAX ? index : index + 1, {}));
     const auto after = std::upper_bound(starts.begin(), starts.end(), index);
     auto loaded = load(static_cast<std::size_t>(after - starts.begin()) - 1);
     if (!loaded) return std::move(loaded).propagate();

@@ -235,7 +235,7 @@ core::Result<Reader> Reader::open(std::unique_ptr<core::Source> source, Ends end
   Reader reader;
   reader.source_ = std::move(source);
   reader.limits_ = limits;
-  if (auto read = reader.read_head(limits); !read) return std::move(read).propagate();
+  RISORIUS_TRY(reader.read_head(limits));
   reader.starts_.assign(1, 0);
   if (auto read = reader.read_index(); !read) {
     if (ends == Ends::kMustBeWhole) return std::move(read).propagate();
@@ -302,7 +302,7 @@ core::Status Reader::load(std::size_t index) {
 core::Status Reader::read_block(std::size_t index, std::uint64_t begin, std::uint64_t end,
                                 std::span<const std::uint32_t> controls, float* out,
                                 std::size_t stride, double* out_times) {
-  if (auto read = load(index); !read) return read;
+  RISORIUS_TRY(load(index));
   const std::uint64_t first = starts_[index];
   const auto skip = static_cast<std::size_t>(begin - first);
   const auto count = static_cast<std::size_t>(end - begin);
@@ -315,14 +315,14 @@ core::Status Reader::read_block(std::size_t index, std::uint64_t begin, std::uin
                              error.message, blocks_[index].offset));
   };
   if (count == frames) {
-    if (auto decoded = decode(controls, out, stride); !decoded) return decoded;
+    RISORIUS_TRY(decode(controls, out, stride));
   } else {
     // Room for all frames of a few controls, of which the wanted ones are kept.
     constexpr std::size_t kAtOnce = 16;
     std::vector<float> curves(kAtOnce * frames);
     for (std::size_t i = 0; i < controls.size(); i += kAtOnce) {
       const auto some = controls.subspan(i, std::min(kAtOnce, controls.size() - i));
-      if (auto decoded = decode(some, curves.data(), frames); !decoded) return decoded;
+      RISORIUS_TRY(decode(some, curves.data(), frames));
       for (std::size_t k = 0; k < some.size(); ++k) {
         std::memcpy(out + (i + k) * stride, curves.data() + k * frames + skip,
                     sizeof(float) * count);
@@ -362,7 +362,7 @@ core::Status Reader::may_read(std::uint64_t begin, std::uint64_t end,
 
 core::Status Reader::read(std::uint64_t begin, std::uint64_t end,
                           std::span<const std::uint32_t> controls, float* out, double* out_times) {
-  if (auto may = may_read(begin, end, controls); !may) return may;
+  RISORIUS_TRY(may_read(begin, end, controls));
   const std::uint64_t count = end - begin;
   if (!head_.has_times) out_times = nullptr;
   auto next = std::upper_bound(starts_.begin(), starts_.end(), begin) - starts_.begin();
@@ -386,7 +386,7 @@ core::Status Reader::read(std::uint64_t begin, std::uint64_t end,
 
 core::Status Reader::resting(std::size_t block, std::span<float> values,
                              std::vector<std::uint32_t>& moving) {
-  if (auto read = load(block); !read) return read;
+  RISORIUS_TRY(load(block));
   for (std::uint32_t control = 0; control < values.size(); ++control) {
     if (!loaded_->curves || !loaded_->curves->is_resting(control, values[control])) {
       moving.push_back(control);
@@ -404,9 +404,7 @@ core::Result<Clip> decode(View bytes, Ends ends, const Limits& limits) {
   clip.events = reader.events();
   std::vector<std::uint32_t> all(clip.head.names.size());
   std::iota(all.begin(), all.end(), 0u);
-  if (auto may = reader.may_read(0, reader.frame_count(), all); !may) {
-    return std::move(may).propagate();
-  }
+  RISORIUS_TRY(reader.may_read(0, reader.frame_count(), all));
   clip.frame_count = static_cast<std::size_t>(reader.frame_count());
   clip.curves.resize(all.size() * clip.frame_count);
   if (clip.head.has_times) clip.times.resize(clip.frame_count);

@@ -95,7 +95,7 @@ struct LayerCurves::Sorter {
 
 core::Result<std::shared_ptr<const LayerCurves>> LayerCurves::make(
     std::span<const std::string> controls, const CurvesView& curves, std::span<const float> mask) {
-  if (auto good = check(curves, controls.size(), mask); !good) return std::move(good).propagate();
+  RISORIUS_TRY(check(curves, controls.size(), mask));
   std::unordered_map<std::string_view, std::uint32_t> index;
   for (std::uint32_t i = 0; i < controls.size(); ++i) index.emplace(controls[i], i);
   Sorter sorter;
@@ -202,7 +202,7 @@ core::Status Mixer::set_layers(std::vector<Layer> layers) {
   for (std::size_t i = 0; i < layers.size(); ++i) {
     Layer& layer = layers[i];
     const std::string where = "layers[" + std::to_string(i) + "]";
-    if (auto good = check(layer, control_count(), where); !good) return good;
+    RISORIUS_TRY(check(layer, control_count(), where));
     set_range(layer);
     const bool repeats = layer.extend == Extend::kRepeat;
     if (repeats && !(std::isfinite(layer.end - layer.start) && layer.end > layer.start)) {
@@ -246,7 +246,7 @@ core::Status Mixer::set_reactions(std::vector<Reaction> reactions) {
       const ReactionPart& part = reactions[r][p];
       const std::string where =
           "reactions[" + std::to_string(r) + "].parts[" + std::to_string(p) + "]";
-      if (auto good = check(part, high_, where); !good) return good;
+      RISORIUS_TRY(check(part, high_, where));
       duration = std::max(duration, part.delay + part.attack + part.hold + part.release);
     }
     durations.push_back(duration);

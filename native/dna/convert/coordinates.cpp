@@ -253,7 +253,7 @@ Status convert_group(const Conversion& c, const std::string& where, JointGroup& 
   }
   std::vector<std::uint16_t> lods;
   for (const std::uint16_t n : g.lods) lods.push_back(static_cast<std::uint16_t>(rows_before[n]));
-  if (Status taken = take_rows(where, std::move(rows), g); !taken) return taken;
+  RISORIUS_TRY(take_rows(where, std::move(rows), g));
   g.lods = std::move(lods);
   return ok();
 }
@@ -473,10 +473,10 @@ void set_system(const System& target, Dna& dna) {
 core::Result<Dna> convert_coordinates(const Dna& dna, const CoordinateTarget& target,
                                       Warnings& warnings) {
   Warnings unused;
-  if (Status valid = validate(dna, unused); !valid) return std::move(valid).propagate();
+  RISORIUS_TRY(validate(dna, unused));
   const System source = system_of(dna), wanted = system_of(target, source);
-  if (Status good = check_system(source, true); !good) return std::move(good).propagate();
-  if (Status good = check_system(wanted, false); !good) return std::move(good).propagate();
+  RISORIUS_TRY(check_system(source, true));
+  RISORIUS_TRY(check_system(wanted, false));
   Dna out = dna;
   if (source == wanted) return out;
   const Conversion c(source, wanted);
@@ -484,7 +484,7 @@ core::Result<Dna> convert_coordinates(const Dna& dna, const CoordinateTarget& ta
   if (!c.basis.identity()) warn_of_components(dna, warnings);
   if (!c.keeps_positions() || !c.keeps_rotations()) warn_of_unknown_layers(dna, warnings);
   convert_definition(c, out.definition);
-  if (Status done = convert_joint_groups(c, out); !done) return std::move(done).propagate();
+  RISORIUS_TRY(convert_joint_groups(c, out));
   for (Mesh& mesh : out.geometry.meshes) convert_mesh(c, mesh);
   convert_control_rotations(c, out);
   convert_ml_joints(c, wanted, out.machine_learned_behavior_ext.joints, warnings);

@@ -588,7 +588,7 @@ Status apply(const LodPlan& plan, bool cut_while_reading, Dna& dna) {
 // A plan that keeps everything but channels.
 core::Result<Dna> remove_unreferenced_blend_shapes(const Dna& dna) {
   std::vector<Warning> unused;
-  if (core::Status valid = validate(dna, unused); !valid) return std::move(valid).propagate();
+  RISORIUS_TRY(validate(dna, unused));
   Dna out = dna;
   const ControlCounts controls = control_counts(dna);
   const auto provided = [&](std::uint32_t control) {
@@ -616,22 +616,18 @@ core::Result<Dna> remove_unreferenced_blend_shapes(const Dna& dna) {
   plan.joints = all(d.joint_names.size());
   plan.meshes = all(d.mesh_names.size());
   plan.animated_maps = all(d.animated_map_names.size());
-  if (core::Status cut = detail::drop_channels(plan, entries, out); !cut) {
-    return std::move(cut).propagate();
-  }
+  RISORIUS_TRY(detail::drop_channels(plan, entries, out));
   return out;
 }
 
 core::Result<Dna> filter_lods(const Dna& dna, const LodSelection& selection) {
   std::vector<Warning> unused;
-  if (core::Status valid = validate(dna, unused); !valid) return std::move(valid).propagate();
+  RISORIUS_TRY(validate(dna, unused));
   auto plan = detail::plan_lods(dna.descriptor, dna.definition, selection);
   if (!plan) return std::move(plan).propagate();
   Dna out = dna;
   if (!plan->has_value()) return out;
-  if (core::Status applied = detail::apply(**plan, false, out); !applied) {
-    return std::move(applied).propagate();
-  }
+  RISORIUS_TRY(detail::apply(**plan, false, out));
   return out;
 }
 

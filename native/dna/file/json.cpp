@@ -660,7 +660,7 @@ Result<Json> parse_text(std::string_view text) {
 
 Result<std::string> to_json(const Dna& dna) {
   std::vector<Warning> oddities;
-  if (core::Status valid = validate(dna, oddities); !valid) return std::move(valid).propagate();
+  RISORIUS_TRY(validate(dna, oddities));
   Writer w;
   w.object([&] {
     w.member("version", [&] {
@@ -706,7 +706,7 @@ Result<Dna> from_json(std::string_view text, const Limits& limits) {
   Reader r(limits);
   r.object(*json, [&] { read_layers(r, dna); });
   if (r.failed()) return r.take_error();
-  if (core::Status valid = validate(dna, dna.warnings); !valid) return std::move(valid).propagate();
+  RISORIUS_TRY(validate(dna, dna.warnings));
   return dna;
 }
 

@@ -80,9 +80,7 @@ class Parser {
   }
 
   Result<Dna> run() {
-    if (Status header = read_header(r_, options_.limits, dna_); !header) {
-      return std::move(header).propagate();
-    }
+    RISORIUS_TRY(read_header(r_, options_.limits, dna_));
     if (dna_.version == 1) {
       parse_sections();
     } else {
@@ -91,9 +89,7 @@ class Parser {
     if (r_.failed()) return r_.take_error();
     if (error_) return core::Unexpected{*error_};
     if (layer_.plan != nullptr) {
-      if (Status applied = detail::apply(*plan_, true, dna_); !applied) {
-        return std::move(applied).propagate();
-      }
+      RISORIUS_TRY(detail::apply(*plan_, true, dna_));
     }
     return std::move(dna_);
   }

@@ -184,7 +184,7 @@ Result<std::optional<Dna>> reduced(const Dna& dna, std::uint16_t minor, bool kep
                                         "controls that drove them"});
   }
   std::vector<Warning> oddities;
-  if (core::Status valid = validate(out, oddities); !valid) return std::move(valid).propagate();
+  RISORIUS_TRY(validate(out, oddities));
   return std::optional<Dna>(std::move(out));
 }
 
@@ -198,7 +198,7 @@ Result<std::vector<std::uint8_t>> write(const Dna& dna, const WriteOptions& opti
         "version 2." + std::to_string(options.minor) + " cannot be written, 2.1 to 2.8 can");
   }
   std::vector<Warning> oddities;
-  if (core::Status valid = validate(dna, oddities); !valid) return std::move(valid).propagate();
+  RISORIUS_TRY(validate(dna, oddities));
   const bool kept = options.newer_layers && options.minor > 1;
   warn_of_losses(dna, options, kept, warnings);
   auto smaller = reduced(dna, options.minor, kept, warnings);
