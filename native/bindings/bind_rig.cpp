@@ -15,6 +15,7 @@
 #include "rig/stages/evaluate.h"
 #include "rig/stages/instance.h"
 #include "rig/stages/rbf.h"
+#include "rig/stages/tables.h"
 
 namespace risorius::bindings {
 

@@ -6,6 +6,7 @@
 
 #include "rig/stages/evaluate.h"
 #include "rig/stages/instance.h"
+#include "rig/stages/tables.h"
 #include "support/counted_new.h"
 #include "support/face.h"
 #include "support/full_face.h"

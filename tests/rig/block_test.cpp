@@ -11,6 +11,7 @@
 #include "rig/stages/evaluate.h"
 #include "rig/stages/instance.h"
 #include "rig/stages/rbf.h"
+#include "rig/stages/tables.h"
 #include "support/face.h"
 
 namespace risorius::rig {

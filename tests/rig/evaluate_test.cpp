@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "rig/stages/instance.h"
+#include "rig/stages/tables.h"
 #include "support/face.h"
 
 namespace risorius::rig {

@@ -6,6 +6,7 @@
 
 #include "compile/compile.h"
 #include "rig/stages/evaluate.h"
+#include "rig/stages/tables.h"
 
 namespace {
 

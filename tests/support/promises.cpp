@@ -18,6 +18,7 @@
 #include "rig/block.h"
 #include "rig/stages/evaluate.h"
 #include "rig/stages/instance.h"
+#include "rig/stages/tables.h"
 
 namespace risorius::promises {
 

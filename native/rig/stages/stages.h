@@ -26,8 +26,14 @@ void run_operation(const Rig& rig, std::uint32_t index, std::uint32_t lod, Works
 /// One RBF solver: overwrites what its poses write.
 void run_solver(const Rig& rig, std::uint32_t index, Workspace& work, float* controls) noexcept;
 
+inline float clamp01(float v) { return v < 0.0f ? 0.0f : (v > 1.0f ? 1.0f : v); }
+
 /// Joints, channels and maps from controls and work.active.
 void outputs(const Rig& rig, std::uint32_t lod, Workspace& work, const PoseView& pose) noexcept;
+
+/// The joint attributes of all groups; overwrites every one.
+void joint_groups(const Rig& rig, std::uint32_t lod, Workspace& work,
+                  const PoseView& pose) noexcept;
 
 /// The parts of outputs that a batch has in common with it. rotations: what comes after the joint
 /// groups, in this order.
