@@ -19,7 +19,7 @@ void bind_dna_extensions(py::module_& m);
 void bind_dna_extension_fields(DnaClass& c);
 void bind_dna_files(py::module_& m, DnaClass& c);
 
-// A class whose constructor takes its fields by keyword and that prints nothing of its arrays.
+/// Binds a struct of Dna as a class whose constructor takes the fields by keyword.
 template <class T>
 py::class_<T, std::shared_ptr<T>> value_class(py::module_& m, const char* name, const char* doc) {
   py::class_<T, std::shared_ptr<T>> c(m, name, doc);
@@ -34,7 +34,11 @@ py::class_<T, std::shared_ptr<T>> value_class(py::module_& m, const char* name, 
   return c;
 }
 
-// Property helpers: `get` maps an object to a reference of the field.
+// Each of the following adds one property to a class.
+// In: name  of the property
+//     get   a function from an object to a reference of its field
+
+/// Numbers: a NumPy array, float32[n, 3] or [n, 2] for planes of coordinates.
 template <class Class, class Get>
 void numbers(Class& c, const char* name, Get get) {
   using Owner = typename Class::type;
@@ -52,6 +56,7 @@ void numbers(Class& c, const char* name, Get get) {
       });
 }
 
+/// One text.
 template <class Class, class Get>
 void text(Class& c, const char* name, Get get) {
   using Owner = typename Class::type;
@@ -60,6 +65,7 @@ void text(Class& c, const char* name, Get get) {
       [get, name](Owner& self, const py::object& v) { get(self) = text_from_python(v, name); });
 }
 
+/// A list of texts.
 template <class Class, class Get>
 void texts(Class& c, const char* name, Get get) {
   using Owner = typename Class::type;
@@ -77,6 +83,7 @@ void texts(Class& c, const char* name, Get get) {
       });
 }
 
+/// One number.
 template <class Class, class Get>
 void number(Class& c, const char* name, Get get) {
   using Owner = typename Class::type;
@@ -86,7 +93,7 @@ void number(Class& c, const char* name, Get get) {
       [get](Owner& self, Number value) { get(self) = value; });
 }
 
-// A struct inside another: the element shares the owner's life.
+/// A struct inside another; the Python object of the inner one keeps the outer one alive.
 template <class Class, class Get>
 void part(Class& c, const char* name, Get get) {
   using Owner = typename Class::type;
@@ -99,6 +106,7 @@ void part(Class& c, const char* name, Get get) {
       [get](Owner& self, const Field& value) { get(self) = value; });
 }
 
+/// A list of structs, as a tuple whose elements can be changed in place.
 template <class Class, class Get>
 void parts(Class& c, const char* name, Get get) {
   using Owner = typename Class::type;
@@ -118,7 +126,7 @@ void parts(Class& c, const char* name, Get get) {
       });
 }
 
-// The words of what says how numbers are meant.
+// The words for the units, axes and orders that say how numbers of a file are meant.
 inline constexpr std::array<const char*, 2> kTranslationUnits{"cm", "m"};
 inline constexpr std::array<const char*, 2> kRotationUnits{"degrees", "radians"};
 inline constexpr std::array<const char*, 6> kDirections{"left", "right", "up",
@@ -126,12 +134,13 @@ inline constexpr std::array<const char*, 6> kDirections{"left", "right", "up",
 inline constexpr std::array<const char*, 6> kSequences{"xyz", "xzy", "yxz", "yzx", "zxy", "zyx"};
 inline constexpr std::array<const char*, 2> kWindings{"ccw", "cw"};
 
-// Enumerations read as words; a number that the format does not know reads as "#17".
+/// The word for a number of an enumeration; one that the format does not know is "#17".
 template <std::size_t kCount>
 std::string word(const std::array<const char*, kCount>& words, std::uint32_t value) {
   return value < kCount ? words[value] : "#" + std::to_string(value);
 }
 
+/// The way back. In: name  of the field. Raises ValueError where the word is not known.
 template <class Number, std::size_t kCount>
 Number value_of_word(const std::array<const char*, kCount>& words, const std::string& text,
                      const char* name) {
@@ -144,6 +153,7 @@ Number value_of_word(const std::array<const char*, kCount>& words, const std::st
   throw py::value_error(std::string(name) + ": one of " + known + " was expected, found " + text);
 }
 
+/// An enumeration, as one of the words.
 template <class Class, std::size_t kCount, class Get>
 void choice(Class& c, const char* name, const std::array<const char*, kCount>& words, Get get) {
   using Owner = typename Class::type;
@@ -155,6 +165,7 @@ void choice(Class& c, const char* name, const std::array<const char*, kCount>& w
       });
 }
 
+/// A LodMapping, or a list with a list of indices for each LOD.
 inline dna::LodMapping lod_mapping_from_python(const py::object& value) {
   if (py::isinstance<dna::LodMapping>(value)) return value.cast<dna::LodMapping>();
   dna::LodMapping mapping;
@@ -168,6 +179,7 @@ inline dna::LodMapping lod_mapping_from_python(const py::object& value) {
   return mapping;
 }
 
+/// A LodMapping; may be set to a list with a list of indices for each LOD.
 template <class Class, class Get>
 void lod_mapping(Class& c, const char* name, Get get) {
   using Owner = typename Class::type;

@@ -17,16 +17,22 @@ namespace risorius::bindings {
 
 namespace py = pybind11;
 
+/// Raises an error as its Python class.
+/// In: file  the file that it is about, or ""
+///     type  the class; nullptr: the one that the error's code belongs to
 void throw_error(const core::Error& error, const std::string& file = "", PyObject* type = nullptr);
-// A new class of errors below risorius.base.errors.RisoriusError; the caller keeps it for ever.
+/// A new class of errors below risorius.base.errors.RisoriusError; the caller keeps it for ever.
 PyObject* new_error_type(const char* name, const char* doc);
 
+/// The value of a result; raises its error. In: file  as throw_error has it
 template <class T>
 T unwrap(core::Result<T>&& result, const std::string& file = "") {
   if (!result) throw_error(result.error(), file);
   return std::move(result).value();
 }
 
+/// A NumPy view of an array's buffer, which lives as long as the view.
+/// In: shape, strides  of the view, strides in bytes
 template <class T>
 py::array read_only_view(const core::Array<T>& values, std::vector<py::ssize_t> shape,
                          std::vector<py::ssize_t> strides) {
@@ -42,6 +48,7 @@ py::array read_only_view(const core::Array<T>& values, std::vector<py::ssize_t> 
   return view;
 }
 
+/// Views without a copy: T[n], and float32[n, planes].
 template <class T>
 py::array to_numpy(const core::Array<T>& values) {
   return read_only_view(values, {static_cast<py::ssize_t>(values.size())},
@@ -56,13 +63,15 @@ py::array to_numpy(const core::PlanarArray<kPlanes>& array) {
       {static_cast<py::ssize_t>(sizeof(float)), n * static_cast<py::ssize_t>(sizeof(float))});
 }
 
+/// Raises ValueError. In: wanted  the shape in words, e.g. "(n, 3)"
 [[noreturn]] inline void shape_error(const std::string& name, const std::string& wanted,
                                      const py::array& given) {
   throw py::value_error(name + ": an array of shape " + wanted + " was expected, the shape is " +
                         py::str(given.attr("shape")).cast<std::string>());
 }
 
-/// Copies any sequence into a core array; integers are checked against their type's range.
+/// Copies any sequence of numbers into a core array. In: name  of the argument, for errors.
+/// Raises ValueError where it is none, or where whole numbers do not fit T.
 template <class T>
 core::Array<T> from_python(const py::object& object, const char* name) {
   const py::module_ numpy = py::module_::import("numpy");
@@ -87,6 +96,7 @@ core::Array<T> from_python(const py::object& object, const char* name) {
   return core::Array<T>(std::vector<T>(typed.data(), typed.data() + typed.size()));
 }
 
+/// Copies float[n, planes] into planes. Raises ValueError as from_python.
 template <std::size_t kPlanes>
 core::PlanarArray<kPlanes> planar_from_python(const py::object& object, const char* name) {
   auto typed = py::array_t<float, py::array::c_style | py::array::forcecast>::ensure(object);
@@ -103,7 +113,8 @@ core::PlanarArray<kPlanes> planar_from_python(const py::object& object, const ch
   return {core::Array<float>(std::move(values))};
 }
 
-/// Text of unknown encoding: bytes that are not UTF-8 survive the way there and back.
+/// A text of a file as a str. Bytes that are no UTF-8 become surrogates, which text_from_python
+/// turns into the same bytes again.
 inline py::str to_python(const std::string& text) {
   PyObject* decoded =
       PyUnicode_DecodeUTF8(text.data(), static_cast<Py_ssize_t>(text.size()), "surrogateescape");
@@ -111,6 +122,7 @@ inline py::str to_python(const std::string& text) {
   return py::reinterpret_steal<py::str>(decoded);
 }
 
+/// The way back. Raises ValueError where the object is no text. In: name  of the argument.
 inline std::string text_from_python(const py::handle& object, const char* name) {
   if (!PyUnicode_Check(object.ptr())) {
     throw py::value_error(std::string(name) + ": a text was expected");

@@ -45,9 +45,12 @@ class ByteReader {
   void clear_error();
   /// No list may have more elements, whatever the bytes would allow.
   void set_max_count(std::uint32_t n) { max_count_ = n; }
+  /// Remembers an error, unless there is one already.
+  /// In: offset  the byte of the file that is wrong; the field is what where() says now
   void fail_at(std::uint64_t offset, ErrorCode code, std::string message);
 
-  /// Restricts reading to [offset, offset + size). Fails when that is outside the source.
+  /// Restricts reading to [offset, offset + size). Out: whether that lies inside the source; if not
+  /// the reader has failed.
   bool enter(std::uint64_t offset, std::uint64_t size);
   /// The window begins small again, as after a jump: little of what comes next may be wanted.
   void read_small() { next_read_ = 0; }
@@ -69,13 +72,16 @@ class ByteReader {
   }
   /// The number at offset, if it lies between here and end(). Reading goes on where it was.
   std::optional<std::uint16_t> peek_u16(std::uint64_t offset);
+  /// A count, then so many bytes of text.
   std::string str();
   std::vector<std::uint8_t> bytes(std::uint64_t size);
   void skip(std::uint64_t size);
-  /// all_finite   becomes false when a value is infinite or no number; is never made true
+  /// A count, then so many numbers.
+  /// Out: all_finite   becomes false when a value is infinite or no number; is never made true
   Array<float> f32_list(bool* all_finite = nullptr);
   Array<std::uint16_t> u16_list();
-  /// largest      grows to the largest value
+  /// A count, then so many numbers.
+  /// Out: largest      grows to the largest value
   Array<std::uint32_t> u32_list(std::uint32_t* largest = nullptr);
   /// Reads n values without a count, straight into out. In: n already checked by count(). What is
   /// in out after a failure is not defined.

@@ -10,6 +10,7 @@
 
 namespace risorius::core {
 
+/// An allocator of std::vector; its memory begins on a multiple of kAlignment bytes.
 template <class T, std::size_t kAlignment = 64>
 struct AlignedAllocator {
   using value_type = T;
@@ -27,9 +28,11 @@ struct AlignedAllocator {
   bool operator==(const AlignedAllocator&) const { return true; }
 };
 
-/// Memory for what is read at random: in large pages where it is large and the system has them, so
-/// that finding it costs no more than reading it.
+/// What new memory holds: zeros, or whatever was there before.
 enum class Fill { kZero, kNothing };
+/// Memory that begins on a cache line. 2 MiB and more are asked for in large pages where the system
+/// has them: memory that is read at random then costs fewer look-ups of addresses.
+/// In: size in bytes
 std::shared_ptr<std::uint8_t> allocate_pages(std::size_t size, Fill fill = Fill::kZero);
 
 template <class T>

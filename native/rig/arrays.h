@@ -1,5 +1,16 @@
 // SPDX-License-Identifier: MIT
-// The arrays of a compiled face: as vectors while it is compiled, as views into one block after.
+// What a compiled face consists of: one header of plain numbers and about fifty arrays.
+//
+// compile() fills the arrays as std::vectors (RigData). make_rig() then copies them into one block
+// of bytes, and a Rig sees each array as a view into that block. Arrays refer to each other by
+// index and never by pointer, so the block can be written to a file and read again at another
+// address.
+//
+// Words: a *control* is one number of the control vector, which evaluation computes from the raw
+// controls that a caller sets. A *joint attribute* is one of the 9 (or, with quaternions, 10)
+// numbers that move a joint. A *row* is a joint attribute as a joint group sees it: the group's own
+// numbering. A *LOD* is a level of detail, 0 the finest. A name that ends in "_begin" or "begins"
+// is an index into another array; where that array is not the next one, a comment names it.
 #pragma once
 
 #include <array>
@@ -12,240 +23,296 @@
 
 namespace risorius::rig {
 
-/// One row of a conditional table: from <= in <= to gives out += slope * in + cut.
+/// One row of a conditional table. Where from <= in <= to holds for the input, the row adds
+/// slope * in + cut to the output.
 struct ConditionalRow {
   std::uint16_t input = 0, output = 0;
   float from = 0, to = 0, slope = 0, cut = 0;  // from <= to
-  std::uint32_t run_end = 0;                   // first row after the run of equal (input, output)
+  // Neighbouring rows with the same input and output are a run, of which at most one row counts.
+  // This is the first row behind the run.
+  std::uint32_t run_end = 0;
 };
 
-/// A corrective: min(1, weight * product of its factors, each clamped to [0, 1]).
+/// A corrective: a control that is min(1, weight * the product of its factors), where each factor
+/// is another control clamped to [0, 1].
 struct Psd {
-  std::uint16_t output = 0;  // control index
-  std::uint16_t factor_count = 0;
-  std::uint32_t factors_begin = 0;
+  std::uint16_t output = 0;         // the control that the corrective writes
+  std::uint16_t factor_count = 0;   // number of factors
+  std::uint32_t factors_begin = 0;  // the first factor in psd_factors
   float weight = 1;
 };
 
-/// A dense matrix from controls to joint attributes, stored by columns of row_count values without
-/// padding; what a control drives in all groups lies together.
-struct JointGroup {
-  std::uint32_t row_count = 0, column_count = 0;  // columns without any value do not count
-  std::uint32_t rows_begin = 0;                   // its rows among those of all groups
-};
-
-/// A corrective, found by a factor that watches it.
+/// A corrective, as it is listed at the factor that watches it.
 struct Watch {
-  std::uint16_t psd = 0;
-  std::uint16_t other = 0;  // another of its factors, or the same again
+  std::uint16_t psd = 0;    // the corrective, an index into psds
+  std::uint16_t other = 0;  // the control of a second factor; with one factor, that factor again
 };
 
-/// A column of a group, found by its control.
+/// A joint group: a dense matrix that turns some controls into some joint attributes.
+///
+/// The matrix is stored column by column, a column for each control, in joint_values or
+/// joint_halves. Columns have row_count values and no padding. The columns of one control in all
+/// groups lie side by side, so that a control is one run of memory.
+struct JointGroup {
+  std::uint32_t row_count = 0;
+  std::uint32_t column_count = 0;  // columns that hold at least one value other than 0
+  std::uint32_t rows_begin = 0;    // this group's first row among the rows of all groups
+};
+
+/// One column of a joint group, as it is listed at its control.
 struct JointColumn {
-  std::uint32_t offset = 0;  // of its first value
-  std::uint32_t group = 0;
+  std::uint32_t offset = 0;  // the column's first value in joint_values or joint_halves
+  std::uint32_t group = 0;   // an index into joint_groups
 };
 
-/// One joint of one group whose rotation is a product of quaternions, one per column that turns it:
-/// a blend of identity and the column's quaternion.
+/// A joint whose rotation in one joint group is a product of quaternions. Each column that turns
+/// the joint gives one factor: the blend of no rotation and the column's quaternion by the control.
 struct QuaternionJoint {
-  std::uint32_t joint = 0, group = 0;
-  std::uint32_t first_row = 0;  // its first rotation row: a LOD with fewer rows leaves it out
+  std::uint32_t joint = 0;
+  std::uint32_t group = 0;  // an index into joint_groups
+  // The joint's first rotation row in the group. A LOD that uses this many rows or fewer leaves the
+  // rotation out.
+  std::uint32_t first_row = 0;
 };
 
-/// A column that turns such joints, by group and then in the order of the file, which is the order
-/// of the product.
+/// A column that turns joints by quaternions. The columns are ordered by group, and within a group
+/// as in the file: quaternions do not commute, so this order is the order of the product.
 struct QuaternionColumn {
   std::uint32_t control = 0;
-  std::uint32_t terms_begin = 0, terms_end = 0;
+  std::uint32_t terms_begin = 0, terms_end = 0;  // its terms in quaternion_terms
 };
 
+/// The rotation that one column gives to one joint while the column's control is 1.
 struct QuaternionTerm {
   Quaternion rotation;
-  std::uint32_t slot = 0;  // of quaternion_joints
+  std::uint32_t slot = 0;  // the joint, an index into quaternion_joints
 };
 
-/// A radial solver: which of its poses' targets its inputs are near.
+/// A radial basis function solver: it compares its input controls with the target of each of its
+/// poses, and the nearer a target, the more of the pose it gives.
 struct RbfSolver {
   double radius = 0;
-  float threshold = 0;
-  std::uint32_t inputs_begin = 0, input_count = 0;
-  std::uint32_t poses_begin = 0, pose_count = 0;
-  std::uint32_t targets_begin = 0;  // [poses, inputs], converted as the inputs are
-  std::uint32_t inverse_begin = 0, interpolative = 0;  // [poses, poses] when it interpolates
-  std::uint32_t distance = 0, function = 0, axis = 0;  // numbers as in the file
-  std::uint32_t always_normalize = 0;
+  float threshold = 0;  // a pose whose weight is not above it is left out
+  std::uint32_t inputs_begin = 0, input_count = 0;  // its input controls in rbf_inputs
+  std::uint32_t poses_begin = 0, pose_count = 0;    // its poses in rbf_poses
+  // The matrix [poses, inputs] of targets in rbf_targets. Where the distance looks at the swing or
+  // the twist of a rotation only, targets hold that part only.
+  std::uint32_t targets_begin = 0;
+  std::uint32_t inverse_begin = 0;  // the matrix [poses, poses] in rbf_inverses, if interpolative
+  std::uint32_t interpolative = 0;  // 1: at the target of a pose the solver gives that pose alone
+  std::uint32_t distance = 0, function = 0, axis = 0;  // the numbers that the file uses
+  std::uint32_t always_normalize = 0;                  // 1: weights sum to 1 however small they are
 };
 
-/// A pose of one solver: output += weight * value * product of the inputs.
+/// A pose of a solver: to each output control it adds weight * value * the product of its inputs,
+/// where value is how much of the pose the solver gives.
 struct RbfPose {
-  std::uint32_t inputs_begin = 0, input_count = 0;
-  std::uint32_t outputs_begin = 0, output_count = 0;
-  float scale = 0;
+  std::uint32_t inputs_begin = 0, input_count = 0;    // controls in rbf_pose_inputs
+  std::uint32_t outputs_begin = 0, output_count = 0;  // in rbf_outputs
+  float scale = 0;                                    // value is multiplied by it
 };
 struct RbfOutput {
   std::uint32_t control = 0;
   float weight = 0;
 };
 
+/// An index that refers to nothing.
 inline constexpr std::uint32_t kNone = 0xFFFFFFFFu;
 
-/// A node of the graph of networks. Its values lie in scratch memory.
+/// An operation: one node of the graph of neural networks. What it computes are floats in the
+/// scratch memory of a Workspace (operation_values), where later operations read them.
 struct MlOperation {
+  // kGather copies controls to values; kMlp runs a network (a multilayer perceptron); kWeightedSum
+  // adds up values of others; kScatter copies values to controls.
   enum Kind : std::uint32_t { kGather = 1, kScatter = 2, kMlp = 3, kWeightedSum = 4 };
   std::uint32_t kind = kGather;
-  std::uint32_t mask = kNone;  // of its network, or of the one that a scatter writes
-  std::uint32_t values_begin = 0, value_count = 0;
-  std::uint32_t segments_begin = 0, segment_count = 0;  // values of others that it reads
-  std::uint32_t items_begin = 0, item_count = 0;        // ml_controls, or ml_layers of a network
+  // The region whose mask switches the operation off: that of its network, or for kScatter that of
+  // the network whose values it writes. kNone: no mask.
+  std::uint32_t mask = kNone;
+  std::uint32_t values_begin = 0, value_count = 0;      // what it computes, in operation_values
+  std::uint32_t segments_begin = 0, segment_count = 0;  // what it reads, in ml_segments
+  std::uint32_t items_begin = 0, item_count = 0;        // in ml_controls, or ml_layers for kMlp
 };
+/// A run of values that another operation computed.
 struct MlSegment {
-  std::uint32_t begin = 0, count = 0;
+  std::uint32_t begin = 0, count = 0;  // in operation_values
   float weight = 1;
 };
+/// A control that an operation reads or writes.
 struct MlControl {
   std::uint32_t control = 0;
-  float rest = 0;  // its value while its network is masked
+  float rest = 0;  // what kScatter writes while the mask of the network is 0
 };
-/// y = activation(W x + b), stored by columns of `rows` values: b, then those of W.
+/// A layer of a network: y = activation(W x + b). In ml_weights lie the `rows` values of b and then
+/// the columns of W, `rows` values each.
 struct MlLayer {
-  std::uint32_t weights_begin = 0, rows = 0, columns = 0, activation = 0;
-  float alpha = 0;  // of the leaky ReLU
+  std::uint32_t weights_begin = 0, rows = 0, columns = 0;
+  std::uint32_t activation = 0;  // the number that the file uses
+  float alpha = 0;               // the slope of the leaky ReLU below 0
 };
 
-/// A joint that networks move: a control or kNone for tx ty tz, x y z w (Euler angles: no w), sx sy
-/// sz.
+/// A joint that networks move, on top of what joint groups do to it.
 struct MlJoint {
-  std::uint32_t joint = 0, is_quaternion = 0;
+  std::uint32_t joint = 0;
+  std::uint32_t is_quaternion = 0;  // 1: the rotation is a quaternion, 0: Euler angles
+  // The controls that hold tx ty tz, x y z w (Euler angles have no w) and sx sy sz; kNone where the
+  // attribute has no control.
   std::uint32_t controls[10] = {kNone, kNone, kNone, kNone, kNone,
                                 kNone, kNone, kNone, kNone, kNone};
 };
 
-/// Spreads the rotation of four controls over joints.
+/// A twist or swing setup: it gives shares of one rotation, which four controls hold, to joints.
 struct TwistSwing {
   enum Kind : std::uint32_t { kTwist, kUntwist, kSwing };
-  std::uint32_t inputs[4] = {0, 0, 0, 0};  // x y z w
-  std::uint32_t axis = 0, kind = kTwist;
-  std::uint32_t outputs_begin = 0, outputs_end = 0;
+  std::uint32_t inputs[4] = {0, 0, 0, 0};  // the controls of x y z w
+  std::uint32_t axis = 0;                  // of the twist: 0 x, 1 y, 2 z
+  std::uint32_t kind = kTwist;
+  std::uint32_t outputs_begin = 0, outputs_end = 0;  // in twist_swing_outputs
 };
 struct TwistSwingOutput {
   std::uint32_t joint = 0;
-  float weight = 0;
+  float weight = 0;  // 0: the whole rotation, 1: no rotation
 };
 
-/// Rows of the raw to GUI table that belong to one GUI control, and in it to one (from, to).
+/// The rows of the GUI table that belong to one GUI control and have the same from and to.
 struct GuiRange {
-  std::uint32_t gui = 0, rows_begin = 0, rows_end = 0;
+  std::uint32_t gui = 0;                       // the GUI control
+  std::uint32_t rows_begin = 0, rows_end = 0;  // in gui_range_rows
 };
 
-/// One thing to do: a kind and an index in one number.
+/// A step of an evaluation: what is to be done and on which element, packed into one number.
 enum class StepKind : std::uint32_t { kOperation, kSolver, kPsd };
 inline constexpr std::uint32_t make_step(StepKind kind, std::uint32_t index) {
   return (static_cast<std::uint32_t>(kind) << 30) | index;
 }
 inline constexpr StepKind step_kind(std::uint32_t step) { return StepKind{step >> 30}; }
+/// An index into ml_operations, rbf_solvers or psds, by the kind of the step.
 inline constexpr std::uint32_t step_index(std::uint32_t step) { return step & 0x3FFFFFFFu; }
 
-/// The lists of steps of a LOD.
+/// Each LOD has these lists of steps. A *settled* evaluation (settle = true) orders everything by
+/// what it needs; a *latent* one follows the reference, whose stages have a fixed order.
 enum StepList : std::uint32_t {
-  kEarly,      // settled: networks and solvers that need no corrective
-  kChained,    // settled: the rest but the watched, what others read first
-  kCyclic,     // what needs itself, directly or not; at rest when settled
-  kReference,  // not settled: networks and then solvers, in the order of the file
-  kStepLists
+  // Settled: networks and solvers that need no corrective. They run before all correctives.
+  kEarly,
+  // Settled: the other networks and solvers, and the correctives that are not watched (see psds),
+  // each behind those that it reads. Latent: its correctives.
+  kChained,
+  // What needs itself, directly or through others, and what needs that. A settled evaluation leaves
+  // it at rest; a latent one runs its correctives.
+  kCyclic,
+  // Latent: networks and then solvers, in the order of the file.
+  kReference,
+  kStepLists  // the number of lists
 };
 
 /// Sizes and settings: plain numbers.
 struct RigHeader {
   std::uint32_t lod_count = 0, joint_count = 0, blend_shape_count = 0, animated_map_count = 0;
-  /// The control vector: raw | corrective | network | RBF pose.
+  // The control vector is raw | corrective | network | RBF pose. These are the lengths of the first
+  // two parts and of the whole; GUI controls are no part of it.
   std::uint32_t raw_count = 0, gui_count = 0, psd_count = 0, control_count = 0;
-  std::uint32_t operation_values = 0, widest_layer = 0, solver_inputs = 0, solver_poses = 0;
-  std::uint32_t mask_count = 0;    // regions of networks
-  std::uint32_t joint_stride = 9;  // 9 with Euler angles, 10 with quaternions
+  std::uint32_t operation_values = 0;  // floats of scratch memory that operations compute
+  std::uint32_t widest_layer = 0;      // rows of the largest layer of a network
+  std::uint32_t solver_inputs = 0, solver_poses = 0;  // of the largest solver
+  std::uint32_t mask_count = 0;                       // regions of networks
+  std::uint32_t joint_stride =
+      9;  // attributes of a joint: 9 with Euler angles, 10 with quaternions
   EulerConvention euler;
-  /// The system of joints that networks move, where it is another: v * ml_basis is a vector in
-  /// ours.
+  // Networks may move joints in another system of axes than the face's. Then ml_converted is 1,
+  // v * ml_basis takes a vector of theirs into ours, and ml_euler says how they spell Euler angles.
   std::uint32_t ml_converted = 0;
   EulerConvention ml_euler;
   float ml_basis[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
 };
 
-/// A is a container of elements: std::vector or a view.
+/// The arrays. A is the container of the elements: std::vector or a view.
 template <template <class> class A>
 struct RigArrays {
-  // Texts back to back: raw controls, GUI controls, ignored layers; text t ends at text_ends[t].
+  // Names, back to back: raw controls, GUI controls, ignored layers. Name t ends at text_ends[t].
   A<char> text;
   A<std::uint32_t> text_ends;
 
-  A<float> neutral_joints;    // [joints, stride], scale 1
-  A<float> initial_controls;  // [controls]
+  A<float> neutral_joints;    // [joints, joint_stride]; the scale is 1
+  A<float> initial_controls;  // [controls]: the control vector at rest
+  // The table from GUI controls to raw controls, and the same rows sorted for the way back:
+  // ranges by GUI control, in the order of their first rows.
   A<ConditionalRow> gui_rows;
-  A<GuiRange> gui_ranges;           // by GUI control, ranges of one in the order of their rows
-  A<std::uint32_t> gui_range_rows;  // in gui_rows
+  A<GuiRange> gui_ranges;
+  A<std::uint32_t> gui_range_rows;  // indices into gui_rows
 
-  // A corrective whose factors are there before any corrective is watched by the factor that
-  // watches the fewest: while that rests at 0 so does the corrective, and nobody looks. Per LOD a
-  // row of control_count + 1 begins into watched.
-  A<Psd> psds;  // by watcher, so that what one look needs lies together; each output once
-  A<std::uint16_t> psd_factors;
-  A<std::uint32_t> watch_begins;
-  A<Watch> watched;
-  // What watches nothing, per LOD and list: steps[step_begins[lod * kStepLists + list] ...].
+  // Correctives. Most rest at 0, and evaluation should not look at those. A corrective whose
+  // factors all have their values before the first corrective is computed is *watched*: it is
+  // listed at one of its factors, the one with the fewest correctives listed. While that factor is
+  // 0 the corrective is 0, and evaluation passes it over without a look.
+  A<Psd> psds;                    // in the order of their watchers; no two have the same output
+  A<std::uint16_t> psd_factors;   // controls
+  A<std::uint32_t> watch_begins;  // [LODs, controls + 1]: where each control's list begins
+  A<Watch> watched;               // the lists
+  // Correctives that are not watched, networks and solvers are steps. List l of a LOD is
+  // steps[step_begins[lod * kStepLists + l]] up to the begin of the next list.
   A<std::uint32_t> step_begins;
   A<std::uint32_t> steps;
 
-  // Groups that coarser LODs have come first: a LOD needs the first live_groups[lod] only.
+  // Joint groups. The groups that coarse LODs use come first, so a LOD needs the first
+  // live_groups[lod] groups only; and of each group the first joint_group_lods[group, lod] rows.
   A<JointGroup> joint_groups;
   A<std::uint32_t> live_groups;       // [LODs]
-  A<std::uint32_t> joint_group_lods;  // [groups, LODs]: rows
-  A<float> joint_values;              // one of these two is empty
-  A<std::uint16_t> joint_halves;
-  A<std::uint16_t> joint_outputs;  // of the rows of all groups, one after the other
-  // Where those rows go, per LOD: for each 16 joint attributes a piece, and extra pieces for what
-  // does not follow each other in the rows (extra_begins[lod] ...).
-  A<simd::Piece> joint_pieces;
-  A<std::uint32_t> extra_begins;
+  A<std::uint32_t> joint_group_lods;  // [groups, LODs]
+  A<float> joint_values;              // the columns as float32 ...
+  A<std::uint16_t> joint_halves;      // ... or as float16; one of the two arrays is empty
+  A<std::uint16_t> joint_outputs;     // [rows of all groups]: the joint attribute of each row
+  // How the rows reach their joint attributes. The attributes are cut into blocks of 16; for each
+  // block of each LOD one piece tells which attributes take values and where these begin in the
+  // rows. Attributes of a block whose rows lie elsewhere have extra pieces.
+  A<simd::Piece> joint_pieces;    // [LODs, blocks]
+  A<std::uint32_t> extra_begins;  // [LODs + 1]
   A<simd::Piece> extra_pieces;
-  A<std::uint32_t> joint_column_begins;  // [controls + 1]
+  A<std::uint32_t> joint_column_begins;  // [controls + 1]: where each control's columns begin
   A<JointColumn> joint_columns;          // by control, then by group
-  A<std::uint16_t> joints_written;       // by any group at any LOD, ascending
+  A<std::uint16_t> joints_written;       // joints that any group moves at any LOD, ascending
 
+  // Joints that are turned by quaternions.
   A<QuaternionJoint> quaternion_joints;
   A<QuaternionColumn> quaternion_columns;
   A<QuaternionTerm> quaternion_terms;
-  A<std::uint32_t> quaternion_column_begins;  // [controls + 1], or empty
-  A<std::uint32_t> quaternion_column_list;    // in quaternion_columns, by control
-  // With quaternions as output: joints turned by Euler angles, those of coarser LODs first.
+  A<std::uint32_t> quaternion_column_begins;  // [controls + 1], or empty without such joints
+  A<std::uint32_t> quaternion_column_list;    // indices into quaternion_columns, by control
+  // Where poses hold quaternions: the joints that are turned by Euler angles and need converting.
+  // Those of coarse LODs come first; a LOD converts the first euler_joint_lods[lod].
   A<std::uint16_t> euler_joints;
-  A<std::uint32_t> euler_joint_lods;  // [LODs]: how many of them
+  A<std::uint32_t> euler_joint_lods;  // [LODs]
 
+  // Solvers.
   A<RbfSolver> rbf_solvers;
   A<std::uint16_t> rbf_inputs;  // controls
   A<double> rbf_targets, rbf_inverses;
   A<RbfPose> rbf_poses;
-  A<std::uint16_t> rbf_pose_inputs;
+  A<std::uint16_t> rbf_pose_inputs;  // controls
   A<RbfOutput> rbf_outputs;
 
+  // Networks.
   A<MlOperation> ml_operations;
   A<MlSegment> ml_segments;
   A<MlControl> ml_controls;
   A<MlLayer> ml_layers;
-  A<std::uint32_t> ml_layer_rows;  // [layers, LODs]
+  A<std::uint32_t> ml_layer_rows;  // [layers, LODs]: the rows of a layer that a LOD needs
   A<float> ml_weights;
   A<MlJoint> ml_joints;
-  A<std::uint32_t> ml_joint_lods;  // [ML joints, LODs]: 1 where the LOD has the joint
+  A<std::uint32_t> ml_joint_lods;  // [network joints, LODs]: 1 where the LOD has the joint
 
   A<TwistSwing> twist_swings;
   A<TwistSwingOutput> twist_swing_outputs;
 
+  // Blend shape channels: channel shape_outputs[i] is control shape_inputs[i]. A LOD has the first
+  // shape_lods[lod] of them.
   A<std::uint16_t> shape_inputs, shape_outputs;
-  A<std::uint32_t> shape_lods;  // [LODs]: entries
+  A<std::uint32_t> shape_lods;  // [LODs]
+  // The table from controls to animated maps. A LOD has the first map_lods[lod] rows.
   A<ConditionalRow> map_rows;
-  A<std::uint32_t> map_lods;  // [LODs]: rows
+  A<std::uint32_t> map_lods;  // [LODs]
 };
 
-/// Calls f(array) for each, in the order of the block.
+/// Calls f(array) for each array, in the order in which the block holds them.
 template <class R, class F>
 constexpr void for_each_array(R& r, F f) {
   f(r.text), f(r.text_ends), f(r.neutral_joints), f(r.initial_controls);

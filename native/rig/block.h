@@ -17,11 +17,16 @@ enum class BlockCheck {
   kFull,    // and every index against its space: for bytes from anywhere, forged ones as well
 };
 
-/// In: data that compile() made. Fails: kLimitExceeded (more than 4 GiB of matrices).
+/// Copies the arrays into one block and opens it.
+/// In:    data     as compile() makes it: it is not checked
+///        kernels  that the rig is evaluated with; they must outlive it
+/// Fails: kLimitExceeded (an array of more elements than an index reaches)
 core::Result<Rig> make_rig(const RigData& data, const simd::Kernels& kernels);
 
 /// A Rig from the bytes of Rig::block(). Copies nothing: they stay where owner keeps them.
-/// In:    bytes  aligned to 64
+/// In:    bytes    aligned to 64
+///        check    how far the bytes are trusted
+///        kernels  as make_rig has them
 /// Fails: kInvalidValue, kInvalidIndex (bytes that are no Rig of this version and machine),
 ///        kInvalidArgument (alignment)
 core::Result<Rig> open_rig(std::span<const std::uint8_t> bytes, std::shared_ptr<const void> owner,

@@ -20,7 +20,7 @@ struct Pose {
   std::vector<float> controls;       // [controls]
 };
 
-/// Where a pose is written.
+/// Where a pose is written: the caller's memory, with the lengths of Pose.
 struct PoseView {
   float* joints = nullptr;
   float* blend_shapes = nullptr;
@@ -32,40 +32,51 @@ inline PoseView view(Pose& pose) {
           pose.controls.data()};
 }
 
-/// Scratch memory of one thread; alone in its cache lines, so that threads side by side do not wait
-/// for each other.
+/// The scratch memory of an evaluation. Threads that evaluate at the same time need one each; its
+/// alignment keeps two of them out of one cache line, where they would slow each other down. Only
+/// masks mean something to a caller.
 struct alignas(128) Workspace {
-  std::vector<std::uint16_t> active;  // controls that are not 0, ascending
+  // Which controls are not 0.
+  std::vector<std::uint16_t> active;  // these controls, ascending; the first active_count count
   std::size_t active_count = 0;
-  std::uint32_t touched = 0;                 // nothing: keeps reads that only fetch
-  std::size_t raw_active = 0;                // how many of them are raw
-  std::vector<std::uint16_t> candidates;     // correctives that may not be 0
-  std::vector<std::uint64_t> psd_bits;       // correctives that are not 0, by output
-  std::vector<std::uint32_t> column_begins;  // [groups + 1], in columns
-  std::vector<simd::Column> columns;         // active, by group
-  core::AlignedVector<float> rows;           // of all groups
-  std::vector<float> last_controls;
+  std::size_t raw_active = 0;  // how many of them are raw controls
+  // Nobody reads this. A sum of values is stored here so that the compiler keeps the reads, which
+  // bring memory into the cache.
+  std::uint32_t touched = 0;
+  // Correctives.
+  std::vector<std::uint16_t> candidates;  // watched correctives whose factors are not known to be 0
+  std::vector<std::uint64_t> psd_bits;    // a bit for each corrective control that is not 0
+  std::vector<float> last_controls;       // [controls]: the controls before the correctives ran
+  // Joint groups.
+  std::vector<std::uint32_t> column_begins;  // [groups + 1]: where a group's columns begin below
+  std::vector<simd::Column> columns;         // the columns of active controls, by group
+  core::AlignedVector<float> rows;           // the rows of all groups
+  // Rotations by quaternions.
   std::vector<Quaternion> products;            // [quaternion joints]
-  std::vector<std::uint64_t> quaternion_bits;  // columns that are not at rest; 0 between calls
-  std::vector<double> solver;                  // a solver's inputs, then two rows of its poses
-  std::vector<float> masks;                    // [regions]; 0: its networks rest
-  core::AlignedVector<float> operation_values, layers[2];
-  std::vector<simd::Column> layer_columns;
-  // Of a batch: [kFrames] of each.
-  std::vector<std::uint64_t> union_bits;      // controls that any frame uses; 0 between calls
-  std::vector<float> frame_weights;           // [controls, kFrames]; 0 between calls
-  std::vector<std::uint32_t> column_offsets;  // as columns
-  std::vector<float> column_weights;          // [.., kFrames]
+  std::vector<std::uint64_t> quaternion_bits;  // a bit for each active column; 0 between calls
+  // Solvers and networks.
+  std::vector<double> solver;  // the inputs of a solver, then two values for each of its poses
+  std::vector<float> masks;    // [regions]: at 0 the networks of the region rest
+  core::AlignedVector<float> operation_values;  // what operations computed
+  core::AlignedVector<float> layers[2];         // what a layer of a network reads and writes
+  std::vector<simd::Column> layer_columns;      // the columns of a layer whose inputs are not 0
+  // For evaluate_frames, which evaluates kFrames frames together.
+  std::vector<std::uint64_t> union_bits;      // a bit for each control that is not 0 in any frame
+  std::vector<float> frame_weights;           // [controls, kFrames]: their values
+  std::vector<std::uint32_t> column_offsets;  // [columns]: as columns has them
+  std::vector<float> column_weights;          // [columns, kFrames]
 };
 
+/// A pose and a workspace of the sizes that the rig needs.
 Pose make_pose(const Rig& rig);
 Workspace make_workspace(const Rig& rig);
-/// For evaluate_frames as well.
+/// A workspace for evaluate_frames; evaluate can use it too.
 Workspace make_batch_workspace(const Rig& rig);
 
 namespace detail {
 
-/// Scratch for the rows of all groups: kernels write and read up to a vector too far.
+/// How many floats the rows of all groups take in a workspace. Kernels write whole vectors and read
+/// up to one vector too far, so there is room behind the last row.
 inline std::size_t rows_size(const Rig& rig) {
   return simd::rounded_up(rig.joint_outputs.size()) + simd::kWidest;
 }

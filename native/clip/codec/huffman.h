@@ -21,13 +21,15 @@ struct Code {
   bool assign();
 };
 
-/// The best code for symbols that occur so often.
+/// The code that makes a text shortest in which symbol i occurs counts[i] times.
 Code make_code(std::span<const std::uint32_t, kMostSymbols> counts);
 
-/// Lengths as half bytes, each zero followed by how many more zeros there are.
+/// Appends the lengths of all codes, half a byte each; behind a zero stands how many more zeros
+/// follow.
 void put_lengths(Bytes& out, std::span<const Code> codes);
 
-/// The codes written by put_lengths. False when the bytes are no codes.
+/// Reads what put_lengths wrote.
+/// Out: codes, all of them; false when the bytes are no codes
 bool get_lengths(Cursor& in, std::span<Code> codes);
 
 }  // namespace risorius::clip

@@ -33,7 +33,7 @@ inline void put_text(Bytes& out, const std::string& text) {
   out.insert(out.end(), text.begin(), text.end());
 }
 
-/// What of a text differs from the one before, behind how much does not.
+/// How many bytes a text shares with the beginning of the one before it, then the rest of it.
 inline void put_next_text(Bytes& out, const std::string& before, const std::string& text) {
   std::size_t same = 0;
   while (same < before.size() && same < text.size() && before[same] == text[same]) ++same;

@@ -33,7 +33,7 @@ class History {
     last_ = bits;
     if constexpr (kOrder > 0) values_[0] = std::bit_cast<float>(bits);
   }
-  /// The same value n times.
+  /// The same as add(bits) n times.
   void rest(std::uint32_t bits, std::size_t n) {
     for (std::size_t i = 0; i < n && i <= kOrder; ++i) add(bits);
   }
@@ -47,7 +47,7 @@ class History {
     if constexpr (kOrder == 2) p = 3 * (v(0) - v(1)) + v(2);
     if constexpr (kOrder == 3) p = 4 * (v(0) + v(2)) - 6 * v(1) - v(3);
     if constexpr (kOrder == 4) p = 5 * (v(0) - v(3)) - 10 * (v(1) - v(2)) + v(4);
-    // Also where a float's range, its denormals or NaNs would make processors differ.
+    // 0 is predicted where processors could differ: beyond a float's range, for denormals and NaN.
     const double size = std::fabs(p);
     if (!(size >= 0x1p-60 && size <= 0x1p100)) return 0;
     return in_order(std::bit_cast<std::uint32_t>(static_cast<float>(p)));
@@ -60,7 +60,8 @@ class History {
   float values_[kOrder + 1] = {};
 };
 
-/// Rounding and denormals as every process begins with them, while this lives.
+/// While an object of this class lives, the processor rounds and treats denormals as at the start
+/// of a process, whatever the host program has set.
 class DefaultArithmetic {
  public:
   DefaultArithmetic() {
@@ -75,7 +76,8 @@ class DefaultArithmetic {
   std::fenv_t before_;
 };
 
-/// Calls what with the order as a constant.
+/// Calls `what` with the order as a template argument.
+/// In: order  of the predictor, 0 to 4
 template <class What>
 auto with_order(int order, const What& what) {
   switch (order) {

@@ -16,7 +16,7 @@
 
 namespace risorius::clip {
 
-/// Curves as somebody else holds them.
+/// Curves in memory that the caller keeps.
 struct CurvesView {
   std::span<const std::string> names;
   std::span<const float> values;  // [names, frames]
@@ -53,6 +53,7 @@ struct Line {
 class LayerCurves {
  public:
   /// In:    controls  the names of the mixer's controls
+  ///        curves    are copied
   ///        mask      float[controls] in [0, 1], or empty: all 1
   /// Fails: kInvalidLength, kInvalidValue, with the field.
   static core::Result<std::shared_ptr<const LayerCurves>> make(
@@ -142,10 +143,9 @@ struct Opposites {
 ///    reversed last - o / scale, where o = (t - start) mod ((last - first) * scale) and at the end
 ///    of a whole number of repeats the end of the clip and not its start. Between frames
 ///    v = a + (b - a) * part, and m = mask * w; see Blend.
-/// 3. Each reaction in the order of its place, each part with envelope e: r = strength * e *
-/// weight;
-///    out += (peak - out) * r where out < peak = min(high, 1): 1 - (1 - out) * (1 - r), also
-///    where a control may be driven beyond 1.
+/// 3. Each reaction in the order of its place, each part with envelope e:
+///    r = strength * e * weight; out += (peak - out) * r where out < peak = min(high, 1). That is
+///    1 - (1 - out) * (1 - r), also where a control may be driven beyond 1.
 /// 4. Yields: all s from the values as they are, then all products. Then opposites:
 ///    c = min(a, b); if c > 0: a -= c, b -= c.
 /// 5. Clamped to the range; NaN becomes its lower end.
@@ -153,8 +153,9 @@ struct Opposites {
 /// From: steps 1 and 2 are Blender's NLA (strips of type Clip; Replace and Add).
 class Mixer {
  public:
-  /// In:    controls  names, each once
-  ///        low, high [controls], low <= high
+  /// In:    controls   names, each once
+  ///        low, high  [controls], low <= high
+  ///        max_fired  reactions that are remembered at once
   /// Fails: kInvalidLength, kInvalidValue.
   static core::Result<Mixer> make(std::vector<std::string> controls, std::vector<float> low,
                                   std::vector<float> high, std::size_t max_fired = 256);
@@ -162,16 +163,22 @@ class Mixer {
   std::span<const std::string> controls() const { return controls_; }
   std::size_t control_count() const { return controls_.size(); }
 
-  /// Bottom to top. Fails: kInvalidValue, with the layer's place and field; the old ones stay.
+  /// Replaces the layers. In: layers  bottom to top.
+  /// Fails: kInvalidValue, with the layer's place and field; the old layers stay.
   core::Status set_layers(std::vector<Layer> layers);
-  /// Forgets what was fired. Fails: kInvalidIndex, kInvalidLength, kInvalidValue.
+  /// Replaces the reactions and forgets what was fired.
+  /// Fails: kInvalidIndex, kInvalidLength, kInvalidValue.
   core::Status set_reactions(std::vector<Reaction> reactions);
+  /// Replaces the rules of controls that exclude each other. In: controls that the mixer has.
   /// Fails: kInvalidIndex, kInvalidValue.
   core::Status set_rules(std::vector<Yield> yields, std::vector<Opposites> opposites);
 
-  /// Fires a reaction. When max_fired are remembered, the one that ended first makes room; false,
-  /// and nothing happens, when none has ended by then. In:    reaction  below the number of
-  /// reactions; time in seconds, finite; strength in [0, 1] Cost:  no allocation.
+  /// Fires a reaction. Where max_fired are remembered the one that ended first makes room.
+  /// In:   reaction  below the number of reactions
+  ///       time      seconds, finite
+  ///       strength  in [0, 1]
+  /// Out:  false, and nothing happens, when none has ended by then
+  /// Cost: no allocation
   bool fire(std::size_t reaction, double time, float strength) noexcept;
   void clear_fired() noexcept { voice_count_ = 0; }
 

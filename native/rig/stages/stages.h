@@ -12,31 +12,35 @@ namespace risorius::rig::detail {
 
 std::uint32_t clamp_lod(const Rig& rig, std::uint32_t lod) noexcept;
 
-/// Fills all of controls from the raw ones, and work.active.
+/// Fills the rest of the controls from the raw ones, and work.active with those that are not 0.
+/// In: controls  [controls]: the raw ones are set, the others are at rest
+///     lod       below the number of LODs, as in everything below
 void settled_controls(const Rig& rig, std::uint32_t lod, Workspace& work, float* controls) noexcept;
-/// The same with the reference's latency: the others are still those of the frame before.
+/// The same with the reference's latency.
+/// In: controls  the raw ones are set, the others are those of the frame before
 void latent_controls(const Rig& rig, std::uint32_t lod, Workspace& work, float* controls) noexcept;
-/// Raw controls, the others at rest, then one of the two above.
+/// Copies the raw controls, puts the others to rest and calls one of the two functions above.
 void begin(const Rig& rig, const float* raw, std::uint32_t lod, bool settle, Workspace& work,
            float* controls) noexcept;
 
-/// One operation of the graph of networks; writes controls if it is a scatter.
+/// Runs one operation of the graph of networks; a scatter writes controls, others scratch memory.
 void run_operation(const Rig& rig, std::uint32_t index, std::uint32_t lod, Workspace& work,
                    float* controls) noexcept;
-/// One RBF solver: overwrites what its poses write.
+/// Runs one RBF solver; overwrites the controls that its poses write.
 void run_solver(const Rig& rig, std::uint32_t index, Workspace& work, float* controls) noexcept;
 
 inline float clamp01(float v) { return v < 0.0f ? 0.0f : (v > 1.0f ? 1.0f : v); }
 
-/// Joints, channels and maps from controls and work.active.
+/// Joints, channels and maps from the controls and from work.active.
+/// Out: pose  all but the controls, which are read
 void outputs(const Rig& rig, std::uint32_t lod, Workspace& work, const PoseView& pose) noexcept;
 
-/// The joint attributes of all groups; overwrites every one.
+/// The joint attributes from the joint groups; overwrites all attributes of all joints.
 void joint_groups(const Rig& rig, std::uint32_t lod, Workspace& work,
                   const PoseView& pose) noexcept;
 
-/// The parts of outputs that a batch has in common with it. rotations: what comes after the joint
-/// groups, in this order.
+/// The stages behind the joint groups, which a batch runs frame by frame. rotations() calls the
+/// four functions behind it in their order.
 void rotations(const Rig& rig, std::uint32_t lod, Workspace& work, const PoseView& pose) noexcept;
 void euler_joints(const Rig& rig, std::uint32_t lod, float* joints) noexcept;
 void quaternion_joints(const Rig& rig, std::uint32_t lod, Workspace& work,
@@ -61,10 +65,11 @@ void for_columns(const Rig& rig, std::size_t control, std::uint32_t live, F f) n
 void count_columns(const Rig& rig, std::uint32_t live, std::span<const std::uint16_t> active,
                    std::uint32_t* begins) noexcept;
 
-/// Where a joint's rotation begins; what of it is written as the output's form.
+/// The first rotation attribute of a joint.
 inline float* rotation_of(const Rig& rig, float* joints, std::uint32_t joint) noexcept {
   return joints + std::size_t{joint} * rig.joint_stride + 3;
 }
+/// Writes a rotation in the form of the rig's poses: four numbers, or three Euler angles.
 inline void store_rotation(const Rig& rig, const Quaternion& q, float* to) noexcept {
   if (rig.joint_stride == 10) {
     to[0] = q.x, to[1] = q.y, to[2] = q.z, to[3] = q.w;
@@ -74,6 +79,8 @@ inline void store_rotation(const Rig& rig, const Quaternion& q, float* to) noexc
   for (std::size_t a = 0; a < 3; ++a) to[a] = angles[a];
 }
 
-/// The rows of all groups to the joint attributes, every one of which is written.
+/// Brings the rows of all groups to their joint attributes; attributes without a row become 0.
+/// In:  rows    [rows of all groups] and a vector more
+/// Out: joints  [joints, stride]
 void place_rows(const Rig& rig, std::uint32_t lod, const float* rows, float* joints) noexcept;
 }  // namespace risorius::rig::detail
