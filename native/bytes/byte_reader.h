@@ -86,6 +86,7 @@ class ByteReader {
   /// Reads n values without a count, straight into out. In: n already checked by count(). What is
   /// in out after a failure is not defined.
   void read_f32(float* out, std::size_t n, bool* all_finite = nullptr);
+  /// The same; largest as in u32_list.
   void read_u16(std::uint16_t* out, std::size_t n);
   void read_u32(std::uint32_t* out, std::size_t n, std::uint32_t* largest = nullptr);
 

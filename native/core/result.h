@@ -49,6 +49,10 @@ struct Unexpected {
   Error error;
 };
 
+/// A failure, which every Result and Status can be made of.
+/// In: where    the field, e.g. "behavior.psds.rows[3]", or ""
+///     message  one sentence: what was expected, what was found
+///     offset   the byte of the file, where it is known
 [[nodiscard]] inline Unexpected fail(ErrorCode code, std::string where, std::string message,
                                      std::optional<std::uint64_t> offset = std::nullopt) {
   return Unexpected{Error{code, offset, std::move(where), std::move(message)}};

@@ -25,7 +25,8 @@ std::uint16_t ml_joint_stride(const MlJoints& joints);
 
 namespace detail {
 
-/// Takes the layer of this id ("mlbh" ...) out, its controls still counted as unread.
+/// Takes a layer out; its controls are still counted, as unread.
+/// In: id  of the layer, e.g. "mlbh"
 void drop_layer(std::string_view id, Dna& dna);
 
 /// Closes the gaps that unread controls leave, so that the value can be written as a file of its

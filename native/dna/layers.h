@@ -25,6 +25,8 @@ inline constexpr KnownLayer kLayers[] = {
 };
 
 /// A layer is known by the exact pair of id and version.
+/// In:  version  major << 16 | minor
+/// Out: nullptr where the pair is not known
 inline const KnownLayer* find_layer(const LayerId& id, std::uint32_t version) {
   for (const KnownLayer& layer : kLayers) {
     if (std::memcmp(layer.id, id.data(), 4) == 0 && layer.version == version) return &layer;

@@ -32,6 +32,7 @@ struct Known {
 /// validate, but every error and not only the first.
 std::vector<Finding> find_all(const Dna& dna, Known known = {});
 
+/// The validate() above, without looking again for what is known.
 core::Status validate(const Dna& dna, Known known, std::vector<Warning>& warnings);
 
 }  // namespace detail

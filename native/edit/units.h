@@ -52,6 +52,7 @@ void find_layers(const dna::Dna& dna, std::vector<Unit>& units);
 class Effects {
  public:
   Effects(const dna::Dna& dna, const Threshold& threshold);
+  /// In: output  joint * 9 + attribute. Out: the effect as a share of the threshold.
   double of(std::uint16_t output, float value) const;
   bool nothing_is_small() const { return nothing_is_small_; }
 

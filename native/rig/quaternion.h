@@ -13,7 +13,8 @@ struct Quaternion {
   float x = 0, y = 0, z = 0, w = 1;
 };
 
-inline Quaternion multiply(const Quaternion& a, const Quaternion& b) {  // Hamilton product
+/// The Hamilton product a b: the rotation b and then the rotation a.
+inline Quaternion multiply(const Quaternion& a, const Quaternion& b) {
   return {
       a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y, a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x,
       a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w, a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z};
@@ -33,6 +34,7 @@ struct EulerConvention {
   float radians_per_unit = 1;
 };
 
+/// The rotation of Euler angles. In: angles about x y z, in the unit of the convention.
 inline Quaternion from_euler(const EulerConvention& c, const std::array<float, 3>& angles) {
   Quaternion q;
   for (const std::uint8_t axis : c.order) {
@@ -45,7 +47,8 @@ inline Quaternion from_euler(const EulerConvention& c, const std::array<float, 3
   return q;
 }
 
-/// The inverse of from_euler. At the pole the last angle of the order is 0.
+/// The inverse of from_euler. In: q of length 1. Out: angles about x y z. At the pole the last
+/// angle of the order is 0.
 inline std::array<float, 3> to_euler(const EulerConvention& c, const Quaternion& q) {
   const float m[3][3] = {
       // rows are the images of the axes (row vectors)

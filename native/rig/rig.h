@@ -26,6 +26,7 @@ class Rig : public RigHeader, public RigArrays<View> {
   std::vector<std::string> ignored_layers() const {
     return texts(raw_count + gui_count, text_ends.size() - raw_count - gui_count);
   }
+  /// In: lod below the number of LODs. Out: steps, see make_step.
   std::span<const std::uint32_t> steps_of(std::uint32_t lod, StepList list) const {
     const std::uint32_t* begin = step_begins.data() + std::size_t{lod} * kStepLists + list;
     return steps.subspan(begin[0], begin[1] - begin[0]);

@@ -46,10 +46,10 @@ core::Result<std::optional<LodPlan>> plan_lods(const Descriptor& descriptor,
                                                const Definition& definition,
                                                const LodSelection& selection);
 
-/// Elements that a mapping lists at a kept LOD.
+/// Out: for each of `count` elements whether the mapping lists it at a kept LOD.
 std::vector<bool> needed(const LodPlan& plan, const LodMapping& mapping, std::size_t count);
 
-/// Adds the networks that operations of kept LODs run.
+/// Out: keep  becomes true for the networks that operations of kept LODs run
 void add_networks_of_operations(const LodPlan& plan, const MachineLearnedBehaviorExt& ext,
                                 std::vector<bool>& keep);
 

@@ -16,9 +16,13 @@ enum RbfDistance : std::uint32_t { kEuclidean, kQuaternion, kSwingAngle, kTwistA
 /// other distances leave them as they are.
 void convert_rbf_inputs(std::uint32_t distance, std::uint32_t axis, double* values,
                         std::size_t count) noexcept;
-/// Between two converted inputs: length of the difference, or root of the sum of squared arcs.
+/// The distance of two inputs that convert_rbf_inputs has converted: the length of their
+/// difference, or for rotations the root of the sum of squared angles.
+/// In: distance  an RbfDistance
+///     a, b      [count]; rotations are x y z w, one after the other
 double rbf_distance(std::uint32_t distance, const double* a, const double* b,
                     std::size_t count) noexcept;
+/// What a solver makes of a distance.
 /// In: function as in the file: 0 Gaussian 1 exponential 2 linear 3 cubic 4 quintic. A radius of 0
 /// is the limit: 1 at distance 0, else 0.
 double rbf_kernel(std::uint32_t function, double distance, double radius) noexcept;

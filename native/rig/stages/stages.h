@@ -10,6 +10,7 @@
 
 namespace risorius::rig::detail {
 
+/// In: lod of any size. Out: the level that the rig has for it, 0 where it has none.
 std::uint32_t clamp_lod(const Rig& rig, std::uint32_t lod) noexcept;
 
 /// Fills the rest of the controls from the raw ones, and work.active with those that are not 0.
