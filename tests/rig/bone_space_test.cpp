@@ -23,8 +23,8 @@ struct Channels {
   std::vector<float> location, rotation, scale;
 };
 
-Channels evaluate(const SpaceConvention& convention, const std::vector<float>& neutral,
-                  const std::vector<float>& deltas, const std::vector<std::uint32_t>& bones) {
+Channels channels_of(const SpaceConvention& convention, const std::vector<float>& neutral,
+                     const std::vector<float>& deltas, const std::vector<std::uint32_t>& bones) {
   const auto joints = static_cast<std::uint32_t>(neutral.size() / 3);
   const BoneSpace space = make_bone_space(convention, neutral.data(), joints, bones);
   Channels out{std::vector<float>(bones.size() * 3), std::vector<float>(bones.size() * 4),
@@ -40,7 +40,7 @@ void expect_near(const std::vector<float>& found, const std::vector<float>& want
 
 TEST(BoneSpace, AxesAndUnitsAreExchanged) {
   const Channels out =
-      evaluate(y_up(), {0, 0, 0}, {100, 200, 300, 0, 90, 0, 0.1f, 0.2f, 0.3f}, {0});
+      channels_of(y_up(), {0, 0, 0}, {100, 200, 300, 0, 90, 0, 0.1f, 0.2f, 0.3f}, {0});
   expect_near(out.location, {1, -3, 2});
   expect_near(out.rotation, {kHalf, 0, 0, kHalf});  // about the file's y is about z
   expect_near(out.scale, {1.1f, 1.3f, 1.2f});
@@ -49,14 +49,14 @@ TEST(BoneSpace, AxesAndUnitsAreExchanged) {
 TEST(BoneSpace, MirroredAxesTurnTheOtherWay) {
   SpaceConvention convention = y_up();
   convention.axes = {-1, 0, 0, 0, 0, -1, 0, 1, 0};
-  expect_near(evaluate(convention, {0, 0, 0}, {0, 0, 0, 0, 90, 0, 0, 0, 0}, {0}).rotation,
+  expect_near(channels_of(convention, {0, 0, 0}, {0, 0, 0, 0, 90, 0, 0, 0, 0}, {0}).rotation,
               {kHalf, 0, 0, -kHalf});
-  expect_near(evaluate(convention, {0, 0, 0}, {0, 0, 0, 90, 0, 0, 0, 0, 0}, {0}).rotation,
+  expect_near(channels_of(convention, {0, 0, 0}, {0, 0, 0, 90, 0, 0, 0, 0, 0}, {0}).rotation,
               {kHalf, kHalf, 0, 0});
 }
 
 TEST(BoneSpace, TheNeutralPoseIsTheRest) {
-  const Channels out = evaluate(y_up(), {0, 90, 0}, {100, 0, 0, 0, 90, 0, 0, 0, 0}, {0});
+  const Channels out = channels_of(y_up(), {0, 90, 0}, {100, 0, 0, 0, 90, 0, 0, 0, 0}, {0});
   expect_near(out.rotation, {kHalf, 0, 0, kHalf});
   expect_near(out.location, {0, -1, 0});  // x, seen from axes turned by 90 degrees about z
 }
@@ -65,7 +65,7 @@ TEST(BoneSpace, BonesMayBeSomeJointsInAnyOrder) {
   const std::vector<float> deltas{1, 0, 0, 0, 0, 0, 0, 0, 0, 2, 0, 0, 0, 0,
                                   0, 0, 0, 0, 3, 0, 0, 0, 0, 0, 0, 0, 0};
   SpaceConvention plain;
-  expect_near(evaluate(plain, std::vector<float>(9, 0.0f), deltas, {2, 0}).location,
+  expect_near(channels_of(plain, std::vector<float>(9, 0.0f), deltas, {2, 0}).location,
               {3, 0, 0, 1, 0, 0});
 }
 
