@@ -32,7 +32,7 @@ else:
     _reason = ""
 
 _HERE = Path(__file__).parent
-ADDON = __package__  # what Blender calls this add-on, whatever folder asks
+ADDON = str(__package__)  # what Blender calls this add-on, whatever folder asks
 
 
 @cache

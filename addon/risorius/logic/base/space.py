@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -231,7 +232,20 @@ def world_matrices(rotations: Float, offsets: Float, parents: NDArray[np.uint16]
     return world
 
 
-def yaw_pitch(direction: Float) -> tuple[float, float]:
-    """Angles of a direction from straight ahead (-y): yaw to the face's left (+x), pitch up."""
-    x, y, z = (float(v) for v in direction)
+class Direction(Protocol):
+    """Three numbers: an array, or a vector of another library."""
+
+    def __getitem__(self, axis: int, /) -> float: ...
+
+
+def yaw_pitch(direction: Direction | Float) -> tuple[float, float]:
+    """Angles of a direction from straight ahead (-y): yaw to the face's left (+x), pitch up.
+
+    Args:
+        direction: x, y, z of any length but 0.
+
+    Returns:
+        Radians.
+    """
+    x, y, z = float(direction[0]), float(direction[1]), float(direction[2])
     return float(np.arctan2(x, -y)), float(np.arctan2(z, np.hypot(x, y)))

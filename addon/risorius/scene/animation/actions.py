@@ -337,7 +337,7 @@ def note_tracks_by_name(owner: Animated) -> bool:
     """
     state = owner.get(BEFORE)
     lines = list(state.get("tracks", ())) if state is not None else []
-    if not lines or lines[0].startswith("["):
+    if state is None or not lines or lines[0].startswith("["):
         return False
     data = owner.animation_data
     assert data is not None

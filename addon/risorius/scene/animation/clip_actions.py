@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ... import native
 from ...logic.animation import clip_units
 from ..base import compat, parts
-from ..base.blender_types import ArmatureObject
+from ..base.blender_types import Animated, ArmatureObject
 from ..character import armatures, runtime
 
 LINEAR = 1  # the number of the interpolation "LINEAR"
@@ -321,7 +321,7 @@ def is_bent(curve: bpy.types.FCurve) -> bool:
     return bool((kinds[:-1] != LINEAR).any())
 
 
-def playing_curves(action: bpy.types.Action, owner: bpy.types.ID) -> list[bpy.types.FCurve]:
+def playing_curves(action: bpy.types.Action, owner: Animated) -> list[bpy.types.FCurve]:
     """The F-curves by which an action moves a datablock, without those that are muted."""
     return [
         c for c in compat.curves_for(action, owner) if not (c.mute or (c.group and c.group.mute))
@@ -394,7 +394,8 @@ def add_sound(
         said = str(error).strip().removeprefix("Error: ")
         raise clip_units.ClipError(f"no sound strip: {said}") from error
     strip = cast("bpy.types.SoundStrip", made)
-    if strip.frame_final_duration <= 1 and not strip.sound.samplerate:
+    sound = strip.sound
+    if strip.frame_final_duration <= 1 and (sound is None or not sound.samplerate):
         strips.remove(strip)
         raise clip_units.ClipError("no sound strip: Blender cannot read it")
     return strip

@@ -59,6 +59,7 @@ def apply(
         The property names of the sliders that it concerns.
     """
     live, face, controls = runtime.there(rig), parts.face_bone(rig), parts.controls_there(rig)
+    assert face is not None
     goals = weights_for(live, expression)
     if others_to_rest:
         goals = {**dict(zip(live.labels, live.rests, strict=True)), **goals}
@@ -126,9 +127,11 @@ def _asset(
     action = clip_actions.make_action(rig, clip, clip_logic.Timing(24.0), name).action
     actions.stamp(action)
     action.asset_mark()
-    action.asset_data.catalog_id = str(catalog_id(expression.group))
-    action.asset_data.description = expression.description
-    action.asset_data.tags.new(expression.group, skip_if_exists=True)
+    asset = action.asset_data
+    assert asset is not None
+    asset.catalog_id = str(catalog_id(expression.group))
+    asset.description = expression.description
+    asset.tags.new(expression.group, skip_if_exists=True)
     return action
 
 

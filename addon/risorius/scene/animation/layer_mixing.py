@@ -178,9 +178,9 @@ def _compile(
     old: Stack | None,
 ) -> Stack:
     """A new Stack. Args: old  the one before it, whose curves serve where they are the same."""
-    same_face = old is not None and old.made_of[0] == made_of[0]
-    stack = Stack(made_of, _mixer(controls, live, maximum) if not same_face else old.mixer)
-    kept = old.kept if same_face else {}
+    same = old if old is not None and old.made_of[0] == made_of[0] else None
+    stack = Stack(made_of, _mixer(controls, live, maximum) if same is None else same.mixer)
+    kept: Kept = {} if same is None else same.kept
     for place, layer in layers.ordered(controls):
         try:
             stack.layers.append(native_layer(controls, live, layer, rate, kept, stack.kept))

@@ -37,7 +37,9 @@ _OVERRIDE: Any = {"LIBRARY_OVERRIDABLE"}
 
 def _changed(self: bpy.types.PropertyGroup, _context: Context) -> None:
     """Let Blender evaluate the character; what is compiled is compared, and made anew."""
-    self.id_data.update_tag()
+    owner = self.id_data
+    assert owner is not None
+    owner.update_tag()
 
 
 def _still(

@@ -242,7 +242,8 @@ def _own_curve_lists(controls: ArmatureObject) -> Iterator[Any]:
 
 def _copy_curves(controls: ArmatureObject, place: int, to: int) -> None:
     for curves in _own_curve_lists(controls):
-        if not hasattr(curves, "new") or curves == controls.animation_data.drivers:
+        data = controls.animation_data
+        if not hasattr(curves, "new") or (data is not None and curves == data.drivers):
             continue
         for curve in [c for c in curves if logic.place_of(c.data_path) == place]:
             path = curve.data_path.replace(f"[{place}]", f"[{to}]", 1)

@@ -124,7 +124,7 @@ def _add_strip(
     action, still = _action_of(scene, rig, live, layer)
     strip = clip_actions.add_strip(rig, action, layer.name)
     strip.use_auto_blend = False
-    strip.blend_type = _BLENDS[layer.blend]
+    strip.blend_type = _BLENDS[layer.blend]  # pyright: ignore[reportAttributeAccessIssue]
     if still:
         strip.extrapolation = "NOTHING" if layer.length else "HOLD"
         strip.frame_start = layer.start
@@ -200,6 +200,7 @@ def _masked(
     copy = layer.action.copy()
     copy.name = f"{layer.action.name} {layer.name}"
     bag = compat.bag_for(copy, controls)
+    assert bag is not None
     gone = {(c.data_path, c.array_index) for c in others}
     for curve in list(bag.fcurves):
         if (curve.data_path, curve.array_index) in gone:
@@ -210,5 +211,5 @@ def _masked(
 def _is_left_out(path: str, allowed: Set[str]) -> bool:
     """Whether a layer does not move what an F-curve moves."""
     if path.startswith('pose.bones["head"].rotation_'):
-        return not allowed.intersection(clip_logic.HEAD)
+        return not allowed & set(clip_logic.HEAD)
     return path not in allowed

@@ -61,8 +61,9 @@ def clip_of(
     Raises:
         ClipError: nothing of it moves.
     """
-    keys = item.data.shape_keys
+    keys = parts.keys_there(item)
     data = keys.animation_data
+    assert data is not None
     stacked = len(data.drivers) or any(len(t.strips) for t in data.nla_tracks)
     span = (context.scene.frame_start, context.scene.frame_end)
     if data.action is not None and not stacked:
@@ -89,7 +90,10 @@ def _blocks(keys: bpy.types.Key) -> list[bpy.types.ShapeKey]:
 
 
 def _read(keys: bpy.types.Key, frames: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
-    curves = {c.data_path: c for c in clip_actions.playing_curves(keys.animation_data.action, keys)}
+    data = keys.animation_data
+    assert data is not None
+    assert data.action is not None
+    curves = {c.data_path: c for c in clip_actions.playing_curves(data.action, keys)}
     table = {}
     for block in _blocks(keys):
         path = f'key_blocks["{bpy.utils.escape_identifier(block.name)}"].value'

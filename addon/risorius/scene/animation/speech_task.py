@@ -122,5 +122,6 @@ def _bundled_pip() -> str:
     if importlib.util.find_spec("pip") is not None:
         return ""
     found = importlib.util.find_spec("ensurepip")
-    folder = Path(found.origin).parent / "_bundled" if found is not None else Path()
+    origin = found.origin if found is not None else None
+    folder = Path(origin).parent / "_bundled" if origin is not None else Path()
     return str(next(iter(sorted(folder.glob("pip-*.whl"))), ""))

@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 
-import bpy
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,7 +18,7 @@ from ...logic.animation import key_reduction
 from ...logic.base.errors import FaceError
 from ..animation import actions
 from ..base import parts, written
-from ..base.blender_types import ArmatureObject, Context, MeshObject
+from ..base.blender_types import Animated, ArmatureObject, Context, MeshObject
 from ..character import lods, runtime
 from ..frame import channel_preview, evaluate
 from . import baked_shape_keys, baked_tracks, sampling
@@ -211,7 +210,7 @@ def _write_keys(
 
 
 def _play(
-    owner: bpy.types.ID,
+    owner: Animated,
     name: str,
     frames: NDArray[np.float64],
     tracks: Sequence[actions.Track],

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Generator, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from typing import Any
 
 import bpy
 import numpy as np
@@ -79,7 +80,7 @@ def sample(
     ]
     items = [o for r in readers for o in r.objects]
     with _stage(context, rigs, items) as scene:
-        depsgraph = None
+        depsgraph: Any = None
         for number, frame in enumerate(frames):
             whole = int(np.floor(frame))
             with evaluate.paused():
@@ -147,7 +148,7 @@ def _needs_whole_scene(scene: bpy.types.Scene, rigs: Iterable[ArmatureObject]) -
                 return True
             data = item.animation_data if item else None
             for curve in data.drivers if data else ():
-                if any(v.type == "CONTEXT_PROP" for v in curve.driver.variables):
+                if curve.driver and any(v.type == "CONTEXT_PROP" for v in curve.driver.variables):
                     return True
     return False
 
@@ -204,7 +205,7 @@ class _Reader:
             for name, values in got.bones.items():
                 moved.foreach_get(name, values[number].ravel())
         for owner, paths in self.paths.items():
-            evaluated = owner.evaluated_get(depsgraph) if paths else None
+            evaluated = owner.evaluated_get(depsgraph) if paths else owner
             for path in paths:
                 value = _value(evaluated, path)
                 if value is not None:

@@ -3,7 +3,7 @@
 
 Objects by what they hold: Blender's own class may hold data of any kind. While the add-on runs all
 of them are bpy.types.Object. What is Any here is so because the base class lacks what its kinds
-have; nothing else of the add-on is.
+have.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import bpy
 
 Context = Any  # its members may be None and are read as methods: one of them is named property
 Node = Any  # one of some hundred kinds, each with settings of its own
+Attribute = Any  # of a mesh: each type has data of its own
 NodeTree = Any  # of a material, a scene or a group
 Socket = Any  # each kind has another default_value
 Animated = bpy.types.Object | bpy.types.Key  # what a face has that plays actions

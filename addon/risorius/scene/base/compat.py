@@ -8,7 +8,7 @@ from typing import cast
 
 import bpy
 
-from .blender_types import Animated
+from .blender_types import Animated, NodeTree
 
 
 def curves_of(action: bpy.types.Action) -> Iterator[bpy.types.FCurve]:
@@ -31,6 +31,17 @@ def make_node_tree(material: bpy.types.Material) -> None:
     """Give a material its nodes: since 5.0 each has them and the switch only warns."""
     if material.node_tree is None:
         material.use_nodes = True
+
+
+def tree_of(material: bpy.types.Material) -> NodeTree:
+    """The nodes of a material that has some."""
+    return material.node_tree
+
+
+def driver_of(curve: bpy.types.FCurve) -> bpy.types.Driver:
+    """The driver of a curve that is listed among drivers."""
+    assert curve.driver is not None
+    return curve.driver
 
 
 def deselect_all(layer: bpy.types.ViewLayer) -> None:

@@ -130,8 +130,10 @@ def plain_driver(
     curve: bpy.types.FCurve, rig: ArmatureObject, data_path: str, name: str = "var"
 ) -> None:
     """Make an F-curve follow one property of the rig, without any expression."""
-    curve.driver.type = "SUM"
-    variable = curve.driver.variables.new()
+    driver = curve.driver
+    assert driver is not None
+    driver.type = "SUM"
+    variable = driver.variables.new()
     variable.name = name
     variable.type = "SINGLE_PROP"
     variable.targets[0].id_type = "OBJECT"

@@ -85,6 +85,13 @@ def controls_there(rig: ArmatureObject) -> ArmatureObject:
     return controls
 
 
+def keys_there(item: MeshObject) -> bpy.types.Key:
+    """The shape keys of a mesh that has some: whoever asks has looked."""
+    key = item.data.shape_keys
+    assert key is not None
+    return key
+
+
 def rig_of(item: bpy.types.Object | None) -> ArmatureObject | None:
     """The deforming armature of the character that an object belongs to, or None."""
     if item is None:

@@ -8,11 +8,12 @@ was. Meshes and shape keys are never shared, because the values of keys belong t
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
 
 import bpy
 
 from . import parts, storage
-from .blender_types import ArmatureObject, Node, current_context
+from .blender_types import ArmatureObject, Node, NodeTree, current_context
 
 DIGEST = "risorius_sha256"  # on an image: hash of the packed file
 STATE = "risorius_state"  # on an image: colour space, way of alpha and size of the packed file
@@ -43,7 +44,7 @@ def find(content: bytes, digest: str, data: bool) -> bpy.types.Image | None:
     for image in bpy.data.images:
         if image.get(DIGEST) != digest or image.library is not None or _edited(image):
             continue
-        if image.colorspace_settings.is_data == data and _packed(image) == content:
+        if _space(image).is_data == data and _packed(image) == content:
             return image
     return None
 
@@ -52,7 +53,8 @@ def nodes_of(rig: ArmatureObject) -> Iterator[Node]:
     """The image nodes in the materials of a character's meshes."""
     used = {m for item in parts.meshes_pointing_at(rig) for m in item.data.materials if m}
     for material in sorted(used, key=lambda m: m.name):
-        for node in material.node_tree.nodes if material.node_tree else ():
+        tree: NodeTree = material.node_tree
+        for node in tree.nodes if tree else ():
             if node.type == "TEX_IMAGE" and node.image is not None:
                 yield node
 
@@ -170,7 +172,8 @@ def _image_of(content: bytes, image: bpy.types.Image, state: str) -> bpy.types.I
     fresh.pack(data=content, data_len=len(content))
     fresh.source = "FILE"
     fresh.filepath_raw = image.filepath_raw
-    fresh.colorspace_settings.name, fresh.alpha_mode = space, alpha
+    _space(fresh).name = space
+    fresh.alpha_mode = alpha  # pyright: ignore[reportAttributeAccessIssue]
     mark(fresh)
     return fresh
 
@@ -201,9 +204,13 @@ def _is_whole(image: bpy.types.Image, digest: str | None = None) -> bool:
     return content is not None and storage.hash_of(content) == (digest or image[DIGEST])
 
 
+def _space(image: bpy.types.Image) -> Any:  # noqa: ANN401  its names are those of the configuration
+    return image.colorspace_settings
+
+
 def _state(image: bpy.types.Image, space: str = "") -> str:
     size = image.packed_file.size if image.packed_file is not None else 0
-    return f"{space or image.colorspace_settings.name}\n{image.alpha_mode}\n{size}"
+    return f"{space or _space(image).name}\n{image.alpha_mode}\n{size}"
 
 
 def _edited(image: bpy.types.Image, spaces: bool = True) -> bool:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from typing import Any, cast
 
 import bpy
 import numpy as np
@@ -54,7 +55,7 @@ def edit_armature(
 ) -> Iterator[bpy.types.ArmatureEditBones]:
     """The edit bones of an armature that is in use, whether its objects are hidden or not."""
     workshop = bpy.data.collections.new("bones")
-    item = bpy.data.objects.new("bones", data)
+    item = cast("ArmatureObject", bpy.data.objects.new("bones", data))
     context.scene.collection.children.link(workshop)
     try:
         with _edit_bones(context, item, workshop) as edit_bones:
@@ -78,7 +79,7 @@ def kept_selection(context: Context) -> Iterator[None]:
         for item in there:
             item.select_set(item in selected, view_layer=layer)
         layer.objects.active = active if active in there else None
-        if active in there and active.mode != mode:
+        if active is not None and active in there and active.mode != mode:
             with context.temp_override(active_object=active, object=active):
                 bpy.ops.object.mode_set(mode=mode)
 
@@ -102,7 +103,7 @@ def build_rig(
     """
     data = bpy.data.armatures.new(f"{plan.name}_rig")
     made.append(data)
-    rig = bpy.data.objects.new(f"{plan.name}_rig", data)
+    rig = cast("ArmatureObject", bpy.data.objects.new(f"{plan.name}_rig", data))
     made.append(rig)
     armature = plan.armature
     with _edit_bones(context, rig, workshop) as edit_bones:
@@ -148,7 +149,8 @@ def pull_controls(rig: ArmatureObject, controls: ArmatureObject) -> None:
     path = f'["{parts.PULL}"]'
     curve = data.drivers.find(path) if data else None
     if curve is None:
-        curve = rig.driver_add(path)
+        curve = cast("bpy.types.FCurve", rig.driver_add(path))
+        assert curve.driver is not None
         curve.driver.type = "SUM"
         for bone in controls.pose.bones:
             variable = curve.driver.variables.new()
@@ -156,6 +158,7 @@ def pull_controls(rig: ArmatureObject, controls: ArmatureObject) -> None:
             target = variable.targets[0]
             target.id, target.bone_target = controls, bone.name
             target.transform_type, target.transform_space = "SCALE_X", "LOCAL_SPACE"
+    assert curve.driver is not None
     for variable in curve.driver.variables:
         if variable.targets[0].id != controls:
             variable.targets[0].id = controls
@@ -182,7 +185,7 @@ def build_controls(
     """
     data = bpy.data.armatures.new(f"{plan.name}_controls")
     made.append(data)
-    controls = bpy.data.objects.new(f"{plan.name}_controls", data)
+    controls = cast("ArmatureObject", bpy.data.objects.new(f"{plan.name}_controls", data))
     made.append(controls)
     places = control_places(plan)
     with _edit_bones(context, controls, workshop) as edit_bones:
@@ -254,7 +257,8 @@ def add_properties(
 def describe_property(bone: bpy.types.PoseBone, control: plans.ControlPlan, maximum: float) -> None:
     """Set limits, default and words of one control property. Args: control  its ControlPlan."""
     name = control.label
-    bone.id_properties_ui(name).update(
+    words: Any = bone.id_properties_ui(name)
+    words.update(
         min=control.lowest,
         max=maximum,
         soft_min=control.lowest,

@@ -127,6 +127,7 @@ def _build(
     context.scene.collection.children.link(workshop)
     rig = armatures.build_rig(context, plan, made, workshop)
     controls = armatures.build_controls(context, plan, made, workshop)
+    assert options.unit is not None  # import_file has filled it in
     _connect(plan, rig, controls, text, file.path, options.unit)
     runtime.take(rig, file.dna, file.rig)
     progress(0.4)
@@ -286,7 +287,7 @@ def remove(rig: ArmatureObject) -> None:
     images = [n.image for n in sharing.nodes_of(rig)]
     _remove([i for i in (*items, rig, controls, *circles) if i is not None])
     for left in (data, used, images):
-        _remove([d for d in dict.fromkeys(left) if d.users == 0])
+        _remove([d for d in dict.fromkeys(left) if d is not None and d.users == 0])
     if text is not None and not any(r.get(parts.DNA) == text for r in parts.rigs()):
         _remove([text])
     _remove([c for c in collections if not c.all_objects])

@@ -80,7 +80,7 @@ def choose(rig: ArmatureObject, seen: ArmatureObject, depsgraph: Depsgraph) -> i
     kept = render_level(rig) if rendering else viewport_level(rig)
     camera = depsgraph.scene.camera if by_distance(rig) else None
     levels = built(rig) if camera is not None else ()
-    if not levels:
+    if camera is None or not levels:
         return kept
     level = rules.level_at(
         _distance(seen, camera.evaluated_get(depsgraph)),

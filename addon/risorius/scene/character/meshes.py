@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from typing import Any, cast
 
 import bmesh
 import bpy
@@ -15,7 +16,7 @@ from ... import native
 from ...logic.base.space import Space
 from ...logic.character import plans, user_edits
 from ...logic.character.plans import AUTO_KEYS, AUTO_LIMIT, LIVE_KEY
-from ..base import drivers, parts
+from ..base import compat, drivers, parts
 from ..base.blender_types import ArmatureObject, MeshObject
 from .armatures import lock_place
 
@@ -55,7 +56,7 @@ def build_mesh(
     mesh.polygons.add(len(mesh_plan.face_starts))
     mesh.polygons.foreach_set("loop_start", mesh_plan.face_starts)
     mesh.update(calc_edges=True)
-    item = bpy.data.objects.new(name, mesh)
+    item = cast("MeshObject", bpy.data.objects.new(name, mesh))
     made.append(item)
     _add_weights(item, mesh_plan, plan.armature.labels)
     mesh.polygons.foreach_set("use_smooth", np.ones(len(mesh.polygons), bool))
@@ -64,7 +65,7 @@ def build_mesh(
         layer.uv.foreach_set("vector", mesh_plan.uvs.ravel())
     if normals and mesh_plan.normals is not None:
         mesh.normals_split_custom_set(mesh_plan.normals)
-    modifier = item.modifiers.new("Armature", "ARMATURE")
+    modifier = cast("bpy.types.ArmatureModifier", item.modifiers.new("Armature", "ARMATURE"))
     modifier.object = rig
     item.parent = rig
     lock_place(item)
@@ -88,7 +89,7 @@ def _add_weights(item: MeshObject, mesh_plan: plans.MeshPlan, labels: Sequence[s
         groups = [group_of[j] for j in mesh_plan.skin_joints.tolist()]
         weights = mesh_plan.skin_weights.tolist()
         for vertex, begin, end in zip(edit.verts, offsets[:-1], offsets[1:], strict=True):
-            held = vertex[layer]
+            held: Any = vertex[layer]  # weights by group, as a dict
             for i in range(begin, end):
                 # A joint may stand twice at a vertex: its weights add up.
                 held[groups[i]] = held.get(groups[i], 0.0) + weights[i]
@@ -115,15 +116,15 @@ def real_channels(item: MeshObject) -> dict[str, int]:
     driver was copied onto another key, the first key of the list is ours.
     """
     key = item.data.shape_keys
-    driven = {}
+    driven: dict[str, int] = {}
     for curve in key.animation_data.drivers if key and key.animation_data else ():
         name = _KEY_VALUE.match(curve.data_path)
-        for variable in curve.driver.variables if name else ():
+        for variable in compat.driver_of(curve).variables if name else ():
             match = _DRIVEN.match(variable.targets[0].data_path)
-            if match and variable.name == parts.CHANNEL_VARIABLE:
+            if name and match and variable.name == parts.CHANNEL_VARIABLE:
                 driven[bpy.utils.unescape_identifier(name.group(1))] = int(match.group(1))
     found, seen = {}, set()
-    for block in key.key_blocks if driven else ():
+    for block in key.key_blocks if key and driven else ():
         channel = driven.get(block.name)
         if channel is not None and channel not in seen:
             found[block.name] = channel
@@ -243,7 +244,7 @@ def add_key(item: MeshObject, name: str, deltas: Deltas) -> bpy.types.ShapeKey:
     block = item.shape_key_add(name=name, from_mix=False)
     block.slider_min, block.slider_max = -10.0, 10.0
     block.value = 0.0
-    points = user_edits.shaped(points_of(item.data.shape_keys.reference_key), *deltas)
+    points = user_edits.shaped(points_of(parts.keys_there(item).reference_key), *deltas)
     block.points.foreach_set("co", points.ravel())
     return block
 
@@ -253,21 +254,21 @@ def add_channel_key(
 ) -> bpy.types.ShapeKey:
     """A real, driven key of a channel."""
     block = add_key(item, name, deltas)
-    drive_key(item.data.shape_keys, block, rig, channel)
+    drive_key(parts.keys_there(item), block, rig, channel)
     return block
 
 
 def remove_channel_key(item: MeshObject, block: bpy.types.ShapeKey) -> None:
     """Take one of our keys away, its driver too."""
     path = f'key_blocks["{bpy.utils.escape_identifier(block.name)}"].value'
-    item.data.shape_keys.driver_remove(path)
+    parts.keys_there(item).driver_remove(path)
     item.shape_key_remove(block)
 
 
 def _to_keys(
     item: MeshObject, rig: ArmatureObject, deltas: Mapping[int, Deltas], labels: Sequence[str]
 ) -> None:
-    key = item.data.shape_keys
+    key = parts.keys_there(item)
     there = set(real_channels(item).values())
     given = dict(key.get(parts.KEY_NAMES, {}))
     order = [c for c in key.get(parts.KEY_ORDER, []) if c in deltas]
@@ -289,7 +290,7 @@ def _to_live(
     imported: NDArray[np.float32],
     labels: Sequence[str],
 ) -> None:
-    key = item.data.shape_keys
+    key = parts.keys_there(item)
     if item.get(parts.MODE) == "KEYS":
         _remember_keys(item, labels)
     kept = []
@@ -325,7 +326,7 @@ def touched(
 
 def _remember_keys(item: MeshObject, labels: Sequence[str]) -> None:
     """Keep the user's names and order of our keys while they are away."""
-    key, channels = item.data.shape_keys, real_channels(item)
+    key, channels = parts.keys_there(item), real_channels(item)
     renamed = {str(c): name for name, c in channels.items() if name != labels[c]}
     if renamed:
         key[parts.KEY_NAMES] = renamed
@@ -339,5 +340,5 @@ def drive_key(
 ) -> None:
     """Drive a key's value by its channel through a plain SUM driver."""
     name = bpy.utils.escape_identifier(block.name)
-    curve = key.driver_add(f'key_blocks["{name}"].value')
+    curve = cast("bpy.types.FCurve", key.driver_add(f'key_blocks["{name}"].value'))
     drivers.plain_driver(curve, rig, f'["{parts.CHANNELS}"][{channel}]', parts.CHANNEL_VARIABLE)

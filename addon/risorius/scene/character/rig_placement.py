@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from typing import cast
 
 import bpy
 import numpy as np
@@ -118,7 +119,7 @@ def attach(
     detach(controls)
     if fit != "NONE":
         _fit(controls, body, neck, head, fit == "SCALE")
-    hold = controls.constraints.new("CHILD_OF")
+    hold = cast("bpy.types.ChildOfConstraint", controls.constraints.new("CHILD_OF"))
     hold.name = CONSTRAINT
     hold.target, hold.subtarget = body, base
     # As the body rests: a body that is posed at this moment carries the face along.
@@ -135,7 +136,8 @@ def _neck_chain(body: ArmatureObject, base: str, neck: str, head: str) -> list[s
     if not neck:
         return []
     bone = body.data.bones.get(head)
-    above = [b.name for b in bone.parent_recursive] if bone is not None else []
+    parents: list[bpy.types.Bone] = bone.parent_recursive if bone is not None else []
+    above = [parent.name for parent in parents]
     chain = above[: above.index(neck) + 1][::-1] if neck in above else [neck]
     return [name for name in chain if name != base]
 
@@ -143,7 +145,10 @@ def _neck_chain(body: ArmatureObject, base: str, neck: str, head: str) -> list[s
 def body_of(controls: ArmatureObject) -> bpy.types.ChildOfConstraint | None:
     """The constraint by which a face hangs on a body, or None."""
     hold = controls.constraints.get(CONSTRAINT)
-    return hold if hold is not None and hold.type == "CHILD_OF" and hold.target else None
+    if hold is None or hold.type != "CHILD_OF":
+        return None
+    found = cast("bpy.types.ChildOfConstraint", hold)
+    return found if found.target else None
 
 
 def body_turns(controls: ArmatureObject, depsgraph: Depsgraph) -> dict[str, Quaternion]:
@@ -160,10 +165,13 @@ def body_turns(controls: ArmatureObject, depsgraph: Depsgraph) -> dict[str, Quat
         "neck" and "head" -> Quaternion in the control armature's axes, without straight ones.
     """
     hold = body_of(controls)
-    rest = hold.target.data.bones.get(hold.subtarget) if hold is not None else None
+    if hold is None:
+        return {}
+    body = cast("ArmatureObject", hold.target)
+    rest = body.data.bones.get(hold.subtarget)
     if rest is None or hold.mute:
         return {}
-    seen = hold.target.evaluated_get(depsgraph)
+    seen = body.evaluated_get(depsgraph)
     # From the control armature's space to the body's while the body rests.
     axes = (rest.matrix_local @ hold.inverse_matrix @ controls.matrix_basis).to_quaternion()
     turns = {}

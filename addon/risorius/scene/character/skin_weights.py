@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import bmesh
 import numpy as np
@@ -55,7 +56,7 @@ def write(item: MeshObject, groups: Weights) -> None:
     try:
         edit.from_mesh(item.data)
         layer = edit.verts.layers.deform.verify()
-        held = [vertex[layer] for vertex in edit.verts]
+        held: list[Any] = [vertex[layer] for vertex in edit.verts]
         ours = set(index_of.values())
         for weights in held:
             for index in [i for i in weights.keys() if i in ours]:  # noqa: SIM118  no dict

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import bpy
 import numpy as np
@@ -106,7 +106,7 @@ def copies(
             selected = layer.objects[:]
             yield {"scene": stage, "view_layer": layer, "selected_objects": selected}, loans
         finally:
-            if shown is not None:
+            if window is not None:
                 window.scene = shown
             _remove_all_but(before)
             loans.give_back()
@@ -172,7 +172,7 @@ def _copy_mesh(
     made.parent = rig_copy
     for modifier in made.modifiers:
         if modifier.type == "ARMATURE":
-            modifier.object = rig_copy
+            cast("bpy.types.ArmatureModifier", modifier).object = rig_copy
     stage.collection.objects.link(made)
     _show(made)
     return made
@@ -201,7 +201,7 @@ def _shapes(
         made.shape_key_remove(key.key_blocks[names.pop(channel)])
     if len(key.key_blocks) < 2:
         return  # a Key taken off a copied mesh would stay in the file for ever
-    others = samples.others.get(item.data.shape_keys)
+    others = samples.others.get(parts.keys_there(item))
     _play(key, samples.frames, baked_tracks.key_tracks(key, names, weights, others))
 
 

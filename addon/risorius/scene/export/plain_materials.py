@@ -137,9 +137,9 @@ def _read(flat: _Flat) -> None:
     mapped = all(item.data.uv_layers for item, _ in flat.users)
     whole = alpha.socket is None or alpha.is_alpha_of(color)
     if mapped and color.is_picture() and whole:
-        flat.images["color"] = color.node.image
+        flat.images["color"] = color.picture()
     if mapped and flat.sources["roughness"].is_picture():
-        flat.images["roughness"] = flat.sources["roughness"].node.image
+        flat.images["roughness"] = flat.sources["roughness"].picture()
     normal = shader_inputs.normal_image(flat.shader) if mapped else None
     if normal is not None:
         flat.images["normal"] = normal.image
@@ -206,8 +206,9 @@ def _write(mesh: bpy.types.Mesh, corners: NDArray[np.int64], part: NDArray[np.fl
     """Put coordinates into the layer that is baked to, which begins as a copy of the shown one."""
     shown, layer = _shown_layer(mesh), mesh.uv_layers.get(_LAYER)
     values = np.zeros(len(mesh.loops) * 2, np.float32)
-    if shown is not None or layer is not None:
-        (layer or shown).uv.foreach_get("vector", values)
+    begins = layer or shown
+    if begins is not None:
+        begins.uv.foreach_get("vector", values)
     layer = layer or mesh.uv_layers.new(name=_LAYER, do_init=False)
     if layer is None:
         raise FaceError(f"{mesh.name} has eight UV maps: remove one to bake its materials.")
@@ -265,13 +266,14 @@ def _bake(
 def _prepare(stage: bpy.types.Scene, size: int) -> None:
     """Cycles on the CPU, one sample: what is baked has no light in it."""
     try:
-        stage.render.engine = "CYCLES"
+        stage.render.engine = "CYCLES"  # pyright: ignore[reportAttributeAccessIssue]
     except TypeError:
         raise FaceError(
             "Cycles bakes the materials: enable its add-on, or switch Bake Materials off"
         ) from None
-    stage.cycles.device, stage.cycles.samples = "CPU", 1
-    stage.cycles.use_denoising = stage.cycles.use_adaptive_sampling = False
+    cycles: Any = stage.cycles
+    cycles.device, cycles.samples = "CPU", 1
+    cycles.use_denoising = cycles.use_adaptive_sampling = False
     settings = stage.render.bake
     settings.margin, settings.margin_type = max(size // 64, 4), "EXTEND"
     settings.use_clear = settings.use_selected_to_active = False
@@ -297,7 +299,7 @@ def _aim(flat: _Flat, wanted: Sequence[str], image: bpy.types.Image) -> None:
     if flat.work is None:
         flat.work = flat.material.copy()
         compat.make_node_tree(flat.work)
-    tree = flat.work.node_tree
+    tree: NodeTree = flat.work.node_tree
     for item, slot in flat.users:
         item.material_slots[slot].material = flat.work
     target = tree.nodes.get(_LAYER) or tree.nodes.new("ShaderNodeTexImage")
@@ -331,6 +333,7 @@ def _bake_one(override: dict[str, Any], items: Iterable[MeshObject], item: MeshO
     for other in items:
         other.hide_render = other != item
     layer = item.data.uv_layers.get(_LAYER) or _shown_layer(item.data)
+    assert layer is not None
     layer.active = True
     _select(override, [item])
     alone = {**override, "selected_objects": [item], "active_object": item, "object": item}
@@ -347,11 +350,11 @@ def _select(override: dict[str, Any], items: Sequence[MeshObject]) -> None:
 
 def _read_back(flat: _Flat, color: bpy.types.Image | None, masks: bpy.types.Image | None) -> None:
     """The images of a material, of what was baked."""
-    values = _pixels(masks) if masks is not None else None
+    values = _pixels(masks) if masks is not None else np.zeros((0, 0, 4), np.float32)
     if color is not None:
         _finish_color(color, values[..., 0] if "alpha" in flat.baked else None)
         flat.images["color"] = color
-    if "roughness" not in flat.baked:
+    if "roughness" not in flat.baked or masks is None:
         return
     if flat.mean:
         seen = values[..., 3] > 0
@@ -374,15 +377,17 @@ def _finish_color(image: bpy.types.Image, alpha: NDArray[np.float32] | None) -> 
 
 
 def _store(image: bpy.types.Image, values: NDArray[np.float32], alpha_mode: str) -> None:
-    image.alpha_mode = alpha_mode
-    image.pixels.foreach_set(values.ravel())
+    image.alpha_mode = alpha_mode  # pyright: ignore[reportAttributeAccessIssue]
+    pixels: Any = image.pixels
+    pixels.foreach_set(values.ravel())
     image.update()
 
 
 def _pixels(image: bpy.types.Image) -> NDArray[np.float32]:
     """float32[height, width, 4] of the stored numbers."""
     values = np.empty(image.size[0] * image.size[1] * 4, np.float32)
-    image.pixels.foreach_get(values)
+    pixels: Any = image.pixels
+    pixels.foreach_get(values)
     return values.reshape(image.size[1], image.size[0], 4)
 
 
@@ -397,8 +402,8 @@ def _build(flat: _Flat, loans: Loans) -> bpy.types.Material:
     material.diffuse_color = user.diffuse_color
     material.use_backface_culling = user.use_backface_culling
     compat.make_node_tree(material)
-    nodes = material.node_tree.nodes
-    shader = next(n for n in nodes if n.type == "BSDF_PRINCIPLED")
+    nodes = compat.tree_of(material).nodes
+    shader: Node = next(n for n in nodes if n.type == "BSDF_PRINCIPLED")
     if flat.shader is None:
         _plain_look(flat, shader)
     else:
@@ -422,6 +427,7 @@ def _plain_look(flat: _Flat, shader: Node) -> None:
 
 
 def _take_numbers(flat: _Flat, shader: Node) -> None:
+    assert flat.shader is not None
     for name in _NUMBERS:
         if name in flat.shader.inputs and name in shader.inputs:
             shader.inputs[name].default_value = flat.shader.inputs[name].default_value
@@ -434,7 +440,7 @@ def _take_numbers(flat: _Flat, shader: Node) -> None:
 
 
 def _take_images(flat: _Flat, material: bpy.types.Material, shader: Node) -> None:
-    tree = material.node_tree
+    tree = compat.tree_of(material)
     for name, image in flat.images.items():
         node = tree.nodes.new("ShaderNodeTexImage")
         node.image = _packed(flat, name, image)
@@ -459,7 +465,7 @@ def write_images(scene: bpy.types.Scene, folder: Path) -> int:
         How many files were written.
     """
     slots = [s for o in scene.objects if o.type == "MESH" for s in o.material_slots if s.material]
-    trees = {s.material.node_tree for s in slots} - {None}
+    trees: set[NodeTree] = {s.material.node_tree for s in slots if s.material} - {None}
     images = {n.image for t in trees for n in t.nodes if n.type == "TEX_IMAGE" and n.image}
     write_bytes = native.part("base.fileio").write_bytes
     for image in images:
@@ -480,6 +486,7 @@ def _packed(flat: _Flat, name: str, image: bpy.types.Image) -> bpy.types.Image:
     # Exporters tell images apart by their paths, and no path of this machine goes out.
     image.filepath_raw = f"//{_file_name(image.name)}{ending or '.png'}"
     if taken:
+        assert image.packed_file is not None
         data = image.packed_file.data  # packed anew: USD writes it under the path it was packed by
         image.pack(data=data, data_len=len(data))
     else:

@@ -10,6 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import bpy
+
 from ..base.blender_types import Node, NodeTree, Socket
 from ..material import skin_material
 
@@ -37,13 +39,18 @@ class Source:
         """Whether it is an image's colour, unchanged."""
         return self.node is not None and self.channel == "Color"
 
+    def picture(self) -> bpy.types.Image:
+        """The image of an input that has one."""
+        assert self.node is not None
+        return self.node.image
+
     def is_alpha_of(self, other: Source) -> bool:
         """Whether it is the alpha of the image that another is the colour of."""
         return (
             self.node is not None
             and self.channel == "Alpha"
             and other.is_picture()
-            and self.node.image == other.node.image
+            and self.node.image == other.picture()
         )
 
 
@@ -64,7 +71,7 @@ def _told(tree: NodeTree) -> tuple[list[tuple[object, ...]], set[tuple[str, str]
     nodes = []
     for node in tree.nodes:
         values = [getattr(s, "default_value", None) for s in (*node.inputs, *node.outputs)]
-        plain = [tuple(v) if hasattr(v, "__len__") else v for v in values]
+        plain = [tuple(v) if v is not None and hasattr(v, "__len__") else v for v in values]
         ramp = getattr(node, "color_ramp", None)
         stops = [(e.position, tuple(e.color)) for e in ramp.elements] if ramp else []
         nodes.append((node.name, node.bl_idname, getattr(node, "image", None), plain, stops))

@@ -152,7 +152,7 @@ class _Job:
         if shape.own:
             self.report.append(f"{name}: keys of your own are not written: {', '.join(shape.own)}.")
         for key in shape.channels:
-            block = item.data.shape_keys.key_blocks[key]
+            block = parts.keys_there(item).key_blocks[key]
             if block.mute or block.vertex_group:
                 self.report.append(f"{name}: the mute or mask of the key {key} is not written.")
 

@@ -181,7 +181,7 @@ def _new_rest(
         parent = new.parents[joint]
         former = back.get(joint)
         local = _relative(new.rest, joint, parent)
-        if former in edited:
+        if former is not None and former in edited:
             local = local @ edited[former].change
             bent.add(joint)
         if parent in bent:
@@ -255,8 +255,8 @@ def _followers(
         while above is not None and above.name in gone:
             above = above.parent
         offset = above.matrix.inverted() @ bone.matrix if above is not None else None
-        lost = above is not bone.parent and above is not None
-        found.append((bone.name, above.name if lost else None, offset, _depth(bone)))
+        lost = above.name if above is not None and above is not bone.parent else None
+        found.append((bone.name, lost, offset, _depth(bone)))
     return [f[:3] for f in sorted(found, key=lambda f: f[3])]
 
 
@@ -309,7 +309,7 @@ def replace_control_places(context: Context, change: Change) -> None:
         for name, (position, *_rest) in old.items()
         if name in controls.data.bones
         and not np.allclose(old[name][0], new[name][0], atol=1e-9)
-        and np.allclose(controls.data.bones[name].head_local, position, atol=near)
+        and np.allclose(controls.data.bones[name].head_local[:], position, atol=near)
     ]
     if not movable:
         return

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ...logic.character import plans, user_edits
 from ..base import parts
-from ..base.blender_types import MeshObject
+from ..base.blender_types import Attribute, MeshObject
 from ..character import build, meshes, runtime, skin_weights
 from . import transfer
 from .file_change import Change
@@ -284,7 +284,7 @@ def _refit_weights(
 
 def _masks(item: MeshObject) -> set[str]:
     """Vertex groups that modifiers and keys use by their names."""
-    used = {m.vertex_group for m in item.modifiers if getattr(m, "vertex_group", "")}
+    used = {group for m in item.modifiers if (group := getattr(m, "vertex_group", ""))}
     key = item.data.shape_keys
     used.update(b.vertex_group for b in key.key_blocks if b.vertex_group) if key else None
     return used
@@ -319,9 +319,10 @@ def _equal(a: NDArray[np.float32] | None, b: NDArray[np.float32] | None) -> bool
 
 def _copy_attributes(mesh: bpy.types.Mesh, source: bpy.types.Mesh) -> None:
     """The attributes that our materials read."""
-    for theirs in [a for a in source.attributes if a.name.startswith(transfer.OUR_PREFIX)]:
+    attributes: list[Attribute] = list(source.attributes)
+    for theirs in [a for a in attributes if a.name.startswith(transfer.OUR_PREFIX)]:
         kind = (theirs.name, theirs.data_type, theirs.domain)
-        ours = mesh.attributes.get(theirs.name) or mesh.attributes.new(*kind)
+        ours: Attribute = mesh.attributes.get(theirs.name) or mesh.attributes.new(*kind)
         flat = np.empty(len(theirs.data) * 3, np.float32)
         theirs.data.foreach_get("vector", flat)
         ours.data.foreach_set("vector", flat)
@@ -380,10 +381,11 @@ def _refit_shape(
     if key is None:
         return
     _drop_gone_keys(change, item, shape, channel_map, deltas)
-    done = {key.reference_key.name: basis}
+    done: dict[str, NDArray[np.float32] | None] = {key.reference_key.name: basis}
     bases = set(shape.relative.values())
     for block in key.key_blocks:
         points = _points(block.name, shape, done, deltas, channel_map, bearer)
+        assert points is not None
         block.points.foreach_set("co", points.ravel())
         if block.name not in bases:
             del done[block.name]  # hundreds of keys would fill the memory
@@ -435,7 +437,7 @@ def _drop_gone_keys(
     deltas: Mapping[int, meshes.Deltas],
 ) -> None:
     """Our keys of channels that are gone: away, or the user's from now on if edited."""
-    key = item.data.shape_keys
+    key = parts.keys_there(item)
     needed = {above for name, above in shape.relative.items() if name in shape.own}
     for name, channel in shape.channels.items():
         if channel < len(channel_map) and channel_map[channel] in deltas:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any, cast
 
 import bpy
 
@@ -119,8 +120,11 @@ def _exchange(context: Context, change: Change, fresh: ArmatureObject) -> None:
 def _array_labels(change: Change) -> dict[str, tuple[list[str], list[str]]]:
     runs = (change.before, change.after)
     return {
-        parts.CHANNELS: tuple(build.channel_labels(r.dna) for r in runs),
-        parts.MAPS: tuple(names.unique_labels(r.dna.animated_map_names) for r in runs),
+        parts.CHANNELS: (build.channel_labels(runs[0].dna), build.channel_labels(runs[1].dna)),
+        parts.MAPS: (
+            names.unique_labels(runs[0].dna.animated_map_names),
+            names.unique_labels(runs[1].dna.animated_map_names),
+        ),
     }
 
 
@@ -182,7 +186,7 @@ def _adopt(change: Change, fresh: ArmatureObject, item: MeshObject) -> None:
     item.parent = rig
     for modifier in item.modifiers:
         if modifier.type == "ARMATURE":
-            modifier.object = rig
+            cast("bpy.types.ArmatureModifier", modifier).object = rig
     refit_joints.rename_groups(change, item)
     home = next((m for m in parts.meshes_of(rig) if m != item), rig)
     for collection in item.users_collection:
@@ -239,8 +243,8 @@ def _sliders(change: Change) -> None:
     used = drivers.used_controls(controls, gone)
     for label in gone:
         if label in used:
-            words = "Not in the present file; its keys are kept"
-            face.id_properties_ui(label).update(description=words)
+            shown: Any = face.id_properties_ui(label)
+            shown.update(description="Not in the present file; its keys are kept")
             change.report.append(f"The control {label} is gone; its keys and drivers are kept.")
         else:
             del face[label]

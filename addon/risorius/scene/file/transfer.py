@@ -11,6 +11,7 @@ from mathutils.bvhtree import BVHTree
 from numpy.typing import NDArray
 
 from ...logic.character import user_edits
+from ..base.blender_types import Attribute
 
 # Attributes that a build makes itself, and Blender's own.
 _OURS = {"position", "UVMap", "custom_normal", "material_index"}
@@ -87,7 +88,7 @@ def nearest_triangles(
     points: NDArray[np.float64], triangles: NDArray[np.int32], queries: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """The nearest triangle of each query point, int[n], and barycentric weights float64[n, 3]."""
-    tree = BVHTree.FromPolygons(points.tolist(), triangles.tolist())
+    tree: Any = BVHTree.FromPolygons(points.tolist(), triangles.tolist())
     found = [tree.find_nearest(query) for query in queries.tolist()]
     where = np.array([hit[2] or 0 for hit in found], np.int64)
     spots = np.array([hit[0] if hit[0] is not None else (0, 0, 0) for hit in found], np.float64)
@@ -112,7 +113,8 @@ def own_attributes(mesh: bpy.types.Mesh) -> tuple[list[tuple[str, str, str, Valu
     """The user's layers of a mesh: (name, type, domain, values) of those that can be carried,
     and the names of the others."""
     kept, other = [], []
-    for layer in mesh.attributes:
+    attributes: list[Attribute] = list(mesh.attributes)
+    for layer in attributes:
         internal = layer.is_internal or layer.name.startswith((".", OUR_PREFIX))
         if internal or layer.name in _OURS | _SHADING:
             continue
@@ -160,14 +162,14 @@ class OldSurface:
         """
         if not self.usable or not len(mesh.polygons):
             return
-        points = points.astype(np.float64)
+        places = points.astype(np.float64)
         corner = np.empty(len(mesh.loops), np.int32)
         mesh.loops.foreach_get("vertex_index", corner)
         sizes = np.empty(len(mesh.polygons), np.int32)
         mesh.polygons.foreach_get("loop_total", sizes)
         face = np.repeat(np.arange(len(sizes)), sizes)
         middle = np.zeros((len(sizes), 3))
-        np.add.at(middle, face, points[corner])
+        np.add.at(middle, face, places[corner])
         middle /= sizes[:, None]
         if self.materials.any():
             where, _ = nearest_triangles(self.points, self.triangles, middle)
@@ -181,7 +183,7 @@ class OldSurface:
                 given = values[self.faces[where]]
             else:
                 if spots is None:  # a little inside its face, so that seams stay seams
-                    inside = points[corner] * 0.98 + middle[face] * 0.02
+                    inside = places[corner] * 0.98 + middle[face] * 0.02
                     spots = nearest_triangles(self.points, self.triangles, inside)
                 given = np.sum(values[self.corners[spots[0]]] * spots[1][..., None], axis=1)
             _write_layer(mesh, name, kind, domain, given)
@@ -198,7 +200,8 @@ class OldSurface:
 
 def _write_layer(mesh: bpy.types.Mesh, name: str, kind: str, domain: str, values: Values) -> None:
     field, _width, dtype = _FIELDS[kind]
-    layer = mesh.attributes.get(name) or mesh.attributes.new(name, kind, domain)
+    attributes: Any = mesh.attributes
+    layer = attributes.get(name) or attributes.new(name, kind, domain)
     if dtype is bool:
         values = np.asarray(values, np.float64) > 0.5
     elif dtype is np.int32:

@@ -123,7 +123,7 @@ def _write_shape(
     """Write the sum of all channels to the live key of a mesh, where it has one."""
     key = item.data.shape_keys
     block = meshes.live_block(item)
-    if block is None or item.mode == "EDIT":
+    if key is None or block is None or item.mode == "EDIT":
         return
     index = item.get(parts.MESH, -1)
     if not 0 <= index < len(live.dna.meshes):

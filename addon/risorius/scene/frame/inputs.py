@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TypeGuard
 
 import bpy
 import numpy as np
@@ -94,13 +93,13 @@ def read_sliders(seen: ArmatureObject, live: runtime.Runtime) -> NDArray[np.floa
     return raw
 
 
-def _rests(bone: bpy.types.PoseBone | None) -> TypeGuard[None]:
-    return bone is None or (not bone.constraints and bone.matrix_basis == _STRAIGHT)
+def _rests(bone: bpy.types.PoseBone) -> bool:
+    return not bone.constraints and bone.matrix_basis == _STRAIGHT
 
 
 def _turn(seen: ArmatureObject, bone: bpy.types.PoseBone | None) -> Quaternion | None:
     """A bone's own rotation in the armature's axes, or None where it is straight."""
-    if _rests(bone):
+    if bone is None or _rests(bone):
         return None
     turn = rig_placement.own_turn(seen, bone)
     return turn if turn.angle else None
@@ -108,7 +107,7 @@ def _turn(seen: ArmatureObject, bone: bpy.types.PoseBone | None) -> Quaternion |
 
 def _moved(seen: ArmatureObject, target: bpy.types.PoseBone | None) -> Vector:
     """How far the eyes' target was moved, in the armature's axes."""
-    if _rests(target):
+    if target is None or _rests(target):
         return Vector()
     local = seen.convert_space(
         pose_bone=target, matrix=target.matrix, from_space="POSE", to_space="LOCAL"

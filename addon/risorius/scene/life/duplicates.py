@@ -4,10 +4,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import cast
 
 import bpy
 
-from ..base import parts, written
+from ..base import compat, parts, written
 from ..base.blender_types import ArmatureObject, MeshObject
 from ..character import armatures, meshes
 from ..material import materials
@@ -47,7 +48,8 @@ def separate(rig: ArmatureObject) -> list[str]:
         done += _own_mesh(item)
         _own_key_drivers(item, rig)
         _own_materials(item, rig, copied)
-        modifier = next((m for m in item.modifiers if m.type == "ARMATURE"), None)
+        modifiers = cast("list[bpy.types.ArmatureModifier]", item.modifiers)
+        modifier = next((m for m in modifiers if m.type == "ARMATURE"), None)
         if modifier is not None and modifier.object is None:
             modifier.object = rig
     if copied:
@@ -69,7 +71,7 @@ def _own_mesh(item: MeshObject) -> list[str]:
 def _retarget(curves: Iterable[bpy.types.FCurve], rig: ArmatureObject) -> bool:
     changed = False
     for curve in curves:
-        for variable in curve.driver.variables:
+        for variable in compat.driver_of(curve).variables:
             for target in variable.targets:
                 if target.id != rig and variable.type == "SINGLE_PROP":
                     target.id = rig
@@ -102,7 +104,9 @@ def _own_materials(
         if material is None:
             continue
         curves = list(materials.map_drivers(material))
-        foreign = any(t.id != rig for c in curves for v in c.driver.variables for t in v.targets)
+        foreign = any(
+            t.id != rig for c in curves for v in compat.driver_of(c).variables for t in v.targets
+        )
         if not foreign or not curves:
             continue
         # The name stays the key while copies are made: a datablock cannot be hashed safely.

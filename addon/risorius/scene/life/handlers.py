@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable
-from typing import Any
+from typing import Any, cast
 
 import bpy
 from bpy.app.handlers import persistent
@@ -87,7 +87,7 @@ def _notice_copies(updates: Iterable[bpy.types.DepsgraphUpdate]) -> None:
     # Their number alone does not tell: as many may go as come in one step.
     known = _state["objects"]
     seen = (u.id.original for u in updates if isinstance(u.id, bpy.types.Object))
-    new = any(item.session_uid not in known for item in seen)
+    new = any(item is not None and item.session_uid not in known for item in seen)
     if new or len(bpy.data.objects) != len(known):
         _state["objects"] = {item.session_uid for item in bpy.data.objects}
         runtime.forget_unused(parts.rigs())
@@ -102,7 +102,7 @@ def _edited(depsgraph: Depsgraph) -> list[ArmatureObject]:
     armatures, actions, bones_edited, camera_moved = set(), set(), False, False
     camera = depsgraph.scene.camera
     for update in depsgraph.updates:
-        item = update.id.original
+        item = update.id.original if update.id is not None else None
         if isinstance(item, bpy.types.Armature):
             bones_edited = True
         elif isinstance(item, bpy.types.Action):
@@ -192,7 +192,7 @@ def refresh() -> None:
     for scene in bpy.data.scenes:
         for layer in scene.view_layers:
             if layer.depsgraph is not None:
-                evaluate.evaluate_all(layer.depsgraph)
+                evaluate.evaluate_all(cast("Depsgraph", layer.depsgraph))
 
 
 _HANDLERS = (

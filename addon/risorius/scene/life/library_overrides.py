@@ -8,7 +8,7 @@ keys, which drivers move without any write, or meshes of this file.
 
 from __future__ import annotations
 
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import bpy
 
@@ -51,7 +51,7 @@ def make_override(
         FaceError: Blender made no override; the text says of what.
     """
     shown = _instance_of(context, rig)
-    root = shown.instance_collection if shown else _linked_root(rig)
+    root: Any = shown.instance_collection if shown else _linked_root(rig)
     before = {o.session_uid for o in bpy.data.objects}
     root.override_hierarchy_create(
         context.scene, context.view_layer, reference=shown, do_fully_editable=True
@@ -77,6 +77,7 @@ def repair(context: Context, rig: ArmatureObject, local_meshes: bool = False) ->
     Returns:
         Sentences for a report.
     """
+    assert rig.override_library is not None
     root = rig.override_library.hierarchy_root
     kinds = ("objects", "meshes", "armatures", "materials", "collections", "shape_keys")
     for kind in kinds:

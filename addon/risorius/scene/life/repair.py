@@ -8,6 +8,8 @@ given back.
 
 from __future__ import annotations
 
+from typing import cast
+
 import bpy
 
 from ...logic.character import plans
@@ -29,7 +31,8 @@ def heal(rig: ArmatureObject) -> list[str]:
     controls = rig.get(parts.CONTROLS)
     if not isinstance(controls, bpy.types.Object) or controls.type != "ARMATURE":
         return []
-    return [*_bone_names(controls), *_sliders(rig), *applied_transforms.take_back(controls)]
+    held = cast("ArmatureObject", controls)
+    return [*_bone_names(held), *_sliders(rig), *applied_transforms.take_back(held)]
 
 
 def heal_all() -> list[ArmatureObject]:
@@ -132,9 +135,10 @@ def _rig_of_ruin(item: bpy.types.Object | None) -> ArmatureObject | None:
     if item is None:
         return None
     if item.type == "ARMATURE" and parts.CONTROLS in item:
-        return item
+        return cast("ArmatureObject", item)
     rig = item.get(parts.RIG)
-    return rig if isinstance(rig, bpy.types.Object) and parts.CONTROLS in rig else None
+    found = rig if isinstance(rig, bpy.types.Object) and parts.CONTROLS in rig else None
+    return cast("ArmatureObject | None", found)
 
 
 def outside(rig: ArmatureObject) -> list[bpy.types.Object]:

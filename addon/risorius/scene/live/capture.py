@@ -15,7 +15,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, cast
 
 import bpy
 from bpy.app.handlers import persistent
@@ -114,10 +114,10 @@ class Session:
 
     def controls(self) -> ArmatureObject | None:
         """The control armature, or None where it went away."""
-        item = bpy.data.objects.get(self.name)
+        item = cast("ArmatureObject | None", bpy.data.objects.get(self.name))
         if item is None or item.session_uid != self.uid:
             found = (o for o in bpy.data.objects if o.session_uid == self.uid)
-            item = next(found, None)
+            item = cast("ArmatureObject | None", next(found, None))
         if item is None or item.type != "ARMATURE" or parts.FACE not in item.pose.bones:
             return None
         self.name = item.name
@@ -420,7 +420,7 @@ def _rotate(bone: bpy.types.PoseBone, turn: Quaternion) -> None:
         axis, angle = turn.to_axis_angle()
         bone.rotation_axis_angle = (angle, *axis)
     else:
-        before = Euler(bone.rotation_euler, bone.rotation_mode)
+        before = Euler(bone.rotation_euler[:], bone.rotation_mode)
         bone.rotation_euler = turn.to_euler(bone.rotation_mode, before)
 
 

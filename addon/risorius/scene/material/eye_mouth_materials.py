@@ -227,7 +227,7 @@ def wet(graph: Graph, look: Look) -> None:
 
 def _transparent(material: bpy.types.Material, method: str) -> None:
     """How EEVEE lets things through; shadows pass the clear parts."""
-    material.surface_render_method = method
+    material.surface_render_method = method  # pyright: ignore[reportAttributeAccessIssue]
     material.use_transparency_overlap = False
     if hasattr(material, "use_transparent_shadow"):
         material.use_transparent_shadow = True

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import bpy
 import numpy as np
@@ -41,7 +42,7 @@ def set_color_space(image: bpy.types.Image, data: bool) -> None:
         image: a loaded image.
         data: numbers, such as normals or masks, that no colour management may touch.
     """
-    settings = image.colorspace_settings
+    settings: Any = image.colorspace_settings
     if not data and image.is_float:
         return  # linear, as Blender assumes by the configuration's role for floats
     known = [item.identifier for item in settings.bl_rna.properties["name"].enum_items]
@@ -106,7 +107,7 @@ class Images:
             self._make_room(path)
             content = path.read_bytes() if path.stat().st_size <= PACK_LIMIT else None
             digest = storage.hash_of(content) if content is not None else ""
-            there = sharing.find(content, digest, data) if digest else None
+            there = sharing.find(content, digest, data) if content is not None else None
             if there is not None:
                 return there
             image = bpy.data.images.load(str(path), check_existing=False)
@@ -165,8 +166,8 @@ class Images:
         places = {}
         for path in dict.fromkeys(m.path for m in held.values()):
             source = _small_copy(path)
-            for region, mask in held.items() if source is not None else ():
-                if mask.path == path:
+            for region, mask in held.items():
+                if source is not None and mask.path == path:
                     number, channel = divmod(len(places), 3)
                     row, column = divmod(number, side)
                     tile = pixels[row * TILE :, column * TILE :]
@@ -177,13 +178,15 @@ class Images:
         image = bpy.data.images.new(name, side * TILE, side * TILE, alpha=False)
         self.made.append(image)
         set_color_space(image, True)
-        image.pixels.foreach_set(pixels.ravel())
+        stored: Any = image.pixels
+        stored.foreach_set(pixels.ravel())
         image.update()
         image.pack()
         return self._shared(image), places
 
     def _shared(self, image: bpy.types.Image) -> bpy.types.Image:
         """An image of this .blend with the same packed bytes in the place of a new one."""
+        assert image.packed_file is not None
         content = bytes(image.packed_file.data)
         digest = storage.hash_of(content)
         there = sharing.find(content, digest, True)
@@ -209,7 +212,8 @@ def _small_copy(path: Path) -> NDArray[np.float32] | None:
             return None
         image.scale(TILE, TILE)
         flat = np.empty(TILE * TILE * 4, np.float32)
-        image.pixels.foreach_get(flat)
+        stored: Any = image.pixels
+        stored.foreach_get(flat)
         return flat.reshape(TILE, TILE, 4)
     finally:
         bpy.data.images.remove(image)
@@ -221,7 +225,7 @@ def mean_of(path: Path) -> NDArray[np.float32] | None:
     return None if small is None else small.mean(axis=(0, 1))
 
 
-def offsets_in(path: Path) -> bool:
+def offsets_in(path: Path | None) -> bool:
     """Whether a wrinkle map holds differences about 0.5 instead of whole colours or normals."""
-    mean = mean_of(path)
+    mean = mean_of(path) if path is not None else None
     return mean is not None and bool(abs(mean[:3] - 0.5).max() < 0.06)

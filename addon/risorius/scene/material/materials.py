@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...logic.character import plans
 from ...logic.material import animated_maps, skin_folds, texture_search
-from ..base.blender_types import ArmatureObject, MeshObject
+from ..base.blender_types import ArmatureObject, Attribute, MeshObject
 from . import eye_mouth_materials, nodes, skin_material
 from .image_loading import Images
 from .look import Look
@@ -145,7 +145,8 @@ def _choose_picture(look: Look, graph: Graph) -> None:
 def _give_iris(mesh: bpy.types.Mesh) -> None:
     """Put the faces of the iris and the pupil into the second slot."""
     flat = np.empty(len(mesh.vertices) * 3, np.float32)
-    mesh.attributes[eye_mouth_materials.EYES].data.foreach_get("vector", flat)
+    places_of: Attribute = mesh.attributes[eye_mouth_materials.EYES]
+    places_of.data.foreach_get("vector", flat)
     places = flat.reshape(-1, 3)
     away = np.hypot(places[:, 0], places[:, 1]) + 2.0 * (1.0 - places[:, 2])
     corners = np.empty(len(mesh.loops), np.int32)
@@ -195,7 +196,7 @@ def _add_attributes(
 def _add(
     mesh: bpy.types.Mesh, name: str, values: NDArray[np.float32] | NDArray[np.float64]
 ) -> None:
-    attribute = mesh.attributes.new(name, "FLOAT_VECTOR", "POINT")
+    attribute: Attribute = mesh.attributes.new(name, "FLOAT_VECTOR", "POINT")
     attribute.data.foreach_set("vector", np.ascontiguousarray(values, np.float32).ravel())
 
 
@@ -213,7 +214,7 @@ def _add_areas(
     return there
 
 
-def _eye_coordinates(points: NDArray[np.float32]) -> NDArray[np.float64]:
+def _eye_coordinates(points: NDArray[np.float32] | NDArray[np.float64]) -> NDArray[np.float64]:
     """float64[V, 3]: x and height from the eye's axis over its radius; 1 on its front half."""
     points = points.astype(np.float64)
     middle = (points[:, 0].min() + points[:, 0].max()) / 2
@@ -232,7 +233,9 @@ def _eye_coordinates(points: NDArray[np.float32]) -> NDArray[np.float64]:
     return values
 
 
-def _tooth_coordinates(points: NDArray[np.float32], unit: float) -> NDArray[np.float64]:
+def _tooth_coordinates(
+    points: NDArray[np.float32] | NDArray[np.float64], unit: float
+) -> NDArray[np.float64]:
     """float64[V, 3]: pi for each tooth along the arch, height from the bite over its reach, 0."""
     points = points.astype(np.float64)
     low, high = points.min(axis=0), points.max(axis=0)

@@ -25,7 +25,8 @@ class Graph:
 
     def __init__(self, material: bpy.types.Material) -> None:
         compat.make_node_tree(material)
-        self.material, self.tree = material, material.node_tree
+        self.material: bpy.types.Material = material
+        self.tree = compat.tree_of(material)
         self.shader = next(n for n in self.tree.nodes if n.type == "BSDF_PRINCIPLED")
         self.output = next(n for n in self.tree.nodes if n.type == "OUTPUT_MATERIAL")
 
@@ -154,7 +155,7 @@ class Graph:
 
     def image(
         self,
-        image: bpy.types.Image,
+        image: bpy.types.Image | None,
         vector: Value | None = None,
         label: str = "",
         clamp: bool = False,

@@ -132,8 +132,8 @@ class Skin:
         kind, name = mask
         if kind == "own":
             use = self.look.uses[name]
-            mask = self.look.image(f"map:{use.label}", data=True)
-            picture = graph.image(mask, label=use.label, clamp=True)
+            own = self.look.image(f"map:{use.label}", data=True)
+            picture = graph.image(own, label=use.label, clamp=True)
             return graph.math("MULTIPLY", members[0][1], picture.outputs["Color"])
         if kind == "atlas":
             amount = graph.total([v for _, v in members])
