@@ -166,7 +166,8 @@ def violations(part: str, files: Mapping[str, str]) -> list[str]:
         found += [
             f"{path}: {reason}" for target in targets if (reason := _refused(path, target, plan))
         ]
-    return found + _circle(used) + _crowded(files, plan) + _disordered(plan["rooms"])
+    found += _circle(used) + _crowded(files, plan) + _disordered(plan["rooms"])
+    return found + (_stale(used, plan["rooms"]) if plan.get("exact") else [])
 
 
 def _refused(path: str, use: Use, plan: dict) -> str:
@@ -214,4 +215,21 @@ def _disordered(rooms: Mapping[str, list[str]]) -> list[str]:
         for room, below in rooms.items()
         for known in below
         if known not in order[: order.index(room)]
+    ]
+
+
+def _stale(used: Mapping[str, list[Use]], rooms: Mapping[str, list[str]]) -> list[str]:
+    """What the plan allows and no file needs: so the plan is a drawing of the house as it is."""
+    needed = {
+        (room_of(path, rooms), room)
+        for path, targets in used.items()
+        for use in targets
+        if use.kind == "inside"
+        for room in (room_of(use.name, rooms), PurePosixPath(use.name).parent.as_posix())
+    }
+    return [
+        f"{room} does not use {target}: take it out of the plan"
+        for room, below in rooms.items()
+        for target in below
+        if (room, target) not in needed
     ]

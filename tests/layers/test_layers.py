@@ -138,3 +138,11 @@ def test_a_plan_that_runs_backwards_is_found(monkeypatch):
     assert any(
         "bindings is not written above" in line for line in violations("native", files_of("native"))
     )
+
+
+def test_a_plan_that_allows_what_nobody_needs_is_found(monkeypatch):
+    rooms = ROOMS["package"]["rooms"]
+    monkeypatch.setitem(rooms, "cli", [*rooms["cli"], "importing/mappings"])
+    assert violations("package", files_of("package")) == [
+        "cli does not use importing/mappings: take it out of the plan"
+    ]
