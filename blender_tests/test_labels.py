@@ -69,8 +69,12 @@ def test_eight_levels_of_detail_have_two_rows_that_can_be_told_apart(rig, monkey
 def test_the_names_of_all_sliders_can_be_read(rig):
     """Of the standard face: 260 sliders, in one column."""
     face = {name: 0.0 for name in (STANDARD / "standard_raw.txt").read_text().split()}
-    layout = Part()
-    ui("face.controls_panel")._draw_sliders(bpy.context, layout, face, list(face))
+    layout, names = Part(), list(face)
+    words = scene.submodule("logic.character.slider_words")
+    regions = scene.submodule("native").regions()
+    for region, shown in words.group_controls(names, regions).items():
+        listed = [names[index] for index in shown]
+        ui("face.controls_panel")._draw_sliders(bpy.context, layout, face, region, listed)
     assert layout.cut(SIDEBAR) == []
     words = texts(layout)
     assert {"Upper Lip Towards Teeth", "Lower Lip Depress", "Dimple"} <= set(words)
@@ -79,7 +83,7 @@ def test_the_names_of_all_sliders_can_be_read(rig):
 def test_a_slider_whose_name_is_short_has_one_line():
     face = dict.fromkeys(("CTRL_expressions.jawOpen", "CTRL_expressions.jawChinRaiseDL"), 0.0)
     layout = Part()
-    ui("face.controls_panel")._draw_sliders(bpy.context, layout, face, list(face))
+    ui("face.controls_panel")._draw_sliders(bpy.context, layout, face, "jaw", list(face))
     (column,) = layout.children
     assert [part.kind for part in column.children] == ["split", "split"]
 

@@ -33,12 +33,18 @@ CLASSES = (
 )
 
 
-def _search_property() -> None:
-    return bpy.props.StringProperty(
-        name="Search",
-        description="Show only the controls whose name has these words",
-        options={"TEXTEDIT_UPDATE", "SKIP_SAVE"},
-    )
+def _window_properties() -> dict[str, object]:
+    """What goes with the window and not with the file."""
+    return {
+        "risorius_search": bpy.props.StringProperty(
+            name="Search",
+            description="Show only the controls whose name has these words",
+            options={"TEXTEDIT_UPDATE", "SKIP_SAVE"},
+        ),
+        "risorius_show_timing": timing_overlay.show_property(),
+        "risorius_live": bpy.props.PointerProperty(type=live_properties.RISORIUS_PG_live),
+        "risorius_test": channel_preview.weight_property(),
+    }
 
 
 def register() -> None:
@@ -46,12 +52,8 @@ def register() -> None:
     for cls in CLASSES:
         bpy.utils.register_class(cls)
     layer_properties.register()
-    bpy.types.WindowManager.risorius_search = _search_property()
-    bpy.types.WindowManager.risorius_show_timing = timing_overlay.show_property()
-    bpy.types.WindowManager.risorius_live = bpy.props.PointerProperty(
-        type=live_properties.RISORIUS_PG_live
-    )
-    bpy.types.WindowManager.risorius_test = channel_preview.weight_property()
+    for name, choice in _window_properties().items():
+        setattr(bpy.types.WindowManager, name, choice)
     bpy.types.TOPBAR_MT_file_import.append(import_operators.draw_import)
     bpy.types.TOPBAR_MT_file_import.append(animation_operators.draw_import)
     bpy.types.TOPBAR_MT_file_export.append(file_operators.draw_export)
@@ -80,10 +82,8 @@ def unregister() -> None:
     bpy.types.TOPBAR_MT_file_export.remove(file_operators.draw_export)
     bpy.types.TOPBAR_MT_file_import.remove(animation_operators.draw_import)
     bpy.types.TOPBAR_MT_file_import.remove(import_operators.draw_import)
-    del bpy.types.WindowManager.risorius_show_timing
-    del bpy.types.WindowManager.risorius_test
-    del bpy.types.WindowManager.risorius_live
-    del bpy.types.WindowManager.risorius_search
+    for name in reversed(_window_properties()):
+        delattr(bpy.types.WindowManager, name)
     layer_properties.unregister()
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

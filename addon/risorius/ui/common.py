@@ -1,14 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What operators and panels of all features share: when they are usable, how they report."""
 
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from .. import native
 from ..logic.base import names
+from ..logic.base.errors import FaceError
 from ..scene.base import parts
+from ..scene.base.blender_types import ArmatureObject
 from ..scene.character import runtime
+from .blender_types import Context, Operator, OperatorBase, PanelBase
 
+_NO_FACE = "Select a face first."
 MODES = (
     ("AUTO", "Automatic", "Real shape keys where a mesh has few, else the live sum"),
     ("LIVE", "Live Sum", "One shape key per mesh that is summed natively: fast"),
@@ -16,7 +21,7 @@ MODES = (
 )
 
 
-def explain(path, error):
+def explain(path: str | Path, error: Exception) -> str:
     """One sentence for what is wrong with a file."""
     reason = error.strerror if isinstance(error, OSError) else None
     text = names.printable(reason or str(error)).strip().rstrip(".")
@@ -24,7 +29,7 @@ def explain(path, error):
     return f"{text}." if name in text else f"{name}: {text}."
 
 
-def usable(cls):
+def usable(cls: type[Operator]) -> bool:
     """Poll: whether the native module is there; says why when it is not."""
     trouble = native.problem()
     if trouble:
@@ -33,7 +38,7 @@ def usable(cls):
 
 
 @contextmanager
-def shown_progress(context):
+def shown_progress(context: Context) -> Iterator[Callable[[float], None]]:
     """Show progress at the mouse; gives a function that takes the share that is done, 0 to 1."""
     manager = context.window_manager
     manager.progress_begin(0, 100)
@@ -43,13 +48,37 @@ def shown_progress(context):
         manager.progress_end()
 
 
-def active_controls(context):
+def active_controls(context: Context) -> ArmatureObject | None:
     """The control armature of the active face, or None; never without the native module."""
     rig = None if native.problem() else parts.active_rig(context)
     return parts.controls_of(rig) if rig is not None else None
 
 
-class FaceOperator:
+def face_rig(context: Context) -> ArmatureObject:
+    """The deforming armature of the active face, after poll has said that there is one.
+
+    Raises:
+        FaceError: there is none.
+    """
+    rig = parts.active_rig(context)
+    if rig is None:
+        raise FaceError(_NO_FACE)
+    return rig
+
+
+def face_controls(context: Context) -> ArmatureObject:
+    """The control armature of the active face, after poll has said that there is one.
+
+    Raises:
+        FaceError: there is none.
+    """
+    controls = active_controls(context)
+    if controls is None:
+        raise FaceError(_NO_FACE)
+    return controls
+
+
+class FaceOperator(OperatorBase):
     """What all operators on a face share; a class says by its attributes which faces will do."""
 
     bl_options = {"REGISTER", "UNDO"}
@@ -57,13 +86,13 @@ class FaceOperator:
     baked_too = False  # a face that plays baked actions will do
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: Context) -> bool:
         """Whether there is a face to work on; says why when there is not."""
         if not usable(cls):
             return False
         rig = parts.active_rig(context)
         if rig is None or (cls.whole_face and parts.controls_of(rig) is None):
-            cls.poll_message_set("Select a face first.")
+            cls.poll_message_set(_NO_FACE)
             return False
         if cls.whole_face and runtime.of(rig) is None:
             cls.poll_message_set("This face has lost the text that holds its DNA.")
@@ -74,7 +103,7 @@ class FaceOperator:
         return True
 
 
-class FacePanel:
+class FacePanel(PanelBase):
     """What all panels of the tab share."""
 
     bl_space_type = "VIEW_3D"
@@ -86,5 +115,5 @@ class FaceOnlyPanel(FacePanel):
     """A panel that is there only with a face."""
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: Context) -> bool:
         return active_controls(context) is not None

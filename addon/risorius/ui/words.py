@@ -5,6 +5,9 @@ import textwrap
 from functools import lru_cache
 
 import blf
+import bpy
+
+from .blender_types import Context, Icon, UILayout
 
 _SIDEBAR = 280  # pixels that Blender gives the sidebar at first
 _EDGES = 36  # of them the tabs and the panel's margins
@@ -14,23 +17,23 @@ _MARGIN = 12  # around the text of a label
 class Ruler:
     """Tells which labels can be read whole in a share of the sidebar's width."""
 
-    def __init__(self, context, share):
+    def __init__(self, context: Context, share: float) -> None:
         """Args: context  has the region, else the sidebar is a new one; share  0 to 1."""
         preferences, region = context.preferences, context.region
-        is_sidebar = region is not None and region.type == "UI" and region.width > 1
-        scale = preferences.system.ui_scale or 1.0  # 0 without a window
-        width = region.width / scale if is_sidebar else _SIDEBAR
+        width: float = _SIDEBAR
+        if region is not None and region.type == "UI" and region.width > 1:
+            width = region.width / (preferences.system.ui_scale or 1.0)  # 0 without a window
         self._room = (width - _EDGES) * share - _MARGIN
         self._points = preferences.ui_styles[0].widget.points
         self._font = preferences.view.font_path_ui
 
-    def fits(self, text):
+    def fits(self, text: str) -> bool:
         """Whether a label can be read whole."""
         return width_of(text, self._points, self._font) <= self._room
 
 
 @lru_cache(maxsize=2048)  # a panel asks for the names of all sliders each time it is drawn
-def width_of(text, points, font=""):
+def width_of(text: str, points: float, font: str = "") -> float:
     """Pixels that a text takes in buttons and labels, at an interface scale of 1.
 
     Args:
@@ -42,7 +45,9 @@ def width_of(text, points, font=""):
     return blf.dimensions(0, text)[0]
 
 
-def prop_or(layout, owner, name, empty, meaning):
+def prop_or(
+    layout: UILayout, owner: bpy.types.bpy_struct, name: str, empty: float | str, meaning: str
+) -> None:
     """A property, and below it in words what is done where it is left as it is.
 
     Args:
@@ -58,7 +63,7 @@ def prop_or(layout, owner, name, empty, meaning):
         row.label(text=meaning)
 
 
-def write(layout, text, icon="NONE"):
+def write(layout: UILayout, text: str, icon: Icon = "NONE") -> None:
     """A sentence in as many lines as a narrow sidebar needs."""
     column = layout.column(align=True)
     column.scale_y = 0.8

@@ -9,7 +9,7 @@ copies of an export, whose materials, meshes and scene go again.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePath
 from typing import Any
@@ -67,7 +67,7 @@ class _Flat:
     mean: bool | float = False
 
 
-def flatten(override: dict[str, Any], loans: Loans, size: int) -> Iterator[float]:
+def flatten(override: dict[str, Any], loans: Loans, size: int) -> Generator[float, None, None]:
     """Replace the materials of copied meshes; a generator.
 
     Args:

@@ -5,11 +5,13 @@ import bpy
 import numpy as np
 
 from ...scene.base import parts
+from ...scene.base.blender_types import ArmatureObject
 from ...scene.character import meshes, runtime
-from ..common import FaceOperator
+from ..blender_types import Context, Operator, Result
+from ..common import FaceOperator, face_rig
 
 
-def describe(rig):
+def describe(rig: ArmatureObject) -> list[str]:
     """What a face is made of, a line per mesh: shapes that move nothing are named.
 
     Args:
@@ -18,7 +20,7 @@ def describe(rig):
     Returns:
         Lines of text.
     """
-    live = runtime.of(rig)
+    live = runtime.there(rig)
     names = live.dna.blend_shape_channel_names
     lines = [
         f"{len(live.labels)} controls, {live.rig.joint_count} joints, {len(live.owned)} of them "
@@ -41,7 +43,7 @@ def describe(rig):
     return lines
 
 
-class RISORIUS_OT_describe(FaceOperator, bpy.types.Operator):
+class RISORIUS_OT_describe(FaceOperator, Operator):
     """List what the active face is made of, mesh by mesh"""
 
     bl_idname = "risorius.describe"
@@ -49,8 +51,8 @@ class RISORIUS_OT_describe(FaceOperator, bpy.types.Operator):
     baked_too = True
     bl_options = {"REGISTER"}
 
-    def execute(self, context):
-        lines = describe(parts.active_rig(context))
+    def execute(self, context: Context) -> Result:
+        lines = describe(face_rig(context))
         for line in lines:
             self.report({"INFO"}, line)
         if not bpy.app.background:

@@ -4,14 +4,14 @@
 import platform
 import sys
 
-import bpy
 import numpy as np
 
 from ... import native
+from ..blender_types import AddonPreferences, Context
 from ..speech.install import draw_preferences
 
 
-def self_test():
+def self_test() -> tuple[bool, str]:
     """One line on whether the native module works: it evaluates a rig of two numbers.
 
     Returns:
@@ -31,10 +31,10 @@ def self_test():
     )
 
 
-class RISORIUS_Preferences(bpy.types.AddonPreferences):
+class RISORIUS_Preferences(AddonPreferences):
     bl_idname = native.ADDON
 
-    def draw(self, _context):
+    def draw(self, context: Context) -> None:
         works, text = self_test()
         self.layout.label(text=text, icon="CHECKMARK" if works else "ERROR")
         if works:

@@ -1,15 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The optional overlay of the 3D view: milliseconds per stage of a frame."""
 
+from typing import cast
+
 import blf
 import bpy
 
 from ...scene.frame import timing
+from ..blender_types import Context, WindowManager
 
-_handles = []
+_handles: list[object] = []
 
 
-def show_property():
+def show_property() -> object:
     """The switch, on the window manager: no part of the file."""
     return bpy.props.BoolProperty(
         name="Show Timing",
@@ -19,27 +22,29 @@ def show_property():
     )
 
 
-def _switched(manager, context):
+def _switched(manager: bpy.types.WindowManager, context: bpy.types.Context) -> None:
     stop()
-    if manager.risorius_show_timing:
+    if cast(WindowManager, manager).risorius_show_timing:
         view = bpy.types.SpaceView3D
         _handles.append(view.draw_handler_add(timing.drawing_begins, (), "WINDOW", "PRE_VIEW"))
         _handles.append(view.draw_handler_add(_draw, (), "WINDOW", "POST_PIXEL"))
-    for area in context.screen.areas if context.screen else ():
+    screen = cast(Context, context).screen
+    for area in screen.areas if screen else ():
         if area.type == "VIEW_3D":
             area.tag_redraw()
 
 
-def stop():
+def stop() -> None:
     """Take the overlay away."""
     while _handles:
         bpy.types.SpaceView3D.draw_handler_remove(_handles.pop(), "WINDOW")
 
 
-def _draw():
+def _draw() -> None:
     timing.drawing_ends()
-    size = round(12 * bpy.context.preferences.system.ui_scale)
-    x = 20 + _width(bpy.context.area, "TOOLS")
+    context = cast(Context, bpy.context)
+    size = round(12 * context.preferences.system.ui_scale)
+    x = 20 + _width(context.area, "TOOLS")
     y = 20
     for text in reversed(timing.lines()):
         blf.size(0, size)
@@ -52,5 +57,5 @@ def _draw():
         y += round(size * 1.5)
 
 
-def _width(area, kind):
+def _width(area: bpy.types.Area | None, kind: str) -> int:
     return next((r.width for r in area.regions if r.type == kind), 0) if area else 0

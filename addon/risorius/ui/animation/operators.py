@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+# Blender takes properties where Python has annotations:
+# pyright: reportInvalidTypeForm=false
 """Operators that bring animation in from files and from other rigs."""
 
 from functools import cache
 from pathlib import Path
 
 import bpy
-from bpy_extras.io_utils import ImportHelper
 
 from ... import native
 from ...logic.base.errors import FaceError
@@ -14,7 +15,8 @@ from ...scene.animation import retarget_shape_keys
 from ...scene.base import parts
 from ...scene.character import runtime
 from .. import words
-from ..common import explain, shown_progress
+from ..blender_types import Context, FileHandler, ImportHelper, Item, Menu, Operator, Result
+from ..common import explain, face_rig, shown_progress
 from .place_clip import PlacesClip
 
 RATES = (
@@ -44,13 +46,13 @@ SOUNDS = (".wav", ".mp3", ".flac", ".ogg", ".m4a", ".aac", ".opus", ".mp4", ".mo
 
 
 @cache
-def _kinds():
+def _kinds() -> list[Item]:
     kinds = native.part("importing").KINDS.items()
     return [("AUTO", "Automatic", "Told from the file"), *((k, t, "") for k, t in kinds)]
 
 
 @cache
-def _mappings():
+def _mappings() -> list[Item]:
     names = native.part("importing").mapping_names()
     return [
         ("AUTO", "Automatic", "The one that knows the file's names"),
@@ -59,7 +61,7 @@ def _mappings():
     ]
 
 
-class RISORIUS_OT_import_animation(PlacesClip, bpy.types.Operator, ImportHelper):
+class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
     """Bring a capture, a table of curves, a viseme track or a clip onto the active face"""
 
     bl_idname = "risorius.import_animation"
@@ -117,18 +119,18 @@ class RISORIUS_OT_import_animation(PlacesClip, bpy.types.Operator, ImportHelper)
         description="Where the file has the eyes' angles, turn the eye bones too",
     )
 
-    def invoke(self, context, event):
+    def invoke(self, context: Context, event: bpy.types.Event) -> Result:
         self.start_with(context.scene)
         if self.properties.is_property_set("filepath"):  # dropped onto the window
             return self.execute(context)
         return ImportHelper.invoke(self, context, event)
 
-    def execute(self, context):
+    def execute(self, context: Context) -> Result:
         if _is_sound(self.filepath):
             name = printable(Path(self.filepath).name)
             self.report({"ERROR"}, f"{name}: this is a sound: use Speak from Audio.")
             return {"CANCELLED"}
-        live, render = runtime.of(parts.active_rig(context)), context.scene.render
+        live, render = runtime.there(face_rig(context)), context.scene.render
         rate = render.fps, render.fps_base
         try:
             with shown_progress(context) as progress:
@@ -147,7 +149,7 @@ class RISORIUS_OT_import_animation(PlacesClip, bpy.types.Operator, ImportHelper)
             return {"CANCELLED"}
         return {"FINISHED"}
 
-    def _read(self, live):
+    def _read(self, live: runtime.Runtime) -> tuple["native.Clip", list[str]]:
         """The file as a clip of raw controls, and lines on what became of its curves."""
         if Path(self.filepath).suffix.lower() == CLIP_EXTENSION:
             return native.module().Clip.load(self.filepath), []
@@ -165,7 +167,7 @@ class RISORIUS_OT_import_animation(PlacesClip, bpy.types.Operator, ImportHelper)
         )
         return clip, lines_of(report)
 
-    def _adjusted(self, clip):
+    def _adjusted(self, clip: "native.Clip") -> "native.Clip":
         """Calibrated, smoothed and multiplied."""
         process = native.part("importing.process")
         if self.use_neutral:
@@ -179,7 +181,7 @@ class RISORIUS_OT_import_animation(PlacesClip, bpy.types.Operator, ImportHelper)
         single = _gains(self.gains)
         return process.adjust(clip, single) if single else clip
 
-    def draw(self, _context):
+    def draw(self, context: Context) -> None:
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
@@ -200,7 +202,7 @@ class RISORIUS_OT_import_animation(PlacesClip, bpy.types.Operator, ImportHelper)
             layout.prop(self, "neutral_last")
 
 
-def _is_sound(path):
+def _is_sound(path: str) -> bool:
     """Whether a file is one that Speak from Audio takes, by its name or its first bytes."""
     if Path(path).suffix.lower() in SOUNDS:
         return True
@@ -212,12 +214,12 @@ def _is_sound(path):
     return head[:4] == b"RIFF" and head[8:] == b"WAVE"
 
 
-def _sliders(clip):
+def _sliders(clip: "native.Clip") -> list[str]:
     """The names of a clip's curves that are no angles."""
     return [n for n in clip.names if n.partition(".")[0] not in ("head", "eyeL", "eyeR")]
 
 
-def _gains(text):
+def _gains(text: str) -> dict[str, float]:
     """`jawOpen=1.2 mouth*=0.8` as a table. Raises: FaceError."""
     table = {}
     for word in text.replace(",", " ").split():
@@ -231,7 +233,7 @@ def _gains(text):
     return table
 
 
-def lines_of(report):
+def lines_of(report: "native.Report") -> list[str]:
     """What a report of risorius.importing has to say, a line each."""
     lines = [f"{len(report.mapped)} curves mapped by {report.mapping}."]
     told = [(head, names) for head, names in report.lists() if names != report.absent]
@@ -239,7 +241,7 @@ def lines_of(report):
     return [*lines, *(f"{note[:1].upper()}{note[1:].rstrip('.')}." for note in report.notes)]
 
 
-class RISORIUS_FH_animation(bpy.types.FileHandler):
+class RISORIUS_FH_animation(FileHandler):
     """Drop a file of animation onto the 3D view"""
 
     bl_idname = "RISORIUS_FH_animation"
@@ -248,12 +250,12 @@ class RISORIUS_FH_animation(bpy.types.FileHandler):
     bl_file_extensions = ".csv;.tsv;.json;.xml;.dat;.pgo;.rzc"
 
     @classmethod
-    def poll_drop(cls, context):
+    def poll_drop(cls, context: Context) -> bool:
         area = context.area
         return area is not None and area.type == "VIEW_3D" and parts.active_rig(context) is not None
 
 
-class RISORIUS_OT_import_arkit_rig(PlacesClip, bpy.types.Operator):
+class RISORIUS_OT_import_arkit_rig(PlacesClip, Operator):
     """Take over the shape-key animation of a selected object: action, NLA strips and drivers"""
 
     bl_idname = "risorius.import_arkit_rig"
@@ -269,7 +271,7 @@ class RISORIUS_OT_import_arkit_rig(PlacesClip, bpy.types.Operator):
     )
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: Context) -> bool:
         if not super().poll(context):
             return False
         if not retarget_shape_keys.sources(context):
@@ -277,12 +279,12 @@ class RISORIUS_OT_import_arkit_rig(PlacesClip, bpy.types.Operator):
             return False
         return True
 
-    def invoke(self, context, _event):
+    def invoke(self, context: Context, event: bpy.types.Event) -> Result:
         found = retarget_shape_keys.source_of(context)
         self.source = found.name if found is not None else ""
         return context.window_manager.invoke_props_dialog(self)
 
-    def execute(self, context):
+    def execute(self, context: Context) -> Result:
         item = (
             bpy.data.objects.get(self.source)
             if self.source
@@ -291,7 +293,7 @@ class RISORIUS_OT_import_arkit_rig(PlacesClip, bpy.types.Operator):
         if item not in retarget_shape_keys.sources(context):
             self.report({"ERROR"}, "Select the object whose shape keys are animated.")
             return {"CANCELLED"}
-        live = runtime.of(parts.active_rig(context))
+        live = runtime.there(face_rig(context))
         try:
             keys = retarget_shape_keys.clip_of(context, item)
             times = keys.frame_times()
@@ -306,14 +308,14 @@ class RISORIUS_OT_import_arkit_rig(PlacesClip, bpy.types.Operator):
             return {"CANCELLED"}
         return {"FINISHED"}
 
-    def draw(self, context):
+    def draw(self, context: Context) -> None:
         layout = self.layout
         layout.use_property_split = True
         layout.prop_search(self, "source", context.scene, "objects")
         self.draw_place(layout)
 
 
-def draw_import(self, _context):
+def draw_import(self: Menu, _context: Context) -> None:
     """Entry of File > Import."""
     self.layout.operator(RISORIUS_OT_import_animation.bl_idname, text="Face Animation")
 

@@ -1,22 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The panel from which animation comes in, with what the last import had to say."""
 
-import bpy
-
-from ...scene.base import parts
 from .. import words
-from ..common import FaceOnlyPanel
+from ..blender_types import Context, Panel
+from ..common import FaceOnlyPanel, face_controls
 from ..expressions.menus import RISORIUS_MT_expressions
 from .operators import RISORIUS_OT_import_animation, RISORIUS_OT_import_arkit_rig
 from .place_clip import report_of
 
 
-class RISORIUS_PT_animation(FaceOnlyPanel, bpy.types.Panel):
+class RISORIUS_PT_animation(FaceOnlyPanel, Panel):
     bl_idname = "RISORIUS_PT_animation"
     bl_label = "Animation"
     bl_order = 1
 
-    def draw(self, context):
+    def draw(self, context: Context) -> None:
         layout = self.layout
         column = layout.column(align=True)
         column.operator_context = "INVOKE_DEFAULT"
@@ -24,14 +22,16 @@ class RISORIUS_PT_animation(FaceOnlyPanel, bpy.types.Panel):
         column.operator(RISORIUS_OT_import_arkit_rig.bl_idname, icon="SHAPEKEY_DATA")
         column.operator("risorius.speak", icon="SPEAKER")
         column.menu(RISORIUS_MT_expressions.bl_idname, icon="USER")
-        data = parts.controls_of(parts.active_rig(context)).animation_data
-        lines = report_of(data.action) if data is not None else []
-        if not lines:
+        data = face_controls(context).animation_data
+        action = data.action if data is not None else None
+        lines = report_of(action)
+        if action is None or not lines:
             return
         header, body = layout.panel("RISORIUS_PT_import_report", default_closed=True)
-        header.label(text=f"Import of {data.action.name}")
-        for line in lines if body is not None else ():
-            words.write(body, line)
+        header.label(text=f"Import of {action.name}")
+        if body is not None:
+            for line in lines:
+                words.write(body, line)
 
 
 CLASSES = (RISORIUS_PT_animation,)

@@ -1,14 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+# Blender takes properties where Python has annotations:
+# pyright: reportInvalidTypeForm=false
 """How an operator puts a clip onto the active face, and what it reports."""
+
+from collections.abc import Sequence
 
 import bpy
 
+from ... import native
 from ...logic.animation.clip_units import ClipError
 from ...logic.base.names import printable
 from ...scene.animation import actions, clip_actions, layers
-from ...scene.base import parts
 from ...scene.frame import evaluate
-from ..common import FaceOperator
+from ..blender_types import Context, UILayout
+from ..common import FaceOperator, face_controls, face_rig
 
 TARGETS = (
     ("ACTION", "Action", "As the face's active action; the one before is kept"),
@@ -39,12 +44,20 @@ class PlacesClip(FaceOperator):
         name="Scene Range", description="First and last frame of the scene", items=RANGES
     )
 
-    def start_with(self, scene):
+    def start_with(self, scene: bpy.types.Scene) -> None:
         """Begin where the scene begins, unless it was said where."""
         if not self.properties.is_property_set("start"):
             self.start = float(scene.frame_start)
 
-    def place(self, context, clip, name, notes=(), with_eyes=True, whole=False):
+    def place(
+        self,
+        context: Context,
+        clip: "native.Clip",
+        name: str,
+        notes: Sequence[str] = (),
+        with_eyes: bool = True,
+        whole: bool = False,
+    ) -> bpy.types.Action:
         """Put a clip onto the active face and report on it.
 
         Args:
@@ -58,8 +71,8 @@ class PlacesClip(FaceOperator):
         Returns:
             Its action.
         """
-        rig = parts.active_rig(context)
-        trouble = actions.busy(parts.controls_of(rig))
+        rig = face_rig(context)
+        trouble = actions.busy(face_controls(context))
         if trouble:
             raise ClipError(trouble)
         timing = clip_actions.timing_of(
@@ -69,19 +82,19 @@ class PlacesClip(FaceOperator):
         notes = [*notes, *made.notes]
         if self.target == "ACTION":
             before = clip_actions.play(rig, made.action)
-            layers.keep_weights(parts.controls_of(rig), before)
+            layers.keep_weights(face_controls(context), before)
             if before is not None:
                 notes.append(f"The action {before.name} was kept.")
         elif self.target == "STRIP":
             clip_actions.add_strip(rig, made.action)
         else:
-            layers.add_action(parts.controls_of(rig), made.action)
+            layers.add_action(face_controls(context), made.action)
         clip_actions.set_range(context.scene, made, self.scene_range)
         evaluate.bring_up(context, rig)
         self._report_on(made, notes)
         return made.action
 
-    def _report_on(self, made, notes):
+    def _report_on(self, made: clip_actions.Report, notes: list[str]) -> None:
         if made.unknown:
             notes.append(f"No control of this face: {', '.join(made.unknown)}.")
         made.action[_REPORT] = "\n".join(printable(note, 4000) for note in notes)
@@ -92,13 +105,13 @@ class PlacesClip(FaceOperator):
         span = f"frame {made.first:g} to {made.last:g}"
         self.report({"INFO"}, f"{made.action.name}: {made.curves} curves, {span}")
 
-    def draw_place(self, layout):
+    def draw_place(self, layout: UILayout) -> None:
         """The properties of this class."""
         for name in ("target", "start", "scene_range"):
             layout.prop(self, name)
 
 
-def report_of(action):
+def report_of(action: bpy.types.Action | None) -> list[str]:
     """What was said when an action was imported: lines."""
     text = action.get(_REPORT, "") if action is not None else ""
     return text.split("\n") if isinstance(text, str) and text else []

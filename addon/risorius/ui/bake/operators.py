@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+# Blender takes properties where Python has annotations:
+# pyright: reportInvalidTypeForm=false
 """Operators that bake faces to plain actions and bring them back to live."""
 
 import time
 import traceback
+from collections.abc import Generator
 
 import bpy
 
@@ -10,13 +13,14 @@ from ... import native
 from ...scene.bake import bake_face
 from ...scene.base import console
 from .. import words
+from ..blender_types import Context, Operator, Result
 from ..common import shown_progress
 from .selection import FacesOperator, FrameRange, selected_rigs
 
 _SLICE = 0.05  # seconds of baking between two looks at the keyboard
 
 
-class RISORIUS_OT_bake(FrameRange, FacesOperator, bpy.types.Operator):
+class RISORIUS_OT_bake(FrameRange, FacesOperator, Operator):
     """Write the animation of the selected faces into plain actions; the way back stays open"""
 
     bl_idname = "risorius.bake"
@@ -54,11 +58,11 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, bpy.types.Operator):
     )
     _interactive = False
 
-    def invoke(self, context, _event):
+    def invoke(self, context: Context, event: bpy.types.Event) -> Result:
         self._interactive = True
         return context.window_manager.invoke_props_dialog(self)
 
-    def draw(self, _context):
+    def draw(self, context: Context) -> None:
         layout = self.layout
         layout.use_property_split = True
         layout.prop(self, "kind")
@@ -70,7 +74,7 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, bpy.types.Operator):
         layout.prop(self, "strip")
         layout.prop(self, "every")
 
-    def execute(self, context):
+    def execute(self, context: Context) -> Result:
         # Adjusting the last operation calls this again, on the same operator: without a dialog.
         interactive, self._interactive = self._interactive, False
         start, end = self.frames(context)
@@ -93,7 +97,7 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, bpy.types.Operator):
             return self._begin(context, job)
         return self._run(context, job)
 
-    def _run(self, context, job):
+    def _run(self, context: Context, job: Generator[float, None, list[str]]) -> Result:
         """Bake without looking up: from scripts and headless."""
         with shown_progress(context):
             while not self._step(context, job, seconds=1.0):
@@ -101,7 +105,7 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, bpy.types.Operator):
                     console.say(f"baking, {self._share:.0%}")
         return self._result
 
-    def _begin(self, context, job):
+    def _begin(self, context: Context, job: Generator[float, None, list[str]]) -> Result:
         manager = context.window_manager
         self._job = job
         self._timer = manager.event_timer_add(0.01, window=context.window)
@@ -109,7 +113,7 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, bpy.types.Operator):
         manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
-    def modal(self, context, event):
+    def modal(self, context: Context, event: bpy.types.Event) -> Result:
         if event.type == "ESC":
             self._job.close()
             self.report({"INFO"}, "Baking was ended; nothing was changed.")
@@ -119,20 +123,22 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, bpy.types.Operator):
         self._end(context)
         return self._result
 
-    def cancel(self, context):
+    def cancel(self, context: Context) -> None:
         """Blender ends it: its window was closed, or another file is being opened."""
         self._job.close()
         self._end(context)
 
-    def _end(self, context):
+    def _end(self, context: Context) -> None:
         manager = context.window_manager
         manager.event_timer_remove(self._timer)
         manager.progress_end()
 
-    def _step(self, context, job, seconds):
+    def _step(
+        self, context: Context, job: Generator[float, None, list[str]], seconds: float
+    ) -> bool:
         """Bake for a while. Returns whether it is over."""
         end = time.monotonic() + seconds
-        self._result = {"FINISHED"}
+        self._result: Result = {"FINISHED"}
         try:
             self._share = next(job)
             while time.monotonic() < end:
@@ -154,14 +160,14 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, bpy.types.Operator):
         return False
 
 
-class RISORIUS_OT_unbake(FacesOperator, bpy.types.Operator):
+class RISORIUS_OT_unbake(FacesOperator, Operator):
     """Let the controls move the selected faces again, as before they were baked. What was baked is
     removed, except actions that you protected or use elsewhere"""
 
     bl_idname = "risorius.unbake"
     bl_label = "Back to Live"
 
-    def execute(self, context):
+    def execute(self, context: Context) -> Result:
         faces = selected_rigs(context, self.every)
         back = [rig for rig in faces if bake_face.unbake(context, rig)]
         if not back:

@@ -1,21 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The panel Bake and Export, and what the panel Face says of a baked face."""
 
-import bpy
-
 from ...scene.bake import bake_face
+from ...scene.base.blender_types import ArmatureObject
 from .. import words
+from ..blender_types import Context, Panel, UILayout
 from ..common import FaceOnlyPanel
 from .operators import RISORIUS_OT_unbake
 
 
-class RISORIUS_PT_out(FaceOnlyPanel, bpy.types.Panel):
+class RISORIUS_PT_out(FaceOnlyPanel, Panel):
     bl_idname = "RISORIUS_PT_out"
     bl_label = "Bake and Export"
     bl_order = 3
     bl_options = {"DEFAULT_CLOSED"}
 
-    def draw(self, _context):
+    def draw(self, context: Context) -> None:
         column = self.layout.column(align=True)
         # A dialog for each; the defaults are those of the last time.
         column.operator_context = "INVOKE_DEFAULT"
@@ -23,7 +23,7 @@ class RISORIUS_PT_out(FaceOnlyPanel, bpy.types.Panel):
         column.operator("risorius.export_animation", icon="EXPORT")
 
 
-def draw_state(layout, rig):
+def draw_state(layout: UILayout, rig: ArmatureObject) -> None:
     """What the panel says of a baked face, and the way back.
 
     Args:

@@ -1,12 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+# Blender takes properties where Python has annotations:
+# pyright: reportInvalidTypeForm=false
 """Which faces and which frames a bake or an export works on."""
 
 import bpy
 
 from ...scene.bake import bake_face
 from ...scene.base import parts
+from ...scene.base.blender_types import ArmatureObject
 from ...scene.character import runtime
 from .. import words
+from ..blender_types import Context, OperatorBase, UILayout
 from ..common import FaceOperator, usable
 
 RANGES = (
@@ -16,7 +20,7 @@ RANGES = (
 )
 
 
-def selected_rigs(context, every=False):
+def selected_rigs(context: Context, every: bool = False) -> list[ArmatureObject]:
     """The characters of the selected objects, else the active one; linked ones are left out.
 
     Args:
@@ -24,10 +28,11 @@ def selected_rigs(context, every=False):
         every: all characters of the scene instead.
     """
     items = context.scene.objects if every else context.selected_objects
-    found = [parts.rig_of(item) for item in items]
-    found = list(dict.fromkeys(r for r in found if r is not None and r.library is None))
-    if not found and parts.active_rig(context) is not None:
-        found = [parts.active_rig(context)]
+    rigs = [parts.rig_of(item) for item in items]
+    found = list(dict.fromkeys(r for r in rigs if r is not None and r.library is None))
+    active = parts.active_rig(context)
+    if not found and active is not None:
+        found = [active]
     return [r for r in found if parts.controls_of(r) is not None and runtime.of(r) is not None]
 
 
@@ -40,7 +45,7 @@ class FacesOperator(FaceOperator):
         options={"SKIP_SAVE"},
     )
 
-    def faces(self, context):
+    def faces(self, context: Context) -> list[ArmatureObject]:
         """The characters to work on.
 
         Raises:
@@ -52,7 +57,7 @@ class FacesOperator(FaceOperator):
         return found
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: Context) -> bool:
         if not usable(cls):
             return False
         if not (selected_rigs(context) or selected_rigs(context, every=True)):
@@ -61,7 +66,7 @@ class FacesOperator(FaceOperator):
         return True
 
 
-class FrameRange:
+class FrameRange(OperatorBase):
     """The frames, and the level of detail, that an operator works on."""
 
     range: bpy.props.EnumProperty(name="Range", items=RANGES)
@@ -78,7 +83,7 @@ class FrameRange:
         max=31,
     )
 
-    def frames(self, context):
+    def frames(self, context: Context) -> tuple[float, float]:
         """(start, end) that were chosen."""
         scene = context.scene
         if self.range == "CUSTOM":
@@ -87,11 +92,11 @@ class FrameRange:
             return scene.frame_preview_start, scene.frame_preview_end
         return scene.frame_start, scene.frame_end
 
-    def draw_lod(self, layout):
+    def draw_lod(self, layout: UILayout) -> None:
         """The level, and that the lowest number is none."""
         words.prop_or(layout, self, "lod", -1, "-1: as in the viewport")
 
-    def draw_range(self, layout):
+    def draw_range(self, layout: UILayout) -> None:
         """The rows of a dialog."""
         layout.prop(self, "range")
         if self.range == "CUSTOM":

@@ -1,10 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Blender's own exporters: the settings that each is called with."""
 
+from pathlib import Path
+from typing import Protocol
+
 import bpy
 
 from ...logic.base.errors import FaceError
 from ...scene.base.console import quiet
+from ..blender_types import Override
 
 FORMATS = (
     ("GLTF", "glTF", "Bones and shape keys, one binary .glb file"),
@@ -22,7 +26,19 @@ _OPERATORS = {
 }
 
 
-def _gltf(operator, stage):
+Settings = dict[str, object]  # of one of Blender's exporters
+
+
+class ExportOperator(Protocol):
+    """What an exporter's settings depend on: properties of the operator."""
+
+    format: str
+    step: float
+    influences: int
+    fbx_units: str
+
+
+def _gltf(operator: ExportOperator, stage: bpy.types.Scene) -> Settings:
     return {
         "export_format": "GLB",
         "use_active_scene": True,
@@ -47,7 +63,7 @@ def _gltf(operator, stage):
     }
 
 
-def _fbx(operator, _stage):
+def _fbx(operator: ExportOperator, _stage: bpy.types.Scene) -> Settings:
     return {
         "object_types": {"ARMATURE", "MESH"},
         "add_leaf_bones": False,
@@ -68,7 +84,7 @@ def _fbx(operator, _stage):
     }
 
 
-def _usd(_operator, _stage):
+def _usd(_operator: ExportOperator, _stage: bpy.types.Scene) -> Settings:
     return {
         "export_animation": True,
         "export_armatures": True,
@@ -80,7 +96,7 @@ def _usd(_operator, _stage):
     }
 
 
-def _alembic(_operator, stage):
+def _alembic(_operator: ExportOperator, stage: bpy.types.Scene) -> Settings:
     return {
         "start": stage.frame_start,
         "end": stage.frame_end,
@@ -98,12 +114,12 @@ def _alembic(_operator, stage):
 _SETTINGS = {"GLTF": _gltf, "FBX": _fbx, "USD": _usd, "ALEMBIC": _alembic}
 
 
-def whole_step(operator):
+def whole_step(operator: ExportOperator) -> int:
     """Exporters step by whole frames."""
     return max(1, round(operator.step))
 
 
-def missing(kind):
+def missing(kind: str) -> str:
     """Why this Blender cannot write a format, in one sentence; empty when it can."""
     if kind not in _OPERATORS:
         return ""
@@ -114,7 +130,7 @@ def missing(kind):
     return f"This Blender has no {label} exporter: enable its add-on, or use another build."
 
 
-def export(operator, override, path):
+def export(operator: ExportOperator, override: Override, path: Path) -> None:
     group, name = _OPERATORS[operator.format]
     function = getattr(getattr(bpy.ops, group), name)
     known = set(function.get_rna_type().properties.keys())

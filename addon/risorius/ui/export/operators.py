@@ -1,20 +1,27 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+# Blender takes properties where Python has annotations:
+# pyright: reportInvalidTypeForm=false
 """Export of a face's animation through Blender's own exporters, and of its controls."""
 
+from collections.abc import Generator
 from pathlib import Path
+from typing import TypeVar
 
 import bpy
-from bpy_extras.io_utils import ExportHelper
 
 from ... import native
 from ...logic.base.errors import FaceError
 from ...scene.animation.clip_actions import frame_rate
+from ...scene.bake import sampling
+from ...scene.base.blender_types import ArmatureObject
 from ...scene.export import export_animation, plain_materials
 from .. import words
 from ..bake.selection import FacesOperator, FrameRange, selected_rigs
+from ..blender_types import Context, ExportHelper, Operator, Result
 from ..common import shown_progress
 from .exporters import FORMATS, export, missing
 
+_T = TypeVar("_T")
 _ENDINGS = {
     "GLTF": ".glb",
     "FBX": ".fbx",
@@ -26,7 +33,7 @@ _ENDINGS = {
 _KNOWN = {*_ENDINGS.values(), ".usd", ".usda", ".usdz", ".gltf"}
 
 
-class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, bpy.types.Operator):
+class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, Operator):
     """Write the animation of the selected faces to a file: baked, from a copy; the scene stays as
     it is"""
 
@@ -90,13 +97,13 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, bpy.
         default=False,
     )
 
-    def invoke(self, context, event):
+    def invoke(self, context: Context, event: bpy.types.Event) -> Result:
         rigs = selected_rigs(context)
         if not self.filepath and rigs:
             self.filepath = rigs[0].name.removesuffix("_rig") + _ENDINGS[self.format]
         return ExportHelper.invoke(self, context, event)
 
-    def check(self, _context):
+    def check(self, context: Context) -> bool:
         """Give the file the ending of its format while the dialog is open."""
         if self.format == "USD" and self.filepath.endswith((".usd", ".usda", ".usdz")):
             return False
@@ -109,7 +116,7 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, bpy.
         self.filepath = changed
         return True
 
-    def draw(self, _context):
+    def draw(self, context: Context) -> None:
         layout = self.layout
         layout.use_property_split = True
         layout.prop(self, "format")
@@ -130,7 +137,7 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, bpy.
             layout.prop(self, "maps")
         layout.prop(self, "every")
 
-    def execute(self, context):
+    def execute(self, context: Context) -> Result:
         if not Path(self.filepath).name:
             self.report({"ERROR"}, "Say into which file: there is no name.")
             return {"CANCELLED"}
@@ -153,7 +160,12 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, bpy.
         self.report({"INFO"}, written)
         return {"FINISHED"}
 
-    def _write(self, context, characters, options):
+    def _write(
+        self,
+        context: Context,
+        characters: list[tuple[ArmatureObject, int, sampling.Samples]],
+        options: export_animation.ShipOptions,
+    ) -> str:
         path = Path(bpy.path.abspath(self.filepath))
         frames = len(characters[0][2].frames)
         if self.format in ("RZC", "CSV"):
@@ -175,7 +187,7 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, bpy.
         return f"{path.name}: {frames} frames, {path.stat().st_size:,} bytes"
 
 
-def _run(context, job):
+def _run(context: Context, job: Generator[float, None, _T]) -> _T:
     """Run a generator to its end, with progress. Returns what it returns."""
     with shown_progress(context) as progress:
         try:
@@ -185,12 +197,12 @@ def _run(context, job):
             return finished.value
 
 
-def _write_csv(clip, path):
+def _write_csv(clip: "native.Clip", path: Path) -> None:
     writing = native.part("importing.writing")
     writing.write_text(writing.csv_text(clip), path)
 
 
-def _one_sentence(path, error):
+def _one_sentence(path: str, error: Exception) -> str:
     """What went wrong; of an exporter's traceback only the last line."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     useful = [x for x in lines if not x.startswith(("Location:", "File ", "Traceback"))]

@@ -1,20 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Menus with one entry per expression."""
 
-import bpy
-
 from ...scene.animation import expressions
+from ..blender_types import Context, Menu
 from .operators import RISORIUS_OT_expression, RISORIUS_OT_make_pose_assets
 
 
-def _expressions_of(group):
+def _expressions_of(group: str) -> list[tuple[str, str]]:
     return [(e.name, e.label) for e in expressions.groups().get(group, ())]
 
 
-def expression_menu(group, title, operator):
+def expression_menu(group: str, title: str, operator: str) -> type[Menu]:
     """A menu with one entry per expression of a group."""
 
-    def draw(self, _context):
+    def draw(self: Menu, _context: Context) -> None:
         for name, label in _expressions_of(group):
             button = self.layout.operator(operator, text=label)
             if operator == RISORIUS_OT_expression.bl_idname:
@@ -23,18 +22,18 @@ def expression_menu(group, title, operator):
                 button.kind, button.source = "EXPRESSION", name
 
     name = f"RISORIUS_MT_{'set' if operator == RISORIUS_OT_expression.bl_idname else 'add'}_{group}"
-    return type(name, (bpy.types.Menu,), {"bl_idname": name, "bl_label": title, "draw": draw})
+    return type(name, (Menu,), {"bl_idname": name, "bl_label": title, "draw": draw})
 
 
 GROUPS = (("emotion", "Emotions"), ("face", "Faces"), ("viseme", "Visemes"))
 _SET = [expression_menu(g, t, RISORIUS_OT_expression.bl_idname) for g, t in GROUPS]
 
 
-class RISORIUS_MT_expressions(bpy.types.Menu):
+class RISORIUS_MT_expressions(Menu):
     bl_idname = "RISORIUS_MT_expressions"
     bl_label = "Expressions"
 
-    def draw(self, _context):
+    def draw(self, context: Context) -> None:
         for menu in _SET:
             self.layout.menu(menu.bl_idname)
         self.layout.separator()

@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+# Blender takes properties where Python has annotations:
+# pyright: reportInvalidTypeForm=false
 """Operators that set the sliders to an expression, and make pose assets of expressions."""
 
 import bpy
 
 from ...scene.animation import expressions
-from ...scene.base import parts
 from ...scene.frame import evaluate
-from ..common import FaceOperator
+from ..blender_types import Context, Operator, Result
+from ..common import FaceOperator, face_rig
 
 
-class RISORIUS_OT_expression(FaceOperator, bpy.types.Operator):
+class RISORIUS_OT_expression(FaceOperator, Operator):
     """Move the sliders to an expression"""
 
     bl_idname = "risorius.expression"
@@ -22,8 +24,8 @@ class RISORIUS_OT_expression(FaceOperator, bpy.types.Operator):
     only: bpy.props.BoolProperty(name="Rest of the Face at Rest", default=True)
     key: bpy.props.BoolProperty(name="Key", description="At the current frame")
 
-    def execute(self, context):
-        rig = parts.active_rig(context)
+    def execute(self, context: Context) -> Result:
+        rig = face_rig(context)
         found = expressions.all_expressions().get(self.expression)
         if found is None:
             self.report({"ERROR"}, f"There is no expression {self.expression}.")
@@ -35,14 +37,14 @@ class RISORIUS_OT_expression(FaceOperator, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class RISORIUS_OT_make_pose_assets(FaceOperator, bpy.types.Operator):
+class RISORIUS_OT_make_pose_assets(FaceOperator, Operator):
     """Make a pose asset of every expression, for Blender's pose library"""
 
     bl_idname = "risorius.make_pose_assets"
     bl_label = "Expressions as Pose Assets"
 
-    def execute(self, context):
-        made, notes = expressions.make_assets(parts.active_rig(context))
+    def execute(self, context: Context) -> Result:
+        made, notes = expressions.make_assets(face_rig(context))
         for note in notes:
             self.report({"WARNING"}, note)
         self.report({"INFO"}, f"{len(made)} pose assets")

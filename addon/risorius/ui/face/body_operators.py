@@ -1,19 +1,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+# Blender takes properties where Python has annotations:
+# pyright: reportInvalidTypeForm=false
 """Operators that hang a face on a body's armature, and take it off."""
+
+from typing import TypeGuard
 
 import bpy
 
 from ...scene.base import parts
+from ...scene.base.blender_types import ArmatureObject
 from ...scene.character import rig_placement
 from ...scene.frame import evaluate
-from ..common import FaceOperator
+from ..blender_types import Context, Operator, Result
+from ..common import FaceOperator, face_controls, face_rig
 
 
-def _is_body(_self, item):
+def _is_body(item: bpy.types.Object) -> TypeGuard[ArmatureObject]:
     return item.type == "ARMATURE" and not (item.get(parts.CONTROLS) or item.get(parts.RIG))
 
 
-class RISORIUS_OT_attach_body(FaceOperator, bpy.types.Operator):
+class RISORIUS_OT_attach_body(FaceOperator, Operator):
     """Hang the face on a body's armature: it follows the body's neck and head"""
 
     bl_idname = "risorius.attach_body"
@@ -38,15 +44,15 @@ class RISORIUS_OT_attach_body(FaceOperator, bpy.types.Operator):
         ),
     )
 
-    def invoke(self, context, _event):
-        bodies = [o for o in context.scene.objects if _is_body(None, o)]
+    def invoke(self, context: Context, event: bpy.types.Event) -> Result:
+        bodies = [o for o in context.scene.objects if _is_body(o)]
         if not self.body and bodies:
             chosen = next((o for o in bodies if o.select_get()), bodies[0])
             self.body = chosen.name
             self.base, self.neck, self.head = rig_placement.find_bones(chosen)
         return context.window_manager.invoke_props_dialog(self)
 
-    def draw(self, context):
+    def draw(self, context: Context) -> None:
         layout = self.layout
         layout.use_property_split = True
         layout.prop_search(self, "body", context.scene, "objects")
@@ -56,10 +62,10 @@ class RISORIUS_OT_attach_body(FaceOperator, bpy.types.Operator):
                 layout.prop_search(self, name, body.data, "bones")
         layout.prop(self, "fit")
 
-    def execute(self, context):
-        rig = parts.active_rig(context)
+    def execute(self, context: Context) -> Result:
+        rig = face_rig(context)
         body = bpy.data.objects.get(self.body)
-        if body is None or not _is_body(None, body):
+        if body is None or not _is_body(body):
             self.report({"ERROR"}, f"'{self.body}' is no armature of a body.")
             return {"CANCELLED"}
         found = rig_placement.find_bones(body)
@@ -73,21 +79,21 @@ class RISORIUS_OT_attach_body(FaceOperator, bpy.types.Operator):
             what = f"no bone '{missing[0]}'" if missing else "no bone named head or neck"
             self.report({"ERROR"}, f"'{body.name}' has {what}: choose the bones.")
             return {"CANCELLED"}
-        rig_placement.attach(parts.controls_of(rig), body, base, neck, head, self.fit)
+        rig_placement.attach(face_controls(context), body, base, neck, head, self.fit)
         evaluate.bring_up(context, rig)
         self.report({"INFO"}, f"The face follows {body.name}: {base}, {neck}, {head}")
         return {"FINISHED"}
 
 
-class RISORIUS_OT_detach_body(FaceOperator, bpy.types.Operator):
+class RISORIUS_OT_detach_body(FaceOperator, Operator):
     """Take the face off its body; it stays where it stands"""
 
     bl_idname = "risorius.detach_body"
     bl_label = "Detach from Body"
 
-    def execute(self, context):
-        rig = parts.active_rig(context)
-        rig_placement.detach(parts.controls_of(rig))
+    def execute(self, context: Context) -> Result:
+        rig = face_rig(context)
+        rig_placement.detach(face_controls(context))
         evaluate.bring_up(context, rig)
         return {"FINISHED"}
 

@@ -1,17 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+# Blender takes properties where Python has annotations:
+# pyright: reportInvalidTypeForm=false
 """Trying one blend shape by hand: a search, a slider, a way back."""
 
 import bpy
 
 from ...scene.base import parts
+from ...scene.base.blender_types import ArmatureObject
 from ...scene.character import build, runtime
 from ...scene.frame import channel_preview, evaluate
-from ..common import FaceOnlyPanel, FaceOperator
+from ..blender_types import Context, Item, Operator, Panel, Result
+from ..common import FaceOnlyPanel, FaceOperator, face_rig
 
-_items = []  # Blender reads the strings later: they must stay alive
+_items: list[Item] = []  # Blender reads the strings later: they must stay alive
 
 
-def _test(context, rig, channel, value):
+def _test(
+    context: bpy.types.Context, rig: ArmatureObject, channel: int, value: float | None
+) -> None:
     """Set the override of a face, or end it where the value is None, and show it."""
     if value is None:
         channel_preview.clear(rig)
@@ -20,12 +26,12 @@ def _test(context, rig, channel, value):
     evaluate.bring_up(context, rig)
 
 
-def _channels(_operator, context):
+def _channels(_operator: object, context: bpy.types.Context | None) -> list[Item]:
     """Enum items: the channels that move a mesh of the active face."""
-    rig = parts.active_rig(context)
+    rig = parts.active_rig(context) if context is not None else None
     live = runtime.of(rig) if rig is not None else None
     _items.clear()
-    if live is None:
+    if rig is None or live is None:
         return _items
     moved = set()
     for item in parts.meshes_of(rig):
@@ -36,7 +42,7 @@ def _channels(_operator, context):
     return _items
 
 
-class RISORIUS_OT_test_channel(FaceOperator, bpy.types.Operator):
+class RISORIUS_OT_test_channel(FaceOperator, Operator):
     """Show one blend shape at a weight of your own; it ends with the next frame, edit or save"""
 
     bl_idname = "risorius.test_channel"
@@ -60,8 +66,8 @@ class RISORIUS_OT_test_channel(FaceOperator, bpy.types.Operator):
         name="End", description="End the test instead", options={"SKIP_SAVE", "HIDDEN"}
     )
 
-    def execute(self, context):
-        rig = parts.active_rig(context)
+    def execute(self, context: Context) -> Result:
+        rig = face_rig(context)
         if self.end:
             _test(context, rig, 0, None)
             return {"FINISHED"}
@@ -71,26 +77,27 @@ class RISORIUS_OT_test_channel(FaceOperator, bpy.types.Operator):
         _test(context, rig, int(self.channel), self.value)
         return {"FINISHED"}
 
-    def invoke(self, context, _event):
+    def invoke(self, context: Context, event: bpy.types.Event) -> Result:
         if self.end:
             return self.execute(context)
         context.window_manager.invoke_search_popup(self)
         return {"RUNNING_MODAL"}
 
 
-def _get_weight(_manager):
-    now = channel_preview.current(parts.active_rig(bpy.context))
+def _get_weight(_manager: bpy.types.WindowManager) -> float:
+    rig = parts.active_rig(bpy.context)
+    now = channel_preview.current(rig) if rig is not None else None
     return now[1] if now else 0.0
 
 
-def _set_weight(_manager, value):
+def _set_weight(_manager: bpy.types.WindowManager, value: float) -> None:
     rig = parts.active_rig(bpy.context)
-    now = channel_preview.current(rig)
-    if now is not None:
+    now = channel_preview.current(rig) if rig is not None else None
+    if rig is not None and now is not None:
         _test(bpy.context, rig, now[0], value)
 
 
-def weight_property():
+def weight_property() -> object:
     """The slider: it shows and sets the override of the active face, and keeps nothing."""
     return bpy.props.FloatProperty(
         name="Weight",
@@ -103,15 +110,15 @@ def weight_property():
     )
 
 
-class RISORIUS_PT_shape_test(FaceOnlyPanel, bpy.types.Panel):
+class RISORIUS_PT_shape_test(FaceOnlyPanel, Panel):
     bl_idname = "RISORIUS_PT_shape_test"
     bl_label = "Test a Shape"
     bl_order = 3
     bl_options = {"DEFAULT_CLOSED"}
 
-    def draw(self, context):
+    def draw(self, context: Context) -> None:
         layout = self.layout
-        rig = parts.active_rig(context)
+        rig = face_rig(context)
         live, now = runtime.of(rig), channel_preview.current(rig)
         if live is None:
             return

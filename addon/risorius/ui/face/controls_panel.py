@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The panel Controls: one slider per control, grouped by region."""
 
+from collections.abc import Sequence
+
 import bpy
 
 from ... import native
@@ -8,9 +10,10 @@ from ...logic.character import slider_words
 from ...scene.base import parts
 from ...scene.character import runtime
 from .. import words
-from ..common import FaceOnlyPanel
+from ..blender_types import Context, Icon, Panel, UILayout
+from ..common import FaceOnlyPanel, face_controls, face_rig
 
-_ICONS = {
+_ICONS: dict[str, Icon] = {
     "brow": "MOD_CURVE",
     "eye": "HIDE_OFF",
     "nose": "MONKEY",
@@ -27,15 +30,15 @@ _OPEN = {"brow", "eye", "mouth", "jaw"}
 _TITLE = 0.5  # of the width, for the names of sliders
 
 
-class RISORIUS_PT_controls(FaceOnlyPanel, bpy.types.Panel):
+class RISORIUS_PT_controls(FaceOnlyPanel, Panel):
     bl_idname = "RISORIUS_PT_controls"
     bl_label = "Controls"
     bl_order = 1
 
-    def draw(self, context):
+    def draw(self, context: Context) -> None:
         layout = self.layout
-        rig = parts.active_rig(context)
-        live, face = runtime.of(rig), parts.face_bone(rig)
+        rig = face_rig(context)
+        live, face = runtime.of(rig), face_controls(context).pose.bones[parts.FACE]
         if live is None:
             return
         regions = native.regions()
@@ -58,7 +61,7 @@ class RISORIUS_PT_controls(FaceOnlyPanel, bpy.types.Panel):
             words.write(layout, "No control has these words in its name.", "INFO")
 
 
-def _draw_region_header(layout, region):
+def _draw_region_header(layout: UILayout, region: str) -> None:
     layout.label(text=native.regions().titles[region], icon=_ICONS[region])
     row = layout.row(align=True)
     row.emboss = "NONE"
@@ -66,7 +69,9 @@ def _draw_region_header(layout, region):
     row.operator("risorius.key", text="", icon="KEY_HLT").region = region
 
 
-def _draw_sliders(context, layout, face, region, names):
+def _draw_sliders(
+    context: Context, layout: UILayout, face: bpy.types.PoseBone, region: str, names: Sequence[str]
+) -> None:
     """One line per control; a left and its right control share it, a long name stands above."""
     column = layout.column(align=True)
     ruler = words.Ruler(context, _TITLE)

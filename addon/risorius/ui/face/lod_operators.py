@@ -1,15 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+# Blender takes properties where Python has annotations:
+# pyright: reportInvalidTypeForm=false
 """Operators that choose the level of detail, in the viewport and in renders."""
 
 import bpy
 
 from ...scene.base import parts
+from ...scene.base.blender_types import ArmatureObject
 from ...scene.character import lods
 from ...scene.frame import evaluate
-from ..common import FaceOperator
+from ..blender_types import Context, Operator, Result
+from ..common import FaceOperator, face_rig
 
 
-class RISORIUS_OT_set_lod(FaceOperator, bpy.types.Operator):
+class RISORIUS_OT_set_lod(FaceOperator, Operator):
     """Show the meshes of one level of detail"""
 
     bl_idname = "risorius.set_lod"
@@ -32,8 +36,8 @@ class RISORIUS_OT_set_lod(FaceOperator, bpy.types.Operator):
         options={"SKIP_SAVE"},
     )
 
-    def execute(self, context):
-        rig = parts.active_rig(context)
+    def execute(self, context: Context) -> Result:
+        rig = face_rig(context)
         follows = self.lod == lods.SAME and self.target == "RENDER"
         if not follows and self.lod not in lods.built(rig):
             self.report({"ERROR"}, f"Level {self.lod} was not built for this face.")
@@ -49,7 +53,7 @@ class RISORIUS_OT_set_lod(FaceOperator, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class RISORIUS_OT_set_lod_by_distance(FaceOperator, bpy.types.Operator):
+class RISORIUS_OT_set_lod_by_distance(FaceOperator, Operator):
     """Let the distance to the scene's camera choose the level of detail"""
 
     bl_idname = "risorius.set_lod_by_distance"
@@ -57,8 +61,8 @@ class RISORIUS_OT_set_lod_by_distance(FaceOperator, bpy.types.Operator):
 
     enable: bpy.props.BoolProperty(name="By Distance", default=True, options={"SKIP_SAVE"})
 
-    def execute(self, context):
-        rig = parts.active_rig(context)
+    def execute(self, context: Context) -> Result:
+        rig = face_rig(context)
         if self.enable and context.scene.camera is None:
             self.report({"WARNING"}, "The scene has no camera yet: the level stays as it is.")
         lods.follow_camera(rig, self.enable, _size(rig))
@@ -66,9 +70,9 @@ class RISORIUS_OT_set_lod_by_distance(FaceOperator, bpy.types.Operator):
         return {"FINISHED"}
 
 
-def _size(rig):
+def _size(rig: ArmatureObject) -> float:
     """The longest side of the largest mesh, in Blender units."""
-    return max((max(m.dimensions) for m in parts.meshes_of(rig)), default=0.25)
+    return max((max(m.dimensions[:]) for m in parts.meshes_of(rig)), default=0.25)
 
 
 CLASSES = (RISORIUS_OT_set_lod, RISORIUS_OT_set_lod_by_distance)

@@ -1,27 +1,30 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+# Blender takes properties where Python has annotations:
+# pyright: reportInvalidTypeForm=false
 """Operators on a face that is there: reset, keys, level of detail, shapes, overdrive."""
 
 import bpy
 
 from ... import native
 from ...scene.base import parts
+from ...scene.base.blender_types import ArmatureObject
 from ...scene.character import armatures, build, runtime
 from ...scene.frame import evaluate
 from ...scene.life import duplicates, library_overrides
-from ..common import MODES, FaceOperator
+from ..blender_types import Context, Operator, Result
+from ..common import MODES, FaceOperator, face_controls, face_rig
 
 
-def _labels(rig, region=""):
-    live = runtime.of(rig)
-    face = parts.face_bone(rig)
+def _labels(context: Context, region: str = "") -> list[str]:
+    face = face_controls(context).pose.bones[parts.FACE]
     return [
         label
-        for label in (live.labels if live else [])
+        for label in runtime.there(face_rig(context)).labels
         if label in face and (not region or native.regions().of_slider(label) == region)
     ]
 
 
-class RISORIUS_OT_reset(FaceOperator, bpy.types.Operator):
+class RISORIUS_OT_reset(FaceOperator, Operator):
     """Set controls to rest and the head, neck and eye bones straight"""
 
     bl_idname = "risorius.reset"
@@ -31,12 +34,12 @@ class RISORIUS_OT_reset(FaceOperator, bpy.types.Operator):
         name="Region", description="Only this region; empty for all", options={"SKIP_SAVE"}
     )
 
-    def execute(self, context):
-        rig = parts.active_rig(context)
-        controls, face = parts.controls_of(rig), parts.face_bone(rig)
-        live = runtime.of(rig)
-        rests = dict(zip(live.labels, live.rests, strict=True)) if live else {}
-        for label in _labels(rig, self.region):
+    def execute(self, context: Context) -> Result:
+        controls = face_controls(context)
+        face = controls.pose.bones[parts.FACE]
+        live = runtime.there(face_rig(context))
+        rests = dict(zip(live.labels, live.rests, strict=True))
+        for label in _labels(context, self.region):
             face[label] = rests[label]
         if not self.region:
             for bone in controls.pose.bones:
@@ -46,7 +49,7 @@ class RISORIUS_OT_reset(FaceOperator, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class RISORIUS_OT_key(FaceOperator, bpy.types.Operator):
+class RISORIUS_OT_key(FaceOperator, Operator):
     """Insert keyframes on the controls at the current frame"""
 
     bl_idname = "risorius.key"
@@ -56,10 +59,9 @@ class RISORIUS_OT_key(FaceOperator, bpy.types.Operator):
         name="Region", description="Only this region; empty for all", options={"SKIP_SAVE"}
     )
 
-    def execute(self, context):
-        rig = parts.active_rig(context)
-        controls = parts.controls_of(rig)
-        labels = _labels(rig, self.region)
+    def execute(self, context: Context) -> Result:
+        controls = face_controls(context)
+        labels = _labels(context, self.region)
         frame = context.scene.frame_current
         for label in labels:
             controls.keyframe_insert(
@@ -71,7 +73,7 @@ class RISORIUS_OT_key(FaceOperator, bpy.types.Operator):
         return {"FINISHED"}
 
     @staticmethod
-    def _key_bones(controls, frame):
+    def _key_bones(controls: ArmatureObject, frame: int) -> None:
         for name in ("neck", "head", "eye_L", "eye_R"):
             bone = controls.pose.bones.get(name)
             if bone is not None:
@@ -82,7 +84,7 @@ class RISORIUS_OT_key(FaceOperator, bpy.types.Operator):
             controls.pose.bones["eyes"].keyframe_insert("location", frame=frame, group="eyes")
 
 
-class RISORIUS_OT_set_shape_mode(FaceOperator, bpy.types.Operator):
+class RISORIUS_OT_set_shape_mode(FaceOperator, Operator):
     """Switch between the live sum and real shape keys; edited keys are kept"""
 
     bl_idname = "risorius.set_shape_mode"
@@ -92,8 +94,8 @@ class RISORIUS_OT_set_shape_mode(FaceOperator, bpy.types.Operator):
         name="Shapes", description="How blend shapes are kept", items=MODES
     )
 
-    def execute(self, context):
-        rig = parts.active_rig(context)
+    def execute(self, context: Context) -> Result:
+        rig = face_rig(context)
         if any(item.mode == "EDIT" for item in parts.meshes_of(rig)):
             self.report({"ERROR"}, "Leave edit mode first.")
             return {"CANCELLED"}
@@ -106,7 +108,7 @@ class RISORIUS_OT_set_shape_mode(FaceOperator, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class RISORIUS_OT_set_overdrive(FaceOperator, bpy.types.Operator):
+class RISORIUS_OT_set_overdrive(FaceOperator, Operator):
     """Let the controls of this face go up to 1.5"""
 
     bl_idname = "risorius.set_overdrive"
@@ -114,27 +116,28 @@ class RISORIUS_OT_set_overdrive(FaceOperator, bpy.types.Operator):
 
     enable: bpy.props.BoolProperty(name="Overdrive", default=True, options={"SKIP_SAVE"})
 
-    def execute(self, context):
-        rig = parts.active_rig(context)
-        controls, face = parts.controls_of(rig), parts.face_bone(rig)
+    def execute(self, context: Context) -> Result:
+        controls = face_controls(context)
+        face = controls.pose.bones[parts.FACE]
         controls[parts.OVERDRIVE] = self.enable
         maximum = parts.maximum_of(controls)
-        for label in _labels(rig):
-            face.id_properties_ui(label).update(max=maximum, soft_max=maximum)
+        for label in _labels(context):
+            limits = face.id_properties_ui(label)
+            limits.update(max=maximum, soft_max=maximum)  # pyright: ignore  the stub says None
             face[label] = min(float(face[label]), maximum)
         controls.update_tag()
         context.view_layer.update()
         return {"FINISHED"}
 
 
-class RISORIUS_OT_separate(FaceOperator, bpy.types.Operator):
+class RISORIUS_OT_separate(FaceOperator, Operator):
     """Give a copied face materials, shapes and drivers of its own"""
 
     bl_idname = "risorius.separate"
     bl_label = "Make Independent"
 
-    def execute(self, context):
-        for sentence in duplicates.separate(parts.active_rig(context)):
+    def execute(self, context: Context) -> Result:
+        for sentence in duplicates.separate(face_rig(context)):
             self.report({"INFO"}, sentence)
         context.view_layer.update()
         return {"FINISHED"}

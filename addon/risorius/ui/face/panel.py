@@ -1,24 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The panels Face and Options of the sidebar tab `Face`."""
 
-import bpy
-
 from ... import native
 from ...logic.character import plans
 from ...scene.base import parts
+from ...scene.base.blender_types import ArmatureObject
 from ...scene.character import lods, rig_placement, runtime
 from .. import words
 from ..bake.panel import draw_state
-from ..common import FaceOnlyPanel, FacePanel
+from ..blender_types import Context, Panel, UILayout
+from ..common import FaceOnlyPanel, FacePanel, face_controls, face_rig
 from ..life.panel import draw_trouble
 
 
-class RISORIUS_PT_character(FacePanel, bpy.types.Panel):
+class RISORIUS_PT_character(FacePanel, Panel):
     bl_idname = "RISORIUS_PT_character"
     bl_label = "Face"
     bl_order = 0
 
-    def draw(self, context):
+    def draw(self, context: Context) -> None:
         layout = self.layout
         trouble = native.problem()
         if trouble:
@@ -45,13 +45,13 @@ class RISORIUS_PT_character(FacePanel, bpy.types.Panel):
             words.write(layout, warning, "INFO")
 
 
-def _draw_start(layout):
+def _draw_start(layout: UILayout) -> None:
     words.write(layout, "No face is selected.", "INFO")
     layout.operator("risorius.add_character", text="Add a Face", icon="USER")
     layout.operator("risorius.import_dna", text="Import DNA", icon="IMPORT")
 
 
-def _draw_detail(layout, rig):
+def _draw_detail(layout: UILayout, rig: ArmatureObject) -> None:
     levels = lods.built(rig)
     if len(levels) < 2:
         return
@@ -76,7 +76,7 @@ def _draw_detail(layout, rig):
             )
 
 
-def _draw_shapes(layout, rig):
+def _draw_shapes(layout: UILayout, rig: ArmatureObject) -> None:
     modes = {m.get(parts.MODE) for m in parts.meshes_of(rig)}
     row = layout.row(align=True)
     row.label(text="Shapes")
@@ -84,18 +84,18 @@ def _draw_shapes(layout, rig):
         row.operator("risorius.set_shape_mode", text=text, depress=mode in modes).mode = mode
 
 
-class RISORIUS_PT_options(FaceOnlyPanel, bpy.types.Panel):
+class RISORIUS_PT_options(FaceOnlyPanel, Panel):
     bl_idname = "RISORIUS_PT_options"
     bl_label = "Options"
     bl_order = 2
     bl_options = {"DEFAULT_CLOSED"}
 
-    def draw(self, context):
+    def draw(self, context: Context) -> None:
         layout = self.layout
-        rig = parts.active_rig(context)
-        on = bool(parts.controls_of(rig).get(parts.OVERDRIVE))
+        rig, controls = face_rig(context), face_controls(context)
+        on = bool(controls.get(parts.OVERDRIVE))
         layout.operator("risorius.set_overdrive", depress=on).enable = not on
-        attached = rig_placement.body_of(parts.controls_of(rig))
+        attached = rig_placement.body_of(controls)
         body = "risorius.detach_body" if attached else "risorius.attach_body"
         layout.operator(body, icon="ARMATURE_DATA")
         layout.operator("risorius.separate", icon="UNLINKED")

@@ -1,18 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """After an import the 3D views show the face: it is a speck in a view of the default scene."""
 
+from collections.abc import Sequence
+from typing import cast
+
+import bpy
 import numpy as np
-from mathutils import Vector
+from mathutils import Quaternion, Vector
 
 from ...logic.character import view_fit
 from ...scene.base import parts
+from ...scene.base.blender_types import ArmatureObject
+from ..blender_types import Context
 
 _FRONT = Vector((0.0, -1.0, 0.0))  # where an imported face looks
 _THREE_QUARTER = Vector((0.36, -0.92, 0.16))  # whence a face is seen best
 _SIDE = 0.77  # cosine of 40 degrees: whoever looks from farther aside sees a profile
 
 
-def frame(context, rig):
+def frame(context: Context, rig: ArmatureObject) -> None:
     """Let the 3D views of the user's window show a face; one in profile is shown from the front.
 
     A view through a camera is left alone, and one that shows the face well already. A solid view in
@@ -28,19 +34,23 @@ def frame(context, rig):
     if not areas:
         return
     middle, radius = _ball(rig)
-    turn = parts.controls_of(rig).matrix_world.to_quaternion()
+    turn = (parts.controls_of(rig) or rig).matrix_world.to_quaternion()
     for area in areas:
-        _show_textures(area.spaces.active.shading)
+        _show_textures(_view(area).shading)
         _frame(area, middle, radius, turn)
 
 
-def _show_textures(shading):
+def _view(area: bpy.types.Area) -> bpy.types.SpaceView3D:
+    return cast(bpy.types.SpaceView3D, area.spaces.active)
+
+
+def _show_textures(shading: bpy.types.View3DShading) -> None:
     if shading.type == "SOLID" and shading.color_type == "MATERIAL":
         shading.color_type = "TEXTURE"
 
 
-def _frame(area, middle, radius, turn):
-    space = area.spaces.active
+def _frame(area: bpy.types.Area, middle: Sequence[float], radius: float, turn: Quaternion) -> None:
+    space = _view(area)
     region = next((r for r in area.regions if r.type == "WINDOW"), None)
     locked = space.lock_object is not None or space.lock_cursor
     if region is None or locked:
@@ -60,7 +70,7 @@ def _frame(area, middle, radius, turn):
             view.view_rotation = (turn @ _THREE_QUARTER).to_track_quat("Z", "Y")
 
 
-def _ball(rig):
+def _ball(rig: ArmatureObject) -> tuple[list[float], float]:
     """Middle and radius of the head, else of all meshes of the finest level that is built."""
     items = parts.meshes_of(rig)
     first = min((min(item[parts.LODS]) for item in items), default=0)

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+# Blender takes properties where Python has annotations:
+# pyright: reportInvalidTypeForm=false
 """Operators that bring faces in: from a file, and the sample."""
 
 from pathlib import Path
 
 import bpy
-from bpy_extras.io_utils import ImportHelper
 
 from ... import native
 from ...logic.base import names
@@ -12,6 +13,7 @@ from ...scene.base import parts
 from ...scene.character import build, rig_placement
 from ...scene.frame import evaluate
 from .. import words
+from ..blender_types import Context, FileHandler, ImportHelper, Menu, Operator, Result
 from ..common import MODES, explain, shown_progress, usable
 from . import framing
 
@@ -23,7 +25,13 @@ FRAME_VIEW = bpy.props.BoolProperty(
 )
 
 
-def import_character(operator, context, path, options, show=False):
+def import_character(
+    operator: Operator,
+    context: Context,
+    path: str | Path,
+    options: build.BuildOptions,
+    show: bool = False,
+) -> Result:
     """Build a character and report on it.
 
     Args:
@@ -58,7 +66,7 @@ def import_character(operator, context, path, options, show=False):
     return {"FINISHED"}
 
 
-class RISORIUS_OT_import_dna(bpy.types.Operator, ImportHelper):
+class RISORIUS_OT_import_dna(Operator, ImportHelper):
     """Build a face from a MetaHuman DNA file"""
 
     bl_idname = "risorius.import_dna"
@@ -105,10 +113,10 @@ class RISORIUS_OT_import_dna(bpy.types.Operator, ImportHelper):
     use_frame_view: FRAME_VIEW
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: Context) -> bool:
         return usable(cls)
 
-    def execute(self, context):
+    def execute(self, context: Context) -> Result:
         options = build.BuildOptions(
             lods=tuple(i for i, chosen in enumerate(self.lods) if chosen) or (0,),
             mode=self.shape_mode,
@@ -124,13 +132,13 @@ class RISORIUS_OT_import_dna(bpy.types.Operator, ImportHelper):
         results = [import_character(self, context, path, options, show) for path in paths]
         return {"FINISHED"} if {"FINISHED"} in results else {"CANCELLED"}
 
-    def invoke(self, context, event):
+    def invoke(self, context: Context, event: bpy.types.Event) -> Result:
         given = self.properties.is_property_set
         if given("filepath") or given("files"):  # dropped onto the window
             return self.execute(context)
         return ImportHelper.invoke(self, context, event)
 
-    def draw(self, _context):
+    def draw(self, context: Context) -> None:
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
@@ -155,7 +163,7 @@ class RISORIUS_OT_import_dna(bpy.types.Operator, ImportHelper):
         layout.prop(self, "use_frame_view")
 
 
-class RISORIUS_FH_dna(bpy.types.FileHandler):
+class RISORIUS_FH_dna(FileHandler):
     """Drop a DNA file onto the 3D view"""
 
     bl_idname = "RISORIUS_FH_dna"
@@ -164,11 +172,11 @@ class RISORIUS_FH_dna(bpy.types.FileHandler):
     bl_file_extensions = ".dna"
 
     @classmethod
-    def poll_drop(cls, context):
+    def poll_drop(cls, context: Context) -> bool:
         return context.area is not None and context.area.type in {"VIEW_3D", "OUTLINER"}
 
 
-class RISORIUS_OT_add_character(bpy.types.Operator):
+class RISORIUS_OT_add_character(Operator):
     """Add a free sample face; its data (48 MB) is downloaded the first time"""
 
     bl_idname = "risorius.add_character"
@@ -187,10 +195,10 @@ class RISORIUS_OT_add_character(bpy.types.Operator):
     use_frame_view: FRAME_VIEW
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: Context) -> bool:
         return usable(cls)
 
-    def execute(self, context):
+    def execute(self, context: Context) -> Result:
         folder = Path(bpy.utils.extension_path_user(native.ADDON, path="sample", create=True))
         path = folder / f"{self.person}-{native.addon_version()}.dna"
         if not path.is_file():
@@ -202,7 +210,7 @@ class RISORIUS_OT_add_character(bpy.types.Operator):
         return import_character(self, context, path, options, self.use_frame_view)
 
 
-def _build_sample(path, folder, person):
+def _build_sample(path: Path, folder: Path, person: str) -> str:
     """Build a sample person's DNA; returns a sentence where it cannot be built."""
     sample = native.sample_module()
     wheels = sorted(folder.glob("*.whl"))
@@ -220,12 +228,12 @@ def _build_sample(path, folder, person):
     return ""
 
 
-def draw_import(self, _context):
+def draw_import(self: Menu, _context: Context) -> None:
     """Entry of File > Import."""
     self.layout.operator(RISORIUS_OT_import_dna.bl_idname, text="MetaHuman DNA (.dna)")
 
 
-def draw_add(self, _context):
+def draw_add(self: Menu, _context: Context) -> None:
     """Entry of the 3D view's Add menu."""
     self.layout.operator_menu_enum(
         RISORIUS_OT_add_character.bl_idname, "person", text="Face", icon="USER"

@@ -1,19 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+# Blender takes properties where Python has annotations:
+# pyright: reportInvalidTypeForm=false
 """Operators between a face and its file: replace it, read it again."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import bpy
-from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from ... import native
 from ...scene.base import parts
 from ...scene.file import export_dna, replace_dna
 from ...scene.frame import evaluate
-from ..common import FaceOperator, explain, shown_progress
+from ..blender_types import Context, ExportHelper, ImportHelper, Menu, Operator, Result
+from ..common import FaceOperator, explain, face_rig, shown_progress
 
 
-def report_all(operator, sentences, shown=8):
+def report_all(operator: Operator, sentences: Sequence[str], shown: int = 8) -> None:
     """Report sentences, the last of many as a number."""
     for sentence in sentences[:shown]:
         operator.report({"INFO"}, sentence)
@@ -21,8 +24,8 @@ def report_all(operator, sentences, shown=8):
         operator.report({"INFO"}, f"and {len(sentences) - shown} more: see the report's text")
 
 
-def _replace(operator, context, path):
-    rig = parts.active_rig(context)
+def _replace(operator: Operator, context: Context, path: str) -> Result:
+    rig = face_rig(context)
     try:
         with shown_progress(context) as progress:
             sentences = replace_dna.replace_file(context, rig, path, progress)
@@ -44,7 +47,7 @@ class _FileOperator(FaceOperator):
     whole_face = False
 
 
-class RISORIUS_OT_replace_dna(_FileOperator, bpy.types.Operator, ImportHelper):
+class RISORIUS_OT_replace_dna(_FileOperator, Operator, ImportHelper):
     """Let another DNA file take this face's place; keys, edits and materials stay"""
 
     bl_idname = "risorius.replace_dna"
@@ -53,28 +56,28 @@ class RISORIUS_OT_replace_dna(_FileOperator, bpy.types.Operator, ImportHelper):
     filename_ext = ".dna"
     filter_glob: bpy.props.StringProperty(default="*.dna", options={"HIDDEN"})
 
-    def execute(self, context):
+    def execute(self, context: Context) -> Result:
         return _replace(self, context, self.filepath)
 
 
-class RISORIUS_OT_reload(_FileOperator, bpy.types.Operator):
+class RISORIUS_OT_reload(_FileOperator, Operator):
     """Read the face's file again; asks for it where it is no longer in its place"""
 
     bl_idname = "risorius.reload"
     bl_label = "Reload from Source"
 
     @staticmethod
-    def _path(context):
-        return bpy.path.abspath(parts.active_rig(context).get(parts.SOURCE, ""))
+    def _path(context: Context) -> str:
+        return bpy.path.abspath(face_rig(context).get(parts.SOURCE, ""))
 
-    def invoke(self, context, _event):
+    def invoke(self, context: Context, event: bpy.types.Event) -> Result:
         path = self._path(context)
         if not path or not Path(path).is_file():
-            bpy.ops.risorius.replace_dna("INVOKE_DEFAULT")
+            bpy.ops.risorius.replace_dna("INVOKE_DEFAULT")  # pyright: ignore  made by registration
             return {"CANCELLED"}  # the file selector does the work
         return self.execute(context)
 
-    def execute(self, context):
+    def execute(self, context: Context) -> Result:
         path = self._path(context)
         if not path or not Path(path).is_file():
             name = Path(path).name or "of this face"
@@ -85,7 +88,7 @@ class RISORIUS_OT_reload(_FileOperator, bpy.types.Operator):
         return _replace(self, context, path)
 
 
-class RISORIUS_OT_export_dna(_FileOperator, bpy.types.Operator, ExportHelper):
+class RISORIUS_OT_export_dna(_FileOperator, Operator, ExportHelper):
     """Write this face's DNA file: byte for byte as imported, with your edits of shape keys,
     neutral vertices, joints and weights"""
 
@@ -112,13 +115,13 @@ class RISORIUS_OT_export_dna(_FileOperator, bpy.types.Operator, ExportHelper):
         name="Weights", description="Write painted skin weights", default=True
     )
 
-    def invoke(self, context, event):
+    def invoke(self, context: Context, event: bpy.types.Event) -> Result:
         if not self.filepath:
-            self.filepath = parts.active_rig(context).name.removesuffix("_rig") + ".dna"
+            self.filepath = face_rig(context).name.removesuffix("_rig") + ".dna"
         return ExportHelper.invoke(self, context, event)
 
-    def execute(self, context):
-        rig = parts.active_rig(context)
+    def execute(self, context: Context) -> Result:
+        rig = face_rig(context)
         options = export_dna.ExportOptions(
             self.use_shapes, self.use_neutral, self.use_joints, self.use_weights
         )
@@ -138,7 +141,7 @@ class RISORIUS_OT_export_dna(_FileOperator, bpy.types.Operator, ExportHelper):
         return {"FINISHED"}
 
 
-def draw_export(self, _context):
+def draw_export(self: Menu, _context: Context) -> None:
     """Entry of File > Export."""
     self.layout.operator(RISORIUS_OT_export_dna.bl_idname, text="MetaHuman DNA (.dna)")
 

@@ -1,16 +1,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Lists of the panel Layers: a line per layer, a line per fired reaction."""
 
-import bpy
-
-from ...scene.animation import layers
+from ...scene.animation import layer_properties, layers
+from ...scene.base.blender_types import ArmatureObject
+from ..blender_types import Context, Icon, UILayout, UIList
 from .menus import ICONS
 
 
-class RISORIUS_UL_layers(bpy.types.UIList):
+class RISORIUS_UL_layers(UIList):
     """One line per layer, the highest first."""
 
-    def draw_item(self, _context, layout, _data, item, _icon, _active, _property):
+    def draw_item(
+        self,
+        context: Context,
+        layout: UILayout,
+        data: ArmatureObject,
+        item: layer_properties.RISORIUS_PG_layer,
+        icon: int,
+        active_data: ArmatureObject,
+        active_property: str,
+    ) -> None:
         row = layout.row(align=True)
         row.active = not item.mute
         row.prop(item, "name", text="", emboss=False, icon=ICONS[item.kind])
@@ -18,10 +27,12 @@ class RISORIUS_UL_layers(bpy.types.UIList):
         part.scale_x = 0.7
         part.prop(item, "weight", text="")
         row.prop(item, "solo", text="", emboss=False, icon="SOLO_ON" if item.solo else "SOLO_OFF")
-        icon = "CHECKBOX_DEHLT" if item.mute else "CHECKBOX_HLT"
-        row.prop(item, "mute", text="", emboss=False, icon=icon, invert_checkbox=True)
+        tick: Icon = "CHECKBOX_DEHLT" if item.mute else "CHECKBOX_HLT"
+        row.prop(item, "mute", text="", emboss=False, icon=tick, invert_checkbox=True)
 
-    def filter_items(self, _context, data, _name):
+    def filter_items(
+        self, context: Context, data: ArmatureObject, property: str
+    ) -> tuple[list[int], list[int]]:
         there = layers.of(data)
         shown = [0 if layer.removed else self.bitflag_filter_item for layer in layers.places(data)]
         order = [0] * len(shown)
@@ -31,10 +42,19 @@ class RISORIUS_UL_layers(bpy.types.UIList):
         return shown, order
 
 
-class RISORIUS_UL_reactions(bpy.types.UIList):
+class RISORIUS_UL_reactions(UIList):
     """One line per fired reaction."""
 
-    def draw_item(self, _context, layout, _data, item, _icon, _active, _property):
+    def draw_item(
+        self,
+        context: Context,
+        layout: UILayout,
+        data: ArmatureObject,
+        item: layer_properties.RISORIUS_PG_reaction,
+        icon: int,
+        active_data: ArmatureObject,
+        active_property: str,
+    ) -> None:
         known = layers.known_reactions().get(item.name)
         split = layout.split(factor=0.52, align=True)
         split.label(text=known.label if known else item.name)

@@ -4,7 +4,8 @@
 import bpy
 
 from ...scene.animation import layers
-from ..common import active_controls
+from ..blender_types import Context, Icon, Menu
+from ..common import face_controls
 from ..expressions.menus import GROUPS, expression_menu
 from .operators import (
     RISORIUS_OT_fire,
@@ -14,16 +15,16 @@ from .operators import (
     RISORIUS_OT_layers_to_nla,
 )
 
-ICONS = {"ACTION": "ACTION", "EXPRESSION": "USER", "IDLE": "HIDE_OFF"}
+ICONS: dict[str, Icon] = {"ACTION": "ACTION", "EXPRESSION": "USER", "IDLE": "HIDE_OFF"}
 _ADD = [expression_menu(g, t, RISORIUS_OT_layer_add.bl_idname) for g, t in GROUPS]
 
 
-class RISORIUS_MT_actions(bpy.types.Menu):
+class RISORIUS_MT_actions(Menu):
     bl_idname = "RISORIUS_MT_actions"
     bl_label = "Action"
 
-    def draw(self, context):
-        controls = active_controls(context)
+    def draw(self, context: Context) -> None:
+        controls = face_controls(context)
         for action in bpy.data.actions:
             if action.asset_data is None and layers.fits(controls, action):
                 button = self.layout.operator(
@@ -32,11 +33,11 @@ class RISORIUS_MT_actions(bpy.types.Menu):
                 button.kind, button.source = "ACTION", action.name
 
 
-class RISORIUS_MT_layer_add(bpy.types.Menu):
+class RISORIUS_MT_layer_add(Menu):
     bl_idname = "RISORIUS_MT_layer_add"
     bl_label = "Add Layer"
 
-    def draw(self, _context):
+    def draw(self, context: Context) -> None:
         layout = self.layout
         add = RISORIUS_OT_layer_add.bl_idname
         layout.operator(add, text="From Active Action", icon="ACTION").kind = "ACTION"
@@ -47,21 +48,21 @@ class RISORIUS_MT_layer_add(bpy.types.Menu):
             layout.menu(menu.bl_idname, icon=ICONS["EXPRESSION"])
 
 
-class RISORIUS_MT_fire(bpy.types.Menu):
+class RISORIUS_MT_fire(Menu):
     bl_idname = "RISORIUS_MT_fire"
     bl_label = "Fire"
 
-    def draw(self, _context):
+    def draw(self, context: Context) -> None:
         for name, reaction in layers.known_reactions().items():
             button = self.layout.operator(RISORIUS_OT_fire.bl_idname, text=reaction.label)
             button.reaction = name
 
 
-class RISORIUS_MT_layer_more(bpy.types.Menu):
+class RISORIUS_MT_layer_more(Menu):
     bl_idname = "RISORIUS_MT_layer_more"
     bl_label = "Layer Specials"
 
-    def draw(self, _context):
+    def draw(self, context: Context) -> None:
         layout = self.layout
         layout.operator(RISORIUS_OT_layer_duplicate.bl_idname, icon="DUPLICATE")
         layout.operator(RISORIUS_OT_layer_warp.bl_idname, icon="MOD_TIME").clear = False

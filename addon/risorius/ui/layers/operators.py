@@ -1,28 +1,31 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+# Blender takes properties where Python has annotations:
+# pyright: reportInvalidTypeForm=false
 """Operators on the layers and the reactions of a face."""
 
 import bpy
 
 from ...scene.animation import expressions, layer_properties, layers, layers_nla
-from ...scene.base import parts
+from ...scene.base.blender_types import ArmatureObject
 from ...scene.frame import evaluate
-from ..common import FaceOperator, active_controls
+from ..blender_types import Context, Operator, Result
+from ..common import FaceOperator, face_controls, face_rig
 
 
 class LayerOperator(FaceOperator):
     """What all operators on the active layer share."""
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: Context) -> bool:
         if not super().poll(context):
             return False
-        if not len(layers.of(active_controls(context))):
+        if not len(layers.of(face_controls(context))):
             cls.poll_message_set("This face has no layers.")
             return False
         return True
 
     @staticmethod
-    def place(controls):
+    def place(controls: ArmatureObject) -> int:
         """The active layer's place; the highest one's where none is active."""
         place, count = controls.risorius_layers_index, len(layers.places(controls))
         if 0 <= place < count and not layers.places(controls)[place].removed:
@@ -30,7 +33,7 @@ class LayerOperator(FaceOperator):
         return layers.place_of(controls, layers.of(controls)[-1])
 
 
-class RISORIUS_OT_layer_add(FaceOperator, bpy.types.Operator):
+class RISORIUS_OT_layer_add(FaceOperator, Operator):
     """Add a layer on top of the others, at the current frame"""
 
     bl_idname = "risorius.layer_add"
@@ -46,9 +49,9 @@ class RISORIUS_OT_layer_add(FaceOperator, bpy.types.Operator):
         options={"SKIP_SAVE"},
     )
 
-    def execute(self, context):
-        rig = parts.active_rig(context)
-        controls, frame = parts.controls_of(rig), context.scene.frame_current
+    def execute(self, context: Context) -> Result:
+        rig = face_rig(context)
+        controls, frame = face_controls(context), context.scene.frame_current
         if self.kind == "ACTION":
             return self._add_action(context, rig, controls)
         if self.kind == "EXPRESSION":
@@ -62,7 +65,9 @@ class RISORIUS_OT_layer_add(FaceOperator, bpy.types.Operator):
         evaluate.bring_up(context, rig)
         return {"FINISHED"}
 
-    def _add_action(self, context, rig, controls):
+    def _add_action(
+        self, context: Context, rig: ArmatureObject, controls: ArmatureObject
+    ) -> Result:
         action = bpy.data.actions.get(self.source) if self.source else None
         data = controls.animation_data
         if action is None and not self.source and data is not None:
@@ -76,20 +81,20 @@ class RISORIUS_OT_layer_add(FaceOperator, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class RISORIUS_OT_layer_remove(LayerOperator, bpy.types.Operator):
+class RISORIUS_OT_layer_remove(LayerOperator, Operator):
     """Remove the active layer and the keys of its weight; its action stays"""
 
     bl_idname = "risorius.layer_remove"
     bl_label = "Remove Layer"
 
-    def execute(self, context):
-        controls = active_controls(context)
+    def execute(self, context: Context) -> Result:
+        controls = face_controls(context)
         layers.remove(controls, self.place(controls))
-        evaluate.bring_up(context, parts.active_rig(context))
+        evaluate.bring_up(context, face_rig(context))
         return {"FINISHED"}
 
 
-class RISORIUS_OT_layer_move(LayerOperator, bpy.types.Operator):
+class RISORIUS_OT_layer_move(LayerOperator, Operator):
     """Move the active layer up or down; higher layers lie over lower ones"""
 
     bl_idname = "risorius.layer_move"
@@ -97,28 +102,28 @@ class RISORIUS_OT_layer_move(LayerOperator, bpy.types.Operator):
 
     up: bpy.props.BoolProperty(name="Up", options={"SKIP_SAVE"})
 
-    def execute(self, context):
-        controls = active_controls(context)
+    def execute(self, context: Context) -> Result:
+        controls = face_controls(context)
         if not layers.move(controls, self.place(controls), self.up):
             return {"CANCELLED"}
-        evaluate.bring_up(context, parts.active_rig(context))
+        evaluate.bring_up(context, face_rig(context))
         return {"FINISHED"}
 
 
-class RISORIUS_OT_layer_duplicate(LayerOperator, bpy.types.Operator):
+class RISORIUS_OT_layer_duplicate(LayerOperator, Operator):
     """Put a copy of the active layer right above it"""
 
     bl_idname = "risorius.layer_duplicate"
     bl_label = "Duplicate Layer"
 
-    def execute(self, context):
-        controls = active_controls(context)
+    def execute(self, context: Context) -> Result:
+        controls = face_controls(context)
         layers.duplicate(controls, self.place(controls))
-        evaluate.bring_up(context, parts.active_rig(context))
+        evaluate.bring_up(context, face_rig(context))
         return {"FINISHED"}
 
 
-class RISORIUS_OT_layer_warp(LayerOperator, bpy.types.Operator):
+class RISORIUS_OT_layer_warp(LayerOperator, Operator):
     """Pin what the active layer shows now to the current frame, or take all pins away"""
 
     bl_idname = "risorius.layer_warp"
@@ -126,8 +131,8 @@ class RISORIUS_OT_layer_warp(LayerOperator, bpy.types.Operator):
 
     clear: bpy.props.BoolProperty(name="Clear", options={"SKIP_SAVE"})
 
-    def execute(self, context):
-        controls = active_controls(context)
+    def execute(self, context: Context) -> Result:
+        controls = face_controls(context)
         layer = layers.places(controls)[self.place(controls)]
         if self.clear:
             layer.warp.clear()
@@ -137,11 +142,11 @@ class RISORIUS_OT_layer_warp(LayerOperator, bpy.types.Operator):
         else:
             layers.add_warp_point(layer, context.scene.frame_current_final)
         controls.update_tag()
-        evaluate.bring_up(context, parts.active_rig(context))
+        evaluate.bring_up(context, face_rig(context))
         return {"FINISHED"}
 
 
-class RISORIUS_OT_fire(FaceOperator, bpy.types.Operator):
+class RISORIUS_OT_fire(FaceOperator, Operator):
     """Fire a reaction at the current frame"""
 
     bl_idname = "risorius.fire"
@@ -152,42 +157,42 @@ class RISORIUS_OT_fire(FaceOperator, bpy.types.Operator):
         name="Strength", default=1.0, min=0.0, max=1.0, subtype="FACTOR"
     )
 
-    def execute(self, context):
+    def execute(self, context: Context) -> Result:
         if self.reaction not in layers.known_reactions():
             self.report({"ERROR"}, f"There is no reaction {self.reaction}.")
             return {"CANCELLED"}
         frame = context.scene.frame_current_final
-        layers.fire(active_controls(context), self.reaction, frame, self.strength)
-        evaluate.bring_up(context, parts.active_rig(context))
+        layers.fire(face_controls(context), self.reaction, frame, self.strength)
+        evaluate.bring_up(context, face_rig(context))
         return {"FINISHED"}
 
 
-class RISORIUS_OT_unfire(FaceOperator, bpy.types.Operator):
+class RISORIUS_OT_unfire(FaceOperator, Operator):
     """Take the active reaction away"""
 
     bl_idname = "risorius.unfire"
     bl_label = "Remove Reaction"
 
     @classmethod
-    def poll(cls, context):
-        return super().poll(context) and bool(len(layers.reactions_of(active_controls(context))))
+    def poll(cls, context: Context) -> bool:
+        return super().poll(context) and bool(len(layers.reactions_of(face_controls(context))))
 
-    def execute(self, context):
-        controls = active_controls(context)
+    def execute(self, context: Context) -> Result:
+        controls = face_controls(context)
         count = len(layers.reactions_of(controls))
         layers.unfire(controls, min(max(controls.risorius_reactions_index, 0), count - 1))
-        evaluate.bring_up(context, parts.active_rig(context))
+        evaluate.bring_up(context, face_rig(context))
         return {"FINISHED"}
 
 
-class RISORIUS_OT_layers_to_nla(LayerOperator, bpy.types.Operator):
+class RISORIUS_OT_layers_to_nla(LayerOperator, Operator):
     """Make NLA strips of the layers, as far as the NLA can say the same"""
 
     bl_idname = "risorius.layers_to_nla"
     bl_label = "Push Layers to NLA"
 
-    def execute(self, context):
-        rig = parts.active_rig(context)
+    def execute(self, context: Context) -> Result:
+        rig = face_rig(context)
         count, notes = layers_nla.push(context.scene, rig)
         evaluate.bring_up(context, rig)
         for note in notes:

@@ -1,14 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The panel Layers."""
 
-import bpy
-
 from ...logic.animation import layer_rules as logic
 from ...scene.animation import layer_mixing, layer_properties, layers
-from ...scene.base import parts
+from ...scene.base.blender_types import ArmatureObject
 from ...scene.character import runtime
 from .. import words
-from ..common import FaceOnlyPanel
+from ..blender_types import Context, Panel, UILayout
+from ..common import FaceOnlyPanel, face_controls, face_rig
 from .menus import RISORIUS_MT_fire, RISORIUS_MT_layer_add, RISORIUS_MT_layer_more
 from .operators import (
     LayerOperator,
@@ -18,15 +17,15 @@ from .operators import (
 )
 
 
-class RISORIUS_PT_layers(FaceOnlyPanel, bpy.types.Panel):
+class RISORIUS_PT_layers(FaceOnlyPanel, Panel):
     bl_idname = "RISORIUS_PT_layers"
     bl_label = "Layers"
     bl_order = 1
 
-    def draw(self, context):
+    def draw(self, context: Context) -> None:
         layout = self.layout
-        rig = parts.active_rig(context)
-        controls, live = parts.controls_of(rig), runtime.of(rig)
+        rig = face_rig(context)
+        controls, live = face_controls(context), runtime.of(rig)
         if live is None:
             return
         row = layout.row()
@@ -49,7 +48,7 @@ class RISORIUS_PT_layers(FaceOnlyPanel, bpy.types.Panel):
             layout.prop(controls, "risorius_layer_rules")
 
 
-def _draw_side(column):
+def _draw_side(column: UILayout) -> None:
     column.menu(RISORIUS_MT_layer_add.bl_idname, text="", icon="ADD")
     column.operator(RISORIUS_OT_layer_remove.bl_idname, text="", icon="REMOVE")
     column.menu(RISORIUS_MT_layer_more.bl_idname, text="", icon="DOWNARROW_HLT")
@@ -57,7 +56,9 @@ def _draw_side(column):
     column.operator(RISORIUS_OT_layer_move.bl_idname, text="", icon="TRIA_DOWN").up = False
 
 
-def _draw_layer(layout, controls, layer):
+def _draw_layer(
+    layout: UILayout, controls: ArmatureObject, layer: layer_properties.RISORIUS_PG_layer
+) -> None:
     column = layout.column()
     column.use_property_split = True
     column.use_property_decorate = False
@@ -82,7 +83,7 @@ def _draw_layer(layout, controls, layer):
         body.prop(layer, "controls")
 
 
-def _draw_time(layout, layer):
+def _draw_time(layout: UILayout, layer: layer_properties.RISORIUS_PG_layer) -> None:
     column = layout.column(align=True)
     column.use_property_split = True
     column.use_property_decorate = False
@@ -107,7 +108,7 @@ def _draw_time(layout, layer):
     column.prop(layer, "fade_out")
 
 
-def _draw_reactions(layout, controls):
+def _draw_reactions(layout: UILayout, controls: ArmatureObject) -> None:
     row = layout.row(align=True)
     row.menu(RISORIUS_MT_fire.bl_idname, text="Fire a Reaction", icon="LIGHT_SUN")
     if not len(layers.reactions_of(controls)):

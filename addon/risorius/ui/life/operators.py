@@ -1,28 +1,34 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+# Blender takes properties where Python has annotations:
+# pyright: reportInvalidTypeForm=false
 """Operators and words for faces that are linked from other files or have lost parts."""
 
 import bpy
 
 from ... import native
+from ...logic.base.errors import FaceError
 from ...scene.base import parts
+from ...scene.base.blender_types import ArmatureObject
 from ...scene.frame import evaluate
 from ...scene.life import library_overrides, repair
+from ..blender_types import Context, Operator, Result
 from ..common import usable
 
+_NOT_LINKED = "Select a linked face first."
 SHAPES = (
     ("DRIVEN", "Driven Keys", "The library's shape keys, moved by drivers: follows its edits"),
     ("LOCAL", "Local Meshes", "Meshes copied into this file: live sum and edits are possible"),
 )
 
 
-def override_trouble(rig):
+def override_trouble(rig: ArmatureObject | None) -> str:
     """Why a face that is an override stands still; empty for all others, and for None."""
     if rig is None or not rig.override_library:
         return ""
     return library_overrides.trouble(rig)
 
 
-class RISORIUS_OT_make_override(bpy.types.Operator):
+class RISORIUS_OT_make_override(Operator):
     """Make a linked face, or an override of one that stands still, ready to animate"""
 
     bl_idname = "risorius.make_override"
@@ -34,25 +40,25 @@ class RISORIUS_OT_make_override(bpy.types.Operator):
     )
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: Context) -> bool:
         if not usable(cls):
             return False
         broken = override_trouble(parts.active_rig(context))
         if library_overrides.linked_rig(context) is None and not broken:
-            cls.poll_message_set("Select a linked face first.")
+            cls.poll_message_set(_NOT_LINKED)
             return False
         return True
 
-    def execute(self, context):
+    def execute(self, context: Context) -> Result:
         local = self.shapes == "LOCAL"
-        rig = parts.active_rig(context)
+        rig, linked = parts.active_rig(context), library_overrides.linked_rig(context)
         try:
-            if override_trouble(rig):
+            if rig is not None and override_trouble(rig):
                 done = library_overrides.repair(context, rig, local)
+            elif linked is not None:
+                rig, done = library_overrides.make_override(context, linked, local)
             else:
-                rig, done = library_overrides.make_override(
-                    context, library_overrides.linked_rig(context), local
-                )
+                raise FaceError(_NOT_LINKED)
         except native.user_errors() as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
@@ -66,7 +72,7 @@ class RISORIUS_OT_make_override(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class RISORIUS_OT_bring_back(bpy.types.Operator):
+class RISORIUS_OT_bring_back(Operator):
     """Put deleted parts of the active face, which are still in the file, back into the scene"""
 
     bl_idname = "risorius.bring_back"
@@ -74,11 +80,12 @@ class RISORIUS_OT_bring_back(bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: Context) -> bool:
         return usable(cls) and context.object is not None
 
-    def execute(self, context):
-        back = repair.bring_back(context.object, context.scene)
+    def execute(self, context: Context) -> Result:
+        item = context.object
+        back = repair.bring_back(item, context.scene) if item is not None else []
         if not back:
             self.report({"ERROR"}, "No deleted part of this face is in the file.")
             return {"CANCELLED"}

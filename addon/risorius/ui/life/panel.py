@@ -4,10 +4,11 @@
 from ...scene.base import parts
 from ...scene.life import library_overrides, migrations, repair
 from .. import words
+from ..blender_types import Context, UILayout
 from .operators import RISORIUS_OT_bring_back, RISORIUS_OT_make_override, override_trouble
 
 
-def draw_trouble(layout, context):
+def draw_trouble(layout: UILayout, context: Context) -> bool:
     """Words and buttons for what keeps the active face from moving.
 
     Returns:

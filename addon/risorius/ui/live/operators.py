@@ -1,30 +1,39 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+# Blender takes properties where Python has annotations:
+# pyright: reportInvalidTypeForm=false
 """Operators of live capture: start and stop, record, neutral face, subject."""
+
+from collections.abc import Callable
 
 import bpy
 
 from ... import native
 from ...logic.base import names
-from ...scene.base import parts
+from ...logic.base.errors import FaceError
+from ...scene.animation import clip_actions
+from ...scene.base.blender_types import ArmatureObject
 from ...scene.live import capture
-from ..common import active_controls, usable
-from .properties import settings_of
+from ..blender_types import Context, Operator, OperatorBase, Result
+from ..common import active_controls, face_rig, usable
+from .properties import choices, settings_of
+
+_NOT_STARTED = "Start live capture first."
 
 
-class _Running:
+class _Running(OperatorBase):
     """What operators share that need a capture of the active face."""
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: Context) -> bool:
         if not usable(cls):
             return False
         if capture.of(active_controls(context)) is None:
-            cls.poll_message_set("Start live capture first.")
+            cls.poll_message_set(_NOT_STARTED)
             return False
         return True
 
 
-def _has_controls(cls, context):
+def _has_controls(cls: type[Operator], context: Context) -> bool:
     """Poll: whether a face is active; says so when there is none."""
     if active_controls(context) is None:
         cls.poll_message_set("Select a face first.")
@@ -32,49 +41,57 @@ def _has_controls(cls, context):
     return True
 
 
-class RISORIUS_OT_live_start(bpy.types.Operator):
+class RISORIUS_OT_live_start(Operator):
     """Let the active face follow a capture app, until it is stopped"""
 
     bl_idname = "risorius.live_start"
     bl_label = "Start"
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: Context) -> bool:
         return usable(cls) and _has_controls(cls, context)
 
-    def execute(self, context):
+    def execute(self, context: Context) -> Result:
         try:
-            capture.start(parts.active_rig(context), settings_of(context))
+            capture.start(face_rig(context), settings_of(context))
         except native.user_errors() as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         return {"FINISHED"}
 
 
-class RISORIUS_OT_live_stop(_Running, bpy.types.Operator):
+def _session(context: Context) -> capture.Session:
+    """The capture of the active face, after poll has said that there is one. Raises: FaceError."""
+    session = capture.of(active_controls(context))
+    if session is None:
+        raise FaceError(_NOT_STARTED)
+    return session
+
+
+class RISORIUS_OT_live_stop(_Running, Operator):
     """Stop following; a recording is finished, or waits; the sliders go back to where they were"""
 
     bl_idname = "risorius.live_stop"
     bl_label = "Stop"
     bl_options = {"REGISTER", "UNDO"}
 
-    def execute(self, context):
-        session = capture.of(active_controls(context))
+    def execute(self, context: Context) -> Result:
+        session = _session(context)
         if session.recording is not None:
             _finish(self, context, lambda *where: capture.finish_take(session, *where))
         capture.stop(active_controls(context))
         return {"FINISHED"}
 
 
-class RISORIUS_OT_live_record(_Running, bpy.types.Operator):
+class RISORIUS_OT_live_record(_Running, Operator):
     """Begin a recording at the current frame, or end it as an action of the face"""
 
     bl_idname = "risorius.live_record"
     bl_label = "Record"
     bl_options = {"REGISTER", "UNDO"}
 
-    def execute(self, context):
-        session = capture.of(active_controls(context))
+    def execute(self, context: Context) -> Result:
+        session = _session(context)
         if session.recording is None:
             capture.begin_take(session, float(context.scene.frame_current))
             return {"FINISHED"}
@@ -82,7 +99,7 @@ class RISORIUS_OT_live_record(_Running, bpy.types.Operator):
         return {"FINISHED"} if done else {"CANCELLED"}
 
 
-class _Waiting:
+class _Waiting(OperatorBase):
     """What operators share that need a recording that waits."""
 
     index: bpy.props.IntProperty(
@@ -90,7 +107,7 @@ class _Waiting:
     )
 
     @classmethod
-    def poll(cls, _context):
+    def poll(cls, context: Context) -> bool:
         if not usable(cls):
             return False
         if not capture.waiting():
@@ -98,7 +115,7 @@ class _Waiting:
             return False
         return True
 
-    def recording(self):
+    def recording(self) -> capture.Recording | None:
         """The Recording that is meant, or None."""
         found = capture.waiting()
         if not 0 <= self.index < len(found):
@@ -107,7 +124,7 @@ class _Waiting:
         return found[self.index]
 
 
-class RISORIUS_OT_live_finish(_Waiting, bpy.types.Operator):
+class RISORIUS_OT_live_finish(_Waiting, Operator):
     """Let the active face play a recording that waits"""
 
     bl_idname = "risorius.live_finish"
@@ -121,10 +138,10 @@ class RISORIUS_OT_live_finish(_Waiting, bpy.types.Operator):
     )
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: Context) -> bool:
         return super().poll(context) and _has_controls(cls, context)
 
-    def execute(self, context):
+    def execute(self, context: Context) -> Result:
         recording = self.recording()
         if recording is None:
             return {"CANCELLED"}
@@ -134,16 +151,16 @@ class RISORIUS_OT_live_finish(_Waiting, bpy.types.Operator):
         return {"FINISHED"} if done else {"CANCELLED"}
 
 
-class RISORIUS_OT_live_discard(_Waiting, bpy.types.Operator):
+class RISORIUS_OT_live_discard(_Waiting, Operator):
     """Throw away a recording that waits; this cannot be undone"""
 
     bl_idname = "risorius.live_discard"
     bl_label = "Throw Away"
 
-    def invoke(self, context, event):
+    def invoke(self, context: Context, event: bpy.types.Event) -> Result:
         return context.window_manager.invoke_confirm(self, event)
 
-    def execute(self, _context):
+    def execute(self, context: Context) -> Result:
         recording = self.recording()
         if recording is None:
             return {"CANCELLED"}
@@ -151,7 +168,7 @@ class RISORIUS_OT_live_discard(_Waiting, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class RISORIUS_OT_live_neutral(_Running, bpy.types.Operator):
+class RISORIUS_OT_live_neutral(_Running, Operator):
     """Take the face of this moment as the face at rest: it is subtracted from what comes"""
 
     bl_idname = "risorius.live_neutral"
@@ -161,8 +178,8 @@ class RISORIUS_OT_live_neutral(_Running, bpy.types.Operator):
         name="Forget", description="Take what comes as it is again", options={"SKIP_SAVE"}
     )
 
-    def execute(self, context):
-        session = capture.of(active_controls(context))
+    def execute(self, context: Context) -> Result:
+        session = _session(context)
         if self.forget:
             capture.forget_neutral(session)
         elif not capture.neutral_now(session):
@@ -171,7 +188,7 @@ class RISORIUS_OT_live_neutral(_Running, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class RISORIUS_OT_live_subject(_Running, bpy.types.Operator):
+class RISORIUS_OT_live_subject(_Running, Operator):
     """Follow this subject"""
 
     bl_idname = "risorius.live_subject"
@@ -179,12 +196,16 @@ class RISORIUS_OT_live_subject(_Running, bpy.types.Operator):
 
     name: bpy.props.StringProperty(name="Subject", options={"SKIP_SAVE"})
 
-    def execute(self, context):
-        context.window_manager.risorius_live.subject = self.name
+    def execute(self, context: Context) -> Result:
+        choices(context).subject = self.name
         return {"FINISHED"}
 
 
-def _finish(operator, context, finish):
+def _finish(
+    operator: Operator,
+    context: Context,
+    finish: Callable[[ArmatureObject, bpy.types.Scene], clip_actions.Report | None],
+) -> bool:
     """End a recording as an action.
 
     Args:
@@ -195,7 +216,7 @@ def _finish(operator, context, finish):
     Returns:
         Whether there is an action. Where there is none, what was recorded waits.
     """
-    rig = parts.active_rig(context)
+    rig = face_rig(context)
     try:
         report = finish(rig, context.scene)
     except native.user_errors() as error:

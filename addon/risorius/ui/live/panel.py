@@ -1,23 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The panel Live Capture."""
 
-import bpy
-
 from ...logic.base import names
 from ...scene.live import capture
 from .. import words
+from ..blender_types import Context, Panel, UILayout
 from ..common import FaceOnlyPanel, active_controls
+from .properties import RISORIUS_PG_live, choices
 
 
-class RISORIUS_PT_live(FaceOnlyPanel, bpy.types.Panel):
+class RISORIUS_PT_live(FaceOnlyPanel, Panel):
     bl_idname = "RISORIUS_PT_live"
     bl_label = "Live Capture"
     bl_order = 1
     bl_options = {"DEFAULT_CLOSED"}
 
-    def draw(self, context):
+    def draw(self, context: Context) -> None:
         layout = self.layout
-        chosen = context.window_manager.risorius_live
+        chosen = choices(context)
         session = capture.of(active_controls(context))
         column = layout.column()
         column.enabled = session is None
@@ -47,7 +47,7 @@ class RISORIUS_PT_live(FaceOnlyPanel, bpy.types.Panel):
         _draw_status(layout, session)
 
 
-def _where(chosen):
+def _where(chosen: RISORIUS_PG_live) -> str:
     """What to type into the app."""
     if not chosen.everywhere:
         return f"Hears this computer only, at 127.0.0.1, port {chosen.port}."
@@ -55,7 +55,7 @@ def _where(chosen):
     return f"In the app: {address}, port {chosen.port}."
 
 
-def _draw_waiting(layout):
+def _draw_waiting(layout: UILayout) -> None:
     """The recordings that are no action yet."""
     for index, recording in enumerate(capture.waiting()):
         box = layout.box()
@@ -68,7 +68,7 @@ def _draw_waiting(layout):
         row.operator("risorius.live_discard", text="", icon="TRASH").index = index
 
 
-def _draw_status(layout, session):
+def _draw_status(layout: UILayout, session: capture.Session) -> None:
     status = session.receiver.status(session.subject)
     column = layout.column(align=True)
     column.scale_y = 0.8
@@ -77,7 +77,7 @@ def _draw_status(layout, session):
         column.label(text=f"Port {session.receiver.port}: {heard}", icon="INFO")
     else:
         column.label(text=f"{status.subject}: {status.per_second:.0f} a second", icon="USER")
-        column.label(text=f"Last face {status.age * 1000:.0f} ms ago", icon="BLANK1")
+        column.label(text=f"Last face {(status.age or 0.0) * 1000:.0f} ms ago", icon="BLANK1")
     if session.recording is not None:
         column.label(text=f"Recording: {len(session.recording.take)} faces", icon="REC")
     for count, what in (

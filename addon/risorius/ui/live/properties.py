@@ -1,10 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+# Blender takes properties where Python has annotations:
+# pyright: reportInvalidTypeForm=false
 """What the user chose for live capture."""
+
+from typing import cast
 
 import bpy
 
 from ... import native
 from ...scene.live import capture
+from ..blender_types import Context
 from ..common import active_controls
 
 SOURCES = tuple(
@@ -13,11 +18,12 @@ SOURCES = tuple(
 PORTS = {name: row["port"] for name, row in native.live_sources().items()}
 
 
-def _source_changed(self, _context):
+def _source_changed(self: "RISORIUS_PG_live", _context: bpy.types.Context) -> None:
     self.port = PORTS[self.source]
 
 
-def _changed(_self, context):
+def _changed(_self: "RISORIUS_PG_live", given: bpy.types.Context) -> None:
+    context = cast(Context, given)
     session = capture.of(active_controls(context))
     if session is not None:
         capture.apply_settings(session, settings_of(context))
@@ -78,9 +84,14 @@ class RISORIUS_PG_live(bpy.types.PropertyGroup):
     )
 
 
-def settings_of(context):
+def choices(context: Context) -> RISORIUS_PG_live:
+    """What the user chose."""
+    return cast(RISORIUS_PG_live, context.window_manager.risorius_live)
+
+
+def settings_of(context: Context) -> capture.Settings:
     """The choices as scene/live/capture.py takes them."""
-    chosen = context.window_manager.risorius_live
+    chosen = choices(context)
     return capture.Settings(
         chosen.source,
         chosen.port,

@@ -5,19 +5,20 @@ import bpy
 
 from ... import native
 from ...scene.animation import speech_task
+from ..blender_types import Context, Operator, Result, UILayout
 from ..common import usable
 
 _OFFLINE = "Allow online access first: Preferences, System, Network."
 
 
-class RISORIUS_OT_install_speech(bpy.types.Operator):
+class RISORIUS_OT_install_speech(Operator):
     """Download PocketSphinx (28 MB, with its model of English) for Speak from Audio"""
 
     bl_idname = "risorius.install_speech"
     bl_label = "Install PocketSphinx"
 
     @classmethod
-    def poll(cls, _context):
+    def poll(cls, context: Context) -> bool:
         if not usable(cls):
             return False
         if not bpy.app.online_access:
@@ -25,7 +26,7 @@ class RISORIUS_OT_install_speech(bpy.types.Operator):
             return False
         return True
 
-    def execute(self, _context):
+    def execute(self, context: Context) -> Result:
         try:
             speech_task.install_recogniser()
         except native.user_errors() as error:
@@ -35,7 +36,7 @@ class RISORIUS_OT_install_speech(bpy.types.Operator):
         return {"FINISHED"}
 
 
-def draw_preferences(layout):
+def draw_preferences(layout: UILayout) -> None:
     """Whether speech works, and the button that makes it work."""
     if speech_task.has_recogniser():
         layout.label(text="Speak from Audio is ready.", icon="CHECKMARK")

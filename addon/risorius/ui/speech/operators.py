@@ -1,26 +1,28 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+# Blender takes properties where Python has annotations:
+# pyright: reportInvalidTypeForm=false
 """Speech: a sound file becomes movement of the face, and a strip that is heard with it."""
 
 from pathlib import Path
 
 import bpy
-from bpy_extras.io_utils import ImportHelper
 
 from ... import native
 from ...logic.animation.clip_units import ClipError
+from ...logic.base.errors import FaceError
 from ...scene.animation import clip_actions, speech_task
-from ...scene.base import parts
 from .. import words
 from ..animation.operators import SOUNDS
 from ..animation.place_clip import PlacesClip
-from ..common import explain
+from ..blender_types import Context, ImportHelper, Operator, Result
+from ..common import explain, face_rig
 
 _MISSING = (
     "Speech needs the package PocketSphinx: install it by the button in the add-on's preferences."
 )
 
 
-class RISORIUS_OT_speak(PlacesClip, bpy.types.Operator, ImportHelper):
+class RISORIUS_OT_speak(PlacesClip, Operator, ImportHelper):
     """Let the active face say what is heard in a sound file; better with the words typed in"""
 
     bl_idname = "risorius.speak"
@@ -53,14 +55,14 @@ class RISORIUS_OT_speak(PlacesClip, bpy.types.Operator, ImportHelper):
         name="Sound Strip", description="Add the sound to the sequencer", default=True
     )
 
-    def invoke(self, context, event):
+    def invoke(self, context: Context, event: bpy.types.Event) -> Result:
         self._asynchronous = not bpy.app.background
         self.start_with(context.scene)
         if self.properties.is_property_set("filepath"):
             return self.execute(context)
         return ImportHelper.invoke(self, context, event)
 
-    def execute(self, context):
+    def execute(self, context: Context) -> Result:
         if not speech_task.has_recogniser():
             self.report({"ERROR"}, _MISSING)
             return {"CANCELLED"}
@@ -78,7 +80,7 @@ class RISORIUS_OT_speak(PlacesClip, bpy.types.Operator, ImportHelper):
             # Made for these frames, not sampled at them: lips that meet shall meet on one.
             rate=clip_actions.frame_rate(context.scene) if self.use_whole_frames else 60.0,
         )
-        self._face = parts.active_rig(context).session_uid
+        self._face = face_rig(context).session_uid
         # Adjusting the last operation calls this again, on the same operator.
         asynchronous, self._asynchronous = getattr(self, "_asynchronous", False), False
         if not asynchronous:
@@ -91,7 +93,7 @@ class RISORIUS_OT_speak(PlacesClip, bpy.types.Operator, ImportHelper):
         manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
-    def modal(self, context, event):
+    def modal(self, context: Context, event: bpy.types.Event) -> Result:
         if event.type == "ESC":
             self.cancel(context)
             self.report({"WARNING"}, "Speech was cancelled.")
@@ -106,24 +108,24 @@ class RISORIUS_OT_speak(PlacesClip, bpy.types.Operator, ImportHelper):
                 return self._finish(context)
         return {"PASS_THROUGH"}
 
-    def cancel(self, context):
+    def cancel(self, context: Context) -> None:
         """Blender calls this too, when it closes."""
         self._task.cancel()
         self._end(context)
 
-    def _end(self, context):
+    def _end(self, context: Context) -> None:
         manager = context.window_manager
         manager.event_timer_remove(self._timer)
         manager.progress_end()
         context.workspace.status_text_set(None)
 
-    def _finish(self, context):
+    def _finish(self, context: Context) -> Result:
         """Put what was made onto the face. It may have gone while the thread worked."""
         task = self._task
         try:
-            if task.error is not None:
-                raise task.error
-            if not type(self).poll(context) or parts.active_rig(context).session_uid != self._face:
+            if task.clip is None:
+                raise task.error or FaceError("nothing was heard")
+            if not type(self).poll(context) or face_rig(context).session_uid != self._face:
                 words = "The face that was to speak is no longer the active one: speak again."
                 self.report({"ERROR"}, words)
                 return {"CANCELLED"}
@@ -136,7 +138,7 @@ class RISORIUS_OT_speak(PlacesClip, bpy.types.Operator, ImportHelper):
         self._add_sound(context)
         return {"FINISHED"}
 
-    def _add_sound(self, context):
+    def _add_sound(self, context: Context) -> None:
         if not self.use_sound:
             return
         try:
@@ -144,7 +146,7 @@ class RISORIUS_OT_speak(PlacesClip, bpy.types.Operator, ImportHelper):
         except ClipError as error:  # the face speaks all the same
             self.report({"WARNING"}, explain(self.filepath, error))
 
-    def draw(self, _context):
+    def draw(self, context: Context) -> None:
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False

@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# A checker sees methods that take a Context with a scene; Blender's take any:
+# pyright: reportIncompatibleMethodOverride=false
+"""Blender's classes as operators, panels and menus meet them, for annotations.
+
+The stubs of Blender's API leave open whether there is a scene, a window manager or a layout. There
+is one while an operator runs or a panel is drawn, and a checker shall not ask for it each time. At
+run time all names here are Blender's own classes.
+"""
+
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import bpy
+from bpy_extras import io_utils
+
+Result: TypeAlias = "set[OperatorReturnItems]"  # of an operator
+Icon: TypeAlias = "IconItems"
+Override = dict[str, Any]  # what bpy.context.temp_override takes: members of all kinds
+Item = tuple[str, str, str]  # of an enumeration: identifier, name, description
+
+if TYPE_CHECKING:
+    from bpy.stub_internal.rna_enums import IconItems, OperatorReturnItems
+
+    class WindowManager(bpy.types.WindowManager):
+        """With the properties that registration.py gives it."""
+
+        risorius_search: str
+        risorius_show_timing: bool
+        risorius_live: bpy.types.PropertyGroup
+
+    class Context(bpy.types.Context):
+        """What an operator or a panel works on.
+
+        In the stubs a member named property makes methods of all members above it.
+        """
+
+        region: bpy.types.Region | None  # pyright: ignore[reportIncompatibleVariableOverride]
+
+        @property
+        def area(self) -> bpy.types.Area | None: ...
+        @property
+        def screen(self) -> bpy.types.Screen | None: ...
+        @property
+        def window(self) -> bpy.types.Window | None: ...
+        @property
+        def preferences(self) -> bpy.types.Preferences: ...
+        @property
+        def scene(self) -> bpy.types.Scene: ...
+        @property
+        def view_layer(self) -> bpy.types.ViewLayer: ...
+        @property
+        def window_manager(self) -> WindowManager: ...
+        @property
+        def workspace(self) -> bpy.types.WorkSpace: ...
+
+    class OperatorButton(bpy.types.OperatorProperties):
+        """The properties that a button gives its operator; each operator has others."""
+
+        def __setattr__(self, name: str, value: object) -> None: ...
+
+    class UILayout(bpy.types.UILayout):
+        """The layout of a panel, a dialog or a menu."""
+
+        def operator(
+            self,
+            operator: str,
+            *,
+            text: str = "",
+            icon: Icon = "NONE",
+            depress: bool = False,
+        ) -> OperatorButton: ...
+        def panel(
+            self, idname: str, *, default_closed: bool = False
+        ) -> "tuple[UILayout, UILayout | None]": ...
+
+    class Operator(bpy.types.Operator):
+        """An operator while it runs or its dialog is drawn."""
+
+        @property
+        def layout(self) -> UILayout: ...
+        @classmethod
+        def poll(cls, context: Context) -> bool: ...
+        def execute(self, context: Context) -> Result: ...
+        def invoke(self, context: Context, event: bpy.types.Event) -> Result: ...
+        def modal(self, context: Context, event: bpy.types.Event) -> Result: ...
+        def cancel(self, context: Context) -> None: ...
+        def check(self, context: Context) -> bool: ...
+        def draw(self, context: Context) -> None: ...
+
+    class _FileSelector:
+        """Beside Operator: has a path that the user chooses."""
+
+        filepath: str
+
+        def invoke(self, context: Context, event: bpy.types.Event) -> Result: ...
+        def check(self, context: Context) -> bool: ...
+
+    ImportHelper = ExportHelper = _FileSelector
+
+    class Panel(bpy.types.Panel):
+        """A panel while it is drawn."""
+
+        @property
+        def layout(self) -> UILayout: ...
+        @classmethod
+        def poll(cls, context: Context) -> bool: ...
+        def draw(self, context: Context) -> None: ...
+
+    class Menu(bpy.types.Menu):
+        """A menu while it is drawn."""
+
+        @property
+        def layout(self) -> UILayout: ...
+        def draw(self, context: Context) -> None: ...
+
+    class UIList(bpy.types.UIList):
+        """A list while its lines are drawn, which are of any kind."""
+
+        def draw_item(
+            self,
+            context: Context,
+            layout: UILayout,
+            data: Any,
+            item: Any,
+            icon: int,
+            active_data: Any,
+            active_property: str,
+        ) -> None: ...
+        def filter_items(
+            self, context: Context, data: Any, property: str
+        ) -> tuple[list[int], list[int]]: ...
+
+    class FileHandler(bpy.types.FileHandler):
+        """What takes files that are dropped onto a window."""
+
+        @classmethod
+        def poll_drop(cls, context: Context) -> bool: ...
+
+    class AddonPreferences(bpy.types.AddonPreferences):
+        """The preferences while they are drawn."""
+
+        layout: UILayout  # pyright: ignore[reportIncompatibleVariableOverride]
+
+    OperatorBase, PanelBase = Operator, Panel
+else:
+    WindowManager = bpy.types.WindowManager
+    Context, UILayout = bpy.types.Context, bpy.types.UILayout
+    Operator, Panel = bpy.types.Operator, bpy.types.Panel
+    Menu, UIList = bpy.types.Menu, bpy.types.UIList
+    FileHandler, AddonPreferences = bpy.types.FileHandler, bpy.types.AddonPreferences
+    ImportHelper, ExportHelper = io_utils.ImportHelper, io_utils.ExportHelper
+    OperatorButton = bpy.types.OperatorProperties
+    OperatorBase = PanelBase = object  # of classes that are not registered themselves
