@@ -167,7 +167,7 @@ def violations(part: str, files: Mapping[str, str]) -> list[str]:
             f"{path}: {reason}" for target in targets if (reason := _refused(path, target, plan))
         ]
     found += _circle(used) + _crowded(files, plan) + _disordered(plan["rooms"])
-    return found + (_stale(used, plan["rooms"]) if plan.get("exact") else [])
+    return found + _stale(used, plan["rooms"])
 
 
 def _refused(path: str, use: Use, plan: dict) -> str:
