@@ -156,6 +156,7 @@ std::optional<std::uint16_t> ByteReader::peek_u16(std::uint64_t offset) {
 
 std::string ByteReader::str() {
   std::string text(count(1), '\0');
+  if (text.empty()) return text;  // memcpy takes no null pointer, not even for 0 bytes
   char* out = text.data();
   for_runs<1>(text.size(), [&](const std::uint8_t* from, std::size_t n) {
     std::memcpy(out, from, n);
