@@ -158,7 +158,8 @@ run_pytest() {
   # shellcheck disable=SC2086  # one word a file
   note_report "Python $version" "$logs/pytest.xml" $code --files $files
 }
-build_tested_wheel() { SKBUILD_CMAKE_DEFINE=RISORIUS_WARNINGS_AS_ERRORS=ON build_wheel; }
+# CXX: Python would name g++, CMake finds c++, and to ccache these are two compilers.
+build_tested_wheel() { CXX=c++ SKBUILD_CMAKE_DEFINE=RISORIUS_WARNINGS_AS_ERRORS=ON build_wheel; }
 python_lane() {
   local version blender
   step "Python's tools" && check "Python's tools" make_venv || return
