@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Materials: nothing is flat, maps reach colour and relief, textures are found, seams close."""
 
+from types import SimpleNamespace
+
 import bpy
 import numpy as np
 import pytest
@@ -415,6 +417,28 @@ def test_a_configuration_with_other_names_gets_the_right_spaces(tmp_path, data):
         # Blender says `is_data` by the role alone, so without one the name must tell.
         assert spaces[name] == (str(data == "Utility - Raw"), "Utility - Raw"), said
     assert spaces["head_color_map.png"] == ("False", "Utility - sRGB - Texture"), said
+
+
+class _Spaces:
+    """The settings of an image in a configuration whose names are none of those that we know."""
+
+    bl_rna = SimpleNamespace(
+        properties={"name": SimpleNamespace(enum_items=[SimpleNamespace(identifier="Vectors")])}
+    )
+    is_data = False
+
+    def __setattr__(self, key, value):
+        if key == "name":
+            raise TypeError(f"enum {value!r} not found")
+        super().__setattr__(key, value)
+
+
+@pytest.mark.parametrize("data", [True, False])
+def test_where_no_name_is_known_the_configuration_itself_says_what_numbers_are(data):
+    settings = _Spaces()
+    image = SimpleNamespace(colorspace_settings=settings, is_float=False)
+    scene.submodule("scene.material.image_loading").set_color_space(image, data)
+    assert settings.is_data is data
 
 
 # --- the seam --------------------------------------------------------------------------------

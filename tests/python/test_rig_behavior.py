@@ -325,6 +325,27 @@ def test_oracle_agrees_and_settled_is_what_repeats_itself(name, rotation):
 
 
 @pytest.mark.parametrize("rotation", ["euler", "quaternion"])
+def test_euler_angles_of_networks_are_read_by_their_own_system(rotation):
+    """Angles of another order and other signs than the face's, about other axes."""
+    dna = risorius.load(GOLDEN / "ml.dna")
+    joints = dna.machine_learned_behavior_ext.joints
+    assert oracle_behavior.ml_stride(dna) == 9
+    own = {3: 0, 4: 5, 5: 2, 6: 1, 7: 0, 8: 1, 9: 3}  # left, back, up; + - +; y, z, x
+    joints.parameter_keys = [*joints.parameter_keys.tolist(), *own]
+    joints.parameter_values = [*joints.parameter_values.tolist(), *own.values()]
+    rig = risorius.Rig(dna, rotation=rotation)
+    pose = rig.evaluate(random_raw(np.random.default_rng(11), dna))
+    controls = pose.controls.astype(float)
+    angles = controls[joints.input_indices[joints.output_indices % 9 // 3 == 1]]
+    assert np.abs(angles).max() > 0.1
+    wanted = oracle_behavior.joints(dna, controls, 0, rotation)
+    actual = pose.joints.astype(float)
+    if rotation == "quaternion":
+        actual[np.sum(actual[:, 3:7] * wanted[:, 3:7], axis=1) < 0, 3:7] *= -1
+    np.testing.assert_allclose(actual, wanted, rtol=0, atol=3e-6 * max(1.0, np.abs(wanted).max()))
+
+
+@pytest.mark.parametrize("rotation", ["euler", "quaternion"])
 @pytest.mark.parametrize("simd", SIMD)
 @pytest.mark.parametrize("name", ["rbf", "ml", "mlquat", "twistswing", "quatjoints", "tiny_v28"])
 def test_batch_rows_are_single_evaluations(name, simd, rotation):
