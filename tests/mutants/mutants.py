@@ -41,9 +41,11 @@ SOURCES = {
     "package": (["native/python/risorius/**/*.py"], []),
     "scene": (["addon/risorius/logic/**/*.py", "addon/risorius/scene/**/*.py"], []),
 }
-SLOW = 900  # seconds for a test of which it is not yet known how long it takes
+SLOW = 300  # seconds for a test of which it is not yet known how long it takes
+# Each mutant is compiled and linked: neither symbols for a debugger nor the last optimisations.
 OPTIONS = [
     "-DCMAKE_CXX_COMPILER_LAUNCHER=ccache", "-DCMAKE_INTERPROCEDURAL_OPTIMIZATION=OFF",
+    "-DCMAKE_CXX_FLAGS_RELWITHDEBINFO=-O1 -DNDEBUG", "-DRISORIUS_UNITY_TESTS=ON",
     "-DRISORIUS_BUILD_BINDINGS=ON", "-DCMAKE_DISABLE_FIND_PACKAGE_benchmark=ON",
     f"-DPython_EXECUTABLE={sys.executable}",
     f"-DCMAKE_PROJECT_risorius_INCLUDE={HERE / 'bindings.cmake'}",
@@ -66,13 +68,28 @@ def tests_of(path: str, table: dict[str, list[str]]) -> list[str]:
     return found
 
 
+def programs(table: dict[str, list[str]]) -> list[str]:
+    """The GoogleTest programs among the tests of a part."""
+    named = {test.partition(":")[0] for tests in table.values() for test in tests}
+    return sorted(name for name in named if "/" not in name)
+
+
 class Copy:
     """A copy of the project's files in build/mutants, in which mutants are tried."""
 
-    def __init__(self, part: str):
+    def __init__(self, part: str, programs: list[str]):
+        """Args:
+        part: native, package or scene.
+        programs: The GoogleTest programs that tests.toml names for it.
+        """
         self.part = part
+        self.programs = programs
         self.root = PROJECT / "build" / "mutants" / part
-        self.usual: dict[str, float] = {}  # seconds that a test takes when nothing is wrong
+        self._times = self.root.with_suffix(".json")
+        # Seconds that a test takes when nothing is wrong.
+        self.usual: dict[str, float] = (
+            json.loads(self._times.read_text()) if self._times.exists() else {}
+        )
         self._fresh = False  # whether the Python module is that of the present sources
 
     def refresh(self) -> None:
@@ -104,7 +121,9 @@ class Copy:
             return
         if not (self.root / "build" / "dev" / "build.ninja").exists():
             self._checked(["cmake", "--preset", "dev", *OPTIONS])
-        self._checked(["cmake", "--build", "build/dev", "-j2"])
+        self._checked(
+            ["cmake", "--build", "build/dev", "-j2", "--target", "_native", *self.programs]
+        )
 
     def _built(self) -> Path:
         return next((self.root / "build" / "dev").rglob("_native.*.so"))
@@ -174,6 +193,7 @@ class Copy:
         code, seconds, text = self._run(command, limit)
         if code == 0:
             self.usual[test] = max(seconds, self.usual.get(test, 0))
+            self._times.write_text(json.dumps(self.usual, indent=1))
             return "passed", ""
         if code is None:
             return "slow", f"{limit:.0f} s"
@@ -251,9 +271,9 @@ def main() -> None:
         for mutant, _ in zip(order, range(wanted), strict=False):
             print(told(mutant, "drawn", ""))
         return
-    copy = Copy(part)
-    copy.root.mkdir(parents=True, exist_ok=True)
     table = tomllib.loads((HERE / "tests.toml").read_text(encoding="utf-8"))[part]
+    copy = Copy(part, programs(table))
+    copy.root.mkdir(parents=True, exist_ok=True)
     kept = PROJECT / "build" / "mutants" / f"{part}-{options.seed}.jsonl"
     before = [json.loads(line) for line in kept.read_text().splitlines()] if kept.exists() else []
     known = {(b["path"], b["line"], b["after"]): b["outcome"] for b in before}
