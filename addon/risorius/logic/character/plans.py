@@ -79,7 +79,6 @@ class MeshPlan:
         normals: float32[N, 3] per corner, or None.
         skin_offsets, skin_joints, skin_weights: influences of vertex v are offsets[v]..[v + 1].
         channels: channel index of each target.
-        key_labels: names of the real shape keys, by target.
     """
 
     index: int
@@ -96,7 +95,6 @@ class MeshPlan:
     skin_joints: NDArray[np.int64]
     skin_weights: NDArray[np.float32]
     channels: list[int]
-    key_labels: list[str]
 
 
 @dataclass(frozen=True)
@@ -221,8 +219,7 @@ def plan_character(
     if not chosen:
         raise PlanError("The file has no meshes at the chosen levels of detail.")
     labels = names.unique_labels(dna.mesh_names)
-    channel_labels = names.unique_labels(dna.blend_shape_channel_names, ["Basis", LIVE_KEY])
-    meshes = [_plan_mesh(dna, i, labels[i], wanted[i], space, channel_labels) for i in chosen]
+    meshes = [_plan_mesh(dna, i, labels[i], wanted[i], space) for i in chosen]
     points = np.concatenate([m.positions for m in meshes])
     if not len(points):
         raise PlanError("The chosen meshes have no vertices, so there is no face to build.")
@@ -356,7 +353,6 @@ def _plan_mesh(
     label: str,
     lods: tuple[int, ...],
     space: Space,
-    channel_labels: Sequence[str],
 ) -> MeshPlan:
     mesh = dna.meshes[index]
     name = dna.mesh_names[index]
@@ -375,7 +371,9 @@ def _plan_mesh(
     if len(offsets) != vertex_count + 1:
         offsets = np.zeros(vertex_count + 1, np.int64)
     channels = [int(t.blend_shape_channel_index) for t in mesh.blend_shape_targets]
-    _check(np.array(channels, np.int64), len(channel_labels), f"shapes of mesh {name}")
+    _check(
+        np.array(channels, np.int64), len(dna.blend_shape_channel_names), f"shapes of mesh {name}"
+    )
     normals = _corner_values(mesh.normals, mesh.layout_normals, corner_layouts)
     return MeshPlan(
         index=index,
@@ -396,7 +394,6 @@ def _plan_mesh(
         skin_joints=joints,
         skin_weights=np.asarray(mesh.skin_weights, np.float32),
         channels=channels,
-        key_labels=names.unique_labels([channel_labels[c] for c in channels], ["Basis", LIVE_KEY]),
     )
 
 

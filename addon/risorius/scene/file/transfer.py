@@ -66,7 +66,7 @@ class Nearest:
     def __init__(
         self, old: NDArray[np.float64], triangles: NDArray[np.int32], new: NDArray[np.float64]
     ) -> None:
-        self._old, self._new, self._triangles = old, new, triangles
+        self._old, self._new = old, new
         where, weights = nearest_triangles(old, triangles, new)
         self._corners, self._weights = triangles[where], weights
 
