@@ -10,7 +10,7 @@ from functools import cache, partial
 from importlib import import_module, resources
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypedDict, cast
 
 from .logic.base.errors import FaceError
 from .logic.base.face_regions import FaceRegions
@@ -117,16 +117,24 @@ def regions() -> FaceRegions:
     return FaceRegions(known.TITLES, of_slider, known.region_of)
 
 
+class LiveSource(TypedDict):
+    """A program that sends faces, as live/sources.toml of the wheel has it."""
+
+    port: int  # of UDP
+    title: str
+    description: str
+
+
 @cache
-def live_sources() -> dict[str, dict[str, Any]]:
-    """Who sends faces: name -> port, title, description; none without the native module.
+def live_sources() -> dict[str, LiveSource]:
+    """Who sends faces, by name; none without the native module.
 
     Blender asks for them as it starts, so nothing that receives is loaded for it.
     """
     if problem():
         return {}
     file = resources.files("risorius").joinpath("live/sources.toml")
-    return tomllib.loads(file.read_text(encoding="utf-8"))
+    return cast(dict[str, LiveSource], tomllib.loads(file.read_text(encoding="utf-8")))
 
 
 def dna_error() -> type[Exception]:

@@ -3,9 +3,9 @@
 # pyright: reportIncompatibleMethodOverride=false
 """Blender's classes as operators, panels and menus meet them, for annotations.
 
-The stubs of Blender's API leave open whether there is a scene, a window manager or a layout. There
-is one while an operator runs or a panel is drawn, and a checker shall not ask for it each time. At
-run time all names here are Blender's own classes.
+The stubs of Blender's API leave open whether there is a layout. There is one while a panel is
+drawn, and a checker shall not ask for it each time. While the add-on runs all names here are
+Blender's own classes. What is Any here is so because a list shows items of any kind.
 """
 
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -13,45 +13,14 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import bpy
 from bpy_extras import io_utils
 
+from ..scene.base.blender_types import Context
+
 Result: TypeAlias = "set[OperatorReturnItems]"  # of an operator
 Icon: TypeAlias = "IconItems"
-Override = dict[str, Any]  # what bpy.context.temp_override takes: members of all kinds
 Item = tuple[str, str, str]  # of an enumeration: identifier, name, description
 
 if TYPE_CHECKING:
     from bpy.stub_internal.rna_enums import IconItems, OperatorReturnItems
-
-    class WindowManager(bpy.types.WindowManager):
-        """With the properties that registration.py gives it."""
-
-        risorius_search: str
-        risorius_show_timing: bool
-        risorius_live: bpy.types.PropertyGroup
-
-    class Context(bpy.types.Context):
-        """What an operator or a panel works on.
-
-        In the stubs a member named property makes methods of all members above it.
-        """
-
-        region: bpy.types.Region | None  # pyright: ignore[reportIncompatibleVariableOverride]
-
-        @property
-        def area(self) -> bpy.types.Area | None: ...
-        @property
-        def screen(self) -> bpy.types.Screen | None: ...
-        @property
-        def window(self) -> bpy.types.Window | None: ...
-        @property
-        def preferences(self) -> bpy.types.Preferences: ...
-        @property
-        def scene(self) -> bpy.types.Scene: ...
-        @property
-        def view_layer(self) -> bpy.types.ViewLayer: ...
-        @property
-        def window_manager(self) -> WindowManager: ...
-        @property
-        def workspace(self) -> bpy.types.WorkSpace: ...
 
     class OperatorButton(bpy.types.OperatorProperties):
         """The properties that a button gives its operator; each operator has others."""
@@ -143,8 +112,7 @@ if TYPE_CHECKING:
 
     OperatorBase, PanelBase = Operator, Panel
 else:
-    WindowManager = bpy.types.WindowManager
-    Context, UILayout = bpy.types.Context, bpy.types.UILayout
+    UILayout = bpy.types.UILayout
     Operator, Panel = bpy.types.Operator, bpy.types.Panel
     Menu, UIList = bpy.types.Menu, bpy.types.UIList
     FileHandler, AddonPreferences = bpy.types.FileHandler, bpy.types.AddonPreferences

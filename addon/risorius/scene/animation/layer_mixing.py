@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TypeAlias
 
 import bpy
 import numpy as np
@@ -45,6 +45,18 @@ _MOST_FIRED = 4096
 _IDLE_LOOP = 120.0  # seconds before idle life without a length comes again
 
 
+Times = dict[str, object]  # keyword arguments of risorius.Layer that say when it plays
+Source: TypeAlias = "tuple[native.Clip | dict[str, float], Times]"
+
+
+@dataclass
+class Kept:
+    """Sources and masks of layers, each by what it was made of."""
+
+    sources: dict[tuple[object, ...], Source] = field(default_factory=dict)
+    masks: dict[tuple[object, ...], NDArray[np.float32]] = field(default_factory=dict)
+
+
 @dataclass
 class Stack:
     """Compiled layers of a character.
@@ -56,21 +68,18 @@ class Stack:
         places: of each the place among the settings.
         weights: of all settings by place, as the mixer has them now.
         problems: sentences on layers that cannot be played, by their place.
-        kept: sources and masks, by what they were made of.
+        kept: sources and masks.
     """
 
-    made_of: tuple[Any, ...]
+    made_of: tuple[object, ...]
     mixer: native.Mixer
     layers: list[native.Layer] = field(default_factory=list)
     places: list[int] = field(default_factory=list)
     weights: tuple[float, ...] = ()
     problems: dict[int | str, str] = field(default_factory=dict)
-    kept: Kept = field(default_factory=dict)
+    kept: Kept = field(default_factory=Kept)
 
 
-Times = dict[str, Any]  # keyword arguments of risorius.Layer that say when it plays
-Source = tuple[Any, Times]  # a risorius.Clip, or a pose as a dict
-Kept = dict[tuple[object, ...], Any]  # sources and masks by what they were made of
 _stacks: dict[int, Stack] = {}  # session uid of a control armature -> Stack
 _versions: dict[int, int] = {}  # session uid of an action -> how often it was edited
 
@@ -180,7 +189,7 @@ def _compile(
     """A new Stack. Args: old  the one before it, whose curves serve where they are the same."""
     same = old if old is not None and old.made_of[0] == made_of[0] else None
     stack = Stack(made_of, _mixer(controls, live, maximum) if same is None else same.mixer)
-    kept: Kept = {} if same is None else same.kept
+    kept = Kept() if same is None else same.kept
     for place, layer in layers.ordered(controls):
         try:
             stack.layers.append(native_layer(controls, live, layer, rate, kept, stack.kept))
@@ -244,20 +253,20 @@ def native_layer(
     Raises:
         ValueError: it has nothing to play, or something that does not fit; the sentence says what.
     """
-    old, kept = old or {}, {} if kept is None else kept
+    old, kept = old or Kept(), kept or Kept()
     source_key, mask_key = _key(layer, rate)
-    if source_key not in kept:
-        made = old.get(source_key)
-        kept[source_key] = made or _SOURCES[layer.kind](controls, live, layer, rate)
-    if mask_key not in kept:
-        made = old.get(mask_key)
-        kept[mask_key] = _mask(live, layer) if made is None else made
-    source, own = kept[source_key]
+    if source_key not in kept.sources:
+        made = old.sources.get(source_key)
+        kept.sources[source_key] = made or _SOURCES[layer.kind](controls, live, layer, rate)
+    if mask_key not in kept.masks:
+        mask = old.masks.get(mask_key)
+        kept.masks[mask_key] = _mask(live, layer) if mask is None else mask
+    source, own = kept.sources[source_key]
     return native.module().Layer(
         source,
         name=layer.name,
         blend=_BLENDS[layer.blend],
-        mask=kept[mask_key],
+        mask=kept.masks[mask_key],
         mute=layer.mute,
         solo=layer.solo,
         **{
@@ -341,7 +350,7 @@ def _idle_source(
     clip = native.part("anim.idle").idle(layer.seed, seconds, loop=endless)
     sliders = clip_actions.sliders_of(live)
     clip = clip.selected([name for name in clip.names if name in sliders])
-    times = {"start": layer.start / rate}
+    times: Times = {"start": layer.start / rate}
     if endless:  # its loop has no begin and no end to fade at
         times.update(extend="repeat", fade_in=0.0, fade_out=0.0)
     return clip.replaced(names=[sliders[name] for name in clip.names]), times

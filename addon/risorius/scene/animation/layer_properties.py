@@ -11,7 +11,6 @@ import bpy
 
 from ... import native
 from ...logic.animation import layer_rules
-from ..base.blender_types import Context
 
 KINDS = (
     ("ACTION", "Action", "Keys of the controls, as of an import or of your own hand"),
@@ -35,7 +34,7 @@ REACTIONS = "risorius_reactions"
 _OVERRIDE: Any = {"LIBRARY_OVERRIDABLE"}
 
 
-def _changed(self: bpy.types.PropertyGroup, _context: Context) -> None:
+def _changed(self: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
     """Let Blender evaluate the character; what is compiled is compared, and made anew."""
     owner = self.id_data
     assert owner is not None

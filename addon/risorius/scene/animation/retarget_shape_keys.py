@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 import bpy
 import numpy as np
 from numpy.typing import NDArray
@@ -16,17 +18,16 @@ from . import clip_actions
 
 def sources(context: Context) -> list[MeshObject]:
     """Mesh objects of the scene whose shape keys move and that are no part of a face."""
-    return [
-        item
-        for item in context.scene.objects
-        if item.type == "MESH" and parts.rig_of(item) is None and _moves(item)
-    ]
+    items = [item for item in context.scene.objects if item.type == "MESH"]
+    meshes = cast(list[MeshObject], items)
+    return [item for item in meshes if parts.rig_of(item) is None and _moves(item)]
 
 
 def source_of(context: Context) -> MeshObject | None:
     """The one to take from: a selected one, else the only one of the scene, else None."""
     there = sources(context)
-    chosen = [item for item in context.selected_objects if item in there]
+    selected = cast(list[MeshObject], context.selected_objects)
+    chosen = [item for item in selected if item in there]
     if chosen:
         return chosen[0]
     return there[0] if len(there) == 1 else None

@@ -6,20 +6,17 @@ All of it is keyed by session uids, so that no Blender object is kept.
 
 from __future__ import annotations
 
-from typing import Any
-
 import bpy
 
-inputs: dict[int, Any] = {}  # deforming armature -> what its face was last evaluated from
-places: dict[int, Any] = {}  # deforming armature -> bytes of the matrix that was last written
-weights: dict[int, Any] = {}  # shape key -> bytes of the channel weights of its sum
-bone_writers: dict[
-    int, Any
-] = {}  # deforming armature -> what writing to its bones needs, until they change
+inputs: dict[int, object] = {}  # deforming armature -> what its face was last evaluated from
+places: dict[int, object] = {}  # deforming armature -> bytes of the matrix that was last written
+weights: dict[int, object] = {}  # shape key -> bytes of the channel weights of its sum
+# Deforming armature -> the Writer of frame/bone_writer.py, until its bones change.
+bone_writers: dict[int, object] = {}
 _refused: set[int] = set()  # objects of overrides that Blender lets nobody write to
 
 
-def is_new(kept: dict[int, Any], item: bpy.types.ID, state: object) -> bool:
+def is_new(kept: dict[int, object], item: bpy.types.ID, state: object) -> bool:
     """Whether a state differs from the one that is kept of a datablock; it is kept from now on.
 
     Args:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import cast
 
 import bpy
 import numpy as np
@@ -23,7 +23,7 @@ from ...logic.base.names import unique_labels
 from ..animation import actions
 from ..bake import bake_face, baked_shape_keys, baked_tracks, sampling
 from ..base import compat, parts, written
-from ..base.blender_types import ArmatureObject, Context, MeshObject
+from ..base.blender_types import ArmatureObject, Context, MeshObject, Override
 from ..character import meshes, runtime
 from ..frame import evaluate
 from .lent_names import Loans
@@ -75,7 +75,7 @@ def copies(
     context: Context,
     characters: Sequence[tuple[ArmatureObject, int, sampling.Samples]],
     options: ShipOptions,
-) -> Iterator[tuple[dict[str, Any], Loans]]:
+) -> Iterator[tuple[Override, Loans]]:
     """Baked copies of characters, selected, alone in a scene that is shown meanwhile.
 
     Args:
@@ -89,7 +89,7 @@ def copies(
     """
     window, user = context.window, context.scene
     before, loans = _everything(), Loans()
-    shown = window.scene if window is not None else None
+    shown = cast(bpy.types.Scene, window.scene) if window is not None else None
     with evaluate.paused():
         try:
             stage = _stage(user, characters[0][2].frames)
@@ -106,7 +106,7 @@ def copies(
             selected = layer.objects[:]
             yield {"scene": stage, "view_layer": layer, "selected_objects": selected}, loans
         finally:
-            if window is not None:
+            if window is not None and shown is not None:
                 window.scene = shown
             _remove_all_but(before)
             loans.give_back()

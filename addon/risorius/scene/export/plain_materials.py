@@ -22,7 +22,7 @@ from ... import native
 from ...logic.base.errors import FaceError
 from ...logic.material import uv_grid
 from ..base import compat
-from ..base.blender_types import MeshObject, Node, NodeTree, Socket
+from ..base.blender_types import MeshObject, Node, NodeTree, Override, Socket
 from ..base.console import quiet
 from ..material import image_loading
 from . import shader_inputs
@@ -67,7 +67,7 @@ class _Flat:
     mean: bool | float = False
 
 
-def flatten(override: dict[str, Any], loans: Loans, size: int) -> Generator[float, None, None]:
+def flatten(override: Override, loans: Loans, size: int) -> Generator[float, None, None]:
     """Replace the materials of copied meshes; a generator.
 
     Args:
@@ -234,7 +234,7 @@ def _keep_one_layout(mesh: bpy.types.Mesh) -> None:
 
 
 def _bake(
-    override: dict[str, Any], items: Sequence[MeshObject], flats: Sequence[_Flat], size: int
+    override: Override, items: Sequence[MeshObject], flats: Sequence[_Flat], size: int
 ) -> Iterator[float]:
     """All that is painted: colours, then opacity and roughness together."""
     _prepare(override["scene"], size)
@@ -328,7 +328,7 @@ def _feed(tree: NodeTree, source: shader_inputs.Source, socket: Socket) -> None:
         socket.default_value = source.value
 
 
-def _bake_one(override: dict[str, Any], items: Iterable[MeshObject], item: MeshObject) -> None:
+def _bake_one(override: Override, items: Iterable[MeshObject], item: MeshObject) -> None:
     """Bake one mesh, alone: Cycles reads the whole scene for each."""
     for other in items:
         other.hide_render = other != item
@@ -341,7 +341,7 @@ def _bake_one(override: dict[str, Any], items: Iterable[MeshObject], item: MeshO
         bpy.ops.object.bake(type="EMIT")
 
 
-def _select(override: dict[str, Any], items: Sequence[MeshObject]) -> None:
+def _select(override: Override, items: Sequence[MeshObject]) -> None:
     layer = override["view_layer"]
     for item in override["scene"].objects:
         item.select_set(item in items, view_layer=layer)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import bpy
 
@@ -30,7 +29,7 @@ class Source:
         socket: what has to be baked, or None.
     """
 
-    value: Any = None
+    value: float | tuple[float, ...] | None = None
     node: Node | None = None
     channel: str = ""
     socket: Socket | None = None

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ...logic.character import plans, user_edits
 from ..base import parts
-from ..base.blender_types import Attribute, MeshObject
+from ..base.blender_types import Attribute, MeshObject, Values
 from ..character import build, meshes, runtime, skin_weights
 from . import transfer
 from .file_change import Change
@@ -137,7 +137,7 @@ class _Nothing:
     def __init__(self, count: int) -> None:
         self._count = count
 
-    def vertices(self, values: transfer.Values) -> transfer.Values:
+    def vertices(self, values: Values) -> Values:
         """Zeros."""
         return np.zeros((self._count, *np.shape(values)[1:]))
 

@@ -11,7 +11,7 @@ from mathutils.bvhtree import BVHTree
 from numpy.typing import NDArray
 
 from ...logic.character import user_edits
-from ..base.blender_types import Attribute
+from ..base.blender_types import Attribute, Values
 
 # Attributes that a build makes itself, and Blender's own.
 _OURS = {"position", "UVMap", "custom_normal", "material_index"}
@@ -26,8 +26,6 @@ _FIELDS = {
     "FLOAT_COLOR": ("color", 4, np.float32),
     "BYTE_COLOR": ("color", 4, np.float32),
 }
-
-Values = NDArray[Any]  # one row for each vertex, corner or face, of the layer's own type
 
 
 class Carry(Protocol):

@@ -112,7 +112,7 @@ def is_there(values: bpy.types.bpy_prop_collection, name: str, wanted: NDArray[n
 def writer_of(rig: ArmatureObject, live: runtime.Runtime) -> Writer:
     """The Writer of an armature as it is now."""
     kept = written.bone_writers.get(rig.session_uid)
-    if kept is None or kept.count != len(rig.pose.bones):
+    if not isinstance(kept, Writer) or kept.count != len(rig.pose.bones):
         kept = written.bone_writers[rig.session_uid] = _make_writer(rig, live)
     return kept
 

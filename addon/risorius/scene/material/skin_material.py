@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import NamedTuple
 
 from ...logic.material import animated_maps
 from ..base import drivers, parts
@@ -26,9 +26,23 @@ _FLUSH_SHARE = 0.22  # of an area's map: without a painted mask a blush must sta
 _PORE_DEPTH = 0.032
 _FOLD_DEPTH = {"level": 0.45, "upright": 0.45, "rays": 0.35, "arc": 1.8, "dimples": 0.6}
 
-Bucket = tuple[str, Any]  # what maps are summed into: kind, and number or fold
-Mask = tuple[str, Any]  # where they show: kind, and region, area or map
 Member = tuple[str, Value]  # side of the face, value of the map
+
+
+class Bucket(NamedTuple):
+    """What maps are summed into: "flush", a set of the textures by number, or folds by name."""
+
+    kind: str  # "flush", "color", "normal" or "bump"
+    number: int = 0  # of the set: of "color" and "normal"
+    folds: str = ""  # of "bump", see animated_maps.FOLDS
+
+
+class Mask(NamedTuple):
+    """Where maps show: the texture of one map, a region of the painted masks, or an area."""
+
+    kind: str  # "own", "atlas" or "area"
+    place: str = ""  # of "atlas" and "area"
+    map_index: int = -1  # of "own"
 
 
 class Skin:
@@ -103,18 +117,18 @@ class Skin:
         look = self.look
         own = look.image(f"map:{use.label}", data=True)
         if own is not None:
-            return [(("flush", ""), ("own", use.index))]
-        mask = ("atlas", use.region) if use.region in look.places else ("area", use.area)
-        if mask[0] == "area" and use.area != "all" and use.area not in look.areas:
+            return [(Bucket("flush"), Mask("own", map_index=use.index))]
+        mask = Mask("atlas", use.region) if use.region in look.places else Mask("area", use.area)
+        if mask.kind == "area" and use.area != "all" and use.area not in look.areas:
             return []
         found = []
         if use.color:
             whole = use.number and look.image(f"color:{use.number}") is not None
-            found.append((("color", use.number) if whole else ("flush", ""), mask))
+            found.append((Bucket("color", use.number) if whole else Bucket("flush"), mask))
         if use.normal:
             whole = use.number and look.image(f"normal:{use.number}", data=True) is not None
-            kind = animated_maps.FOLDS[use.area]
-            found.append((("normal", use.number) if whole else ("bump", kind), mask))
+            folds = Bucket("bump", folds=animated_maps.FOLDS[use.area])
+            found.append((Bucket("normal", use.number) if whole else folds, mask))
         return found
 
     def _value(self, use: animated_maps.MapUse, frame: Node) -> Socket:
@@ -129,19 +143,20 @@ class Skin:
     def _masked(self, bucket: Bucket, mask: Mask, members: Sequence[Member]) -> Socket:
         """The sum of some maps' values, each side on its own half, times their mask."""
         graph = self.graph
-        kind, name = mask
-        if kind == "own":
-            use = self.look.uses[name]
+        if mask.kind == "own":
+            use = self.look.uses[mask.map_index]
             own = self.look.image(f"map:{use.label}", data=True)
             picture = graph.image(own, label=use.label, clamp=True)
             return graph.math("MULTIPLY", members[0][1], picture.outputs["Color"])
-        if kind == "atlas":
+        if mask.kind == "atlas":
             amount = graph.total([v for _, v in members])
-            return graph.math("MULTIPLY", amount, self._atlas_channel(name))
-        share = _FLUSH_SHARE if bucket[0] == "flush" else 1.0
+            return graph.math("MULTIPLY", amount, self._atlas_channel(mask.place))
+        share = _FLUSH_SHARE if bucket.kind == "flush" else 1.0
         amount = graph.math("MINIMUM", self._sided(members), 1.0)
         amount = graph.math("MULTIPLY", amount, share)
-        return amount if name == "all" else graph.math("MULTIPLY", amount, self.areas[name])
+        if mask.place == "all":
+            return amount
+        return graph.math("MULTIPLY", amount, self.areas[mask.place])
 
     def _sided(self, members: Sequence[Member]) -> Value:
         left = [v for side, v in members if side != "R"]
@@ -166,16 +181,15 @@ class Skin:
         return cache[column, row][channel]
 
     def _file(self, bucket: Bucket, amounts: list[Value]) -> None:
-        kind, name = bucket
-        amount = self.graph.total(amounts, clamp=kind != "flush")
-        if kind == "flush":
+        amount = self.graph.total(amounts, clamp=bucket.kind != "flush")
+        if bucket.kind == "flush":
             self.flush = amounts
-        elif kind == "color":
-            self.tints.append((name, amount))
-        elif kind == "normal":
-            self.wrinkles[name] = amount
+        elif bucket.kind == "color":
+            self.tints.append((bucket.number, amount))
+        elif bucket.kind == "normal":
+            self.wrinkles[bucket.number] = amount
         else:
-            self.bumps[name] = amount
+            self.bumps[bucket.folds] = amount
 
     # --- colour --------------------------------------------------------------------------
 

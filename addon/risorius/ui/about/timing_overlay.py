@@ -6,8 +6,9 @@ from typing import cast
 import blf
 import bpy
 
+from ...scene.base.blender_types import WindowManager
 from ...scene.frame import timing
-from ..blender_types import Context, WindowManager
+from ..blender_types import Context
 
 _handles: list[object] = []
 

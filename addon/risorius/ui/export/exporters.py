@@ -7,8 +7,8 @@ from typing import Protocol
 import bpy
 
 from ...logic.base.errors import FaceError
+from ...scene.base.blender_types import Override
 from ...scene.base.console import quiet
-from ..blender_types import Override
 
 FORMATS = (
     ("GLTF", "glTF", "Bones and shape keys, one binary .glb file"),

@@ -3,10 +3,12 @@
 # pyright: reportInvalidTypeForm=false
 """Trying one blend shape by hand: a search, a slider, a way back."""
 
+from typing import cast
+
 import bpy
 
 from ...scene.base import parts
-from ...scene.base.blender_types import ArmatureObject
+from ...scene.base.blender_types import ArmatureObject, current_context
 from ...scene.character import build, runtime
 from ...scene.frame import channel_preview, evaluate
 from ..blender_types import Context, Item, Operator, Panel, Result
@@ -15,9 +17,7 @@ from ..common import FaceOnlyPanel, FaceOperator, face_rig
 _items: list[Item] = []  # Blender reads the strings later: they must stay alive
 
 
-def _test(
-    context: bpy.types.Context, rig: ArmatureObject, channel: int, value: float | None
-) -> None:
+def _test(context: Context, rig: ArmatureObject, channel: int, value: float | None) -> None:
     """Set the override of a face, or end it where the value is None, and show it."""
     if value is None:
         channel_preview.clear(rig)
@@ -28,7 +28,7 @@ def _test(
 
 def _channels(_operator: object, context: bpy.types.Context | None) -> list[Item]:
     """Enum items: the channels that move a mesh of the active face."""
-    rig = parts.active_rig(context) if context is not None else None
+    rig = parts.active_rig(cast(Context, context)) if context is not None else None
     live = runtime.of(rig) if rig is not None else None
     _items.clear()
     if rig is None or live is None:
@@ -85,16 +85,16 @@ class RISORIUS_OT_test_channel(FaceOperator, Operator):
 
 
 def _get_weight(_manager: bpy.types.WindowManager) -> float:
-    rig = parts.active_rig(bpy.context)
+    rig = parts.active_rig(current_context())
     now = channel_preview.current(rig) if rig is not None else None
     return now[1] if now else 0.0
 
 
 def _set_weight(_manager: bpy.types.WindowManager, value: float) -> None:
-    rig = parts.active_rig(bpy.context)
+    rig = parts.active_rig(current_context())
     now = channel_preview.current(rig) if rig is not None else None
     if rig is not None and now is not None:
-        _test(bpy.context, rig, now[0], value)
+        _test(current_context(), rig, now[0], value)
 
 
 def weight_property() -> object:
