@@ -7,6 +7,9 @@ import ast
 import re
 from collections.abc import Iterator
 
+# What Blender calls on the classes of an add-on, always with the same arguments.
+BLENDERS = {"poll", "execute", "invoke", "modal", "draw", "draw_item", "filter_items"}
+
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 
 
@@ -14,14 +17,16 @@ def public_functions(tree: ast.Module) -> Iterator[tuple[str, Function]]:
     """(dotted name, definition) of the functions of a module and the methods of its classes.
 
     Names that begin with an underscore, and what lies in them, are not public. Overloads are left
-    to the definition behind them.
+    to the definition behind them, and what Blender calls on its classes to Blender's manual.
     """
     for node in tree.body:
         if isinstance(node, Function) and _shown(node):
             yield node.name, node
         elif isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
             for inner in node.body:
-                if isinstance(inner, Function) and _shown(inner):
+                if not (isinstance(inner, Function) and _shown(inner)):
+                    continue
+                if not (node.name.startswith("RISORIUS_") and inner.name in BLENDERS):
                     yield f"{node.name}.{inner.name}", inner
 
 

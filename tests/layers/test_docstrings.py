@@ -8,7 +8,12 @@ import pytest
 from docstrings import public_functions, unsaid
 
 ROOT = Path(__file__).resolve().parents[2]
-FOLDERS = ["native/python/risorius", "addon/risorius/logic"]
+FOLDERS = [
+    "native/python/risorius",
+    "addon/risorius/logic",
+    "addon/risorius/scene",
+    "addon/risorius/ui",
+]
 
 
 def found_in(source):
@@ -38,6 +43,9 @@ def test_docstrings_name_arguments_and_errors(folder):
         ("class C:\n    def f(self, a, b):\n        '''Of ab.'''", {"C.f": ["a", "b"]}),
         ("def f(a, b):\n    '''a, b.'''\n    raise ValueError(a)", {"f": ["Raises"]}),
         ("def f(a, b):\n    '''a, b. Raises: E.'''\n    raise ValueError(a)", {"f": []}),
+        ("class RISORIUS_OT_f:\n    def invoke(self, context, event): pass", {}),
+        ("class RISORIUS_OT_f:\n    def g(self, a, b): pass", {"RISORIUS_OT_f.g": ["a", "b"]}),
+        ("class C:\n    def invoke(self, a, b): pass", {"C.invoke": ["a", "b"]}),
         ("def f(a): pass\ndef _g(a, b): pass\nclass _C:\n    def f(self, a, b): pass", {"f": []}),
     ],
 )

@@ -22,7 +22,12 @@ MODES = (
 
 
 def explain(path: str | Path, error: Exception) -> str:
-    """One sentence for what is wrong with a file."""
+    """One sentence for what is wrong with a file.
+
+    Args:
+        path: of the file; its name begins the sentence, unless the error names it.
+        error: what reading or writing it raised.
+    """
     reason = error.strerror if isinstance(error, OSError) else None
     text = names.printable(reason or str(error)).strip().rstrip(".")
     name = names.printable(Path(path).name)

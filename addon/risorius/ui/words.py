@@ -64,7 +64,13 @@ def prop_or(
 
 
 def write(layout: UILayout, text: str, icon: Icon = "NONE") -> None:
-    """A sentence in as many lines as a narrow sidebar needs."""
+    """A sentence in as many lines as a narrow sidebar needs.
+
+    Args:
+        layout: of the panel.
+        text: the sentence.
+        icon: before the first line.
+    """
     column = layout.column(align=True)
     column.scale_y = 0.8
     for number, line in enumerate(textwrap.wrap(text, 38)):

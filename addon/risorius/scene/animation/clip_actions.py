@@ -94,7 +94,7 @@ def make_action(
         Report.
 
     Raises:
-        clips.ClipError: nothing in it is for this face, or it lies beyond what Blender can play.
+        clip_units.ClipError: nothing in it is for this face, or it is beyond what Blender plays.
     """
     controls, live = parts.controls_there(rig), runtime.there(rig)
     times = clip.frame_times()
@@ -219,6 +219,10 @@ def _as_rotation(bone: bpy.types.PoseBone, turns: NDArray[np.float64]) -> NDArra
 def play(rig: ArmatureObject, action: bpy.types.Action) -> bpy.types.Action | None:
     """Let a character play an action as its active one.
 
+    Args:
+        rig: its deforming armature.
+        action: any action; where it has slots, the one that fits the control armature is played.
+
     Returns:
         The action that it played before, now kept by a fake user; None where there was none.
     """
@@ -232,7 +236,16 @@ def play(rig: ArmatureObject, action: bpy.types.Action) -> bpy.types.Action | No
 
 
 def add_strip(rig: ArmatureObject, action: bpy.types.Action, name: str = "") -> bpy.types.NlaStrip:
-    """Play an action as a strip of a new NLA track, where its keys are. Returns: the strip."""
+    """Play an action as a strip of a new NLA track, where its keys are.
+
+    Args:
+        rig: deforming armature of the character.
+        action: any action.
+        name: of the track and the strip; "" for the action's.
+
+    Returns:
+        The strip.
+    """
     controls = parts.controls_there(rig)
     track = controls.animation_data_create().nla_tracks.new()
     track.name = name or action.name
@@ -291,6 +304,13 @@ def dna_names(live: runtime.Runtime, names: Iterable[str]) -> list[str]:
     """The names that other characters know: the DNA's instead of Blender's cut ones.
 
     A slider keeps Blender's where the DNA has a name twice; what is no slider keeps its own.
+
+    Args:
+        live: the character's Runtime.
+        names: of its sliders, as Blender's properties are called, and of anything else.
+
+    Returns:
+        As many names, in the same order.
     """
     own = {}
     for label, name in zip(live.labels, live.dna.raw_control_names, strict=True):
@@ -322,7 +342,12 @@ def is_bent(curve: bpy.types.FCurve) -> bool:
 
 
 def playing_curves(action: bpy.types.Action, owner: Animated) -> list[bpy.types.FCurve]:
-    """The F-curves by which an action moves a datablock, without those that are muted."""
+    """The F-curves by which an action moves a datablock, without those that are muted.
+
+    Args:
+        action: any action.
+        owner: the object or the shape keys; where the action has slots, its slot is read.
+    """
     return [
         c for c in compat.curves_for(action, owner) if not (c.mute or (c.group and c.group.mute))
     ]
@@ -384,7 +409,7 @@ def add_sound(
         The strip.
 
     Raises:
-        clips.ClipError: Blender cannot read the file.
+        clip_units.ClipError: Blender cannot read the file.
     """
     strips = compat.strips_of(scene)
     start = round(frame)

@@ -36,7 +36,15 @@ def groups() -> dict[str, list[native.Expression]]:
 
 
 def weights_for(live: runtime.Runtime, expression: native.Expression) -> dict[str, float]:
-    """The sliders of an expression: property name -> value, without those the face lacks."""
+    """The sliders of an expression, without those the face lacks.
+
+    Args:
+        live: the character's Runtime.
+        expression: risorius.expressions.Expression, whose weights go by the DNA's control names.
+
+    Returns:
+        Property name -> value.
+    """
     sliders = clip_actions.sliders_of(live)
     return {sliders[n]: float(w) for n, w in expression.weights.items() if n in sliders}
 
@@ -73,7 +81,13 @@ def apply(
 
 
 def key(rig: ArmatureObject, names: Iterable[str], frame: float) -> None:
-    """Insert keys on sliders at a frame."""
+    """Insert keys on sliders at a frame, of the values that they have now.
+
+    Args:
+        rig: deforming armature of the character.
+        names: of the sliders, as Blender's properties are called.
+        frame: of the scene; need not be whole.
+    """
     controls = parts.controls_there(rig)
     for name in names:
         path = parts.property_path(name)
@@ -136,7 +150,12 @@ def _asset(
 
 
 def regions_of(expression: native.Expression, weights: Iterable[str]) -> set[str]:
-    """The regions that an expression moves; a viseme always the whole mouth."""
+    """The regions that an expression moves; a viseme always the whole mouth.
+
+    Args:
+        expression: risorius.expressions.Expression.
+        weights: the names of its sliders on this face, from weights_for.
+    """
     held = {native.regions().of_slider(name) for name in weights}
     return held | {"mouth", "jaw", "tongue"} if expression.group == "viseme" else held
 

@@ -151,7 +151,14 @@ def mix(
 def compiled(
     controls: ArmatureObject, live: runtime.Runtime, scene: bpy.types.Scene, maximum: float = 1.0
 ) -> Stack:
-    """The Stack of a character, compiled anew only where something changed."""
+    """The Stack of a character, compiled anew only where something changed.
+
+    Args:
+        controls: its control armature, the original one.
+        live: its Runtime.
+        scene: gives the frame rate.
+        maximum: of the sliders.
+    """
     rate = clip_actions.frame_rate(scene)
     made_of = (
         (id(live), maximum, controls.risorius_layer_rules),
@@ -285,7 +292,12 @@ def _mask(live: runtime.Runtime, layer: RISORIUS_PG_layer) -> NDArray[np.float32
 
 
 def allowed_names(live: runtime.Runtime, layer: RISORIUS_PG_layer) -> set[str]:
-    """What a layer may move: sliders, and the head's angles, which belong to the neck's region."""
+    """What a layer may move: sliders, and the head's angles, which belong to the neck's region.
+
+    Args:
+        live: Runtime of the character, for the names of its sliders.
+        layer: settings with the regions and the patterns of names.
+    """
     chosen = {region.lower() for region in layer.regions}
     labels = [*live.labels, *clip_logic.HEAD]
     return set(logic.masked(labels, native.regions(), chosen, layer.controls))
@@ -360,7 +372,13 @@ _SOURCES = {"ACTION": _action_source, "EXPRESSION": _expression_source, "IDLE": 
 
 
 def problems(controls: ArmatureObject, live: runtime.Runtime, scene: bpy.types.Scene) -> list[str]:
-    """Sentences on layers that cannot be played, as last compiled."""
+    """Sentences on layers that cannot be played, as last compiled.
+
+    Args:
+        controls: control armature of the character, the original one.
+        live: its Runtime.
+        scene: gives the frame rate.
+    """
     stack = compiled(controls, live, scene, parts.maximum_of(controls))
     names: dict[int | str, str] = {
         place: layer.name for place, layer in enumerate(layers.places(controls))

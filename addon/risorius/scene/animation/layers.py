@@ -59,7 +59,12 @@ def has_any(controls: ArmatureObject) -> bool:
 
 
 def plays(controls: ArmatureObject, actions: Collection[bpy.types.Action]) -> bool:
-    """Whether a layer of a character plays one of the actions."""
+    """Whether a layer of a character plays one of the actions.
+
+    Args:
+        controls: control armature of the character.
+        actions: those that are looked for.
+    """
     return any(layer.action in actions for layer in of(controls) if layer.action is not None)
 
 
@@ -88,7 +93,12 @@ def known_reactions() -> dict[str, native.Reaction]:
 
 
 def fits(controls: ArmatureObject, action: bpy.types.Action) -> bool:
-    """Whether an action has keys of a slider of a character."""
+    """Whether an action has keys of a slider of a character.
+
+    Args:
+        controls: control armature of the character.
+        action: any action; where it has slots, the one for these controls is read.
+    """
     path = parts.property_path("")[:-3]
     return any(c.data_path.startswith(path) for c in compat.curves_for(action, controls))
 
@@ -119,7 +129,7 @@ def add(controls: ArmatureObject, kind: str, name: str, **settings: object) -> R
 
     Args:
         controls: control armature.
-        kind: see layer_props.KINDS.
+        kind: see layer_properties.KINDS.
         name: what the list shows; numbered where a layer has it already.
         settings: other properties of the layer.
 
@@ -147,13 +157,27 @@ def _free_name(name: str, taken: Collection[str]) -> str:
 def add_action(
     controls: ArmatureObject, action: bpy.types.Action, **settings: object
 ) -> RISORIUS_PG_layer:
-    """A layer that plays an action where its keys are. Returns: the layer."""
+    """A layer that plays an action where its keys are.
+
+    Args:
+        controls: control armature of the character.
+        action: what is played, from the frame of its first key on.
+        settings: properties of the layer by name, as `add` takes them.
+
+    Returns:
+        The layer, which is the highest.
+    """
     first = action.frame_range[0]
     return add(controls, "ACTION", action.name, action=action, start=first, **settings)
 
 
 def place_of(controls: ArmatureObject, layer: RISORIUS_PG_layer) -> int:
-    """The place of a layer: what its keys and drivers call it by."""
+    """The place of a layer: what its keys and drivers call it by.
+
+    Args:
+        controls: control armature of the character.
+        layer: one of its layers, also a removed one.
+    """
     return list(places(controls)).index(layer)
 
 
@@ -161,6 +185,10 @@ def remove(controls: ArmatureObject, place: int) -> None:
     """Remove a layer, and the keys of its weight where no other character plays them.
 
     Its place stays empty while an action has keys for it, so that they move no other layer.
+
+    Args:
+        controls: control armature of the character.
+        place: of the layer, from place_of.
     """
     layer = places(controls)[place]
     below = of(controls).index(layer) - 1
@@ -189,6 +217,11 @@ def _trim(controls: ArmatureObject) -> None:
 def move(controls: ArmatureObject, place: int, up: bool) -> bool:
     """Put a layer one higher or lower; its place, and with it its keys, stay.
 
+    Args:
+        controls: control armature of the character.
+        place: of the layer, from place_of.
+        up: higher if true, else lower.
+
     Returns:
         Whether there was one to change with.
     """
@@ -210,7 +243,15 @@ def _rank(there: Sequence[RISORIUS_PG_layer]) -> None:
 
 
 def duplicate(controls: ArmatureObject, place: int) -> RISORIUS_PG_layer:
-    """Put a copy of a layer, with the keys of its weight, right above it. Returns: the copy."""
+    """Put a copy of a layer, with the keys of its weight, right above it.
+
+    Args:
+        controls: control armature of the character.
+        place: of the layer, from place_of.
+
+    Returns:
+        The copy.
+    """
     source = places(controls)[place]
     name, kind = source.name, source.kind
     add(controls, kind, name)
@@ -251,7 +292,12 @@ def _copy_curves(controls: ArmatureObject, place: int, to: int) -> None:
 
 
 def copy_keys(source: bpy.types.FCurve, target: bpy.types.FCurve) -> None:
-    """Give an F-curve without keys those of another."""
+    """Give an F-curve without keys those of another, with their handles and interpolation.
+
+    Args:
+        source: the F-curve that has keys; unchanged.
+        target: the F-curve that gets them.
+    """
     target.keyframe_points.add(len(source.keyframe_points))
     for new, old in zip(target.keyframe_points, source.keyframe_points, strict=True):
         for name in _KEY_SETTINGS:
@@ -287,7 +333,17 @@ def keep_weights(controls: ArmatureObject, before: bpy.types.Action | None) -> N
 def fire(
     controls: ArmatureObject, name: str, frame: float, strength: float = 1.0
 ) -> RISORIUS_PG_reaction:
-    """Fire a reaction at a frame. Returns: its entry in the list."""
+    """Fire a reaction at a frame.
+
+    Args:
+        controls: control armature of the character.
+        name: of the reaction, see known_reactions.
+        frame: of the scene; need not be whole.
+        strength: 0 to 1, factor on the reaction's values.
+
+    Returns:
+        Its entry in the list.
+    """
     entry = reactions_of(controls).add()
     entry.name, entry.frame, entry.strength = name, frame, strength
     controls.risorius_reactions_index = len(reactions_of(controls)) - 1
@@ -296,7 +352,12 @@ def fire(
 
 
 def unfire(controls: ArmatureObject, place: int) -> None:
-    """Take a fired reaction out again."""
+    """Take a fired reaction out again.
+
+    Args:
+        controls: control armature of the character.
+        place: in the list of fired reactions, from 0.
+    """
     reactions_of(controls).remove(place)
     controls.risorius_reactions_index = max(0, min(place, len(reactions_of(controls)) - 1))
     controls.update_tag()

@@ -40,7 +40,7 @@ class BakeOptions:
         start, end, step: frames; the step may be a part of one.
         lod: level of detail of a RESULT; -1 for the one that the viewport shows.
         wanted: of a RESULT: some of "BONES", "SHAPES", "MAPS"; the rest stays as it stands.
-        error: keys are left out while straight lines stay within it, see curves.reduce_keys.
+        error: keys are left out while straight lines stay within it, see key_reduction.reduce_keys.
         strip: put the actions onto new NLA tracks.
     """
 
@@ -75,7 +75,12 @@ def words(rig: ArmatureObject) -> str:
 
 
 def refusal(rig: ArmatureObject, kind: str) -> str:
-    """Why a character cannot be baked now, in one sentence; empty when it can."""
+    """Why a character cannot be baked now, in one sentence; empty when it can.
+
+    Args:
+        rig: its deforming armature.
+        kind: what would be baked: CONTROLS or RESULT.
+    """
     if baked(rig) in (RESULT, kind):
         return f"{rig.name} is baked already: choose Back to Live first."
     controls = parts.controls_there(rig)
@@ -139,7 +144,14 @@ def bake(
 
 
 def level_of(rig: ArmatureObject, lod: int) -> int:
-    """The level that is baked.
+    """The level of detail that is baked.
+
+    Args:
+        rig: deforming armature of the character.
+        lod: the wanted level; negative for the one that the viewport shows.
+
+    Returns:
+        The level, never beyond the coarsest that the DNA has.
 
     Raises:
         BakeError: it was not built.
@@ -152,12 +164,25 @@ def level_of(rig: ArmatureObject, lod: int) -> int:
 
 
 def shown(rig: ArmatureObject, level: int) -> list[MeshObject]:
-    """The meshes that a level shows."""
+    """The meshes that a level of detail shows.
+
+    Args:
+        rig: deforming armature of the character.
+        level: 0 is the finest.
+    """
     return [m for m in parts.meshes_of(rig) if level in list(m.get(parts.LODS, [level]))]
 
 
 def animated_keys(rig: ArmatureObject, level: int) -> list[tuple[MeshObject, list[str]]]:
-    """(mesh, data paths) of shape keys that actions of the user's move."""
+    """The shape keys that actions of the user's move.
+
+    Args:
+        rig: deforming armature of the character.
+        level: of detail; only meshes that it shows are looked at.
+
+    Returns:
+        (mesh, data paths) of each mesh that has such keys.
+    """
     found = []
     for item in shown(rig, level):
         key = item.data.shape_keys

@@ -26,7 +26,16 @@ _CHANNEL = re.compile(r'^\["channels"\]\[(\d+)\]$')
 
 
 def evaluate(live: runtime.Runtime, samples: sampling.Samples, lod: int) -> native.Pose:
-    """The poses of all frames. Returns: a risorius.Pose whose fields have a leading N."""
+    """The poses of all frames.
+
+    Args:
+        live: the character's Runtime.
+        samples: from sampling.sample, of N frames.
+        lod: level of detail at which the rig is evaluated.
+
+    Returns:
+        A risorius.Pose whose fields have a leading N.
+    """
     return live.rig.evaluate_batch(samples.raw, lod)
 
 

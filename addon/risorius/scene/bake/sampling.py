@@ -257,7 +257,12 @@ def _animated(owner: bpy.types.Object) -> bool:
 
 
 def animated_paths(owner: bpy.types.Object | bpy.types.Key, drivers: bool = True) -> list[str]:
-    """The data paths that an action, an NLA strip or a driver moves on a datablock, in order."""
+    """The data paths that an action, an NLA strip or a driver moves on a datablock, in order.
+
+    Args:
+        owner: the object or the shape keys.
+        drivers: whether paths of drivers count too.
+    """
     data = owner.animation_data
     if data is None:
         return []

@@ -76,6 +76,10 @@ def slot_for(action: bpy.types.Action, owner: Animated) -> bpy.types.ActionSlot 
     """The slot of an action that fits a datablock, or None: before 4.4, and where none fits.
 
     The one that it plays, else the one of its name, else the first of its kind.
+
+    Args:
+        action: any action.
+        owner: the object or the shape keys that play it or shall play it.
     """
     kinds = (owner.id_type, "UNSPECIFIED")
     slots = [s for s in getattr(action, "slots", ()) if s.target_id_type in kinds]
@@ -90,7 +94,9 @@ def slot_for(action: bpy.types.Action, owner: Animated) -> bpy.types.ActionSlot 
 def bag_for(action: bpy.types.Action, owner: Animated) -> bpy.types.ActionChannelbag | None:
     """What holds the F-curves by which an action moves a datablock, or None where there is none.
 
-    Actions as one makes them have one layer with one strip.
+    Args:
+        action: as one makes them, with one layer of one strip; before 4.4 it is given itself.
+        owner: the object or the shape keys; decides on the slot.
     """
     if not hasattr(action, "slots") or not len(action.layers):
         own = action if hasattr(action, "fcurves") else None
@@ -101,7 +107,12 @@ def bag_for(action: bpy.types.Action, owner: Animated) -> bpy.types.ActionChanne
 
 
 def curves_for(action: bpy.types.Action, owner: Animated) -> list[bpy.types.FCurve]:
-    """The F-curves by which an action moves a datablock: of one slot, where it has slots."""
+    """The F-curves by which an action moves a datablock: of one slot, where it has slots.
+
+    Args:
+        action: any action.
+        owner: the object or the shape keys; decides on the slot.
+    """
     if not hasattr(action, "slots") or not len(action.layers):
         return list(getattr(action, "fcurves", ()))
     slot = slot_for(action, owner)
@@ -133,7 +144,13 @@ def assign_action(
     action: bpy.types.Action,
     slot: bpy.types.ActionSlot | None = None,
 ) -> None:
-    """Let an object's animation data, or an NLA strip, play an action."""
+    """Let an object's animation data, or an NLA strip, play an action.
+
+    Args:
+        target: the animation data or the strip.
+        action: any action.
+        slot: of the action; None leaves the choice to Blender, and is all there is before 4.4.
+    """
     target.action = action
     if slot is not None:
         target.action_slot = slot

@@ -129,7 +129,14 @@ def used_controls(controls: ArmatureObject, labels: Sequence[str]) -> set[str]:
 def plain_driver(
     curve: bpy.types.FCurve, rig: ArmatureObject, data_path: str, name: str = "var"
 ) -> None:
-    """Make an F-curve follow one property of the rig, without any expression."""
+    """Make an F-curve follow one property of the rig, without any expression.
+
+    Args:
+        curve: of a new driver that has no variables.
+        rig: the object that has the property.
+        data_path: from the object to one number.
+        name: of the driver's variable.
+    """
     driver = curve.driver
     assert driver is not None
     driver.type = "SUM"

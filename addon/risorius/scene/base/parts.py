@@ -33,7 +33,9 @@ REAL = "risorius_real"  # on a Key: channels that are real keys although the mes
 KEY_NAMES = "risorius_key_names"  # on a Key in LIVE mode: names that the user gave to our keys
 KEY_ORDER = "risorius_key_order"  # on a Key in LIVE mode: their order, as channels
 CHANNEL_VARIABLE = "risorius_channel"  # name of the driver variable of our keys
-TEST = "risorius_test"  # on the deforming armature: a channel's test override, see testing.py
+TEST = (
+    "risorius_test"  # on the deforming armature: a channel's test override, see channel_preview.py
+)
 BAKED = "risorius_baked"  # on rig or controls: what was baked; the rig's is not live meanwhile
 MAPS = "maps"  # on the deforming armature: values of the animated maps
 CHANNELS = "channels"  # on the deforming armature: values of the channels
@@ -65,6 +67,11 @@ def point(owner: bpy.types.Object, key: str, item: bpy.types.ID) -> None:
     """Let a custom property point to another part, also on overrides of linked characters.
 
     Blender gives a pointer of an override back to the library at load unless it is marked so.
+
+    Args:
+        owner: the object that has the property.
+        key: name of the property; whatever it held is replaced.
+        item: the object or text that it points to from now on.
     """
     owner[key] = item
     owner.property_overridable_library_set(f'["{key}"]', True)

@@ -72,7 +72,12 @@ def _holds(text: bpy.types.Text, wanted: bytes) -> bool:
 
 
 def same(one: bpy.types.Text, other: bpy.types.Text) -> bool:
-    """Whether two Texts hold the same packed bytes of a DNA file."""
+    """Whether two Texts hold the same packed bytes of a DNA file.
+
+    Args:
+        one: a Text that holds a file.
+        other: another, or the same Text.
+    """
     return one == other or (
         content_hash(one) == content_hash(other) and one.get(_BYTES) == other.get(_BYTES)
     )

@@ -31,7 +31,12 @@ def is_new(kept: dict[int, object], item: bpy.types.ID, state: object) -> bool:
 
 
 def note_refusal(item: bpy.types.ID, taken: bool) -> None:
-    """Note whether Blender took what was written to an object: it refuses without a word."""
+    """Note whether Blender took what was written to an object: it refuses without a word.
+
+    Args:
+        item: the object.
+        taken: whether it has now what was written.
+    """
     if taken:
         _refused.discard(item.session_uid)
     else:

@@ -53,7 +53,14 @@ def _edit_bones(
 def edit_armature(
     context: Context, data: bpy.types.Armature
 ) -> Iterator[bpy.types.ArmatureEditBones]:
-    """The edit bones of an armature that is in use, whether its objects are hidden or not."""
+    """The edit bones of an armature that is in use, whether its objects are hidden or not.
+
+    A context manager; what is changed within it is kept.
+
+    Args:
+        context: its scene holds the helper object for the while.
+        data: the armature.
+    """
     workshop = bpy.data.collections.new("bones")
     item = cast("ArmatureObject", bpy.data.objects.new("bones", data))
     context.scene.collection.children.link(workshop)
@@ -178,7 +185,11 @@ def build_controls(
 ) -> ArmatureObject:
     """Build the small control armature with the sliders and the bones that turn things.
 
-    Args: see build_rig.
+    Args:
+        context: a Blender context with a view layer.
+        plan: the CharacterPlan.
+        made: list that every new datablock is put on.
+        workshop: a linked collection in which bones are edited.
 
     Returns:
         The armature object.
@@ -248,14 +259,26 @@ def control_places(plan: plans.CharacterPlan) -> dict[str, BonePlace]:
 def add_properties(
     bone: bpy.types.PoseBone, controls: Iterable[plans.ControlPlan], maximum: float = 1.0
 ) -> None:
-    """Give a pose bone the float property of each ControlPlan: limits, default, words."""
+    """Give a pose bone the float property of each slider: limits, default, words.
+
+    Args:
+        bone: the bone of the face.
+        controls: ControlPlans of the sliders.
+        maximum: highest value of all of them.
+    """
     for control in controls:
         bone[control.label] = control.rest
         describe_property(bone, control, maximum)
 
 
 def describe_property(bone: bpy.types.PoseBone, control: plans.ControlPlan, maximum: float) -> None:
-    """Set limits, default and words of one control property. Args: control  its ControlPlan."""
+    """Set limits, default and words of one slider.
+
+    Args:
+        bone: the bone of the face, which has the property already.
+        control: its ControlPlan.
+        maximum: highest value that it may have.
+    """
     name = control.label
     words: Any = bone.id_properties_ui(name)
     words.update(

@@ -164,7 +164,12 @@ def _first(plan: plans.CharacterPlan) -> int:
 
 
 def settle(context: Context, *items: bpy.types.Object) -> None:
-    """Bring new custom properties to the evaluated copies."""
+    """Bring new custom properties to the evaluated copies.
+
+    Args:
+        context: its view layer is brought up to date.
+        items: the objects whose properties are new.
+    """
     for item in items:
         item.update_tag()
     context.view_layer.update()
@@ -249,7 +254,12 @@ def _into_place(
 
 
 def change_mode(rig: ArmatureObject, mode: str) -> list[str]:
-    """Switch the meshes of a character to LIVE or KEYS shapes; AUTO chooses by size.
+    """Switch the meshes of a character to another kind of shapes.
+
+    Args:
+        rig: its deforming armature.
+        mode: "LIVE" for one key that the add-on sums, "KEYS" for one key a channel, or "AUTO",
+            which chooses for each mesh by its size.
 
     Returns:
         Sentences on meshes that could not be switched.

@@ -188,12 +188,28 @@ def set_mode(
 
 
 def imported_basis(dna_mesh: native.Mesh, space: Space) -> NDArray[np.float32]:
-    """The neutral mesh as an import gives it, float32[V, 3] in Blender units."""
+    """The neutral mesh as an import gives it.
+
+    Args:
+        dna_mesh: risorius.Mesh with V vertices.
+        space: from the DNA's axes and unit to Blender's.
+
+    Returns:
+        float32[V, 3] in Blender units.
+    """
     return np.ascontiguousarray(space.points(dna_mesh.positions), np.float32)
 
 
 def deltas_by_channel(dna_mesh: native.Mesh, matrix: NDArray[np.float32]) -> dict[int, Deltas]:
-    """Channel -> (vertex indices, float32[K, 3] deltas); targets of one channel are joined."""
+    """The blend shape targets of a mesh by their channel; those of one channel are joined.
+
+    Args:
+        dna_mesh: risorius.Mesh.
+        matrix: float32[3, 3] that turns and scales the DNA's deltas to Blender's axes and unit.
+
+    Returns:
+        Channel -> (vertex indices, float32[K, 3] deltas).
+    """
     joined = {}
     for target in dna_mesh.blend_shape_targets:
         indices = np.asarray(target.vertex_indices, np.int64)
@@ -233,14 +249,23 @@ def edits_of(
         deltas: (vertex indices, float32[K, 3]) of its channel.
 
     Returns:
-        See edits.key_edits.
+        See user_edits.key_edits.
     """
     base = points_of(block.relative_key)
     return user_edits.key_edits(base, points_of(block), imported, user_edits.shaped(base, *deltas))
 
 
 def add_key(item: MeshObject, name: str, deltas: Deltas) -> bpy.types.ShapeKey:
-    """A real key of value 0. Args: deltas  (vertex indices, float32[K, 3])."""
+    """Add a real shape key of value 0, which may go from -10 to 10.
+
+    Args:
+        item: the mesh object.
+        name: of the key.
+        deltas: (vertex indices, float32[K, 3]) from the reference key, in Blender units.
+
+    Returns:
+        The key.
+    """
     block = item.shape_key_add(name=name, from_mix=False)
     block.slider_min, block.slider_max = -10.0, 10.0
     block.value = 0.0
@@ -252,14 +277,30 @@ def add_key(item: MeshObject, name: str, deltas: Deltas) -> bpy.types.ShapeKey:
 def add_channel_key(
     item: MeshObject, rig: ArmatureObject, channel: int, name: str, deltas: Deltas
 ) -> bpy.types.ShapeKey:
-    """A real, driven key of a channel."""
+    """Add a real shape key that follows a channel by a driver.
+
+    Args:
+        item: the mesh object.
+        rig: deforming armature, which has the channels' weights.
+        channel: index of the blend shape channel.
+        name: of the key.
+        deltas: (vertex indices, float32[K, 3]) from the reference key, in Blender units.
+
+    Returns:
+        The key.
+    """
     block = add_key(item, name, deltas)
     drive_key(parts.keys_there(item), block, rig, channel)
     return block
 
 
 def remove_channel_key(item: MeshObject, block: bpy.types.ShapeKey) -> None:
-    """Take one of our keys away, its driver too."""
+    """Take one of our keys away, its driver too.
+
+    Args:
+        item: the mesh object.
+        block: one of its keys, made by add_channel_key.
+    """
     path = f'key_blocks["{bpy.utils.escape_identifier(block.name)}"].value'
     parts.keys_there(item).driver_remove(path)
     item.shape_key_remove(block)
@@ -318,7 +359,14 @@ def _to_live(
 def touched(
     key: bpy.types.Key, block: bpy.types.ShapeKey, imported: NDArray[np.float32], deltas: Deltas
 ) -> bool:
-    """Whether a key of ours bears something that the channel sum cannot."""
+    """Whether a key of ours bears something that the channel sum cannot.
+
+    Args:
+        key: the shape keys of the mesh.
+        block: the one in question.
+        imported: float32[V, 3], the neutral mesh as an import gives it.
+        deltas: (vertex indices, float32[K, 3]) that the DNA has for its channel.
+    """
     if block.mute or block.vertex_group or block.relative_key != key.reference_key:
         return True
     return bool(edits_of(block, imported, deltas)[0].any())
@@ -338,7 +386,14 @@ def _remember_keys(item: MeshObject, labels: Sequence[str]) -> None:
 def drive_key(
     key: bpy.types.Key, block: bpy.types.ShapeKey, rig: ArmatureObject, channel: int
 ) -> None:
-    """Drive a key's value by its channel through a plain SUM driver."""
+    """Drive a key's value by its channel through a plain SUM driver.
+
+    Args:
+        key: the shape keys of the mesh.
+        block: the one that is driven.
+        rig: deforming armature, which has the channels' weights.
+        channel: index of the blend shape channel.
+    """
     name = bpy.utils.escape_identifier(block.name)
     curve = cast("bpy.types.FCurve", key.driver_add(f'key_blocks["{name}"].value'))
     drivers.plain_driver(curve, rig, f'["{parts.CHANNELS}"][{channel}]', parts.CHANNEL_VARIABLE)

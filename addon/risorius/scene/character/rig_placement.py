@@ -187,7 +187,12 @@ def body_turns(controls: ArmatureObject, depsgraph: Depsgraph) -> dict[str, Quat
 
 
 def own_turn(seen: ArmatureObject, bone: bpy.types.PoseBone) -> Quaternion:
-    """A bone's own rotation after its constraints, in the axes of its armature."""
+    """A bone's own rotation after its constraints, in the axes of its armature.
+
+    Args:
+        seen: the evaluated armature.
+        bone: one of its pose bones.
+    """
     local = seen.convert_space(
         pose_bone=bone, matrix=bone.matrix, from_space="POSE", to_space="LOCAL"
     )

@@ -53,6 +53,14 @@ def sampled(
 ) -> Generator[float, None, list[tuple[ArmatureObject, int, sampling.Samples]]]:
     """Sample characters for `copies` or `clip`; a generator like sampling.sample.
 
+    Args:
+        context: scene and view layer that are sampled.
+        rigs: deforming armatures of the characters.
+        options: ShipOptions with the range of frames, its step and the level of detail.
+
+    Yields:
+        The share that is done, 0 to 1.
+
     Returns:
         (rig, level, Samples) of each.
 

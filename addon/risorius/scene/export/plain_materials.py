@@ -49,7 +49,7 @@ class _Flat:
         users: (mesh object, slot number) that show it.
         shader: the node of the copy that gives the colour; None for a film.
         clear: light passes somewhere.
-        sources: input -> flat_trees.Source.
+        sources: input -> shader_inputs.Source.
         images: input -> image, taken over or baked; "normal" too.
         baked: inputs that are baked.
         mean: the roughness becomes one number, because faces lie on each other in the UV map.
@@ -71,8 +71,8 @@ def flatten(override: Override, loans: Loans, size: int) -> Generator[float, Non
     """Replace the materials of copied meshes; a generator.
 
     Args:
-        override: context override of the export, from ship.copies.
-        loans: loans.Loans for the names of the materials.
+        override: context override of the export, from export_animation.copies.
+        loans: lent_names.Loans for the names of the materials.
         size: pixels of a side of what is baked.
 
     Yields:

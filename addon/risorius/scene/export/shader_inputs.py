@@ -62,7 +62,12 @@ def rest_maps(tree: NodeTree) -> None:
 
 
 def alike(tree: NodeTree, other: NodeTree) -> bool:
-    """Whether two trees paint the same, as those of an eye and of its iris that nobody edited."""
+    """Whether two trees paint the same, as those of an eye and of its iris that nobody edited.
+
+    Args:
+        tree: nodes of a material.
+        other: nodes of another material.
+    """
     return _told(tree) == _told(other)
 
 
@@ -106,7 +111,15 @@ def _upstream(socket: Socket) -> list[Node]:
 
 
 def source(shader: Node, *names: str) -> Source:
-    """The Source of the first of some inputs that a shader has."""
+    """Where the values of a shader's input come from.
+
+    Args:
+        shader: the node.
+        names: of the input in versions of Blender; the first that the node has is taken.
+
+    Returns:
+        Source; an empty one where the node has none of these inputs.
+    """
     socket = next((shader.inputs[n] for n in names if n in shader.inputs), None)
     if socket is None:
         return Source()

@@ -134,7 +134,7 @@ def replace_joints(context: Context, change: Change) -> None:
 
     Args:
         context: a Blender context with a view layer.
-        change: replace.Change; its bone names are filled in.
+        change: file_change.Change; its bone names are filled in.
     """
     rig, old, new = change.rig, change.old.armature, change.new.armature
     if rig.data.users > 1:
@@ -289,7 +289,12 @@ def _release(change: Change, moved: Sequence[int]) -> None:
 
 
 def rename_groups(change: Change, item: MeshObject) -> None:
-    """Vertex groups of a mesh that was built apart, named as the bones are named here."""
+    """Name the vertex groups of a mesh that was built apart as the bones are named here.
+
+    Args:
+        change: what replaces what, with the names of the bones of the new file's joints.
+        item: the mesh object.
+    """
     labels = change.new.armature.labels
     real = {label: change.new_bones[k] for k, label in enumerate(labels)}
     for group in item.vertex_groups:
@@ -299,7 +304,12 @@ def rename_groups(change: Change, item: MeshObject) -> None:
 
 
 def replace_control_places(context: Context, change: Change) -> None:
-    """Move the bones of the control armature to the new face, unless the user moved them."""
+    """Move the bones of the control armature to the new face, unless the user moved them.
+
+    Args:
+        context: its scene is used to edit bones.
+        change: what replaces what.
+    """
     old = armatures.control_places(change.old)
     new = armatures.control_places(change.new)
     controls = parts.controls_there(change.rig)

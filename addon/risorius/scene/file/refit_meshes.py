@@ -55,7 +55,7 @@ def replace_meshes(change: Change, fresh_meshes: Mapping[int, MeshObject]) -> se
     """Move the new file's meshes into the objects that are there.
 
     Args:
-        change: replace.Change.
+        change: file_change.Change.
         fresh_meshes: new mesh number -> the object that was built for it.
 
     Returns:
@@ -95,7 +95,12 @@ def _faces_of(mesh: bpy.types.Mesh) -> tuple[NDArray[np.int32], NDArray[np.int32
 
 
 def has_faces_of(mesh: bpy.types.Mesh, plan: plans.MeshPlan) -> bool:
-    """Whether a mesh has the vertices and faces of a MeshPlan."""
+    """Whether a mesh has as many vertices as a plan, and the same faces.
+
+    Args:
+        mesh: a Mesh.
+        plan: MeshPlan.
+    """
     corners, starts = _faces_of(mesh)
     return (
         len(mesh.vertices) == len(plan.positions)

@@ -85,7 +85,16 @@ class Nearest:
 def nearest_triangles(
     points: NDArray[np.float64], triangles: NDArray[np.int32], queries: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """The nearest triangle of each query point, int[n], and barycentric weights float64[n, 3]."""
+    """The nearest triangle of each query point.
+
+    Args:
+        points: float64[V, 3] of a mesh.
+        triangles: int32[T, 3] indices of points.
+        queries: float64[n, 3] in the same space.
+
+    Returns:
+        int64[n] triangles, and float64[n, 3] barycentric weights of the nearest points on them.
+    """
     tree: Any = BVHTree.FromPolygons(points.tolist(), triangles.tolist())
     found = [tree.find_nearest(query) for query in queries.tolist()]
     where = np.array([hit[2] or 0 for hit in found], np.int64)

@@ -103,14 +103,25 @@ def _taken(rig: ArmatureObject, written: Mapping[str, NDArray[np.float32]]) -> b
 
 
 def is_there(values: bpy.types.bpy_prop_collection, name: str, wanted: NDArray[np.float32]) -> bool:
-    """Whether a bulk read gives what was written. Args: values  a collection of properties."""
+    """Whether a bulk read gives what was written.
+
+    Args:
+        values: a collection of properties.
+        name: of the member that is read from each.
+        wanted: float32, flat, what it should be.
+    """
     got = np.empty_like(wanted)
     values.foreach_get(name, got)
     return np.array_equal(got, wanted)
 
 
 def writer_of(rig: ArmatureObject, live: runtime.Runtime) -> Writer:
-    """The Writer of an armature as it is now."""
+    """The Writer of an armature as it is now.
+
+    Args:
+        rig: deforming armature.
+        live: the character's Runtime.
+    """
     kept = written.bone_writers.get(rig.session_uid)
     if not isinstance(kept, Writer) or kept.count != len(rig.pose.bones):
         kept = written.bone_writers[rig.session_uid] = _make_writer(rig, live)

@@ -81,6 +81,11 @@ def override(
 
 
 def apply(test: tuple[int, float] | None, weights: NDArray[np.float32]) -> None:
-    """Write an override into a pose's channel weights, in place; None changes nothing."""
+    """Write an override into a pose's channel weights, in place.
+
+    Args:
+        test: (channel, weight) from `override`; None changes nothing.
+        weights: float32[C], changed.
+    """
     if test is not None and test[0] < len(weights):
         weights[test[0]] = test[1]

@@ -99,7 +99,12 @@ def evaluate(rig: ArmatureObject, depsgraph: Depsgraph, force: bool = False) -> 
 
 
 def bring_up(context: Context, rig: ArmatureObject) -> None:
-    """Show a change that an operator made: bring one character up and evaluate the scene."""
+    """Show a change that an operator made: bring one character up and evaluate the scene.
+
+    Args:
+        context: its view layer is evaluated, before and after.
+        rig: deforming armature of the character.
+    """
     context.view_layer.update()
     evaluate(rig, context.evaluated_depsgraph_get(), force=True)
     context.view_layer.update()

@@ -74,7 +74,19 @@ def complete(
     raw: NDArray[np.float32],
     own: Mapping[str, Quaternion | None],
 ) -> tuple[NDArray[np.float32], Turns]:
-    """Add what the body and the eye bones ask for. Changes raw. Returns: as `read_inputs`."""
+    """Add what the body and the eye bones ask for.
+
+    Args:
+        seen: the evaluated control armature.
+        live: the character's Runtime.
+        depsgraph: the evaluated graph that has the body too.
+        maximum: of the sliders.
+        raw: float32[R], the sliders with their layers; the look controls are changed in place.
+        own: the turns of the character's own head and neck bones by name, None where they rest.
+
+    Returns:
+        raw, and the turns with the body's, as `read_inputs` gives them.
+    """
     turns = rig_placement.body_turns(seen.original, depsgraph)
     for name, turn in own.items():
         if turn is not None:
@@ -84,7 +96,15 @@ def complete(
 
 
 def read_sliders(seen: ArmatureObject, live: runtime.Runtime) -> NDArray[np.float32]:
-    """Read the sliders alone, float32[R]; what is no number counts as 0 or rest."""
+    """Read the sliders alone; what is no number counts as 0, what is missing as its rest.
+
+    Args:
+        seen: the evaluated control armature.
+        live: the character's Runtime, for their names and order.
+
+    Returns:
+        float32[R].
+    """
     values = dict(seen.pose.bones[parts.FACE].items())
     rests = live.rests
     raw = np.array([values.get(label, rests[i]) for i, label in enumerate(live.labels)], np.float32)

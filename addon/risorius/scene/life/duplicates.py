@@ -90,7 +90,12 @@ def _own_key_drivers(item: MeshObject, rig: ArmatureObject) -> None:
 
 
 def retarget_materials(item: MeshObject, rig: ArmatureObject) -> None:
-    """Let the animated maps of a mesh's materials follow another rig."""
+    """Let the animated maps of a mesh's materials follow another rig.
+
+    Args:
+        item: the mesh object.
+        rig: deforming armature that the drivers of the maps read from now on.
+    """
     for slot in item.material_slots:
         if slot.material is not None:
             _retarget(materials.map_drivers(slot.material), rig)

@@ -72,7 +72,10 @@ def make_override(
 def repair(context: Context, rig: ArmatureObject, local_meshes: bool = False) -> list[str]:
     """Make an override that Blender made by itself fully editable.
 
-    Args: see make_override; rig is the override's deforming armature.
+    Args:
+        context: its view layer is brought up to date.
+        rig: deforming armature of the override.
+        local_meshes: copy the meshes into this file; else their real keys are driven.
 
     Returns:
         Sentences for a report.

@@ -168,7 +168,12 @@ def start(rig: ArmatureObject, settings: Settings) -> Session:
 
 
 def apply_settings(session: Session, settings: Settings) -> None:
-    """Take over what can change while it runs: subject, smoothing, gains."""
+    """Take over what can change while it runs: subject, smoothing, gains.
+
+    Args:
+        session: of the character.
+        settings: as they are now; source, port and mapping are left as they were at the start.
+    """
     session.subject = settings.subject
     session.shaper.smoothing = settings.smoothing
     session.shaper.gain, session.shaper.head_gain = settings.gain, settings.head_gain
@@ -244,7 +249,12 @@ def address() -> str:
 
 
 def begin_take(session: Session, frame: float) -> None:
-    """Record from now. Args: frame  of the scene at which the take is to begin."""
+    """Record from now.
+
+    Args:
+        session: of the character.
+        frame: of the scene at which the take is to begin.
+    """
     take = session.receiver.record(session.subject)
     session.recording = Recording(take, session.shaper, frame)
 
@@ -260,10 +270,10 @@ def finish_take(
         scene: gives the rate; its frame when the recording began is the take's first.
 
     Returns:
-        clips.Report, or None where nothing came.
+        clip_actions.Report, or None where nothing came.
 
     Raises:
-        clips.ClipError: as finish; what was recorded then waits to be finished again.
+        clip_units.ClipError: as finish; what was recorded then waits to be finished again.
     """
     recording = _lay_by(session)
     return finish(recording, rig, scene) if recording is not None else None
@@ -290,11 +300,11 @@ def finish(
         scene: gives the rate.
 
     Returns:
-        clips.Report.
+        clip_actions.Report.
 
     Raises:
-        clips.ClipError: nothing of it is for this face, it is longer than Blender can play, or the
-            NLA is being edited.
+        clip_units.ClipError: nothing of it is for this face, it is longer than Blender can play,
+            or the NLA is being edited.
     """
     controls, take = parts.controls_there(rig), recording.take
     trouble = actions.busy(controls)
@@ -346,6 +356,10 @@ def _beat() -> float | None:
 
 def show(session: Session, controls: ArmatureObject) -> bool:
     """Write the newest face to a character, if it is a new one.
+
+    Args:
+        session: of the character.
+        controls: its control armature.
 
     Returns:
         Whether there was one.

@@ -24,7 +24,12 @@ _COARSE = 1500  # vertices: a mesh of teeth with fewer has no single teeth
 
 
 def build(graph: Graph, look: Look) -> None:
-    """Fill the tree of a material by the kind of its mesh."""
+    """Fill the tree of a material by the kind of its mesh.
+
+    Args:
+        graph: of the material, with its shader and its output.
+        look: sizes, textures and areas of the mesh.
+    """
     _KINDS[look.kind](graph, look)
 
 
@@ -42,6 +47,10 @@ def eyes(graph: Graph, look: Look) -> None:
 
     The coat keeps the smooth normal of the ball while the iris below has its own, so that its
     highlight is round and the iris is lit from the far side, as refraction does.
+
+    Args:
+        graph: of the material, with its shader and its output.
+        look: sizes, textures and areas of the mesh.
     """
     x, z, front = graph.split(graph.attribute(EYES))
     flat = graph.node("CombineXYZ")
@@ -107,7 +116,12 @@ def _film(graph: Graph, look: Look, low: float, high: float) -> Socket:
 
 
 def teeth(graph: Graph, look: Look) -> None:
-    """Enamel that yellows towards the gum, single teeth where the mesh has none, gums above."""
+    """Enamel that yellows towards the gum, single teeth where the mesh has none, gums above.
+
+    Args:
+        graph: of the material, with its shader and its output.
+        look: sizes, textures and areas of the mesh.
+    """
     picture = look.image("color")
     points = graph.rest_points(look.extent)
     place, height, _ = graph.split(graph.attribute(TEETH))
@@ -139,12 +153,22 @@ def teeth(graph: Graph, look: Look) -> None:
 
 
 def tongue(graph: Graph, look: Look) -> None:
-    """Papillae, and a wet coat that breaks on them."""
+    """Papillae, and a wet coat that breaks on them.
+
+    Args:
+        graph: of the material, with its shader and its output.
+        look: sizes, textures and areas of the mesh.
+    """
     _flesh(graph, look, (_TONGUE_DARK, _TONGUE), 46.0)
 
 
 def gum(graph: Graph, look: Look) -> None:
-    """Wet, mottled flesh: gums, caruncles, cartilage."""
+    """Wet, mottled flesh: gums, caruncles, cartilage.
+
+    Args:
+        graph: of the material, with its shader and its output.
+        look: sizes, textures and areas of the mesh.
+    """
     _flesh(graph, look, (_GUM_DARK, _GUM), 26.0)
 
 
@@ -169,7 +193,12 @@ def _flesh(graph: Graph, look: Look, tones: tuple[Color, Color], grain: float) -
 
 
 def lashes(graph: Graph, look: Look) -> None:
-    """Hairs on cards: by an alpha or colour texture, else strands across the UV map."""
+    """Hairs on cards: by an alpha or colour texture, else strands across the UV map.
+
+    Args:
+        graph: of the material, with its shader and its output.
+        look: sizes, textures and areas of the mesh.
+    """
     picture, mask = look.image("color"), look.image("alpha", data=True)
     strands = _strands(graph, look)
     color = graph.ramp(strands, (0.35, _LASH), (0.85, _LASH_TIP))
@@ -199,6 +228,10 @@ def wet(graph: Graph, look: Look) -> None:
 
     Transparent instead of refracting, because a refracting shell keeps light from the eye under
     it in both engines; what bends here is only the reflection.
+
+    Args:
+        graph: of the material, with its shader and its output.
+        look: sizes, textures and areas of the mesh.
     """
     points = graph.rest_points(look.extent)
     ripples = graph.noise(points, 18.0 / look.unit, detail=3.0)

@@ -94,7 +94,12 @@ class Images:
         self._room, self._files = 0, 0  # bytes, of all images that were loaded
 
     def load(self, path: Path | None, data: bool = False) -> bpy.types.Image | None:
-        """The image of a file, or None where there is none or it cannot be read."""
+        """The image of a file, or None where there is none or it cannot be read.
+
+        Args:
+            path: of the file; None gives None.
+            data: whether its pixels are numbers instead of colours, as in a normal map.
+        """
         if path is None:
             return None
         key = (str(path), data)
@@ -152,7 +157,7 @@ class Images:
 
         Args:
             name: of the image.
-            masks: region -> textures.Mask.
+            masks: region -> texture_search.Mask.
 
         Returns:
             The image or None, and region -> (column, row, channel, tiles in a row).

@@ -29,7 +29,7 @@ class Look:
         simple: leave out subsurface, relief and maps.
         uses: what the animated maps do.
         areas: areas of a face that this mesh has.
-        found: textures.TexturePlan.
+        found: texture_search.TexturePlan.
         images: loads them.
         atlas, places: image with the wrinkle masks, and where in it each region's is.
         offsets: role -> whether that wrinkle map holds differences; filled when asked.
@@ -52,7 +52,12 @@ class Look:
     offsets: dict[str, bool] = field(default_factory=dict)
 
     def image(self, role: str, data: bool = False) -> bpy.types.Image | None:
-        """The image of a role, or None."""
+        """The image of a role, or None.
+
+        Args:
+            role: "color", "cavity", "normal:2" and the like, see texture_search.
+            data: whether its pixels are numbers instead of colours.
+        """
         return self.images.load(self.found.of(self.base, role), data)
 
     def is_offset(self, role: str) -> bool:

@@ -28,7 +28,7 @@ _VIEW_COLORS = {
     "wet": (1.0, 1.0, 1.0, 0.0),
 }
 _IRIS_COLOR = (0.035, 0.02, 0.012, 1.0)
-_IRIS_RADIUS = 0.47  # of the eye's: where its limbus ends, see looks.eyes
+_IRIS_RADIUS = 0.47  # of the eye's: where its limbus ends, see eyes
 _WIDE = 1.6  # a mesh wider than this times its height holds both eyes
 
 
@@ -47,7 +47,7 @@ def build_materials(
         rig: the deforming armature, whose `maps` array drives the map values.
         built: mesh objects, in the order of the plan's meshes.
         made: list that every new datablock is put on.
-        found: logic.textures.TexturePlan; None for no textures.
+        found: texture_search.TexturePlan; None for no textures.
         simple: build the cheap variant: no subsurface, relief or maps.
 
     Returns:

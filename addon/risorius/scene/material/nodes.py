@@ -31,7 +31,12 @@ class Graph:
         self.output = next(n for n in self.tree.nodes if n.type == "OUTPUT_MATERIAL")
 
     def node(self, kind: str, label: str = "") -> Node:
-        """A new node of the type `ShaderNode<kind>`."""
+        """A new node.
+
+        Args:
+            kind: its type is `ShaderNode<kind>`.
+            label: shown as its title; "" for the type's.
+        """
         node = self.tree.nodes.new(f"ShaderNode{kind}")
         node.label = label
         return node
@@ -53,7 +58,13 @@ class Graph:
             self.put(value, self.shader.inputs[name.replace("_", " ").replace("Ior", "IOR")])
 
     def math(self, operation: str, *values: Value, clamp: bool = False) -> Socket:
-        """A Math node."""
+        """A Math node; its output.
+
+        Args:
+            operation: of Blender's Math node, "ADD" and the like.
+            values: numbers or sockets for its inputs, in their order.
+            clamp: whether the result is held within 0 and 1.
+        """
         node = self.node("Math")
         node.operation, node.use_clamp = operation, clamp
         for value, socket in zip(values, node.inputs, strict=False):
@@ -61,14 +72,24 @@ class Graph:
         return node.outputs[0]
 
     def total(self, values: Sequence[Value], clamp: bool = False) -> Value:
-        """The sum of sockets; 0 for none."""
+        """The sum of numbers or sockets; 0 for none.
+
+        Args:
+            values: what is added.
+            clamp: whether the sum is held within 0 and 1.
+        """
         result = values[0] if values else 0.0
         for value in values[1:]:
             result = self.math("ADD", result, value)
         return self.math("ADD", result, 0.0, clamp=True) if clamp and values else result
 
     def vector(self, operation: str, *values: Value) -> Socket:
-        """A Vector Math node; its vector output."""
+        """A Vector Math node; its vector output, or its number for lengths and products.
+
+        Args:
+            operation: of Blender's Vector Math node, "ADD" and the like.
+            values: numbers, vectors or sockets for its inputs, in their order.
+        """
         node = self.node("VectorMath")
         node.operation = operation
         for value, socket in zip(values, node.inputs, strict=False):
@@ -76,7 +97,14 @@ class Graph:
         return node.outputs[1 if operation in ("LENGTH", "DISTANCE", "DOT_PRODUCT") else 0]
 
     def mix(self, factor: Value, a: Value, b: Value, blend: str = "MIX") -> Socket:
-        """Mix two colours."""
+        """Mix two colours.
+
+        Args:
+            factor: 0 gives a, 1 gives b; held within 0 and 1.
+            a: colour or socket.
+            b: colour or socket.
+            blend: of Blender's Mix node, "MIX", "MULTIPLY" and the like.
+        """
         node = self.node("Mix")
         node.data_type, node.blend_type = "RGBA", blend
         node.clamp_factor = True
@@ -84,7 +112,13 @@ class Graph:
         return next(s for s in node.outputs if s.identifier == "Result_Color")
 
     def mix_number(self, factor: Value, a: Value, b: Value) -> Socket:
-        """Mix two numbers."""
+        """Mix two numbers.
+
+        Args:
+            factor: 0 gives a, 1 gives b; held within 0 and 1.
+            a: number or socket.
+            b: number or socket.
+        """
         node = self.node("Mix")
         node.data_type = "FLOAT"
         self._mix_inputs(node, factor, a, b, "Float")
@@ -97,7 +131,12 @@ class Graph:
         self.put(b, where[f"B_{kind}"])
 
     def ramp(self, factor: Value, *stops: tuple[float, Color]) -> Socket:
-        """A colour ramp; stops are (position, (r, g, b))."""
+        """A colour ramp; its colour.
+
+        Args:
+            factor: where on the ramp, 0 to 1.
+            stops: (position, (r, g, b)) in rising order, linear colours; two at least.
+        """
         node = self.node("ValToRGB")
         elements = node.color_ramp.elements
         while len(elements) < len(stops):
@@ -110,7 +149,14 @@ class Graph:
     def noise(
         self, vector: Value, scale: float, detail: float = 2.0, roughness: float = 0.5
     ) -> Socket:
-        """Noise from 0 to 1, its mean near 0.5."""
+        """Noise from 0 to 1, its mean near 0.5.
+
+        Args:
+            vector: the place.
+            scale: how many cells of noise lie on a unit of vector.
+            detail: how many octaves are added.
+            roughness: how much each octave counts beside the one before.
+        """
         node = self.node("TexNoise")
         self.put(vector, node.inputs["Vector"])
         node.inputs["Scale"].default_value = scale
@@ -119,7 +165,13 @@ class Graph:
         return node.outputs[0]
 
     def cells(self, vector: Value, scale: float, feature: str = "F1") -> Socket:
-        """Distance of Voronoi cells."""
+        """Distances of Voronoi cells.
+
+        Args:
+            vector: the place.
+            scale: how many cells lie on a unit of vector.
+            feature: of Blender's Voronoi node: "F1" the distance to the nearest point, or another.
+        """
         node = self.node("TexVoronoi")
         node.feature = feature
         self.put(vector, node.inputs["Vector"])
@@ -160,7 +212,14 @@ class Graph:
         label: str = "",
         clamp: bool = False,
     ) -> Node:
-        """An image texture node."""
+        """An image texture node.
+
+        Args:
+            image: what it shows.
+            vector: where; None for the UV map.
+            label: shown as its title.
+            clamp: whether its edge is held outside of it instead of repeating it.
+        """
         node = self.node("TexImage", label)
         node.image = image
         if clamp:
@@ -171,7 +230,14 @@ class Graph:
     def bump(
         self, height: Value, distance: float, normal: Value | None = None, strength: float = 1.0
     ) -> Socket:
-        """A normal that a height field gives."""
+        """A normal that a height field gives.
+
+        Args:
+            height: 0 to 1.
+            distance: in Blender units, how much height 1 is.
+            normal: that it is added to; None for the surface's own.
+            strength: 0 to 1.
+        """
         node = self.node("Bump")
         node.inputs["Strength"].default_value = strength
         node.inputs["Distance"].default_value = distance

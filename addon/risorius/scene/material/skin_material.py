@@ -50,7 +50,7 @@ class Skin:
 
     Args:
         graph: nodes.Graph of the material.
-        look: materials.Look of the mesh base: sizes, textures, areas.
+        look: look.Look of the mesh base: sizes, textures, areas.
     """
 
     def __init__(self, graph: Graph, look: Look) -> None:

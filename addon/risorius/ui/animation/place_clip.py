@@ -70,6 +70,9 @@ class PlacesClip(FaceOperator):
 
         Returns:
             Its action.
+
+        Raises:
+            ClipError: the NLA is being edited, or nothing of the clip is for this face.
         """
         rig = face_rig(context)
         trouble = actions.busy(face_controls(context))

@@ -131,6 +131,16 @@ def missing(kind: str) -> str:
 
 
 def export(operator: ExportOperator, override: Override, path: Path) -> None:
+    """Let Blender's own exporter of a format write a file.
+
+    Args:
+        operator: has the format and the settings that the user chose.
+        override: the context for the exporter, from export_animation.copies.
+        path: of the file.
+
+    Raises:
+        FaceError: the exporter says what it cannot, or wrote nothing.
+    """
     group, name = _OPERATORS[operator.format]
     function = getattr(getattr(bpy.ops, group), name)
     known = set(function.get_rna_type().properties.keys())

@@ -11,7 +11,16 @@ def _expressions_of(group: str) -> list[tuple[str, str]]:
 
 
 def expression_menu(group: str, title: str, operator: str) -> type[Menu]:
-    """A menu with one entry per expression of a group."""
+    """A menu with one entry per expression of a group.
+
+    Args:
+        group: "emotion", "viseme" and the like, of the expressions that are listed.
+        title: of the menu.
+        operator: bl_idname of what an entry calls: to set the expression, or to add it as a layer.
+
+    Returns:
+        The class, to be registered.
+    """
 
     def draw(self: Menu, _context: Context) -> None:
         for name, label in _expressions_of(group):

@@ -17,7 +17,13 @@ from ..common import FaceOperator, explain, face_rig, shown_progress
 
 
 def report_all(operator: Operator, sentences: Sequence[str], shown: int = 8) -> None:
-    """Report sentences, the last of many as a number."""
+    """Report sentences, the last of many as a number.
+
+    Args:
+        operator: that reports.
+        sentences: in the order in which they are shown.
+        shown: how many are shown at most.
+    """
     for sentence in sentences[:shown]:
         operator.report({"INFO"}, sentence)
     if len(sentences) > shown:

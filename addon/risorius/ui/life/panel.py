@@ -11,6 +11,10 @@ from .operators import RISORIUS_OT_bring_back, RISORIUS_OT_make_override, overri
 def draw_trouble(layout: UILayout, context: Context) -> bool:
     """Words and buttons for what keeps the active face from moving.
 
+    Args:
+        layout: of the panel.
+        context: has the active object.
+
     Returns:
         Whether the panel need not say anything more.
     """
