@@ -181,10 +181,14 @@ def _tree(source: str) -> str:
             node.returns = None
         if isinstance(node, ast.arg):
             node.annotation = None
+        if isinstance(node, ast.AnnAssign):
+            node.annotation = ast.Constant(None)
     return ast.dump(tree)
 
 
 def _says_nothing(node: ast.AST) -> bool:
-    """Whether a statement is a docstring, a text that stands alone or `pass`."""
+    """Whether a statement does nothing when it runs: texts, `pass`, `__future__`, types alone."""
     text = isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
-    return text or isinstance(node, ast.Pass)
+    future = isinstance(node, ast.ImportFrom) and node.module == "__future__"
+    types = isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+    return text or future or types or isinstance(node, ast.Pass)

@@ -115,7 +115,9 @@ class Copy:
             package = importlib.util.find_spec("risorius")
             if package is None or package.origin is None:
                 sys.exit("the wheel is not installed: packaging/demo.sh builds it")
-            self._copy_module(next(Path(package.origin).parent.glob("_native.*.so")))
+            installed = Path(package.origin).parent
+            self._copy_module(next(installed.glob("_native.*.so")))
+            shutil.copy(installed / "rig_bench", self.root / "native" / "python" / "risorius")
             compiled = ["compileall", "-q", "--invalidation-mode", "checked-hash", "native/python"]
             self._checked([sys.executable, "-m", *compiled])
             return

@@ -259,6 +259,9 @@ def test_info_prints_for_people_and_programs(tmp_path):
     dna = risorius.load(GOLDEN / "medium.dna")
     assert facts["counts"]["raw_controls"] == len(dna.raw_control_names)
     assert [m["vertices"] for m in facts["meshes"]] == [len(m.positions) for m in dna.meshes]
+    assert [m["faces"] for m in facts["meshes"]] == [
+        np.diff(m.face_offsets).size for m in dna.meshes
+    ]
     cut = tmp_path / "cut.dna"
     cut.write_bytes(dna.to_bytes(version="2.1", unknown_layers="ignore")[:-1])  # of the end's mark
     facts = json.loads(run("info", "--json", cut).stdout)

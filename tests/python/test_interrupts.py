@@ -10,6 +10,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 
 import pytest
 from conftest import GOLDEN
@@ -36,7 +37,12 @@ def started(arguments, folder):
         [sys.executable, "-m", "risorius", *arguments],
         cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
-    return process, open(folder / name, "wb", buffering=0), folder / name
+    while True:
+        assert process.poll() is None, process.communicate()[1]
+        with contextlib.suppress(OSError):  # nobody reads yet
+            pipe = os.open(folder / name, os.O_WRONLY | os.O_NONBLOCK)
+            return process, open(pipe, "wb", buffering=0), folder / name
+        time.sleep(0.01)
 
 
 @needs_pipes
