@@ -20,6 +20,16 @@ def test_controls_are_floats_with_limits(dna_file):
         assert words["description"]
 
 
+def test_control_bones_are_seen_as_closed_rings(dna_file):
+    bones = scene.controls(scene.load(dna_file)).pose.bones
+    for bone in (b for b in bones if b.custom_shape):
+        ring = bone.custom_shape.data
+        assert len(ring.vertices) == len(ring.edges) > 8
+        assert all(v.co.length == pytest.approx(1.0) for v in ring.vertices)
+        assert all(e.vertices[0] != e.vertices[1] for e in ring.edges)
+    assert any(b.custom_shape for b in bones)
+
+
 def test_long_and_repeated_names_are_cut_and_numbered(dna_file):
     rig = scene.load(dna_file, "KEYS")
     labels = [k for k in scene.face(rig).keys() if k not in CONTROLS[:8]]  # noqa: SIM118

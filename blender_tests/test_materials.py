@@ -315,6 +315,18 @@ def test_a_chosen_folder_is_looked_into_first_and_the_finds_are_said(tmp_path):
     assert not image.colorspace_settings.is_data
 
 
+def test_lashes_are_hairs_where_a_mask_or_the_alpha_of_a_picture_says_so(tmp_path, kinds_file):
+    maps = tmp_path / "Maps"
+    maps.mkdir()
+    found = []
+    for name, channels in (("T_Eyelashes_BC.png", 4), ("T_Eyelashes_Opacity.png", 3)):
+        looks.write_image(maps / name, np.full((4, 4, channels), 0.5, np.float32))
+        shader = looks.principled(_materials(scene.load(kinds_file))["eyelashes"])
+        socket = shader.inputs["Alpha"].links[0].from_socket
+        found.append((socket.node.image.name, socket.name))
+    assert found == [("T_Eyelashes_BC.png", "Alpha"), ("T_Eyelashes_Opacity.png", "Color")]
+
+
 def test_a_broken_texture_is_a_sentence(tmp_path):
     path = _save(tmp_path, small_face())
     (tmp_path / "Maps").mkdir()
