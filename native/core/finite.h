@@ -3,6 +3,7 @@
 #pragma once
 
 #include <bit>
+#include <cmath>
 #include <cstdint>
 #include <span>
 
@@ -24,6 +25,14 @@ inline bool all_finite(std::span<const float> values) {
   std::uint32_t found = 0;
   for (const float value : values) found |= non_finite_bit(std::bit_cast<std::uint32_t>(value));
   return found >> 31 == 0;
+}
+
+/// The same of doubles, whose values are few: times and points of lines.
+inline bool all_finite(std::span<const double> values) {
+  for (const double value : values) {
+    if (!std::isfinite(value)) return false;
+  }
+  return true;
 }
 
 }  // namespace risorius::core

@@ -7,12 +7,15 @@
 #include <memory>
 #include <new>
 #include <set>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "core/aligned.h"
 #include "core/array.h"
 #include "core/budget.h"
 #include "core/buffer.h"
+#include "core/finite.h"
 #include "core/result.h"
 
 namespace risorius::core {
@@ -190,6 +193,25 @@ TEST(Aligned, PagesAreZeroWhereThatIsAsked) {
     std::size_t set = 0;
     for (std::size_t i = 0; i < size; ++i) set += pages.get()[i] != 0;
     EXPECT_EQ(set, 0u) << size;
+  }
+}
+
+template <typename Number>
+class Finite : public testing::Test {};
+using Numbers = testing::Types<float, double>;
+TYPED_TEST_SUITE(Finite, Numbers);
+
+TYPED_TEST(Finite, OneInfinityOrNaNAnywhereIsFound) {
+  using Limits = std::numeric_limits<TypeParam>;
+  std::vector<TypeParam> values = {0, -0.0f, Limits::max(), Limits::lowest(), Limits::denorm_min()};
+  EXPECT_TRUE(all_finite(std::span<const TypeParam>(values)));
+  EXPECT_TRUE(all_finite(std::span<const TypeParam>()));
+  for (const TypeParam bad : {Limits::infinity(), -Limits::infinity(), Limits::quiet_NaN()}) {
+    for (std::size_t place = 0; place < values.size(); ++place) {
+      std::vector<TypeParam> broken = values;
+      broken[place] = bad;
+      EXPECT_FALSE(all_finite(std::span<const TypeParam>(broken))) << bad << " at " << place;
+    }
   }
 }
 

