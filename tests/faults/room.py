@@ -17,7 +17,7 @@ import risorius
 from bombs import MiB
 from conftest import GOLDEN
 from risorius import importing
-from risorius.base import fileio
+from risorius.files import fileio
 
 CORE = GOLDEN / "core.dna"
 # A command that says when it listens to signals: before, Python itself would answer them.

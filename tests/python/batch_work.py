@@ -6,9 +6,9 @@ import os
 import signal
 import time
 
-from risorius.base.fileio import replacing
 from risorius.batch.outcome import Outcome
 from risorius.batch.work import run_job
+from risorius.files.fileio import replacing
 
 SECONDS = 0.05
 

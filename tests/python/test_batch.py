@@ -20,13 +20,13 @@ import pytest
 import risorius
 from conftest import GOLDEN, PROJECT, no_room
 from risorius.baking.progress import Progress, clock
-from risorius.base import fileio
 from risorius.batch.cluster import Cluster
 from risorius.batch.jobs import JobsError, read_jobs
 from risorius.batch.journal import Journal
 from risorius.batch.pool import Pool, PoolError
 from risorius.batch.work import run_job, stamp
 from risorius.cli import main
+from risorius.files import fileio
 from test_eval_clip import write_clip
 
 RATE = 30

@@ -12,7 +12,7 @@ import textwrap
 
 import pytest
 from conftest import no_room
-from risorius.base import fileio
+from risorius.files import fileio
 
 posix = pytest.mark.skipif(os.name == "nt", reason="of POSIX")
 
@@ -95,7 +95,7 @@ def test_a_full_device_is_an_error_of_that_name():
 def test_what_a_killed_writer_left_goes_with_the_next_one_and_a_live_ones_stays(tmp_path):
     code = """
         import os, signal, sys
-        from risorius.base import fileio
+        from risorius.files import fileio
         with fileio.replacing(sys.argv[1]) as file:
             file.write(b"half")
             file.flush()
@@ -116,7 +116,7 @@ def test_rights_and_links_stay_and_the_mask_is_the_systems(tmp_path):
     path, link = tmp_path / "a", tmp_path / "link"
     done = run(
         "import os, sys; os.umask(0o027)\n"
-        "from risorius.base import fileio; fileio.write_text(sys.argv[1], 'new')",
+        "from risorius.files import fileio; fileio.write_text(sys.argv[1], 'new')",
         path,
     )
     assert done.returncode == 0, done.stderr
@@ -176,7 +176,7 @@ def test_a_folder_that_may_not_be_written_is_known_before(tmp_path):
     done = run(
         """
         import os, sys
-        from risorius.base import fileio
+        from risorius.files import fileio
         if os.getuid() == 0: os.setgid(65534); os.setuid(65534)
         for name in ("a", "b/c"):
             try:

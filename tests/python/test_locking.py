@@ -11,7 +11,7 @@ import sys
 import threading
 
 import pytest
-from risorius.base.locking import NAME, LockedError, locked
+from risorius.files.locking import NAME, LockedError, locked
 
 if os.name != "nt":
     import fcntl
@@ -19,7 +19,7 @@ if os.name != "nt":
 HOLD = """
 import sys
 from pathlib import Path
-from risorius.base.locking import locked
+from risorius.files.locking import locked
 with locked(Path(sys.argv[1])):
     print("has it", flush=True)
     sys.stdin.readline()

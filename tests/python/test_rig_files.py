@@ -10,7 +10,7 @@ import pytest
 import risorius
 import xxhash
 from conftest import GOLDEN
-from risorius.base import caches
+from risorius.files import caches
 from risorius.rigs import cache
 
 FILE = GOLDEN / "core.dna"

@@ -189,4 +189,4 @@ def _add_catalogs(path: Path, wanted: Iterable[str]) -> None:
             title = f"{group[:1].upper()}{group[1:]}s"
             text = f"{text.rstrip()}\n{number}:{CATALOG}/{title}:{CATALOG}-{title}\n"
     # The file belongs to every .blend of the folder: it is whole at all times.
-    native.part("base.fileio").write_text(path, text)
+    native.part("files.fileio").write_text(path, text)

@@ -467,7 +467,7 @@ def write_images(scene: bpy.types.Scene, folder: Path) -> int:
     slots = [s for o in scene.objects if o.type == "MESH" for s in o.material_slots if s.material]
     trees: set[NodeTree] = {s.material.node_tree for s in slots if s.material} - {None}
     images = {n.image for t in trees for n in t.nodes if n.type == "TEX_IMAGE" and n.image}
-    write_bytes = native.part("base.fileio").write_bytes
+    write_bytes = native.part("files.fileio").write_bytes
     for image in images:
         folder.mkdir(exist_ok=True)
         write_bytes(folder / PurePath(image.filepath_raw).name, image.packed_file.data)

@@ -131,7 +131,7 @@ class RISORIUS_OT_export_dna(_FileOperator, Operator, ExportHelper):
         options = export_dna.ExportOptions(
             self.use_shapes, self.use_neutral, self.use_joints, self.use_weights
         )
-        fileio = native.part("base.fileio")
+        fileio = native.part("files.fileio")
         try:
             fileio.check_writable(self.filepath)
             content, sentences = export_dna.export(context, rig, options)

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 
 import risorius
 
-from ..base.fileio import replacing
+from ..files.fileio import replacing
 from .face import PARTS, Chunk, Face, played
 from .measure import Measure
 from .writing import CsvWriter, NpzWriter, about, find_moving

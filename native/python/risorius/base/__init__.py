@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""What every room uses: errors, whole files, locks, budgets, TOML. Knows no other room."""
+"""What every room uses: errors, budgets, filters, TOML. Knows no other room."""

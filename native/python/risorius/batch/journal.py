@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ..base.fileio import replacing
+from ..files.fileio import replacing
 from .jobs import Job, JobsError
 from .outcome import Outcome
 from .work import stamp

@@ -14,8 +14,8 @@ from typing import Any
 import risorius
 
 from ..baking.progress import Progress, clock
-from ..base import fileio
-from ..base.locking import locked
+from ..files import fileio
+from ..files.locking import locked
 from . import summary
 from .cluster import Cluster
 from .jobs import Job, Plan

@@ -11,7 +11,7 @@ from typing import Any, TextIO
 
 import risorius
 
-from ..base.fileio import replacing
+from ..files.fileio import replacing
 from .jobs import Plan
 from .journal import Journal
 from .outcome import Outcome

@@ -13,8 +13,8 @@ from typing import Any
 
 import risorius
 
-from ..base import fileio
 from ..base.words import counted
+from ..files import fileio
 from .files import (
     KINDS,
     CommandLineError,

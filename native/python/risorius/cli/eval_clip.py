@@ -15,8 +15,8 @@ from risorius.baking.bake import DEFAULT_PARTS, bake
 from risorius.baking.clips import load_performance
 from risorius.baking.face import PARTS, load_face, prepared
 from risorius.baking.progress import Progress
-from risorius.base import fileio
 from risorius.base.errors import ArgumentError
+from risorius.files import fileio
 
 from ..base.words import counted
 from .files import CommandLineError, refuse_same_file, require_writable

@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import risorius
-from risorius.base import fileio
 from risorius.base.errors import RisoriusError
 from risorius.base.words import counted
+from risorius.files import fileio
 
 KINDS = ("dna", "json")
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import risorius
 
-from ..base import fileio
+from ..files import fileio
 from .files import CommandLineError, InputError, read_bytes, require_suffix, require_writable
 
 _NEEDS = "plot draws with Matplotlib, which is not installed: pip install risorius[plot]"

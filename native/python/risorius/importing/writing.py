@@ -11,8 +11,8 @@ import os
 import numpy as np
 
 from ..anim.clip import Clip
-from ..base import fileio
 from ..base.errors import ArgumentError
+from ..files import fileio
 
 
 def csv_text(clip: Clip) -> str:

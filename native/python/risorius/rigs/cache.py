@@ -11,7 +11,7 @@ from pathlib import Path
 
 from .._native import DnaError, Rig, compile_version, rig_block_version
 from ..base import version
-from ..base.caches import cache_folder
+from ..files.caches import cache_folder
 from .load import load
 
 

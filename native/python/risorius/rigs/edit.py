@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import cast
 
-from .. import _native
 from .._native import Dna, GroupSizes, LargestChange, RegroupReport
+from .._native import regroup as _regroup
 from ..base.errors import ArgumentError
 
 __all__ = ["GroupSizes", "LargestChange", "RegroupReport", "regroup"]
@@ -60,7 +60,7 @@ def regroup(
         ValueError: an unknown joint name; a threshold of other than one or three numbers.
     """
     mm, degrees, scale = _three(threshold)
-    return _native.regroup(
+    return _regroup(
         dna,
         regions=[] if regions is None else _indices(dna, regions),
         translation_mm=mm,

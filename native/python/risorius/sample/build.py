@@ -18,8 +18,8 @@ from .. import (
     Mesh,
     Psds,
 )
-from ..base import fileio
 from ..base.easing import smooth_step
+from ..files import fileio
 from . import expressions as ex
 from .controls import gui_table
 from .paint import paint_textures

