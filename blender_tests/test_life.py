@@ -117,6 +117,16 @@ def test_a_copy_is_noticed_where_as_many_objects_went(dna_file):
     assert copy.data != head.data
 
 
+def test_what_a_save_separates_is_said(dna_file, tmp_path, capsys):
+    head = scene.meshes(scene.load(dna_file, "LIVE"))[0]
+    copy = head.copy()  # shows the same mesh; no update comes before the save
+    bpy.context.scene.collection.objects.link(copy)
+    capsys.readouterr()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "copied.blend"))
+    assert capsys.readouterr().out.count("was given a mesh of its own") == 1
+    assert copy.data != head.data
+
+
 def test_undo_and_redo(mode, dna_file):
     bpy.context.preferences.edit.use_global_undo = True
     rig = _posed(dna_file, mode)

@@ -111,6 +111,19 @@ def test_a_form_that_is_no_number_counts_as_none(rubbish):
     assert past.controls()[0][VERSION] == 1
 
 
+def test_an_old_bake_whose_tracks_are_gone_is_brought_up(capsys):
+    """The animation data went away while nobody looked, what is kept of its tracks did not."""
+    with bpy.data.libraries.load(str(FOLDER / "baked_controls.blend")) as (there, into):
+        into.objects = [name for name in there.objects if name.endswith("_controls")]
+    controls = into.objects[0]
+    assert not controls["risorius_before"]["tracks"][0].startswith("[")  # by their order
+    controls.animation_data_clear()
+    note = scene.submodule("scene.animation.actions").note_tracks_by_name
+    assert note(controls) is False
+    assert list(controls["risorius_before"]["tracks"]) == []
+    assert note(controls) is False
+
+
 def test_what_an_old_bake_silenced_is_known_by_name(capsys):
     bpy.ops.wm.open_mainfile(filepath=str(FOLDER / "baked_controls.blend"))
     (line,) = _lines(capsys)

@@ -181,6 +181,26 @@ def test_an_edit_of_one_image_stays_with_the_active_face(edit, noticed, textured
     assert len({r.name for r in rigs if _images(r)["flush"] == _images(rigs[0])["flush"]}) == 3
 
 
+@pytest.mark.parametrize("rubbish", [None, "", "words", "No Space\nNO_ALPHA\n1", 5, [1, 2]])
+@pytest.mark.parametrize("key", ["risorius_state", "risorius_sha256"])
+def test_a_note_that_somebody_changed_breaks_nothing(key, rubbish, textured, tmp_path, capsys):
+    rigs = [scene.load(textured) for _ in range(2)]
+    before = _pixels(rigs[0])
+    image = _images(rigs[1])["Colour"]
+    settings = image.colorspace_settings.name, image.alpha_mode
+    bpy.context.view_layer.objects.active = scene.controls(rigs[1])
+    del image[key]
+    if rubbish is not None:
+        image[key] = rubbish
+    scene.update(scene.controls(rigs[0]))
+    _save(tmp_path / "noted.blend")
+    assert "Traceback" not in capsys.readouterr().err
+    for rig in rigs:
+        np.testing.assert_array_equal(_pixels(rig), before)
+        shown = _images(rig)["Colour"]
+        assert (shown.colorspace_settings.name, shown.alpha_mode) == settings
+
+
 def test_a_face_alone_is_painted_without_a_word(textured, tmp_path, capsys):
     rig = scene.load(textured)
     image = _images(rig)["Colour"]

@@ -125,6 +125,27 @@ def test_refuses(tmp_path, old, new, sentence):
     assert str(path) in str(error.value)
 
 
+def test_a_name_in_two_files_is_said_and_the_later_one_counts(tmp_path, monkeypatch):
+    for file, weight in (("a.toml", 0.25), ("b.toml", 0.5)):
+        (tmp_path / file).write_text(
+            f"[expressions.grin]\nweights = {{jawOpen = {weight}}}\n"
+            f"[expressions.{file[0]}]\nweights = {{jawOpen = 1.0}}\n"
+        )
+    monkeypatch.setattr(expressions, "FILES", ("a.toml", "b.toml"))
+    monkeypatch.setattr(expressions.resources, "files", lambda _package: tmp_path)
+    with pytest.warns(UserWarning, match=r"grin is in a\.toml and in b\.toml") as said:
+        found = expressions._own.__wrapped__()
+    assert len(said) == 1
+    assert {name: list(e.weights.values()) for name, e in found.items()} == {
+        "grin": [0.5], "a": [1.0], "b": [1.0]
+    }  # fmt: skip
+
+
+def test_those_that_come_along_have_each_name_once(recwarn):
+    assert len(expressions._own.__wrapped__()) > 30
+    assert list(recwarn) == []
+
+
 def test_an_unknown_name_is_said():
     with pytest.raises(ValueError, match="joi: an expression such as joy"):
         expressions.get("joi")

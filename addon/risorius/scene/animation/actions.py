@@ -340,7 +340,9 @@ def note_tracks_by_name(owner: Animated) -> bool:
     if state is None or not lines or lines[0].startswith("["):
         return False
     data = owner.animation_data
-    assert data is not None
+    if data is None:  # somebody took it away, and the tracks with it
+        state["tracks"] = []
+        return False
     own = data.nla_tracks.get(state["track"])
     others = [track for track in data.nla_tracks if track != own]
     pairs = [(t, *(int(w) for w in x.split())) for t, x in zip(others, lines, strict=False)]

@@ -61,7 +61,8 @@ def nodes_of(rig: ArmatureObject) -> Iterator[Node]:
 
 def keep() -> None:
     """Hold the bytes of the images that several characters show: what is edited is lost else."""
-    shown = {i[DIGEST]: i for i, owners in _owners(parts.rigs()).items() if len(owners) > 1}
+    owned = _owners(parts.rigs()).items()
+    shown = {_noted(image)[0]: image for image, owners in owned if len(owners) > 1}
     for digest in [d for d in _kept if d not in shown]:
         del _kept[digest]
     for digest, image in shown.items():
@@ -107,7 +108,7 @@ def share() -> list[str]:
             if DIGEST not in image and not image.is_dirty:
                 mark(image)
             if DIGEST in image:
-                first.setdefault((image[DIGEST], image[STATE]), []).append(image)
+                first.setdefault(_noted(image), []).append(image)
     for equal in first.values():
         _merge(equal, rigs)
     keep()
@@ -150,8 +151,9 @@ def _show_instead(
 
 
 def _separate(image: bpy.types.Image, owners: Sequence[ArmatureObject]) -> list[str]:
-    digest, state = image[DIGEST], image[STATE]
-    del image[DIGEST], image[STATE]
+    digest, state = _noted(image)
+    for key in {DIGEST, STATE} & set(image.keys()):
+        del image[key]
     active = parts.rig_of(current_context().view_layer.objects.active)
     keeper = active if active in owners else next(iter(owners), None)
     others = [rig for rig in owners if rig != keeper]
@@ -166,16 +168,37 @@ def _separate(image: bpy.types.Image, owners: Sequence[ArmatureObject]) -> list[
 
 
 def _image_of(content: bytes, image: bpy.types.Image, state: str) -> bpy.types.Image:
-    """A new image of packed bytes, with the settings that another had."""
-    space, alpha, _ = state.split("\n")
+    """A new image of packed bytes, with the settings that another had as its state was noted.
+
+    What is noted may be any text; where it names no setting, the other's present ones are taken.
+    """
+    space, alpha = (*state.split("\n"), "")[:2]
     fresh = bpy.data.images.new(image.name, 1, 1)
     fresh.pack(data=content, data_len=len(content))
     fresh.source = "FILE"
     fresh.filepath_raw = image.filepath_raw
-    _space(fresh).name = space
-    fresh.alpha_mode = alpha  # pyright: ignore[reportAttributeAccessIssue]
+    for found in (space, _space(image).name):
+        if _takes(_space(fresh), "name", found):
+            break
+    for found in (alpha, image.alpha_mode):
+        if _takes(fresh, "alpha_mode", found):
+            break
     mark(fresh)
     return fresh
+
+
+def _takes(owner: bpy.types.bpy_struct, name: str, choice: str) -> bool:
+    """Set a property that is one of some choices. Returns: whether it has this one."""
+    try:
+        setattr(owner, name, choice)
+    except TypeError:
+        return False
+    return True
+
+
+def _noted(image: bpy.types.Image) -> tuple[str, str]:
+    """Digest and state that an image was marked with, as text: anybody may have written there."""
+    return str(image.get(DIGEST)), str(image.get(STATE))
 
 
 def _images(rigs: Iterable[ArmatureObject]) -> list[bpy.types.Image]:
@@ -201,7 +224,8 @@ def _packed(image: bpy.types.Image) -> bytes | None:
 def _is_whole(image: bpy.types.Image, digest: str | None = None) -> bool:
     """Whether what is packed is what was marked."""
     content = _packed(image)
-    return content is not None and storage.hash_of(content) == (digest or image[DIGEST])
+    wanted = _noted(image)[0] if digest is None else digest
+    return content is not None and storage.hash_of(content) == wanted
 
 
 def _space(image: bpy.types.Image) -> Any:  # noqa: ANN401  its names are those of the configuration
@@ -214,7 +238,7 @@ def _state(image: bpy.types.Image, space: str = "") -> str:
 
 
 def _edited(image: bpy.types.Image, spaces: bool = True) -> bool:
-    noted = str(image.get(STATE))
+    noted = _noted(image)[1]
     space = "" if spaces else noted.partition("\n")[0]
     return image.is_dirty or noted != _state(image, space)
 

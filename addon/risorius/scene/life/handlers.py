@@ -173,7 +173,7 @@ def _restored(*_arguments: object) -> None:
 def _before_save(*_arguments: object) -> None:
     if native.problem():
         return
-    duplicates.separate_all()
+    console.say(*duplicates.separate_all())
     _end_tests()
     repair.remove_dead()
     console.say(*sharing.share())

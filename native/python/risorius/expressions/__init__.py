@@ -8,6 +8,7 @@ loaded. A name that ends in * stands for both sides, in ** for the four lip quar
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -111,10 +112,23 @@ def pose_vector(expression: str | Expression, rig_names: Sequence[str]) -> npt.N
 
 @cache
 def _own() -> dict[str, Expression]:
+    folder = resources.files(__package__)
+    texts = {file: folder.joinpath(file).read_text(encoding="utf-8") for file in FILES}
+    return _joined({file: _parsed(toml.parse(text), file) for file, text in texts.items()})
+
+
+def _joined(found: Mapping[str, Mapping[str, Expression]]) -> dict[str, Expression]:
+    """The expressions of several files: of a name that two have, the later file's is taken."""
     out: dict[str, Expression] = {}
-    for file in FILES:
-        text = resources.files(__package__).joinpath(file).read_text(encoding="utf-8")
-        out |= _parsed(toml.parse(text), file)
+    file_of: dict[str, str] = {}
+    for file, expressions in found.items():
+        for name in sorted(out.keys() & expressions.keys()):
+            warnings.warn(
+                f"the expression {name} is in {file_of[name]} and in {file}, which is taken",
+                stacklevel=2,
+            )
+        out |= expressions
+        file_of |= dict.fromkeys(expressions, file)
     return out
 
 
