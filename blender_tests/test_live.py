@@ -44,7 +44,7 @@ def port():
 
 @pytest.fixture(autouse=True)
 def no_recordings_of_other_tests(addon):
-    module = scene.submodule("scene.live.capture")
+    module = scene.submodule("scene.live.recordings")
     for recording in module.waiting():
         module.discard(recording)
 
@@ -64,7 +64,7 @@ def send(port, *steps):
 
 
 def session_of(rig):
-    return scene.submodule("scene.live.capture").of(scene.controls(rig))
+    return scene.submodule("scene.live.sessions").of(scene.controls(rig))
 
 
 def tick_until(rig, frames):
@@ -346,7 +346,7 @@ def jaw_keys(rig):
 
 def only_recording(faces):
     """The one that waits, with so many faces."""
-    (recording,) = scene.submodule("scene.live.capture").waiting()
+    (recording,) = scene.submodule("scene.live.recordings").waiting()
     assert len(recording.take) == faces
     return recording
 
@@ -369,7 +369,7 @@ def test_an_error_ends_it_and_is_shown(dna_file, port, monkeypatch):
     assert "2 faces wait" in drawn()
     assert bpy.ops.risorius.live_finish() == {"FINISHED"}
     assert jaw_keys(rig)[:, 1].tolist() == [0.5, 0.75]
-    assert not module.waiting()
+    assert not scene.submodule("scene.live.recordings").waiting()
     assert not bpy.ops.risorius.live_finish.poll()
 
 
@@ -426,7 +426,7 @@ def test_the_recording_of_a_face_that_went_away_and_of_a_file_that_was_closed(dn
     assert module._tick() is None
     only_recording(1)
     assert bpy.ops.risorius.live_discard() == {"FINISHED"}
-    assert not module.waiting()
+    assert not scene.submodule("scene.live.recordings").waiting()
 
     rig = scene.load(dna_file)
     begin_recording(rig, packet(1, _17=0.5), packet(2, _17=0.75))

@@ -12,7 +12,7 @@ from ...logic.base import names
 from ...logic.base.errors import FaceError
 from ...scene.animation import clip_actions
 from ...scene.base.blender_types import ArmatureObject
-from ...scene.live import capture
+from ...scene.live import capture, recordings, sessions
 from ..blender_types import Context, Operator, OperatorBase, Result
 from ..common import active_controls, face_rig, usable
 from .properties import choices, settings_of
@@ -27,7 +27,7 @@ class _Running(OperatorBase):
     def poll(cls, context: Context) -> bool:
         if not usable(cls):
             return False
-        if capture.of(active_controls(context)) is None:
+        if sessions.of(active_controls(context)) is None:
             cls.poll_message_set(_NOT_STARTED)
             return False
         return True
@@ -60,9 +60,9 @@ class RISORIUS_OT_live_start(Operator):
         return {"FINISHED"}
 
 
-def _session(context: Context) -> capture.Session:
+def _session(context: Context) -> sessions.Session:
     """The capture of the active face, after poll has said that there is one. Raises: FaceError."""
-    session = capture.of(active_controls(context))
+    session = sessions.of(active_controls(context))
     if session is None:
         raise FaceError(_NOT_STARTED)
     return session
@@ -110,14 +110,14 @@ class _Waiting(OperatorBase):
     def poll(cls, context: Context) -> bool:
         if not usable(cls):
             return False
-        if not capture.waiting():
+        if not recordings.waiting():
             cls.poll_message_set("No recording waits to be finished.")
             return False
         return True
 
-    def recording(self) -> capture.Recording | None:
+    def recording(self) -> recordings.Recording | None:
         """The Recording that is meant, or None."""
-        found = capture.waiting()
+        found = recordings.waiting()
         if not 0 <= self.index < len(found):
             self.report({"ERROR"}, f"There is no recording {self.index}: {len(found)} wait.")
             return None
@@ -147,7 +147,7 @@ class RISORIUS_OT_live_finish(_Waiting, Operator):
             return {"CANCELLED"}
         if self.at_current:
             recording.frame = float(context.scene.frame_current)
-        done = _finish(self, context, lambda *where: capture.finish(recording, *where))
+        done = _finish(self, context, lambda *where: recordings.finish(recording, *where))
         return {"FINISHED"} if done else {"CANCELLED"}
 
 
@@ -164,7 +164,7 @@ class RISORIUS_OT_live_discard(_Waiting, Operator):
         recording = self.recording()
         if recording is None:
             return {"CANCELLED"}
-        capture.discard(recording)
+        recordings.discard(recording)
         return {"FINISHED"}
 
 
@@ -181,8 +181,8 @@ class RISORIUS_OT_live_neutral(_Running, Operator):
     def execute(self, context: Context) -> Result:
         session = _session(context)
         if self.forget:
-            capture.forget_neutral(session)
-        elif not capture.neutral_now(session):
+            sessions.forget_neutral(session)
+        elif not sessions.neutral_now(session):
             self.report({"ERROR"}, "No face was received yet.")
             return {"CANCELLED"}
         return {"FINISHED"}

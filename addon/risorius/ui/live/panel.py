@@ -2,7 +2,7 @@
 """The panel Live Capture."""
 
 from ...logic.base import names
-from ...scene.live import capture
+from ...scene.live import capture, recordings, sessions
 from .. import words
 from ..blender_types import Context, Panel, UILayout
 from ..common import FaceOnlyPanel, active_controls
@@ -18,7 +18,7 @@ class RISORIUS_PT_live(FaceOnlyPanel, Panel):
     def draw(self, context: Context) -> None:
         layout = self.layout
         chosen = choices(context)
-        session = capture.of(active_controls(context))
+        session = sessions.of(active_controls(context))
         column = layout.column()
         column.enabled = session is None
         column.prop(chosen, "source", text="")
@@ -57,7 +57,7 @@ def _where(chosen: RISORIUS_PG_live) -> str:
 
 def _draw_waiting(layout: UILayout) -> None:
     """The recordings that are no action yet."""
-    for index, recording in enumerate(capture.waiting()):
+    for index, recording in enumerate(recordings.waiting()):
         box = layout.box()
         text = f"{recording.face}: {len(recording.take)} faces wait"
         box.label(text=names.printable(text, 60), icon="REC")
@@ -68,7 +68,7 @@ def _draw_waiting(layout: UILayout) -> None:
         row.operator("risorius.live_discard", text="", icon="TRASH").index = index
 
 
-def _draw_status(layout: UILayout, session: capture.Session) -> None:
+def _draw_status(layout: UILayout, session: sessions.Session) -> None:
     status = session.receiver.status(session.subject)
     column = layout.column(align=True)
     column.scale_y = 0.8

@@ -8,7 +8,7 @@ from typing import cast
 import bpy
 
 from ... import native
-from ...scene.live import capture
+from ...scene.live import sessions
 from ..blender_types import Context
 from ..common import active_controls
 
@@ -24,9 +24,9 @@ def _source_changed(self: "RISORIUS_PG_live", _context: bpy.types.Context) -> No
 
 def _changed(_self: "RISORIUS_PG_live", given: bpy.types.Context) -> None:
     context = cast(Context, given)
-    session = capture.of(active_controls(context))
+    session = sessions.of(active_controls(context))
     if session is not None:
-        capture.apply_settings(session, settings_of(context))
+        sessions.apply_settings(session, settings_of(context))
 
 
 class RISORIUS_PG_live(bpy.types.PropertyGroup):
@@ -89,10 +89,10 @@ def choices(context: Context) -> RISORIUS_PG_live:
     return cast(RISORIUS_PG_live, context.window_manager.risorius_live)
 
 
-def settings_of(context: Context) -> capture.Settings:
-    """The choices as scene/live/capture.py takes them."""
+def settings_of(context: Context) -> sessions.Settings:
+    """The choices as scene/live/sessions.py takes them."""
     chosen = choices(context)
-    return capture.Settings(
+    return sessions.Settings(
         chosen.source,
         chosen.port,
         chosen.everywhere,

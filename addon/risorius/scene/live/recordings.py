@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Recordings of live capture: they become actions, or wait in memory until somebody decides.
+
+One that cannot become an action when it ends, whose face went away or whose file is closed waits
+until it is finished or thrown away: nobody acts the same twice.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+
+from ... import native
+from ...logic.animation.clip_units import ClipError
+from ...logic.base import names
+from ..animation import actions, clip_actions, layers
+from ..base import parts
+from ..base.blender_types import ArmatureObject
+
+_waiting: list[Recording] = []  # ended without becoming an action, the oldest first
+
+
+@dataclass
+class Recording:
+    """What was recorded, or is being recorded.
+
+    Attributes:
+        take: risorius.live.Take.
+        shaper: risorius.live.Shaper, of the capture that it belongs to.
+        frame: of the scene, when it began.
+        face: name of the control armature.
+    """
+
+    take: native.Take
+    shaper: native.Shaper
+    frame: float
+    face: str = ""
+
+
+def lay_by(recording: Recording) -> None:
+    """Let a recording that ended wait."""
+    _waiting.append(recording)
+
+
+def waiting() -> tuple[Recording, ...]:
+    """The recordings that wait to be finished: a tuple of Recordings, the oldest first."""
+    return tuple(_waiting)
+
+
+def discard(recording: Recording) -> None:
+    """Throw away a recording that waits."""
+    _waiting.remove(recording)
+
+
+def finish(
+    recording: Recording, rig: ArmatureObject, scene: bpy.types.Scene
+) -> clip_actions.Report:
+    """Let a character play a recording that waits; then it waits no more.
+
+    Args:
+        recording: of waiting(); made with this character or with another.
+        rig: the character.
+        scene: gives the rate.
+
+    Returns:
+        clip_actions.Report.
+
+    Raises:
+        clip_units.ClipError: nothing of it is for this face, it is longer than Blender can play,
+            or the NLA is being edited.
+    """
+    controls, take = parts.controls_there(rig), recording.take
+    trouble = actions.busy(controls)
+    if trouble:
+        raise ClipError(trouble)
+    clip = take.clip(recording.shaper)
+    timing = clip_actions.timing_of(clip, scene, recording.frame)
+    report = clip_actions.make_action(
+        rig, clip, timing, f"Live {names.printable(take.subject, 40)}"
+    )
+    if take.full:
+        report.notes.append(f"The take is full: {take.full} faces were left out.")
+    layers.keep_weights(controls, clip_actions.play(rig, report.action))
+    scene.frame_end = max(scene.frame_end, round(report.last))
+    _waiting.remove(recording)
+    return report
