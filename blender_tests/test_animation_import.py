@@ -639,3 +639,20 @@ def test_a_clip_of_our_own_comes_back_bit_for_bit(rig, tmp_path):
     path.write_bytes(path.read_bytes()[:40])
     with pytest.raises(RuntimeError, match=r"take\.rzc"):
         _import(path)
+
+
+def test_the_other_rig_is_the_selected_one_or_the_only_one(rig):
+    bpy.context.view_layer.objects.active = scene.controls(rig)
+    assert not bpy.ops.risorius.import_arkit_rig.poll()
+    _arkit_rig()
+    bpy.context.view_layer.objects.active = scene.controls(rig)
+    assert bpy.ops.risorius.import_arkit_rig() == {"FINISHED"}
+    other = _arkit_rig()
+    for item in bpy.context.selected_objects:
+        item.select_set(False)
+    bpy.context.view_layer.objects.active = scene.controls(rig)
+    with pytest.raises(RuntimeError, match="Select the object whose shape keys are animated"):
+        bpy.ops.risorius.import_arkit_rig()
+    other.select_set(True)
+    assert bpy.ops.risorius.import_arkit_rig() == {"FINISHED"}
+    assert scene.controls(rig).animation_data.action.name.startswith("Other.001")

@@ -267,3 +267,18 @@ def test_a_moved_face_and_edited_bones_stay_as_they_were_put(dna_file):
     scene.update(controls)
     np.testing.assert_array_equal(_rests(controls), bones)
     assert tuple(controls.scale) == (2.0, 2.0, 2.0)
+
+
+def test_a_face_is_made_as_large_as_the_body_it_is_put_on(dna_file):
+    rig = scene.load(dna_file)
+    controls, body = scene.controls(rig), _body(NAMES["rigify"], 2.0, 0.3)
+    _attach(rig, body, fit="SCALE")
+    bpy.context.view_layer.update()
+    for own, name in (("head", "head"), ("neck", "neck")):
+        there = body.matrix_world @ body.data.bones[name].head_local
+        here = controls.matrix_world @ controls.data.bones[own].head_local
+        if own == "head":
+            assert (here - there).length < 1e-5
+            head, heads = here, there
+        else:
+            assert (here - head).length == pytest.approx((there - heads).length, rel=1e-4)

@@ -175,3 +175,25 @@ def test_words_are_measured_once(rig, monkeypatch):
     names = [text for _font, text in asked]
     assert names
     assert len(names) == len(set(names))
+
+
+def test_menus_offer_every_expression_and_the_actions_that_fit(rig):
+    scene.face(rig).keyframe_insert('["CTRL_expressions.jawOpen"]', frame=1)
+    scene.controls(rig).animation_data.action.name = "Speaks"
+    bpy.data.actions.new("Walks")
+    menus, expressions = ui("layers.menus"), ui("expressions.menus")
+    assert texts(drawn(menus.RISORIUS_MT_actions, bpy.context)) == ["Speaks"]
+    known = scene.submodule("scene.animation.expressions").all_expressions().values()
+    shown = []
+    for kind in menus._ADD:
+        group = kind.bl_idname.rpartition("_")[2]
+        labels = [e.label for e in known if e.group == group]
+        assert texts(drawn(kind, bpy.context)) == labels != []
+        assert texts(drawn(getattr(bpy.types, f"RISORIUS_MT_set_{group}"), bpy.context)) == labels
+        shown.append(kind.bl_label)
+    assert texts(drawn(expressions.RISORIUS_MT_expressions, bpy.context))[:-1] == shown
+    add = texts(drawn(menus.RISORIUS_MT_layer_add, bpy.context))
+    assert add == ["From Active Action", "Action", "Idle Life", *shown]
+    fire = texts(drawn(menus.RISORIUS_MT_fire, bpy.context))
+    assert "Flash" in " ".join(fire)
+    assert "Clear Warp Points" in texts(drawn(menus.RISORIUS_MT_layer_more, bpy.context))

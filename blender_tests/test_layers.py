@@ -781,3 +781,45 @@ def test_a_reaction_needs_no_layer(blinker):
     bpy.context.scene.frame_set(15)
     assert bpy.ops.risorius.fire(reaction="flash") == {"FINISHED"}
     assert _value(blinker, 19, BLINK) > 0.9
+
+
+def test_a_copy_of_a_layer_has_its_own_warp_points(rig):
+    controls = scene.controls(rig)
+    _entry(rig, name="a", action=_wave(rig), weight=0.5)
+    for frame in (5, 15):
+        bpy.context.scene.frame_set(frame)
+        assert bpy.ops.risorius.layer_warp() == {"FINISHED"}
+    assert bpy.ops.risorius.layer_duplicate() == {"FINISHED"}
+    first, second = _layers().of(controls)
+    pins = [(point.frame, point.source) for point in first.warp]
+    assert {5, 15} <= {frame for frame, _source in pins}
+    assert [(point.frame, point.source) for point in second.warp] == pins
+    assert (second.action, second.weight) == (first.action, 0.5)
+    assert bpy.ops.risorius.layer_warp(clear=True) == {"FINISHED"}
+    assert sorted(len(layer.warp) for layer in _layers().of(controls)) == [0, len(pins)]
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"), [("EXPRESSION", "no expression gone"), ("ACTION", "no action gone")]
+)
+def test_a_layer_of_what_is_not_there_is_refused(rig, kind, words):
+    with pytest.raises(RuntimeError, match=words):
+        bpy.ops.risorius.layer_add(kind=kind, source="gone")
+    assert not len(_layers().of(scene.controls(rig)))
+    assert bpy.ops.risorius.layer_add(kind="EXPRESSION", source="joy") == {"FINISHED"}
+    with pytest.raises(RuntimeError, match="Only a layer with an action"):
+        bpy.ops.risorius.layer_warp()
+
+
+def test_a_reaction_that_is_gone_is_named_and_the_others_are_shown(blinker):
+    from support.layout import Recorder
+
+    bpy.context.scene.frame_set(15)
+    assert bpy.ops.risorius.fire(reaction="flash") == {"FINISHED"}
+    _layers().reactions_of(scene.controls(blinker))[0].name = "sneeze"
+    _entry(blinker, kind="EXPRESSION", expression="joy", weight=0.0)
+    assert bpy.ops.risorius.fire(reaction="flash") == {"FINISHED"}
+    assert _value(blinker, 19, BLINK) > 0.9
+    drawn = Recorder()
+    bpy.types.RISORIUS_PT_layers.draw(type("Panel", (), {"layout": drawn})(), bpy.context)
+    assert "sneeze: there is no such reaction" in drawn.text()

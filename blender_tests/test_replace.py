@@ -745,3 +745,24 @@ def test_a_replaced_face_outlasts_the_file(mode, dna_file, other_file, tmp_path)
     np.testing.assert_array_equal(scene.snapshot(rig), before)
     assert scene.submodule("scene.base.storage").content(rig["risorius_dna"]) == content
     _still_decorated(rig)
+
+
+def _uvs(item):
+    flat = np.empty(len(item.data.loops) * 2, np.float32)
+    item.data.uv_layers["UVMap"].uv.foreach_get("vector", flat)
+    return flat.reshape(-1, 2)
+
+
+@pytest.mark.parametrize("is_edited", [False, True])
+def test_an_edited_uv_map_stays_and_another_follows_the_file(dna_file, tmp_path, is_edited):
+    dna = small_face()
+    dna.meshes[0].texture_coordinates = dna.meshes[0].texture_coordinates / 2
+    rig = scene.load(dna_file)
+    head = scene.meshes(rig)[0]
+    if is_edited:
+        head.data.uv_layers["UVMap"].uv[3].vector = (0.9, 0.8)
+    before = _uvs(head)
+    _replace(_save(dna, tmp_path))
+    np.testing.assert_allclose(_uvs(head), before if is_edited else before / 2, atol=1e-6)
+    assert ("Small replace report" in bpy.data.texts) == is_edited
+    assert not is_edited or "keeps your UV map" in _report()

@@ -356,3 +356,11 @@ def test_actions_that_the_face_does_not_play_stay_out(dna_file, tmp_path):
     bone.location.x = 0.0
     found = _import("GLTF", _export("GLTF", tmp_path))
     assert _error(_film(found), wanted) < NEAR["GLTF"]
+
+
+def test_a_baked_face_is_not_exported(dna_file, tmp_path):
+    scene.load(dna_file)
+    assert bpy.ops.risorius.bake(range="CUSTOM", start=1, end=2) == {"FINISHED"}
+    with pytest.raises(RuntimeError, match="is baked: choose Back to Live first"):
+        bpy.ops.risorius.export_animation(filepath=str(tmp_path / "face.glb"), format="GLTF")
+    assert not list(tmp_path.glob("*.glb"))
