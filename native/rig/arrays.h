@@ -6,11 +6,15 @@
 // index and never by pointer, so the block can be written to a file and read again at another
 // address.
 //
-// Words: a *control* is one number of the control vector, which evaluation computes from the raw
-// controls that a caller sets. A *joint attribute* is one of the 9 (or, with quaternions, 10)
-// numbers that move a joint. A *row* is a joint attribute as a joint group sees it: the group's own
-// numbering. A *LOD* is a level of detail, 0 the finest. A name that ends in "_begin" or "begins"
-// is an index into another array; where that array is not the next one, a comment names it.
+// Words: a *control* is one number of the control vector, which evaluation computes from the *raw
+// controls* that a caller sets; 0 is mostly rest and 1 full, as of a smile. A *GUI control* is a
+// slider of the rig's control panel: a table turns GUI controls into raw controls. What the vector
+// moves are *joint attributes*, each one of the 9 (or, with quaternions, 10) numbers of
+// translation, rotation and scale of a joint; *blend shape channels*, the weights of shapes that
+// meshes add to their neutral one; and *animated maps*, the weights of wrinkle and colour textures.
+// A *row* is a joint attribute as a joint group sees it: the group's own numbering. A *LOD* is a
+// level of detail, 0 the finest. A name that ends in "_begin" or "begins" is an index into another
+// array; where that array is not the next one, a comment names it.
 #pragma once
 
 #include <array>
@@ -33,8 +37,9 @@ struct ConditionalRow {
   std::uint32_t run_end = 0;
 };
 
-/// A corrective: a control that is min(1, weight * the product of its factors), where each factor
-/// is another control clamped to [0, 1].
+/// A corrective ("pose space deformation", hence Psd): a control that corrects what some controls
+/// give together, as lips that are pulled and pressed at once. It is min(1, weight * the product of
+/// its factors), where each factor is another control clamped to [0, 1].
 struct Psd {
   std::uint16_t output = 0;         // the control that the corrective writes
   std::uint16_t factor_count = 0;   // number of factors
@@ -100,8 +105,10 @@ struct RbfSolver {
   std::uint32_t targets_begin = 0;
   std::uint32_t inverse_begin = 0;  // the matrix [poses, poses] in rbf_inverses, if interpolative
   std::uint32_t interpolative = 0;  // 1: at the target of a pose the solver gives that pose alone
-  std::uint32_t distance = 0, function = 0, axis = 0;  // the numbers that the file uses
-  std::uint32_t always_normalize = 0;                  // 1: weights sum to 1 however small they are
+  // How distance is measured, how it becomes a weight, and about which axis a twist is: the numbers
+  // that the file uses, which stages/rbf.cpp reads.
+  std::uint32_t distance = 0, function = 0, axis = 0;
+  std::uint32_t always_normalize = 0;  // 1: weights sum to 1 however small they are
 };
 
 /// A pose of a solver: to each output control it adds weight * value * the product of its inputs,
@@ -161,8 +168,11 @@ struct MlJoint {
                                 kNone, kNone, kNone, kNone, kNone};
 };
 
-/// A twist or swing setup: it gives shares of one rotation, which four controls hold, to joints.
+/// A twist or swing setup. Four controls hold a rotation, which is a *twist* about an axis and a
+/// *swing* of that axis; joints get shares of the one or the other, as along a neck.
 struct TwistSwing {
+  // What shares are of: kTwist: the twist; kUntwist: its inverse; kSwing: the inverse of the swing,
+  // and each joint takes the whole inverse of the twist with it.
   enum Kind : std::uint32_t { kTwist, kUntwist, kSwing };
   std::uint32_t inputs[4] = {0, 0, 0, 0};  // the controls of x y z w
   std::uint32_t axis = 0;                  // of the twist: 0 x, 1 y, 2 z
@@ -215,8 +225,7 @@ struct RigHeader {
   std::uint32_t widest_layer = 0;      // rows of the largest layer of a network
   std::uint32_t solver_inputs = 0, solver_poses = 0;  // of the largest solver
   std::uint32_t mask_count = 0;                       // regions of networks
-  std::uint32_t joint_stride =
-      9;  // attributes of a joint: 9 with Euler angles, 10 with quaternions
+  std::uint32_t joint_stride = 9;                     // attributes of a joint; with quaternions 10
   EulerConvention euler;
   // Networks may move joints in another system of axes than the face's. Then ml_converted is 1,
   // v * ml_basis takes a vector of theirs into ours, and ml_euler says how they spell Euler angles.
