@@ -35,19 +35,19 @@ def table_hits(
     """
     out: dict[int, list[tuple[int, Facts]]] = {}
     matched = None
-    for r in range(rows):
-        pair = int(table.input_indices[r]), int(table.output_indices[r])
+    for row in range(rows):
+        pair = int(table.input_indices[row]), int(table.output_indices[row])
         if pair == matched:
             continue  # within a run only the first row that holds counts
         matched = None
-        low, high = sorted((float(table.from_values[r]), float(table.to_values[r])))
+        low, high = sorted((float(table.from_values[row]), float(table.to_values[row])))
         value = float(inputs[pair[0]])
         if not low <= value <= high:
             continue
         matched = pair
-        slope, cut = float(table.slope_values[r]), float(table.cut_values[r])
-        row = {"from": low, "to": high, "slope": slope, "cut": cut, "gives": slope * value + cut}
-        out.setdefault(pair[1], []).append((pair[0], {"value": value} | row))
+        slope, cut = float(table.slope_values[row]), float(table.cut_values[row])
+        facts = {"from": low, "to": high, "slope": slope, "cut": cut, "gives": slope * value + cut}
+        out.setdefault(pair[1], []).append((pair[0], {"value": value} | facts))
     return out
 
 

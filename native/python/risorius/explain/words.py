@@ -36,8 +36,8 @@ def _number(value: float) -> str:
     return f"{value:.4g}"
 
 
-def _counted(n: int, noun: str) -> str:
-    return f"{n} {noun}{'' if n == 1 else 's'}"
+def _counted(count: int, noun: str) -> str:
+    return f"{count} {noun}{'' if count == 1 else 's'}"
 
 
 def _listed(rows: Sequence[T], top: int, line: Callable[[T], str]) -> list[str]:
@@ -94,29 +94,36 @@ def _factor(factor: Facts) -> str:
 
 
 def _correctives(facts: Facts, top: int) -> list[str]:
-    c = facts["correctives"]
-    if c["count"] == 0:
+    correctives = facts["correctives"]
+    if correctives["count"] == 0:
         return []
-    n = len(c["fire"])
-    out = [f"{n if n else 'none'} of {_counted(c['count'], 'corrective')} {_verb(n, 'fire')}"]
+    count, all_of_them = len(correctives["fire"]), _counted(correctives["count"], "corrective")
+    out = [f"{count if count else 'none'} of {all_of_them} {_verb(count, 'fire')}"]
     out += _listed(
-        c["fire"], top, lambda row: f"{row['name']} = {_number(row['value'])}: {_factors(row)}"
+        correctives["fire"],
+        top,
+        lambda row: f"{row['name']} = {_number(row['value'])}: {_factors(row)}",
     )
-    if c["lack_one"]:
-        n = len(c["lack_one"])
-        out += ["", f"{_counted(n, 'corrective')} {_verb(n, 'lack')} one control only"]
-        out += _listed(c["lack_one"], top, _near_miss)
-    if c["rest_at_this_lod"]:
-        n = len(c["rest_at_this_lod"])
-        out += ["", f"{_counted(n, 'corrective')} {_verb(n, 'rest')} although all controls are on"]
+    if correctives["lack_one"]:
+        count = len(correctives["lack_one"])
+        out += ["", f"{_counted(count, 'corrective')} {_verb(count, 'lack')} one control only"]
+        out += _listed(correctives["lack_one"], top, _near_miss)
+    if correctives["rest_at_this_lod"]:
+        count = len(correctives["rest_at_this_lod"])
+        out += [
+            "",
+            f"{_counted(count, 'corrective')} {_verb(count, 'rest')} although all controls are on",
+        ]
         out += _listed(
-            c["rest_at_this_lod"], top, lambda r: f"{r['name']} ({_factors(r)}): {r['reason']}"
+            correctives["rest_at_this_lod"],
+            top,
+            lambda r: f"{r['name']} ({_factors(r)}): {r['reason']}",
         )
     return out
 
 
-def _verb(n: int, word: str) -> str:
-    return word + ("s" if n == 1 else "")
+def _verb(count: int, word: str) -> str:
+    return word + ("s" if count == 1 else "")
 
 
 def _near_miss(row: Facts) -> str:

@@ -123,57 +123,63 @@ def blend(image: Floats, colour: tuple[float, float, float], mask: Floats) -> Fl
     return image * (1 - mask) + np.array(colour) * mask
 
 
-def brow_mask(p: Floats, eye: Floats, random: np.random.Generator) -> Floats:
+def brow_mask(texels: Floats, eye: Floats, random: np.random.Generator) -> Floats:
     """Strands along an arched line above each eye, float64[h, w] from 0 to 1.
 
     Args:
-        p: float64[h, w, 3], each texel's place on the head, decimetres.
+        texels: float64[h, w, 3], each texel's place on the head, decimetres.
         eye: float64[3], the left eye's middle.
         random: gives the strands.
     """
-    x, y = np.abs(p[:, :, 0]), p[:, :, 1] - eye[1]
-    t = (x - (eye[0] - 0.19)) / 0.44  # 0 at the nose, 1 at the temple
-    ridge = 0.165 + 0.055 * np.sin(np.clip(t, 0, 1.1) * 2.2) - 0.045 * np.clip(t - 0.55, 0, 1) / 0.5
-    half = 0.05 * (1 - 0.62 * np.clip(t, 0, 1)) * smooth(-0.04, 0.1, t) + 0.002
+    x, y = np.abs(texels[:, :, 0]), texels[:, :, 1] - eye[1]
+    along = (x - (eye[0] - 0.19)) / 0.44  # 0 at the nose, 1 at the temple
+    ridge = (
+        0.165
+        + 0.055 * np.sin(np.clip(along, 0, 1.1) * 2.2)
+        - 0.045 * np.clip(along - 0.55, 0, 1) / 0.5
+    )
+    half = 0.05 * (1 - 0.62 * np.clip(along, 0, 1)) * smooth(-0.04, 0.1, along) + 0.002
     across = (y - ridge) / half
-    body = (1 - smooth(0.45, 1.05, np.abs(across))) * smooth(-0.03, 0.1, t)
-    body *= 1 - smooth(0.9, 1.02, t)
-    front = smooth(0.05, 0.2, p[:, :, 2] - eye[2] + 0.1)
+    body = (1 - smooth(0.45, 1.05, np.abs(across))) * smooth(-0.03, 0.1, along)
+    body *= 1 - smooth(0.9, 1.02, along)
+    front = smooth(0.05, 0.2, texels[:, :, 2] - eye[2] + 0.1)
     # Strands lean outward: lines of equal (t * lean - y) are one strand.
-    phase = (x * (1.0 + 0.8 * np.clip(t, 0, 1)) - y * (1.2 - 0.9 * np.clip(t, 0, 1))) * 620
-    jitter = 2.5 * noise(len(p), 300, random)
+    phase = (x * (1.0 + 0.8 * np.clip(along, 0, 1)) - y * (1.2 - 0.9 * np.clip(along, 0, 1))) * 620
+    jitter = 2.5 * noise(len(texels), 300, random)
     strands = 0.5 + 0.5 * np.sin(phase + jitter)
     return np.asarray(body * front * (0.55 + 0.45 * strands))
 
 
-def hair_mask(p: Floats, eye: Floats, random: np.random.Generator) -> Floats:
+def hair_mask(texels: Floats, eye: Floats, random: np.random.Generator) -> Floats:
     """A shaved head's shadow, with a soft natural hairline, float64[h, w] from 0 to 1.
 
     Args:
-        p: float64[h, w, 3], each texel's place on the head, decimetres.
+        texels: float64[h, w, 3], each texel's place on the head, decimetres.
         eye: float64[3], the left eye's middle.
         random: makes the hairline uneven.
     """
-    back = p[:, :, 2] - eye[2]
+    back = texels[:, :, 2] - eye[2]
     line = np.interp(
         back,
         [-1.9, -1.35, -1.05, -0.85, -0.62, -0.45, 0.1],
         [-0.62, -0.5, -0.2, 0.1, 0.22, 0.5, 0.76],
     )
-    height = p[:, :, 1] - eye[1] - line
-    wobble = 0.03 * noise(len(p), 60, random)
-    ear = smooth(0.8, 0.86, np.abs(p[:, :, 0])) * (1 - smooth(0.35, 0.45, p[:, :, 1] - eye[1]))
+    height = texels[:, :, 1] - eye[1] - line
+    wobble = 0.03 * noise(len(texels), 60, random)
+    ear = smooth(0.8, 0.86, np.abs(texels[:, :, 0])) * (
+        1 - smooth(0.35, 0.45, texels[:, :, 1] - eye[1])
+    )
     return np.asarray(smooth(-0.06, 0.12, height + wobble) * (1 - ear))
 
 
-def lip_mask(part: Part, p: Floats, place: Floats, units: dict[str, Expression]) -> Floats:
+def lip_mask(part: Part, positions: Floats, place: Floats, units: dict[str, Expression]) -> Floats:
     """The vermilion, from the line where the lips meet, float64[h, w] from 0 to 1.
 
     That line is where vertices that the jaw takes along touch vertices that it leaves.
 
     Args:
         part: the head.
-        p: float64[v, 3], positions of its vertices, decimetres.
+        positions: float64[v, 3], positions of its vertices, decimetres.
         place: float64[h, w, 3], each texel's place on the head, decimetres.
         units: what each raw control does, by its name.
     """
@@ -187,9 +193,11 @@ def lip_mask(part: Part, p: Floats, place: Floats, units: dict[str, Expression])
             np.linalg.norm(part.carry(units["mouthUpperLipRollInR"].displacement), axis=1) > 0.004
         ),
     )
-    low_lip = np.flatnonzero(travel > 0.6 * travel[np.abs(p[:, 0]) < 0.2].max())
-    gap = np.linalg.norm(p[mouth][:, None, :] - p[low_lip][None, :, :], axis=2).min(axis=1)
-    seam = p[mouth[gap < 0.03]]
+    low_lip = np.flatnonzero(travel > 0.6 * travel[np.abs(positions[:, 0]) < 0.2].max())
+    gap = np.linalg.norm(positions[mouth][:, None, :] - positions[low_lip][None, :, :], axis=2).min(
+        axis=1
+    )
+    seam = positions[mouth[gap < 0.03]]
     seam = seam[seam[:, 2] > seam[:, 2].max() - 0.25]
     width = float(np.abs(seam[:, 0]).max())
     line = np.polyfit(np.abs(seam[:, 0]), seam[:, 1], 2)
@@ -210,7 +218,7 @@ def paint_head(
     person: Person,
     part: Part,
     uvs: Floats,
-    p: Floats,
+    positions: Floats,
     eye: Floats,
     units: dict[str, Expression],
 ) -> tuple[Floats, Floats]:
@@ -220,7 +228,7 @@ def paint_head(
         person: has the colours.
         part: the head.
         uvs: float64[T, 2] in [0, 1].
-        p: float64[v, 3], positions of its vertices, decimetres.
+        positions: float64[v, 3], positions of its vertices, decimetres.
         eye: float64[3], the left eye's middle.
         units: what each raw control does, by its name.
     """
@@ -230,9 +238,9 @@ def paint_head(
         for n in ("eyeBlinkL", "eyeBlinkR")
     )
     lids = smooth(0.1, 0.8, blink / blink.max())
-    image, covered = bake(part.polygons, uvs, np.column_stack([p, lids]), HEAD_SIZE)
+    image, covered = bake(part.polygons, uvs, np.column_stack([positions, lids]), HEAD_SIZE)
     place = image[:, :, :3]
-    lips = lip_mask(part, p, place, units)
+    lips = lip_mask(part, positions, place, units)
     colour = np.ones((HEAD_SIZE, HEAD_SIZE, 3)) * np.array(person.skin)
     mottle = 0.5 * noise(HEAD_SIZE, 40, random) + 0.3 * noise(HEAD_SIZE, 150, random)
     colour += 0.018 * mottle[:, :, None] * np.array([0.6, 1.0, 1.0])

@@ -122,74 +122,83 @@ def subdivide(mesh: Polygons) -> tuple[Polygons, Operator]:
     From: Catmull and Clark, Recursively generated B-spline surfaces (1978), with the usual
     boundary rule (cubic B-spline curve along borders).
     """
-    v, f = mesh.vertex_count, len(mesh.faces)
+    vertex_count, face_count = mesh.vertex_count, len(mesh.faces)
     edges = edges_of(mesh.faces)
     edge_number = {edge: i for i, edge in enumerate(edges)}
     entries: list[tuple[int, int, float]] = []
-    around: list[list[int]] = [[] for _ in range(v)]
-    borders: list[list[int]] = [[] for _ in range(v)]
-    neighbours: list[list[int]] = [[] for _ in range(v)]
+    around: list[list[int]] = [[] for _ in range(vertex_count)]
+    borders: list[list[int]] = [[] for _ in range(vertex_count)]
+    neighbours: list[list[int]] = [[] for _ in range(vertex_count)]
     for i, face in enumerate(mesh.faces):
-        entries += [(v + i, c, 1 / len(face)) for c in face]
-        for c in face:
-            around[c].append(i)
+        entries += [(vertex_count + i, corner, 1 / len(face)) for corner in face]
+        for corner in face:
+            around[corner].append(i)
     for (a, b), owners in edges.items():
-        row = v + f + edge_number[(a, b)]
+        row = vertex_count + face_count + edge_number[(a, b)]
         neighbours[a].append(b)
         neighbours[b].append(a)
         if len(owners) == 2:
             entries += [(row, a, 0.25), (row, b, 0.25)]
-            for o in owners:
-                entries += [(row, c, 0.25 / len(mesh.faces[o])) for c in mesh.faces[o]]
+            for owner in owners:
+                face = mesh.faces[owner]
+                entries += [(row, corner, 0.25 / len(face)) for corner in face]
         else:
             entries += [(row, a, 0.5), (row, b, 0.5)]
             borders[a].append(b)
             borders[b].append(a)
-    for i in range(v):
+    for i in range(vertex_count):
         if borders[i] or not around[i]:
             ends = borders[i][:2]
             entries.append((i, i, 1 - 0.125 * len(ends)))
-            entries += [(i, c, 0.125) for c in ends]
+            entries += [(i, end, 0.125) for end in ends]
             continue
-        n = len(around[i])
-        entries.append((i, i, (n - 3) / n + 1 / n))
-        entries += [(i, c, 1 / n**2) for c in neighbours[i]]
-        for o in around[i]:
-            entries += [(i, c, 1 / n**2 / len(mesh.faces[o])) for c in mesh.faces[o]]
+        count = len(around[i])
+        entries.append((i, i, (count - 3) / count + 1 / count))
+        entries += [(i, other, 1 / count**2) for other in neighbours[i]]
+        for owner in around[i]:
+            face = mesh.faces[owner]
+            entries += [(i, corner, 1 / count**2 / len(face)) for corner in face]
     table = np.array(entries)
     operator = Operator(
-        table[:, 0].astype(int), table[:, 1].astype(int), table[:, 2], (v + f + len(edges), v)
+        table[:, 0].astype(int),
+        table[:, 1].astype(int),
+        table[:, 2],
+        (vertex_count + face_count + len(edges), vertex_count),
     )
-    return _split_faces(mesh, edge_number, v, f), operator
+    return _split_faces(mesh, edge_number, vertex_count, face_count), operator
 
 
 def _split_faces(
-    mesh: Polygons, edge_number: dict[tuple[int, int], int], v: int, f: int
+    mesh: Polygons, edge_number: dict[tuple[int, int], int], vertex_count: int, face_count: int
 ) -> Polygons:
     uv_edges: dict[tuple[int, int], int] = {}
     uvs = list(mesh.uvs)
     faces, uv_faces = [], []
     for i, (face, uv_face) in enumerate(zip(mesh.faces, mesh.uv_faces, strict=True)):
-        n = len(face)
+        corners = len(face)
         middle = len(uvs)
         uvs.append(mesh.uvs[uv_face].mean(axis=0))
 
-        def point(k: int, face: list[int] = face, n: int = n) -> int:
-            a, b = face[k % n], face[(k + 1) % n]
-            return v + f + edge_number[(min(a, b), max(a, b))]
+        def point(corner: int, face: list[int] = face, corners: int = corners) -> int:
+            a, b = face[corner % corners], face[(corner + 1) % corners]
+            return vertex_count + face_count + edge_number[(min(a, b), max(a, b))]
 
-        def uv_point(k: int, uv_face: list[int] = uv_face, n: int = n) -> int:
-            a, b = uv_face[k % n], uv_face[(k + 1) % n]
+        def uv_point(corner: int, uv_face: list[int] = uv_face, corners: int = corners) -> int:
+            a, b = uv_face[corner % corners], uv_face[(corner + 1) % corners]
             key = (min(a, b), max(a, b))
             if key not in uv_edges:
                 uv_edges[key] = len(uvs)
                 uvs.append((mesh.uvs[a] + mesh.uvs[b]) / 2)
             return uv_edges[key]
 
-        for k in range(n):
-            faces.append([face[k], point(k), v + i, point(k + n - 1)])
-            uv_faces.append([uv_face[k], uv_point(k), middle, uv_point(k + n - 1)])
-    return Polygons(faces, uv_faces, np.array(uvs), v + f + len(edge_number))
+        for corner in range(corners):
+            faces.append(
+                [face[corner], point(corner), vertex_count + i, point(corner + corners - 1)]
+            )
+            uv_faces.append(
+                [uv_face[corner], uv_point(corner), middle, uv_point(corner + corners - 1)]
+            )
+    return Polygons(faces, uv_faces, np.array(uvs), vertex_count + face_count + len(edge_number))
 
 
 def vertex_normals(positions: Floats, faces: list[list[int]]) -> Floats:

@@ -9,12 +9,12 @@ from ..pairing.comparison import Comparison
 from ..pairing.pairs import pair_names
 
 
-def compare(c: Comparison) -> None:
-    file = Place(c, "file")
-    versions = [f"{dna.generation}.{dna.version}" for dna in (c.a, c.b)]
+def compare(faces: Comparison) -> None:
+    file = Place(faces, "file")
+    versions = [f"{dna.generation}.{dna.version}" for dna in (faces.a, faces.b)]
     if versions[0] != versions[1]:
         file.at("version", "version").say(" -> ".join(versions))
-    names_a, names_b = c.a.layers, c.b.layers
+    names_a, names_b = faces.a.layers, faces.b.layers
     pairs = pair_names(names_a, names_b)
     layers = file.at("layers")
     for side, left, names in (("A", pairs.only_a, names_a), ("B", pairs.only_b, names_b)):
@@ -22,11 +22,11 @@ def compare(c: Comparison) -> None:
             layers.say(f"layer {names[i]} only in {side}")
     if pairs.reordered:
         layers.say("the layers stand in another order in the file")
-    _unknown_layers(c, file.at("unknown_layers"))
+    _unknown_layers(faces, file.at("unknown_layers"))
 
 
-def _unknown_layers(c: Comparison, place: Place) -> None:
-    a, b = c.a.unknown_layers, c.b.unknown_layers
+def _unknown_layers(faces: Comparison, place: Place) -> None:
+    a, b = faces.a.unknown_layers, faces.b.unknown_layers
     names_a, names_b = ([f"{id_} {version}" for id_, version, _ in side] for side in (a, b))
     pairs = pair_names(names_a, names_b)
     for side, left, names in (("A", pairs.only_a, names_a), ("B", pairs.only_b, names_b)):

@@ -17,16 +17,22 @@ from ..pairing.spaces import Space
 _COLUMNS = ("from_values", "to_values", "slope_values", "cut_values")
 
 
-def compare(c: Comparison) -> None:
-    place = Place(c, "behavior")
-    table(place.at("gui_to_raw", "GUI to raw"), c.gui, c.raw, c.a.gui_to_raw, c.b.gui_to_raw)
-    value(place.at("psd_count", "correctives"), c.a.psd_count, c.b.psd_count)
-    _psds(c, place.at("psds"))
-    _channels(c, place.at("blend_shape_channels"))
+def compare(faces: Comparison) -> None:
+    place = Place(faces, "behavior")
+    table(
+        place.at("gui_to_raw", "GUI to raw"),
+        faces.gui,
+        faces.raw,
+        faces.a.gui_to_raw,
+        faces.b.gui_to_raw,
+    )
+    value(place.at("psd_count", "correctives"), faces.a.psd_count, faces.b.psd_count)
+    _psds(faces, place.at("psds"))
+    _channels(faces, place.at("blend_shape_channels"))
     maps = place.at("animated_maps", "animated maps")
-    rows_per_lod(maps.at("lods"), c.a.animated_maps.lods, c.b.animated_maps.lods)
-    a, b = c.a.animated_maps.conditionals, c.b.animated_maps.conditionals
-    table(maps.at("conditionals"), c.controls, c.maps, a, b)
+    rows_per_lod(maps.at("lods"), faces.a.animated_maps.lods, faces.b.animated_maps.lods)
+    a, b = faces.a.animated_maps.conditionals, faces.b.animated_maps.conditionals
+    table(maps.at("conditionals"), faces.controls, faces.maps, a, b)
 
 
 def table(
@@ -63,49 +69,54 @@ def _column(
 ) -> None:
     noun = place.field.rpartition(".")[2].removesuffix("_values")
     x, y = a[pairs.a], b[pairs.b]
-    for i in np.flatnonzero(place.c.changed(x, y)).tolist():
+    for i in np.flatnonzero(place.faces.changed(x, y)).tolist():
         at = pairs.a[i]
         read, written = inputs.label(int(rows[0][at])), outputs.label(int(rows[1][at]))
         place.say(f"row from {read} to {written}: {noun} {x[i]!s} -> {y[i]!s}")
 
 
-def _psds(c: Comparison, place: Place) -> None:
-    only_in(place, c.psds, c.psds.pairs)
-    order(place, c.psds.pairs, c.psds.plural)
-    a, b = c.a.psds, c.b.psds
-    rows_a = (c.controls.in_a(a.rows), c.controls.in_a(a.columns))
-    rows_b = (c.controls.in_b(b.rows), c.controls.in_b(b.columns))
+def _psds(faces: Comparison, place: Place) -> None:
+    only_in(place, faces.psds, faces.psds.pairs)
+    order(place, faces.psds.pairs, faces.psds.plural)
+    a, b = faces.a.psds, faces.b.psds
+    rows_a = (faces.controls.in_a(a.rows), faces.controls.in_a(a.columns))
+    rows_b = (faces.controls.in_b(b.rows), faces.controls.in_b(b.columns))
     pairs = pair_rows(rows_a, rows_b)
-    named = c.controls.pairs
+    named = faces.controls.pairs
     for side, left, rows, gone in (
-        ("A", pairs.only_a, rows_a, c.controls.a[named.only_a]),
-        ("B", pairs.only_b, rows_b, c.controls.b[named.only_b]),
+        ("A", pairs.only_a, rows_a, faces.controls.a[named.only_a]),
+        ("B", pairs.only_b, rows_b, faces.controls.b[named.only_b]),
     ):
         left = left[~np.isin(rows[0][left], gone)]  # noqa: PLW2901 whole correctives are said above
-        both = zip(c.controls.labels(rows[0][left]), c.controls.labels(rows[1][left]), strict=True)
+        both = zip(
+            faces.controls.labels(rows[0][left]), faces.controls.labels(rows[1][left]), strict=True
+        )
         for row, column in both:
             place.at("columns").say(f"{row}: factor {column} only in {side}")
     order(place.at("rows"), pairs, "factors of correctives")
     x, y = a.values[pairs.a], b.values[pairs.b]
-    for i in np.flatnonzero(c.changed(x, y)).tolist():
-        row, column = (c.controls.label(int(numbers[pairs.a[i]])) for numbers in rows_a)
+    for i in np.flatnonzero(faces.changed(x, y)).tolist():
+        row, column = (faces.controls.label(int(numbers[pairs.a[i]])) for numbers in rows_a)
         real(place.at("values", f"{row}: factor {column}"), x[i], y[i])
 
 
-def _channels(c: Comparison, place: Place) -> None:
-    a, b = c.a.blend_shape_channels, c.b.blend_shape_channels
+def _channels(faces: Comparison, place: Place) -> None:
+    a, b = faces.a.blend_shape_channels, faces.b.blend_shape_channels
     rows_per_lod(place.at("lods", "blend shape channels"), a.lods, b.lods)
-    outputs_a, outputs_b = c.channels.in_a(a.output_indices), c.channels.in_b(b.output_indices)
+    outputs_a, outputs_b = (
+        faces.channels.in_a(a.output_indices),
+        faces.channels.in_b(b.output_indices),
+    )
     pairs = pair(outputs_a, outputs_b)
     for side, left, numbers in (("A", pairs.only_a, outputs_a), ("B", pairs.only_b, outputs_b)):
         if len(left):
-            listed = c.report.listed(c.channels.labels(numbers[left]))
+            listed = faces.report.listed(faces.channels.labels(numbers[left]))
             text = f"{counted(len(left), 'channel')} driven only in {side}: {listed}"
             place.at("output_indices").say(text)
     order(place.at("output_indices"), pairs, "driven channels")
-    inputs_a, inputs_b = c.controls.in_a(a.input_indices), c.controls.in_b(b.input_indices)
+    inputs_a, inputs_b = faces.controls.in_a(a.input_indices), faces.controls.in_b(b.input_indices)
     x, y = inputs_a[pairs.a], inputs_b[pairs.b]
     for i in np.flatnonzero(x != y).tolist():
-        channel = c.channels.label(int(outputs_a[pairs.a[i]]))
-        new, old = c.controls.label(int(y[i])), c.controls.label(int(x[i]))
+        channel = faces.channels.label(int(outputs_a[pairs.a[i]]))
+        new, old = faces.controls.label(int(y[i])), faces.controls.label(int(x[i]))
         place.at("input_indices").say(f"channel {channel} is driven by {new} instead of {old}")

@@ -24,15 +24,17 @@ _VALUES = (
 )
 
 
-def compare(c: Comparison) -> None:
-    place = Place(c, "descriptor")
+def compare(faces: Comparison) -> None:
+    place = Place(faces, "descriptor")
     for name in _VALUES:
-        value(place.at(name, name.replace("_", " ")), getattr(c.a, name), getattr(c.b, name))
-    _metadata(c, place.at("metadata"))
+        value(
+            place.at(name, name.replace("_", " ")), getattr(faces.a, name), getattr(faces.b, name)
+        )
+    _metadata(faces, place.at("metadata"))
 
 
-def _metadata(c: Comparison, place: Place) -> None:
-    a, b = c.a.metadata, c.b.metadata
+def _metadata(faces: Comparison, place: Place) -> None:
+    a, b = faces.a.metadata, faces.b.metadata
     for key, old in a.items():
         if key not in b:
             place.say(f"metadata key {key} only in A: {old!r}")

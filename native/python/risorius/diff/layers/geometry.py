@@ -31,15 +31,15 @@ _LAYOUTS = (
 )
 
 
-def compare(c: Comparison) -> None:
-    place = Place(c, "geometry")
-    pairs = c.meshes.pairs
+def compare(faces: Comparison) -> None:
+    place = Place(faces, "geometry")
+    pairs = faces.meshes.pairs
     for i, j in zip(pairs.a.tolist(), pairs.b.tolist(), strict=True):
-        mesh = place.at("meshes", f"mesh {c.meshes.label(i)}")
-        if i < len(c.meshes_a) and j < len(c.meshes_b):
-            _mesh(mesh, c.meshes_a[i], c.meshes_b[j])
-        elif i < len(c.meshes_a) or j < len(c.meshes_b):
-            mesh.say(f"geometry only in {'A' if i < len(c.meshes_a) else 'B'}")
+        mesh = place.at("meshes", f"mesh {faces.meshes.label(i)}")
+        if i < len(faces.meshes_a) and j < len(faces.meshes_b):
+            _mesh(mesh, faces.meshes_a[i], faces.meshes_b[j])
+        elif i < len(faces.meshes_a) or j < len(faces.meshes_b):
+            mesh.say(f"geometry only in {'A' if i < len(faces.meshes_a) else 'B'}")
 
 
 def _mesh(place: Place, a: risorius.Mesh, b: risorius.Mesh) -> None:
@@ -58,11 +58,11 @@ def _points(place: Place, a: Floats, b: Floats, noun: str, verb: str, kind: str)
     if len(a) != len(b):
         place.say(f"{counted(len(a), noun)} -> {len(b):,}")
         return
-    changed = place.c.changed(a, b).any(axis=1)
+    changed = place.faces.changed(a, b).any(axis=1)
     if not changed.any():
         return
     x, y = a[changed], b[changed]
-    amount = place.c.distance(x, y) if kind == "length" else place.c.by(x, y, kind)
+    amount = place.faces.distance(x, y) if kind == "length" else place.faces.by(x, y, kind)
     place.say(f"{counted(len(x), noun)} of {len(a):,} {verb} {amount}")
 
 

@@ -14,15 +14,19 @@ from ..pairing.comparison import Comparison
 from ..pairing.pairs import Bools, Ints, Pairs, pair, pair_sets
 
 
-def compare(c: Comparison) -> None:
-    place = Place(c, "behavior")
+def compare(faces: Comparison) -> None:
+    place = Place(faces, "behavior")
     for field in ("joint_row_count", "joint_column_count"):
-        value(place.at(field, field.replace("_", " ")), getattr(c.a, field), getattr(c.b, field))
+        value(
+            place.at(field, field.replace("_", " ")),
+            getattr(faces.a, field),
+            getattr(faces.b, field),
+        )
     groups = place.at("joint_groups")
-    a, b = c.a.joint_groups, c.b.joint_groups
+    a, b = faces.a.joint_groups, faces.b.joint_groups
     pairs = pair_sets(
-        [c.rows_in_a(group.output_indices) for group in a],
-        [c.rows_in_b(group.output_indices) for group in b],
+        [faces.rows_in_a(group.output_indices) for group in a],
+        [faces.rows_in_b(group.output_indices) for group in b],
     )
     for side, left, side_groups in (("A", pairs.only_a, a), ("B", pairs.only_b, b)):
         for i in left.tolist():
@@ -35,19 +39,22 @@ def compare(c: Comparison) -> None:
 
 
 def _group(place: Place, a: risorius.JointGroup, b: risorius.JointGroup) -> None:
-    c = place.c
-    rows_a, rows_b = c.rows_in_a(a.output_indices), c.rows_in_b(b.output_indices)
-    columns_a, columns_b = c.controls.in_a(a.input_indices), c.controls.in_b(b.input_indices)
+    faces = place.faces
+    rows_a, rows_b = faces.rows_in_a(a.output_indices), faces.rows_in_b(b.output_indices)
+    columns_a, columns_b = (
+        faces.controls.in_a(a.input_indices),
+        faces.controls.in_b(b.input_indices),
+    )
     rows, columns = pair(rows_a, rows_b), pair(columns_a, columns_b)
     rows_per_lod(place.at("lods"), a.lods, b.lods)
-    members(place.at("input_indices", "inputs"), c.controls, a.input_indices, b.input_indices)
+    members(place.at("input_indices", "inputs"), faces.controls, a.input_indices, b.input_indices)
     outputs = place.at("output_indices")
     for side, left, numbers in (("A", rows.only_a, rows_a), ("B", rows.only_b, rows_b)):
         if len(left):
-            listed = c.report.listed(c.row_labels(numbers[left]))
+            listed = faces.report.listed(faces.row_labels(numbers[left]))
             outputs.say(f"{counted(len(left), 'row')} only in {side}: {listed}")
     order(outputs, rows, "rows")
-    members(place.at("joint_indices", "joints"), c.joints, a.joint_indices, b.joint_indices)
+    members(place.at("joint_indices", "joints"), faces.joints, a.joint_indices, b.joint_indices)
     if a.values.ndim == b.values.ndim == 2:
         _values(place.at("values"), a.values, b.values, rows, columns, rows_a)
 
@@ -55,23 +62,23 @@ def _group(place: Place, a: risorius.JointGroup, b: risorius.JointGroup) -> None
 def _values(place: Place, a: Floats, b: Floats, rows: Pairs, columns: Pairs, numbers: Ints) -> None:
     """Values by joint attribute and control, wherever they stand."""
     x, y = cut(a, rows.a, columns.a), cut(b, rows.b, columns.b)
-    changed = place.c.changed(x, y)
+    changed = place.faces.changed(x, y)
     if not changed.any():
         return
     numbers = numbers[rows.a]
     touched = np.unique(numbers[changed.any(axis=1)] // 9)
-    joints = place.c.report.listed(place.c.joints.labels(touched))
+    joints = place.faces.report.listed(place.faces.joints.labels(touched))
     place.say(
         f"{np.count_nonzero(changed):,} of {counted(x.size, 'value')} changed "
-        f"{_amounts(place.c, x, y, changed, numbers % 9 // 3)} (of {joints})"
+        f"{_amounts(place.faces, x, y, changed, numbers % 9 // 3)} (of {joints})"
     )
 
 
-def _amounts(c: Comparison, a: Floats, b: Floats, changed: Bools, kinds: Ints) -> str:
+def _amounts(faces: Comparison, a: Floats, b: Floats, changed: Bools, kinds: Ints) -> str:
     """E.g. "by up to 0.3 mm and by up to 2 degrees": translations, rotations, scales."""
     parts = []
     for kind, measure in enumerate(("length", "angle", "number")):
         mask = changed & (kinds == kind)[:, None]
         if mask.any():
-            parts.append(c.by(a[mask], b[mask], measure) + (" of scale" if kind == 2 else ""))
+            parts.append(faces.by(a[mask], b[mask], measure) + (" of scale" if kind == 2 else ""))
     return joined(parts)

@@ -19,15 +19,15 @@ from .definition import names
 _ACTIVATIONS = ("linear", "relu", "leaky relu", "tanh", "sigmoid")
 
 
-def compare(c: Comparison) -> None:
-    place = Place(c, "machine learned behavior", "machine_learned_behavior")
-    a, b = c.a.machine_learned_behavior, c.b.machine_learned_behavior
-    names(place.at("ml_control_names"), c.ml)
+def compare(faces: Comparison) -> None:
+    place = Place(faces, "machine learned behavior", "machine_learned_behavior")
+    a, b = faces.a.machine_learned_behavior, faces.b.machine_learned_behavior
+    names(place.at("ml_control_names"), faces.ml)
     mappings = a.lod_neural_network_mapping, b.lod_neural_network_mapping
-    lod_mapping(place.at("lod_neural_network_mapping"), c.networks, *mappings)
+    lod_mapping(place.at("lod_neural_network_mapping"), faces.networks, *mappings)
     _regions(place, a, b)
-    networks, pairs = place.at("neural_networks"), c.networks.pairs
-    only_in(networks, c.networks, pairs)
+    networks, pairs = place.at("neural_networks"), faces.networks.pairs
+    only_in(networks, faces.networks, pairs)
     order(networks, pairs, "networks")
     for i, j in zip(pairs.a.tolist(), pairs.b.tolist(), strict=True):
         name = f"network {i}" if i == j else f"network {i} ({j} in B)"
@@ -35,7 +35,7 @@ def compare(c: Comparison) -> None:
 
 
 def _network(place: Place, a: risorius.NeuralNetwork, b: risorius.NeuralNetwork) -> None:
-    controls = place.c.controls
+    controls = place.faces.controls
     members(place.at("input_indices", "inputs"), controls, a.input_indices, b.input_indices)
     members(place.at("output_indices", "outputs"), controls, a.output_indices, b.output_indices)
     layers_a, layers_b = a.layers, b.layers
@@ -59,24 +59,24 @@ def _regions(
     place: Place, a: risorius.MachineLearnedBehavior, b: risorius.MachineLearnedBehavior
 ) -> None:
     """Regions of a mesh by their names, and the networks of each."""
-    c = place.c
+    faces = place.faces
     names_a, names_b = a.region_names, b.region_names
     if len(names_a) != len(names_b):
         sizes = f"{counted(len(names_a), 'mesh', 'meshes')} -> {len(names_b)}"
         place.at("region_names").say(f"regions of {sizes}")
     indices_a, indices_b = a.region_network_indices, b.region_network_indices
-    for i, j in zip(c.meshes.pairs.a.tolist(), c.meshes.pairs.b.tolist(), strict=True):
-        mesh = f"regions of mesh {c.meshes.label(i)}"
+    for i, j in zip(faces.meshes.pairs.a.tolist(), faces.meshes.pairs.b.tolist(), strict=True):
+        mesh = f"regions of mesh {faces.meshes.label(i)}"
         old, new = _at(names_a, i), _at(names_b, j)
         pairs = pair_names(old, new)
         for side, left, texts in (("A", pairs.only_a, old), ("B", pairs.only_b, new)):
             if len(left):
-                listed = c.report.listed([texts[k] for k in left.tolist()])
+                listed = faces.report.listed([texts[k] for k in left.tolist()])
                 place.at("region_names", mesh).say(f"only in {side}: {listed}")
         order(place.at("region_names", mesh), pairs, "regions")
         for k, m in zip(pairs.a.tolist(), pairs.b.tolist(), strict=True):
             of = place.at("region_network_indices", f"{mesh}, {old[k]}")
-            members(of, c.networks, _at(_at(indices_a, i), k), _at(_at(indices_b, j), m))
+            members(of, faces.networks, _at(_at(indices_a, i), k), _at(_at(indices_b, j), m))
         _unnamed(place, mesh, _at(indices_a, i)[len(old) :], _at(indices_b, j)[len(new) :])
 
 

@@ -30,9 +30,9 @@ _KEYS = (
 )
 
 
-def compare(c: Comparison) -> None:
-    place = Place(c, "machine learned behavior", "machine_learned_behavior_ext")
-    a, b = c.a.machine_learned_behavior_ext, c.b.machine_learned_behavior_ext
+def compare(faces: Comparison) -> None:
+    place = Place(faces, "machine learned behavior", "machine_learned_behavior_ext")
+    a, b = faces.a.machine_learned_behavior_ext, faces.b.machine_learned_behavior_ext
     types_a, types_b = a.types, b.types
     if len(types_a) != len(types_b):
         place.at("types").say(f"{counted(len(types_a), 'graph')} -> {len(types_b)}")
@@ -73,20 +73,22 @@ def _numbered(noun: str, count_a: int, count_b: int) -> Space:
 def _operation(place: Place, a: risorius.MlOperation, b: risorius.MlOperation) -> None:
     types = a.operation_type, b.operation_type
     choice(place.at("operation_type", "type"), _TYPES, *types)
-    x, y = _parameters(place.c, a, "a"), _parameters(place.c, b, "b")
+    x, y = _parameters(place.faces, a, "a"), _parameters(place.faces, b, "b")
     _list(place.at("parameters"), "parameter", x, y)
     for name in ("operation_set_dependency_indices", "operation_dependency_indices"):
         words = name.replace("operation_", "").replace("_", " ")
         _list(place.at(name, words), "index", getattr(a, name), getattr(b, name))
 
 
-def _parameters(c: Comparison, operation: risorius.MlOperation, side: str) -> Ints:
+def _parameters(faces: Comparison, operation: risorius.MlOperation, side: str) -> Ints:
     """Controls and networks under the numbers that both rigs share."""
     numbers = integers(operation.parameters)
     if operation.operation_type in (_GATHER, _SCATTER):
-        return c.controls.in_a(numbers) if side == "a" else c.controls.in_b(numbers)
+        return faces.controls.in_a(numbers) if side == "a" else faces.controls.in_b(numbers)
     if operation.operation_type == _MLP and len(numbers):
-        first = c.networks.in_a(numbers[:1]) if side == "a" else c.networks.in_b(numbers[:1])
+        first = (
+            faces.networks.in_a(numbers[:1]) if side == "a" else faces.networks.in_b(numbers[:1])
+        )
         return np.concatenate([first, numbers[1:]])
     return numbers
 
@@ -107,7 +109,7 @@ def _stride(joints: risorius.MlJoints) -> int:
 
 
 def _joints(place: Place, a: risorius.MlJoints, b: risorius.MlJoints) -> None:
-    c = place.c
+    faces = place.faces
     keys = pair(integers(a.parameter_keys), integers(b.parameter_keys))
     for side, left, joints in (("A", keys.only_a, a), ("B", keys.only_b, b)):
         for key in joints.parameter_keys[left].tolist():
@@ -118,20 +120,23 @@ def _joints(place: Place, a: risorius.MlJoints, b: risorius.MlJoints) -> None:
         if x != y:
             place.at("parameter_values").say(f"{_key(key)} {x} -> {y}")
     strides = _stride(a), _stride(b)
-    rows_a = c.rows_in_a(a.output_indices, strides[0])
-    rows_b = c.rows_in_b(b.output_indices, strides[1])
+    rows_a = faces.rows_in_a(a.output_indices, strides[0])
+    rows_b = faces.rows_in_b(b.output_indices, strides[1])
     pairs = pair(rows_a, rows_b)
     sides = (("A", pairs.only_a, rows_a, strides[0]), ("B", pairs.only_b, rows_b, strides[1]))
     for side, left, rows, stride in sides:
         if len(left):
-            listed = c.report.listed(c.row_labels(rows[left], stride))
+            listed = faces.report.listed(faces.row_labels(rows[left], stride))
             text = f"{counted(len(left), 'attribute')} only in {side}: {listed}"
             place.at("output_indices").say(text)
     order(place.at("output_indices"), pairs, "attributes")
-    x, y = c.controls.in_a(a.input_indices)[pairs.a], c.controls.in_b(b.input_indices)[pairs.b]
-    labels = c.row_labels(rows_a[pairs.a], strides[0])
+    x, y = (
+        faces.controls.in_a(a.input_indices)[pairs.a],
+        faces.controls.in_b(b.input_indices)[pairs.b],
+    )
+    labels = faces.row_labels(rows_a[pairs.a], strides[0])
     for i in np.flatnonzero(x != y).tolist():
-        words = f"{c.controls.label(int(y[i]))} instead of {c.controls.label(int(x[i]))}"
+        words = f"{faces.controls.label(int(y[i]))} instead of {faces.controls.label(int(x[i]))}"
         place.at("input_indices").say(f"{labels[i]} is moved by {words}")
 
 

@@ -24,23 +24,23 @@ def compare_skin(place: Place, a: risorius.Mesh, b: risorius.Mesh) -> None:
         text = f"skin weights of {counted(count_a, 'vertex', 'vertices')} -> {count_b:,}"
         place.at("skin_offsets").say(text)
         return
-    c = place.c
-    rows_a = (_vertices(a), c.joints.in_a(a.skin_joint_indices))
-    rows_b = (_vertices(b), c.joints.in_b(b.skin_joint_indices))
+    faces = place.faces
+    rows_a = (_vertices(a), faces.joints.in_a(a.skin_joint_indices))
+    rows_b = (_vertices(b), faces.joints.in_b(b.skin_joint_indices))
     pairs = pair_rows(rows_a, rows_b)
     for side, left, rows in (("A", pairs.only_a, rows_a), ("B", pairs.only_b, rows_b)):
         if len(left):
-            joints = c.report.listed(c.joints.labels(np.unique(rows[1][left])))
+            joints = faces.report.listed(faces.joints.labels(np.unique(rows[1][left])))
             number = counted(len(np.unique(rows[0][left])), "vertex")
             text = f"skin weights of {number} with joints that only {side} has there: {joints}"
             place.at("skin_joint_indices").say(text)
     x, y = a.skin_weights[pairs.a], b.skin_weights[pairs.b]
-    changed = c.changed(x, y)
+    changed = faces.changed(x, y)
     if changed.any():
         vertices = len(np.unique(rows_a[0][pairs.a[changed]]))
         place.at("skin_weights").say(
             f"skin weights of {counted(vertices, 'vertex', 'vertices')} changed "
-            f"{c.by(x[changed], y[changed])}"
+            f"{faces.by(x[changed], y[changed])}"
         )
     order(place.at("skin_joint_indices"), pairs, "joints of some vertices")
 

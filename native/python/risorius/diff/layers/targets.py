@@ -19,16 +19,16 @@ def compare_targets(place: Place, a: risorius.Mesh, b: risorius.Mesh) -> None:
         place: where the differences are reported.
         a, b: the same mesh of each face.
     """
-    c = place.c
+    faces = place.faces
     targets_a, targets_b = a.blend_shape_targets, b.blend_shape_targets
-    channels_a = c.channels.in_a([t.blend_shape_channel_index for t in targets_a])
-    channels_b = c.channels.in_b([t.blend_shape_channel_index for t in targets_b])
+    channels_a = faces.channels.in_a([t.blend_shape_channel_index for t in targets_a])
+    channels_b = faces.channels.in_b([t.blend_shape_channel_index for t in targets_b])
     pairs = pair(channels_a, channels_b)
-    text = more_and_less(place, pairs, c.channels, channels_a, channels_b)
+    text = more_and_less(place, pairs, faces.channels, channels_a, channels_b)
     if text:
         place.at("blend_shape_channel_index", "targets").say(text)
     for i, j in zip(pairs.a.tolist(), pairs.b.tolist(), strict=True):
-        _target(place, c.channels.label(int(channels_a[i])), targets_a[i], targets_b[j])
+        _target(place, faces.channels.label(int(channels_a[i])), targets_a[i], targets_b[j])
 
 
 def _target(
@@ -38,10 +38,10 @@ def _target(
     x, y = a.deltas, b.deltas
     if not pairs.identical:
         x, y = x[pairs.a], y[pairs.b]
-    changed = place.c.changed(x, y).any(axis=1)
+    changed = place.faces.changed(x, y).any(axis=1)
     parts = []
     if changed.any():
-        amount = place.c.distance(x[changed], y[changed])
+        amount = place.faces.distance(x[changed], y[changed])
         parts.append((np.count_nonzero(changed), f" changed {amount}"))
     parts += [(len(pairs.only_b), " added"), (len(pairs.only_a), " removed")]
     parts = [part for part in parts if part[0]]

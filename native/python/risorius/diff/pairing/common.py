@@ -21,8 +21,8 @@ from .spaces import Space
 class Place:
     """Where differences are reported: a layer, a field and the words before each text."""
 
-    def __init__(self, c: Comparison, layer: str, field: str = "", what: str = ""):
-        self.c, self.layer, self.field, self.what = c, layer, field, what
+    def __init__(self, faces: Comparison, layer: str, field: str = "", what: str = ""):
+        self.faces, self.layer, self.field, self.what = faces, layer, field, what
 
     def at(self, name: str, what: str = "") -> Place:
         """The place of a field inside this one.
@@ -32,11 +32,11 @@ class Place:
             what: words that stand before each text from there, behind those of this place.
         """
         field = ".".join(part for part in (self.field, name) if part)
-        return Place(self.c, self.layer, field, ", ".join(w for w in (self.what, what) if w))
+        return Place(self.faces, self.layer, field, ", ".join(w for w in (self.what, what) if w))
 
     def say(self, text: str) -> None:
         words = f"{self.what}: {text}" if self.what else text
-        self.c.report.add(self.layer, self.field, words)
+        self.faces.report.add(self.layer, self.field, words)
 
 
 def value(place: Place, a: Any, b: Any) -> None:
@@ -78,7 +78,7 @@ def real(place: Place, a: float, b: float) -> None:
         a, b: the number in each face; compared as float32.
     """
     x, y = np.array([a], np.float32), np.array([b], np.float32)
-    if place.c.changed(x, y).any():
+    if place.faces.changed(x, y).any():
         place.say(f"{x[0]!s} -> {y[0]!s}")
 
 
@@ -94,9 +94,9 @@ def reals(place: Place, noun: str, a: Floats, b: Floats, kind: str = "number") -
     if len(a) != len(b):
         place.say(f"{counted(len(a), noun)} -> {len(b):,}")
         return
-    changed = place.c.changed(a, b)
+    changed = place.faces.changed(a, b)
     if changed.any():
-        amount = place.c.by(a[changed], b[changed], kind)
+        amount = place.faces.by(a[changed], b[changed], kind)
         place.say(f"{np.count_nonzero(changed):,} of {counted(len(a), noun)} changed {amount}")
 
 
@@ -135,7 +135,7 @@ def more_and_less(place: Place, pairs: Pairs, space: Space, a: Any, b: Any) -> s
         space: what the numbers count.
         a, b: int64[n], int64[m], common numbers of the space.
     """
-    listed = place.c.report.listed
+    listed = place.faces.report.listed
     parts = []
     for word, left, numbers in (("more", pairs.only_b, b), ("fewer", pairs.only_a, a)):
         if len(left):
@@ -168,7 +168,7 @@ def lod_mapping(place: Place, space: Space, a: risorius.LodMapping, b: risorius.
         space: what the lists hold indices of.
         a, b: the LODs' lists of each face.
     """
-    found = len(place.c.report.differences)
+    found = len(place.faces.report.differences)
     for lod in range(max(len(a), len(b))):
         lists = [_list(mapping, lod) for mapping in (a, b)]
         if lists[0] is None or lists[1] is None:
@@ -181,7 +181,7 @@ def lod_mapping(place: Place, space: Space, a: risorius.LodMapping, b: risorius.
         text = more_and_less(place, pair(x, y), space, x, y)
         if text:
             place.say(f"LOD {lod} lists {text}")
-    if found == len(place.c.report.differences) and not _same_storage(space, a, b):
+    if found == len(place.faces.report.differences) and not _same_storage(space, a, b):
         place.say(f"the LODs' lists of {space.plural} are stored or shared in another way")
 
 
@@ -214,7 +214,7 @@ def only_in(place: Place, space: Space, pairs: Pairs) -> None:
     """
     for side, left, numbers in (("A", pairs.only_a, space.a), ("B", pairs.only_b, space.b)):
         if len(left):
-            names = place.c.report.listed(space.labels(numbers[left]))
+            names = place.faces.report.listed(space.labels(numbers[left]))
             place.say(f"{counted(len(left), space.noun)} only in {side}: {names}")
 
 
