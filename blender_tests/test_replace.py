@@ -395,6 +395,22 @@ def test_an_edited_joint_stays_edited(dna_file, other_file):
     assert "Your edit of the joint FACIAL_L_Eye was carried over" in _report("Small.001")
 
 
+def test_control_bones_go_with_the_new_face_unless_the_user_moved_them(dna_file, other_file):
+    clean = scene.controls(scene.load(other_file)).data.bones
+    rig = scene.load(dna_file)
+    data = scene.controls(rig).data
+    armatures = scene.submodule("scene.character.armatures")
+    with armatures.edit_armature(bpy.context, data) as bones:
+        bones["neck"].head.x += 0.01
+        bones["neck"].tail.x += 0.01
+    moved, before = data.bones["neck"].head_local.copy(), data.bones["head"].head_local.copy()
+    _replace(other_file)
+    assert (data.bones["neck"].head_local - moved).length < 1e-6
+    assert (data.bones["head"].head_local - clean["head"].head_local).length < 1e-6
+    assert (clean["head"].head_local - before).length > 1e-4
+    assert (clean["neck"].head_local - moved).length > 1e-3
+
+
 def test_drivers_of_users_follow_names_not_numbers(mode, dna_file, other_file):
     rig = scene.load(dna_file, mode)
     lamp = bpy.data.objects.new("lamp", bpy.data.lights.new("lamp", "POINT"))

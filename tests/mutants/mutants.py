@@ -228,8 +228,12 @@ class Copy:
 
 
 def _kill_group(process: subprocess.Popen[bytes]) -> None:
-    """The test and every process that it started."""
+    """The test and every process that it started; Ninja ends its compilers, which are apart."""
     with contextlib.suppress(ProcessLookupError):
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGTERM)
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.wait(5)
         os.killpg(process.pid, signal.SIGKILL)
     process.wait()
 
