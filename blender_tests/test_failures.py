@@ -91,6 +91,18 @@ def test_wheel_of_another_version_is_said_in_words(monkeypatch):
     bpy.context.scene.frame_set(2)
 
 
+def test_with_the_wrong_wheel_edits_of_a_face_are_not_looked_at(dna_file, monkeypatch):
+    rig, looked = scene.load(dna_file), []
+    handlers = scene.submodule("scene.life.handlers")
+    monkeypatch.setattr(handlers, "_notice_copies", looked.append)
+    scene.set_controls(rig, jawOpen=0.5)
+    assert looked
+    looked.clear()
+    monkeypatch.setattr(scene.submodule("native")._risorius, "__version__", "9.9.9")
+    scene.set_controls(rig, jawOpen=1.0)
+    assert not looked
+
+
 def test_no_permission_gets_a_sentence(dna_file, monkeypatch):
     build = scene.submodule("scene.character.build")
 

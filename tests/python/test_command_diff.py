@@ -378,6 +378,7 @@ def test_deltas_are_known_by_their_vertex():
     target = other.meshes[0].blend_shape_targets[0]
     deltas = target.deltas.copy()
     deltas[1] += np.float32([0, 0.03, 0.04])
+    deltas[0] += 1  # of another vertex now: added, not changed
     target.deltas, target.vertex_indices = deltas, [2, 1, 3]
     assert texts(full(), other) == [
         "mesh head: 1 delta of channel open changed by 0.5 mm, 1 added, 1 removed"
