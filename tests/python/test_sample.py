@@ -11,7 +11,7 @@ import risorius
 from conftest import _not_run, no_room
 from risorius.cli import main
 from risorius.controls.arkit import mapping
-from risorius.sample import build, expressions, people, polygons, source
+from risorius.sample import build, expressions, paint, people, polygons, source
 
 ARKIT = """browDownLeft browDownRight browInnerUp browOuterUpLeft browOuterUpRight cheekPuff
 cheekSquintLeft cheekSquintRight eyeBlinkLeft eyeBlinkRight eyeLookDownLeft eyeLookDownRight
@@ -98,15 +98,16 @@ def test_a_rigid_motion_is_found_again():
 
 @pytest.fixture(scope="module", params=sorted(people.PEOPLE))
 def sample(request):
-    """(source, dna, parts, shaped positions) of each real person."""
+    """(source, dna, parts, shaped positions, person, units) of each real person."""
     try:
         path = source.fetch()
     except source.SourceError as error:
         _not_run.add("the sample's CC0 data")
         pytest.skip(f"extra not run: {error}")
     data = source.Source(path)
-    dna, parts, positions, _ = build.assemble(data, lambda _: None, people.PEOPLE[request.param])
-    return data, dna, parts, positions
+    person = people.PEOPLE[request.param]
+    dna, parts, positions, units = build.assemble(data, lambda _: None, person)
+    return data, dna, parts, positions, person, units
 
 
 def skinned(dna, rig, raw, mesh_index, lod):
@@ -144,7 +145,7 @@ def skinned(dna, rig, raw, mesh_index, lod):
 @pytest.mark.parametrize("lod", [0, 1])
 def test_extra_each_row_of_the_mapping_gives_back_its_unit(sample, lod):
     """Within 0.1 % of head height, for every vertex of every mesh."""
-    data, dna, parts, positions = sample
+    data, dna, parts, positions, *_ = sample
     rig = risorius.Rig(dna)
     names = dna.raw_control_names
     head = np.asarray(dna.meshes[0].positions)
@@ -166,7 +167,7 @@ def test_extra_each_row_of_the_mapping_gives_back_its_unit(sample, lod):
 
 
 def test_extra_the_sample_is_sane(sample, tmp_path):
-    _, dna, _, _ = sample
+    _, dna, *_ = sample
     assert dna.validate() == []
     names = dna.raw_control_names
     assert len(names) == len(set(names))
@@ -185,7 +186,7 @@ def test_extra_the_sample_is_sane(sample, tmp_path):
 
 
 def test_extra_correctives_fire_only_together(sample):
-    _, dna, _, _ = sample
+    _, dna, *_ = sample
     rig = risorius.Rig(dna)
     names = dna.raw_control_names
     pair = [names.index(f"CTRL_expressions.{n}") for n in ("jawOpen", "mouthCornerPullL")]
@@ -195,6 +196,20 @@ def test_extra_correctives_fire_only_together(sample):
     raw[pair[1]] = 0.5
     fired = rig.evaluate(raw).controls[len(names) :]
     assert sorted(fired[fired > 0].tolist()) == [0.5]
+
+
+def test_extra_each_cheek_flushes_on_its_side(sample, monkeypatch):
+    _, _, parts, positions, person, units = sample
+    monkeypatch.setattr(paint, "HEAD_SIZE", 256)
+    monkeypatch.setattr(paint, "MASK_SIZE", 64)
+    monkeypatch.setattr(paint, "paint_eye", lambda _: np.zeros((1, 1, 3)))
+    monkeypatch.setattr(paint, "paint_lashes", lambda: np.zeros((1, 1)))
+    monkeypatch.setattr(paint, "png", lambda image: image)
+    files, _ = paint.paint_textures(person, positions, units, parts)
+    left, right = files["head_flush_L.png"], files["head_flush_R.png"]
+    assert 0.5 < left.max() <= 1
+    assert left.sum() == pytest.approx(right.sum(), rel=0.05)
+    assert np.minimum(left, right).max() < 0.1
 
 
 def test_a_missing_wheel_is_one_sentence(tmp_path, monkeypatch):
