@@ -411,6 +411,26 @@ def test_control_bones_go_with_the_new_face_unless_the_user_moved_them(dna_file,
     assert (clean["neck"].head_local - moved).length > 1e-3
 
 
+def _uvs(rig):
+    layer = scene.meshes(rig)[0].data.uv_layers["UVMap"]
+    flat = np.empty(len(layer.uv) * 2, np.float32)
+    layer.uv.foreach_get("vector", flat)
+    return flat
+
+
+def test_a_file_with_another_uv_map_brings_it_and_leaves_nothing_of_its_own(dna_file, tmp_path):
+    other = small_face()
+    other.meshes[0].texture_coordinates = other.meshes[0].texture_coordinates * np.float32(0.5)
+    path = _save(other, tmp_path)
+    rig, clean = scene.load(dna_file), scene.load(path)
+    before, meshes = _uvs(rig), set(bpy.data.meshes)
+    bpy.context.view_layer.objects.active = rig
+    _replace(path)
+    assert np.abs(_uvs(clean) - before).max() > 0.2
+    np.testing.assert_array_equal(_uvs(rig), _uvs(clean))
+    assert set(bpy.data.meshes) == meshes
+
+
 def test_drivers_of_users_follow_names_not_numbers(mode, dna_file, other_file):
     rig = scene.load(dna_file, mode)
     lamp = bpy.data.objects.new("lamp", bpy.data.lights.new("lamp", "POINT"))

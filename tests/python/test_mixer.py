@@ -367,6 +367,12 @@ def test_the_lip_seal_closes_the_jaw():
     assert Mixer(names, exclusives="default").evaluate(0, base)[4] == pytest.approx(0.12)
 
 
+def test_a_jaw_cannot_go_both_ways():
+    names = ["CTRL_expressions.jawLeft", "CTRL_expressions.jawRight"]
+    found = Mixer(names, exclusives="default").evaluate(0, [0.75, 0.25])
+    np.testing.assert_allclose(found, [0.5, 0.0], atol=1e-6)
+
+
 def test_files_of_rules_and_reactions(tmp_path):
     own = load_reactions()
     assert {"flash", "blink", "startle"} <= set(own)
