@@ -404,7 +404,10 @@ def test_control_bones_go_with_the_new_face_unless_the_user_moved_them(dna_file,
         bones["neck"].head.x += 0.01
         bones["neck"].tail.x += 0.01
     moved, before = data.bones["neck"].head_local.copy(), data.bones["head"].head_local.copy()
+    other = bpy.data.objects.new("other", data)  # that shares the bones
     _replace(other_file)
+    assert (other.data.bones["head"].head_local - before).length == 0
+    data = scene.controls(rig).data
     assert (data.bones["neck"].head_local - moved).length < 1e-6
     assert (data.bones["head"].head_local - clean["head"].head_local).length < 1e-6
     assert (clean["head"].head_local - before).length > 1e-4

@@ -329,6 +329,7 @@ def test_a_missing_file_or_a_folder_is_one_line(tmp_path):
         ["--version", "2.9"],
         ["--lods", "x"],
         ["--lods", "2-1"],
+        ["--lods", "65536"],
         ["--lods", "4"],
         ["--lods", ""],
         ["--layers", "hair"],

@@ -86,9 +86,7 @@ def infer_base(codes: Sequence[Timecode]) -> int | None:
     return None
 
 
-def seconds_of(
-    codes: Sequence[Timecode], base: int, is_true_rate: bool = True
-) -> npt.NDArray[np.float64]:
+def seconds_of(codes: Sequence[Timecode], base: int, is_true_rate: bool) -> npt.NDArray[np.float64]:
     """Seconds of each timecode since midnight of the first, with midnights counted.
 
     Args:
