@@ -7,10 +7,10 @@ source "$(dirname "$0")/setup.sh"
 cd "$project"
 step "tools" && install_packages clang-14 && make_venv && quality_tools
 step "compile commands"
-cmake --preset tidy > /dev/null
+cmake --preset tidy -DPython_EXECUTABLE="$python" > /dev/null
 step "clang-tidy"
 files=("$@")
-[ $# -gt 0 ] || mapfile -t files < <(find native -name '*.cpp' -not -path '*/bindings/*' | sort)
+[ $# -gt 0 ] || mapfile -t files < <(find native -name '*.cpp' | sort)
 code=0
 printf '%s\n' "${files[@]}" |
   xargs -P "$(nproc)" -n 1 "$venv/bin/clang-tidy" -p build/tidy --quiet 2> build/tidy/said.log || code=1

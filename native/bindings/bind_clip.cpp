@@ -126,7 +126,7 @@ class ClipFile {
     }();
     taken(std::move(done), name_);
     py::object own = py::none();
-    if (reader_->head().has_times) own = times;
+    if (reader_->head().has_times) own = std::move(times);
     return py::make_tuple(curves, own);
   }
 

@@ -98,6 +98,7 @@ clip::Layer layer_of(const py::dict& given) {
 
 void set_layers(clip::Mixer& mixer, const std::vector<py::dict>& given) {
   std::vector<clip::Layer> layers;
+  layers.reserve(given.size());
   for (const py::dict& layer : given) layers.push_back(layer_of(layer));
   value_or_throw(mixer.set_layers(std::move(layers)));
 }
@@ -124,6 +125,7 @@ void set_rules(clip::Mixer& mixer, const std::vector<YieldTuple>& yields,
     rules.push_back({vector_of(by), vector_of(of), kind, amount});
   }
   std::vector<clip::Opposites> pairs;
+  pairs.reserve(opposites.size());
   for (const auto& [a, b] : opposites) pairs.push_back({a, b});
   value_or_throw(mixer.set_rules(std::move(rules), std::move(pairs)));
 }

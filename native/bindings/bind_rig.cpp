@@ -201,7 +201,7 @@ std::shared_ptr<rig::Rig> make_rig(const dna::Dna& dna, const std::string& preci
 }
 
 // Keeps a buffer of Python's; whoever lets go of it last may not hold the interpreter.
-std::shared_ptr<const void> keep(py::buffer buffer, const void* address) {
+std::shared_ptr<const void> keep(const py::buffer& buffer, const void* address) {
   auto* held = new py::buffer_info(buffer.request());
   return {address, [held](const void*) {
             const py::gil_scoped_acquire acquired;

@@ -9,7 +9,8 @@ namespace risorius::core {
 namespace {
 
 constexpr std::size_t kFirstRead = 512;
-constexpr std::size_t kWindowBytes = 64 * 1024;  // stays in the cache between kernel and swap
+constexpr std::size_t kWindowBytes =
+    std::size_t{64} * 1024;  // stays in the cache between kernel and swap
 
 }  // namespace
 

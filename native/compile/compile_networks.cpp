@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <limits>
 #include <map>
 
 #include "compile/parts.h"
@@ -29,7 +30,8 @@ dna::MlType synthesized(const dna::MachineLearnedBehavior& ml) {
   dna::MlType type;
   type.lod_operation_mappings.assign(3, ml.lod_neural_network_mapping);
   std::vector<dna::MlOperation> gathers, networks, scatters;
-  const std::size_t count = std::min<std::size_t>(ml.neural_networks.size(), 65535);  // 16 bits
+  const auto count = static_cast<std::uint16_t>(
+      std::min<std::size_t>(ml.neural_networks.size(), std::numeric_limits<std::uint16_t>::max()));
   for (std::uint16_t i = 0; i < count; ++i) {
     const dna::NeuralNetwork& n = ml.neural_networks[i];
     dna::MlOperation gather, network, scatter;

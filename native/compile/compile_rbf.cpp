@@ -2,6 +2,7 @@
 // Radial solvers: targets in the form that inputs take, radii, and inverses. From: dna-format 12.4
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "compile/parts.h"
 #include "dna/controls.h"
@@ -79,7 +80,7 @@ void add_inverse(rig::RbfSolver& s, RigData& out) {
   }
   if (!(invert(kernels, inverse, n) > kSingular)) {
     for (std::size_t i = 0; i < n; ++i) kernels[i * n + i] += kRidge;
-    if (!(invert(kernels, inverse, n) > 0)) inverse = kernels;
+    if (!(invert(kernels, inverse, n) > 0)) inverse = std::move(kernels);
   }
   s.interpolative = 1;
   s.inverse_begin = count_of(out.rbf_inverses);
@@ -92,9 +93,9 @@ void add_targets(const dna::RbfSolver& source, rig::RbfSolver& s, RigData& out) 
     out.rbf_targets.push_back(static_cast<double>(v));
   }
   for (std::uint32_t p = 0; p < s.pose_count; ++p) {
-    rig::convert_rbf_inputs(s.distance, s.axis,
-                            out.rbf_targets.data() + s.targets_begin + p * s.input_count,
-                            s.input_count);
+    rig::convert_rbf_inputs(
+        s.distance, s.axis,
+        out.rbf_targets.data() + s.targets_begin + std::size_t{p} * s.input_count, s.input_count);
   }
 }
 

@@ -78,6 +78,8 @@ class List {
   List() : items_(std::make_shared<std::vector<T>>()) {}
   List(std::vector<T> items) : items_(std::make_shared<std::vector<T>>(std::move(items))) {}
   List(const List& other) : List(*other.items_) {}
+  // What was moved from is an empty list, and that one needs memory.
+  // NOLINTNEXTLINE(bugprone-unsafe-to-allow-exceptions)
   List(List&& other) noexcept(false) : List() { items_.swap(other.items_); }
   List& operator=(List other) {
     items_.swap(other.items_);

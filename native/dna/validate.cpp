@@ -428,7 +428,7 @@ void check_operations(Checker& c, const Dna& dna) {
                       type.operations[s].size(), "operations", dna.descriptor.lod_count);
       }
       for (std::size_t i = 0; i < type.operations[s].size(); ++i) {
-        check_operation(c, ((where + ".operations")[s])[i], type.operations[s][i], type, dna);
+        check_operation(c, (where + ".operations")[s][i], type.operations[s][i], type, dna);
       }
     }
   }

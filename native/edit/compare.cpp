@@ -122,6 +122,8 @@ class Comparison {
       for (std::size_t side = 0; side < 2; ++side) {
         locals_[side][j] = skeleton_.local(j, pose[side] + 9 * j);
       }
+      // The same bits move nothing, whatever numbers they are.
+      // NOLINTNEXTLINE(bugprone-suspicious-memory-comparison)
       if (!std::memcmp(pose[0] + 9 * j, pose[1] + 9 * j, 9 * sizeof(float))) continue;
       const Local &a = locals_[0][j], &b = locals_[1][j];
       note(length(a.translation, b.translation), j, frame, out[0]);

@@ -52,7 +52,7 @@ class Uses {
   void count_entries(const core::Array<std::uint16_t>& lods,
                      const core::Array<std::uint16_t>& inputs) {
     for (std::uint32_t l = 0; l < lods_ && l < lods.size(); ++l) {
-      for (std::uint32_t i = 0; i < lods[l]; ++i) ++counts_[inputs[i] * std::size_t{lods_} + l];
+      for (std::uint32_t i = 0; i < lods[l]; ++i) ++counts_[inputs[i] * lods_ + l];
     }
   }
 

@@ -80,9 +80,10 @@ void join(Cluster& a, Cluster& b) {
 class Clustering {
  public:
   explicit Clustering(std::vector<Cluster>& clusters)
-      : clusters_(clusters), best_(clusters.size(), kNoMerge), count_(clusters.size()) {
-    const std::size_t most = std::max(kFewGroups, clusters.size() / kJointsOfGroup);
-    for (std::uint32_t i = 0; i < clusters.size(); ++i) search(i);
+      : clusters_(clusters), best_(clusters.size(), kNoMerge), count_(clusters.size()) {}
+  void run() {
+    const std::size_t most = std::max(kFewGroups, clusters_.size() / kJointsOfGroup);
+    for (std::uint32_t i = 0; i < clusters_.size(); ++i) search(i);
     while (step(count_ > most)) --count_;
   }
 
@@ -140,6 +141,7 @@ std::vector<Vector> neutral_positions(const dna::Dna& dna) {
   const Skeleton skeleton(dna, euler);
   const float rest[9] = {};
   std::vector<Local> locals;
+  locals.reserve(skeleton.joint_count());
   for (std::size_t j = 0; j < skeleton.joint_count(); ++j) {
     locals.push_back(skeleton.local(j, rest));
   }
@@ -213,7 +215,7 @@ Regions find_regions(const dna::Dna& dna, const std::vector<Unit>& units, const 
   }
   std::vector<Cluster> clusters = list_clusters(dna, units, effects, significant_only, wanted);
   pack_controls(clusters);
-  Clustering{clusters};
+  Clustering(clusters).run();
   auto next = static_cast<std::uint32_t>(options.regions.size());
   for (const Cluster& cluster : clusters) {
     if (cluster.joints.empty()) continue;

@@ -202,6 +202,7 @@ void remove_hidden(const dna::Dna& dna, std::vector<Unit>& units) {
 void find_layers(const dna::Dna& dna, std::vector<Unit>& units) {
   remove_hidden(dna, units);
   std::vector<Unit*> order;
+  order.reserve(units.size());
   for (Unit& unit : units) order.push_back(&unit);
   std::ranges::stable_sort(order, std::greater{}, [](const Unit* u) {
     return std::tuple(u->rows[0].group, u->bundle, u->rows[0].row);

@@ -192,12 +192,12 @@ struct GuiRange {
 
 /// A step of an evaluation: what is to be done and on which element, packed into one number.
 enum class StepKind : std::uint32_t { kOperation, kSolver, kPsd };
-inline constexpr std::uint32_t make_step(StepKind kind, std::uint32_t index) {
+constexpr std::uint32_t make_step(StepKind kind, std::uint32_t index) {
   return (static_cast<std::uint32_t>(kind) << 30) | index;
 }
-inline constexpr StepKind step_kind(std::uint32_t step) { return StepKind{step >> 30}; }
+constexpr StepKind step_kind(std::uint32_t step) { return StepKind{step >> 30}; }
 /// An index into ml_operations, rbf_solvers or psds, by the kind of the step.
-inline constexpr std::uint32_t step_index(std::uint32_t step) { return step & 0x3FFFFFFFu; }
+constexpr std::uint32_t step_index(std::uint32_t step) { return step & 0x3FFFFFFFu; }
 
 /// Each LOD has these lists of steps. A *settled* evaluation (settle = true) orders everything by
 /// what it needs; a *latent* one follows the reference, whose stages have a fixed order.

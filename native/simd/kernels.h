@@ -16,7 +16,7 @@ namespace risorius::simd {
 /// behind its last one: rows are not padded, a kernel reads on into the next column and its caller
 /// passes the surplus over.
 inline constexpr std::size_t kWidest = 16;
-inline constexpr std::size_t rounded_up(std::size_t rows) {
+constexpr std::size_t rounded_up(std::size_t rows) {
   return (rows + kWidest - 1) / kWidest * kWidest;
 }
 /// Frames that a batch kernel takes at once.

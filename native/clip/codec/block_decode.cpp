@@ -284,7 +284,7 @@ core::Result<bool> EncodedCurves::fill(std::size_t control, float* out) const {
 
 core::Status EncodedCurves::decode_pair(const Pending& a, const Pending* b) const {
   const Entry* const tables = tables_->entries.data();
-  const std::array<bool, 2> whole = with_order(a.chunk[0], [&]<int kOrder>() {
+  const std::array<bool, 2> whole = with_order(a.chunk[0], [&]<int kOrder> {
     Lane<kOrder> first(tables, a.chunk, a.out, frames_);
     if (b == nullptr) return std::array{finish(first), true};
     return finish_both(first, Lane<kOrder>(tables, b->chunk, b->out, frames_));

@@ -61,7 +61,7 @@ Coded best_tokens(std::span<const float> curve) {
   Coded best{0, bits_of(curve[0]), tokens_of<0>(curve)};
   double least = cost_of(best.tokens);
   for (int order = 1; order < kOrders; ++order) {
-    auto tokens = with_order(order, [&]<int kOrder>() { return tokens_of<kOrder>(curve); });
+    auto tokens = with_order(order, [&]<int kOrder> { return tokens_of<kOrder>(curve); });
     const double cost = cost_of(tokens);
     if (cost >= least) continue;
     least = cost;

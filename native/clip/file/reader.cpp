@@ -123,7 +123,8 @@ core::Status Reader::read_names(View body, const Limits& limits) {
   for (std::uint64_t i = 0; i < controls && !in.failed(); ++i) {
     head_.names.push_back(in.next_text(head_.names.empty() ? "" : head_.names.back()));
     // A name may repeat the one before in a few bytes: these, too, are counted.
-    if ((length += head_.names.back().size()) > limits.head_bytes) {
+    length += head_.names.back().size();
+    if (length > limits.head_bytes) {
       return refuse(ErrorCode::kLimitExceeded, "head.names",
                     "names longer than " + std::to_string(limits.head_bytes) + " bytes together");
     }

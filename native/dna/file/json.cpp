@@ -697,7 +697,7 @@ Result<Dna> from_json(std::string_view text, const Limits& limits) {
     return fail(
         ErrorCode::kLimitExceeded, "",
         "the levels of nesting pass the limit of " + std::to_string(limits.max_nesting) + " here",
-        *at);
+        at);
   }
   Result<Json> json = parse_text(text);
   if (!json) return std::move(json).propagate();
