@@ -184,6 +184,16 @@ def test_odd_gltf_is_one_sentence(tmp_path, change, sentence):
     assert "\n" not in str(caught.value)
 
 
+def test_channels_that_turn_a_node_are_counted_and_left_out(tmp_path):
+    document, binary = small([0, 1], [0, 1, 1, 0], WEIGHTS)
+    channels = document["animations"][0]["channels"]
+    for said in ([], ["1 channel(s) move nodes, not shapes or properties: left out"]):
+        (tmp_path / "a.glb").write_bytes(glb(document, binary))
+        notes = importing.read(tmp_path / "a.glb").notes
+        assert [note for note in notes if "move nodes" in note] == said
+        channels.append({**channels[0], "target": {"node": 0, "path": "rotation"}})
+
+
 def test_the_animation_is_chosen_by_name_or_number(tmp_path):
     document, binary = small([0, 1], [0, 1, 1, 0], WEIGHTS)
     document["animations"].append({**document["animations"][0], "name": "Sing"})
