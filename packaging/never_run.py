@@ -21,6 +21,8 @@ from typing import Any
 PROJECT = Path(__file__).resolve().parents[1]
 PARTS = {"native": "native/", "package": "native/python/", "add-on": "addon/"}  # and their folders
 
+_QUIET = re.compile(r"\s*(return \w+;|\}+[;)]*)\s*(//.*)?$")
+
 
 @dataclass
 class File:
@@ -50,21 +52,42 @@ def short_name(function: str) -> str:
     return re.sub(r"^risorius::(?:\w+::(?=\w+(::|$)))?", "", name) or function
 
 
+def _only_cleans_up(source: list[str], number: int, before: int) -> bool:
+    """Whether a line runs without being counted: `return out;` and `}` after a statement that ran.
+
+    The compiler makes the result in its place, so these hold only what an exception would run.
+
+    Args:
+        source: the lines of the file.
+        number: of the line in question, from 1.
+        before: of the counted line before it.
+    """
+    if not 0 < before < number <= len(source):
+        return False
+    said = source[before - 1].split("//")[0].strip()
+    goes_on = said.endswith((";", "}")) and not said.startswith(("return", "throw"))
+    return goes_on and _QUIET.match(source[number - 1]) is not None
+
+
 def native_files(report: dict[str, Any]) -> list[File]:
     """The files of a JSON report of gcovr; a line ran if it did in any build of its function."""
     files = []
     for told in report["files"]:
-        names = {f["name"]: short_name(f["demangled_name"]) for f in told["functions"]}
         ran: Counter[int] = Counter()
         inside: dict[int, str] = {}
         for line in told["lines"]:
             if not line.get("gcovr/noncode"):
                 ran[line["line_number"]] += line["count"]
-                function = line.get("function_name", "")
-                inside[line["line_number"]] = names.get(function, function)
-        file = File(told["file"], len(ran))
-        for number in sorted(n for n, count in ran.items() if count == 0):
-            file.never.setdefault(inside[number], []).append(number)
+                inside[line["line_number"]] = short_name(line.get("function_name", ""))
+        file, before = File(told["file"], len(ran)), 0
+        path = PROJECT / file.name
+        source = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+        for number in sorted(ran):
+            if ran[number] or _only_cleans_up(source, number, before):
+                before = number
+            else:
+                before = 0
+                file.never.setdefault(inside[number], []).append(number)
         files.append(file)
     return files
 

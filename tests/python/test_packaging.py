@@ -145,25 +145,25 @@ def test_blenders_says_what_it_needs(tmp_path):
     assert done.stderr.count("\n") == 1
 
 
-def test_lines_that_never_ran_are_listed_by_function():
+def test_lines_that_never_ran_are_listed_by_function(tmp_path):
     never = _script("never_run")
+    unnamed = "risorius::dna::(anonymous namespace)::f(int)"
+    method = "void risorius::core::List<A<B> >::g(int)"
+    never.PROJECT = tmp_path
+    (tmp_path / "native/core").mkdir(parents=True)
+    code = ["if (a) {", "}", "", "b();  // c", "return out;", "", "", "", "return 1;", "}"]
+    (tmp_path / "native/core/a.h").write_text("\n".join(code), encoding="utf-8")
     report = {
         "files": [
             {
                 "file": "native/core/a.h",
-                "functions": [
-                    {
-                        "name": "_Z1",
-                        "demangled_name": "risorius::dna::(anonymous namespace)::f(int)",
-                    },
-                    {"name": "_Z2", "demangled_name": "void risorius::core::List<A<B> >::g(int)"},
-                ],
                 "lines": [
-                    {"line_number": 1, "count": 0, "function_name": "_Z1"},
-                    {"line_number": 2, "count": 0, "function_name": "_Z1"},
-                    {"line_number": 4, "count": 0, "function_name": "_Z2"},
-                    {"line_number": 4, "count": 1, "function_name": "_Z1"},  # of another type
-                    {"line_number": 9, "count": 0, "function_name": "_Z2"},
+                    {"line_number": 1, "count": 0, "function_name": unnamed},
+                    {"line_number": 2, "count": 0, "function_name": unnamed},
+                    {"line_number": 4, "count": 0, "function_name": method},
+                    {"line_number": 4, "count": 1, "function_name": method},  # of another type
+                    {"line_number": 5, "count": 0, "function_name": method},  # only cleans up
+                    {"line_number": 9, "count": 0, "function_name": method},
                 ],
             }
         ]
@@ -177,12 +177,12 @@ def test_lines_that_never_ran_are_listed_by_function():
         }
     }
     assert never.told(never.native_files(report) + never.python_files(package)).splitlines() == [
-        "native/core/a.h: 3 of 4",
+        "native/core/a.h: 3 of 5",
         "    f: 1-2",
         "    List::g: 9",
         "native/python/risorius/b.py: 3 of 7",
         "    C.h: 3, 5-6",
-        "native: no test runs 3 of 4 lines",
+        "native: no test runs 3 of 5 lines",
         "package: no test runs 3 of 7 lines",
         "add-on: no test runs 0 of 0 lines",
     ]
