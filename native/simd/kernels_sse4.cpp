@@ -39,7 +39,7 @@ struct V {
     return _mm_add_ps(sum, _mm_mul_ps(a, b));
   }
   RISORIUS_INLINE static void expand(const float* from, std::uint32_t mask, float* to) {
-    for (int q = 0; q < 4; ++q, mask >>= 4) {
+    for (std::size_t q = 0; q < 4; ++q, mask >>= 4) {
       const __m128i order =
           _mm_loadu_si128(reinterpret_cast<const __m128i*>(kExpandBytes[mask & 15u].data()));
       store(to + 4 * q, _mm_castsi128_ps(_mm_shuffle_epi8(_mm_castps_si128(load(from)), order)));

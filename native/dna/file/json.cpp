@@ -37,6 +37,7 @@ struct UniqueMap : std::map<Key, Value, Less, Allocator> {
   using std::map<Key, Value, Less, Allocator>::map;
   Value& operator[](const Key& key) {
     const auto [at, added] = this->try_emplace(key);
+    // NOLINTNEXTLINE(bugprone-std-exception-baseclass): nobody but parse_text may catch it
     if (!added) throw RepeatedMember{key};
     return at->second;
   }
@@ -328,7 +329,7 @@ class Reader {
     std::set<std::string> outer_used = std::exchange(used_, {"signature", "size", "offset"});
     body();
     for (const auto& member : json.items()) {
-      if (used_.count(member.key()) > 0) continue;
+      if (used_.contains(member.key())) continue;
       path_.push_back(member.key());
       error("this member is not known");
       path_.pop_back();
