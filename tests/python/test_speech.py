@@ -28,7 +28,7 @@ from risorius.speech import (
     voting,
 )
 from risorius.speech.audio import RATE, AudioError, parse_wav, read_audio, resample
-from risorius.speech.listening import pieces, with_silences
+from risorius.speech.listening import _shifted, pieces, with_silences
 from risorius.speech.phones import CLASS_OF, VISEMES, Phoneme
 from risorius.speech.recogniser import MissingError, Segment
 
@@ -322,6 +322,12 @@ def test_listening_tells_how_far_it_is_and_can_be_cancelled(voice):
     assert parts[-1] == 1.0
     with pytest.raises(CancelledError):
         listen(path, cancel=lambda: True)
+
+
+def test_phonemes_of_a_piece_lie_on_the_clock_of_the_whole_and_end_with_it():
+    heard = [Phoneme(0.0, 0.5, "AA"), Phoneme(0.5, 1.1, "P")]  # the last one a little too long
+    found = _shifted(heard, 2.0, 3.0)
+    assert found == [Phoneme(2.0, 2.5, "AA"), Phoneme(2.5, 3.0, "P")]
 
 
 def test_a_recording_is_cut_in_pauses_and_covered_as_a_whole():
