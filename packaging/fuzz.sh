@@ -7,7 +7,7 @@ set -uo pipefail
 source "$(dirname "$0")/setup.sh"
 
 targets=(parse filter round_trip json evaluate coordinates rig clip)
-programs="$project/build/fuzz/tests/fuzz"
+programs="$project/build/asan-ubsan/tests/fuzz"
 corpora="$project/build/fuzz-corpus"
 finds="$project/build/fuzz-finds"
 logs="$project/build/logs/fuzz"
@@ -20,8 +20,8 @@ case "${1:-}" in
 esac
 
 build_targets() {
-  (cd "$project" && cmake --preset fuzz -DCMAKE_CXX_COMPILER_LAUNCHER=ccache &&
-    cmake --build --preset fuzz -j"$(nproc)" --target make_seeds planted_fuzz greedy_fuzz \
+  (cd "$project" && cmake --preset asan-ubsan -DCMAKE_CXX_COMPILER_LAUNCHER=ccache &&
+    cmake --build --preset asan-ubsan -j"$(nproc)" --target make_seeds planted_fuzz greedy_fuzz \
       "${targets[@]/%/_fuzz}") > "$logs/build.log" 2>&1 ||
     { tail -n 30 "$logs/build.log" && return 1; }
 }

@@ -63,7 +63,7 @@ void expect_of_every_prefix(const Bytes& bytes, Check check) {
 
 // The sanitizers take four times as long and see what every fifth byte does; the plain build takes
 // each one, and the fuzzers, which are sanitized too, others every time.
-#if defined(__SANITIZE_ADDRESS__)
+#if defined(RISORIUS_SANITIZED)
 constexpr std::size_t kSanitized = 5;
 #else
 constexpr std::size_t kSanitized = 1;
