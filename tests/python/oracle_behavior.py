@@ -15,8 +15,15 @@ SEQUENCES = ["xyz", "xzy", "yxz", "yzx", "zxy", "zyx"]
 
 
 def multiply(a, b):
-    v = a[3] * b[:3] + b[3] * a[:3] + np.cross(a[:3], b[:3])
-    return np.array([*v, a[3] * b[3] - a[:3] @ b[:3]])
+    # Written out: np.cross of three numbers takes fifty times as long.
+    ax, ay, az, aw = (float(v) for v in a)
+    bx, by, bz, bw = (float(v) for v in b)
+    return np.array([
+        aw * bx + bw * ax + ay * bz - az * by,
+        aw * by + bw * ay + az * bx - ax * bz,
+        aw * bz + bw * az + ax * by - ay * bx,
+        aw * bw - ax * bx - ay * by - az * bz,
+    ])  # fmt: skip
 
 
 def conjugate(q):
