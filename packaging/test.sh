@@ -109,7 +109,7 @@ run_blender() {
 some() { printf 'blender_tests/test_%s.py ' "$@"; }
 run_subsets() { # what differs most between versions: installing, building, keys and actions, odd files
   local subset version other
-  subset=$(some extension vertices controls frames failures animation_import bake past)
+  subset=$(some extension vertices controls frames failures bake past)
   for version in 4.2.23 5.0.1; do
     step "a fast subset in bpy $version"
     if other=$(bpy_venv "$version" 90); then

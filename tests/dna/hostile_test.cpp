@@ -13,6 +13,7 @@
 #include "support/files.h"
 #include "support/full_face.h"
 #include "support/promises.h"
+#include "support/stride.h"
 
 namespace risorius {
 namespace {
@@ -61,19 +62,11 @@ void expect_of_every_prefix(const Bytes& bytes, Check check) {
   }
 }
 
-// The sanitizers take four times as long and see what every fifth byte does; the plain build takes
-// each one, and the fuzzers, which are sanitized too, others every time.
-#if defined(RISORIUS_SANITIZED)
-constexpr std::size_t kSanitized = 5;
-#else
-constexpr std::size_t kSanitized = 1;
-#endif
-
 // Each byte in turn becomes 0x00, 0xFF, and itself with one bit flipped. check gets a turn that is
 // another one for each of the three.
 template <class Check>
 void expect_of_every_patch(const Bytes& bytes, std::size_t stride, Check check) {
-  for (std::size_t at = 0; at < bytes.size(); at += stride * kSanitized) {
+  for (std::size_t at = 0; at < bytes.size(); at += stride * testing_support::kStride) {
     const auto flipped = static_cast<std::uint8_t>(bytes[at] ^ (1u << at % 8));
     std::size_t turn = at;
     for (const std::uint8_t value : {std::uint8_t{0x00}, std::uint8_t{0xFF}, flipped}) {
@@ -243,7 +236,7 @@ TEST(HostileSource, ThatChangesBetweenTwoReadsIsNoHarm) {
   mesh.skin_joint_indices = std::vector<std::uint16_t>(kCount, 1);
   std::vector<dna::Warning> warnings;
   const Bytes bytes = *dna::write(face, {8, true}, warnings);
-  for (std::size_t honest = 0; honest < 60; ++honest) {
+  for (std::size_t honest = 0; honest < 60; honest += testing_support::kStride) {
     for (std::uint64_t phase = 0; phase < 4; ++phase) {
       ChangingSource source(bytes, honest, phase);
       const auto dna = dna::parse(source);
