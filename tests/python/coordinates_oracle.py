@@ -147,9 +147,3 @@ def mapped_world(source, target, matrices):
     out = np.linalg.inv(c) @ matrices @ c
     out[:, 3, :3] *= scale_of_unit(source, target)
     return out
-
-
-def quaternion_product(a, b):
-    """Hamilton's, (x, y, z, w)."""
-    v = a[3] * b[:3] + b[3] * a[:3] + np.cross(a[:3], b[:3])
-    return np.array([*v, a[3] * b[3] - a[:3] @ b[:3]])
