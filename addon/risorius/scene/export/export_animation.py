@@ -84,7 +84,7 @@ def copies(
     characters: Sequence[tuple[ArmatureObject, int, sampling.Samples]],
     options: ShipOptions,
 ) -> Iterator[tuple[Override, Loans]]:
-    """Baked copies of characters, selected, alone in a scene that is shown meanwhile.
+    """Baked copies of characters, alone in a scene that is shown meanwhile.
 
     Args:
         context: with the window whose scene is exchanged.
@@ -108,11 +108,8 @@ def copies(
             if window is not None:
                 window.scene = stage
             stage.frame_set(stage.frame_start)
-            for item in layer.objects:
-                item.select_set(True, view_layer=layer)
             layer.objects.active = layer.objects[0]
-            selected = layer.objects[:]
-            yield {"scene": stage, "view_layer": layer, "selected_objects": selected}, loans
+            yield {"scene": stage, "view_layer": layer}, loans
         finally:
             if window is not None and shown is not None:
                 window.scene = shown

@@ -258,7 +258,6 @@ def _bake(
     bpy.data.images.remove(spare)
     for item in items:
         item.hide_render = False
-    _select(override, items)
     for flat in flats:
         _read_back(flat, *(targets.get((flat.material, i)) for i in (("color",), _MASKS)))
 
@@ -335,17 +334,9 @@ def _bake_one(override: Override, items: Iterable[MeshObject], item: MeshObject)
     layer = item.data.uv_layers.get(_LAYER) or _shown_layer(item.data)
     assert layer is not None
     layer.active = True
-    _select(override, [item])
     alone = {**override, "selected_objects": [item], "active_object": item, "object": item}
     with bpy.context.temp_override(**alone), quiet():
         bpy.ops.object.bake(type="EMIT")
-
-
-def _select(override: Override, items: Sequence[MeshObject]) -> None:
-    layer = override["view_layer"]
-    for item in override["scene"].objects:
-        item.select_set(item in items, view_layer=layer)
-    layer.objects.active = items[0]
 
 
 def _read_back(flat: _Flat, color: bpy.types.Image | None, masks: bpy.types.Image | None) -> None:
