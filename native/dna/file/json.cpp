@@ -8,6 +8,7 @@
 #include <optional>
 #include <set>
 
+#include "core/function_ref.h"
 #include "dna/layers.h"
 #include "dna/schema.h"
 #include "dna/validate.h"
@@ -19,6 +20,7 @@ namespace {
 using core::Array;
 using core::ErrorCode;
 using core::fail;
+using core::FunctionRef;
 using core::List;
 using core::PlanarArray;
 using core::Result;
@@ -105,56 +107,32 @@ class Writer {
  public:
   std::string take() { return std::move(out_); }
 
-  template <class Body>
-  void object(Body body) {
-    out_ += '{';
-    ++depth_;
-    first_ = true;
-    body();
-    --depth_;
-    if (!first_) line();
-    out_ += '}';
-    first_ = false;
-  }
-  template <class Body>
-  void member(const std::string& name, Body body) {
-    comma();
-    line();
-    out_ += '"' + name + "\": ";
-    body();
-    first_ = false;
-  }
+  void object(FunctionRef<void()> body);
+  void member(const std::string& name, FunctionRef<void()> body);
   // Members of an array on lines of their own (structs) or in a row (numbers).
   template <class Items, class Each>
   void array(const Items& items, bool lines, Each each) {
-    out_ += '[';
-    ++depth_;
+    begin_array();
     bool first = true;
     for (const auto& item : items) {
-      if (!first) out_ += lines ? "," : ", ";
-      if (lines) line();
+      begin_item(first, lines);
       each(item);
       first = false;
     }
-    --depth_;
-    if (lines && !first) line();
-    out_ += ']';
+    end_array(lines && !first);
   }
 
-  template <class Body>
-  void group(Name name, Body body) {
-    member(json_name(name), [&] { object(body); });
-  }
+  void group(Name name, FunctionRef<void()> body);
   template <class T>
   void field(Name name, const T& v) {
-    member(json_name(name), [&] { value(v); });
+    named(name, [&] { value(v); });
   }
   template <class T>
   void sized(Name name, const List<T>& v, const LodMapping*) {
     field(name, v);
   }
   void setups(Name name, const List<TwistSwingSetup>& v, bool twist) {
-    member(json_name(name), [&] {
+    named(name, [&] {
       array(v, true, [&](const TwistSwingSetup& setup) {
         object([&] { describe_setup(*this, setup, twist); });
       });
@@ -191,35 +169,9 @@ class Writer {
   }
   // Signs are stored as u32; other tools of the format print them so.
   void value(std::int32_t v) { value(static_cast<std::uint32_t>(v)); }
-  void value(float v) {
-    if (std::isnan(v)) {
-      char bits[16];
-      const auto* end =
-          std::to_chars(bits, bits + sizeof(bits), std::bit_cast<std::uint32_t>(v), 16).ptr;
-      out_ += "\"NaN:" + std::string(static_cast<const char*>(bits), end) + '"';
-    } else if (std::isinf(v)) {
-      out_ += v > 0 ? "\"Infinity\"" : "\"-Infinity\"";
-    } else if (v == 0.0f && std::signbit(v)) {
-      out_ += "-0.0";
-    } else {
-      char text[32];
-      out_.append(text, std::to_chars(text, text + sizeof(text), v).ptr);
-    }
-  }
-  void value(const std::string& v) {
-    try {
-      out_ += Json(v).dump();
-    } catch (const Json::exception&) {  // not UTF-8
-      out_ += "{\"hex\": \"" + to_hex(v.data(), v.size()) + "\"}";
-    }
-  }
-  void value(const std::pair<std::string, std::string>& v) {
-    out_ += '[';
-    value(v.first);
-    out_ += ", ";
-    value(v.second);
-    out_ += ']';
-  }
+  void value(float v);
+  void value(const std::string& v);
+  void value(const std::pair<std::string, std::string>& v);
   template <class T>
   void value(std::span<const T> v) {
     array(v, false, [this](T number) { value(number); });
@@ -257,9 +209,10 @@ class Writer {
     for (std::size_t i = 0; i < numbers.size(); ++i) numbers[i] = i;
     array(numbers, true, [&](std::size_t i) { row(offsets[i], offsets[i + 1] - offsets[i]); });
   }
-  void comma() {
-    if (!first_) out_ += ',';
-  }
+  void named(Name name, FunctionRef<void()> body);
+  void begin_array();
+  void begin_item(bool first, bool on_a_line);
+  void end_array(bool on_a_line);
   void line() {
     out_ += '\n';
     out_.append(depth_, ' ');
@@ -269,6 +222,81 @@ class Writer {
   std::size_t depth_ = 0;
   bool first_ = true;
 };
+
+// What every field calls is no template and stands outside of the class: it is compiled once, not
+// once more for each of some 150 fields.
+void Writer::object(FunctionRef<void()> body) {
+  out_ += '{';
+  ++depth_;
+  first_ = true;
+  body();
+  --depth_;
+  if (!first_) line();
+  out_ += '}';
+  first_ = false;
+}
+
+void Writer::member(const std::string& name, FunctionRef<void()> body) {
+  if (!first_) out_ += ',';
+  line();
+  out_ += '"' + name + "\": ";
+  body();
+  first_ = false;
+}
+
+void Writer::named(Name name, FunctionRef<void()> body) { member(json_name(name), body); }
+
+void Writer::group(Name name, FunctionRef<void()> body) {
+  named(name, [&] { object(body); });
+}
+
+void Writer::begin_array() {
+  out_ += '[';
+  ++depth_;
+}
+
+void Writer::begin_item(bool first, bool on_a_line) {
+  if (!first) out_ += on_a_line ? "," : ", ";
+  if (on_a_line) line();
+}
+
+void Writer::end_array(bool on_a_line) {
+  --depth_;
+  if (on_a_line) line();
+  out_ += ']';
+}
+
+void Writer::value(float v) {
+  if (std::isnan(v)) {
+    char bits[16];
+    const auto* end =
+        std::to_chars(bits, bits + sizeof(bits), std::bit_cast<std::uint32_t>(v), 16).ptr;
+    out_ += "\"NaN:" + std::string(static_cast<const char*>(bits), end) + '"';
+  } else if (std::isinf(v)) {
+    out_ += v > 0 ? "\"Infinity\"" : "\"-Infinity\"";
+  } else if (v == 0.0f && std::signbit(v)) {
+    out_ += "-0.0";
+  } else {
+    char text[32];
+    out_.append(text, std::to_chars(text, text + sizeof(text), v).ptr);
+  }
+}
+
+void Writer::value(const std::string& v) {
+  try {
+    out_ += Json(v).dump();
+  } catch (const Json::exception&) {  // not UTF-8
+    out_ += "{\"hex\": \"" + to_hex(v.data(), v.size()) + "\"}";
+  }
+}
+
+void Writer::value(const std::pair<std::string, std::string>& v) {
+  out_ += '[';
+  value(v.first);
+  out_ += ", ";
+  value(v.second);
+  out_ += ']';
+}
 
 void write_index(Writer& w, const Dna& dna) {
   std::size_t next_unknown = 0;
@@ -309,63 +337,23 @@ class Reader {
   bool failed() const { return error_.has_value(); }
   core::Unexpected take_error() { return core::Unexpected{*error_}; }
 
-  void error(const std::string& message, ErrorCode code = ErrorCode::kInvalidValue) {
-    if (error_) return;
-    std::string where;
-    for (const std::string& part : path_) {
-      if (!where.empty() && part[0] != '[') where += '.';
-      where += part;
-    }
-    std::optional<std::uint64_t> offset;
-    if (where.empty()) offset = 0;  // the text as a whole
-    error_ = core::Error{code, offset, where, message};
-  }
-
+  void error(const std::string& message, ErrorCode code = ErrorCode::kInvalidValue);
   // Runs body with `json` as the object whose members fields are; every member must be used.
-  template <class Body>
-  void object(const Json& json, Body body) {
-    if (!json.is_object()) return error("an object was expected");
-    const Json* outer = std::exchange(object_, &json);
-    std::set<std::string> outer_used = std::exchange(used_, {"signature", "size", "offset"});
-    body();
-    for (const auto& member : json.items()) {
-      if (used_.contains(member.key())) continue;
-      path_.push_back(member.key());
-      error("this member is not known");
-      path_.pop_back();
-    }
-    object_ = outer;
-    used_ = std::move(outer_used);
-  }
-  template <class Body>
-  void member(const std::string& name, Body body) {
-    if (failed()) return;
-    path_.push_back(name);
-    const auto at = object_->find(name);
-    if (at == object_->end()) {
-      error("this member is missing");
-    } else {
-      used_.insert(name);
-      body(*at);
-    }
-    path_.pop_back();
-  }
+  void object(const Json& json, FunctionRef<void()> body);
+  void member(const std::string& name, FunctionRef<void(const Json&)> body);
   bool has(const std::string& name) const { return object_->contains(name); }
 
-  template <class Body>
-  void group(Name name, Body body) {
-    member(json_name(name), [&](const Json& json) { object(json, body); });
-  }
+  void group(Name name, FunctionRef<void()> body);
   template <class T>
   void field(Name name, T& v) {
-    member(json_name(name), [&](const Json& json) { read(json, v); });
+    named(name, [&](const Json& json) { read(json, v); });
   }
   template <class T>
   void sized(Name name, List<T>& v, const LodMapping*) {
     field(name, v);
   }
   void setups(Name name, List<TwistSwingSetup>& v, bool twist) {
-    member(json_name(name), [&](const Json& json) {
+    named(name, [&](const Json& json) {
       std::vector<TwistSwingSetup> setups;
       elements(json, [&](const Json& item) {
         object(item, [&] { describe_setup(*this, setups.emplace_back(), twist); });
@@ -417,53 +405,10 @@ class Reader {
     }
     v = static_cast<T>(json.get<std::uint64_t>());
   }
-  void read(const Json& json, std::int32_t& v) {
-    std::uint32_t bits = 0;
-    if (json.is_number_integer() && !json.is_number_unsigned()) {
-      if (json.get<std::int64_t>() < INT32_MIN) return error("the number is too small");
-      v = static_cast<std::int32_t>(json.get<std::int64_t>());
-      return;
-    }
-    read(json, bits);
-    v = static_cast<std::int32_t>(bits);
-  }
-  void read(const Json& json, float& v) {
-    if (json.is_number()) {
-      v = json.get<float>();
-      return;
-    }
-    const std::string text = json.is_string() ? json.get<std::string>() : "";
-    if (text == "Infinity" || text == "-Infinity") {
-      v = text[0] == '-' ? -HUGE_VALF : HUGE_VALF;
-      return;
-    }
-    std::uint32_t bits = 0;
-    const char* begin = text.data() + 4;
-    const char* end = text.data() + text.size();
-    if (!text.starts_with("NaN:") || std::from_chars(begin, end, bits, 16).ptr != end ||
-        !std::isnan(std::bit_cast<float>(bits))) {
-      return error("a number was expected");
-    }
-    v = std::bit_cast<float>(bits);
-  }
-  void read(const Json& json, std::string& v) {
-    if (json.is_string()) {
-      v = json.get<std::string>();
-    } else if (json.is_object() && json.size() == 1 && json.contains("hex")) {
-      const Json& hex = json["hex"];
-      const auto bytes =
-          hex.is_string() ? from_hex(hex.get_ref<const std::string&>()) : std::nullopt;
-      if (!bytes) return error("pairs of hex digits were expected");
-      v = *bytes;
-    } else {
-      error("a text was expected");
-    }
-  }
-  void read(const Json& json, std::pair<std::string, std::string>& v) {
-    if (!json.is_array() || json.size() != 2) return error("a pair of texts was expected");
-    read(json[0], v.first);
-    read(json[1], v.second);
-  }
+  void read(const Json& json, std::int32_t& v);
+  void read(const Json& json, float& v);
+  void read(const Json& json, std::string& v);
+  void read(const Json& json, std::pair<std::string, std::string>& v);
   template <class T>
   void read(const Json& json, Array<T>& v) {
     std::vector<T> numbers;
@@ -501,29 +446,11 @@ class Reader {
     object(json, [&] { describe(*this, v); });
   }
 
-  template <class Each>
-  void elements(const Json& json, Each each) {
-    if (!is_list(json)) return;
-    std::size_t i = 0;
-    for (const Json& item : json) {
-      if (failed()) return;
-      path_.push_back("[" + std::to_string(i++) + "]");
-      each(item);
-      path_.pop_back();
-    }
-  }
+  void elements(const Json& json, FunctionRef<void(const Json&)> each);
 
  private:
-  bool is_list(const Json& json) {
-    if (!json.is_array()) {
-      error("an array was expected");
-    } else if (json.size() > limits_.max_count) {
-      error(std::to_string(json.size()) + " elements, the limit is " +
-                std::to_string(limits_.max_count),
-            ErrorCode::kLimitExceeded);
-    }
-    return !failed();
-  }
+  void named(Name name, FunctionRef<void(const Json&)> body);
+  bool is_list(const Json& json);
   // Numbers come by the million: no path is kept for each until one is wrong.
   template <class T>
   void append(const Json& json, std::vector<T>& out) {
@@ -545,6 +472,126 @@ class Reader {
   std::vector<std::string> path_;
   std::optional<core::Error> error_;
 };
+
+void Reader::error(const std::string& message, ErrorCode code) {
+  if (error_) return;
+  std::string where;
+  for (const std::string& part : path_) {
+    if (!where.empty() && part[0] != '[') where += '.';
+    where += part;
+  }
+  std::optional<std::uint64_t> offset;
+  if (where.empty()) offset = 0;  // the text as a whole
+  error_ = core::Error{code, offset, where, message};
+}
+
+void Reader::object(const Json& json, FunctionRef<void()> body) {
+  if (!json.is_object()) return error("an object was expected");
+  const Json* outer = std::exchange(object_, &json);
+  std::set<std::string> outer_used = std::exchange(used_, {"signature", "size", "offset"});
+  body();
+  for (const auto& member : json.items()) {
+    if (used_.contains(member.key())) continue;
+    path_.push_back(member.key());
+    error("this member is not known");
+    path_.pop_back();
+  }
+  object_ = outer;
+  used_ = std::move(outer_used);
+}
+
+void Reader::member(const std::string& name, FunctionRef<void(const Json&)> body) {
+  if (failed()) return;
+  path_.push_back(name);
+  const auto at = object_->find(name);
+  if (at == object_->end()) {
+    error("this member is missing");
+  } else {
+    used_.insert(name);
+    body(*at);
+  }
+  path_.pop_back();
+}
+
+void Reader::named(Name name, FunctionRef<void(const Json&)> body) {
+  member(json_name(name), body);
+}
+
+void Reader::group(Name name, FunctionRef<void()> body) {
+  named(name, [&](const Json& json) { object(json, body); });
+}
+
+void Reader::elements(const Json& json, FunctionRef<void(const Json&)> each) {
+  if (!is_list(json)) return;
+  std::size_t i = 0;
+  for (const Json& item : json) {
+    if (failed()) return;
+    path_.push_back("[" + std::to_string(i++) + "]");
+    each(item);
+    path_.pop_back();
+  }
+}
+
+bool Reader::is_list(const Json& json) {
+  if (!json.is_array()) {
+    error("an array was expected");
+  } else if (json.size() > limits_.max_count) {
+    error(std::to_string(json.size()) + " elements, the limit is " +
+              std::to_string(limits_.max_count),
+          ErrorCode::kLimitExceeded);
+  }
+  return !failed();
+}
+
+void Reader::read(const Json& json, std::int32_t& v) {
+  std::uint32_t bits = 0;
+  if (json.is_number_integer() && !json.is_number_unsigned()) {
+    if (json.get<std::int64_t>() < INT32_MIN) return error("the number is too small");
+    v = static_cast<std::int32_t>(json.get<std::int64_t>());
+    return;
+  }
+  read(json, bits);
+  v = static_cast<std::int32_t>(bits);
+}
+
+void Reader::read(const Json& json, float& v) {
+  if (json.is_number()) {
+    v = json.get<float>();
+    return;
+  }
+  const std::string text = json.is_string() ? json.get<std::string>() : "";
+  if (text == "Infinity" || text == "-Infinity") {
+    v = text[0] == '-' ? -HUGE_VALF : HUGE_VALF;
+    return;
+  }
+  std::uint32_t bits = 0;
+  const char* begin = text.data() + 4;
+  const char* end = text.data() + text.size();
+  if (!text.starts_with("NaN:") || std::from_chars(begin, end, bits, 16).ptr != end ||
+      !std::isnan(std::bit_cast<float>(bits))) {
+    return error("a number was expected");
+  }
+  v = std::bit_cast<float>(bits);
+}
+
+void Reader::read(const Json& json, std::string& v) {
+  if (json.is_string()) {
+    v = json.get<std::string>();
+  } else if (json.is_object() && json.size() == 1 && json.contains("hex")) {
+    const Json& hex = json["hex"];
+    const auto bytes = hex.is_string() ? from_hex(hex.get_ref<const std::string&>()) : std::nullopt;
+    if (!bytes) return error("pairs of hex digits were expected");
+    v = *bytes;
+  } else {
+    error("a text was expected");
+  }
+}
+
+void Reader::read(const Json& json, std::pair<std::string, std::string>& v) {
+  if (!json.is_array() || json.size() != 2) return error("a pair of texts was expected");
+  read(json[0], v.first);
+  read(json[1], v.second);
+}
 
 void read_index_entry(Reader& r, Dna& dna) {
   std::string id;
