@@ -84,12 +84,13 @@ configure() { # configure TARGET FLAGS [OPTION...]
     -DRISORIUS_BUILD_BINDINGS=OFF -DRISORIUS_WARNINGS_AS_ERRORS=ON -DCMAKE_BUILD_TYPE=None \
     -DCMAKE_CXX_FLAGS="$flags" -DCMAKE_CXX_COMPILER_LAUNCHER=ccache -DCMAKE_UNITY_BUILD=ON "$@"
 }
-# Warnings need no optimisation, and zig's own checks of undefined behavior would only take time. -c
-# reaches the program that tells CMake what the compiler is: to link it takes minutes.
+# Warnings need no optimisation and no lines for a debugger, and zig's own checks of undefined behavior
+# would only take time. -c reaches the program that tells CMake what the compiler is: to link it takes
+# minutes.
 build_libraries() { # build_libraries TARGET [LIBRARY...]
   local target=$1
   shift
-  configure "$target" "-c -O0 -fno-sanitize=undefined" &&
+  configure "$target" "-c -O0 -g0 -fno-sanitize=undefined" &&
     CCACHE_COMPILERTYPE=clang cmake --build "$out/$target" -j"$jobs" ${1:+--target "$@"}
 }
 build_programs() {
