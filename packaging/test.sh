@@ -86,8 +86,8 @@ native_lane() {
   google_tests "thread sanitizer, one Rig" tsan
   step "other compilers, systems and processors"
   run_cross
-  step "fuzz targets, 20 s each"
-  run_fuzzers 20
+  step "fuzz targets, 10 s each"
+  run_fuzzers 10
 }
 
 # run_blender NAME FILES COMMAND...: FILES are the test files that must have been run, one a word
