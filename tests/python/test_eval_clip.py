@@ -30,11 +30,11 @@ def own_cache(tmp_path, monkeypatch):
 
 def write_clip(path, names, curves, rate=30.0, start=0.0):
     """A CSV of curves[names, frames], digits enough to give every float32 back."""
-    with open(path, "w", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow(["time", *names])
-        for i, row in enumerate(np.asarray(curves).T):
-            writer.writerow([repr(start + i / rate), *(f"{v:.9g}" for v in row)])
+    curves = np.asarray(curves, float)
+    times = start + np.arange(curves.shape[1]) / rate
+    table, digits = np.column_stack([times, curves.T]), ["%.17g", *["%.9g"] * len(names)]
+    header = ",".join(["time", *names])
+    np.savetxt(path, table, digits, ",", newline="\r\n", header=header, comments="")
     return path
 
 

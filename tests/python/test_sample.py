@@ -134,7 +134,7 @@ def skinned(dna, rig, raw, mesh_index, lod):
         root = parent == j
         posed.append(local if root else posed[parent] @ local)
         bind.append(still if root else bind[parent] @ still)
-    moves = np.array([a @ np.linalg.inv(b) for a, b in zip(posed, bind, strict=True)])
+    moves = np.array(posed) @ np.linalg.inv(np.array(bind))
     owner = np.repeat(np.arange(len(p)), np.diff(mesh.skin_offsets.astype(int)))
     blend = np.zeros((len(p), 4, 4))
     weights = np.asarray(mesh.skin_weights, float)
