@@ -9,6 +9,7 @@
 #include "clip/file/reader.h"
 #include "support/clips.h"
 #include "support/files.h"
+#include "support/stride.h"
 
 namespace risorius::clip {
 namespace {
@@ -195,7 +196,7 @@ TEST(ClipFile, EveryPrefixIsRefusedAndReadUpToItsLastBlock) {
 
 TEST(ClipFile, EveryDamagedByteIsNoticed) {
   const Bytes bytes = must_encode(make_full_clip(40), 30);
-  for (std::size_t at = 0; at < bytes.size(); ++at) {
+  for (std::size_t at = 0; at < bytes.size(); at += kStride) {
     for (const int change : {1, 0x80, 0xFF}) {
       Bytes damaged = bytes;
       damaged[at] = static_cast<std::uint8_t>(damaged[at] ^ change);
@@ -212,7 +213,7 @@ TEST(ClipFile, DamageUnderAGoodChecksumDoesNoHarm) {
   seal(same);
   ASSERT_EQ(same, bytes);
   int accepted = 0;
-  for (std::size_t at = 0; at < bytes.size(); ++at) {
+  for (std::size_t at = 0; at < bytes.size(); at += kStride) {
     for (const int change : {1, 0x80, 0xFF}) {
       Bytes damaged = bytes;
       damaged[at] = static_cast<std::uint8_t>(damaged[at] ^ change);

@@ -3,6 +3,12 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <iterator>
+#include <string_view>
+#include <unordered_set>
+#include <vector>
 
 namespace risorius::testing_support {
 
@@ -13,5 +19,37 @@ inline constexpr std::size_t kStride = 5;
 #else
 inline constexpr std::size_t kStride = 1;
 #endif
+
+// Runs of one program with other instruction sets begin at other bytes, so that together they pass
+// over few.
+inline std::size_t first_byte() {
+  constexpr std::string_view kSets[] = {"scalar", "sse4", "avx2", "avx512", "neon"};
+  const char* forced = std::getenv("RISORIUS_SIMD");
+  for (std::size_t i = 0; forced != nullptr && i < std::size(kSets); ++i) {
+    if (kSets[i] == forced) return i % kStride;
+  }
+  return 0;
+}
+
+// Bytes of a file to change: each one, but of those that stand with the same neighbours in another
+// file, whose bytes are all changed too, one in four.
+inline std::vector<std::size_t> bytes_to_change(const std::vector<std::uint8_t>& file,
+                                                const std::vector<std::uint8_t>& other) {
+  constexpr std::size_t kBefore = 24, kAround = 40;
+  const auto around = [](const std::vector<std::uint8_t>& bytes, std::size_t at) {
+    return std::string_view(reinterpret_cast<const char*>(bytes.data()) + at - kBefore, kAround);
+  };
+  const auto inside = [](const std::vector<std::uint8_t>& bytes, std::size_t at) {
+    return at >= kBefore && at - kBefore + kAround <= bytes.size();
+  };
+  std::unordered_set<std::string_view> known;
+  for (std::size_t at = kBefore; inside(other, at); ++at) known.insert(around(other, at));
+  std::vector<std::size_t> places;
+  for (std::size_t at = 0, passed = 0; at < file.size(); ++at) {
+    if (inside(file, at) && known.contains(around(file, at)) && passed++ % 4 != 0) continue;
+    places.push_back(at);
+  }
+  return places;
+}
 
 }  // namespace risorius::testing_support
