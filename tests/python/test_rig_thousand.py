@@ -104,10 +104,9 @@ def turned(dna, values, losses):
     out, lost = np.zeros((2, len(values), 10))
     out[:, :3], out[:, 7:] = values[:, :3], values[:, 6:]
     lost[:, :3], lost[:, 7:] = losses[:, :3], losses[:, 6:]
-    for joint, angles in enumerate(values[:, 3:6] * scale):
-        out[joint, 3:7] = oracle_behavior.from_euler(
-            dna.rotation_sequence, dna.rotation_signs, angles
-        )
+    out[:, 3:7] = oracle_behavior.from_euler(
+        dna.rotation_sequence, dna.rotation_signs, values[:, 3:6] * scale
+    )
     # Half an angle's loss, the roundings of the angle itself, sines to 1e-7, three products.
     angles = np.abs(values[:, 3:6]) * scale
     loss = 0.5 * (losses[:, 3:6] * scale + 4 * EPS * angles).sum(axis=1) + 3e-7 + 12 * EPS
