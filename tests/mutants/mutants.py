@@ -77,13 +77,13 @@ def programs(table: dict[str, list[str]]) -> list[str]:
 class Copy:
     """A copy of the project's files in build/mutants, in which mutants are tried."""
 
-    def __init__(self, part: str, programs: list[str]):
+    def __init__(self, part: str, targets: list[str]):
         """Args:
         part: native, package or scene.
-        programs: The GoogleTest programs that tests.toml names for it.
+        targets: What is built before a native mutant is tried.
         """
         self.part = part
-        self.programs = programs
+        self.targets = targets
         self.root = PROJECT / "build" / "mutants" / part
         self._times = self.root.with_suffix(".json")
         # Seconds that a test takes when nothing is wrong.
@@ -123,9 +123,7 @@ class Copy:
             return
         if not (self.root / "build" / "dev" / "build.ninja").exists():
             self._checked(["cmake", "--preset", "dev", *OPTIONS])
-        self._checked(
-            ["cmake", "--build", "build/dev", "-j2", "--target", "_native", *self.programs]
-        )
+        self._checked(["cmake", "--build", "build/dev", "-j2", "--target", *self.targets])
 
     def _built(self) -> Path:
         return next((self.root / "build" / "dev").rglob("_native.*.so"))
@@ -278,7 +276,8 @@ def main() -> None:
             print(told(mutant, "drawn", ""))
         return
     table = tomllib.loads((HERE / "tests.toml").read_text(encoding="utf-8"))[part]
-    copy = Copy(part, programs(table))
+    # The Python module is a long build that the programs alone do not wait for.
+    copy = Copy(part, programs(table) + ([] if options.programs else ["_native"]))
     copy.root.mkdir(parents=True, exist_ok=True)
     kept = PROJECT / "build" / "mutants" / f"{part}-{options.seed}.jsonl"
     before = [json.loads(line) for line in kept.read_text().splitlines()] if kept.exists() else []
