@@ -18,6 +18,7 @@ import importlib.util
 import json
 import os
 import re
+import resource
 import shutil
 import signal
 import subprocess
@@ -42,6 +43,7 @@ SOURCES = {
     "scene": (["addon/risorius/logic/**/*.py", "addon/risorius/scene/**/*.py"], []),
 }
 SLOW = 300  # seconds for a test of which it is not yet known how long it takes
+MEMORY = 6 << 30  # bytes of any program: a count without end is not to fill the machine
 # Each mutant is compiled and linked: neither symbols for a debugger nor the last optimisations.
 OPTIONS = [
     "-DCMAKE_CXX_COMPILER_LAUNCHER=ccache", "-DCMAKE_INTERPROCEDURAL_OPTIMIZATION=OFF",
@@ -269,6 +271,7 @@ def main() -> None:
     options = parser.parse_args()
     # A shell's background job ignores it, and so would the programs that tests interrupt.
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))  # what it starts has it too
     part, wanted = options.part, options.count or COUNTS[options.part]
     order = drawn(PROJECT, sources(PROJECT, part), options.seed)
     if options.list:
