@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: MIT
 // A Dna may have been edited: whatever stands in it, compile gives a Rig or an error with the
 // field.
+#include <cmath>
 #include <ctime>
 #include <functional>
 #include <ostream>
 
 #include "rig/block.h"
 #include "support/face.h"
+#include "support/full_face.h"
 
 namespace risorius::compile {
 namespace {
@@ -111,6 +113,41 @@ TEST(Compile, NamesTheLayersThatAreNotEvaluated) {
   EXPECT_TRUE(must_compile(dna).ignored_layers().empty());
   dna.unknown_layers.push_back({{'n', 'e', 'w', '1'}, 0x10000, {}});
   EXPECT_EQ(must_compile(dna).ignored_layers(), std::vector<std::string>{"new1"});
+}
+
+TEST(Compile, NeutralJointsTurnAsTheRigWritesRotations) {
+  const dna::Dna face = testing_support::make_full_face();
+  CompileOptions options;
+  options.rotation = Rotation::kQuaternion;
+  const rig::Rig angles = must_compile(face);
+  const core::Result<rig::Rig> turned = compile(face, options);
+  ASSERT_TRUE(turned.has_value()) << turned.error().describe();
+  // The last joint: 90 degrees about z.
+  const float* a = angles.neutral_joints.data() + 2 * 9 + 3;
+  EXPECT_EQ(std::vector<float>(a, a + 6), (std::vector<float>{0, 0, 90, 1, 1, 1}));
+  const float* q = turned.value().neutral_joints.data() + 2 * 10 + 3;
+  const float half = std::sqrt(0.5f);
+  const float wanted[] = {0, 0, half, half, 1, 1, 1};
+  for (int i = 0; i < 7; ++i) EXPECT_NEAR(q[i], wanted[i], 1e-6f) << i;
+}
+
+// A twist that shares its rotation with a swing is another kind than one alone.
+TEST(Compile, SwingsComeBeforeTwistsAndAreToldApart) {
+  dna::Dna dna = good_face();
+  dna::TwistSwingSetup alone, shared;
+  alone.output_joint_indices = shared.output_joint_indices = {0};
+  alone.blend_weights = shared.blend_weights = {1.0f};
+  alone.input_control_indices = {0, 0, 0, 1};
+  shared.input_control_indices = {0, 1, 0, 1};
+  dna.twist_swing_behavior.twists = std::vector{alone, shared};
+  dna.twist_swing_behavior.swings = std::vector{shared};
+  std::vector<std::uint32_t> kinds;
+  const rig::Rig rig = must_compile(dna);
+  for (const rig::TwistSwing& s : rig.twist_swings) kinds.push_back(s.kind);
+  using rig::TwistSwing;
+  const std::vector<std::uint32_t> wanted{TwistSwing::kSwing, TwistSwing::kTwist,
+                                          TwistSwing::kUntwist};
+  EXPECT_EQ(kinds, wanted);
 }
 
 TEST(Compile, ChoicesThatTheFormatDoesNotKnowStayInsideTheRig) {

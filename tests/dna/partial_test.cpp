@@ -7,6 +7,7 @@
 #include <iterator>
 #include <map>
 
+#include "support/full_face.h"
 #include "support/head.h"
 
 namespace risorius::dna {
@@ -423,6 +424,49 @@ TEST(PartialLoad, LeavesAVertexTheSumOfItsWeights) {
   const float grow = 1.0f / 0.75f;
   EXPECT_EQ(cut.skin_weights, (Array<float>{0.5f * grow, 0.25f * grow, 1.0f, 1.0f, 1.0f}));
   EXPECT_EQ(cut.skin_joint_indices, (Array<std::uint16_t>{0, 1, 0, 1, 0}));
+}
+
+// The control of the first channel, of those of full_face.h: the last raw one, the corrective, both
+// of the networks, and the RBF pose. A channel goes with the layer that computes its control.
+TEST(PartialLoad, LeavesOutChannelsOfControlsThatAreNotLoaded) {
+  for (std::uint16_t control = 4; control <= 8; ++control) {
+    Dna face = make_full_face();
+    face.behavior.blend_shape_channels.input_indices = {control, 0};
+    const Bytes bytes = write_head(face, 8);
+    for (const unsigned layers : {0u, 1u, 2u, 3u}) {
+      ParseOptions options;
+      options.unreferenced_blend_shapes = false;
+      options.machine_learned_behavior = (layers & 1) != 0;
+      options.rbf_behavior = (layers & 2) != 0;
+      core::SpanSource source(bytes);
+      const Dna dna = must_parse(source, options);
+      const bool is_computed =
+          control < 6 || (control < 8 ? options.machine_learned_behavior : options.rbf_behavior);
+      const auto& inputs = dna.behavior.blend_shape_channels.input_indices;
+      EXPECT_EQ(inputs.size(), is_computed ? 2u : 1u) << control << ", layers " << layers;
+      // The first channel is "wide", with a target of each mesh; "open" has one alone.
+      std::size_t targets = 0;
+      for (const Mesh& m : dna.geometry.meshes) targets += m.blend_shape_targets.size();
+      EXPECT_EQ(targets, is_computed ? 3u : 1u) << control << ", layers " << layers;
+    }
+  }
+}
+
+// Where no layer names the controls of RBF poses, as before 2.5, the solvers' poses are counted.
+TEST(PartialLoad, SaysWherePosesCannotBeCounted) {
+  Dna face = make_full_face();
+  face.rbf_behavior_ext = {};
+  File file = describe_file(write_head(face, 4));
+  const std::size_t at = file.layers.at("rbfb").begin;
+  std::fill_n(file.bytes.begin() + static_cast<std::ptrdiff_t>(at), 4, std::uint8_t{0xff});
+  ParseOptions options;
+  options.rbf_behavior = false;
+  core::SpanSource source(file.bytes);
+  const auto dna = parse(source, options);
+  ASSERT_FALSE(dna.has_value());
+  EXPECT_EQ(dna.error().code, core::ErrorCode::kInvalidCount);
+  EXPECT_EQ(dna.error().offset, at);
+  EXPECT_EQ(dna.error().where, "rbf_behavior.lod_solver_mapping.lods");
 }
 
 TEST(PartialLoad, SaysWhereAJointIndexIsTooLarge) {

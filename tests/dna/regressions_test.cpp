@@ -97,6 +97,7 @@ TEST(FuzzFind008, RefusesATextWithAZeroByte) {
   const core::Error error = json_error("008-zero-byte.json");
   EXPECT_EQ(error.code, core::ErrorCode::kNotDna);
   EXPECT_EQ(error.offset, 44u);
+  EXPECT_NE(error.message.find("zero byte"), std::string::npos);
 }
 
 // Rows, and no column with a value: a batch stepped from a null pointer, though it read nothing.
