@@ -174,6 +174,9 @@ TEST_P(ByteReaderOf, ACountBeyondTheCallersLimitIsRefused) {
   ASSERT_TRUE(reader.failed());
   EXPECT_EQ(reader.error().code, ErrorCode::kLimitExceeded);
   EXPECT_EQ(*reader.error().offset, 6u);
+  ByteReader& counted = open({0, 0, 0, 3, 1, 1, 1});
+  counted.set_max_count(2);
+  EXPECT_EQ(counted.count(1), 0u) << "what failed must not be counted on";
 }
 
 TEST_P(ByteReaderOf, NothingIsReadBeyondARegion) {
