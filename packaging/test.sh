@@ -26,6 +26,8 @@ logs="$project/build/logs"
 rm -rf "$logs/rows"
 mkdir -p "$logs/rows"
 source packaging/rows.sh
+# Two lanes share the cores: threads of linear algebra that wait for each other would only burn them.
+export OPENBLAS_NUM_THREADS=1
 
 build_preset() { # build_preset PRESET [TARGET...]
   local preset=$1 targets=()

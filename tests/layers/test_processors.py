@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Which processor it is, only native/simd asks: the other folders need not be compiled for each."""
+"""Which processor it is, only native/simd asks, and which system core, simd and bytes alone: the
+other folders need not be compiled for each (packaging/cross.sh)."""
 
 import re
 from pathlib import Path
@@ -14,10 +15,27 @@ PROCESSOR = re.compile(
 )
 
 
+# What compilers define, and headers that the C++ standard does not have.
+SYSTEM = re.compile(
+    r"\b(_WIN32|_WIN64|__APPLE__|__linux__|__unix__|_MSC_VER|__GLIBC__|__MINGW\w+|__ANDROID__)\b"
+    r"|#include <[\w/]+\.h>"
+)
+# Headers of packages whose source is the same everywhere.
+PACKAGES = re.compile(r"#include <(pybind11/[\w/]+|xxhash)\.h>")
+
+
+def that_ask(sources, words, folders):
+    """Names of those sources (name: text) outside the folders that have such words."""
+    elsewhere = {name: text for name, text in sources.items() if not name.startswith(folders)}
+    return sorted(name for name, text in elsewhere.items() if words.search(PACKAGES.sub("", text)))
+
+
 def of_processors(sources):
-    """Names of those sources (name: text) outside simd that ask for a processor."""
-    elsewhere = {name: text for name, text in sources.items() if not name.startswith("simd/")}
-    return sorted(name for name, text in elsewhere.items() if PROCESSOR.search(text))
+    return that_ask(sources, PROCESSOR, ("simd/",))
+
+
+def of_systems(sources):
+    return that_ask(sources, SYSTEM, ("core/", "simd/", "bytes/"))
 
 
 def sources():
@@ -27,6 +45,19 @@ def sources():
 
 def test_only_simd_asks():
     assert of_processors(sources()) == []
+
+
+def test_only_core_simd_and_bytes_ask_for_the_system():
+    assert of_systems(sources()) == []
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["#ifdef _WIN32", "#if defined(__APPLE__)", "#include <unistd.h>", "#include <sys/stat.h>"],
+)
+def test_another_that_asks_for_the_system_is_found(line):
+    assert of_systems({**sources(), "rig/planted.cpp": line}) == ["rig/planted.cpp"]
+    assert of_systems({"bytes/planted.cpp": line}) == []
 
 
 @pytest.mark.parametrize(
