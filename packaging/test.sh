@@ -10,9 +10,9 @@
 #                                  (install, import, controls, frames, a rendering)
 #   ./packaging/test.sh --help     this text
 #
-# Two lanes side by side, because half of the work keeps one core busy only: `native` is GoogleTest,
-# sanitizers, cross compilers and fuzzers; `python` is the wheel, style, pytest and Blender. The native
-# lane comes last to its end: its work is what two cores can share.
+# Three lanes side by side, because half of the work keeps one core busy only: `native` is GoogleTest,
+# sanitizers, cross compilers and fuzzers; `python` is the wheel, style, types and pytest; `blender` waits
+# for the extension's zip, and is every test inside Blender.
 set -uo pipefail
 mode=${1:-all}
 case $mode in
@@ -23,7 +23,7 @@ esac
 source "$(dirname "$0")/setup.sh"
 cd "$project" || exit 1
 logs="$project/build/logs"
-rm -rf "$logs/rows"
+rm -rf "$logs/rows" "$logs/extension.made"
 mkdir -p "$logs/rows"
 source packaging/rows.sh
 # Two lanes share the cores: threads of linear algebra that wait for each other would only burn them.
@@ -164,7 +164,6 @@ run_pytest() {
 # CXX: Python would name g++, CMake finds c++, and to ccache these are two compilers.
 build_tested_wheel() { CXX=c++ SKBUILD_CMAKE_DEFINE=RISORIUS_WARNINGS_AS_ERRORS=ON build_wheel; }
 python_lane() {
-  local version blender
   step "Python's tools" && check "Python's tools" make_venv || return
   [ "$mode" = --quick ] || { step "style" && run_style; }
   step "waiting for the native libraries" && flock "$logs/libraries.lock" true
@@ -174,6 +173,12 @@ python_lane() {
   [ "$mode" = --quick ] || { step "types" && run_types; }
   step "Python tests"
   run_pytest
+}
+blender_lane() {
+  local version blender
+  step "waiting for the extension" && flock "$logs/extension.lock" true
+  check "extension's zip" [ -e "$logs/extension.made" ] || return
+  zip=$(ls "$project"/build/dist/risorius-*.zip)
   step "Blender tests in bpy"
   version=$("$python" -c 'import importlib.metadata as m; print(m.version("bpy"))')
   if [ "$mode" = --quick ]; then
@@ -201,9 +206,13 @@ exec 9> "$logs/libraries.lock"
 flock 9
 run_lane native native_lane &
 exec 9>&-
+exec 8> "$logs/extension.lock"
+flock 8
 run_lane python python_lane &
+exec 8>&-
+run_lane blender blender_lane &
 wait
-results table "$logs/rows" native python
+results table "$logs/rows" native python blender
 code=$?
 echo "$((SECONDS - _begin)) s in all"
 exit $code
