@@ -106,7 +106,7 @@ build_libraries() { # build_libraries TARGET [LIBRARY...]
 }
 build_programs() {
   build_google_test &&
-    configure aarch64-linux-gnu "-O1 -Wno-psabi" -DRISORIUS_BUILD_TESTS=ON -DRISORIUS_QUICK_BUILD_TESTS=ON &&
+    configure aarch64-linux-gnu "-O1 -Wno-psabi -DRISORIUS_STRIDE=40" -DRISORIUS_BUILD_TESTS=ON -DRISORIUS_QUICK_BUILD_TESTS=ON &&
     cmake --build "$out/aarch64-linux-gnu" -j"$jobs" --target "${programs[@]}" scalar_bits
 }
 run_programs() {

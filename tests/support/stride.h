@@ -14,7 +14,9 @@ namespace risorius::testing_support {
 
 // The sanitizers take four times as long and see what every fifth byte does; the plain build
 // takes each one, and the fuzzers, which are sanitized too, others every time.
-#if defined(RISORIUS_SANITIZED)
+#if defined(RISORIUS_STRIDE)  // an emulator takes forty times as long
+inline constexpr std::size_t kStride = RISORIUS_STRIDE;
+#elif defined(RISORIUS_SANITIZED)
 inline constexpr std::size_t kStride = 5;
 #else
 inline constexpr std::size_t kStride = 1;
