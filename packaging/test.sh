@@ -6,8 +6,8 @@
 # Exit code 0 only if all passed. packaging/matrix.sh runs all Blender tests in all versions.
 #
 #   ./packaging/test.sh            everything; to stay under 25 minutes on two quiet cores
-#   ./packaging/test.sh --quick    GoogleTest, the Python tests and the front door in bpy 4.5
-#                                  (install, import, controls, frames, a rendering)
+#   ./packaging/test.sh --quick    the quick ones of GoogleTest and of the Python tests, and the front
+#                                  door in bpy 4.5 (install, import, controls, frames, a rendering)
 #   ./packaging/test.sh --help     this text
 #
 # Three lanes side by side, because half of the work keeps one core busy only: `native` is GoogleTest,
@@ -26,6 +26,10 @@ logs="$project/build/logs"
 rm -rf "$logs/rows" "$logs/extension.made"
 mkdir -p "$logs/rows"
 source packaging/rows.sh
+# What --quick leaves out: tests that try every byte, and files of tests that take longest.
+every_byte='EveryByte|EveryPatched|EveryChangedByte|ChangedBytes|CutAtEvery|DamagedByte|DamageUnder|Changes.*Reads'
+slow_python=(batch command_bench command_convert command_diff command_plot edit_regroup rig_nan rig_settle
+  rig_thousand sample speech speech_apart)
 # Two lanes share the cores: threads of linear algebra that wait for each other would only burn them.
 export OPENBLAS_NUM_THREADS=1
 
@@ -39,10 +43,11 @@ build_preset() { # build_preset PRESET [TARGET...]
       { tail -n 30 "$logs/build-$preset.log" && false; }; }
 }
 google_tests() { # google_tests NAME PRESET
-  local name=$1 preset=$2 log="$logs/ctest-$2.log" code
+  local name=$1 preset=$2 log="$logs/ctest-$2.log" code quick=()
+  [ "$mode" = all ] || quick=(-E "$every_byte")
   build_preset "$preset" || { note "$name: does not build" 0 1 && return; }
   rm -f "$logs/ctest-$preset.xml"
-  ctest --preset "$preset" -j"$(nproc)" --output-junit "$logs/ctest-$preset.xml" > "$log" 2>&1
+  ctest --preset "$preset" -j"$(nproc)" "${quick[@]}" --output-junit "$logs/ctest-$preset.xml" > "$log" 2>&1
   code=$?
   tail -n 5 "$log"
   [ $code -eq 0 ] || grep -B2 -A30 -m3 -E '\[  FAILED  \]|\*\*\*(Failed|Exception)' "$log" | head -n 90
@@ -151,11 +156,16 @@ run_types() {
   check "pyright of the add-on" "$venv/bin/pyright"
 }
 run_pytest() {
-  local code version files
+  local code version files slow=()
   version=$("$python" -c 'import platform; print(platform.python_version())')
   files=$(find tests -name 'test_*.py')
+  if [ "$mode" = --quick ]; then
+    slow=("${slow_python[@]/%/.py}")
+    slow=("${slow[@]/#/tests/python/test_}" tests/faults/test_faults.py)
+    files=$(echo "$files" | grep -vxF "$(printf '%s\n' "${slow[@]}")")
+  fi
   rm -f "$logs/pytest.xml"
-  "$python" -m pytest -q -rs --durations 25 --junitxml "$logs/pytest.xml" tests > "$logs/pytest.log" 2>&1
+  "$python" -m pytest -q -rs "${slow[@]/#/--ignore=}" --durations 25 --junitxml "$logs/pytest.xml" tests > "$logs/pytest.log" 2>&1
   code=$?
   tail -n 15 "$logs/pytest.log"
   # shellcheck disable=SC2086  # one word a file
