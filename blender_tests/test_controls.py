@@ -20,14 +20,22 @@ def test_controls_are_floats_with_limits(dna_file):
         assert words["description"]
 
 
-def test_control_bones_are_seen_as_closed_rings(dna_file):
+def test_control_bones_are_told_apart_by_outline_and_colour(dna_file):
     bones = scene.controls(scene.load(dna_file)).pose.bones
-    for bone in (b for b in bones if b.custom_shape):
-        ring = bone.custom_shape.data
-        assert len(ring.vertices) == len(ring.edges) > 8
-        assert all(v.co.length == pytest.approx(1.0) for v in ring.vertices)
-        assert all(e.vertices[0] != e.vertices[1] for e in ring.edges)
-    assert any(b.custom_shape for b in bones)
+    outlines, colours = {}, set()
+    for bone in bones:
+        line = bone.custom_shape.data
+        # closed: each corner has two edges
+        ends = [v for edge in line.edges for v in edge.vertices]
+        assert sorted(ends) == sorted([*range(len(line.vertices))] * 2)
+        far = max(vertex.co.length for vertex in line.vertices)
+        assert 0.9 < far < 1.4
+        outlines[bone.name] = tuple(round(c, 4) for v in line.vertices for c in v.co)
+        assert bone.color.palette == "CUSTOM"
+        colours.add(tuple(round(c, 3) for c in bone.color.custom.normal))
+    assert len(colours) == len(bones) == 6
+    assert outlines.pop("eye_R") == outlines["eye_L"]  # the same thing, of another colour
+    assert len(set(outlines.values())) == 5
 
 
 def test_long_and_repeated_names_are_cut_and_numbered(dna_file):

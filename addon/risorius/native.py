@@ -112,9 +112,11 @@ def regions() -> FaceRegions:
     """The regions of a face; none without the native module."""
     if problem():
         return FaceRegions({}, lambda _: "", lambda _: "")
-    known = part("controls.regions")
+    known, sides = part("controls.regions"), part("controls.sides")
     of_slider = partial(known.region_of, by_last_part=True)
-    return FaceRegions(known.TITLES, of_slider, known.region_of)
+    return FaceRegions(
+        known.TITLES, of_slider, known.region_of, sides.mirrored_name, sides.name_across
+    )
 
 
 class LiveSource(TypedDict):

@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One ordered list of classes; unregistered in reverse."""
+"""One ordered list of classes, and what goes with them; unregistered in reverse."""
 
 import bpy
 
 from . import native
+from .language import tables
 from .scene.animation import layer_properties
 from .scene.base import console
 from .scene.life import handlers
 from .scene.live import capture
 from .ui import about, animation, bake, export, expressions, face, file, layers, life, live, speech
+from .ui import words
 from .ui.about import timing_overlay
 from .ui.animation import operators as animation_operators
 from .ui.face import channel_preview
@@ -38,8 +40,15 @@ def _window_properties() -> dict[str, object]:
     return {
         "risorius_search": bpy.props.StringProperty(
             name="Search",
-            description="Show only the controls whose name has these words",
+            translation_context=tables.CONTEXT,
+            description="Show only the controls with these words: smile, open mouth, kiss, frown",
             options={"TEXTEDIT_UPDATE", "SKIP_SAVE"},
+        ),
+        "risorius_only_used": bpy.props.BoolProperty(
+            name="Only Controls in Use",
+            translation_context=tables.CONTEXT,
+            description="Show only the controls that are not at rest or have keys",
+            options={"SKIP_SAVE"},
         ),
         "risorius_show_timing": timing_overlay.show_property(),
         "risorius_live": bpy.props.PointerProperty(type=live_properties.RISORIUS_PG_live),
@@ -49,7 +58,9 @@ def _window_properties() -> dict[str, object]:
 
 def register() -> None:
     """Register classes, menus and handlers; without the native module only words."""
+    bpy.app.translations.register(native.ADDON, tables.translations())
     for cls in CLASSES:
+        words.give_context(cls)
         bpy.utils.register_class(cls)
     layer_properties.register()
     for name, choice in _window_properties().items():
@@ -87,3 +98,4 @@ def unregister() -> None:
     layer_properties.unregister()
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)
+    bpy.app.translations.unregister(native.ADDON)

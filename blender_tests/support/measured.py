@@ -87,7 +87,7 @@ class Part:
         part._leaf(text, width_of(text) + _MARGIN)
         part._leaf("", 0)
 
-    def label(self, text="", icon="NONE"):
+    def label(self, text="", icon="NONE", **_options):
         pixels = width_of(text) + _MARGIN + (_ICON if icon != "NONE" else 0)
         self._leaf(text, pixels, pixels - _MARGIN / 2)
 
@@ -96,7 +96,7 @@ class Part:
         self._button(rna.name if text is None else text, icon)
         return SimpleNamespace()
 
-    def menu(self, name, text=None, icon="NONE"):
+    def menu(self, name, text=None, icon="NONE", **_options):
         self._button(getattr(bpy.types, name).bl_label if text is None else text, icon)
 
     def _button(self, text, icon):

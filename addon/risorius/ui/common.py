@@ -83,6 +83,12 @@ def face_controls(context: Context) -> ArmatureObject:
     return controls
 
 
+def as_seen(context: Context) -> bool:
+    """Whether left and right are those of one who looks at the face, else the character's own."""
+    addon = context.preferences.addons.get(native.ADDON)
+    return addon is None or getattr(addon.preferences, "sides", "SEEN") == "SEEN"
+
+
 class FaceOperator(OperatorBase):
     """What all operators on a face share; a class says by its attributes which faces will do."""
 

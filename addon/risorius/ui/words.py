@@ -7,6 +7,7 @@ from functools import lru_cache
 import blf
 import bpy
 
+from ..language.tables import CONTEXT
 from .blender_types import Context, Icon, UILayout
 
 _SIDEBAR = 280  # pixels that Blender gives the sidebar at first
@@ -60,7 +61,7 @@ def prop_or(
     if getattr(owner, name) == empty:
         row = layout.row()
         row.alignment, row.active = "RIGHT", False
-        row.label(text=meaning)
+        row.label(text=meaning, text_ctxt=CONTEXT)
 
 
 def write(layout: UILayout, text: str, icon: Icon = "NONE") -> None:
@@ -68,10 +69,46 @@ def write(layout: UILayout, text: str, icon: Icon = "NONE") -> None:
 
     Args:
         layout: of the panel.
-        text: the sentence.
+        text: the sentence; in the user's language where the table of words has it.
         icon: before the first line.
     """
     column = layout.column(align=True)
     column.scale_y = 0.8
-    for number, line in enumerate(textwrap.wrap(text, 38)):
-        column.label(text=line, icon=icon if number == 0 else "BLANK1")
+    for number, line in enumerate(textwrap.wrap(say(text), 38)):
+        show(column, line, icon if number == 0 else "BLANK1")
+
+
+def say(text: str, **values: object) -> str:
+    """A label or sentence in the user's language.
+
+    Args:
+        text: in English, as in the table of words, with {names} of the values.
+        values: what stands for them: numbers, names of things, which are never translated.
+    """
+    local = bpy.app.translations.pgettext_iface(text, CONTEXT)
+    return local.format(**values) if values else local
+
+
+def show(layout: UILayout, text: str, icon: Icon = "NONE") -> None:
+    """A label that is shown as it is: the name of a thing, or words that `say` gave.
+
+    Args:
+        layout: of the panel.
+        text: the label.
+        icon: before it.
+    """
+    layout.label(text=text, icon=icon, translate=False)
+
+
+def give_context(cls: type) -> None:
+    """Let Blender look for a class's words, and those of its properties, among ours first.
+
+    Args:
+        cls: an operator, a panel, a menu or a group of properties, before it is registered.
+    """
+    if issubclass(cls, (bpy.types.Operator, bpy.types.Panel, bpy.types.Menu)):
+        cls.bl_translation_context = CONTEXT
+    for one in cls.__mro__:
+        for held in getattr(one, "__annotations__", {}).values():
+            if hasattr(held, "keywords"):
+                held.keywords.setdefault("translation_context", CONTEXT)

@@ -8,6 +8,13 @@ from collections.abc import Sequence
 
 from ..base.face_regions import FaceRegions
 
+_OTHER = {"Left": "Right", "Right": "Left"}
+_SIDE = re.compile(r"[LR](?=$|Ph\d$)")
+# Upper and lower lip or teeth, the inner and outer part, a phase: as they end the names.
+_WORDS = {"U": " Upper ", "D": " Lower ", "C": " Centre ", "IN": " Inner ", "OUT": " Outer "}
+_WORDS |= {"Ph": "Phase ", "Fwd": "Forward"}
+_SHORT = re.compile(r"\b[UD](?=$|IN$|OUT$|C$)|(?<=\b[UD])(IN|OUT|C)$|\b(IN|OUT)$|\bPh(?=\d$)|\bFwd\b")
+
 
 def short_name(control: str) -> str:
     """The part after the last prefix: `CTRL_expressions.jawOpen` gives `jawOpen`."""
@@ -20,19 +27,49 @@ def title(control: str) -> str:
     return " ".join(w[:1].upper() + w[1:] for w in words) or control
 
 
-def title_in_region(control: str, region: str, sided: bool = True) -> str:
+def title_in_region(
+    control: str, region: str, sided: bool = True, swapped: bool = False
+) -> str:
     """Words for a slider under its region's heading: no `Mouth` before `Corner Pull L`.
 
     Args:
         control: the control's name.
         region: the one that it is shown under.
         sided: keep a last L or R; without, both sides share the words.
+        swapped: say left for right: the words are for one who looks at the face.
     """
-    text = title(control)
-    if not sided and text[-1:] in ("L", "R"):
-        text = text[:-1].rstrip()
+    text, side = _without_side(title(control))
+    if swapped:
+        text = " ".join(_OTHER.get(word, word) for word in text.split())
+        side = {"L": "R", "R": "L"}.get(side, side)
+    text = _below(text, region)
+    return f"{text} {side}" if sided and side else text
+
+
+def title_of_directions(control: str, region: str) -> str:
+    """Words that a control that goes left shares with the one that goes right.
+
+    Args:
+        control: one of them.
+        region: the one that they are shown under.
+    """
+    words = ["Sideways" if word in _OTHER else word for word in title(control).split()]
+    return _below(" ".join(words), region)
+
+
+def _without_side(text: str) -> tuple[str, str]:
+    """`Press UL` gives `Press U`, `L`; `Lips Sticky LPh1` gives `Lips Sticky Ph1`, `L`."""
+    found = _SIDE.search(text)
+    if not found:
+        return text, ""
+    return " ".join((text[: found.start()] + text[found.end() :]).split()), found[0]
+
+
+def _below(text: str, region: str) -> str:
+    """A title without its region's name, and what is short in it in words."""
     first, _, rest = text.partition(" ")
-    return rest if rest and first.lower() == region else text
+    text = rest if rest and first.lower() == region else text
+    return " ".join(_SHORT.sub(lambda part: _WORDS[part[0]], text).split())
 
 
 def group_controls(controls: Sequence[str], regions: FaceRegions) -> dict[str, list[int]]:
@@ -51,7 +88,13 @@ def group_controls(controls: Sequence[str], regions: FaceRegions) -> dict[str, l
     return {region: indices for region, indices in groups.items() if indices}
 
 
-def matches(control: str, search: str) -> bool:
-    """Whether every word of the search stands somewhere in the control's name or title."""
-    text = f"{control} {title(control)}".lower()
-    return all(word in text for word in search.lower().split())
+def matches(control: str, search: str, known: str = "") -> bool:
+    """Whether every word of the search stands somewhere in what a control is called.
+
+    Args:
+        control: its name; its title is looked at too.
+        search: what was typed.
+        known: more words for it, as animators have them.
+    """
+    text = f"{control} {title(control)} {known}".casefold()
+    return all(word in text for word in search.casefold().split())

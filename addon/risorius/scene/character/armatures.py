@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any, cast
@@ -13,9 +12,11 @@ import numpy as np
 from mathutils import Matrix, Vector
 
 from ... import native
+from ...language import tables
 from ...logic.character import plans
 from ..base import parts
 from ..base.blender_types import ArmatureObject, Context
+from . import bone_shapes
 
 SHELF = "Joints"  # the bone collection of the deforming bones, not shown
 LIVE_PROPERTIES = (parts.MAPS, parts.CHANNELS)
@@ -208,18 +209,17 @@ def build_controls(
         for name, (_position, _axis, _length, parent) in places.items():
             if parent:
                 edit_bones[name].parent = edit_bones[parent]
-    circle = _circle(made, plan.name)
     for name in places:
         data.bones[name][parts.PART] = name
         bone = controls.pose.bones[name]
-        bone.custom_shape = circle
+        bone.custom_shape = bone_shapes.make(made, plan.name, name)
         bone.use_custom_shape_bone_size = True
         bone.lock_scale = (True, True, True)
         if name != "eyes":
             bone.lock_location = (True, True, True)
         if name in ("face", "eyes"):
             bone.lock_rotation = (True, True, True)
-        _shape(bone, name)
+        bone_shapes.place(bone, name)
     data.bones.active = data.bones[parts.FACE]
     controls.show_in_front = True
     controls[parts.OVERDRIVE] = False
@@ -289,7 +289,7 @@ def describe_property(bone: bpy.types.PoseBone, control: plans.ControlPlan, maxi
         default=control.rest,
         step=1.0,
         precision=3,
-        description=control.description,
+        description=tables.controls().tooltip(name) or control.description,
     )
     bone.property_overridable_library_set(f'["{bpy.utils.escape_identifier(name)}"]', True)
 
@@ -298,36 +298,3 @@ def key_group(name: str) -> str:
     """The F-curve group that keys of a control go to."""
     regions = native.regions()
     return regions.titles[regions.of_slider(name)]
-
-
-def _shape(bone: bpy.types.PoseBone, name: str) -> None:
-    """Turn and size the wire circle so that it surrounds what the bone turns."""
-    if name in ("neck", "head"):  # circle around the upright bone
-        bone.custom_shape_scale_xyz = (1.4, 1.4, 1.4) if name == "head" else (1.7, 1.7, 1.7)
-        bone.custom_shape_rotation_euler = (math.pi / 2, 0.0, 0.0)
-        if name == "head":
-            bone.custom_shape_translation = (0.0, bone.length * 1.6, 0.0)
-            bone.custom_shape_scale_xyz = (0.9, 0.9, 0.9)
-    elif name == "face":  # a disc beside the face, seen from the front
-        bone.custom_shape_scale_xyz = (0.5, 0.5, 0.5)
-    else:  # discs that look ahead
-        scale = 0.7 if name == "eyes" else 0.5
-        bone.custom_shape_scale_xyz = (scale, scale, scale)
-        bone.custom_shape_rotation_euler = (math.pi / 2, 0.0, 0.0)
-        if name != "eyes":
-            bone.custom_shape_translation = (0.0, bone.length * 1.5, 0.0)
-
-
-def _circle(made: list[bpy.types.ID], name: str) -> bpy.types.Object:
-    """A wire circle of radius 1 in the xy plane, in no collection: only bones show it."""
-    count = 32
-    mesh = bpy.data.meshes.new(f"{name}_circle")
-    made.append(mesh)
-    corners = [
-        (math.cos(2 * math.pi * i / count), math.sin(2 * math.pi * i / count), 0.0)
-        for i in range(count)
-    ]
-    mesh.from_pydata(corners, [(i, (i + 1) % count) for i in range(count)], [])
-    item = bpy.data.objects.new(f"{name}_circle", mesh)
-    made.append(item)
-    return item

@@ -1,12 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+# Blender takes properties where Python has annotations:
+# pyright: reportInvalidTypeForm=false
 """The preferences of the add-on, with a self-test."""
 
 import platform
 import sys
 
+import bpy
 import numpy as np
 
 from ... import native
+from .. import words
 from ..blender_types import AddonPreferences, Context
 from ..speech.install import draw_preferences
 
@@ -34,9 +38,19 @@ def self_test() -> tuple[bool, str]:
 class RISORIUS_Preferences(AddonPreferences):
     bl_idname = native.ADDON
 
+    sides: bpy.props.EnumProperty(
+        name="Left and Right",
+        description="Whose left and right sliders are named and placed by",
+        items=(
+            ("SEEN", "As Seen", "Left is on the left of a face that looks at you"),
+            ("OWN", "The Character's", "Left is the character's own left, as in a body's bones"),
+        ),
+    )
+
     def draw(self, context: Context) -> None:
         works, text = self_test()
-        self.layout.label(text=text, icon="CHECKMARK" if works else "ERROR")
+        words.show(self.layout, text, "CHECKMARK" if works else "ERROR")
+        self.layout.prop(self, "sides")
         if works:
             draw_preferences(self.layout)
 

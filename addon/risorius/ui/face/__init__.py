@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A face that is there: controls, level of detail, shapes, body, overdrive."""
 
-from . import body_operators, channel_preview, controls_panel, lod_operators, operators, panel
+from . import body_operators, channel_preview, controls_panel, lod_operators, operators, panel, side_operators
 
 CLASSES = (
     *operators.CLASSES,
     *lod_operators.CLASSES,
     *body_operators.CLASSES,
+    *side_operators.CLASSES,
     *panel.CLASSES,
     *controls_panel.CLASSES,
     *channel_preview.CLASSES,

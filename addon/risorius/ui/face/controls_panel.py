@@ -1,17 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The panel Controls: one slider per control, grouped by region."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import bpy
 
 from ... import native
-from ...logic.character import slider_words
+from ...language import tables
+from ...logic.base.control_words import PREFIX
+from ...logic.character import slider_rows, slider_words
 from ...scene.base import parts
-from ...scene.character import runtime
+from ...scene.character import runtime, sides
 from .. import words
 from ..blender_types import Context, Icon, Panel, UILayout
-from ..common import FaceOnlyPanel, face_controls, face_rig
+from ..common import FaceOnlyPanel, as_seen, face_controls, face_rig
 
 _ICONS: dict[str, Icon] = {
     "brow": "MOD_CURVE",
@@ -26,7 +28,6 @@ _ICONS: dict[str, Icon] = {
     "ear": "SPEAKER",
     "other": "DOT",
 }
-_OPEN = {"brow", "eye", "mouth", "jaw"}
 _TITLE = 0.5  # of the width, for the names of sliders
 
 
@@ -37,61 +38,101 @@ class RISORIUS_PT_controls(FaceOnlyPanel, Panel):
 
     def draw(self, context: Context) -> None:
         layout = self.layout
-        rig = face_rig(context)
-        live, face = runtime.of(rig), face_controls(context).pose.bones[parts.FACE]
+        rig, controls = face_rig(context), face_controls(context)
+        live, face = runtime.of(rig), controls.pose.bones[parts.FACE]
         if live is None:
             return
-        regions = native.regions()
-        search = context.window_manager.risorius_search
-        layout.prop(context.window_manager, "risorius_search", text="", icon="VIEWZOOM")
-        shown = [n for n in live.labels if n in face and slider_words.matches(n, search)]
-        for region, indices in slider_words.group_controls(shown, regions).items():
+        manager = context.window_manager
+        search, only_used = manager.risorius_search, manager.risorius_only_used
+        followers = sides.followers(controls)
+        _draw_tools(layout, context, bool(followers))
+        shown = [name for name in live.labels if name in face and _is_found(name, search)]
+        if only_used:
+            used = sides.in_use(rig)
+            shown = [name for name in shown if name in used]
+        for region, indices in slider_words.group_controls(shown, native.regions()).items():
             names = [shown[i] for i in indices]
-            if search:
+            if search or only_used:
                 _draw_region_header(layout.row(), region)
-                _draw_sliders(context, layout, face, region, names)
+                _draw_sliders(context, layout, face, region, names, followers)
                 continue
-            header, body = layout.panel(
-                f"RISORIUS_PT_region_{region}", default_closed=region not in _OPEN
-            )
+            header, body = layout.panel(f"RISORIUS_PT_region_{region}", default_closed=True)
             _draw_region_header(header, region)
             if body is not None:
-                _draw_sliders(context, body, face, region, names)
+                _draw_sliders(context, body, face, region, names, followers)
         if not shown:
-            words.write(layout, "No control has these words in its name.", "INFO")
+            nothing = "No control has these words." if search else "All controls are at rest."
+            words.write(layout, nothing, "INFO")
+
+
+def _is_found(name: str, search: str) -> bool:
+    known = tables.search_words().get(name.removeprefix(PREFIX), "") if search else ""
+    return slider_words.matches(name, search, known)
+
+
+def _draw_tools(layout: UILayout, context: Context, linked: bool) -> None:
+    manager, seen = context.window_manager, as_seen(context)
+    column = layout.column(align=True)
+    row = column.row(align=True)
+    row.prop(manager, "risorius_search", text="", icon="VIEWZOOM")
+    row.prop(manager, "risorius_only_used", text="", icon="FILTER")
+    addon = context.preferences.addons.get(native.ADDON)
+    if addon is not None:
+        column.row(align=True).prop(addon.preferences, "sides", expand=True)
+    row = column.row(align=True)
+    row.operator("risorius.mirror", text="Mirror", icon="MOD_MIRROR").region = ""
+    for from_left, text in ((True, "L > R"), (False, "R > L")):
+        button = row.operator("risorius.copy_side", text=text)
+        button.region, button.from_left = "", from_left != seen
+    row.operator(
+        "risorius.link_sides", text="Link", icon="LINKED", depress=linked
+    ).enable = not linked
+    row.operator("risorius.copy_pose", text="", icon="COPYDOWN").region = ""
+    row.operator("risorius.paste_pose", text="", icon="PASTEDOWN").flipped = False
+    row.operator("risorius.paste_pose", text="", icon="PASTEFLIPDOWN").flipped = True
 
 
 def _draw_region_header(layout: UILayout, region: str) -> None:
-    layout.label(text=native.regions().titles[region], icon=_ICONS[region])
+    title = words.say(native.regions().titles[region])
+    words.show(layout, title, _ICONS[region])
     row = layout.row(align=True)
     row.emboss = "NONE"
+    row.operator("risorius.copy_pose", text="", icon="COPYDOWN").region = region
+    row.operator("risorius.mirror", text="", icon="MOD_MIRROR").region = region
     row.operator("risorius.reset", text="", icon="LOOP_BACK").region = region
     row.operator("risorius.key", text="", icon="KEY_HLT").region = region
 
 
 def _draw_sliders(
-    context: Context, layout: UILayout, face: bpy.types.PoseBone, region: str, names: Sequence[str]
+    context: Context,
+    layout: UILayout,
+    face: bpy.types.PoseBone,
+    region: str,
+    names: Sequence[str],
+    followers: Mapping[str, str] | None = None,
 ) -> None:
-    """One line per control; a left and its right control share it, a long name stands above."""
+    """One line per control; both its sides share it, a long name stands above.
+
+    Of two sides that are linked the one that leads is shown.
+    """
     column = layout.column(align=True)
     ruler = words.Ruler(context, _TITLE)
-    there = set(names)
-    for name in names:
-        left, right = f"{name[:-1]}L", f"{name[:-1]}R"
-        if name == right and left in there:
-            continue
-        paired = name == left and right in there
-        title = slider_words.title_in_region(name, region, sided=not paired)
-        if ruler.fits(title):
-            line = column.split(factor=_TITLE, align=True)
-            line.label(text=title)
+    followers = followers or {}
+    for line in slider_rows.rows_of(names, region, native.regions(), as_seen(context)):
+        if ruler.fits(line.title):
+            row = column.split(factor=_TITLE, align=True)
+            words.show(row, line.title)
         else:
-            column.label(text=title)
-            line = column
-        row = line.row(align=True)
-        for one, text in ((left, "L"), (right, "R")) if paired else ((name, ""),):
-            quoted = bpy.utils.escape_identifier(one)
-            row.prop(face, f'["{quoted}"]', text=text, slider=True)
+            words.show(column, line.title)
+            row = column
+        row = row.row(align=True)
+        linked = any(name in followers for name, _letter in line.sliders)
+        for name, letter in line.sliders:
+            if linked and name in followers and followers[name] in names:
+                continue
+            text = words.say("L = R") if linked else words.say(letter) if letter else ""
+            quoted = bpy.utils.escape_identifier(name)
+            row.prop(face, f'["{quoted}"]', text=text, slider=True, translate=False)
 
 
 CLASSES = (RISORIUS_PT_controls,)

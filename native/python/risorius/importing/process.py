@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -14,14 +13,13 @@ from ..base import filters
 from ..base.budget import Budget
 from ..base.errors import ArgumentError
 from ..base.filters import OneEuro
+from ..controls.sides import mirrored_name
 from .mapping import ANGLES, fits
 
 Doubles = npt.NDArray[np.float64]
 
 # Where the neutral value leaves a smaller range than this, stretching would only amplify noise.
 LEAST_RANGE = 0.05
-_SIDES = {"L": "R", "R": "L"}
-_WORDS = {"Left": "Right", "Right": "Left"}
 # Mirroring a face negates these angles.
 _MIRRORED_ANGLES = ("yaw", "roll")
 
@@ -228,19 +226,6 @@ def mirror(clip: Clip) -> Clip:
     turned = [name in ANGLES and name.rpartition(".")[2] in _MIRRORED_ANGLES for name in names]
     signs = np.where(np.array(turned, bool), -1.0, 1.0).astype(np.float32)
     return clip.replaced(names=names, curves=clip.curves * signs[:, None])
-
-
-def mirrored_name(name: str) -> str:
-    """A control's partner: ...L and ...R, ...Left and ...Right; eyeLookLeftL and eyeLookRightR.
-
-    A control without a side is its own partner.
-    """
-    before, dot, last = name.rpartition(".")
-    if before in ("eyeL", "eyeR"):
-        return f"eye{_SIDES[before[-1]]}.{last}"
-    last = re.sub("Left|Right", lambda match: _WORDS[match[0]], last)
-    last = re.sub(r"[LR](?=$|Ph\d$)", lambda match: _SIDES[match[0]], last)
-    return before + dot + last
 
 
 def parse_amounts(texts: Sequence[str]) -> dict[str, float]:

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Reads the tables of words that lie beside this file.
+
+controls_<language>.toml has a row for each control, with * for its side; interface_<language>.toml
+the words of panels, dialogs and reports by their English ones. A new language is two files.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from ..logic.base.control_words import ControlWords, expand
+
+CONTEXT = "Risorius"  # Blender's own words have others: our Face is no polygon
+TOOLTIPS = "*"  # Blender looks for tooltips without a context
+ENGLISH = "en"
+_HERE = Path(__file__).parent
+
+
+def _read(name: str) -> dict[str, Any]:
+    return tomllib.loads((_HERE / f"{name}.toml").read_text(encoding="utf-8"))
+
+
+@cache
+def controls(language: str = ENGLISH) -> ControlWords:
+    """What is said of the standard controls in a language."""
+    return expand(_read(f"controls_{language}"))
+
+
+@cache
+def languages() -> tuple[str, ...]:
+    """The languages beside English, as Blender calls them without a country."""
+    return tuple(sorted(p.stem.partition("_")[2] for p in _HERE.glob("interface_*.toml")))
+
+
+@cache
+def search_words() -> dict[str, str]:
+    """Control -> the words in all languages that it is found by."""
+    tables = [controls(language) for language in (ENGLISH, *languages())]
+    return {name: " ".join(table.searched(name) for table in tables) for name in tables[0].rows}
+
+
+def translations() -> dict[str, dict[tuple[str, str], str]]:
+    """The words for Blender: language -> (context, English) -> what is shown."""
+    found = {}
+    english = controls()
+    for language in languages():
+        words = {
+            (context, key): text
+            for context, table in _read(f"interface_{language}").items()
+            for key, text in table.items()
+        }
+        theirs = controls(language)
+        for name in english.rows:
+            words[TOOLTIPS, english.tooltip(name)] = theirs.tooltip(name)
+        found[language] = words
+    return found

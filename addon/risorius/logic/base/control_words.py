@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a control does, in words: a table with a row for each, and * for the side."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+PREFIX = "CTRL_expressions."  # of every raw control of a standard file
+
+
+@dataclass(frozen=True)
+class Row:
+    """What is said of one control.
+
+    Attributes:
+        does: a sentence.
+        words: what it is searched by.
+        side: the sentence on its side, or nothing.
+    """
+
+    does: str
+    words: tuple[str, ...]
+    side: str = ""
+
+
+@dataclass(frozen=True)
+class ControlWords:
+    """A table: rows by the names of controls, without their prefix."""
+
+    rows: Mapping[str, Row]
+
+    def tooltip(self, control: str) -> str:
+        """What a control does, its side and its name; nothing of one that is not in the table.
+
+        Args:
+            control: its name, with the prefix or without.
+        """
+        name = control.removeprefix(PREFIX)
+        row = self.rows.get(name)
+        if row is None:
+            return ""
+        return " ".join(part for part in (row.does, row.side, PREFIX + name) if part)
+
+    def searched(self, control: str) -> str:
+        """The words that a control is found by, as one text."""
+        row = self.rows.get(control.removeprefix(PREFIX))
+        return " ".join(row.words) if row is not None else ""
+
+
+def expand(table: Mapping[str, Mapping[str, Any]]) -> ControlWords:
+    """Rows for both sides of what has a * for its side.
+
+    Args:
+        table: `sides`, with a sentence each for L and R; all others are rows with `does` and
+            `words`, by the name of the control.
+    """
+    sides = table["sides"]
+    rows = {}
+    for name, row in table.items():
+        if name == "sides":
+            continue
+        does, words = row["does"], tuple(row["words"])
+        if "*" not in name:
+            rows[name] = Row(does, words)
+            continue
+        for side in ("L", "R"):
+            rows[name.replace("*", side)] = Row(does, words, sides[side])
+    return ControlWords(rows)

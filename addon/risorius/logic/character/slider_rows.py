@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sliders in rows: what stands beside what, and what is called left."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+
+from ..base.face_regions import FaceRegions
+from . import slider_words
+
+_DIRECTIONS = {"Left": "Right", "Right": "Left"}
+_LEFT = re.compile(r"L(?=$|Ph\d$)|Left")
+
+
+@dataclass(frozen=True)
+class Row:
+    """What stands in one line of the panel.
+
+    Attributes:
+        title: the words before the sliders.
+        sliders: a control and its letter each, L, R or none, from the left to the right.
+        twins: they are the two sides of one control, and not the two directions of a whole one.
+    """
+
+    title: str
+    sliders: tuple[tuple[str, str], ...]
+    twins: bool = False
+
+
+def rows_of(names: Sequence[str], region: str, regions: FaceRegions, as_seen: bool) -> list[Row]:
+    """The rows of a region.
+
+    Args:
+        names: controls of the region, in their order.
+        region: under whose heading they stand.
+        regions: of the face, which know partners.
+        as_seen: left is where one sees it when the face looks at oneself; else it is the
+            character's own left. Both are named and placed so.
+
+    Returns:
+        Each control once: the two sides of a control in one row, and so a control that goes
+        left and one that goes right.
+    """
+    there, done, rows = set(names), set(), []
+    for name in names:
+        if name in done:
+            continue
+        other = regions.across(name)
+        twins = other != name
+        if not twins:
+            other = regions.mirrored(name)
+        pair = other != name and other in there and other not in done
+        done |= {name, other} if pair else {name}
+        rows.append(_row(name, other if pair else "", region, as_seen, twins))
+    return rows
+
+
+def _row(name: str, other: str, region: str, as_seen: bool, twins: bool) -> Row:
+    if not other:
+        return Row(slider_words.title_in_region(name, region, swapped=as_seen), ((name, ""),))
+    first, second = sorted((name, other), key=lambda one: not is_left(one, twins))
+    if as_seen:
+        first, second = second, first
+    title = (
+        slider_words.title_in_region(name, region, sided=False, swapped=as_seen)
+        if twins
+        else slider_words.title_of_directions(name, region)
+    )
+    return Row(title, ((first, "L"), (second, "R")), twins)
+
+
+def is_left(name: str, by_side: bool = True) -> bool:
+    """Whether a control is of the character's left side, or else goes to its left.
+
+    Args:
+        name: of a control that has a partner.
+        by_side: look at the side, which stands at the end; eyeLookLeftR is no left one then.
+    """
+    last = slider_words.short_name(name)
+    found = _LEFT.findall(last)
+    return ("L" in found) if by_side else ("Left" in found)
+
+
+def across_from(
+    values: Mapping[str, float], regions: FaceRegions, from_left: bool
+) -> dict[str, float]:
+    """What the other side is to have so that both are alike.
+
+    Args:
+        values: of controls that are there, by name.
+        regions: of the face.
+        from_left: the character's left side is the one that is copied.
+
+    Returns:
+        The new values of the other side; eyes go on looking the same way. A control without a
+        side is not among them.
+    """
+    found = {}
+    for name, value in values.items():
+        other = regions.across(name)
+        if other != name and other in values and is_left(name) == from_left:
+            found[other] = value
+    return found
+
+
+def mirrored(values: Mapping[str, float], regions: FaceRegions) -> dict[str, float]:
+    """Values with left for right.
+
+    Args:
+        values: of controls, by name.
+        regions: of the face.
+
+    Returns:
+        The same controls; one whose partner is not there keeps its value.
+    """
+    return {name: values.get(regions.mirrored(name), value) for name, value in values.items()}
+
+
+def flipped(values: Mapping[str, float], regions: FaceRegions) -> dict[str, float]:
+    """A copied pose with left for right, for a face that may have other controls.
+
+    Args:
+        values: of controls, by name.
+        regions: of the face.
+    """
+    return {regions.mirrored(name): value for name, value in values.items()}
+
+
+def pairs(names: Collection[str], regions: FaceRegions) -> list[tuple[str, str]]:
+    """The controls of the character's left side with those of its right."""
+    found = ((name, regions.across(name)) for name in names if is_left(name))
+    return [(left, right) for left, right in found if left != right and right in names]

@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the control bones look like: each has an outline that tells what it moves, and a colour."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import bpy
+
+Line = Sequence[tuple[float, float]]  # corners in the xy plane, the last joined to the first
+_COUNT = 32
+
+
+def _ring(size: float = 1.0, x: float = 0.0, y: float = 0.0, flat: float = 1.0) -> Line:
+    return [
+        (x + size * math.cos(turn), y + size * flat * math.sin(turn))
+        for turn in (2 * math.pi * i / _COUNT for i in range(_COUNT))
+    ]
+
+
+def _lens() -> Line:
+    """The outline of an open eye: two arcs that meet in corners."""
+    half = _COUNT // 2
+    arc = [(math.cos(math.pi * i / half), 0.55 * math.sin(math.pi * i / half)) for i in range(half)]
+    return [(x, y * abs(1 - x * x) ** 0.5) for x, y in arc] + [
+        (-x, -y * abs(1 - x * x) ** 0.5) for x, y in arc
+    ]
+
+
+def _band(low: float, high: float) -> Line:
+    """The lower part of a ring with a second one inside: a mouth that smiles."""
+    turns = [math.pi * (1.15 + 0.7 * i / 12) for i in range(13)]
+    outer = [(high * math.cos(t), high * math.sin(t)) for t in turns]
+    return outer + [(low * math.cos(t), low * math.sin(t)) for t in reversed(turns)]
+
+
+def _cross() -> list[Line]:
+    """A ring with four marks: what one takes aim with."""
+    marks = []
+    for x, y in ((1, 0), (0, 1), (-1, 0), (0, -1)):
+        marks.append([(0.72 * x - 0.04 * y, 0.72 * y + 0.04 * x), (1.3 * x, 1.3 * y),
+                      (0.72 * x + 0.04 * y, 0.72 * y - 0.04 * x)])  # fmt: skip
+    return [_ring(), *marks]
+
+
+# Each is seen in the xy plane; the longest way from the middle is about 1.
+_OUTLINES: dict[str, list[Line]] = {
+    "head": [_ring(), _ring(0.94)],
+    "neck": [[(-1, -0.6), (-0.6, -1), (0.6, -1), (1, -0.6), (1, 0.6), (0.6, 1), (-0.6, 1), (-1, 0.6)]],
+    "eye_L": [_lens(), _ring(0.3)],
+    "eye_R": [_lens(), _ring(0.3)],
+    "eyes": _cross(),
+    "face": [_ring(), _ring(0.11, -0.36, 0.3), _ring(0.11, 0.36, 0.3), _band(0.5, 0.62)],
+}  # fmt: skip
+# Yellow for the head, its neck darker; the two eyes as warm and cold; what bears the sliders green.
+_COLOURS = {
+    "head": (0.95, 0.75, 0.15),
+    "neck": (0.75, 0.45, 0.10),
+    "eye_L": (0.15, 0.50, 1.00),
+    "eye_R": (1.00, 0.25, 0.25),
+    "eyes": (0.75, 0.35, 0.95),
+    "face": (0.25, 0.85, 0.35),
+}
+
+
+def make(made: list[bpy.types.ID], character: str, bone: str) -> bpy.types.Object:
+    """The outline of a bone as a wire mesh, in no collection: only the bone shows it.
+
+    Args:
+        made: list that every new datablock is put on.
+        character: name that the datablocks begin with.
+        bone: name of the control bone.
+    """
+    corners: list[tuple[float, float, float]] = []
+    edges = []
+    for line in _OUTLINES[bone]:
+        first, count = len(corners), len(line)
+        corners += [(x, y, 0.0) for x, y in line]
+        edges += [(first + i, first + (i + 1) % count) for i in range(count)]
+    name = f"{character}_shape_{bone}"
+    mesh = bpy.data.meshes.new(name)
+    made.append(mesh)
+    mesh.from_pydata(corners, edges, [])
+    item = bpy.data.objects.new(name, mesh)
+    made.append(item)
+    return item
+
+
+def place(bone: bpy.types.PoseBone, name: str) -> None:
+    """Turn and size the outline so that it surrounds what the bone turns, and colour it.
+
+    Args:
+        bone: the control bone, which has its outline.
+        name: what it is.
+    """
+    if name in ("neck", "head"):  # around the upright bone
+        bone.custom_shape_scale_xyz = (0.9, 0.9, 0.9) if name == "head" else (1.7, 1.7, 1.7)
+        bone.custom_shape_rotation_euler = (math.pi / 2, 0.0, 0.0)
+        if name == "head":
+            bone.custom_shape_translation = (0.0, bone.length * 1.6, 0.0)
+    elif name == "face":  # beside the face, seen from the front
+        bone.custom_shape_scale_xyz = (0.7, 0.7, 0.7)
+    else:  # they look ahead
+        scale = 0.7 if name == "eyes" else 0.6
+        bone.custom_shape_scale_xyz = (scale, scale, scale)
+        bone.custom_shape_rotation_euler = (math.pi / 2, 0.0, 0.0)
+        if name != "eyes":
+            bone.custom_shape_translation = (0.0, bone.length * 1.5, 0.0)
+    bone.color.palette = "CUSTOM"
+    colours = bone.color.custom
+    colours.normal = _COLOURS[name]
+    colours.select = [0.5 + 0.5 * part for part in _COLOURS[name]]
+    colours.active = [0.75 + 0.25 * part for part in _COLOURS[name]]

@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Left and right of a face: mirrored, alike, or one led by the other; poses by region."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import cast
+
+import bpy
+from mathutils import Matrix
+
+from ... import native
+from ...logic.character import slider_rows
+from ..base import compat, parts
+from ..base.blender_types import ArmatureObject
+from . import runtime
+
+_FLIP = Matrix.Diagonal((-1.0, 1.0, 1.0, 1.0))
+_TWIN = "twin"  # name of the variable of the drivers that let one side follow the other
+_OTHER_BONE = {"eye_L": "eye_R", "eye_R": "eye_L"}
+
+
+def values_of(rig: ArmatureObject, region: str = "") -> dict[str, float]:
+    """The sliders of a face, or of one region, with their values.
+
+    Args:
+        rig: the character.
+        region: its name; empty for all.
+    """
+    face = parts.face_bone(rig)
+    assert face is not None
+    of_slider = native.regions().of_slider
+    return {
+        label: float(face[label])
+        for label in runtime.there(rig).labels
+        if label in face and region in ("", of_slider(label))
+    }
+
+
+def put(rig: ArmatureObject, values: Mapping[str, float]) -> int:
+    """Set sliders, within their limits; those that follow others and those that are not there stay.
+
+    Args:
+        rig: the character.
+        values: by the names of the sliders.
+
+    Returns:
+        How many were set.
+    """
+    face, controls, live = parts.face_bone(rig), parts.controls_there(rig), runtime.there(rig)
+    assert face is not None
+    maximum, led = parts.maximum_of(controls), followers(controls)
+    count = 0
+    for label, lowest in zip(live.labels, live.lowest, strict=True):
+        if label in values and label in face and label not in led:
+            face[label] = min(max(values[label], lowest), maximum)
+            count += 1
+    controls.update_tag()
+    return count
+
+
+def mirror(rig: ArmatureObject, region: str = "") -> None:
+    """Set the sliders left for right; without a region the head, neck and eye bones too."""
+    put(rig, slider_rows.mirrored(values_of(rig, region), native.regions()))
+    if not region:
+        mirror_bones(parts.controls_there(rig))
+
+
+def mirror_bones(controls: ArmatureObject) -> None:
+    """Turn the bones of a control armature as in a mirror; each eye takes the other's turn."""
+    bones = controls.pose.bones
+    turned = {}
+    for bone in bones:
+        rest = bone.bone.matrix_local
+        turned[_OTHER_BONE.get(bone.name, bone.name)] = (
+            _FLIP @ rest @ bone.matrix_basis @ rest.inverted() @ _FLIP
+        )
+    for name, turn in turned.items():
+        if name in bones:
+            rest = bones[name].bone.matrix_local
+            bones[name].matrix_basis = rest.inverted() @ turn @ rest
+
+
+def copy_across(rig: ArmatureObject, from_left: bool, region: str = "") -> int:
+    """Make one side like the other; eyes go on looking the same way.
+
+    Args:
+        rig: the character.
+        from_left: its own left side is the one that is copied.
+        region: only of this one; empty for all.
+
+    Returns:
+        How many sliders were set.
+    """
+    values = values_of(rig, region)
+    return put(rig, slider_rows.across_from(values, native.regions(), from_left))
+
+
+def link(rig: ArmatureObject, from_left: bool) -> int:
+    """Let the sliders of one side follow those of the other, by drivers that anyone can see.
+
+    A slider that has a driver already is left alone.
+
+    Args:
+        rig: the character.
+        from_left: its own left side leads.
+
+    Returns:
+        How many follow.
+    """
+    controls, live = parts.controls_there(rig), runtime.there(rig)
+    unlink(rig)
+    data = controls.animation_data_create()
+    assert data is not None
+    count = 0
+    for pair in slider_rows.pairs(live.labels, native.regions()):
+        leader, follower = pair if from_left else pair[::-1]
+        path = parts.property_path(follower)
+        if data.drivers.find(path) is not None or data.drivers.find(parts.property_path(leader)):
+            continue
+        driver = compat.driver_of(cast("bpy.types.FCurve", controls.driver_add(path)))
+        driver.type = "SUM"
+        variable = driver.variables.new()
+        variable.name = _TWIN
+        target = variable.targets[0]
+        target.id, target.data_path = controls, parts.property_path(leader)
+        count += 1
+    return count
+
+
+def unlink(rig: ArmatureObject) -> None:
+    """Let each side go its own way again, from where it stands."""
+    controls, face = parts.controls_there(rig), parts.face_bone(rig)
+    assert face is not None
+    for follower, leader in followers(controls).items():
+        controls.driver_remove(parts.property_path(follower))
+        if leader in face and follower in face:
+            face[follower] = face[leader]
+    controls.update_tag()
+
+
+def followers(controls: ArmatureObject) -> dict[str, str]:
+    """The sliders that follow their twin, each with the one that leads it."""
+    data = controls.animation_data
+    if data is None or not len(data.drivers):
+        return {}
+    found = {}
+    start, end = parts.property_path("\0").split("\0")
+    for curve in data.drivers:
+        driver = compat.driver_of(curve)
+        if len(driver.variables) == 1 and driver.variables[0].name == _TWIN:
+            leader = driver.variables[0].targets[0].data_path
+            found[_label(curve.data_path, start, end)] = _label(leader, start, end)
+    return found
+
+
+def _label(path: str, start: str, end: str) -> str:
+    return bpy.utils.unescape_identifier(path.removeprefix(start).removesuffix(end))
+
+
+def in_use(rig: ArmatureObject) -> set[str]:
+    """The sliders that are not at rest, and those that the face's action has keys for."""
+    live, controls = runtime.there(rig), parts.controls_there(rig)
+    data = controls.animation_data
+    action = data.action if data is not None else None
+    keyed = {curve.data_path for curve in compat.curves_of(action)} if action is not None else set()
+    values = values_of(rig)
+    return {
+        label
+        for label, rest in zip(live.labels, live.rests, strict=True)
+        if label in values
+        and (abs(values[label] - rest) > 1e-6 or parts.property_path(label) in keyed)
+    }

@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Blender takes properties where Python has annotations:
+# pyright: reportInvalidTypeForm=false
+"""Operators on the two sides of a face, and poses that are copied and pasted."""
+
+import bpy
+
+from ... import native
+from ...logic.character import slider_rows
+from ...scene.character import sides
+from ...scene.frame import evaluate
+from ..blender_types import Context, Operator, Result
+from ..common import FaceOperator, as_seen, face_controls, face_rig
+from ..words import say
+
+_copied: dict[str, float] = {}  # the sliders that were copied last, of any face
+
+
+def _region() -> object:
+    return bpy.props.StringProperty(
+        name="Region", description="Only this region; empty for all", options={"SKIP_SAVE"}
+    )
+
+
+def _from_left() -> object:
+    return bpy.props.BoolProperty(
+        name="From the Character's Left",
+        description="The character's own left side is the one that is copied; off: its right",
+        default=True,
+        options={"SKIP_SAVE"},
+    )
+
+
+class RISORIUS_OT_mirror(FaceOperator, Operator):
+    """Swap left and right of the face, as in a mirror"""
+
+    bl_idname = "risorius.mirror"
+    bl_label = "Mirror Face"
+
+    region: _region()
+
+    def execute(self, context: Context) -> Result:
+        rig = face_rig(context)
+        sides.mirror(rig, self.region)
+        evaluate.bring_up(context, rig)
+        return {"FINISHED"}
+
+
+class RISORIUS_OT_copy_side(FaceOperator, Operator):
+    """Make one side of the face like the other; the eyes go on looking the same way"""
+
+    bl_idname = "risorius.copy_side"
+    bl_label = "Copy to Other Side"
+
+    region: _region()
+    from_left: _from_left()
+
+    def execute(self, context: Context) -> Result:
+        rig = face_rig(context)
+        count = sides.copy_across(rig, self.from_left, self.region)
+        if not count:
+            self.report({"WARNING"}, say("No control here has two sides that are free."))
+        evaluate.bring_up(context, rig)
+        return {"FINISHED"}
+
+
+class RISORIUS_OT_link_sides(FaceOperator, Operator):
+    """Let one slider move both sides of the face, by drivers; again: each side is free"""
+
+    bl_idname = "risorius.link_sides"
+    bl_label = "Link Left and Right"
+
+    enable: bpy.props.BoolProperty(name="Link", default=True, options={"SKIP_SAVE"})
+    from_left: _from_left()
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        if not super().poll(context):
+            return False
+        if face_controls(context).override_library:
+            cls.poll_message_set(say("The controls are an override: Blender keeps no drivers there."))
+            return False
+        return True
+
+    def execute(self, context: Context) -> Result:
+        rig = face_rig(context)
+        if self.enable:
+            count = sides.link(rig, self.from_left)
+            self.report({"INFO"}, say("{count} controls follow the other side", count=count))
+        else:
+            sides.unlink(rig)
+        evaluate.bring_up(context, rig)
+        return {"FINISHED"}
+
+
+class RISORIUS_OT_copy_pose(FaceOperator, Operator):
+    """Copy the sliders, to be pasted onto this face or another"""
+
+    bl_idname = "risorius.copy_pose"
+    bl_label = "Copy Face"
+    bl_options = {"REGISTER"}
+    baked_too = True
+
+    region: _region()
+
+    def execute(self, context: Context) -> Result:
+        _copied.clear()
+        _copied.update(sides.values_of(face_rig(context), self.region))
+        self.report({"INFO"}, say("{count} controls copied", count=len(_copied)))
+        return {"FINISHED"}
+
+
+class RISORIUS_OT_paste_pose(FaceOperator, Operator):
+    """Paste the sliders that were copied"""
+
+    bl_idname = "risorius.paste_pose"
+    bl_label = "Paste Face"
+
+    flipped: bpy.props.BoolProperty(
+        name="Flipped", description="Left for right", options={"SKIP_SAVE"}
+    )
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        if not super().poll(context):
+            return False
+        if not _copied:
+            cls.poll_message_set(say("No controls were copied yet."))
+            return False
+        return True
+
+    @classmethod
+    def description(cls, _context: Context, properties: bpy.types.OperatorProperties) -> str:
+        text = "Paste the sliders that were copied"
+        if getattr(properties, "flipped", False):
+            text = "Paste the sliders that were copied, left for right"
+        return bpy.app.translations.pgettext_tip(text)
+
+    def execute(self, context: Context) -> Result:
+        rig, values = face_rig(context), dict(_copied)
+        if self.flipped:
+            values = slider_rows.flipped(values, native.regions())
+        count = sides.put(rig, values)
+        if not count:
+            self.report({"WARNING"}, say("This face has none of the copied controls."))
+        evaluate.bring_up(context, rig)
+        return {"FINISHED"}
+
+
+CLASSES = (
+    RISORIUS_OT_mirror,
+    RISORIUS_OT_copy_side,
+    RISORIUS_OT_link_sides,
+    RISORIUS_OT_copy_pose,
+    RISORIUS_OT_paste_pose,
+)

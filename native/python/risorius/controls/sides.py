@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: MIT
+"""Left and right in the names of controls: whose partner each is."""
+
+from __future__ import annotations
+
+import re
+
+_SIDES = {"L": "R", "R": "L"}
+_WORDS = {"Left": "Right", "Right": "Left"}
+_AT_THE_END = re.compile(r"[LR](?=$|Ph\d$)")
+
+
+def mirrored_name(name: str) -> str:
+    """A control's partner: ...L and ...R, ...Left and ...Right; eyeLookLeftL and eyeLookRightR.
+
+    A control without a side is its own partner.
+    """
+    before, dot, last = name.rpartition(".")
+    if before in ("eyeL", "eyeR"):
+        return f"eye{_SIDES[before[-1]]}.{last}"
+    last = re.sub("Left|Right", lambda match: _WORDS[match[0]], last)
+    return before + dot + _on_the_other_side(last)
+
+
+def name_across(name: str) -> str:
+    """The same control of the other side: eyeLookLeftL and eyeLookLeftR look the same way.
+
+    A control of the whole face, as jawLeft, stays itself.
+    """
+    before, dot, last = name.rpartition(".")
+    return before + dot + _on_the_other_side(last)
+
+
+def _on_the_other_side(last: str) -> str:
+    return _AT_THE_END.sub(lambda match: _SIDES[match[0]], last)
