@@ -13,7 +13,7 @@ from .ui import about, animation, bake, export, expressions, face, file, layers,
 from .ui import words
 from .ui.about import timing_overlay
 from .ui.animation import operators as animation_operators
-from .ui.face import channel_preview
+from .ui.face import channel_preview, paste_flipped
 from .ui.file import import_operators
 from .ui.file import operators as file_operators
 from .ui.live import properties as live_properties
@@ -73,6 +73,7 @@ def register() -> None:
     if trouble:
         console.say(trouble)
     handlers.register()
+    paste_flipped.register()
     capture.register()
     bpy.app.timers.register(_refresh_once, first_interval=0.0)
 
@@ -87,6 +88,7 @@ def unregister() -> None:
     if bpy.app.timers.is_registered(_refresh_once):
         bpy.app.timers.unregister(_refresh_once)
     capture.unregister()
+    paste_flipped.unregister()
     handlers.unregister()
     timing_overlay.stop()
     bpy.types.VIEW3D_MT_add.remove(import_operators.draw_add)

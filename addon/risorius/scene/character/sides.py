@@ -59,6 +59,14 @@ def put(rig: ArmatureObject, values: Mapping[str, float]) -> int:
     return count
 
 
+def restore(rig: ArmatureObject, values: Mapping[str, float]) -> None:
+    """Give sliders the values that they had, whatever their limits. Args: as of `put`."""
+    face = parts.face_bone(rig)
+    assert face is not None
+    for label, value in values.items():
+        face[label] = value
+
+
 def mirror(rig: ArmatureObject, region: str = "") -> None:
     """Set the sliders left for right; without a region the head, neck and eye bones too."""
     put(rig, slider_rows.mirrored(values_of(rig, region), native.regions()))
@@ -145,7 +153,7 @@ def followers(controls: ArmatureObject) -> dict[str, str]:
     if data is None or not len(data.drivers):
         return {}
     found = {}
-    start, end = parts.property_path("\0").split("\0")
+    start, _, end = parts.property_path("@").partition("@")
     for curve in data.drivers:
         driver = compat.driver_of(curve)
         if len(driver.variables) == 1 and driver.variables[0].name == _TWIN:

@@ -1,13 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A face that is there: controls, level of detail, shapes, body, overdrive."""
 
-from . import body_operators, channel_preview, controls_panel, lod_operators, operators, panel, side_operators
+from . import (
+    body_operators,
+    channel_preview,
+    controls_panel,
+    lod_operators,
+    operators,
+    panel,
+    paste_flipped,
+    side_operators,
+)
 
 CLASSES = (
     *operators.CLASSES,
     *lod_operators.CLASSES,
     *body_operators.CLASSES,
     *side_operators.CLASSES,
+    *paste_flipped.CLASSES,
     *panel.CLASSES,
     *controls_panel.CLASSES,
     *channel_preview.CLASSES,

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender's Paste Pose Flipped on the controls of a face.
+
+Blender turns bones over by the L and R of their names; sliders are properties of one bone, which it
+pastes as they are. So its command is followed by a step that puts them left for right: as an
+operator in its place on the same keys, and where Blender's own was called from a menu, once more.
+"""
+
+from typing import Any
+
+import bpy
+from bpy.app.handlers import persistent
+
+from ... import native
+from ...logic.character import slider_rows
+from ...scene.base import parts
+from ...scene.base.blender_types import ArmatureObject
+from ...scene.character import sides
+from ...scene.frame import evaluate
+from ..blender_types import Context, Menu, Operator, Result
+from ..common import FaceOperator, active_controls, face_controls, face_rig
+from ..words import say
+
+_MARK = 0.3215  # no hand sets a slider to it
+_BLENDERS = "POSE_OT_paste"
+_keys: list[Any] = []
+_seen: dict[str, int] = {}  # of Blender's last operator, as a number
+
+
+def _posed_controls(context: Context) -> ArmatureObject | None:
+    """The controls of the active face where they are what is posed."""
+    controls = active_controls(context)
+    return controls if controls is not None and context.pose_object == controls else None
+
+
+class RISORIUS_OT_paste_pose_flipped(FaceOperator, Operator):
+    """Paste the copied pose left for right, with the sliders of the face"""
+
+    bl_idname = "risorius.paste_pose_flipped"
+    bl_label = "Paste Pose Flipped, with Sliders"
+
+    selected: bpy.props.BoolProperty(
+        name="On Selected Only", description="Only onto bones that are selected", default=False
+    )
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        if not super().poll(context):
+            return False
+        if _posed_controls(context) is None:
+            cls.poll_message_set(say("Pose the controls of a face first."))
+            return False
+        return True
+
+    def execute(self, context: Context) -> Result:
+        rig, controls = face_rig(context), face_controls(context)
+        before = sides.values_of(rig)
+        face = controls.pose.bones[parts.FACE]
+        for name in before:
+            face[name] = _MARK
+        try:
+            bpy.ops.pose.paste(flipped=True, selected_mask=self.selected)
+        except RuntimeError as error:  # nothing was copied
+            sides.restore(rig, before)
+            self.report({"ERROR"}, str(error).strip().removeprefix("Error: "))
+            return {"CANCELLED"}
+        pasted = {name: value for name, value in sides.values_of(rig).items() if not _is_mark(value)}
+        sides.restore(rig, before)
+        sides.put(rig, slider_rows.flipped(pasted, native.regions()))
+        evaluate.bring_up(context, rig)
+        return {"FINISHED"}
+
+
+def _is_mark(value: float) -> bool:
+    return abs(value - _MARK) < 1e-6
+
+
+def _draw(self: Menu, context: Context) -> None:
+    """Entry of the menu Pose, beside Blender's."""
+    if _posed_controls(context) is not None:
+        self.layout.separator()
+        self.layout.operator("risorius.copy_pose", icon="COPYDOWN")
+        self.layout.operator("risorius.paste_pose", icon="PASTEDOWN")
+        self.layout.operator("risorius.paste_pose_flipped", icon="PASTEFLIPDOWN")
+        self.layout.operator("risorius.mirror", icon="MOD_MIRROR")
+
+
+def pasted_by_blender(manager: bpy.types.WindowManager) -> bool:
+    """Whether Blender's own operator has just pasted a pose flipped; said once for each time."""
+    last = manager.operators[-1] if len(manager.operators) else None
+    number = last.as_pointer() if last is not None else 0
+    if number == _seen.get("last", 0):
+        return False
+    _seen["last"] = number
+    return last is not None and last.bl_idname == _BLENDERS and last.properties.flipped
+
+
+@persistent
+def _updated(_scene: bpy.types.Scene, _depsgraph: object) -> None:
+    context = bpy.context
+    if pasted_by_blender(context.window_manager) and _posed_controls(context) is not None:
+        bpy.app.timers.register(_once_more, first_interval=0.0)
+
+
+def _once_more() -> None:
+    """Take Blender's step back and do ours, so that one undo takes back all of it."""
+    window = bpy.context.window_manager.windows[0]
+    with bpy.context.temp_override(window=window):
+        if bpy.ops.ed.undo.poll():
+            bpy.ops.ed.undo()
+        if bpy.ops.risorius.paste_pose_flipped.poll():
+            bpy.ops.risorius.paste_pose_flipped("EXEC_DEFAULT", True)
+
+
+def register() -> None:
+    """Add the entry of the menu, the keys and what notices Blender's own command."""
+    bpy.types.VIEW3D_MT_pose.append(_draw)
+    bpy.app.handlers.depsgraph_update_post.append(_updated)
+    config = bpy.context.window_manager.keyconfigs.addon
+    if config is not None:  # there is none without a window
+        keymap = config.keymaps.new("Pose", space_type="EMPTY")
+        for command in ({"ctrl": True}, {"oskey": True}):
+            item = keymap.keymap_items.new(
+                RISORIUS_OT_paste_pose_flipped.bl_idname, "V", "PRESS", shift=True, **command
+            )
+            _keys.append((keymap, item))
+
+
+def unregister() -> None:
+    """Take them away."""
+    for keymap, item in _keys:
+        keymap.keymap_items.remove(item)
+    _keys.clear()
+    bpy.app.handlers.depsgraph_update_post.remove(_updated)
+    bpy.types.VIEW3D_MT_pose.remove(_draw)
+
+
+CLASSES = (RISORIUS_OT_paste_pose_flipped,)
