@@ -9,8 +9,20 @@ from .scene.animation import layer_properties
 from .scene.base import console
 from .scene.life import handlers
 from .scene.live import capture
-from .ui import about, animation, bake, export, expressions, face, file, layers, life, live, speech
-from .ui import words
+from .ui import (
+    about,
+    animation,
+    bake,
+    export,
+    expressions,
+    face,
+    file,
+    layers,
+    life,
+    live,
+    speech,
+    words,
+)
 from .ui.about import timing_overlay
 from .ui.animation import operators as animation_operators
 from .ui.face import channel_preview, paste_flipped

@@ -12,6 +12,7 @@ from ..scene.base import parts
 from ..scene.base.blender_types import ArmatureObject
 from ..scene.character import runtime
 from .blender_types import Context, Operator, OperatorBase, PanelBase
+from .words import say
 
 _NO_FACE = "Select a face first."
 MODES = (
@@ -103,13 +104,13 @@ class FaceOperator(OperatorBase):
             return False
         rig = parts.active_rig(context)
         if rig is None or (cls.whole_face and parts.controls_of(rig) is None):
-            cls.poll_message_set(_NO_FACE)
+            cls.poll_message_set(say(_NO_FACE))
             return False
         if cls.whole_face and runtime.of(rig) is None:
-            cls.poll_message_set("This face has lost the text that holds its DNA.")
+            cls.poll_message_set(say("This face has lost the text that holds its DNA."))
             return False
         if parts.BAKED in rig and not cls.baked_too:
-            cls.poll_message_set("This face is baked: choose Back to Live first.")
+            cls.poll_message_set(say("This face is baked: choose Back to Live first."))
             return False
         return True
 
@@ -119,7 +120,7 @@ class FacePanel(PanelBase):
 
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
-    bl_category = "Face"
+    bl_category = "Risorius"  # a name: Blender translates a tab without a context
 
 
 class FaceOnlyPanel(FacePanel):

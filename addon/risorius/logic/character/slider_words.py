@@ -13,7 +13,9 @@ _SIDE = re.compile(r"[LR](?=$|Ph\d$)")
 # Upper and lower lip or teeth, the inner and outer part, a phase: as they end the names.
 _WORDS = {"U": " Upper ", "D": " Lower ", "C": " Centre ", "IN": " Inner ", "OUT": " Outer "}
 _WORDS |= {"Ph": "Phase ", "Fwd": "Forward"}
-_SHORT = re.compile(r"\b[UD](?=$|IN$|OUT$|C$)|(?<=\b[UD])(IN|OUT|C)$|\b(IN|OUT)$|\bPh(?=\d$)|\bFwd\b")
+_SHORT = re.compile(
+    r"\b[UD](?=$|IN$|OUT$|C$)|(?<=\b[UD])(IN|OUT|C)$|\b(IN|OUT)$|\bPh(?=\d$)|\bFwd\b"
+)
 
 
 def short_name(control: str) -> str:
@@ -27,9 +29,7 @@ def title(control: str) -> str:
     return " ".join(w[:1].upper() + w[1:] for w in words) or control
 
 
-def title_in_region(
-    control: str, region: str, sided: bool = True, swapped: bool = False
-) -> str:
+def title_in_region(control: str, region: str, sided: bool = True, swapped: bool = False) -> str:
     """Words for a slider under its region's heading: no `Mouth` before `Corner Pull L`.
 
     Args:

@@ -44,10 +44,11 @@ def _cross() -> list[Line]:
     return [_ring(), *marks]
 
 
+_OCTAGON = [(1, 0.6), (0.6, 1), (-0.6, 1), (-1, 0.6), (-1, -0.6), (-0.6, -1), (0.6, -1), (1, -0.6)]
 # Each is seen in the xy plane; the longest way from the middle is about 1.
 _OUTLINES: dict[str, list[Line]] = {
     "head": [_ring(), _ring(0.94)],
-    "neck": [[(-1, -0.6), (-0.6, -1), (0.6, -1), (1, -0.6), (1, 0.6), (0.6, 1), (-0.6, 1), (-1, 0.6)]],
+    "neck": [_OCTAGON],
     "eye_L": [_lens(), _ring(0.3)],
     "eye_R": [_lens(), _ring(0.3)],
     "eyes": _cross(),

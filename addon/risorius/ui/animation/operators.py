@@ -128,7 +128,9 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
     def execute(self, context: Context) -> Result:
         if _is_sound(self.filepath):
             name = printable(Path(self.filepath).name)
-            self.report({"ERROR"}, f"{name}: this is a sound: use Speak from Audio.")
+            self.report(
+                {"ERROR"}, words.say("{name}: this is a sound: use Speak from Audio.", name=name)
+            )
             return {"CANCELLED"}
         live, render = runtime.there(face_rig(context)), context.scene.render
         rate = render.fps, render.fps_base
@@ -275,7 +277,9 @@ class RISORIUS_OT_import_arkit_rig(PlacesClip, Operator):
         if not super().poll(context):
             return False
         if not retarget_shape_keys.sources(context):
-            cls.poll_message_set("No other object of this scene has animated shape keys.")
+            cls.poll_message_set(
+                words.say("No other object of this scene has animated shape keys.")
+            )
             return False
         return True
 
@@ -291,7 +295,7 @@ class RISORIUS_OT_import_arkit_rig(PlacesClip, Operator):
             else retarget_shape_keys.source_of(context)
         )
         if item not in retarget_shape_keys.sources(context):
-            self.report({"ERROR"}, "Select the object whose shape keys are animated.")
+            self.report({"ERROR"}, words.say("Select the object whose shape keys are animated."))
             return {"CANCELLED"}
         live = runtime.there(face_rig(context))
         try:

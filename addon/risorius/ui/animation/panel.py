@@ -13,6 +13,7 @@ class RISORIUS_PT_animation(FaceOnlyPanel, Panel):
     bl_idname = "RISORIUS_PT_animation"
     bl_label = "Animation"
     bl_order = 1
+    bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: Context) -> None:
         layout = self.layout
@@ -28,7 +29,7 @@ class RISORIUS_PT_animation(FaceOnlyPanel, Panel):
         if action is None or not lines:
             return
         header, body = layout.panel("RISORIUS_PT_import_report", default_closed=True)
-        header.label(text=f"Import of {action.name}")
+        words.show(header, words.say("Import of {action}", action=action.name))
         if body is not None:
             for line in lines:
                 words.write(body, line)

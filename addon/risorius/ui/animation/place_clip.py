@@ -14,6 +14,7 @@ from ...scene.animation import actions, clip_actions, layers
 from ...scene.frame import evaluate
 from ..blender_types import Context, UILayout
 from ..common import FaceOperator, face_controls, face_rig
+from ..words import say
 
 TARGETS = (
     ("ACTION", "Action", "As the face's active action; the one before is kept"),
@@ -104,9 +105,18 @@ class PlacesClip(FaceOperator):
         for note in notes[:_SHOWN]:
             self.report({"INFO"}, printable(note))
         if len(notes) > _SHOWN:
-            self.report({"INFO"}, f"and {len(notes) - _SHOWN} more lines in the panel Animation")
-        span = f"frame {made.first:g} to {made.last:g}"
-        self.report({"INFO"}, f"{made.action.name}: {made.curves} curves, {span}")
+            self.report(
+                {"INFO"},
+                say("and {count} more lines in the panel Animation", count=len(notes) - _SHOWN),
+            )
+        text = say(
+            "{action}: {curves} curves, frame {first:g} to {last:g}",
+            action=made.action.name,
+            curves=made.curves,
+            first=made.first,
+            last=made.last,
+        )
+        self.report({"INFO"}, text)
 
     def draw_place(self, layout: UILayout) -> None:
         """The properties of this class."""

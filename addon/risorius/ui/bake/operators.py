@@ -116,7 +116,7 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, Operator):
     def modal(self, context: Context, event: bpy.types.Event) -> Result:
         if event.type == "ESC":
             self._job.close()
-            self.report({"INFO"}, "Baking was ended; nothing was changed.")
+            self.report({"INFO"}, words.say("Baking was ended; nothing was changed."))
             self._result = {"CANCELLED"}
         elif event.type != "TIMER" or not self._step(context, self._job, _SLICE):
             return {"RUNNING_MODAL"}
@@ -153,7 +153,12 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, Operator):
             return True
         except Exception as error:  # noqa: BLE001  an operator that raises would stay for ever
             traceback.print_exc()
-            self.report({"ERROR"}, f"Baking failed, and the faces are as before: {error!r}.")
+            self.report(
+                {"ERROR"},
+                words.say(
+                    "Baking failed, and the faces are as before: {error}.", error=repr(error)
+                ),
+            )
             self._result = {"CANCELLED"}
             return True
         context.window_manager.progress_update(self._share * 100)
@@ -171,7 +176,7 @@ class RISORIUS_OT_unbake(FacesOperator, Operator):
         faces = selected_rigs(context, self.every)
         back = [rig for rig in faces if bake_face.unbake(context, rig)]
         if not back:
-            self.report({"WARNING"}, "Nothing of the selected faces is baked.")
+            self.report({"WARNING"}, words.say("Nothing of the selected faces is baked."))
             return {"CANCELLED"}
         return {"FINISHED"}
 

@@ -61,7 +61,7 @@ class FacesOperator(FaceOperator):
         if not usable(cls):
             return False
         if not (selected_rigs(context) or selected_rigs(context, every=True)):
-            cls.poll_message_set("Select a face first.")
+            cls.poll_message_set(words.say("Select a face first."))
             return False
         return True
 

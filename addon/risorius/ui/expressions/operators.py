@@ -9,6 +9,7 @@ from ...scene.animation import expressions
 from ...scene.frame import evaluate
 from ..blender_types import Context, Operator, Result
 from ..common import FaceOperator, face_rig
+from ..words import say
 
 
 class RISORIUS_OT_expression(FaceOperator, Operator):
@@ -28,7 +29,7 @@ class RISORIUS_OT_expression(FaceOperator, Operator):
         rig = face_rig(context)
         found = expressions.all_expressions().get(self.expression)
         if found is None:
-            self.report({"ERROR"}, f"There is no expression {self.expression}.")
+            self.report({"ERROR"}, say("There is no expression {name}.", name=self.expression))
             return {"CANCELLED"}
         names = expressions.apply(rig, found, self.strength, self.only)
         if self.key:
@@ -47,7 +48,7 @@ class RISORIUS_OT_make_pose_assets(FaceOperator, Operator):
         made, notes = expressions.make_assets(face_rig(context))
         for note in notes:
             self.report({"WARNING"}, note)
-        self.report({"INFO"}, f"{len(made)} pose assets")
+        self.report({"INFO"}, say("{count} pose assets", count=len(made)))
         return {"FINISHED"}
 
 

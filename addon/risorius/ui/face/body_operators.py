@@ -13,6 +13,7 @@ from ...scene.character import rig_placement
 from ...scene.frame import evaluate
 from ..blender_types import Context, Operator, Result
 from ..common import FaceOperator, face_controls, face_rig
+from ..words import say
 
 
 def _is_body(item: bpy.types.Object) -> TypeGuard[ArmatureObject]:
@@ -66,7 +67,7 @@ class RISORIUS_OT_attach_body(FaceOperator, Operator):
         rig = face_rig(context)
         body = bpy.data.objects.get(self.body)
         if body is None or not _is_body(body):
-            self.report({"ERROR"}, f"'{self.body}' is no armature of a body.")
+            self.report({"ERROR"}, say("'{name}' is no armature of a body.", name=self.body))
             return {"CANCELLED"}
         found = rig_placement.find_bones(body)
         base, neck, head = (
@@ -76,12 +77,21 @@ class RISORIUS_OT_attach_body(FaceOperator, Operator):
         base = base or neck or head
         missing = [n for n in (base, neck, head) if n and n not in body.data.bones]
         if missing or not base:
-            what = f"no bone '{missing[0]}'" if missing else "no bone named head or neck"
-            self.report({"ERROR"}, f"'{body.name}' has {what}: choose the bones.")
+            text = "'{body}' has no bone named head or neck: choose the bones."
+            if missing:
+                text = "'{body}' has no bone '{bone}': choose the bones."
+            self.report({"ERROR"}, say(text, body=body.name, bone=(missing or [""])[0]))
             return {"CANCELLED"}
         rig_placement.attach(face_controls(context), body, base, neck, head, self.fit)
         evaluate.bring_up(context, rig)
-        self.report({"INFO"}, f"The face follows {body.name}: {base}, {neck}, {head}")
+        self.report(
+            {"INFO"},
+            say(
+                "The face follows {body}: {bones}",
+                body=body.name,
+                bones=", ".join((base, neck, head)),
+            ),
+        )
         return {"FINISHED"}
 
 

@@ -13,6 +13,7 @@ from ...scene.character import build, runtime
 from ...scene.frame import channel_preview, evaluate
 from ..blender_types import Context, Item, Operator, Panel, Result
 from ..common import FaceOnlyPanel, FaceOperator, face_rig
+from ..words import say
 
 _items: list[Item] = []  # Blender reads the strings later: they must stay alive
 
@@ -72,7 +73,7 @@ class RISORIUS_OT_test_channel(FaceOperator, Operator):
             _test(context, rig, 0, None)
             return {"FINISHED"}
         if not self.channel:
-            self.report({"ERROR"}, f"{rig.name} has no blend shapes.")
+            self.report({"ERROR"}, say("{name} has no blend shapes.", name=rig.name))
             return {"CANCELLED"}
         _test(context, rig, int(self.channel), self.value)
         return {"FINISHED"}

@@ -11,6 +11,7 @@ from ...scene.character import lods
 from ...scene.frame import evaluate
 from ..blender_types import Context, Operator, Result
 from ..common import FaceOperator, face_rig
+from ..words import say
 
 
 class RISORIUS_OT_set_lod(FaceOperator, Operator):
@@ -40,7 +41,9 @@ class RISORIUS_OT_set_lod(FaceOperator, Operator):
         rig = face_rig(context)
         follows = self.lod == lods.SAME and self.target == "RENDER"
         if not follows and self.lod not in lods.built(rig):
-            self.report({"ERROR"}, f"Level {self.lod} was not built for this face.")
+            self.report(
+                {"ERROR"}, say("Level {level} was not built for this face.", level=self.lod)
+            )
             return {"CANCELLED"}
         lods.follow_camera(rig, False)
         if self.target == "BOTH":
@@ -64,7 +67,7 @@ class RISORIUS_OT_set_lod_by_distance(FaceOperator, Operator):
     def execute(self, context: Context) -> Result:
         rig = face_rig(context)
         if self.enable and context.scene.camera is None:
-            self.report({"WARNING"}, "The scene has no camera yet: the level stays as it is.")
+            self.report({"WARNING"}, say("The scene has no camera yet: the level stays as it is."))
         lods.follow_camera(rig, self.enable, _size(rig))
         evaluate.bring_up(context, rig)
         return {"FINISHED"}

@@ -13,6 +13,7 @@ from ...scene.frame import evaluate
 from ...scene.life import duplicates, library_overrides
 from ..blender_types import Context, Operator, Result
 from ..common import MODES, FaceOperator, face_controls, face_rig
+from ..words import say
 
 
 def _labels(context: Context, region: str = "") -> list[str]:
@@ -69,7 +70,9 @@ class RISORIUS_OT_key(FaceOperator, Operator):
             )
         if not self.region:
             self._key_bones(controls, frame)
-        self.report({"INFO"}, f"{len(labels)} controls keyed at frame {frame}")
+        self.report(
+            {"INFO"}, say("{count} controls keyed at frame {frame}", count=len(labels), frame=frame)
+        )
         return {"FINISHED"}
 
     @staticmethod
@@ -97,10 +100,10 @@ class RISORIUS_OT_set_shape_mode(FaceOperator, Operator):
     def execute(self, context: Context) -> Result:
         rig = face_rig(context)
         if any(item.mode == "EDIT" for item in parts.meshes_of(rig)):
-            self.report({"ERROR"}, "Leave edit mode first.")
+            self.report({"ERROR"}, say("Leave edit mode first."))
             return {"CANCELLED"}
         if library_overrides.unlock_shapes(rig):
-            self.report({"INFO"}, "The linked meshes were copied into this file.")
+            self.report({"INFO"}, say("The linked meshes were copied into this file."))
         for sentence in build.change_mode(rig, self.mode):
             self.report({"WARNING"}, sentence)
         rig.update_tag()

@@ -34,13 +34,16 @@ class RISORIUS_PT_character(FacePanel, Panel):
         controls = parts.controls_of(rig)
         if live is None or controls is None:
             return  # said above
-        layout.label(text=rig.name.removesuffix("_rig"), icon="USER")
+        words.show(layout, rig.name.removesuffix("_rig"), "USER")
         draw_state(layout, rig)
-        _draw_detail(layout, rig)
-        _draw_shapes(layout, rig)
         row = layout.row(align=True)
         row.operator("risorius.reset", icon="LOOP_BACK").region = ""
         row.operator("risorius.key", text="Key All", icon="KEYFRAME_HLT").region = ""
+        header, body = layout.panel("RISORIUS_PT_detail", default_closed=True)
+        header.label(text="Detail and Shapes", text_ctxt=words.CONTEXT)
+        if body is not None:
+            _draw_detail(body, rig)
+            _draw_shapes(body, rig)
         for warning in plans.layer_warnings(live.rig.ignored_layers):
             words.write(layout, warning, "INFO")
 
@@ -62,7 +65,7 @@ def _draw_detail(layout: UILayout, rig: ArmatureObject) -> None:
         ("RENDER", "Detail in Renders", lods.render_level(rig)),
     ):
         # On a line of its own: beside eight levels there is no room for words.
-        column.label(text=text)
+        column.label(text=text, text_ctxt=words.CONTEXT)
         row = column.row(align=True)
         row.active = not auto
         for level in levels:
@@ -72,14 +75,18 @@ def _draw_detail(layout: UILayout, rig: ArmatureObject) -> None:
     if auto:
         for level in range(min(len(rig[parts.LOD_DISTANCES]), levels[-1])):
             column.prop(
-                rig, f'["{parts.LOD_DISTANCES}"]', index=level, text=f"LOD {level + 1} from"
+                rig,
+                f'["{parts.LOD_DISTANCES}"]',
+                index=level,
+                text=words.say("LOD {level} from", level=level + 1),
+                translate=False,
             )
 
 
 def _draw_shapes(layout: UILayout, rig: ArmatureObject) -> None:
     modes = {m.get(parts.MODE) for m in parts.meshes_of(rig)}
     row = layout.row(align=True)
-    row.label(text="Shapes")
+    row.label(text="Shapes", text_ctxt=words.CONTEXT)
     for mode, text in (("LIVE", "Live"), ("KEYS", "Keys")):
         row.operator("risorius.set_shape_mode", text=text, depress=mode in modes).mode = mode
 
@@ -111,8 +118,20 @@ class RISORIUS_PT_options(FaceOnlyPanel, Panel):
         if live is not None:
             column = layout.column(align=True)
             column.scale_y = 0.8
-            column.label(text=f"{len(live.labels)} controls, {live.rig.joint_count} joints")
-            column.label(text=f"{live.rig.blend_shape_count} shapes, {live.rig.simd}")
+            words.show(
+                column,
+                words.say(
+                    "{controls} controls, {joints} joints",
+                    controls=len(live.labels),
+                    joints=live.rig.joint_count,
+                ),
+            )
+            words.show(
+                column,
+                words.say(
+                    "{shapes} shapes, {simd}", shapes=live.rig.blend_shape_count, simd=live.rig.simd
+                ),
+            )
 
 
 CLASSES = (RISORIUS_PT_character, RISORIUS_PT_options)

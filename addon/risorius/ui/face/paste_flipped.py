@@ -64,7 +64,9 @@ class RISORIUS_OT_paste_pose_flipped(FaceOperator, Operator):
             sides.restore(rig, before)
             self.report({"ERROR"}, str(error).strip().removeprefix("Error: "))
             return {"CANCELLED"}
-        pasted = {name: value for name, value in sides.values_of(rig).items() if not _is_mark(value)}
+        pasted = {
+            name: value for name, value in sides.values_of(rig).items() if not _is_mark(value)
+        }
         sides.restore(rig, before)
         sides.put(rig, slider_rows.flipped(pasted, native.regions()))
         evaluate.bring_up(context, rig)

@@ -10,7 +10,7 @@ from ...logic.character import slider_rows
 from ...scene.character import sides
 from ...scene.frame import evaluate
 from ..blender_types import Context, Operator, Result
-from ..common import FaceOperator, as_seen, face_controls, face_rig
+from ..common import FaceOperator, face_controls, face_rig
 from ..words import say
 
 _copied: dict[str, float] = {}  # the sliders that were copied last, of any face
@@ -78,7 +78,9 @@ class RISORIUS_OT_link_sides(FaceOperator, Operator):
         if not super().poll(context):
             return False
         if face_controls(context).override_library:
-            cls.poll_message_set(say("The controls are an override: Blender keeps no drivers there."))
+            cls.poll_message_set(
+                say("The controls are an override: Blender keeps no drivers there.")
+            )
             return False
         return True
 

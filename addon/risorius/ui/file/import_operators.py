@@ -57,12 +57,17 @@ def import_character(
     for warning in warnings[:5]:
         operator.report({"WARNING"}, names.printable(str(warning)))
     if len(warnings) > 5:
-        operator.report({"WARNING"}, f"and {len(warnings) - 5} more warnings")
+        operator.report(
+            {"WARNING"}, words.say("and {count} more warnings", count=len(warnings) - 5)
+        )
     count = len(parts.meshes_of(rig))
     found = rig.get(parts.TEXTURES, "")
     if found:
-        operator.report({"INFO"}, f"Textures of {found}")
-    operator.report({"INFO"}, f"{Path(path).name}: {count} meshes, ready to move")
+        operator.report({"INFO"}, words.say("Textures of {found}", found=found))
+    operator.report(
+        {"INFO"},
+        words.say("{name}: {count} meshes, ready to move", name=Path(path).name, count=count),
+    )
     return {"FINISHED"}
 
 
@@ -142,7 +147,7 @@ class RISORIUS_OT_import_dna(Operator, ImportHelper):
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
-        layout.label(text="Levels of Detail")
+        layout.label(text="Levels of Detail", text_ctxt=words.CONTEXT)
         row = layout.row(align=True)
         row.use_property_split = False
         for level in range(8):

@@ -14,6 +14,7 @@ from ...scene.file import export_dna, replace_dna
 from ...scene.frame import evaluate
 from ..blender_types import Context, ExportHelper, ImportHelper, Menu, Operator, Result
 from ..common import FaceOperator, explain, face_rig, shown_progress
+from ..words import say
 
 
 def report_all(operator: Operator, sentences: Sequence[str], shown: int = 8) -> None:
@@ -27,7 +28,9 @@ def report_all(operator: Operator, sentences: Sequence[str], shown: int = 8) -> 
     for sentence in sentences[:shown]:
         operator.report({"INFO"}, sentence)
     if len(sentences) > shown:
-        operator.report({"INFO"}, f"and {len(sentences) - shown} more: see the report's text")
+        operator.report(
+            {"INFO"}, say("and {count} more: see the report's text", count=len(sentences) - shown)
+        )
 
 
 def _replace(operator: Operator, context: Context, path: str) -> Result:
@@ -43,7 +46,10 @@ def _replace(operator: Operator, context: Context, path: str) -> Result:
         return {"CANCELLED"}
     evaluate.bring_up(context, rig)
     report_all(operator, sentences)
-    operator.report({"INFO"}, f"{rig.name.removesuffix('_rig')} is now {Path(path).name}")
+    operator.report(
+        {"INFO"},
+        say("{face} is now {file}", face=rig.name.removesuffix("_rig"), file=Path(path).name),
+    )
     return {"FINISHED"}
 
 
@@ -88,7 +94,8 @@ class RISORIUS_OT_reload(_FileOperator, Operator):
         if not path or not Path(path).is_file():
             name = Path(path).name or "of this face"
             self.report(
-                {"ERROR"}, f"The file {name} is not in its place any more: use Replace DNA."
+                {"ERROR"},
+                say("The file {name} is not in its place any more: use Replace DNA.", name=name),
             )
             return {"CANCELLED"}
         return _replace(self, context, path)
@@ -143,7 +150,10 @@ class RISORIUS_OT_export_dna(_FileOperator, Operator, ExportHelper):
             self.report({"ERROR"}, explain(self.filepath, error))
             return {"CANCELLED"}
         report_all(self, sentences)
-        self.report({"INFO"}, f"{Path(self.filepath).name}: {len(content):,} bytes")
+        self.report(
+            {"INFO"},
+            say("{name}: {count:,} bytes", name=Path(self.filepath).name, count=len(content)),
+        )
         return {"FINISHED"}
 
 

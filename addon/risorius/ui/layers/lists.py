@@ -3,6 +3,7 @@
 
 from ...scene.animation import layer_properties, layers
 from ...scene.base.blender_types import ArmatureObject
+from .. import words
 from ..blender_types import Context, Icon, UILayout, UIList
 from .menus import ICONS
 
@@ -57,7 +58,10 @@ class RISORIUS_UL_reactions(UIList):
     ) -> None:
         known = layers.known_reactions().get(item.name)
         split = layout.split(factor=0.52, align=True)
-        split.label(text=known.label if known else item.name)
+        if known:
+            split.label(text=known.label, text_ctxt=words.CONTEXT)
+        else:
+            words.show(split, item.name)
         row = split.row(align=True)
         row.prop(item, "frame", text="", emboss=False)
         row.prop(item, "strength", text="", emboss=False)

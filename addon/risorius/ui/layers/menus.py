@@ -28,7 +28,10 @@ class RISORIUS_MT_actions(Menu):
         for action in bpy.data.actions:
             if action.asset_data is None and layers.fits(controls, action):
                 button = self.layout.operator(
-                    RISORIUS_OT_layer_add.bl_idname, text=action.name, icon="ACTION"
+                    RISORIUS_OT_layer_add.bl_idname,
+                    text=action.name,
+                    icon="ACTION",
+                    translate=False,
                 )
                 button.kind, button.source = "ACTION", action.name
 

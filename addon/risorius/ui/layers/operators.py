@@ -10,6 +10,7 @@ from ...scene.base.blender_types import ArmatureObject
 from ...scene.frame import evaluate
 from ..blender_types import Context, Operator, Result
 from ..common import FaceOperator, face_controls, face_rig
+from ..words import say
 
 
 class LayerOperator(FaceOperator):
@@ -20,7 +21,7 @@ class LayerOperator(FaceOperator):
         if not super().poll(context):
             return False
         if not len(layers.of(face_controls(context))):
-            cls.poll_message_set("This face has no layers.")
+            cls.poll_message_set(say("This face has no layers."))
             return False
         return True
 
@@ -57,7 +58,7 @@ class RISORIUS_OT_layer_add(FaceOperator, Operator):
         if self.kind == "EXPRESSION":
             known = expressions.all_expressions()
             if self.source not in known:
-                self.report({"ERROR"}, f"There is no expression {self.source}.")
+                self.report({"ERROR"}, say("There is no expression {name}.", name=self.source))
                 return {"CANCELLED"}
             layers.add(controls, "EXPRESSION", known[self.source].label, expression=self.source)
         else:
@@ -74,7 +75,12 @@ class RISORIUS_OT_layer_add(FaceOperator, Operator):
             action, data.action = data.action, None
             layers.keep_weights(controls, action)
         if action is None:
-            self.report({"ERROR"}, f"There is no action {self.source or 'to make a layer of'}.")
+            self.report(
+                {"ERROR"},
+                say("There is no action {name}.", name=self.source)
+                if self.source
+                else say("There is no action to make a layer of."),
+            )
             return {"CANCELLED"}
         layers.add_action(controls, action)
         evaluate.bring_up(context, rig)
@@ -137,7 +143,7 @@ class RISORIUS_OT_layer_warp(LayerOperator, Operator):
         if self.clear:
             layer.warp.clear()
         elif layer.kind != "ACTION" or layer.action is None:
-            self.report({"ERROR"}, "Only a layer with an action has a time to warp.")
+            self.report({"ERROR"}, say("Only a layer with an action has a time to warp."))
             return {"CANCELLED"}
         else:
             layers.add_warp_point(layer, context.scene.frame_current_final)
@@ -159,7 +165,7 @@ class RISORIUS_OT_fire(FaceOperator, Operator):
 
     def execute(self, context: Context) -> Result:
         if self.reaction not in layers.known_reactions():
-            self.report({"ERROR"}, f"There is no reaction {self.reaction}.")
+            self.report({"ERROR"}, say("There is no reaction {name}.", name=self.reaction))
             return {"CANCELLED"}
         frame = context.scene.frame_current_final
         layers.fire(face_controls(context), self.reaction, frame, self.strength)
@@ -197,7 +203,7 @@ class RISORIUS_OT_layers_to_nla(LayerOperator, Operator):
         evaluate.bring_up(context, rig)
         for note in notes:
             self.report({"WARNING"}, note)
-        self.report({"INFO"}, f"{count} layers are NLA strips now")
+        self.report({"INFO"}, say("{count} layers are NLA strips now", count=count))
         return {"FINISHED"} if count else {"CANCELLED"}
 
 

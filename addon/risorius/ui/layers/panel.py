@@ -21,6 +21,7 @@ class RISORIUS_PT_layers(FaceOnlyPanel, Panel):
     bl_idname = "RISORIUS_PT_layers"
     bl_label = "Layers"
     bl_order = 1
+    bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: Context) -> None:
         layout = self.layout
@@ -71,11 +72,11 @@ def _draw_layer(
     row.use_property_decorate = True
     row.prop(layer, "weight")
     header, body = layout.panel("RISORIUS_PT_layer_time", default_closed=True)
-    header.label(text="Time")
+    header.label(text="Time", text_ctxt=words.CONTEXT)
     if body is not None:
         _draw_time(body, layer)
     header, body = layout.panel("RISORIUS_PT_layer_mask", default_closed=True)
-    header.label(text="Mask")
+    header.label(text="Mask", text_ctxt=words.CONTEXT)
     if body is not None:
         grid = body.grid_flow(columns=3, align=True, even_columns=True)
         for region in layer_properties.REGIONS:
@@ -110,7 +111,12 @@ def _draw_time(layout: UILayout, layer: layer_properties.RISORIUS_PG_layer) -> N
 
 def _draw_reactions(layout: UILayout, controls: ArmatureObject) -> None:
     row = layout.row(align=True)
-    row.menu(RISORIUS_MT_fire.bl_idname, text="Fire a Reaction", icon="LIGHT_SUN")
+    row.menu(
+        RISORIUS_MT_fire.bl_idname,
+        text="Fire a Reaction",
+        text_ctxt=words.CONTEXT,
+        icon="LIGHT_SUN",
+    )
     if not len(layers.reactions_of(controls)):
         return
     row = layout.row()

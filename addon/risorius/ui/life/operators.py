@@ -13,6 +13,7 @@ from ...scene.frame import evaluate
 from ...scene.life import library_overrides, repair
 from ..blender_types import Context, Operator, Result
 from ..common import usable
+from ..words import say
 
 _NOT_LINKED = "Select a linked face first."
 SHAPES = (
@@ -45,7 +46,7 @@ class RISORIUS_OT_make_override(Operator):
             return False
         broken = override_trouble(parts.active_rig(context))
         if library_overrides.linked_rig(context) is None and not broken:
-            cls.poll_message_set(_NOT_LINKED)
+            cls.poll_message_set(say(_NOT_LINKED))
             return False
         return True
 
@@ -87,10 +88,10 @@ class RISORIUS_OT_bring_back(Operator):
         item = context.object
         back = repair.bring_back(item, context.scene) if item is not None else []
         if not back:
-            self.report({"ERROR"}, "No deleted part of this face is in the file.")
+            self.report({"ERROR"}, say("No deleted part of this face is in the file."))
             return {"CANCELLED"}
         context.view_layer.update()
-        self.report({"INFO"}, f"Brought back: {', '.join(o.name for o in back)}")
+        self.report({"INFO"}, say("Brought back: {names}", names=", ".join(o.name for o in back)))
         return {"FINISHED"}
 
 

@@ -15,6 +15,7 @@ from ...scene.base.blender_types import ArmatureObject
 from ...scene.live import capture, recordings, sessions
 from ..blender_types import Context, Operator, OperatorBase, Result
 from ..common import active_controls, face_rig, usable
+from ..words import say
 from .properties import choices, settings_of
 
 _NOT_STARTED = "Start live capture first."
@@ -28,7 +29,7 @@ class _Running(OperatorBase):
         if not usable(cls):
             return False
         if sessions.of(active_controls(context)) is None:
-            cls.poll_message_set(_NOT_STARTED)
+            cls.poll_message_set(say(_NOT_STARTED))
             return False
         return True
 
@@ -36,7 +37,7 @@ class _Running(OperatorBase):
 def _has_controls(cls: type[Operator], context: Context) -> bool:
     """Poll: whether a face is active; says so when there is none."""
     if active_controls(context) is None:
-        cls.poll_message_set("Select a face first.")
+        cls.poll_message_set(say("Select a face first."))
         return False
     return True
 
@@ -111,7 +112,7 @@ class _Waiting(OperatorBase):
         if not usable(cls):
             return False
         if not recordings.waiting():
-            cls.poll_message_set("No recording waits to be finished.")
+            cls.poll_message_set(say("No recording waits to be finished."))
             return False
         return True
 
@@ -119,7 +120,14 @@ class _Waiting(OperatorBase):
         """The Recording that is meant, or None."""
         found = recordings.waiting()
         if not 0 <= self.index < len(found):
-            self.report({"ERROR"}, f"There is no recording {self.index}: {len(found)} wait.")
+            self.report(
+                {"ERROR"},
+                say(
+                    "There is no recording {number}: {count} wait.",
+                    number=self.index,
+                    count=len(found),
+                ),
+            )
             return None
         return found[self.index]
 
@@ -183,7 +191,7 @@ class RISORIUS_OT_live_neutral(_Running, Operator):
         if self.forget:
             sessions.forget_neutral(session)
         elif not sessions.neutral_now(session):
-            self.report({"ERROR"}, "No face was received yet.")
+            self.report({"ERROR"}, say("No face was received yet."))
             return {"CANCELLED"}
         return {"FINISHED"}
 
@@ -221,13 +229,21 @@ def _finish(
         report = finish(rig, context.scene)
     except native.user_errors() as error:
         why = names.printable(str(error)).rstrip(".")
-        operator.report({"ERROR"}, f"{why}. The recording waits: finish it in the panel.")
+        operator.report(
+            {"ERROR"}, say("{reason}. The recording waits: finish it in the panel.", reason=why)
+        )
         return False
     if report is None:
-        operator.report({"WARNING"}, "Nothing was received: there is no recording.")
+        operator.report({"WARNING"}, say("Nothing was received: there is no recording."))
         return False
-    length = f"{report.curves} curves, frames {report.first:.0f} to {report.last:.0f}"
-    operator.report({"INFO"}, f"{report.action.name}: {length}")
+    text = say(
+        "{action}: {curves} curves, frames {first:.0f} to {last:.0f}",
+        action=report.action.name,
+        curves=report.curves,
+        first=report.first,
+        last=report.last,
+    )
+    operator.report({"INFO"}, text)
     for note in report.notes:
         operator.report({"WARNING"}, note)
     return True

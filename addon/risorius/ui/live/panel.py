@@ -50,17 +50,18 @@ class RISORIUS_PT_live(FaceOnlyPanel, Panel):
 def _where(chosen: RISORIUS_PG_live) -> str:
     """What to type into the app."""
     if not chosen.everywhere:
-        return f"Hears this computer only, at 127.0.0.1, port {chosen.port}."
-    address = capture.address() or "this computer's address"
-    return f"In the app: {address}, port {chosen.port}."
+        return words.say("Hears this computer only, at 127.0.0.1, port {port}.", port=chosen.port)
+    address = capture.address() or words.say("this computer's address")
+    return words.say("In the app: {address}, port {port}.", address=address, port=chosen.port)
 
 
 def _draw_waiting(layout: UILayout) -> None:
     """The recordings that are no action yet."""
     for index, recording in enumerate(recordings.waiting()):
         box = layout.box()
-        text = f"{recording.face}: {len(recording.take)} faces wait"
-        box.label(text=names.printable(text, 60), icon="REC")
+        count = len(recording.take)
+        text = words.say("{name}: {count} faces wait", name=recording.face, count=count)
+        words.show(box, names.printable(text, 60), "REC")
         row = box.row(align=True)
         row.operator("risorius.live_finish").index = index
         here = row.operator("risorius.live_finish", text="Finish Here")
@@ -73,29 +74,38 @@ def _draw_status(layout: UILayout, session: sessions.Session) -> None:
     column = layout.column(align=True)
     column.scale_y = 0.8
     if not status.subject:
-        heard = "no face in what comes" if status.packets else "nothing heard yet"
-        column.label(text=f"Port {session.receiver.port}: {heard}", icon="INFO")
+        heard = "Port {port}: nothing heard yet"
+        if status.packets:
+            heard = "Port {port}: no face in what comes"
+        words.show(column, words.say(heard, port=session.receiver.port), "INFO")
     else:
-        column.label(text=f"{status.subject}: {status.per_second:.0f} a second", icon="USER")
-        column.label(text=f"Last face {(status.age or 0.0) * 1000:.0f} ms ago", icon="BLANK1")
+        rate = f"{status.per_second:.0f}"
+        words.show(
+            column, words.say("{name}: {rate} a second", name=status.subject, rate=rate), "USER"
+        )
+        age = f"{(status.age or 0.0) * 1000:.0f}"
+        words.show(column, words.say("Last face {age} ms ago", age=age), "BLANK1")
     if session.recording is not None:
-        column.label(text=f"Recording: {len(session.recording.take)} faces", icon="REC")
+        count = len(session.recording.take)
+        words.show(column, words.say("Recording: {count} faces", count=count), "REC")
     for count, what in (
-        (status.lost, "Lost on the way"),
-        (status.late, "Late, left out"),
-        (status.refused, "Packets refused"),
-        (status.floods, "Floods"),
+        (status.lost, words.say("Lost on the way")),
+        (status.late, words.say("Late, left out")),
+        (status.refused, words.say("Packets refused")),
+        (status.floods, words.say("Floods")),
     ):
         if count:
-            column.label(text=f"{what}: {count}", icon="ERROR")
+            words.show(column, f"{what}: {count}", "ERROR")
     if status.reasons:
         words.write(layout, names.printable(status.reasons[0][0], 120))
     missed = session.shaper.unmapped
     if missed:
-        words.write(layout, f"Not mapped: {names.printable(', '.join(missed), 120)}")
+        left_out = names.printable(", ".join(missed), 120)
+        words.write(layout, words.say("Not mapped: {names}", names=left_out))
     others = [s for s in status.subjects if s != status.subject]
     for name in others[:8]:
-        layout.operator("risorius.live_subject", text=name, icon="USER").name = name
+        button = layout.operator("risorius.live_subject", text=name, icon="USER", translate=False)
+        button.name = name
 
 
 CLASSES = (RISORIUS_PT_live,)

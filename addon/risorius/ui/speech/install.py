@@ -5,6 +5,7 @@ import bpy
 
 from ... import native
 from ...scene.animation import speech_task
+from .. import words
 from ..blender_types import Context, Operator, Result, UILayout
 from ..common import usable
 
@@ -22,7 +23,7 @@ class RISORIUS_OT_install_speech(Operator):
         if not usable(cls):
             return False
         if not bpy.app.online_access:
-            cls.poll_message_set(_OFFLINE)
+            cls.poll_message_set(words.say(_OFFLINE))
             return False
         return True
 
@@ -32,18 +33,20 @@ class RISORIUS_OT_install_speech(Operator):
         except native.user_errors() as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        self.report({"INFO"}, "PocketSphinx is installed.")
+        self.report({"INFO"}, words.say("PocketSphinx is installed."))
         return {"FINISHED"}
 
 
 def draw_preferences(layout: UILayout) -> None:
     """Whether speech works, and the button that makes it work."""
     if speech_task.has_recogniser():
-        layout.label(text="Speak from Audio is ready.", icon="CHECKMARK")
+        layout.label(text="Speak from Audio is ready.", text_ctxt=words.CONTEXT, icon="CHECKMARK")
         return
-    layout.label(text="Speak from Audio needs the package PocketSphinx (28 MB).", icon="INFO")
+    words.show(
+        layout, words.say("Speak from Audio needs the package PocketSphinx (28 MB)."), "INFO"
+    )
     if not bpy.app.online_access:
-        layout.label(text=_OFFLINE, icon="ERROR")
+        words.show(layout, words.say(_OFFLINE), "ERROR")
     layout.operator(RISORIUS_OT_install_speech.bl_idname, icon="IMPORT")
 
 

@@ -64,11 +64,11 @@ class RISORIUS_OT_speak(PlacesClip, Operator, ImportHelper):
 
     def execute(self, context: Context) -> Result:
         if not speech_task.has_recogniser():
-            self.report({"ERROR"}, _MISSING)
+            self.report({"ERROR"}, words.say(_MISSING))
             return {"CANCELLED"}
         text = bpy.data.texts.get(self.transcript_text) if self.transcript_text else None
         if self.transcript_text and text is None:
-            self.report({"ERROR"}, f"There is no text {self.transcript_text}.")
+            self.report({"ERROR"}, words.say("There is no text {name}.", name=self.transcript_text))
             return {"CANCELLED"}
         self._task = speech_task.Task(
             self.filepath,
@@ -96,13 +96,14 @@ class RISORIUS_OT_speak(PlacesClip, Operator, ImportHelper):
     def modal(self, context: Context, event: bpy.types.Event) -> Result:
         if event.type == "ESC":
             self.cancel(context)
-            self.report({"WARNING"}, "Speech was cancelled.")
+            self.report({"WARNING"}, words.say("Speech was cancelled."))
             return {"CANCELLED"}
         if event.type == "TIMER":
             share = round(self._task.share * 100)
             context.window_manager.progress_update(share)
-            words = f"Listening to {Path(self.filepath).name}: {share} %, Esc cancels"
-            context.workspace.status_text_set(words)
+            name = Path(self.filepath).name
+            text = words.say("Listening to {name}: {share} %, Esc cancels", name=name, share=share)
+            context.workspace.status_text_set(text)
             if not self._task.is_running():
                 self._end(context)
                 return self._finish(context)
@@ -126,8 +127,8 @@ class RISORIUS_OT_speak(PlacesClip, Operator, ImportHelper):
             if task.clip is None:
                 raise task.error or FaceError("nothing was heard")
             if not type(self).poll(context) or face_rig(context).session_uid != self._face:
-                words = "The face that was to speak is no longer the active one: speak again."
-                self.report({"ERROR"}, words)
+                text = "The face that was to speak is no longer the active one: speak again."
+                self.report({"ERROR"}, words.say(text))
                 return {"CANCELLED"}
             notes = [n for n in task.clip.metadata.get("notes", "").split("; ") if n]
             name = Path(self.filepath).stem
