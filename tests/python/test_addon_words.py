@@ -81,7 +81,7 @@ class Reader(ast.NodeVisitor):
                 if isinstance(target, ast.Name)
             }
             self.add(given.get("bl_label"), "Risorius")
-            if "Operator" in bases:
+            if "Operator" in bases and "bl_idname" in given:
                 self.add(ast.Constant(ast.get_docstring(node) or "", lineno=node.lineno), "*")
         self.generic_visit(node)
 
