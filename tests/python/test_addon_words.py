@@ -20,7 +20,12 @@ PACKAGE = ROOT / "native" / "python" / "risorius"
 LANGUAGES = sorted(p.stem.partition("_")[2] for p in (ADDON / "language").glob("interface_*.toml"))
 STANDARD = ROOT / "tests" / "data" / "controls" / "standard_raw.txt"
 CLASSES = ("Operator", "Panel", "Menu", "AddonPreferences", "FileHandler", "PropertyGroup")
-SENTENCES = {"say": 0, "write": 1, "prop_or": 4}  # functions that look words up -> which argument
+SENTENCES = {
+    "say": 0,
+    "mark": 0,
+    "write": 1,
+    "prop_or": 4,
+}  # functions that look words up -> which argument
 SHOWN = {"report": 1, "poll_message_set": 0}  # functions of Blender that show a text as it is
 
 Found = dict[tuple[str, str], str]  # (context, English) -> where
@@ -82,7 +87,8 @@ class Reader(ast.NodeVisitor):
             }
             self.add(given.get("bl_label"), "Risorius")
             if "Operator" in bases and "bl_idname" in given:
-                self.add(ast.Constant(ast.get_docstring(node) or "", lineno=node.lineno), "*")
+                told = ast.Constant(ast.get_docstring(node, clean=False), lineno=node.lineno)
+                self.add(given.get("bl_description", told), "*")
         self.generic_visit(node)
 
     def visit_Tuple(self, node: ast.Tuple) -> None:
@@ -129,8 +135,11 @@ def titles_of_the_package() -> Found:
     table = tomllib.loads((PACKAGE / "controls" / "regions.toml").read_text(encoding="utf-8"))
     found |= {("Risorius", row["title"]): "regions.toml" for row in table.values()}
     for path in [*(PACKAGE / "expressions").glob("*.toml"), PACKAGE / "anim" / "reactions.toml"]:
-        for row in tomllib.loads(path.read_text(encoding="utf-8")).values():
-            if isinstance(row, dict) and "label" in row and path.stem != "visemes":
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+        if table.get("group") == "viseme":
+            continue  # their labels are signs of sounds
+        for row in table.get("expressions", table).values():
+            if isinstance(row, dict) and "label" in row:
                 found["Risorius", row["label"]] = path.name
     table = tomllib.loads((PACKAGE / "live" / "sources.toml").read_text(encoding="utf-8"))
     found |= {("*", row["description"]): "sources.toml" for row in table.values()}

@@ -166,11 +166,14 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, Operator):
 
 
 class RISORIUS_OT_unbake(FacesOperator, Operator):
-    """Let the controls move the selected faces again, as before they were baked. What was baked is
-    removed, except actions that you protected or use elsewhere"""
+    """Let the controls move the selected faces again."""
 
     bl_idname = "risorius.unbake"
     bl_label = "Back to Live"
+    bl_description = (
+        "Let the controls move the selected faces again, as before they were baked. What was baked "
+        "is removed, except actions that you protected or use elsewhere"
+    )
 
     def execute(self, context: Context) -> Result:
         faces = selected_rigs(context, self.every)

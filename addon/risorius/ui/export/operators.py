@@ -34,11 +34,14 @@ _KNOWN = {*_ENDINGS.values(), ".usd", ".usda", ".usdz", ".gltf"}
 
 
 class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, Operator):
-    """Write the animation of the selected faces to a file: baked, from a copy; the scene stays as
-    it is"""
+    """Write the animation of the selected faces to a file."""
 
     bl_idname = "risorius.export_animation"
     bl_label = "Export Animation"
+    bl_description = (
+        "Write the animation of the selected faces to a file: baked, from a copy; the scene stays "
+        "as it is"
+    )
     bl_options = {"PRESET"}
 
     filename_ext = ".glb"

@@ -3,6 +3,7 @@
 
 from ...scene.animation import expressions
 from ..blender_types import Context, Menu
+from ..words import mark
 from .operators import RISORIUS_OT_expression, RISORIUS_OT_make_pose_assets
 
 
@@ -34,7 +35,7 @@ def expression_menu(group: str, title: str, operator: str) -> type[Menu]:
     return type(name, (Menu,), {"bl_idname": name, "bl_label": title, "draw": draw})
 
 
-GROUPS = (("emotion", "Emotions"), ("face", "Faces"), ("viseme", "Visemes"))
+GROUPS = (("emotion", mark("Emotions")), ("face", mark("Faces")), ("viseme", mark("Visemes")))
 _SET = [expression_menu(g, t, RISORIUS_OT_expression.bl_idname) for g, t in GROUPS]
 
 

@@ -28,6 +28,7 @@ _ICONS: dict[str, Icon] = {
     "ear": "SPEAKER",
     "other": "DOT",
 }
+_LETTERS = {"L": words.mark("L"), "R": words.mark("R"), "": ""}
 _TITLE = 0.5  # of the width, for the names of sliders
 
 
@@ -130,7 +131,7 @@ def _draw_sliders(
         for name, letter in line.sliders:
             if linked and name in followers and followers[name] in names:
                 continue
-            text = words.say("L = R") if linked else words.say(letter) if letter else ""
+            text = words.say("L = R") if linked else words.say(_LETTERS[letter])
             quoted = bpy.utils.escape_identifier(name)
             row.prop(face, f'["{quoted}"]', text=text, slider=True, translate=False)
 

@@ -102,11 +102,14 @@ class RISORIUS_OT_reload(_FileOperator, Operator):
 
 
 class RISORIUS_OT_export_dna(_FileOperator, Operator, ExportHelper):
-    """Write this face's DNA file: byte for byte as imported, with your edits of shape keys,
-    neutral vertices, joints and weights"""
+    """Write this face's DNA file, with the edits."""
 
     bl_idname = "risorius.export_dna"
     bl_label = "Export DNA"
+    bl_description = (
+        "Write this face's DNA file: byte for byte as imported, with your edits of shape keys, "
+        "neutral vertices, joints and weights"
+    )
     bl_options = {"PRESET"}
 
     filename_ext = ".dna"
