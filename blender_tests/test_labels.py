@@ -59,7 +59,7 @@ def test_every_panel_can_be_read(rig):
 def test_eight_levels_of_detail_have_two_rows_that_can_be_told_apart(rig, monkeypatch):
     panels = ui("face.panel")
     monkeypatch.setattr(panels.lods, "built", lambda _rig: list(range(8)))
-    layout = drawn(panels.RISORIUS_PT_character, bpy.context)
+    layout = drawn(panels.RISORIUS_PT_options, bpy.context)
     assert layout.cut(SIDEBAR) == []
     words = texts(layout)
     assert words.count("7") == 2

@@ -69,7 +69,7 @@ def test_linked_sides_move_together_and_are_free_again(rig):
     seen = scene.controls(rig).evaluated_get(bpy.context.evaluated_depsgraph_get())
     assert seen.pose.bones["face"][PREFIX + "mouthCornerPullR"] == pytest.approx(0.35)
     layout = drawn(ui("face.controls_panel").RISORIUS_PT_controls, bpy.context)
-    assert "L = R" in _texts(layout)
+    assert "Both Sides" in _texts(layout)
     assert bpy.ops.risorius.link_sides(enable=False) == {"FINISHED"}
     assert not scene.controls(rig).animation_data.drivers
     assert value(rig, "mouthCornerPullR") == pytest.approx(0.35)
@@ -141,6 +141,9 @@ def test_only_what_is_in_use_is_listed(rig):
         scene.set_controls(rig, jawOpen=0.0)
         scene.face(rig).keyframe_insert(f'["{PREFIX}jawOpen"]', frame=1)
         assert "Open" in _texts(drawn(panel, bpy.context))
+        assert "Corner Pull" not in _texts(drawn(panel, bpy.context))
+        scene.set_controls(rig, mouthCornerPullR=0.2)  # its twin is shown beside it
+        assert "Corner Pull" in _texts(drawn(panel, bpy.context))
     finally:
         manager.risorius_only_used = False
 
@@ -172,6 +175,5 @@ def test_left_is_where_one_sees_it_or_the_characters_own(rig):
     pair = [PREFIX + "mouthCornerPullL", PREFIX + "mouthCornerPullR"]
     (seen,) = rows.rows_of(pair, "mouth", regions, True)
     (own,) = rows.rows_of(pair, "mouth", regions, False)
-    assert [letter for _name, letter in seen.sliders] == ["L", "R"]
-    assert [name[-1] for name, _letter in seen.sliders] == ["R", "L"]
-    assert [name[-1] for name, _letter in own.sliders] == ["L", "R"]
+    assert [name[-1] for name in seen.sliders] == ["R", "L"]
+    assert [name[-1] for name in own.sliders] == ["L", "R"]

@@ -20,13 +20,17 @@ class Row:
 
     Attributes:
         title: the words before the sliders.
-        sliders: a control and its letter each, L, R or none, from the left to the right.
-        twins: they are the two sides of one control, and not the two directions of a whole one.
+        sliders: controls from the left to the right; two are the two sides of one control or the
+            two directions of a whole one.
     """
 
     title: str
-    sliders: tuple[tuple[str, str], ...]
-    twins: bool = False
+    sliders: tuple[str, ...]
+
+    @property
+    def is_pair(self) -> bool:
+        """Whether one of the sliders is the left one, and one the right."""
+        return len(self.sliders) == 2
 
 
 def rows_of(names: Sequence[str], region: str, regions: FaceRegions, as_seen: bool) -> list[Row]:
@@ -59,7 +63,7 @@ def rows_of(names: Sequence[str], region: str, regions: FaceRegions, as_seen: bo
 
 def _row(name: str, other: str, region: str, as_seen: bool, twins: bool) -> Row:
     if not other:
-        return Row(slider_words.title_in_region(name, region, swapped=as_seen), ((name, ""),))
+        return Row(slider_words.title_in_region(name, region, swapped=as_seen), (name,))
     first, second = sorted((name, other), key=lambda one: not is_left(one, twins))
     if as_seen:
         first, second = second, first
@@ -68,7 +72,7 @@ def _row(name: str, other: str, region: str, as_seen: bool, twins: bool) -> Row:
         if twins
         else slider_words.title_of_directions(name, region)
     )
-    return Row(title, ((first, "L"), (second, "R")), twins)
+    return Row(title, (first, second))
 
 
 def is_left(name: str, by_side: bool = True) -> bool:

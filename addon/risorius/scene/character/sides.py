@@ -167,15 +167,16 @@ def _label(path: str, start: str, end: str) -> str:
 
 
 def in_use(rig: ArmatureObject) -> set[str]:
-    """The sliders that are not at rest, and those that the face's action has keys for."""
+    """The sliders that are not at rest or have keys in the face's action, with their twins."""
     live, controls = runtime.there(rig), parts.controls_there(rig)
     data = controls.animation_data
     action = data.action if data is not None else None
     keyed = {curve.data_path for curve in compat.curves_of(action)} if action is not None else set()
     values = values_of(rig)
-    return {
+    used = {
         label
         for label, rest in zip(live.labels, live.rests, strict=True)
         if label in values
         and (abs(values[label] - rest) > 1e-6 or parts.property_path(label) in keyed)
     }
+    return used | {native.regions().across(label) for label in used}

@@ -114,7 +114,7 @@ def weight_property() -> object:
 class RISORIUS_PT_shape_test(FaceOnlyPanel, Panel):
     bl_idname = "RISORIUS_PT_shape_test"
     bl_label = "Test a Shape"
-    bl_order = 3
+    bl_parent_id = "RISORIUS_PT_options"
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: Context) -> None:

@@ -28,7 +28,6 @@ _ICONS: dict[str, Icon] = {
     "ear": "SPEAKER",
     "other": "DOT",
 }
-_LETTERS = {"L": words.mark("L"), "R": words.mark("R"), "": ""}
 _TITLE = 0.5  # of the width, for the names of sliders
 
 
@@ -77,17 +76,15 @@ def _draw_tools(layout: UILayout, context: Context, linked: bool) -> None:
     row = column.row(align=True)
     row.prop(manager, "risorius_search", text="", icon="VIEWZOOM")
     row.prop(manager, "risorius_only_used", text="", icon="FILTER")
-    addon = context.preferences.addons.get(native.ADDON)
-    if addon is not None:
-        column.row(align=True).prop(addon.preferences, "sides", expand=True)
     row = column.row(align=True)
     row.operator("risorius.mirror", text="Mirror", icon="MOD_MIRROR").region = ""
-    for from_left, text in ((True, "L > R"), (False, "R > L")):
-        button = row.operator("risorius.copy_side", text=text)
-        button.region, button.from_left = "", from_left != seen
     row.operator(
         "risorius.link_sides", text="Link", icon="LINKED", depress=linked
     ).enable = not linked
+    row = column.row(align=True)
+    for from_left, text in ((True, "L > R"), (False, "R > L")):
+        button = row.operator("risorius.copy_side", text=text)
+        button.region, button.from_left = "", from_left != seen
     row.operator("risorius.copy_pose", text="", icon="COPYDOWN").region = ""
     row.operator("risorius.paste_pose", text="", icon="PASTEDOWN").flipped = False
     row.operator("risorius.paste_pose", text="", icon="PASTEFLIPDOWN").flipped = True
@@ -119,7 +116,10 @@ def _draw_sliders(
     column = layout.column(align=True)
     ruler = words.Ruler(context, _TITLE)
     followers = followers or {}
-    for line in slider_rows.rows_of(names, region, native.regions(), as_seen(context)):
+    lines = slider_rows.rows_of(names, region, native.regions(), as_seen(context))
+    if any(line.is_pair for line in lines):
+        _draw_sides(column, bool(followers))
+    for line in lines:
         if ruler.fits(line.title):
             row = column.split(factor=_TITLE, align=True)
             words.show(row, line.title)
@@ -127,13 +127,22 @@ def _draw_sliders(
             words.show(column, line.title)
             row = column
         row = row.row(align=True)
-        linked = any(name in followers for name, _letter in line.sliders)
-        for name, letter in line.sliders:
-            if linked and name in followers and followers[name] in names:
-                continue
-            text = words.say("L = R") if linked else words.say(_LETTERS[letter])
-            quoted = bpy.utils.escape_identifier(name)
-            row.prop(face, f'["{quoted}"]', text=text, slider=True, translate=False)
+        for name in line.sliders:
+            if followers.get(name) not in names:
+                quoted = bpy.utils.escape_identifier(name)
+                row.prop(face, f'["{quoted}"]', text="", slider=True)
+
+
+def _draw_sides(column: UILayout, linked: bool) -> None:
+    """What the columns of sliders are: a slider is too narrow for a letter before its number."""
+    row = column.split(factor=_TITLE, align=True)
+    row.label(text="")
+    row = row.row(align=True)
+    row.active = False
+    for text in ("Both Sides",) if linked else ("Left", "Right"):
+        part = row.row()
+        part.alignment = "CENTER"
+        part.label(text=text, text_ctxt=words.CONTEXT)
 
 
 CLASSES = (RISORIUS_PT_controls,)

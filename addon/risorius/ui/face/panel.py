@@ -34,16 +34,17 @@ class RISORIUS_PT_character(FacePanel, Panel):
         controls = parts.controls_of(rig)
         if live is None or controls is None:
             return  # said above
-        words.show(layout, rig.name.removesuffix("_rig"), "USER")
+        row = layout.row()
+        words.show(row, rig.name.removesuffix("_rig"), "USER")
+        row = row.row(align=True)
+        ruler = words.Ruler(context, 0.3)
+        for operator, icon, text in (
+            ("risorius.reset", "LOOP_BACK", words.say("Reset")),
+            ("risorius.key", "KEYFRAME_HLT", words.say("Key All")),
+        ):
+            shown = text if ruler.fits(text) else ""  # its tooltip says the same
+            row.operator(operator, text=shown, icon=icon, translate=False).region = ""
         draw_state(layout, rig)
-        row = layout.row(align=True)
-        row.operator("risorius.reset", icon="LOOP_BACK").region = ""
-        row.operator("risorius.key", text="Key All", icon="KEYFRAME_HLT").region = ""
-        header, body = layout.panel("RISORIUS_PT_detail", default_closed=True)
-        header.label(text="Detail and Shapes", text_ctxt=words.CONTEXT)
-        if body is not None:
-            _draw_detail(body, rig)
-            _draw_shapes(body, rig)
         for warning in plans.layer_warnings(live.rig.ignored_layers):
             words.write(layout, warning, "INFO")
 
@@ -100,6 +101,15 @@ class RISORIUS_PT_options(FaceOnlyPanel, Panel):
     def draw(self, context: Context) -> None:
         layout = self.layout
         rig, controls = face_rig(context), face_controls(context)
+        addon = context.preferences.addons.get(native.ADDON)
+        if addon is not None:
+            layout.label(text="Left and Right", text_ctxt=words.CONTEXT)
+            layout.row(align=True).prop(addon.preferences, "sides", expand=True)
+        header, body = layout.panel("RISORIUS_PT_detail", default_closed=True)
+        header.label(text="Detail and Shapes", text_ctxt=words.CONTEXT)
+        if body is not None:
+            _draw_detail(body, rig)
+            _draw_shapes(body, rig)
         on = bool(controls.get(parts.OVERDRIVE))
         layout.operator("risorius.set_overdrive", depress=on).enable = not on
         attached = rig_placement.body_of(controls)
@@ -113,7 +123,12 @@ class RISORIUS_PT_options(FaceOnlyPanel, Panel):
         layout.prop(context.window_manager, "risorius_show_timing")
         render = context.scene.render
         if not render.use_lock_interface:
-            layout.prop(render, "use_lock_interface", text="Lock Interface in Renders")
+            layout.prop(
+                render,
+                "use_lock_interface",
+                text="Lock Interface in Renders",
+                text_ctxt=words.CONTEXT,
+            )
         live = runtime.of(rig)
         if live is not None:
             column = layout.column(align=True)
