@@ -139,10 +139,11 @@ def _draw_sides(column: UILayout, linked: bool) -> None:
     row.label(text="")
     row = row.row(align=True)
     row.active = False
-    for text in ("Both Sides",) if linked else ("Left", "Right"):
+    both, left, right = words.say("Both Sides"), words.say("Left"), words.say("Right")
+    for text in (both,) if linked else (left, right):
         part = row.row()
         part.alignment = "CENTER"
-        part.label(text=text, text_ctxt=words.CONTEXT)
+        words.show(part, text)
 
 
 CLASSES = (RISORIUS_PT_controls,)

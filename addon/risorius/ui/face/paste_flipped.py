@@ -14,7 +14,7 @@ from bpy.app.handlers import persistent
 from ... import native
 from ...logic.character import slider_rows
 from ...scene.base import parts
-from ...scene.base.blender_types import ArmatureObject
+from ...scene.base.blender_types import ArmatureObject, current_context
 from ...scene.character import sides
 from ...scene.frame import evaluate
 from ..blender_types import Context, Menu, Operator, Result
@@ -99,15 +99,28 @@ def pasted_by_blender(manager: bpy.types.WindowManager) -> bool:
 
 @persistent
 def _updated(_scene: bpy.types.Scene, _depsgraph: object) -> None:
-    context = bpy.context
-    if pasted_by_blender(context.window_manager) and _posed_controls(context) is not None:
+    manager = current_context().window_manager
+    if pasted_by_blender(manager) and _posing_window(manager) is not None:
         bpy.app.timers.register(_once_more, first_interval=0.0)
+
+
+def _posing_window(manager: bpy.types.WindowManager) -> bpy.types.Window | None:
+    """A window in which the controls of a face are posed: handlers run without an active one."""
+    for window in manager.windows:
+        active = window.view_layer.objects.active
+        rig = parts.rig_of(active)
+        if rig is not None and active.mode == "POSE" and parts.controls_of(rig) == active:
+            return window
+    return None
 
 
 def _once_more() -> None:
     """Take Blender's step back and do ours, so that one undo takes back all of it."""
-    window = bpy.context.window_manager.windows[0]
-    with bpy.context.temp_override(window=window):
+    context = current_context()
+    window = _posing_window(context.window_manager)
+    if window is None:
+        return
+    with context.temp_override(window=window):
         if bpy.ops.ed.undo.poll():
             bpy.ops.ed.undo()
         if bpy.ops.risorius.paste_pose_flipped.poll():
