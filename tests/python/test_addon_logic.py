@@ -116,7 +116,7 @@ class TestRegions:
         [
             ("CTRL_expressions.mouthCornerPullL", False, "Corner Pull"),
             ("CTRL_expressions.mouthCornerPullL", True, "Corner Pull L"),
-            ("CTRL_expressions.mouthFunnelUL", False, "Funnel U"),
+            ("CTRL_expressions.mouthFunnelUL", False, "Funnel Upper"),
             ("CTRL_expressions.jawOpen", True, "Open"),
             ("jaw", True, "Jaw"),
         ],

@@ -27,7 +27,8 @@ def _read(name: str) -> dict[str, Any]:
 @cache
 def controls(language: str = ENGLISH) -> ControlWords:
     """What is said of the standard controls in a language."""
-    return expand(_read(f"controls_{language}"))
+    table = _read(f"controls_{language}")
+    return expand(table, table.pop("sides"))
 
 
 @cache

@@ -5,9 +5,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TypedDict
 
 PREFIX = "CTRL_expressions."  # of every raw control of a standard file
+
+
+class WrittenRow(TypedDict):
+    """A row as a table has it."""
+
+    does: str
+    words: list[str]
 
 
 @dataclass(frozen=True)
@@ -49,18 +56,15 @@ class ControlWords:
         return " ".join(row.words) if row is not None else ""
 
 
-def expand(table: Mapping[str, Mapping[str, Any]]) -> ControlWords:
+def expand(table: Mapping[str, WrittenRow], sides: Mapping[str, str]) -> ControlWords:
     """Rows for both sides of what has a * for its side.
 
     Args:
-        table: `sides`, with a sentence each for L and R; all others are rows with `does` and
-            `words`, by the name of the control.
+        table: rows by the name of the control.
+        sides: a sentence each for L and R.
     """
-    sides = table["sides"]
     rows = {}
     for name, row in table.items():
-        if name == "sides":
-            continue
         does, words = row["does"], tuple(row["words"])
         if "*" not in name:
             rows[name] = Row(does, words)

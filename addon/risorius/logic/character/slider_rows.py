@@ -133,6 +133,11 @@ def flipped(values: Mapping[str, float], regions: FaceRegions) -> dict[str, floa
 
 
 def pairs(names: Collection[str], regions: FaceRegions) -> list[tuple[str, str]]:
-    """The controls of the character's left side with those of its right."""
+    """The controls of the character's left side with those of its right.
+
+    Args:
+        names: of all controls.
+        regions: of the face.
+    """
     found = ((name, regions.across(name)) for name in names if is_left(name))
     return [(left, right) for left, right in found if left != right and right in names]

@@ -60,7 +60,12 @@ def put(rig: ArmatureObject, values: Mapping[str, float]) -> int:
 
 
 def restore(rig: ArmatureObject, values: Mapping[str, float]) -> None:
-    """Give sliders the values that they had, whatever their limits. Args: as of `put`."""
+    """Give sliders the values that they had, whatever their limits.
+
+    Args:
+        rig: the character.
+        values: by the names of the sliders.
+    """
     face = parts.face_bone(rig)
     assert face is not None
     for label, value in values.items():
@@ -68,7 +73,12 @@ def restore(rig: ArmatureObject, values: Mapping[str, float]) -> None:
 
 
 def mirror(rig: ArmatureObject, region: str = "") -> None:
-    """Set the sliders left for right; without a region the head, neck and eye bones too."""
+    """Set the sliders left for right.
+
+    Args:
+        rig: the character.
+        region: only of this one; empty for all, with the head, neck and eye bones.
+    """
     put(rig, slider_rows.mirrored(values_of(rig, region), native.regions()))
     if not region:
         mirror_bones(parts.controls_there(rig))

@@ -16,7 +16,7 @@ from ..words import say
 _copied: dict[str, float] = {}  # the sliders that were copied last, of any face
 
 
-def _region() -> object:
+def _only_region() -> object:
     return bpy.props.StringProperty(
         name="Region", description="Only this region; empty for all", options={"SKIP_SAVE"}
     )
@@ -37,7 +37,7 @@ class RISORIUS_OT_mirror(FaceOperator, Operator):
     bl_idname = "risorius.mirror"
     bl_label = "Mirror Face"
 
-    region: _region()
+    region: _only_region()
 
     def execute(self, context: Context) -> Result:
         rig = face_rig(context)
@@ -52,7 +52,7 @@ class RISORIUS_OT_copy_side(FaceOperator, Operator):
     bl_idname = "risorius.copy_side"
     bl_label = "Copy to Other Side"
 
-    region: _region()
+    region: _only_region()
     from_left: _from_left()
 
     def execute(self, context: Context) -> Result:
@@ -103,7 +103,7 @@ class RISORIUS_OT_copy_pose(FaceOperator, Operator):
     bl_options = {"REGISTER"}
     baked_too = True
 
-    region: _region()
+    region: _only_region()
 
     def execute(self, context: Context) -> Result:
         _copied.clear()
@@ -133,6 +133,7 @@ class RISORIUS_OT_paste_pose(FaceOperator, Operator):
 
     @classmethod
     def description(cls, _context: Context, properties: bpy.types.OperatorProperties) -> str:
+        """The tooltip. Args: _context  of the button, properties  as it gives them."""
         text = "Paste the sliders that were copied"
         if getattr(properties, "flipped", False):
             text = "Paste the sliders that were copied, left for right"
