@@ -37,6 +37,7 @@ if TYPE_CHECKING:
             text: str = "",
             icon: Icon = "NONE",
             depress: bool = False,
+            translate: bool = True,
         ) -> OperatorButton: ...
         def panel(
             self, idname: str, *, default_closed: bool = False

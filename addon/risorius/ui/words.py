@@ -85,7 +85,7 @@ def say(text: str, **values: object) -> str:
         text: in English, as in the table of words, with {names} of the values.
         values: what stands for them: numbers, names of things, which are never translated.
     """
-    local = bpy.app.translations.pgettext_iface(text, CONTEXT)
+    local = bpy.app.translations.pgettext_iface(text, CONTEXT) or text
     return local.format(**values) if values else local
 
 

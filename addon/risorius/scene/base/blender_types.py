@@ -57,6 +57,7 @@ if TYPE_CHECKING:
         """With the properties that registration.py gives it."""
 
         risorius_search: str
+        risorius_only_used: bool
         risorius_show_timing: bool
         risorius_live: bpy.types.PropertyGroup
 

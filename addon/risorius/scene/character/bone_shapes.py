@@ -110,6 +110,7 @@ def place(bone: bpy.types.PoseBone, name: str) -> None:
             bone.custom_shape_translation = (0.0, bone.length * 1.5, 0.0)
     bone.color.palette = "CUSTOM"
     colours = bone.color.custom
+    assert colours is not None  # it is there with this palette
     colours.normal = _COLOURS[name]
     colours.select = [0.5 + 0.5 * part for part in _COLOURS[name]]
     colours.active = [0.75 + 0.25 * part for part in _COLOURS[name]]

@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+# Blender takes properties where Python has annotations:
+# pyright: reportInvalidTypeForm=false
 """Blender's Paste Pose Flipped on the controls of a face.
 
 Blender turns bones over by the L and R of their names; sliders are properties of one bone, which it
@@ -109,7 +111,9 @@ def _posing_window(manager: bpy.types.WindowManager) -> bpy.types.Window | None:
     for window in manager.windows:
         active = window.view_layer.objects.active
         rig = parts.rig_of(active)
-        if rig is not None and active.mode == "POSE" and parts.controls_of(rig) == active:
+        if active is None or rig is None:
+            continue
+        if active.mode == "POSE" and parts.controls_of(rig) == active:
             return window
     return None
 
@@ -121,22 +125,28 @@ def _once_more() -> None:
     if window is None:
         return
     with context.temp_override(window=window):
-        if bpy.ops.ed.undo.poll():
+        if bpy.ops.ed.undo.poll():  # pyright: ignore[reportCallIssue]
             bpy.ops.ed.undo()
-        if bpy.ops.risorius.paste_pose_flipped.poll():
-            bpy.ops.risorius.paste_pose_flipped("EXEC_DEFAULT", True)
+        ours = bpy.ops.risorius.paste_pose_flipped  # pyright: ignore[reportAttributeAccessIssue]
+        if ours.poll():
+            ours("EXEC_DEFAULT", True)
 
 
 def register() -> None:
     """Add the entry of the menu, the keys and what notices Blender's own command."""
     bpy.types.VIEW3D_MT_pose.append(_draw)
     bpy.app.handlers.depsgraph_update_post.append(_updated)
-    config = bpy.context.window_manager.keyconfigs.addon
+    config = current_context().window_manager.keyconfigs.addon
     if config is not None:  # there is none without a window
         keymap = config.keymaps.new("Pose", space_type="EMPTY")
-        for command in ({"ctrl": True}, {"oskey": True}):
+        for ctrl in (True, False):
             item = keymap.keymap_items.new(
-                RISORIUS_OT_paste_pose_flipped.bl_idname, "V", "PRESS", shift=True, **command
+                RISORIUS_OT_paste_pose_flipped.bl_idname,
+                "V",
+                "PRESS",
+                shift=True,
+                ctrl=ctrl,
+                oskey=not ctrl,  # on a Mac
             )
             _keys.append((keymap, item))
 

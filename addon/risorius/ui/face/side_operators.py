@@ -132,12 +132,14 @@ class RISORIUS_OT_paste_pose(FaceOperator, Operator):
         return True
 
     @classmethod
-    def description(cls, _context: Context, properties: bpy.types.OperatorProperties) -> str:
-        """The tooltip. Args: _context  of the button, properties  as it gives them."""
+    def description(
+        cls, context: bpy.types.Context, properties: bpy.types.OperatorProperties
+    ) -> str:
+        """The tooltip. Args: context  of the button, properties  as it gives them."""
         text = "Paste the sliders that were copied"
         if getattr(properties, "flipped", False):
             text = "Paste the sliders that were copied, left for right"
-        return bpy.app.translations.pgettext_tip(text)
+        return bpy.app.translations.pgettext_tip(text) or text
 
     def execute(self, context: Context) -> Result:
         rig, values = face_rig(context), dict(_copied)
