@@ -164,7 +164,7 @@ def test_a_tooltip_says_what_the_control_does(rig):
     words = scene.face(rig).id_properties_ui(PREFIX + "mouthCornerPullL").as_dict()["description"]
     assert "smile" in words
     assert "your right" in words
-    assert words.endswith(PREFIX + "mouthCornerPullL")
+    assert not words.endswith(".")  # Blender sets one
     other = scene.face(rig).id_properties_ui("twice").as_dict()["description"]
     assert other == "Twice (twice)"  # nobody knows what it does
 
@@ -177,3 +177,23 @@ def test_left_is_where_one_sees_it_or_the_characters_own(rig):
     (own,) = rows.rows_of(pair, "mouth", regions, False)
     assert [name[-1] for name in seen.sliders] == ["R", "L"]
     assert [name[-1] for name in own.sliders] == ["L", "R"]
+
+
+def test_linked_sliders_have_keys_on_the_side_that_leads(rig):
+    assert bpy.ops.risorius.link_sides(from_left=True) == {"FINISHED"}
+    assert bpy.ops.risorius.key(region="mouth") == {"FINISHED"}
+    curves = scene.submodule("scene.base.compat").curves_of
+    keyed = {c.data_path.split('"')[-2] for c in curves(scene.controls(rig).animation_data.action)}
+    assert PREFIX + "mouthCornerPullL" in keyed
+    assert PREFIX + "mouthCornerPullR" not in keyed
+
+
+def test_a_driver_of_ones_own_is_left_alone(rig):
+    path = scene.submodule("scene.base.parts").property_path(PREFIX + "mouthCornerPullR")
+    curve = scene.controls(rig).driver_add(path)
+    curve.driver.expression = "0.5"
+    bpy.ops.risorius.link_sides(from_left=True)
+    bpy.ops.risorius.link_sides(enable=False)
+    found = scene.controls(rig).animation_data.drivers.find(path)
+    assert found is not None
+    assert found.driver.expression == "0.5"

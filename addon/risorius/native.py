@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, TypedDict, cast
 
 from .logic.base.errors import FaceError
 from .logic.base.face_regions import FaceRegions
+from .logic.base.sentences import told
 
 if TYPE_CHECKING:  # names for annotations: nothing else may import the wheel
     from risorius import BoneSpace, Clip, Dna, Layer, Mesh, Mixer, Morph, Pose, Rig  # noqa: F401
@@ -50,16 +51,21 @@ def problem() -> str:
     if _risorius is None:
         wheels = sorted(p.name for p in (_HERE / "wheels").glob("*.whl"))
         tags = sorted({t for w in wheels for t in re.findall(r"-cp3(\d+)-", w)}, key=int)
-        have = ", ".join(f"3.{t}" for t in tags) if tags else "no Python at all"
-        return (
-            f"The native module for Python {running} is missing: this package has wheels for "
-            f"{have}. Install the package made for this Blender. ({_reason})"
+        have = ", ".join(f"3.{t}" for t in tags) if tags else told("no Python at all")
+        return told(
+            "The native module for Python {running} is missing: this package has wheels for "
+            "{have}. Install the package made for this Blender. ({reason})",
+            running=running,
+            have=have,
+            reason=_reason,
         )
     version = getattr(_risorius, "__version__", "unknown")
     if version != addon_version():
-        return (
-            f"The native module is version {version}, the add-on is {addon_version()}. "
-            "Install the add-on anew, then restart Blender."
+        return told(
+            "The native module is version {version}, the add-on is {own}. "
+            "Install the add-on anew, then restart Blender.",
+            version=version,
+            own=addon_version(),
         )
     return ""
 

@@ -70,7 +70,7 @@ def _window_properties() -> dict[str, object]:
 
 def register() -> None:
     """Register classes, menus and handlers; without the native module only words."""
-    bpy.app.translations.register(native.ADDON, tables.translations())
+    words.follow_language()
     for cls in CLASSES:
         words.give_context(cls)
         bpy.utils.register_class(cls)
@@ -112,4 +112,4 @@ def unregister() -> None:
     layer_properties.unregister()
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)
-    bpy.app.translations.unregister(native.ADDON)
+    words.forget_language()

@@ -21,6 +21,10 @@ _ASKED = 30  # beside its text a button asks a row for as much, a label for next
 _NUMBER = 60  # a number for more
 _NAMES = 0.4
 _VALUE = "0.000"
+# Heights, as they were measured in a window of Blender 4.3, where they are larger than in 5.2.
+HEADER, SUB_HEADER, _LINE, EDGES = 28, 25, 21, 10
+# English -> another language, as Blender would look it up: its own build as a module cannot.
+LOCAL = {}
 
 
 def width_of(text):
@@ -30,13 +34,21 @@ def width_of(text):
     return blf.dimensions(0, text)[0]
 
 
+def local(text):
+    """A label in the language that is tried."""
+    return LOCAL.get(text, text)
+
+
 class Part:
     """A row, a column or a split.
 
     Its children are Parts and (text, pixels to be read, pixels that it asks a row for).
     """
 
+    everything_open = True  # else panels within panels are as a new file has them
+
     def __init__(self, kind="column", factor=0.0, split=False):
+        self.is_header = False
         self.kind, self.factor, self.children = kind, factor, []
         self.use_property_split = split
         self.use_property_decorate = self.active = self.enabled = True
@@ -69,7 +81,11 @@ class Part:
         return self._inner("split", factor)
 
     def panel(self, _name, default_closed=False):
-        return self._inner("row"), self._inner("column")
+        header = self._inner("row")
+        header.is_header = True
+        if default_closed and not Part.everything_open:
+            return header, None
+        return header, self._inner("column")
 
     def separator(self):
         pass
@@ -87,17 +103,19 @@ class Part:
         part._leaf(text, width_of(text) + _MARGIN)
         part._leaf("", 0)
 
-    def label(self, text="", icon="NONE", **_options):
+    def label(self, text="", icon="NONE", translate=True, **_options):
+        text = local(text) if translate else text
         pixels = width_of(text) + _MARGIN + (_ICON if icon != "NONE" else 0)
         self._leaf(text, pixels, pixels - _MARGIN / 2)
 
-    def operator(self, name, text=None, icon="NONE", **_options):
+    def operator(self, name, text=None, icon="NONE", translate=True, **_options):
         rna = getattr(bpy.ops.risorius, name.partition(".")[2]).get_rna_type()
-        self._button(rna.name if text is None else text, icon)
+        text = rna.name if text is None else text
+        self._button(local(text) if translate else text, icon)
         return SimpleNamespace()
 
     def menu(self, name, text=None, icon="NONE", **_options):
-        self._button(getattr(bpy.types, name).bl_label if text is None else text, icon)
+        self._button(local(getattr(bpy.types, name).bl_label if text is None else text), icon)
 
     def _button(self, text, icon):
         there = width_of(text) + (_ICON if icon != "NONE" else 0)
@@ -108,19 +126,19 @@ class Part:
 
     def prop_enum(self, data, name, value):
         items = _property(data, name).enum_items
-        self._button(items[value].name, "NONE")
+        self._button(local(items[value].name), "NONE")
 
     def prop_search(self, data, name, _where, _names, **_options):
-        self._value(_property(data, name).name, 100)
+        self._value(local(_property(data, name).name), 100)
 
     def prop(self, data, name, text=None, icon="NONE", toggle=False, index=-1, **_options):
         rule = None if name.startswith("[") else _property(data, name)
-        shown = (rule.name if rule is not None else name) if text is None else text
+        shown = local((rule.name if rule is not None else name) if text is None else text)
         kind = "FLOAT" if rule is None else rule.type
         if kind == "BOOLEAN":
             self._checkbox(shown, icon, toggle)
         elif kind == "ENUM":
-            names = [item.name for item in rule.enum_items]
+            names = [local(item.name) for item in rule.enum_items]
             self._value(shown, max(map(width_of, names), default=60) + _BUTTON + _ICON)
         else:
             number = kind in ("INT", "FLOAT")
@@ -153,6 +171,13 @@ class Part:
         """Pixels that it asks a row for."""
         asked = [c.asks() if isinstance(c, Part) else c[2] for c in self.children]
         return sum(asked) if self.kind == "row" else max(asked, default=0)
+
+    def height(self):
+        """Pixels from top to bottom."""
+        if self.is_header:
+            return SUB_HEADER
+        tall = [c.height() if isinstance(c, Part) else _LINE for c in self.children]
+        return max(tall, default=0) if self.kind in ("row", "split") else sum(tall)
 
     def cut(self, width):
         """The words that are cut where there is so much room, each with what it needs and has."""

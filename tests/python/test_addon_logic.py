@@ -12,8 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 import risorius
-from risorius.controls.regions import region_of
+from risorius.controls.regions import TITLES, region_of
+from risorius.controls.sides import mirrored_name, name_across
 
+STANDARD = Path(__file__).resolve().parents[1] / "data" / "controls" / "standard_raw.txt"
 LOGIC = Path(__file__).resolve().parents[2] / "addon" / "risorius" / "logic"
 
 
@@ -35,6 +37,8 @@ def _load_logic() -> ModuleType:
 _load_logic()
 names = importlib.import_module("risorius_addon_logic.base.names")
 face_regions = importlib.import_module("risorius_addon_logic.base.face_regions")
+sentences = importlib.import_module("risorius_addon_logic.base.sentences")
+slider_rows = importlib.import_module("risorius_addon_logic.character.slider_rows")
 slider_words = importlib.import_module("risorius_addon_logic.character.slider_words")
 space = importlib.import_module("risorius_addon_logic.base.space")
 plans = importlib.import_module("risorius_addon_logic.character.plans")
@@ -118,6 +122,10 @@ class TestRegions:
             ("CTRL_expressions.mouthCornerPullL", True, "Corner Pull L"),
             ("CTRL_expressions.mouthFunnelUL", False, "Funnel Upper"),
             ("CTRL_expressions.jawOpen", True, "Open"),
+            ("CTRL_expressions.mouthStickyUINL", False, "Sticky Upper Inner"),
+            ("CTRL_expressions.mouthStickyDC", True, "Sticky Lower Centre"),
+            ("CTRL_expressions.mouthLipsStickyRPh2", False, "Lips Sticky Phase 2"),
+            ("CTRL_expressions.teethFwdD", True, "Forward Lower"),
             ("jaw", True, "Jaw"),
         ],
     )
@@ -130,6 +138,112 @@ class TestRegions:
         assert slider_words.matches(control, "corner pull")
         assert slider_words.matches(control, "MOUTH")
         assert not slider_words.matches(control, "mouth brow")
+        assert not slider_words.matches(control, "smile")
+        assert slider_words.matches(control, "Smile", "grin smile")
+        assert slider_words.matches(control, "SÜSS corner", "süss")
+        assert slider_words.matches(control, "smi", "grin smile")
+        assert not slider_words.matches(control, "ear", "fear tears")
+
+
+def test_a_sentence_remembers_what_it_was_made_of() -> None:
+    reason = sentences.told("only the first {count} are shown", count=3)
+    whole = sentences.told("{layer}: {reason}.", layer="Idle", reason=reason)
+    assert whole == "Idle: only the first 3 are shown."
+    assert whole.template == "{layer}: {reason}."
+    assert whole.values["reason"].values == {"count": 3}
+    assert sentences.told("100 % {plain}") == "100 % {plain}"  # nothing stands for it
+
+
+REGIONS = face_regions.FaceRegions(
+    {"mouth": "Mouth", "eye": "Eyes"}, region_of, region_of, mirrored_name, name_across
+)
+
+
+class TestLeftAndRight:
+    def test_sides_stand_where_they_are_seen(self) -> None:
+        pair = ["a.mouthDimpleL", "a.mouthDimpleR"]
+        for names in (pair, pair[::-1]):
+            (seen,) = slider_rows.rows_of(names, "mouth", REGIONS, True)
+            (own,) = slider_rows.rows_of(names, "mouth", REGIONS, False)
+            assert seen == slider_rows.Row("Dimple", ("a.mouthDimpleR", "a.mouthDimpleL"))
+            assert own == slider_rows.Row("Dimple", ("a.mouthDimpleL", "a.mouthDimpleR"))
+            assert own.is_pair
+
+    def test_directions_share_a_row_and_go_to_their_own_side(self) -> None:
+        (row,) = slider_rows.rows_of(["mouthLeft", "mouthRight"], "mouth", REGIONS, True)
+        assert row == slider_rows.Row("Sideways", ("mouthRight", "mouthLeft"))
+        (row,) = slider_rows.rows_of(["mouthLeft", "mouthRight"], "mouth", REGIONS, False)
+        assert row.sliders == ("mouthLeft", "mouthRight")
+
+    def test_gaze_has_a_row_for_each_direction_named_as_seen(self) -> None:
+        names = [f"eyeLook{way}{side}" for way in ("Left", "Right") for side in "LR"]
+        rows = slider_rows.rows_of(names, "eye", REGIONS, True)
+        assert [row.title for row in rows] == ["Look Right", "Look Left"]
+        assert rows[0].sliders == ("eyeLookLeftR", "eyeLookLeftL")
+        rows = slider_rows.rows_of(names, "eye", REGIONS, False)
+        assert [row.title for row in rows] == ["Look Left", "Look Right"]
+
+    def test_phases_have_their_side_before_the_end(self) -> None:
+        names = ["mouthLipsStickyLPh1", "mouthLipsStickyRPh1"]
+        (row,) = slider_rows.rows_of(names, "mouth", REGIONS, False)
+        assert row == slider_rows.Row("Lips Sticky Phase 1", tuple(names))
+
+    def test_one_side_alone_says_which_it_is(self) -> None:
+        rows = slider_rows.rows_of(["mouthDimpleL", "mouthUp"], "mouth", REGIONS, True)
+        assert [(row.title, row.is_pair) for row in rows] == [("Dimple R", False), ("Up", False)]
+        rows = slider_rows.rows_of(["mouthDimpleL"], "mouth", REGIONS, False)
+        assert rows[0].title == "Dimple L"
+
+    def test_every_control_of_a_standard_face_has_its_place_once(self) -> None:
+        names = STANDARD.read_text(encoding="utf-8").split()
+        for seen in (True, False):
+            groups = slider_words.group_controls(names, _all_regions())
+            rows = [
+                row
+                for region, places in groups.items()
+                for row in slider_rows.rows_of(
+                    [names[i] for i in places], region, _all_regions(), seen
+                )
+            ]
+            assert sorted(n for row in rows for n in row.sliders) == sorted(names)
+            assert all(row.title for row in rows)
+            pairs = [row.sliders for row in rows if row.is_pair]
+            assert all(len({mirrored_name(a), name_across(a)} & {b}) == 1 for a, b in pairs)
+
+    def test_a_mirrored_pose_is_the_pose_when_mirrored_again(self) -> None:
+        values = {"mouthDimpleL": 0.7, "mouthDimpleR": 0.1, "jawLeft": 0.3, "jawRight": 0.0}
+        values |= {"eyeLookLeftL": 0.5, "eyeLookRightR": 0.0, "jawOpen": 0.2, "alone_L": 0.9}
+        once = slider_rows.mirrored(values, REGIONS)
+        assert once["mouthDimpleR"] == 0.7
+        assert once["jawRight"] == 0.3
+        assert once["eyeLookRightR"] == 0.5
+        assert once["jawOpen"] == 0.2
+        assert once["alone_L"] == 0.9
+        assert slider_rows.mirrored(once, REGIONS) == values
+        assert slider_rows.flipped({"jawLeft": 0.3}, REGIONS) == {"jawRight": 0.3}
+
+    def test_the_other_side_is_made_alike_and_eyes_look_the_same_way(self) -> None:
+        values = {"mouthDimpleL": 0.7, "mouthDimpleR": 0.1, "jawLeft": 0.3, "jawRight": 0.0}
+        values |= {"eyeLookLeftL": 0.5, "eyeLookLeftR": 0.0, "eyeLookRightR": 0.0}
+        assert slider_rows.across_from(values, REGIONS, True) == {
+            "mouthDimpleR": 0.7,
+            "eyeLookLeftR": 0.5,
+        }
+        assert slider_rows.across_from(values, REGIONS, False) == {
+            "mouthDimpleL": 0.1,
+            "eyeLookLeftL": 0.0,
+        }
+
+    def test_pairs_are_left_then_right(self) -> None:
+        names = ["mouthDimpleR", "mouthDimpleL", "jawLeft", "jawRight", "eyeBlinkL"]
+        assert slider_rows.pairs(names, REGIONS) == [("mouthDimpleL", "mouthDimpleR")]
+
+
+def _all_regions() -> Any:
+    def of_slider(name: str) -> str:
+        return region_of(name, by_last_part=True)
+
+    return face_regions.FaceRegions(TITLES, of_slider, region_of, mirrored_name, name_across)
 
 
 def _space(**changes: object) -> Any:

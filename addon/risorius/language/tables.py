@@ -44,18 +44,21 @@ def search_words() -> dict[str, str]:
     return {name: " ".join(table.searched(name) for table in tables) for name in tables[0].rows}
 
 
-def translations() -> dict[str, dict[tuple[str, str], str]]:
-    """The words for Blender: language -> (context, English) -> what is shown."""
-    found = {}
-    english = controls()
-    for language in languages():
-        words = {
-            (context, key): text
-            for context, table in _read(f"interface_{language}").items()
-            for key, text in table.items()
-        }
-        theirs = controls(language)
-        for name in english.rows:
-            words[TOOLTIPS, english.tooltip(name)] = theirs.tooltip(name)
-        found[language] = words
-    return found
+def language_of(locale: str) -> str:
+    """The language of ours that a locale of Blender's is, as de of de_DE; empty for all others."""
+    language = locale.replace("@", "_").partition("_")[0]
+    return language if language in languages() else ""
+
+
+@cache
+def translation(language: str) -> dict[tuple[str, str], str]:
+    """The words of a language for Blender: (context, English) -> what is shown."""
+    words = {
+        (context, key): text
+        for context, table in _read(f"interface_{language}").items()
+        for key, text in table.items()
+    }
+    english, theirs = controls(), controls(language)
+    for name in english.rows:
+        words[TOOLTIPS, english.tooltip(name)] = theirs.tooltip(name)
+    return words

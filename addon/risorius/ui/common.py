@@ -39,7 +39,7 @@ def usable(cls: type[Operator]) -> bool:
     """Poll: whether the native module is there; says why when it is not."""
     trouble = native.problem()
     if trouble:
-        cls.poll_message_set(trouble)
+        cls.poll_message_set(say(trouble))
     return not trouble
 
 

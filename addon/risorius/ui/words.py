@@ -3,16 +3,22 @@
 
 import textwrap
 from functools import lru_cache
+from typing import Any
 
 import blf
 import bpy
 
+from .. import native
+from ..language import tables
 from ..language.tables import CONTEXT
+from ..logic.base.sentences import Sentence
 from .blender_types import Context, Icon, UILayout
 
+NAMES = "Names"  # the context of names of things, in which nothing is translated
 _SIDEBAR = 280  # pixels that Blender gives the sidebar at first
 _EDGES = 36  # of them the tabs and the panel's margins
 _MARGIN = 12  # around the text of a label
+_language = {"locale": "", "given": ""}  # Blender's of now; the language that it has our words of
 
 
 class Ruler:
@@ -82,9 +88,13 @@ def say(text: str, **values: object) -> str:
     """A label or sentence in the user's language.
 
     Args:
-        text: in English, as in the table of words, with {names} of the values.
+        text: in English, as in the table of words, with {names} of the values; or a Sentence.
         values: what stands for them: numbers, names of things, which are never translated.
     """
+    follow_language()
+    if isinstance(text, Sentence):
+        return say(text.template, **text.values)
+    values = {name: say(v) if isinstance(v, Sentence) else v for name, v in values.items()}
     local = bpy.app.translations.pgettext_iface(text, CONTEXT) or text
     return local.format(**values) if values else local
 
@@ -103,6 +113,26 @@ def show(layout: UILayout, text: str, icon: Icon = "NONE") -> None:
         icon: before it.
     """
     layout.label(text=text, icon=icon, translate=False)
+
+
+def follow_language() -> None:
+    """Give Blender our words in the user's language; they are read when it is first chosen."""
+    locale = bpy.app.translations.locale or ""
+    if locale == _language["locale"]:
+        return
+    forget_language()
+    language = tables.language_of(locale)
+    _language["locale"], _language["given"] = locale, language
+    if language:
+        ours: Any = {language: tables.translation(language)}  # the stub has no contexts
+        bpy.app.translations.register(native.ADDON, ours)
+
+
+def forget_language() -> None:
+    """Take our words away from Blender."""
+    if _language["given"]:
+        bpy.app.translations.unregister(native.ADDON)
+    _language["locale"] = _language["given"] = ""
 
 
 def give_context(cls: type) -> None:

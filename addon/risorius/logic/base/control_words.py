@@ -39,16 +39,17 @@ class ControlWords:
     rows: Mapping[str, Row]
 
     def tooltip(self, control: str) -> str:
-        """What a control does, its side and its name; nothing of one that is not in the table.
+        """What a control does, and its side; nothing of one that is not in the table.
+
+        Blender puts the name before it and a full stop after it.
 
         Args:
             control: its name, with the prefix or without.
         """
-        name = control.removeprefix(PREFIX)
-        row = self.rows.get(name)
+        row = self.rows.get(control.removeprefix(PREFIX))
         if row is None:
             return ""
-        return " ".join(part for part in (row.does, row.side, PREFIX + name) if part)
+        return f"{row.does} {row.side}".rstrip(" .")
 
     def searched(self, control: str) -> str:
         """The words that a control is found by, as one text."""

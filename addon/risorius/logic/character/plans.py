@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..base import names
 from ..base.errors import FaceError
+from ..base.sentences import told
 from ..base.space import Float, Space, make_space, world_matrices
 from ..material import texture_search
 from . import slider_words
@@ -22,12 +23,12 @@ LIVE_KEY = "<channel sum>"
 AUTO_LIMIT = 500_000
 AUTO_KEYS = 200  # real keys of a character: each driver costs Blender some 3 us a frame
 _LAYER_WORDS = {
-    "mlbh": "neural network behaviour",
-    "mlbe": "neural network behaviour",
-    "rbfb": "pose-driven correctives (RBF)",
-    "rbfe": "pose-driven correctives (RBF)",
-    "twsw": "twist and swing joints",
-    "jbmd": "joint representations",
+    "mlbh": told("neural network behaviour"),
+    "mlbe": told("neural network behaviour"),
+    "rbfb": told("pose-driven correctives (RBF)"),
+    "rbfe": told("pose-driven correctives (RBF)"),
+    "twsw": told("twist and swing joints"),
+    "jbmd": told("joint representations"),
 }
 _KINDS = (
     ("lashes", ("lash", "eyebrow")),
@@ -146,8 +147,8 @@ def kind_of(mesh_name: str) -> str:
 
 def layer_warnings(layers: Sequence[str]) -> list[str]:
     """Words for the layers whose behaviour is not evaluated."""
-    words = dict.fromkeys(_LAYER_WORDS.get(layer, f"layer '{layer}'") for layer in layers)
-    return [f"Not evaluated yet: {word}" for word in words]
+    words = [_LAYER_WORDS.get(layer) or told("layer '{name}'", name=layer) for layer in layers]
+    return [told("Not evaluated yet: {what}", what=word) for word in dict.fromkeys(words)]
 
 
 def space_of(dna: DnaData, unit_scale: float) -> Space:

@@ -89,12 +89,16 @@ def group_controls(controls: Sequence[str], regions: FaceRegions) -> dict[str, l
 
 
 def matches(control: str, search: str, known: str = "") -> bool:
-    """Whether every word of the search stands somewhere in what a control is called.
+    """Whether every word of the search stands in what a control is called.
 
     Args:
-        control: its name; its title is looked at too.
+        control: its name; a word may stand anywhere in it, or in its title.
         search: what was typed.
-        known: more words for it, as animators have them.
+        known: more words for it, as animators have them, which begin with what was typed: an ear
+            is no fear.
     """
-    text = f"{control} {title(control)} {known}".casefold()
-    return all(word in text for word in search.casefold().split())
+    text, more = f"{control} {title(control)}".casefold(), known.casefold().split()
+    return all(
+        word in text or any(one.startswith(word) for one in more)
+        for word in search.casefold().split()
+    )

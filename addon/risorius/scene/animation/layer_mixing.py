@@ -21,6 +21,7 @@ from ... import native
 from ...logic.animation import clip_units as clip_logic
 from ...logic.animation import layer_rules as logic
 from ...logic.base.errors import FaceError
+from ...logic.base.sentences import Sentence, told
 from ..base import parts
 from ..base.blender_types import ArmatureObject, Depsgraph
 from ..character import runtime
@@ -202,7 +203,9 @@ def _compile(
             stack.layers.append(native_layer(controls, live, layer, rate, kept, stack.kept))
             stack.places.append(place)
         except (ValueError, LookupError, RuntimeError) as error:
-            stack.problems[place] = str(error).rstrip(".")
+            reason = error.args[0] if error.args else ""
+            is_told = isinstance(reason, Sentence)
+            stack.problems[place] = reason if is_told else str(error).rstrip(".")
     _fire(stack, controls, rate)
     stack.mixer.layers = stack.layers
     return stack
@@ -224,10 +227,12 @@ def _fire(stack: Stack, controls: ArmatureObject, rate: float) -> None:
         try:
             fired = stack.mixer.fire(reaction.name, reaction.frame / rate, reaction.strength)
         except KeyError:
-            stack.problems[reaction.name] = "there is no such reaction"
+            stack.problems[reaction.name] = told("there is no such reaction")
             continue
         if not fired:
-            stack.problems["Reactions"] = f"only the first {_MOST_FIRED} are shown"
+            stack.problems["Reactions"] = told(
+                "only the first {count} are shown", count=_MOST_FIRED
+            )
 
 
 def _set_weights(stack: Stack, weights: tuple[float, ...]) -> None:
@@ -328,14 +333,14 @@ def _action_source(
 ) -> Source:
     action = layer.action
     if action is None:
-        raise FaceError("choose an action")
+        raise FaceError(told("choose an action"))
     span = layers.span_of(layer)
     curves = clip_actions.playing_curves(action, controls)
     keys = np.unique(np.concatenate([clip_actions.key_points(c)[0] for c in curves] or [[]]))
     frames = logic.sample_frames(span, keys, any(clip_actions.is_bent(c) for c in curves))
     clip = clip_actions.clip_of_action(controls, live, action, frames, rate)
     if not clip.names:
-        raise FaceError(f"{action.name} has no keys of a control of this face")
+        raise FaceError(told("{action} has no keys of a control of this face", action=action.name))
     if clip.frame_count < 2:
         return clip, _still_times(layer, rate)
     return clip, _span_times(span, rate)
@@ -383,4 +388,7 @@ def problems(controls: ArmatureObject, live: runtime.Runtime, scene: bpy.types.S
     names: dict[int | str, str] = {
         place: layer.name for place, layer in enumerate(layers.places(controls))
     }
-    return [f"{names.get(place, place)}: {words}." for place, words in stack.problems.items()]
+    return [
+        told("{layer}: {reason}.", layer=names.get(place, place), reason=reason)
+        for place, reason in stack.problems.items()
+    ]

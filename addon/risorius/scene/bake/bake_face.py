@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ...logic.animation import key_reduction
 from ...logic.base.errors import FaceError
+from ...logic.base.sentences import told
 from ..animation import actions
 from ..base import parts, written
 from ..base.blender_types import Animated, ArmatureObject, Context, MeshObject
@@ -68,10 +69,12 @@ def words(rig: ArmatureObject) -> str:
     if not kind:
         return ""
     state = (rig if kind == RESULT else parts.controls_there(rig))[parts.BAKED]
-    what = "Baked: it plays its actions"
+    what = told("Baked: it plays its actions")
     if kind == CONTROLS:
-        what = "The controls are baked; layers, NLA and drivers rest"
-    return f"{what}, frames {state['start']:g} to {state['end']:g}."
+        what = told("The controls are baked; layers, NLA and drivers rest")
+    return told(
+        "{what}, frames {start:g} to {end:g}.", what=what, start=state["start"], end=state["end"]
+    )
 
 
 def refusal(rig: ArmatureObject, kind: str) -> str:

@@ -108,9 +108,11 @@ def place(bone: bpy.types.PoseBone, name: str) -> None:
         bone.custom_shape_rotation_euler = (math.pi / 2, 0.0, 0.0)
         if name != "eyes":
             bone.custom_shape_translation = (0.0, bone.length * 1.5, 0.0)
-    bone.color.palette = "CUSTOM"
-    colours = bone.color.custom
-    assert colours is not None  # it is there with this palette
+    look = bone.color
+    assert look is not None
+    look.palette = "CUSTOM"
+    colours = look.custom
+    assert colours is not None
     colours.normal = _COLOURS[name]
     colours.select = [0.5 + 0.5 * part for part in _COLOURS[name]]
     colours.active = [0.75 + 0.25 * part for part in _COLOURS[name]]

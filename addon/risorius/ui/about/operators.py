@@ -7,6 +7,7 @@ import numpy as np
 from ...scene.base import parts
 from ...scene.base.blender_types import ArmatureObject
 from ...scene.character import meshes, runtime
+from .. import words
 from ..blender_types import Context, Operator, Result
 from ..common import FaceOperator, face_rig
 
@@ -23,9 +24,16 @@ def describe(rig: ArmatureObject) -> list[str]:
     live = runtime.there(rig)
     names = live.dna.blend_shape_channel_names
     lines = [
-        f"{len(live.labels)} controls, {live.rig.joint_count} joints, {len(live.owned)} of them "
-        f"moved by the file, {len(names)} channels, {len(live.dna.animated_map_names)} maps.",
-        "Hair, clothes and grooms are not in DNA files.",
+        words.say(
+            "{controls} controls, {joints} joints, {moved} of them moved by the file, "
+            "{channels} channels, {maps} maps.",
+            controls=len(live.labels),
+            joints=live.rig.joint_count,
+            moved=len(live.owned),
+            channels=len(names),
+            maps=len(live.dna.animated_map_names),
+        ),
+        words.say("Hair, clothes and grooms are not in DNA files."),
     ]
     for item in parts.meshes_of(rig):
         targets = live.dna.meshes[item[parts.MESH]].blend_shape_targets
@@ -34,12 +42,18 @@ def describe(rig: ArmatureObject) -> list[str]:
             names[t.blend_shape_channel_index] for t in targets if not np.any(np.asarray(t.deltas))
         ]
         levels = ", ".join(str(level) for level in item[parts.LODS])
-        lines.append(
-            f"{item.name}: level {levels}, {len(item.data.vertices):,} vertices, "
-            f"{len(targets)} channels move it, {real} of them as real keys."
+        line = words.say(
+            "{mesh}: level {levels}, {vertices:,} vertices, {channels} channels move it, "
+            "{real} of them as real keys.",
+            mesh=item.name,
+            levels=levels,
+            vertices=len(item.data.vertices),
+            channels=len(targets),
+            real=real,
         )
+        lines.append(line)
         if still:
-            lines.append(f"    Move nothing: {', '.join(still)}")
+            lines.append("    " + words.say("Move nothing: {names}", names=", ".join(still)))
     return lines
 
 
@@ -57,8 +71,8 @@ class RISORIUS_OT_describe(FaceOperator, Operator):
             self.report({"INFO"}, line)
         if not bpy.app.background:
             context.window_manager.popup_menu(
-                lambda menu, _context: [menu.layout.label(text=line) for line in lines],
-                title="What is in this face",
+                lambda menu, _context: [words.show(menu.layout, line) for line in lines],
+                title=words.say("What is in this face"),
                 icon="INFO",
             )
         return {"FINISHED"}

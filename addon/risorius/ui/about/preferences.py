@@ -23,15 +23,20 @@ def self_test() -> tuple[bool, str]:
     """
     trouble = native.problem()
     if trouble:
-        return False, trouble
+        return False, words.say(trouble)
     risorius = native.module()
     space = risorius.BoneSpace(np.zeros((1, 3), np.float32), [0], axes=np.eye(3), scale=2.0)
     deltas = np.array([[1, 2, 3, 0, 0, 0, 0, 0, 0]], np.float32)
     if space.evaluate(deltas)[0].tolist() != [[2.0, 4.0, 6.0]]:
-        return False, "The native module computes wrong numbers: install the extension anew."
-    return True, (
-        f"Risorius {native.addon_version()} works: Python {sys.version_info.major}."
-        f"{sys.version_info.minor}, {platform.machine()}, {risorius.available_simd()}"
+        return False, words.say(
+            "The native module computes wrong numbers: install the extension anew."
+        )
+    return True, words.say(
+        "Risorius {version} works: Python {python}, {machine}, {simd}",
+        version=native.addon_version(),
+        python=f"{sys.version_info.major}.{sys.version_info.minor}",
+        machine=platform.machine(),
+        simd=risorius.available_simd(),
     )
 
 

@@ -9,6 +9,7 @@ import bpy
 from ...logic.base.errors import FaceError
 from ...scene.base.blender_types import Override
 from ...scene.base.console import quiet
+from ..words import say
 
 FORMATS = (
     ("GLTF", "glTF", "Bones and shape keys, one binary .glb file"),
@@ -127,7 +128,10 @@ def missing(kind: str) -> str:
     if name in dir(getattr(bpy.ops, group)):
         return ""
     label = next(f[1] for f in FORMATS if f[0] == kind)
-    return f"This Blender has no {label} exporter: enable its add-on, or use another build."
+    return say(
+        "This Blender has no {format} exporter: enable its add-on, or use another build.",
+        format=label,
+    )
 
 
 def export(operator: ExportOperator, override: Override, path: Path) -> None:

@@ -13,7 +13,7 @@ from ...scene.character import build, runtime
 from ...scene.frame import channel_preview, evaluate
 from ..blender_types import Context, Item, Operator, Panel, Result
 from ..common import FaceOnlyPanel, FaceOperator, face_rig
-from ..words import say
+from ..words import NAMES, say
 
 _items: list[Item] = []  # Blender reads the strings later: they must stay alive
 
@@ -52,7 +52,10 @@ class RISORIUS_OT_test_channel(FaceOperator, Operator):
     baked_too = True
 
     channel: bpy.props.EnumProperty(
-        name="Shape", description="The blend shape that is tried", items=_channels
+        name="Shape",
+        description="The blend shape that is tried",
+        items=_channels,
+        translation_context=NAMES,
     )
     value: bpy.props.FloatProperty(
         name="Weight",
@@ -123,8 +126,8 @@ class RISORIUS_PT_shape_test(FaceOnlyPanel, Panel):
         live, now = runtime.of(rig), channel_preview.current(rig)
         if live is None:
             return
-        name = build.channel_labels(live.dna)[now[0]] if now else "Choose a Shape"
-        layout.operator("risorius.test_channel", text=name, icon="VIEWZOOM")
+        name = build.channel_labels(live.dna)[now[0]] if now else say("Choose a Shape")
+        layout.operator("risorius.test_channel", text=name, icon="VIEWZOOM", translate=False)
         if now:
             row = layout.row(align=True)
             row.prop(context.window_manager, "risorius_test", slider=True)

@@ -78,9 +78,8 @@ def _draw_tools(layout: UILayout, context: Context, linked: bool) -> None:
     row.prop(manager, "risorius_only_used", text="", icon="FILTER")
     row = column.row(align=True)
     row.operator("risorius.mirror", text="Mirror", icon="MOD_MIRROR").region = ""
-    row.operator(
-        "risorius.link_sides", text="Link", icon="LINKED", depress=linked
-    ).enable = not linked
+    button = row.operator("risorius.link_sides", text="Link", icon="LINKED", depress=linked)
+    button.enable, button.from_left = not linked, not seen
     row = column.row(align=True)
     for from_left, text in ((True, "L > R"), (False, "R > L")):
         button = row.operator("risorius.copy_side", text=text)

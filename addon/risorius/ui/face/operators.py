@@ -8,7 +8,7 @@ import bpy
 from ... import native
 from ...scene.base import parts
 from ...scene.base.blender_types import ArmatureObject
-from ...scene.character import armatures, build, runtime
+from ...scene.character import armatures, build, runtime, sides
 from ...scene.frame import evaluate
 from ...scene.life import duplicates, library_overrides
 from ..blender_types import Context, Operator, Result
@@ -62,7 +62,8 @@ class RISORIUS_OT_key(FaceOperator, Operator):
 
     def execute(self, context: Context) -> Result:
         controls = face_controls(context)
-        labels = _labels(context, self.region)
+        led = sides.followers(controls)  # they have the keys of those that lead them
+        labels = [label for label in _labels(context, self.region) if label not in led]
         frame = context.scene.frame_current
         for label in labels:
             controls.keyframe_insert(

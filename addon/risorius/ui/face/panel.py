@@ -8,7 +8,7 @@ from ...scene.base.blender_types import ArmatureObject
 from ...scene.character import lods, rig_placement, runtime
 from .. import words
 from ..bake.panel import draw_state
-from ..blender_types import Context, Panel, UILayout
+from ..blender_types import Context, Icon, Panel, UILayout
 from ..common import FaceOnlyPanel, FacePanel, face_controls, face_rig
 from ..life.panel import draw_trouble
 
@@ -38,10 +38,11 @@ class RISORIUS_PT_character(FacePanel, Panel):
         words.show(row, rig.name.removesuffix("_rig"), "USER")
         row = row.row(align=True)
         ruler = words.Ruler(context, 0.3)
-        for operator, icon, text in (
+        buttons: tuple[tuple[str, Icon, str], ...] = (
             ("risorius.reset", "LOOP_BACK", words.say("Reset")),
             ("risorius.key", "KEYFRAME_HLT", words.say("Key All")),
-        ):
+        )
+        for operator, icon, text in buttons:
             shown = text if ruler.fits(text) else ""  # its tooltip says the same
             row.operator(operator, text=shown, icon=icon, translate=False).region = ""
         draw_state(layout, rig)

@@ -26,7 +26,7 @@ from ..words import say
 _MARK = 0.3215  # no hand sets a slider to it
 _BLENDERS = "POSE_OT_paste"
 _keys: list[Any] = []
-_seen: dict[str, int] = {}  # of Blender's last operator, as a number
+_seen: dict[str, object] = {}  # last: which operator was; selected: how it had pasted
 
 
 def _posed_controls(context: Context) -> ArmatureObject | None:
@@ -92,11 +92,15 @@ def _draw(self: Menu, context: Context) -> None:
 def pasted_by_blender(manager: bpy.types.WindowManager) -> bool:
     """Whether Blender's own operator has just pasted a pose flipped; said once for each time."""
     last = manager.operators[-1] if len(manager.operators) else None
-    number = last.as_pointer() if last is not None else 0
-    if number == _seen.get("last", 0):
+    kind = last.bl_idname if last is not None else ""
+    state = (last.as_pointer() if last is not None else 0, kind)
+    if state == _seen.get("last"):
         return False
-    _seen["last"] = number
-    return last is not None and last.bl_idname == _BLENDERS and last.properties.flipped
+    _seen["last"] = state
+    if last is None or kind != _BLENDERS or not last.properties.flipped:
+        return False
+    _seen["selected"] = last.properties.selected_mask
+    return True
 
 
 @persistent
@@ -125,11 +129,12 @@ def _once_more() -> None:
     if window is None:
         return
     with context.temp_override(window=window):
+        ours = bpy.ops.risorius.paste_pose_flipped  # pyright: ignore[reportAttributeAccessIssue]
+        if not ours.poll():
+            return  # what Blender did stays
         if bpy.ops.ed.undo.poll():  # pyright: ignore[reportCallIssue]
             bpy.ops.ed.undo()
-        ours = bpy.ops.risorius.paste_pose_flipped  # pyright: ignore[reportAttributeAccessIssue]
-        if ours.poll():
-            ours("EXEC_DEFAULT", True)
+        ours("EXEC_DEFAULT", True, selected=bool(_seen.get("selected")))
 
 
 def register() -> None:
@@ -156,7 +161,10 @@ def unregister() -> None:
     for keymap, item in _keys:
         keymap.keymap_items.remove(item)
     _keys.clear()
-    bpy.app.handlers.depsgraph_update_post.remove(_updated)
+    if _updated in bpy.app.handlers.depsgraph_update_post:
+        bpy.app.handlers.depsgraph_update_post.remove(_updated)
+    if bpy.app.timers.is_registered(_once_more):
+        bpy.app.timers.unregister(_once_more)
     bpy.types.VIEW3D_MT_pose.remove(_draw)
 
 

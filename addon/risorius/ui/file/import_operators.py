@@ -228,8 +228,13 @@ def _build_sample(path: Path, folder: Path, person: str) -> str:
             offline=not online,
         )
     except native.user_errors() as error:
-        advice = "" if online else " Allow online access in the preferences (System) first."
-        return f"The sample face could not be built: {str(error).rstrip('.')}.{advice}"
+        text = "The sample face could not be built: {reason}."
+        if not online:
+            text = (
+                "The sample face could not be built: {reason}. "
+                "Allow online access in the preferences (System) first."
+            )
+        return words.say(text, reason=str(error).rstrip("."))
     return ""
 
 
