@@ -510,10 +510,10 @@ class Labels:
     def __init__(self):
         self.words = []
 
-    def label(self, text="", icon="NONE"):
+    def label(self, text="", icon="NONE", translate=True, text_ctxt=""):
         self.words.append(text)
 
-    def operator(self, name, icon="NONE"):
+    def operator(self, name, icon="NONE", translate=True):
         self.words.append(name)
 
 

@@ -465,15 +465,15 @@ class Layout:
     def __init__(self):
         self.words = []
 
-    def label(self, text="", icon="NONE"):
+    def label(self, text="", icon="NONE", translate=True, text_ctxt=""):
         assert icon in self.ICONS, icon
         self.words.append(text)
 
-    def prop(self, data, name, text=None, icon="NONE"):
+    def prop(self, data, name, text=None, icon="NONE", translate=True):
         assert name in data.bl_rna.properties
         assert icon in self.ICONS, icon
 
-    def operator(self, name, text="", icon="NONE", depress=False):
+    def operator(self, name, text="", icon="NONE", depress=False, translate=True):
         assert icon in self.ICONS, icon
         assert name.partition(".")[2] in dir(bpy.ops.risorius), name
         self.words.append(text)
