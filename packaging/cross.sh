@@ -92,7 +92,7 @@ configure() { # configure TARGET FLAGS [OPTION...]
   shift 2
   cmake -S "$project" -B "$out/$target" -G Ninja --toolchain "$project/packaging/cross/toolchain.cmake" \
     -DRISORIUS_TARGET="$target" -DRISORIUS_TOOLS="$tools" -DRISORIUS_PREFIX="$prefix" \
-    -DRISORIUS_BUILD_BINDINGS=OFF -DRISORIUS_WARNINGS_AS_ERRORS=ON -DCMAKE_BUILD_TYPE=None \
+    -DRISORIUS_BUILD_BINDINGS=OFF -DRISORIUS_BUILD_LIBRARY=OFF -DRISORIUS_WARNINGS_AS_ERRORS=ON -DCMAKE_BUILD_TYPE=None \
     -DCMAKE_CXX_FLAGS="$flags" -DCMAKE_CXX_COMPILER_LAUNCHER=ccache -DCMAKE_UNITY_BUILD=ON "$@"
 }
 # Warnings need no optimisation and no lines for a debugger, and zig's own checks of undefined behavior

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Which processor it is, only native/simd asks, and which system core, simd and bytes alone: the
-other folders need not be compiled for each (packaging/cross.sh)."""
+other folders need not be compiled for each (packaging/cross.sh). risorius.h is C, and packaging/host.sh
+compiles it for other systems."""
 
 import re
 from pathlib import Path
@@ -35,7 +36,7 @@ def of_processors(sources):
 
 
 def of_systems(sources):
-    return that_ask(sources, SYSTEM, ("core/", "simd/", "bytes/"))
+    return that_ask(sources, SYSTEM, ("core/", "simd/", "bytes/", "api/risorius.h"))
 
 
 def sources():

@@ -1,0 +1,33 @@
+# The library's soname and its exported names, and the functions of the header, against a list of them.
+# A change of symbols.txt is a change of the ABI: count up RISORIUS_ABI if a name goes.
+execute_process(COMMAND ${NM} -D --defined-only ${LIBRARY} OUTPUT_VARIABLE text
+                COMMAND_ERROR_IS_FATAL ANY)
+string(REGEX MATCHALL "[0-9a-f]+ [A-Za-z] [^\n]+" lines "${text}")
+set(found)
+foreach(line ${lines})
+  # The version itself, risorius_1, is an absolute name.
+  if(NOT line MATCHES " A ")
+    string(REGEX REPLACE "^[0-9a-f]+ [A-Za-z] ([^@]+).*$" "\\1" name "${line}")
+    list(APPEND found ${name})
+  endif()
+endforeach()
+file(STRINGS ${WANTED} wanted)
+list(POP_FRONT wanted soname)
+if(CASE STREQUAL "symbols_planted")
+  list(APPEND wanted risorius_planted)
+endif()
+file(READ ${HEADER} header)
+string(REGEX MATCHALL "\nRISORIUS_API[^(;]+\\(" declarations "${header}")
+set(declared)
+foreach(declaration ${declarations})
+  string(REGEX MATCH "risorius_[a-z_]+\\($" name "${declaration}")
+  string(REPLACE "(" "" name "${name}")
+  list(APPEND declared ${name})
+endforeach()
+list(SORT found)
+list(SORT wanted)
+list(SORT declared)
+if(NOT SONAME STREQUAL soname OR NOT found STREQUAL wanted OR NOT declared STREQUAL wanted)
+  message(FATAL_ERROR "of the library: ${SONAME};${found}\nof the header:  ${declared}\n"
+                      "of the list:    ${soname};${wanted}")
+endif()
