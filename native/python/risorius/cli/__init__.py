@@ -25,12 +25,12 @@ from . import (
     edit,
     info,
     live,
-    plot,
     sample,
     speech,
 )
 from . import eval as evaluate
 from .files import CommandLineError
+from .pages import plot
 
 INTERRUPTED = 130
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import risorius
 
-from ..files import fileio
-from .files import CommandLineError, InputError, read_bytes, require_suffix, require_writable
+from ...files import fileio
+from ..files import CommandLineError, InputError, read_bytes, require_suffix, require_writable
 
 _NEEDS = "plot draws with Matplotlib, which is not installed: pip install risorius[plot]"
 
@@ -42,12 +42,12 @@ def complain(args: argparse.Namespace) -> None:
 def run(args: argparse.Namespace) -> int:
     complain(args)
     try:
-        from ..plot import page, sheet
+        from ...plot import page, sheet
     except ImportError as error:
         if (error.name or "").partition(".")[0] != "matplotlib":
             raise
         raise InputError(_NEEDS) from error
-    from ..plot.content.facts import gather
+    from ...plot.content.facts import gather
 
     data = read_bytes(str(args.file))
     dna = risorius.load(data)
