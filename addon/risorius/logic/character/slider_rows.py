@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from ..base.face_regions import FaceRegions
 from . import slider_words
 
-_DIRECTIONS = {"Left": "Right", "Right": "Left"}
 _LEFT = re.compile(r"L(?=$|Ph\d$)|Left")
 
 

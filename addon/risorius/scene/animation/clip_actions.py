@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ... import native
 from ...logic.animation import clip_units
+from ...logic.base.sentences import Sentence, told
 from ..base import compat, parts
 from ..base.blender_types import Animated, ArmatureObject
 from ..character import armatures, runtime
@@ -42,6 +43,16 @@ class Report:
     curves: int = 0
     unknown: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+
+    def summary(self) -> Sentence:
+        """One line: its name, how much it moves, and when."""
+        return told(
+            "{action}: {curves} curves, frames {first:g} to {last:g}",
+            action=self.action.name,
+            curves=self.curves,
+            first=round(self.first, 1),
+            last=round(self.last, 1),
+        )
 
 
 def frame_rate(scene: bpy.types.Scene) -> float:

@@ -22,10 +22,9 @@ def _ring(size: float = 1.0, x: float = 0.0, y: float = 0.0, flat: float = 1.0) 
 def _lens() -> Line:
     """The outline of an open eye: two arcs that meet in corners."""
     half = _COUNT // 2
-    arc = [(math.cos(math.pi * i / half), 0.55 * math.sin(math.pi * i / half)) for i in range(half)]
-    return [(x, y * abs(1 - x * x) ** 0.5) for x, y in arc] + [
-        (-x, -y * abs(1 - x * x) ** 0.5) for x, y in arc
-    ]
+    turns = [math.pi * i / half for i in range(half)]
+    arc = [(math.cos(turn), 0.55 * math.sin(turn) ** 2) for turn in turns]
+    return arc + [(-x, -y) for x, y in arc]
 
 
 def _band(low: float, high: float) -> Line:

@@ -33,7 +33,7 @@ def values_of(rig: ArmatureObject, region: str = "") -> dict[str, float]:
     return {
         label: float(face[label])
         for label in runtime.there(rig).labels
-        if label in face and region in ("", of_slider(label))
+        if label in face and (not region or of_slider(label) == region)
     }
 
 

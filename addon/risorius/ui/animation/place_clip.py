@@ -109,14 +109,7 @@ class PlacesClip(FaceOperator):
                 {"INFO"},
                 say("and {count} more lines in the panel Animation", count=len(notes) - _SHOWN),
             )
-        text = say(
-            "{action}: {curves} curves, frame {first:g} to {last:g}",
-            action=made.action.name,
-            curves=made.curves,
-            first=made.first,
-            last=made.last,
-        )
-        self.report({"INFO"}, text)
+        self.report({"INFO"}, say(made.summary()))
 
     def draw_place(self, layout: UILayout) -> None:
         """The properties of this class."""

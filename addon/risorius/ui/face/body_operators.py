@@ -76,11 +76,13 @@ class RISORIUS_OT_attach_body(FaceOperator, Operator):
         )
         base = base or neck or head
         missing = [n for n in (base, neck, head) if n and n not in body.data.bones]
-        if missing or not base:
+        if not base:
             text = "'{body}' has no bone named head or neck: choose the bones."
-            if missing:
-                text = "'{body}' has no bone '{bone}': choose the bones."
-            self.report({"ERROR"}, say(text, body=body.name, bone=(missing or [""])[0]))
+            self.report({"ERROR"}, say(text, body=body.name))
+            return {"CANCELLED"}
+        if missing:
+            text = "'{body}' has no bone '{bone}': choose the bones."
+            self.report({"ERROR"}, say(text, body=body.name, bone=missing[0]))
             return {"CANCELLED"}
         rig_placement.attach(face_controls(context), body, base, neck, head, self.fit)
         evaluate.bring_up(context, rig)

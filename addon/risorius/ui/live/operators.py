@@ -236,14 +236,7 @@ def _finish(
     if report is None:
         operator.report({"WARNING"}, say("Nothing was received: there is no recording."))
         return False
-    text = say(
-        "{action}: {curves} curves, frames {first:.0f} to {last:.0f}",
-        action=report.action.name,
-        curves=report.curves,
-        first=report.first,
-        last=report.last,
-    )
-    operator.report({"INFO"}, text)
+    operator.report({"INFO"}, say(report.summary()))
     for note in report.notes:
         operator.report({"WARNING"}, note)
     return True
