@@ -18,6 +18,7 @@ import risorius
 from mathutils import Euler, Vector
 from risorius import speech
 from support import scene
+from support.layout import Recorder
 
 JAW, PULL, BROW = (f"CTRL_expressions.{n}" for n in ("jawOpen", "mouthCornerPullL", "browDownL"))
 
@@ -504,26 +505,13 @@ def test_speech_without_the_recogniser_says_what_to_do(rig, voice, monkeypatch):
         bpy.ops.risorius.speak(filepath=str(voice))
 
 
-class Labels:
-    """Stands in for a layout; keeps the words, and what its buttons are called."""
-
-    def __init__(self):
-        self.words = []
-
-    def label(self, text="", icon="NONE", translate=True, text_ctxt=""):
-        self.words.append(text)
-
-    def operator(self, name, icon="NONE", translate=True):
-        self.words.append(name)
-
-
 def test_the_preferences_say_in_words_why_the_button_is_grey(monkeypatch):
     listening = scene.submodule("scene.animation.speech_task")
     monkeypatch.setattr(listening, "has_recogniser", lambda: False)
-    layout = Labels()
+    layout = Recorder()
     scene.submodule("ui.speech.install").draw_preferences(layout)
-    assert layout.words[-1] == "risorius.install_speech"
-    said = any("Allow online access" in line for line in layout.words)
+    assert layout.operators == ["risorius.install_speech"]
+    said = "Allow online access" in layout.text()
     assert said == (not bpy.app.online_access)
     if said:
         with pytest.raises(RuntimeError, match="Allow online access first"):

@@ -1,15 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Baked faces move as the live ones did, by plain actions alone, and come back as they were."""
 
-from types import SimpleNamespace
-
 import addon_utils
 import bpy
 import numpy as np
 import pytest
 from support import scene
 from support.animation import animate
-from support.layout import Recorder
+from support.layout import drawn
 
 NEAR = 1e-5  # of the size: what a bake may move a vertex by
 FRAMES = (1, 2, 3, 4, 6, 8, 10)
@@ -679,26 +677,20 @@ def test_a_copy_of_a_baked_face_is_a_baked_face(mode, dna_file):
     assert not any("_baked" in a.name for a in bpy.data.actions)
 
 
-def _drawn(cls):
-    layout = Recorder()
-    cls.draw(SimpleNamespace(layout=layout), bpy.context)
-    return layout
-
-
 def test_the_panel_shows_the_state_and_the_way_back(dna_file):
     _face(dna_file)
     panel = scene.submodule("ui.face.panel").RISORIUS_PT_character
-    assert "risorius.unbake" not in _drawn(panel).operators
+    assert "risorius.unbake" not in drawn(panel).operators
     _bake(start=2, end=9)
-    assert "it plays its actions, frames 2 to 9." in _drawn(panel).text()
-    assert "risorius.unbake" in _drawn(panel).operators
-    out = _drawn(scene.submodule("ui.bake.panel").RISORIUS_PT_out)
+    assert "it plays its actions, frames 2 to 9." in drawn(panel).text()
+    assert "risorius.unbake" in drawn(panel).operators
+    out = drawn(scene.submodule("ui.bake.panel").RISORIUS_PT_out)
     assert out.operators == ["risorius.bake", "risorius.export_animation"]
     bpy.ops.risorius.unbake()
     _bake(kind="CONTROLS")
     assert (
         "The controls are baked; layers, NLA and drivers rest, frames 1 to 10."
-        in _drawn(panel).text()
+        in drawn(panel).text()
     )
 
 

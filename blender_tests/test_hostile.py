@@ -7,12 +7,12 @@ import random
 import tracemalloc
 import zlib
 from pathlib import Path
-from types import SimpleNamespace
 
 import bpy
 import pytest
 from support import hostile, scene
 from support.faces import small_face
+from support.layout import drawn
 
 SEED = 20261121
 QUICK = {"shape_mode": "LIVE", "use_materials": False}
@@ -130,28 +130,6 @@ def test_a_face_that_left_is_not_kept(tmp_path):
     assert all(len(entries) <= 5 for entries in kept)
 
 
-class _Layout:
-    """Stands in for a panel's layout: takes everything, and looks up what would be shown."""
-
-    def __init__(self):
-        self.said = []
-
-    def label(self, text="", **_options):
-        self.said.append(text)
-
-    def prop(self, owner, path, **_options):
-        owner.path_resolve(path)
-
-    def panel(self, *_arguments, **_options):
-        return self, self
-
-    def operator(self, *_arguments, **_options):
-        return SimpleNamespace()
-
-    def __getattr__(self, _name):
-        return lambda *_arguments, **_options: self
-
-
 def _draw_panels():
     """Draw every panel of the sidebar; returns the words that were shown."""
     said = []
@@ -160,9 +138,7 @@ def _draw_panels():
         scene.submodule(f"{face}.panel").CLASSES + scene.submodule(f"{face}.controls_panel").CLASSES
     ):
         if getattr(panel, "poll", lambda _context: True)(bpy.context):
-            layout = _Layout()
-            panel.draw(SimpleNamespace(layout=layout), bpy.context)
-            said += layout.said
+            said += drawn(panel).labels
     return " ".join(said)
 
 

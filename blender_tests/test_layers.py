@@ -5,6 +5,7 @@ import bpy
 import numpy as np
 import pytest
 from support import scene
+from support.layout import drawn
 
 PREFIX = "CTRL_expressions."
 JAW, PULL, BROW = (PREFIX + n for n in ("jawOpen", "mouthCornerPullL", "browDownL"))
@@ -613,8 +614,6 @@ def test_what_no_strip_can_say_stays_a_layer_and_all_above_it(rig):
 
 
 def test_operators_and_panel(rig):
-    from support.layout import Recorder
-
     controls = scene.controls(rig)
     play = scene.submodule("scene.animation.clip_actions").play
     play(rig, _wave(rig))
@@ -625,10 +624,7 @@ def test_operators_and_panel(rig):
     with pytest.raises(RuntimeError, match="no reaction sneeze"):
         bpy.ops.risorius.fire(reaction="sneeze")
     _entry(rig, name="broken", kind="EXPRESSION", expression="nothing")
-    drawn = Recorder()
-    panel = bpy.types.RISORIUS_PT_layers
-    panel.draw(type("Panel", (), {"layout": drawn})(), bpy.context)
-    assert "broken: nothing: an expression" in drawn.text()
+    assert "broken: nothing: an expression" in drawn(bpy.types.RISORIUS_PT_layers).text()
     assert bpy.ops.risorius.unfire() == {"FINISHED"}
     assert not len(controls.risorius_reactions)
 
@@ -812,14 +808,10 @@ def test_a_layer_of_what_is_not_there_is_refused(rig, kind, words):
 
 
 def test_a_reaction_that_is_gone_is_named_and_the_others_are_shown(blinker):
-    from support.layout import Recorder
-
     bpy.context.scene.frame_set(15)
     assert bpy.ops.risorius.fire(reaction="flash") == {"FINISHED"}
     _layers().reactions_of(scene.controls(blinker))[0].name = "sneeze"
     _entry(blinker, kind="EXPRESSION", expression="joy", weight=0.0)
     assert bpy.ops.risorius.fire(reaction="flash") == {"FINISHED"}
     assert _value(blinker, 19, BLINK) > 0.9
-    drawn = Recorder()
-    bpy.types.RISORIUS_PT_layers.draw(type("Panel", (), {"layout": drawn})(), bpy.context)
-    assert "sneeze: there is no such reaction" in drawn.text()
+    assert "sneeze: there is no such reaction" in drawn(bpy.types.RISORIUS_PT_layers).text()

@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 import pytest
 from support import scene
-from support.layout import Recorder
+from support.layout import drawn
 
 
 @pytest.fixture
@@ -20,18 +20,13 @@ def rig(dna_file, mode):
 
 def _said(active):
     bpy.context.view_layer.objects.active = active
-    layout = Recorder()
+    said = ""
     for name in ("panel.RISORIUS_PT_character", "controls_panel.RISORIUS_PT_controls"):
         module, _, cls = name.partition(".")
         panel = getattr(scene.submodule(f"ui.face.{module}"), cls)
         if not hasattr(panel, "poll") or panel.poll(bpy.context):
-            panel.draw(_Drawn(layout), bpy.context)
-    return layout.text()
-
-
-class _Drawn:
-    def __init__(self, layout):
-        self.layout = layout
+            said += drawn(panel).text()
+    return said
 
 
 def _use(active):

@@ -8,14 +8,13 @@ import subprocess
 import sys
 from pathlib import Path
 from time import monotonic, sleep
-from types import SimpleNamespace
 
 import bpy
 import numpy as np
 import pytest
 import risorius.live
 from mathutils import Euler
-from support import scene
+from support import layout, scene
 from support.faces import CONTROLS, HEAD
 
 SENDER = Path(__file__).resolve().parents[1] / "tests" / "python" / "face_sender.py"
@@ -457,40 +456,9 @@ def test_undo_does_not_end_it(dna_file, port):
     assert scene.error_against_oracle(rig, dna_file, raw(jawOpen=0.5)) < scene.TOLERANCE
 
 
-class Layout:
-    """Stands in for a panel's layout: takes what Blender's would, keeps the words."""
-
-    ICONS = set(bpy.types.UILayout.bl_rna.functions["label"].parameters["icon"].enum_items.keys())
-
-    def __init__(self):
-        self.words = []
-
-    def label(self, text="", icon="NONE", translate=True, text_ctxt=""):
-        assert icon in self.ICONS, icon
-        self.words.append(text)
-
-    def prop(self, data, name, text=None, icon="NONE", translate=True):
-        assert name in data.bl_rna.properties
-        assert icon in self.ICONS, icon
-
-    def operator(self, name, text="", icon="NONE", depress=False, translate=True):
-        assert icon in self.ICONS, icon
-        assert name.partition(".")[2] in dir(bpy.ops.risorius), name
-        self.words.append(text)
-        return SimpleNamespace()
-
-    def row(self, align=False):
-        return self
-
-    column = box = row
-
-
 def drawn():
     """The words of the panel as it is now."""
-    layout = Layout()
-    panel = scene.submodule("ui.live.panel").RISORIUS_PT_live
-    panel.draw(SimpleNamespace(layout=layout), bpy.context)
-    return " | ".join(layout.words)
+    return layout.drawn(scene.submodule("ui.live.panel").RISORIUS_PT_live).text(" | ")
 
 
 def test_the_panel_says_what_comes(dna_file, port):

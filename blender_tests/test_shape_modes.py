@@ -5,6 +5,7 @@ import bpy
 import numpy as np
 import pytest
 from support import scene
+from support.layout import drawn
 
 
 def _head(rig):
@@ -274,19 +275,13 @@ def test_override_ends_by_itself(mode, dna_file, tmp_path, end):
 
 
 def test_the_panel_draws_with_and_without_a_test(dna_file):
-    from types import SimpleNamespace
-
-    from support.layout import Recorder
-
     scene.load(dna_file)
     panel = scene.submodule("ui.face.channel_preview").RISORIUS_PT_shape_test
     assert panel.poll(bpy.context)
     for value, buttons in ((None, 1), (0.5, 2)):
         if value is not None:
             bpy.ops.risorius.test_channel(channel="1", value=value)
-        layout = Recorder()
-        panel.draw(SimpleNamespace(layout=layout), bpy.context)
-        assert layout.operators == ["risorius.test_channel"] * buttons
+        assert drawn(panel).operators == ["risorius.test_channel"] * buttons
 
 
 def test_only_shapes_that_move_something_are_offered(dna_file):

@@ -1,9 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Stands in for a UILayout: remembers what a panel says, because no window exists here."""
 
+from operator import attrgetter
+from types import SimpleNamespace
+
+import bpy
+
+ICONS = set(bpy.types.UILayout.bl_rna.functions["label"].parameters["icon"].enum_items.keys())
+
 
 class Recorder:
-    """Takes every call that a panel makes; `labels` and `operators` hold what was drawn."""
+    """Takes every call that a panel makes, and looks up what Blender would look up.
+
+    `labels` has the words that were drawn, those of buttons too, `operators` what the buttons do.
+    """
 
     def __init__(self, top=None):
         top = top or self
@@ -14,21 +24,38 @@ class Recorder:
     def __setattr__(self, _name, _value):
         """Options of a layout or of an operator button."""
 
-    def label(self, text="", **_options):
+    def label(self, text="", icon="NONE", **_options):
+        assert icon in ICONS, icon
         self.labels.append(text)
 
-    def operator(self, name, *_arguments, **_options):
+    def prop(self, owner, path, icon="NONE", **_options):
+        assert icon in ICONS, icon
+        owner.path_resolve(path)
+
+    def operator(self, name, text="", icon="NONE", **_options):
+        assert icon in ICONS, icon
+        attrgetter(name)(bpy.ops).get_rna_type()
         self.operators.append(name)
+        if text:
+            self.labels.append(text)
         return Recorder(self._top)
+
+    def operator_menu_enum(self, name, _property, **options):
+        return self.operator(name, **options)
 
     def panel(self, *_arguments, **_options):
         return Recorder(self._top), Recorder(self._top)
 
     def __getattr__(self, name):
-        if name == "operator_menu_enum":
-            return self.operator
         return lambda *_a, **_o: Recorder(self._top)
 
-    def text(self):
+    def text(self, between=" "):
         """All words, as one line."""
-        return " ".join(self.labels)
+        return between.join(self.labels)
+
+
+def drawn(panel):
+    """What a panel draws now, as a Recorder."""
+    layout = Recorder()
+    panel.draw(SimpleNamespace(layout=layout), bpy.context)
+    return layout
