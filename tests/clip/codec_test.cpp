@@ -104,6 +104,26 @@ TEST(ClipFile, FramesThatAreNotThereAreRefused) {
   limits = {};
   limits.controls = 7;
   EXPECT_EQ(decode(bytes, Ends::kMustBeWhole, limits).error().where, "head.names");
+  limits = {};
+  limits.frames = 49;
+  const auto long_one = decode(bytes, Ends::kMustBeWhole, limits);
+  EXPECT_EQ(long_one.error().code, core::ErrorCode::kLimitExceeded);
+  EXPECT_EQ(long_one.error().where, "index");
+  limits.frames = 50;
+  EXPECT_TRUE(decode(bytes, Ends::kMustBeWhole, limits).has_value());
+}
+
+TEST(ClipFile, PairsOfMetadataAreLimited) {
+  Clip clip = make_full_clip(3);
+  clip.head.metadata = {{"a", "1"}, {"b", "2"}, {"c", "3"}};
+  const Bytes bytes = must_encode(clip);
+  Limits limits;
+  limits.metadata = 3;
+  EXPECT_TRUE(decode(bytes, Ends::kMustBeWhole, limits).has_value());
+  limits.metadata = 2;
+  const auto read = decode(bytes, Ends::kMustBeWhole, limits);
+  EXPECT_EQ(read.error().code, core::ErrorCode::kLimitExceeded);
+  EXPECT_EQ(read.error().where, "head.metadata");
 }
 
 // Each name repeats the one before and adds a letter: 3 bytes in the file.

@@ -155,6 +155,15 @@ constexpr Bad kBad[] = {
     {"curves", [](Layer& l) { l.curves = nullptr; }},
 };
 
+TEST(Mixer, RefusesRangesThatAreNotOneForEachControl) {
+  for (const auto& [low, high] : {std::pair{3u, 4u}, std::pair{4u, 5u}}) {
+    const auto made = Mixer::make(kNames, std::vector<float>(low), std::vector<float>(high), 8);
+    ASSERT_FALSE(made);
+    EXPECT_EQ(made.error().code, core::ErrorCode::kInvalidLength);
+    EXPECT_EQ(made.error().where, "ranges");
+  }
+}
+
 TEST(Mixer, RefusesALayerThatMakesNoSenseAndKeepsTheOldOnes) {
   Mixer m = mixer();
   const Layer good = layer(curves({"a"}, {0.5f, 0.75f}, 2));

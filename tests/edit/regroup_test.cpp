@@ -133,6 +133,27 @@ TEST(Regroup, ZeroTakesOutNothing) {
   EXPECT_EQ(out.report.before.nonzero, out.report.after.nonzero);
 }
 
+// Two pairs of joints, each by a control of its own. The other pair's control moves each a little,
+// which shows no kinship as long as what is small is left out of the search.
+TEST(Regroup, FindsRegionsByWhatIsNotSmall) {
+  dna::Dna dna = make_face(2, 0, 4);
+  dna.behavior.joint_groups = std::vector{
+      make_group({4, 4}, {0, 1}, {0, 9, 18, 27}, {1, 0.04f, 1, 0.04f, 0.04f, 1, 0.04f, 1})};
+  RegroupOptions options;
+  options.threshold.translation_mm = 0.5;
+  EXPECT_EQ(must_regroup(dna, options).report.regions, (std::vector<Indices>{{0, 1}, {2, 3}}));
+}
+
+TEST(Regroup, TimesBothFacesWhereItIsAsked) {
+  RegroupOptions options;
+  options.timed = 3;
+  const auto out = regroup(two_joints(), options);
+  ASSERT_TRUE(out.has_value());
+  EXPECT_GT(out->report.microseconds_before, 0.0);
+  EXPECT_GT(out->report.microseconds_after, 0.0);
+  EXPECT_EQ(must_regroup(two_joints()).report.microseconds_after, 0.0);
+}
+
 TEST(Regroup, NamesThePoseWhereAJointMovedMost) {
   // Joint 0 turns by a foreign degree; joint 1 is its child, 10 cm away.
   dna::Dna dna = with_outliers(0.0f, 0.0f);
