@@ -114,9 +114,9 @@ run_blender() {
   note_report "$name" "$log.xml" $code --files $files
 }
 some() { printf 'blender_tests/test_%s.py ' "$@"; }
-run_subsets() { # what differs most between versions: installing, building, keys and actions, odd files
+run_subsets() { # what differs most between versions: installing, building, keys and actions, saved files
   local subset version other
-  subset=$(some extension vertices controls frames failures bake past)
+  subset=$(some extension controls frames past)
   for version in 4.2.23 5.0.1; do
     step "a fast subset in bpy $version"
     if other=$(bpy_venv "$version" 90); then

@@ -158,7 +158,7 @@ FloatArray out_argument(const clip::Mixer& mixer, const py::object& out) {
   return py::cast<FloatArray>(given);
 }
 
-FloatArray evaluate(clip::Mixer& mixer, double time, const py::object& base,
+FloatArray mix(clip::Mixer& mixer, double time, const py::object& base,
                     const py::object& out) {
   FloatArray result = out_argument(mixer, out);
   FloatArray below;
@@ -168,7 +168,7 @@ FloatArray evaluate(clip::Mixer& mixer, double time, const py::object& base,
 }
 
 // base: one frame for all times, or one for each.
-FloatArray evaluate_batch(clip::Mixer& mixer, const DoubleArray& times, const py::object& base) {
+FloatArray mix_batch(clip::Mixer& mixer, const DoubleArray& times, const py::object& base) {
   if (times.ndim() != 1) shape_error("times", "(n,)", times);
   const auto count = static_cast<py::ssize_t>(mixer.control_count());
   FloatArray below;
@@ -218,8 +218,8 @@ void bind_mixer(py::module_& m) {
       .def("set_rules", &set_rules, "yields"_a, "opposites"_a)
       .def("fire", &fire, "reaction"_a, "time"_a, "strength"_a)
       .def("clear_fired", &clip::Mixer::clear_fired)
-      .def("evaluate", &evaluate, "time"_a, "base"_a = py::none(), "out"_a = py::none())
-      .def("evaluate_batch", &evaluate_batch, "times"_a, "base"_a = py::none());
+      .def("evaluate", &mix, "time"_a, "base"_a = py::none(), "out"_a = py::none())
+      .def("evaluate_batch", &mix_batch, "times"_a, "base"_a = py::none());
 }
 
 }  // namespace risorius::bindings

@@ -135,7 +135,8 @@ TEST(Block, EveryPrefixIsRefused) {
 
 TEST(Block, EveryChangedByteIsFoundByTheFullCheck) {
   const BlockBytes whole = bytes_of(must_compile(face_with_everything()));
-  for (std::size_t at = first_byte(); at < whole.size(); at += kStride) {
+  const auto [first, step] = shared_steps();
+  for (std::size_t at = first; at < whole.size(); at += step) {
     for (const int change : {0x01, 0x80, 0xFF}) {
       BlockBytes changed = whole;
       changed[at] = static_cast<std::uint8_t>(changed[at] ^ change);
@@ -146,7 +147,8 @@ TEST(Block, EveryChangedByteIsFoundByTheFullCheck) {
 
 int damage_each_byte(const BlockBytes& whole) {
   int refused = 0;
-  for (std::size_t at = first_byte(); at < whole.size(); at += kStride) {
+  const auto [first, step] = shared_steps();
+  for (std::size_t at = first; at < whole.size(); at += step) {
     for (const int value : {0x00, 0x01, 0x7F, 0xFF}) {
       BlockBytes changed = whole;
       changed[at] = static_cast<std::uint8_t>(value);
@@ -186,7 +188,7 @@ TEST(Block, ChangedBytesUnderARightHashDoNoHarm) {
   for (const dna::Dna& dna : {face_with_everything(), face_that_learns()}) {
     refused += damage_each_byte(bytes_of(must_compile(dna)));
   }
-  EXPECT_GT(refused, 500 / static_cast<int>(kStride));
+  EXPECT_GT(refused, 500 / static_cast<int>(shared_steps().step));
 }
 
 // The first element of one of a Rig's arrays, in a copy of its block.

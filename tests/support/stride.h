@@ -2,6 +2,7 @@
 // Tests that change each byte of a file in turn.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
@@ -22,15 +23,21 @@ inline constexpr std::size_t kStride = 5;
 inline constexpr std::size_t kStride = 1;
 #endif
 
-// Runs of one program with other instruction sets begin at other bytes, so that together they pass
-// over few.
-inline std::size_t first_byte() {
+// Which bytes of a file are changed: from first, each step-th.
+struct Steps {
+  std::size_t first, step;
+};
+
+// A program that is run with each instruction set changes other bytes in each, so that together
+// the runs pass over few: what a changed byte does is the same in all of them.
+inline Steps shared_steps() {
   constexpr std::string_view kSets[] = {"scalar", "sse4", "avx2", "avx512", "neon"};
+  constexpr std::size_t kOfOneProcessor = 4, kStep = std::max(kStride, kOfOneProcessor);
   const char* forced = std::getenv("RISORIUS_SIMD");
   for (std::size_t i = 0; forced != nullptr && i < std::size(kSets); ++i) {
-    if (kSets[i] == forced) return i % kStride;
+    if (kSets[i] == forced) return {i % kStep, kStep};
   }
-  return 0;
+  return {0, kStride};
 }
 
 // Bytes of a file to change: each one, but of those that stand with the same neighbours in another
