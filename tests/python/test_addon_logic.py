@@ -40,6 +40,7 @@ face_regions = importlib.import_module("risorius_addon_logic.base.face_regions")
 sentences = importlib.import_module("risorius_addon_logic.base.sentences")
 slider_rows = importlib.import_module("risorius_addon_logic.character.slider_rows")
 slider_words = importlib.import_module("risorius_addon_logic.character.slider_words")
+lod_distance = importlib.import_module("risorius_addon_logic.character.lod_distance")
 space = importlib.import_module("risorius_addon_logic.base.space")
 plans = importlib.import_module("risorius_addon_logic.character.plans")
 recogniser = importlib.import_module("risorius_addon_logic.animation.recogniser")
@@ -143,6 +144,20 @@ class TestRegions:
         assert slider_words.matches(control, "SÜSS corner", "süss")
         assert slider_words.matches(control, "smi", "grin smile")
         assert not slider_words.matches(control, "ear", "fear tears")
+
+
+def test_levels_give_way_at_doubled_distances_and_come_back_late() -> None:
+    assert lod_distance.default_distances(4, 0.25) == [1.5, 3.0, 6.0]
+    assert (
+        lod_distance.default_distances(1, 0.25) == lod_distance.default_distances(2, 0.25) == [1.5]
+    )
+    limits, built = [1.5, 3.0, 6.0], [0, 1, 3]
+    at = [lod_distance.level_at(d, limits, built) for d in (1.49, 1.5, 3.0, 6.0, 99.0)]
+    assert at == [0, 1, 3, 3, 3]  # level 2 has no mesh
+    assert lod_distance.level_at(1.6, limits, built, current=0) == 0
+    assert lod_distance.level_at(1.66, limits, built, current=0) == 1
+    assert lod_distance.level_at(1.4, limits, built, current=1) == 1
+    assert lod_distance.level_at(1.34, limits, built, current=1) == 0
 
 
 def test_a_sentence_remembers_what_it_was_made_of() -> None:
