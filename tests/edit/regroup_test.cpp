@@ -133,15 +133,27 @@ TEST(Regroup, ZeroTakesOutNothing) {
   EXPECT_EQ(out.report.before.nonzero, out.report.after.nonzero);
 }
 
-// Two pairs of joints, each by a control of its own. The other pair's control moves each a little,
-// which shows no kinship as long as what is small is left out of the search.
+// Two halves of the joints, each by a control of its own. The other half's control moves each fifth
+// a little, which shows no kinship as long as what is small is left out of the search.
 TEST(Regroup, FindsRegionsByWhatIsNotSmall) {
-  dna::Dna dna = make_face(2, 0, 4);
-  dna.behavior.joint_groups = std::vector{
-      make_group({4, 4}, {0, 1}, {0, 9, 18, 27}, {1, 0.04f, 1, 0.04f, 0.04f, 1, 0.04f, 1})};
+  constexpr std::uint16_t kHalf = 40;
+  dna::Dna dna = make_face(2, 0, 2 * kHalf);
+  Indices outputs;
+  std::vector<float> values;
+  std::vector<Indices> halves(2);
+  for (std::uint16_t j = 0; j < 2 * kHalf; ++j) {
+    outputs.push_back(static_cast<std::uint16_t>(j * 9));
+    const float small = j % 5 == 0 ? 0.04f : 0.0f;
+    values.insert(values.end(), {j < kHalf ? 1.0f : small, j < kHalf ? small : 1.0f});
+    halves[j / kHalf].push_back(j);
+  }
+  dna.behavior.joint_groups =
+      std::vector{make_group({2 * kHalf, 2 * kHalf}, {0, 1}, outputs, values)};
   RegroupOptions options;
   options.threshold.translation_mm = 0.5;
-  EXPECT_EQ(must_regroup(dna, options).report.regions, (std::vector<Indices>{{0, 1}, {2, 3}}));
+  const Regrouped out = must_regroup(dna, options);
+  EXPECT_EQ(out.report.regions, halves);
+  EXPECT_EQ(out.report.removed, 2u * kHalf / 5);
 }
 
 TEST(Regroup, TimesBothFacesWhereItIsAsked) {
