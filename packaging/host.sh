@@ -1,0 +1,140 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
+# host.sh: the C library as other programs have it. It is installed into an empty folder; the sample
+# host of native/example is built from there with find_package, and run; golden values are compared
+# through ctypes; then the same for Windows, with zig, and run under wine.
+# Prints rows `row<TAB>name<TAB>passed<TAB>failed`; exit code 0 only if nothing failed.
+#
+#   host.sh             Linux
+#   host.sh --windows   and Windows: needs Debian's wine64, and says NOT RUN where there is none
+set -uo pipefail
+source "$(dirname "$0")/setup.sh"
+
+out="$project/build/host"
+logs="$project/build/logs/host"
+golden="$project/tests/data/golden"
+face="$golden/medium.dna"
+failed=0
+case "${1:-}" in
+  "" | --windows) ;;
+  *) echo "host.sh: $1 is not --windows" >&2 && exit 2 ;;
+esac
+
+works() { # works NAME LOG COMMAND...: one row
+  local name=$1 log="$logs/$2.log" good=1
+  shift 2
+  "$@" > "$log" 2>&1 || good=0
+  [ $good = 1 ] || { tail -n 30 "$log" && failed=1; }
+  printf 'row\t%s\t%d\t%d\n' "$name" $good $((1 - good))
+  [ $good = 1 ]
+}
+
+# install_library FOLDER [OPTION...]: into FOLDER/prefix
+install_library() {
+  local to=$1
+  shift
+  rm -rf "$to/prefix"
+  cmake -S "$project" -B "$to-library" -G Ninja -DCMAKE_BUILD_TYPE=Release -DRISORIUS_BUILD_BINDINGS=OFF \
+    -DRISORIUS_WARNINGS_AS_ERRORS=ON -DCMAKE_CXX_COMPILER_LAUNCHER=ccache "$@" &&
+    cmake --build "$to-library" -j"$(nproc)" --target risorius_shared risorius_static && cmake --install "$to-library" --prefix "$to/prefix"
+}
+# What a packager would miss: a file more or less. The version of the files is the project's.
+is_whole() {
+  (cd "$out/prefix" && find . -type f -o -type l | sed 's|^\./||' | sed -E 's/\.so\.[0-9]+\.[0-9]+\.[0-9]+$/.so.VERSION/' |
+    LC_ALL=C sort) | diff - "$project/packaging/host/installed.txt"
+}
+# build_example FOLDER [OPTION...]: of what FOLDER/prefix has, and of nothing else
+build_example() {
+  local to=$1
+  shift
+  rm -rf "$to/example"
+  cmake -S "$project/native/example" -B "$to/example" -G Ninja -DCMAKE_BUILD_TYPE=Release \
+    -DCMAKE_PREFIX_PATH="$to/prefix" "$@" && cmake --build "$to/example"
+}
+# Both ways of linking say the same, and it is the face of the file.
+example_runs() {
+  "$out/example/smile_risorius" "$face" > "$out/shared.txt" &&
+    "$out/example/smile_static" "$face" > "$out/static.txt" && cat "$out/shared.txt" &&
+    cmp "$out/shared.txt" "$out/static.txt" && [ "$(grep -c '^LOD' "$out/shared.txt")" -eq 4 ] &&
+    grep -q 'joints: sum [1-9]' "$out/shared.txt"
+}
+refuses() { # refuses COMMAND...: a file that is cut short, in one sentence and with exit code 1
+  head -c 3000 "$face" > "$out/cut.dna"
+  "$@" "$out/cut.dna" 2> "$out/refused.txt"
+  [ $? -eq 1 ] && cat "$out/refused.txt" && [ "$(wc -l < "$out/refused.txt")" -eq 1 ] &&
+    grep -qE '^smile: (truncated|invalid_).* at byte [0-9]+' "$out/refused.txt"
+}
+# The header alone, in C99 and in C++, as strict as compilers are.
+header_compiles() {
+  local header="$out/prefix/include/risorius.h"
+  gcc -std=c99 -Wall -Wextra -Wstrict-prototypes -pedantic-errors -Werror -fsyntax-only -x c "$header" &&
+    g++ -std=c++11 -Wall -Wextra -pedantic-errors -Werror -fsyntax-only -x c++ "$header"
+}
+agrees_with_golden() {
+  "$python" "$project/packaging/host/golden.py" "$(find "$out/prefix" -name 'librisorius.so')" "$golden"
+}
+
+windows="$project/build/host-windows"
+zig_for_windows() {
+  local zig name tools="$windows/tools" venv="$project/build/cross/venv"
+  [ -x "$venv/bin/python" ] || python3 -m venv "$venv" || return 1
+  "$venv/bin/python" -m pip install -q -r "$project/packaging/cross/requirements.txt" || return 1
+  zig=$("$venv/bin/python" -c \
+    'import pathlib, ziglang; print(pathlib.Path(ziglang.__file__).with_name("zig"))') || return 1
+  mkdir -p "$tools" "$windows/packages/include"
+  for name in ar ranlib rc; do printf '#!/bin/sh\nexec "%s" %s "$@"\n' "$zig" $name > "$tools/$name"; done
+  # zig checks undefined behavior unless it is told not to, and the checks ask for a runtime library.
+  for name in cc c++; do
+    printf '#!/bin/sh\nexec "%s" %s -target x86_64-windows-gnu -fno-sanitize=undefined "$@"\n' "$zig" $name \
+      > "$tools/x86_64-windows-gnu-$name"
+  done
+  chmod +x "$tools"/*
+  cp -rT /usr/include/nlohmann "$windows/packages/include/nlohmann" &&
+    cp /usr/include/xxhash.h "$windows/packages/include/" &&
+    mkdir -p "$windows/packages/share/cmake" &&
+    cp -rT /usr/share/cmake/nlohmann_json "$windows/packages/share/cmake/nlohmann_json"
+}
+windows_options=(--toolchain "$project/packaging/cross/toolchain.cmake" -DRISORIUS_TARGET=x86_64-windows-gnu
+  -DRISORIUS_TOOLS="$windows/tools" "-DCMAKE_C_COMPILER=$windows/tools/x86_64-windows-gnu-cc"
+  -DRISORIUS_PREFIX="$windows/packages;$windows/prefix")
+under_wine() { # under_wine COMMAND...: the dynamic library lies in bin
+  WINEPREFIX="$windows/wine" WINEDEBUG=-all WINEPATH="$(winepath_of "$windows/prefix/bin")" \
+    timeout -s KILL 300 "$wine" "$@"
+}
+winepath_of() { echo "Z:${1//\//\\}"; }
+# The scalar path has the same bits on every system.
+windows_runs() {
+  local kind
+  for kind in risorius static; do
+    RISORIUS_SIMD=scalar under_wine "$windows/example/smile_$kind.exe" "$(winepath_of "$face")" |
+      tr -d '\r' > "$windows/$kind.txt" || return 1
+    RISORIUS_SIMD=scalar "$out/example/smile_static" "$face" | diff - "$windows/$kind.txt" || return 1
+  done
+  cat "$windows/static.txt"
+}
+
+mkdir -p "$out" "$logs"
+step "tools" && install_packages && make_venv || exit 1
+step "C library"
+works "C library, installed" library install_library "$out" || exit 1
+works "C library, what is installed" installed is_whole
+works "risorius.h in C99 and C++" header header_compiles
+step "sample host"
+works "sample host, built by find_package" example build_example "$out" &&
+  works "sample host, shared and static" run example_runs &&
+  works "sample host, a file cut short" refused refuses "$out/example/smile_risorius"
+works "C library through ctypes, golden values" golden agrees_with_golden
+if [ "${1:-}" = --windows ]; then
+  step "Windows"
+  wine=$(command -v wine64 || ls /usr/lib/wine/wine64 2> /dev/null)
+  works "C library, x86_64-windows-gnu" windows-library eval 'zig_for_windows &&
+    install_library "$windows" "${windows_options[@]}"' &&
+    works "sample host, x86_64-windows-gnu" windows-example build_example "$windows" "${windows_options[@]}" &&
+    if [ -n "$wine" ]; then
+      works "sample host under wine, bits of Linux" wine windows_runs
+    else
+      echo "NOT RUN: the sample host for Windows, there is no wine64"
+    fi
+fi
+step ""
+[ $failed -eq 0 ]
