@@ -2,6 +2,7 @@
 """The panel Controls: one slider per control, grouped by region."""
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 
 import bpy
 
@@ -50,8 +51,7 @@ class RISORIUS_PT_controls(FaceOnlyPanel, Panel):
         if only_used:
             used = sides.in_use(rig)
             shown = [name for name in shown if name in used]
-        for region, indices in slider_words.group_controls(shown, native.regions()).items():
-            names = [shown[i] for i in indices]
+        for region, names in _regions(tuple(shown)):
             if search or only_used:
                 _draw_region_header(layout.row(), region)
                 _draw_sliders(context, layout, face, region, names, followers)
@@ -63,6 +63,18 @@ class RISORIUS_PT_controls(FaceOnlyPanel, Panel):
         if not shown:
             nothing = "No control has these words." if search else "All controls are at rest."
             words.write(layout, nothing, "INFO")
+
+
+# A panel is drawn again with every frame that plays: what is in it is sorted once.
+@lru_cache(maxsize=8)
+def _regions(shown: tuple[str, ...]) -> list[tuple[str, tuple[str, ...]]]:
+    groups = slider_words.group_controls(shown, native.regions())
+    return [(region, tuple(shown[i] for i in places)) for region, places in groups.items()]
+
+
+@lru_cache(maxsize=64)
+def _rows(names: tuple[str, ...], region: str, seen: bool) -> list[slider_rows.Row]:
+    return slider_rows.rows_of(names, region, native.regions(), seen)
 
 
 def _is_found(name: str, search: str) -> bool:
@@ -115,7 +127,7 @@ def _draw_sliders(
     column = layout.column(align=True)
     ruler = words.Ruler(context, _TITLE)
     followers = followers or {}
-    lines = slider_rows.rows_of(names, region, native.regions(), as_seen(context))
+    lines = _rows(tuple(names), region, as_seen(context))
     if any(line.is_pair for line in lines):
         _draw_sides(column, bool(followers))
     for line in lines:
