@@ -1,0 +1,17 @@
+# SPDX-License-Identifier: MIT
+"""python -m risorius.selftest [FACE.dna]: prints the report; exit code 0 only if all is well."""
+
+import sys
+
+from . import failed, run, text
+
+
+def main() -> int:
+    """Run the checks; a face that is named is the one whose frame is timed."""
+    rows = run(sys.argv[1] if len(sys.argv) > 1 else None)
+    print(text(rows))
+    return 1 if failed(rows) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

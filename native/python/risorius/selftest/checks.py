@@ -1,0 +1,220 @@
+# SPDX-License-Identifier: MIT
+"""The checks, each a row: load, evaluate with every instruction set, write and read, time a frame.
+
+The faces and the values beside them (golden/) are synthetic and come from OpenRigLogic, an
+independent implementation (tests/data/golden/README.md of the project). What is compared was chosen
+by tests/python/make_selftest.py.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from functools import partial
+from importlib import resources
+from pathlib import Path
+from time import perf_counter
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from .. import Clip, DnaError, Rig, __version__, available_simd, load
+from ..files import fileio
+
+FACES = ("core", "units", "solvers")
+TOLERANCE = 2e-4  # of max(1, |value|); what float32 sums in another order may differ by
+TIMED = 0.2  # seconds that frames are timed for
+_NAME = "Prüfung 面.dna"  # a name that old ways of writing files do not carry
+
+
+class Row(NamedTuple):
+    """What one check found."""
+
+    name: str
+    passed: bool
+    text: str
+
+
+class _Failed(Exception):  # noqa: N818  never leaves this file
+    """A check found something wrong; the text says what."""
+
+
+def run(face: str | os.PathLike[str] | None = None) -> list[Row]:
+    """Run every check; what raises is a row that failed.
+
+    Args:
+        face: a DNA file whose frame is timed; None takes one of the wheel's.
+    """
+    rows = [_guarded("machine", _machine)]
+    rows += [_guarded(f"load {name}", partial(_load, name)) for name in FACES]
+    for simd in available_simd().split(", "):
+        rows.append(_guarded(f"evaluate, {simd}", partial(_evaluate, simd)))
+    rows.append(_guarded("scalar bits", _scalar_bits))
+    rows.append(_guarded("damaged file", _damaged))
+    rows.append(_guarded("write and read", _files))
+    rows.append(_guarded("time of a frame", partial(_time, face)))
+    return rows
+
+
+def _guarded(name: str, check: Callable[[], str]) -> Row:
+    try:
+        return Row(name, True, check())
+    except _Failed as error:
+        return Row(name, False, str(error))
+    except OSError as error:  # without the path: a report goes to strangers
+        return Row(name, False, f"{type(error).__name__}: {error.strerror or 'no reason given'}")
+    except Exception as error:  # noqa: BLE001  the report is for what nobody expected
+        return Row(name, False, f"{type(error).__name__}: {error}")
+
+
+def content(name: str) -> bytes:
+    """The bytes of a file of golden/."""
+    return resources.files(__package__).joinpath("golden", name).read_bytes()
+
+
+class _Case(NamedTuple):
+    """Raw controls at a LOD, and what a reference evaluates them to."""
+
+    lod: int
+    raw: npt.NDArray[np.float32]
+    joints: npt.NDArray[np.float32]
+    shapes: npt.NDArray[np.float32]
+    maps: npt.NDArray[np.float32]
+
+
+def _cases(name: str) -> Iterator[_Case]:
+    """The cases of a face: golden/NAME.f32, little-endian float32, a row for each.
+
+    A row is lod, raw controls, joints (9 each), blend shapes, animated maps.
+    """
+    dna = load(content(f"{name}.dna"))
+    sizes = [1, len(dna.raw_control_names), 9 * len(dna.joint_names)]
+    sizes += [len(dna.blend_shape_channel_names), len(dna.animated_map_names)]
+    table = np.frombuffer(content(f"{name}.f32"), "<f4").reshape(-1, sum(sizes))
+    for row in table:
+        lod, raw, joints, shapes, maps = np.split(row, np.cumsum(sizes)[:-1])
+        yield _Case(int(lod[0]), raw, joints, shapes, maps)
+
+
+def _machine() -> str:
+    libc = " ".join(platform.libc_ver()) if sys.platform == "linux" else ""
+    return ", ".join(
+        word
+        for word in (
+            f"Risorius {__version__}",
+            f"Python {sys.version.split()[0]}",
+            f"NumPy {np.__version__}",
+            sys.platform,
+            platform.release(),
+            platform.machine(),
+            libc,
+        )
+        if word
+    )
+
+
+def _load(name: str) -> str:
+    dna = load(content(f"{name}.dna"))
+    findings = dna.validate()
+    if findings:
+        raise _Failed(str(findings[0]))
+    return f"{len(dna.raw_control_names)} controls, {len(dna.joint_names)} joints"
+
+
+def _error(case: _Case, rig: Rig) -> float:
+    pose = rig.evaluate(case.raw, lod=case.lod, settle=False)
+    worst = 0.0
+    for wanted, given in (
+        (case.joints, pose.joints.ravel()),
+        (case.shapes, pose.blend_shapes),
+        (case.maps, pose.animated_maps),
+    ):
+        if wanted.size:
+            apart = np.abs(given.astype(np.float64) - wanted) / np.maximum(1, np.abs(wanted))
+            worst = max(worst, float(apart.max())) if np.isfinite(apart).all() else np.inf
+    return worst
+
+
+def _evaluate(simd: str) -> str:
+    worst, count = 0.0, 0
+    for name in FACES:
+        rig = Rig(load(content(f"{name}.dna")), simd=simd)
+        for case in _cases(name):
+            error = _error(case, rig)
+            if error > TOLERANCE:
+                raise _Failed(f"face {name}, case {count}: {error:.2g} from the reference")
+            worst, count = max(worst, error), count + 1
+    return f"{count} poses, at most {worst:.1g} from the reference"
+
+
+def scalar_hash() -> str:
+    """SHA-256 of what the scalar path makes of all cases of the face `core`, in hexadecimal."""
+    rig = Rig(load(content("core.dna")), simd="scalar")
+    out = hashlib.sha256()
+    for case in _cases("core"):
+        pose = rig.evaluate(case.raw, lod=case.lod, settle=False)
+        for values in (pose.joints, pose.blend_shapes, pose.animated_maps, pose.controls):
+            out.update(np.ascontiguousarray(values, "<f4").tobytes())
+    return out.hexdigest()
+
+
+def _scalar_bits() -> str:
+    found, wanted = scalar_hash(), content("scalar.sha256").decode().strip()
+    if found != wanted:
+        raise _Failed(f"{found[:16]}, elsewhere {wanted[:16]}")
+    return f"{found[:16]}, as everywhere"
+
+
+def _damaged() -> str:
+    whole = content("core.dna")
+    for size in (0, 3, len(whole) // 2, len(whole) - 1):
+        try:
+            load(whole[:size])
+        except DnaError:
+            continue
+        raise _Failed(f"a file of {size} bytes of {len(whole)} was taken")
+    return "files that are cut short are refused"
+
+
+def _files() -> str:
+    whole = content("solvers.dna")
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / _NAME
+        for _ in range(2):  # the second time over the first
+            load(whole).save(str(path))
+            if path.read_bytes() != whole:
+                raise _Failed("what was written is not what was read")
+        if load(path).to_bytes() != whole:
+            raise _Failed("the file says something else than its bytes")
+        names = load(whole).raw_control_names
+        curves = np.linspace(0, 1, 5 * len(names), dtype=np.float32).reshape(-1, 5)
+        clip = path.with_suffix(".rzc")
+        Clip(names, curves, 30.0).save(clip)
+        if not np.array_equal(Clip.load(clip).curves, curves):
+            raise _Failed("a clip came back different")
+        fileio.write_bytes(path, b"")
+        if path.read_bytes() != b"":
+            raise _Failed("a file could not be replaced")
+        left = sorted(p.suffix for p in Path(folder).iterdir())
+        if left != [".dna", ".rzc"]:
+            raise _Failed(f"files were left behind: {left}")
+    return "a face and a clip, byte for byte, under a name with umlauts and Chinese"
+
+
+def _time(face: str | os.PathLike[str] | None) -> str:
+    rig = Rig(load(face if face is not None else content("solvers.dna")))
+    raw = np.full(len(rig.raw_control_names), 0.5, np.float32)
+    rig.evaluate(raw)
+    times = []
+    end = perf_counter() + TIMED
+    while perf_counter() < end:
+        begin = perf_counter()
+        rig.evaluate(raw)
+        times.append(perf_counter() - begin)
+    middle = sorted(times)[len(times) // 2] * 1e6
+    return f"{middle:.0f} microseconds ({rig.simd}, {rig.joint_count} joints)"

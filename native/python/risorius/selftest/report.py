@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: MIT
+"""The report: text that a user sends back; it names the machine and nobody's folders."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from .checks import Row
+
+
+def failed(rows: Iterable[Row]) -> list[Row]:
+    """The rows that did not pass."""
+    return [row for row in rows if not row.passed]
+
+
+def text(rows: Iterable[Row]) -> str:
+    """A line for each row, and one that says how it went."""
+    rows = list(rows)
+    bad = len(failed(rows))
+    width = max(len(row.name) for row in rows)
+    lines = [f"{'ok  ' if row.passed else 'FAIL'} {row.name:<{width}}  {row.text}" for row in rows]
+    last = f"{bad} of {len(rows)} checks failed" if bad else f"all {len(rows)} checks passed"
+    return "\n".join(["Risorius self-test", *lines, last])
