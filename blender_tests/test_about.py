@@ -30,6 +30,94 @@ def test_the_self_test_says_that_the_module_works(monkeypatch):
     assert "wrong numbers" in text
 
 
+def test_the_whole_self_test_goes_to_the_console_and_the_clipboard(capsys, monkeypatch):
+    assert bpy.ops.risorius.self_test() == {"FINISHED"}
+    said = capsys.readouterr().out
+    rows, report = scene.submodule("ui.about.operators").self_test_rows()
+    names = [row.name for row in rows]
+    assert {"Blender", "evaluate, scalar", "write and read", "time of a frame"} <= set(names)
+    assert all(row.passed for row in rows), report
+    assert bpy.app.version_string in report
+    assert f"all {len(rows)} checks passed" in said
+
+    checks = scene.submodule("native").part("selftest.checks")
+    monkeypatch.setattr(checks, "TOLERANCE", -1.0)
+    with pytest.raises(RuntimeError, match="checks failed: evaluate, scalar"):
+        bpy.ops.risorius.self_test()
+    assert "FAIL evaluate, scalar" in capsys.readouterr().out
+
+
+def test_a_newer_blender_gets_a_notice_and_no_refusal(monkeypatch, capsys):
+    compat = scene.submodule("scene.base.compat")
+    assert compat.notice() == ""
+    older = (bpy.app.version[0], bpy.app.version[1] - 1)
+    monkeypatch.setattr(compat, "NEWEST_TRIED", older)
+    assert "look for an update" in compat.notice()
+    registration = scene.submodule("registration")
+    registration.unregister()
+    registration.register()
+    assert "look for an update" in capsys.readouterr().out
+    assert bpy.ops.risorius.self_test.poll()
+
+
+def test_after_an_update_in_use_it_says_restart(monkeypatch):
+    native = scene.submodule("native")
+    monkeypatch.setattr(native._risorius, "__version__", "0.0.1")
+    assert "restart Blender" in native.problem()
+    assert "save your work" in native.problem()
+    monkeypatch.setattr(native, "installed_version", lambda: "0.0.1")
+    assert "Install the add-on anew" in native.problem()
+    assert not bpy.ops.risorius.self_test.poll()
+
+
+def test_the_manual_of_each_button_is_its_page(monkeypatch):
+    from fnmatch import fnmatchcase
+
+    registration = scene.submodule("registration")
+    native, manual = scene.submodule("native"), scene.submodule("ui.about.manual")
+    before = list(bpy.utils.manual_map())
+    assert native.website() == ""
+    registration.unregister()
+    monkeypatch.setattr(native, "website", lambda: "https://a.example/")
+    registration.register()
+    assert ("https://a.example/", manual.pages()[1]) in list(bpy.utils.manual_map())
+    for cls in registration.CLASSES:
+        if issubclass(cls, bpy.types.Operator):
+            wanted = f"reference/blender/{cls.bl_idname}.html"
+            for asked in (f"bpy.ops.{cls.bl_idname}", f"bpy.types.{cls.__name__.lower()}.x"):
+                pages = [page for pattern, page in manual.pages()[1] if fnmatchcase(asked, pattern)]
+                assert pages == [wanted]
+    registration.unregister()
+    monkeypatch.undo()
+    registration.register()
+    assert list(bpy.utils.manual_map()) == before
+
+
+def test_of_two_copies_one_stays_idle(addon, monkeypatch, capsys):
+    import sys
+    import types
+
+    registration = scene.submodule("registration")
+    registration.unregister()
+    other = types.ModuleType("bl_ext.elsewhere.risorius")
+    other.__addon_enabled__ = True
+    monkeypatch.setitem(sys.modules, other.__name__, other)
+    registration.register()
+    assert (
+        "Another copy of Risorius is in use, of the repository elsewhere" in capsys.readouterr().out
+    )
+    assert not [n for n in dir(bpy.types) if n.startswith("RISORIUS_")]
+    assert scene.submodule("ui.about.preferences").RISORIUS_Idle.is_registered
+    assert not [
+        h for h in bpy.app.handlers.frame_change_post if "risorius" in getattr(h, "__module__", "")
+    ]
+    registration.unregister()
+    assert not [n for n in dir(bpy.types) if n.startswith("RISORIUS_")]
+    other.__addon_enabled__ = False
+    registration.register()
+    assert bpy.ops.risorius.self_test.poll()
+
+
 def test_what_a_face_is_made_of(mode, dna_file):
     rig = scene.load(dna_file, mode)
     lines = scene.submodule("ui.about.operators").describe(rig)

@@ -11,6 +11,7 @@ import json
 import os
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 import bpy
@@ -108,6 +109,22 @@ def test_it_is_there_in_the_next_process(home):
     assert "import_dna" in found["operators"]
     assert found["menus"] == 3
     assert str(home) in found["wheel"]
+
+
+def test_a_sample_face_is_there_without_a_network(home):
+    with zipfile.ZipFile(PACKAGE) as package:
+        names = package.namelist()
+        face = [i for i in package.infolist() if i.filename.startswith("sample/")]
+    if "sample/man.dna" not in names:
+        pytest.skip("EXTRA NOT RUN: the sample's data could not be had when the zip was made")
+    assert {"sample/LICENSE.txt", "sample/README.txt"} <= set(names)
+    assert all(i.file_size for i in face)
+    assert sum(i.compress_size for i in face) <= 8_000_000
+    found = _step(home, "add")
+    assert found["name"] == "Sample"
+    assert found["moved"] > 1000
+    assert found["licence"] == "CC0-1.0"
+    assert max(width * height for width, height in found["textures"].values()) == 1024 * 1024
 
 
 def test_disabled_nothing_of_it_runs_and_the_face_is_kept(home):

@@ -251,6 +251,7 @@ def _plant_sample(monkeypatch, tmp_path, dna_file, error=None):
         shutil.copy(dna_file, path)
 
     monkeypatch.setattr(sample, "build_sample", build_sample)
+    monkeypatch.setattr(sample, "is_fetched", lambda: True)
     monkeypatch.setattr(bpy.utils, "extension_path_user", lambda *_a, **_k: str(tmp_path))
     return calls
 
@@ -258,7 +259,8 @@ def _plant_sample(monkeypatch, tmp_path, dna_file, error=None):
 def test_add_face_builds_the_sample_once(monkeypatch, tmp_path, dna_file, mode):
     calls = _plant_sample(monkeypatch, tmp_path, dna_file)
     for _ in range(2):
-        assert bpy.ops.risorius.add_character(shape_mode=mode) == {"FINISHED"}
+        made = bpy.ops.risorius.add_character(person="woman", shape_mode=mode)
+        assert made == {"FINISHED"}
     assert [c["offline"] for c in calls] == [not bpy.app.online_access]
     assert len([o for o in bpy.data.objects if "risorius_controls" in o]) == 2
 
@@ -269,8 +271,32 @@ def test_add_face_without_data_says_why(monkeypatch, tmp_path, dna_file):
     _plant_sample(monkeypatch, tmp_path, dna_file, sample.SourceError("No data is there."))
     before = scene.counts()
     with pytest.raises(RuntimeError, match="could not be built: No data is there"):
-        bpy.ops.risorius.add_character()
+        bpy.ops.risorius.add_character(person="woman")
     assert scene.counts() == before
+
+
+def test_add_face_offline_says_what_to_do_and_no_path(monkeypatch, tmp_path, dna_file):
+    from risorius import sample
+
+    calls = _plant_sample(monkeypatch, tmp_path, dna_file)
+    monkeypatch.setattr(sample, "is_fetched", lambda: False)
+    assert not bpy.app.online_access
+    with pytest.raises(RuntimeError, match="allow online access first") as said:
+        bpy.ops.risorius.add_character(person="woman")
+    assert str(tmp_path) not in str(said.value)
+    assert "/" not in str(said.value).partition(":")[2].partition("Location")[0]
+    assert calls == []
+
+
+def test_a_folder_that_cannot_be_written_is_one_sentence(monkeypatch, tmp_path, dna_file):
+    calls = _plant_sample(monkeypatch, tmp_path, dna_file)
+    blocked = tmp_path / "a file"
+    blocked.write_bytes(b"")  # root may write everywhere, but not below a file
+    monkeypatch.setattr(bpy.utils, "extension_path_user", lambda *_a, **_k: str(blocked / "in it"))
+    with pytest.raises(RuntimeError, match="See that you may write there") as said:
+        bpy.ops.risorius.add_character(person="woman")
+    assert str(tmp_path) not in str(said.value)
+    assert calls == []
 
 
 def test_a_texture_that_is_missing_is_a_warning(tmp_path):

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: MIT
 """Makes the Blender extension: the add-on with wheels of the native module inside.
 
-    python packaging/build_extension.py --wheels WHEEL [WHEEL ...] --out FOLDER
+    python packaging/build_extension.py --wheels WHEEL [WHEEL ...] --out FOLDER [--sample FOLDER]
 
 Prints the path of the zip. The wheels' version must equal the add-on's. The pure wheels that
-extension_wheels.txt pins are fetched with pip, their hashes checked, and kept in OUT/pure.
+extension_wheels.txt pins are fetched with pip, their hashes checked, and kept in OUT/pure. Equal
+files make an equal zip, whenever it is made.
 """
 
 from __future__ import annotations
@@ -20,13 +21,15 @@ from pathlib import Path
 
 ADDON = Path(__file__).resolve().parents[1] / "addon" / "risorius"
 PINNED = Path(__file__).with_name("extension_wheels.txt")
+SAMPLE = Path(__file__).with_name("sample")  # licence and origin of the sample face
 PLATFORMS = {
-    "linux_x86_64": "linux-x64",
-    "manylinux": "linux-x64",
-    "win_amd64": "windows-x64",
-    "macosx_11_0_arm64": "macos-arm64",
-    "macosx": "macos-x64",
+    r"(many)?linux.*_x86_64": "linux-x64",
+    r"win_amd64": "windows-x64",
+    r"win_arm64": "windows-arm64",
+    r"macosx_.*_arm64": "macos-arm64",
+    r"macosx_.*_x86_64": "macos-x64",
 }
+DATE = (2026, 1, 1, 0, 0, 0)  # of every file in a zip, so that equal files make an equal zip
 
 
 def manifest_version(text: str) -> str:
@@ -38,8 +41,9 @@ def manifest_version(text: str) -> str:
 
 def platform_of(wheel: Path) -> str:
     tag = wheel.stem.rsplit("-", 1)[-1]
-    for start, platform in PLATFORMS.items():
-        if tag.startswith(start):
+    # One wheel may name several systems: manylinux_2_27_x86_64.manylinux_2_28_x86_64.
+    for pattern, platform in PLATFORMS.items():
+        if re.fullmatch(pattern, tag.split(".")[0]):
             return platform
     raise SystemExit(f"{wheel.name}: no Blender platform for {tag}")
 
@@ -74,15 +78,49 @@ def fetch_pinned(folder: Path) -> list[Path]:
     return [wheel for wheels in found for wheel in wheels]
 
 
-def build(wheels: list[Path], out: Path, pure: list[Path] | None = None) -> Path:
-    """Write the zip. Raises SystemExit with a sentence when something does not fit together.
+def copy_sample(sample: Path, target: Path) -> None:
+    """The sample face with its textures, its licence and its origin beside it.
+
+    Args:
+        sample: a folder with what `risorius sample build` wrote.
+        target: a folder that is not there yet.
+    """
+    shutil.copytree(sample, target, ignore=shutil.ignore_patterns(".*"))
+    for path in sorted(SAMPLE.iterdir()):
+        shutil.copy(path, target)
+
+
+def write_zip(root: Path, target: Path) -> None:
+    """All files below a folder as a zip that depends on nothing but them.
+
+    Args:
+        root: the folder.
+        target: the zip.
+    """
+    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
+        for path in sorted(root.rglob("*")):
+            if path.is_file():
+                about = zipfile.ZipInfo(path.relative_to(root).as_posix(), DATE)
+                about.compress_type = zipfile.ZIP_DEFLATED
+                about.external_attr = 0o644 << 16
+                archive.writestr(about, path.read_bytes())
+
+
+def make_tree(
+    wheels: list[Path], root: Path, pure: list[Path], sample: Path | None, website: str = ""
+) -> str:
+    """The extension as a folder, as Blender's own tools take it; gives its version.
 
     Args:
         wheels: of ours, one for each Python and platform.
-        out: folder of the zip.
+        root: a folder that is not there yet.
         pure: wheels for every Python and platform, taken as they are.
+        sample: a folder with the sample face, or None.
+        website: address of the documentation, where there is one.
+
+    Raises:
+        SystemExit: something does not fit together; a sentence says what.
     """
-    pure = pure or []
     text = (ADDON / "blender_manifest.toml").read_text(encoding="utf-8")
     version = manifest_version(text)
     for wheel in wheels:
@@ -92,23 +130,31 @@ def build(wheels: list[Path], out: Path, pure: list[Path] | None = None) -> Path
     names = ", ".join(f'"./wheels/{name}"' for name in inside)
     platforms = ", ".join(f'"{p}"' for p in sorted({platform_of(w) for w in wheels}))
     head, mark, tail = text.partition("\n[permissions]")
+    head += f'\nwebsite = "{website}"' if website else ""
     text = f"{head}\nplatforms = [{platforms}]\nwheels = [{names}]\n{mark}{tail}"
+    ignored = shutil.ignore_patterns("__pycache__", "*.pyc", ".*")
+    shutil.copytree(ADDON, root, ignore=ignored)
+    (root / "blender_manifest.toml").write_text(text, encoding="utf-8")
+    (root / "wheels").mkdir()
+    for wheel in wheels:
+        shutil.copy(wheel, root / "wheels" / name_inside(wheel))
+    for wheel in pure:
+        shutil.copy(wheel, root / "wheels")
+    if sample is not None:
+        copy_sample(sample, root / "sample")
+    return version
+
+
+def build(
+    wheels: list[Path], out: Path, pure: list[Path] | None = None, sample: Path | None = None
+) -> Path:
+    """Write the zip with all wheels, into `out`; the rest is as make_tree takes and raises it."""
     out.mkdir(parents=True, exist_ok=True)
-    target = out / f"risorius-{version}.zip"
     with tempfile.TemporaryDirectory() as folder:
         root = Path(folder) / "risorius"
-        ignored = shutil.ignore_patterns("__pycache__", "*.pyc", ".*")
-        shutil.copytree(ADDON, root, ignore=ignored)
-        (root / "blender_manifest.toml").write_text(text, encoding="utf-8")
-        (root / "wheels").mkdir()
-        for wheel in wheels:
-            shutil.copy(wheel, root / "wheels" / name_inside(wheel))
-        for wheel in pure:
-            shutil.copy(wheel, root / "wheels")
-        with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
-            for path in sorted(root.rglob("*")):
-                if path.is_file():
-                    archive.write(path, path.relative_to(root).as_posix())
+        version = make_tree(wheels, root, pure or [], sample)
+        target = out / f"risorius-{version}.zip"
+        write_zip(root, target)
     return target
 
 
@@ -116,8 +162,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--wheels", nargs="+", type=Path, required=True)
     parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--sample", type=Path, help="folder with the sample face")
     args = parser.parse_args()
-    print(build(args.wheels, args.out, fetch_pinned(args.out / "pure")))
+    print(build(args.wheels, args.out, fetch_pinned(args.out / "pure"), args.sample))
     return 0
 
 

@@ -7,7 +7,7 @@ import re
 import sys
 import tomllib
 from functools import cache, partial
-from importlib import import_module, resources
+from importlib import import_module, metadata, resources
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, TypedDict, cast
@@ -45,6 +45,32 @@ def addon_version() -> str:
     return found.group(1) if found else "unknown"
 
 
+@cache
+def website() -> str:
+    """The address of the documentation, with a slash at its end, where the manifest has one."""
+    text = (_HERE / "blender_manifest.toml").read_text(encoding="utf-8")
+    found = re.search(r'^website = "([^"]+)"', text, re.MULTILINE)
+    return found.group(1).rstrip("/") + "/" if found else ""
+
+
+def other_copy() -> str:
+    """The module of a copy of this add-on, from another repository, that is in use; else empty."""
+    last = ADDON.rpartition(".")[2]
+    for name, module in list(sys.modules.items()):
+        same = name.startswith("bl_ext.") and name.count(".") == 2 and name.endswith(f".{last}")
+        if same and name != ADDON and getattr(module, "__addon_enabled__", False):
+            return name
+    return ""
+
+
+def installed_version() -> str:
+    """The version of the wheel on the disk, which after an update is not the one that runs."""
+    try:
+        return metadata.version("risorius")
+    except metadata.PackageNotFoundError:
+        return ""
+
+
 def problem() -> str:
     """Why the native module cannot be used, in one or two sentences; empty when all is well."""
     running = f"{sys.version_info.major}.{sys.version_info.minor}"
@@ -60,6 +86,13 @@ def problem() -> str:
             reason=_reason,
         )
     version = getattr(_risorius, "__version__", "unknown")
+    if version != addon_version() == installed_version():
+        return told(
+            "Risorius was updated from {version} to {own} while it was in use: save your work and "
+            "restart Blender.",
+            version=version,
+            own=addon_version(),
+        )
     if version != addon_version():
         return told(
             "The native module is version {version}, the add-on is {own}. "
@@ -80,6 +113,16 @@ def module() -> ModuleType:
     if trouble or _risorius is None:
         raise UnusableError(trouble)
     return _risorius
+
+
+def bundled_sample(person: str) -> Path | None:
+    """The DNA file of a sample person that came with the add-on, or None.
+
+    Args:
+        person: as the package's PEOPLE name them.
+    """
+    path = _HERE / "sample" / f"{person}.dna"
+    return path if path.is_file() else None
 
 
 def sample_module() -> ModuleType:

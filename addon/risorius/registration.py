@@ -6,7 +6,7 @@ import bpy
 from . import native
 from .language import tables
 from .scene.animation import layer_properties
-from .scene.base import console
+from .scene.base import compat, console
 from .scene.life import handlers
 from .scene.live import capture
 from .ui import (
@@ -23,7 +23,7 @@ from .ui import (
     speech,
     words,
 )
-from .ui.about import timing_overlay
+from .ui.about import manual, preferences, timing_overlay
 from .ui.animation import operators as animation_operators
 from .ui.face import channel_preview, paste_flipped
 from .ui.file import import_operators
@@ -45,6 +45,9 @@ CLASSES = (
     *layers.CLASSES,
     *live.CLASSES,
 )
+
+
+_idle: list[type] = []  # what is registered where another copy is in use
 
 
 def _window_properties() -> dict[str, object]:
@@ -69,8 +72,17 @@ def _window_properties() -> dict[str, object]:
 
 
 def register() -> None:
-    """Register classes, menus and handlers; without the native module only words."""
+    """Register classes, menus and handlers; without the native module only words.
+
+    Where another copy is in use this one stays idle: two would move each face twice.
+    """
     words.follow_language()
+    other = native.other_copy()
+    if other:
+        console.say(preferences.twice(other))
+        bpy.utils.register_class(preferences.RISORIUS_Idle)
+        _idle.append(preferences.RISORIUS_Idle)
+        return
     for cls in CLASSES:
         words.give_context(cls)
         bpy.utils.register_class(cls)
@@ -82,8 +94,10 @@ def register() -> None:
     bpy.types.TOPBAR_MT_file_export.append(file_operators.draw_export)
     bpy.types.VIEW3D_MT_add.append(import_operators.draw_add)
     trouble = native.problem()
-    if trouble:
-        console.say(trouble)
+    manual.register()
+    for sentence in (trouble, compat.notice()):
+        if sentence:
+            console.say(sentence)
     handlers.register()
     paste_flipped.register()
     capture.register()
@@ -97,11 +111,16 @@ def _refresh_once() -> None:
 
 def unregister() -> None:
     """Undo `register` in reverse."""
+    if _idle:
+        bpy.utils.unregister_class(_idle.pop())
+        words.forget_language()
+        return
     if bpy.app.timers.is_registered(_refresh_once):
         bpy.app.timers.unregister(_refresh_once)
     capture.unregister()
     paste_flipped.unregister()
     handlers.unregister()
+    manual.unregister()
     timing_overlay.stop()
     bpy.types.VIEW3D_MT_add.remove(import_operators.draw_add)
     bpy.types.TOPBAR_MT_file_export.remove(file_operators.draw_export)

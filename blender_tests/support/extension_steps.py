@@ -9,6 +9,8 @@ Prints what it found as one line of JSON after `RESULT `; an exception ends it w
 
 import json
 import os
+import socket
+import subprocess
 import sys
 import traceback
 from pathlib import Path
@@ -57,7 +59,7 @@ def _read_preferences(step):
     user's, so what is installed is enabled by hand there."""
     if bpy.app.version >= (4, 5, 0):
         bpy.ops.wm.read_userpref()
-    elif step in ("use", "disable", "remove"):
+    elif step in ("use", "add", "disable", "remove"):
         import addon_utils
 
         addon_utils.extensions_refresh()
@@ -90,6 +92,35 @@ def use(path):
     return {**_of_ours(), "moved": moved, "wheel": risorius.__file__}
 
 
+def add(_nothing=""):
+    """Add > Face, where nothing may be fetched and nothing be run that could fetch."""
+
+    def forbidden(*_arguments, **_options):
+        raise AssertionError("the sample face needs another program")
+
+    subprocess.Popen.__init__ = forbidden
+    socket.socket.connect = forbidden
+    assert bpy.ops.risorius.add_character() == {"FINISHED"}
+    rig = next(o for o in bpy.data.objects if "risorius_controls" in o)
+    head = next(o for o in bpy.data.objects if o.type == "MESH" and "head" in o.name)
+
+    def vertices():
+        graph = bpy.context.evaluated_depsgraph_get()
+        return [tuple(v.co) for v in head.evaluated_get(graph).data.vertices]
+
+    before = vertices()
+    rig["risorius_controls"].pose.bones["face"]["CTRL_expressions.jawOpen"] = 1.0
+    rig["risorius_controls"].update_tag()
+    bpy.context.view_layer.update()
+    after = vertices()
+    return {
+        "name": rig.name.removesuffix("_rig"),
+        "moved": sum(a != b for a, b in zip(before, after, strict=True)),
+        "textures": {i.name: list(i.size) for i in bpy.data.images if i.packed_file},
+        "licence": rig["risorius_controls"].data.get("dna_licence", ""),
+    }
+
+
 def disable(_nothing=""):
     """As a user does it: the check box in the preferences."""
     bpy.ops.preferences.addon_disable(module=MODULE)
@@ -114,7 +145,14 @@ def remove(_nothing=""):
     return _of_ours()
 
 
-STEPS = {"install": install, "use": use, "disable": disable, "look": look, "remove": remove}
+STEPS = {
+    "install": install,
+    "use": use,
+    "add": add,
+    "disable": disable,
+    "look": look,
+    "remove": remove,
+}
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 """What the packaging scripts compute: names of wheels in the zip, and the version matrix."""
 
 import importlib.util
+import os
 import shutil
 import subprocess
 import sys
@@ -69,6 +70,54 @@ def test_pure_wheels_are_carried_as_they_are_and_pinned_by_hash(tmp_path):
     required = tomllib.loads((PACKAGING.parent / "pyproject.toml").read_text(encoding="utf-8"))
     (osc,) = required["project"]["optional-dependencies"]["live"]
     assert f"\n{osc} --hash=sha256:" in pinned
+
+
+def test_equal_files_make_an_equal_zip_with_the_face_its_licence_and_its_origin(tmp_path):
+    build = _script("build_extension")
+    version = build.manifest_version(
+        (build.ADDON / "blender_manifest.toml").read_text(encoding="utf-8")
+    )
+    wheel = tmp_path / f"risorius-{version}-cp311-cp311-manylinux_2_28_x86_64.whl"
+    face = tmp_path / "face"
+    face.mkdir()
+    made = []
+    for seconds in (1_000_000_000, 1_500_000_000):
+        for path in (wheel, face / "man.dna", face / ".stamp"):
+            path.write_bytes(b"bytes")
+            os.utime(path, (seconds, seconds))
+        made.append(build.build([wheel], tmp_path / str(seconds), [], face).read_bytes())
+    assert made[0] == made[1]
+    with zipfile.ZipFile(tmp_path / "1000000000" / f"risorius-{version}.zip") as package:
+        inside = {n for n in package.namelist() if n.startswith("sample/")}
+        licence = package.read("sample/LICENSE.txt").decode()
+        origin = package.read("sample/README.txt").decode()
+    assert inside == {"sample/man.dna", "sample/LICENSE.txt", "sample/README.txt"}
+    assert "CC0 1.0 Universal" in licence
+    assert "MakeHuman" in origin
+
+
+@pytest.mark.parametrize(
+    ("tag", "platform"),
+    [
+        ("linux_x86_64", "linux-x64"),
+        ("manylinux_2_27_x86_64.manylinux_2_28_x86_64", "linux-x64"),
+        ("win_amd64", "windows-x64"),
+        ("win_arm64", "windows-arm64"),
+        ("macosx_11_0_arm64", "macos-arm64"),
+        ("macosx_12_3_arm64", "macos-arm64"),
+        ("macosx_11_0_x86_64", "macos-x64"),
+        ("linux_aarch64", ""),
+        ("musllinux_1_2_x86_64", ""),
+    ],
+)
+def test_tags_of_wheels_lead_to_blenders_platforms(tag, platform):
+    build = _script("build_extension")
+    wheel = Path(f"risorius-1.0.0-cp311-cp311-{tag}.whl")
+    if platform:
+        assert build.platform_of(wheel) == platform
+    else:
+        with pytest.raises(SystemExit, match="no Blender platform"):
+            build.platform_of(wheel)
 
 
 def test_the_table_counts_by_version_and_file(tmp_path):

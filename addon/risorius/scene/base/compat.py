@@ -8,7 +8,22 @@ from typing import cast
 
 import bpy
 
+from ...logic.base.sentences import told
 from .blender_types import Animated, NodeTree
+
+NEWEST_TRIED = (5, 2)  # of Blender, by packaging/matrix.sh
+
+
+def notice() -> str:
+    """A sentence where this Blender is newer than all that Risorius was tried with, else empty."""
+    if bpy.app.version[:2] <= NEWEST_TRIED:
+        return ""
+    return told(
+        "This is Blender {running}; Risorius was tried up to Blender {tried}. Everything can be "
+        "used; if something looks wrong, look for an update of Risorius.",
+        tried=".".join(map(str, NEWEST_TRIED)),
+        running=".".join(map(str, bpy.app.version[:2])),
+    )
 
 
 def curves_of(action: bpy.types.Action) -> Iterator[bpy.types.FCurve]:

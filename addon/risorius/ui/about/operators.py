@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a face is made of, as a list."""
+"""What a face is made of, as a list; the self-test."""
 
 import bpy
 import numpy as np
 
-from ...scene.base import parts
+from ... import native
+from ...scene.base import console, parts
 from ...scene.base.blender_types import ArmatureObject
 from ...scene.character import meshes, runtime
 from .. import words
 from ..blender_types import Context, Operator, Result
-from ..common import FaceOperator, face_rig
+from ..common import FaceOperator, face_rig, usable
 
 
 def describe(rig: ArmatureObject) -> list[str]:
@@ -78,4 +79,46 @@ class RISORIUS_OT_describe(FaceOperator, Operator):
         return {"FINISHED"}
 
 
-CLASSES = (RISORIUS_OT_describe,)
+def self_test_rows() -> tuple[list[tuple[str, bool, str]], str]:
+    """The checks of the wheel and what they ran in, and the report as text.
+
+    Raises:
+        UnusableError: the native module is missing or of another version.
+    """
+    selftest = native.part("selftest")
+    window = "background" if bpy.app.background else bpy.app.version_cycle
+    where = f"{bpy.app.version_string}, {window}, add-on {native.addon_version()}"
+    rows = [selftest.Row("Blender", True, where), *selftest.run(native.bundled_sample("man"))]
+    return rows, selftest.text(rows)
+
+
+class RISORIUS_OT_self_test(Operator):
+    """Load, evaluate, write, read and time on this machine; the report goes to the clipboard"""
+
+    bl_idname = "risorius.self_test"
+    bl_label = "Self-Test"
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        return usable(cls)
+
+    def execute(self, context: Context) -> Result:
+        rows, report = self_test_rows()
+        console.say(*report.splitlines())
+        context.window_manager.clipboard = report
+        bad = [row for row in rows if not row[1]]
+        if bad:
+            text = words.say("{count} checks failed: {name}", count=len(bad), name=bad[0][0])
+            self.report({"ERROR"}, text)
+        else:
+            self.report({"INFO"}, words.say("All {count} checks passed.", count=len(rows)))
+        if not bpy.app.background:
+            context.window_manager.popup_menu(
+                lambda menu, _context: [words.show(menu.layout, s) for s in report.splitlines()],
+                title=words.say("Self-test; the clipboard has this report"),
+                icon="ERROR" if bad else "CHECKMARK",
+            )
+        return {"FINISHED"}
+
+
+CLASSES = (RISORIUS_OT_describe, RISORIUS_OT_self_test)

@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 
 from ... import native
+from ...scene.base import compat
 from .. import words
 from ..blender_types import AddonPreferences, Context
 from ..speech.install import draw_preferences
@@ -54,10 +55,36 @@ class RISORIUS_Preferences(AddonPreferences):
 
     def draw(self, context: Context) -> None:
         works, text = self_test()
-        words.show(self.layout, text, "CHECKMARK" if works else "ERROR")
+        row = self.layout.row()
+        words.show(row, text, "CHECKMARK" if works else "ERROR")
+        row.operator("risorius.self_test", icon="CHECKMARK")
+        if compat.notice():
+            words.write(self.layout, compat.notice(), "INFO")
         self.layout.prop(self, "sides")
         if works:
             draw_preferences(self.layout)
+
+
+class RISORIUS_Idle(AddonPreferences):
+    """The preferences of a copy that does nothing because another one is in use."""
+
+    bl_idname = native.ADDON
+
+    def draw(self, context: Context) -> None:
+        words.write(self.layout, twice(native.other_copy()), "ERROR")
+
+
+def twice(other: str) -> str:
+    """What to do where another copy is in use.
+
+    Args:
+        other: its module, bl_ext.REPOSITORY.risorius.
+    """
+    return words.say(
+        "Another copy of Risorius is in use, of the repository {name}; this one does nothing. "
+        "Disable or remove one of the two.",
+        name=other.removeprefix("bl_ext.").partition(".")[0],
+    )
 
 
 CLASSES = (RISORIUS_Preferences,)

