@@ -1,0 +1,61 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
+# release.sh: everything that is published of a version, from a clean tree whose HEAD has the tag
+# vVERSION: wheels and sdist (wheels.sh), one extension for each platform and one with all, a repository
+# of extensions with a page, an SBOM, notes and checksums. They lie in build/release/VERSION; nothing is
+# uploaded and nothing signed. Needs the sample's data (48 MB, once).
+#
+#   RISORIUS_SITE=https://... is the address of the documentation, for Blender's Online Manual
+#   release.sh VERSION [--trial]   --trial: also of a tree that could not be released; says why not, and
+#                                  takes the wheels that there are
+set -euo pipefail
+source "$(dirname "$0")/setup.sh"
+version=${1:-}
+trial=${2:-}
+if [ -z "$version" ] || { [ -n "$trial" ] && [ "$trial" != --trial ]; }; then
+  echo "release.sh: release.sh VERSION [--trial]" >&2 && exit 2
+fi
+cd "$project"
+make="packaging/release/make.py"
+out="$project/build/release/$version"
+
+# shellcheck disable=SC2086
+checked() { "$python" $make check "$version" >&2 || { [ -n "$trial" ] && echo "A trial: not to be published." >&2; }; }
+gather_wheels() { # of wheels.sh; a trial does with what was built for this machine
+  shopt -s nullglob
+  if [ -z "$trial" ]; then
+    rm -rf "$project/build/wheels"
+    packaging/wheels.sh
+  fi
+  wheels=("$project"/build/wheels/risorius-"$version"-*.whl)
+  [ ${#wheels[@]} -gt 0 ] || { [ -n "$trial" ] && wheels=("$project"/build/dist/risorius-"$version"-*.whl); }
+  sdist=("$project"/build/wheels/risorius-"$version".tar.gz)
+  shopt -u nullglob
+  [ ${#wheels[@]} -gt 0 ] || { echo "release.sh: there is no wheel of $version" >&2 && return 1; }
+}
+
+step "may it be released"
+install_packages && make_venv
+checked
+step "wheels"
+compgen -G "$project/build/dist/risorius-$version-cp311-*.whl" > /dev/null || build_wheel
+gather_wheels
+step "sample face"
+sample=$(sample_face)
+step "extensions and their repository"
+rm -rf "$out" && mkdir -p "$out"
+cp "${wheels[@]}" "${sdist[@]}" "$out"
+mapfile -t zips < <("$python" $make zips "$out" --wheels "${wheels[@]}" --sample "$sample" \
+  --website "${RISORIUS_SITE:-}")
+[ ${#zips[@]} -gt 1 ]
+"$python" $make repository "$out/repository" "${zips[@]:1}"
+step "SBOM, notes, checksums"
+tools="$project/build/venv-release"
+[ -e "$tools/.made" ] || { python3.11 -m venv "$tools" &&
+  "$tools/bin/python" -m pip install -q -r packaging/release/requirements.txt && touch "$tools/.made"; }
+"$tools/bin/python" packaging/release/sbom.py "$version" "$out" > "$out/risorius-$version.cdx.json"
+"$python" $make notes "$version" > "$out/NOTES.md"
+"$python" $make sums "$out"
+step ""
+ls -l "$out" "$out/repository" | awk 'NF > 8 { print $5, $9 }'
+echo "$out"

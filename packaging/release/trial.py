@@ -1,0 +1,268 @@
+# SPDX-License-Identifier: MIT
+"""One step of a user who installs from the repository, in a Blender with a window; see trial.sh.
+
+    blender --python trial.py -- STEP OUT URL
+
+Steps are generators that say how long Blender's window shall live before they go on. What they
+found is a line of JSON at the end of OUT/results.jsonl; OUT/*.png are pictures of the whole screen.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import traceback
+from pathlib import Path
+
+import addon_utils
+import bpy
+
+STEP, OUT, URL = sys.argv[sys.argv.index("--") + 1 :]
+OUT = Path(OUT)
+NAME = "Risorius trial"
+SLIDER = "CTRL_expressions.jawOpen"
+
+
+def shot(name):
+    """A picture of the screen, of this program's window and all that lies over it."""
+    subprocess.run(["import", "-window", "root", str(OUT / f"{name}.png")], check=True)
+
+
+def repository():
+    """Index of the repository of this trial, and its module."""
+    for index, repo in enumerate(bpy.context.preferences.extensions.repos):
+        if repo.name == NAME:
+            return index, repo.module
+    raise RuntimeError("the repository is not there")
+
+
+def module():
+    return f"bl_ext.{repository()[1]}.risorius"
+
+
+def window():
+    """What operators of the 3D view want to know, of the main window."""
+    main = bpy.context.window_manager.windows[0]
+    area = next(a for a in main.screen.areas if a.type == "VIEW_3D")
+    region = next(r for r in area.regions if r.type == "WINDOW")
+    return bpy.context.temp_override(window=main, area=area, region=region)
+
+
+def preferences(section="EXTENSIONS"):
+    bpy.ops.screen.userpref_show("INVOKE_DEFAULT")
+    bpy.context.preferences.active_section = section
+    bpy.context.window_manager.extension_search = "risorius"
+    bpy.context.preferences.view.show_developer_ui = False
+
+
+def close_preferences():
+    for one in list(bpy.context.window_manager.windows)[1:]:
+        with bpy.context.temp_override(window=one):
+            bpy.ops.wm.window_close()
+
+
+def said(call, **arguments):
+    """What an operator says where it refuses, else its result."""
+    try:
+        return sorted(call(**arguments))
+    except RuntimeError as error:
+        return str(error).strip()
+
+
+def face():
+    rig = next(o for o in bpy.data.objects if "risorius_controls" in o)
+    return rig, rig["risorius_controls"].pose.bones["face"]
+
+
+def chin(value):
+    """Height of the lowest vertex of the head that the jaw moves, at a value of its slider."""
+    rig, bone = face()
+    bone[SLIDER] = value
+    rig["risorius_controls"].update_tag()
+    bpy.context.view_layer.update()
+    head = next(o for o in bpy.data.objects if o.type == "MESH" and "head" in o.name)
+    graph = bpy.context.evaluated_depsgraph_get()
+    return [tuple(v.co) for v in head.evaluated_get(graph).data.vertices]
+
+
+def moves():
+    """How many vertices the slider moves."""
+    return sum(a != b for a, b in zip(chin(0.0), chin(1.0), strict=True))
+
+
+def ours():
+    """What of Risorius this process can see."""
+    return {
+        "classes": [n for n in dir(bpy.types) if n.startswith("RISORIUS_")],
+        "modules": sorted(m for m in sys.modules if m.startswith("bl_ext.") and "risorius" in m),
+        "enabled": [a.module for a in bpy.context.preferences.addons if "risorius" in a.module],
+    }
+
+
+def native():
+    return sys.modules[f"{module()}.native"]
+
+
+def install():
+    """Add the address, find, install, add a face, save."""
+    bpy.context.preferences.system.use_online_access = True
+    bpy.ops.preferences.extension_repo_add(name=NAME, remote_url=URL, type="REMOTE")
+    index, _ = repository()
+    synced = said(bpy.ops.extensions.repo_sync, repo_index=index)
+    preferences()
+    yield 3.0
+    shot("1-found")
+    made = said(
+        bpy.ops.extensions.package_install,
+        repo_index=index,
+        pkg_id="risorius",
+        enable_on_install=True,
+    )
+    yield 3.0
+    shot("2-installed")
+    bpy.ops.wm.save_userpref()
+    close_preferences()
+    yield 1.0
+    with window():
+        added = said(bpy.ops.risorius.add_character)
+        bpy.context.space_data.show_region_ui = True
+    yield 4.0
+    shot("3-face")
+    moved = moves()
+    yield 3.0
+    shot("4-jaw-open")
+    bpy.ops.wm.save_as_mainfile(filepath=str(OUT / "face.blend"))
+    yield {"sync": synced, "install": made, "add": added, "moved": moved,
+           "version": native().addon_version()}  # fmt: skip
+
+
+def update():
+    """Open the face; update while it is open; save."""
+    bpy.ops.wm.open_mainfile(filepath=str(OUT / "face.blend"))
+    yield 2.0
+    before, moved = native().addon_version(), moves()
+    index, _ = repository()
+    said(bpy.ops.extensions.repo_sync, repo_index=index)
+    preferences()
+    yield 3.0
+    shot("5-update-found")
+    made = said(bpy.ops.extensions.package_upgrade_all)
+    yield 3.0
+    shot("6-updated")
+    close_preferences()
+    with window():
+        bpy.context.space_data.show_region_ui = True
+    yield 2.0
+    shot("7-says-restart")
+    bpy.context.scene.frame_set(2)
+    bpy.ops.wm.save_mainfile()
+    bpy.ops.wm.save_userpref()
+    yield {"before": before, "moved": moved, "update": made, "after": native().addon_version(),
+           "problem": native().problem()}  # fmt: skip
+
+
+def after():
+    """The next start: the new version, the old face, the self-test, faults of others."""
+    bpy.ops.wm.open_mainfile(filepath=str(OUT / "face.blend"))
+    yield 2.0
+    found = {"version": native().addon_version(), "problem": native().problem(), "moved": moves()}
+    found["self_test"] = said(bpy.ops.risorius.self_test)
+    yield 3.0
+    shot("8-self-test")
+    preferences("ADDONS")
+    bpy.ops.preferences.addon_expand(module=module())
+    yield 3.0
+    shot("9-preferences")
+    yield found
+
+
+def faults():
+    """A file cut short, of another system, of another Python; a repository that is gone."""
+    files, found = OUT / "faults", {}
+    for path in sorted(files.glob("*.zip")):
+        found[path.stem] = said(
+            bpy.ops.extensions.package_install_files,
+            filepath=str(path), repo="user_default", enable_on_install=True,
+        )  # fmt: skip
+        found[path.stem + " enabled"] = [
+            a.module for a in bpy.context.preferences.addons if "user_default" in a.module
+        ]
+    bpy.ops.preferences.extension_repo_add(
+        name="cut", remote_url=URL.replace("/index.json", "-cut/index.json"), type="REMOTE"
+    )
+    bpy.ops.preferences.extension_repo_add(
+        name="gone", remote_url="http://127.0.0.1:9/index.json", type="REMOTE"
+    )
+    for index, repo in enumerate(bpy.context.preferences.extensions.repos):
+        if repo.name in ("cut", "gone"):
+            found[f"sync {repo.name}"] = said(bpy.ops.extensions.repo_sync, repo_index=index)
+            install_it = bpy.ops.extensions.package_install
+            if repo.name == "cut":
+                found["install cut"] = said(install_it, repo_index=index, pkg_id="risorius")
+    yield found
+
+
+def twice():
+    """The same add-on from a second place beside the first."""
+    path = next((OUT / "twice").glob("*.zip"))
+    found = {"install": said(
+        bpy.ops.extensions.package_install_files,
+        filepath=str(path), repo="user_default", enable_on_install=True,
+    )}  # fmt: skip
+    yield 2.0
+    preferences("ADDONS")
+    yield 3.0
+    shot("10-twice")
+    found["enabled"] = ours()["enabled"]
+    found["handlers"] = len([h for h in bpy.app.handlers.frame_change_post
+                             if "risorius" in getattr(h, "__module__", "")])  # fmt: skip
+    names = [r.module for r in bpy.context.preferences.extensions.repos]
+    found["uninstall"] = said(
+        bpy.ops.extensions.package_uninstall,
+        repo_index=names.index("user_default"), pkg_id="risorius",
+    )  # fmt: skip
+    bpy.ops.wm.save_userpref()
+    yield found
+
+
+def remove():
+    """Disable, remove, take the address away."""
+    bpy.ops.preferences.addon_disable(module=module())
+    disabled = ours()
+    index, _ = repository()
+    gone = said(bpy.ops.extensions.package_uninstall, repo_index=index, pkg_id="risorius")
+    preferences()
+    yield 3.0
+    shot("11-removed")
+    bpy.ops.preferences.extension_repo_remove(index=index, remove_files=True)
+    bpy.ops.wm.save_userpref()
+    yield {"disabled": disabled, "remove": gone, "left": ours()}
+
+
+def look():
+    """What a fresh start still sees."""
+    addon_utils.modules_refresh()
+    yield ours()
+
+
+STEPS = {f.__name__: f for f in (install, update, after, faults, twice, remove, look)}
+
+
+def run():
+    """Go on with the step; None ends the timer."""
+    try:
+        given = next(steps)
+    except BaseException:  # noqa: BLE001  printed, and the result says it
+        traceback.print_exc()
+        given = {"traceback": traceback.format_exc()}
+    if isinstance(given, float):
+        return given
+    with (OUT / "results.jsonl").open("a", encoding="utf-8") as file:
+        file.write(json.dumps({"step": STEP, "blender": bpy.app.version_string, **given}) + "\n")
+    sys.stdout.flush()
+    os._exit(0)  # asks nothing about unsaved work
+    return None
+
+
+steps = STEPS[STEP]()
+bpy.app.timers.register(run, first_interval=2.0, persistent=True)

@@ -1,0 +1,77 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
+# trial.sh: what a user does with a release, in real Blender programs with windows: adds the address of
+# the repository, finds, installs, adds a face, updates from the release before with the face open,
+# starts again, disables, removes; and faults: a file cut short, of another system or Python, a
+# repository that is gone, two of the same. A local server serves the release; nothing else is reached.
+# Screens are pictures below OUT, to be looked at. Prints rows `row<TAB>name<TAB>passed<TAB>failed`;
+# exit code 0 only if nothing failed. Needs Xvfb and ImageMagick, in a chroot's own system too.
+#
+#   release/trial.sh RELEASE OUT BLENDER...   RELEASE: build/release/VERSION, of release.sh; BLENDER: as
+#                                             packaging/blenders.sh printed them; OUT: below /tmp
+set -uo pipefail
+[ $# -ge 3 ] || { echo "trial.sh: trial.sh RELEASE OUT BLENDER..." >&2 && exit 2; }
+source "$(dirname "$0")/../setup.sh"
+here="$project/packaging/release"
+release=$(realpath "$1")
+top=$(realpath -m "$2")
+shift 2
+version=$(basename "$release")
+zip="$release/risorius-$version-linux-x64.zip"
+before=0.0.1
+export DISPLAY=:${TRIAL_DISPLAY:-77}
+port=${TRIAL_PORT:-8177}
+failed=0
+
+row() { # row NAME GOOD(0 or 1)
+  [ "$2" -eq 1 ] || failed=1
+  printf 'row\t%s\t%d\t%d\n' "$1" "$2" $((1 - $2))
+}
+repository() { # repository FOLDER ZIP...
+  "$python" "$here/make.py" repository "$@" || exit 1
+}
+prepare() { # the release before, a zip that is cut short, those of other machines
+  mkdir -p "$top/before" "$out/faults" "$out/twice"
+  "$python" "$here/older.py" "$zip" "$before" "$top/before" > /dev/null &&
+    repository "$served/risorius" "$top/before"/*.zip &&
+    repository "$served/risorius-cut" "$zip" || exit 1
+  truncate -s 900000 "$served/risorius-cut/$(basename "$zip")"
+  for other in windows-x64 macos-arm64; do
+    [ ! -e "$release/risorius-$version-$other.zip" ] || cp "$release/risorius-$version-$other.zip" "$out/faults/"
+  done
+  head -c 900000 "$zip" > "$out/faults/cut-short.zip"
+  cp "$zip" "$out/twice/"
+}
+in_blender() { # in_blender STEP: with a window, which Xvfb shows
+  BLENDER_USER_RESOURCES="$user" HOME="$user/home" RISORIUS_CACHE="$user/home/cache" timeout -s KILL 900 \
+    "$blender" --window-geometry 0 0 1280 800 -noaudio --python "$here/trial.py" -- \
+    "$1" "$out" "http://127.0.0.1:$port/risorius/index.json" > "$out/$1.log" 2>&1
+}
+left_behind() { find "$user" -iname '*risorius*' -not -path '*/home/*' | grep -v __pycache__ || true; }
+
+for blender; do
+  name=$(timeout -s KILL 120 "$blender" --version 2> /dev/null | grep -oE '^Blender [0-9.]+' | head -n 1)
+  [ -n "$name" ] || { row "$blender starts" 0 && continue; }
+  out="$top/${name// /-}" served="$top/served"
+  rm -rf "$out" "$served"
+  mkdir -p "$out" "$served"
+  user=$(mktemp -d /tmp/trial.XXXXXX)
+  mkdir -p "$user/home"
+  prepare
+  Xvfb "$DISPLAY" -screen 0 1280x800x24 > "$out/xvfb.log" 2>&1 &
+  x=$!
+  python3 -m http.server "$port" --bind 127.0.0.1 --directory "$served" > "$out/server.log" 2>&1 &
+  server=$!
+  trap 'kill $x $server 2> /dev/null' EXIT
+  in_blender install
+  repository "$served/risorius" "$zip"
+  for step in update after faults twice remove look; do in_blender "$step"; done
+  left_behind > "$out/left.txt"
+  kill $x $server 2> /dev/null
+  wait $x $server 2> /dev/null
+  trap - EXIT
+  while IFS=$'\t' read -r check good; do row "$name: $check" "$good"; done \
+    < <("$python" "$here/trial_results.py" "$out" "$before" "$version")
+  rm -rf "$user"
+done
+[ $failed -eq 0 ]

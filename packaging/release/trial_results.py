@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: MIT
+"""What a trial found, judged: a line `check<TAB>1 or 0` each; what Blender said goes to said.md.
+
+trial_results.py OUT BEFORE VERSION
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+
+def checks(
+    found: dict[str, Any], before: str, version: str, left: str
+) -> Iterator[tuple[str, bool]]:
+    """(what is checked, whether it is so), whatever is missing.
+
+    Args:
+        found: result of each step by its name.
+        before, version: the release that is updated, and the one that it is updated to.
+        left: files of ours that remain after all.
+    """
+
+    def of(step: str, name: str) -> Any:
+        return found.get(step, {}).get(name)
+
+    done = ["FINISHED"]
+    yield "found and installed", of("install", "install") == done
+    yield "the version before runs", of("install", "version") == before
+    yield "Add > Face without a network", of("install", "add") == done
+    yield "its jaw moves", (of("install", "moved") or 0) > 1000
+    yield "updated with the face open", of("update", "update") == done
+    yield "the open session says restart", "restart Blender" in (of("update", "problem") or "")
+    yield "the next start has the new version", of("after", "version") == version
+    yield "and nothing to complain of", of("after", "problem") == ""
+    yield "the saved face moves", (of("after", "moved") or 0) > 1000
+    yield "self-test", of("after", "self_test") == done
+    refused = [v for k, v in found.get("faults", {}).items() if " " not in k]
+    yield "files that do not fit are refused", bool(refused) and all(v != done for v in refused)
+    enabled = [v for k, v in found.get("faults", {}).items() if k.endswith(" enabled")]
+    yield "and not enabled", bool(enabled) and not any(enabled)
+    yield "a download cut short is refused", of("faults", "install cut") not in (None, done)
+    yield "a repository that is gone is said", of("faults", "sync gone") not in (None, done)
+    yield "of two, one runs", (of("twice", "handlers") or 9) == 1
+    disabled = of("remove", "disabled") or {}
+    yield "disabled, no class is left", disabled.get("classes") == []
+    yield "removed", of("remove", "remove") == done
+    last = found.get("look", {"classes": None})
+    yield (
+        "a fresh start sees nothing",
+        not any(last.get(k) for k in ("classes", "modules", "enabled")),
+    )
+    yield "no file is left", left == ""
+
+
+def main() -> int:
+    """Print the checks; exit code 0."""
+    out, before, version = Path(sys.argv[1]), *sys.argv[2:4]
+    file = out / "results.jsonl"
+    text = file.read_text(encoding="utf-8") if file.exists() else ""
+    found = {row["step"]: row for row in map(json.loads, text.splitlines())}
+    left = (out / "left.txt").read_text(encoding="utf-8").strip()
+    for name, good in checks(found, before, version, left):
+        print(f"{name}\t{int(bool(good))}")
+    lines = [f"- {k}: {v}" for k, v in found.get("faults", {}).items()]
+    (out / "said.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
