@@ -11,7 +11,7 @@ _FOLDER = "reference/blender/"
 def pages() -> tuple[str, tuple[tuple[str, str], ...]]:
     """As `bpy.utils.register_manual_map` takes it: the site, and (pattern, page) of ours."""
     rows = []
-    for name in sorted(dir(bpy.ops.risorius)):
+    for name in sorted(dir(bpy.ops.risorius)):  # pyright: ignore  made by registration
         page = f"{_FOLDER}risorius.{name}.html"
         rows += [(f"bpy.ops.risorius.{name}", page), (f"bpy.types.risorius_ot_{name}.*", page)]
     rows.append(("bpy.types.*.risorius_*", f"{_FOLDER}index.html"))
