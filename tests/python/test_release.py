@@ -20,14 +20,18 @@ PLATFORMS = {
 }
 
 
-@pytest.fixture(scope="module")
-def make():
-    path = PROJECT / "packaging" / "release" / "make.py"
-    described = importlib.util.spec_from_file_location("release_make", path)
+def _module(name):
+    path = PROJECT / "packaging" / "release" / f"{name}.py"
+    described = importlib.util.spec_from_file_location(f"release_{name}", path)
     module = importlib.util.module_from_spec(described)
     sys.modules[described.name] = module
     described.loader.exec_module(module)
     return module
+
+
+@pytest.fixture(scope="module")
+def make():
+    return _module("make")
 
 
 @pytest.fixture
@@ -163,3 +167,42 @@ def test_release_refuses_a_tree_that_it_cannot_be_made_of():
         )
         assert done.returncode == 2
         assert done.stderr == "release.sh: release.sh VERSION [--trial]\n"
+
+
+def test_the_release_before_differs_in_its_version_alone(tmp_path):
+    older = _module("older")
+    info, name = "risorius-1.2.3.dist-info", "risorius-1.2.3-cp311-cp311-linux_x86_64.whl"
+    inside = {
+        "risorius/base/version.py": b'__version__ = "1.2.3"\n',
+        "risorius/_native.so": b"1.2.3",
+        f"{info}/METADATA": b"Name: risorius\nVersion: 1.2.3\nRequires: numpy\n",
+        f"{info}/RECORD": b"old",
+    }
+    with zipfile.ZipFile(tmp_path / name, "w") as wheel:
+        for path, data in inside.items():
+            wheel.writestr(path, data)
+    manifest = f'version = "1.2.3"\nwheels = ["./wheels/{name}"]\n'
+    with zipfile.ZipFile(tmp_path / "risorius-1.2.3.zip", "w") as package:
+        package.writestr("blender_manifest.toml", manifest)
+        package.write(tmp_path / name, f"wheels/{name}")
+    out = tmp_path / "out"
+    out.mkdir()
+    made = older.extension_as(tmp_path / "risorius-1.2.3.zip", "1.0.0", out)
+    assert made.name == "risorius-1.0.0.zip"
+    with zipfile.ZipFile(made) as package:
+        assert package.read("blender_manifest.toml").decode() == manifest.replace("1.2.3", "1.0.0")
+        package.extract(f"wheels/{name.replace('1.2.3', '1.0.0')}", tmp_path)
+    with zipfile.ZipFile(tmp_path / "wheels" / name.replace("1.2.3", "1.0.0")) as wheel:
+        assert wheel.read("risorius/base/version.py") == b'__version__ = "1.0.0"\n'
+        assert wheel.read("risorius/_native.so") == b"1.2.3"
+        info = info.replace("1.2.3", "1.0.0")
+        assert b"\nVersion: 1.0.0\n" in wheel.read(f"{info}/METADATA")
+        rows = wheel.read(f"{info}/RECORD").decode().splitlines()
+    assert [row.split(",")[0] for row in rows] == [n.replace("1.2.3", "1.0.0") for n in inside]
+
+
+def test_a_trial_that_found_nothing_has_passed_nothing():
+    results = _module("trial_results")
+    judged = list(results.checks({}, "1.0.0", "1.2.3", "a file"))
+    assert len(judged) == len({name for name, _ in judged}) > 15
+    assert not [name for name, good in judged if good]
