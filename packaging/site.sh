@@ -1,0 +1,48 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
+# site.sh: the documentation as a site in build/site/html, by mkdocs-material: what is written in docs/
+# and the READMEs, a page for each panel and operator from the registered classes, the commands from
+# --help, Python from docstrings, C++ from headers. A warning is an error; every link of the finished
+# pages is followed. Needs the extension's zip in build/dist.
+# Prints rows `row<TAB>name<TAB>passed<TAB>failed`; exit code 0 only if nothing failed.
+#
+#   site.sh
+set -uo pipefail
+source "$(dirname "$0")/setup.sh"
+site="$project/build/site"
+own="$project/packaging/site"
+tools="$project/build/venv-site"
+logs="$project/build/logs"
+mkdir -p "$site" "$logs"
+failed=0
+
+row() { # row NAME COMMAND...
+  local name=$1 log="$logs/site-${1// /-}.log"
+  shift
+  if "$@" > "$log" 2>&1; then
+    printf 'row\t%s\t1\t0\n' "$name"
+  else
+    failed=1
+    tail -n 30 "$log"
+    printf 'row\t%s\t0\t1\n' "$name"
+    return 1
+  fi
+}
+site_tools() {
+  local stamp
+  stamp="$tools/.$(sha256sum "$own/requirements.txt" | cut -c1-16)"
+  [ -e "$stamp" ] && return 0
+  python3.11 -m venv "$tools" && "$tools/bin/python" -m pip install -q -r "$own/requirements.txt" &&
+    touch "$stamp"
+}
+zip=$(ls "$project"/build/dist/risorius-*.zip 2> /dev/null | head -n 1)
+[ -n "$zip" ] || { echo "site.sh: there is no build/dist/risorius-*.zip: build_extension" >&2 && exit 1; }
+
+step "site"
+row "site: tools" site_tools &&
+  row "site: panels and operators" timeout -s KILL 300 "$python" "$own/blender_classes.py" "$zip" "$site/classes.json" &&
+  row "site: pages" "$python" "$own/gather.py" "$site/pages" "$site/classes.json" &&
+  row "site: mkdocs build --strict" "$tools/bin/python" -m mkdocs build --strict --quiet -f "$site/mkdocs.yml" &&
+  row "site: links" "$tools/bin/python" "$own/links.py" "$site/html"
+step ""
+[ $failed -eq 0 ]
