@@ -29,7 +29,7 @@ gather_wheels() { # of wheels.sh; a trial does with what was built for this mach
   fi
   wheels=("$project"/build/wheels/risorius-"$version"-*.whl)
   [ ${#wheels[@]} -gt 0 ] || { [ -n "$trial" ] && wheels=("$project"/build/dist/risorius-"$version"-*.whl); }
-  sdist=("$project"/build/wheels/risorius-"$version".tar.gz)
+  sdist=("$project"/build/wheels/risorius-"$version".tar*)
   shopt -u nullglob
   [ ${#wheels[@]} -gt 0 ] || { echo "release.sh: there is no wheel of $version" >&2 && return 1; }
 }

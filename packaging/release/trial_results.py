@@ -48,11 +48,9 @@ def checks(
     disabled = of("remove", "disabled") or {}
     yield "disabled, no class is left", disabled.get("classes") == []
     yield "removed", of("remove", "remove") == done
-    last = found.get("look", {"classes": None})
-    yield (
-        "a fresh start sees nothing",
-        not any(last.get(k) for k in ("classes", "modules", "enabled")),
-    )
+    last = found.get("look")
+    seen = last is None or any(last.get(k) for k in ("classes", "modules", "enabled"))
+    yield "a fresh start sees nothing", not seen
     yield "no file is left", left == ""
 
 

@@ -223,7 +223,7 @@ def main() -> int:
     own = Path(__file__).parent
     text = (own / "mkdocs.yml").read_text(encoding="utf-8")
     shutil.copy(own / "index.md", pages / "index.md")
-    copy_pages(pages, [*listed(text), "docs/images/start_face.jpg"])
+    copy_pages(pages, [*listed(text), "docs/images/first_look.jpg"])
     nav = blender_pages(pages, json.loads(classes.read_text(encoding="utf-8")))
     for name, content in (("commands", commands()), ("python", python_api()), ("cpp", cpp_api())):
         (pages / "reference" / f"{name}.md").write_text(content, encoding="utf-8")
