@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""One step of a user who installs from the repository, in a Blender with a window; see trial.sh.
+"""Steps of a user who installs from the repository, in a Blender with a window; see trial.sh.
 
-    blender --python trial.py -- STEP OUT URL
+    blender --python trial.py -- STEP,STEP,... OUT URL
 
 Steps are generators that say how long Blender's window shall live before they go on. What they
 found is a line of JSON at the end of OUT/results.jsonl; OUT/*.png are pictures of the whole screen.
@@ -17,7 +17,7 @@ from pathlib import Path
 import addon_utils
 import bpy
 
-STEP, OUT, URL = sys.argv[sys.argv.index("--") + 1 :]
+NAMES, OUT, URL = sys.argv[sys.argv.index("--") + 1 :]
 OUT = Path(OUT)
 NAME = "Risorius trial"
 SLIDER = "CTRL_expressions.jawOpen"
@@ -249,20 +249,27 @@ STEPS = {f.__name__: f for f in (install, update, after, faults, twice, remove, 
 
 
 def run():
-    """Go on with the step; None ends the timer."""
+    """Go on with the step, then with the next; the process ends with the last."""
     try:
-        given = next(steps)
+        given = next(steps[0])
     except BaseException:  # noqa: BLE001  printed, and the result says it
         traceback.print_exc()
         given = {"traceback": traceback.format_exc()}
     if isinstance(given, float):
         return given
+    row = {"step": names.pop(0), "blender": bpy.app.version_string, **given}
     with (OUT / "results.jsonl").open("a", encoding="utf-8") as file:
-        file.write(json.dumps({"step": STEP, "blender": bpy.app.version_string, **given}) + "\n")
-    sys.stdout.flush()
-    os._exit(0)  # asks nothing about unsaved work
-    return None
+        file.write(json.dumps(row) + "\n")
+    steps.pop(0)
+    if not steps:
+        sys.stdout.flush()
+        os._exit(0)  # asks nothing about unsaved work
+    return 1.0
 
 
-steps = STEPS[STEP]()
+names = NAMES.split(",")
+steps = [STEPS[name]() for name in names]
+if bpy.app.background:
+    while True:
+        run()
 bpy.app.timers.register(run, first_interval=2.0, persistent=True)

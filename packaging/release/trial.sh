@@ -39,13 +39,18 @@ prepare() { # the release before, a zip that is cut short, those of other machin
   for other in windows-x64 macos-arm64; do
     [ ! -e "$release/risorius-$version-$other.zip" ] || cp "$release/risorius-$version-$other.zip" "$out/faults/"
   done
+  "$python" "$project/packaging/build_extension.py" --out "$top/python" \
+    --wheels "$release/risorius-$version-cp311-cp311-"*linux*.whl > /dev/null &&
+    mv "$top/python/risorius-$version.zip" "$out/faults/other-python.zip" || exit 1
   head -c 900000 "$zip" > "$out/faults/cut-short.zip"
   cp "$zip" "$out/twice/"
 }
-in_blender() { # in_blender STEP: with a window, which Xvfb shows
-  BLENDER_USER_RESOURCES="$user" HOME="$user/home" RISORIUS_CACHE="$user/home/cache" timeout -s KILL 900 \
-    "$blender" --window-geometry 0 0 1280 800 -noaudio --python "$here/trial.py" -- \
-    "$1" "$out" "http://127.0.0.1:$port/risorius/index.json" > "$out/$1.log" 2>&1
+in_blender() { # in_blender STEP,STEP,... [OPTION...]: with a window, which Xvfb shows
+  local steps=$1
+  shift
+  BLENDER_USER_RESOURCES="$user" HOME="$user/home" RISORIUS_CACHE="$user/home/cache" timeout -s KILL 1800 \
+    "$blender" "$@" --window-geometry 0 0 1280 800 -noaudio --python "$here/trial.py" -- \
+    "$steps" "$out" "http://127.0.0.1:$port/risorius/index.json" > "$out/$steps.log" 2>&1
 }
 left_behind() { find "$user" -iname '*risorius*' -not -path '*/home/*' | grep -v __pycache__ || true; }
 
@@ -65,7 +70,9 @@ for blender; do
   trap 'kill $x $server 2> /dev/null' EXIT
   in_blender install
   repository "$served/risorius" "$zip"
-  for step in update after faults twice remove look; do in_blender "$step"; done
+  in_blender update
+  in_blender after,faults,twice,remove
+  in_blender look --background
   left_behind > "$out/left.txt"
   kill $x $server 2> /dev/null
   wait $x $server 2> /dev/null
