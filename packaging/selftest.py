@@ -7,8 +7,8 @@ The checks are those of the wheel, `python -m risorius.selftest`; this file only
 sentence what to do where the wheel cannot even be imported. Exit code 0 only if all is well.
 """
 
-import platform
 import sys
+import sysconfig
 
 
 def main() -> int:
@@ -18,7 +18,7 @@ def main() -> int:
     except ImportError as error:
         print(
             f"FAIL the package risorius cannot be imported by Python {sys.version.split()[0]}, "
-            f"{sys.platform} {platform.machine()}: {error}. Install the wheel made for this Python "
+            f"{sysconfig.get_platform()}: {error}. Install the wheel made for this Python "
             "and this system."
         )
         return 1

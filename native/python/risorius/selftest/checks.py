@@ -12,6 +12,7 @@ import hashlib
 import os
 import platform
 import sys
+import sysconfig
 import tempfile
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -101,6 +102,14 @@ def _cases(name: str) -> Iterator[_Case]:
         yield _Case(int(lod[0]), raw, joints, shapes, maps)
 
 
+def _system() -> str:
+    """The system's name and version; of Windows without WMI, which wine has not."""
+    if sys.platform == "win32":
+        version = sys.getwindowsversion()
+        return f"Windows {version.major}.{version.minor}.{version.build}"
+    return f"{platform.system()} {platform.release()}"
+
+
 def _machine() -> str:
     libc = " ".join(platform.libc_ver()) if sys.platform == "linux" else ""
     return ", ".join(
@@ -109,9 +118,8 @@ def _machine() -> str:
             f"Risorius {__version__}",
             f"Python {sys.version.split()[0]}",
             f"NumPy {np.__version__}",
-            sys.platform,
-            platform.release(),
-            platform.machine(),
+            _system(),
+            sysconfig.get_platform(),
             libc,
         )
         if word
