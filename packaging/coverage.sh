@@ -13,7 +13,7 @@ mkdir -p "$out"
 slow=(tests/python/test_rig_behavior.py tests/python/test_rig_golden.py
   tests/python/test_rig_thousand.py tests/faults tests/mutants
   blender_tests/test_hostile.py blender_tests/test_soak.py)
-changed_bytes='SurvivesEveryPatchedByte|ChangedBytesUnderARightHash|EveryChangedByte'
+changed_bytes='EveryByte|EveryPatched|EveryChangedByte|ChangedBytes|CutAtEvery|Changes.*Reads'
 
 # counted FOLDER PROGRAM...: Python with the package of FOLDER, whose lines coverage.py counts
 counted() {
