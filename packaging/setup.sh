@@ -74,7 +74,7 @@ make_venv() {
   local base=python3.11
   command -v $base > /dev/null || base=python3
   "$base" -m venv "$venv"
-  "$python" -m pip install -q -r "$project/packaging/requirements.txt"
+  "$python" -m pip install -q --no-compile -r "$project/packaging/requirements.txt"
   touch "$stamp"
 }
 
@@ -82,7 +82,7 @@ quality_tools() { # clang-tidy, coverage.py and gcovr, which test.sh does withou
   local stamp
   stamp="$venv/.quality-$(sha256sum "$project/packaging/quality_requirements.txt" | cut -c1-16)"
   [ -e "$stamp" ] && return 0
-  "$python" -m pip install -q -r "$project/packaging/quality_requirements.txt" && touch "$stamp"
+  "$python" -m pip install -q --no-compile -r "$project/packaging/quality_requirements.txt" && touch "$stamp"
 }
 
 # bpy_venv VERSION [SECONDS]: prints the Python of a venv with this bpy and pytest; it is made
@@ -93,7 +93,7 @@ bpy_venv() {
   pytest=$(grep '^pytest==' "$project/packaging/requirements.txt")
   if [ ! -e "$folder/.made" ]; then
     python3.11 -m venv "$folder" >&2 &&
-      timeout "${2:-600}" "$folder/bin/python" -m pip install -q "bpy==$1" "$pytest" >&2 &&
+      timeout "${2:-600}" "$folder/bin/python" -m pip install -q --no-compile "bpy==$1" "$pytest" >&2 &&
       touch "$folder/.made" || return 1
   fi
   echo "$folder/bin/python"

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "api/errors.h"
 
+#include <new>
 #include <string>
 
 namespace risorius::api {
@@ -52,16 +53,17 @@ risorius_status remember(const core::Error& error, std::string_view file) noexce
   LastError& last = last_error();
   // Should this fail, the error that is shown may not point into texts that were half replaced.
   last.shown = {status, core::to_string(error.code), "", "", -1, "There is no memory for words."};
-  (void)guarded([&] {
+  if (error.offset) last.shown.offset = static_cast<std::int64_t>(*error.offset);
+  try {
     last.file = file;
     last.field = error.where;
     last.message = error.message;
-    last.shown.file = last.file.c_str();
-    last.shown.field = last.field.c_str();
-    last.shown.message = last.message.c_str();
-    if (error.offset) last.shown.offset = static_cast<std::int64_t>(*error.offset);
+  } catch (const std::bad_alloc&) {
     return status;
-  });
+  }
+  last.shown.file = last.file.c_str();
+  last.shown.field = last.field.c_str();
+  last.shown.message = last.message.c_str();
   return status;
 }
 
