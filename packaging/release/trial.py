@@ -12,6 +12,7 @@ import os
 import subprocess
 import sys
 import traceback
+from contextlib import suppress
 from pathlib import Path
 
 import addon_utils
@@ -46,6 +47,14 @@ def window():
     area = next(a for a in main.screen.areas if a.type == "VIEW_3D")
     region = next(r for r in area.regions if r.type == "WINDOW")
     return bpy.context.temp_override(window=main, area=area, region=region)
+
+
+def show_tab():
+    """The sidebar with our tab, in the view of `window`."""
+    bpy.context.space_data.show_region_ui = True
+    sidebar = next(r for r in bpy.context.area.regions if r.type == "UI")
+    with suppress(AttributeError, TypeError):  # before the sidebar was first drawn
+        sidebar.active_panel_category = "Risorius"
 
 
 def preferences(section="EXTENSIONS"):
@@ -123,10 +132,14 @@ def install():
     bpy.ops.wm.save_userpref()
     close_preferences()
     yield 1.0
+    bpy.data.objects.remove(bpy.data.objects["Cube"])  # the face would be in it
     with window():
         added = said(bpy.ops.risorius.add_character)
-        bpy.context.space_data.show_region_ui = True
-    yield 4.0
+        show_tab()
+    yield 2.0
+    with window():
+        show_tab()
+    yield 3.0
     shot("3-face")
     moved = moves()
     yield 3.0
@@ -151,7 +164,7 @@ def update():
     shot("6-updated")
     close_preferences()
     with window():
-        bpy.context.space_data.show_region_ui = True
+        show_tab()
     yield 2.0
     shot("7-says-restart")
     bpy.context.scene.frame_set(2)
@@ -267,6 +280,7 @@ def run():
     return 1.0
 
 
+bpy.context.preferences.view.show_splash = False
 names = NAMES.split(",")
 steps = [STEPS[name]() for name in names]
 if bpy.app.background:

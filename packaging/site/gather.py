@@ -14,6 +14,7 @@ import shutil
 import sys
 from collections.abc import Iterable
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 PROJECT = Path(__file__).resolve().parents[2]
@@ -107,6 +108,19 @@ def commands() -> str:
     return "\n".join(parts)
 
 
+def python_item(module: ModuleType, name: str) -> str:
+    """The entry of a public name: of a class or function where it is defined, of a value its value.
+
+    Args:
+        module: that gives it.
+        name: of it.
+    """
+    item = getattr(module, name)
+    if hasattr(item, "__qualname__"):
+        return f"::: {item.__module__}.{item.__qualname__}\n"
+    return f"### {module.__name__}.{name}\n\n`{str(item)[:200]}`\n"
+
+
 def python_api() -> str:
     """What `import risorius` gives, and the modules that are used by name."""
     import risorius
@@ -119,7 +133,7 @@ def python_api() -> str:
     for name in ("importing", "live", "speech", "baking", "batch", "sample", "selftest"):
         module = __import__(f"risorius.{name}", fromlist=["__all__"])
         parts.append(f"## risorius.{name}\n\n{(module.__doc__ or '').strip()}\n")
-        parts += [f"::: risorius.{name}.{item}\n" for item in getattr(module, "__all__", ())]
+        parts += [python_item(module, item) for item in getattr(module, "__all__", ())]
     return "\n".join(parts)
 
 
