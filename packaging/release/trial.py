@@ -175,7 +175,7 @@ def update():
 
 
 def after():
-    """The next start: the new version, the old face, the self-test, faults of others."""
+    """The next start: the new version, the old face, the self-test."""
     bpy.ops.wm.open_mainfile(filepath=str(OUT / "face.blend"))
     yield 2.0
     found = {"version": native().addon_version(), "problem": native().problem(), "moved": moves()}
@@ -186,32 +186,6 @@ def after():
     bpy.ops.preferences.addon_expand(module=module())
     yield 3.0
     shot("9-preferences")
-    yield found
-
-
-def faults():
-    """A file cut short, of another system, of another Python; a repository that is gone."""
-    files, found = OUT / "faults", {}
-    for path in sorted(files.glob("*.zip")):
-        found[path.stem] = said(
-            bpy.ops.extensions.package_install_files,
-            filepath=str(path), repo="user_default", enable_on_install=True,
-        )  # fmt: skip
-        found[path.stem + " enabled"] = [
-            a.module for a in bpy.context.preferences.addons if "user_default" in a.module
-        ]
-    bpy.ops.preferences.extension_repo_add(
-        name="cut", remote_url=URL.replace("/index.json", "-cut/index.json"), type="REMOTE"
-    )
-    bpy.ops.preferences.extension_repo_add(
-        name="gone", remote_url="http://127.0.0.1:9/index.json", type="REMOTE"
-    )
-    for index, repo in enumerate(bpy.context.preferences.extensions.repos):
-        if repo.name in ("cut", "gone"):
-            found[f"sync {repo.name}"] = said(bpy.ops.extensions.repo_sync, repo_index=index)
-            install_it = bpy.ops.extensions.package_install
-            if repo.name == "cut":
-                found["install cut"] = said(install_it, repo_index=index, pkg_id="risorius")
     yield found
 
 
@@ -258,7 +232,7 @@ def look():
     yield ours()
 
 
-STEPS = {f.__name__: f for f in (install, update, after, faults, twice, remove, look)}
+STEPS = {f.__name__: f for f in (install, update, after, twice, remove, look)}
 
 
 def run():

@@ -45,12 +45,37 @@ prepare() { # the release before, a zip that is cut short, those of other machin
   head -c 900000 "$zip" > "$out/faults/cut-short.zip"
   cp "$zip" "$out/twice/"
 }
-in_blender() { # in_blender STEP,STEP,... [OPTION...]: with a window, which Xvfb shows
-  local steps=$1
-  shift
+in_blender() { # in_blender STEP,STEP,...: with a window, which Xvfb shows
   BLENDER_USER_RESOURCES="$user" HOME="$user/home" RISORIUS_CACHE="$user/home/cache" timeout -s KILL 1800 \
-    "$blender" "$@" --window-geometry 0 0 1280 800 -noaudio --python "$here/trial.py" -- \
-    "$steps" "$out" "http://127.0.0.1:$port/risorius/index.json" > "$out/$steps.log" 2>&1
+    "$blender" --window-geometry 0 0 1280 800 -noaudio --python "$here/trial.py" -- \
+    "$1" "$out" "http://127.0.0.1:$port/risorius/index.json" > "$out/$1.log" 2>&1
+}
+in_blender_without_window() { # the one step that asks nothing of a window
+  BLENDER_USER_RESOURCES="$user" HOME="$user/home" timeout -s KILL 900 "$blender" --background -noaudio \
+    --python "$here/trial.py" -- "$1" "$out" none > "$out/$1.log" 2>&1
+}
+# command NAME ARGUMENT...: Blender's own command line; what it said and whether Risorius is there then,
+# in faults.tsv
+command_of_blender() {
+  local name=$1 said
+  shift
+  said=$(BLENDER_USER_RESOURCES="$user" HOME="$user/home" timeout -s KILL 900 "$blender" --online-mode \
+    --command extension "$@" 2>&1 | grep -iE 'error|warn|incompatible|not |fail' | grep -v mounted | head -n 3 |
+    sed "s|$top[^\" ]*/||g;s|$user[^\" ]*/||g" | paste -sd ' ')
+  printf '%s\t%s\t%s\n' "$name" "$(ls -d "$user"/extensions/{user_default,cut,gone}/risorius 2> /dev/null | wc -l)" \
+    "$said" >> "$out/faults.tsv"
+}
+make_faults() {
+  local file url="http://127.0.0.1:$port"
+  for file in "$out"/faults/*.zip; do
+    command_of_blender "$(basename "$file")" install-file -r user_default "$file"
+  done
+  command_of_blender "-" repo-add --url "$url/risorius-cut/index.json" cut
+  command_of_blender "a download that is cut short" install --sync cut.risorius
+  command_of_blender "-" repo-remove cut
+  command_of_blender "-" repo-add --url "http://127.0.0.1:9/index.json" gone
+  command_of_blender "a repository that is gone" sync
+  command_of_blender "-" repo-remove gone
 }
 left_behind() { find "$user" -iname '*risorius*' -not -path '*/home/*' | grep -v __pycache__ || true; }
 
@@ -71,8 +96,9 @@ for blender; do
   in_blender install
   repository "$served/risorius" "$zip"
   in_blender update
-  in_blender after,faults,twice,remove
-  in_blender look --background
+  make_faults
+  in_blender after,twice,remove
+  in_blender_without_window look
   left_behind > "$out/left.txt"
   kill $x $server 2> /dev/null
   wait $x $server 2> /dev/null
