@@ -22,10 +22,10 @@ import bpy
 from install_extension import install
 
 
-def options(cls: type) -> list[dict[str, Any]]:
+def options(rna: bpy.types.Struct) -> list[dict[str, Any]]:
     """The properties that a user can set of an operator."""
     out = []
-    for one in cls.bl_rna.properties:
+    for one in rna.properties:
         if one.identifier == "rna_type" or one.is_hidden:
             continue
         default = getattr(one, "default", "")
@@ -65,7 +65,7 @@ def rows(module: str) -> list[dict[str, Any]]:
             rna = getattr(getattr(bpy.ops, category), name).get_rna_type()
             out.append({"kind": "operator", "id": cls.bl_idname, "label": cls.bl_label,
                         "description": rna.description, "parent": "", "buttons": [],
-                        "properties": options(cls)})  # fmt: skip
+                        "properties": options(rna)})  # fmt: skip
         elif issubclass(cls, bpy.types.Panel):
             parent = getattr(cls, "bl_parent_id", "")
             out.append({"kind": "panel", "id": cls.__name__, "label": cls.bl_label,

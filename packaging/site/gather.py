@@ -184,7 +184,12 @@ def blender_page(row: dict[str, Any]) -> str:
     if row["properties"]:
         lines += ["| Option | Name in Python | Default | What it does |", "|---|---|---|---|"]
         for one in row["properties"]:
-            words = [one["label"], f"`{one['id']}`", f"`{one['default']}`", one["description"]]
+            words = [
+                one["label"],
+                f"`{one['id']}`",
+                f"`{one['default']}`" if one["default"] else "",
+                one["description"],
+            ]
             lines.append("| " + " | ".join(cell(word) for word in words) + " |")
         for one in row["properties"]:
             for item in one["items"]:

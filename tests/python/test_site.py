@@ -27,7 +27,9 @@ def test_every_page_of_the_navigation_and_all_that_it_links_to_is_there(tmp_path
     assert written <= set(names)
     gather.copy_pages(tmp_path, names)
     for name in names:
-        assert (tmp_path / name).is_file()
+        text = (tmp_path / name).read_text(encoding="utf-8")
+        # A menu's > that comes to stand first in its line would be a quotation.
+        assert not [line for line in text.splitlines() if line.startswith("> ")], name
 
 
 def test_a_link_to_a_folder_leads_to_its_page_and_one_to_nothing_stops(tmp_path, monkeypatch):
