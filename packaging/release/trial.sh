@@ -5,7 +5,8 @@
 # starts again, disables, removes; and faults: a file cut short, of another system or Python, a
 # repository that is gone, two of the same. A local server serves the release; nothing else is reached.
 # Screens are pictures below OUT, to be looked at. Prints rows `row<TAB>name<TAB>passed<TAB>failed`;
-# exit code 0 only if nothing failed. Needs Xvfb and ImageMagick, in a chroot's own system too.
+# exit code 0 only if nothing failed. Needs Xvfb, xdotool and ImageMagick, the last in a chroot's own
+# system too.
 #
 #   release/trial.sh RELEASE OUT BLENDER...   RELEASE: build/release/VERSION, of release.sh; BLENDER: as
 #                                             packaging/blenders.sh printed them; OUT: below /tmp
@@ -90,9 +91,12 @@ for blender; do
   prepare
   Xvfb "$DISPLAY" -screen 0 1280x800x24 > "$out/xvfb.log" 2>&1 &
   x=$!
+  # Without a window manager newer Blenders open their preferences half above the screen.
+  while sleep 1; do xdotool search --name Preferences windowmove 190 70; done > /dev/null 2>&1 &
+  mover=$!
   python3 -m http.server "$port" --bind 127.0.0.1 --directory "$served" > "$out/server.log" 2>&1 &
   server=$!
-  trap 'kill $x $server 2> /dev/null' EXIT
+  trap 'kill $x $server $mover 2> /dev/null' EXIT
   in_blender install
   repository "$served/risorius" "$zip"
   in_blender update
@@ -100,8 +104,8 @@ for blender; do
   in_blender after,twice,remove
   in_blender_without_window look
   left_behind > "$out/left.txt"
-  kill $x $server 2> /dev/null
-  wait $x $server 2> /dev/null
+  kill $x $server $mover 2> /dev/null
+  wait $x $server $mover 2> /dev/null
   trap - EXIT
   while IFS=$'\t' read -r check good; do row "$name: $check" "$good"; done \
     < <("$python" "$here/trial_results.py" "$out" "$before" "$version")
