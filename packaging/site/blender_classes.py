@@ -69,7 +69,7 @@ def rows(module: str) -> list[dict[str, Any]]:
         elif issubclass(cls, bpy.types.Panel):
             parent = getattr(cls, "bl_parent_id", "")
             out.append({"kind": "panel", "id": cls.__name__, "label": cls.bl_label,
-                        "description": inspect.getdoc(cls) or "", "parent": labels.get(parent, ""),
+                        "description": inspect.cleandoc(cls.__dict__.get("__doc__") or ""), "parent": labels.get(parent, ""),
                         "buttons": buttons(cls), "properties": []})  # fmt: skip
     return out
 

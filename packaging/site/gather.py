@@ -216,7 +216,8 @@ def blender_pages(
         for row in mine:
             name = f"{row['id']}.md"
             (folder / name).write_text(blender_page(row), encoding="utf-8")
-            index.append(f"| [{row['label'] or row['id']}]({name}) | {cell(row['description'])} |")
+            words = row["description"] or ", ".join(row["buttons"])
+            index.append(f"| [{row['label'] or row['id']}]({name}) | {cell(words)} |")
             group.append((row["label"] or row["id"], f"reference/blender/{name}"))
         index.append("")
         nav.append((heading, group))
