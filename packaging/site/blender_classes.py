@@ -68,8 +68,9 @@ def rows(module: str) -> list[dict[str, Any]]:
                         "properties": options(rna)})  # fmt: skip
         elif issubclass(cls, bpy.types.Panel):
             parent = getattr(cls, "bl_parent_id", "")
+            own = inspect.cleandoc(cls.__dict__.get("__doc__") or "")
             out.append({"kind": "panel", "id": cls.__name__, "label": cls.bl_label,
-                        "description": inspect.cleandoc(cls.__dict__.get("__doc__") or ""), "parent": labels.get(parent, ""),
+                        "description": own, "parent": labels.get(parent, ""),
                         "buttons": buttons(cls), "properties": []})  # fmt: skip
     return out
 
