@@ -2,11 +2,8 @@
 # SPDX-License-Identifier: MIT
 # host.sh: the C library as other programs have it. It is installed into an empty folder; the sample
 # host of native/example is built from there with find_package, and run; golden values are compared
-# through ctypes; then the same for Windows, with zig, and run under wine.
+# through ctypes.
 # Prints rows `row<TAB>name<TAB>passed<TAB>failed`; exit code 0 only if nothing failed.
-#
-#   host.sh             Linux
-#   host.sh --windows   and Windows: needs Debian's wine64, and says NOT RUN where there is none
 set -uo pipefail
 source "$(dirname "$0")/setup.sh"
 
@@ -15,10 +12,6 @@ logs="$project/build/logs/host"
 golden="$project/tests/data/golden"
 face="$golden/medium.dna"
 failed=0
-case "${1:-}" in
-  "" | --windows) ;;
-  *) echo "host.sh: $1 is not --windows" >&2 && exit 2 ;;
-esac
 
 works() { # works NAME LOG COMMAND...: one row
   local name=$1 log="$logs/$2.log" good=1
@@ -74,45 +67,6 @@ agrees_with_golden() {
   "$python" "$project/packaging/host/golden.py" "$(find "$out/prefix" -name 'librisorius.so')" "$golden"
 }
 
-windows="$project/build/host-windows"
-zig_for_windows() {
-  local zig name tools="$windows/tools" venv="$project/build/cross/venv"
-  [ -x "$venv/bin/python" ] || python3 -m venv "$venv" || return 1
-  "$venv/bin/python" -m pip install -q -r "$project/packaging/cross/requirements.txt" || return 1
-  zig=$("$venv/bin/python" -c \
-    'import pathlib, ziglang; print(pathlib.Path(ziglang.__file__).with_name("zig"))') || return 1
-  mkdir -p "$tools" "$windows/packages/include"
-  for name in ar ranlib rc; do printf '#!/bin/sh\nexec "%s" %s "$@"\n' "$zig" $name > "$tools/$name"; done
-  # zig checks undefined behavior unless it is told not to, and the checks ask for a runtime library.
-  for name in cc c++; do
-    printf '#!/bin/sh\nexec "%s" %s -target x86_64-windows-gnu -fno-sanitize=undefined "$@"\n' "$zig" $name \
-      > "$tools/x86_64-windows-gnu-$name"
-  done
-  chmod +x "$tools"/*
-  cp -rT /usr/include/nlohmann "$windows/packages/include/nlohmann" &&
-    cp /usr/include/xxhash.h "$windows/packages/include/" &&
-    mkdir -p "$windows/packages/share/cmake" &&
-    cp -rT /usr/share/cmake/nlohmann_json "$windows/packages/share/cmake/nlohmann_json"
-}
-windows_options=(--toolchain "$project/packaging/cross/toolchain.cmake" -DRISORIUS_TARGET=x86_64-windows-gnu
-  -DRISORIUS_TOOLS="$windows/tools" "-DCMAKE_C_COMPILER=$windows/tools/x86_64-windows-gnu-cc"
-  -DRISORIUS_PREFIX="$windows/packages;$windows/prefix")
-under_wine() { # under_wine COMMAND...: the dynamic library lies in bin
-  WINEPREFIX="$windows/wine" WINEDEBUG=-all WINEPATH="$(winepath_of "$windows/prefix/bin")" \
-    timeout -s KILL 300 "$wine" "$@"
-}
-winepath_of() { echo "Z:${1//\//\\}"; }
-# The scalar path has the same bits on every system.
-windows_runs() {
-  local kind
-  for kind in risorius static; do
-    RISORIUS_SIMD=scalar under_wine "$windows/example/smile_$kind.exe" "$(winepath_of "$face")" |
-      tr -d '\r' > "$windows/$kind.txt" || return 1
-    RISORIUS_SIMD=scalar "$out/example/smile_static" "$face" | diff - "$windows/$kind.txt" || return 1
-  done
-  cat "$windows/static.txt"
-}
-
 mkdir -p "$out" "$logs"
 step "tools" && install_packages && make_venv || exit 1
 step "C library"
@@ -124,17 +78,5 @@ works "sample host, built by find_package" example build_example "$out" &&
   works "sample host, shared and static" run example_runs &&
   works "sample host, a file cut short" refused refuses "$out/example/smile_risorius"
 works "C library through ctypes, golden values" golden agrees_with_golden
-if [ "${1:-}" = --windows ]; then
-  step "Windows"
-  wine=$(command -v wine64 || ls /usr/lib/wine/wine64 2> /dev/null)
-  works "C library, x86_64-windows-gnu" windows-library eval 'zig_for_windows &&
-    install_library "$windows" "${windows_options[@]}"' &&
-    works "sample host, x86_64-windows-gnu" windows-example build_example "$windows" "${windows_options[@]}" &&
-    if [ -n "$wine" ]; then
-      works "sample host under wine, bits of Linux" wine windows_runs
-    else
-      echo "NOT RUN: the sample host for Windows, there is no wine64"
-    fi
-fi
 step ""
 [ $failed -eq 0 ]

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Which processor it is, only native/simd asks, and which system core, simd and bytes alone: the
-other folders need not be compiled for each (packaging/cross.sh). risorius.h is C;
-packaging/host.sh compiles it for other systems."""
+other folders need not be compiled for each (packaging/cross.sh). risorius.h is C,
+for compilers of any system."""
 
 import re
 from pathlib import Path
