@@ -69,7 +69,7 @@ command_of_blender() {
 make_faults() {
   local file url="http://127.0.0.1:$port"
   for file in "$out"/faults/*.zip; do
-    command_of_blender "$(basename "$file")" install-file -r user_default "$file"
+    command_of_blender "$(basename "$file")" install-file -e -r user_default "$file"
   done
   command_of_blender "-" repo-add --url "$url/risorius-cut/index.json" cut
   command_of_blender "a download that is cut short" install --sync cut.risorius
