@@ -12,13 +12,15 @@ ICONS = set(bpy.types.UILayout.bl_rna.functions["label"].parameters["icon"].enum
 class Recorder:
     """Takes every call that a panel makes, and looks up what Blender would look up.
 
-    `labels` has the words that were drawn, those of buttons too, `operators` what the buttons do.
+    `labels` has the words that were drawn, those of buttons too, `operators` what the buttons do,
+    `properties` the paths of what can be set.
     """
 
     def __init__(self, top=None):
         top = top or self
         object.__setattr__(self, "labels", [] if top is self else top.labels)
         object.__setattr__(self, "operators", [] if top is self else top.operators)
+        object.__setattr__(self, "properties", [] if top is self else top.properties)
         object.__setattr__(self, "_top", top)
 
     def __setattr__(self, _name, _value):
@@ -31,6 +33,7 @@ class Recorder:
     def prop(self, owner, path, icon="NONE", **_options):
         assert icon in ICONS, icon
         owner.path_resolve(path)
+        self.properties.append(path)
 
     def operator(self, name, text="", icon="NONE", **_options):
         assert icon in ICONS, icon
