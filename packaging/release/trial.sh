@@ -61,10 +61,11 @@ command_of_blender() {
   local name=$1 said
   shift
   said=$(BLENDER_USER_RESOURCES="$user" HOME="$user/home" timeout -s KILL 900 "$blender" --online-mode \
-    --command extension "$@" 2>&1 | grep -iE 'error|warn|incompatible|not |fail' | grep -v mounted | head -n 3 |
+    --command extension "$@" 2>&1 | grep -iE 'error|warn|incompatible|not |fail' | grep -vE 'mounted|blender[._]org' | head -n 3 |
     sed "s|$top[^\" ]*/||g;s|$user[^\" ]*/||g" | paste -sd ' ')
   printf '%s\t%s\t%s\n' "$name" "$(ls -d "$user"/extensions/{user_default,cut,gone}/risorius 2> /dev/null | wc -l)" \
     "$said" >> "$out/faults.tsv"
+  rm -rf "$user"/extensions/{user_default,cut,gone}/risorius # the next fault begins without it
 }
 make_faults() {
   local file url="http://127.0.0.1:$port"
