@@ -78,6 +78,7 @@ make_faults() {
   command_of_blender "-" repo-add --url "http://127.0.0.1:9/index.json" gone
   command_of_blender "a repository that is gone" sync
   command_of_blender "-" repo-remove gone
+  rm -rf "$user"/extensions/{cut,gone} # Blender keeps half a download in its own cache
 }
 left_behind() { find "$user" -iname '*risorius*' -not -path '*/home/*' | grep -v __pycache__ || true; }
 

@@ -55,9 +55,8 @@ class RISORIUS_Preferences(AddonPreferences):
 
     def draw(self, context: Context) -> None:
         works, text = self_test()
-        row = self.layout.row()
-        words.show(row, text, "CHECKMARK" if works else "ERROR")
-        row.operator("risorius.self_test", icon="CHECKMARK")
+        words.show(self.layout, text, "CHECKMARK" if works else "ERROR")
+        self.layout.operator("risorius.self_test", icon="CHECKMARK")
         if compat.notice():
             words.write(self.layout, compat.notice(), "INFO")
         self.layout.prop(self, "sides")
