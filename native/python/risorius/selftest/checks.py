@@ -25,6 +25,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .. import Clip, DnaError, Rig, __version__, available_simd, load
+from ..base.errors import RisoriusError
 from ..files import fileio
 
 FACES = ("core", "units", "solvers")
@@ -41,7 +42,7 @@ class Row(NamedTuple):
     text: str
 
 
-class _Failed(Exception):  # noqa: N818  never leaves this file
+class _Failed(RisoriusError):  # noqa: N818  never leaves this file
     """A check found something wrong; the text says what."""
 
 
