@@ -1,32 +1,71 @@
 // SPDX-License-Identifier: MIT
 #include "simd/cpu.h"
 
-#if defined(_MSC_VER) && !defined(__clang__) && (defined(_M_X64) || defined(_M_IX86))
+#if defined(__x86_64__) || defined(__i386__) || defined(_M_X64) || defined(_M_IX86)
+#define RISORIUS_X86
+#if defined(_MSC_VER) && !defined(__clang__)
 #include <immintrin.h>
 #include <intrin.h>
+#else
+#include <cpuid.h>
+#endif
 #endif
 
 namespace risorius::simd {
 
-#if defined(_MSC_VER) && !defined(__clang__) && (defined(_M_X64) || defined(_M_IX86))
+#ifdef RISORIUS_X86
 
+// Asked of the processor itself: what some compilers bring for __builtin_cpu_supports says no to
+// all.
 namespace {
+
+struct Leaf {
+  unsigned a = 0, b = 0, c = 0, d = 0;
+};
+
+#if defined(_MSC_VER) && !defined(__clang__)
+
+Leaf read_leaf(int number) {
+  int highest[4], words[4];
+  __cpuidex(highest, 0, 0);
+  if (highest[0] < number) return {};
+  __cpuidex(words, number, 0);
+  return {static_cast<unsigned>(words[0]), static_cast<unsigned>(words[1]),
+          static_cast<unsigned>(words[2]), static_cast<unsigned>(words[3])};
+}
+
+unsigned saved_registers() { return static_cast<unsigned>(_xgetbv(0)); }
+
+#else
+
+Leaf read_leaf(unsigned number) {
+  Leaf leaf;
+  return __get_cpuid_count(number, 0, &leaf.a, &leaf.b, &leaf.c, &leaf.d) != 0 ? leaf : Leaf{};
+}
+
+// _xgetbv would need an option that lets the compiler use such instructions elsewhere too.
+unsigned saved_registers() {
+  unsigned low = 0, high = 0;
+  __asm__ volatile("xgetbv" : "=a"(low), "=d"(high) : "c"(0));
+  return low;
+}
+
+#endif
 
 struct Features {
   bool sse4, avx2, avx512;
 };
 
 Features detect() {
-  int leaf1[4], leaf7[4];
-  __cpuidex(leaf1, 1, 0);
-  __cpuidex(leaf7, 7, 0);
-  const auto has = [](int word, int bit) { return (word & (1 << bit)) != 0; };
-  const unsigned long long saved = has(leaf1[2], 27) ? _xgetbv(0) : 0;
-  const bool avx = (saved & 6) == 6, wide = (saved & 0xE6) == 0xE6;
-  const bool avx2 = avx && has(leaf1[2], 12) && has(leaf1[2], 29) && has(leaf7[1], 5);
-  return {has(leaf1[2], 19), avx2,
-          avx2 && wide && has(leaf7[1], 16) && has(leaf7[1], 17) && has(leaf7[1], 30) &&
-              has(leaf7[1], 31)};
+  const Leaf first = read_leaf(1), seventh = read_leaf(7);
+  const auto has = [](unsigned word, int bit) { return (word >> bit & 1) != 0; };
+  // Of what the system keeps for a thread that is not running.
+  const unsigned saved = has(first.c, 27) ? saved_registers() : 0;
+  const bool avx = (saved & 0x06) == 0x06, wide = (saved & 0xE6) == 0xE6;
+  const bool avx2 = avx && has(first.c, 12) && has(first.c, 29) && has(seventh.b, 5);
+  return {has(first.c, 19), avx2,
+          avx2 && wide && has(seventh.b, 16) && has(seventh.b, 17) && has(seventh.b, 30) &&
+              has(seventh.b, 31)};
 }
 
 }  // namespace
@@ -34,23 +73,6 @@ Features detect() {
 bool cpu_has_sse4() { return detect().sse4; }
 bool cpu_has_avx2() { return detect().avx2; }
 bool cpu_has_avx512() { return detect().avx512; }
-
-#elif defined(__x86_64__) || defined(__i386__)
-
-bool cpu_has_sse4() {
-  __builtin_cpu_init();
-  return __builtin_cpu_supports("sse4.1") != 0;
-}
-// Every CPU with AVX2 has F16C, which older compilers cannot ask for.
-bool cpu_has_avx2() {
-  __builtin_cpu_init();
-  return __builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0;
-}
-bool cpu_has_avx512() {
-  return cpu_has_avx2() && __builtin_cpu_supports("avx512f") != 0 &&
-         __builtin_cpu_supports("avx512bw") != 0 && __builtin_cpu_supports("avx512dq") != 0 &&
-         __builtin_cpu_supports("avx512vl") != 0;
-}
 
 #else
 
