@@ -158,8 +158,7 @@ FloatArray out_argument(const clip::Mixer& mixer, const py::object& out) {
   return py::cast<FloatArray>(given);
 }
 
-FloatArray mix(clip::Mixer& mixer, double time, const py::object& base,
-                    const py::object& out) {
+FloatArray mix(clip::Mixer& mixer, double time, const py::object& base, const py::object& out) {
   FloatArray result = out_argument(mixer, out);
   FloatArray below;
   if (!base.is_none()) below = base_argument(mixer, base);
