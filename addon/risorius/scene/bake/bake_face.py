@@ -21,7 +21,7 @@ from ..animation import actions
 from ..base import parts, written
 from ..base.blender_types import Animated, ArmatureObject, Context, MeshObject
 from ..character import lods, runtime
-from ..frame import channel_preview, evaluate
+from ..frame import channel_preview, controls_ahead, evaluate
 from . import baked_shape_keys, baked_tracks, sampling
 
 RESULT, CONTROLS = "RESULT", "CONTROLS"
@@ -122,7 +122,9 @@ def bake(
         ValueError: the range is none.
     """
     for rig in rigs:
-        trouble = refusal(rig, options.kind)
+        trouble = refusal(rig, options.kind) or controls_ahead.examine(
+            context.scene, rig, parts.controls_there(rig)
+        )
         if trouble:
             raise BakeError(trouble)
         channel_preview.clear(rig)

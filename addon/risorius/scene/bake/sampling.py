@@ -19,7 +19,7 @@ from mathutils import Matrix, Quaternion
 from numpy.typing import NDArray
 
 from ..animation import layers
-from ..base import compat, parts
+from ..base import compat, drivers, parts
 from ..base.blender_types import ArmatureObject, Context, Depsgraph, MeshObject
 from ..character import rig_placement, runtime
 from ..frame import evaluate, inputs
@@ -179,7 +179,7 @@ class _Reader:
         if hold is not None:
             # All of its bones: of what nothing visible depends on Blender evaluates nothing.
             self.objects.append(hold.target)
-        if _animated(rig):
+        if drivers.moves(rig):
             size = len(rig.pose.bones)
             self.samples.bones = {
                 n: np.empty((count, size, w), np.float32) for n, w in _CHANNELS.items()
@@ -245,15 +245,6 @@ def _value(owner: bpy.types.ID, path: str) -> list[float] | None:
         return [float(v) for v in value]
     except (TypeError, ValueError):
         return None
-
-
-def _animated(owner: bpy.types.Object) -> bool:
-    data = owner.animation_data
-    return data is not None and bool(
-        data.action
-        or data.nla_tracks
-        or any(c.data_path != f'["{parts.PULL}"]' for c in data.drivers)
-    )
 
 
 def animated_paths(owner: bpy.types.Object | bpy.types.Key, drivers: bool = True) -> list[str]:

@@ -106,6 +106,16 @@ def _gone_key(array: str, label: str) -> str:
     return names.cut(f"gone {array}: {label}")
 
 
+def moves(owner: bpy.types.Object) -> bool:
+    """Whether an action, an NLA strip or a driver other than our own moves an object."""
+    data = owner.animation_data
+    return data is not None and bool(
+        data.action
+        or data.nla_tracks
+        or any(c.data_path != f'["{parts.PULL}"]' for c in data.drivers)
+    )
+
+
 def used_controls(controls: ArmatureObject, labels: Sequence[str]) -> set[str]:
     """Those control properties that an F-curve of any action or a driver uses.
 

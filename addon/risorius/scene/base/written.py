@@ -13,6 +13,7 @@ places: dict[int, object] = {}  # deforming armature -> bytes of the matrix that
 weights: dict[int, object] = {}  # shape key -> bytes of the channel weights of its sum
 # Deforming armature -> the Writer of frame/bone_writer.py, until its bones change.
 bone_writers: dict[int, object] = {}
+unheard: set[int] = set()  # shape keys whose points were last written without an update
 _refused: set[int] = set()  # objects of overrides that Blender lets nobody write to
 
 
@@ -52,4 +53,5 @@ def forget() -> None:
     """Let the next evaluation write everything: after undo, load and changes of shape mode."""
     for kept in (inputs, places, weights, bone_writers):
         kept.clear()
+    unheard.clear()
     _refused.clear()

@@ -66,6 +66,19 @@ def follow_camera(rig: ArmatureObject, enable: bool, size: float | None = None) 
     show(rig)
 
 
+def expected(rig: ArmatureObject, rendering: bool, last: int | None) -> int:
+    """The level of a frame that is not evaluated yet: the camera's distance is not known.
+
+    Args:
+        rig: the deforming armature.
+        rendering: whether the frame is rendered.
+        last: the level of the frame before, if there was one.
+    """
+    if by_distance(rig) and last is not None:
+        return last
+    return render_level(rig) if rendering else viewport_level(rig)
+
+
 def choose(rig: ArmatureObject, seen: ArmatureObject, depsgraph: Depsgraph) -> int:
     """The level to evaluate for a dependency graph; shows it where the distance asks for it.
 

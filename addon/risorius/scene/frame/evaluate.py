@@ -12,16 +12,15 @@ from contextlib import contextmanager
 from time import perf_counter
 
 import bpy
-import numpy as np
-from numpy.typing import NDArray
 
 from ... import native
-from ..base import parts, written
-from ..base.blender_types import ArmatureObject, Context, Depsgraph, MeshObject
-from ..character import lods, meshes, rig_placement, runtime
-from . import bone_writer, channel_preview, inputs, timing
+from ..base import drivers, parts, written
+from ..base.blender_types import ArmatureObject, Context, Depsgraph
+from ..character import lods, rig_placement, runtime
+from . import bone_writer, channel_preview, controls_ahead, inputs, lateness, live_keys, timing
 
 _pauses: list[bool] = []
+_ahead: dict[int, bool] = {}  # deforming armature -> whether it was written before this frame
 
 
 @contextmanager
@@ -51,13 +50,62 @@ def evaluate_all(depsgraph: Depsgraph, force: bool = False) -> None:
         evaluate(rig, depsgraph, force)
 
 
-def evaluate(rig: ArmatureObject, depsgraph: Depsgraph, force: bool = False) -> bool:
+def before_frame(scene: bpy.types.Scene, rendering: bool) -> None:
+    """Bring the characters of a scene up to a frame that Blender is about to evaluate.
+
+    Args:
+        scene: at its new time.
+        rendering: whether the frame is rendered.
+    """
+    _ahead.clear()
+    if native.problem() or is_paused():
+        return
+    found = [(rig, parts.controls_of(rig)) for rig in parts.rigs() if parts.BAKED not in rig]
+    faces = [(r, c) for r, c in found if c is not None and scene in c.users_scene]
+    if not faces:
+        return
+    depsgraph, faces = controls_ahead.at(scene, faces)
+    timing.animated()
+    if depsgraph is None:
+        return
+    for rig, _controls in faces:
+        _ahead[rig.session_uid] = evaluate(rig, depsgraph, ahead=True, rendering=rendering)
+
+
+def after_frame(depsgraph: Depsgraph) -> None:
+    """Bring up what could not be brought up before its frame, and count it.
+
+    Args:
+        depsgraph: what Blender has evaluated.
+    """
+    if native.problem() or is_paused():
+        return
+    for rig in parts.rigs():
+        was = written.inputs.get(rig.session_uid)
+        done = _ahead.pop(rig.session_uid, None)
+        if done and drivers.moves(rig):
+            written.inputs.pop(rig.session_uid, None)  # what else moves its bones came over ours
+        if evaluate(rig, depsgraph) and (done is not None or lateness.circle(rig)):
+            now = written.inputs.get(rig.session_uid)
+            lateness.count(rig, was, now, runtime.there(rig).labels)
+    live_keys.reach(depsgraph)
+
+
+def evaluate(
+    rig: ArmatureObject,
+    depsgraph: Depsgraph,
+    force: bool = False,
+    ahead: bool = False,
+    rendering: bool = False,
+) -> bool:
     """Bring one character up to its controls.
 
     Args:
         rig: its deforming armature, the original.
         depsgraph: the evaluated dependency graph to read from.
         force: write also what seems unchanged.
+        ahead: `depsgraph` has the controls alone, at a frame that Blender is about to evaluate.
+        rendering: whether that frame is rendered.
 
     Returns:
         Whether there was anything to write.
@@ -74,10 +122,16 @@ def evaluate(rig: ArmatureObject, depsgraph: Depsgraph, force: bool = False) -> 
         return False  # renamed a moment ago, and not evaluated since
     raw, turns = inputs.read_inputs(seen, live, depsgraph, parts.maximum_of(controls))
     rig_placement.follow(rig, seen)
-    lod = min(max(lods.choose(rig, seen, depsgraph), 0), max(live.rig.lod_count - 1, 0))
+    if ahead:
+        last = written.inputs.get(rig.session_uid)
+        lod = lods.expected(rig, rendering, last[1] if isinstance(last, tuple) else None)
+    else:
+        lod = lods.choose(rig, seen, depsgraph)
+    lod = min(max(lod, 0), max(live.rig.lod_count - 1, 0))
     test = channel_preview.override(rig, raw, depsgraph.scene)
     state = (raw.tobytes(), lod, test, *((name, *turn) for name, turn in turns.items()))
     if not written.is_new(written.inputs, rig, state) and not force:
+        timing.looked(times[0])
         return False
     times.append(perf_counter())
     pose = live.rig.evaluate(raw, lod)
@@ -91,7 +145,7 @@ def evaluate(rig: ArmatureObject, depsgraph: Depsgraph, force: bool = False) -> 
     times.append(perf_counter())
     for item in parts.meshes_of(rig):
         if lod in list(item.get(parts.LODS, [lod])):
-            _write_shape(item, live, pose.blend_shapes, force)
+            live_keys.write(item, live, pose.blend_shapes, force, ahead)
     rig.update_tag(refresh={"OBJECT"})
     times.append(perf_counter())
     timing.add(times)
@@ -120,32 +174,3 @@ def _write_values(rig: ArmatureObject, pose: native.Pose) -> None:
     for name, values in ((parts.MAPS, pose.animated_maps), (parts.CHANNELS, pose.blend_shapes)):
         if len(values) and len(rig.get(name, ())) == len(values):
             rig[name][:] = values.tolist()
-
-
-def _write_shape(
-    item: MeshObject, live: runtime.Runtime, weights: NDArray[np.float32], force: bool
-) -> None:
-    """Write the sum of all channels to the live key of a mesh, where it has one."""
-    key = item.data.shape_keys
-    block = meshes.live_block(item)
-    if key is None or block is None or item.mode == "EDIT":
-        return
-    index = item.get(parts.MESH, -1)
-    if not 0 <= index < len(live.dna.meshes):
-        return  # the data in the .blend is another file's
-    morph = live.morph(index)
-    if morph.vertex_count != len(block.points):
-        return  # the user changed the topology
-    if parts.REAL in key:
-        weights = weights.copy()
-        weights[list(key[parts.REAL])] = 0.0
-    state = weights[morph.channel_indices].tobytes()
-    if not written.is_new(written.weights, key, state) and not force:
-        return
-    basis = meshes.points_of(key.reference_key)
-    points = morph.evaluate(weights, base=basis)
-    block.points.foreach_set("co", points.ravel())
-    if item.data.library or item.data.override_library:
-        written.note_refusal(item, bone_writer.is_there(block.points, "co", points.ravel()))
-    key.update_tag()
-    item.data.update_tag()

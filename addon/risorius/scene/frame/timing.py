@@ -38,8 +38,21 @@ def begin() -> None:
 
 
 def animated() -> None:
-    """Blender has evaluated curves, strips and drivers."""
+    """Blender has evaluated curves, strips and drivers of the controls."""
     frames[-1].animation = _since(frames[-1].begin)
+
+
+def evaluated() -> None:
+    """Blender has evaluated the frame; what was brought up before it is in it."""
+    if frames[-1].characters:
+        frames[-1].deform = _since(frames[-1].ended)
+    else:
+        animated()
+
+
+def looked(begin: float) -> None:
+    """The controls of a character were read, and are unchanged. Args: begin  perf_counter then."""
+    frames[-1].stages["controls"] += _since(begin)
 
 
 def add(times: Sequence[float]) -> None:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Collection, Iterable
 from typing import Any, cast
 
@@ -14,28 +15,48 @@ from ..animation import layer_mixing, layers
 from ..base import console, parts, sharing, written
 from ..base.blender_types import ArmatureObject, Depsgraph, current_context
 from ..character import lods, rig_placement, runtime
-from ..frame import channel_preview, evaluate, timing
+from ..frame import channel_preview, controls_ahead, evaluate, lateness, timing
 from . import applied_transforms, duplicates, migrations, repair
 
 # objects: session uids of those seen; mended: of characters that were mended at the last update.
-_state: dict[str, Any] = {"objects": frozenset(), "busy": False, "mended": set()}
+# rendering: since a render began.
+_state: dict[str, Any] = {
+    "objects": frozenset(),
+    "busy": False,
+    "mended": set(),
+    "rendering": False,
+}
 
 
 @persistent
-def _frame_changes(*_arguments: object) -> None:
+def _frame_changes(scene: bpy.types.Scene, *_arguments: object) -> None:
     timing.begin()
+    evaluate.before_frame(scene, _is_rendered())
 
 
 @persistent
 def _frame_changed(_scene: bpy.types.Scene, depsgraph: Depsgraph | None = None) -> None:
     if depsgraph is not None:
-        timing.animated()
-        evaluate.evaluate_all(depsgraph)
+        timing.evaluated()
+        evaluate.after_frame(depsgraph)
+
+
+def _is_rendered() -> bool:
+    """Whether the frame that changes is a render's: beside one the interface has its own."""
+    if not _state["rendering"] or not bpy.app.is_job_running("RENDER"):
+        return bool(_state["rendering"])
+    return threading.current_thread() is not threading.main_thread()
+
+
+@persistent
+def _render_begins(*_arguments: object) -> None:
+    _state["rendering"] = True
 
 
 @persistent
 def _render_ended(*_arguments: object) -> None:
     """The viewport shows its own level of detail again."""
+    _state["rendering"] = False
     for rig in parts.rigs():
         controls = parts.controls_of(rig)
         apart = lods.by_distance(rig) or lods.render_level(rig) != lods.viewport_level(rig)
@@ -47,6 +68,7 @@ def _render_ended(*_arguments: object) -> None:
 @persistent
 def _updated(_scene: bpy.types.Scene, depsgraph: Depsgraph) -> None:
     """React to edits of control armatures; writes here tag the rig only, so it ends at once."""
+    controls_ahead.note_edit()
     # While a render runs beside the interface, only its own frames are written.
     if _state["busy"] or bpy.app.is_job_running("RENDER") or native.problem():
         return
@@ -95,6 +117,7 @@ def _notice_copies(updates: Iterable[bpy.types.DepsgraphUpdate]) -> None:
         console.say(*migrations.bring_up_all())
         console.say(*duplicates.separate_all())
         sharing.keep()
+        lateness.forget()
 
 
 def _edited(depsgraph: Depsgraph) -> list[ArmatureObject]:
@@ -158,6 +181,7 @@ def _restored(*_arguments: object) -> None:
     point to bones that are no more, and Blender dies of a look at them.
     """
     written.forget()
+    lateness.forget()
     layer_mixing.forget()
     applied_transforms.forget()
     _state["objects"] = frozenset()
@@ -167,6 +191,12 @@ def _restored(*_arguments: object) -> None:
         controls = parts.controls_of(rig)
         if controls is not None:
             controls.update_tag()
+
+
+@persistent
+def _before_restoring(*_arguments: object) -> None:
+    """Before load, undo and redo: what is freed by them is let go."""
+    controls_ahead.close()
 
 
 @persistent
@@ -199,11 +229,15 @@ _HANDLERS = (
     ("frame_change_pre", _frame_changes),
     ("frame_change_post", _frame_changed),
     ("depsgraph_update_post", _updated),
+    ("load_pre", _before_restoring),
+    ("undo_pre", _before_restoring),
+    ("redo_pre", _before_restoring),
     ("load_post", _loaded),
     ("undo_post", _restored),
     ("redo_post", _restored),
     ("save_pre", _before_save),
     ("render_init", _end_tests),
+    ("render_init", _render_begins),
     ("render_complete", _render_ended),
     ("render_cancel", _render_ended),
 )
@@ -211,7 +245,7 @@ _HANDLERS = (
 
 def register() -> None:
     """Add the handlers, and bring up what is already there."""
-    _state.update(objects=frozenset(), busy=False, mended=set())
+    _state.update(objects=frozenset(), busy=False, mended=set(), rendering=False)
     for name, handler in _HANDLERS:
         present = getattr(bpy.app.handlers, name)
         if handler not in present:
@@ -224,6 +258,8 @@ def unregister() -> None:
         present = getattr(bpy.app.handlers, name)
         if handler in present:
             present.remove(handler)
+    controls_ahead.close()
+    lateness.forget()
     layer_mixing.forget()
     sharing.forget()
     runtime.forget()

@@ -10,11 +10,11 @@ from collections.abc import Generator
 import bpy
 
 from ... import native
-from ...scene.bake import bake_face
-from ...scene.base import console
+from ...scene.bake import bake_face, physics
+from ...scene.base import console, parts
 from .. import words
 from ..blender_types import Context, Operator, Result
-from ..common import shown_progress
+from ..common import FaceOperator, shown_progress
 from .selection import FacesOperator, FrameRange, selected_rigs
 
 _SLICE = 0.05  # seconds of baking between two looks at the keyboard
@@ -184,4 +184,22 @@ class RISORIUS_OT_unbake(FacesOperator, Operator):
         return {"FINISHED"}
 
 
-CLASSES = (RISORIUS_OT_bake, RISORIUS_OT_unbake)
+class RISORIUS_OT_bake_physics(FaceOperator, Operator):
+    """Bake all simulations of the scene, with its faces where they are at each frame"""
+
+    bl_idname = "risorius.bake_physics"
+    bl_label = "Bake Physics"
+    bl_options = {"REGISTER"}
+    baked_too = True
+
+    def execute(self, context: Context) -> Result:
+        faces = [r for r in selected_rigs(context, every=True) if parts.BAKED not in r]
+        try:
+            self.report({"INFO"}, physics.bake(context, faces))
+        except native.user_errors() as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
+CLASSES = (RISORIUS_OT_bake, RISORIUS_OT_unbake, RISORIUS_OT_bake_physics)

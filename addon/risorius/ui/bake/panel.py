@@ -3,6 +3,7 @@
 
 from ...scene.bake import bake_face
 from ...scene.base.blender_types import ArmatureObject
+from ...scene.frame import lateness
 from .. import words
 from ..blender_types import Context, Panel, UILayout
 from ..common import FaceOnlyPanel
@@ -21,10 +22,11 @@ class RISORIUS_PT_out(FaceOnlyPanel, Panel):
         column.operator_context = "INVOKE_DEFAULT"
         column.operator("risorius.bake", icon="ACTION")
         column.operator("risorius.export_animation", icon="EXPORT")
+        column.operator("risorius.bake_physics", icon="PHYSICS")
 
 
 def draw_state(layout: UILayout, rig: ArmatureObject) -> None:
-    """What the panel says of a baked face, and the way back.
+    """What the panel says of a baked face, with the way back, and of one that is late.
 
     Args:
         layout: of the panel.
@@ -35,6 +37,9 @@ def draw_state(layout: UILayout, rig: ArmatureObject) -> None:
         box = layout.box()
         words.write(box, text, "ACTION")
         box.operator(RISORIUS_OT_unbake.bl_idname, icon="LOOP_BACK")
+    late = lateness.words(rig)
+    if late:
+        words.write(layout, late, "ERROR")
 
 
 CLASSES = (RISORIUS_PT_out,)

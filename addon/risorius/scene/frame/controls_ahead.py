@@ -1,0 +1,232 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The controls of a frame before Blender evaluates it.
+
+Blender evaluates a frame in one go, simulations too, and calls its handlers afterwards: what they
+write comes too late for cloth and hair. So the control armatures alone are evaluated first, in a
+graph of their own, and the face has its pose when the frame begins.
+
+The scene of that graph is in no file: it lies in data of its own, where no list, save, undo step,
+append or handler finds it. It has the armatures as cameras of its markers: those are evaluated and
+get no user by it. What else is evaluated there is what moves them, and Blender finds that itself.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import threading
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
+from typing import cast
+
+import bpy
+
+from ..base import parts
+from ..base.blender_types import ArmatureObject, Depsgraph
+from ..character import rig_placement
+from . import lateness
+
+_FAR = 1_000_000  # frame of the first marker: no animation gets there
+_HANDLERS = (
+    "frame_change_pre",
+    "frame_change_post",
+    "depsgraph_update_pre",
+    "depsgraph_update_post",
+)
+_TIME = ("fps", "fps_base", "frame_map_old", "frame_map_new")
+
+Face = tuple[ArmatureObject, ArmatureObject]  # deforming armature, control armature
+
+_stages: dict[int, _Stage] = {}  # scene -> its stage
+_state = {"edited": True}  # whether the file was edited since the last frame
+_lock = threading.Lock()  # a render works beside the interface
+
+
+class _Stage:
+    """A scene in data of its own.
+
+    Args:
+        roots: what is evaluated.
+    """
+
+    def __init__(self, roots: Sequence[bpy.types.Object]) -> None:
+        self._data = bpy.data.temp_data()
+        self._file = self._data.__enter__()
+        # Blender counts one reference to this too few, and would free it twice.
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._file))
+        self._scene = self._file.scenes.new("Risorius")
+        for number, item in enumerate(roots):
+            marker = self._scene.timeline_markers.new(str(number), frame=_FAR + number)
+            marker.camera = item
+        self.roots = _identity(roots)
+
+    def evaluate(self, user: bpy.types.Scene) -> Depsgraph:
+        """The graph at the time of a scene."""
+        own, layer = self._scene, self._scene.view_layers[0]
+        for name in _TIME:
+            value = getattr(user.render, name)
+            if getattr(own.render, name) != value:
+                setattr(own.render, name, value)
+        own.frame_current = user.frame_current
+        if own.frame_subframe != user.frame_subframe:
+            own.frame_subframe = user.frame_subframe
+        with _unheard():
+            if own.frame_current == user.frame_current:
+                layer.update()
+            else:  # below 0 the preferences forbid it, but not to scripts; redraws every window
+                own.frame_set(user.frame_current, subframe=user.frame_subframe)
+        return cast("Depsgraph", layer.depsgraph)
+
+    def close(self) -> None:
+        """Free the scene and its graph."""
+        self._data.__exit__(None, None, None)
+
+
+def at(user: bpy.types.Scene, faces: Sequence[Face]) -> tuple[Depsgraph | None, list[Face]]:
+    """Evaluate the controls of faces at the time of a scene.
+
+    Args:
+        user: the scene that Blender is about to evaluate.
+        faces: those in it.
+
+    Returns:
+        The graph, and the faces whose controls can be read in it: not those that depend on what
+        a face does, which is not known yet. Where another thread is at it, none.
+    """
+    if not _lock.acquire(blocking=False):
+        return None, []
+    try:
+        known = [face for face in faces if not lateness.is_circle(*face)]
+        graph = _evaluated(user, known) if known else None
+        if graph is None or not _faces_in(graph, known, whole=_state["edited"]):
+            _state["edited"] = False
+            return graph, known
+        # Either Blender built the graph anew since, and the whole faces came in with the
+        # pointers; or something there depends on a face.
+        _close()
+        graph = _evaluated(user, known)
+        if _faces_in(graph, known, whole=True):
+            _close()
+            for rig, controls in known:
+                if _depends(user, (rig, controls), known):
+                    lateness.note_circle(rig, controls)
+            known = [face for face in known if not lateness.is_circle(*face)]
+            graph = _evaluated(user, known) if known else None
+        _state["edited"] = False
+        return graph, known
+    finally:
+        _lock.release()
+
+
+def examine(user: bpy.types.Scene, rig: ArmatureObject, controls: ArmatureObject) -> str:
+    """Look anew whether what moves a face depends on it.
+
+    Args:
+        user: a scene that has it.
+        rig, controls: its armatures.
+
+    Returns:
+        Why it cannot be baked, in one sentence; empty where it can.
+    """
+    lateness.forget(rig)
+    with _lock:
+        if not _depends(user, (rig, controls), [(rig, controls)]):
+            return ""
+    lateness.note_circle(rig, controls)
+    return f"{rig.name} is no function of its frame: {lateness.circle(rig)}."
+
+
+def note_edit() -> None:
+    """Something was edited: Blender may build graphs anew."""
+    _state["edited"] = True
+
+
+def close() -> None:
+    """Give the scene and its graph back: before undo and load, which free what they point to."""
+    with _lock:
+        _close()
+
+
+def _close() -> None:
+    while _stages:
+        _stages.popitem()[1].close()
+
+
+def _evaluated(user: bpy.types.Scene, faces: Sequence[Face]) -> Depsgraph:
+    roots = _roots(faces)
+    stage = _stages.get(user.session_uid)
+    if stage is not None and stage.roots != _identity(roots):
+        _close()
+        stage = None
+    if stage is None:
+        stage = _stages[user.session_uid] = _Stage(roots)
+        _state["edited"] = True
+    # Without an interface scripts edit and step without an update between, and nobody looks on.
+    with _alone(faces) if _state["edited"] or bpy.app.background else nullcontext():
+        return stage.evaluate(user)
+
+
+def _depends(user: bpy.types.Scene, face: Face, others: Sequence[Face]) -> bool:
+    """Whether what moves a face depends on one of several faces, itself among them."""
+    stage = _Stage(_roots([face]))
+    try:
+        with _alone(others):
+            return _faces_in(stage.evaluate(user), others, whole=True)
+    finally:
+        stage.close()
+
+
+def _roots(faces: Iterable[Face]) -> list[bpy.types.Object]:
+    """The control armatures, and the bodies: of a body's bones only those are read that turn."""
+    found: dict[bpy.types.Object, None] = {}
+    for _rig, controls in faces:
+        hold = rig_placement.body_of(controls)
+        found[controls] = None
+        if hold is not None and hold.target is not None:
+            found[hold.target] = None
+    return list(found)
+
+
+def _identity(items: Iterable[bpy.types.Object]) -> tuple[tuple[int, int], ...]:
+    """What tells that they are still those of before, without holding them."""
+    return tuple((item.session_uid, item.as_pointer()) for item in items)
+
+
+def _faces_in(graph: Depsgraph, faces: Iterable[Face], whole: bool) -> bool:
+    """Whether a graph has a face. Args: whole  look for its meshes, too."""
+    return any(
+        item.evaluated_get(graph).is_evaluated
+        for rig, _controls in faces
+        for item in (rig, *(parts.meshes_of(rig) if whole else ()))
+    )
+
+
+@contextmanager
+def _alone(faces: Iterable[Face]) -> Iterator[None]:
+    """While a graph is built the controls do not point to their faces.
+
+    A graph has all that its objects' properties point to: the meshes and their keys would be
+    copied, and copied again at each frame.
+    """
+    held = [(controls, controls.get(parts.RIG)) for _rig, controls in faces]
+    held = [(controls, item) for controls, item in held if isinstance(item, bpy.types.Object)]
+    try:
+        for controls, _item in held:
+            controls[parts.RIG] = controls
+        yield
+    finally:
+        for controls, item in held:
+            parts.point(controls, parts.RIG, item)
+
+
+@contextmanager
+def _unheard() -> Iterator[None]:
+    """While this lasts no handler is told of a frame or an update: it is none of the user's."""
+    lists = [getattr(bpy.app.handlers, name) for name in _HANDLERS]
+    kept = [handlers[:] for handlers in lists]
+    for handlers in lists:
+        handlers.clear()
+    try:
+        yield
+    finally:
+        for handlers, before in zip(lists, kept, strict=True):
+            handlers[:0] = before

@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Faces that are brought up after their frame, and why: simulations see those one frame late.
+
+Kept by session uids and never saved.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ..base import compat, parts
+from ..base.blender_types import ArmatureObject
+
+
+@dataclass
+class _Late:
+    """Attributes: cause  what it follows, in words; wiring  see _wiring; frames  that were late."""
+
+    cause: str
+    wiring: tuple[object, ...] = ()
+    frames: int = 0
+
+
+_circles: dict[int, _Late] = {}  # deforming armature -> why its controls wait for a face
+_others: dict[int, _Late] = {}  # -> what had another value after the frame than before it
+
+
+def is_circle(rig: ArmatureObject, controls: ArmatureObject) -> bool:
+    """Whether a face is known to read itself or another face; forgotten where it is wired anew."""
+    kept = _circles.get(rig.session_uid)
+    if kept is None:
+        return False
+    if kept.wiring != _wiring(controls):
+        del _circles[rig.session_uid]
+        return False
+    return True
+
+
+def note_circle(rig: ArmatureObject, controls: ArmatureObject) -> None:
+    """Note that what moves a face depends on one."""
+    cause = next(_causes(controls), "Something that the controls follow")
+    _circles[rig.session_uid] = _Late(cause, _wiring(controls))
+
+
+def count(rig: ArmatureObject, before: object, after: object, labels: Sequence[str]) -> None:
+    """Count a frame after which a face had to be brought up once more.
+
+    Args:
+        rig: deforming armature.
+        before, after: the states of evaluate.evaluate: bytes of the raw controls, level, ...
+        labels: names of the raw controls.
+    """
+    kept = _circles.get(rig.session_uid)
+    if kept is None:
+        cause = _difference(before, after, labels)
+        if not cause:
+            return
+        kept = _others.setdefault(rig.session_uid, _Late(cause))
+        kept.cause = cause
+    kept.frames += 1
+
+
+def _difference(before: object, after: object, labels: Sequence[str]) -> str:
+    """Which control had two values; empty where it was the level of detail."""
+    if not isinstance(before, tuple) or not isinstance(after, tuple):
+        return ""
+    first, then = (np.frombuffer(state[0], np.float32) for state in (before, after))
+    apart = np.flatnonzero(first != then) if len(first) == len(then) else ()
+    if len(apart):
+        return labels[int(apart[0])]
+    return "The turn of the head" if before[3:] != after[3:] else ""
+
+
+def circle(rig: ArmatureObject) -> str:
+    """Why a face reads one, in one sentence; empty where it does not."""
+    kept = _circles.get(rig.session_uid)
+    return f"{kept.cause} depends on what a face does" if kept is not None else ""
+
+
+def words(rig: ArmatureObject) -> str:
+    """What the panel says of a face that is late; empty for others."""
+    kept = _circles.get(rig.session_uid)
+    if kept is not None:
+        return (
+            f"{kept.cause} depends on what a face does: it is shown one pass late, and "
+            f"simulations see it one frame late ({_frames(kept)})."
+        )
+    kept = _others.get(rig.session_uid)
+    if kept is None:
+        return ""
+    return (
+        f"{kept.cause} had another value after the frame than before it: simulations saw it one "
+        f"frame late ({_frames(kept)})."
+    )
+
+
+def _frames(late: _Late) -> str:
+    return "1 frame" if late.frames == 1 else f"{late.frames} frames"
+
+
+def total() -> int:
+    """How many frames were late, of all faces."""
+    return sum(late.frames for kept in (_circles, _others) for late in kept.values())
+
+
+def forget(rig: ArmatureObject | None = None) -> None:
+    """Forget what is known of a face, or of all. Args: rig  its deforming armature."""
+    for kept in (_circles, _others):
+        if rig is None:
+            kept.clear()
+        else:
+            kept.pop(rig.session_uid, None)
+
+
+def _wiring(controls: ArmatureObject) -> tuple[object, ...]:
+    """What the controls follow, as far as it stands on them: compared, not read."""
+    data = controls.animation_data
+    return (
+        controls.parent.session_uid if controls.parent is not None else 0,
+        tuple((c.data_path, c.array_index, c.mute) for c in (data.drivers if data else ())),
+        tuple((owner, c.name, c.mute) for owner, c in _constraints(controls)),
+    )
+
+
+def _constraints(controls: ArmatureObject) -> Iterator[tuple[str, bpy.types.Constraint]]:
+    for constraint in controls.constraints:
+        yield controls.name, constraint
+    for bone in controls.pose.bones:
+        for constraint in bone.constraints:
+            yield bone.name, constraint
+
+
+def _causes(controls: ArmatureObject) -> Iterator[str]:
+    """Names of what reads a part of a face straight away; what goes by others has none."""
+    members = set()
+    for rig in parts.rigs():
+        items = parts.meshes_of(rig)
+        keys = [item.data.shape_keys for item in items]
+        owners = (rig, *items, *(item.data for item in items), *(key for key in keys if key))
+        members |= {owner.session_uid for owner in owners}
+    data = controls.animation_data
+    for curve in data.drivers if data else ():
+        targets = (t.id for v in compat.driver_of(curve).variables for t in v.targets)
+        if any(item is not None and item.session_uid in members for item in targets):
+            yield _label(curve.data_path)
+    for owner, constraint in _constraints(controls):
+        target = getattr(constraint, "target", None)
+        if target is not None and target.session_uid in members:
+            yield f"The constraint {constraint.name} of {owner}"
+
+
+def _label(path: str) -> str:
+    """`pose.bones["face"]["jawOpen"]` as `jawOpen`."""
+    quoted = path.rpartition('["')[2].removesuffix('"]')
+    return bpy.utils.unescape_identifier(quoted) if quoted != path else path

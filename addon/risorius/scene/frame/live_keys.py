@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The sum of all channels in the live key of a mesh.
+
+A written key is an edit of its mesh, and an edited mesh forgets its simulations: cloth would stand
+still at its first step. So before a frame the key of a mesh that bears one is written without a
+word, to the key and to its copies in the graphs of all scenes; graphs that are nobody's but a
+render's or an exporter's are told afterwards.
+"""
+
+from __future__ import annotations
+
+import ctypes
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base import parts, written
+from ..base.blender_types import Depsgraph, MeshObject
+from ..character import meshes, runtime
+from . import bone_writer
+
+_SIMULATED = frozenset(("CLOTH", "SOFT_BODY", "PARTICLE_SYSTEM", "DYNAMIC_PAINT", "FLUID"))
+
+
+def write(
+    item: MeshObject,
+    live: runtime.Runtime,
+    weights: NDArray[np.float32],
+    force: bool,
+    ahead: bool = False,
+) -> None:
+    """Write the sum of all channels to the live key of a mesh, where it has one.
+
+    Args:
+        item: the mesh object.
+        live: the Runtime of its character.
+        weights: float32[C] of the channels.
+        force: write also what seems unchanged.
+        ahead: whether Blender is about to evaluate a frame.
+    """
+    key = item.data.shape_keys
+    block = meshes.live_block(item)
+    if key is None or block is None or item.mode == "EDIT":
+        return
+    index = item.get(parts.MESH, -1)
+    if not 0 <= index < len(live.dna.meshes):
+        return  # the data in the .blend is another file's
+    morph = live.morph(index)
+    if morph.vertex_count != len(block.points):
+        return  # the user changed the topology
+    if parts.REAL in key:
+        weights = weights.copy()
+        weights[list(key[parts.REAL])] = 0.0
+    state = weights[morph.channel_indices].tobytes()
+    if not written.is_new(written.weights, key, state) and not force:
+        return
+    basis = meshes.points_of(key.reference_key)
+    points = morph.evaluate(weights, base=basis)
+    linked = item.data.library or item.data.override_library
+    if ahead and not linked and bears_simulation(item):
+        _write_unheard(key, block, points)
+        return
+    written.unheard.discard(key.session_uid)
+    block.points.foreach_set("co", points.ravel())
+    if linked:
+        written.note_refusal(item, bone_writer.is_there(block.points, "co", points.ravel()))
+    key.update_tag()
+    item.data.update_tag()
+
+
+def bears_simulation(item: MeshObject) -> bool:
+    """Whether a mesh has a simulation of its own, which an edit of the mesh resets."""
+    return item.rigid_body is not None or any(m.type in _SIMULATED for m in item.modifiers)
+
+
+def reach(depsgraph: Depsgraph) -> None:
+    """Write the keys anew that were written without a word and did not reach a graph.
+
+    Args:
+        depsgraph: what Blender has evaluated.
+    """
+    if not written.unheard:
+        return
+    for item in (item for rig in parts.rigs() for item in parts.meshes_of(rig)):
+        key, block = item.data.shape_keys, meshes.live_block(item)
+        if key is None or block is None or key.session_uid not in written.unheard:
+            continue
+        seen = key.evaluated_get(depsgraph)
+        if seen.is_evaluated:
+            there = meshes.points_of(seen.key_blocks[block.name])
+            if not np.array_equal(there, meshes.points_of(block)):
+                key.update_tag()
+                item.data.update_tag()
+
+
+def _write_unheard(
+    key: bpy.types.Key, block: bpy.types.ShapeKey, points: NDArray[np.float32]
+) -> None:
+    """Write points without an update: to the memory of the key, and to its copies in graphs."""
+    points = np.ascontiguousarray(points, np.float32)
+    ctypes.memmove(block.points[0].as_pointer(), points.ctypes.data, points.nbytes)
+    written.unheard.add(key.session_uid)
+    layers = (layer for scene in bpy.data.scenes for layer in scene.view_layers)
+    for graph in (layer.depsgraph for layer in layers):
+        seen = key.evaluated_get(graph) if graph is not None else key
+        if seen.is_evaluated:
+            seen.key_blocks[block.name].points.foreach_set("co", points.ravel())
