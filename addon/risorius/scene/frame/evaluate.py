@@ -9,18 +9,36 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from time import perf_counter
 
 import bpy
+import numpy as np
 
 from ... import native
+from ..animation import layers
 from ..base import drivers, parts, written
 from ..base.blender_types import ArmatureObject, Context, Depsgraph
 from ..character import lods, rig_placement, runtime
 from . import bone_writer, channel_preview, controls_ahead, inputs, lateness, live_keys, timing
 
 _pauses: list[bool] = []
-_ahead: dict[int, bool] = {}  # deforming armature -> whether it was written before this frame
+_ahead: dict[int, _Ahead] = {}  # deforming armature -> what was done before this frame
+
+
+@dataclass(frozen=True)
+class _Ahead:
+    """What was done for a character before its frame.
+
+    Attributes:
+        glance: see _glance; None where it does not tell all.
+        wrote: whether there was anything to write.
+        rendering: whether the frame is rendered.
+    """
+
+    glance: tuple[object, ...] | None
+    wrote: bool
+    rendering: bool
 
 
 @contextmanager
@@ -68,8 +86,10 @@ def before_frame(scene: bpy.types.Scene, rendering: bool) -> None:
     timing.animated()
     if depsgraph is None:
         return
-    for rig, _controls in faces:
-        _ahead[rig.session_uid] = evaluate(rig, depsgraph, ahead=True, rendering=rendering)
+    for rig, controls in faces:
+        glance = _glance(rig, controls, depsgraph)
+        wrote = evaluate(rig, depsgraph, ahead=True, rendering=rendering)
+        _ahead[rig.session_uid] = _Ahead(glance, wrote, rendering)
 
 
 def after_frame(depsgraph: Depsgraph) -> None:
@@ -81,14 +101,47 @@ def after_frame(depsgraph: Depsgraph) -> None:
     if native.problem() or is_paused():
         return
     for rig in parts.rigs():
-        was = written.inputs.get(rig.session_uid)
         done = _ahead.pop(rig.session_uid, None)
-        if done and drivers.moves(rig):
+        again = done is not None and done.wrote and drivers.moves(rig)
+        if done is not None and not again and _is_as_before(rig, done, depsgraph):
+            continue
+        was = written.inputs.get(rig.session_uid)
+        if again:
             written.inputs.pop(rig.session_uid, None)  # what else moves its bones came over ours
         if evaluate(rig, depsgraph) and (done is not None or lateness.circle(rig)):
             now = written.inputs.get(rig.session_uid)
             lateness.count(rig, was, now, runtime.there(rig).labels)
     live_keys.reach(depsgraph)
+
+
+def _glance(
+    rig: ArmatureObject, controls: ArmatureObject, depsgraph: Depsgraph
+) -> tuple[object, ...] | None:
+    """All that moves a simple character, to compare and not to read; None where more does.
+
+    Args:
+        rig, controls: its armatures, the originals.
+        depsgraph: has the evaluated controls.
+    """
+    seen = controls.evaluated_get(depsgraph)
+    more = lods.by_distance(rig) or parts.TEST in rig or layers.has_any(controls)
+    if more or rig_placement.body_of(controls) or parts.FACE not in seen.pose.bones:
+        return None
+    bones = seen.pose.bones
+    matrices = np.empty(16 * len(bones), np.float32)
+    bones.foreach_get("matrix", matrices)
+    place = tuple(map(tuple, seen.matrix_world))
+    return tuple(bones[parts.FACE].values()), matrices.tobytes(), place
+
+
+def _is_as_before(rig: ArmatureObject, done: _Ahead, depsgraph: Depsgraph) -> bool:
+    """Whether a character's controls are, after its frame, what they were before it."""
+    controls = parts.controls_of(rig)
+    if done.glance is None or controls is None:
+        return False
+    if done.rendering != (depsgraph.mode == "RENDER"):
+        return False
+    return done.glance == _glance(rig, controls, depsgraph)
 
 
 def evaluate(
