@@ -685,7 +685,11 @@ def test_the_panel_shows_the_state_and_the_way_back(dna_file):
     assert "it plays its actions, frames 2 to 9." in drawn(panel).text()
     assert "risorius.unbake" in drawn(panel).operators
     out = drawn(scene.submodule("ui.bake.panel").RISORIUS_PT_out)
-    assert out.operators == ["risorius.bake", "risorius.export_animation"]
+    assert out.operators == [
+        "risorius.bake",
+        "risorius.export_animation",
+        "risorius.bake_physics",
+    ]
     bpy.ops.risorius.unbake()
     _bake(kind="CONTROLS")
     assert (

@@ -215,7 +215,7 @@ def _alone(faces: Iterable[Face]) -> Iterator[None]:
         yield
     finally:
         for controls, item in held:
-            parts.point(controls, parts.RIG, item)
+            controls[parts.RIG] = item  # it keeps its marks
 
 
 @contextmanager

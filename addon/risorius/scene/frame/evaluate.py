@@ -87,7 +87,8 @@ def before_frame(scene: bpy.types.Scene, rendering: bool) -> None:
     if depsgraph is None:
         return
     for rig, controls in faces:
-        glance = _glance(rig, controls, depsgraph)
+        seen = controls.evaluated_get(depsgraph)
+        glance = _glance(seen) if _is_simple(rig, seen) else None
         wrote = evaluate(rig, depsgraph, ahead=True, rendering=rendering)
         _ahead[rig.session_uid] = _Ahead(glance, wrote, rendering)
 
@@ -114,24 +115,19 @@ def after_frame(depsgraph: Depsgraph) -> None:
     live_keys.reach(depsgraph)
 
 
-def _glance(
-    rig: ArmatureObject, controls: ArmatureObject, depsgraph: Depsgraph
-) -> tuple[object, ...] | None:
-    """All that moves a simple character, to compare and not to read; None where more does.
-
-    Args:
-        rig, controls: its armatures, the originals.
-        depsgraph: has the evaluated controls.
-    """
-    seen = controls.evaluated_get(depsgraph)
-    more = lods.by_distance(rig) or parts.TEST in rig or layers.has_any(controls)
-    if more or rig_placement.body_of(controls) or parts.FACE not in seen.pose.bones:
-        return None
+def _glance(seen: ArmatureObject) -> tuple[object, ...]:
+    """What moves a simple character, to compare and not to read. Args: seen  its controls."""
     bones = seen.pose.bones
     matrices = np.empty(16 * len(bones), np.float32)
     bones.foreach_get("matrix", matrices)
     place = tuple(map(tuple, seen.matrix_world))
     return tuple(bones[parts.FACE].values()), matrices.tobytes(), place
+
+
+def _is_simple(rig: ArmatureObject, seen: ArmatureObject) -> bool:
+    """Whether its control armature alone moves a character. Args: seen  that, evaluated."""
+    more = lods.by_distance(rig) or parts.TEST in rig or layers.has_any(seen.original)
+    return not more and not rig_placement.body_of(seen.original) and parts.FACE in seen.pose.bones
 
 
 def _is_as_before(rig: ArmatureObject, done: _Ahead, depsgraph: Depsgraph) -> bool:
@@ -141,7 +137,8 @@ def _is_as_before(rig: ArmatureObject, done: _Ahead, depsgraph: Depsgraph) -> bo
         return False
     if done.rendering != (depsgraph.mode == "RENDER"):
         return False
-    return done.glance == _glance(rig, controls, depsgraph)
+    seen = controls.evaluated_get(depsgraph)
+    return parts.FACE in seen.pose.bones and done.glance == _glance(seen)
 
 
 def evaluate(

@@ -20,7 +20,9 @@ from ..base.blender_types import Depsgraph, MeshObject
 from ..character import meshes, runtime
 from . import bone_writer
 
-_SIMULATED = frozenset(("CLOTH", "SOFT_BODY", "PARTICLE_SYSTEM", "DYNAMIC_PAINT", "FLUID"))
+_SIMULATED = frozenset(
+    ("CLOTH", "COLLISION", "SOFT_BODY", "PARTICLE_SYSTEM", "DYNAMIC_PAINT", "FLUID")
+)
 
 
 def write(
@@ -70,8 +72,10 @@ def write(
 
 
 def bears_simulation(item: MeshObject) -> bool:
-    """Whether a mesh has a simulation of its own, which an edit of the mesh resets."""
-    return item.rigid_body is not None or any(m.type in _SIMULATED for m in item.modifiers)
+    """Whether an edit of a mesh resets a simulation: its own, or one that collides with it."""
+    field = item.field is not None and item.field.type != "NONE"
+    body = item.rigid_body is not None
+    return field or body or any(m.type in _SIMULATED for m in item.modifiers)
 
 
 def reach(depsgraph: Depsgraph) -> None:
