@@ -15,7 +15,7 @@ from __future__ import annotations
 import ctypes
 import threading
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import cast
 
 import bpy
@@ -49,7 +49,8 @@ class _Stage:
     """
 
     def __init__(self, roots: Sequence[bpy.types.Object]) -> None:
-        self._data = bpy.data.temp_data()
+        data = bpy.data.temp_data()  # which the stubs take for what it gives
+        self._data = cast("AbstractContextManager[bpy.types.BlendData]", data)
         self._file = self._data.__enter__()
         # Blender counts one reference to this too few, and would free it twice.
         ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._file))

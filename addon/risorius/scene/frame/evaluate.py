@@ -120,7 +120,7 @@ def _glance(seen: ArmatureObject) -> tuple[object, ...]:
     bones = seen.pose.bones
     matrices = np.empty(16 * len(bones), np.float32)
     bones.foreach_get("matrix", matrices)
-    place = tuple(map(tuple, seen.matrix_world))
+    place = np.array(seen.matrix_world).tobytes()
     return tuple(bones[parts.FACE].values()), matrices.tobytes(), place
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import bpy
 import numpy as np
@@ -30,7 +31,11 @@ _others: dict[int, _Late] = {}  # -> what had another value after the frame than
 
 
 def is_circle(rig: ArmatureObject, controls: ArmatureObject) -> bool:
-    """Whether a face is known to read itself or another face; forgotten where it is wired anew."""
+    """Whether a face is known to read itself or another face; forgotten where it is wired anew.
+
+    Args:
+        rig, controls: its armatures.
+    """
     kept = _circles.get(rig.session_uid)
     if kept is None:
         return False
@@ -41,7 +46,7 @@ def is_circle(rig: ArmatureObject, controls: ArmatureObject) -> bool:
 
 
 def note_circle(rig: ArmatureObject, controls: ArmatureObject) -> None:
-    """Note that what moves a face depends on one."""
+    """Note that what moves a face depends on one. Args: rig, controls  its armatures."""
     cause = next(_causes(controls), "Something that the controls follow")
     _circles[rig.session_uid] = _Late(cause, _wiring(controls))
 
@@ -68,11 +73,14 @@ def _difference(before: object, after: object, labels: Sequence[str]) -> str:
     """Which control had two values; empty where it was the level of detail."""
     if not isinstance(before, tuple) or not isinstance(after, tuple):
         return ""
-    first, then = (np.frombuffer(state[0], np.float32) for state in (before, after))
-    apart = np.flatnonzero(first != then) if len(first) == len(then) else ()
+    states = cast("tuple[object, ...]", before), cast("tuple[object, ...]", after)
+    first, then = (np.frombuffer(cast("bytes", state[0]), np.float32) for state in states)
+    if len(first) != len(then):
+        return ""
+    apart = np.flatnonzero(first != then)
     if len(apart):
         return labels[int(apart[0])]
-    return "The turn of the head" if before[3:] != after[3:] else ""
+    return "The turn of the head" if states[0][3:] != states[1][3:] else ""
 
 
 def circle(rig: ArmatureObject) -> str:
