@@ -99,6 +99,12 @@ def say(text: str, **values: object) -> str:
     return local.format(**values) if values else local
 
 
+def of_error(error: Exception) -> str:
+    """What an error says; in the user's language where a sentence was given to it."""
+    first = error.args[0] if error.args else ""
+    return say(first) if isinstance(first, Sentence) else str(error)
+
+
 def mark(text: str) -> str:
     """A label that Blender itself looks up later; so the test of the tables finds it."""
     return text

@@ -3,18 +3,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import cast
+from collections.abc import Sequence
 
 import bpy
 
+from ...logic.base.sentences import Sentence, told
 from ..base import console, parts
 from ..base.blender_types import ArmatureObject, Context
-from ..frame import controls_ahead, lateness
+from ..frame import caches, controls_ahead, lateness
 from .bake_face import BakeError
 
 
-def bake(context: Context, rigs: Sequence[ArmatureObject]) -> str:
+def bake(context: Context, rigs: Sequence[ArmatureObject]) -> Sentence:
     """Bake all simulations of the scene that have a point cache.
 
     Args:
@@ -28,34 +28,21 @@ def bake(context: Context, rigs: Sequence[ArmatureObject]) -> str:
         BakeError: there is nothing to bake, or a face cannot be at its place in time; what was
             baked of it is freed.
     """
-    caches = list(_caches(context.scene))
-    if not caches:
-        raise BakeError("There is no simulation with a cache in this scene.")
+    count = len(list(caches.of_scene(context.scene)))
+    if not count:
+        raise BakeError(told("There is no simulation with a cache in this scene."))
     for rig in rigs:
         trouble = controls_ahead.examine(context.scene, rig, parts.controls_there(rig))
         if trouble:
             raise BakeError(trouble)
+    if caches.are_late(context.scene):
+        bpy.ops.ptcache.free_bake_all()
+        caches.look()
     before = lateness.total()
     with console.quiet():
         bpy.ops.ptcache.bake_all(bake=True)
     if lateness.total() != before:
         bpy.ops.ptcache.free_bake_all()
-        late = [words for words in map(lateness.words, rigs) if words]
-        raise BakeError(" ".join([*late, "Nothing is baked."]))
-    return f"{len(caches)} simulations baked." if len(caches) > 1 else "1 simulation baked."
-
-
-def _caches(scene: bpy.types.Scene) -> Iterator[bpy.types.PointCache]:
-    """The point caches of a scene's cloth, soft bodies, particles, paint and rigid bodies."""
-    for item in scene.objects:
-        for modifier in item.modifiers:
-            if modifier.type in ("CLOTH", "SOFT_BODY"):
-                yield cast("bpy.types.ClothModifier", modifier).point_cache
-            elif modifier.type == "PARTICLE_SYSTEM":
-                yield cast("bpy.types.ParticleSystemModifier", modifier).particle_system.point_cache
-            elif modifier.type == "DYNAMIC_PAINT":
-                canvas = cast("bpy.types.DynamicPaintModifier", modifier).canvas_settings
-                for surface in canvas.canvas_surfaces if canvas else ():
-                    yield surface.point_cache
-    if scene.rigidbody_world is not None:
-        yield scene.rigidbody_world.point_cache
+        why = next(filter(None, map(lateness.words, rigs)), "")
+        raise BakeError(told("Nothing is baked. {why}", why=why))
+    return told("Simulations baked: {count}.", count=count)

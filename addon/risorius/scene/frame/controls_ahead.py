@@ -13,6 +13,7 @@ get no user by it. What else is evaluated there is what moves them, and Blender 
 from __future__ import annotations
 
 import ctypes
+import sys
 import threading
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
@@ -20,6 +21,7 @@ from typing import cast
 
 import bpy
 
+from ...logic.base.sentences import told
 from ..base import parts
 from ..base.blender_types import ArmatureObject, Depsgraph
 from ..character import rig_placement
@@ -52,8 +54,10 @@ class _Stage:
         data = bpy.data.temp_data()  # which the stubs take for what it gives
         self._data = cast("AbstractContextManager[bpy.types.BlendData]", data)
         self._file = self._data.__enter__()
-        # Blender counts one reference to this too few, and would free it twice.
-        ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._file))
+        # Blender counts one reference to this too few, and would free it twice: ours and that of
+        # what gave it, with the one that is asked here, are three.
+        if sys.getrefcount(self._file) < 3:
+            ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._file))
         self._scene = self._file.scenes.new("Risorius")
         for number, item in enumerate(roots):
             marker = self._scene.timeline_markers.new(str(number), frame=_FAR + number)
@@ -133,7 +137,11 @@ def examine(user: bpy.types.Scene, rig: ArmatureObject, controls: ArmatureObject
         if not _depends(user, (rig, controls), [(rig, controls)]):
             return ""
     lateness.note_circle(rig, controls)
-    return f"{rig.name} is no function of its frame: {lateness.circle(rig)}."
+    return told(
+        "{face} cannot be baked: {cause} depends on what a face does.",
+        face=rig.name,
+        cause=lateness.circle(rig),
+    )
 
 
 def note_edit() -> None:

@@ -79,7 +79,8 @@ def before_frame(scene: bpy.types.Scene, rendering: bool) -> None:
     if native.problem() or is_paused():
         return
     found = [(rig, parts.controls_of(rig)) for rig in parts.rigs() if parts.BAKED not in rig]
-    faces = [(r, c) for r, c in found if c is not None and scene in c.users_scene]
+    members = set(scene.objects)  # users_scene would list them once for each face
+    faces = [(r, c) for r, c in found if c in members]
     if not faces:
         return
     depsgraph, faces = controls_ahead.at(scene, faces)

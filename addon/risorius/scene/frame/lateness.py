@@ -13,6 +13,7 @@ from typing import cast
 import bpy
 import numpy as np
 
+from ...logic.base.sentences import told
 from ..base import compat, parts
 from ..base.blender_types import ArmatureObject
 
@@ -47,7 +48,7 @@ def is_circle(rig: ArmatureObject, controls: ArmatureObject) -> bool:
 
 def note_circle(rig: ArmatureObject, controls: ArmatureObject) -> None:
     """Note that what moves a face depends on one. Args: rig, controls  its armatures."""
-    cause = next(_causes(controls), "Something that the controls follow")
+    cause = next(_causes(controls), told("Something that the controls follow"))
     _circles[rig.session_uid] = _Late(cause, _wiring(controls))
 
 
@@ -80,34 +81,34 @@ def _difference(before: object, after: object, labels: Sequence[str]) -> str:
     apart = np.flatnonzero(first != then)
     if len(apart):
         return labels[int(apart[0])]
-    return "The turn of the head" if states[0][3:] != states[1][3:] else ""
+    return told("The turn of the head") if states[0][3:] != states[1][3:] else ""
 
 
 def circle(rig: ArmatureObject) -> str:
-    """Why a face reads one, in one sentence; empty where it does not."""
+    """What of a face depends on what a face does, in words; empty where nothing does."""
     kept = _circles.get(rig.session_uid)
-    return f"{kept.cause} depends on what a face does" if kept is not None else ""
+    return kept.cause if kept is not None else ""
 
 
 def words(rig: ArmatureObject) -> str:
     """What the panel says of a face that is late; empty for others."""
     kept = _circles.get(rig.session_uid)
     if kept is not None:
-        return (
-            f"{kept.cause} depends on what a face does: it is shown one pass late, and "
-            f"simulations see it one frame late ({_frames(kept)})."
+        return told(
+            "{cause} depends on what a face does: it is shown one pass late, and simulations see "
+            "it one frame late (frames so far: {count}).",
+            cause=kept.cause,
+            count=kept.frames,
         )
     kept = _others.get(rig.session_uid)
     if kept is None:
         return ""
-    return (
-        f"{kept.cause} had another value after the frame than before it: simulations saw it one "
-        f"frame late ({_frames(kept)})."
+    return told(
+        "{cause} had another value after the frame than before it: simulations saw it one frame "
+        "late (frames so far: {count}).",
+        cause=kept.cause,
+        count=kept.frames,
     )
-
-
-def _frames(late: _Late) -> str:
-    return "1 frame" if late.frames == 1 else f"{late.frames} frames"
 
 
 def total() -> int:
@@ -158,7 +159,7 @@ def _causes(controls: ArmatureObject) -> Iterator[str]:
     for owner, constraint in _constraints(controls):
         target = getattr(constraint, "target", None)
         if target is not None and target.session_uid in members:
-            yield f"The constraint {constraint.name} of {owner}"
+            yield told("The constraint {name} of {owner}", name=constraint.name, owner=owner)
 
 
 def _label(path: str) -> str:

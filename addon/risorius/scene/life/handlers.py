@@ -15,7 +15,7 @@ from ..animation import layer_mixing, layers
 from ..base import console, parts, sharing, written
 from ..base.blender_types import ArmatureObject, Depsgraph, current_context
 from ..character import lods, rig_placement, runtime
-from ..frame import channel_preview, controls_ahead, evaluate, lateness, timing
+from ..frame import caches, channel_preview, controls_ahead, evaluate, lateness, timing
 from . import applied_transforms, duplicates, migrations, repair
 
 # objects: session uids of those seen; mended: of characters that were mended at the last update.
@@ -31,6 +31,7 @@ _state: dict[str, Any] = {
 @persistent
 def _frame_changes(scene: bpy.types.Scene, *_arguments: object) -> None:
     timing.begin()
+    caches.look()
     evaluate.before_frame(scene, _is_rendered())
 
 
@@ -204,6 +205,7 @@ def _before_save(*_arguments: object) -> None:
     if native.problem():
         return
     console.say(*duplicates.separate_all())
+    console.say(*migrations.bring_up_all())  # whose late caches are free now
     _end_tests()
     repair.remove_dead()
     console.say(*sharing.share())

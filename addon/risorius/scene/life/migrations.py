@@ -10,8 +10,9 @@ from __future__ import annotations
 from ..animation import actions
 from ..base import form, parts
 from ..base.blender_types import ArmatureObject
+from ..frame import caches
 
-_said: set[int] = set()  # session uids of newer characters
+_said: set[int] = set()  # session uids of characters that something was said of
 
 
 def bring_up_all() -> list[str]:
@@ -33,14 +34,25 @@ def bring_up_all() -> list[str]:
 
 
 def _bring_up(rig: ArmatureObject, controls: ArmatureObject) -> list[str]:
-    changed = []
-    for step in _STEPS[form.version_of(controls) :]:
-        changed += step(rig, controls)
-    if form.VERSION in controls:
-        del controls[form.VERSION]  # it may be no number
-    # Of an override of an older library it is lost when the file is saved: it is brought up anew.
-    controls[form.VERSION] = form.PRESENT
-    return [f"{rig.name} is of an older file: {', '.join(changed)}."] if changed else []
+    changed: list[str] = []
+    found = reached = form.version_of(controls)
+    for step in _STEPS[found:]:
+        done = step(rig, controls)
+        if done is None:
+            break  # and is asked for again later
+        changed += done
+        reached += 1
+    if reached > found:
+        if form.VERSION in controls:
+            del controls[form.VERSION]  # it may be no number
+        # Of an override of an older library it is lost when the file is saved: it is brought up
+        # anew.
+        controls[form.VERSION] = reached
+    late = caches.words(rig) if rig.session_uid not in _said else ""
+    if late:
+        _said.add(rig.session_uid)
+    told = [f"{rig.name} is of an older file: {', '.join(changed)}."] if changed else []
+    return [*told, *([f"{rig.name}: {late}"] if late else [])]
 
 
 def _say_once(rig: ArmatureObject, controls: ArmatureObject) -> list[str]:
@@ -80,4 +92,13 @@ def _to_1(rig: ArmatureObject, controls: ArmatureObject) -> list[str]:
     return changed
 
 
-_STEPS = (_to_1,)
+def _to_2(rig: ArmatureObject, _controls: ArmatureObject) -> list[str] | None:
+    """Simulations see the face of their own frame: what was baked before is late."""
+    if caches.note_old(rig):
+        return None
+    if caches.have_nodes(rig):
+        return ["geometry nodes that were baked around it are one frame late: bake them again"]
+    return []
+
+
+_STEPS = (_to_1, _to_2)

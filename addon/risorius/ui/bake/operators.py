@@ -91,7 +91,7 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, Operator):
         try:
             job = bake_face.bake(context, self.faces(context), options)
         except native.user_errors() as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, words.of_error(error))
             return {"CANCELLED"}
         if interactive and not bpy.app.background:
             return self._begin(context, job)
@@ -148,7 +148,7 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, Operator):
                 self.report({"INFO"}, sentence)
             return True
         except native.user_errors() as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, words.of_error(error))
             self._result = {"CANCELLED"}
             return True
         except Exception as error:  # noqa: BLE001  an operator that raises would stay for ever
@@ -195,9 +195,9 @@ class RISORIUS_OT_bake_physics(FaceOperator, Operator):
     def execute(self, context: Context) -> Result:
         faces = [r for r in selected_rigs(context, every=True) if parts.BAKED not in r]
         try:
-            self.report({"INFO"}, physics.bake(context, faces))
+            self.report({"INFO"}, words.say(physics.bake(context, faces)))
         except native.user_errors() as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, words.of_error(error))
             return {"CANCELLED"}
         return {"FINISHED"}
 

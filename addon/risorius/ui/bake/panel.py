@@ -3,7 +3,7 @@
 
 from ...scene.bake import bake_face
 from ...scene.base.blender_types import ArmatureObject
-from ...scene.frame import lateness
+from ...scene.frame import caches, lateness
 from .. import words
 from ..blender_types import Context, Panel, UILayout
 from ..common import FaceOnlyPanel
@@ -37,8 +37,8 @@ def draw_state(layout: UILayout, rig: ArmatureObject) -> None:
         box = layout.box()
         words.write(box, text, "ACTION")
         box.operator(RISORIUS_OT_unbake.bl_idname, icon="LOOP_BACK")
-    late = lateness.words(rig)
-    if late:
+    caches.look()
+    for late in filter(None, (lateness.words(rig), caches.words(rig))):
         words.write(layout, late, "ERROR")
 
 

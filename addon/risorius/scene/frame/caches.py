@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The caches of simulations, and those that were baked while faces were one frame late.
+
+Nothing in a cache says how it was made; the form of a scene's characters does: before form 2 every
+simulation saw the face of the frame before. So a character of an older file keeps its form as long
+as a cache that was baked then is there, and is asked again when the file is opened.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import cast
+
+import bpy
+
+from ...logic.base.sentences import told
+from ..base import parts
+from ..base.blender_types import ArmatureObject
+
+Key = tuple[int, str]  # of the object, and what of it has the cache
+
+_late: dict[int, set[Key]] = {}  # deforming armature -> caches that were always baked since load
+
+
+def of_scene(scene: bpy.types.Scene) -> Iterator[tuple[Key, bpy.types.PointCache]]:
+    """The point caches of a scene's cloth, soft bodies, particles, paint and rigid bodies."""
+    for item in scene.objects:
+        for modifier in item.modifiers:
+            for number, cache in enumerate(_of_modifier(modifier)):
+                yield (item.session_uid, f"{modifier.name} {number}"), cache
+    if scene.rigidbody_world is not None:
+        yield (scene.session_uid, "rigid bodies"), scene.rigidbody_world.point_cache
+
+
+def _of_modifier(modifier: bpy.types.Modifier) -> Iterator[bpy.types.PointCache]:
+    if modifier.type in ("CLOTH", "SOFT_BODY"):
+        yield cast("bpy.types.ClothModifier", modifier).point_cache
+    elif modifier.type == "PARTICLE_SYSTEM":
+        yield cast("bpy.types.ParticleSystemModifier", modifier).particle_system.point_cache
+    elif modifier.type == "DYNAMIC_PAINT":
+        canvas = cast("bpy.types.DynamicPaintModifier", modifier).canvas_settings
+        for surface in canvas.canvas_surfaces if canvas else ():
+            yield surface.point_cache
+
+
+def _baked(scene: bpy.types.Scene) -> set[Key]:
+    """Those of a scene's caches that are baked, and its fluids that are."""
+    found = {key for key, cache in of_scene(scene) if cache.is_baked}
+    for item in scene.objects:
+        for modifier in item.modifiers:
+            domain = getattr(modifier, "domain_settings", None)
+            if domain is not None and domain.has_cache_baked_data:
+                found.add((item.session_uid, modifier.name))
+    return found
+
+
+def have_nodes(rig: ArmatureObject) -> bool:
+    """Whether geometry nodes in a face's scenes can be baked: they do not say whether they are."""
+    items = (item for scene in rig.users_scene for item in scene.objects)
+    return any(getattr(m, "bakes", ()) for item in items for m in item.modifiers)
+
+
+def note_old(rig: ArmatureObject) -> bool:
+    """Note what is baked in the scenes of a character of an older file.
+
+    Args:
+        rig: its deforming armature.
+
+    Returns:
+        Whether any of it is there still.
+    """
+    if rig.session_uid not in _late:
+        _late[rig.session_uid] = {key for scene in rig.users_scene for key in _baked(scene)}
+    look()
+    return bool(_late[rig.session_uid])
+
+
+def look() -> None:
+    """Caches that are freed now are as good as new. Costs nothing where none is late."""
+    if any(_late.values()):
+        there = {key for scene in bpy.data.scenes for key in _baked(scene)}
+        for keys in _late.values():
+            keys.intersection_update(there)
+
+
+def words(rig: ArmatureObject) -> str:
+    """What the panel says where caches around a face are late; else empty."""
+    count = len(_late.get(rig.session_uid, ()))
+    if not count:
+        return ""
+    return told(
+        "Simulations here were baked by an older Risorius, with the face of the frame before: "
+        "bake them again (caches: {count}).",
+        count=count,
+    )
+
+
+def forget() -> None:
+    """After load nothing is known of what is there."""
+    _late.clear()
+
+
+def are_late(scene: bpy.types.Scene) -> bool:
+    """Whether a scene has such caches."""
+    return any(_late.get(rig.session_uid) for rig in parts.rigs() if scene in rig.users_scene)
