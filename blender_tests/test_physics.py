@@ -4,12 +4,9 @@
 import bpy
 import numpy as np
 import pytest
-from support import scene
-from support.animation import animate
+from support import scene, simulations
+from support.simulations import FRAMES, FREE, NEAR
 
-FRAMES = range(1, 11)
-NEAR = 1e-5  # of the size, where every vertex is pinned
-FREE = 2e-3  # of the size, where cloth hangs free
 HANDLERS = (
     "frame_change_pre",
     "frame_change_post",
@@ -18,118 +15,56 @@ HANDLERS = (
 )
 
 
-def _film(item, frames=FRAMES):
-    """Frame -> vertices of a mesh as Blender shows it then."""
-    found = {}
-    for frame in frames:
-        bpy.context.scene.frame_set(int(np.floor(frame)), subframe=float(frame % 1))
-        found[frame] = scene.evaluated(item)
-    return found
-
-
-def _apart(film, wanted):
-    """The largest distance over all frames, over the size of the mesh."""
-    size = np.ptp(wanted[min(wanted)], axis=0).max()
-    return max(float(np.abs(film[f] - wanted[f]).max()) for f in wanted) / size
-
-
-def _moving(dna_file, mode, far=0.2):
-    """A face whose jaw, head and place are keyed; and its head mesh."""
-    rig = scene.load(dna_file, mode)
-    controls = animate(rig)
-    for frame, x in ((1, 0.0), (6, far), (10, far / 2)):
-        controls.location.x, controls.rotation_euler.z = x, 2.0 * x
-        controls.keyframe_insert("location", frame=frame)
-        controls.keyframe_insert("rotation_euler", frame=frame)
-    bpy.context.scene.frame_start, bpy.context.scene.frame_end = FRAMES[0], FRAMES[-1]
-    return rig, scene.meshes(rig)[0]
-
-
-def _cloth(item, pinned=1.0):
-    """A cloth modifier after all others; the upper share of the vertices is pinned."""
-    group = item.vertex_groups.new(name="pins")
-    height = np.array([v.co.z for v in item.data.vertices])
-    held = np.flatnonzero(height >= np.quantile(height, 1.0 - pinned))
-    group.add(held.tolist(), 1.0, "REPLACE")
-    modifier = item.modifiers.new("Cloth", "CLOTH")
-    modifier.settings.vertex_group_mass = group.name
-    modifier.settings.quality, modifier.settings.air_damping = 3, 10.0
-    modifier.point_cache.frame_start, modifier.point_cache.frame_end = FRAMES[0], FRAMES[-1]
-    bpy.context.scene.frame_set(FRAMES[0])
-    return modifier
-
-
 def test_pinned_cloth_is_the_face_of_its_frame(mode, dna_file):
-    _rig, item = _moving(dna_file, mode)
-    wanted = _film(item)
-    _cloth(item)
-    assert _apart(_film(item), wanted) < NEAR
+    _rig, item = simulations.moving(dna_file, mode)
+    wanted = simulations.film(item)
+    simulations.cloth(item)
+    assert simulations.apart(simulations.film(item), wanted) < NEAR
     assert bpy.ops.risorius.bake_physics() == {"FINISHED"}
-    assert _apart(_film(item, reversed(FRAMES)), wanted) < NEAR
-    assert _apart(wanted, {f: wanted[max(f - 1, 1)] for f in FRAMES}) > 1000 * NEAR
+    assert simulations.apart(simulations.film(item, reversed(FRAMES)), wanted) < NEAR
+    assert simulations.apart(wanted, {f: wanted[max(f - 1, 1)] for f in FRAMES}) > 1000 * NEAR
 
 
 def test_free_cloth_falls_as_on_a_face_of_plain_actions(mode, dna_file):
-    rig, item = _moving(dna_file, mode, far=0.0)
-    modifier = _cloth(item, pinned=0.5)
-    found = _film(item, FRAMES[:5])  # it doubles what the last bits of its mesh are in each frame
+    rig, item = simulations.moving(dna_file, mode, far=0.0)
+    modifier = simulations.cloth(item, pinned=0.5)
+    found = simulations.film(
+        item, FRAMES[:5]
+    )  # it doubles what the last bits of its mesh are in each frame
     item.modifiers.remove(modifier)
     assert bpy.ops.risorius.bake() == {"FINISHED"}
-    _cloth(item, pinned=0.5)
-    wanted = _film(item, FRAMES[:5])
-    assert _apart(found, wanted) < FREE
+    simulations.cloth(item, pinned=0.5)
+    wanted = simulations.film(item, FRAMES[:5])
+    assert simulations.apart(found, wanted) < FREE
     assert not scene.submodule("scene.frame.lateness").words(rig)
 
 
-def _node(tree, kind, *links):
-    node = tree.nodes.new(kind)
-    for source, target in links:
-        tree.links.new(source, node.inputs[target])
-    return node
-
-
-def _simulation(item):
-    """Geometry nodes whose state takes the places of what comes in, at each step."""
-    tree = bpy.data.node_groups.new("Follow", "GeometryNodeTree")
-    for way in ("INPUT", "OUTPUT"):
-        tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
-    comes, goes = tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
-    begin = tree.nodes.new("GeometryNodeSimulationInput")
-    end = tree.nodes.new("GeometryNodeSimulationOutput")
-    begin.pair_with_output(end)
-    tree.links.new(comes.outputs[0], begin.inputs[0])
-    sample = tree.nodes.new("GeometryNodeSampleIndex")
-    sample.data_type = "FLOAT_VECTOR"
-    place, index = (
-        tree.nodes.new("GeometryNodeInputPosition"),
-        tree.nodes.new("GeometryNodeInputIndex"),
-    )
-    value = next(s for s in sample.inputs if s.name == "Value" and s.enabled)
-    tree.links.new(comes.outputs[0], sample.inputs["Geometry"])
-    tree.links.new(place.outputs[0], value)
-    tree.links.new(index.outputs[0], sample.inputs["Index"])
-    taken = next(s for s in sample.outputs if s.enabled)
-    state = next(s for s in begin.outputs if s.name == "Geometry")
-    put = _node(tree, "GeometryNodeSetPosition", (state, "Geometry"), (taken, "Position"))
-    tree.links.new(put.outputs[0], next(s for s in end.inputs if s.name == "Geometry"))
-    tree.links.new(next(s for s in end.outputs if s.name == "Geometry"), goes.inputs[0])
-    item.modifiers.new("Nodes", "NODES").node_group = tree
-    bpy.context.scene.frame_set(FRAMES[0])
-
-
 def test_a_simulation_of_geometry_nodes_sees_the_face_of_its_frame(mode, dna_file):
-    _rig, item = _moving(dna_file, mode)
-    wanted = _film(item)
-    _simulation(item)
-    assert _apart(_film(item), wanted) < NEAR
+    _rig, item = simulations.moving(dna_file, mode, far=0.0)
+    wanted = simulations.mean_places(simulations.film(item))
+    simulations.trail(item)
+    assert simulations.apart(simulations.film(item), wanted) < NEAR
+
+
+@pytest.mark.parametrize("kind", ["SURFACE_DEFORM", "SHRINKWRAP"])
+def test_what_lies_on_the_face_is_simulated_with_the_face_of_its_frame(kind, mode, dna_file):
+    _rig, item = simulations.moving(dna_file, mode)
+    sheet = simulations.scarf(item, kind)
+    wanted = simulations.film(sheet)
+    simulations.cloth(sheet)
+    assert simulations.apart(simulations.film(sheet), wanted) < NEAR
+    assert bpy.ops.risorius.bake_physics() == {"FINISHED"}
+    assert simulations.apart(simulations.film(sheet, reversed(FRAMES)), wanted) < NEAR
+    late = {f: wanted[max(f - 1, 1)] for f in FRAMES}
+    assert simulations.apart(wanted, late) > 1000 * NEAR
 
 
 def test_alembic_has_the_cloth_of_each_frame(mode, dna_file, tmp_path):
     if not bpy.app.build_options.alembic:
         pytest.skip("EXTRA NOT RUN: this Blender has no Alembic exporter")
-    _rig, item = _moving(dna_file, mode)
-    wanted = _film(item)
-    _cloth(item)
+    _rig, item = simulations.moving(dna_file, mode)
+    wanted = simulations.film(item)
+    simulations.cloth(item)
     if mode == "LIVE":  # see docs/performance.md: a graph of the exporter's own is told afterwards
         assert bpy.ops.risorius.bake_physics() == {"FINISHED"}
     path = str(tmp_path / "face.abc")
@@ -140,7 +75,7 @@ def test_alembic_has_the_cloth_of_each_frame(mode, dna_file, tmp_path):
     bpy.ops.wm.alembic_import(filepath=path, as_background_job=False)
     came = [o for o in bpy.data.objects if o not in before and o.type == "MESH"]
     same = next(o for o in came if len(o.data.vertices) == len(item.data.vertices))
-    assert _apart(_film(same), wanted) < NEAR
+    assert simulations.apart(simulations.film(same), wanted) < NEAR
 
 
 def _by_nla(rig):
@@ -213,7 +148,7 @@ WAYS = (_as_it_is, _by_nla, _by_driver, _by_constraint, _by_body, _by_layer, _by
 @pytest.mark.parametrize("way", WAYS)
 def test_the_pose_is_there_when_the_frame_is_evaluated(way, dna_file):
     """The first handler after the graph sees what is shown in the end."""
-    rig, item = _moving(dna_file, "AUTO")
+    rig, item = simulations.moving(dna_file, "AUTO")
     way(rig)
     seen = []
 
@@ -248,9 +183,9 @@ def _circle(rig):
 
 
 def test_a_control_that_reads_its_face_is_named_and_not_baked(dna_file):
-    rig, item = _moving(dna_file, "KEYS")
+    rig, item = simulations.moving(dna_file, "KEYS")
     _circle(rig)
-    _cloth(item)
+    simulations.cloth(item)
     bpy.context.scene.frame_set(5)
     words = scene.submodule("scene.frame.lateness").words(rig)
     assert "browDownL" in words
@@ -264,7 +199,7 @@ def test_a_control_that_reads_its_face_is_named_and_not_baked(dna_file):
 
 
 def test_nothing_of_it_is_seen(dna_file, tmp_path, capfd):
-    rig, _item = _moving(dna_file, "AUTO")
+    rig, _item = simulations.moving(dna_file, "AUTO")
     counts, calls = scene.counts(), []
     users = [o.users for o in bpy.data.objects]
 
@@ -295,7 +230,7 @@ def test_nothing_of_it_is_seen(dna_file, tmp_path, capfd):
 def test_it_lives_through_undo_deletion_and_load(dna_file, tmp_path):
     path = str(tmp_path / "saved.blend")
     for turn in range(6):
-        rig, item = _moving(dna_file, "AUTO")
+        rig, item = simulations.moving(dna_file, "AUTO")
         _by_driver(rig)
         bpy.context.scene.frame_set(3)
         if turn == 0:
@@ -317,4 +252,4 @@ def test_it_lives_through_undo_deletion_and_load(dna_file, tmp_path):
         bpy.data.orphans_purge(do_recursive=True)
     bpy.ops.wm.open_mainfile(filepath=path)
     rig = next(o for o in bpy.data.objects if "risorius_controls" in o)
-    assert _apart(_film(scene.meshes(rig)[0], [3]), {3: wanted}) < NEAR
+    assert simulations.apart(simulations.film(scene.meshes(rig)[0], [3]), {3: wanted}) < NEAR

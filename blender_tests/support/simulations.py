@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A face that moves, what is simulated on it, and how it looks from frame to frame."""
+
+import bpy
+import numpy as np
+
+from . import scene
+from .animation import animate
+
+FRAMES = range(1, 11)
+NEAR = 1e-5  # of the size, where every vertex is pinned
+FREE = 2e-3  # of the size, where cloth hangs free
+
+
+def film(item, frames=FRAMES):
+    """Frame -> vertices of a mesh as Blender shows it then."""
+    found = {}
+    for frame in frames:
+        bpy.context.scene.frame_set(int(np.floor(frame)), subframe=float(frame % 1))
+        found[frame] = scene.evaluated(item)
+    return found
+
+
+def apart(film, wanted):
+    """The largest distance over all frames, over the size of the mesh."""
+    size = np.ptp(wanted[min(wanted)], axis=0).max()
+    return max(float(np.abs(film[f] - wanted[f]).max()) for f in wanted) / size
+
+
+def moving(dna_file, mode, far=0.2):
+    """A face whose jaw, head and place are keyed; and its head mesh."""
+    rig = scene.load(dna_file, mode)
+    controls = animate(rig)
+    for frame, x in ((1, 0.0), (6, far), (10, far / 2)):
+        controls.location.x, controls.rotation_euler.z = x, 2.0 * x
+        controls.keyframe_insert("location", frame=frame)
+        controls.keyframe_insert("rotation_euler", frame=frame)
+    bpy.context.scene.frame_start, bpy.context.scene.frame_end = FRAMES[0], FRAMES[-1]
+    return rig, scene.meshes(rig)[0]
+
+
+def cloth(item, pinned=1.0):
+    """A cloth modifier after all others; the upper share of the vertices is pinned."""
+    group = item.vertex_groups.new(name="pins")
+    height = np.array([v.co.z for v in item.data.vertices])
+    held = np.flatnonzero(height >= np.quantile(height, 1.0 - pinned))
+    group.add(held.tolist(), 1.0, "REPLACE")
+    modifier = item.modifiers.new("Cloth", "CLOTH")
+    modifier.settings.vertex_group_mass = group.name
+    modifier.settings.quality, modifier.settings.air_damping = 3, 10.0
+    modifier.point_cache.frame_start, modifier.point_cache.frame_end = FRAMES[0], FRAMES[-1]
+    bpy.context.scene.frame_set(FRAMES[0])
+    return modifier
+
+
+def mean_places(places):
+    """Frame -> what `trail` shows of vertices that are at these places. Args: places  a film."""
+    found, state = {}, None
+    for frame in sorted(places):
+        state = places[frame] if state is None else (state + places[frame]) / 2
+        found[frame] = state
+    return found
+
+
+def trail(item):
+    """Geometry nodes whose state goes half the way to what comes in, at each step."""
+    tree = bpy.data.node_groups.new("Trail", "GeometryNodeTree")
+    for way in ("INPUT", "OUTPUT"):
+        tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
+    comes, goes = tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
+    begin = tree.nodes.new("GeometryNodeSimulationInput")
+    end = tree.nodes.new("GeometryNodeSimulationOutput")
+    begin.pair_with_output(end)
+    state, result = (next(s for s in sockets if s.name == "Geometry")
+                     for sockets in (begin.outputs, end.inputs))  # fmt: skip
+    place, index, taken, half, put = (
+        tree.nodes.new(kind)
+        for kind in ("GeometryNodeInputPosition", "GeometryNodeInputIndex",
+                     "GeometryNodeSampleIndex", "ShaderNodeMix", "GeometryNodeSetPosition")
+    )  # fmt: skip
+    taken.data_type, half.data_type = "FLOAT_VECTOR", "VECTOR"
+    half.inputs[0].default_value = 0.5
+    first, second = (next(s for s in half.inputs if s.name == n and s.enabled) for n in "AB")
+    for source, target in (
+        (comes.outputs[0], begin.inputs[0]),
+        (comes.outputs[0], taken.inputs["Geometry"]),
+        (place.outputs[0], next(s for s in taken.inputs if s.name == "Value" and s.enabled)),
+        (index.outputs[0], taken.inputs["Index"]),
+        (place.outputs[0], first),
+        (next(s for s in taken.outputs if s.enabled), second),
+        (state, put.inputs["Geometry"]),
+        (next(s for s in half.outputs if s.enabled), put.inputs["Position"]),
+        (put.outputs[0], result),
+        (next(s for s in end.outputs if s.name == "Geometry"), goes.inputs[0]),
+    ):
+        tree.links.new(source, target)
+    item.modifiers.new("Nodes", "NODES").node_group = tree
+    bpy.context.scene.frame_set(FRAMES[0])
+
+
+def scarf(item, kind):
+    """A sheet that lies on a mesh by a modifier: SURFACE_DEFORM or SHRINKWRAP."""
+    points = np.array([v.co for v in item.data.vertices]) @ np.array(item.matrix_world)[:3, :3].T
+    points += np.array(item.matrix_world)[:3, 3]
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle, size = (low + high) / 2, (high - low).max()
+    place = (middle[0], low[1], middle[2])
+    bpy.ops.mesh.primitive_grid_add(
+        x_subdivisions=5, y_subdivisions=4, size=0.3 * size, location=place,
+        rotation=(np.pi / 2, 0, 0),
+    )  # fmt: skip
+    sheet = bpy.context.object
+    modifier = sheet.modifiers.new("Follow", kind)
+    modifier.target = item
+    if kind == "SURFACE_DEFORM":
+        assert bpy.ops.object.surfacedeform_bind(modifier=modifier.name) == {"FINISHED"}
+        assert modifier.is_bound
+    return sheet
