@@ -227,7 +227,31 @@ def test_nothing_of_it_is_seen(dna_file, tmp_path, capfd):
         assert list(there.scenes) == ["Scene"]
 
 
-def test_it_lives_through_undo_deletion_and_load(dna_file, tmp_path):
+@pytest.fixture
+def onlooker():
+    """Another add-on that is told of frames: for it faces have their pose in time."""
+
+    def look(*_arguments):
+        pass
+
+    bpy.app.handlers.frame_change_post.append(look)
+    yield
+    if look in bpy.app.handlers.frame_change_post:  # a file that is opened takes it away
+        bpy.app.handlers.frame_change_post.remove(look)
+
+
+def test_frames_that_nobody_sees_early_are_not_evaluated_twice(dna_file):
+    _rig, item = simulations.moving(dna_file, "AUTO")
+    ahead = scene.submodule("scene.frame.evaluate")._ahead
+    needed = scene.submodule("scene.frame.controls_ahead").is_needed
+    bpy.context.scene.frame_set(2)
+    bpy.context.scene.frame_set(3)
+    assert (needed(), ahead) == (False, {})
+    simulations.trail(item)
+    assert needed()
+
+
+def test_it_lives_through_undo_deletion_and_load(dna_file, tmp_path, onlooker):
     path = str(tmp_path / "saved.blend")
     for turn in range(6):
         rig, item = simulations.moving(dna_file, "AUTO")

@@ -17,6 +17,9 @@ from ...logic.base.sentences import told
 from ..base import parts
 from ..base.blender_types import ArmatureObject
 
+SIMULATED = frozenset(
+    ("CLOTH", "COLLISION", "SOFT_BODY", "PARTICLE_SYSTEM", "DYNAMIC_PAINT", "FLUID")
+)
 Key = tuple[int, str]  # of the object, and what of it has the cache
 
 _late: dict[int, set[Key]] = {}  # deforming armature -> caches that were always baked since load
@@ -54,10 +57,23 @@ def _baked(scene: bpy.types.Scene) -> set[Key]:
     return found
 
 
+def any_simulates() -> bool:
+    """Whether anything in this file keeps what it saw of frames before, instances included."""
+    if any(scene.rigidbody_world is not None for scene in bpy.data.scenes):
+        return True
+    modifiers = (modifier for item in bpy.data.objects for modifier in item.modifiers)
+    return any(m.type in SIMULATED or (m.type == "NODES" and _bakes(m)) for m in modifiers)
+
+
+def _bakes(modifier: bpy.types.Modifier) -> bool:
+    """Whether geometry nodes have a zone or a node that can be baked, in groups too."""
+    return len(getattr(modifier, "bakes", ())) > 0
+
+
 def have_nodes(rig: ArmatureObject) -> bool:
     """Whether geometry nodes in a face's scenes can be baked: they do not say whether they are."""
     items = (item for scene in rig.users_scene for item in scene.objects)
-    return any(getattr(m, "bakes", ()) for item in items for m in item.modifiers)
+    return any(_bakes(m) for item in items for m in item.modifiers)
 
 
 def note_old(rig: ArmatureObject) -> bool:

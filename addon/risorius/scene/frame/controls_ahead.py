@@ -25,7 +25,7 @@ from ...logic.base.sentences import told
 from ..base import parts
 from ..base.blender_types import ArmatureObject, Depsgraph
 from ..character import rig_placement
-from . import lateness
+from . import caches, lateness
 
 _FAR = 1_000_000  # frame of the first marker: no animation gets there
 _HANDLERS = (
@@ -39,7 +39,8 @@ _TIME = ("fps", "fps_base", "frame_map_old", "frame_map_new")
 Face = tuple[ArmatureObject, ArmatureObject]  # deforming armature, control armature
 
 _stages: dict[int, _Stage] = {}  # scene -> its stage
-_state = {"edited": True}  # whether the file was edited since the last frame
+# edited: whether the file was since the last frame; simulated: whether anything in it is.
+_state = {"edited": True, "simulated": True}
 _lock = threading.Lock()  # a render works beside the interface
 
 
@@ -84,6 +85,22 @@ class _Stage:
     def close(self) -> None:
         """Free the scene and its graph."""
         self._data.__exit__(None, None, None)
+
+
+def is_needed() -> bool:
+    """Whether anything sees a frame before its faces could be brought up after it.
+
+    Else the curves would be evaluated twice for nothing. The first frame after an edit is always
+    done: what was edited may read a face.
+    """
+    # Without an interface scripts edit and step without an update between.
+    if _state["edited"] or bpy.app.background:
+        _state["simulated"] = caches.any_simulates()
+    if _state["edited"] or _state["simulated"]:
+        return True
+    ours = __name__.partition(".scene.")[0]
+    places = (getattr(h, "__module__", None) or "" for h in bpy.app.handlers.frame_change_post)
+    return any(not place.startswith(ours) for place in places)
 
 
 def at(user: bpy.types.Scene, faces: Sequence[Face]) -> tuple[Depsgraph | None, list[Face]]:

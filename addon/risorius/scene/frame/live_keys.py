@@ -18,11 +18,7 @@ from numpy.typing import NDArray
 from ..base import parts, written
 from ..base.blender_types import Depsgraph, MeshObject
 from ..character import meshes, runtime
-from . import bone_writer
-
-_SIMULATED = frozenset(
-    ("CLOTH", "COLLISION", "SOFT_BODY", "PARTICLE_SYSTEM", "DYNAMIC_PAINT", "FLUID")
-)
+from . import bone_writer, caches
 
 
 def write(
@@ -75,7 +71,7 @@ def bears_simulation(item: MeshObject) -> bool:
     """Whether an edit of a mesh resets a simulation: its own, or one that collides with it."""
     field = item.field is not None and item.field.type != "NONE"
     body = item.rigid_body is not None
-    return field or body or any(m.type in _SIMULATED for m in item.modifiers)
+    return field or body or any(m.type in caches.SIMULATED for m in item.modifiers)
 
 
 def reach(depsgraph: Depsgraph) -> None:
