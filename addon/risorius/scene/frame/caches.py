@@ -61,8 +61,12 @@ def any_simulates() -> bool:
     """Whether anything in this file keeps what it saw of frames before, instances included."""
     if any(scene.rigidbody_world is not None for scene in bpy.data.scenes):
         return True
-    modifiers = (modifier for item in bpy.data.objects for modifier in item.modifiers)
-    return any(m.type in SIMULATED or (m.type == "NODES" and _bakes(m)) for m in modifiers)
+    for item in bpy.data.objects:
+        for modifier in item.modifiers:
+            kind = modifier.type
+            if kind in SIMULATED or (kind == "NODES" and _bakes(modifier)):
+                return True
+    return False
 
 
 def _bakes(modifier: bpy.types.Modifier) -> bool:

@@ -76,12 +76,12 @@ def before_frame(scene: bpy.types.Scene, rendering: bool) -> None:
         rendering: whether the frame is rendered.
     """
     _ahead.clear()
-    if native.problem() or is_paused():
+    if native.problem() or is_paused() or not controls_ahead.is_needed():
         return
     found = [(rig, parts.controls_of(rig)) for rig in parts.rigs() if parts.BAKED not in rig]
     members = set(scene.objects)  # users_scene would list them once for each face
     faces = [(r, c) for r, c in found if c in members]
-    if not faces or not controls_ahead.is_needed():
+    if not faces:
         return
     depsgraph, faces = controls_ahead.at(scene, faces)
     timing.animated()
