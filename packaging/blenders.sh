@@ -24,11 +24,6 @@ fi
 source "$(dirname "$0")/setup.sh"
 make_venv >&2
 
-mirror() { # the Debian mirror that this machine's apt already uses, or nothing: debootstrap's own
-  apt-get indextargets --format '$(REPO_URI)' 'Created-By: Packages' 2> /dev/null |
-    grep -E '/debian/?$' | head -n 1 || true
-}
-
 make_system() { # make_system SUITE ROOT
   local uri
   uri=$(mirror)

@@ -9,11 +9,10 @@
 #   cross.sh --all   all libraries for macOS too, and all quick GoogleTests on aarch64
 set -uo pipefail
 source "$(dirname "$0")/setup.sh"
+source "$project/packaging/cross/zig.sh"
 
-out="$project/build/cross"
+out=$cross
 logs="$project/build/logs/cross"
-prefix="$out/prefix" # packages that only have headers, and GoogleTest for aarch64
-tools="$out/tools"
 jobs=$(nproc)
 # Of what asks for the processor, and of what stands on it; the system is the one that the other tests
 # run on. That char is unsigned there is tried by the sanitizers' build. The hostile bytes of hostile_test
@@ -45,39 +44,10 @@ works() { # works NAME LOG COMMAND...: one row
   fi
 }
 
-get_zig() {
-  local stamp
-  stamp="$out/venv/.$(sha256sum "$project/packaging/cross/requirements.txt" | cut -c1-16)"
-  [ -e "$stamp" ] && return 0
-  python3 -m venv "$out/venv" &&
-    "$out/venv/bin/python" -m pip install -q -r "$project/packaging/cross/requirements.txt" &&
-    touch "$stamp"
-}
-# CMake and ccache want a compiler to be one program.
-wrap_zig() {
-  local zig name
-  zig=$("$out/venv/bin/python" -c \
-    'import pathlib, ziglang; print(pathlib.Path(ziglang.__file__).with_name("zig"))') || return 1
-  mkdir -p "$tools"
-  for name in ar ranlib rc; do
-    printf '#!/bin/sh\nexec "%s" %s "$@"\n' "$zig" $name > "$tools/$name"
-  done
-  for name in x86_64-macos aarch64-macos x86_64-windows-gnu; do
-    printf '#!/bin/sh\nexec "%s" c++ -target %s "$@"\n' "$zig" $name > "$tools/$name-c++"
-  done
-  chmod +x "$tools"/*
-  export CCACHE_COMPILERCHECK="string:$("$zig" version)"
-}
-gather_packages() {
-  mkdir -p "$prefix/include" "$prefix/lib" "$prefix/share/cmake" &&
-    cp -rT /usr/include/nlohmann "$prefix/include/nlohmann" &&
-    cp /usr/include/xxhash.h "$prefix/include/" &&
-    cp -rT /usr/share/cmake/nlohmann_json "$prefix/share/cmake/nlohmann_json" &&
-    cp -rT "$google/include/gtest" "$prefix/include/gtest"
-}
 google=/usr/src/googletest/googletest
 build_google_test() {
   local name
+  cp -rT "$google/include/gtest" "$prefix/include/gtest" || return 1
   for name in gtest gtest_main; do
     local source=$name
     [ $name = gtest ] && source=gtest-all
@@ -102,7 +72,7 @@ build_libraries() { # build_libraries TARGET [LIBRARY...]
   local target=$1
   shift
   configure "$target" "-c -O0 -g0 -fno-sanitize=undefined" &&
-    CCACHE_COMPILERTYPE=clang cmake --build "$out/$target" -j"$jobs" ${1:+--target "$@"}
+    cmake --build "$out/$target" -j"$jobs" ${1:+--target "$@"}
 }
 build_programs() {
   build_google_test &&
@@ -168,8 +138,8 @@ other_bits() {
 }
 
 mkdir -p "$out" "$logs"
-step "tools" && install_packages clang-14 googletest g++-aarch64-linux-gnu qemu-user && get_zig &&
-  wrap_zig && gather_packages || exit 1
+step "tools" && install_packages clang-14 googletest g++-aarch64-linux-gnu qemu-user &&
+  get_zig x86_64-windows-gnu aarch64-macos x86_64-macos && gather_headers || exit 1
 step "x86_64-windows-gnu"
 works "libraries, x86_64-windows-gnu" x86_64-windows-gnu build_libraries x86_64-windows-gnu
 # The other folders ask for no system and no processor (tests/layers/test_processors.py), and the
@@ -178,7 +148,7 @@ step "aarch64-macos"
 works "libraries, aarch64-macos" aarch64-macos build_libraries aarch64-macos "${of_macos[@]}"
 step "x86_64-macos"
 works "SIMD, x86_64-macos" x86_64-macos build_libraries x86_64-macos risorius_simd
-unset CCACHE_COMPILERCHECK
+unset CCACHE_COMPILERCHECK CCACHE_COMPILERTYPE
 step "aarch64-linux-gnu"
 works "GoogleTest for aarch64 builds" aarch64 build_programs && step "emulator" && run_programs
 step "scalar bits"

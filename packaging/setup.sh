@@ -66,6 +66,11 @@ install_packages() { # install_packages [MORE...]: what every build needs, and m
   DEBIAN_FRONTEND=noninteractive apt-get install -y -qq "${missing[@]}" > /dev/null
 }
 
+mirror() { # the Debian mirror that this machine's apt already uses, or nothing: debootstrap's own
+  apt-get indextargets --format '$(REPO_URI)' 'Created-By: Packages' 2> /dev/null |
+    grep -E '/debian/?$' | head -n 1 || true
+}
+
 make_venv() {
   local stamp
   stamp="$venv/.$(sha256sum "$project/packaging/requirements.txt" | cut -c1-16)"

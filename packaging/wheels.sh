@@ -1,0 +1,215 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
+# wheels.sh: the wheels that are released, of every system, from this machine: zig compiles and links
+# them with the CMake project and toolchain of cross.sh, pip and scikit-build-core pack them. Each is
+# inspected by other people's tools (cross/inspect_wheel.py), and imported where that can be done here.
+# They lie in build/wheels; what is known of each is in build/wheels/facts.tsv (cross/facts.py).
+# Prints rows `row<TAB>name<TAB>passed<TAB>failed`; exit code 0 only if nothing failed.
+#
+#   wheels.sh [--twice] [PLATFORM[=PYTHON]...]
+#       of linux-x64, windows-x64, windows-arm64, macos-arm64, macos-x64 and sdist; without one all.
+#       linux-x64=3.13 is that Python's alone. --twice: each once more, from nothing and elsewhere; the
+#       bytes must be the same
+set -uo pipefail
+source "$(dirname "$0")/setup.sh"
+source "$project/packaging/cross/zig.sh"
+source "$project/packaging/cross/pythons.sh"
+
+declare -A versions=([linux-x64]="3.11 3.13 3.14" [windows-x64]="3.11 3.13" [windows-arm64]="3.11 3.13"
+  [macos-arm64]="3.11 3.13" [macos-x64]="3.11")
+declare -A target_of=([linux-x64]=x86_64-linux-gnu.2.28 [windows-x64]=x86_64-windows-gnu
+  [windows-arm64]=aarch64-windows-gnu [macos-arm64]=aarch64-macos.11.0 [macos-x64]=x86_64-macos.11.0)
+declare -A label_of=([linux-x64]=manylinux_2_28_x86_64 [windows-x64]=win_amd64 [windows-arm64]=win_arm64
+  [macos-arm64]=macosx_11_0_arm64 [macos-x64]=macosx_11_0_x86_64)
+all=(linux-x64 windows-x64 windows-arm64 macos-arm64 macos-x64)
+wheels="$project/build/wheels"
+logs="$project/build/logs/wheels"
+facts="$wheels/facts.tsv"
+twice=
+platforms=()
+for word; do
+  case $word in
+    --twice) twice=yes ;;
+    sdist) platforms+=(sdist) ;;
+    *)
+      [[ -n "${versions[${word%=*}]:-}" && ($word != *=* || " ${versions[${word%=*}]} " == *" ${word#*=} "*) ]] || {
+        echo "wheels.sh: $word is none of --twice, sdist, ${all[*]}, or of no Python of theirs" >&2 && exit 2
+      }
+      platforms+=("$word")
+      ;;
+  esac
+done
+[ ${#platforms[@]} -gt 0 ] || platforms=("${all[@]}" sdist)
+failed=0
+
+row() { # row NAME COMMAND...: one row; the command's output is in a log
+  local name=$1 log="$logs/${1//[^a-zA-Z0-9.]/-}.log"
+  shift
+  if "$@" > "$log" 2>&1; then
+    printf 'row\t%s\t1\t0\n' "$name"
+  else
+    failed=1
+    tail -n 30 "$log"
+    printf 'row\t%s\t0\t1\n' "$name"
+    return 1
+  fi
+}
+fact() { # fact PLATFORM PYTHON COLUMN WHAT: for the table; the newest counts
+  printf '%s\t%s\t%s\t%s\n' "$@" >> "$facts"
+}
+
+forget() { # forget PLATFORM PYTHON: what is known of a wheel that was there before
+  grep -vP "^$1\t$2\t" "$facts" > "$facts.new"
+  mv "$facts.new" "$facts"
+}
+
+# options PLATFORM PYTHON: CMake's, one a line
+options() {
+  local include library=
+  case $1 in
+    linux-* | macos-*) include=$(unix_headers "${1%%-*}" "$2") || return 1 ;;
+    windows-*)
+      include=$(windows_python "$2") || return 1
+      library="$include/libs/python${2/./}.lib"
+      if [ "$1" = windows-arm64 ]; then
+        library="$pythons/$1-$2/python${2/./}.lib"
+        arm64_library "$2" "$(dirname "$library")" >&2 || return 1
+      fi
+      include="$include/include"
+      ;;
+  esac
+  printf '%s\n' "RISORIUS_TARGET=${target_of[$1]}" "RISORIUS_TOOLS=$tools" "RISORIUS_PREFIX=$prefix" \
+    RISORIUS_WARNINGS_AS_ERRORS=ON CMAKE_UNITY_BUILD=ON CMAKE_INTERPROCEDURAL_OPTIMIZATION=OFF \
+    "CMAKE_CXX_FLAGS=-fno-sanitize=undefined -ffile-prefix-map=$source=." \
+    "Python_INCLUDE_DIR=$include" "pybind11_DIR=$pybind11" CMAKE_CXX_COMPILER_LAUNCHER=ccache
+  [ -z "$library" ] || echo "Python_LIBRARY=$library"
+}
+build() { # build PLATFORM PYTHON OUT: a wheel of $source
+  local tag="cp${2/./}" defines
+  defines=$(options "$1" "$2" | paste -sd ';') || return 1
+  mkdir -p "$3"
+  # A cache of CMake's would keep the flags of before; ccache keeps the objects.
+  rm -rf "$3/build-$1-$2" "$3/risorius-"*"-$tag-$tag-${label_of[$1]}.whl"
+  SETUPTOOLS_EXT_SUFFIX=$("$inspect" suffix "$tag" "${label_of[$1]}") \
+    SKBUILD_CMAKE_TOOLCHAIN_FILE="$project/packaging/cross/toolchain.cmake" SKBUILD_CMAKE_PYTHON_HINTS=false \
+    SKBUILD_WHEEL_TAGS="$tag-$tag-${label_of[$1]}" SKBUILD_CMAKE_DEFINE="$defines" \
+    SKBUILD_BUILD_DIR="$3/build-$1-$2" CMAKE_BUILD_PARALLEL_LEVEL=${RISORIUS_JOBS:-$(nproc)} \
+    "$build_python" -m pip wheel -q --no-build-isolation --no-deps -w "$3" "$source"
+}
+wheel_of() { echo "${3:-$wheels}"/risorius-*-"cp${2/./}-cp${2/./}-${label_of[$1]}.whl"; }
+
+# a_python VERSION: a program of it, with the names that a module may ask for
+a_python() {
+  if [ -z "${suite_of[$1]:-}" ]; then
+    echo "/usr/bin/python$1"
+  else
+    echo "$(debian_python "$1")/usr/bin/python$1"
+  fi
+}
+inspected() { # inspected PLATFORM PYTHON
+  local program said
+  program=$(a_python "$2") || return 1
+  said=$("$inspect" wheel "$(wheel_of "$1" "$2")" --python "$(realpath "$program")" --zig "$zig_lib") ||
+    { echo "$said" && return 1; }
+  echo "$said"
+  fact "$1" "$2" "tags and contents" "$(echo "$said" | paste -sd ';' | sed 's/;/; /g')"
+}
+faults_found() { # faults_found PLATFORM PYTHON: what would be wrong is seen
+  "$build_python" "$project/packaging/cross/plant_faults.py" "$(wheel_of "$1" "$2")" \
+    --python "$(realpath "$(a_python "$2")")" --zig "$zig_lib"
+}
+imported() { # imported PYTHON: the Linux wheel, by Debian's Python of that version
+  local said
+  said=$(linux_run "$1" "$project/packaging/cross/trial.py") || return 1
+  echo "$said"
+  [[ "$said" == *"; $(cpu_sets); "* ]] || { echo "the processor has $(cpu_sets)" && return 1; }
+  fact linux-x64 "$1" imported "$said"
+}
+same() { # same PLATFORM PYTHON: built elsewhere from nothing
+  source=$elsewhere CCACHE_DISABLE=1 build "$1" "$2" "$again" &&
+    cmp "$(wheel_of "$1" "$2")" "$(wheel_of "$1" "$2" "$again")" &&
+    fact "$1" "$2" "built twice" "same bytes"
+}
+copy_elsewhere() {
+  elsewhere=$(mktemp -d)/risorius again="$wheels/again"
+  rm -rf "$again"
+  # What git knows of, as it lies here.
+  git -C "$project" ls-files -z | (cd "$project" && xargs -0 cp --parents -t "$(mkdir -p "$elsewhere" && echo "$elsewhere")")
+}
+
+make_platform() { # make_platform PLATFORM[=PYTHON]
+  local version name of=${versions[${1%=*}]}
+  [ "$1" = "${1%=*}" ] || of=${1#*=}
+  set -- "${1%=*}"
+  for version in $of; do
+    name="$1, Python $version"
+    source=$project
+    forget "$1" "$version"
+    row "wheel, $name" build "$1" "$version" "$wheels" || continue
+    fact "$1" "$version" built "$(basename "$(wheel_of "$1" "$version")")"
+    row "inspected, $name" inspected "$1" "$version"
+    [ "$version" != 3.11 ] || row "planted faults are found, $1" faults_found "$1" "$version"
+    [ "$1" != linux-x64 ] || row "imported, $name" imported "$version"
+    [ -z "$twice" ] || row "same bytes twice, $name" same "$1" "$version"
+  done
+}
+make_sdist() {
+  rm -f "$wheels"/risorius-*.tar.gz
+  "$build_python" -m pip wheel --help > /dev/null &&
+    (cd "$project" && "$build_python" -c "from scikit_build_core.build import build_sdist; build_sdist('$wheels')")
+}
+sdist_builds() { # the wheel of what is in it is the one of the project, byte for byte
+  local work
+  work=$(mktemp -d)
+  tar -xzf "$wheels"/risorius-*.tar.gz -C "$work" && source=$(echo "$work"/risorius-*) &&
+    build linux-x64 3.11 "$wheels/again" && cmp "$(wheel_of linux-x64 3.11 "$wheels/again")" "$(wheel_of linux-x64 3.11)"
+  local code=$?
+  rm -rf "$work"
+  return $code
+}
+
+# linux_run VERSION ARGUMENT...: Debian's Python of that version with NumPy and our wheel, as pip takes it
+# for glibc 2.28
+linux_run() {
+  local version=$1 root folder="$cross/try-$1" program=("/usr/bin/python$1")
+  shift
+  rm -rf "$folder"
+  "$build_python" -m pip install -q --target "$folder" --no-deps --only-binary :all: --implementation cp \
+    --python-version "$version" --platform manylinux_2_28_x86_64 --platform manylinux_2_17_x86_64 \
+    "numpy==${numpy_of[$version]}" "$(wheel_of linux-x64 "$version")" || return 1
+  if [ -n "${suite_of[$version]:-}" ]; then
+    root=$(debian_python "$version") || return 1
+    program=("$root/usr/lib/x86_64-linux-gnu/ld-linux-x86-64.so.2" --library-path
+      "$root/usr/lib/x86_64-linux-gnu" "$root/usr/bin/python$version")
+    export PYTHONHOME="$root/usr"
+  fi
+  PYTHONPATH=$folder "${program[@]}" "$@"
+}
+declare -A numpy_of=([3.11]=1.26.4 [3.13]=2.3.5 [3.14]=2.3.5)
+
+mkdir -p "$wheels" "$logs"
+touch "$facts"
+step "tools"
+install_packages && get_zig "${target_of[@]}" && gather_headers || exit 1
+{ grep -hE '^(scikit-build-core|pybind11|packaging)==' "$project/packaging/requirements.txt" &&
+  cat "$project/packaging/cross/inspect_requirements.txt"; } > "$cross/wheels.txt" &&
+  pip_venv "$cross/wheels" "$cross/wheels.txt" || exit 1
+build_python="$cross/wheels/bin/python"
+printf '#!/bin/sh\nexec "%s" "%s" "$@"\n' "$build_python" "$project/packaging/cross/inspect_wheel.py" \
+  > "$tools/inspect" && chmod +x "$tools/inspect"
+inspect="$tools/inspect"
+PATH="$cross/wheels/bin:$PATH"
+pybind11=$("$build_python" -m pybind11 --cmakedir)
+zig_lib=$("$cross/venv/bin/python" -c \
+  'import pathlib, ziglang; print(pathlib.Path(ziglang.__file__).with_name("lib"))')
+[ -z "$twice" ] || copy_elsewhere
+for platform in "${platforms[@]}"; do
+  step "$platform"
+  if [ "$platform" = sdist ]; then
+    row "sdist" make_sdist && row "wheel of the sdist" sdist_builds
+  else
+    make_platform "$platform"
+  fi
+done
+step ""
+[ $failed -eq 0 ]
