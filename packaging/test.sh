@@ -5,7 +5,7 @@
 # they can be fetched). At the end: seconds of each stage, what ran where, what did not run and why.
 # Exit code 0 only if all passed. packaging/matrix.sh runs all Blender tests in all versions.
 #
-#   ./packaging/test.sh            everything; to stay under 25 minutes on two quiet cores
+#   ./packaging/test.sh            everything; about half an hour on two quiet cores
 #   ./packaging/test.sh --quick    the quick ones of GoogleTest and of the Python tests, and the front
 #                                  door in bpy 4.5 (install, import, controls, frames, a rendering)
 #   ./packaging/test.sh --help     this text
