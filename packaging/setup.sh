@@ -8,6 +8,8 @@ venv="$project/.venv"
 python="$venv/bin/python"
 export PIP_DISABLE_PIP_VERSION_CHECK=1 PYTHONDONTWRITEBYTECODE=1
 export CCACHE_DIR="${CCACHE_DIR:-$HOME/.cache/ccache}"
+# Builds in build/*/ share their objects, though each writes the files that it compiles together itself.
+export CCACHE_BASEDIR="$project"
 unset PYTHONPATH
 
 _begin=$SECONDS
