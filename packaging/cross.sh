@@ -95,9 +95,8 @@ run_programs() {
 
 # scalar_bits NAME COMPILER FLAGS...: the program of tests/rig with the arithmetic of `sources`
 # compiled so; the rest of it comes from the preset tests. What is of one folder is compiled at once.
-rig="$out/rig.cpp"
-sources=("$rig" "$project"/native/simd/kernels_scalar.cpp
-  "$project"/native/compile/compile.cpp "$project"/tests/rig/scalar_bits.cpp)
+sources=("$out/rig.cpp" "$out/compile.cpp" "$project"/native/simd/kernels_scalar.cpp
+  "$project"/tests/rig/scalar_bits.cpp)
 scalar_bits() {
   local folder="$out/bits-$1" compiler=$2
   shift 2
@@ -112,7 +111,10 @@ scalar_bits() {
 }
 built="$project/build/tests/native"
 build_rest() {
-  find "$project/native/rig" -name '*.cpp' | sort | sed 's/.*/#include "&"/' > "$rig"
+  local folder
+  for folder in rig compile; do
+    find "$project/native/$folder" -name '*.cpp' | sort | sed 's/.*/#include "&"/' > "$out/$folder.cpp"
+  done
   (cd "$project" && cmake --preset tests -DCMAKE_CXX_COMPILER_LAUNCHER=ccache &&
     cmake --build --preset tests -j"$jobs" --target risorius_compile)
 }
