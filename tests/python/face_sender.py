@@ -70,7 +70,11 @@ def bundle(messages):
     return builder.build().dgram
 
 
-PACKERS = {"v6": v6, "v5": v5, "v1": v1, "none": none, "bundle": bundle}
+def message(address, arguments):
+    return osc(address, arguments).dgram
+
+
+PACKERS = {"v6": v6, "v5": v5, "v1": v1, "none": none, "osc": message, "bundle": bundle}
 
 
 def main():
@@ -82,8 +86,6 @@ def main():
             time.sleep(arguments[0])
         elif kind == "hex":
             sender.sendto(bytes.fromhex(arguments[0]), target)
-        elif kind == "osc":
-            sender.sendto(osc(*arguments).dgram, target)
         else:
             sender.sendto(PACKERS[kind](*arguments), target)
 

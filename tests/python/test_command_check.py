@@ -7,6 +7,7 @@ import struct
 import subprocess
 import sys
 
+import command_line
 import pytest
 import risorius
 from conftest import GOLDEN, SHARED, require_extra
@@ -17,14 +18,7 @@ MALFORMED = SHARED / "data" / "golden" / "malformed"
 
 
 def check(*arguments):
-    done = subprocess.run(
-        [sys.executable, "-m", "risorius", "check", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert "Traceback" not in done.stderr, done.stderr
-    return done
+    return command_line.run("check", *arguments, text=True)
 
 
 @pytest.fixture

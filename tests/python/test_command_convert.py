@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 
+import command_line
 import numpy as np
 import pytest
 import risorius
@@ -17,15 +18,12 @@ MALFORMED = SHARED / "data" / "golden" / "malformed"
 
 
 def convert(*arguments, stdin=b"", script=None):
-    """The command in a process of its own; with a script, what runs before it."""
-    begin = ["-c", f"{script}\nfrom risorius.cli import main; import sys; sys.exit(main())"]
+    """The command; with a script, in a process of its own where that runs before it."""
+    if script is None:
+        return command_line.run("convert", *arguments, stdin=stdin)
+    begin = f"{script}\nfrom risorius.cli import main; import sys; sys.exit(main())"
     done = subprocess.run(
-        [
-            sys.executable,
-            *(begin if script else ["-m", "risorius"]),
-            "convert",
-            *map(str, arguments),
-        ],
+        [sys.executable, "-c", begin, "convert", *map(str, arguments)],
         input=stdin,
         capture_output=True,
         check=False,

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import warnings
 
+import command_line
 import numpy as np
 import pytest
 import risorius
@@ -21,14 +22,7 @@ FILES = sorted(GOLDEN.glob("*.dna"))
 
 
 def diff(*arguments):
-    done = subprocess.run(
-        [sys.executable, "-m", "risorius", "info", "--diff", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert "Traceback" not in done.stderr, done.stderr
-    return done
+    return command_line.run("info", "--diff", *arguments, text=True)
 
 
 def saved(dna, path, version="2.8"):

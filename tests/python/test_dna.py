@@ -5,9 +5,8 @@ import copy
 import json
 import pickle
 import struct
-import subprocess
-import sys
 
+import command_line
 import numpy as np
 import pytest
 import risorius
@@ -243,12 +242,7 @@ def test_a_folder_or_missing_file_is_one_sentence(tmp_path):
 
 
 def run(*arguments):
-    return subprocess.run(
-        [sys.executable, "-m", "risorius", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    return command_line.run(*arguments, text=True)
 
 
 def test_info_prints_for_people_and_programs(tmp_path):

@@ -11,6 +11,7 @@ import re
 import subprocess
 import sys
 
+import command_line
 import numpy as np
 import oracle
 import pytest
@@ -498,14 +499,7 @@ def test_what_makes_no_sense_is_refused(options, words):
 
 
 def command(*arguments):
-    done = subprocess.run(
-        [sys.executable, "-m", "risorius", "edit", "regroup", *map(str, arguments)],
-        capture_output=True,
-        check=False,
-        text=True,
-    )
-    assert "Traceback" not in done.stderr, done.stderr
-    return done
+    return command_line.run("edit", "regroup", *arguments, text=True)
 
 
 def test_the_command_writes_a_file_without_findings(tmp_path, capsys):

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: MIT
+"""The command line in this process: a process of its own takes longer to start than to work."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import subprocess
+import sys
+import warnings
+from unittest import mock
+
+from risorius.cli import main
+
+
+def run(*arguments: object, stdin: bytes = b"", text: bool = False) -> subprocess.CompletedProcess:
+    """Run a command as a terminal would.
+
+    Args:
+        arguments: what is typed after "risorius".
+        stdin: the bytes of the standard input.
+        text: give the outputs as strings; else as bytes.
+
+    Returns:
+        What subprocess.run gives. An exception that main does not catch is raised.
+    """
+    words = [str(argument) for argument in arguments]
+    read, out, error = io.BytesIO(stdin), io.BytesIO(), io.BytesIO()
+    with (
+        mock.patch.object(sys, "stdin", io.TextIOWrapper(read, encoding="utf-8")),
+        mock.patch.object(sys, "stdout", io.TextIOWrapper(out, encoding="utf-8")) as typed,
+        mock.patch.object(sys, "stderr", io.TextIOWrapper(error, encoding="utf-8")) as said,
+        warnings.catch_warnings(),
+    ):
+        warnings.simplefilter("default")  # pytest keeps warnings; a process prints them
+        warnings.showwarning = _print_warning
+        try:
+            code = main(words)
+        except SystemExit as end:
+            code = end.code
+        for stream in (typed, said):
+            stream.flush()
+    outputs = (out.getvalue(), error.getvalue())
+    if text:
+        outputs = tuple(output.decode("utf-8") for output in outputs)
+    return subprocess.CompletedProcess(words, int(code or 0), *outputs)
+
+
+def _print_warning(message, category, filename, lineno, _file=None, line=None):
+    with contextlib.suppress(OSError):
+        sys.stderr.write(warnings.formatwarning(message, category, filename, lineno, line))
