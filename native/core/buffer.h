@@ -47,13 +47,20 @@ class Buffer {
   struct Free {
     void operator()(T* p) const { std::free(p); }
   };
+  [[noreturn]] static void no_memory() {
+#ifdef __cpp_exceptions
+    throw std::bad_alloc();
+#else
+    std::abort();  // as the standard library does without exceptions (WebAssembly)
+#endif
+  }
   void allocate(std::size_t n) {
     if (n == 0) {
       data_.reset();
     } else {
-      if (n > std::numeric_limits<std::size_t>::max() / sizeof(T)) throw std::bad_alloc();
+      if (n > std::numeric_limits<std::size_t>::max() / sizeof(T)) no_memory();
       void* p = std::realloc(data_.get(), n * sizeof(T));
-      if (p == nullptr) throw std::bad_alloc();
+      if (p == nullptr) no_memory();
       (void)data_.release();  // realloc has freed it or gives it back
       data_.reset(static_cast<T*>(p));
     }
