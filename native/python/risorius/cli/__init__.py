@@ -30,7 +30,7 @@ from . import (
 )
 from . import eval as evaluate
 from .files import CommandLineError
-from .pages import plot
+from .pages import plot, web
 
 INTERRUPTED = 130
 
@@ -82,6 +82,7 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
         evaluate,
         sample,
         plot,
+        web,
         bench,
         edit,
         clip,

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: MIT
+"""risorius web: a face as a page for any browser."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import risorius
+
+from ...baking.clips import load_performance
+from ...baking.face import load_face
+from ...files import fileio
+from ...web import find_pictures, render
+from ...web.page import SOUNDS, empty_page
+from ..files import CommandLineError, InputError, read_bytes, require_suffix, require_writable
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = subparsers.add_parser(
+        "web",
+        help="the face as a web page",
+        description="One page that opens in a browser without a network: the face with sliders, "
+        "levels of detail and a clip, evaluated by the library itself.",
+    )
+    parser.add_argument("file", type=Path, help="the DNA file; textures beside it come along")
+    parser.add_argument("-o", "--out", type=Path, metavar="PAGE.html", help="else FILE.html")
+    parser.add_argument(
+        "--clip", type=Path, metavar="TAKE", help="animation that plays: .rzc, or what eval reads"
+    )
+    parser.add_argument("--sound", type=Path, metavar="VOICE.wav", help="what the clip says")
+    parser.add_argument(
+        "--lods",
+        metavar="A:B",
+        help="these levels of detail only: 0:2, or 1: for all but the finest",
+    )
+    parser.add_argument("--title", help="in place of the character's name")
+    parser.set_defaults(func=run)
+
+
+_LAST_LOD = 65535  # of the format
+
+
+def _lods(text: str | None) -> tuple[int, int] | None:
+    if text is None:
+        return None
+    first, colon, last = text.partition(":")
+    if not all(part.isdigit() for part in (first or "0", last or "0")) or text in ("", ":"):
+        raise CommandLineError(f"--lods: two levels as in 0:2 were expected, found {text!r}")
+    return int(first or 0), int(last or (_LAST_LOD if colon else first))
+
+
+def run(args: argparse.Namespace) -> int:
+    out = args.out or args.file.with_suffix(".html")
+    require_suffix(out, (".html", ".htm"), "-o")
+    require_writable(out)
+    if args.sound is not None:
+        if args.clip is None:
+            raise CommandLineError("--sound: it goes with a clip: --clip TAKE")
+        require_suffix(args.sound, SOUNDS, "--sound")
+    lods = _lods(args.lods)
+    empty_page()  # a build without the page says so before the file is read
+    dna = risorius.load(args.file, lods=lods)
+    clip = None
+    if args.clip is not None:
+        clip = load_performance(args.clip, load_face(args.file)).clip
+    sound = None
+    if args.sound is not None:
+        sound = (read_bytes(str(args.sound)), args.sound.suffix, 0.0)
+    title = args.title or dna.name or args.file.stem
+    pictures = find_pictures(dna, args.file)
+    try:
+        page = render(dna, title, pictures=pictures, clip=clip, sound=sound)
+    except risorius.RisoriusError as error:
+        raise InputError(f"{args.file}: {error}") from error
+    fileio.write_bytes(out, page)
+    print(f"{out}: {len(page) / 1e6:.1f} MB")
+    return 0

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: MIT
+// From the joint values of a pose to matrices that move vertices.
+import { Matrix4, Quaternion, Vector3 } from "three";
+
+const AXES = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
+// Left and right of who looks at the face: 0 left 1 right 2 up 3 down 4 front 5 back.
+const DIRECTIONS = [[-1, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]];
+const UNITS = [new Vector3(1, 0, 0), new Vector3(0, 1, 0), new Vector3(0, 0, 1)];
+
+/** Takes the file's axes and units to the scene: metres, x to the right of who looks, y up, z front. */
+export function toScene(skeleton) {
+  const scale = skeleton.inMetres ? 1 : 0.01;
+  return new Matrix4().makeBasis(
+    ...Array.from(skeleton.axes, (axis) => new Vector3(...DIRECTIONS[axis]).multiplyScalar(scale)),
+  );
+}
+
+export class Joints {
+  constructor(skeleton) {
+    this.skeleton = skeleton;
+    this.order = this.parentsFirst();
+    this.world = Array.from({ length: skeleton.count }, () => new Matrix4());
+    this.skin = new Float32Array(12 * skeleton.count); // rows of 3x4 matrices
+    this.parts = [new Vector3(), new Quaternion(), new Vector3(), new Quaternion()];
+    const rest = new Float32Array(skeleton.count * skeleton.stride);
+    this.place(rest);
+    this.inverse = this.world.map((m) => m.clone().invert());
+  }
+
+  parentsFirst() {
+    const { count, parents } = this.skeleton;
+    const order = [];
+    const seen = new Uint8Array(count);
+    const add = (j) => {
+      const chain = [];
+      for (; !seen[j]; j = parents[j]) {
+        seen[j] = 1;
+        chain.push(j);
+      }
+      order.push(...chain.reverse());
+    };
+    for (let j = 0; j < count; ++j) add(j);
+    return order;
+  }
+
+  /** World matrices of a pose. In: values float32[joints, 9], deltas from neutral. */
+  place(values) {
+    const { neutral, parents, stride, inRadians, order, signs } = this.skeleton;
+    const unit = inRadians ? 1 : Math.PI / 180;
+    const [position, rotation, scale, turn] = this.parts;
+    for (const j of this.order) {
+      const at = j * stride;
+      const sum = (k) => neutral[at + k] + values[at + k];
+      position.set(sum(0), sum(1), sum(2));
+      rotation.identity();
+      for (const axis of AXES[order]) {
+        turn.setFromAxisAngle(UNITS[axis], signs[axis] * unit * sum(3 + axis));
+        rotation.premultiply(turn);
+      }
+      scale.set(sum(6), sum(7), sum(8));
+      this.world[j].compose(position, rotation, scale);
+      if (parents[j] !== j) this.world[j].premultiply(this.world[parents[j]]);
+    }
+  }
+
+  /** What takes a vertex at rest along with each joint. In: as place. */
+  pose(values) {
+    this.place(values);
+    const product = new Matrix4();
+    for (let j = 0; j < this.world.length; ++j) {
+      const e = product.multiplyMatrices(this.world[j], this.inverse[j]).elements;
+      for (let row = 0; row < 3; ++row) {
+        for (let column = 0; column < 4; ++column) {
+          this.skin[12 * j + 4 * row + column] = e[4 * column + row];
+        }
+      }
+    }
+    return this.skin;
+  }
+}

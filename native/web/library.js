@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: MIT
+// risorius.h in JavaScript: the C API that was compiled to WebAssembly. Offsets are those of its
+// structs with pointers of 4 bytes.
+
+export const List = { RAW: 0, GUI: 1, JOINTS: 2, SHAPES: 3, MAPS: 4, MESHES: 5, LODS: 6 };
+const GEOMETRY_AND_TARGETS = 3;
+const ABI = 1;
+
+export class FaceError extends Error {}
+
+/** What the C++ library asks of its system: nothing but time, chance and an end. */
+function system(memory) {
+  const enosys = () => 52;
+  const calls = {
+    environ_sizes_get: (count, size) => {
+      const view = new DataView(memory().buffer);
+      view.setUint32(count, 0, true);
+      view.setUint32(size, 0, true);
+      return 0;
+    },
+    environ_get: () => 0,
+    proc_exit: (code) => {
+      throw new FaceError(code ? "The face asks for more memory than the browser gives." : "The end.");
+    },
+  };
+  return new Proxy(calls, { get: (all, name) => all[name] ?? enosys });
+}
+
+export class Library {
+  /** In: bytes of risorius.wasm. Throws FaceError where the browser lacks what they need. */
+  static async load(bytes) {
+    const library = new Library();
+    let module;
+    try {
+      module = await WebAssembly.compile(bytes);
+    } catch (error) {
+      throw new FaceError(`This browser cannot run WebAssembly with SIMD: ${error.message}`);
+    }
+    const imports = {};
+    for (const { module: name } of WebAssembly.Module.imports(module)) {
+      imports[name] = system(() => library.c.memory);
+    }
+    library.c = (await WebAssembly.instantiate(module, imports)).exports;
+    library.c._initialize?.();
+    if (library.c.risorius_abi() !== ABI) throw new FaceError("The page and its library differ.");
+    return library;
+  }
+
+  text(pointer) {
+    const bytes = new Uint8Array(this.c.memory.buffer, pointer);
+    return new TextDecoder().decode(bytes.slice(0, bytes.indexOf(0)));
+  }
+  numbers(Type, pointer, count) {
+    return new Type(this.c.memory.buffer, pointer, count);
+  }
+  /** A copy: views end when the memory grows. */
+  copy(Type, pointer, count) {
+    return pointer === 0 ? new Type(0) : this.numbers(Type, pointer, count).slice();
+  }
+  reserve(size) {
+    const pointer = this.c.malloc(size);
+    if (pointer === 0 && size > 0) throw new FaceError("The browser gives no more memory.");
+    return pointer;
+  }
+  /** Calls body with memory that is free again afterwards. */
+  with(size, body) {
+    const pointer = this.reserve(size);
+    try {
+      return body(pointer);
+    } finally {
+      this.c.free(pointer);
+    }
+  }
+  lastError() {
+    const at = this.c.risorius_last_error();
+    const view = new DataView(this.c.memory.buffer, at);
+    const offset = view.getBigInt64(16, true);
+    const [field, message] = [this.text(view.getUint32(12, true)), this.text(view.getUint32(24, true))];
+    return `${message}${field ? ` (${field}${offset >= 0n ? `, byte ${offset}` : ""})` : ""}`;
+  }
+  check(status) {
+    if (status !== 0) throw new FaceError(this.lastError());
+  }
+
+  /** In: bytes of a DNA file. */
+  open(bytes) {
+    return this.with(bytes.length, (data) => {
+      this.numbers(Uint8Array, data, bytes.length).set(bytes);
+      return this.with(24, (options) => {
+        const words = this.numbers(Uint32Array, options, 6);
+        words.fill(0);
+        words[0] = GEOMETRY_AND_TARGETS;
+        const face = options + 20;
+        this.check(this.c.risorius_open_memory(data, bytes.length, options, face));
+        return new Face(this, this.numbers(Uint32Array, face, 1)[0]);
+      });
+    });
+  }
+}
+
+class Face {
+  constructor(library, pointer) {
+    this.library = library;
+    this.pointer = pointer;
+  }
+  count(list) {
+    return this.library.c.risorius_count(this.pointer, list);
+  }
+  names(list) {
+    const name = (_, i) => this.library.text(this.library.c.risorius_name(this.pointer, list, i));
+    return Array.from({ length: this.count(list) }, name);
+  }
+  /** Indices of the list that a LOD has. */
+  itemsOf(list, lod) {
+    const { library } = this;
+    return library.with(8, (out) => {
+      library.check(library.c.risorius_lod_items(this.pointer, list, lod, out, out + 4));
+      const [items, count] = library.numbers(Uint32Array, out, 2);
+      return library.copy(Uint16Array, items, count);
+    });
+  }
+  skeleton() {
+    const { library } = this;
+    return library.with(52, (out) => {
+      library.check(library.c.risorius_get_skeleton(this.pointer, out));
+      const words = library.copy(Uint32Array, out, 13);
+      const [count, stride] = words;
+      return {
+        count,
+        stride,
+        parents: library.copy(Uint16Array, words[2], count),
+        neutral: library.copy(Float32Array, words[3], count * stride),
+        inMetres: words[4] === 1,
+        inRadians: words[5] === 1,
+        axes: words.slice(6, 9),
+        order: words[9],
+        signs: new Int32Array(words.slice(10, 13).buffer),
+      };
+    });
+  }
+  mesh(index) {
+    const { library } = this;
+    return library.with(68, (out) => {
+      library.check(library.c.risorius_get_mesh(this.pointer, index, out));
+      const w = library.copy(Uint32Array, out, 17);
+      const [vertices, uvs, , corners, polygons, targets] = w;
+      const begins = library.copy(Uint32Array, w[12], polygons + 1);
+      const skin = library.copy(Uint32Array, w[14], vertices + 1);
+      const influences = skin.length ? skin[vertices] : 0;
+      return {
+        vertices,
+        positions: library.copy(Float32Array, w[6], 3 * vertices),
+        uvCount: uvs,
+        uvs: library.copy(Float32Array, w[7], 2 * uvs),
+        cornerPositions: library.copy(Uint32Array, w[9], corners),
+        cornerUvs: library.copy(Uint32Array, w[10], corners),
+        begins,
+        polygonCorners: library.copy(Uint32Array, w[13], begins.length ? begins[polygons] : 0),
+        skin,
+        weights: library.copy(Float32Array, w[15], influences),
+        joints: library.copy(Uint16Array, w[16], influences),
+        targets: Array.from({ length: targets }, (_, i) => this.target(index, i)),
+      };
+    });
+  }
+  target(mesh, index) {
+    const { library } = this;
+    return library.with(16, (out) => {
+      library.check(library.c.risorius_get_target(this.pointer, mesh, index, out));
+      const [shape, count, vertices, deltas] = library.copy(Uint32Array, out, 4);
+      return {
+        shape,
+        vertices: library.copy(Uint32Array, vertices, count),
+        deltas: library.copy(Float32Array, deltas, 3 * count),
+      };
+    });
+  }
+  instance() {
+    const { library } = this;
+    return library.with(4, (out) => {
+      library.check(library.c.risorius_create(this.pointer, 0, out));
+      return new Instance(library, library.numbers(Uint32Array, out, 1)[0]);
+    });
+  }
+}
+
+class Instance {
+  constructor(library, pointer) {
+    this.library = library;
+    this.pointer = pointer;
+    this.room = library.reserve(4);
+  }
+  /** In: values of the raw controls from the first on. */
+  setRaw(values) {
+    const { library } = this;
+    library.with(4 * values.length, (at) => {
+      library.numbers(Float32Array, at, values.length).set(values);
+      library.check(library.c.risorius_set(this.pointer, List.RAW, 0, values.length, at));
+    });
+  }
+  setLod(lod) {
+    this.library.check(this.library.c.risorius_set_lod(this.pointer, lod));
+  }
+  evaluate() {
+    this.library.check(this.library.c.risorius_evaluate(this.pointer));
+  }
+  /** A view, until the next call. */
+  values(list) {
+    const at = this.library.c.risorius_values(this.pointer, list, this.room);
+    if (at === 0) throw new FaceError(this.library.lastError());
+    return this.library.numbers(Float32Array, at, this.library.numbers(Uint32Array, this.room, 1)[0]);
+  }
+}
