@@ -23,6 +23,7 @@ class RISORIUS_PT_out(FaceOnlyPanel, Panel):
         column.operator("risorius.bake", icon="ACTION")
         column.operator("risorius.export_animation", icon="EXPORT")
         column.operator("risorius.bake_physics", icon="PHYSICS")
+        column.operator("risorius.export_web", icon="URL")
 
 
 def draw_state(layout: UILayout, rig: ArmatureObject) -> None:

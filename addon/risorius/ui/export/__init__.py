@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Animation that leaves Blender: through its own exporters, as a clip or as a table."""
 
-from . import operators
+from . import operators, web
 
-CLASSES = (*operators.CLASSES,)
+CLASSES = (*operators.CLASSES, *web.CLASSES)

@@ -153,7 +153,7 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, Oper
             start, end, self.step, self.lod, frozenset(self.wanted), self.all_shapes
         )
         try:
-            characters = _run(
+            characters = run(
                 context, export_animation.sampled(context, self.faces(context), options)
             )
             written = self._write(context, characters, options)
@@ -182,7 +182,7 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, Oper
         else:
             with export_animation.copies(context, characters, options) as (override, loans):
                 if self.bake_materials:
-                    _run(context, plain_materials.flatten(override, loans, self.texture_size))
+                    run(context, plain_materials.flatten(override, loans, self.texture_size))
                 export(self, override, path)
                 if self.bake_materials and self.format == "ALEMBIC":
                     folder = path.with_name(path.stem + "_textures")
@@ -190,8 +190,16 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, Oper
         return f"{path.name}: {frames} frames, {path.stat().st_size:,} bytes"
 
 
-def _run(context: Context, job: Generator[float, None, _T]) -> _T:
-    """Run a generator to its end, with progress. Returns what it returns."""
+def run(context: Context, job: Generator[float, None, _T]) -> _T:
+    """Run a generator to its end, with progress.
+
+    Args:
+        context: whose window shows it.
+        job: yields the share that is done, 0 to 1.
+
+    Returns:
+        What it returns.
+    """
     with shown_progress(context) as progress:
         try:
             while True:

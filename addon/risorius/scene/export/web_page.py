@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A face as a web page: its file with the edits, its textures, what it plays and says."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import cast
+
+import bpy
+
+from ... import native
+from ...logic.base.errors import FaceError
+from ..base import compat, parts
+from ..base.blender_types import ArmatureObject
+
+
+@dataclass(frozen=True)
+class Sound:
+    """A sound strip of the sequencer, as a page plays it.
+
+    Attributes:
+        path: of the sound file.
+        offset: seconds from the first frame that is exported to the strip's own begin; below 0
+            where the strip has begun before.
+    """
+
+    path: Path
+    offset: float
+
+
+def first_sound(scene: bpy.types.Scene, start: float, end: float, rate: float) -> Sound | None:
+    """The sound strip that is heard first in a range of frames; None where there is none.
+
+    Args:
+        scene: has the sequencer.
+        start, end: frames.
+        rate: frames per second.
+    """
+    endings = native.part("web.page").SOUNDS
+    heard: list[tuple[float, Sound]] = []
+    for each in compat.strips_of(scene) if scene.sequence_editor is not None else ():
+        if each.type != "SOUND" or each.mute:
+            continue
+        strip = cast("bpy.types.SoundStrip", each)
+        if strip.sound is None:
+            continue
+        path = Path(bpy.path.abspath(strip.sound.filepath, library=strip.sound.library))
+        if path.suffix.lower() not in endings or not path.is_file():
+            continue
+        if strip.frame_final_end > start and strip.frame_final_start <= end:
+            heard.append((strip.frame_final_start, Sound(path, (strip.frame_start - start) / rate)))
+    return min(heard, key=lambda pair: pair[0])[1] if heard else None
+
+
+def page(
+    rig: ArmatureObject, content: bytes, clip: native.Clip | None, sound: Sound | None
+) -> bytes:
+    """The page of a face, as HTML.
+
+    Args:
+        rig: deforming armature.
+        content: bytes of its DNA file.
+        clip: what it plays, of raw controls; None: nothing.
+        sound: what is heard with the clip.
+
+    Raises:
+        FaceError: the build of Risorius has no page in it, or the face cannot be shown.
+    """
+    web = native.part("web")
+    dna = native.module().load(content)
+    source = Path(bpy.path.abspath(str(rig.get(parts.SOURCE, ""))))
+    heard = (sound.path.read_bytes(), sound.path.suffix, sound.offset) if sound else None
+    title = rig.name.removesuffix("_rig")
+    try:
+        made: bytes = web.render(
+            dna, title, pictures=web.find_pictures(dna, source), clip=clip, sound=heard
+        )
+    except web.WebError as error:
+        raise FaceError(str(error)) from error
+    return made
