@@ -47,7 +47,8 @@ sources() { # sources FOLDER
 compile_library() {
   local version exports folder files=() name
   version=$(sed -nE 's/^project\(risorius VERSION ([0-9.]+).*/\1/p' "$project/CMakeLists.txt")
-  exports=$(sed -nE 's/^RISORIUS_API .*[ *](risorius_[a-z_]+)\(.*/-Wl,--export=\1/p' "$project/native/api/risorius.h")
+  exports=$(sed -nE 's/^RISORIUS_API .*[ *](risorius_[a-z_]+)\(.*/-Wl,--export=\1/p' "$project/native/api/risorius.h" |
+    grep -v open_file)
   for folder in api bytes compile core dna rig; do
     sources $folder | sed 's/.*/#include "&"/' > "$out/$folder.cpp"
     files+=("$out/$folder.cpp")

@@ -2,18 +2,7 @@
 #include "bytes/source.h"
 
 #include <algorithm>
-#include <cerrno>
-#include <cstdio>
 #include <cstring>
-#include <system_error>
-
-#include "bytes/path_text.h"
-#include "bytes/read_at.h"
-
-#ifndef _WIN32
-#include <fcntl.h>
-#include <unistd.h>
-#endif
 
 namespace risorius::core {
 
@@ -22,78 +11,6 @@ std::size_t SpanSource::read(std::uint64_t offset, std::span<std::uint8_t> out) 
   const std::size_t n = std::min<std::size_t>(out.size(), bytes_.size() - std::size_t(offset));
   if (n > 0) std::memcpy(out.data(), bytes_.data() + offset, n);
   return n;
-}
-
-namespace {
-
-#ifdef _WIN32
-
-using Handle = std::FILE*;
-
-Handle open_for_reading(const std::filesystem::path& path) {
-  std::FILE* file = nullptr;
-  if (_wfopen_s(&file, path.c_str(), L"rb") != 0) return nullptr;
-  // The reader above has a window of its own; a second buffer would only copy.
-  std::setvbuf(file, nullptr, _IONBF, 0);
-  return file;
-}
-bool is_open(Handle file) { return file != nullptr; }
-void close_handle(Handle file) { std::fclose(file); }
-
-std::size_t read_at(Handle file, std::uint64_t offset, std::span<std::uint8_t> out) {
-  if (_fseeki64(file, static_cast<long long>(offset), SEEK_SET) != 0) return 0;
-  return std::fread(out.data(), 1, out.size(), file);
-}
-
-#else
-
-using Handle = int;
-
-Handle open_for_reading(const std::filesystem::path& path) {
-  return ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-}
-bool is_open(Handle file) { return file >= 0; }
-void close_handle(Handle file) { ::close(file); }
-
-using detail::read_at;
-
-#endif
-
-class FileSource final : public Source {
- public:
-  FileSource(Handle file, std::uint64_t size) : file_(file), size_(size) {}
-  ~FileSource() override { close_handle(file_); }
-  FileSource(const FileSource&) = delete;
-  FileSource& operator=(const FileSource&) = delete;
-  std::uint64_t size() const override { return size_; }
-  std::size_t read(std::uint64_t offset, std::span<std::uint8_t> out) override {
-    return read_at(file_, offset, out);
-  }
-
- private:
-  Handle file_;
-  std::uint64_t size_;
-};
-
-}  // namespace
-
-Result<std::unique_ptr<Source>> open_file(const std::filesystem::path& path) {
-  const std::string name = utf8(path);
-  std::error_code error;
-  if (std::filesystem::is_directory(path, error)) {
-    return fail(ErrorCode::kIoOpen, "", name + " is a folder, a file was expected");
-  }
-  const Handle file = open_for_reading(path);
-  if (!is_open(file)) {
-    return fail(ErrorCode::kIoOpen, "",
-                "cannot open " + name + ": " + std::generic_category().message(errno));
-  }
-  const std::uint64_t size = std::filesystem::file_size(path, error);
-  if (error) {
-    close_handle(file);
-    return fail(ErrorCode::kIoRead, "", "cannot read the size of " + name + ": " + error.message());
-  }
-  return std::unique_ptr<Source>(std::make_unique<FileSource>(file, size));
 }
 
 }  // namespace risorius::core
