@@ -51,11 +51,17 @@ compile_library() {
     grep -v open_file)
   for folder in api bytes compile core dna rig; do
     sources $folder | sed 's/.*/#include "&"/' > "$out/$folder.cpp"
+    # Sizes are 32 bits wide here. Those of a block were held against its bytes, as 64 bits, before.
+    [ $folder != rig ] || sed -i '1i #pragma clang diagnostic ignored "-Wc++11-narrowing"' "$out/rig.cpp"
     files+=("$out/$folder.cpp")
   done
   for name in cpu dispatch kernels_scalar kernels_sse4 kernels_avx2 kernels_avx512 kernels_neon; do
     files+=("$project/native/simd/$name.cpp")
   done
+  # A browser's only thread has no end to register for.
+  echo 'extern "C" int __cxa_thread_atexit(void (*f)(void*), void* p, void* d) { (void)f; (void)p; (void)d; return 0; }' \
+    > "$out/thread.cpp"
+  files+=("$out/thread.cpp")
   # shellcheck disable=SC2086
   "$venv_zig/bin/python" -m ziglang c++ -target wasm32-wasi -mexec-model=reactor -std=c++20 -O3 -msimd128 \
     -ffp-contract=off -fno-exceptions -fno-rtti -fno-sanitize=undefined -fvisibility=hidden -DNDEBUG \

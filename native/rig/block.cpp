@@ -98,7 +98,9 @@ struct BlockReader {
       const bool fits = p.offset % kAlignment == 0 && p.offset <= bytes.size() &&
                         p.count <= (bytes.size() - p.offset) / sizeof(T);
       inside = inside && fits;
-      if (fits) view = {reinterpret_cast<const T*>(bytes.data() + p.offset), p.count};
+      if (!fits) return;
+      view = {reinterpret_cast<const T*>(bytes.data() + p.offset),
+              static_cast<std::size_t>(p.count)};
     });
     if (!inside) return fail(ErrorCode::kInvalidIndex, "rig.places", "an array outside the block");
     rig.block_ = bytes;
