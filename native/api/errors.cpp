@@ -54,13 +54,12 @@ risorius_status remember(const core::Error& error, std::string_view file) noexce
   // Should this fail, the error that is shown may not point into texts that were half replaced.
   last.shown = {status, core::to_string(error.code), "", "", -1, "There is no memory for words."};
   if (error.offset) last.shown.offset = static_cast<std::int64_t>(*error.offset);
-  try {
+  const bool copied = had_memory([&] {
     last.file = file;
     last.field = error.where;
     last.message = error.message;
-  } catch (const std::bad_alloc&) {
-    return status;
-  }
+  });
+  if (!copied) return status;
   last.shown.file = last.file.c_str();
   last.shown.field = last.field.c_str();
   last.shown.message = last.message.c_str();

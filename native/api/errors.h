@@ -41,4 +41,20 @@ risorius_status guarded(const Body& body) noexcept {
 #endif
 }
 
+/// Runs body, which copies words.
+/// Out: false where there was no memory for them
+template <class Body>
+bool had_memory(const Body& body) noexcept {
+#ifdef __cpp_exceptions
+  try {
+    body();
+  } catch (const std::bad_alloc&) {
+    return false;
+  }
+#else
+  body();
+#endif
+  return true;
+}
+
 }  // namespace risorius::api
