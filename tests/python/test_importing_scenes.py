@@ -172,6 +172,17 @@ def damaged(change):
         (lambda d: d["buffers"][0].update(uri="../a.bin"), "a file beside this one was expected"),
         (lambda d: d["buffers"][0].update(uri="/a.bin"), "a file beside this one was expected"),
         (lambda d: d["buffers"][0].update(uri="data:,%%%"), "base64 was expected"),
+        (lambda d: d["buffers"][0].update(uri=7), "a uri was expected, found 7"),
+        (lambda d: d["accessors"][1].update(count=True), "count: a whole number was expected"),
+        (lambda d: d["accessors"][1].update(sparse={}), "that is not sparse was expected"),
+        (lambda d: d["bufferViews"][0].update(byteStride=16), "numbers close together were"),
+        (lambda d: d["animations"][0].pop("channels"), "channels were expected"),
+        (lambda d: d["animations"][0]["channels"][0].pop("target"), "a target was expected"),
+        (lambda d: d["animations"][0].pop("samplers"), "a sampler was expected, found 0"),
+        (lambda d: d["animations"][0]["samplers"][0].update(interpolation="BEZIER"),
+         "LINEAR.* was expected, found 'BEZIER'"),
+        (lambda d: d["animations"][0]["channels"][0].update(target=pointer("/nodes/0/weights/2")),
+         "a weight of 2 was expected, found '/nodes/0/weights/2'"),
         (lambda d: d["asset"].update(version="1.0"), "glTF of version 2 was expected, found '1.0'"),
         (lambda d: d["animations"][0]["channels"][0]["target"].update(path="rotation"),
          "animated morph targets or properties were expected, found none"),
@@ -182,6 +193,49 @@ def test_odd_gltf_is_one_sentence(tmp_path, change, sentence):
     with pytest.raises(importing.AnimationFileError, match=sentence) as caught:
         importing.read(tmp_path / "a.glb")
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("data", "sentence"),
+    [
+        (b"glTF\2\0\0\0", "a GLB's header was expected, found 8 bytes"),
+        (b"glTF" + struct.pack("<II", 3, 20) + bytes(8), "GLB of version 2 was expected, found 3"),
+        (b"glTF" + struct.pack("<II", 2, 99) + bytes(8), "99 bytes were expected, found 20"),
+        (
+            b"glTF" + struct.pack("<IIII", 2, 20, 50, 0),
+            "a chunk of 50 bytes at byte 12 ends beyond",
+        ),
+        (
+            b"glTF" + struct.pack("<III4s", 2, 20, 0, b"BIN\0"),
+            "a JSON chunk was expected, found none",
+        ),
+        (b"glTF" + struct.pack("<III4s", 2, 24, 4, b"JSON") + b'{"\xff}', r"in UTF-8 .*\(byte 2\)"),
+    ],
+)
+def test_odd_glb_is_one_sentence(tmp_path, data, sentence):
+    (tmp_path / "a.glb").write_bytes(data)
+    with pytest.raises(importing.AnimationFileError, match=sentence) as caught:
+        importing.read(tmp_path / "a.glb")
+    assert "\n" not in str(caught.value)
+
+
+def test_two_meshes_of_one_name_keep_the_first_and_say_so(tmp_path):
+    document, binary = small([0, 1], [0, 1, 1, 0], WEIGHTS)
+    (animation,) = document["animations"]
+    animation["channels"].append({"sampler": 0, "target": dict(WEIGHTS)})
+    (tmp_path / "a.glb").write_bytes(glb(document, binary))
+    done = importing.read(tmp_path / "a.glb")
+    assert not any("another mesh" in note for note in done.notes)  # it moves the same
+    animation["samplers"].append({"input": 0, "output": 1, "interpolation": "STEP"})
+    document["accessors"].append(document["accessors"][1] | {"byteOffset": 0})
+    animation["samplers"][1]["output"] = 2
+    document["bufferViews"].append(document["bufferViews"][1] | {"byteOffset": 4})
+    document["accessors"][2]["bufferView"] = 2
+    animation["channels"][1]["sampler"] = 1
+    (tmp_path / "a.glb").write_bytes(glb(document, binary + bytes(16)))
+    done = importing.read(tmp_path / "a.glb")
+    assert done.clip.curve("jawOpen").tolist()[-1] == 1.0
+    assert any("another mesh moves it differently" in note for note in done.notes)
 
 
 def test_channels_that_turn_a_node_are_counted_and_left_out(tmp_path):

@@ -286,6 +286,60 @@ def test_face_cap_and_plain_messages():
     assert len(packets) == 3
 
 
+def faces_of(*messages):
+    """The values of the face that messages make, and the sentences of those that make none."""
+    decoder, refused = osc.Decoder(), []
+    for address, values in messages:
+        try:
+            decoder.feed(packed(["osc", address, values]), "here", 0.0)
+        except LiveError as error:
+            refused.append(str(error))
+    return [dict(zip(p.names, p.values.tolist(), strict=True)) for p in decoder.flush()], refused
+
+
+def test_a_head_as_a_quaternion_is_not_overruled_by_degrees():
+    half = math.radians(30.0) / 2.0
+    turned = [0.0, math.sin(half), 0.0, math.cos(half)]  # ARKit: about up, to the own left
+    (face,), _ = faces_of(["/HRQ", turned], ["/HR", [40.0, 40.0, 40.0]])
+    angles = {"head.yaw": math.radians(30.0), "head.pitch": 0.0, "head.roll": 0.0}
+    # The app's degrees and its quaternion mean the same turn.
+    (degrees,), _ = faces_of(["/HR", [0.0, 30.0, 0.0]])
+    assert face == pytest.approx(angles, abs=1e-6)
+    assert degrees == pytest.approx(angles, abs=1e-6)
+
+
+def test_eyes_of_both_apps():
+    (face,), _ = faces_of(["/ELR", [10.0, 20.0]], ["/ERR", [-10.0, 5.0]])
+    wanted = {"eyeL.yaw": 20.0, "eyeL.pitch": -10.0, "eyeR.yaw": 5.0, "eyeR.pitch": 10.0}
+    assert face == pytest.approx({k: math.radians(v) for k, v in wanted.items()}, abs=1e-6)
+    half = math.radians(12.0) / 2.0
+    turned = [0.0, 0.0, 0.0, 0.0, math.sin(half), 0.0, math.cos(half)]
+    (face,), _ = faces_of(["/VMC/Ext/Bone/Pos", ["LeftEye", *turned]])
+    assert {name: abs(v) for name, v in face.items()} == pytest.approx(
+        {"eyeL.yaw": math.radians(12.0), "eyeL.pitch": 0.0}, abs=1e-6
+    )
+
+
+@pytest.mark.parametrize(
+    ("address", "values", "sentence"),
+    [
+        ("/jawOpen", [200.0], "jawOpen: a value of a face was expected, found 200.0"),
+        ("/jawOpen", [1e9], "numbers of a face were expected, found (1000000000.0,)"),
+        ("/VMC/Ext/Blend/Val", ["A"], "a name and a value were expected"),
+        ("/VMC/Ext/Blend/Val", ["A" * 999, 1.0], "a name of at most"),
+        ("/VMC/Ext/Bone/Pos", [1.0] * 8, "a bone's name and seven numbers were expected"),
+        ("/HRQ", [0.0, 0.0, 0.0, 0.0], "a rotation was expected, found a quaternion of zeros"),
+        ("/HR", [1.0, 2.0], "3 numbers were expected, found 2"),
+        ("/HR", [1.0, "x", 2.0], "numbers of a face were expected"),
+        ("/W", [999, 1.0], "an index below 52 and a value were expected"),
+    ],
+)
+def test_a_message_that_no_face_sends_is_one_sentence(address, values, sentence):
+    faces, (said,) = faces_of([address, values])
+    assert faces == []
+    assert sentence in said
+
+
 def test_raw_controls_by_their_own_names():
     clip, _ = record("osc", ["osc", "/CTRL_expressions.noseWrinkleL", [0.75]])
     assert clip.names == ("CTRL_expressions.noseWrinkleL",)
