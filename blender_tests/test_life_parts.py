@@ -174,3 +174,43 @@ def test_a_copy_of_the_controls_alone_says_that_it_moves_nothing(rig, dna_file):
     bpy.context.view_layer.update()
     assert f"{copy.name} is a copy of the controls alone" in " ".join(_said(copy).split())
     assert "copy of the controls" not in " ".join(_said(controls).split())
+
+
+def _writer(rig):
+    return scene.submodule("scene.base.written").bone_writers[rig.session_uid]
+
+
+def test_a_step_of_a_slider_is_no_edit_of_the_bones(rig, dna_file):
+    """The sidebar tags the armature too; all that is known of its bones stays known."""
+    controls = scene.controls(rig)
+    bpy.context.view_layer.update()
+    scene.set_controls(rig, jawOpen=0.1)
+    kept = _writer(rig)
+    for value in (0.2, 0.3):
+        controls.pose.bones["face"]["jawOpen"] = value
+        controls.update_tag()  # of everything, as a slider of the sidebar does
+        bpy.context.view_layer.update()
+        assert (
+            scene.error_against_oracle(rig, dna_file, scene.raw_of(rig, dna_file)) < scene.TOLERANCE
+        )
+    assert _writer(rig) is kept
+
+
+def test_an_edit_of_the_bones_is_one(rig):
+    scene.set_controls(rig, jawOpen=0.1)
+    kept = _writer(rig)
+    bpy.context.view_layer.objects.active = rig
+    rig.hide_set(False)
+    bpy.ops.object.mode_set(mode="EDIT")
+    rig.data.edit_bones[-1].roll += 0.5
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.context.view_layer.update()
+    scene.set_controls(rig, jawOpen=0.2)
+    assert _writer(rig) is not kept
+    kept = _writer(rig)
+    scene.controls(rig).data.bones["face"].name = "head of it"
+    bpy.context.view_layer.update()
+    bpy.context.view_layer.update()
+    assert "face" in scene.controls(rig).data.bones
+    scene.set_controls(rig, jawOpen=0.3)
+    assert _writer(rig) is not kept

@@ -16,7 +16,7 @@ from ..base import console, parts, sharing, written
 from ..base.blender_types import ArmatureObject, Depsgraph, current_context
 from ..character import lods, rig_placement, runtime
 from ..frame import caches, channel_preview, controls_ahead, evaluate, lateness, timing
-from . import applied_transforms, duplicates, migrations, repair
+from . import applied_transforms, bone_edits, duplicates, migrations, repair
 
 # objects: session uids of those seen; mended: of characters that were mended at the last update.
 # rendering: since a render began.
@@ -128,7 +128,7 @@ def _edited(depsgraph: Depsgraph) -> list[ArmatureObject]:
     for update in depsgraph.updates:
         item = update.id.original if update.id is not None else None
         if isinstance(item, bpy.types.Armature):
-            bones_edited = True
+            bones_edited |= bone_edits.is_edited(item)
         elif isinstance(item, bpy.types.Action):
             actions.add(item)
         elif isinstance(item, bpy.types.Object):
@@ -185,6 +185,7 @@ def _restored(*_arguments: object) -> None:
     lateness.forget()
     layer_mixing.forget()
     applied_transforms.forget()
+    bone_edits.forget()
     _state["objects"] = frozenset()
     if native.problem():
         return

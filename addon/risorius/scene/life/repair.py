@@ -68,7 +68,8 @@ def _sliders(rig: ArmatureObject) -> list[str]:
     face, live = parts.face_bone(rig), runtime.of(rig)
     if face is None or live is None:
         return []
-    wrong = [i for i, label in enumerate(live.labels) if not isinstance(face.get(label), float)]
+    there = dict(face.items())  # one by one they take four times as long
+    wrong = [i for i, label in enumerate(live.labels) if not isinstance(there.get(label), float)]
     if not wrong:
         return []
     planned = plans.plan_controls(live.dna.raw_control_names, live.rests)

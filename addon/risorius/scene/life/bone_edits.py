@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whether the bones of an armature were edited, or Blender only says so.
+
+A step of a slider in the sidebar tags its object's geometry, and with it the armature, as if its
+bones had changed.
+"""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ..base import parts
+
+# Session uid of an armature -> its bones' names, marks and places at rest, as last seen.
+_seen: dict[int, tuple[list[object], bytes]] = {}
+
+
+def forget() -> None:
+    """After load: what was seen before says nothing about what is there."""
+    _seen.clear()
+
+
+def is_edited(armature: bpy.types.Armature) -> bool:
+    """Whether an armature has other bones than when this was last asked, or was never asked.
+
+    Args:
+        armature: of a deforming or a control armature, the original.
+    """
+    bones = armature.bones
+    marks = [(bone.name, bone.get(parts.PART), bone.get(parts.JOINT)) for bone in bones]
+    places = np.empty(16 * len(bones), np.float32)
+    bones.foreach_get("matrix_local", places)
+    state = (marks, places.tobytes())
+    if _seen.get(armature.session_uid) == state:
+        return False
+    _seen[armature.session_uid] = state
+    return True

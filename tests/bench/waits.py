@@ -1,0 +1,258 @@
+# SPDX-License-Identifier: MIT
+"""The waits of a working day in Blender, each beside what Blender alone takes in the same scene.
+
+    python tests/bench/waits.py FULL.dna [--sample SAMPLE.dna] --extension ZIP [--faces 1 2 4 8]
+
+Runs inside the bpy module or an executable (blender -b --python ... --), with the add-on's zip
+installed. FULL.dna is a file of real size (tests/fullscale/generate.py); ten of SAMPLE.dna stand
+in the file that is opened and saved. The floor is measured in the same scene with the add-on off:
+frames and slider steps by a bare handler that writes the same bones and live keys, two poses in
+turn, that were read off the add-on before; undo by a plain property beside the same write; files
+and modes as they are. Times are medians in ms.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import statistics
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+import bpy
+import frame_time
+import install_extension
+import numpy as np
+
+CHANNELS = {"location": 3, "rotation_quaternion": 4, "scale": 3}
+
+
+def median_ms(action, rounds, before=None):
+    """Median ms of an action, each time after `before`."""
+    times = []
+    for _ in range(rounds):
+        if before is not None:
+            before()
+        begin = time.perf_counter()
+        action()
+        times.append((time.perf_counter() - begin) * 1000)
+    return statistics.median(times)
+
+
+def row(name, ours, floor=None, note=""):
+    """One line of the table."""
+    base = f"{floor:.1f}" if floor is not None else ""
+    ratio = f"{ours / floor:.2f}" if floor else ""
+    print(f"| {name} | {ours:.1f} | {base} | {ratio} | {note} |", flush=True)
+
+
+class Bare:
+    """The same bones and live keys, written by a loop that knows nothing of faces."""
+
+    def __init__(self, rigs):
+        # Names: an undo makes all objects anew.
+        self.rigs, self.poses, self.turn = [rig.name for rig in rigs], [], 0
+
+    def remember(self):
+        """Keep what stands in the scene now as one of the poses that are written in turn."""
+        pose = []
+        for rig in map(bpy.data.objects.get, self.rigs):
+            bones = {}
+            for name, width in CHANNELS.items():
+                bones[name] = np.empty(len(rig.pose.bones) * width, np.float32)
+                rig.pose.bones.foreach_get(name, bones[name])
+            keys = []
+            for item in rig.children_recursive:
+                key = item.data.shape_keys if item.type == "MESH" else None
+                if key is not None and len(key.key_blocks) == 2 and not item.hide_viewport:
+                    points = np.empty(len(key.key_blocks[1].points) * 3, np.float32)
+                    key.key_blocks[1].points.foreach_get("co", points)
+                    keys.append((item.name, points))
+            pose.append((rig.name, bones, keys))
+        self.poses.append(pose)
+
+    def write(self, *_arguments):
+        self.turn += 1
+        for rig_name, bones, keys in self.poses[self.turn % len(self.poses)]:
+            rig = bpy.data.objects[rig_name]
+            for name, values in bones.items():
+                rig.pose.bones.foreach_set(name, values)
+            rig.update_tag(refresh={"OBJECT"})
+            for item_name, points in keys:
+                item = bpy.data.objects[item_name]
+                key = item.data.shape_keys
+                key.key_blocks[1].points.foreach_set("co", points)
+                key.update_tag()
+                item.data.update_tag()
+
+
+def faces(path, count, mode="LIVE", lods=(0,)):
+    """So many characters of a file in an empty scene: [(control armature, deforming armature)]."""
+    found = [frame_time.import_face(path, mode, lods)[:2] for _ in range(count)]
+    for number, (controls, _) in enumerate(found):
+        controls.location.x = 0.4 * number
+    bpy.context.view_layer.update()
+    return found
+
+
+def measure_frames(path, package, counts, frames):
+    """Playback of several full-scale faces."""
+    for count in counts:
+        frame_time.empty_scene(package)
+        found = faces(path, count)
+        for controls, _ in found:
+            frame_time.animate(controls, frames)
+        bare = Bare([rig for _, rig in found])
+        for frame in (frames // 3, frames // 2):
+            bpy.context.scene.frame_set(frame)
+            bare.remember()
+        ours = statistics.median(frame_time.step(frames))
+        bpy.ops.preferences.addon_disable(module=package)
+        bpy.app.handlers.frame_change_post.append(bare.write)
+        floor = statistics.median(frame_time.step(frames))
+        bpy.app.handlers.frame_change_post.remove(bare.write)
+        row(f"a frame, {count} full-scale", ours, floor, f"{1000 / ours:.0f} fps")
+
+
+def slide(controls, value):
+    """A slider's step: its value, as the sidebar writes it, and the evaluated scene."""
+    face = controls.pose.bones["face"]
+    name = next(n for n in list(face.keys()) if isinstance(face[n], float))
+    face[name] = value
+    controls.update_tag()
+    bpy.context.view_layer.update()
+
+
+class Slider:
+    """Steps of one slider, each another value."""
+
+    def __init__(self, controls, after=lambda: None):
+        self.controls, self.after, self.step = controls.name, after, 0
+
+    def __call__(self):
+        self.step += 1
+        slide(bpy.data.objects[self.controls], 0.1 + self.step % 7 / 10)
+        self.after()
+
+
+def measure_slider(path, package, rounds):
+    """A slider's step, and its undo and redo."""
+    frame_time.empty_scene(package)
+    (controls, rig), *_ = faces(path, 1)
+    bare, drag, name = Bare([rig]), Slider(controls), controls.name
+    for _ in range(2):
+        drag()
+        bpy.context.view_layer.update()
+        bare.remember()
+    ours = median_ms(drag, rounds)
+    undone = measure_undo(drag)
+    bpy.ops.preferences.addon_disable(module=package)
+
+    def written():
+        bare.write()
+        bpy.context.view_layer.update()
+
+    drag = Slider(bpy.data.objects[name], written)
+    row("a slider's step to the evaluated mesh", ours, median_ms(drag, rounds))
+    bare_undone = measure_undo(drag)
+    for wait, own, floor in zip(("undo", "redo"), undone, bare_undone, strict=True):
+        row(f"{wait} of a slider's step", own, floor)
+
+
+def measure_undo(drag, steps=8):
+    """Median ms of undo and of redo of so many steps, each to the evaluated scene."""
+    bpy.context.preferences.edit.use_global_undo = True
+    bpy.ops.ed.undo_push(message="start")
+    for step in range(steps):
+        drag()
+        bpy.ops.ed.undo_push(message=str(step))
+
+    def evaluated(operator):
+        operator()
+        bpy.context.view_layer.update()
+
+    undo = median_ms(lambda: evaluated(bpy.ops.ed.undo), steps - 1)
+    redo = median_ms(lambda: evaluated(bpy.ops.ed.redo), steps - 1)
+    return undo, redo
+
+
+def measure_switches(path, package, rounds):
+    """Levels of detail, ways of keeping shapes and edit mode, back and forth."""
+    frame_time.empty_scene(package)
+    (controls, rig), *_ = faces(path, 1, lods=range(8))
+    bpy.context.view_layer.objects.active = controls
+    levels = iter([1, 0] * rounds)
+    ours = median_ms(lambda: bpy.ops.risorius.set_lod(lod=next(levels)), 2 * rounds)
+    row("level of detail, 0 and 1", ours)
+    modes = iter(["KEYS", "LIVE"] * rounds)
+    for name in ("Live to Keys", "Keys to Live"):
+        row(name, median_ms(lambda: bpy.ops.risorius.set_shape_mode(mode=next(modes)), 1))
+    head = max((m for m in rig.children_recursive if m.type == "MESH"),
+               key=lambda m: len(m.data.vertices))  # fmt: skip
+
+    def edit():
+        bpy.context.view_layer.objects.active = head
+        bpy.ops.object.mode_set(mode="EDIT")
+        bpy.context.view_layer.update()
+        bpy.ops.object.mode_set(mode="OBJECT")
+        bpy.context.view_layer.update()
+
+    ours = median_ms(edit, rounds)
+    bpy.ops.preferences.addon_disable(module=package)
+    row("edit mode, in and out", ours, median_ms(edit, rounds))
+
+
+def measure_files(path, package, rounds, count=10):
+    """Import, and a .blend with several faces."""
+    frame_time.empty_scene(package)
+    seconds = []
+    for _ in range(rounds):
+        frame_time.empty_scene(package)
+        seconds.append(frame_time.import_face(path, "LIVE")[2])
+    row(f"import of {path.stem}", 1000 * statistics.median(seconds))
+    frame_time.empty_scene(package)
+    faces(path, count, lods=range(8))
+    with tempfile.TemporaryDirectory() as folder:
+        blend = str(Path(folder) / "faces.blend")
+        save = lambda: bpy.ops.wm.save_as_mainfile(filepath=blend, copy=True)  # noqa: E731
+
+        def load():
+            bpy.ops.wm.open_mainfile(filepath=blend)
+            bpy.context.view_layer.update()
+
+        saved = median_ms(save, rounds)
+        size = Path(blend).stat().st_size / 1e6
+        opened = median_ms(load, rounds)
+        bpy.ops.preferences.addon_disable(module=package)
+        floor = median_ms(load, rounds)
+        row(f"opening {count} of {path.stem}", opened, floor, f"{size:.1f} MB")
+        row(f"saving {count} of {path.stem}", saved, median_ms(save, rounds))
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("full", type=Path)
+    parser.add_argument("--sample", type=Path)
+    parser.add_argument("--extension", type=Path, required=True)
+    parser.add_argument("--faces", type=int, nargs="+", default=[1, 2, 4, 8])
+    parser.add_argument("--frames", type=int, default=40)
+    parser.add_argument("--rounds", type=int, default=7)
+    args = parser.parse_args(install_extension.arguments())
+    package = install_extension.install(args.extension)
+    print(frame_time.machine())
+    print("| wait | ms | floor | times the floor | |\n|---|---|---|---|---|")
+    measure_frames(args.full, package, args.faces, args.frames)
+    measure_slider(args.full, package, 5 * args.rounds)
+    measure_switches(args.full, package, args.rounds)
+    measure_files(args.full, package, 3, count=1)
+    if args.sample:
+        measure_files(args.sample, package, args.rounds)
+
+
+if __name__ == "__main__":
+    main()
+    sys.stdout.flush()
+    os._exit(0)  # bpy sometimes hangs at exit
