@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
 # release.sh: everything that is published of a version, from a clean tree whose HEAD has the tag
-# vVERSION: wheels and sdist (wheels.sh), one extension for each platform and one with all, a repository
-# of extensions with a page, an SBOM, notes and checksums. They lie in build/release/VERSION; nothing is
-# uploaded and nothing signed. Needs the sample's data (48 MB, once).
+# vVERSION: the page of `risorius web` (web.sh), wheels and sdist (wheels.sh), one extension for each
+# platform and one with all, a repository of extensions with a page, an SBOM, notes and checksums. They
+# lie in build/release/VERSION; nothing is uploaded and nothing signed. Needs the sample's data (48 MB,
+# once).
 #
 #   RISORIUS_SITE=https://... is the address of the documentation, for Blender's Online Manual
 #   release.sh VERSION [--trial]   --trial: also of a tree that could not be released; says why not, and
@@ -24,6 +25,7 @@ checked() { "$python" $make check "$version" >&2 || { [ -n "$trial" ] && echo "A
 gather_wheels() { # of wheels.sh; a trial does with what was built for this machine
   shopt -s nullglob
   if [ -z "$trial" ]; then
+    packaging/web.sh # the wheels that are built now have it
     rm -rf "$project/build/wheels"
     packaging/wheels.sh
   fi
