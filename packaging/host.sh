@@ -6,21 +6,12 @@
 # Prints rows `row<TAB>name<TAB>passed<TAB>failed`; exit code 0 only if nothing failed.
 set -uo pipefail
 source "$(dirname "$0")/setup.sh"
+source "$project/packaging/works.sh"
 
 out="$project/build/host"
 logs="$project/build/logs/host"
 golden="$project/tests/data/golden"
 face="$golden/medium.dna"
-failed=0
-
-works() { # works NAME LOG COMMAND...: one row
-  local name=$1 log="$logs/$2.log" good=1
-  shift 2
-  "$@" > "$log" 2>&1 || good=0
-  [ $good = 1 ] || { tail -n 30 "$log" && failed=1; }
-  printf 'row\t%s\t%d\t%d\n' "$name" $good $((1 - good))
-  [ $good = 1 ]
-}
 
 # install_library FOLDER [OPTION...]: into FOLDER/prefix
 install_library() {

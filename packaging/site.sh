@@ -9,25 +9,12 @@
 #   site.sh
 set -uo pipefail
 source "$(dirname "$0")/setup.sh"
+source "$project/packaging/works.sh"
 site="$project/build/site"
 own="$project/packaging/site"
 tools="$project/build/venv-site"
-logs="$project/build/logs"
+logs="$project/build/logs/site"
 mkdir -p "$site" "$logs"
-failed=0
-
-row() { # row NAME COMMAND...
-  local name=$1 log="$logs/site-${1// /-}.log"
-  shift
-  if "$@" > "$log" 2>&1; then
-    printf 'row\t%s\t1\t0\n' "$name"
-  else
-    failed=1
-    tail -n 30 "$log"
-    printf 'row\t%s\t0\t1\n' "$name"
-    return 1
-  fi
-}
 site_tools() {
   local stamp
   stamp="$tools/.$(sha256sum "$own/requirements.txt" | cut -c1-16)"
@@ -39,10 +26,10 @@ zip=$(ls "$project"/build/dist/risorius-*.zip 2> /dev/null | head -n 1)
 [ -n "$zip" ] || { echo "site.sh: there is no build/dist/risorius-*.zip: build_extension" >&2 && exit 1; }
 
 step "site"
-row "site: tools" site_tools &&
-  row "site: panels and operators" timeout -s KILL 300 "$python" "$own/blender_classes.py" "$zip" "$site/classes.json" &&
-  row "site: pages" "$python" "$own/gather.py" "$site/pages" "$site/classes.json" &&
-  row "site: mkdocs build --strict" "$tools/bin/python" -m mkdocs build --strict --quiet -f "$site/mkdocs.yml" &&
-  row "site: links" "$tools/bin/python" "$own/links.py" "$site/html"
+works "site: tools" tools site_tools &&
+  works "site: panels and operators" panels timeout -s KILL 300 "$python" "$own/blender_classes.py" "$zip" "$site/classes.json" &&
+  works "site: pages" pages "$python" "$own/gather.py" "$site/pages" "$site/classes.json" &&
+  works "site: mkdocs build --strict" mkdocs "$tools/bin/python" -m mkdocs build --strict --quiet -f "$site/mkdocs.yml" &&
+  works "site: links" links "$tools/bin/python" "$own/links.py" "$site/html"
 step ""
 [ $failed -eq 0 ]

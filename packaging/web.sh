@@ -6,25 +6,17 @@
 # Prints rows `row<TAB>name<TAB>passed<TAB>failed`; exit code 0 only if nothing failed.
 set -uo pipefail
 source "$(dirname "$0")/setup.sh"
+source "$project/packaging/works.sh"
 
 out="$project/build/web"
 logs="$project/build/logs/web"
 venv_zig="$project/build/cross/venv"
 most=1200000 # bytes of the page; packed in the wheel it is about a third
-failed=0
 case "${1:-}" in
   "" | --check) ;;
   *) echo "web.sh: $1 is not --check" >&2 && exit 2 ;;
 esac
 
-works() { # works NAME LOG COMMAND...: one row
-  local name=$1 log="$logs/$2.log" good=1
-  shift 2
-  "$@" > "$log" 2>&1 || good=0
-  [ $good = 1 ] || { tail -n 30 "$log" && failed=1; }
-  printf 'row\t%s\t%d\t%d\n' "$name" $good $((1 - good))
-  [ $good = 1 ]
-}
 get_tools() {
   local stamp
   stamp="$out/npm/.$(sha256sum "$project/native/web/package-lock.json" | cut -c1-16)"
