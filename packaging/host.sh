@@ -18,7 +18,8 @@ install_library() {
   local to=$1
   shift
   rm -rf "$to/prefix"
-  cmake -S "$project" -B "$to-library" -G Ninja -DCMAKE_BUILD_TYPE=Release -DRISORIUS_BUILD_BINDINGS=OFF \
+  # As preset tests: ccache has these objects.
+  cmake -S "$project" -B "$to-library" -G Ninja -DCMAKE_BUILD_TYPE=Release -DRISORIUS_BUILD_BINDINGS=OFF -DCMAKE_UNITY_BUILD=ON \
     -DRISORIUS_WARNINGS_AS_ERRORS=ON -DCMAKE_CXX_COMPILER_LAUNCHER=ccache "$@" &&
     cmake --build "$to-library" -j"$(nproc)" --target risorius_shared risorius_static && cmake --install "$to-library" --prefix "$to/prefix"
 }

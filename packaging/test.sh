@@ -11,8 +11,9 @@
 #   ./packaging/test.sh --help     this text
 #
 # Three lanes side by side, because half of the work keeps one core busy only: `native` is GoogleTest,
-# sanitizers, cross compilers, fuzzers, and at last the older Blenders; `python` is the wheel, style, types
-# and pytest; `blender` waits for the extension's zip, and is every test inside bpy 4.5.
+# sanitizers, cross compilers, fuzzers, and at last the C library installed and the older Blenders; `python`
+# is the wheel, style, types, pytest and the documentation as a site; `blender` waits for the extension's zip,
+# and is every test inside bpy 4.5.
 set -uo pipefail
 mode=${1:-all}
 case $mode in
@@ -55,14 +56,14 @@ google_tests() { # google_tests NAME PRESET
   grep -ohE 'This CPU has no [a-z0-9]+' "$logs/cmake-$preset.log" | sort -u |
     while read -r line; do say "NOT RUN, $name: ${line,}"; done
 }
-run_cross() {
-  local code name good bad
-  "$project/packaging/cross.sh" > "$logs/cross.log" 2>&1
+run_script() { # run_script NAME: one of packaging/ whose steps are rows
+  local log="$logs/${1%.sh}.log" code name good bad
+  "$project/packaging/$1" > "$log" 2>&1
   code=$?
   while IFS=$'\t' read -r _ name good bad; do
     note "$name" "$good" "$bad"
-  done < <(grep -P '^row\t' "$logs/cross.log")
-  check "cross.sh" [ "$code" -eq 0 ] || tail -n 40 "$logs/cross.log"
+  done < <(grep -P '^row\t' "$log")
+  check "$1" [ "$code" -eq 0 ] || tail -n 40 "$log"
 }
 run_fuzzers() { # run_fuzzers SECONDS
   local code target executions finds
@@ -94,11 +95,14 @@ native_lane() {
   step "one Rig under eight threads"
   google_tests "thread sanitizer, one Rig" tsan
   step "other compilers, systems and processors"
-  run_cross
+  run_script cross.sh
   step "fuzz targets, 10 s each"
   run_fuzzers 10
-  # This lane ends before the others: it takes what the longest one would have last.
-  extension_is_there && run_subsets
+  # This lane ends before the others: it takes what the longest one would have last, and what needs the wheel.
+  extension_is_there || return
+  step "C library for other programs"
+  run_script host.sh
+  run_subsets
 }
 # Waits for the python lane's extension; zip is its path.
 extension_is_there() {
@@ -194,6 +198,7 @@ python_lane() {
   [ "$mode" = --quick ] || { step "types" && run_types; }
   step "Python tests"
   run_pytest
+  [ "$mode" = --quick ] || { step "documentation as a site" && run_script site.sh; }
 }
 blender_lane() {
   local version blender
