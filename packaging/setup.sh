@@ -110,8 +110,9 @@ build_wheel() {
   mkdir -p "$project/build/dist"
   rm -f "$project"/build/dist/risorius-*-cp311-*.whl
   CMAKE_CXX_COMPILER_LAUNCHER=ccache "$python" -m pip wheel -q --no-build-isolation --no-deps \
-    -w "$project/build/dist" "$project"
-  "$python" -m pip install -q --no-deps --force-reinstall "$project"/build/dist/risorius-*-cp311-*.whl
+    -C cmake.define.RISORIUS_BUILD_RIG_BENCH=ON -w "$project/build/dist" "$project"
+  "$python" -m pip install -q --no-deps --force-reinstall "$project"/build/dist/risorius-*-cp311-*.whl &&
+    cp "$project"/build/wheel-cp311-*/tests/bench/rig_bench "$venv/bin/"
 }
 
 # sample_face: prints the folder of the face that each zip carries; made again when its code changed.

@@ -119,7 +119,6 @@ class Copy:
                 sys.exit("the wheel is not installed: packaging/demo.sh builds it")
             installed = Path(package.origin).parent
             self._copy_module(next(installed.glob("_native.*.so")))
-            shutil.copy(installed / "rig_bench", self.root / "native" / "python" / "risorius")
             compiled = ["compileall", "-q", "--invalidation-mode", "checked-hash", "native/python"]
             self._checked([sys.executable, "-m", *compiled])
             return

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from importlib import metadata
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ MEDIUM = Path(__file__).parents[1] / "data" / "golden" / "medium.dna"
 @pytest.fixture
 def quick() -> None:
     if bench.program() is None:
-        pytest.fail("the wheel under test was built without Google Benchmark")
+        pytest.fail("rig_bench was not built with the wheel under test")
 
 
 def number_of(text: str, name: str) -> float:
@@ -86,9 +87,16 @@ def test_bad_files_are_sentences(tmp_path: Path, capfd: pytest.CaptureFixture[st
     assert "bad.dna" in capfd.readouterr().err
 
 
-def test_a_wheel_without_it_says_so(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+def test_without_the_program_it_says_so(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(bench, "program", lambda: None)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setattr(bench.sysconfig, "get_path", lambda _: str(tmp_path))
     assert cli.main(["bench", str(MEDIUM)]) == 1
-    assert "Google Benchmark" in capsys.readouterr().err
+    assert "rig_bench" in capsys.readouterr().err
+
+
+def test_no_wheel_holds_it() -> None:
+    files = metadata.files("risorius")
+    assert files
+    assert [str(file) for file in files if file.stem == "rig_bench"] == []

@@ -34,7 +34,7 @@ def error_classes():
     """Every class of errors that a module of the package makes, by name."""
     found = {}
     for module in pkgutil.walk_packages(risorius.__path__, "risorius."):
-        if module.name in ("risorius.__main__", "risorius.rig_bench"):
+        if module.name == "risorius.__main__":
             continue
         for name, value in vars(importlib.import_module(module.name)).items():
             ours = inspect.isclass(value) and value.__module__.split(".")[0] == "risorius"

@@ -4,8 +4,11 @@
 from __future__ import annotations
 
 import argparse
+import os
+import shutil
 import subprocess
 import sys
+import sysconfig
 import tempfile
 import zipfile
 from pathlib import Path
@@ -49,10 +52,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def program() -> Path | None:
-    """The benchmark that this wheel was built with, if it was."""
-    folder = Path(risorius.__file__).parent
-    found = [folder / name for name in ("rig_bench", "rig_bench.exe")]
-    return next((path for path in found if path.is_file()), None)
+    """The benchmark, beside this Python's own programs or on PATH: no wheel holds it."""
+    places = [sysconfig.get_path("scripts"), *os.get_exec_path()]
+    found = shutil.which("rig_bench", path=os.pathsep.join(places))
+    return Path(found) if found else None
 
 
 def export_frames(source: Path, raw_count: int, folder: Path) -> list[str]:
@@ -98,7 +101,10 @@ def _export_frames(source: Path, raw_count: int, folder: Path) -> list[str]:
 def run(args: argparse.Namespace) -> int:
     path = program()
     if path is None:
-        raise InputError("this wheel was built without Google Benchmark, which bench runs on")
+        raise InputError(
+            "the program rig_bench, which bench runs, is neither beside this Python nor on PATH: "
+            "packaging/demo.sh builds it from the sources"
+        )
     dna = risorius.load(args.file, layers="definition")
     with tempfile.TemporaryDirectory() as folder:
         raw = len(dna.raw_control_names)
