@@ -77,7 +77,9 @@ std::string machine_name() {
   return GetComputerNameA(name, &length) ? std::string(name, length) : std::string();
 }
 
-void keep_group(const fs::path&, const fs::path&, fs::perms&) {}
+// All that is known of rights here is whether a file may be written at all; one that may not is not
+// replaced, and a new one of that kind could not be removed.
+void inherit_rights(const fs::path&, const fs::path&) {}
 
 #else
 
@@ -127,6 +129,15 @@ void keep_group(const fs::path& old, const fs::path& made, fs::perms& rights) {
   rights = (rights & ~fs::perms::group_all) | static_cast<fs::perms>(others << 3);
 }
 
+void inherit_rights(const fs::path& old, const fs::path& made) {
+  std::error_code error;
+  const fs::file_status before = fs::status(old, error);
+  if (error || !fs::exists(before)) return;
+  fs::perms rights = before.permissions();
+  keep_group(old, made, rights);
+  fs::permissions(made, rights, error);
+}
+
 #endif
 
 int rename_file(const fs::path& from, const fs::path& to) {
@@ -173,15 +184,6 @@ std::optional<long long> maker_of(std::string_view name, std::string_view begin)
       tail.substr(1, kTokenDigits).find_first_not_of("0123456789abcdef") == std::string_view::npos;
   if (!whole || !token || tail[0] != '-' || process <= 0) return {};
   return process;
-}
-
-void inherit_rights(const fs::path& old, const fs::path& made) {
-  std::error_code error;
-  const fs::file_status before = fs::status(old, error);
-  if (error || !fs::exists(before)) return;
-  fs::perms rights = before.permissions();
-  keep_group(old, made, rights);
-  fs::permissions(made, rights, error);
 }
 
 Unexpected failure(const fs::path& path, const std::error_code& reason) {
@@ -282,7 +284,13 @@ std::optional<NewFile> NewFile::beside(const fs::path& target, std::error_code& 
     return {};
   }
   const bool is_private = fs::exists(target, ignored);
-  return create(target.parent_path() / hidden_name(), Leftover::kRemove, error, calls, is_private);
+  const fs::path folder = target.parent_path();
+  auto file = create(folder / hidden_name(), Leftover::kRemove, error, calls, is_private);
+  // Windows says of a file that stands there what it says of a folder that is not there.
+  if (error == std::errc::no_such_file_or_directory && fs::is_regular_file(folder, ignored)) {
+    error = std::make_error_code(std::errc::not_a_directory);
+  }
+  return file;
 }
 
 std::error_code NewFile::write(std::span<const std::uint8_t> bytes) {

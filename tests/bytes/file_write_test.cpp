@@ -123,6 +123,19 @@ TEST_F(FileWrite, OfNoFileFromBeforeAndOfAFolderThatIsNotThereItSaysSo) {
   EXPECT_EQ(folder.error().message, "cannot write " + folder_.string() + ": Is a directory");
 }
 
+// Windows gives the same reason for a file in place of the folder as for no folder.
+TEST_F(FileWrite, AFileInPlaceOfTheFolderIsToldFromNoFolderWhateverTheSystemSays) {
+  std::ofstream(folder_ / "file") << "x";
+  failing = 'o', reason = ENOENT;
+  for (const auto& [name, said] : {std::pair{"file", "a file stands where its folder should be"},
+                                   std::pair{"none", "its folder is not there"}}) {
+    const Status written = write_file_atomically(folder_ / name / "a", Bytes{1}, kCalls);
+    ASSERT_FALSE(written);
+    EXPECT_NE(written.error().describe().find(said), std::string::npos)
+        << written.error().describe();
+  }
+}
+
 TEST_F(FileWrite, TakesNamesAsLongAsTheSystemDoes) {
   for (const std::size_t length : {244u, 250u, 255u}) {
     const fs::path path = folder_ / std::string(length, 'n');
