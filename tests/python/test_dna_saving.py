@@ -2,7 +2,6 @@
 """Saving: whatever goes wrong, the file is the whole old one or the whole new one."""
 
 import os
-import signal
 import stat
 import subprocess
 import sys
@@ -91,7 +90,7 @@ def test_a_kill_in_the_middle_leaves_one_whole_file(tmp_path):
         if round_ % 2:  # also after the first whole file, however long that takes
             assert child.stdout.readline() == "saved\n"
         time.sleep(0.005 + 0.011 * round_)
-        child.send_signal(signal.SIGKILL)
+        child.kill()
         child.wait()
         child.stdout.close()
         dna = risorius.load(path)  # whole, or this raises

@@ -4,6 +4,7 @@
 import errno
 import json
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -45,7 +46,7 @@ def test_the_second_is_told_who_has_it_and_gets_it_when_the_first_is_killed(tmp_
         process.communicate()
     since = r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d"
     who = f"process {process.pid} on {socket.gethostname()}, since {since},"
-    assert caught.match(f"^{tmp_path}: {who} works in this folder")
+    assert caught.match(f"^{re.escape(str(tmp_path))}: {who} works in this folder")
     assert (tmp_path / NAME).exists() == (os.name != "nt")
     with locked(tmp_path):
         about = json.loads((tmp_path / NAME).read_text())
