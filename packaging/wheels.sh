@@ -133,8 +133,9 @@ same() { # same PLATFORM PYTHON: built elsewhere from nothing
 copy_elsewhere() {
   elsewhere=$(mktemp -d)/risorius again="$wheels/again"
   rm -rf "$again"
-  # What git knows of, as it lies here.
-  git -C "$project" ls-files -z | (cd "$project" && xargs -0 cp --parents -t "$(mkdir -p "$elsewhere" && echo "$elsewhere")")
+  # What git knows of, as it lies here, and the page of web.sh.
+  (cd "$project" && { git ls-files -z && find build/web -maxdepth 1 -name page.html -print0; } 2> /dev/null |
+    xargs -0 cp --parents -t "$(mkdir -p "$elsewhere" && echo "$elsewhere")")
 }
 
 make_platform() { # make_platform PLATFORM[=PYTHON]

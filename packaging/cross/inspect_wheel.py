@@ -31,8 +31,10 @@ MOST_BYTES = 4 * 1000 * 1000
 OLDEST_GLIBC = 28  # 2.28
 OLDEST_MACOS = (11, 0)
 LICENCES = {"LICENSE", "native/NOTICES.txt"}
-# What the package has beside its module, and what its self-test compares with.
-OWN = re.compile(r"risorius/(.+\.(py|pyi|toml)|py\.typed|selftest/golden/\w+\.(dna|f32|sha256))")
+# What the package has beside its module, what its self-test compares with, and the page of web.sh.
+OWN = re.compile(
+    r"risorius/(.+\.(py|pyi|toml)|py\.typed|selftest/golden/\w+\.(dna|f32|sha256)|web/page\.html)"
+)
 MACHINES = {"win_amd64": "AMD64", "win_arm64": "ARM64"}
 PROCESSORS = {"macosx_11_0_arm64": "ARM64", "macosx_11_0_x86_64": "X86_64"}
 # Whatever Windows 10 has: the C library by its contracts, and the kernel.
