@@ -130,7 +130,7 @@ run_blender() {
 some() { printf 'blender_tests/test_%s.py ' "$@"; }
 run_subsets() { # what differs most between versions: installing, building, keys and actions, saved files
   local subset version other
-  subset=$(some extension controls frames past)
+  subset=$(some extension controls frames past life_scenes)
   for version in 4.2.23 5.0.1; do
     step "a fast subset in bpy $version"
     if other=$(bpy_venv "$version" 90); then

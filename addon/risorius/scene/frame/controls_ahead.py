@@ -41,6 +41,7 @@ Face = tuple[ArmatureObject, ArmatureObject]  # deforming armature, control arma
 _stages: dict[int, _Stage] = {}  # scene -> its stage
 # edited: whether the file was since the last frame; simulated: whether anything in it is.
 _state = {"edited": True, "simulated": True}
+_evaluated_scenes: set[int] = set()  # session uids, since the last load or undo
 _lock = threading.Lock()  # a render works beside the interface
 
 
@@ -101,6 +102,24 @@ def is_needed() -> bool:
     ours = __name__.partition(".scene.")[0]
     places = (getattr(h, "__module__", None) or "" for h in bpy.app.handlers.frame_change_post)
     return any(not place.startswith(ours) for place in places)
+
+
+def note_evaluated(scene: bpy.types.Scene) -> None:
+    """A scene of the user's was evaluated. Args: scene  the original."""
+    _evaluated_scenes.add(scene.session_uid)
+
+
+def is_safe(user: bpy.types.Scene) -> bool:
+    """Whether a graph may be built before a frame of a scene.
+
+    Blender builds the scene's own graph anew then. Blender 4.2 dies of that where this graph was
+    built and never evaluated, as that of a scene which a window was just switched to: its first
+    frame is brought up afterwards. To look into such a graph is as deadly.
+
+    Args:
+        user: the scene that Blender is about to evaluate.
+    """
+    return bpy.app.version >= (4, 3) or user.session_uid in _evaluated_scenes
 
 
 def at(user: bpy.types.Scene, faces: Sequence[Face]) -> tuple[Depsgraph | None, list[Face]]:
@@ -168,6 +187,7 @@ def note_edit() -> None:
 
 def close() -> None:
     """Give the scene and its graph back: before undo and load, which free what they point to."""
+    _evaluated_scenes.clear()
     with _lock:
         _close()
 

@@ -81,7 +81,7 @@ def before_frame(scene: bpy.types.Scene, rendering: bool) -> None:
     found = [(rig, parts.controls_of(rig)) for rig in parts.rigs() if parts.BAKED not in rig]
     members = set(scene.objects)  # users_scene would list them once for each face
     faces = [(r, c) for r, c in found if c in members]
-    if not faces:
+    if not faces or not controls_ahead.is_safe(scene):
         return
     depsgraph, faces = controls_ahead.at(scene, faces)
     timing.animated()

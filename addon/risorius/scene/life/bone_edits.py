@@ -7,13 +7,15 @@ bones had changed.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import bpy
 import numpy as np
 
 from ..base import parts
 
 # Session uid of an armature -> its bones' names, marks and places at rest, as last seen.
-_seen: dict[int, tuple[list[object], bytes]] = {}
+_seen: dict[int, tuple[Sequence[object], bytes]] = {}
 
 
 def forget() -> None:

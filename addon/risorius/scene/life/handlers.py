@@ -36,7 +36,8 @@ def _frame_changes(scene: bpy.types.Scene, *_arguments: object) -> None:
 
 
 @persistent
-def _frame_changed(_scene: bpy.types.Scene, depsgraph: Depsgraph | None = None) -> None:
+def _frame_changed(scene: bpy.types.Scene, depsgraph: Depsgraph | None = None) -> None:
+    controls_ahead.note_evaluated(scene)
     if depsgraph is not None:
         timing.evaluated()
         evaluate.after_frame(depsgraph)
@@ -67,8 +68,9 @@ def _render_ended(*_arguments: object) -> None:
 
 
 @persistent
-def _updated(_scene: bpy.types.Scene, depsgraph: Depsgraph) -> None:
+def _updated(scene: bpy.types.Scene, depsgraph: Depsgraph) -> None:
     """React to edits of control armatures; writes here tag the rig only, so it ends at once."""
+    controls_ahead.note_evaluated(scene)
     controls_ahead.note_edit()
     # While a render runs beside the interface, only its own frames are written.
     if _state["busy"] or bpy.app.is_job_running("RENDER") or native.problem():
@@ -162,12 +164,15 @@ def _concerned(
 @persistent
 def _loaded(*_arguments: object) -> None:
     """After load: Blender calls no update handler when it evaluates a file for the first time."""
-    layer = current_context().view_layer
+    context = current_context()
+    layer = context.view_layer
     migrations.forget()
     if not native.problem():
         console.say(*migrations.bring_up_all())
     if layer is not None and not native.problem() and parts.rigs():
         layer.update()
+        if context.scene is not None:
+            controls_ahead.note_evaluated(context.scene)
         repair.heal_all()
         written.forget()
         refresh()
