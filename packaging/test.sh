@@ -11,9 +11,9 @@
 #   ./packaging/test.sh --help     this text
 #
 # Three lanes side by side, because half of the work keeps one core busy only: `native` is GoogleTest,
-# sanitizers, cross compilers, fuzzers, and at last the C library installed and the older Blenders; `python`
-# is the wheel, style, types, pytest and the documentation as a site; `blender` waits for the extension's zip,
-# and is every test inside bpy 4.5.
+# sanitizers, cross compilers, fuzzers and the C library installed; `python` is the wheel, style, types,
+# pytest and the documentation as a site; `blender` waits for the extension's zip, and is every test inside
+# Blender.
 set -uo pipefail
 mode=${1:-all}
 case $mode in
@@ -98,11 +98,9 @@ native_lane() {
   run_script cross.sh
   step "fuzz targets, 10 s each"
   run_fuzzers 10
-  # This lane ends before the others: it takes what the longest one would have last, and what needs the wheel.
-  extension_is_there || return
+  extension_is_there || return # of the same lane as the wheel, which the next step needs
   step "C library for other programs"
   run_script host.sh
-  run_subsets
 }
 # Waits for the python lane's extension; zip is its path.
 extension_is_there() {
@@ -216,6 +214,7 @@ blender_lane() {
   fi
   run_blender "bpy $version" "$(echo blender_tests/test_*.py)" "$python" blender_tests/run.py -- \
     --extension "$zip"
+  run_subsets
   for blender in $(printf '%s\n' "${BLENDER:-}" "$(command -v blender || true)" | sort -u); do
     step "Blender tests in $blender"
     run_program "$blender"
