@@ -7,7 +7,14 @@
 #include "bytes/read_at.h"
 #include "bytes/source.h"
 
-#ifndef _WIN32
+#ifdef _WIN32
+#define NOMINMAX
+#define WIN32_LEAN_AND_MEAN
+#include <windows.h>
+// After it.
+#include <fcntl.h>
+#include <io.h>
+#else
 #include <fcntl.h>
 #include <unistd.h>
 #endif
@@ -21,8 +28,22 @@ namespace {
 using Handle = std::FILE*;
 
 Handle open_for_reading(const std::filesystem::path& path) {
-  std::FILE* file = nullptr;
-  if (_wfopen_s(&file, path.c_str(), L"rb") != 0) return nullptr;
+  // As on POSIX: others may write into the file meanwhile, rename it, or put another in its place.
+  const HANDLE handle = CreateFileW(path.c_str(), GENERIC_READ,
+                                    FILE_SHARE_READ | FILE_SHARE_WRITE | FILE_SHARE_DELETE, nullptr,
+                                    OPEN_EXISTING, FILE_ATTRIBUTE_NORMAL, nullptr);
+  if (handle == INVALID_HANDLE_VALUE) {
+    const std::error_code error(static_cast<int>(GetLastError()), std::system_category());
+    errno = error.default_error_condition().value();
+    return nullptr;
+  }
+  const int number =
+      _open_osfhandle(reinterpret_cast<std::intptr_t>(handle), _O_RDONLY | _O_BINARY);
+  std::FILE* const file = number < 0 ? nullptr : _fdopen(number, "rb");
+  if (file == nullptr) {
+    number < 0 ? static_cast<void>(CloseHandle(handle)) : static_cast<void>(_close(number));
+    return nullptr;
+  }
   // The reader above has a window of its own; a second buffer would only copy.
   std::setvbuf(file, nullptr, _IONBF, 0);
   return file;
