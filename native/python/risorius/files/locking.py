@@ -16,6 +16,7 @@ from pathlib import Path
 from ..base.errors import RisoriusError
 
 NAME = ".risorius.lock"
+_GOING = 1.0  # seconds in which others let go of a file that was removed
 _UNKNOWN = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL)
 
 
@@ -57,11 +58,15 @@ def _remove(folder: Path) -> None:
 
 def _open(folder: Path) -> int:
     """A descriptor of the folder's lock, which this process has now."""
-    path = folder / NAME
+    path, last = folder / NAME, time.monotonic() + _GOING
     while True:
         try:
             handle = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_CLOEXEC", 0), 0o666)
         except OSError as error:
+            # Windows refuses the name of a file that was removed until nobody has it open.
+            if sys.platform == "win32" and error.errno == errno.EACCES and time.monotonic() < last:
+                time.sleep(0.01)
+                continue
             raise OSError(error.errno, error.strerror, str(folder)) from None
         try:
             _take(handle, folder)
