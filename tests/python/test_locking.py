@@ -81,7 +81,8 @@ def test_one_of_many_threads_has_it_at_a_time(tmp_path):
         thread.join()
     assert broken == []
     assert most[0] == 1
-    assert os.listdir(tmp_path) == []
+    # Windows removes no file that another has open: an empty one may stay, which is nobody's.
+    assert os.listdir(tmp_path) in ([], [NAME] if os.name == "nt" else [])
 
 
 @pytest.mark.skipif(os.name == "nt", reason="an open file stays in its folder there")
