@@ -49,7 +49,7 @@ install_blender() { # install_blender SUITE ROOT
   chroot "$2" sh -ec "export DEBIAN_FRONTEND=noninteractive
     apt-get -o Acquire::Check-Valid-Until=false update -qq
     apt-get install -y -qq --no-install-recommends blender python3-dev python3-numpy $more \
-      python3-venv python3-pip python3-pytest g++ cmake ninja-build nlohmann-json3-dev libxxhash-dev \
+      python3-venv python3-pip python3-pytest g++ cmake ninja-build nlohmann-json3-dev libxxhash-dev libeigen3-dev \
       ca-certificates xvfb imagemagick libgl1-mesa-dri libegl1 libegl-mesa0"
 }
 

@@ -54,7 +54,7 @@ shown() {
 install_packages() { # install_packages [MORE...]: what every build needs, and more
   local missing=()
   for package in python3-venv python3-dev g++ cmake ninja-build ccache libgtest-dev libgmock-dev libbenchmark-dev \
-    nlohmann-json3-dev libxxhash-dev espeak-ng ffmpeg libxrender1 libxi6 libxkbcommon0 libsm6 libgl1 libegl1 libxxf86vm1 \
+    nlohmann-json3-dev libxxhash-dev libeigen3-dev espeak-ng ffmpeg libxrender1 libxi6 libxkbcommon0 libsm6 libgl1 libegl1 libxxf86vm1 \
     libxfixes3 assimp-utils "$@"; do
     dpkg-query -W -f='${Status}' "$package" 2>/dev/null | grep -q 'ok installed' ||
       missing+=("$package")

@@ -6,6 +6,7 @@
 
 namespace risorius::bindings {
 
+void bind_author(py::module_& m);
 void bind_clip(py::module_& m);
 void bind_dna(py::module_& m);
 void bind_edit(py::module_& m);
@@ -50,6 +51,7 @@ PYBIND11_MODULE(_native, m) {
   risorius::bindings::bind_dna(m);
   risorius::bindings::bind_rig(m);
   risorius::bindings::bind_edit(m);
+  risorius::bindings::bind_author(m);
   risorius::bindings::bind_files(m);
   risorius::bindings::bind_mixer(m);
   risorius::bindings::bind_clip(m);

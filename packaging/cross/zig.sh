@@ -35,5 +35,7 @@ gather_headers() {
   mkdir -p "$prefix/include" "$prefix/lib" "$prefix/share/cmake" &&
     cp -rT /usr/include/nlohmann "$prefix/include/nlohmann" &&
     cp /usr/include/xxhash.h "$prefix/include/" &&
+    cp -rT /usr/include/eigen3 "$prefix/include/eigen3" &&
+    cp -rT /usr/share/eigen3 "$prefix/share/eigen3" &&
     cp -rT /usr/share/cmake/nlohmann_json "$prefix/share/cmake/nlohmann_json"
 }

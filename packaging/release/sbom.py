@@ -86,8 +86,10 @@ def of_others() -> list[Component]:
     assert data is not None
     assert digest is not None
     xxhash, json = installed("libxxhash-dev"), installed("nlohmann-json3-dev")
+    eigen = installed("libeigen3-dev")
     return [
         component("xxhash", xxhash, "BSD-2-Clause", f"pkg:deb/debian/libxxhash-dev@{xxhash}"),
+        component("Eigen", eigen, "MPL-2.0", f"pkg:deb/debian/libeigen3-dev@{eigen}"),
         component("nlohmann-json", json, "MIT", f"pkg:deb/debian/nlohmann-json3-dev@{json}"),
         component("pybind11", binding, "BSD-3-Clause", f"pkg:pypi/pybind11@{binding}"),
         component(

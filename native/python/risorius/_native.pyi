@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from os import PathLike
 from typing import Any, SupportsFloat, SupportsIndex, SupportsInt, TypeAlias
 
@@ -1101,6 +1101,62 @@ class RegroupReport:
     @property
     def combinations(self) -> int:
         """Random poses that were tried."""
+
+class JointFit:
+    """Joints, weights and joint motions that repeat shapes."""
+
+    @property
+    def joints(self) -> npt.NDArray[np.float64]:
+        """float64[J, 3]: neutral positions."""
+    @property
+    def mirrored(self) -> npt.NDArray[np.uint32]:
+        """uint32[J]: the joint of the other side, itself in the middle."""
+    @property
+    def weight_joints(self) -> npt.NDArray[np.uint16]:
+        """uint16[V, influences]: joints of each vertex."""
+    @property
+    def weights(self) -> npt.NDArray[np.float32]:
+        """float32[V, influences]: their weights, rows sum to 1."""
+    @property
+    def rotations(self) -> npt.NDArray[np.float64]:
+        """float64[E, J, 3]: rotation vectors about the joint, radians."""
+    @property
+    def translations(self) -> npt.NDArray[np.float64]:
+        """float64[E, J, 3]: shifts of the joint."""
+
+def fit_joints(
+    neutral: npt.ArrayLike,
+    displacements: npt.ArrayLike,
+    edges: npt.ArrayLike,
+    positions: npt.ArrayLike,
+    rotations: npt.ArrayLike,
+    translations: npt.ArrayLike,
+    *,
+    joints: int,
+    influences: int,
+    smoothness: float,
+    emphasis: float,
+    rounds: int,
+    symmetric: bool,
+    threads: int,
+    progress: Callable[[float], bool | None] | None,
+) -> JointFit:
+    """JointFit: see risorius.author.fitting."""
+
+def fit_weights(
+    neutral: npt.ArrayLike,
+    displacements: npt.ArrayLike,
+    edges: npt.ArrayLike,
+    positions: npt.ArrayLike,
+    rotations: npt.ArrayLike,
+    translations: npt.ArrayLike,
+    *,
+    influences: int,
+    smoothness: float,
+    symmetric: bool,
+    threads: int,
+) -> JointFit:
+    """JointFit with these joints: see risorius.author.fitting."""
 
 def regroup(
     dna: Dna,

@@ -1,0 +1,357 @@
+// SPDX-License-Identifier: MIT
+#include "author/fit.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "author/fitting/problem.h"
+#include "core/finite.h"
+
+namespace risorius::author {
+
+namespace {
+
+using detail::Influence;
+using detail::Joint;
+using detail::Mat3;
+using detail::Problem;
+using detail::State;
+using detail::Vec3;
+
+constexpr int kRoundsOfWeights = 8;
+/// Of the mean square of motion: as smooth as Dem Bones leaves weights with its own default.
+constexpr double kSmoothness = 0.045;
+
+void find_neighbours(const std::vector<Edge>& edges, Problem& problem) {
+  std::vector<std::uint32_t>& first = problem.first_neighbour;
+  first.assign(problem.vertices + 1, 0);
+  for (const Edge& e : edges) {
+    ++first[e[0] + 1];
+    ++first[e[1] + 1];
+  }
+  for (std::size_t v = 0; v < problem.vertices; ++v) first[v + 1] += first[v];
+  problem.neighbours.resize(2 * edges.size());
+  std::vector<std::uint32_t> next(first.begin(), first.end() - 1);
+  for (const Edge& e : edges) {
+    problem.neighbours[next[e[0]]++] = e[1];
+    problem.neighbours[next[e[1]]++] = e[0];
+  }
+}
+
+/// Displacements in the fit's unit. An expression without a partner on the other side gets one, so
+/// that what the middle and both sides ask for is the same.
+void take_displacements(const Shapes& shapes, Problem& problem) {
+  std::vector<std::uint32_t> alone;
+  if (!problem.mirror.empty()) {
+    for (std::uint32_t e = 0; e < shapes.expressions; ++e) {
+      if (problem.mirror.expressions[e] == Mirror::kNone) alone.push_back(e);
+    }
+  }
+  problem.expressions = shapes.expressions + alone.size();
+  problem.displacements.resize(problem.vertices * problem.expressions * 3);
+  problem.motion.resize(problem.vertices);
+  const auto scale = static_cast<float>(problem.scale);
+  for (std::size_t v = 0; v < problem.vertices; ++v) {
+    float* out = problem.displacements.data() + v * problem.expressions * 3;
+    const float* own = shapes.of_vertex(v);
+    for (std::size_t x = 0; x < 3 * shapes.expressions; ++x) *out++ = own[x] * scale;
+    for (const std::uint32_t e : alone) {
+      const float* other = shapes.of_vertex(problem.mirror.vertices[v]) + 3 * e;
+      *out++ = -other[0] * scale;
+      *out++ = other[1] * scale;
+      *out++ = other[2] * scale;
+    }
+    double sum = 0.0;
+    const float* d = problem.of_vertex(v);
+    for (std::size_t x = 0; x < 3 * problem.expressions; ++x) sum += double{d[x]} * double{d[x]};
+    problem.motion[v] = std::sqrt(sum);
+  }
+}
+
+Problem make_problem(const Shapes& shapes, const FitOptions& options) {
+  Problem out;
+  out.vertices = shapes.vertex_count();
+  out.influences = options.influences;
+  out.threads = options.threads;
+  if (options.symmetric) out.mirror = find_mirror(shapes);
+  Vec3 low = Vec3::Constant(1e300), high = -low;
+  for (const Vector3& p : shapes.neutral) {
+    low = low.cwiseMin(Vec3(p[0], p[1], p[2]));
+    high = high.cwiseMax(Vec3(p[0], p[1], p[2]));
+  }
+  out.middle = (low + high) / 2;
+  if (!out.mirror.empty()) out.middle.x() = 0.0;
+  out.scale = 1.0 / (high - low).maxCoeff();
+  for (const Vector3& p : shapes.neutral) {
+    out.positions.push_back((Vec3(p[0], p[1], p[2]) - out.middle) * out.scale);
+  }
+  find_neighbours(shapes.edges, out);
+  take_displacements(shapes, out);
+  out.importance.assign(out.vertices, 1.0);
+  double mean = 0.0;
+  for (const double m : out.motion) mean += m * m;
+  out.smoothness =
+      (options.smoothness * kSmoothness + 1e-9) * mean / static_cast<double>(out.vertices);
+  return out;
+}
+
+void set_motion(const Problem& problem, const JointMotion& from, std::size_t e, Joint& joint) {
+  const Vec3 turn(from.rotation[0], from.rotation[1], from.rotation[2]);
+  const double angle = turn.norm();
+  if (angle > 0.0) joint.rotations[e] = Eigen::AngleAxisd(angle, turn / angle).toRotationMatrix();
+  joint.translations[e] =
+      Vec3(from.translation[0], from.translation[1], from.translation[2]) * problem.scale;
+  detail::update_motion(joint, e);
+}
+
+/// A given joint. Expressions that were added as mirrors take the mirrored motion of their origin,
+/// which is the motion of the joint on the other side: see pair_given.
+Joint take_joint(const Problem& problem, const GivenJoint& given, std::uint32_t number) {
+  Joint out;
+  const Vector3& p = given.position;
+  out.position = (Vec3(p[0], p[1], p[2]) - problem.middle) * problem.scale;
+  out.rests = given.motions.empty();
+  out.given = true;
+  out.mirrored = number;
+  detail::rest(out, problem.expressions);
+  for (std::size_t e = 0; e < given.motions.size(); ++e)
+    set_motion(problem, given.motions[e], e, out);
+  return out;
+}
+
+/// Finds given joints' mirrors, and fills their motions in the expressions that were added.
+void pair_given(const Problem& problem, std::vector<Joint>& joints, std::size_t own) {
+  if (problem.mirror.empty()) return;
+  for (Joint& joint : joints) {
+    for (std::uint32_t k = 0; k < joints.size(); ++k) {
+      const Vec3& p = joints[k].position;
+      if ((Vec3(-p.x(), p.y(), p.z()) - joint.position).norm() < 1e-3) joint.mirrored = k;
+    }
+  }
+  const Mat3 flip = Vec3(-1, 1, 1).asDiagonal();
+  std::size_t e = own;
+  for (std::size_t from = 0; from < own; ++from) {
+    if (problem.mirror.expressions[from] != Mirror::kNone) continue;
+    for (Joint& joint : joints) {
+      const Joint& other = joints[joint.mirrored];
+      joint.rotations[e] = flip * other.rotations[from] * flip;
+      joint.translations[e] = flip * other.translations[from];
+      detail::update_motion(joint, e);
+    }
+    ++e;
+  }
+}
+
+State start(const Problem& problem, const std::vector<GivenJoint>& given, std::size_t own) {
+  State out;
+  for (const GivenJoint& g : given) {
+    out.joints.push_back(take_joint(problem, g, static_cast<std::uint32_t>(out.joints.size())));
+  }
+  const auto rests = [](const Joint& j) { return j.rests; };
+  if (std::none_of(out.joints.begin(), out.joints.end(), rests)) {
+    GivenJoint head;
+    head.position = {problem.middle.x(), problem.middle.y(), problem.middle.z()};
+    out.joints.push_back(take_joint(problem, head, static_cast<std::uint32_t>(out.joints.size())));
+  }
+  pair_given(problem, out.joints, own);
+  const auto head = std::find_if(out.joints.begin(), out.joints.end(), rests);
+  out.weights.assign(problem.vertices,
+                     {Influence{static_cast<std::uint32_t>(head - out.joints.begin()), 1.0}});
+  return out;
+}
+
+/// Vertices whose largest error stands out count more from here on.
+void emphasise(Problem& problem, const std::vector<float>& left, double power) {
+  if (power <= 0.0) return;
+  std::vector<double> worst(problem.vertices);
+  double mean = 0.0;
+  for (std::size_t v = 0; v < problem.vertices; ++v) {
+    const float* r = left.data() + v * problem.expressions * 3;
+    for (std::size_t e = 0; e < problem.expressions; ++e, r += 3) {
+      const double square =
+          double{r[0]} * double{r[0]} + double{r[1]} * double{r[1]} + double{r[2]} * double{r[2]};
+      worst[v] = std::max(worst[v], square);
+    }
+    worst[v] = std::sqrt(worst[v]);
+    mean += worst[v] / static_cast<double>(problem.vertices);
+  }
+  double sum = 0.0;
+  for (std::size_t v = 0; v < problem.vertices; ++v) {
+    const double target = std::pow((worst[v] + 0.2 * mean) / mean, power);
+    problem.importance[v] = std::sqrt(problem.importance[v] * target);
+    sum += problem.importance[v];
+  }
+  const double mean_is_one = static_cast<double>(problem.vertices) / sum;
+  for (double& i : problem.importance) i = std::clamp(i * mean_is_one, 0.1, 100.0);
+}
+
+Fit pack(const Problem& problem, const State& state, std::size_t expressions) {
+  Fit out;
+  out.influences = problem.influences;
+  out.weight_joints.assign(problem.vertices * out.influences, 0);
+  out.weights.assign(problem.vertices * out.influences, 0.0f);
+  for (std::size_t v = 0; v < problem.vertices; ++v) {
+    std::size_t at = v * out.influences;
+    for (const Influence& i : state.weights[v]) {
+      out.weight_joints[at] = static_cast<std::uint16_t>(i.joint);
+      out.weights[at++] = static_cast<float>(i.weight);
+    }
+  }
+  for (const Joint& joint : state.joints) {
+    const Vec3 p = joint.position / problem.scale + problem.middle;
+    out.joints.push_back({p.x(), p.y(), p.z()});
+    out.mirrored.push_back(joint.mirrored);
+    for (std::size_t e = 0; e < expressions; ++e) {
+      const Eigen::AngleAxisd turn(joint.rotations[e]);
+      const Vec3 r = turn.angle() * turn.axis(), t = joint.translations[e] / problem.scale;
+      out.motions.push_back({{r.x(), r.y(), r.z()}, {t.x(), t.y(), t.z()}});
+    }
+  }
+  return out;
+}
+
+core::Status check(const Shapes& shapes, const FitOptions& options) {
+  using core::ErrorCode;
+  const std::size_t n = shapes.vertex_count(), values = n * shapes.expressions * 3;
+  if (n == 0 || shapes.expressions == 0) {
+    return core::fail(ErrorCode::kInvalidArgument, "shapes",
+                      "a mesh and at least one expression were expected");
+  }
+  if (shapes.displacements.size() != values) {
+    return core::fail(ErrorCode::kInvalidArgument, "displacements",
+                      std::to_string(values) + " numbers were expected, found " +
+                          std::to_string(shapes.displacements.size()));
+  }
+  for (const Edge& e : shapes.edges) {
+    if (e[0] < n && e[1] < n) continue;
+    return core::fail(
+        ErrorCode::kInvalidIndex, "edges",
+        "an edge has vertex " + std::to_string(std::max(e[0], e[1])) + " of " + std::to_string(n));
+  }
+  for (std::size_t v = 0; v < n; ++v) {
+    for (const double x : shapes.neutral[v]) {
+      if (!std::isfinite(x)) {
+        return core::fail(ErrorCode::kInvalidValue, "neutral[" + std::to_string(v) + "]",
+                          "a finite number was expected");
+      }
+    }
+  }
+  double most = 0.0;
+  for (std::size_t i = 0; i < values; ++i) {
+    const float d = shapes.displacements[i];
+    if (!core::is_finite(d)) {
+      return core::fail(ErrorCode::kInvalidValue,
+                        "displacements[" + std::to_string(i / 3 / shapes.expressions) + "][" +
+                            std::to_string(i / 3 % shapes.expressions) + "]",
+                        "a finite number was expected");
+    }
+    most = std::max(most, std::abs(double{d}));
+  }
+  if (most <= 0.0)
+    return core::fail(ErrorCode::kInvalidValue, "displacements", "no expression moves a vertex");
+  for (const GivenJoint& g : options.given) {
+    if (g.motions.empty() || g.motions.size() == shapes.expressions) continue;
+    return core::fail(ErrorCode::kInvalidLength, "given",
+                      "motions of " + std::to_string(shapes.expressions) +
+                          " expressions or none were expected, found " +
+                          std::to_string(g.motions.size()));
+  }
+  const std::size_t needed = options.given.size() + 2;
+  if (options.joints < needed || options.joints > 4096) {
+    return core::fail(
+        ErrorCode::kInvalidArgument, "joints",
+        std::to_string(needed) + " to 4096 were expected, found " + std::to_string(options.joints));
+  }
+  if (options.influences < 1 || options.influences > 16) {
+    return core::fail(ErrorCode::kInvalidArgument, "influences",
+                      "1 to 16 were expected, found " + std::to_string(options.influences));
+  }
+  for (const double x : {options.smoothness, options.emphasis}) {
+    if (!(x >= 0.0 && x <= 100.0)) {
+      return core::fail(ErrorCode::kInvalidArgument, "smoothness, emphasis",
+                        "0 to 100 were expected");
+    }
+  }
+  return core::ok();
+}
+
+/// How many joints there are after each step of growing.
+std::vector<std::size_t> stages(std::size_t joints) {
+  std::vector<std::size_t> out{joints};
+  while (out.back() > 30) out.push_back(out.back() * 2 / 3);
+  std::reverse(out.begin(), out.end());
+  return out;
+}
+
+class Steps {  // tells how far the work is
+ public:
+  Steps(const Progress& progress, std::size_t count) : progress_(progress), count_(count) {}
+  bool go_on() {
+    ++done_;
+    return !progress_ || progress_(static_cast<double>(done_) / static_cast<double>(count_));
+  }
+
+ private:
+  const Progress& progress_;
+  std::size_t count_, done_ = 0;
+};
+
+void improve(const Problem& problem, State& state, std::vector<float>& left) {
+  detail::solve_motions(problem, state, left);
+  detail::solve_weights(problem, state);
+  detail::move_joints(problem, state);
+  detail::find_residual(problem, state, left);
+}
+
+}  // namespace
+
+core::Result<Fit> fit_joints(const Shapes& shapes, const FitOptions& options,
+                             const Progress& progress) {
+  RISORIUS_TRY(check(shapes, options));
+  Problem problem = make_problem(shapes, options);
+  State state = start(problem, options.given, shapes.expressions);
+  std::vector<float> left;
+  if (!options.given.empty()) {  // what the given joints move is theirs before others come
+    for (int round = 0; round < kRoundsOfWeights; ++round) detail::solve_weights(problem, state);
+  }
+  detail::find_residual(problem, state, left);
+  const std::vector<std::size_t> counts = stages(options.joints);
+  Steps steps(progress, 2 * counts.size() + options.rounds + 1);
+  const auto stopped = [] { return core::fail(core::ErrorCode::kInvalidArgument, "", "stopped"); };
+  for (const std::size_t count : counts) {
+    detail::add_joints(problem, state, left, std::max(count, state.joints.size()));
+    for (int repeat = 0; repeat < 2; ++repeat) {
+      detail::find_residual(problem, state, left);
+      improve(problem, state, left);
+      if (!steps.go_on()) return stopped();
+    }
+  }
+  for (std::size_t r = 0; r < options.rounds; ++r) {
+    improve(problem, state, left);
+    // The last two rounds even out what the new importance asked for.
+    if (r + 2 < options.rounds) emphasise(problem, left, options.emphasis);
+    if (!steps.go_on()) return stopped();
+  }
+  detail::solve_motions(problem, state, left);
+  if (!steps.go_on()) return stopped();
+  return pack(problem, state, shapes.expressions);
+}
+
+core::Result<Fit> fit_weights(const Shapes& shapes, const std::vector<GivenJoint>& joints,
+                              const FitOptions& options) {
+  FitOptions own = options;
+  own.given = joints;
+  own.joints = joints.size() + 2;
+  RISORIUS_TRY(check(shapes, own));
+  const Problem problem = make_problem(shapes, own);
+  State state = start(problem, joints, shapes.expressions);
+  // Neighbours tell each other which joints are worth trying: once round a ring, twice for the
+  // next.
+  for (int round = 0; round < kRoundsOfWeights; ++round) detail::solve_weights(problem, state);
+  return pack(problem, state, shapes.expressions);
+}
+
+}  // namespace risorius::author

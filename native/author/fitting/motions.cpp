@@ -1,0 +1,439 @@
+// SPDX-License-Identifier: MIT
+// Motions of all joints for given weights: one sparse system for all expressions (a face turns
+// little), whose right side is exact, so that what it ends at is the optimum of turned joints.
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+#include <Eigen/SparseCholesky>
+#include <Eigen/SparseCore>
+#include <algorithm>
+#include <cmath>
+
+#include "author/fitting/problem.h"
+#include "core/parallel_for.h"
+
+namespace risorius::author::detail {
+
+namespace {
+
+using Mat6 = Eigen::Matrix<double, 6, 6>;
+using Vec6 = Eigen::Matrix<double, 6, 1>;
+
+constexpr double kFar = 0.25;  // radians from which on arms count as turned
+// Ridges, shares of the joints' mean stiffness: what keeps joints that share vertices from turning
+// against each other. Tried from 1e-4 to 10 on a head with 52 expressions.
+constexpr double kTurn = 0.1;
+constexpr double kShift = 3e-3;
+
+Mat3 cross_matrix(const Vec3& a) {
+  Mat3 m;
+  m << 0, -a.z(), a.y(), a.z(), 0, -a.x(), -a.y(), a.x(), 0;
+  return m;
+}
+
+/// Sums of s, s v, s v v^T over the vertices that two joints share.
+struct Moments {
+  double zeroth = 0.0;
+  Vec3 first = Vec3::Zero();
+  Mat3 second = Mat3::Zero();
+
+  void add(double s, const Vec3& v) {
+    zeroth += s;
+    first += s * v;
+    second.noalias() += (s * v) * v.transpose();
+  }
+};
+
+/// What two joints have in common: sums over their vertices with arms p = v - a and q = v - b.
+struct Shared {
+  int column = 0;  // of the other joint
+  std::uint32_t joint = 0;
+  double mass = 0.0;
+  Mat3 qp = Mat3::Zero();  // sum of q p^T
+  Vec3 p = Vec3::Zero(), q = Vec3::Zero();
+};
+
+Shared share(const Moments& m, const Vec3& a, const Vec3& b) {
+  Shared out;
+  out.mass = m.zeroth;
+  out.qp =
+      m.second - m.first * a.transpose() - b * m.first.transpose() + m.zeroth * b * a.transpose();
+  out.p = m.first - m.zeroth * a;
+  out.q = m.first - m.zeroth * b;
+  return out;
+}
+
+/// Stiffness of two joints against each other, turned and shifted, whose arms are turned already.
+Mat6 block(const Shared& s, const Mat3& turn, const Mat3& other) {
+  const Mat3 qp = other * s.qp * turn.transpose();
+  Mat6 out;
+  out.topLeftCorner<3, 3>() = qp.trace() * Mat3::Identity() - qp;
+  out.topRightCorner<3, 3>() = cross_matrix(turn * s.p);
+  out.bottomLeftCorner<3, 3>() = -cross_matrix(other * s.q);
+  out.bottomRightCorner<3, 3>() = s.mass * Mat3::Identity();
+  return out;
+}
+
+struct ByJoint {  // the weights by joint
+  struct Entry {
+    std::uint32_t vertex;
+    double weight;
+  };
+  std::vector<std::vector<Entry>> of;
+};
+
+ByJoint by_joint(const State& state) {
+  ByJoint out;
+  out.of.resize(state.joints.size());
+  for (std::uint32_t v = 0; v < state.weights.size(); ++v) {
+    for (const Influence& i : state.weights[v]) out.of[i.joint].push_back({v, i.weight});
+  }
+  return out;
+}
+
+using Sparse = Eigen::SparseMatrix<double>;
+
+/// A matrix factored once: densely where that is quicker.
+class Factor {
+ public:
+  void compute(const Sparse& lower) {
+    dense_ = lower.rows() <= kDense;
+    if (dense_) {
+      full_.compute(Eigen::MatrixXd(lower));
+    } else {
+      thin_.compute(lower);
+    }
+  }
+  Eigen::VectorXd solve(const Eigen::VectorXd& right) const {
+    return dense_ ? Eigen::VectorXd(full_.solve(right)) : Eigen::VectorXd(thin_.solve(right));
+  }
+
+ private:
+  static constexpr Eigen::Index kDense = 1500;
+  bool dense_ = false;
+  Eigen::LLT<Eigen::MatrixXd> full_;
+  Eigen::SimplicialLLT<Sparse> thin_;
+};
+
+class System {
+ public:
+  System(const Problem& problem, const State& state, const ByJoint& weights)
+      : column_(state.joints.size(), -1), rows_(state.joints.size()) {
+    int n = 0;
+    for (std::size_t j = 0; j < state.joints.size(); ++j) {
+      if (!state.joints[j].given) column_[j] = n++;
+    }
+    size_ = 6 * n;
+    core::parallel_for(state.joints.size(), problem.threads, [&](std::size_t from, std::size_t to) {
+      std::vector<Moments> sums(state.joints.size());
+      std::vector<bool> met(state.joints.size());
+      std::vector<std::uint32_t> partners;
+      for (std::size_t j = from; j < to; ++j) {
+        if (column_[j] < 0) continue;
+        for (const auto& entry : weights.of[j]) {
+          const double s = problem.importance[entry.vertex] * entry.weight;
+          for (const Influence& other : state.weights[entry.vertex]) {
+            if (other.joint < j || column_[other.joint] < 0) continue;
+            if (!met[other.joint]) {
+              met[other.joint] = true;
+              partners.push_back(other.joint);
+            }
+            sums[other.joint].add(s * other.weight, problem.positions[entry.vertex]);
+          }
+        }
+        std::sort(partners.begin(), partners.end());
+        for (const std::uint32_t k : partners) {
+          Shared s = share(sums[k], state.joints[j].position, state.joints[k].position);
+          s.column = column_[k];
+          s.joint = k;
+          rows_[j].push_back(s);
+          sums[k] = {};
+          met[k] = false;
+        }
+        partners.clear();
+      }
+    });
+    for (std::size_t j = 0; j < rows_.size(); ++j) {
+      for (const Shared& s : rows_[j]) {
+        if (s.joint != j) continue;
+        turn_ += 2.0 / 3.0 * s.qp.trace() / std::max(1, n);
+        shift_ += s.mass / std::max(1, n);
+      }
+    }
+    solver_.compute(matrix([](std::size_t) { return Mat3(Mat3::Identity()); }));
+  }
+
+  int column(std::size_t joint) const { return column_[joint]; }
+  int size() const { return size_; }
+  double ridge(int row) const {
+    return row % 6 < 3 ? kTurn * turn_ + 1e-12 : kShift * shift_ + 1e-12;
+  }
+  const Factor& at_rest() const { return solver_; }
+
+  /// The stiffness where joints are turned. In: turn(joint)  its rotation
+  template <class Turn>
+  Sparse matrix(const Turn& turn) const {
+    std::vector<Eigen::Triplet<double>> entries;
+    for (std::size_t j = 0; j < rows_.size(); ++j) {
+      for (const Shared& s : rows_[j]) {
+        const Mat6 b = block(s, turn(j), turn(s.joint));
+        const int row = 6 * column_[j], col = 6 * s.column;
+        for (int x = 0; x < 6; ++x) {
+          for (int y = row == col ? x : 0; y < 6; ++y)
+            entries.emplace_back(col + y, row + x, b(x, y));
+        }
+      }
+    }
+    for (int r = 0; r < size_; ++r) entries.emplace_back(r, r, ridge(r));
+    Sparse out(size_, size_);
+    out.setFromTriplets(entries.begin(), entries.end());
+    return out;
+  }
+
+ private:
+  std::vector<int> column_;
+  std::vector<std::vector<Shared>> rows_;
+  int size_ = 0;
+  double turn_ = 0.0, shift_ = 0.0;
+  Factor solver_;
+};
+
+/// What the residual asks of a joint in each expression: torque and force.
+void gradient(const Problem& problem, const Joint& joint,
+              const std::vector<ByJoint::Entry>& weights, const std::vector<float>& left,
+              std::vector<Vec6>& out) {
+  const std::size_t count = problem.expressions;
+  // Sums of r and of (v - c) r^T; the turned arm's torque follows from the second.
+  std::vector<Eigen::Matrix<double, 4, 3>> sums(count, Eigen::Matrix<double, 4, 3>::Zero());
+  for (const auto& entry : weights) {
+    const double s = problem.importance[entry.vertex] * entry.weight;
+    const Vec3 arm = s * (problem.positions[entry.vertex] - joint.position);
+    const float* r = left.data() + std::size_t{entry.vertex} * count * 3;
+    for (std::size_t e = 0; e < count; ++e, r += 3) {
+      const double x = double{r[0]}, y = double{r[1]}, z = double{r[2]};
+      auto& m = sums[e];
+      for (int k = 0; k < 3; ++k) {
+        m(k, 0) += arm[k] * x;
+        m(k, 1) += arm[k] * y;
+        m(k, 2) += arm[k] * z;
+      }
+      m(3, 0) += s * x;
+      m(3, 1) += s * y;
+      m(3, 2) += s * z;
+    }
+  }
+  for (std::size_t e = 0; e < count; ++e) {
+    const Mat3 m = joint.rotations[e] * sums[e].topRows<3>();  // sum of (R arm) r^T
+    out[e].head<3>() = Vec3(m(1, 2) - m(2, 1), m(2, 0) - m(0, 2), m(0, 1) - m(1, 0));
+    out[e].tail<3>() = sums[e].row(3).transpose();
+  }
+}
+
+Vec3 rotation_vector(const Mat3& rotation) {
+  const Eigen::AngleAxisd turned(rotation);
+  return turned.angle() * turned.axis();
+}
+
+}  // namespace
+
+void rest(Joint& joint, std::size_t expressions) {
+  joint.rotations.assign(expressions, Mat3::Identity());
+  joint.translations.assign(expressions, Vec3::Zero());
+  joint.motions.assign(expressions, Affine::Zero());
+}
+
+void update_motion(Joint& joint, std::size_t e) {
+  Affine& m = joint.motions[e];
+  m.leftCols<3>() = joint.rotations[e] - Mat3::Identity();
+  m.col(3) = joint.translations[e] - m.leftCols<3>() * joint.position;
+}
+
+void find_residual(const Problem& problem, const State& state, std::vector<float>& left) {
+  const std::size_t count = problem.expressions;
+  left.resize(problem.displacements.size());
+  core::parallel_for(problem.vertices, problem.threads, [&](std::size_t from, std::size_t to) {
+    std::vector<double> sum(3 * count);
+    for (std::size_t v = from; v < to; ++v) {
+      const float* d = problem.of_vertex(v);
+      for (std::size_t x = 0; x < 3 * count; ++x) sum[x] = double{d[x]};
+      const Vec3& p = problem.positions[v];
+      for (const Influence& i : state.weights[v]) {
+        const Joint& joint = state.joints[i.joint];
+        if (joint.rests) continue;
+        const Vec3 weighted = i.weight * p;
+        for (std::size_t e = 0; e < count; ++e) {
+          const Affine& m = joint.motions[e];
+          for (int k = 0; k < 3; ++k) {
+            sum[3 * e + static_cast<std::size_t>(k)] -= m(k, 0) * weighted[0] +
+                                                        m(k, 1) * weighted[1] +
+                                                        m(k, 2) * weighted[2] + m(k, 3) * i.weight;
+          }
+        }
+      }
+      float* out = left.data() + v * 3 * count;
+      for (std::size_t x = 0; x < 3 * count; ++x) out[x] = static_cast<float>(sum[x]);
+    }
+  });
+}
+
+namespace {
+
+/// Squared error of each expression, importance counted.
+std::vector<double> energies(const Problem& problem, const std::vector<float>& left) {
+  const std::size_t count = problem.expressions;
+  std::vector<double> out(count);
+  core::parallel_for(count, problem.threads, [&](std::size_t from, std::size_t to) {
+    for (std::size_t v = 0; v < problem.vertices; ++v) {
+      const float* r = left.data() + (v * count + from) * 3;
+      for (std::size_t e = from; e < to; ++e, r += 3) {
+        const double x = double{r[0]}, y = double{r[1]}, z = double{r[2]};
+        out[e] += problem.importance[v] * (x * x + y * y + z * z);
+      }
+    }
+  });
+  return out;
+}
+
+/// Goes the step in each expression, or half of it and less where the whole one leads uphill.
+/// Out: left  the residual there
+void take_step(const Problem& problem, State& state, const System& system,
+               const Eigen::MatrixXd& step, std::vector<float>& left) {
+  const std::size_t count = problem.expressions;
+  const State before = state;
+  const std::vector<double> energy = energies(problem, left);
+  std::vector<double> share(count, 1.0);
+  std::vector<bool> open(count, true);
+  for (int trial = 0; trial < 4; ++trial) {
+    core::parallel_for(state.joints.size(), problem.threads, [&](std::size_t from, std::size_t to) {
+      for (std::size_t j = from; j < to; ++j) {
+        if (system.column(j) < 0) continue;
+        Joint& joint = state.joints[j];
+        const Joint& old = before.joints[j];
+        for (std::size_t e = 0; e < count; ++e) {
+          if (!open[e]) continue;
+          const Vec6 s =
+              share[e] * step.block<6, 1>(6 * system.column(j), static_cast<Eigen::Index>(e));
+          const double angle = s.head<3>().norm();
+          joint.rotations[e] = old.rotations[e];
+          if (angle > 0) {
+            joint.rotations[e] =
+                Eigen::AngleAxisd(angle, s.head<3>() / angle).toRotationMatrix() * old.rotations[e];
+          }
+          joint.translations[e] = old.translations[e] + s.tail<3>();
+          update_motion(joint, e);
+        }
+      }
+    });
+    find_residual(problem, state, left);
+    const std::vector<double> now = energies(problem, left);
+    bool any = false;
+    for (std::size_t e = 0; e < count; ++e) {
+      open[e] = open[e] && now[e] > energy[e];
+      if (open[e]) share[e] = trial < 2 ? share[e] / 3 : 0.0;
+      any = any || open[e];
+    }
+    if (!any) return;
+  }
+}
+
+/// The step of an expression that turns joints far: conjugate gradients on the stiffness there.
+/// Where neighbours turn alike it is that at rest in the joints' own axes, which is the start.
+Eigen::VectorXd solve_turned(const State& state, const System& system, std::size_t e,
+                             const Eigen::VectorXd& right) {
+  const Sparse matrix = system.matrix([&](std::size_t j) { return state.joints[j].rotations[e]; });
+  const auto turn = [&](Eigen::VectorXd& all, bool back) {
+    for (std::size_t j = 0; j < state.joints.size(); ++j) {
+      if (system.column(j) < 0) continue;
+      const Mat3& r = state.joints[j].rotations[e];
+      for (int half = 0; half < 6; half += 3) {
+        auto part = all.segment<3>(6 * system.column(j) + half);
+        part = (back ? Mat3(r.transpose()) : r) * Vec3(part);
+      }
+    }
+  };
+  const auto near_inverse = [&](Eigen::VectorXd v) {
+    turn(v, true);
+    v = system.at_rest().solve(v);
+    turn(v, false);
+    return v;
+  };
+  Eigen::VectorXd x = Eigen::VectorXd::Zero(right.size()), left = right;
+  Eigen::VectorXd z = near_inverse(left), direction = z;
+  double energy = left.dot(z);
+  const double enough = 1e-6 * energy;
+  for (int step = 0; step < 40 && energy > enough; ++step) {
+    const Eigen::VectorXd pushed = matrix.selfadjointView<Eigen::Lower>() * direction;
+    const double length = energy / direction.dot(pushed);
+    x += length * direction;
+    left -= length * pushed;
+    z = near_inverse(left);
+    const double next = left.dot(z);
+    direction = z + next / energy * direction;
+    energy = next;
+  }
+  return x;
+}
+
+}  // namespace
+
+void solve_motions(const Problem& problem, State& state, std::vector<float>& left) {
+  const ByJoint weights = by_joint(state);
+  const System system(problem, state, weights);
+  const std::size_t count = problem.expressions;
+  Eigen::MatrixXd right = Eigen::MatrixXd::Zero(system.size(), static_cast<Eigen::Index>(count));
+  core::parallel_for(state.joints.size(), problem.threads, [&](std::size_t from, std::size_t to) {
+    std::vector<Vec6> asked(count);
+    for (std::size_t j = from; j < to; ++j) {
+      if (system.column(j) < 0) continue;
+      gradient(problem, state.joints[j], weights.of[j], left, asked);
+      const int row = 6 * system.column(j);
+      for (std::size_t e = 0; e < count; ++e) {
+        const Joint& joint = state.joints[j];
+        asked[e].head<3>() -= system.ridge(row) * rotation_vector(joint.rotations[e]);
+        asked[e].tail<3>() -= system.ridge(row + 3) * joint.translations[e];
+        right.block<6, 1>(row, static_cast<Eigen::Index>(e)) = asked[e];
+      }
+    }
+  });
+  Eigen::MatrixXd step(right.rows(), right.cols());
+  core::parallel_for(count, problem.threads, [&](std::size_t from, std::size_t to) {
+    for (std::size_t e = from; e < to; ++e) {
+      const auto column = static_cast<Eigen::Index>(e);
+      const bool turned =
+          std::any_of(state.joints.begin(), state.joints.end(), [&](const Joint& j) {
+            return j.rotations[e].trace() < 3 - kFar * kFar;  // trace = 1 + 2 cos(angle)
+          });
+      if (!turned) {
+        step.col(column) = system.at_rest().solve(right.col(column));
+        continue;
+      }
+      step.col(column) = solve_turned(state, system, e, right.col(column));
+    }
+  });
+  take_step(problem, state, system, step, left);
+}
+
+void move_joints(const Problem& problem, State& state) {
+  const ByJoint weights = by_joint(state);
+  for (std::size_t j = 0; j < state.joints.size(); ++j) {
+    Joint& joint = state.joints[j];
+    if (joint.given) continue;
+    Vec3 sum = Vec3::Zero();
+    double total = 0.0;
+    for (const auto& entry : weights.of[j]) {
+      const double s = entry.weight * entry.weight;
+      sum += s * problem.positions[entry.vertex];
+      total += s;
+    }
+    if (total <= 0.0) continue;
+    Vec3 to = sum / total;
+    if (!problem.mirror.empty() && joint.mirrored == j) to.x() = 0.0;
+    // The same motion about another point.
+    for (std::size_t e = 0; e < problem.expressions; ++e) {
+      const Vec3 arm = to - joint.position;
+      joint.translations[e] += joint.rotations[e] * arm - arm;
+    }
+    joint.position = to;
+  }
+}
+
+}  // namespace risorius::author::detail

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: MIT
+// What the steps of a fit share. Private to native/author.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "author/fit.h"
+#include "author/mirror.h"
+
+namespace risorius::author::detail {
+
+using Vec3 = Eigen::Vector3d;
+using Mat3 = Eigen::Matrix3d;
+
+/// The shapes in the fit's own unit (the size of the mesh is 1, its middle the origin).
+struct Problem {
+  std::size_t vertices = 0, expressions = 0, influences = 0, threads = 0;
+  Vec3 middle = Vec3::Zero();
+  double scale = 1.0;                // from the input's unit to the fit's
+  std::vector<Vec3> positions;       // [V]
+  std::vector<float> displacements;  // [V][E][3], mirrored expressions that were missing at the end
+  std::vector<std::uint32_t> first_neighbour, neighbours;  // of vertices, as rows of a CSR matrix
+  std::vector<double> motion;  // [V] root of the summed squares of its displacements
+  Mirror mirror;
+  double smoothness = 0.0;
+  std::vector<double> importance;  // [V] of a vertex' error, mean 1
+
+  const float* of_vertex(std::size_t v) const { return displacements.data() + v * expressions * 3; }
+  bool is_representative(std::size_t v) const { return mirror.empty() || mirror.vertices[v] >= v; }
+};
+
+/// How a joint in an expression moves a vertex p: matrix * (p, 1), without p itself.
+using Affine = Eigen::Matrix<double, 3, 4, Eigen::RowMajor>;
+
+struct Joint {
+  Vec3 position = Vec3::Zero();
+  std::uint32_t mirrored = 0;
+  bool rests = false;              // no expression moves it
+  bool given = false;              // it stays where it is and moves as it did
+  std::vector<Mat3> rotations;     // [E]
+  std::vector<Vec3> translations;  // [E]
+  std::vector<Affine> motions;     // [E] of the two above
+};
+
+struct Influence {
+  std::uint32_t joint = 0;
+  double weight = 0.0;
+};
+
+struct State {
+  std::vector<Joint> joints;
+  std::vector<std::vector<Influence>> weights;  // [V] by joint's number
+};
+
+/// Best weights for the motions that there are.
+void solve_weights(const Problem& problem, State& state);
+/// Best motions for the weights that there are.
+/// In: left  what remains of the displacements, see find_residual
+void solve_motions(const Problem& problem, State& state, std::vector<float>& left);
+/// Out: [V][E][3] displacements less what the joints do
+void find_residual(const Problem& problem, const State& state, std::vector<float>& left);
+/// Joints where the given ones leave most, until there are `count`.
+void add_joints(const Problem& problem, State& state, const std::vector<float>& left,
+                std::size_t count);
+/// Joints' neutral positions to the middle of what they move, the given ones left alone.
+void move_joints(const Problem& problem, State& state);
+
+void rest(Joint& joint, std::size_t expressions);
+void update_motion(Joint& joint, std::size_t expression);
+
+}  // namespace risorius::author::detail

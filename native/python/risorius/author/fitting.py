@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: MIT
+"""Joints, weights and motions that repeat shapes; the native fit and its options."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from .. import _native
+from .._native import JointFit
+from .skeleton import Doubles, rotation_vectors
+
+__all__ = ["FitOptions", "JointFit", "fit_joints", "fit_weights"]
+
+Progress = Callable[[float], bool | None]
+
+
+@dataclass(frozen=True)
+class FitOptions:
+    """How a fit is made."""
+
+    joints: int = 120  # new ones
+    influences: int = 8  # joints of a vertex at most
+    smoothness: float = 1.0  # 0: only the error counts; 1: as smooth as Dem Bones' default
+    emphasis: float = 3.0  # how far the largest error is fought; 0: least squares alone
+    rounds: int = 20
+    symmetric: bool = True  # where the mesh is
+    threads: int = 0  # 0: all cores; the result does not depend on it
+
+
+def split_motions(motions: Doubles, positions: Doubles) -> tuple[Doubles, Doubles]:
+    """Rotation vectors and shifts float64[E, J, 3] of rigid motions about the joints.
+
+    Args:
+        motions: float64[E, J, 3, 4].
+        positions: float64[J, 3] of the joints.
+    """
+    moved = np.einsum("ejik,jk->eji", motions[..., :3], positions) + motions[..., 3]
+    return rotation_vectors(motions[..., :3]), moved - positions
+
+
+def fit_joints(
+    neutral: Doubles,
+    displacements: npt.NDArray[np.float32],
+    edges: npt.NDArray[np.uint32],
+    *,
+    given: Doubles,
+    motions: Doubles,
+    options: FitOptions | None = None,
+    progress: Progress | None = None,
+) -> JointFit:
+    """New joints beside those that are there, weights on all, motions of the new ones.
+
+    Args:
+        neutral: float64[V, 3]; the left side of the face is +x or -x, its middle x = 0.
+        displacements: float32[E, V, 3] of each expression at 1.
+        edges: uint32[n, 2] of the polygons.
+        given: float64[J, 3], joints that stay where they are.
+        motions: float64[E, J, 3, 4] of the given joints; one at least rests in all expressions.
+        options: how.
+        progress: told the share that is done; False stops the work, with a DnaError "stopped".
+
+    Raises:
+        DnaError: a value that is not finite, no motion at all, options out of their range.
+    """
+    o = options or FitOptions()
+    rotations, translations = split_motions(motions, given)
+    return _native.fit_joints(
+        neutral,
+        displacements,
+        edges,
+        given,
+        rotations,
+        translations,
+        joints=len(given) + o.joints,
+        influences=o.influences,
+        smoothness=o.smoothness,
+        emphasis=o.emphasis,
+        rounds=o.rounds,
+        symmetric=o.symmetric,
+        threads=o.threads,
+        progress=progress,
+    )
+
+
+def fit_weights(
+    neutral: Doubles,
+    displacements: npt.NDArray[np.float32],
+    edges: npt.NDArray[np.uint32],
+    *,
+    given: Doubles,
+    motions: Doubles,
+    options: FitOptions | None = None,
+) -> JointFit:
+    """Weights of another mesh on joints that move as they do: a coarser level of detail.
+
+    Args:
+        neutral: float64[V, 3].
+        displacements: float32[E, V, 3].
+        edges: uint32[n, 2].
+        given: float64[J, 3], all joints.
+        motions: float64[E, J, 3, 4].
+        options: influences, smoothness, symmetric and threads of it count.
+
+    Raises:
+        DnaError: as fit_joints.
+    """
+    o = options or FitOptions()
+    rotations, translations = split_motions(motions, given)
+    return _native.fit_weights(
+        neutral,
+        displacements,
+        edges,
+        given,
+        rotations,
+        translations,
+        influences=o.influences,
+        smoothness=o.smoothness,
+        symmetric=o.symmetric,
+        threads=o.threads,
+    )

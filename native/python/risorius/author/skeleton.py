@@ -1,0 +1,224 @@
+# SPDX-License-Identifier: MIT
+"""What joints and shapes of a Dna do to its vertices, for each input of its behavior at 1.
+
+A column is an input of joint groups and blend shape channels: a raw control or a corrective. All in
+double precision and apart from the evaluator, whose pose is one of all controls together.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from .. import Dna, Mesh
+from ..rigs.rotation import Convention
+
+Doubles = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+
+def rotation_matrices(convention: Convention, angles: Doubles) -> Doubles:
+    """float64[..., 3, 3] of Euler angles: what turns a column vector.
+
+    Args:
+        convention: order, signs and unit of the angles.
+        angles: float64[..., 3].
+    """
+    turned = angles * convention.signs * convention.radians
+    out = np.broadcast_to(np.eye(3), (*angles.shape[:-1], 3, 3))
+    for axis in convention.order:
+        c, s = np.cos(turned[..., axis]), np.sin(turned[..., axis])
+        step = np.zeros((*angles.shape[:-1], 3, 3))
+        i, j = (axis + 1) % 3, (axis + 2) % 3
+        step[..., axis, axis] = 1
+        step[..., i, i] = step[..., j, j] = c
+        step[..., j, i], step[..., i, j] = s, -s
+        out = step @ out
+    return out
+
+
+def euler_angles(convention: Convention, matrices: Doubles) -> Doubles:
+    """float64[n, 3], in the convention's unit, of float64[n, 3, 3]; small turns get small angles.
+
+    Args:
+        convention: order, signs and unit of the angles.
+        matrices: rotations of column vectors.
+    """
+    i, j, k = convention.order
+    parity = 1 if j == (i + 1) % 3 else -1
+    m = matrices
+    out = np.zeros((len(m), 3))
+    out[:, j] = np.arcsin(np.clip(-parity * m[:, k, i], -1, 1))
+    out[:, i] = np.arctan2(parity * m[:, k, j], m[:, k, k])
+    out[:, k] = np.arctan2(parity * m[:, j, i], m[:, i, i])
+    return out * convention.signs / convention.radians
+
+
+def rotation_vectors(matrices: Doubles) -> Doubles:
+    """float64[..., 3] of rotations float64[..., 3, 3]: the axis, as long as the angle in radians."""
+    m = matrices
+    axis = np.stack(
+        [
+            m[..., 2, 1] - m[..., 1, 2],
+            m[..., 0, 2] - m[..., 2, 0],
+            m[..., 1, 0] - m[..., 0, 1],
+        ],
+        axis=-1,
+    )
+    sine = np.linalg.norm(axis, axis=-1) / 2
+    cosine = (np.trace(m, axis1=-2, axis2=-1) - 1) / 2
+    angle = np.arctan2(sine, cosine)
+    return axis * (angle / np.maximum(2 * sine, 1e-30))[..., None]
+
+
+def matrices_of_vectors(vectors: Doubles) -> Doubles:
+    """float64[..., 3, 3] of rotation vectors float64[..., 3] (Rodrigues)."""
+    angle = np.linalg.norm(vectors, axis=-1)[..., None, None]
+    x, y, z = np.moveaxis(vectors, -1, 0)
+    zero = np.zeros_like(x)
+    cross = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1)
+    cross = cross.reshape(*x.shape, 3, 3) / np.maximum(angle, 1e-30)
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * (cross @ cross)
+
+
+def column_count(dna: Dna) -> int:
+    """How many inputs joint groups and blend shape channels have."""
+    lists = [g.input_indices for g in dna.joint_groups] + [dna.blend_shape_channels.input_indices]
+    most = max((int(values.max()) + 1 for values in lists if len(values)), default=0)
+    return max(most, dna.joint_column_count, len(dna.raw_control_names))
+
+
+def parent_order(dna: Dna) -> list[int]:
+    """Joint indices, parents before their children."""
+    parents = [int(p) for p in dna.joint_parents]
+    depth = []
+    for joint in range(len(parents)):
+        steps, at = 0, joint
+        while parents[at] != at and steps < len(parents):
+            at = parents[at]
+            steps += 1
+        depth.append(steps)
+    return sorted(range(len(parents)), key=lambda joint: (depth[joint], joint))
+
+
+def column_deltas(dna: Dna, columns: int) -> Doubles:
+    """float64[columns, joints, 9]: what each input at 1 adds to the joints' attributes.
+
+    Args:
+        dna: the face.
+        columns: how many inputs, see column_count.
+    """
+    out = np.zeros((columns, len(dna.joint_names) * 9))
+    for group in dna.joint_groups:
+        values = np.asarray(group.values, np.float64)
+        inputs = np.asarray(group.input_indices, np.int64)
+        out[inputs[:, None], np.asarray(group.output_indices, np.int64)[None]] += values.T
+    return out.reshape(columns, -1, 9)
+
+
+def world_matrices(dna: Dna, deltas: Doubles) -> Doubles:
+    """float64[..., joints, 4, 4] of the joints.
+
+    Args:
+        dna: the neutral pose and the tree.
+        deltas: float64[..., joints, 9], tx ty tz rx ry rz sx sy sz beside the neutral pose.
+    """
+    convention = Convention.of(dna)
+    local = np.zeros((*deltas.shape[:-1], 4, 4))
+    angles = np.asarray(dna.neutral_joint_rotations, np.float64) + deltas[..., 3:6]
+    turn = rotation_matrices(convention, angles)
+    local[..., :3, :3] = turn * (1 + deltas[..., 6:9])[..., None, :]
+    local[..., :3, 3] = np.asarray(dna.neutral_joint_translations, np.float64) + deltas[..., :3]
+    local[..., 3, 3] = 1
+    out = local.copy()
+    for joint in parent_order(dna):
+        parent = int(dna.joint_parents[joint])
+        if parent != joint:
+            out[..., joint, :, :] = out[..., parent, :, :] @ local[..., joint, :, :]
+    return out
+
+
+def column_motions(dna: Dna, columns: int) -> Doubles:
+    """float64[columns, joints, 3, 4]: where an input at 1 brings what is fixed to a joint.
+
+    Args:
+        dna: the face.
+        columns: how many inputs.
+    """
+    deltas = column_deltas(dna, columns)
+    rest = world_matrices(dna, np.zeros_like(deltas[0]))
+    posed = world_matrices(dna, deltas)
+    return (posed @ np.linalg.inv(rest))[..., :3, :]
+
+
+def dense_weights(mesh: Mesh, joints: int) -> Doubles:
+    """float64[V, joints] of a mesh' skin weights, rows with sum 1.
+
+    Args:
+        mesh: has the weights.
+        joints: how many joints there are.
+    """
+    count = len(mesh.positions)
+    offsets = np.asarray(mesh.skin_offsets, np.int64)
+    vertex = np.repeat(np.arange(count), np.diff(offsets))
+    out = np.zeros((count, joints))
+    np.add.at(out, (vertex, np.asarray(mesh.skin_joint_indices, np.int64)), mesh.skin_weights)
+    total = out.sum(axis=1, keepdims=True)
+    return out / np.where(total > 0, total, 1)
+
+
+def column_shapes(dna: Dna, mesh: Mesh, columns: int) -> dict[int, Doubles]:
+    """float64[V, 3] by input: what blend shapes add to a mesh before it is skinned.
+
+    Args:
+        dna: has the channels.
+        mesh: has the targets.
+        columns: how many inputs.
+    """
+    drives: dict[int, list[int]] = {}
+    channels = dna.blend_shape_channels
+    for source, channel in zip(channels.input_indices, channels.output_indices, strict=True):
+        drives.setdefault(int(channel), []).append(int(source))
+    out: dict[int, Doubles] = {}
+    for target in mesh.blend_shape_targets:
+        for column in drives.get(int(target.blend_shape_channel_index), ()):
+            if column < columns:
+                delta = out.setdefault(column, np.zeros((len(mesh.positions), 3)))
+                np.add.at(delta, np.asarray(target.vertex_indices, np.int64), target.deltas)
+    return out
+
+
+def skinned(positions: Doubles, weights: Doubles, motions: Doubles) -> Doubles:
+    """float64[V, 3]: where joints bring vertices (linear blend skinning).
+
+    Args:
+        positions: float64[V, 3].
+        weights: float64[V, joints].
+        motions: float64[joints, 3, 4], as column_motions gives them.
+    """
+    blended = (weights @ motions.reshape(len(motions), 12)).reshape(-1, 3, 4)
+    return np.einsum("vij,vj->vi", blended[..., :3], positions) + blended[..., 3]
+
+
+def before_skin(wanted: Doubles, weights: Doubles, motions: Doubles) -> Doubles:
+    """float64[V, 3]: which positions the joints bring to the wanted ones.
+
+    Args:
+        wanted: float64[V, 3].
+        weights: float64[V, joints].
+        motions: float64[joints, 3, 4].
+    """
+    blended = (weights @ motions.reshape(len(motions), 12)).reshape(-1, 3, 4)
+    right = (wanted - blended[..., 3])[..., None]
+    return np.asarray(np.linalg.solve(blended[..., :3], right)[..., 0])
+
+
+def mesh_edges(mesh: Mesh) -> npt.NDArray[np.uint32]:
+    """uint32[n, 2]: the edges of the polygons, each once."""
+    corners = np.asarray(mesh.layout_positions, np.int64)[np.asarray(mesh.face_layouts, np.int64)]
+    offsets = np.asarray(mesh.face_offsets, np.int64)
+    following = np.arange(1, len(corners) + 1)
+    following[offsets[1:] - 1] = offsets[:-1]
+    pairs = np.sort(np.stack([corners, corners[following]], axis=1), axis=1)
+    pairs = pairs[pairs[:, 0] != pairs[:, 1]]
+    return np.unique(pairs, axis=0).astype(np.uint32)

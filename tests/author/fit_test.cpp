@@ -1,0 +1,269 @@
+// SPDX-License-Identifier: MIT
+// Fits of joints to shapes whose joints are known.
+#include "author/fit.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "author/mirror.h"
+
+namespace risorius::author {
+namespace {
+
+constexpr std::uint32_t kSide = 21;  // vertices along a side: 441 in all
+
+/// A sheet of 2 x 2 about the origin, in the plane z = 0.
+Shapes sheet(std::size_t expressions) {
+  Shapes out;
+  out.expressions = expressions;
+  for (std::uint32_t y = 0; y < kSide; ++y) {
+    for (std::uint32_t x = 0; x < kSide; ++x) {
+      out.neutral.push_back({-1.0 + 0.1 * x, -1.0 + 0.1 * y, 0.0});
+      const std::uint32_t v = y * kSide + x;
+      if (x + 1 < kSide) out.edges.push_back({v, v + 1});
+      if (y + 1 < kSide) out.edges.push_back({v, v + kSide});
+    }
+  }
+  out.displacements.assign(3 * expressions * out.vertex_count(), 0.0f);
+  return out;
+}
+
+float& at(Shapes& shapes, std::size_t v, std::size_t e, std::size_t k) {
+  return shapes.displacements[3 * (v * shapes.expressions + e) + k];
+}
+
+double bump(const Vector3& p, double x, double y) {
+  const double d = ((p[0] - x) * (p[0] - x) + (p[1] - y) * (p[1] - y)) / 0.36;
+  return d < 1.0 ? (1.0 - d) * (1.0 - d) : 0.0;
+}
+
+/// Both sides rise, each by an expression of its own; the left one turns about y in a third.
+Shapes two_sides() {
+  Shapes out = sheet(3);
+  const double angle = 0.3;
+  for (std::size_t v = 0; v < out.vertex_count(); ++v) {
+    const Vector3& p = out.neutral[v];
+    const double left = bump(p, 0.5, 0.0), right = bump(p, -0.5, 0.0);
+    at(out, v, 0, 2) = static_cast<float>(0.1 * left);
+    at(out, v, 1, 2) = static_cast<float>(0.1 * right);
+    at(out, v, 2, 0) = static_cast<float>(left * (p[0] - 0.5) * (std::cos(angle) - 1.0));
+    at(out, v, 2, 2) = static_cast<float>(-left * (p[0] - 0.5) * std::sin(angle));
+  }
+  return out;
+}
+
+/// The fit's own position of a vertex, by Rodrigues' formula.
+Vector3 posed(const Shapes& shapes, const Fit& fit, std::size_t v, std::size_t e) {
+  Vector3 out{};
+  const Vector3& p = shapes.neutral[v];
+  for (std::size_t i = 0; i < fit.influences; ++i) {
+    const double w = double{fit.weights[v * fit.influences + i]};
+    const std::size_t j = fit.weight_joints[v * fit.influences + i];
+    const JointMotion& m = fit.motions[j * shapes.expressions + e];
+    const Vector3& c = fit.joints[j];
+    const Vector3 a{p[0] - c[0], p[1] - c[1], p[2] - c[2]};
+    const Vector3& r = m.rotation;
+    const double angle = std::sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2]);
+    const double s = angle > 0 ? std::sin(angle) / angle : 1.0;
+    const double t = angle > 0 ? (1.0 - std::cos(angle)) / (angle * angle) : 0.5;
+    const double dot = r[0] * a[0] + r[1] * a[1] + r[2] * a[2];
+    const Vector3 cross{r[1] * a[2] - r[2] * a[1], r[2] * a[0] - r[0] * a[2],
+                        r[0] * a[1] - r[1] * a[0]};
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double turned = std::cos(angle) * a[k] + s * cross[k] + t * dot * r[k];
+      out[k] += w * (c[k] + turned + m.translation[k]);
+    }
+  }
+  return out;
+}
+
+double largest_error(const Shapes& shapes, const Fit& fit) {
+  double most = 0.0;
+  for (std::size_t v = 0; v < shapes.vertex_count(); ++v) {
+    for (std::size_t e = 0; e < shapes.expressions; ++e) {
+      const Vector3 p = posed(shapes, fit, v, e);
+      double square = 0.0;
+      for (std::size_t k = 0; k < 3; ++k) {
+        const double goal = shapes.neutral[v][k] +
+                            double{shapes.displacements[3 * (v * shapes.expressions + e) + k]};
+        square += (p[k] - goal) * (p[k] - goal);
+      }
+      most = std::max(most, std::sqrt(square));
+    }
+  }
+  return most;
+}
+
+FitOptions few(std::size_t joints) {
+  FitOptions out;
+  out.joints = joints;
+  out.rounds = 10;
+  out.smoothness = 0.01;
+  return out;
+}
+
+TEST(Fit, MoreJointsComeNearer) {
+  const Shapes shapes = two_sides();  // its motions are up to 0.18 long
+  double before = 0.02;
+  for (const std::size_t joints : {3u, 9u, 25u}) {
+    auto fit = fit_joints(shapes, few(joints));
+    ASSERT_TRUE(fit) << fit.error().describe();
+    EXPECT_EQ(fit->joints.size(), joints);
+    const double error = largest_error(shapes, *fit);
+    EXPECT_LT(error, before) << joints;
+    before = error / 2;
+  }
+}
+
+TEST(Fit, WeightsAreNotNegativeAndSumToOne) {
+  FitOptions options = few(12);
+  options.influences = 3;
+  const Shapes shapes = two_sides();
+  auto fit = fit_joints(shapes, options);
+  ASSERT_TRUE(fit) << fit.error().describe();
+  ASSERT_EQ(fit->weights.size(), 3 * shapes.vertex_count());
+  for (std::size_t v = 0; v < shapes.vertex_count(); ++v) {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < 3; ++i) {
+      EXPECT_GE(fit->weights[3 * v + i], 0.0f);
+      sum += double{fit->weights[3 * v + i]};
+    }
+    EXPECT_NEAR(sum, 1.0, 1e-6);
+  }
+}
+
+TEST(Fit, TheNumberOfThreadsChangesNoBit) {
+  const Shapes shapes = two_sides();
+  FitOptions options = few(9);
+  options.threads = 1;
+  auto one = fit_joints(shapes, options);
+  options.threads = 3;
+  auto three = fit_joints(shapes, options);
+  ASSERT_TRUE(one && three);
+  EXPECT_EQ(one->weights, three->weights);
+  EXPECT_EQ(one->weight_joints, three->weight_joints);
+  EXPECT_EQ(one->joints, three->joints);
+  for (std::size_t i = 0; i < one->motions.size(); ++i) {
+    EXPECT_EQ(one->motions[i].rotation, three->motions[i].rotation);
+    EXPECT_EQ(one->motions[i].translation, three->motions[i].translation);
+  }
+}
+
+TEST(Fit, BothSidesOfASymmetricMeshAreAlike) {
+  const Shapes shapes = two_sides();
+  const Mirror mirror = find_mirror(shapes);
+  ASSERT_FALSE(mirror.empty());
+  EXPECT_EQ(mirror.expressions[0], 1u);
+  EXPECT_EQ(mirror.expressions[2], Mirror::kNone);
+  auto fit = fit_joints(shapes, few(9));
+  ASSERT_TRUE(fit);
+  for (std::size_t j = 0; j < fit->joints.size(); ++j) {
+    const Vector3& p = fit->joints[j];
+    const Vector3& q = fit->joints[fit->mirrored[j]];
+    EXPECT_NEAR(p[0], -q[0], 1e-9);
+    EXPECT_NEAR(p[1], q[1], 1e-9);
+  }
+  for (std::size_t v = 0; v < shapes.vertex_count(); ++v) {
+    std::vector<float> here(fit->joints.size()), there(fit->joints.size());
+    for (std::size_t i = 0; i < fit->influences; ++i) {
+      const std::size_t a = v * fit->influences + i;
+      const std::size_t b = mirror.vertices[v] * fit->influences + i;
+      here[fit->weight_joints[a]] += fit->weights[a];
+      there[fit->mirrored[fit->weight_joints[b]]] += fit->weights[b];
+    }
+    for (std::size_t j = 0; j < here.size(); ++j) EXPECT_NEAR(here[j], there[j], 1e-6);
+  }
+}
+
+TEST(Fit, AGivenJointKeepsItsMotionAndGetsWhatItMoves) {
+  const Shapes shapes = two_sides();
+  GivenJoint head, riser;
+  riser.position = {0.5, 0.0, 0.0};
+  riser.motions.resize(3);
+  riser.motions[0].translation = {0.0, 0.0, 0.1};
+  riser.motions[2].rotation = {0.0, 0.3, 0.0};
+  FitOptions options = few(4);
+  options.symmetric = false;
+  options.given = {head, riser};
+  auto fit = fit_joints(shapes, options);
+  ASSERT_TRUE(fit) << fit.error().describe();
+  EXPECT_EQ(fit->joints[1], riser.position);
+  EXPECT_NEAR(fit->motions[3 * 1 + 2].rotation[1], 0.3, 1e-12);
+  const std::size_t top = 10 * kSide + 15;  // at (0.5, 0)
+  float share = 0.0f;
+  for (std::size_t i = 0; i < fit->influences; ++i) {
+    const std::size_t a = top * fit->influences + i;
+    if (fit->weight_joints[a] == 1) share += fit->weights[a];
+  }
+  EXPECT_GT(share, 0.9f);
+}
+
+TEST(Fit, AnotherMeshHangsOnTheSameJoints) {
+  const Shapes shapes = two_sides();
+  GivenJoint head, left, right;
+  left.position = {0.5, 0.0, 0.0};
+  right.position = {-0.5, 0.0, 0.0};
+  left.motions.resize(3);
+  right.motions.resize(3);
+  left.motions[0].translation = right.motions[1].translation = {0.0, 0.0, 0.1};
+  left.motions[2].rotation = {0.0, 0.3, 0.0};
+  FitOptions options = few(3);
+  auto fit = fit_weights(shapes, {head, left, right}, options);
+  ASSERT_TRUE(fit) << fit.error().describe();
+  EXPECT_EQ(fit->joints.size(), 3u);
+  EXPECT_LT(largest_error(shapes, *fit), 0.004);
+}
+
+TEST(Fit, SaysWhatItCannotUse) {
+  const auto says = [](const Shapes& shapes, const FitOptions& options) {
+    auto fit = fit_joints(shapes, options);
+    return fit ? std::string("nothing") : fit.error().describe();
+  };
+  Shapes shapes = two_sides();
+  at(shapes, 7, 1, 2) = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_NE(says(shapes, few(5)).find("displacements[7][1]"), std::string::npos);
+  shapes = two_sides();
+  shapes.neutral[3][1] = std::numeric_limits<double>::infinity();
+  EXPECT_NE(says(shapes, few(5)).find("neutral[3]"), std::string::npos);
+  EXPECT_NE(says(sheet(2), few(5)).find("no expression moves a vertex"), std::string::npos);
+  shapes = two_sides();
+  shapes.edges.push_back({0, 441});
+  EXPECT_NE(says(shapes, few(5)).find("vertex 441 of 441"), std::string::npos);
+  EXPECT_NE(says(two_sides(), few(1)).find("2 to 4096"), std::string::npos);
+  FitOptions options = few(5);
+  options.influences = 0;
+  EXPECT_NE(says(two_sides(), options).find("influences"), std::string::npos);
+  options = few(5);
+  options.given.resize(1);
+  options.given[0].motions.resize(2);
+  EXPECT_NE(says(two_sides(), options).find("found 2"), std::string::npos);
+}
+
+TEST(Fit, StopsWhenItIsTold) {
+  int told = 0;
+  auto fit = fit_joints(two_sides(), few(5), [&](double share) {
+    EXPECT_GT(share, 0.0);
+    return ++told < 3;
+  });
+  ASSERT_FALSE(fit);
+  EXPECT_EQ(told, 3);
+  EXPECT_EQ(fit.error().message, "stopped");
+}
+
+TEST(Fit, ALargerOrSmallerUnitIsTheSameFit) {
+  Shapes shapes = two_sides();
+  auto metres = fit_joints(shapes, few(5));
+  for (Vector3& p : shapes.neutral) {
+    for (double& x : p) x *= 1024.0;
+  }
+  for (float& d : shapes.displacements) d *= 1024.0f;
+  auto large = fit_joints(shapes, few(5));
+  ASSERT_TRUE(metres && large);
+  EXPECT_EQ(metres->weights, large->weights);
+}
+
+}  // namespace
+}  // namespace risorius::author
