@@ -108,7 +108,7 @@ FitOptions few(std::size_t joints) {
 TEST(Fit, MoreJointsComeNearer) {
   const Shapes shapes = two_sides();  // its motions are up to 0.18 long
   double before = 0.02;
-  for (const std::size_t joints : {3u, 9u, 25u}) {
+  for (const std::size_t joints : {3u, 9u}) {
     auto fit = fit_joints(shapes, few(joints));
     ASSERT_TRUE(fit) << fit.error().describe();
     EXPECT_EQ(fit->joints.size(), joints);

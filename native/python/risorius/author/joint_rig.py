@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -98,8 +98,8 @@ def make_joint_rig(
     """
     o = options or RigOptions()
     work = _begin(dna)
-    of_lod = [[int(m) for m in row] for row in dna.lod_mesh_mapping] or [[*range(len(dna.meshes))]]
-    first = of_lod[0]
+    mapping = dna.lod_mesh_mapping
+    first = [int(m) for m in mapping[0]] if len(mapping) else list(range(len(dna.meshes)))
     wanted = {m: _displacements(work, dna.meshes[m]) for m in range(len(dna.meshes))}
     shaped = [m for m in first if _needs_joints(work, dna.meshes[m], wanted[m])]
     if not shaped:
@@ -124,15 +124,17 @@ def make_joint_rig(
             errors.append(left)
     work.dna.meshes = meshes
     work.dna.mesh_blend_shape_channel_mapping = np.array(
-        [(m, t.blend_shape_channel_index) for m, x in enumerate(meshes) for t in x.blend_shape_targets]
+        [
+            (m, t.blend_shape_channel_index)
+            for m, x in enumerate(meshes)
+            for t in x.blend_shape_targets
+        ]
     ).reshape(-1, 2)
     unit = MM.get(dna.translation_unit, 10.0)
     tallest = max(
         (np.ptp(np.asarray(dna.meshes[m].positions, np.float64)[:, 1]) for m in first), default=0
     )
-    return JointRig(
-        work.dna, names, errors, float(tallest) * unit, _deltas(dna), _deltas(work.dna)
-    )
+    return JointRig(work.dna, names, errors, float(tallest) * unit, _deltas(dna), _deltas(work.dna))
 
 
 def _deltas(dna: Dna) -> int:
@@ -290,7 +292,8 @@ def _add_joints(work: _Work, fit: JointFit) -> tuple[list[str], dict[str, list[s
     )
     everyone = range(len(dna.joint_names))
     new = everyone[-len(names) :]
-    dna.lod_joint_mapping = [[*(int(j) for j in row), *new] for row in dna.lod_joint_mapping]
+    mapping = dna.lod_joint_mapping
+    dna.lod_joint_mapping = [[*map(int, mapping[lod]), *new] for lod in range(len(mapping))]
     dna.joint_row_count = 9 * len(everyone)
     regions: dict[str, list[str]] = {}
     for name in names:
@@ -340,7 +343,7 @@ def _add_behavior(
     convention = Convention.of(dna)
     for column in range(len(work.columns)):
         values[:, 3:, column] = sk.euler_angles(convention, local[column])
-    values *= (effects.T >= options.least_effect_mm)[:, None]
+    values *= (options.least_effect_mm <= effects.T)[:, None]
     rows = values.reshape(6 * count, -1)
     joints = np.arange(count) + len(work.source.joint_names)
     outputs = (9 * joints[:, None] + np.arange(6)).ravel()
@@ -388,7 +391,12 @@ def _with_resting(work: _Work, mesh: Mesh, rows: Doubles) -> Doubles:
 
 
 def _finish_mesh(
-    work: _Work, number: int, rows: Doubles, motions: Doubles, wanted: Doubles, options: RigOptions
+    work: _Work,
+    number: int,
+    rows: Doubles,
+    motions: Doubles,
+    wanted: Doubles,
+    options: RigOptions,
 ) -> tuple[Mesh, MeshErrors]:
     """The mesh with its new weights and with what blend shapes have still to do."""
     mesh = work.source.meshes[number]
@@ -397,43 +405,47 @@ def _finish_mesh(
     weights = sk.dense_weights(out, rows.shape[1])
     positions = np.asarray(mesh.positions, np.float64)
     mm = MM.get(work.dna.translation_unit, 10.0)
-    channel = {
-        int(a): int(b)
-        for a, b in zip(
-            work.dna.blend_shape_channels.input_indices,
-            work.dna.blend_shape_channels.output_indices,
-            strict=True,
-        )
-    }
-    left = MeshErrors(
-        work.source.mesh_names[number], work.names, *(np.zeros(len(work.columns)) for _ in range(4)),
-        np.zeros(len(work.columns), np.int64), np.zeros(len(work.columns)),
-    )
-    targets = []
+    channel = _channels(work.dna)
+    halves = sk.column_motions(work.dna, sk.column_count(work.dna), 0.5)[work.columns]
+    found, targets = _no_errors(work.source.mesh_names[number], work.names), []
     for row, column in enumerate(work.columns):
         goal = positions + wanted[row]
-        by_joints = sk.skinned(positions, weights, motions[row])
-        error = np.linalg.norm(by_joints - goal, axis=1) * mm
-        left.motion[row] = np.sqrt((wanted[row] ** 2).sum(axis=1).mean()) * mm
-        left.joints_rms[row] = np.sqrt((error**2).mean())
-        left.joints_largest[row], left.worst_vertex[row] = error.max(), error.argmax()
-        left.largest[row] = error.max()
-        if options.tolerance_mm is None or column not in channel:
-            continue
-        moved = np.flatnonzero(error > options.tolerance_mm)
-        if len(moved):
-            wished = sk.before_skin(goal[moved], weights[moved], motions[row])
-            targets.append(
-                BlendShapeTarget(
-                    deltas=wished - positions[moved],
-                    vertex_indices=moved,
-                    blend_shape_channel_index=channel[column],
+        error = np.linalg.norm(sk.skinned(positions, weights, motions[row]) - goal, axis=1) * mm
+        half = sk.skinned(positions, weights, halves[row]) - positions - 0.5 * wanted[row]
+        found.half_largest[row] = np.linalg.norm(half, axis=1).max() * mm
+        found.motion[row] = np.sqrt((wanted[row] ** 2).sum(axis=1).mean()) * mm
+        found.joints_rms[row] = np.sqrt((error**2).mean())
+        found.joints_largest[row], found.worst_vertex[row] = error.max(), error.argmax()
+        if options.tolerance_mm is not None and column in channel:
+            moved = np.flatnonzero(error > options.tolerance_mm)
+            if len(moved):
+                shaped = sk.before_skin(goal[moved], weights[moved], motions[row])
+                targets.append(
+                    BlendShapeTarget(
+                        deltas=shaped - positions[moved],
+                        vertex_indices=moved,
+                        blend_shape_channel_index=channel[column],
+                    )
                 )
-            )
             error[moved] = 0
-        left.largest[row] = error.max()
+        found.largest[row] = error.max()
     out.blend_shape_targets = targets
-    return out, left
+    return out, found
+
+
+def _channels(dna: Dna) -> dict[int, int]:
+    """The blend shape channel of each input that drives one."""
+    channels = dna.blend_shape_channels
+    pairs = zip(channels.input_indices, channels.output_indices, strict=True)
+    return {int(source): int(channel) for source, channel in pairs}
+
+
+def _no_errors(name: str, expressions: list[str]) -> MeshErrors:
+    def none() -> Doubles:
+        return np.zeros(len(expressions))
+
+    worst = np.zeros(len(expressions), np.int64)
+    return MeshErrors(name, expressions, none(), none(), none(), none(), worst, none())
 
 
 def _set_skin(mesh: Mesh, rows: Doubles) -> None:

@@ -55,7 +55,7 @@ def euler_angles(convention: Convention, matrices: Doubles) -> Doubles:
 
 
 def rotation_vectors(matrices: Doubles) -> Doubles:
-    """float64[..., 3] of rotations float64[..., 3, 3]: the axis, as long as the angle in radians."""
+    """float64[..., 3] of rotations [..., 3, 3]: axes, each as long as its angle in radians."""
     m = matrices
     axis = np.stack(
         [
@@ -138,14 +138,15 @@ def world_matrices(dna: Dna, deltas: Doubles) -> Doubles:
     return out
 
 
-def column_motions(dna: Dna, columns: int) -> Doubles:
-    """float64[columns, joints, 3, 4]: where an input at 1 brings what is fixed to a joint.
+def column_motions(dna: Dna, columns: int, value: float = 1.0) -> Doubles:
+    """float64[columns, joints, 3, 4]: where an input brings what is fixed to a joint.
 
     Args:
         dna: the face.
         columns: how many inputs.
+        value: of the input, all others are 0.
     """
-    deltas = column_deltas(dna, columns)
+    deltas = value * column_deltas(dna, columns)
     rest = world_matrices(dna, np.zeros_like(deltas[0]))
     posed = world_matrices(dna, deltas)
     return (posed @ np.linalg.inv(rest))[..., :3, :]

@@ -17,6 +17,7 @@ from collections.abc import Sequence
 from .. import __version__
 from ..base.errors import RisoriusError, sentence
 from . import (
+    author,
     batch,
     bench,
     check,
@@ -85,6 +86,7 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
         web,
         bench,
         edit,
+        author,
         clip,
         speech,
         live,

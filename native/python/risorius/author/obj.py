@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: MIT
+"""Wavefront OBJ: the polygons of one mesh in the file's own order, which expressions share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from ..base.errors import RisoriusError
+from .skeleton import Doubles
+
+
+class ShapeFileError(RisoriusError, ValueError):
+    """A file of a mesh or of an expression that cannot be used."""
+
+    code = "shape_file"
+
+
+@dataclass
+class ObjMesh:
+    """Positions, texture coordinates and polygons, as the file lists them."""
+
+    positions: Doubles  # [V, 3]
+    uvs: Doubles  # [T, 2]
+    faces: list[list[int]] = field(default_factory=list)  # vertices of each polygon
+    uv_faces: list[list[int]] = field(default_factory=list)  # the same corners in uvs
+
+
+def read_obj(path: Path) -> ObjMesh:
+    """The mesh of an OBJ file; groups, materials and normals are passed over.
+
+    Raises:
+        ShapeFileError: a line that is no vertex or polygon of its kind, with its number.
+        OSError: the file cannot be read.
+    """
+    positions: list[list[float]] = []
+    uvs: list[list[float]] = []
+    faces: list[list[int]] = []
+    uv_faces: list[list[int]] = []
+    text = path.read_text(encoding="utf-8", errors="replace")
+    for number, line in enumerate(text.splitlines(), 1):
+        kind, _, rest = line.strip().partition(" ")
+        try:
+            if kind == "v":
+                positions.append(_numbers(rest, 3))
+            elif kind == "vt":
+                uvs.append(_numbers(rest, 2))
+            elif kind == "f":
+                face, uv_face = _polygon(rest, len(positions), len(uvs))
+                faces.append(face)
+                uv_faces.append(uv_face)
+        except ValueError as error:
+            raise ShapeFileError(f"{path}: line {number}: {error}") from None
+    if not positions or not faces:
+        raise ShapeFileError(f"{path}: vertices and polygons were expected, found none")
+    return ObjMesh(np.array(positions), np.array(uvs).reshape(-1, 2), faces, uv_faces)
+
+
+def read_positions(path: Path, count: int) -> Doubles:
+    """float64[count, 3]: the vertices of an expression's OBJ file.
+
+    Args:
+        path: the file.
+        count: vertices of the neutral mesh.
+
+    Raises:
+        ShapeFileError: another number of vertices, or a value that is no finite number.
+        OSError: the file cannot be read.
+    """
+    positions = []
+    with path.open(encoding="utf-8", errors="replace") as lines:
+        for number, line in enumerate(lines, 1):
+            if line.startswith("v "):
+                try:
+                    positions.append(_numbers(line[2:], 3))
+                except ValueError as error:
+                    raise ShapeFileError(f"{path}: line {number}: {error}") from None
+    if len(positions) != count:
+        raise ShapeFileError(
+            f"{path}: {count:,} vertices were expected, as the neutral mesh has, "
+            f"found {len(positions):,}"
+        )
+    return np.array(positions)
+
+
+def _numbers(text: str, count: int) -> list[float]:
+    words = text.split()[:count]
+    values = [float(word) for word in words]
+    if len(values) != count or not np.isfinite(values).all():
+        raise ValueError(f"{count} finite numbers were expected, found {text.strip()!r}")
+    return values
+
+
+def _polygon(text: str, vertices: int, uvs: int) -> tuple[list[int], list[int]]:
+    face, uv_face = [], []
+    for word in text.split():
+        parts = word.split("/")
+        face.append(_index(parts[0], vertices, "vertex"))
+        if len(parts) > 1 and parts[1]:
+            uv_face.append(_index(parts[1], uvs, "texture coordinate"))
+    if len(face) < 3 or len(uv_face) not in (0, len(face)):
+        raise ValueError(f"a polygon of three corners or more was expected, found {text!r}")
+    return face, uv_face
+
+
+def _index(text: str, count: int, what: str) -> int:
+    """From 0; a negative number counts from the end. Raises: ValueError."""
+    number = int(text)
+    index = number - 1 if number > 0 else count + number
+    if not 0 <= index < count:
+        raise ValueError(f"{what} {number} of {count} is not there")
+    return index

@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: MIT
+"""A face of blend shapes from a mesh and its expressions: what a joint rig is then made from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .. import BlendShapeChannels, BlendShapeTarget, Dna, Mesh
+from ..base.easing import smooth_step
+from ..base.errors import ArgumentError
+from .matching import PREFIX
+from .obj import ObjMesh
+from .skeleton import Doubles
+
+_LEAST = 1e-6  # of the mesh' size: a vertex that moves less rests
+
+
+@dataclass
+class ShapeSet:
+    """One mesh, y up, and its expressions, all in one unit."""
+
+    name: str
+    mesh: ObjMesh
+    expressions: dict[str, Doubles] = field(default_factory=dict)  # name -> displacement [V, 3]
+    left: int = 1  # the character's left is +x (1) or -x (-1)
+    unit: str = "cm"
+
+
+def check_shapes(shapes: ShapeSet) -> list[str]:
+    """What is odd about the expressions, a sentence each; none of it stops the work.
+
+    Raises:
+        ValueError: no expression moves a vertex, or one is not of the mesh' size.
+    """
+    size = float(np.ptp(shapes.mesh.positions, axis=0).max())
+    out: list[str] = []
+    seen: dict[bytes, str] = {}
+    moving = 0
+    for name, delta in shapes.expressions.items():
+        if delta.shape != shapes.mesh.positions.shape:
+            raise ArgumentError(
+                f"expression {name}: {len(shapes.mesh.positions):,} vertices were expected, "
+                f"found {len(delta):,}"
+            )
+        length = np.linalg.norm(delta, axis=1)
+        if length.max() <= _LEAST * size:
+            out.append(f"{name} moves nothing")
+            continue
+        moving += 1
+        mean = delta.mean(axis=0)
+        if np.linalg.norm(delta - mean, axis=1).max() < 0.02 * np.linalg.norm(mean):
+            out.append(f"{name} moves the whole mesh: is another neutral baked into it?")
+        elif length.mean() > 0.25 * size:
+            out.append(f"{name} is far from the neutral mesh: another unit or other axes?")
+        key = np.round(delta / size, 6).tobytes()
+        if key in seen:
+            out.append(f"{name} is the same as {seen[key]}")
+        seen.setdefault(key, name)
+    if not moving:
+        raise ArgumentError("no expression moves a vertex of the neutral mesh")
+    return out
+
+
+def make_shape_face(shapes: ShapeSet, controls: Mapping[str, Sequence[str]]) -> Dna:
+    """A Dna with one mesh, a raw control for each expression (or two where it is split by sides),
+    a blend shape for each control, and the joints root and head.
+
+    Args:
+        shapes: the mesh and its expressions.
+        controls: raw controls without prefix by expression, as matching.assign gives them. Of
+            several that end in L and R each gets its half, with a soft edge in the middle; others
+            are joined under the expression's own name.
+    """
+    positions = shapes.mesh.positions
+    deltas = _by_control(shapes, controls)
+    dna = Dna()
+    dna.name, dna.db_name = shapes.name, "risorius"
+    dna.archetype, dna.gender = "other", "other"
+    dna.coordinate_system = ("right" if shapes.left > 0 else "left", "up", "front")
+    dna.translation_unit = shapes.unit
+    dna.lod_count = 1
+    low, high = positions.min(axis=0), positions.max(axis=0)
+    head = np.array([0.0, low[1] + 0.4 * (high[1] - low[1]), 0.4 * low[2] + 0.6 * high[2]])
+    dna.joint_names = ["root", "head"]
+    dna.joint_parents = [0, 0]
+    dna.neutral_joint_translations = np.array([np.zeros(3), head])
+    dna.neutral_joint_rotations = np.zeros((2, 3))
+    names = list(deltas)
+    dna.raw_control_names = [PREFIX + name for name in names]
+    dna.blend_shape_channel_names = names
+    count = len(names)
+    dna.blend_shape_channels = BlendShapeChannels(
+        lods=[count], input_indices=range(count), output_indices=range(count)
+    )
+    dna.joint_row_count, dna.joint_column_count = 18, count
+    mesh = _mesh(shapes.mesh)
+    size = float(np.ptp(positions, axis=0).max())
+    targets = []
+    for channel, delta in enumerate(deltas.values()):
+        moved = np.flatnonzero(np.linalg.norm(delta, axis=1) > _LEAST * size)
+        if len(moved):
+            targets.append(
+                BlendShapeTarget(
+                    deltas=delta[moved], vertex_indices=moved, blend_shape_channel_index=channel
+                )
+            )
+    mesh.blend_shape_targets = targets
+    dna.meshes, dna.mesh_names = [mesh], [f"{shapes.name}_lod0_mesh"]
+    dna.mesh_blend_shape_channel_mapping = np.array(
+        [(0, t.blend_shape_channel_index) for t in targets]
+    ).reshape(-1, 2)
+    dna.lod_mesh_mapping = [[0]]
+    dna.lod_joint_mapping = [[0, 1]]
+    dna.lod_blend_shape_mapping = [range(count)]
+    return dna
+
+
+def _by_control(shapes: ShapeSet, controls: Mapping[str, Sequence[str]]) -> dict[str, Doubles]:
+    x = shapes.mesh.positions[:, 0] * shapes.left
+    width = 0.06 * np.ptp(x)
+    left = smooth_step(x / width + 0.5)
+    halves = {"L": left, "R": 1 - left}
+    out: dict[str, Doubles] = {}
+    for expression, delta in shapes.expressions.items():
+        named = list(controls.get(expression) or [expression])
+        if sorted(name[-1:] for name in named) == ["L", "R"]:
+            for name in named:
+                out[name] = delta * halves[name[-1]][:, None]
+        else:
+            out[named[0] if len(named) == 1 else expression] = delta
+    return out
+
+
+def _mesh(source: ObjMesh) -> Mesh:
+    positions, count = source.positions, len(source.positions)
+    uvs, uv_faces = source.uvs, source.uv_faces
+    if not len(uvs) or not all(uv_faces):
+        uvs, uv_faces = np.zeros((count, 2)), source.faces
+    corners = np.array(
+        [
+            pair
+            for face, uv_face in zip(source.faces, uv_faces, strict=True)
+            for pair in zip(face, uv_face, strict=True)
+        ]
+    )
+    layouts, index = np.unique(corners, axis=0, return_inverse=True)
+    sizes = [len(face) for face in source.faces]
+    return Mesh(
+        positions=positions,
+        texture_coordinates=uvs,
+        normals=_normals(positions, source.faces),
+        layout_positions=layouts[:, 0],
+        layout_texture_coordinates=layouts[:, 1],
+        layout_normals=layouts[:, 0],
+        face_offsets=np.concatenate([[0], np.cumsum(sizes)]),
+        face_layouts=index.ravel(),
+        skin_offsets=np.arange(count + 1),
+        skin_weights=np.ones(count),
+        skin_joint_indices=np.ones(count, np.int64),
+        maximum_influence_per_vertex=1,
+    )
+
+
+def _normals(positions: Doubles, faces: Sequence[Sequence[int]]) -> Doubles:
+    """float64[V, 3]: area-weighted, of unit length; of vertices without a polygon z."""
+    out = np.zeros_like(positions)
+    for face in faces:
+        points = positions[list(face)]
+        out[list(face)] += np.cross(points, np.roll(points, -1, axis=0)).sum(axis=0)
+    length = np.linalg.norm(out, axis=1, keepdims=True)
+    return np.where(length > 0, out / np.maximum(length, 1e-30), [0.0, 0.0, 1.0])

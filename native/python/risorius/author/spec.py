@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: MIT
+"""SPEC.toml: what a joint rig is made from and what it is to be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from .. import Dna, load
+from ..base import toml
+from .fitting import FitOptions
+from .joint_rig import RigOptions
+from .matching import assign
+from .obj import ShapeFileError, read_obj, read_positions
+from .shape_face import ShapeSet, check_shapes, make_shape_face
+
+_TABLES: dict[str, dict[str, tuple[type, ...]]] = {
+    "source": {
+        "dna": (str,),
+        "neutral": (str,),
+        "expressions": (str,),
+        "left": (str,),
+        "unit": (str,),
+    },
+    "joints": {
+        "count": (int,),
+        "influences": (int,),
+        "smoothness": (int, float),
+        "emphasis": (int, float),
+        "rounds": (int,),
+        "symmetric": (bool,),
+        "least_effect_mm": (int, float),
+    },
+    "shapes": {"tolerance_mm": (int, float), "keep": (bool,)},
+}
+
+
+@dataclass
+class Spec:
+    """A spec that was read: where the face is, and the options."""
+
+    path: Path
+    name: str
+    source: dict[str, Any]
+    options: RigOptions
+    controls: dict[str, str | list[str]] = field(default_factory=dict)
+
+
+def read_spec(path: Path) -> Spec:
+    """The content of a SPEC.toml.
+
+    Raises:
+        ShapeFileError: no TOML, or a table, a name or a kind of value that is not known.
+        OSError: the file cannot be read.
+    """
+    try:
+        table = toml.parse(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise ShapeFileError(f"{path}: {error}") from None
+    for name, rows in table.items():
+        if name in ("name", "controls"):
+            continue
+        if name not in _TABLES or not isinstance(rows, dict):
+            known = ", ".join(["name", *_TABLES, "controls"])
+            raise ShapeFileError(f"{path}: {name}: one of {known} was expected")
+        for key, value in rows.items():
+            kinds = _TABLES[name].get(key)
+            if kinds is None:
+                known = ", ".join(_TABLES[name])
+                raise ShapeFileError(f"{path}: {name}.{key}: one of {known} was expected")
+            if not isinstance(value, kinds) or (isinstance(value, bool) and bool not in kinds):
+                raise ShapeFileError(f"{path}: {name}.{key}: {value!r} is of another kind")
+    source = table.get("source", {})
+    if ("dna" in source) == ("neutral" in source):
+        raise ShapeFileError(f"{path}: source: either dna or neutral was expected")
+    if "neutral" in source and "expressions" not in source:
+        raise ShapeFileError(f"{path}: source.expressions: a folder of OBJ files was expected")
+    return Spec(
+        path,
+        str(table.get("name", path.stem)),
+        source,
+        _options(table.get("joints", {}), table.get("shapes", {})),
+        dict(table.get("controls", {})),
+    )
+
+
+def _options(joints: dict[str, Any], shapes: dict[str, Any]) -> RigOptions:
+    named = {"joints" if k == "count" else k: v for k, v in joints.items()}
+    least = float(named.pop("least_effect_mm", RigOptions.least_effect_mm))
+    tolerance = float(shapes.get("tolerance_mm", 0.05)) if shapes.get("keep", True) else None
+    return RigOptions(FitOptions(**named), tolerance, least)
+
+
+def read_face(spec: Spec) -> tuple[Dna, dict[str, list[str]], list[str]]:
+    """The face of blend shapes that a spec names.
+
+    Returns:
+        The face; the raw controls of each expression (empty where the source is a DNA); what is
+        odd about the expressions, a sentence each.
+
+    Raises:
+        DnaError: the DNA file cannot be used.
+        ShapeFileError: a mesh or an expression cannot be used.
+        OSError: a file cannot be read.
+    """
+    folder = spec.path.parent
+    if "dna" in spec.source:
+        return load(folder / spec.source["dna"]), {}, []
+    shapes = _read_shapes(spec, folder)
+    odd = check_shapes(shapes)
+    controls = assign(shapes.expressions, spec.controls)
+    return make_shape_face(shapes, controls), controls, odd
+
+
+def _read_shapes(spec: Spec, folder: Path) -> ShapeSet:
+    neutral = folder / spec.source["neutral"]
+    mesh = read_obj(neutral)
+    left = spec.source.get("left", "+x")
+    if left not in ("+x", "-x"):
+        raise ShapeFileError(f"{spec.path}: source.left: +x or -x was expected, found {left!r}")
+    out = ShapeSet(spec.name, mesh, {}, 1 if left == "+x" else -1, spec.source.get("unit", "cm"))
+    if out.unit not in ("cm", "m"):
+        raise ShapeFileError(f"{spec.path}: source.unit: cm or m was expected, found {out.unit!r}")
+    files = sorted((folder / spec.source["expressions"]).glob("*.obj"))
+    for path in files:
+        if path.resolve() == neutral.resolve():
+            continue
+        out.expressions[path.stem] = read_positions(path, len(mesh.positions)) - mesh.positions
+    if not out.expressions:
+        raise ShapeFileError(
+            f"{folder / spec.source['expressions']}: a folder of OBJ files was expected, one for "
+            "each expression"
+        )
+    return out

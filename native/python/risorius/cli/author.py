@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: MIT
+"""risorius author: a face of joints made from a mesh and its expressions."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from pathlib import Path
+
+import numpy as np
+
+from ..author.joint_rig import JointRig, make_joint_rig
+from ..author.spec import read_face, read_spec
+from ..base.words import counted
+from ..files import fileio
+from .files import CommandLineError
+
+_DESCRIPTION = """\
+Finds joints, skin weights and joint motions that repeat the expressions of a face, and writes them
+as a DNA file; what joints leave beyond a tolerance stays as blend shapes. SPEC.toml says where the
+face is (a DNA file whose expressions are blend shapes, or a neutral OBJ file and a folder with one
+OBJ file for each expression) and what the rig is to be: docs/authoring.md has every entry."""
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = subparsers.add_parser(
+        "author", help="make a joint rig from expressions", description=_DESCRIPTION
+    )
+    parser.add_argument("spec", type=Path, metavar="SPEC.toml")
+    parser.add_argument("-o", "--out", type=Path, metavar="OUT.dna", help="the DNA file to write")
+    parser.add_argument(
+        "--names", action="store_true", help="print which control each expression is, and end"
+    )
+    parser.add_argument(
+        "--joints-only", action="store_true", help="no blend shapes, whatever the spec says"
+    )
+    parser.add_argument("--threads", type=int, default=0, metavar="N", help="0: one for each core")
+    parser.add_argument("--json", action="store_true", help="the errors for a program")
+    parser.set_defaults(func=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    from dataclasses import replace
+
+    if args.out is None and not args.names:
+        raise CommandLineError("author: -o OUT.dna was expected")
+    spec = read_spec(args.spec)
+    dna, controls, odd = read_face(spec)
+    for sentence in odd:
+        print(f"note: {sentence}", flush=True)
+    if args.names:
+        print("[controls]")
+        for name, raw in controls.items():
+            print(f"{json.dumps(name)} = {json.dumps(raw[0] if len(raw) == 1 else raw)}")
+        return 0
+    fileio.check_writable(args.out)
+    options = replace(spec.options, fit=replace(spec.options.fit, threads=args.threads))
+    if args.joints_only:
+        options = replace(options, tolerance_mm=None)
+    begin, last = time.monotonic(), -1.0
+
+    def say(share: float) -> None:
+        nonlocal last
+        if not args.json and (share - last >= 0.1 or share >= 1):
+            last = share
+            print(f"[{time.monotonic() - begin:5.1f} s] {share:4.0%}", flush=True)
+
+    rig = make_joint_rig(dna, options, say)
+    rig.dna.save(args.out)
+    print(json.dumps(as_json(rig)) if args.json else "\n".join(as_lines(rig, args.out)))
+    return 0
+
+
+def as_json(rig: JointRig) -> dict[str, object]:
+    """The errors of each mesh and expression, for a program."""
+    return {
+        "joints": rig.new_joints,
+        "height_mm": rig.height_mm,
+        "deltas": {"before": rig.deltas_before, "after": rig.deltas_after},
+        "meshes": [
+            {
+                "name": m.name,
+                "expressions": [
+                    {
+                        "name": name,
+                        "motion_rms_mm": m.motion[e],
+                        "joints_rms_mm": m.joints_rms[e],
+                        "joints_largest_mm": m.joints_largest[e],
+                        "largest_mm": m.largest[e],
+                        "half_largest_mm": m.half_largest[e],
+                        "worst_vertex": int(m.worst_vertex[e]),
+                    }
+                    for e, name in enumerate(m.expressions)
+                ],
+            }
+            for m in rig.errors
+        ],
+    }
+
+
+def as_lines(rig: JointRig, path: Path) -> list[str]:
+    """The errors of each mesh as lines of a table.
+
+    Args:
+        rig: what was made.
+        path: where it was written.
+    """
+    title = f"{'mesh':26} {'RMS mm':>8} {'% height':>9} {'largest mm':>11}  expression"
+    out = [title]
+    for m in rig.errors:
+        rms = float(np.sqrt((m.joints_rms**2).mean()))
+        worst = int(m.joints_largest.argmax())
+        out.append(
+            f"{m.name:26} {rms:8.4f} {100 * rms / rig.height_mm:9.4f} "
+            f"{m.joints_largest[worst]:11.3f}  {m.expressions[worst]}"
+        )
+    largest = max((float(m.largest.max()) for m in rig.errors), default=0.0)
+    out.append(
+        f"{path}: {counted(len(rig.new_joints), 'new joint')}; with blend shapes at most "
+        f"{largest:.3f} mm, {rig.deltas_after:,} deltas instead of {rig.deltas_before:,}"
+    )
+    return out

@@ -1,0 +1,288 @@
+# SPDX-License-Identifier: MIT
+"""Joint rigs from expressions: what the written file does, by a reader of its own, and refusals."""
+
+import importlib.util
+import json
+from pathlib import Path
+
+import command_line
+import face_shapes
+import numpy as np
+import pytest
+import risorius
+from risorius.author import FitOptions, RigOptions, make_joint_rig, matching, shape_face, spec
+
+# Skinning and morphing from the format's description alone; nothing of risorius.author is in it.
+_ORACLE = Path(__file__).parents[2] / "blender_tests" / "support" / "oracle.py"
+_SPEC = importlib.util.spec_from_file_location("blender_oracle", _ORACLE)
+oracle = importlib.util.module_from_spec(_SPEC)
+_SPEC.loader.exec_module(oracle)
+
+METRES = 0.01
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("egg")
+    face_shapes.write_all(folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def made(folder):
+    done = command_line.run("author", folder / "spec.toml", "-o", folder / "egg.dna", text=True)
+    assert done.returncode == 0, done.stderr
+    return risorius.load(folder / "egg.dna"), done.stdout
+
+
+def posed(dna, controls):
+    """Vertices in metres with raw controls, by name without prefix, at their values."""
+    rig = risorius.Rig(dna)
+    names = list(dna.raw_control_names)
+    values = np.zeros(len(names), np.float32)
+    for name, value in controls.items():
+        values[names.index("CTRL_expressions." + name)] = value
+    pose = rig.evaluate(values)
+    return oracle.vertices(dna, 0, pose)
+
+
+def wanted(dna, delta):
+    positions, _ = face_shapes.head()
+    return oracle.to_blender(dna, positions + delta)
+
+
+NAMES = {
+    "mouthSmileLeft": "mouthCornerPullL",
+    "mouthSmileRight": "mouthCornerPullR",
+    "browOuterUpLeft": "browRaiseOuterL",
+    "browOuterUpRight": "browRaiseOuterR",
+    "eyeBlinkLeft": "eyeBlinkL",
+    "eyeBlinkRight": "eyeBlinkR",
+    "jawOpen": "jawOpen",
+}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_control_at_1_is_the_expression(made, name):
+    dna, _ = made
+    goal = wanted(dna, face_shapes.expressions(face_shapes.head()[0])[name])
+    error = np.linalg.norm(posed(dna, {NAMES[name]: 1}) - goal, axis=1)
+    assert error.max() * 1000 < 0.0505  # mm: the default tolerance, and rounding
+
+
+def test_the_file_is_sound_and_says_what_moves(made):
+    dna, said = made
+    assert len(dna.joint_names) == 42
+    assert dna.joint_names[:2] == ["root", "head"]
+    assert len(set(dna.joint_names)) == 42
+    assert {name.split("_")[1] for name in dna.joint_names[2:]} == {"L", "R", "C"}
+    assert any(name.startswith("FACIAL_L_Brow") for name in dna.joint_names)
+    assert "40 new joints" in said
+
+
+def test_joints_alone_come_near(folder, tmp_path):
+    out = tmp_path / "joints.dna"
+    done = command_line.run(
+        "author", folder / "spec.toml", "-o", out, "--joints-only", "--json", text=True
+    )
+    told = json.loads(done.stdout)
+    dna = risorius.load(out)
+    assert sum(len(mesh.blend_shape_targets) for mesh in dna.meshes) == 0
+    table = {row["name"]: row for row in told["meshes"][0]["expressions"]}
+    for name, delta in face_shapes.expressions(face_shapes.head()[0]).items():
+        error = np.linalg.norm(posed(dna, {NAMES[name]: 1}) - wanted(dna, delta), axis=1)
+        row = table["CTRL_expressions." + NAMES[name]]
+        assert error.max() * 1000 == pytest.approx(row["joints_largest_mm"], abs=2e-3)
+        assert error.max() < 0.1 * np.linalg.norm(delta, axis=1).max() * METRES
+        half = np.linalg.norm(
+            posed(dna, {NAMES[name]: 0.5}) - wanted(dna, 0.5 * delta), axis=1
+        ).max()
+        assert half * 1000 == pytest.approx(row["half_largest_mm"], abs=2e-3)
+
+
+def test_both_sides_mirror_each_other(made):
+    dna, _ = made
+    left = posed(dna, {"mouthCornerPullL": 1})
+    right = posed(dna, {"mouthCornerPullR": 1})
+    grid = right.reshape(face_shapes.DOWN, face_shapes.ACROSS, 3)[:, ::-1].reshape(-1, 3)
+    assert np.abs(left - grid * [-1, 1, 1]).max() < 1e-4  # 0.1 mm
+
+
+def test_threads_change_no_byte(folder, tmp_path):
+    files = []
+    for threads in (1, 3):
+        files.append(tmp_path / f"{threads}.dna")
+        command = ("author", folder / "spec.toml", "-o", files[-1], "--threads", threads)
+        assert command_line.run(*command).returncode == 0
+    assert files[0].read_bytes() == files[1].read_bytes()
+
+
+def test_joints_that_are_there_stay(folder):
+    """A neck that has half of the lower vertices keeps them, a jaw keeps its motion."""
+    read = spec.read_spec(folder / "spec.toml")
+    dna, _, _ = spec.read_face(read)
+    positions, _ = face_shapes.head()
+    dna.joint_names = [*dna.joint_names, "neck", "jaw"]
+    dna.joint_parents = [0, 0, 0, 1]
+    head = np.asarray(dna.neutral_joint_translations)[1]
+    dna.neutral_joint_translations = [[0, 0, 0], head, [0, -12, 0], np.array([0, 0, -2]) - head]
+    dna.neutral_joint_rotations = np.zeros((4, 3))
+    dna.lod_joint_mapping = [range(4)]
+    dna.joint_row_count = 36
+    jaw = list(dna.raw_control_names).index("CTRL_expressions.jawOpen")
+    dna.joint_groups = [
+        risorius.JointGroup(
+            lods=[1], input_indices=[jaw], output_indices=[3 * 9 + 3], joint_indices=[3],
+            values=np.degrees([[0.3]]),
+        )
+    ]  # fmt: skip
+    mesh = dna.meshes[0]
+    low = positions[:, 1] < -9
+    weights = np.zeros((len(positions), 4))
+    weights[:, 1] = 1
+    weights[low] = [0, 0.5, 0.5, 0]
+    vertex, joint = np.nonzero(weights)
+    mesh.skin_offsets = np.concatenate([[0], np.cumsum((weights > 0).sum(axis=1))])
+    mesh.skin_weights, mesh.skin_joint_indices = weights[vertex, joint], joint
+    mesh.maximum_influence_per_vertex = 2
+    dna.meshes = [mesh]
+    before = {name: posed(dna, {name: 1}) for name in ("jawOpen", "mouthCornerPullL")}
+    rig = make_joint_rig(dna, RigOptions(FitOptions(joints=24, rounds=8)))
+    rows = shape_weights(rig.dna.meshes[0], len(rig.dna.joint_names))
+    assert np.allclose(rows[low, 2], 0.5, atol=1e-3)
+    assert np.allclose(rows[~low, 2], 0)
+    kept = [g for g in rig.dna.joint_groups if 3 in list(g.joint_indices)]
+    assert len(kept) == 1
+    at = list(kept[0].output_indices).index(30), list(kept[0].input_indices).index(jaw)
+    assert kept[0].values[at] == pytest.approx(np.degrees(0.3))
+    for name, goal in before.items():
+        error = np.linalg.norm(posed(rig.dna, {name: 1}) - goal, axis=1)
+        assert error.max() * 1000 < 0.0505
+
+
+def shape_weights(mesh, joints):
+    out = np.zeros((len(mesh.positions), joints))
+    vertex = np.repeat(np.arange(len(out)), np.diff(mesh.skin_offsets.astype(int)))
+    out[vertex, mesh.skin_joint_indices] = mesh.skin_weights
+    return out
+
+
+@pytest.mark.parametrize(
+    ("name", "controls"),
+    [
+        ("jawOpen", ["jawOpen"]),
+        ("eyeBlink_L", ["eyeBlinkL"]),
+        ("EyeBlinkRight", ["eyeBlinkR"]),
+        ("browInnerUp", ["browRaiseInL", "browRaiseInR"]),
+        ("AU12", ["mouthCornerPullL", "mouthCornerPullR"]),
+        ("AU12_L", ["mouthCornerPullL"]),
+        ("Left_Smile", ["mouthCornerPullL"]),
+        ("CTRL_expressions_noseWrinkleL", []),
+        ("noseWrinkleL", ["noseWrinkleL"]),
+        ("grumpy", []),
+    ],
+)
+def test_names_are_guessed(name, controls):
+    assert matching.guess(name) == controls
+
+
+def test_a_control_belongs_to_one_expression():
+    found = matching.assign(["blinkLeft", "eyeBlinkLeft", "odd one"], {"eyeBlinkLeft": "eyeBlinkL"})
+    assert found == {
+        "blinkLeft": ["blinkLeft"],
+        "eyeBlinkLeft": ["eyeBlinkL"],
+        "odd one": ["odd_one"],
+    }
+
+
+def test_a_sum_of_both_sides_is_split_softly():
+    positions, faces = face_shapes.head()
+    mesh = shape_face.ObjMesh(positions, np.zeros((0, 2)), [list(f) for f in faces])
+    whole = face_shapes.bump(positions, 0, 5, 6)[:, None] * [0, 1.0, 0]
+    shapes = shape_face.ShapeSet("x", mesh, {"browInnerUp": whole})
+    dna = shape_face.make_shape_face(shapes, {"browInnerUp": ["browRaiseInL", "browRaiseInR"]})
+    halves = np.zeros((2, *whole.shape))
+    for target in dna.meshes[0].blend_shape_targets:
+        halves[target.blend_shape_channel_index, target.vertex_indices] = target.deltas
+    assert np.allclose(halves.sum(axis=0), whole, atol=1e-5)
+    assert not halves[0][positions[:, 0] < -1].any()  # the left of the character is +x
+    assert not halves[1][positions[:, 0] > 1].any()
+
+
+def refused(*arguments):
+    done = command_line.run("author", *arguments, text=True)
+    assert done.returncode == 1, done.stdout
+    assert done.stderr.count("\n") == 1
+    return done.stderr
+
+
+def test_bad_input_is_one_sentence(tmp_path):
+    path = face_shapes.write_all(tmp_path / "a")
+    out = tmp_path / "out.dna"
+    positions, faces = face_shapes.head()
+    bad = path.parent / "shapes" / "bad.obj"
+    face_shapes.write_obj(bad, positions[:-1], faces)
+    assert "bad.obj: 506 vertices were expected" in refused(path, "-o", out)
+    bad.write_text("v 1 2 nan\n", encoding="utf-8")
+    assert "bad.obj: line 1: 3 finite numbers" in refused(path, "-o", out)
+    bad.unlink()
+    neutral = path.parent / "neutral.obj"
+    text = neutral.read_text(encoding="utf-8")
+    neutral.write_text(text + "f 1 2 9999\n", encoding="utf-8")
+    assert "vertex 9999 of 506 is not there" in refused(path, "-o", out)
+    neutral.write_text(text, encoding="utf-8")
+    plain = path.read_text(encoding="utf-8")
+    for change, words in (
+        ("[joint]\n", "joint: one of name, source, joints, shapes, controls was expected"),
+        ("number = 3\n", "joints.number: one of count"),
+        ("rounds = 1.5\n", "joints.rounds: 1.5 is of another kind"),
+        ("influences = 99\n", "1 to 16 were expected, found 99"),
+    ):
+        path.write_text(plain + change, encoding="utf-8")
+        assert words in refused(path, "-o", out)
+    path.write_text('[source]\ndna = "nowhere.dna"\n', encoding="utf-8")
+    assert "nowhere.dna" in refused(path, "-o", out)
+    path.write_text("[source]\n", encoding="utf-8")
+    assert "either dna or neutral was expected" in refused(path, "-o", out)
+    assert not out.exists()
+
+
+def test_nothing_that_moves_is_refused_and_oddities_are_named(tmp_path):
+    path = face_shapes.write_all(tmp_path / "a")
+    positions, faces = face_shapes.head()
+    shapes = path.parent / "shapes"
+    smile = face_shapes.expressions(positions)["mouthSmileLeft"]
+    face_shapes.write_obj(shapes / "again.obj", positions + smile, faces)
+    face_shapes.write_obj(shapes / "baked.obj", positions + np.array([0, 3, 0]), faces)
+    face_shapes.write_obj(shapes / "still.obj", positions, faces)
+    face_shapes.write_obj(shapes / "tall.obj", positions * 10, faces)
+    said = command_line.run("author", path, "--names", text=True).stdout
+    for words in (
+        "mouthSmileLeft is the same as again",
+        "baked moves the whole mesh",
+        "still moves nothing",
+        "tall is far from the neutral mesh",
+    ):
+        assert words in said
+    for file in shapes.glob("*.obj"):
+        face_shapes.write_obj(file, positions, faces)
+    assert "no expression moves a vertex" in refused(path, "-o", tmp_path / "out.dna")
+
+
+def test_progress_can_stop_it(folder):
+    dna, _, _ = spec.read_face(spec.read_spec(folder / "spec.toml"))
+    shares = []
+
+    def tell(share):
+        shares.append(share)
+        return len(shares) < 3
+
+    with pytest.raises(risorius.DnaError, match="stopped"):
+        make_joint_rig(dna, RigOptions(FitOptions(joints=10)), tell)
+    assert len(shares) == 3
+
+    def fail(_share):
+        raise KeyError("mine")
+
+    with pytest.raises(KeyError, match="mine"):
+        make_joint_rig(dna, RigOptions(FitOptions(joints=10)), fail)
