@@ -23,7 +23,7 @@ using detail::Vec3;
 
 constexpr int kRoundsOfWeights = 8;
 /// Of the mean square of motion: as smooth as Dem Bones leaves weights with its own default.
-constexpr double kSmoothness = 0.045;
+constexpr double kSmoothness = 0.18;
 
 void find_neighbours(const std::vector<Edge>& edges, Problem& problem) {
   std::vector<std::uint32_t>& first = problem.first_neighbour;
