@@ -160,6 +160,45 @@ def test_joints_that_are_there_stay(folder):
         assert error.max() * 1000 < 0.0505
 
 
+def test_a_coarser_mesh_hangs_on_the_same_joints(folder):
+    """The mesh of LOD 1 has every second row and column, and shapes of its own."""
+    dna, _, _ = spec.read_face(spec.read_spec(folder / "spec.toml"))
+    positions, _ = face_shapes.head()
+    grid = np.arange(len(positions)).reshape(face_shapes.DOWN, face_shapes.ACROSS)[::3, ::2]
+    kept = grid.ravel()
+    corner = np.arange(len(kept)).reshape(grid.shape)
+    faces = np.stack(
+        [corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]], axis=-1
+    ).reshape(-1, 4)
+    coarse = shape_face.ObjMesh(positions[kept], np.zeros((0, 2)), faces.tolist())
+    moved = {n: d[kept] for n, d in sorted(face_shapes.expressions(positions).items())}
+    other = shape_face.make_shape_face(
+        shape_face.ShapeSet("coarse", coarse, moved), {n: [NAMES[n]] for n in moved}
+    )
+    assert other.raw_control_names == dna.raw_control_names
+    dna.lod_count = 2
+    dna.meshes = [dna.meshes[0], other.meshes[0]]
+    dna.mesh_names = ["fine", "coarse"]
+    dna.lod_mesh_mapping = [[0], [1]]
+    dna.lod_joint_mapping = [[0, 1]] * 2
+    dna.lod_blend_shape_mapping = [range(7)] * 2
+    channels = dna.blend_shape_channels
+    channels.lods = [7, 7]
+    dna.blend_shape_channels = channels
+    rig = make_joint_rig(dna, RigOptions(FitOptions(joints=40), tolerance_mm=None)).dna
+    assert [error.name for error in make_joint_rig(dna, RigOptions(FitOptions(9))).errors] == [
+        "fine"
+    ]
+    names = list(rig.raw_control_names)
+    for expression, delta in moved.items():
+        values = np.zeros(len(names), np.float32)
+        values[names.index("CTRL_expressions." + NAMES[expression])] = 1
+        pose = risorius.Rig(rig).evaluate(values, lod=1)
+        goal = oracle.to_blender(rig, positions[kept] + delta)
+        error = np.linalg.norm(oracle.vertices(rig, 1, pose) - goal, axis=1)
+        assert error.max() < 0.1 * np.linalg.norm(delta, axis=1).max() * METRES
+
+
 def shape_weights(mesh, joints):
     out = np.zeros((len(mesh.positions), joints))
     vertex = np.repeat(np.arange(len(out)), np.diff(mesh.skin_offsets.astype(int)))
