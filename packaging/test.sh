@@ -79,7 +79,7 @@ run_fuzzers() { # run_fuzzers SECONDS
 # lane waits for them, and does what needs no wheel meanwhile.
 build_libraries() {
   step "native libraries"
-  check "native libraries" build_preset tests risorius_dna_file risorius_edit risorius_clip
+  check "native libraries" build_preset tests risorius_dna_file risorius_edit risorius_clip risorius_author
   flock -u 9 # lets the python lane go on
 }
 native_lane() {
