@@ -464,20 +464,20 @@ def test_a_face_speaks_and_is_heard(rig, voice):
 
 def test_speech_beside_blender_is_the_same_and_can_be_cancelled(rig, voice, tmp_path):
     listening = scene.submodule("scene.animation.speech_task")
-    task = listening.Task(str(voice), WORDS, seed=3)
+    task = listening.SpeechTask(str(voice), WORDS, seed=3)
     task.start()
     task.wait()
     clip = speech.speak(str(voice), WORDS, seed=3)
     assert task.error is None
-    np.testing.assert_array_equal(task.clip.curves, clip.curves)
-    ended = listening.Task(str(voice), WORDS)
+    np.testing.assert_array_equal(task.result.curves, clip.curves)
+    ended = listening.SpeechTask(str(voice), WORDS)
     ended.cancel()
     ended.run()
     assert type(ended.error).__name__ == "CancelledError"
-    assert ended.clip is None
+    assert ended.result is None
     # Nothing ever comes out of this file; the process that reads it is ended all the same.
     os.mkfifo(tmp_path / "endless.wav")
-    stuck = listening.Task(str(tmp_path / "endless.wav"), WORDS)
+    stuck = listening.SpeechTask(str(tmp_path / "endless.wav"), WORDS)
     stuck.start()
     assert stuck.is_running()
     stuck.cancel()

@@ -26,7 +26,7 @@ from .ui import (
 from .ui.about import manual, preferences, timing_overlay
 from .ui.animation import operators as animation_operators
 from .ui.face import channel_preview, paste_flipped
-from .ui.file import import_operators
+from .ui.file import import_operators, rig_operators
 from .ui.file import operators as file_operators
 from .ui.live import properties as live_properties
 
@@ -93,6 +93,8 @@ def register() -> None:
     bpy.types.TOPBAR_MT_file_import.append(animation_operators.draw_import)
     bpy.types.TOPBAR_MT_file_export.append(file_operators.draw_export)
     bpy.types.VIEW3D_MT_add.append(import_operators.draw_add)
+    bpy.types.MESH_MT_shape_key_context_menu.append(rig_operators.draw_make_rig)
+    bpy.types.VIEW3D_MT_object.append(rig_operators.draw_make_rig)
     trouble = native.problem()
     manual.register()
     for sentence in (trouble, compat.notice()):
@@ -122,6 +124,8 @@ def unregister() -> None:
     handlers.unregister()
     manual.unregister()
     timing_overlay.stop()
+    bpy.types.VIEW3D_MT_object.remove(rig_operators.draw_make_rig)
+    bpy.types.MESH_MT_shape_key_context_menu.remove(rig_operators.draw_make_rig)
     bpy.types.VIEW3D_MT_add.remove(import_operators.draw_add)
     bpy.types.TOPBAR_MT_file_export.remove(file_operators.draw_export)
     bpy.types.TOPBAR_MT_file_import.remove(animation_operators.draw_import)

@@ -9,7 +9,7 @@ import platform
 import subprocess
 import sys
 import tempfile
-import threading
+from collections.abc import Callable
 from importlib.machinery import PathFinder
 from pathlib import Path
 
@@ -18,62 +18,24 @@ import bpy
 from ... import native
 from ...logic.animation import recogniser
 from ...logic.base.errors import FaceError
+from ..base.task import Task
 
 
-class Task:
-    """A clip of speech on its way.
-
-    Attributes:
-        share: 0 to 1, how far it is.
-        clip: risorius.Clip when it is done.
-        error: what went wrong, or None.
-    """
+class SpeechTask(Task["native.Clip"]):
+    """A clip of speech on its way, made by a process."""
 
     def __init__(self, path: str, transcript: str | None, **options: object) -> None:
         """Args: as of risorius.speech.speak."""
-        self.share = 0.0
-        self.clip: native.Clip | None = None
-        self.error: Exception | None = None
-        self._arguments = (path, transcript or None)
-        self._options = options
-        self._cancelled = threading.Event()
-        self._thread = threading.Thread(target=self.run, daemon=True)
         folder = str(packages_folder())
         if folder not in sys.path:
             sys.path.append(folder)  # the process looks for packages where this one does
 
-    def start(self) -> None:
-        """Begin in a thread, which waits for the process and touches nothing of Blender's."""
-        self._thread.start()
-
-    def run(self) -> None:
-        """Do it now, waiting in this thread."""
-        try:
-            self.clip = native.part("speech.apart").speak_apart(
-                *self._arguments,
-                progress=self._progress,
-                cancel=self._cancelled.is_set,
-                **self._options,
+        def work(progress: Callable[[float], None], cancelled: Callable[[], bool]) -> native.Clip:
+            return native.part("speech.apart").speak_apart(
+                path, transcript or None, progress=progress, cancel=cancelled, **options
             )
-        except Exception as error:  # noqa: BLE001  a thread's error is told by who waits for it
-            self.error = error
 
-    def _progress(self, share: float) -> None:
-        self.share = float(share)
-
-    def is_running(self) -> bool:
-        """Whether the thread still works."""
-        return self._thread.is_alive()
-
-    def wait(self) -> None:
-        """Until the thread ends."""
-        if self.is_running():
-            self._thread.join()
-
-    def cancel(self) -> None:
-        """End the process, and wait for that."""
-        self._cancelled.set()
-        self.wait()
+        super().__init__(work)
 
 
 def has_recogniser() -> bool:

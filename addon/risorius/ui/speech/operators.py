@@ -14,6 +14,7 @@ from ...scene.animation import clip_actions, speech_task
 from .. import words
 from ..animation.operators import SOUNDS
 from ..animation.place_clip import PlacesClip
+from ..beside import RunsBeside
 from ..blender_types import Context, ImportHelper, Operator, Result
 from ..common import explain, face_rig
 
@@ -22,7 +23,7 @@ _MISSING = (
 )
 
 
-class RISORIUS_OT_speak(PlacesClip, Operator, ImportHelper):
+class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
     """Let the active face say what is heard in a sound file; better with the words typed in"""
 
     bl_idname = "risorius.speak"
@@ -56,7 +57,7 @@ class RISORIUS_OT_speak(PlacesClip, Operator, ImportHelper):
     )
 
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:
-        self._asynchronous = not bpy.app.background
+        self.wait_beside()
         self.start_with(context.scene)
         if self.properties.is_property_set("filepath"):
             return self.execute(context)
@@ -70,7 +71,7 @@ class RISORIUS_OT_speak(PlacesClip, Operator, ImportHelper):
         if self.transcript_text and text is None:
             self.report({"ERROR"}, words.say("There is no text {name}.", name=self.transcript_text))
             return {"CANCELLED"}
-        self._task = speech_task.Task(
+        self._task = speech_task.SpeechTask(
             self.filepath,
             text.as_string() if text is not None else self.transcript,
             intensity=self.intensity,
@@ -81,58 +82,28 @@ class RISORIUS_OT_speak(PlacesClip, Operator, ImportHelper):
             rate=clip_actions.frame_rate(context.scene) if self.use_whole_frames else 60.0,
         )
         self._face = face_rig(context).session_uid
-        # Adjusting the last operation calls this again, on the same operator.
-        asynchronous, self._asynchronous = getattr(self, "_asynchronous", False), False
-        if not asynchronous:
-            self._task.run()
-            return self._finish(context)
-        self._task.start()
-        manager = context.window_manager
-        manager.progress_begin(0, 100)
-        self._timer = manager.event_timer_add(0.1, window=context.window)
-        manager.modal_handler_add(self)
-        return {"RUNNING_MODAL"}
+        return self.begin(context, self._task)
 
-    def modal(self, context: Context, event: bpy.types.Event) -> Result:
-        if event.type == "ESC":
-            self.cancel(context)
-            self.report({"WARNING"}, words.say("Speech was cancelled."))
-            return {"CANCELLED"}
-        if event.type == "TIMER":
-            share = round(self._task.share * 100)
-            context.window_manager.progress_update(share)
-            name = Path(self.filepath).name
-            text = words.say("Listening to {name}: {share} %, Esc cancels", name=name, share=share)
-            context.workspace.status_text_set(text)
-            if not self._task.is_running():
-                self._end(context)
-                return self._finish(context)
-        return {"PASS_THROUGH"}
+    def shown(self, share: int) -> str:
+        name = Path(self.filepath).name
+        return words.say("Listening to {name}: {share} %, Esc cancels", name=name, share=share)
 
-    def cancel(self, context: Context) -> None:
-        """Blender calls this too, when it closes."""
-        self._task.cancel()
-        self._end(context)
+    def cancelled_text(self) -> str:
+        return words.say("Speech was cancelled.")
 
-    def _end(self, context: Context) -> None:
-        manager = context.window_manager
-        manager.event_timer_remove(self._timer)
-        manager.progress_end()
-        context.workspace.status_text_set(None)
-
-    def _finish(self, context: Context) -> Result:
+    def finish(self, context: Context) -> Result:
         """Put what was made onto the face. It may have gone while the thread worked."""
         task = self._task
         try:
-            if task.clip is None:
+            if task.result is None:
                 raise task.error or FaceError("nothing was heard")
             if not type(self).poll(context) or face_rig(context).session_uid != self._face:
                 text = "The face that was to speak is no longer the active one: speak again."
                 self.report({"ERROR"}, words.say(text))
                 return {"CANCELLED"}
-            notes = [n for n in task.clip.metadata.get("notes", "").split("; ") if n]
+            notes = [n for n in task.result.metadata.get("notes", "").split("; ") if n]
             name = Path(self.filepath).stem
-            self.place(context, task.clip, name, notes, whole=self.use_whole_frames)
+            self.place(context, task.result, name, notes, whole=self.use_whole_frames)
         except native.user_errors() as error:
             self.report({"ERROR"}, explain(self.filepath, error))
             return {"CANCELLED"}

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators whose work goes on beside Blender: progress in the status bar, Esc cancels."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import bpy
+
+from ..scene.base.task import Task
+from .blender_types import Context, Result
+
+if TYPE_CHECKING:
+    from .blender_types import Operator as _Base
+else:
+    _Base = object
+
+
+class RunsBeside(_Base):
+    """For an operator: what `finish`, `shown` and `cancelled_text` say is theirs.
+
+    In background mode, and where the last operation is adjusted, it waits instead.
+    """
+
+    def wait_beside(self) -> None:
+        """Called by invoke: a person is there who may go on working."""
+        self._beside = not bpy.app.background
+
+    def begin(self, context: Context, task: Task) -> Result:
+        """Start the task, or do it now.
+
+        Args:
+            context: with a window, where there is one.
+            task: of which the operator knows more.
+        """
+        self._running = task
+        # Adjusting the last operation calls this again, on the same operator.
+        beside, self._beside = getattr(self, "_beside", False), False
+        if not beside:
+            task.run()
+            return self.finish(context)
+        task.start()
+        manager = context.window_manager
+        manager.progress_begin(0, 100)
+        self._timer = manager.event_timer_add(0.1, window=context.window)
+        manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: Context, event: bpy.types.Event) -> Result:
+        """Blender calls this with each event of the context's window."""
+        if event.type == "ESC":
+            self.cancel(context)
+            self.report({"WARNING"}, self.cancelled_text())
+            return {"CANCELLED"}
+        if event.type == "TIMER":
+            share = round(self._running.share * 100)
+            context.window_manager.progress_update(share)
+            context.workspace.status_text_set(self.shown(share))
+            if not self._running.is_running():
+                self._end(context)
+                return self.finish(context)
+        return {"PASS_THROUGH"}
+
+    def cancel(self, context: Context) -> None:
+        """Blender calls this too, when it closes."""
+        self._running.cancel()
+        self._end(context)
+
+    def _end(self, context: Context) -> None:
+        manager = context.window_manager
+        manager.event_timer_remove(self._timer)
+        manager.progress_end()
+        context.workspace.status_text_set(None)
+
+    def finish(self, context: Context) -> Result:
+        """What is done with the task's result, or its error."""
+        raise NotImplementedError
+
+    def shown(self, share: int) -> str:
+        """What the status bar says. Args: share  per cent that is done."""
+        raise NotImplementedError
+
+    def cancelled_text(self) -> str:
+        """What is reported after Esc."""
+        raise NotImplementedError

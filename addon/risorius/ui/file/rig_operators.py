@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Blender takes properties where Python has annotations:
+# pyright: reportInvalidTypeForm=false
+"""A head with shape keys becomes a face: joints that do what its shapes did."""
+
+from typing import cast
+
+import bpy
+
+from ... import native
+from ...scene.base import parts
+from ...scene.base.blender_types import MeshObject
+from ...scene.character import build
+from ...scene.file import shape_key_head
+from .. import words
+from ..beside import RunsBeside
+from ..blender_types import Context, ExportHelper, Menu, Operator, Result
+from ..common import explain, usable
+from .import_operators import import_character
+
+
+class RISORIUS_OT_make_rig(RunsBeside, Operator, ExportHelper):
+    """Make a face of joints from the active mesh and its shape keys, and write it as a DNA file"""
+
+    bl_idname = "risorius.make_rig"
+    bl_label = "Make Rig from Shape Keys"
+    bl_options = {"REGISTER", "UNDO"}
+
+    filename_ext = ".dna"
+    filter_glob: bpy.props.StringProperty(default="*.dna", options={"HIDDEN"})
+    joints: bpy.props.IntProperty(
+        name="Joints", description="How many are made", default=120, min=2, max=1000
+    )
+    use_shapes: bpy.props.BoolProperty(
+        name="Keep Shapes",
+        description="What the joints leave of a shape stays as a blend shape",
+        default=True,
+    )
+    tolerance: bpy.props.FloatProperty(
+        name="Tolerance",
+        description="Millimetres that joints may be off before a blend shape helps",
+        default=0.1,
+        min=0.0,
+        max=10.0,
+    )
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        if not usable(cls):
+            return False
+        if not shape_key_head.usable_head(context.active_object):
+            cls.poll_message_set(words.say("Select a mesh with shape keys that is no face yet."))
+            return False
+        return True
+
+    def invoke(self, context: Context, event: bpy.types.Event) -> Result:
+        self.wait_beside()
+        if not self.filepath and context.active_object is not None:
+            self.filepath = shape_key_head.name_of(context.active_object)
+        return ExportHelper.invoke(self, context, event)
+
+    def execute(self, context: Context) -> Result:
+        item = cast(MeshObject, context.active_object)
+        try:
+            shapes = shape_key_head.shapes_of(context, item)
+        except native.user_errors() as error:
+            self.report({"ERROR"}, words.of_error(error))
+            return {"CANCELLED"}
+        self._head = item.name
+        tolerance = self.tolerance if self.use_shapes else None
+        task = shape_key_head.rig_task(shapes, self.filepath, self.joints, tolerance)
+        self._task = task
+        return self.begin(context, task)
+
+    def shown(self, share: int) -> str:
+        return words.say("Finding joints: {share} %, Esc cancels", share=share)
+
+    def cancelled_text(self) -> str:
+        return words.say("No rig was made.")
+
+    def finish(self, context: Context) -> Result:
+        """Import what was written; the head stays, and lends its materials."""
+        task = self._task
+        try:
+            if task.result is None:
+                raise task.error or RuntimeError("nothing was made")
+        except native.user_errors() as error:
+            self.report({"ERROR"}, explain(self.filepath, error))
+            return {"CANCELLED"}
+        rig, odd = task.result
+        before = set(bpy.data.objects)
+        options = build.BuildOptions(materials=False)
+        if import_character(self, context, self.filepath, options, True) != {"FINISHED"}:
+            return {"CANCELLED"}
+        self._lend_materials(before)
+        for sentence in odd[:5]:
+            self.report({"WARNING"}, sentence)
+        largest = max(float(errors.largest.max()) for errors in rig.errors)
+        self.report(
+            {"INFO"},
+            words.say(
+                "{count} joints; no vertex is further off than {mm} mm",
+                count=len(rig.new_joints),
+                mm=f"{largest:.2f}",
+            ),
+        )
+        return {"FINISHED"}
+
+    def _lend_materials(self, before: set[bpy.types.Object]) -> None:
+        head = bpy.data.objects.get(self._head)
+        fresh = set(bpy.data.objects) - before
+        made = [mesh for o in fresh if parts.is_rig(o) for mesh in parts.meshes_of(o)]
+        if head is not None and made:
+            shape_key_head.take_materials(made[0], cast(MeshObject, head))
+
+    def draw(self, context: Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layout.prop(self, "joints")
+        layout.prop(self, "use_shapes")
+        row = layout.row()
+        row.active = self.use_shapes
+        row.prop(self, "tolerance")
+
+
+def draw_make_rig(self: Menu, _context: Context) -> None:
+    """Entry of the menu beside the list of shape keys, and of Object."""
+    self.layout.separator()
+    self.layout.operator(RISORIUS_OT_make_rig.bl_idname, icon="ARMATURE_DATA")
+
+
+CLASSES = (RISORIUS_OT_make_rig,)
