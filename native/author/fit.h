@@ -62,12 +62,20 @@ using Progress = std::function<bool(double)>;
 core::Result<Fit> fit_joints(const Shapes& shapes, const FitOptions& options,
                              const Progress& progress = {});
 
+/// Weights that a fit of weights begins with: rows as those of Fit, of any sum above 0.
+struct StartWeights {
+  std::size_t influences = 0;
+  std::vector<std::uint16_t> joints;  // [V][influences]
+  std::vector<float> weights;         // [V][influences]
+};
+
 /// Weights of another mesh on joints that move as they do: a coarser level of detail.
 /// In: joints   with the motions of each of the shapes' expressions
 ///     options  influences, smoothness, threads
+///     start    such as those of the finer mesh; empty: all on a joint that rests
 /// Out: a Fit with the given joints alone
-/// Fails: as fit_joints
+/// Fails: as fit_joints; kInvalidLength, kInvalidIndex, kInvalidValue (start)
 core::Result<Fit> fit_weights(const Shapes& shapes, const std::vector<GivenJoint>& joints,
-                              const FitOptions& options);
+                              const FitOptions& options, const StartWeights& start = {});
 
 }  // namespace risorius::author

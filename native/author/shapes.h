@@ -19,6 +19,8 @@ struct Shapes {
   std::vector<float> displacements;
   std::size_t expressions = 0;
   std::vector<Edge> edges;  // of the polygons, each once; a mesh may be in pieces
+  /// [vertices] how much a vertex' squared error counts, more than 0; empty: all alike.
+  std::vector<double> importance;
 
   std::size_t vertex_count() const { return neutral.size(); }
   const float* of_vertex(std::size_t v) const { return displacements.data() + v * expressions * 3; }

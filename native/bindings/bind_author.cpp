@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "author/fit.h"
+#include "author/simplify.h"
 #include "bindings/fields.h"
 
 namespace risorius::bindings {
@@ -15,7 +16,8 @@ using Floats = py::array_t<float, py::array::c_style | py::array::forcecast>;
 using Indices = py::array_t<std::uint32_t, py::array::c_style | py::array::forcecast>;
 
 /// [V, 3], [E, V, 3] and [edges, 2] as Shapes. Raises ValueError where shapes do not agree.
-author::Shapes shapes(const Doubles& neutral, const Floats& displacements, const Indices& edges) {
+author::Shapes shapes(const Doubles& neutral, const Floats& displacements, const Indices& edges,
+                      const Doubles& importance) {
   if (neutral.ndim() != 2 || neutral.shape(1) != 3) shape_error("neutral", "(V, 3)", neutral);
   if (displacements.ndim() != 3 || displacements.shape(1) != neutral.shape(0) ||
       displacements.shape(2) != 3) {
@@ -39,6 +41,7 @@ author::Shapes shapes(const Doubles& neutral, const Floats& displacements, const
   for (py::ssize_t i = 0; i < edges.shape(0); ++i) {
     out.edges.push_back({edges.data()[2 * i], edges.data()[2 * i + 1]});
   }
+  out.importance.assign(importance.data(), importance.data() + importance.size());
   return out;
 }
 
@@ -90,10 +93,11 @@ std::vector<author::GivenJoint> given_joints(const Doubles& positions, const Dou
 }
 
 Fit fit_joints(const Doubles& neutral, const Floats& displacements, const Indices& edges,
-               const Doubles& positions, const Doubles& rotations, const Doubles& translations,
-               std::size_t joints, std::size_t influences, double smoothness, double emphasis,
-               std::size_t rounds, bool symmetric, std::size_t threads, py::object progress) {
-  const author::Shapes input = shapes(neutral, displacements, edges);
+               const Doubles& importance, const Doubles& positions, const Doubles& rotations,
+               const Doubles& translations, std::size_t joints, std::size_t influences,
+               double smoothness, double emphasis, std::size_t rounds, bool symmetric,
+               std::size_t threads, py::object progress) {
+  const author::Shapes input = shapes(neutral, displacements, edges, importance);
   author::FitOptions options;
   options.joints = joints;
   options.influences = influences;
@@ -113,18 +117,27 @@ Fit fit_joints(const Doubles& neutral, const Floats& displacements, const Indice
 }
 
 Fit fit_weights(const Doubles& neutral, const Floats& displacements, const Indices& edges,
-                const Doubles& positions, const Doubles& rotations, const Doubles& translations,
-                std::size_t influences, double smoothness, bool symmetric, std::size_t threads) {
-  const author::Shapes input = shapes(neutral, displacements, edges);
+                const Doubles& importance, const Doubles& positions, const Doubles& rotations,
+                const Doubles& translations, const Indices& start_joints,
+                const Floats& start_weights, std::size_t influences, double smoothness,
+                bool symmetric, std::size_t threads) {
+  const author::Shapes input = shapes(neutral, displacements, edges, importance);
   author::FitOptions options;
   options.influences = influences;
   options.smoothness = smoothness;
   options.symmetric = symmetric;
   options.threads = threads;
   const auto joints = given_joints(positions, rotations, translations, input.expressions);
+  author::StartWeights start;
+  if (start_joints.ndim() != 2 || start_weights.ndim() != 2) {
+    shape_error("start", "(V, n)", start_joints);
+  }
+  start.influences = static_cast<std::size_t>(start_joints.shape(1));
+  start.joints.assign(start_joints.data(), start_joints.data() + start_joints.size());
+  start.weights.assign(start_weights.data(), start_weights.data() + start_weights.size());
   auto result = [&] {
     const py::gil_scoped_release released;
-    return author::fit_weights(input, joints, options);
+    return author::fit_weights(input, joints, options, start);
   }();
   return unwrap(std::move(result));
 }
@@ -148,6 +161,39 @@ py::array_t<T> rows(const std::vector<T>& values, std::size_t width) {
       {static_cast<py::ssize_t>(values.size() / width), static_cast<py::ssize_t>(width)});
   std::copy(values.begin(), values.end(), out.mutable_data());
   return out;
+}
+
+/// uint32[n, 3] triangles and the error: see risorius.author.simplify.
+py::tuple simplify(const Floats& positions, const Floats& attributes, const Indices& triangles,
+                   std::size_t count) {
+  if (positions.ndim() != 2 || positions.shape(1) != 3)
+    shape_error("positions", "(C, 3)", positions);
+  if (attributes.ndim() != 2 || attributes.shape(0) != positions.shape(0)) {
+    shape_error("attributes", "(C, n)", attributes);
+  }
+  if (triangles.ndim() != 2 || triangles.shape(1) != 3)
+    shape_error("triangles", "(n, 3)", triangles);
+  author::Surface surface;
+  surface.positions.resize(static_cast<std::size_t>(positions.shape(0)));
+  for (std::size_t c = 0; c < surface.positions.size(); ++c) {
+    std::copy_n(positions.data() + 3 * c, 3, surface.positions[c].begin());
+  }
+  surface.attribute_count = static_cast<std::size_t>(attributes.shape(1));
+  surface.attributes.assign(attributes.data(), attributes.data() + attributes.size());
+  for (py::ssize_t t = 0; t < triangles.shape(0); ++t) {
+    const std::uint32_t* at = triangles.data() + 3 * t;
+    surface.triangles.push_back({at[0], at[1], at[2]});
+  }
+  auto result = [&] {
+    const py::gil_scoped_release released;
+    return author::simplify(surface, count);
+  }();
+  const author::Simplified out = unwrap(std::move(result));
+  py::array_t<std::uint32_t> found(
+      {static_cast<py::ssize_t>(out.triangles.size()), py::ssize_t{3}});
+  std::uint32_t* to = found.mutable_data();
+  for (const author::Triangle& t : out.triangles) to = std::copy(t.begin(), t.end(), to);
+  return py::make_tuple(found, out.error);
 }
 
 }  // namespace
@@ -180,14 +226,17 @@ void bind_author(py::module_& m) {
           [](const Fit& f) { return motions(f, &author::JointMotion::translation); },
           "float64[E, J, 3]: shifts of the joint.");
   m.def("fit_joints", &fit_joints, py::arg("neutral"), py::arg("displacements"), py::arg("edges"),
-        py::arg("positions"), py::arg("rotations"), py::arg("translations"), py::kw_only(),
-        py::arg("joints"), py::arg("influences"), py::arg("smoothness"), py::arg("emphasis"),
-        py::arg("rounds"), py::arg("symmetric"), py::arg("threads"), py::arg("progress"),
-        "JointFit: see risorius.author.fitting.");
+        py::arg("importance"), py::arg("positions"), py::arg("rotations"), py::arg("translations"),
+        py::kw_only(), py::arg("joints"), py::arg("influences"), py::arg("smoothness"),
+        py::arg("emphasis"), py::arg("rounds"), py::arg("symmetric"), py::arg("threads"),
+        py::arg("progress"), "JointFit: see risorius.author.fitting.");
   m.def("fit_weights", &fit_weights, py::arg("neutral"), py::arg("displacements"), py::arg("edges"),
-        py::arg("positions"), py::arg("rotations"), py::arg("translations"), py::kw_only(),
-        py::arg("influences"), py::arg("smoothness"), py::arg("symmetric"), py::arg("threads"),
+        py::arg("importance"), py::arg("positions"), py::arg("rotations"), py::arg("translations"),
+        py::arg("start_joints"), py::arg("start_weights"), py::kw_only(), py::arg("influences"),
+        py::arg("smoothness"), py::arg("symmetric"), py::arg("threads"),
         "JointFit with these joints: see risorius.author.fitting.");
+  m.def("simplify", &simplify, py::arg("positions"), py::arg("attributes"), py::arg("triangles"),
+        py::arg("count"), "See risorius.author.simplify.");
 }
 
 }  // namespace risorius::bindings

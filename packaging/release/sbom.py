@@ -87,9 +87,15 @@ def of_others() -> list[Component]:
     assert digest is not None
     xxhash, json = installed("libxxhash-dev"), installed("nlohmann-json3-dev")
     eigen = installed("libeigen3-dev")
+    recipe = (PROJECT / "native/author/meshoptimizer.cmake").read_text(encoding="utf-8")
+    meshes = re.search(r"set\(version (\S+)\)", recipe)
+    assert meshes is not None
     return [
         component("xxhash", xxhash, "BSD-2-Clause", f"pkg:deb/debian/libxxhash-dev@{xxhash}"),
         component("Eigen", eigen, "MPL-2.0", f"pkg:deb/debian/libeigen3-dev@{eigen}"),
+        component(
+            "meshoptimizer", meshes.group(1), "MIT", f"pkg:pypi/meshoptimizer@{meshes.group(1)}"
+        ),
         component("nlohmann-json", json, "MIT", f"pkg:deb/debian/nlohmann-json3-dev@{json}"),
         component("pybind11", binding, "BSD-3-Clause", f"pkg:pypi/pybind11@{binding}"),
         component(

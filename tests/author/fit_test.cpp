@@ -217,6 +217,58 @@ TEST(Fit, AnotherMeshHangsOnTheSameJoints) {
   EXPECT_LT(largest_error(shapes, *fit), 0.004);
 }
 
+TEST(Fit, WhatIsMoreImportantComesNearer) {
+  Shapes shapes = two_sides();
+  FitOptions options = few(5);
+  options.symmetric = false;
+  options.emphasis = 0.0;
+  const auto left_error = [&] {
+    auto fit = fit_joints(shapes, options);
+    EXPECT_TRUE(fit) << fit.error().describe();
+    Shapes left = shapes;
+    for (std::size_t v = 0; v < left.vertex_count(); ++v) {
+      if (left.neutral[v][0] > 0.0) continue;
+      // What lies on the right is not looked at.
+      for (std::size_t e = 0; e < left.expressions; ++e) {
+        for (std::size_t k = 0; k < 3; ++k) at(left, v, e, k) = 0.0f;
+      }
+      for (std::size_t i = 0; i < fit->influences; ++i) {
+        fit->weight_joints[v * fit->influences + i] = 0;
+      }
+    }
+    return largest_error(left, *fit);
+  };
+  const double alike = left_error();
+  for (const Vector3& p : shapes.neutral) shapes.importance.push_back(p[0] > 0.0 ? 1.0 : 1e-4);
+  EXPECT_LT(left_error(), 0.8 * alike);
+}
+
+TEST(Fit, WeightsGoOnFromThoseOfTheFinerMesh) {
+  const Shapes shapes = two_sides();
+  auto fit = fit_joints(shapes, few(9));
+  ASSERT_TRUE(fit);
+  std::vector<GivenJoint> joints(fit->joints.size());
+  for (std::size_t j = 1; j < joints.size(); ++j) {  // the first rests
+    joints[j].position = fit->joints[j];
+    const auto first = fit->motions.begin() + static_cast<std::ptrdiff_t>(3 * j);
+    joints[j].motions.assign(first, first + 3);
+  }
+  StartWeights start{fit->influences, fit->weight_joints, fit->weights};
+  auto again = fit_weights(shapes, joints, few(9), start);
+  ASSERT_TRUE(again) << again.error().describe();
+  EXPECT_LT(largest_error(shapes, *again), 1.1 * largest_error(shapes, *fit));
+  start.joints[5] = 9;
+  start.weights[5] = 1.0f;
+  EXPECT_EQ(fit_weights(shapes, joints, few(9), start).error().code,
+            core::ErrorCode::kInvalidIndex);
+  start.weights[5] = -1.0f;
+  EXPECT_EQ(fit_weights(shapes, joints, few(9), start).error().code,
+            core::ErrorCode::kInvalidValue);
+  start.weights.pop_back();
+  EXPECT_EQ(fit_weights(shapes, joints, few(9), start).error().code,
+            core::ErrorCode::kInvalidLength);
+}
+
 TEST(Fit, SaysWhatItCannotUse) {
   const auto says = [](const Shapes& shapes, const FitOptions& options) {
     auto fit = fit_joints(shapes, options);
@@ -232,6 +284,12 @@ TEST(Fit, SaysWhatItCannotUse) {
   shapes = two_sides();
   shapes.edges.push_back({0, 441});
   EXPECT_NE(says(shapes, few(5)).find("vertex 441 of 441"), std::string::npos);
+  shapes = two_sides();
+  shapes.importance.assign(441, 1.0);
+  shapes.importance[9] = 0.0;
+  EXPECT_NE(says(shapes, few(5)).find("importance[9]"), std::string::npos);
+  shapes.importance.pop_back();
+  EXPECT_NE(says(shapes, few(5)).find("found 440"), std::string::npos);
   EXPECT_NE(says(two_sides(), few(1)).find("2 to 4096"), std::string::npos);
   FitOptions options = few(5);
   options.influences = 0;

@@ -22,7 +22,7 @@ SYSTEM = re.compile(
     r"|#include <[\w/]+\.h>"
 )
 # Headers of packages whose source is the same everywhere.
-PACKAGES = re.compile(r"#include <(pybind11/[\w/]+|xxhash)\.h>")
+PACKAGES = re.compile(r"#include <(pybind11/[\w/]+|meshoptimizer/meshoptimizer|xxhash)\.h>")
 
 
 def that_ask(sources, words, folders):

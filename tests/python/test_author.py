@@ -2,15 +2,26 @@
 """Joint rigs from expressions: what the written file does, by a reader of its own, and refusals."""
 
 import importlib.util
+import itertools
 import json
 from pathlib import Path
 
 import command_line
+import dna_bytes
 import face_shapes
 import numpy as np
 import pytest
 import risorius
-from risorius.author import FitOptions, RigOptions, make_joint_rig, matching, shape_face, spec
+from risorius.author import (
+    FitOptions,
+    LodOptions,
+    RigOptions,
+    make_joint_rig,
+    matching,
+    shape_face,
+    spec,
+)
+from risorius.author.simplify import simplified
 
 # Skinning and morphing from the format's description alone; nothing of risorius.author is in it.
 _ORACLE = Path(__file__).parents[2] / "blender_tests" / "support" / "oracle.py"
@@ -78,6 +89,151 @@ def test_the_file_is_sound_and_says_what_moves(made):
     assert {name.split("_")[1] for name in dna.joint_names[2:]} == {"L", "R", "C"}
     assert any(name.startswith("FACIAL_L_Brow") for name in dna.joint_names)
     assert "40 new joints" in said
+
+
+@pytest.fixture(scope="module")
+def read(folder, made):
+    """What was written, by a reader from bytes on that shares nothing with us."""
+    return dna_bytes.Face((folder / "egg.dna").read_bytes())
+
+
+def raw(name, value=1.0):
+    return {"CTRL_expressions." + NAMES[name]: value}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_another_reader_gets_the_same_expression(read, name):
+    positions, _ = face_shapes.head()
+    delta = face_shapes.expressions(positions)[name]
+    error = np.linalg.norm(read.vertices(raw(name)) - positions - delta, axis=1)
+    assert 10 * error.max() < 0.0505  # mm
+
+
+def test_eight_levels_by_another_reader(read, made):
+    """Fewer joints and vertices from level to level, all of them the finer one's, and near it."""
+    _, said = made
+    assert read.lod_count == 8
+    counts = [len(read.geometry[m[0]]["positions"]) for m in read.lod_meshes]
+    assert counts[0] == 506
+    assert counts[1:6] == sorted(set(counts[1:6]), reverse=True)
+    assert counts[5] < 45 >= counts[7]
+    joints = [set(level.tolist()) for level in read.lod_joints]
+    assert all(a >= b for a, b in itertools.pairwise(joints))
+    for level, budget in zip(joints, [40, 32, 24, 18, 12, 8, 5, 4], strict=True):
+        assert budget - 1 <= len(level) - 2 <= budget  # both of a pair or none
+    positions, _ = face_shapes.head()
+    for lod in range(1, 8):
+        mesh = read.geometry[read.lod_meshes[lod][0]]
+        places = np.linalg.norm(mesh["positions"][:, None] - positions, axis=2)
+        assert places.min(axis=1).max() < 1e-5
+        row = next(line for line in said.splitlines() if line.split()[:1] == [str(lod)]).split()
+        assert int(row[2]) == counts[lod]
+        fine = places.argmin(axis=1)
+        far = [
+            np.linalg.norm(read.vertices(raw(name), lod) - (positions + delta)[fine], axis=1).max()
+            for name, delta in face_shapes.expressions(positions).items()
+        ]
+        assert 10 * max(far) == pytest.approx(float(row[-1]), abs=2e-3)
+        assert max(far) < (0.2 if lod < 4 else 0.7)  # cm, of motions up to 3
+
+
+def test_a_coarser_level_keeps_the_rim_and_is_no_fold(read):
+    """The face is open: its rim is still the rim, and no triangle looks the other way."""
+    positions, _ = face_shapes.head()
+    for lod in range(1, 5):
+        mesh = read.geometry[read.lod_meshes[lod][0]]
+        points = mesh["positions"]
+        assert np.allclose(np.ptp(points, axis=0), np.ptp(positions, axis=0), rtol=0.03)
+        corners = points[mesh["layouts"][np.array(mesh["faces"]), 0]]
+        across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        outward = (across * corners.mean(axis=1)).sum(axis=1)
+        assert (np.sign(outward) == np.sign(outward[0])).all()
+
+
+def test_exact_leaves_nothing(folder, tmp_path):
+    out = tmp_path / "exact.dna"
+    assert command_line.run("author", folder / "spec.toml", "-o", out, "--exact").returncode == 0
+    face = dna_bytes.Face(out.read_bytes())
+    positions, _ = face_shapes.head()
+    for name, delta in face_shapes.expressions(positions).items():
+        error = np.linalg.norm(face.vertices(raw(name)) - positions - delta, axis=1)
+        assert np.sqrt((error**2).mean()) < 1e-5 * np.ptp(positions[:, 1])
+
+
+def test_budgets_are_kept(folder, tmp_path):
+    path = tmp_path / "budgets.toml"
+    text = (folder / "spec.toml").read_text(encoding="utf-8")
+    for name in ("neutral.obj", "shapes"):
+        text = text.replace(f'"{name}"', json.dumps((folder / name).as_posix()))
+    path.write_text(text + "[lods]\njoints = [40, 11, 3]\nvertices = [506, 120, 40]\n")
+    out = tmp_path / "budgets.dna"
+    done = command_line.run("author", path, "-o", out, "--joints-only", "--json", text=True)
+    assert done.returncode == 0, done.stderr
+    face = dna_bytes.Face(out.read_bytes())
+    assert face.lod_count == 3
+    for lod, (joints, vertices) in enumerate([(40, 506), (11, 120), (3, 40)]):
+        assert len(face.lod_joints[lod]) - 2 in (joints, joints - 1)  # both of a pair or none
+        assert len(face.geometry[face.lod_meshes[lod][0]]["positions"]) <= vertices
+        assert json.loads(done.stdout)["lods"][lod]["joints"] == len(face.lod_joints[lod]) - 2
+
+
+def test_a_seam_of_the_texture_stays_closed():
+    """Two halves of a sheet with a seam between them: fewer triangles, no gap, the same corners."""
+    n = 12
+    x, y = np.meshgrid(np.arange(2 * n + 1), np.arange(n + 1))
+    positions = np.stack([x.ravel(), y.ravel(), 0.01 * (x * y).ravel()], axis=1).astype(float)
+    uvs = np.concatenate([positions[:, :2] / 24, positions[:, :2] / 24 + [0.5, 0]])
+    corner = np.arange(len(positions)).reshape(x.shape)
+    quads = np.stack(
+        [corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]], axis=-1
+    ).reshape(-1, 4)
+    right = positions[quads].mean(axis=1)[:, 0] > n
+    pairs = np.stack([quads, quads + right[:, None] * len(positions)], axis=-1)
+    layouts, index = np.unique(pairs.reshape(-1, 2), axis=0, return_inverse=True)
+    mesh = risorius.Mesh(
+        positions=positions, texture_coordinates=uvs,
+        normals=np.tile([0.0, 0, 1], (len(positions), 1)),
+        layout_positions=layouts[:, 0], layout_texture_coordinates=layouts[:, 1],
+        layout_normals=layouts[:, 0], face_offsets=4 * np.arange(len(quads) + 1),
+        face_layouts=index.ravel(),
+    )  # fmt: skip
+    bend = np.zeros((1, len(positions), 3))
+    bend[0, :, 2] = np.maximum(0, positions[:, 1] - 8)
+    coarse, kept = simplified(mesh, bend, 60)
+    assert 20 < len(kept) <= 60
+    triangles = np.asarray(coarse.face_layouts, int).reshape(-1, 3)
+    places = np.asarray(coarse.layout_positions, int)[triangles]
+    assert np.array_equal(coarse.positions, positions.astype(np.float32)[kept])
+    flat = np.asarray(coarse.positions)[places][:, :, :2]
+    edges = flat[:, 1:] - flat[:, :1]
+    areas = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
+    assert (areas > 0).all()
+    assert areas.sum() / 2 == pytest.approx(2 * n * n)  # neither hole nor overlap
+    used = np.asarray(coarse.layout_texture_coordinates, int)[triangles]
+    found = np.asarray(coarse.texture_coordinates)[used] * 24 - flat
+    assert np.allclose(found[flat.mean(axis=1)[:, 0] < n], 0, atol=1e-4)
+    assert np.allclose(found[flat.mean(axis=1)[:, 0] > n], [12, 0], atol=1e-4)
+    pairs = np.sort(places[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    _, uses = np.unique(pairs, axis=0, return_counts=True)
+    assert uses.max() == 2
+
+
+def test_a_report_is_one_page(folder, tmp_path):
+    page = tmp_path / "report.html"
+    done = command_line.run(
+        "author", folder / "spec.toml", "-o", tmp_path / "a.dna", "--report", page, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    text = page.read_text(encoding="utf-8")
+    for name in NAMES.values():
+        assert f"<td>{name}</td>" in text
+    assert text.count("<figure") == 4
+    assert "http" not in text.replace("http://www.w3.org", "")
+    other = ("author", folder / "spec.toml", "-o", tmp_path / "b.dna", "--report", "page.txt")
+    done = command_line.run(*other, text=True)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert "a name ending in .html was expected" in done.stderr
+    assert not (tmp_path / "b.dna").exists()
 
 
 def test_joints_alone_come_near(folder, tmp_path):
@@ -186,8 +342,10 @@ def test_a_coarser_mesh_hangs_on_the_same_joints(folder):
     channels.lods = [7, 7]
     dna.blend_shape_channels = channels
     rig = make_joint_rig(dna, RigOptions(FitOptions(joints=40), tolerance_mm=None)).dna
-    assert [error.name for error in make_joint_rig(dna, RigOptions(FitOptions(9))).errors] == [
-        "fine"
+    two = RigOptions(FitOptions(9), lods=LodOptions(count=2))
+    assert [(e.name, e.lod) for e in make_joint_rig(dna, two).errors] == [
+        ("fine", 0),
+        ("coarse", 1),
     ]
     names = list(rig.raw_control_names)
     for expression, delta in moved.items():
@@ -272,10 +430,17 @@ def test_bad_input_is_one_sentence(tmp_path):
     neutral.write_text(text, encoding="utf-8")
     plain = path.read_text(encoding="utf-8")
     for change, words in (
-        ("[joint]\n", "joint: one of name, source, joints, shapes, controls was expected"),
+        ("[joint]\n", "joint: one of name, source, joints, shapes, lods, controls was expected"),
         ("number = 3\n", "joints.number: one of count"),
         ("rounds = 1.5\n", "joints.rounds: 1.5 is of another kind"),
         ("influences = 99\n", "1 to 16 were expected, found 99"),
+        ("[lods]\ncount = 33\n", "lods.count: 1 to 32 was expected, found 33"),
+        ("[lods]\njoints = [40, 50]\n", "lods.joints: numbers that do not grow were expected"),
+        (
+            "[lods]\ncount = 3\nvertices = [5, 4]\n",
+            "lods.vertices: 3 numbers were expected, found 2",
+        ),
+        ("[lods]\njoints = [4, true]\n", "lods.joints: whole numbers were expected"),
     ):
         path.write_text(plain + change, encoding="utf-8")
         assert words in refused(path, "-o", out)

@@ -9,6 +9,7 @@
 
 #include "author/fitting/problem.h"
 #include "core/finite.h"
+#include "core/parallel_for.h"
 
 namespace risorius::author {
 
@@ -21,7 +22,10 @@ using detail::Problem;
 using detail::State;
 using detail::Vec3;
 
-constexpr int kRoundsOfWeights = 8;
+constexpr int kRoundsOfWeights = 12;
+/// Joints that stay where they are: those that a vertex needs may lie further off than its
+/// neighbours'.
+constexpr std::size_t kNearOfGiven = 12;
 /// Of the mean square of motion: as smooth as Dem Bones leaves weights with its own default.
 constexpr double kSmoothness = 0.18;
 
@@ -90,9 +94,15 @@ Problem make_problem(const Shapes& shapes, const FitOptions& options) {
   }
   find_neighbours(shapes.edges, out);
   take_displacements(shapes, out);
-  out.importance.assign(out.vertices, 1.0);
+  out.asked = shapes.importance;
+  if (out.asked.empty()) out.asked.assign(out.vertices, 1.0);
+  double all = 0.0;
+  for (const double a : out.asked) all += a / static_cast<double>(out.vertices);
+  for (double& a : out.asked) a /= all;
+  out.importance = out.asked;
   double mean = 0.0;
-  for (const double m : out.motion) mean += m * m;
+  for (std::size_t v = 0; v < out.vertices; ++v)
+    mean += out.asked[v] * out.motion[v] * out.motion[v];
   out.smoothness =
       (options.smoothness * kSmoothness + 1e-9) * mean / static_cast<double>(out.vertices);
   return out;
@@ -145,7 +155,32 @@ void pair_given(const Problem& problem, std::vector<Joint>& joints, std::size_t 
   }
 }
 
-State start(const Problem& problem, const std::vector<GivenJoint>& given, std::size_t own) {
+/// Which of the given joints alone comes nearest to what a vertex does, where that is near at all.
+void find_nearest_given(Problem& problem, const std::vector<Joint>& joints) {
+  problem.nearest_given.assign(problem.vertices, Mirror::kNone);
+  core::parallel_for(problem.vertices, problem.threads, [&](std::size_t from, std::size_t to) {
+    for (std::size_t v = from; v < to; ++v) {
+      const Vec3& p = problem.positions[v];
+      double least = 0.5 * problem.motion[v] * problem.motion[v];
+      for (std::uint32_t j = 0; j < joints.size(); ++j) {
+        if (joints[j].rests) continue;
+        const float* d = problem.of_vertex(v);
+        double error = 0.0;
+        for (std::size_t e = 0; e < problem.expressions && error < least; ++e, d += 3) {
+          const detail::Affine& m = joints[j].motions[e];
+          const Vec3 wanted(double{d[0]}, double{d[1]}, double{d[2]});
+          error += (m.leftCols<3>() * p + m.col(3) - wanted).squaredNorm();
+        }
+        if (error < least) {
+          least = error;
+          problem.nearest_given[v] = j;
+        }
+      }
+    }
+  });
+}
+
+State start(Problem& problem, const std::vector<GivenJoint>& given, std::size_t own) {
   State out;
   for (const GivenJoint& g : given) {
     out.joints.push_back(take_joint(problem, g, static_cast<std::uint32_t>(out.joints.size())));
@@ -157,6 +192,7 @@ State start(const Problem& problem, const std::vector<GivenJoint>& given, std::s
     out.joints.push_back(take_joint(problem, head, static_cast<std::uint32_t>(out.joints.size())));
   }
   pair_given(problem, out.joints, own);
+  find_nearest_given(problem, out.joints);
   const auto head = std::find_if(out.joints.begin(), out.joints.end(), rests);
   out.weights.assign(problem.vertices,
                      {Influence{static_cast<std::uint32_t>(head - out.joints.begin()), 1.0}});
@@ -175,17 +211,21 @@ void emphasise(Problem& problem, const std::vector<float>& left, double power) {
           double{r[0]} * double{r[0]} + double{r[1]} * double{r[1]} + double{r[2]} * double{r[2]};
       worst[v] = std::max(worst[v], square);
     }
-    worst[v] = std::sqrt(worst[v]);
+    worst[v] = std::sqrt(problem.asked[v] * worst[v]);
     mean += worst[v] / static_cast<double>(problem.vertices);
   }
   double sum = 0.0;
   for (std::size_t v = 0; v < problem.vertices; ++v) {
-    const double target = std::pow((worst[v] + 0.2 * mean) / mean, power);
+    const double target = problem.asked[v] * std::pow((worst[v] + 0.2 * mean) / mean, power);
     problem.importance[v] = std::sqrt(problem.importance[v] * target);
     sum += problem.importance[v];
   }
   const double mean_is_one = static_cast<double>(problem.vertices) / sum;
-  for (double& i : problem.importance) i = std::clamp(i * mean_is_one, 0.1, 100.0);
+  for (std::size_t v = 0; v < problem.vertices; ++v) {
+    const double asked = problem.asked[v];
+    problem.importance[v] =
+        std::clamp(problem.importance[v] * mean_is_one, 0.1 * asked, 100.0 * asked);
+  }
 }
 
 Fit pack(const Problem& problem, const State& state, std::size_t expressions) {
@@ -239,6 +279,16 @@ core::Status check(const Shapes& shapes, const FitOptions& options) {
       }
     }
   }
+  if (!shapes.importance.empty() && shapes.importance.size() != n) {
+    return core::fail(ErrorCode::kInvalidLength, "importance",
+                      std::to_string(n) + " numbers or none were expected, found " +
+                          std::to_string(shapes.importance.size()));
+  }
+  for (std::size_t v = 0; v < shapes.importance.size(); ++v) {
+    if (shapes.importance[v] > 0.0 && std::isfinite(shapes.importance[v])) continue;
+    return core::fail(ErrorCode::kInvalidValue, "importance[" + std::to_string(v) + "]",
+                      "a finite number above 0 was expected");
+  }
   double most = 0.0;
   for (std::size_t i = 0; i < values; ++i) {
     const float d = shapes.displacements[i];
@@ -274,6 +324,40 @@ core::Status check(const Shapes& shapes, const FitOptions& options) {
       return core::fail(ErrorCode::kInvalidArgument, "smoothness, emphasis",
                         "0 to 100 were expected");
     }
+  }
+  return core::ok();
+}
+
+/// Takes the weights to begin with. Fails: see fit_weights
+core::Status take_start(const StartWeights& start, State& state) {
+  using core::ErrorCode;
+  if (start.influences == 0) return core::ok();
+  const std::size_t size = state.weights.size() * start.influences;
+  if (start.joints.size() != size || start.weights.size() != size) {
+    return core::fail(ErrorCode::kInvalidLength, "start",
+                      std::to_string(size) + " numbers were expected");
+  }
+  for (std::size_t v = 0; v < state.weights.size(); ++v) {
+    std::vector<Influence> row;
+    double sum = 0.0;
+    for (std::size_t at = v * start.influences; at < (v + 1) * start.influences; ++at) {
+      const float weight = start.weights[at];
+      const std::string place = "start[" + std::to_string(v) + "]";
+      if (!(weight >= 0.0f && weight <= 1e6f)) {
+        return core::fail(ErrorCode::kInvalidValue, place, "weights from 0 on were expected");
+      }
+      if (weight == 0.0f) continue;
+      if (start.joints[at] >= state.joints.size()) {
+        return core::fail(ErrorCode::kInvalidIndex, place,
+                          "joint " + std::to_string(start.joints[at]) + " of " +
+                              std::to_string(state.joints.size()));
+      }
+      row.push_back({start.joints[at], static_cast<double>(weight)});
+      sum += static_cast<double>(weight);
+    }
+    if (row.empty()) continue;
+    for (Influence& i : row) i.weight /= sum;
+    state.weights[v] = std::move(row);
   }
   return core::ok();
 }
@@ -341,13 +425,15 @@ core::Result<Fit> fit_joints(const Shapes& shapes, const FitOptions& options,
 }
 
 core::Result<Fit> fit_weights(const Shapes& shapes, const std::vector<GivenJoint>& joints,
-                              const FitOptions& options) {
+                              const FitOptions& options, const StartWeights& start_weights) {
   FitOptions own = options;
   own.given = joints;
   own.joints = joints.size() + 2;
   RISORIUS_TRY(check(shapes, own));
-  const Problem problem = make_problem(shapes, own);
+  Problem problem = make_problem(shapes, own);
+  problem.near = kNearOfGiven;
   State state = start(problem, joints, shapes.expressions);
+  RISORIUS_TRY(take_start(start_weights, state));
   // Neighbours tell each other which joints are worth trying: once round a ring, twice for the
   // next.
   for (int round = 0; round < kRoundsOfWeights; ++round) detail::solve_weights(problem, state);

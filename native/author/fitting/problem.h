@@ -26,7 +26,11 @@ struct Problem {
   std::vector<double> motion;  // [V] root of the summed squares of its displacements
   Mirror mirror;
   double smoothness = 0.0;
-  std::vector<double> importance;  // [V] of a vertex' error, mean 1
+  std::size_t near = 5;  // joints that a vertex tries because they are near
+  std::vector<double> importance;  // [V] of a vertex' squared error, mean 1
+  std::vector<double> asked;       // [V] of it, what the caller asked for
+  /// [V] the given joint that alone comes nearest to what the vertex does, or Mirror::kNone.
+  std::vector<std::uint32_t> nearest_given;
 
   const float* of_vertex(std::size_t v) const { return displacements.data() + v * expressions * 3; }
   bool is_representative(std::size_t v) const { return mirror.empty() || mirror.vertices[v] >= v; }

@@ -12,9 +12,8 @@ namespace risorius::author::detail {
 
 namespace {
 
-constexpr std::size_t kNear = 5;  // joints that are tried because they are near
-constexpr int kCandidates = 22;   // joints that are tried in all
-constexpr double kLeast = 1e-4;   // a smaller weight is none
+constexpr int kCandidates = 22;  // joints that are tried in all
+constexpr double kLeast = 1e-4;  // a smaller weight is none
 
 // At most kCandidates rows: they need no memory of their own.
 using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kCandidates, kCandidates>;
@@ -86,6 +85,7 @@ std::vector<Influence> candidates_of(const Problem& problem, const State& state,
   for (std::uint32_t j = 0; j < state.joints.size(); ++j) {
     if (state.joints[j].rests) note(j, 100.0);
   }
+  if (problem.nearest_given[v] != Mirror::kNone) note(problem.nearest_given[v], 50.0);
   for (const Influence& i : state.weights[v]) note(i.joint, 1.0 + i.weight);
   const std::size_t begin = problem.first_neighbour[v], end = problem.first_neighbour[v + 1];
   for (std::size_t n = begin; n < end; ++n) {
@@ -99,7 +99,7 @@ std::vector<Influence> candidates_of(const Problem& problem, const State& state,
   for (std::uint32_t j = 0; j < state.joints.size(); ++j) {
     near.emplace_back((state.joints[j].position - problem.positions[v]).squaredNorm(), j);
   }
-  const std::size_t count = std::min(kNear, near.size());
+  const std::size_t count = std::min(problem.near, near.size());
   std::partial_sort(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(count), near.end());
   for (std::size_t i = 0; i < count; ++i)
     note(near[i].second, 0.02 / (1.0 + static_cast<double>(i)));

@@ -1128,6 +1128,7 @@ def fit_joints(
     neutral: npt.ArrayLike,
     displacements: npt.ArrayLike,
     edges: npt.ArrayLike,
+    importance: npt.ArrayLike,
     positions: npt.ArrayLike,
     rotations: npt.ArrayLike,
     translations: npt.ArrayLike,
@@ -1147,9 +1148,12 @@ def fit_weights(
     neutral: npt.ArrayLike,
     displacements: npt.ArrayLike,
     edges: npt.ArrayLike,
+    importance: npt.ArrayLike,
     positions: npt.ArrayLike,
     rotations: npt.ArrayLike,
     translations: npt.ArrayLike,
+    start_joints: npt.ArrayLike,
+    start_weights: npt.ArrayLike,
     *,
     influences: int,
     smoothness: float,
@@ -1157,6 +1161,14 @@ def fit_weights(
     threads: int,
 ) -> JointFit:
     """JointFit with these joints: see risorius.author.fitting."""
+
+def simplify(
+    positions: npt.ArrayLike,
+    attributes: npt.ArrayLike,
+    triangles: npt.ArrayLike,
+    count: int,
+) -> tuple[_U32, float]:
+    """See risorius.author.simplify."""
 
 def regroup(
     dna: Dna,

@@ -2,12 +2,16 @@
 """Joint rigs made from expressions."""
 
 from .fitting import FitOptions, JointFit, fit_joints, fit_weights
-from .joint_rig import JointRig, MeshErrors, RigOptions, make_joint_rig
+from .joint_rig import JointRig, make_joint_rig
+from .levels import LodOptions
+from .work import Level, MeshErrors, RigOptions
 
 __all__ = [
     "FitOptions",
     "JointFit",
     "JointRig",
+    "Level",
+    "LodOptions",
     "MeshErrors",
     "RigOptions",
     "fit_joints",

@@ -49,6 +49,7 @@ def fit_joints(
     *,
     given: Doubles,
     motions: Doubles,
+    importance: Doubles | None = None,
     options: FitOptions | None = None,
     progress: Progress | None = None,
 ) -> JointFit:
@@ -60,6 +61,7 @@ def fit_joints(
         edges: uint32[n, 2] of the polygons.
         given: float64[J, 3], joints that stay where they are.
         motions: float64[E, J, 3, 4] of the given joints; one at least rests in all expressions.
+        importance: float64[V], how much a vertex' squared error counts; None: all alike.
         options: how.
         progress: told the share that is done; False stops the work, with a DnaError "stopped".
 
@@ -72,6 +74,7 @@ def fit_joints(
         neutral,
         displacements,
         edges,
+        np.zeros(0) if importance is None else importance,
         given,
         rotations,
         translations,
@@ -93,6 +96,8 @@ def fit_weights(
     *,
     given: Doubles,
     motions: Doubles,
+    importance: Doubles | None = None,
+    start: Doubles | None = None,
     options: FitOptions | None = None,
 ) -> JointFit:
     """Weights of another mesh on joints that move as they do: a coarser level of detail.
@@ -103,6 +108,8 @@ def fit_weights(
         edges: uint32[n, 2].
         given: float64[J, 3], all joints.
         motions: float64[E, J, 3, 4].
+        importance: as fit_joints.
+        start: float64[V, J], weights to begin with, such as those of the finer mesh.
         options: influences, smoothness, symmetric and threads of it count.
 
     Raises:
@@ -114,11 +121,20 @@ def fit_weights(
         neutral,
         displacements,
         edges,
+        np.zeros(0) if importance is None else importance,
         given,
         rotations,
         translations,
+        *_rows(np.zeros((len(neutral), 0)) if start is None else start),
         influences=o.influences,
         smoothness=o.smoothness,
         symmetric=o.symmetric,
         threads=o.threads,
     )
+
+
+def _rows(dense: Doubles) -> tuple[npt.NDArray[np.uint32], npt.NDArray[np.float32]]:
+    """Joints and weights [V, n] of dense rows [V, J], n the most of any vertex."""
+    most = int((dense > 0).sum(axis=1).max(initial=0)) if dense.size else 0
+    joints = np.argsort(-dense, axis=1, kind="stable")[:, :most]
+    return joints.astype(np.uint32), np.take_along_axis(dense, joints, axis=1).astype(np.float32)

@@ -10,10 +10,11 @@ from typing import Any
 from .. import Dna, load
 from ..base import toml
 from .fitting import FitOptions
-from .joint_rig import RigOptions
+from .levels import LodOptions
 from .matching import assign
 from .obj import ShapeFileError, read_obj, read_positions
 from .shape_face import ShapeSet, check_shapes, make_shape_face
+from .work import RigOptions
 
 _TABLES: dict[str, dict[str, tuple[type, ...]]] = {
     "source": {
@@ -33,6 +34,7 @@ _TABLES: dict[str, dict[str, tuple[type, ...]]] = {
         "least_effect_mm": (int, float),
     },
     "shapes": {"tolerance_mm": (int, float), "keep": (bool,)},
+    "lods": {"count": (int,), "joints": (list,), "vertices": (list,)},
 }
 
 
@@ -80,16 +82,31 @@ def read_spec(path: Path) -> Spec:
         path,
         str(table.get("name", path.stem)),
         source,
-        _options(table.get("joints", {}), table.get("shapes", {})),
+        _options(path, table),
         dict(table.get("controls", {})),
     )
 
 
-def _options(joints: dict[str, Any], shapes: dict[str, Any]) -> RigOptions:
-    named = {"joints" if k == "count" else k: v for k, v in joints.items()}
+def _options(path: Path, table: dict[str, Any]) -> RigOptions:
+    named = {"joints" if k == "count" else k: v for k, v in table.get("joints", {}).items()}
     least = float(named.pop("least_effect_mm", RigOptions.least_effect_mm))
+    shapes = table.get("shapes", {})
     tolerance = float(shapes.get("tolerance_mm", 0.05)) if shapes.get("keep", True) else None
-    return RigOptions(FitOptions(**named), tolerance, least)
+    levels = dict(table.get("lods", {}))
+    for name in ("joints", "vertices"):
+        budgets = levels.get(name, [])
+        if not all(isinstance(n, int) and not isinstance(n, bool) for n in budgets):
+            raise ShapeFileError(f"{path}: lods.{name}: whole numbers were expected")
+        levels[name] = tuple(budgets)
+    longest = max(len(levels["joints"]), len(levels["vertices"]))
+    if longest and "count" not in levels:
+        levels["count"] = longest
+    try:
+        lods = LodOptions(**levels)
+        lods.check()
+    except ValueError as error:
+        raise ShapeFileError(f"{path}: {error}") from None
+    return RigOptions(FitOptions(**named), tolerance, least, lods)
 
 
 def read_face(spec: Spec) -> tuple[Dna, dict[str, list[str]], list[str]]:

@@ -14,7 +14,8 @@ from ..author.joint_rig import JointRig, make_joint_rig
 from ..author.spec import read_face, read_spec
 from ..base.words import counted
 from ..files import fileio
-from .files import CommandLineError
+from .files import CommandLineError, require_suffix
+from .pages.authoring import need_plot, write_report
 
 _DESCRIPTION = """\
 Finds joints, skin weights and joint motions that repeat the expressions of a face, and writes them
@@ -34,6 +35,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument(
         "--joints-only", action="store_true", help="no blend shapes, whatever the spec says"
+    )
+    parser.add_argument(
+        "--exact", action="store_true", help="blend shapes for all that joints leave"
+    )
+    parser.add_argument(
+        "--report", type=Path, metavar="PAGE.html", help="a page with pictures of errors and levels"
     )
     parser.add_argument("--threads", type=int, default=0, metavar="N", help="0: one for each core")
     parser.add_argument("--json", action="store_true", help="the errors for a program")
@@ -55,9 +62,15 @@ def run(args: argparse.Namespace) -> int:
             print(f"{json.dumps(name)} = {json.dumps(raw[0] if len(raw) == 1 else raw)}")
         return 0
     fileio.check_writable(args.out)
+    if args.report is not None:
+        require_suffix(args.report, (".html",), "--report")
+        fileio.check_writable(args.report)
+        need_plot()
     options = replace(spec.options, fit=replace(spec.options.fit, threads=args.threads))
     if args.joints_only:
         options = replace(options, tolerance_mm=None)
+    elif args.exact:
+        options = replace(options, tolerance_mm=0.0)
     begin, last = time.monotonic(), -1.0
 
     def say(share: float) -> None:
@@ -68,6 +81,8 @@ def run(args: argparse.Namespace) -> int:
 
     rig = make_joint_rig(dna, options, say)
     rig.dna.save(args.out)
+    if args.report is not None:
+        write_report(args.report, dna, rig, args.out)
     print(json.dumps(as_json(rig)) if args.json else "\n".join(as_lines(rig, args.out)))
     return 0
 
@@ -77,10 +92,22 @@ def as_json(rig: JointRig) -> dict[str, object]:
     return {
         "joints": rig.new_joints,
         "height_mm": rig.height_mm,
+        "lods": [
+            {
+                "joints": level.joints,
+                "vertices": level.vertices,
+                "deltas": level.deltas,
+                "rms_mm": level.rms,
+                "largest_mm": level.largest,
+                "largest_with_shapes_mm": level.largest_with_shapes,
+            }
+            for level in rig.levels
+        ],
         "deltas": {"before": rig.deltas_before, "after": rig.deltas_after},
         "meshes": [
             {
                 "name": m.name,
+                "lod": m.lod,
                 "expressions": [
                     {
                         "name": name,
@@ -106,16 +133,26 @@ def as_lines(rig: JointRig, path: Path) -> list[str]:
         rig: what was made.
         path: where it was written.
     """
+    levels = (
+        f"{'LOD':>3} {'joints':>7} {'vertices':>9} {'deltas':>9} {'RMS mm':>8} {'largest mm':>11}"
+    )
+    out = [levels]
+    for lod, x in enumerate(rig.levels):
+        out.append(
+            f"{lod:3} {x.joints:7,} {x.vertices:9,} {x.deltas:9,} {x.rms:8.4f} {x.largest:11.3f}"
+        )
     title = f"{'mesh':26} {'RMS mm':>8} {'% height':>9} {'largest mm':>11}  expression"
-    out = [title]
+    out.append(title)
     for m in rig.errors:
+        if m.lod > 0:
+            continue
         rms = float(np.sqrt((m.joints_rms**2).mean()))
         worst = int(m.joints_largest.argmax())
         out.append(
             f"{m.name:26} {rms:8.4f} {100 * rms / rig.height_mm:9.4f} "
             f"{m.joints_largest[worst]:11.3f}  {m.expressions[worst]}"
         )
-    largest = max((float(m.largest.max()) for m in rig.errors), default=0.0)
+    largest = rig.levels[0].largest_with_shapes
     out.append(
         f"{path}: {counted(len(rig.new_joints), 'new joint')}; with blend shapes at most "
         f"{largest:.3f} mm, {rig.deltas_after:,} deltas instead of {rig.deltas_before:,}"

@@ -83,7 +83,7 @@ def require_suffix(path: Path, kinds: Sequence[str], option: str) -> None:
 
     Args:
         path: of the output.
-        kinds: suffixes with their dots, two or more.
+        kinds: suffixes with their dots.
         option: that names the output.
 
     Raises:
@@ -91,7 +91,7 @@ def require_suffix(path: Path, kinds: Sequence[str], option: str) -> None:
     """
     if path.suffix.lower() not in kinds:
         *most, last = kinds
-        listed = f"{', '.join(most)} or {last}"
+        listed = f"{', '.join(most)} or {last}" if most else last
         raise CommandLineError(
             f"{option}: a name ending in {listed} was expected, found {path.name!r}"
         )

@@ -6,7 +6,7 @@ from __future__ import annotations
 import html
 import io
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
@@ -19,7 +19,7 @@ from .drawing.paper import ACCENT, INK, MUTED, RULE, Canvas, settings
 from .page_parts import SCRIPT, STYLE
 
 _VARIABLES = {INK: "--ink", MUTED: "--muted", RULE: "--rule", ACCENT: "--accent"}
-_WIDTH = 12.4  # inches
+WIDTH = 12.4  # inches
 
 
 def render(facts: Facts, lod: int, dpi: int) -> bytes:
@@ -33,20 +33,21 @@ def render(facts: Facts, lod: int, dpi: int) -> bytes:
     bars = 0.75 + 0.3 * len(facts.layers)
     with settings():
         sections = [
-            _section("face", words.FACE, words.face(lod), 8.1, dpi,
+            section("face", words.FACE, words.face(lod), 8.1, dpi,
                      lambda canvas: draw_face.draw(canvas, facts, lod, dpi)),
-            _section("matrix", words.MATRIX, words.matrix(facts), 9.2, dpi,
+            section("matrix", words.MATRIX, words.matrix(facts), 9.2, dpi,
                      lambda canvas: draw_matrix.draw(canvas, facts, 2 * dpi)),
-            _section("lods", words.LODS, words.lods(), 5.4, dpi,
+            section("lods", words.LODS, words.lods(), 5.4, dpi,
                      lambda canvas: draw_lods.draw(canvas, facts)),
-            _section("sizes", words.SIZES, words.sizes(facts), bars, dpi,
+            section("sizes", words.SIZES, words.sizes(facts), bars, dpi,
                      lambda canvas: draw_sizes.draw(canvas, facts, with_counts=False),
                      after=_tables(facts)),
         ]  # fmt: skip
-    return _document(facts, "\n".join(sections)).encode()
+    links = [("face", "face"), ("matrix", "matrix"), ("lods", "levels"), ("sizes", "sizes")]
+    return document(facts, "\n".join(sections), links).encode()
 
 
-def _section(
+def section(
     name: str,
     title: str,
     caption: str,
@@ -55,10 +56,20 @@ def _section(
     draw: Callable[[Canvas], None],
     after: str = "",
 ) -> str:
-    """A heading, a caption, the drawing `height` inches high, and what follows it."""
-    figure = Figure(figsize=(_WIDTH, height), dpi=dpi)
+    """A heading, a caption, the drawing `height` inches high, and what follows it.
+
+    Args:
+        name: the section's identifier.
+        title: the heading.
+        caption: a sentence or two under it.
+        height: of the drawing, inches.
+        dpi: of its pictures.
+        draw: fills the canvas.
+        after: HTML behind the drawing.
+    """
+    figure = Figure(figsize=(WIDTH, height), dpi=dpi)
     FigureCanvasSVG(figure)
-    draw(Canvas(figure, _WIDTH, height))
+    draw(Canvas(figure, WIDTH, height))
     return (
         f'<section id="{name}"><h2>{html.escape(title)}</h2><p>{html.escape(caption)}</p>'
         f'<figure tabindex="0">{_svg(figure, name, title)}</figure>{after}</section>'
@@ -103,7 +114,14 @@ def _tables(facts: Facts) -> str:
     )
 
 
-def _document(facts: Facts, sections: str) -> str:
+def document(facts: Facts, sections: str, links: Sequence[tuple[str, str]]) -> str:
+    """The whole page.
+
+    Args:
+        facts: of the face.
+        sections: HTML of what `section` made.
+        links: identifiers of the sections and the words that lead there.
+    """
     title = html.escape(facts.title)
     legend = "".join(
         f'<li><i style="background:{COLORS[region]}"></i>{region} <b>{count}</b></li>'
@@ -121,8 +139,7 @@ def _document(facts: Facts, sections: str) -> str:
 <header>
 <h1>{title}</h1>
 <p>{html.escape(facts.file_name)} | {html.escape(descriptor(facts))}</p>
-<nav><a href="#face">face</a> <a href="#matrix">matrix</a> <a href="#lods">levels</a>
-<a href="#sizes">sizes</a></nav>
+<nav>{" ".join(f'<a href="#{name}">{word}</a>' for name, word in links)}</nav>
 </header>
 <ul class="legend" aria-label="Face regions and their joints">{legend}</ul>
 <main>

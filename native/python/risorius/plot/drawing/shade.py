@@ -26,7 +26,8 @@ _BATCH = 1 << 20  # pixels at a time, which bounds the memory at some 150 MB
 
 @dataclass(frozen=True)
 class Surface:
-    """float64[V, 3] points and normals in view axes, int64[F, 3] triangles, float64[V] paint."""
+    """float64[V, 3] points and normals in view axes, int64[F, 3] triangles, and the paint of the
+    vertices: float64[V], lightness of clay, or float64[V, 3], a colour beside clay."""
 
     points: Floats
     normals: Floats
@@ -52,7 +53,8 @@ def surface(meshes: list[risorius.Mesh], paints: list[Floats], axes: Floats) -> 
 
     Args:
         meshes: to join.
-        paints: float64[V] of each mesh, the lightness of its vertices; 1 is clay.
+        paints: of each mesh, float64[V], the lightness of its vertices, 1 is clay; or of all
+            meshes float64[V, 3], a colour that clay is multiplied by.
         axes: float64[3, 3] from file axes to right, up, front.
     """
     points, triangles, paint, first = [np.zeros((0, 3))], [np.zeros((0, 3), np.int64)], [], 0
@@ -64,7 +66,8 @@ def surface(meshes: list[risorius.Mesh], paints: list[Floats], axes: Floats) -> 
         first += len(own)
     places, faces = np.concatenate(points), np.concatenate(triangles)
     faces = faces[np.all(np.isfinite(places[faces]).reshape(len(faces), 9), axis=1)]
-    return Surface(places, _normals(places, faces), faces, np.concatenate([*paint, np.zeros(0)]))
+    whole = np.concatenate(paint) if paint else np.ones(0)
+    return Surface(places, _normals(places, faces), faces, whole)
 
 
 def _normals(points: Floats, triangles: Ints) -> Floats:
@@ -108,7 +111,7 @@ def render(
     corners = shape.triangles[face[hit]]
     blend = weights[hit]
     normals = np.einsum("nk,nkd->nd", blend, shape.normals[corners])
-    paint = np.einsum("nk,nk->n", blend, shape.paint[corners])
+    paint = np.einsum("nk,nk...->n...", blend, shape.paint[corners])
     picture[hit, :3] = _lit(normals, paint)
     picture[hit, 3] = 1
     return _averaged(picture.reshape(high, wide, 4), smooth)
@@ -191,7 +194,9 @@ def _lit(normals: Floats, paint: Floats) -> Floats:
     fill = np.clip(normals @ (_FILL / np.linalg.norm(_FILL)), 0, 1)
     light = 0.3 + 0.52 * key + 0.16 * fill + 0.08 * normals[:, 2]
     clay = np.array([0.88, 0.86, 0.84])
-    return np.asarray(np.clip(light[:, None] * paint[:, None] * clay, 0, 1))
+    return np.asarray(
+        np.clip(light[:, None] * (paint[:, None] if paint.ndim == 1 else paint) * clay, 0, 1)
+    )
 
 
 def _averaged(picture: Floats, smooth: int) -> npt.NDArray[np.uint8]:

@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: MIT
+# The library `meshoptimizer` of its source package on PyPI, whose simplifier alone is compiled. The
+# source lies in build/third_party (an sdist of ours carries it); if it is not there, pip fetches it.
+set(version 0.2.30a0)
+set(sha256 36b18b61a95ba992de804b1e91e86be2ba185925e4e2c1481495f8c68a17f5db)
+set(folder "${PROJECT_SOURCE_DIR}/build/third_party/meshoptimizer")
+if(NOT EXISTS "${folder}/simplifier.cpp")
+  find_program(python3 NAMES python3 python REQUIRED)
+  set(package "${PROJECT_BINARY_DIR}/meshoptimizer-${version}.tar.gz")
+  execute_process(COMMAND "${python3}" -m pip download --quiet --no-deps --no-binary meshoptimizer
+                          --dest "${PROJECT_BINARY_DIR}" meshoptimizer==${version}
+                  RESULT_VARIABLE code OUTPUT_VARIABLE said ERROR_VARIABLE said)
+  if(NOT code EQUAL 0)
+    message(FATAL_ERROR "PyPI's meshoptimizer ${version} (source) could not be fetched; put its folder "
+                        "src/ at ${folder}, or see to it that this works:\n"
+                        "${python3} -m pip download --no-deps --no-binary meshoptimizer meshoptimizer==${version}\n${said}")
+  endif()
+  file(SHA256 "${package}" found)
+  if(NOT found STREQUAL sha256)
+    message(FATAL_ERROR "${package}: SHA256 ${sha256} was expected, found ${found}")
+  endif()
+  file(ARCHIVE_EXTRACT INPUT "${package}" DESTINATION "${PROJECT_BINARY_DIR}")
+  # simplifier.cpp, which is looked for, comes last: who stops in between leaves nothing that looks whole.
+  set(unpacked "${PROJECT_BINARY_DIR}/meshoptimizer-${version}")
+  file(MAKE_DIRECTORY "${folder}")
+  foreach(file meshoptimizer.h allocator.cpp simplifier.cpp)
+    file(COPY_FILE "${unpacked}/src/${file}" "${folder}/${file}")
+  endforeach()
+  file(REMOVE_RECURSE "${unpacked}" "${package}")
+endif()
+add_library(meshoptimizer STATIC "${folder}/allocator.cpp" "${folder}/simplifier.cpp")
+target_include_directories(meshoptimizer SYSTEM INTERFACE "${PROJECT_SOURCE_DIR}/build/third_party")
+if(NOT MSVC)
+  # As our own code: the same bits everywhere. Its warnings are not ours.
+  target_compile_options(meshoptimizer PRIVATE -ffp-contract=off -w)
+endif()

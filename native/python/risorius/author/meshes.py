@@ -1,0 +1,263 @@
+# SPDX-License-Identifier: MIT
+"""The meshes of all levels of a joint rig: weights, what blend shapes have still to do, errors."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from .. import BlendShapeTarget, Dna, Mesh
+from . import skeleton as sk
+from .fitting import fit_weights
+from .levels import level_name, mesh_budget, vertex_budgets
+from .simplify import simplified
+from .skeleton import Doubles
+from .work import (
+    MM,
+    Level,
+    MeshErrors,
+    RigOptions,
+    Work,
+    dense,
+    for_the_rest,
+    given,
+    listed_meshes,
+)
+
+_LEAST_WEIGHT = 1e-3
+
+
+def count_deltas(meshes: Sequence[Mesh]) -> int:
+    return sum(len(t.vertex_indices) for mesh in meshes for t in mesh.blend_shape_targets)
+
+
+class Made:
+    """Meshes of all levels as they are made, one level after the other."""
+
+    def __init__(self, work: Work, options: RigOptions, weights: dict[int, Doubles]) -> None:
+        self.work, self.options, self.weights = work, options, weights
+        dna = work.dna
+        self.motions = sk.column_motions(dna, sk.column_count(work.source))[work.columns]
+        self.rest = sk.world_matrices(dna, np.zeros((len(dna.joint_names), 9)))[:, :3, 3]
+        self.meshes: list[Mesh] = []
+        self.names: list[str] = []
+        self.listed: list[list[int]] = []
+        self.errors: list[MeshErrors] = []
+        own = [
+            sum(len(work.source.meshes[m].positions) for m in listed_meshes(work.source, lod))
+            for lod in range(max(1, work.source.lod_count))
+        ]
+        self.budgets = vertex_budgets(options.lods, work.levels, own)
+        self.own = len(own)
+        self._numbers: dict[int, int] = {}  # a mesh of the source may be at several levels
+
+    def add_level(self, lod: int, wanted: dict[int, Doubles], needs: set[int]) -> None:
+        """The meshes of a level: those of the source, or the finest ones with fewer vertices.
+
+        Args:
+            lod: the level; they are added in order.
+            wanted: float64[E, V, 3] of each mesh of the source, what it is to do.
+            needs: meshes that hang on new joints.
+        """
+        self.listed.append([])
+        source = self.work.source
+        if lod < self.own:
+            for m in listed_meshes(source, lod):
+                if m in self._numbers:
+                    self.listed[lod].append(self._numbers[m])
+                    continue
+                self._numbers[m] = len(self.meshes)
+                mesh = source.meshes[m]
+                start = self._start(mesh) if m in needs and m not in self.weights else None
+                start = self.weights.get(m, start)
+                self._add(lod, mesh, source.mesh_names[m], wanted[m], start)
+            return
+        share = self.budgets[lod] / max(1, self.budgets[0])
+        for m in listed_meshes(source, 0):
+            mesh, name = source.meshes[m], source.mesh_names[m]
+            budget = mesh_budget(name, len(mesh.positions), share)
+            if not budget:
+                continue
+            coarse, kept = simplified(mesh, wanted[m], budget)
+            if len(kept):
+                _set_skin(coarse, sk.dense_weights(mesh, len(source.joint_names))[kept])
+                name = level_name(name, lod)
+                start = self.weights[m][kept] if m in needs else None
+                self._add(lod, coarse, name, wanted[m][:, kept], start)
+
+    def _start(self, mesh: Mesh) -> Doubles:
+        """Dense weights of the nearest vertices of the finest level."""
+        source = self.work.source
+        fine = np.concatenate([np.asarray(source.meshes[m].positions) for m in self.weights])
+        rows = np.concatenate(list(self.weights.values()))
+        positions = np.asarray(mesh.positions)
+        lengths = (fine**2).sum(axis=1)
+        nearest = [
+            (lengths - 2 * positions[at : at + 256] @ fine.T).argmin(axis=1)
+            for at in range(0, len(positions), 256)
+        ]
+        return rows[np.concatenate(nearest)]
+
+    def _add(self, lod: int, mesh: Mesh, name: str, wanted: Doubles, rows: Doubles | None) -> None:
+        """A mesh with the weights that it has, or with new ones from `rows` on."""
+        self.listed[lod].append(len(self.meshes))
+        self.names.append(name)
+        if rows is None:
+            self.meshes.append(mesh)
+            return
+        if lod > 0:
+            rows = self._weights(lod, mesh, wanted, rows)
+        rows = _with_resting(self.work, mesh, rows)
+        shaped = self.options if lod < self.own else replace(self.options, tolerance_mm=None)
+        made, left = _finish_mesh(self.work, mesh, rows, self.motions, wanted, shaped)
+        left.name, left.lod = name, lod
+        self.meshes.append(made)
+        self.errors.append(left)
+
+    def _weights(self, lod: int, mesh: Mesh, wanted: Doubles, start: Doubles) -> Doubles:
+        """Dense weights of a mesh on the joints of a level. Its vertices lie further apart than
+        those of the finest: evened out as much they would lose what they do."""
+        work, options = self.work, self.options.fit
+        before = len(work.source.joint_names)
+        joints = np.concatenate([given(work), before + work.new[lod]])
+        rows, kept = start.copy(), set(joints.tolist())
+        for joint in np.flatnonzero(rows.any(axis=0)).tolist():
+            heir = joint
+            while heir not in kept and heir in work.heirs:
+                heir = work.heirs[heir]
+            if heir != joint:
+                rows[:, heir] += rows[:, joint]
+                rows[:, joint] = 0
+        asked, counts = for_the_rest(work, mesh, wanted)
+        fit = fit_weights(
+            np.asarray(mesh.positions, np.float64),
+            asked.astype(np.float32),
+            sk.mesh_edges(mesh),
+            given=self.rest[joints],
+            motions=self.motions[:, joints],
+            importance=counts,
+            start=rows[:, joints],
+            options=replace(options, smoothness=0.1 * options.smoothness),
+        )
+        return dense(fit, joints, len(self.rest))
+
+    def finish(self) -> None:
+        """The meshes into the Dna."""
+        dna = self.work.dna
+        dna.meshes, dna.mesh_names, dna.lod_mesh_mapping = self.meshes, self.names, self.listed
+        dna.mesh_blend_shape_channel_mapping = np.array(
+            [
+                (m, t.blend_shape_channel_index)
+                for m, mesh in enumerate(self.meshes)
+                for t in mesh.blend_shape_targets
+            ]
+        ).reshape(-1, 2)
+
+    def levels(self) -> list[Level]:
+        out = []
+        for lod, listed in enumerate(self.listed):
+            names = {self.names[m] for m in listed}
+            errors = [e for e in self.errors if e.name in names]
+            meshes = [self.meshes[m] for m in listed]
+            vertices = sum(len(mesh.positions) for mesh in meshes)
+            squares = sum((e.joints_rms**2).mean() * e.vertices for e in errors)
+            count = max(1, sum(e.vertices for e in errors))
+            out.append(
+                Level(
+                    joints=len(self.work.new[lod]),
+                    vertices=vertices,
+                    deltas=sum(
+                        len(t.vertex_indices) for x in meshes for t in x.blend_shape_targets
+                    ),
+                    rms=float(np.sqrt(squares / count)),
+                    largest=max((float(e.joints_largest.max()) for e in errors), default=0.0),
+                    largest_with_shapes=max((float(e.largest.max()) for e in errors), default=0.0),
+                )
+            )
+        return out
+
+
+def _with_resting(work: Work, mesh: Mesh, rows: Doubles) -> Doubles:
+    """Neck and spine, which no expression moves, keep the weights that they had."""
+    before = sk.dense_weights(mesh, len(work.source.joint_names))
+    moving = set(given(work).tolist())
+    others = [j for j in range(before.shape[1]) if j not in moving]
+    out = rows.copy()
+    out[:, work.head] += out[:, others].sum(axis=1)  # to a fit all that rests is alike
+    out[:, others] = 0
+    out *= (1 - before[:, others].sum(axis=1))[:, None] / np.maximum(
+        out.sum(axis=1, keepdims=True), 1e-30
+    )
+    out[:, others] = before[:, others]
+    return out
+
+
+def _finish_mesh(
+    work: Work,
+    mesh: Mesh,
+    rows: Doubles,
+    motions: Doubles,
+    wanted: Doubles,
+    options: RigOptions,
+) -> tuple[Mesh, MeshErrors]:
+    """The mesh with its new weights and with what blend shapes have still to do."""
+    out = copy.copy(mesh)
+    _set_skin(out, rows)
+    weights = sk.dense_weights(out, rows.shape[1])
+    positions = np.asarray(mesh.positions, np.float64)
+    mm = MM.get(work.dna.translation_unit, 10.0)
+    channel = _channels(work.dna)
+    halves = sk.column_motions(work.dna, sk.column_count(work.dna), 0.5)[work.columns]
+    found, targets = _no_errors(len(positions), work.names), []
+    for row, column in enumerate(work.columns):
+        goal = positions + wanted[row]
+        error = np.linalg.norm(sk.skinned(positions, weights, motions[row]) - goal, axis=1) * mm
+        half = sk.skinned(positions, weights, halves[row]) - positions - 0.5 * wanted[row]
+        found.half_largest[row] = np.linalg.norm(half, axis=1).max() * mm
+        found.motion[row] = np.sqrt((wanted[row] ** 2).sum(axis=1).mean()) * mm
+        found.joints_rms[row] = np.sqrt((error**2).mean())
+        found.joints_largest[row], found.worst_vertex[row] = error.max(), error.argmax()
+        if options.tolerance_mm is not None and column in channel:
+            moved = np.flatnonzero(error > options.tolerance_mm)
+            if len(moved):
+                shaped = sk.before_skin(goal[moved], weights[moved], motions[row])
+                targets.append(
+                    BlendShapeTarget(
+                        deltas=shaped - positions[moved],
+                        vertex_indices=moved,
+                        blend_shape_channel_index=channel[column],
+                    )
+                )
+            error[moved] = 0
+        found.largest[row] = error.max()
+    out.blend_shape_targets = targets
+    return out, found
+
+
+def _channels(dna: Dna) -> dict[int, int]:
+    """The blend shape channel of each input that drives one."""
+    channels = dna.blend_shape_channels
+    pairs = zip(channels.input_indices, channels.output_indices, strict=True)
+    return {int(source): int(channel) for source, channel in pairs}
+
+
+def _no_errors(vertices: int, expressions: list[str]) -> MeshErrors:
+    def none() -> Doubles:
+        return np.zeros(len(expressions))
+
+    worst = np.zeros(len(expressions), np.int64)
+    return MeshErrors("", vertices, expressions, none(), none(), none(), none(), worst, none())
+
+
+def _set_skin(mesh: Mesh, rows: Doubles) -> None:
+    kept = np.where(rows > _LEAST_WEIGHT, rows, 0)
+    kept /= kept.sum(axis=1, keepdims=True)
+    vertex, joint = np.nonzero(kept)
+    counts = (kept > 0).sum(axis=1)
+    mesh.skin_offsets = np.concatenate([[0], np.cumsum(counts)])
+    mesh.skin_weights = kept[vertex, joint]
+    mesh.skin_joint_indices = joint
+    mesh.maximum_influence_per_vertex = int(counts.max())

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: MIT
+"""Meshes with fewer vertices, for coarser levels of detail: corners of the fine one, none moved."""
+
+from __future__ import annotations
+
+import copy
+
+import numpy as np
+
+from .. import Mesh, _native
+from .skeleton import Doubles, Ints
+
+_UV = 0.5  # of the texture's width counts as much as of the mesh' size
+_MOTION = 2.0  # of the mesh' size, moved otherwise than the neighbours, counts as much as one of it
+_COMPONENTS = 6  # of the motion that are looked at
+_TRIES = 4
+
+
+def fan_triangles(mesh: Mesh) -> Ints:
+    """int64[n, 3]: the polygons as fans of triangles, in layouts."""
+    offsets = np.asarray(mesh.face_offsets, np.int64)
+    layouts = np.asarray(mesh.face_layouts, np.int64)
+    fans = np.maximum(np.diff(offsets) - 2, 0)
+    first = np.repeat(offsets[:-1], fans)
+    step = np.arange(fans.sum()) - np.repeat(np.cumsum(fans) - fans, fans)
+    return layouts[np.stack([first, first + step + 1, first + step + 2], axis=1)]
+
+
+def _attributes(mesh: Mesh, displacements: Doubles, size: float) -> Doubles:
+    """float64[layouts, n]: texture coordinates, and the main components of the motion."""
+    places = np.asarray(mesh.layout_positions, np.int64)
+    uvs = np.asarray(mesh.texture_coordinates, np.float64)
+    own = uvs[np.asarray(mesh.layout_texture_coordinates, np.int64)]
+    if not len(displacements):
+        return _UV * own
+    moved = displacements.transpose(1, 0, 2).reshape(len(mesh.positions), -1) / size
+    spread, axes = np.linalg.eigh(moved.T @ moved)
+    main = axes[:, np.argsort(-spread, kind="stable")[:_COMPONENTS]]
+    # An axis has no direction of its own: the larger half of it points up, on every machine.
+    main = main * np.where(main[np.abs(main).argmax(axis=0), range(main.shape[1])] < 0, -1, 1)
+    return np.column_stack([_UV * own, _MOTION * (moved @ main)[places]])
+
+
+def simplified(mesh: Mesh, displacements: Doubles, vertices: int) -> tuple[Mesh, Ints]:
+    """A mesh with about so many vertices, some of those that it has; no skin and no shapes.
+
+    What the texture and the expressions do is kept beside the form. Borders and seams stay where
+    they are, so a mesh of many pieces may keep more vertices than were asked for.
+
+    Args:
+        mesh: stays as it is.
+        displacements: float64[E, V, 3], what expressions add to its vertices.
+        vertices: at most, where it can be.
+
+    Returns:
+        The new mesh of triangles, and which vertices of the fine one its own are.
+    """
+    positions = np.asarray(mesh.positions, np.float64)
+    places = np.asarray(mesh.layout_positions, np.int64)
+    size = float(np.ptp(positions, axis=0).max()) or 1.0
+    points = positions[places].astype(np.float32)
+    attributes = _attributes(mesh, displacements, size).astype(np.float32)
+    triangles = fan_triangles(mesh).astype(np.uint32)
+    # A closed surface has twice as many triangles as vertices; what is open has fewer.
+    count = 2 * vertices
+    found = triangles
+    for _ in range(_TRIES):
+        found, _ = _native.simplify(points, attributes, triangles, count)
+        now = len(np.unique(places[found]))
+        if now <= vertices or not len(found):
+            break
+        count = int(0.97 * count * vertices / now)
+    return _corners_of(mesh, np.asarray(found, np.int64))
+
+
+def _corners_of(mesh: Mesh, triangles: Ints) -> tuple[Mesh, Ints]:
+    """The mesh with these triangles of its layouts alone, and the vertices that it kept."""
+    layouts, corners = np.unique(triangles, return_inverse=True)
+
+    def kept(of: object) -> tuple[Ints, Ints]:
+        return np.unique(np.asarray(of, np.int64)[layouts], return_inverse=True)
+
+    vertices, to_vertex = kept(mesh.layout_positions)
+    uvs, to_uv = kept(mesh.layout_texture_coordinates)
+    normals, to_normal = kept(mesh.layout_normals)
+    out = copy.copy(mesh)
+    out.positions = np.asarray(mesh.positions)[vertices]
+    out.texture_coordinates = np.asarray(mesh.texture_coordinates)[uvs]
+    out.normals = np.asarray(mesh.normals)[normals]
+    out.layout_positions, out.layout_texture_coordinates = to_vertex, to_uv
+    out.layout_normals = to_normal
+    out.face_offsets = 3 * np.arange(len(triangles) + 1)
+    out.face_layouts = corners.ravel()
+    out.blend_shape_targets = []
+    return out, vertices

@@ -1,0 +1,214 @@
+# SPDX-License-Identifier: MIT
+"""What the steps from a face of shapes to one of joints share: options, errors, the face itself."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .. import Dna, Mesh
+from ..base.errors import ArgumentError
+from . import skeleton as sk
+from .fitting import FitOptions, JointFit
+from .levels import LodOptions
+from .skeleton import Doubles, Ints
+
+MM = {"cm": 10.0, "m": 1000.0}
+_LEAST_SHARE = 0.1  # vertices that hang on the neck beyond it are left to blend shapes
+_RIGID_MM = 0.02  # a mesh that its joints bring so near needs no others
+
+
+@dataclass(frozen=True)
+class RigOptions:
+    """What the joint rig is to be."""
+
+    fit: FitOptions = field(default_factory=FitOptions)
+    # A blend shape keeps what joints leave of a vertex beyond this, in mm; None: no blend shapes.
+    tolerance_mm: float | None = 0.05
+    # A joint does not follow an expression in which it moves no vertex further than this.
+    least_effect_mm: float = 0.02
+    lods: LodOptions = field(default_factory=LodOptions)
+
+
+@dataclass
+class MeshErrors:
+    """What is left of each expression's motion on one mesh, by joints alone and with shapes."""
+
+    name: str
+    vertices: int
+    expressions: list[str]
+    motion: Doubles  # [E] root mean square of the motion, mm
+    joints_rms: Doubles  # [E] mm
+    joints_largest: Doubles  # [E] mm
+    largest: Doubles  # [E] mm, with blend shapes
+    worst_vertex: Ints  # [E] by joints alone
+    half_largest: Doubles  # [E] mm, by joints alone with the control at 0.5
+    lod: int = 0
+
+
+@dataclass
+class Level:
+    """A level of detail of what was made, and what is left of the motion of all its meshes."""
+
+    joints: int  # new ones
+    vertices: int
+    deltas: int
+    rms: float  # mm, by joints alone, over vertices and expressions
+    largest: float  # mm, by joints alone
+    largest_with_shapes: float  # mm
+
+
+@dataclass
+class Work:
+    """The face that is made, and what of it is computed once."""
+
+    source: Dna
+    dna: Dna
+    columns: list[int]  # inputs that move a vertex
+    names: list[str]  # of these
+    motions: Doubles  # [C, J, 3, 4] of the joints that were there
+    positions: Doubles  # [J, 3]
+    head: int  # what new joints hang on
+    levels: int = 1
+    new: list[Ints] = field(default_factory=list)  # joints of each level, among the new ones
+    heirs: dict[int, int] = field(
+        default_factory=dict
+    )  # what takes a joint's vertices in its place
+
+
+def begin(dna: Dna) -> Work:
+    if not dna.meshes or not dna.joint_names:
+        raise ArgumentError("a face with meshes and at least one joint was expected")
+    count = sk.column_count(dna)
+    deltas = sk.column_deltas(dna, count)
+    if np.any(deltas[..., 6:9]):
+        joint = int(np.argwhere(deltas[..., 6:9].any(axis=(0, 2)))[0, 0])
+        raise ArgumentError(f"joint {dna.joint_names[joint]} changes its size: not supported")
+    motions = sk.column_motions(dna, count)
+    moving = np.flatnonzero(deltas.any(axis=(1, 2)))
+    shaped = {c for mesh in dna.meshes for c in sk.column_shapes(dna, mesh, count)}
+    columns = sorted(shaped | {int(c) for c in moving})
+    names = [_column_name(dna, column) for column in columns]
+    rest = sk.world_matrices(dna, np.zeros((len(dna.joint_names), 9)))
+    work = Work(dna, copy.copy(dna), columns, names, motions[columns], rest[:, :3, 3], 0)
+    work.head = _head(work)
+    return work
+
+
+def _column_name(dna: Dna, column: int) -> str:
+    raw = dna.raw_control_names
+    if column < len(raw):
+        return raw[column]
+    rows = np.asarray(dna.psds.rows, np.int64)
+    parts = np.asarray(dna.psds.columns, np.int64)[rows == column]
+    return " x ".join(raw[int(p)] if p < len(raw) else str(p) for p in parts) or f"input {column}"
+
+
+def _head(work: Work) -> int:
+    """The resting joint that most of what moves hangs on."""
+    dna = work.source
+    share = np.zeros(len(dna.joint_names))
+    for mesh in dna.meshes:
+        moved = np.linalg.norm(displacements(work, mesh), axis=2).max(axis=0)
+        share += moved @ sk.dense_weights(mesh, len(share))
+    still = np.isclose(work.motions, np.eye(3, 4), atol=1e-12).all(axis=(0, 2, 3))
+    if not still.any():
+        raise ArgumentError("a joint that no control moves was expected, such as the head")
+    return int(np.argmax(np.where(still, share + 1e-30, -1)))
+
+
+def displacements(work: Work, mesh: Mesh) -> Doubles:
+    """float64[C, V, 3]: where each input at 1 brings the vertices, less where they rest.
+
+    Args:
+        work: the face of shapes.
+        mesh: one of its own.
+    """
+    positions = np.asarray(mesh.positions, np.float64)
+    weights = sk.dense_weights(mesh, len(work.source.joint_names))
+    shapes = sk.column_shapes(work.source, mesh, sk.column_count(work.source))
+    out = np.zeros((len(work.columns), len(positions), 3))
+    still = np.eye(3, 4)
+    for row, column in enumerate(work.columns):
+        delta = shapes.get(column)
+        if not np.allclose(work.motions[row], still, atol=1e-12):
+            shaped = positions if delta is None else positions + delta
+            out[row] = sk.skinned(shaped, weights, work.motions[row]) - positions
+        elif delta is not None:
+            out[row] = delta
+    return out
+
+
+def needs_joints(work: Work, mesh: Mesh, wanted: Doubles) -> bool:
+    """Whether blend shapes move the mesh, and not the joints that are there alone (an eyeball).
+
+    Args:
+        work: the face.
+        mesh: one of its own.
+        wanted: float64[E, V, 3], of it.
+    """
+    if not mesh.blend_shape_targets:
+        return False
+    positions = np.asarray(mesh.positions, np.float64)
+    weights = sk.dense_weights(mesh, len(work.source.joint_names))
+    far = 0.0
+    for row in range(len(work.columns)):
+        if wanted[row].any():
+            by_joints = sk.skinned(positions, weights, work.motions[row]) - positions
+            far = max(far, float(np.abs(by_joints - wanted[row]).max()))
+    return far * MM.get(work.source.translation_unit, 10.0) > _RIGID_MM
+
+
+def _resting(work: Work, mesh: Mesh) -> Doubles:
+    """float64[V]: the share of a vertex that hangs on joints which no expression moves, such as
+    those of the neck, the head not counted."""
+    before = sk.dense_weights(mesh, len(work.source.joint_names))
+    before[:, given(work)] = 0
+    return np.asarray(before.sum(axis=1))
+
+
+def for_the_rest(work: Work, mesh: Mesh, wanted: Doubles) -> tuple[Doubles, Doubles]:
+    """What the joints have to do, so that with the resting share it becomes what is wanted, and how
+    much its squared error then counts.
+
+    Args:
+        work: the face.
+        mesh: has the weights of the joints that rest.
+        wanted: float64[E, V, 3].
+    """
+    share = np.maximum(1 - _resting(work, mesh), _LEAST_SHARE)
+    counts: Doubles = share * share
+    return wanted / share[:, None], counts
+
+
+def given(work: Work) -> Ints:
+    """The head, and the joints that controls move."""
+    still = np.isclose(work.motions, np.eye(3, 4), atol=1e-12).all(axis=(0, 2, 3))
+    return np.array([work.head, *np.flatnonzero(~still)])
+
+
+def dense(fit: JointFit, place: Ints, joints: int) -> Doubles:
+    """float64[V, joints]: the weights of a fit.
+
+    Args:
+        fit: has them, by its own joints.
+        place: of each of these, the joint's index.
+        joints: how many there are.
+    """
+    out = np.zeros((len(fit.weights), joints))
+    rows = np.arange(len(out))[:, None]
+    np.add.at(out, (rows, place[np.asarray(fit.weight_joints, np.int64)]), fit.weights)
+    return out
+
+
+def listed_meshes(dna: Dna, lod: int) -> list[int]:
+    """The meshes of a level; all where the file does not say.
+
+    Args:
+        dna: the face.
+        lod: the level.
+    """
+    mapping = dna.lod_mesh_mapping
+    return [int(m) for m in mapping[lod]] if lod < len(mapping) else list(range(len(dna.meshes)))

@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: MIT
+"""The page of `risorius author --report`."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+import risorius
+
+from ...author.joint_rig import JointRig
+from ...author.measure import expression_errors
+from ...files import fileio
+from ..files import InputError
+
+if TYPE_CHECKING:  # they need Matplotlib
+    from ...plot.drawing.draw_errors import Expression
+    from ...plot.report import ExpressionRow
+
+_NEEDS = "--report draws with Matplotlib, which is not installed: pip install risorius[plot]"
+_DRAWN = 12
+_TIMED = 2000
+_DPI = 150
+
+
+def need_plot() -> None:
+    """Raises InputError where there is nothing to draw with."""
+    try:
+        from ...plot import report  # noqa: F401
+    except ImportError as error:
+        if (error.name or "").partition(".")[0] != "matplotlib":
+            raise
+        raise InputError(_NEEDS) from error
+
+
+def write_report(path: Path, source: risorius.Dna, rig: JointRig, made: Path) -> None:
+    """Draws what was made beside what it was made from.
+
+    Args:
+        path: of the page.
+        source: the face of shapes.
+        rig: the face of joints and its errors.
+        made: the DNA file that was written of it.
+    """
+    from ...plot.content.facts import gather
+    from ...plot.report import LevelRow, render
+
+    data = made.read_bytes()
+    dna = risorius.load(data)
+    levels = [
+        LevelRow(
+            joints=level.joints,
+            vertices=level.vertices,
+            deltas=level.deltas,
+            size=len(dna.filter_lods([lod]).to_bytes()),
+            microseconds=_microseconds(dna, lod),
+            rms=level.rms,
+            largest=level.largest,
+            with_shapes=level.largest_with_shapes,
+        )
+        for lod, level in enumerate(rig.levels)
+    ]
+    page = render(gather(dna, data, made.name), levels, _rows(rig), _worst(source, rig), _DPI)
+    fileio.write_bytes(path, page)
+
+
+def _microseconds(dna: risorius.Dna, lod: int) -> float:
+    """Of a pose with twenty controls that move, the median."""
+    rig = risorius.Rig(dna)
+    raw = np.zeros(len(rig.raw_control_names), np.float32)
+    raw[:: max(1, len(raw) // 20)] = 0.5
+    times = []
+    for _ in range(_TIMED):
+        begin = time.perf_counter()
+        rig.evaluate(raw, lod=lod)
+        times.append(time.perf_counter() - begin)
+    return 1e6 * statistics.median(times)
+
+
+def _rows(rig: JointRig) -> list[ExpressionRow]:
+    from ...plot.report import ExpressionRow as Row
+
+    fine = [errors for errors in rig.errors if errors.lod == 0]
+    count = sum(errors.vertices for errors in fine)
+    out = []
+    for e, name in enumerate(fine[0].expressions):
+        worst = max(fine, key=lambda errors: errors.joints_largest[e])
+
+        def mean(values: list[float]) -> float:
+            pairs = zip(values, fine, strict=True)
+            return float(np.sqrt(sum(x**2 * errors.vertices for x, errors in pairs) / count))
+
+        out.append(
+            Row(
+                name=name.removeprefix("CTRL_expressions."),
+                motion=mean([x.motion[e] for x in fine]),
+                rms=mean([x.joints_rms[e] for x in fine]),
+                largest=float(worst.joints_largest[e]),
+                half=max(float(x.half_largest[e]) for x in fine),
+                with_shapes=max(float(x.largest[e]) for x in fine),
+                worst=f"{worst.name} {int(worst.worst_vertex[e])}",
+            )
+        )
+    return out
+
+
+def _worst(source: risorius.Dna, rig: JointRig) -> list[Expression]:
+    from ...plot.drawing.draw_errors import Expression as Drawn
+
+    fine = [errors for errors in rig.errors if errors.lod == 0]
+    largest = np.max([errors.joints_largest for errors in fine], axis=0)
+    out = []
+    for e in np.argsort(-largest, kind="stable")[:_DRAWN].tolist():
+        meshes, errors = expression_errors(
+            source, rig.dna, rig.columns[e], [errors.name for errors in fine]
+        )
+        every = np.concatenate(errors)
+        out.append(
+            Drawn(
+                name=fine[0].expressions[e].removeprefix("CTRL_expressions."),
+                meshes=meshes,
+                errors=errors,
+                largest=float(every.max()),
+                rms=float(np.sqrt((every**2).mean())),
+            )
+        )
+    return out
