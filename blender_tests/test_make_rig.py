@@ -88,10 +88,14 @@ def test_the_face_does_what_the_keys_did(head, tmp_path):
     assert len(head.data.shape_keys.key_blocks) == 8  # it stays as it was
 
 
-def test_joints_alone(head, tmp_path):
+def test_joints_alone_and_as_many_levels_as_asked_for(head, tmp_path):
     path = tmp_path / "egg.dna"
-    assert make(path, use_shapes=False) == {"FINISHED"}
-    assert not any(mesh.blend_shape_targets for mesh in risorius.load(path).meshes)
+    assert make(path, use_shapes=False, levels=3) == {"FINISHED"}
+    dna = risorius.load(path)
+    assert not any(mesh.blend_shape_targets for mesh in dna.meshes)
+    assert dna.lod_count == 3
+    sizes = [len(dna.meshes[int(level[0])].positions) for level in dna.lod_mesh_mapping]
+    assert sizes[0] == 506 > sizes[1] > sizes[2]
 
 
 def test_a_mesh_without_keys_and_a_face_are_refused(head, dna_file, tmp_path):
@@ -123,7 +127,7 @@ def test_what_cannot_be_used_leaves_nothing(head, tmp_path):
 def test_a_cancelled_rig_leaves_no_file(head, tmp_path):
     heads = scene.submodule("scene.file.shape_key_head")
     shapes = heads.shapes_of(bpy.context, head)
-    task = heads.rig_task(shapes, str(tmp_path / "a.dna"), 40, 0.1)
+    task = heads.rig_task(shapes, str(tmp_path / "a.dna"), 40, 8, 0.1)
     task.start()
     task.cancel()
     assert not task.is_running()

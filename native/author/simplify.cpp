@@ -13,6 +13,7 @@ namespace risorius::author {
 namespace {
 
 constexpr std::size_t kMostAttributes = 32;  // meshoptimizer's own limit
+constexpr float kAnyError = 1e6f;            // the number of triangles is what is asked for
 
 core::Status check(const Surface& surface) {
   using core::ErrorCode;
@@ -62,7 +63,7 @@ core::Result<Simplified> simplify(const Surface& surface, std::size_t triangles)
       out.triangles.front().data(), surface.triangles.front().data(), 3 * surface.triangles.size(),
       surface.positions.front().data(), surface.positions.size(), sizeof(surface.positions.front()),
       surface.attributes.data(), surface.attribute_count * sizeof(float), weights.data(),
-      surface.attribute_count, nullptr, 3 * triangles, 1.0f, 0, &error);
+      surface.attribute_count, nullptr, 3 * triangles, kAnyError, 0, &error);
   out.triangles.resize(found / 3);
   out.error = static_cast<double>(error);
   return out;

@@ -134,7 +134,7 @@ def test_eight_levels_by_another_reader(read, made):
             for name, delta in face_shapes.expressions(positions).items()
         ]
         assert 10 * max(far) == pytest.approx(float(row[-1]), abs=2e-3)
-        assert max(far) < (0.2 if lod < 4 else 0.7)  # cm, of motions up to 3
+        assert max(far) < (0.5 if lod < 4 else 0.7)  # cm, of motions up to 3
 
 
 def test_a_coarser_level_keeps_the_rim_and_is_no_fold(read):
@@ -216,6 +216,21 @@ def test_a_seam_of_the_texture_stays_closed():
     pairs = np.sort(places[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     _, uses = np.unique(pairs, axis=0, return_counts=True)
     assert uses.max() == 2
+
+
+def test_a_mesh_that_is_all_seams_gets_coarser_all_the_same():
+    positions, faces = face_shapes.head()
+    uvs = np.random.default_rng(1).random((faces.size, 2))
+    corners = np.arange(faces.size).reshape(faces.shape).tolist()
+    mesh = shape_face.ObjMesh(positions, uvs, faces.tolist(), corners)
+    moved = face_shapes.expressions(positions)
+    face = shape_face.make_shape_face(shape_face.ShapeSet("seams", mesh, moved), {})
+    coarse, kept = simplified(face.meshes[0], np.stack(list(moved.values())), 100)
+    assert 80 < len(kept) <= 100
+    places = np.asarray(coarse.layout_texture_coordinates, int)
+    old = np.asarray(face.meshes[0].texture_coordinates)
+    for corner in places:
+        assert (old == coarse.texture_coordinates[corner]).all(axis=1).any()
 
 
 def test_a_report_is_one_page(folder, tmp_path):

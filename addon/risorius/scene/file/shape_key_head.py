@@ -91,7 +91,7 @@ def _polygons(item: MeshObject) -> tuple[Doubles, list[list[int]], list[list[int
 
 
 def rig_task(
-    shapes: native.ShapeSet, path: str, joints: int, tolerance_mm: float | None
+    shapes: native.ShapeSet, path: str, joints: int, levels: int, tolerance_mm: float | None
 ) -> Task[tuple[native.JointRig, list[str]]]:
     """The making of a joint rig, which ends with the file; a cancelled one leaves none.
 
@@ -99,6 +99,7 @@ def rig_task(
         shapes: as shapes_of gives them.
         path: of the DNA file.
         joints: new ones.
+        levels: of detail.
         tolerance_mm: what blend shapes keep; None: joints alone.
 
     Returns:
@@ -116,7 +117,11 @@ def rig_task(
 
         odd = face.check_shapes(shapes)
         dna = face.make_shape_face(shapes, matching.assign(shapes.expressions, {}))
-        options = author.RigOptions(author.FitOptions(joints=joints), tolerance_mm)
+        options = author.RigOptions(
+            author.FitOptions(joints=joints),
+            tolerance_mm,
+            lods=author.LodOptions(count=levels),
+        )
         rig = author.make_joint_rig(dna, options, tell)
         if not cancelled():
             rig.dna.save(path)

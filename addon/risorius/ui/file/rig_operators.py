@@ -31,6 +31,13 @@ class RISORIUS_OT_make_rig(RunsBeside, Operator, ExportHelper):
     joints: bpy.props.IntProperty(
         name="Joints", description="How many are made", default=120, min=2, max=1000
     )
+    levels: bpy.props.IntProperty(
+        name="Levels of Detail",
+        description="Each with fewer joints and vertices than the one before",
+        default=8,
+        min=1,
+        max=32,
+    )
     use_shapes: bpy.props.BoolProperty(
         name="Keep Shapes",
         description="What the joints leave of a shape stays as a blend shape",
@@ -68,7 +75,7 @@ class RISORIUS_OT_make_rig(RunsBeside, Operator, ExportHelper):
             return {"CANCELLED"}
         self._head = item.name
         tolerance = self.tolerance if self.use_shapes else None
-        task = shape_key_head.rig_task(shapes, self.filepath, self.joints, tolerance)
+        task = shape_key_head.rig_task(shapes, self.filepath, self.joints, self.levels, tolerance)
         self._task = task
         return self.begin(context, task)
 
@@ -95,7 +102,7 @@ class RISORIUS_OT_make_rig(RunsBeside, Operator, ExportHelper):
         self._lend_materials(before)
         for sentence in odd[:5]:
             self.report({"WARNING"}, sentence)
-        largest = max(float(errors.largest.max()) for errors in rig.errors)
+        largest = rig.levels[0].largest_with_shapes
         self.report(
             {"INFO"},
             words.say(
@@ -118,6 +125,7 @@ class RISORIUS_OT_make_rig(RunsBeside, Operator, ExportHelper):
         layout.use_property_split = True
         layout.use_property_decorate = False
         layout.prop(self, "joints")
+        layout.prop(self, "levels")
         layout.prop(self, "use_shapes")
         row = layout.row()
         row.active = self.use_shapes

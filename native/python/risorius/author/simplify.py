@@ -6,6 +6,7 @@ from __future__ import annotations
 import copy
 
 import numpy as np
+import numpy.typing as npt
 
 from .. import Mesh, _native
 from .skeleton import Doubles, Ints
@@ -14,6 +15,10 @@ _UV = 0.5  # of the texture's width counts as much as of the mesh' size
 _MOTION = 2.0  # of the mesh' size, moved otherwise than the neighbours, counts as much as one of it
 _COMPONENTS = 6  # of the motion that are looked at
 _TRIES = 4
+_STUCK = 1.5  # times the vertices that were asked for: seams are given up
+
+Floats = npt.NDArray[np.float32]
+Indices = npt.NDArray[np.uint32]
 
 
 def fan_triangles(mesh: Mesh) -> Ints:
@@ -45,7 +50,8 @@ def simplified(mesh: Mesh, displacements: Doubles, vertices: int) -> tuple[Mesh,
     """A mesh with about so many vertices, some of those that it has; no skin and no shapes.
 
     What the texture and the expressions do is kept beside the form. Borders and seams stay where
-    they are, so a mesh of many pieces may keep more vertices than were asked for.
+    they are; where there are so many seams that nothing can be taken away, each vertex keeps one
+    place of the texture. A mesh of many pieces may keep more vertices than were asked for.
 
     Args:
         mesh: stays as it is.
@@ -61,16 +67,28 @@ def simplified(mesh: Mesh, displacements: Doubles, vertices: int) -> tuple[Mesh,
     points = positions[places].astype(np.float32)
     attributes = _attributes(mesh, displacements, size).astype(np.float32)
     triangles = fan_triangles(mesh).astype(np.uint32)
+    found = _fewer(points, attributes, triangles, places, vertices)
+    if len(np.unique(places[found])) > _STUCK * vertices:
+        _, first, of = np.unique(places, return_index=True, return_inverse=True)
+        welded = of.ravel()[triangles].astype(np.uint32)
+        found = _fewer(points[first], attributes[first, 2:], welded, places[first], vertices)
+        found = first[found]
+    return _corners_of(mesh, np.asarray(found, np.int64))
+
+
+def _fewer(
+    points: Floats, attributes: Floats, triangles: Indices, places: Ints, vertices: int
+) -> Indices:
+    """Triangles with at most so many vertices, where it can be."""
     # A closed surface has twice as many triangles as vertices; what is open has fewer.
-    count = 2 * vertices
-    found = triangles
+    count, found = 2 * vertices, triangles
     for _ in range(_TRIES):
         found, _ = _native.simplify(points, attributes, triangles, count)
         now = len(np.unique(places[found]))
         if now <= vertices or not len(found):
             break
         count = int(0.97 * count * vertices / now)
-    return _corners_of(mesh, np.asarray(found, np.int64))
+    return found
 
 
 def _corners_of(mesh: Mesh, triangles: Ints) -> tuple[Mesh, Ints]:
