@@ -55,8 +55,12 @@ def controls():
 
 
 def open_it(path, _folder):
-    """As one opens it."""
-    bpy.ops.wm.open_mainfile(filepath=str(path))
+    """As one opens it. Blender 5.2 mends the root of overrides of 4.2, and calls that an error."""
+    try:
+        bpy.ops.wm.open_mainfile(filepath=str(path))
+    except RuntimeError as error:
+        if "library override hierarchy root" not in str(error):
+            raise
 
 
 def _open_if_needed(path, folder):

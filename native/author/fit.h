@@ -30,6 +30,13 @@ struct GivenJoint {
   std::vector<JointMotion> motions;  // [expressions], or none where no expression moves it
 };
 
+/// A point that what some expressions move turns about: an eye for its lids, a jaw's hinge. Joints
+/// that move mostly in these are placed there, so that on the way to 1 they go along the arc.
+struct Pivot {
+  Vector3 position{};
+  std::vector<std::uint32_t> expressions;
+};
+
 struct FitOptions {
   std::size_t joints = 120;    // all, the given ones too
   std::size_t influences = 8;  // joints of a vertex at most
@@ -40,6 +47,7 @@ struct FitOptions {
   std::size_t rounds = 20;  // of weights and motions after all joints are there
   std::size_t threads = 0;  // 0: all cores; the result does not depend on it
   std::vector<GivenJoint> given;
+  std::vector<Pivot> pivots;
 };
 
 struct Fit {

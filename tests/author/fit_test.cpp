@@ -269,6 +269,40 @@ TEST(Fit, WeightsGoOnFromThoseOfTheFinerMesh) {
             core::ErrorCode::kInvalidLength);
 }
 
+TEST(Fit, JointsOfBothSidesAtOnePlaceAreToldApart) {
+  const Shapes shapes = two_sides();
+  // Two joints of each side turn about one point, each in an expression of its own.
+  std::vector<GivenJoint> joints(5);
+  for (std::size_t j = 1; j < 5; ++j) {
+    joints[j].position = {j % 2 == 1 ? 0.5 : -0.5, 0.0, -0.4};
+    joints[j].motions.resize(3);
+  }
+  joints[1].motions[0].translation = joints[2].motions[1].translation = {0.0, 0.0, 0.1};
+  joints[3].motions[2].rotation = {0.0, 0.3, 0.0};
+  joints[4].motions[2].rotation = {0.0, -0.3, 0.0};
+  auto fit = fit_weights(shapes, joints, few(5));
+  ASSERT_TRUE(fit) << fit.error().describe();
+  EXPECT_EQ(fit->mirrored, (std::vector<std::uint32_t>{0, 2, 1, 4, 3}));
+}
+
+TEST(Fit, JointsOfALidLieInTheEye) {
+  Shapes shapes = two_sides();
+  FitOptions options = few(9);
+  options.pivots = {{{0.5, 0.0, -0.4}, {0}}, {{-0.5, 0.0, -0.4}, {1}}};
+  auto fit = fit_joints(shapes, options);
+  ASSERT_TRUE(fit) << fit.error().describe();
+  const auto at_pivot = [&](double x) {
+    return std::count_if(fit->joints.begin(), fit->joints.end(), [&](const Vector3& p) {
+      return std::abs(p[0] - x) < 1e-6 && std::abs(p[2] + 0.4) < 1e-6;
+    });
+  };
+  EXPECT_GT(at_pivot(0.5), 0);
+  EXPECT_EQ(at_pivot(0.5), at_pivot(-0.5));
+  EXPECT_LT(largest_error(shapes, *fit), 0.02);
+  options.pivots[0].expressions = {3};
+  EXPECT_NE(fit_joints(shapes, options).error().describe().find("pivots[0]"), std::string::npos);
+}
+
 TEST(Fit, SaysWhatItCannotUse) {
   const auto says = [](const Shapes& shapes, const FitOptions& options) {
     auto fit = fit_joints(shapes, options);

@@ -18,6 +18,7 @@ from risorius.author import (
     RigOptions,
     make_joint_rig,
     matching,
+    pivots,
     shape_face,
     spec,
 )
@@ -265,10 +266,45 @@ def test_joints_alone_come_near(folder, tmp_path):
         row = table["CTRL_expressions." + NAMES[name]]
         assert error.max() * 1000 == pytest.approx(row["joints_largest_mm"], abs=2e-3)
         assert error.max() < 0.1 * np.linalg.norm(delta, axis=1).max() * METRES
-        half = np.linalg.norm(
-            posed(dna, {NAMES[name]: 0.5}) - wanted(dna, 0.5 * delta), axis=1
-        ).max()
-        assert half * 1000 == pytest.approx(row["half_largest_mm"], abs=2e-3)
+        if name.startswith(("mouth", "brow")):  # the others go round an eye, or a hinge
+            between = max(
+                np.linalg.norm(posed(dna, {NAMES[name]: t}) - wanted(dna, t * delta), axis=1).max()
+                for t in (0.25, 0.5, 0.75)
+            )
+            assert between * 1000 == pytest.approx(row["between_largest_mm"], abs=2e-3)
+
+
+def test_a_jaws_hinge_and_an_eyes_middle_are_found():
+    positions, _ = face_shapes.head()
+    opened = face_shapes.expressions(positions)["jawOpen"]  # about (0, 0, -2)
+    (jaw,) = pivots.find_pivots(
+        ["x.jawOpen"], positions, opened[None], [], np.zeros((0, 3)), jaw=None
+    )
+    assert np.abs(jaw.position - [0, 0, -2]).max() < 0.2
+    assert jaw.expressions == (0,)
+    # A lid of vertices on a ball, which goes down on it.
+    middle, turn = np.array([3.0, 2.0, 7.0]), np.linspace(0.1, 0.6, 9)
+    u, v = (x.ravel() for x in np.meshgrid(np.linspace(-0.7, 0.7, 9), turn))
+    ball = lambda up: (
+        1.2
+        * np.stack(
+            [np.sin(u) * np.cos(up), np.sin(up), np.cos(u) * np.cos(up)], axis=1
+        )
+    )
+    lid, shut = middle + ball(v), ball(v - 0.5) - ball(v)
+    names = ["x.eyeBlinkL", "x.eyeWidenL", "x.eyeBlinkR"]
+    moved = np.stack([shut, -0.3 * shut, 0 * shut])
+    (eye,) = pivots.find_pivots(names, lid, moved, [], np.zeros((0, 3)), jaw=None)
+    assert np.abs(eye.position - middle).max() < 1e-6
+    assert eye.expressions == (0, 1)
+    given = np.array([[9.0, 9.0, 9.0]])
+    (eye,) = pivots.find_pivots(names[:2], lid, moved[:2], ["FACIAL_L_Eye"], given, jaw=None)
+    assert (eye.position == given[0]).all()
+    half = lid + pivots.arc(lid, shut, middle, 0.5) - middle
+    assert np.linalg.norm(half, axis=1) == pytest.approx(1.2)  # on the ball, as the line is not
+    assert np.linalg.norm(lid + 0.5 * shut - middle, axis=1).max() < 1.19
+    for share, goal in ((0.0, 0 * shut), (1.0, shut)):
+        assert np.allclose(pivots.arc(lid, shut, middle, share), goal, atol=1e-12)
 
 
 def test_both_sides_mirror_each_other(made):

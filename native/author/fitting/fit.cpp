@@ -23,6 +23,9 @@ using detail::State;
 using detail::Vec3;
 
 constexpr int kRoundsOfWeights = 12;
+/// Joints lie amid what they move until the last rounds: from a far pivot they turn on their own
+/// worse.
+constexpr std::size_t kRoundsAtPivots = 4;
 /// Joints that stay where they are: those that a vertex needs may lie further off than its
 /// neighbours'.
 constexpr std::size_t kNearOfGiven = 12;
@@ -123,6 +126,7 @@ Joint take_joint(const Problem& problem, const GivenJoint& given, std::uint32_t 
   Joint out;
   const Vector3& p = given.position;
   out.position = (Vec3(p[0], p[1], p[2]) - problem.middle) * problem.scale;
+  out.place = out.position;
   out.rests = given.motions.empty();
   out.given = true;
   out.mirrored = number;
@@ -135,13 +139,32 @@ Joint take_joint(const Problem& problem, const GivenJoint& given, std::uint32_t 
 /// Finds given joints' mirrors, and fills their motions in the expressions that were added.
 void pair_given(const Problem& problem, std::vector<Joint>& joints, std::size_t own) {
   if (problem.mirror.empty()) return;
-  for (Joint& joint : joints) {
-    for (std::uint32_t k = 0; k < joints.size(); ++k) {
-      const Vec3& p = joints[k].position;
-      if ((Vec3(-p.x(), p.y(), p.z()) - joint.position).norm() < 1e-3) joint.mirrored = k;
-    }
-  }
   const Mat3 flip = Vec3(-1, 1, 1).asDiagonal();
+  // Several may lie at one place, such as the joints of a lid in the eye's middle: then what they
+  // do tells which belong together. Each is one other's, never two's.
+  std::vector<bool> taken(joints.size(), false);
+  for (std::uint32_t j = 0; j < joints.size(); ++j) {
+    if (taken[j]) continue;
+    std::uint32_t best = j;
+    double least = 1e300;
+    for (std::uint32_t k = j; k < joints.size(); ++k) {
+      if (taken[k] || (flip * joints[k].position - joints[j].position).norm() > 1e-3) continue;
+      double apart = 0.0;
+      for (std::size_t e = 0; e < own; ++e) {
+        const std::uint32_t f = problem.mirror.expressions[e];
+        if (f == Mirror::kNone || f >= own) continue;
+        apart += (flip * joints[k].rotations[f] * flip - joints[j].rotations[e]).squaredNorm();
+        apart += (flip * joints[k].translations[f] - joints[j].translations[e]).squaredNorm();
+      }
+      if (apart < least) {
+        least = apart;
+        best = k;
+      }
+    }
+    joints[j].mirrored = best;
+    joints[best].mirrored = j;
+    taken[j] = taken[best] = true;
+  }
   std::size_t e = own;
   for (std::size_t from = 0; from < own; ++from) {
     if (problem.mirror.expressions[from] != Mirror::kNone) continue;
@@ -178,6 +201,36 @@ void find_nearest_given(Problem& problem, const std::vector<Joint>& joints) {
       }
     }
   });
+}
+
+/// The pivots in the fit's unit, each with that of the other side.
+void take_pivots(const std::vector<Pivot>& pivots, Problem& problem) {
+  for (std::size_t i = 0; i < pivots.size(); ++i) {
+    const Vector3& p = pivots[i].position;
+    Problem::Pivot pivot;
+    pivot.position = (Vec3(p[0], p[1], p[2]) - problem.middle) * problem.scale;
+    pivot.expressions.assign(problem.expressions, false);
+    for (const std::uint32_t e : pivots[i].expressions) pivot.expressions[e] = true;
+    pivot.mirrored = i;
+    problem.pivots.push_back(std::move(pivot));
+  }
+  if (problem.mirror.empty()) return;
+  for (std::size_t i = 0; i < pivots.size(); ++i) {
+    for (std::size_t k = 0; k < i; ++k) {
+      Vec3& a = problem.pivots[i].position;
+      Vec3& b = problem.pivots[k].position;
+      const Vec3 other(-b.x(), b.y(), b.z());
+      if ((a - other).norm() > 0.02) continue;
+      a = (a + other) / 2;
+      b = Vec3(-a.x(), a.y(), a.z());
+      problem.pivots[i].mirrored = k;
+      problem.pivots[k].mirrored = i;
+    }
+    // What has no other side lies in the middle.
+    if (problem.pivots[i].mirrored == i && std::abs(problem.pivots[i].position.x()) < 0.02) {
+      problem.pivots[i].position.x() = 0.0;
+    }
+  }
 }
 
 State start(Problem& problem, const std::vector<GivenJoint>& given, std::size_t own) {
@@ -309,6 +362,20 @@ core::Status check(const Shapes& shapes, const FitOptions& options) {
                           " expressions or none were expected, found " +
                           std::to_string(g.motions.size()));
   }
+  for (std::size_t i = 0; i < options.pivots.size(); ++i) {
+    const Pivot& pivot = options.pivots[i];
+    const std::string place = "pivots[" + std::to_string(i) + "]";
+    for (const double x : pivot.position) {
+      if (!std::isfinite(x))
+        return core::fail(ErrorCode::kInvalidValue, place, "a finite number was expected");
+    }
+    for (const std::uint32_t e : pivot.expressions) {
+      if (e < shapes.expressions) continue;
+      return core::fail(
+          ErrorCode::kInvalidIndex, place,
+          "expression " + std::to_string(e) + " of " + std::to_string(shapes.expressions));
+    }
+  }
   const std::size_t needed = options.given.size() + 2;
   if (options.joints < needed || options.joints > 4096) {
     return core::fail(
@@ -396,6 +463,7 @@ core::Result<Fit> fit_joints(const Shapes& shapes, const FitOptions& options,
                              const Progress& progress) {
   RISORIUS_TRY(check(shapes, options));
   Problem problem = make_problem(shapes, options);
+  take_pivots(options.pivots, problem);
   State state = start(problem, options.given, shapes.expressions);
   std::vector<float> left;
   if (!options.given.empty()) {  // what the given joints move is theirs before others come
@@ -414,6 +482,7 @@ core::Result<Fit> fit_joints(const Shapes& shapes, const FitOptions& options,
     }
   }
   for (std::size_t r = 0; r < options.rounds; ++r) {
+    problem.to_pivots = r + kRoundsAtPivots >= options.rounds;
     improve(problem, state, left);
     // The last two rounds even out what the new importance asked for.
     if (r + 2 < options.rounds) emphasise(problem, left, options.emphasis);

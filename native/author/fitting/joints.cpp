@@ -43,6 +43,7 @@ double spacing(const Problem& problem, std::size_t joints) {
 Joint make_joint(const Problem& problem, const Vec3& position, std::uint32_t mirrored) {
   Joint out;
   out.position = position;
+  out.place = position;
   out.mirrored = mirrored;
   rest(out, problem.expressions);
   return out;

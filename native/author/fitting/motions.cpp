@@ -23,6 +23,7 @@ constexpr double kFar = 0.25;  // radians from which on arms count as turned
 // against each other. Tried from 1e-4 to 10 on a head with 52 expressions.
 constexpr double kTurn = 0.1;
 constexpr double kShift = 3e-3;
+constexpr double kTurnAtPivot = 0.01;  // there a shift is the stranger one
 
 Mat3 cross_matrix(const Vec3& a) {
   Mat3 m;
@@ -120,7 +121,9 @@ class System {
       : column_(state.joints.size(), -1), rows_(state.joints.size()) {
     int n = 0;
     for (std::size_t j = 0; j < state.joints.size(); ++j) {
-      if (!state.joints[j].given) column_[j] = n++;
+      if (state.joints[j].given) continue;
+      column_[j] = n++;
+      at_pivot_.push_back(state.joints[j].at_pivot);
     }
     size_ = 6 * n;
     core::parallel_for(state.joints.size(), problem.threads, [&](std::size_t from, std::size_t to) {
@@ -155,7 +158,11 @@ class System {
     for (std::size_t j = 0; j < rows_.size(); ++j) {
       for (const Shared& s : rows_[j]) {
         if (s.joint != j) continue;
-        turn_ += 2.0 / 3.0 * s.qp.trace() / std::max(1, n);
+        // About the middle of what it moves: arms from a far pivot are no stiffness against
+        // turning.
+        const Vec3 off = state.joints[j].place - state.joints[j].position;
+        const double own = s.qp.trace() - 2.0 * off.dot(s.p) + off.squaredNorm() * s.mass;
+        turn_ += 2.0 / 3.0 * own / std::max(1, n);
         shift_ += s.mass / std::max(1, n);
       }
     }
@@ -165,7 +172,9 @@ class System {
   int column(std::size_t joint) const { return column_[joint]; }
   int size() const { return size_; }
   double ridge(int row) const {
-    return row % 6 < 3 ? kTurn * turn_ + 1e-12 : kShift * shift_ + 1e-12;
+    if (row % 6 >= 3) return kShift * shift_ + 1e-12;
+    const bool far = at_pivot_[static_cast<std::size_t>(row / 6)];
+    return (far ? kTurnAtPivot : kTurn) * turn_ + 1e-12;
   }
   const Factor& at_rest() const { return solver_; }
 
@@ -192,6 +201,7 @@ class System {
  private:
   std::vector<int> column_;
   std::vector<std::vector<Shared>> rows_;
+  std::vector<bool> at_pivot_;  // by column
   int size_ = 0;
   double turn_ = 0.0, shift_ = 0.0;
   Factor solver_;
@@ -412,8 +422,57 @@ void solve_motions(const Problem& problem, State& state, std::vector<float>& lef
   take_step(problem, state, system, step, left);
 }
 
+namespace {
+
+/// The pivot of the expressions that a good part of a joint's motion belongs to, or -1.
+int pivot_of(const Problem& problem, const Joint& joint,
+             const std::vector<ByJoint::Entry>& weights) {
+  if (problem.pivots.empty() || !problem.to_pivots) return -1;
+  std::vector<double> energy(problem.expressions, 0.0);
+  double all = 0.0;
+  for (const auto& entry : weights) {
+    const Vec3 p = entry.weight * problem.positions[entry.vertex];
+    for (std::size_t e = 0; e < problem.expressions; ++e) {
+      const Affine& m = joint.motions[e];
+      const double moved = (m.leftCols<3>() * p + entry.weight * m.col(3)).squaredNorm();
+      energy[e] += moved;
+      all += moved;
+    }
+  }
+  int best = -1;
+  double most = 0.3 * all;
+  for (std::size_t i = 0; i < problem.pivots.size(); ++i) {
+    double share = 0.0;
+    for (std::size_t e = 0; e < problem.expressions; ++e) {
+      if (problem.pivots[i].expressions[e]) share += energy[e];
+    }
+    if (share > most) {
+      most = share;
+      best = static_cast<int>(i);
+    }
+  }
+  return best;
+}
+
+/// The same motion about another point.
+void place_at(const Problem& problem, const Vec3& to, Joint& joint) {
+  const Vec3 arm = to - joint.position;
+  for (std::size_t e = 0; e < problem.expressions; ++e) {
+    joint.translations[e] += joint.rotations[e] * arm - arm;
+  }
+  joint.position = to;
+}
+
+}  // namespace
+
 void move_joints(const Problem& problem, State& state) {
   const ByJoint weights = by_joint(state);
+  std::vector<int> pivots(state.joints.size(), -1);
+  core::parallel_for(state.joints.size(), problem.threads, [&](std::size_t from, std::size_t to) {
+    for (std::size_t j = from; j < to; ++j) {
+      if (!state.joints[j].given) pivots[j] = pivot_of(problem, state.joints[j], weights.of[j]);
+    }
+  });
   for (std::size_t j = 0; j < state.joints.size(); ++j) {
     Joint& joint = state.joints[j];
     if (joint.given) continue;
@@ -425,14 +484,21 @@ void move_joints(const Problem& problem, State& state) {
       total += s;
     }
     if (total <= 0.0) continue;
-    Vec3 to = sum / total;
-    if (!problem.mirror.empty() && joint.mirrored == j) to.x() = 0.0;
-    // The same motion about another point.
-    for (std::size_t e = 0; e < problem.expressions; ++e) {
-      const Vec3 arm = to - joint.position;
-      joint.translations[e] += joint.rotations[e] * arm - arm;
+    joint.place = sum / total;
+    const bool alone = joint.mirrored == j;
+    if (!problem.mirror.empty() && alone) joint.place.x() = 0.0;
+    int pivot = pivots[j];
+    if (!problem.mirror.empty() && joint.mirrored < j) {  // as the other side decided
+      const int other = pivots[joint.mirrored];
+      pivot = other < 0
+                  ? -1
+                  : static_cast<int>(problem.pivots[static_cast<std::size_t>(other)].mirrored);
     }
-    joint.position = to;
+    Vec3 to = joint.place;
+    if (pivot >= 0) to = problem.pivots[static_cast<std::size_t>(pivot)].position;
+    if (!problem.mirror.empty() && alone && to.x() != 0.0) to = joint.place;
+    joint.at_pivot = to != joint.place;
+    place_at(problem, to, joint);
   }
 }
 

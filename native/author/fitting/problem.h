@@ -25,8 +25,15 @@ struct Problem {
   std::vector<std::uint32_t> first_neighbour, neighbours;  // of vertices, as rows of a CSR matrix
   std::vector<double> motion;  // [V] root of the summed squares of its displacements
   Mirror mirror;
+  struct Pivot {
+    Vec3 position = Vec3::Zero();
+    std::vector<bool> expressions;  // [E]
+    std::size_t mirrored = 0;       // the pivot of the other side, itself in the middle
+  };
+  std::vector<Pivot> pivots;
+  bool to_pivots = false;  // whether joints are placed there already
   double smoothness = 0.0;
-  std::size_t near = 5;  // joints that a vertex tries because they are near
+  std::size_t near = 5;            // joints that a vertex tries because they are near
   std::vector<double> importance;  // [V] of a vertex' squared error, mean 1
   std::vector<double> asked;       // [V] of it, what the caller asked for
   /// [V] the given joint that alone comes nearest to what the vertex does, or Mirror::kNone.
@@ -41,8 +48,10 @@ using Affine = Eigen::Matrix<double, 3, 4, Eigen::RowMajor>;
 
 struct Joint {
   Vec3 position = Vec3::Zero();
+  Vec3 place = Vec3::Zero();  // the middle of what it moves: its position, if that is no pivot
   std::uint32_t mirrored = 0;
   bool rests = false;              // no expression moves it
+  bool at_pivot = false;           // its position is a pivot
   bool given = false;              // it stays where it is and moves as it did
   std::vector<Mat3> rotations;     // [E]
   std::vector<Vec3> translations;  // [E]
@@ -69,7 +78,8 @@ void find_residual(const Problem& problem, const State& state, std::vector<float
 /// Joints where the given ones leave most, until there are `count`.
 void add_joints(const Problem& problem, State& state, const std::vector<float>& left,
                 std::size_t count);
-/// Joints' neutral positions to the middle of what they move, the given ones left alone.
+/// Joints' neutral positions to the middle of what they move, or to the pivot of the expressions
+/// that they mostly move in; the given ones are left alone.
 void move_joints(const Problem& problem, State& state);
 
 void rest(Joint& joint, std::size_t expressions);

@@ -97,7 +97,7 @@ std::vector<Influence> candidates_of(const Problem& problem, const State& state,
   }
   std::vector<std::pair<double, std::uint32_t>> near;
   for (std::uint32_t j = 0; j < state.joints.size(); ++j) {
-    near.emplace_back((state.joints[j].position - problem.positions[v]).squaredNorm(), j);
+    near.emplace_back((state.joints[j].place - problem.positions[v]).squaredNorm(), j);
   }
   const std::size_t count = std::min(problem.near, near.size());
   std::partial_sort(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(count), near.end());

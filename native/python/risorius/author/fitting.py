@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from .. import _native
 from .._native import JointFit
+from .pivots import Pivot
 from .skeleton import Doubles, rotation_vectors
 
 __all__ = ["FitOptions", "JointFit", "fit_joints", "fit_weights"]
@@ -50,6 +51,7 @@ def fit_joints(
     given: Doubles,
     motions: Doubles,
     importance: Doubles | None = None,
+    pivots: Sequence[Pivot] = (),
     options: FitOptions | None = None,
     progress: Progress | None = None,
 ) -> JointFit:
@@ -62,6 +64,7 @@ def fit_joints(
         given: float64[J, 3], joints that stay where they are.
         motions: float64[E, J, 3, 4] of the given joints; one at least rests in all expressions.
         importance: float64[V], how much a vertex' squared error counts; None: all alike.
+        pivots: points that joints of some expressions are placed at.
         options: how.
         progress: told the share that is done; False stops the work, with a DnaError "stopped".
 
@@ -85,6 +88,8 @@ def fit_joints(
         rounds=o.rounds,
         symmetric=o.symmetric,
         threads=o.threads,
+        pivots=np.array([pivot.position for pivot in pivots]).reshape(-1, 3),
+        pivot_expressions=[list(pivot.expressions) for pivot in pivots],
         progress=progress,
     )
 

@@ -20,6 +20,7 @@ from .fitting import FitOptions, JointFit, Progress, fit_joints
 from .levels import LodOptions, extend_levels, joint_budgets, joint_order, level_joints
 from .meshes import Made, count_deltas
 from .naming import joint_names
+from .pivots import find_pivots
 from .skeleton import Doubles
 from .work import (
     MM,
@@ -117,6 +118,15 @@ def _level_count(dna: Dna, options: LodOptions) -> int:
     return own if fixed else max(own, options.count)
 
 
+def _jaw(work: Work) -> int | None:
+    """The joint that opens the mouth most, if there is one."""
+    opening = [e for e, name in enumerate(work.names) if name.endswith("jawOpen")]
+    if not opening:
+        return None
+    turned = np.linalg.norm(work.motions[opening[0]] - np.eye(3, 4), axis=(1, 2))
+    return int(turned.argmax()) if turned.max() > 1e-9 else None
+
+
 def _part(progress: Progress | None, begin: float, end: float) -> Progress | None:
     return None if progress is None else lambda share: progress(begin + share * (end - begin))
 
@@ -161,6 +171,14 @@ def _fit(
         edges.append(sk.mesh_edges(dna.meshes[m]) + np.uint32(begin[-1]))
         begin.append(begin[-1] + len(dna.meshes[m].positions))
     used = given(work)
+    work.pivots = find_pivots(
+        work.names,
+        neutral,
+        moved.astype(np.float64),
+        dna.joint_names,
+        work.positions,
+        jaw=_jaw(work),
+    )
     fit = fit_joints(
         neutral,
         moved,
@@ -168,6 +186,7 @@ def _fit(
         given=work.positions[used],
         motions=work.motions[:, used],
         importance=np.concatenate([counts for _, counts in asked]),
+        pivots=work.pivots,
         options=options,
         progress=progress,
     )

@@ -13,6 +13,7 @@ from .. import BlendShapeTarget, Dna, Mesh
 from . import skeleton as sk
 from .fitting import fit_weights
 from .levels import level_name, mesh_budget, vertex_budgets
+from .pivots import arc
 from .simplify import simplified
 from .skeleton import Doubles
 from .work import (
@@ -210,13 +211,12 @@ def _finish_mesh(
     positions = np.asarray(mesh.positions, np.float64)
     mm = MM.get(work.dna.translation_unit, 10.0)
     channel = _channels(work.dna)
-    halves = sk.column_motions(work.dna, sk.column_count(work.dna), 0.5)[work.columns]
+    between = _Between(work, mesh)
     found, targets = _no_errors(len(positions), work.names), []
     for row, column in enumerate(work.columns):
         goal = positions + wanted[row]
         error = np.linalg.norm(sk.skinned(positions, weights, motions[row]) - goal, axis=1) * mm
-        half = sk.skinned(positions, weights, halves[row]) - positions - 0.5 * wanted[row]
-        found.half_largest[row] = np.linalg.norm(half, axis=1).max() * mm
+        found.between_largest[row] = between.largest(row, wanted[row], weights) * mm
         found.motion[row] = np.sqrt((wanted[row] ** 2).sum(axis=1).mean()) * mm
         found.joints_rms[row] = np.sqrt((error**2).mean())
         found.joints_largest[row], found.worst_vertex[row] = error.max(), error.argmax()
@@ -235,6 +235,43 @@ def _finish_mesh(
         found.largest[row] = error.max()
     out.blend_shape_targets = targets
     return out, found
+
+
+class _Between:
+    """How far joints are off on the way to 1: from the line, or from the arc about a pivot."""
+
+    SHARES = (0.25, 0.5, 0.75)
+
+    def __init__(self, work: Work, mesh: Mesh) -> None:
+        self.work = work
+        self.positions = np.asarray(mesh.positions, np.float64)
+        count = sk.column_count(work.source)
+        self.motions = {t: sk.column_motions(work.dna, count, t)[work.columns] for t in self.SHARES}
+        self.before = {
+            t: sk.column_motions(work.source, count, t)[work.columns] for t in self.SHARES
+        }
+        self.weights = sk.dense_weights(mesh, len(work.source.joint_names))
+        self.middles = {e: p.position for p in work.pivots for e in p.expressions}
+
+    def truth(self, row: int, wanted: Doubles, share: float) -> Doubles:
+        """float64[V, 3], what is added to the neutral positions."""
+        whole = self.work.motions[row]
+        if np.allclose(whole, np.eye(3, 4), atol=1e-12):
+            middle = self.middles.get(row)
+            return share * wanted if middle is None else arc(self.positions, wanted, middle, share)
+        # Joints that were there go their own arc; what shapes do beside them is a line.
+        goal = self.positions + wanted
+        shape = sk.before_skin(goal, self.weights, whole) - self.positions
+        part = sk.skinned(self.positions + share * shape, self.weights, self.before[share][row])
+        return part - self.positions
+
+    def largest(self, row: int, wanted: Doubles, weights: Doubles) -> float:
+        worst = 0.0
+        for share in self.SHARES:
+            reached = sk.skinned(self.positions, weights, self.motions[share][row])
+            off = reached - self.positions - self.truth(row, wanted, share)
+            worst = max(worst, float(np.linalg.norm(off, axis=1).max()))
+        return worst
 
 
 def _channels(dna: Dna) -> dict[int, int]:

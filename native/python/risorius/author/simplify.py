@@ -72,7 +72,7 @@ def simplified(mesh: Mesh, displacements: Doubles, vertices: int) -> tuple[Mesh,
         _, first, of = np.unique(places, return_index=True, return_inverse=True)
         welded = of.ravel()[triangles].astype(np.uint32)
         found = _fewer(points[first], attributes[first, 2:], welded, places[first], vertices)
-        found = first[found]
+        found = np.asarray(first, np.uint32)[found]
     return _corners_of(mesh, np.asarray(found, np.int64))
 
 

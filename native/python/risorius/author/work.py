@@ -13,6 +13,7 @@ from ..base.errors import ArgumentError
 from . import skeleton as sk
 from .fitting import FitOptions, JointFit
 from .levels import LodOptions
+from .pivots import Pivot
 from .skeleton import Doubles, Ints
 
 MM = {"cm": 10.0, "m": 1000.0}
@@ -44,7 +45,8 @@ class MeshErrors:
     joints_largest: Doubles  # [E] mm
     largest: Doubles  # [E] mm, with blend shapes
     worst_vertex: Ints  # [E] by joints alone
-    half_largest: Doubles  # [E] mm, by joints alone with the control at 0.5
+    # [E] mm, by joints alone with the control at 0.25, 0.5 and 0.75, against the line or the arc
+    between_largest: Doubles
     lod: int = 0
 
 
@@ -73,6 +75,7 @@ class Work:
     head: int  # what new joints hang on
     levels: int = 1
     new: list[Ints] = field(default_factory=list)  # joints of each level, among the new ones
+    pivots: list[Pivot] = field(default_factory=list)
     heirs: dict[int, int] = field(
         default_factory=dict
     )  # what takes a joint's vertices in its place

@@ -115,7 +115,7 @@ def as_json(rig: JointRig) -> dict[str, object]:
                         "joints_rms_mm": m.joints_rms[e],
                         "joints_largest_mm": m.joints_largest[e],
                         "largest_mm": m.largest[e],
-                        "half_largest_mm": m.half_largest[e],
+                        "between_largest_mm": m.between_largest[e],
                         "worst_vertex": int(m.worst_vertex[e]),
                     }
                     for e, name in enumerate(m.expressions)

@@ -38,7 +38,7 @@ class ExpressionRow:
     motion: float
     rms: float
     largest: float
-    half: float
+    between: float  # the largest at 0.25, 0.5 and 0.75
     with_shapes: float
     worst: str  # mesh and vertex
 
@@ -114,12 +114,19 @@ def _levels(levels: Sequence[LevelRow]) -> str:
 
 
 def _expressions(rows: Sequence[ExpressionRow]) -> str:
-    titles = ["expression", "motion RMS mm", "RMS mm", "largest mm", "at 0.5 mm", "with shapes mm"]
+    titles = [
+        "expression",
+        "motion RMS mm",
+        "RMS mm",
+        "largest mm",
+        "on the way mm",
+        "with shapes mm",
+    ]
     return _table(
         [*titles, "worst vertex"],
         [
             [
-                x.name, f"{x.motion:.3f}", f"{x.rms:.4f}", f"{x.largest:.3f}", f"{x.half:.3f}",
+                x.name, f"{x.motion:.3f}", f"{x.rms:.4f}", f"{x.largest:.3f}", f"{x.between:.3f}",
                 f"{x.with_shapes:.3f}", x.worst,
             ]
             for x in sorted(rows, key=lambda row: -row.largest)

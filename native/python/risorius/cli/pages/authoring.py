@@ -100,7 +100,7 @@ def _rows(rig: JointRig) -> list[ExpressionRow]:
                 motion=mean([x.motion[e] for x in fine]),
                 rms=mean([x.joints_rms[e] for x in fine]),
                 largest=float(worst.joints_largest[e]),
-                half=max(float(x.half_largest[e]) for x in fine),
+                between=max(float(x.between_largest[e]) for x in fine),
                 with_shapes=max(float(x.largest[e]) for x in fine),
                 worst=f"{worst.name} {int(worst.worst_vertex[e])}",
             )
