@@ -28,6 +28,9 @@ struct JointMotion {
 struct GivenJoint {
   Vector3 position{};
   std::vector<JointMotion> motions;  // [expressions], or none where no expression moves it
+  /// The joint of the other side, itself in the middle; kUnknown: found by place and motion.
+  std::uint32_t mirrored = kUnknown;
+  static constexpr std::uint32_t kUnknown = 0xffffffffu;
 };
 
 /// A point that what some expressions move turns about: an eye for its lids, a jaw's hinge. Joints

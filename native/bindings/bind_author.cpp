@@ -129,7 +129,7 @@ Fit fit_joints(const Doubles& neutral, const Floats& displacements, const Indice
 
 Fit fit_weights(const Doubles& neutral, const Floats& displacements, const Indices& edges,
                 const Doubles& importance, const Doubles& positions, const Doubles& rotations,
-                const Doubles& translations, const Indices& start_joints,
+                const Doubles& translations, const Indices& mirrored, const Indices& start_joints,
                 const Floats& start_weights, std::size_t influences, double smoothness,
                 bool symmetric, std::size_t threads) {
   const author::Shapes input = shapes(neutral, displacements, edges, importance);
@@ -138,7 +138,13 @@ Fit fit_weights(const Doubles& neutral, const Floats& displacements, const Indic
   options.smoothness = smoothness;
   options.symmetric = symmetric;
   options.threads = threads;
-  const auto joints = given_joints(positions, rotations, translations, input.expressions);
+  auto joints = given_joints(positions, rotations, translations, input.expressions);
+  if (mirrored.size() != 0) {
+    if (static_cast<std::size_t>(mirrored.size()) != joints.size()) {
+      shape_error("mirrored", "(J,)", mirrored);
+    }
+    for (std::size_t j = 0; j < joints.size(); ++j) joints[j].mirrored = mirrored.data()[j];
+  }
   author::StartWeights start;
   if (start_joints.ndim() != 2 || start_weights.ndim() != 2) {
     shape_error("start", "(V, n)", start_joints);
@@ -244,8 +250,8 @@ void bind_author(py::module_& m) {
         "JointFit: see risorius.author.fitting.");
   m.def("fit_weights", &fit_weights, py::arg("neutral"), py::arg("displacements"), py::arg("edges"),
         py::arg("importance"), py::arg("positions"), py::arg("rotations"), py::arg("translations"),
-        py::arg("start_joints"), py::arg("start_weights"), py::kw_only(), py::arg("influences"),
-        py::arg("smoothness"), py::arg("symmetric"), py::arg("threads"),
+        py::arg("mirrored"), py::arg("start_joints"), py::arg("start_weights"), py::kw_only(),
+        py::arg("influences"), py::arg("smoothness"), py::arg("symmetric"), py::arg("threads"),
         "JointFit with these joints: see risorius.author.fitting.");
   m.def("simplify", &simplify, py::arg("positions"), py::arg("attributes"), py::arg("triangles"),
         py::arg("count"), "See risorius.author.simplify.");

@@ -283,6 +283,10 @@ TEST(Fit, JointsOfBothSidesAtOnePlaceAreToldApart) {
   auto fit = fit_weights(shapes, joints, few(5));
   ASSERT_TRUE(fit) << fit.error().describe();
   EXPECT_EQ(fit->mirrored, (std::vector<std::uint32_t>{0, 2, 1, 4, 3}));
+  joints[1].mirrored = 2;
+  EXPECT_EQ(fit_weights(shapes, joints, few(5)).error().code, core::ErrorCode::kInvalidIndex);
+  joints[2].mirrored = 1;
+  EXPECT_TRUE(fit_weights(shapes, joints, few(5)));
 }
 
 TEST(Fit, JointsOfALidLieInTheEye) {

@@ -285,12 +285,10 @@ def test_a_jaws_hinge_and_an_eyes_middle_are_found():
     # A lid of vertices on a ball, which goes down on it.
     middle, turn = np.array([3.0, 2.0, 7.0]), np.linspace(0.1, 0.6, 9)
     u, v = (x.ravel() for x in np.meshgrid(np.linspace(-0.7, 0.7, 9), turn))
-    ball = lambda up: (
-        1.2
-        * np.stack(
-            [np.sin(u) * np.cos(up), np.sin(up), np.cos(u) * np.cos(up)], axis=1
-        )
-    )
+
+    def ball(up):
+        return 1.2 * np.stack([np.sin(u) * np.cos(up), np.sin(up), np.cos(u) * np.cos(up)], axis=1)
+
     lid, shut = middle + ball(v), ball(v - 0.5) - ball(v)
     names = ["x.eyeBlinkL", "x.eyeWidenL", "x.eyeBlinkR"]
     moved = np.stack([shut, -0.3 * shut, 0 * shut])

@@ -137,12 +137,17 @@ Joint take_joint(const Problem& problem, const GivenJoint& given, std::uint32_t 
 }
 
 /// Finds given joints' mirrors, and fills their motions in the expressions that were added.
-void pair_given(const Problem& problem, std::vector<Joint>& joints, std::size_t own) {
+void pair_given(const Problem& problem, const std::vector<GivenJoint>& given,
+                std::vector<Joint>& joints, std::size_t own) {
   if (problem.mirror.empty()) return;
   const Mat3 flip = Vec3(-1, 1, 1).asDiagonal();
   // Several may lie at one place, such as the joints of a lid in the eye's middle: then what they
   // do tells which belong together. Each is one other's, never two's.
   std::vector<bool> taken(joints.size(), false);
+  for (std::uint32_t j = 0; j < joints.size(); ++j) {
+    taken[j] = j < given.size() && given[j].mirrored != GivenJoint::kUnknown;
+    if (taken[j]) joints[j].mirrored = given[j].mirrored;
+  }
   for (std::uint32_t j = 0; j < joints.size(); ++j) {
     if (taken[j]) continue;
     std::uint32_t best = j;
@@ -244,7 +249,7 @@ State start(Problem& problem, const std::vector<GivenJoint>& given, std::size_t 
     head.position = {problem.middle.x(), problem.middle.y(), problem.middle.z()};
     out.joints.push_back(take_joint(problem, head, static_cast<std::uint32_t>(out.joints.size())));
   }
-  pair_given(problem, out.joints, own);
+  pair_given(problem, given, out.joints, own);
   find_nearest_given(problem, out.joints);
   const auto head = std::find_if(out.joints.begin(), out.joints.end(), rests);
   out.weights.assign(problem.vertices,
@@ -355,6 +360,13 @@ core::Status check(const Shapes& shapes, const FitOptions& options) {
   }
   if (most <= 0.0)
     return core::fail(ErrorCode::kInvalidValue, "displacements", "no expression moves a vertex");
+  for (std::size_t j = 0; j < options.given.size(); ++j) {
+    const std::uint32_t other = options.given[j].mirrored;
+    if (other == GivenJoint::kUnknown) continue;
+    if (other < options.given.size() && options.given[other].mirrored == j) continue;
+    return core::fail(ErrorCode::kInvalidIndex, "given[" + std::to_string(j) + "]",
+                      "a joint of the other side was expected whose other side it is");
+  }
   for (const GivenJoint& g : options.given) {
     if (g.motions.empty() || g.motions.size() == shapes.expressions) continue;
     return core::fail(ErrorCode::kInvalidLength, "given",

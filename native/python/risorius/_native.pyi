@@ -1154,6 +1154,7 @@ def fit_weights(
     positions: npt.ArrayLike,
     rotations: npt.ArrayLike,
     translations: npt.ArrayLike,
+    mirrored: npt.ArrayLike,
     start_joints: npt.ArrayLike,
     start_weights: npt.ArrayLike,
     *,

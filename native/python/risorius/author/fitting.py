@@ -12,7 +12,7 @@ import numpy.typing as npt
 from .. import _native
 from .._native import JointFit
 from .pivots import Pivot
-from .skeleton import Doubles, rotation_vectors
+from .skeleton import Doubles, Ints, rotation_vectors
 
 __all__ = ["FitOptions", "JointFit", "fit_joints", "fit_weights"]
 
@@ -102,6 +102,7 @@ def fit_weights(
     given: Doubles,
     motions: Doubles,
     importance: Doubles | None = None,
+    mirrored: Ints | None = None,
     start: Doubles | None = None,
     options: FitOptions | None = None,
 ) -> JointFit:
@@ -114,6 +115,7 @@ def fit_weights(
         given: float64[J, 3], all joints.
         motions: float64[E, J, 3, 4].
         importance: as fit_joints.
+        mirrored: int64[J], the joint of the other side; None: found by place and motion.
         start: float64[V, J], weights to begin with, such as those of the finer mesh.
         options: influences, smoothness, symmetric and threads of it count.
 
@@ -130,6 +132,7 @@ def fit_weights(
         given,
         rotations,
         translations,
+        np.zeros(0, np.uint32) if mirrored is None else mirrored.astype(np.uint32),
         *_rows(np.zeros((len(neutral), 0)) if start is None else start),
         influences=o.influences,
         smoothness=o.smoothness,

@@ -151,6 +151,7 @@ def _order_levels(
     )
     work.new = [level_joints(order, mirrored, budget) - len(used) for budget in budgets]
     place = np.concatenate([used, own])
+    work.mirrored = dict(zip(place.tolist(), place[mirrored].tolist(), strict=True))
     work.heirs = {int(place[joint]): int(place[heir]) for joint, heir in heirs.items()}
 
 

@@ -140,6 +140,7 @@ class Made:
             given=self.rest[joints],
             motions=self.motions[:, joints],
             importance=counts,
+            mirrored=np.array([joints.tolist().index(work.mirrored[j]) for j in joints.tolist()]),
             start=rows[:, joints],
             options=replace(options, smoothness=0.1 * options.smoothness),
         )

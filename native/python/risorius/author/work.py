@@ -76,6 +76,7 @@ class Work:
     levels: int = 1
     new: list[Ints] = field(default_factory=list)  # joints of each level, among the new ones
     pivots: list[Pivot] = field(default_factory=list)
+    mirrored: dict[int, int] = field(default_factory=dict)  # joints of the other side
     heirs: dict[int, int] = field(
         default_factory=dict
     )  # what takes a joint's vertices in its place
