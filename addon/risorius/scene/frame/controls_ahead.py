@@ -112,9 +112,9 @@ def note_evaluated(scene: bpy.types.Scene) -> None:
 def is_safe(user: bpy.types.Scene) -> bool:
     """Whether a graph may be built before a frame of a scene.
 
-    Blender builds the scene's own graph anew then. Blender 4.2 and 4.3 die of that where this graph was
-    built and never evaluated, as that of a scene which a window was just switched to: its first
-    frame is brought up afterwards. To look into such a graph is as deadly.
+    Blender builds the scene's own graph anew then. Blender 4.2 and 4.3 die of that where this graph
+    was built and never evaluated, as that of a scene which a window was just switched to: its
+    first frame is brought up afterwards. To look into such a graph is as deadly.
 
     Args:
         user: the scene that Blender is about to evaluate.

@@ -96,7 +96,7 @@ def _rows(rig: JointRig) -> list[ExpressionRow]:
 
         out.append(
             Row(
-                name=name.removeprefix("CTRL_expressions."),
+                name=name.replace("CTRL_expressions.", ""),
                 motion=mean([x.motion[e] for x in fine]),
                 rms=mean([x.joints_rms[e] for x in fine]),
                 largest=float(worst.joints_largest[e]),
@@ -121,7 +121,7 @@ def _worst(source: risorius.Dna, rig: JointRig) -> list[Expression]:
         every = np.concatenate(errors)
         out.append(
             Drawn(
-                name=fine[0].expressions[e].removeprefix("CTRL_expressions."),
+                name=fine[0].expressions[e].replace("CTRL_expressions.", ""),
                 meshes=meshes,
                 errors=errors,
                 largest=float(every.max()),
