@@ -350,6 +350,56 @@ def test_own_bones_follow_their_joints(dna_file, other_file):
     np.testing.assert_allclose(np.array(after), np.array(before), atol=2e-6)
 
 
+def test_a_bone_that_the_user_connected_stays_where_it_was_put(dna_file, other_file):
+    rig = scene.load(dna_file)
+    armatures = scene.submodule("scene.character.armatures")
+    with armatures.edit_armature(bpy.context, rig.data) as bones:
+        bones["FACIAL_L_Eye"].use_connect = True  # it jumps to the tail of the head
+
+    def local():
+        bones = rig.data.bones
+        return np.array(bones["head"].matrix_local.inverted() @ bones["FACIAL_L_Eye"].matrix_local)
+
+    put = local()
+    _replace(other_file)
+    assert not rig.data.bones["FACIAL_L_Eye"].use_connect
+    np.testing.assert_allclose(local(), put, atol=1e-5)
+
+
+def test_a_bones_copy_bears_no_joint_that_is_gone(dna_file, other_file):
+    rig = scene.load(dna_file)
+    joints = {bone.name: bone["dna_joint"] for bone in rig.data.bones}
+    armatures = scene.submodule("scene.character.armatures")
+    with armatures.edit_armature(bpy.context, rig.data) as bones:
+        for name in joints:
+            bone = bones.new(f"copy_{name}")
+            bone.head, bone.tail = (0.0, 0.0, 1.0), (0.0, 0.0, 1.1)
+    for name, joint in joints.items():
+        rig.data.bones[f"copy_{name}"]["dna_joint"] = joint
+    _replace(other_file)
+    gone = {name for name in joints if name not in rig.data.bones}
+    assert gone
+    for name in joints:
+        copy = rig.data.bones[f"copy_{name}"]
+        if name in gone:
+            assert "dna_joint" not in copy
+        else:
+            assert copy["dna_joint"] == rig.data.bones[name]["dna_joint"]
+
+
+def test_a_mesh_without_faces_lends_nothing_and_breaks_nothing():
+    transfer = scene.submodule("scene.file.transfer")
+    bare, whole = bpy.data.meshes.new("bare"), bpy.data.meshes.new("whole")
+    bare.from_pydata([(0, 0, 0), (1, 0, 0)], [(0, 1)], [])
+    bare.attributes.new("mine", "FLOAT", "POINT")
+    whole.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
+    points = np.zeros((2, 3), np.float32)
+    old = transfer.OldSurface(bare, points)
+    assert not old.usable
+    old.give(whole, np.zeros((3, 3), np.float32), transfer.SameVertices())
+    assert "mine" not in whole.attributes
+
+
 def test_joints_that_the_new_file_does_not_move_go_back_to_rest(dna_file, tmp_path):
     dna = small_face()
     dna.joint_groups = dna.joint_groups[:1]  # the eye's group is gone

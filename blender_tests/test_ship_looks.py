@@ -184,3 +184,42 @@ def test_a_mesh_without_a_uv_map_gets_one_with_its_colours(tmp_path):
     found = _read("GLTF", _export("GLTF", tmp_path, texture_size=512))
     assert len(eye.uv_layers) == 0
     _has_colors("GLTF", found)
+
+
+def _gltf(path):
+    content = path.read_bytes()
+    return json.loads(content[20 : 20 + int.from_bytes(content[12:16], "little")])
+
+
+def test_a_material_without_a_shader_is_what_the_solid_view_shows(tmp_path):
+    rig = scene.load(_face(tmp_path))
+    animate(rig)
+    teeth = next(m for m in scene.meshes(rig).values() if "teeth" in m.name)
+    plain = bpy.data.materials.new("Plain")
+    plain.diffuse_color, plain.roughness = (0.8, 0.4, 0.2, 1.0), 0.25
+    plain.use_nodes = True
+    plain.node_tree.nodes.clear()
+    teeth.data.materials.clear()
+    teeth.data.materials.append(plain)
+    tree = _gltf(_export("GLTF", tmp_path, texture_size=64))
+    found = next(m for m in tree["materials"] if m["name"] == "Plain")["pbrMetallicRoughness"]
+    assert np.allclose(found["baseColorFactor"][:3], (0.8, 0.4, 0.2), atol=1e-6)
+    assert np.isclose(found["roughnessFactor"], 0.25)
+    assert teeth.material_slots[0].material == plain
+
+
+def test_a_mesh_without_room_for_a_uv_map_is_one_sentence(tmp_path):
+    rig = scene.load(_face(tmp_path))
+    animate(rig)
+    meshes = [m.data for m in scene.meshes(rig).values()]
+    for mesh in meshes:
+        flat = np.empty(2 * len(mesh.loops), np.float32)
+        mesh.uv_layers[0].uv.foreach_get("vector", flat)
+        mesh.uv_layers[0].uv.foreach_set("vector", 5 * flat)  # beyond the picture that is baked
+        while len(mesh.uv_layers) < 8:
+            mesh.uv_layers.new(name=f"own{len(mesh.uv_layers)}")
+    before = _everything()
+    with pytest.raises(RuntimeError, match="has eight UV maps: remove one to bake its materials"):
+        _export("GLTF", tmp_path, texture_size=64)
+    assert _everything() == before
+    assert {len(mesh.uv_layers) for mesh in meshes} == {8}

@@ -407,6 +407,64 @@ class TestPlans:
         with pytest.raises(plans.PlanError, match="no geometry"):
             plans.plan_character(risorius.Dna(), "nothing")
 
+    @pytest.mark.parametrize(
+        ("change", "words"),
+        [
+            ("joint_names", "The file has no joints"),
+            ("lods", "no meshes at the chosen levels of detail"),
+            ("vertices", "The chosen meshes have no vertices"),
+            ("parents", "joint names, parents and neutral pose differ in length"),
+            ("parent", "names a parent joint that does not exist"),
+            ("circle", "form a circle of parents"),
+            ("rotation", "neutral joint rotations are not all finite numbers"),
+            ("positions", "positions of mesh .* are not all finite numbers"),
+            ("layout", "layout of mesh .* leads to number 9999999 of"),
+            ("faces", "faces leads to number 9999999 of"),
+            ("skin", "skin of mesh .* leads to number 60000 of"),
+        ],
+    )
+    def test_what_leads_nowhere_is_refused_in_a_sentence(self, change: str, words: str) -> None:
+        golden = LOGIC.parents[2] / "tests" / "data" / "golden" / "medium.dna"
+        dna = risorius.load(str(golden))
+        mesh = dna.meshes[0]
+        parents = np.array(dna.joint_parents)
+
+        def spoilt(values: Any, value: float) -> Any:
+            out = np.array(values)
+            out[5] = value
+            return out
+
+        if change == "joint_names":
+            dna.joint_names = []
+        elif change == "lods":
+            dna.lod_mesh_mapping = [[], list(range(len(dna.meshes)))]
+        elif change == "vertices":
+            mesh = risorius.Mesh()
+            dna.lod_mesh_mapping = [[0]]
+        elif change == "parents":
+            dna.joint_parents = parents[:-1]
+        elif change == "parent":
+            parents[-1] = len(parents)
+            dna.joint_parents = parents
+        elif change == "circle":
+            parents[-2:] = [len(parents) - 1, len(parents) - 2]
+            dna.joint_parents = parents
+        elif change == "rotation":
+            rotations = np.array(dna.neutral_joint_rotations)
+            rotations[3, 1] = np.nan
+            dna.neutral_joint_rotations = rotations
+        elif change == "positions":
+            mesh.positions = spoilt(mesh.positions, np.inf)
+        elif change == "layout":
+            mesh.layout_positions = spoilt(mesh.layout_positions, 9999999)
+        elif change == "faces":
+            mesh.face_layouts = spoilt(mesh.face_layouts, 9999999)
+        else:
+            mesh.skin_joint_indices = spoilt(mesh.skin_joint_indices, 60000)
+        dna.meshes = [mesh, *dna.meshes[1:]]
+        with pytest.raises(plans.PlanError, match=words):
+            plans.plan_character(dna, "medium", (0,))
+
     def test_a_golden_file_becomes_a_plan(self) -> None:
         golden = LOGIC.parents[2] / "tests" / "data" / "golden" / "medium.dna"
         dna = risorius.load(str(golden))
