@@ -257,6 +257,16 @@ TEST(Fit, WeightsGoOnFromThoseOfTheFinerMesh) {
   auto again = fit_weights(shapes, joints, few(9), start);
   ASSERT_TRUE(again) << again.error().describe();
   EXPECT_LT(largest_error(shapes, *again), 1.1 * largest_error(shapes, *fit));
+  // Joints that rest, more of them than joints that a vertex tries, keep none from those that move.
+  std::vector<GivenJoint> many(30);
+  many.insert(many.end(), joints.begin() + 1, joints.end());
+  StartWeights later = start;
+  for (std::uint16_t& joint : later.joints) {
+    if (joint > 0) joint = static_cast<std::uint16_t>(joint + 29);
+  }
+  auto beside = fit_weights(shapes, many, few(9), later);
+  ASSERT_TRUE(beside) << beside.error().describe();
+  EXPECT_LT(largest_error(shapes, *beside), 1.1 * largest_error(shapes, *fit));
   start.joints[5] = 9;
   start.weights[5] = 1.0f;
   EXPECT_EQ(fit_weights(shapes, joints, few(9), start).error().code,

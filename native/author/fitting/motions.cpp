@@ -24,6 +24,7 @@ constexpr double kFar = 0.25;  // radians from which on arms count as turned
 constexpr double kTurn = 0.1;
 constexpr double kShift = 3e-3;
 constexpr double kTurnAtPivot = 0.01;  // there a shift is the stranger one
+constexpr double kShiftAtPivot = 0.01;
 
 Mat3 cross_matrix(const Vec3& a) {
   Mat3 m;
@@ -172,8 +173,8 @@ class System {
   int column(std::size_t joint) const { return column_[joint]; }
   int size() const { return size_; }
   double ridge(int row) const {
-    if (row % 6 >= 3) return kShift * shift_ + 1e-12;
     const bool far = at_pivot_[static_cast<std::size_t>(row / 6)];
+    if (row % 6 >= 3) return (far ? kShiftAtPivot : kShift) * shift_ + 1e-12;
     return (far ? kTurnAtPivot : kTurn) * turn_ + 1e-12;
   }
   const Factor& at_rest() const { return solver_; }

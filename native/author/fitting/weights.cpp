@@ -82,8 +82,11 @@ std::vector<Influence> candidates_of(const Problem& problem, const State& state,
     }
     score[j] += add;
   };
+  // One that rests is enough: there may be more of them than joints that are tried.
   for (std::uint32_t j = 0; j < state.joints.size(); ++j) {
-    if (state.joints[j].rests) note(j, 100.0);
+    if (!state.joints[j].rests) continue;
+    note(j, 100.0);
+    break;
   }
   if (problem.nearest_given[v] != Mirror::kNone) note(problem.nearest_given[v], 50.0);
   for (const Influence& i : state.weights[v]) note(i.joint, 1.0 + i.weight);

@@ -7,7 +7,7 @@ Dna --columns, displacements--> fit --weights, joint groups--> Dna --what remain
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,14 +16,16 @@ from ..base.errors import ArgumentError
 from ..rigs.edit import regroup
 from ..rigs.rotation import Convention
 from . import skeleton as sk
-from .fitting import FitOptions, JointFit, Progress, fit_joints
+from .fitting import FitOptions, Progress, fit_joints
 from .levels import LodOptions, extend_levels, joint_budgets, joint_order, level_joints
 from .meshes import Made, count_deltas
 from .naming import joint_names
+from .parents import choose_parents, joint_motions, room_for_second, second_joints
 from .pivots import find_pivots
 from .skeleton import Doubles
 from .work import (
     MM,
+    Joints,
     Level,
     MeshErrors,
     RigOptions,
@@ -31,7 +33,6 @@ from .work import (
     begin,
     dense,
     displacements,
-    for_the_rest,
     given,
     listed_meshes,
     needs_joints,
@@ -81,7 +82,11 @@ def make_joint_rig(
         raise ArgumentError("no mesh of LOD 0 has a blend shape that an expression moves")
     shaped = [m for m in listed_meshes(dna, 0) if m in needs]
     # The fit is nearly all of the work; levels and weights take what is left of the bar.
-    fit, weights = _fit(work, shaped, wanted, o.fit, _part(progress, 0.0, 0.8))
+    room = room_for_second(work, shaped, wanted, o.fit.joints)
+    own = replace(o.fit, joints=o.fit.joints - room)
+    fit, weights = _fit(work, shaped, wanted, own, _part(progress, 0.0, 0.8))
+    parents = choose_parents(work, shaped, fit, weights, _jaw(work))
+    fit, weights, work.parents = second_joints(work, shaped, fit, weights, parents, room)
     _order_levels(work, shaped, fit, weights, o)
     names, regions = _add_joints(work, fit)
     _add_behavior(work, fit, _effects(work, shaped, fit, weights), regions, o)
@@ -132,27 +137,39 @@ def _part(progress: Progress | None, begin: float, end: float) -> Progress | Non
 
 
 def _order_levels(
-    work: Work, shaped: Sequence[int], fit: JointFit, weights: dict[int, Doubles], o: RigOptions
+    work: Work, shaped: Sequence[int], fit: Joints, weights: dict[int, Doubles], o: RigOptions
 ) -> None:
     """Which of the new joints each level has."""
     used = given(work)
     count = len(fit.joints) - len(used)
     budgets = joint_budgets(o.lods, work.levels, count)
     own = np.arange(count) + len(work.source.joint_names)
-    mirrored = np.asarray(fit.mirrored, np.int64)
+    mirrored = fit.mirrored
     order, heirs = joint_order(
         np.concatenate([np.asarray(work.source.meshes[m].positions, np.float64) for m in shaped]),
         np.concatenate([weights[m][:, np.concatenate([used, own])] for m in shaped]),
-        sk.matrices_of_vectors(np.asarray(fit.rotations)),
-        np.asarray(fit.translations),
-        np.asarray(fit.joints),
+        sk.matrices_of_vectors(fit.rotations),
+        fit.translations,
+        fit.joints,
         mirrored,
         len(used),
     )
     work.new = [level_joints(order, mirrored, budget) - len(used) for budget in budgets]
     place = np.concatenate([used, own])
-    work.mirrored = dict(zip(place.tolist(), place[mirrored].tolist(), strict=True))
+    work.mirrored = _mirrored_given(work)
+    work.mirrored |= dict(zip(place.tolist(), place[mirrored].tolist(), strict=True))
     work.heirs = {int(place[joint]): int(place[heir]) for joint, heir in heirs.items()}
+
+
+def _mirrored_given(work: Work) -> dict[int, int]:
+    """Of each joint of the source that of the other side by its place, else itself."""
+    near = 1e-3 * np.ptp(work.positions, axis=0).max()
+    out = {}
+    for joint, place in enumerate(work.positions):
+        apart = np.linalg.norm(work.positions - place * [-1, 1, 1], axis=1)
+        other = int(apart.argmin())
+        out[joint] = other if abs(place[0]) > near and apart[other] < near else joint
+    return out
 
 
 def _fit(
@@ -161,12 +178,11 @@ def _fit(
     wanted: dict[int, Doubles],
     options: FitOptions,
     progress: Progress | None,
-) -> tuple[JointFit, dict[int, Doubles]]:
+) -> tuple[Joints, dict[int, Doubles]]:
     """The fit of all meshes of the finest LOD together, and dense weights of each."""
     dna = work.source
     neutral = np.concatenate([np.asarray(dna.meshes[m].positions, np.float64) for m in meshes])
-    asked = [for_the_rest(work, dna.meshes[m], wanted[m]) for m in meshes]
-    moved = np.concatenate([delta for delta, _ in asked], axis=1).astype(np.float32)
+    moved = np.concatenate([wanted[m] for m in meshes], axis=1).astype(np.float32)
     edges, begin = [], [0]
     for m in meshes:
         edges.append(sk.mesh_edges(dna.meshes[m]) + np.uint32(begin[-1]))
@@ -186,7 +202,6 @@ def _fit(
         np.concatenate(edges),
         given=work.positions[used],
         motions=work.motions[:, used],
-        importance=np.concatenate([counts for _, counts in asked]),
         pivots=work.pivots,
         options=options,
         progress=progress,
@@ -195,23 +210,29 @@ def _fit(
     place = np.concatenate([used, new])
     rows = dense(fit, place, len(dna.joint_names) + len(new))
     parts = {m: rows[a:b] for m, a, b in zip(meshes, begin[:-1], begin[1:], strict=True)}
-    return fit, parts
+    found = Joints(
+        np.asarray(fit.joints),
+        np.asarray(fit.rotations),
+        np.asarray(fit.translations),
+        np.asarray(fit.mirrored, np.int64),
+    )
+    return found, parts
 
 
-def _add_joints(work: Work, fit: JointFit) -> tuple[list[str], dict[str, list[str]]]:
-    """The new joints at the end of the Dna's, children of the head; their names, and by region."""
+def _add_joints(work: Work, fit: Joints) -> tuple[list[str], dict[str, list[str]]]:
+    """The new joints at the end of the Dna's; their names, and by region."""
     dna = work.dna
     first = len(given(work))
-    positions = np.asarray(fit.joints)[first:]
-    turns, shifts = np.asarray(fit.rotations)[:, first:], np.asarray(fit.translations)[:, first:]
+    positions = fit.joints[first:]
+    turns, shifts = fit.rotations[:, first:], fit.translations[:, first:]
     reach = 0.1 * np.ptp(positions, axis=0).max()
     amounts = np.linalg.norm(shifts, axis=2) + reach * np.linalg.norm(turns, axis=2)
     left = -1 if dna.coordinate_system[0] == "left" else 1
     names = joint_names(positions, amounts, work.names, left=left, taken=set(dna.joint_names))
-    rest = sk.world_matrices(dna, np.zeros((len(dna.joint_names), 9)))[work.head]
-    local = (positions - rest[:3, 3]) @ np.linalg.inv(rest[:3, :3]).T
+    rest = sk.world_matrices(dna, np.zeros((len(dna.joint_names), 9)))[work.parents]
+    local = np.linalg.solve(rest[:, :3, :3], (positions - rest[:, :3, 3])[..., None])[..., 0]
     dna.joint_names = [*dna.joint_names, *names]
-    dna.joint_parents = [*(int(p) for p in dna.joint_parents), *[work.head] * len(names)]
+    dna.joint_parents = [*(int(p) for p in dna.joint_parents), *work.parents]
     dna.neutral_joint_translations = np.concatenate([dna.neutral_joint_translations, local])
     dna.neutral_joint_rotations = np.concatenate(
         [dna.neutral_joint_rotations, np.zeros_like(local)]
@@ -228,44 +249,56 @@ def _add_joints(work: Work, fit: JointFit) -> tuple[list[str], dict[str, list[st
     return names, regions
 
 
+def _beside_parents(work: Work, fit: Joints) -> Doubles:
+    """float64[C, new joints, 3, 4]: what each new joint does beside what its parent does."""
+    own = joint_motions(fit)[:, len(given(work)) :]
+    parents = work.motions[:, work.parents]
+    turns = np.swapaxes(parents[..., :3], -1, -2)
+    shifts = own[..., 3] - parents[..., 3]
+    return np.concatenate([turns @ own[..., :3], (turns @ shifts[..., None])], axis=-1)
+
+
 def _effects(
-    work: Work, meshes: Sequence[int], fit: JointFit, weights: dict[int, Doubles]
+    work: Work, meshes: Sequence[int], fit: Joints, weights: dict[int, Doubles]
 ) -> Doubles:
     """float64[C, new joints]: how far each expression moves a vertex by each joint, mm."""
-    first, before = len(given(work)), len(work.source.joint_names)
+    before = len(work.source.joint_names)
     positions = np.concatenate(
         [np.asarray(work.source.meshes[m].positions, np.float64) for m in meshes]
     )
     rows = np.concatenate([weights[m][:, before:] for m in meshes])
-    turns = sk.matrices_of_vectors(np.asarray(fit.rotations)[:, first:]) - np.eye(3)
-    shifts, centres = np.asarray(fit.translations)[:, first:], np.asarray(fit.joints)[first:]
-    out = np.zeros(shifts.shape[:2])
-    for joint in range(len(centres)):
+    motions = _beside_parents(work, fit)
+    out = np.zeros(motions.shape[:2])
+    for joint in range(motions.shape[1]):
         held = np.flatnonzero(rows[:, joint])
-        arms = positions[held] - centres[joint]
-        moved = np.einsum("eik,vk->evi", turns[:, joint], arms) + shifts[:, joint, None]
-        lengths = np.linalg.norm(moved, axis=2) * rows[held, joint]
+        own = motions[:, joint]
+        moved = np.einsum("eik,vk->evi", own[..., :3], positions[held]) + own[:, None, :, 3]
+        lengths = np.linalg.norm(moved - positions[held], axis=2) * rows[held, joint]
         out[:, joint] = lengths.max(axis=1, initial=0)
     return out * MM.get(work.source.translation_unit, 10.0)
 
 
 def _add_behavior(
     work: Work,
-    fit: JointFit,
+    fit: Joints,
     effects: Doubles,
     regions: dict[str, list[str]],
     options: RigOptions,
 ) -> None:
     """A joint group of the new joints, which regroup makes into dense ones by region."""
     dna = work.dna
-    first = len(given(work))
-    turns = sk.matrices_of_vectors(np.asarray(fit.rotations)[:, first:])
-    frame = sk.world_matrices(dna, np.zeros((len(dna.joint_names), 9)))[work.head, :3, :3]
-    frame = frame / np.linalg.norm(frame, axis=0)
-    local = frame.T @ turns @ frame
+    before = len(work.source.joint_names)
+    # In the parent's frame: its rest matrix carries what is done beside it over.
+    frames = sk.world_matrices(dna, np.zeros((len(dna.joint_names), 9)))[work.parents]
+    motions = _beside_parents(work, fit)
+    whole = np.zeros((*motions.shape[:2], 4, 4))
+    whole[..., :3, :], whole[..., 3, 3] = motions, 1
+    carried = np.linalg.inv(frames) @ whole @ frames
+    neutral = np.asarray(dna.neutral_joint_translations, np.float64)[before:]
+    local = carried[..., :3, :3]
+    shifts = np.einsum("ejik,jk->eji", local, neutral) + carried[..., :3, 3] - neutral
     count = local.shape[1]
     values = np.zeros((count, 6, len(work.columns)))
-    shifts = np.asarray(fit.translations)[:, first:] @ frame
     values[:, :3] = shifts.transpose(1, 2, 0)
     convention = Convention.of(dna)
     for column in range(len(work.columns)):

@@ -11,9 +11,9 @@ import numpy as np
 
 from .. import BlendShapeTarget, Dna, Mesh
 from . import skeleton as sk
-from .fitting import fit_weights
+from .between import Between
+from .level_weights import level_weights
 from .levels import level_name, mesh_budget, vertex_budgets
-from .pivots import arc
 from .simplify import simplified
 from .skeleton import Doubles
 from .work import (
@@ -22,9 +22,6 @@ from .work import (
     MeshErrors,
     RigOptions,
     Work,
-    dense,
-    for_the_rest,
-    given,
     listed_meshes,
 )
 
@@ -74,7 +71,8 @@ class Made:
                 mesh = source.meshes[m]
                 start = self._start(mesh) if m in needs and m not in self.weights else None
                 start = self.weights.get(m, start)
-                self._add(lod, mesh, source.mesh_names[m], wanted[m], start)
+                finest = m if m in self.weights else None
+                self._add(lod, mesh, source.mesh_names[m], wanted[m], start, finest)
             return
         share = self.budgets[lod] / max(1, self.budgets[0])
         for m in listed_meshes(source, 0):
@@ -102,49 +100,40 @@ class Made:
         ]
         return rows[np.concatenate(nearest)]
 
-    def _add(self, lod: int, mesh: Mesh, name: str, wanted: Doubles, rows: Doubles | None) -> None:
-        """A mesh with the weights that it has, or with new ones from `rows` on."""
+    def _add(
+        self,
+        lod: int,
+        mesh: Mesh,
+        name: str,
+        wanted: Doubles,
+        rows: Doubles | None,
+        finest: int | None = None,
+    ) -> None:
+        """A mesh with the weights that it has, or with new ones from `rows` on.
+
+        Args:
+            lod: the level.
+            mesh: with its skin in the source.
+            name: of it.
+            wanted: float64[E, V, 3], of it.
+            rows: dense weights, or None.
+            finest: the mesh of the source whose weights coarser levels begin with.
+        """
         self.listed[lod].append(len(self.meshes))
         self.names.append(name)
         if rows is None:
             self.meshes.append(mesh)
             return
-        if lod > 0:
-            rows = self._weights(lod, mesh, wanted, rows)
-        rows = _with_resting(self.work, mesh, rows)
+        rows = level_weights(
+            self.work, self.options.fit, lod, mesh, wanted, rows, self.motions, self.rest
+        )
+        if finest is not None:
+            self.weights[finest] = rows
         shaped = self.options if lod < self.own else replace(self.options, tolerance_mm=None)
         made, left = _finish_mesh(self.work, mesh, rows, self.motions, wanted, shaped)
         left.name, left.lod = name, lod
         self.meshes.append(made)
         self.errors.append(left)
-
-    def _weights(self, lod: int, mesh: Mesh, wanted: Doubles, start: Doubles) -> Doubles:
-        """Dense weights of a mesh on the joints of a level. Its vertices lie further apart than
-        those of the finest: evened out as much they would lose what they do."""
-        work, options = self.work, self.options.fit
-        before = len(work.source.joint_names)
-        joints = np.concatenate([given(work), before + work.new[lod]])
-        rows, kept = start.copy(), set(joints.tolist())
-        for joint in np.flatnonzero(rows.any(axis=0)).tolist():
-            heir = joint
-            while heir not in kept and heir in work.heirs:
-                heir = work.heirs[heir]
-            if heir != joint:
-                rows[:, heir] += rows[:, joint]
-                rows[:, joint] = 0
-        asked, counts = for_the_rest(work, mesh, wanted)
-        fit = fit_weights(
-            np.asarray(mesh.positions, np.float64),
-            asked.astype(np.float32),
-            sk.mesh_edges(mesh),
-            given=self.rest[joints],
-            motions=self.motions[:, joints],
-            importance=counts,
-            mirrored=np.array([joints.tolist().index(work.mirrored[j]) for j in joints.tolist()]),
-            start=rows[:, joints],
-            options=replace(options, smoothness=0.1 * options.smoothness),
-        )
-        return dense(fit, joints, len(self.rest))
 
     def finish(self) -> None:
         """The meshes into the Dna."""
@@ -182,21 +171,6 @@ class Made:
         return out
 
 
-def _with_resting(work: Work, mesh: Mesh, rows: Doubles) -> Doubles:
-    """Neck and spine, which no expression moves, keep the weights that they had."""
-    before = sk.dense_weights(mesh, len(work.source.joint_names))
-    moving = set(given(work).tolist())
-    others = [j for j in range(before.shape[1]) if j not in moving]
-    out = rows.copy()
-    out[:, work.head] += out[:, others].sum(axis=1)  # to a fit all that rests is alike
-    out[:, others] = 0
-    out *= (1 - before[:, others].sum(axis=1))[:, None] / np.maximum(
-        out.sum(axis=1, keepdims=True), 1e-30
-    )
-    out[:, others] = before[:, others]
-    return out
-
-
 def _finish_mesh(
     work: Work,
     mesh: Mesh,
@@ -212,7 +186,7 @@ def _finish_mesh(
     positions = np.asarray(mesh.positions, np.float64)
     mm = MM.get(work.dna.translation_unit, 10.0)
     channel = _channels(work.dna)
-    between = _Between(work, mesh)
+    between = Between(work, mesh)
     found, targets = _no_errors(len(positions), work.names), []
     for row, column in enumerate(work.columns):
         goal = positions + wanted[row]
@@ -236,43 +210,6 @@ def _finish_mesh(
         found.largest[row] = error.max()
     out.blend_shape_targets = targets
     return out, found
-
-
-class _Between:
-    """How far joints are off on the way to 1: from the line, or from the arc about a pivot."""
-
-    SHARES = (0.25, 0.5, 0.75)
-
-    def __init__(self, work: Work, mesh: Mesh) -> None:
-        self.work = work
-        self.positions = np.asarray(mesh.positions, np.float64)
-        count = sk.column_count(work.source)
-        self.motions = {t: sk.column_motions(work.dna, count, t)[work.columns] for t in self.SHARES}
-        self.before = {
-            t: sk.column_motions(work.source, count, t)[work.columns] for t in self.SHARES
-        }
-        self.weights = sk.dense_weights(mesh, len(work.source.joint_names))
-        self.middles = {e: p.position for p in work.pivots for e in p.expressions}
-
-    def truth(self, row: int, wanted: Doubles, share: float) -> Doubles:
-        """float64[V, 3], what is added to the neutral positions."""
-        whole = self.work.motions[row]
-        if np.allclose(whole, np.eye(3, 4), atol=1e-12):
-            middle = self.middles.get(row)
-            return share * wanted if middle is None else arc(self.positions, wanted, middle, share)
-        # Joints that were there go their own arc; what shapes do beside them is a line.
-        goal = self.positions + wanted
-        shape = sk.before_skin(goal, self.weights, whole) - self.positions
-        part = sk.skinned(self.positions + share * shape, self.weights, self.before[share][row])
-        return part - self.positions
-
-    def largest(self, row: int, wanted: Doubles, weights: Doubles) -> float:
-        worst = 0.0
-        for share in self.SHARES:
-            reached = sk.skinned(self.positions, weights, self.motions[share][row])
-            off = reached - self.positions - self.truth(row, wanted, share)
-            worst = max(worst, float(np.linalg.norm(off, axis=1).max()))
-        return worst
 
 
 def _channels(dna: Dna) -> dict[int, int]:

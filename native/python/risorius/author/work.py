@@ -17,7 +17,6 @@ from .pivots import Pivot
 from .skeleton import Doubles, Ints
 
 MM = {"cm": 10.0, "m": 1000.0}
-_LEAST_SHARE = 0.1  # vertices that hang on the neck beyond it are left to blend shapes
 _RIGID_MM = 0.02  # a mesh that its joints bring so near needs no others
 
 
@@ -63,6 +62,16 @@ class Level:
 
 
 @dataclass
+class Joints:
+    """The head and the joints that controls move, then new ones; as a fit gives them."""
+
+    joints: Doubles  # [J, 3]
+    rotations: Doubles  # [E, J, 3], vectors
+    translations: Doubles  # [E, J, 3]
+    mirrored: Ints  # [J] the joint of the other side, itself in the middle
+
+
+@dataclass
 class Work:
     """The face that is made, and what of it is computed once."""
 
@@ -72,11 +81,12 @@ class Work:
     names: list[str]  # of these
     motions: Doubles  # [C, J, 3, 4] of the joints that were there
     positions: Doubles  # [J, 3]
-    head: int  # what new joints hang on
+    head: int  # what most of the face hangs on
     levels: int = 1
     new: list[Ints] = field(default_factory=list)  # joints of each level, among the new ones
     pivots: list[Pivot] = field(default_factory=list)
     mirrored: dict[int, int] = field(default_factory=dict)  # joints of the other side
+    parents: list[int] = field(default_factory=list)  # of the new joints
     heirs: dict[int, int] = field(
         default_factory=dict
     )  # what takes a joint's vertices in its place
@@ -165,26 +175,43 @@ def needs_joints(work: Work, mesh: Mesh, wanted: Doubles) -> bool:
     return far * MM.get(work.source.translation_unit, 10.0) > _RIGID_MM
 
 
-def _resting(work: Work, mesh: Mesh) -> Doubles:
-    """float64[V]: the share of a vertex that hangs on joints which no expression moves, such as
-    those of the neck, the head not counted."""
-    before = sk.dense_weights(mesh, len(work.source.joint_names))
-    before[:, given(work)] = 0
-    return np.asarray(before.sum(axis=1))
+def family_shares(work: Work, mesh: Mesh) -> tuple[Ints, Doubles]:
+    """The joints that no expression moves, such as head and neck, and how the resting part of each
+    vertex hangs on them: float64[V, families], rows with sum 1.
 
-
-def for_the_rest(work: Work, mesh: Mesh, wanted: Doubles) -> tuple[Doubles, Doubles]:
-    """What the joints have to do, so that with the resting share it becomes what is wanted, and how
-    much its squared error then counts.
+    To a fit all that rests is alike; which of these a vertex follows when a neck is turned by hand
+    is to stay as it was.
 
     Args:
         work: the face.
-        mesh: has the weights of the joints that rest.
-        wanted: float64[E, V, 3].
+        mesh: one of its own, or with its skin.
     """
-    share = np.maximum(1 - _resting(work, mesh), _LEAST_SHARE)
-    counts: Doubles = share * share
-    return wanted / share[:, None], counts
+    moving = set(given(work)[1:].tolist())
+    families = np.array([j for j in range(len(work.source.joint_names)) if j not in moving])
+    shares = sk.dense_weights(mesh, len(work.source.joint_names))[:, families]
+    total = shares.sum(axis=1, keepdims=True)
+    alone = (families == work.head).astype(np.float64)  # all of it moves: a jaw's own skin
+    return families, np.where(total > 1e-9, shares / np.maximum(total, 1e-30), alone)
+
+
+def carriers(work: Work, families: Ints) -> Ints:
+    """int64[joints]: which of the families carries a joint: itself, or the next above it.
+
+    Args:
+        work: the face, parents of new joints chosen.
+        families: of family_shares.
+    """
+    own = set(families.tolist())
+    parents = [*(int(p) for p in work.source.joint_parents), *work.parents]
+    out = []
+    for joint in range(len(parents)):
+        at = joint
+        for _ in range(len(parents)):
+            if at in own:
+                break
+            at = parents[at]
+        out.append(at if at in own else work.head)
+    return np.array(out, np.int64)
 
 
 def given(work: Work) -> Ints:

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: MIT
+"""Weights of a mesh on the joints of a level, whose motions are known by then."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from .. import Mesh
+from . import skeleton as sk
+from .between import Between
+from .fitting import FitOptions, fit_weights
+from .skeleton import Doubles, Ints
+from .work import MM, Work, carriers, dense, family_shares, given
+
+# A vertex that follows another neck joint than before counts as one that is so far off.
+_CARRIED_MM = 5.0
+# Half the way counts so many times beside the whole, for expressions that go along an arc.
+_HALVES = 1.5
+
+
+def level_weights(
+    work: Work,
+    options: FitOptions,
+    lod: int,
+    mesh: Mesh,
+    wanted: Doubles,
+    start: Doubles,
+    motions: Doubles,
+    rest: Doubles,
+) -> Doubles:
+    """float64[V, joints]: weights on the joints of a level.
+
+    Beside the expressions, what each of the joints that rest carries is asked for as if it were
+    one: the neck shifted, with all that hangs on it. So is what lies half the way of those that go
+    along an arc.
+
+    Args:
+        work: the face, parents of new joints chosen.
+        options: of the fit.
+        lod: the level; the coarser one is, the further apart its vertices lie, and evened out as
+            those of the finest they would lose what they do.
+        mesh: with its skin in the source.
+        wanted: float64[E, V, 3], of it.
+        start: float64[V, joints], weights to begin with.
+        motions: float64[E, joints, 3, 4] of all joints.
+        rest: float64[joints, 3], where they are.
+    """
+    extra, shifted, used = _carried(work, mesh, len(rest))
+    halves, half_motions = _halves(work, mesh, wanted)
+    if lod == 0 and not len(extra) and not len(halves):
+        return start
+    joints = np.concatenate([used, len(work.source.joint_names) + work.new[lod]])
+    asked = np.concatenate([wanted, shifted, halves])
+    # Smoothness counts beside all that is asked for; it is meant beside the expressions.
+    even = options.smoothness * float((wanted**2).sum() / max((asked**2).sum(), 1e-30))
+    fit = fit_weights(
+        np.asarray(mesh.positions, np.float64),
+        asked.astype(np.float32),
+        sk.mesh_edges(mesh),
+        given=rest[joints],
+        motions=np.concatenate([motions, extra, half_motions])[:, joints],
+        mirrored=np.array([joints.tolist().index(work.mirrored[j]) for j in joints.tolist()]),
+        start=_inherited(work, start, set(joints.tolist()))[:, joints],
+        options=replace(options, smoothness=even if lod == 0 else 0.1 * even),
+    )
+    return dense(fit, joints, len(rest))
+
+
+def _carried(work: Work, mesh: Mesh, joints: int) -> tuple[Doubles, Doubles, Ints]:
+    """What is asked for beside the expressions, so that each vertex stays with its own joint of
+    neck and head: motions [n, joints, 3, 4] and displacements [n, V, 3]; and which joints of the
+    source take part."""
+    families, shares = family_shares(work, mesh)
+    own = [at for at, f in enumerate(families) if f == work.head or shares[:, at].any()]
+    carrying = [at for at in own if families[at] != work.head]
+    roots = carriers(work, families)
+    motions = np.zeros((len(carrying), joints, 3, 4)) + np.eye(3, 4)
+    shifted = np.zeros((len(carrying), len(mesh.positions), 3))
+    shift = _CARRIED_MM / MM.get(work.source.translation_unit, 10.0)
+    for row, at in enumerate(carrying):
+        motions[row, roots == families[at], 1, 3] = shift
+        shifted[row, :, 1] = shift * shares[:, at]
+    return motions, shifted, np.concatenate([families[own], given(work)[1:]])
+
+
+def _halves(work: Work, mesh: Mesh, wanted: Doubles) -> tuple[Doubles, Doubles]:
+    """What is to be half the way of expressions that go along an arc, float64[n, V, 3], and what
+    joints do there, float64[n, joints, 3, 4]."""
+    between = Between(work, mesh)
+    rows = sorted({e for pivot in work.pivots for e in pivot.expressions})
+    halves = np.zeros((len(rows), len(mesh.positions), 3))
+    for at, row in enumerate(rows):
+        halves[at] = between.truth(row, wanted[row], 0.5)
+    still = np.eye(3, 4)
+    return _HALVES * halves, still + _HALVES * (between.motions[0.5][rows] - still)
+
+
+def _inherited(work: Work, start: Doubles, there: set[int]) -> Doubles:
+    """Weights without joints that a level does not have: their heirs take the vertices."""
+    rows = start.copy()
+    for joint in np.flatnonzero(rows.any(axis=0)).tolist():
+        heir = joint
+        while heir not in there and heir in work.heirs:
+            heir = work.heirs[heir]
+        if heir != joint:
+            rows[:, heir] += rows[:, joint]
+            rows[:, joint] = 0
+    return rows
