@@ -17,11 +17,9 @@ from risorius.author import (
     LodOptions,
     RigOptions,
     make_joint_rig,
-    matching,
     pivots,
-    shape_face,
-    spec,
 )
+from risorius.author.input import matching, shape_face, spec
 from risorius.author.simplify import simplified
 
 # Skinning and morphing from the format's description alone; nothing of risorius.author is in it.

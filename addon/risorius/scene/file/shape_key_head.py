@@ -34,7 +34,7 @@ def usable_head(item: bpy.types.Object | None) -> bool:
 
 
 def shapes_of(context: Context, item: MeshObject) -> native.ShapeSet:
-    """The mesh and its shape keys as risorius.author.shape_face.ShapeSet, in cm with y up.
+    """The mesh and its shape keys as risorius.author.input.shape_face.ShapeSet, in cm with y up.
 
     Rotation and size of the object count, its place does not. A key is what it adds to the key that
     it is relative to; muted ones are left out.
@@ -51,7 +51,7 @@ def shapes_of(context: Context, item: MeshObject) -> native.ShapeSet:
         raise HeadError(told("The shape keys are not relative: turn on Relative in their panel."))
     if not item.data.polygons:
         raise HeadError(told("{name} has no faces.", name=item.name))
-    author, face = native.part("author.obj"), native.part("author.shape_face")
+    author, face = native.part("author.input.obj"), native.part("author.input.shape_face")
     turn = np.array(item.matrix_world.to_3x3())
     # Blender's x, z and -y are the file's x, y and z.
     turn = turn[[0, 2, 1]] * np.array([[1.0], [1.0], [-1.0]])
@@ -106,7 +106,7 @@ def rig_task(
         A task whose result is risorius.author.JointRig and what is odd, a sentence each.
     """
     author = native.part("author")
-    face, matching = native.part("author.shape_face"), native.part("author.matching")
+    face, matching = native.part("author.input.shape_face"), native.part("author.input.matching")
 
     def work(
         progress: Callable[[float], None], cancelled: Callable[[], bool]

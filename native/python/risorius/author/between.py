@@ -29,7 +29,13 @@ class Between:
         self.middles = {e: p.position for p in work.pivots for e in p.expressions}
 
     def truth(self, row: int, wanted: Doubles, share: float) -> Doubles:
-        """float64[V, 3], what is added to the neutral positions."""
+        """float64[V, 3], what is added to the neutral positions.
+
+        Args:
+            row: the expression.
+            wanted: float64[V, 3], what it adds at 1.
+            share: of the way, 0 to 1.
+        """
         whole = self.work.motions[row]
         if np.allclose(whole, np.eye(3, 4), atol=1e-12):
             middle = self.middles.get(row)
@@ -41,6 +47,13 @@ class Between:
         return part - self.positions
 
     def largest(self, row: int, wanted: Doubles, weights: Doubles) -> float:
+        """How far the joints are off at most, at the shares, in the file's unit.
+
+        Args:
+            row: the expression.
+            wanted: float64[V, 3], what it adds at 1.
+            weights: float64[V, joints].
+        """
         worst = 0.0
         for share in self.SHARES:
             reached = sk.skinned(self.positions, weights, self.motions[share][row])

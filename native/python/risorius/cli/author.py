@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ..author.input.spec import read_face, read_spec
 from ..author.joint_rig import JointRig, make_joint_rig
-from ..author.spec import read_face, read_spec
 from ..base.words import counted
 from ..files import fileio
 from .files import CommandLineError, require_suffix

@@ -7,14 +7,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from .. import Dna, load
-from ..base import toml
-from .fitting import FitOptions
-from .levels import LodOptions
+from ... import Dna, load
+from ...base import toml
+from ..fitting import FitOptions
+from ..levels import LodOptions
+from ..work import RigOptions
 from .matching import assign
 from .obj import ShapeFileError, read_obj, read_positions
 from .shape_face import ShapeSet, check_shapes, make_shape_face
-from .work import RigOptions
 
 _TABLES: dict[str, dict[str, tuple[type, ...]]] = {
     "source": {

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..base.errors import RisoriusError
-from .skeleton import Doubles
+from ...base.errors import RisoriusError
+from ..skeleton import Doubles
 
 
 class ShapeFileError(RisoriusError, ValueError):

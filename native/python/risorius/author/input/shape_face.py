@@ -8,12 +8,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .. import BlendShapeChannels, BlendShapeTarget, Dna, Mesh
-from ..base.easing import smooth_step
-from ..base.errors import ArgumentError
+from ... import BlendShapeChannels, BlendShapeTarget, Dna, Mesh
+from ...base.easing import smooth_step
+from ...base.errors import ArgumentError
+from ..skeleton import Doubles
 from .matching import PREFIX
 from .obj import ObjMesh
-from .skeleton import Doubles
 
 _LEAST = 1e-6  # of the mesh' size: a vertex that moves less rests
 

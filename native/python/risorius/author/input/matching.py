@@ -8,8 +8,8 @@ from collections.abc import Iterable, Mapping
 from functools import cache
 from importlib import resources
 
-from ..base import toml
-from ..controls import arkit
+from ...base import toml
+from ...controls import arkit
 
 PREFIX = "CTRL_expressions."
 _SIDES = {"l": "L", "left": "L", "lf": "L", "lt": "L", "r": "R", "right": "R", "rt": "R"}
