@@ -265,6 +265,29 @@ def test_add_face_builds_the_sample_once(monkeypatch, tmp_path, dna_file, mode):
     assert len([o for o in bpy.data.objects if "risorius_controls" in o]) == 2
 
 
+def test_building_a_sample_ends_where_that_is_asked_for(monkeypatch, tmp_path):
+    """What the status bar shows, and Esc: the task of the operator, without a window."""
+    from risorius import sample
+
+    task = None
+
+    def build_sample(path, progress, **_options):
+        assert progress(0.25)
+        task._cancelled.set()
+        if not progress(0.5):
+            raise sample.SourceError("stopped")
+        path.write_bytes(b"")
+
+    monkeypatch.setattr(sample, "build_sample", build_sample)
+    sample_face = scene.submodule("scene.file.sample_face")
+    path = tmp_path / "new" / "woman.dna"
+    task = sample_face.sample_task(path, "woman", offline=True)
+    task.run()
+    assert task.share == 0.5
+    assert str(task.error) == "stopped"
+    assert not path.exists()
+
+
 def test_add_face_without_data_says_why(monkeypatch, tmp_path, dna_file):
     from risorius import sample
 

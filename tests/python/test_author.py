@@ -277,7 +277,7 @@ def test_a_jaws_hinge_and_an_eyes_middle_are_found():
     positions, _ = face_shapes.head()
     opened = face_shapes.expressions(positions)["jawOpen"]  # about (0, 0, -2)
     (jaw,) = pivots.find_pivots(
-        ["x.jawOpen"], positions, opened[None], [], np.zeros((0, 3)), jaw=None
+        ["x.jawOpen"], positions, opened[None], [], np.zeros((0, 3)), jaw=False
     )
     assert np.abs(jaw.position - [0, 0, -2]).max() < 0.2
     assert jaw.expressions == (0,)
@@ -291,11 +291,11 @@ def test_a_jaws_hinge_and_an_eyes_middle_are_found():
     lid, shut = middle + ball(v), ball(v - 0.5) - ball(v)
     names = ["x.eyeBlinkL", "x.eyeWidenL", "x.eyeBlinkR"]
     moved = np.stack([shut, -0.3 * shut, 0 * shut])
-    (eye,) = pivots.find_pivots(names, lid, moved, [], np.zeros((0, 3)), jaw=None)
+    (eye,) = pivots.find_pivots(names, lid, moved, [], np.zeros((0, 3)), jaw=False)
     assert np.abs(eye.position - middle).max() < 1e-6
     assert eye.expressions == (0, 1)
     given = np.array([[9.0, 9.0, 9.0]])
-    (eye,) = pivots.find_pivots(names[:2], lid, moved[:2], ["FACIAL_L_Eye"], given, jaw=None)
+    (eye,) = pivots.find_pivots(names[:2], lid, moved[:2], ["FACIAL_L_Eye"], given, jaw=False)
     assert (eye.position == given[0]).all()
     half = lid + pivots.arc(lid, shut, middle, 0.5) - middle
     assert np.linalg.norm(half, axis=1) == pytest.approx(1.2)  # on the ball, as the line is not

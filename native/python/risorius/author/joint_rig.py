@@ -194,7 +194,7 @@ def _fit(
         moved.astype(np.float64),
         dna.joint_names,
         work.positions,
-        jaw=_jaw(work),
+        jaw=_jaw(work) is not None,
     )
     fit = fit_joints(
         neutral,

@@ -9,7 +9,7 @@ import numpy as np
 
 from .. import Mesh
 from . import skeleton as sk
-from .between import Between
+from .between import Between, Ways
 from .fitting import FitOptions, fit_weights
 from .skeleton import Doubles, Ints
 from .work import MM, Work, carriers, dense, family_shares, given
@@ -21,7 +21,7 @@ _HALVES = 1.5
 
 
 def level_weights(
-    work: Work,
+    ways: Ways,
     options: FitOptions,
     lod: int,
     mesh: Mesh,
@@ -37,7 +37,7 @@ def level_weights(
     along an arc.
 
     Args:
-        work: the face, parents of new joints chosen.
+        ways: the face, parents of new joints chosen.
         options: of the fit.
         lod: the level; the coarser one is, the further apart its vertices lie, and evened out as
             those of the finest they would lose what they do.
@@ -47,8 +47,9 @@ def level_weights(
         motions: float64[E, joints, 3, 4] of all joints.
         rest: float64[joints, 3], where they are.
     """
+    work = ways.work
     extra, shifted, used = _carried(work, mesh, len(rest))
-    halves, half_motions = _halves(work, mesh, wanted)
+    halves, half_motions = _halves(ways, mesh, wanted)
     if lod == 0 and not len(extra) and not len(halves):
         return start
     joints = np.concatenate([used, len(work.source.joint_names) + work.new[lod]])
@@ -85,16 +86,18 @@ def _carried(work: Work, mesh: Mesh, joints: int) -> tuple[Doubles, Doubles, Int
     return motions, shifted, np.concatenate([families[own], given(work)[1:]])
 
 
-def _halves(work: Work, mesh: Mesh, wanted: Doubles) -> tuple[Doubles, Doubles]:
+def _halves(ways: Ways, mesh: Mesh, wanted: Doubles) -> tuple[Doubles, Doubles]:
     """What is to be half the way of expressions that go along an arc, float64[n, V, 3], and what
     joints do there, float64[n, joints, 3, 4]."""
-    between = Between(work, mesh)
-    rows = sorted({e for pivot in work.pivots for e in pivot.expressions})
+    between = Between(ways, mesh)
+    turning = np.any(np.abs(ways.work.motions - np.eye(3, 4)) > 1e-9, axis=(1, 2, 3))
+    pivots = {e for pivot in ways.work.pivots for e in pivot.expressions}
+    rows = sorted(pivots | set(np.flatnonzero(turning).tolist()))
     halves = np.zeros((len(rows), len(mesh.positions), 3))
     for at, row in enumerate(rows):
         halves[at] = between.truth(row, wanted[row], 0.5)
     still = np.eye(3, 4)
-    return _HALVES * halves, still + _HALVES * (between.motions[0.5][rows] - still)
+    return _HALVES * halves, still + _HALVES * (ways.made[0.5][rows] - still)
 
 
 def _inherited(work: Work, start: Doubles, there: set[int]) -> Doubles:

@@ -11,7 +11,7 @@ import numpy as np
 
 from .. import BlendShapeTarget, Dna, Mesh
 from . import skeleton as sk
-from .between import Between
+from .between import Between, Ways
 from .level_weights import level_weights
 from .levels import level_name, mesh_budget, vertex_budgets
 from .simplify import simplified
@@ -38,6 +38,7 @@ class Made:
     def __init__(self, work: Work, options: RigOptions, weights: dict[int, Doubles]) -> None:
         self.work, self.options, self.weights = work, options, weights
         dna = work.dna
+        self.ways = Ways(work)
         self.motions = sk.column_motions(dna, sk.column_count(work.source))[work.columns]
         self.rest = sk.world_matrices(dna, np.zeros((len(dna.joint_names), 9)))[:, :3, 3]
         self.meshes: list[Mesh] = []
@@ -125,12 +126,12 @@ class Made:
             self.meshes.append(mesh)
             return
         rows = level_weights(
-            self.work, self.options.fit, lod, mesh, wanted, rows, self.motions, self.rest
+            self.ways, self.options.fit, lod, mesh, wanted, rows, self.motions, self.rest
         )
         if finest is not None:
             self.weights[finest] = rows
         shaped = self.options if lod < self.own else replace(self.options, tolerance_mm=None)
-        made, left = _finish_mesh(self.work, mesh, rows, self.motions, wanted, shaped)
+        made, left = _finish_mesh(self.ways, mesh, rows, self.motions, wanted, shaped)
         left.name, left.lod = name, lod
         self.meshes.append(made)
         self.errors.append(left)
@@ -172,7 +173,7 @@ class Made:
 
 
 def _finish_mesh(
-    work: Work,
+    ways: Ways,
     mesh: Mesh,
     rows: Doubles,
     motions: Doubles,
@@ -180,13 +181,14 @@ def _finish_mesh(
     options: RigOptions,
 ) -> tuple[Mesh, MeshErrors]:
     """The mesh with its new weights and with what blend shapes have still to do."""
+    work = ways.work
     out = copy.copy(mesh)
     _set_skin(out, rows)
     weights = sk.dense_weights(out, rows.shape[1])
     positions = np.asarray(mesh.positions, np.float64)
     mm = MM.get(work.dna.translation_unit, 10.0)
     channel = _channels(work.dna)
-    between = Between(work, mesh)
+    between = Between(ways, mesh)
     found, targets = _no_errors(len(positions), work.names), []
     for row, column in enumerate(work.columns):
         goal = positions + wanted[row]

@@ -35,7 +35,7 @@ def find_pivots(
     joint_names: Sequence[str],
     joints: Doubles,
     *,
-    jaw: int | None,
+    jaw: bool,
 ) -> list[Pivot]:
     """The eyes, for their lids, and the jaw's hinge.
 
@@ -45,7 +45,7 @@ def find_pivots(
         displacements: float64[E, V, 3].
         joint_names: of joints that are there.
         joints: float64[J, 3], where they are.
-        jaw: the joint that opens the mouth, if one is there.
+        jaw: whether a joint opens the mouth already.
     """
     out = []
     eyes = {_side(n): p for n, p in zip(joint_names, joints, strict=True) if _EYE_JOINT.search(n)}
@@ -60,9 +60,8 @@ def find_pivots(
                 out.append(Pivot(middle, tuple(rows)))
     rows = [e for e, n in enumerate(names) if _JAW.search(n)]
     opening = [e for e in rows if names[e].endswith("jawOpen")]
-    if opening:
-        found = _hinge(positions, displacements[opening[0]]) if jaw is None else None
-        hinge = found if jaw is None else joints[jaw]
+    if opening and not jaw:  # else what goes with the jaw is its child
+        hinge = _hinge(positions, displacements[opening[0]])
         if hinge is not None:
             out.append(Pivot(hinge, tuple(rows)))
     return out

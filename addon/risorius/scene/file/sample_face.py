@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A sample person whose file is not there yet: built beside Blender."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from ... import native
+from ..base.task import Task
+
+
+def sample_task(path: Path, person: str, *, offline: bool) -> Task[bool]:
+    """A task that builds a person and writes the file with its textures; its result is True.
+
+    Args:
+        path: of the DNA file; its folder may hold the wheel of data.
+        person: as the package's PEOPLE name them.
+        offline: do not download.
+    """
+    sample = native.sample_module()
+
+    def work(progress: Callable[[float], None], cancelled: Callable[[], bool]) -> bool:
+        def tell(share: float) -> bool:
+            progress(share)
+            return not cancelled()
+
+        path.parent.mkdir(parents=True, exist_ok=True)
+        wheels = sorted(path.parent.glob("*.whl"))
+        sample.build_sample(
+            path,
+            person=sample.PEOPLE[person],
+            data=wheels[0] if wheels else None,
+            offline=offline,
+            progress=tell,
+        )
+        return True
+
+    return Task(work)
+
+
+def can_be_built(folder: Path) -> bool:
+    """Whether a person can be built without a download.
+
+    Args:
+        folder: where the wheel of data may lie.
+    """
+    return bool(sorted(folder.glob("*.whl"))) or bool(native.sample_module().is_fetched())
