@@ -209,6 +209,32 @@ def test_extra_the_packed_face_gives_back_its_units(sample):
     assert worst < 0.07
 
 
+def _carried(dna, mesh_name):
+    """float64[V, 4]: how much spine, the two of the neck and the head carry of each vertex."""
+    carriers = ["spine_04", "neck_01", "neck_02", "head"]
+    mesh = dna.meshes[dna.mesh_names.index(mesh_name)]
+    out = np.zeros((len(mesh.positions), len(carriers)))
+    vertex = np.repeat(np.arange(len(out)), np.diff(mesh.skin_offsets.astype(int)))
+    for v, joint, weight in zip(vertex, mesh.skin_joint_indices, mesh.skin_weights, strict=True):
+        at = int(joint)
+        while dna.joint_names[at] not in carriers:
+            at = int(dna.joint_parents[at])
+        out[v, carriers.index(dna.joint_names[at])] += weight
+    return out
+
+
+@pytest.mark.parametrize("sample", ["man"], indirect=True)
+def test_extra_the_packed_face_turns_its_neck_as_before(sample):
+    packed = Path(__file__).parents[2] / "build" / "sample" / "man.dna"
+    if not packed.is_file():
+        _not_run.add("the extension's sample face")
+        pytest.skip("extra not run: no extension was built here")
+    apart = [_carried(dna, "head_lod0_mesh") for dna in (sample[1], risorius.load(packed))]
+    deviation = np.abs(apart[0] - apart[1]).sum(axis=1) / 2
+    assert deviation.max() < 0.12
+    assert deviation.mean() < 0.003
+
+
 def test_extra_the_sample_is_sane(sample, tmp_path):
     _, dna, *_ = sample
     assert dna.validate() == []

@@ -17,6 +17,7 @@ from ..rigs.edit import regroup
 from ..rigs.rotation import Convention
 from . import skeleton as sk
 from .fitting import FitOptions, Progress, fit_joints
+from .level_weights import CARRIED_MM
 from .levels import LodOptions, extend_levels, joint_budgets, joint_order, level_joints
 from .meshes import Made, count_deltas
 from .naming import joint_names
@@ -31,6 +32,7 @@ from .work import (
     RigOptions,
     Work,
     begin,
+    carriers,
     dense,
     displacements,
     given,
@@ -145,17 +147,23 @@ def _order_levels(
     budgets = joint_budgets(o.lods, work.levels, count)
     own = np.arange(count) + len(work.source.joint_names)
     mirrored = fit.mirrored
+    place = np.concatenate([used, own])
+    # What the joints of the neck carry counts as an expression here too, see level_weights.
+    families = [j for j in range(len(work.source.joint_names)) if j not in used[1:]]
+    roots = carriers(work, np.array(families))[place]
+    carried = np.zeros((len(families), len(place), 3))
+    for row, family in enumerate(families):
+        carried[row, roots == family, 1] = CARRIED_MM / MM.get(work.source.translation_unit, 10.0)
     order, heirs = joint_order(
         np.concatenate([np.asarray(work.source.meshes[m].positions, np.float64) for m in shaped]),
-        np.concatenate([weights[m][:, np.concatenate([used, own])] for m in shaped]),
-        sk.matrices_of_vectors(fit.rotations),
-        fit.translations,
+        np.concatenate([weights[m][:, place] for m in shaped]),
+        sk.matrices_of_vectors(np.concatenate([fit.rotations, np.zeros_like(carried)])),
+        np.concatenate([fit.translations, carried]),
         fit.joints,
         mirrored,
         len(used),
     )
     work.new = [level_joints(order, mirrored, budget) - len(used) for budget in budgets]
-    place = np.concatenate([used, own])
     work.mirrored = _mirrored_given(work)
     work.mirrored |= dict(zip(place.tolist(), place[mirrored].tolist(), strict=True))
     work.heirs = {int(place[joint]): int(place[heir]) for joint, heir in heirs.items()}

@@ -14,8 +14,9 @@ from .fitting import FitOptions, fit_weights
 from .skeleton import Doubles, Ints
 from .work import MM, Work, carriers, dense, family_shares, given
 
-# A vertex that follows another neck joint than before counts as one that is so far off.
-_CARRIED_MM = 5.0
+# A vertex that follows another joint of the neck than before counts as one that is so far off: a
+# head that is turned moves them about so far against each other.
+CARRIED_MM = 20.0
 # Half the way counts so many times beside the whole, for expressions that go along an arc.
 _HALVES = 1.5
 
@@ -74,12 +75,17 @@ def _carried(work: Work, mesh: Mesh, joints: int) -> tuple[Doubles, Doubles, Int
     neck and head: motions [n, joints, 3, 4] and displacements [n, V, 3]; and which joints of the
     source take part."""
     families, shares = family_shares(work, mesh)
-    own = [at for at, f in enumerate(families) if f == work.head or shares[:, at].any()]
-    carrying = [at for at in own if families[at] != work.head]
     roots = carriers(work, families)
+    before = len(work.source.joint_names)
+    own = [
+        at
+        for at, f in enumerate(families)
+        if f == work.head or shares[:, at].any() or np.any(roots[before:] == f)
+    ]
+    carrying = [at for at in own if families[at] != work.head]
     motions = np.zeros((len(carrying), joints, 3, 4)) + np.eye(3, 4)
     shifted = np.zeros((len(carrying), len(mesh.positions), 3))
-    shift = _CARRIED_MM / MM.get(work.source.translation_unit, 10.0)
+    shift = CARRIED_MM / MM.get(work.source.translation_unit, 10.0)
     for row, at in enumerate(carrying):
         motions[row, roots == families[at], 1, 3] = shift
         shifted[row, :, 1] = shift * shares[:, at]

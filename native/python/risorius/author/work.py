@@ -176,8 +176,8 @@ def needs_joints(work: Work, mesh: Mesh, wanted: Doubles) -> bool:
 
 
 def family_shares(work: Work, mesh: Mesh) -> tuple[Ints, Doubles]:
-    """The joints that no expression moves, such as head and neck, and how the resting part of each
-    vertex hangs on them: float64[V, families], rows with sum 1.
+    """The joints that no expression moves, such as head and neck, and how much of each vertex they
+    carry, by themselves and by moving joints below them: float64[V, families], rows with sum 1.
 
     To a fit all that rests is alike; which of these a vertex follows when a neck is turned by hand
     is to stay as it was.
@@ -186,12 +186,12 @@ def family_shares(work: Work, mesh: Mesh) -> tuple[Ints, Doubles]:
         work: the face.
         mesh: one of its own, or with its skin.
     """
+    count = len(work.source.joint_names)
     moving = set(given(work)[1:].tolist())
-    families = np.array([j for j in range(len(work.source.joint_names)) if j not in moving])
-    shares = sk.dense_weights(mesh, len(work.source.joint_names))[:, families]
-    total = shares.sum(axis=1, keepdims=True)
-    alone = (families == work.head).astype(np.float64)  # all of it moves: a jaw's own skin
-    return families, np.where(total > 1e-9, shares / np.maximum(total, 1e-30), alone)
+    families = np.array([j for j in range(count) if j not in moving])
+    weights = sk.dense_weights(mesh, count)
+    roots = carriers(work, families)[:count]
+    return families, np.stack([weights[:, roots == f].sum(axis=1) for f in families], axis=1)
 
 
 def carriers(work: Work, families: Ints) -> Ints:

@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: MIT
+"""Faces side by side in the same expressions: what joints do beside what shapes did.
+
+compare.py -- --extension ZIP --out SHEET.jpg --face NAME=FILE.dna [...] [--size PIXELS]
+
+One row for each face, one column for each expression; needs Pillow beside bpy.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from math import radians
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+sys.path[:0] = [str(HERE), str(HERE.parent)]
+
+import bpy  # noqa: E402
+import demo  # noqa: E402
+import install_extension  # noqa: E402
+import scene as stage  # noqa: E402
+from PIL import Image, ImageDraw, ImageFont  # noqa: E402
+
+LEFT_RIGHT = ("L", "R")
+EXPRESSIONS = {  # controls of both sides without L and R; of the whole face
+    "neutral": ({}, {}),
+    "smile": ({"mouthCornerPull": 1, "eyeCheekRaise": 0.6, "eyeSquintInner": 0.4}, {}),
+    "blink": ({"eyeBlink": 1}, {}),
+    "oo": ({"mouthLipsPurseU": 0.8, "mouthLipsPurseD": 0.8, "mouthFunnelU": 0.4,
+            "mouthFunnelD": 0.4}, {"jawOpen": 0.15}),
+    "shout": ({"mouthStretch": 0.6, "mouthLowerLipDepress": 0.7, "mouthUpperLipRaise": 0.5,
+               "neckStretch": 1, "browDown": 0.6, "noseWrinkle": 0.5}, {"jawOpen": 0.9}),
+    "raised brows": ({"browRaiseIn": 1, "browRaiseOuter": 1, "eyeWiden": 0.4}, {}),
+    "turned": ({"neckStretch": 0.5}, {}),
+}  # fmt: skip
+TURNED = {"neck": 16.0, "head": 18.0}  # degrees about the vertical
+
+
+def parse():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--extension", type=Path, required=True)
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--face", nargs="+", required=True, metavar="NAME=FILE")
+    parser.add_argument("--size", type=int, default=320)
+    return parser.parse_args(install_extension.arguments())
+
+
+def set_expression(controls, name):
+    """Put a face into one of the expressions.
+
+    Args:
+        controls: its control armature.
+        name: of the expression.
+    """
+    both, whole = EXPRESSIONS[name]
+    values = {f"{control}{side}": v for control, v in both.items() for side in LEFT_RIGHT} | whole
+    face = controls.pose.bones["face"]
+    for key in list(face.keys()):
+        if key.startswith("CTRL_expressions."):
+            face[key] = float(values.get(key.removeprefix("CTRL_expressions."), 0.0))
+    for bone_name, degrees in TURNED.items():
+        bone = controls.pose.bones[bone_name]
+        bone.rotation_mode = "XYZ"
+        angle = radians(degrees if name == "turned" else 0.0)
+        turn = bone.bone.matrix_local.to_3x3().inverted() @ stage.Vector((0.0, 0.0, angle))
+        bone.rotation_euler = turn
+    controls.update_tag()
+
+
+def render_row(path, folder, size):
+    """Pictures of a face in all expressions, as files by expression.
+
+    Args:
+        path: of the DNA file.
+        folder: where the pictures go.
+        size: of a picture, pixels.
+    """
+    for item in list(bpy.data.objects):
+        bpy.data.objects.remove(item)
+    controls = demo.import_face(path)
+    stage.build(controls.users_collection[0])
+    out = {}
+    for number, name in enumerate(EXPRESSIONS):
+        set_expression(controls, name)
+        out[name] = folder / f"{path.stem}_{number}.png"
+        demo.still(out[name], number + 1, size)
+    return out
+
+
+def sheet(rows, size):
+    """The pictures as one, with what each row and column is.
+
+    Args:
+        rows: by face the pictures by expression.
+        size: of a picture, pixels.
+    """
+    label = max(22, size // 12)
+    font = ImageFont.load_default(size=label * 0.62)
+    height = label + len(rows) * (size + label)
+    out = Image.new("RGB", (len(EXPRESSIONS) * size, height), (24, 26, 30))
+    draw = ImageDraw.Draw(out)
+    for column, name in enumerate(EXPRESSIONS):
+        draw.text((column * size + 8, 4), name, fill=(215, 218, 222), font=font)
+    for row, (face, pictures) in enumerate(rows.items()):
+        y = label + row * (size + label)
+        draw.text((8, y + 2), face, fill=(160, 190, 220), font=font)
+        for column, path in enumerate(pictures.values()):
+            with Image.open(path) as picture:
+                out.paste(picture.convert("RGB"), (column * size, y + label))
+    return out
+
+
+def main():
+    args = parse()
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    install_extension.install(args.extension)
+    rows = {}
+    with tempfile.TemporaryDirectory() as folder:
+        for face in args.face:
+            name, _, path = face.partition("=")
+            rows[name] = render_row(Path(path), Path(folder), args.size)
+            print(f"    {name}: {len(EXPRESSIONS)} pictures", flush=True)
+        sheet(rows, args.size).save(args.out, quality=88)
+    print(args.out, flush=True)
+
+
+if __name__ == "__main__":
+    stage.end_with(main)

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: MIT
+"""Bytes of one animation as controls, and as the joints and shapes that a face makes of it.
+
+    python tests/bench/animation_sizes.py FACE.dna [FACE.dna ...]
+
+The demo's acting at 30 and 60 frames a second, smoothed between its keys, and at 30 with the noise
+of a capture on all controls. Joints: the curves that change, as a bake writes them (three
+translations and three rotations of each joint that moves), and the blend shape weights that change.
+Float32 as it is, and both packed by the same lossless clip format.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+import numpy as np
+import risorius
+from risorius.anim.clip import Clip
+from risorius.base.easing import smooth_step
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "packaging" / "demo"))
+import acting
+
+NOISE = 0.004
+
+
+def controls_clip(names, rate):
+    """The acting on a face's raw controls.
+
+    Args:
+        names: of its raw controls.
+        rate: frames a second.
+    """
+    tracks, _ = acting.tracks(set(names))
+    times = np.arange(round(acting.LAST_FRAME / acting.FRAME_RATE * rate)) / rate
+    curves = np.zeros((len(tracks), len(times)), np.float32)
+    for row, keys in zip(curves, tracks.values(), strict=True):
+        frames, values = (np.array(x, float) for x in zip(*keys, strict=True))
+        at = 1 + times * acting.FRAME_RATE
+        right = np.clip(np.searchsorted(frames, at, side="right"), 1, len(frames) - 1)
+        span = np.maximum(frames[right] - frames[right - 1], 1e-9)
+        share = smooth_step((at - frames[right - 1]) / span)
+        row[:] = values[right - 1] + share * (values[right] - values[right - 1])
+    return Clip(list(tracks), curves, rate=rate)
+
+
+def captured(clip, names, noise):
+    """The clip as a camera would have seen it: every control, each with noise, in thousandths.
+
+    Args:
+        clip: of raw controls.
+        names: of all raw controls.
+        noise: standard deviation.
+    """
+    random = np.random.default_rng(7)
+    curves = random.normal(0, noise, (len(names), clip.frame_count)).astype(np.float32)
+    for name, curve in zip(clip.names, clip.curves, strict=True):
+        curves[list(names).index(name)] += curve
+    curves = np.round(np.clip(curves, 0, 1), 3).astype(np.float32)
+    return Clip(list(names), curves, rate=clip.rate)
+
+
+def baked_clips(rig, clip):
+    """Clips of the joints' and the shapes' curves that change.
+
+    Args:
+        rig: a risorius.Rig.
+        clip: of raw controls.
+    """
+    raw, _ = clip.raw_controls(rig.raw_control_names)
+    poses = [rig.evaluate(row) for row in np.ascontiguousarray(raw)]
+    joints = np.array([pose.joints[:, :6].ravel() for pose in poses]).T
+    shapes = np.array([pose.blend_shapes for pose in poses]).T
+    out = []
+    for curves in (joints, shapes):
+        moving = np.flatnonzero(np.ptp(curves, axis=1) > 1e-7)
+        names = [str(i) for i in moving]
+        out.append(Clip(names, np.ascontiguousarray(curves[moving]), rate=clip.rate))
+    return out
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("faces", nargs="+", type=Path)
+    for path in parser.parse_args().faces:
+        dna = risorius.load(path)
+        rig = risorius.Rig(dna)
+        print(f"{path.name}: {len(dna.joint_names)} joints, {len(dna.raw_control_names)} controls")
+        for rate, noise in ((30, 0.0), (60, 0.0), (30, NOISE)):
+            clip = controls_clip(dna.raw_control_names, rate)
+            if noise:
+                clip = captured(clip, dna.raw_control_names, noise)
+            kinds = {"controls": [clip]}
+            joints, shapes = baked_clips(rig, clip)
+            kinds["joints"], kinds["joints, shapes"] = [joints], [joints, shapes]
+            base = None
+            for kind, clips in kinds.items():
+                plain = sum(c.curves.nbytes for c in clips)
+                packed = sum(len(c.to_bytes()) for c in clips)
+                base = base or (plain, packed)
+                count = sum(len(c.names) for c in clips)
+                print(
+                    f"  {rate} fps {'captured' if noise else 'keyed':9} {kind:14} {count:5} curves "
+                    f"{plain / 1000:8.1f} kB {plain / base[0]:6.1f} times "
+                    f"packed {packed / 1000:8.1f} kB {packed / base[1]:6.1f} times"
+                )
+
+
+if __name__ == "__main__":
+    main()
