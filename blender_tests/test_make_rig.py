@@ -65,6 +65,26 @@ def shape(item, name):
     return out.reshape(-1, 3) @ np.array(item.matrix_world.to_3x3()).T
 
 
+def test_what_blender_saves_as_gltf_is_the_same_head(head, tmp_path):
+    from risorius.author.input import gltf
+
+    path = tmp_path / "egg.glb"
+    bpy.ops.export_scene.gltf(filepath=str(path), use_selection=True, export_morph=True)
+    mesh, moved = gltf.read_gltf(path)
+    positions, faces = face_shapes.head()
+    assert len(mesh.positions) == len(positions)
+    assert len(mesh.faces) == 2 * len(faces)
+    wanted = face_shapes.expressions(positions)
+    assert list(moved) == list(wanted)
+    # Blender may put vertices into another order: each is looked for by its place.
+    apart = np.linalg.norm(mesh.positions[:, None] * 100 - positions[None], axis=2)
+    places = apart.argmin(axis=1)
+    assert sorted(places.tolist()) == list(range(len(positions)))
+    assert apart.min(axis=1).max() < 1e-4
+    for name, delta in wanted.items():
+        np.testing.assert_allclose(moved[name] * 100, delta[places], atol=1e-4)
+
+
 def test_the_face_does_what_the_keys_did(head, tmp_path):
     head.location = (2.0, 1.0, 0.5)
     head.scale = (1.5, 1.5, 1.5)

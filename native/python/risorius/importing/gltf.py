@@ -132,6 +132,80 @@ class Document:
         self._numbers[int(index)] = out  # type: ignore[call-overload]  # item says it is one
         return out
 
+    def rows(self, index: object, place: str, kind: str) -> Doubles:
+        """float64[count, n] of an accessor of meshes: n is 1, 2 or 3 by its kind.
+
+        Strided and sparse ones too. Whole numbers stay what they are, unless the file says that
+        they are fractions.
+
+        Args:
+            index: of the accessor, as the file gives it.
+            place: what errors name: where the index stands.
+            kind: "SCALAR", "VEC2" or "VEC3".
+
+        Raises:
+            AnimationFileError: no such accessor, one of another kind, one that reaches beyond its
+                buffer, numbers that are not finite.
+            BudgetError: more numbers than a file of this size may hold.
+        """
+        accessor = self.item("accessors", index, place)
+        at = f"accessors[{index}]"
+        if accessor.get("type") != kind or accessor.get("componentType") not in _TYPES:
+            raise self.fail(at, f"{kind} was expected, found {accessor.get('type')!r}")
+        width = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}[kind]
+        dtype = np.dtype(_TYPES[accessor["componentType"]])
+        count = self.whole(accessor, "count", at)
+        self.budget.hold(count * width * 8, at)
+        out = np.zeros((count, width))
+        if "bufferView" in accessor:
+            out[:] = self._viewed(accessor, at, dtype, (count, width))
+        sparse = accessor.get("sparse")
+        if isinstance(sparse, dict):
+            self._put_sparse(sparse, f"{at}.sparse", dtype, out)
+        if accessor.get("normalized") is True and dtype.kind != "f":
+            out = np.maximum(out / np.iinfo(dtype).max, -1.0)
+        if not np.isfinite(out).all():
+            raise self.fail(at, f"finite numbers were expected, found {out[~np.isfinite(out)][0]}")
+        return out
+
+    def _put_sparse(
+        self, sparse: Mapping[str, Any], at: str, dtype: np.dtype[Any], out: Doubles
+    ) -> None:
+        """The rows that a sparse accessor names, in place."""
+        count = self.whole(sparse, "count", at)
+        parts = [sparse.get("indices"), sparse.get("values")]
+        if not all(isinstance(part, dict) for part in parts):
+            raise self.fail(at, "indices and values were expected")
+        indices, values = (part for part in parts if isinstance(part, dict))
+        if indices.get("componentType") not in (5121, 5123, 5125):
+            raise self.fail(f"{at}.indices", "whole numbers without a sign were expected")
+        kind = np.dtype(_TYPES[indices["componentType"]])
+        self.budget.hold(count * (1 + out.shape[1]) * 8, at)
+        rows = self._viewed(indices, f"{at}.indices", kind, (count, 1))[:, 0].astype(np.int64)
+        if count and rows.max() >= len(out):
+            raise self.fail(f"{at}.indices", f"row {rows.max()} of {len(out)}")
+        out[rows] = self._viewed(values, f"{at}.values", dtype, (count, out.shape[1]))
+
+    def _viewed(
+        self, table: Mapping[str, Any], at: str, dtype: np.dtype[Any], shape: tuple[int, int]
+    ) -> npt.NDArray[Any]:
+        """Numbers [shape] where a table's bufferView and byteOffset say, with the view's stride."""
+        view = self.item("bufferViews", table.get("bufferView"), at)
+        view_at = f"bufferViews[{table['bufferView']}]"
+        data = self._buffer(view.get("buffer"), view_at)
+        row = dtype.itemsize * shape[1]
+        stride = self.whole(view, "byteStride", view_at, row)
+        if stride < row:
+            raise self.fail(
+                view_at, f"a stride of {row} bytes or more was expected, found {stride}"
+            )
+        inside = self.whole(table, "byteOffset", at)
+        start = self.whole(view, "byteOffset", view_at) + inside
+        length = stride * (shape[0] - 1) + row if shape[0] else 0
+        if inside + length > self.whole(view, "byteLength", view_at) or start + length > len(data):
+            raise self.fail(at, f"{length} bytes from {start} were expected, the buffer is shorter")
+        return np.ndarray(shape, dtype, data, start, (stride, dtype.itemsize))
+
     def _buffer(self, index: object, place: str) -> bytes:
         table = self.item("buffers", index, place)
         number = int(index)  # type: ignore[call-overload]  # item says it is one

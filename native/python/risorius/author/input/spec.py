@@ -11,16 +11,20 @@ from ... import Dna, load
 from ...base import toml
 from ..fitting import FitOptions
 from ..levels import LodOptions
+from ..skeleton import Doubles
 from ..work import RigOptions
+from . import gltf
 from .matching import assign
 from .obj import ShapeFileError, read_obj, read_positions
 from .shape_face import ShapeSet, check_shapes, make_shape_face
 
+_BY_BLENDER = (".fbx", ".usd", ".usdc", ".usda", ".usdz", ".abc", ".blend", ".dae")
 _TABLES: dict[str, dict[str, tuple[type, ...]]] = {
     "source": {
         "dna": (str,),
         "neutral": (str,),
         "expressions": (str,),
+        "mesh": (str,),
         "left": (str,),
         "unit": (str,),
     },
@@ -76,7 +80,13 @@ def read_spec(path: Path) -> Spec:
     source = table.get("source", {})
     if ("dna" in source) == ("neutral" in source):
         raise ShapeFileError(f"{path}: source: either dna or neutral was expected")
-    if "neutral" in source and "expressions" not in source:
+    suffix = Path(source.get("neutral", "")).suffix.lower()
+    if suffix in _BY_BLENDER:
+        raise ShapeFileError(
+            f"{path}: source.neutral: OBJ, glTF or GLB was expected, found {suffix}: import it "
+            "into Blender and choose Object > Make Rig from Shape Keys, or save it there as glTF"
+        )
+    if "neutral" in source and suffix not in gltf.SUFFIXES and "expressions" not in source:
         raise ShapeFileError(f"{path}: source.expressions: a folder of OBJ files was expected")
     return Spec(
         path,
@@ -132,13 +142,21 @@ def read_face(spec: Spec) -> tuple[Dna, dict[str, list[str]], list[str]]:
 
 def _read_shapes(spec: Spec, folder: Path) -> ShapeSet:
     neutral = folder / spec.source["neutral"]
-    mesh = read_obj(neutral)
+    morphs: dict[str, Doubles] = {}
+    if neutral.suffix.lower() in gltf.SUFFIXES:
+        mesh, morphs = gltf.read_gltf(neutral, spec.source.get("mesh", ""))
+        unit = "m"
+    else:
+        mesh, unit = read_obj(neutral), "cm"
     left = spec.source.get("left", "+x")
     if left not in ("+x", "-x"):
         raise ShapeFileError(f"{spec.path}: source.left: +x or -x was expected, found {left!r}")
-    out = ShapeSet(spec.name, mesh, {}, 1 if left == "+x" else -1, spec.source.get("unit", "cm"))
+    out = ShapeSet(spec.name, mesh, {}, 1 if left == "+x" else -1, spec.source.get("unit", unit))
     if out.unit not in ("cm", "m"):
         raise ShapeFileError(f"{spec.path}: source.unit: cm or m was expected, found {out.unit!r}")
+    out.expressions.update(morphs)
+    if morphs:
+        return out
     files = sorted((folder / spec.source["expressions"]).glob("*.obj"))
     for path in files:
         if path.resolve() == neutral.resolve():
