@@ -181,7 +181,9 @@ def test_what_is_no_head_is_one_sentence(tmp_path):
     assert "a table was expected" in said(primitive("targets", [3] * 7))
     assert "VEC3 was expected" in said(accessor(0, type="VEC4"))
     assert "the buffer is shorter" in said(accessor(0, count=99_999))
-    assert "a stride of 12 bytes or more" in said(lambda j: j["bufferViews"][0].update(byteStride=8))
+    assert "a stride of 12 bytes or more" in said(
+        lambda j: j["bufferViews"][0].update(byteStride=8)
+    )
     assert "of 528 vertices were expected" in said(accessor(9, componentType=5120))
     assert "3 numbers were expected" in said(lambda j: j["nodes"][1].update(scale=[1, "2", 3]))
     assert "indices: row " in said(accessor(2, count=3))

@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: MIT
+"""The sample man's head with other polygons, made into a rig as any head is.
+
+    python tests/bench/author_remeshed.py --out remeshed.dna [--voxel 4.0] [--joints 120]
+
+Blender (the bpy module) remeshes the head by voxels; each expression is carried over from the
+nearest place on the old surface. The new head goes through the same steps as OBJ files do. Prints
+what `risorius author` prints.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Vector
+from mathutils.bvhtree import BVHTree
+from risorius.author import FitOptions, RigOptions, make_joint_rig
+from risorius.author.input.matching import assign
+from risorius.author.input.obj import ObjMesh
+from risorius.author.input.shape_face import ShapeSet, check_shapes, make_shape_face
+from risorius.cli.author import as_lines
+from risorius.sample import build
+from risorius.sample.people import MAN
+from risorius.sample.source import FACE_UNITS, Source, fetch
+
+
+def old_head(source):
+    """Positions [V, 3] in cm, polygons and the ARKit units' displacements of the base head."""
+    _, parts, positions, _ = build.assemble(source, print, MAN)
+    part = next(p for p in parts if p.name == "head_lod1_mesh")
+    units = {}
+    for name in source._zip.namelist():
+        if name.startswith(FACE_UNITS) and name.endswith(".target"):
+            unit = Path(name).stem
+            units[unit] = part.carry(source.face_unit(unit, len(positions))) * build.CM
+    return part.carry(positions) * build.CM, part.polygons.faces, units
+
+
+def remeshed(positions, faces, voxel):
+    """Positions and polygons of Blender's voxel remesh, the same on both sides.
+
+    Args:
+        positions: float64[V, 3], cm.
+        faces: polygons.
+        voxel: mm.
+    """
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    mesh = bpy.data.meshes.new("head")
+    mesh.from_pydata(positions.tolist(), [], [list(map(int, face)) for face in faces])
+    item = bpy.data.objects.new("head", mesh)
+    bpy.context.scene.collection.objects.link(item)
+    bpy.context.view_layer.objects.active = item
+    solid = item.modifiers.new("solid", "SOLIDIFY")  # voxels want a volume
+    solid.thickness = voxel / 10
+    remesh = item.modifiers.new("remesh", "REMESH")
+    remesh.mode, remesh.voxel_size = "VOXEL", voxel / 10
+    made = item.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
+    points = np.array([v.co for v in made.vertices], float)
+    polygons = [list(p.vertices) for p in made.polygons]
+    return points, polygons
+
+
+def carried(points, positions, faces, units):
+    """Where each point lies on the old surface, and the units' displacements there."""
+    triangles = np.array([[f[0], f[i], f[i + 1]] for f in faces for i in range(1, len(f) - 1)])
+    tree = BVHTree.FromPolygons(positions.tolist(), triangles.tolist())
+    corners, shares, apart = [], [], []
+    for point in points:
+        place, _, number, distance = tree.find_nearest(Vector(point))
+        a, b, c = (positions[i] for i in triangles[number])
+        rows = np.column_stack([b - a, c - a])
+        uv, *_ = np.linalg.lstsq(rows, np.array(place) - a, rcond=None)
+        corners.append(triangles[number])
+        shares.append([1 - uv.sum(), *uv])
+        apart.append(distance)
+    corners, shares = np.array(corners), np.array(shares)
+    print(f"new vertices lie at most {10 * max(apart):.2f} mm off the old surface")
+    return {n: np.einsum("vk,vkx->vx", shares, d[corners]) for n, d in units.items()}
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--voxel", type=float, default=4.0, help="mm (default: %(default)s)")
+    parser.add_argument("--joints", type=int, default=120)
+    args = parser.parse_args()
+    positions, faces, units = old_head(Source(fetch()))
+    points, polygons = remeshed(positions, faces, args.voxel)
+    print(f"{len(positions):,} vertices before, {len(points):,} after")
+    moved = carried(points, positions, faces, units)
+    shapes = ShapeSet("remeshed", ObjMesh(points, np.zeros((0, 2)), polygons), moved)
+    for sentence in check_shapes(shapes):
+        print("note:", sentence)
+    dna = make_shape_face(shapes, assign(shapes.expressions, {}))
+    rig = make_joint_rig(dna, RigOptions(FitOptions(joints=args.joints)))
+    rig.dna.save(args.out)
+    print("\n".join(as_lines(rig, args.out)))
+
+
+if __name__ == "__main__":
+    main()
