@@ -118,11 +118,15 @@ faults_found() { # faults_found PLATFORM PYTHON: what would be wrong is seen
   "$build_python" "$project/packaging/cross/plant_faults.py" "$(wheel_of "$1" "$2")" \
     --python "$(realpath "$(a_python "$2")")" --zig "$zig_lib"
 }
+scalar_bits= # of the first that was imported
 imported() { # imported PYTHON: the Linux wheel, by Debian's Python of that version
   local said
   said=$(linux_run "$1" "$project/packaging/cross/trial.py") || return 1
   echo "$said"
   [[ "$said" == *"; $(cpu_sets); "* ]] || { echo "the processor has $(cpu_sets)" && return 1; }
+  # Whatever its Python, it computes the same bits.
+  [ "${said##*scalar }" = "${scalar_bits:=${said##*scalar }}" ] ||
+    { echo "scalar bits of another Python: $scalar_bits" && return 1; }
   fact linux-x64 "$1" imported "$said"
 }
 same() { # same PLATFORM PYTHON: built elsewhere from nothing
@@ -147,7 +151,8 @@ make_platform() { # make_platform PLATFORM[=PYTHON]
     source=$project
     forget "$1" "$version"
     row "wheel, $name" build "$1" "$version" "$wheels" || continue
-    fact "$1" "$version" built "$(basename "$(wheel_of "$1" "$version")")"
+    fact "$1" "$version" built "$(basename "$(wheel_of "$1" "$version")"), sha256 $(sha256sum \
+      "$(wheel_of "$1" "$version")" | cut -c1-16)"
     row "inspected, $name" inspected "$1" "$version"
     [ "$version" != 3.11 ] || row "planted faults are found, $1" faults_found "$1" "$version"
     [ "$1" != linux-x64 ] || row "imported, $name" imported "$version"

@@ -56,6 +56,12 @@ python_of() { # python_of VERSION ARGUMENT...: in wine, whose Python knows no ha
     timeout -s KILL 1800 "$wine" "$folder/python.exe" "$@" 2>&1 | cat
 }
 
+# wheel_is_new VERSION: it is there, and nothing that it is made of is younger
+wheel_is_new() {
+  local wheel=("$project"/build/wheels/risorius-*-"cp${1/./}-cp${1/./}-win_amd64.whl")
+  [ -e "${wheel[0]}" ] && [ -z "$(cd "$project" &&
+    find native packaging/cross CMakeLists.txt pyproject.toml -type f -newer "${wheel[0]}" -print -quit)" ]
+}
 row() { printf 'row\t%s\t%d\t%d\n' "$@"; }
 note() { # note NAME LOG COMMAND...
   local name=$1 log="$logs/$2.log"
@@ -100,8 +106,7 @@ step "wine" && install_packages wine64 && get_zig && note "wine" wine wine_is_re
 venv_python="$cross/venv/bin/python"
 for version in "${versions[@]}"; do
   step "Windows, Python $version"
-  [ -e "$project/build/wheels/$(basename "$(ls "$project"/build/wheels/*-"cp${version/./}"-*-win_amd64.whl 2> /dev/null)")" ] ||
-    "$project/packaging/wheels.sh" windows-x64 || exit 1
+  wheel_is_new "$version" || "$project/packaging/wheels.sh" "windows-x64=$version" || exit 1
   note "wheel installed, Windows $version" "install-$version" install "$version" "$windows/site-$version" || continue
   cp "$project/packaging/cross/windows_plugin.py" "$windows/site-$version/"
   note "every instruction set, scalar bits, Windows $version in wine" "trial-$version" tried "$version" || continue

@@ -3,6 +3,8 @@
 
 import importlib.util
 import os
+import re
+import runpy
 import shutil
 import subprocess
 import sys
@@ -235,3 +237,16 @@ def test_lines_that_never_ran_are_listed_by_function(tmp_path):
         "package: no test runs 3 of 7 lines",
         "add-on: no test runs 0 of 0 lines",
     ]
+
+
+def test_what_nobody_tried_has_a_row_of_the_table():
+    facts = runpy.run_path(str(PACKAGING / "cross" / "facts.py"))
+    text = (PACKAGING / "wheels.sh").read_text(encoding="utf-8")
+    found = re.search(r"declare -A versions=\((.*?)\)\n", text, re.DOTALL)
+    rows = re.findall(r'\[([\w-]+)\]="([^"]+)"', found.group(1))
+    assert facts["PLANNED"] == {name: tuple(all_of.split()) for name, all_of in rows}
+    known = facts["read"](["linux-x64\t3.11\tbuilt\tx.whl, sha256 0123\n"])
+    table = facts["table"](known)
+    assert table.count("\n") == 1 + sum(len(all_of.split()) for _, all_of in rows)
+    assert "| linux-x64 | 3.11 | x.whl, sha256 0123 | NOT DONE |" in table
+    assert "| macos-x64 | 3.11 | NOT DONE | NOT DONE | NOT DONE | NOT RUN: no macOS here |" in table
