@@ -90,8 +90,9 @@ def make_joint_rig(
     parents = choose_parents(work, shaped, fit, weights, _jaw(work))
     fit, weights, work.parents = second_joints(work, shaped, fit, weights, parents, room)
     _order_levels(work, shaped, fit, weights, o)
-    names, regions = _add_joints(work, fit)
-    _add_behavior(work, fit, _effects(work, shaped, fit, weights), regions, o)
+    effects = _effects(work, shaped, fit, weights)
+    names, regions = _add_joints(work, fit, effects)
+    _add_behavior(work, fit, effects, regions, o)
     made = Made(work, o, weights)
     for lod in range(work.levels):
         made.add_level(lod, wanted, needs)
@@ -227,16 +228,17 @@ def _fit(
     return found, parts
 
 
-def _add_joints(work: Work, fit: Joints) -> tuple[list[str], dict[str, list[str]]]:
+def _add_joints(
+    work: Work, fit: Joints, effects: Doubles
+) -> tuple[list[str], dict[str, list[str]]]:
     """The new joints at the end of the Dna's; their names, and by region."""
     dna = work.dna
     first = len(given(work))
     positions = fit.joints[first:]
-    turns, shifts = fit.rotations[:, first:], fit.translations[:, first:]
-    reach = 0.1 * np.ptp(positions, axis=0).max()
-    amounts = np.linalg.norm(shifts, axis=2) + reach * np.linalg.norm(turns, axis=2)
     left = -1 if dna.coordinate_system[0] == "left" else 1
-    names = joint_names(positions, amounts, work.names, left=left, taken=set(dna.joint_names))
+    taken = set(dna.joint_names)
+    pairs = fit.mirrored[first:] - first
+    names = joint_names(positions, effects, pairs, work.names, left=left, taken=taken)
     rest = sk.world_matrices(dna, np.zeros((len(dna.joint_names), 9)))[work.parents]
     local = np.linalg.solve(rest[:, :3, :3], (positions - rest[:, :3, 3])[..., None])[..., 0]
     dna.joint_names = [*dna.joint_names, *names]
@@ -253,7 +255,7 @@ def _add_joints(work: Work, fit: Joints) -> tuple[list[str], dict[str, list[str]
     dna.joint_row_count = 9 * len(dna.joint_names)
     regions: dict[str, list[str]] = {}
     for name in names:
-        regions.setdefault(name.split("_")[2].rstrip("0123456789"), []).append(name)
+        regions.setdefault(name.split("_")[2].rstrip("0123456789AB"), []).append(name)
     return names, regions
 
 

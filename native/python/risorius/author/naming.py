@@ -8,38 +8,61 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..controls.regions import TITLES, region_of
-from .skeleton import Doubles
+from .skeleton import Doubles, Ints
 
 _WORDS = {"brow": "Brow", "eye": "Eye", "nose": "Nose", "cheek": "Cheek", "mouth": "Mouth"}
 _WORDS |= {"jaw": "JawSkin", "tongue": "Tongue", "teeth": "Teeth", "neck": "Neck"}
 
 
 def joint_names(
-    positions: Doubles, amounts: Doubles, controls: Sequence[str], *, left: int, taken: set[str]
+    positions: Doubles,
+    effects: Doubles,
+    mirrored: Ints,
+    controls: Sequence[str],
+    *,
+    left: int,
+    taken: set[str],
 ) -> list[str]:
-    """A name of its own for each joint.
+    """A name of its own for each joint; those of a pair differ in their side alone.
 
     Args:
         positions: float64[J, 3], x across the face, 0 in its middle.
-        amounts: float64[E, J], how far an expression moves what hangs on the joint.
-        controls: names of the expressions, E; their regions name the joints'.
+        effects: float64[E, J], how far an expression moves what hangs on the joint.
+        mirrored: int64[J], the joint of the other side, itself in the middle.
+        controls: names of the expressions, E; the region of what moves a joint most names it.
         left: 1 where the character's left is +x, -1 where it is -x.
         taken: names that are there already; is added to.
     """
     regions = list(TITLES)
     share = np.zeros((len(regions), len(positions)))
-    for row, control in zip(amounts, controls, strict=True):
-        share[regions.index(region_of(control))] += row
+    for row, control in zip(effects, controls, strict=True):
+        region = regions.index(region_of(control))
+        share[region] = np.maximum(share[region], row)
+    share = np.maximum(share, share[:, mirrored])
     size = np.ptp(positions[:, 0]) or 1.0
     out = [""] * len(positions)
-    counts: dict[str, int] = {}
-    for joint in np.lexsort((positions[:, 0] * left, -positions[:, 1].round(3))):
-        region = regions[int(share[:, joint].argmax())]
-        x = positions[joint, 0] * left
-        side = "C" if abs(x) < 1e-3 * size else "L" if x > 0 else "R"
-        stem = f"FACIAL_{side}_{_WORDS.get(region, region.title())}"
-        while not out[joint] or out[joint] in taken:
-            counts[stem] = counts.get(stem, 0) + 1
-            out[joint] = f"{stem}{counts[stem]}"
-        taken.add(out[joint])
+    counts: dict[tuple[bool, str], int] = {}
+    for joint in np.lexsort((positions[:, 0] * left, -positions[:, 1].round(3))).tolist():
+        if out[joint]:
+            continue
+        pair = sorted({joint, int(mirrored[joint])})
+        word = regions[int(share[:, joint].argmax())]
+        word = _WORDS.get(word, word.title())
+        names: list[str] = []
+        while not names or not taken.isdisjoint(names):
+            key = (len(pair) == 2, word)
+            counts[key] = counts.get(key, 0) + 1
+            sides = [_side(positions[j, 0] * left, size, len(pair) == 2) for j in pair]
+            names = [f"FACIAL_{side}_{word}{counts[key]}" for side in sides]
+        if len(set(names)) < len(names):  # both on one side: no pair that could be told apart
+            names = [f"{name}{letter}" for name, letter in zip(names, "AB", strict=True)]
+        for j, name in zip(pair, names, strict=True):
+            out[j] = name
+        taken.update(names)
     return out
+
+
+def _side(x: float, size: float, paired: bool) -> str:
+    if not paired and abs(x) < 1e-3 * size:
+        return "C"
+    return "L" if x > 0 else "R"
