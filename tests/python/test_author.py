@@ -368,6 +368,77 @@ def test_joints_that_are_there_stay(folder):
         assert error.max() * 1000 < 0.0505
 
 
+def test_what_goes_with_a_jaw_is_its_child(folder):
+    """Half the way and with other expressions the skin is where jaw, skin and shapes had it."""
+    dna, _, _ = spec.read_face(spec.read_spec(folder / "spec.toml"))
+    positions, _ = face_shapes.head()
+    hinge = np.array([0, 0, -2.0])
+    head = np.asarray(dna.neutral_joint_translations)[1]
+    dna.joint_names = [*dna.joint_names, "jaw"]
+    dna.joint_parents = [0, 0, 1]
+    dna.neutral_joint_translations = [[0, 0, 0], head, hinge - head]
+    dna.neutral_joint_rotations = np.zeros((3, 3))
+    dna.lod_joint_mapping = [range(3)]
+    dna.joint_row_count = 27
+    names = list(dna.raw_control_names)
+    opening = names.index("CTRL_expressions.jawOpen")
+    dna.joint_groups = [
+        risorius.JointGroup(
+            lods=[1], input_indices=[opening], output_indices=[2 * 9 + 3], joint_indices=[2],
+            values=np.degrees([[0.3]]),
+        )
+    ]  # fmt: skip
+    mesh = dna.meshes[0]
+    share = np.clip((-positions[:, 1] - 2) / 6, 0, 1)
+    weights = np.stack([0 * share, 1 - share, share], axis=1)
+    vertex, joint = np.nonzero(weights)
+    mesh.skin_offsets = np.concatenate([[0], np.cumsum((weights > 0).sum(axis=1))])
+    mesh.skin_weights, mesh.skin_joint_indices = weights[vertex, joint], joint
+    mesh.maximum_influence_per_vertex = 2
+    kept = [t for t in mesh.blend_shape_targets if t.blend_shape_channel_index != opening]
+    chin = face_shapes.bump(positions, 0, -9, 3)[:, None] * [0.0, -0.4, 0.2]
+    moved = np.flatnonzero(chin.any(axis=1))
+    kept.append(
+        risorius.BlendShapeTarget(
+            deltas=chin[moved], vertex_indices=moved, blend_shape_channel_index=opening
+        )
+    )
+    mesh.blend_shape_targets = kept
+    dna.meshes = [mesh]
+    options = RigOptions(FitOptions(joints=40), tolerance_mm=None, lods=LodOptions(count=1))
+    made = make_joint_rig(dna, options).dna
+    assert list(made.joint_parents).count(2) >= 3
+    for controls, most in (
+        ({"jawOpen": 1}, 0.6),
+        ({"jawOpen": 0.5}, 0.4),
+        ({"jawOpen": 1, "mouthCornerPullL": 1}, 1.2),
+    ):
+        error = np.linalg.norm(posed(made, controls) - posed(dna, controls), axis=1)
+        assert error.max() * 1000 < most, controls
+
+
+def test_joints_of_a_pair_are_named_alike(made):
+    names = made[0].joint_names
+    sides = [{n[9:] for n in names if n.startswith(f"FACIAL_{side}_")} for side in "LR"]
+    assert sides[0] == sides[1]
+    regions = {n.split("_")[2].rstrip("0123456789") for n in names if n.startswith("FACIAL_")}
+    assert regions == {"Brow", "Eye", "Mouth", "JawSkin"}
+    assert not [n for n in names if n.endswith(("A", "B"))]
+    positions = np.asarray(made[0].neutral_joint_translations)
+    brows = [positions[i][1] for i, n in enumerate(names) if "_Brow" in n]
+    mouth = [positions[i][1] for i, n in enumerate(names) if "_Mouth" in n]
+    assert min(brows) > max(mouth)
+
+
+def test_half_the_way_of_an_arc_is_no_worse_than_its_end(folder):
+    dna, _, _ = spec.read_face(spec.read_spec(folder / "spec.toml"))
+    options = RigOptions(FitOptions(joints=40), tolerance_mm=None, lods=LodOptions(count=1))
+    (errors,) = make_joint_rig(dna, options).errors
+    for name in ("jawOpen", "eyeBlinkL", "eyeBlinkR"):
+        at = errors.expressions.index("CTRL_expressions." + name)
+        assert errors.between_largest[at] < errors.joints_largest[at]
+
+
 def test_a_coarser_mesh_hangs_on_the_same_joints(folder):
     """The mesh of LOD 1 has every second row and column, and shapes of its own."""
     dna, _, _ = spec.read_face(spec.read_spec(folder / "spec.toml"))

@@ -91,7 +91,7 @@ def make_joint_rig(
     fit, weights, work.parents = second_joints(work, shaped, fit, weights, parents, room)
     _order_levels(work, shaped, fit, weights, o)
     effects = _effects(work, shaped, fit, weights)
-    names, regions = _add_joints(work, fit, effects)
+    names, regions = _add_joints(work, fit, effects, _places(work, shaped, fit, weights))
     _add_behavior(work, fit, effects, regions, o)
     made = Made(work, o, weights)
     for lod in range(work.levels):
@@ -229,7 +229,7 @@ def _fit(
 
 
 def _add_joints(
-    work: Work, fit: Joints, effects: Doubles
+    work: Work, fit: Joints, effects: Doubles, places: Doubles
 ) -> tuple[list[str], dict[str, list[str]]]:
     """The new joints at the end of the Dna's; their names, and by region."""
     dna = work.dna
@@ -238,7 +238,7 @@ def _add_joints(
     left = -1 if dna.coordinate_system[0] == "left" else 1
     taken = set(dna.joint_names)
     pairs = fit.mirrored[first:] - first
-    names = joint_names(positions, effects, pairs, work.names, left=left, taken=taken)
+    names = joint_names(places, effects, pairs, work.names, left=left, taken=taken)
     rest = sk.world_matrices(dna, np.zeros((len(dna.joint_names), 9)))[work.parents]
     local = np.linalg.solve(rest[:, :3, :3], (positions - rest[:, :3, 3])[..., None])[..., 0]
     dna.joint_names = [*dna.joint_names, *names]
@@ -266,6 +266,17 @@ def _beside_parents(work: Work, fit: Joints) -> Doubles:
     turns = np.swapaxes(parents[..., :3], -1, -2)
     shifts = own[..., 3] - parents[..., 3]
     return np.concatenate([turns @ own[..., :3], (turns @ shifts[..., None])], axis=-1)
+
+
+def _places(work: Work, meshes: Sequence[int], fit: Joints, weights: dict[int, Doubles]) -> Doubles:
+    """float64[new joints, 3]: the middle of what each moves; where it lies, if it moves nothing."""
+    positions = np.concatenate(
+        [np.asarray(work.source.meshes[m].positions, np.float64) for m in meshes]
+    )
+    rows = np.concatenate([weights[m][:, len(work.source.joint_names) :] for m in meshes]) ** 2
+    total = rows.sum(axis=0)[:, None]
+    middles = (rows.T @ positions) / np.maximum(total, 1e-30)
+    return np.where(total > 1e-12, middles, fit.joints[len(given(work)) :])
 
 
 def _effects(

@@ -26,7 +26,7 @@ def joint_names(
     """A name of its own for each joint; those of a pair differ in their side alone.
 
     Args:
-        positions: float64[J, 3], x across the face, 0 in its middle.
+        positions: float64[J, 3], the middle of what each moves; x across the face, 0 in its middle.
         effects: float64[E, J], how far an expression moves what hangs on the joint.
         mirrored: int64[J], the joint of the other side, itself in the middle.
         controls: names of the expressions, E; the region of what moves a joint most names it.
@@ -39,6 +39,11 @@ def joint_names(
         region = regions.index(region_of(control))
         share[region] = np.maximum(share[region], row)
     share = np.maximum(share, share[:, mirrored])
+    moving = np.flatnonzero(share.any(axis=0))
+    for joint in np.flatnonzero(~share.any(axis=0)):  # one that moves nothing is as its neighbour
+        if len(moving):
+            apart = ((positions[moving] - positions[joint]) ** 2).sum(axis=1)
+            share[:, joint] = share[:, moving[apart.argmin()]]
     size = np.ptp(positions[:, 0]) or 1.0
     out = [""] * len(positions)
     counts: dict[tuple[bool, str], int] = {}
