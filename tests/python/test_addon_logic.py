@@ -66,6 +66,11 @@ class TestNames:
     def test_a_number_that_is_taken_is_passed_over(self) -> None:
         assert names.unique_labels(["a", "a.001", "a"]) == ["a", "a.001", "a.002"]
 
+    def test_a_sentence_names_the_first_and_counts_the_rest(self) -> None:
+        assert names.listed(["a"]) == "a"
+        assert names.listed(list("abcdefgh")) == "a, b, c, d, e, f, g, h"
+        assert names.listed(list("abcde"), 3) == "a, b, c and 2 more"
+
     def test_names_that_are_no_text(self) -> None:
         labels = names.unique_labels(["", "\udcff", "a\0b"])
         assert all(label.encode("utf-8") for label in labels)

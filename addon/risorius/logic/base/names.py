@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 MAX_BYTES = 63
 
@@ -21,6 +21,17 @@ def cut(name: str, limit: int = MAX_BYTES) -> str:
     clean = name.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
     clean = clean.replace("\0", "") or "unnamed"
     return clean.encode("utf-8")[:limit].decode("utf-8", "ignore")
+
+
+def listed(labels: Sequence[str], most: int = 8) -> str:
+    """Labels for a sentence: the first ones, and how many more there are.
+
+    Args:
+        labels: at least one.
+        most: so many are named.
+    """
+    shown = ", ".join(labels[:most])
+    return f"{shown} and {len(labels) - most} more" if len(labels) > most else shown
 
 
 def unique_labels(names: Iterable[str], taken: Iterable[str] = ()) -> list[str]:

@@ -11,11 +11,14 @@ import numpy as np
 from mathutils import Matrix, Vector
 from numpy.typing import NDArray
 
+from ...logic.base import names
 from ...logic.character import plans, user_edits
 from ..base import parts
 from ..base.blender_types import ArmatureObject, Context, MeshObject
 from ..character import armatures
 from .file_change import Change
+
+_NAMED = 8  # joints that are gone are named one by one up to here
 
 _EPS = float(np.finfo(np.float32).eps)
 
@@ -157,11 +160,14 @@ def replace_joints(context: Context, change: Change) -> None:
         if joint not in kept and shelf is not None:
             shelf.assign(rig.data.bones[name])
     _release(change, moved)
-    for label in (old.labels[j] for j in gone.values() if j < len(old.labels)):
-        change.report.append(f"The joint {label} is gone.")
+    lost = [old.labels[j] for j in gone.values() if j < len(old.labels)]
+    if len(lost) > _NAMED:
+        change.report.append(f"{len(lost)} joints are gone: {names.listed(lost, _NAMED)}.")
+    else:
+        change.report += [f"The joint {label} is gone." for label in lost]
     added = [label for k, label in enumerate(new.labels) if k not in kept]
     if added:
-        change.report.append(f"New joints: {', '.join(added)}.")
+        change.report.append(f"New joints: {names.listed(added)}.")
     for joint in edited:
         if moved[joint] >= 0:
             change.report.append(f"Your edit of the joint {old.labels[joint]} was carried over.")

@@ -137,7 +137,7 @@ def _report_entries(change: Change, entries: drivers.Entries) -> None:
             change.report.append(f"The {what} {label} is gone{tail}.")
         added = [x for x in new if x not in old]
         if added:
-            change.report.append(f"New {what}s: {', '.join(added)}.")
+            change.report.append(f"New {what}s: {names.listed(added)}.")
 
 
 def _take_properties(change: Change, fresh: ArmatureObject) -> None:
