@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from .. import Mesh
+from .. import Dna, Mesh
 from . import skeleton as sk
 from .pivots import arc
 from .skeleton import Doubles
@@ -15,14 +17,32 @@ SHARES = (0.25, 0.5, 0.75)
 
 
 class Ways:
-    """Where joints are on the way to 1, of the face that is made and of its source: once for all
-    meshes."""
+    """Where joints are at 1 and on the way there, of the face that is made and of its source: once
+    for all meshes.
+
+    Attributes:
+        rest: float64[joints, 3], where all joints lie.
+        whole: float64[C, joints, 3, 4], how they move at 1.
+        made: the same at each of SHARES.
+        before: of the source's joints at each of SHARES.
+        turning: bool[C], whether an input moves joints of the source.
+        middles: float64[3], what an input's motion goes round.
+    """
 
     def __init__(self, work: Work) -> None:
         count = sk.column_count(work.source)
+
+        def motions(dna: Dna, value: float) -> Doubles:
+            return sk.column_motions(dna, count, value)[work.columns]
+
         self.work = work
-        self.made = {t: sk.column_motions(work.dna, count, t)[work.columns] for t in SHARES}
-        self.before = {t: sk.column_motions(work.source, count, t)[work.columns] for t in SHARES}
+        neutral = np.zeros((len(work.dna.joint_names), 9))
+        self.rest = sk.world_matrices(work.dna, neutral)[:, :3, 3]
+        self.whole = motions(work.dna, 1.0)
+        self.made = {t: motions(work.dna, t) for t in SHARES}
+        self.before = {t: motions(work.source, t) for t in SHARES}
+        still = np.isclose(work.motions, np.eye(3, 4), atol=1e-12)
+        self.turning = ~still.all(axis=(1, 2, 3))
         self.middles = {e: p.position for p in work.pivots for e in p.expressions}
 
 
@@ -30,29 +50,33 @@ class Between:
     """How far joints are off on the way to 1: from the line, or from the arc about a pivot."""
 
     def __init__(self, ways: Ways, mesh: Mesh) -> None:
-        self.ways, self.work = ways, ways.work
+        self.ways = ways
         self.positions = np.asarray(mesh.positions, np.float64)
-        self.weights = sk.dense_weights(mesh, len(self.work.source.joint_names))
+        self.weights = sk.dense_weights(mesh, len(ways.work.source.joint_names))
 
-    def truth(self, row: int, wanted: Doubles, share: float) -> Doubles:
-        """float64[V, 3], what is added to the neutral positions.
+    def truth(self, row: int, wanted: Doubles, shares: Sequence[float]) -> list[Doubles]:
+        """float64[V, 3] of each share, what is added to the neutral positions.
 
         Args:
             row: the expression.
             wanted: float64[V, 3], what it adds at 1.
-            share: of the way, 0 to 1.
+            shares: of the way, some of SHARES.
         """
-        whole = self.work.motions[row]
-        if np.allclose(whole, np.eye(3, 4), atol=1e-12):
+        if not self.ways.turning[row]:
             middle = self.ways.middles.get(row)
-            return share * wanted if middle is None else arc(self.positions, wanted, middle, share)
+            if middle is None:
+                return [share * wanted for share in shares]
+            return [arc(self.positions, wanted, middle, share) for share in shares]
         # Joints that were there go their own arc; what shapes do beside them is a line.
         goal = self.positions + wanted
+        whole = self.ways.work.motions[row]
         shape = sk.before_skin(goal, self.weights, whole) - self.positions
-        part = sk.skinned(
-            self.positions + share * shape, self.weights, self.ways.before[share][row]
-        )
-        return part - self.positions
+        out = []
+        for share in shares:
+            shaped = self.positions + share * shape
+            moved = sk.skinned(shaped, self.weights, self.ways.before[share][row])
+            out.append(moved - self.positions)
+        return out
 
     def largest(self, row: int, wanted: Doubles, weights: Doubles) -> float:
         """How far the joints are off at most, at the shares, in the file's unit.
@@ -63,8 +87,8 @@ class Between:
             weights: float64[V, joints].
         """
         worst = 0.0
-        for share in SHARES:
+        for share, truth in zip(SHARES, self.truth(row, wanted, SHARES), strict=True):
             reached = sk.skinned(self.positions, weights, self.ways.made[share][row])
-            off = reached - self.positions - self.truth(row, wanted, share)
+            off = reached - self.positions - truth
             worst = max(worst, float(np.linalg.norm(off, axis=1).max()))
         return worst

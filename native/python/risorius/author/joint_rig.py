@@ -17,7 +17,6 @@ from ..rigs.edit import regroup
 from ..rigs.rotation import Convention
 from . import skeleton as sk
 from .fitting import FitOptions, Progress, fit_joints
-from .level_weights import CARRIED_MM
 from .levels import LodOptions, extend_levels, joint_budgets, joint_order, level_joints
 from .meshes import Made, count_deltas
 from .naming import joint_names
@@ -32,12 +31,15 @@ from .work import (
     RigOptions,
     Work,
     begin,
-    carriers,
+    carried_shifts,
     dense,
     displacements,
     given,
+    joined_positions,
     listed_meshes,
     needs_joints,
+    new_weights,
+    resting,
 )
 
 
@@ -86,13 +88,16 @@ def make_joint_rig(
     # The fit is nearly all of the work; levels and weights take what is left of the bar.
     room = room_for_second(work, shaped, wanted, o.fit.joints)
     own = replace(o.fit, joints=o.fit.joints - room)
-    fit, weights = _fit(work, shaped, wanted, own, _part(progress, 0.0, 0.8))
-    parents = choose_parents(work, shaped, fit, weights, _jaw(work))
-    fit, weights, work.parents = second_joints(work, shaped, fit, weights, parents, room)
+    jaw = _jaw(work)
+    fit, weights = _fit(work, shaped, wanted, jaw, own, _part(progress, 0.0, 0.8))
+    work.parents = choose_parents(work, shaped, fit, weights, jaw)
+    fit, weights, work.parents = second_joints(work, shaped, fit, weights, room)
     _order_levels(work, shaped, fit, weights, o)
-    effects = _effects(work, shaped, fit, weights)
-    names, regions = _add_joints(work, fit, effects, _places(work, shaped, fit, weights))
-    _add_behavior(work, fit, effects, regions, o)
+    beside = _beside_parents(work, fit)
+    held = new_weights(work, shaped, weights)
+    effects = _effects(work, shaped, beside, held)
+    names, regions = _add_joints(work, fit, effects, _places(work, shaped, fit, held))
+    _add_behavior(work, beside, effects, regions, o)
     made = Made(work, o, weights)
     for lod in range(work.levels):
         made.add_level(lod, wanted, needs)
@@ -150,13 +155,9 @@ def _order_levels(
     mirrored = fit.mirrored
     place = np.concatenate([used, own])
     # What the joints of the neck carry counts as an expression here too, see level_weights.
-    families = [j for j in range(len(work.source.joint_names)) if j not in used[1:]]
-    roots = carriers(work, np.array(families))[place]
-    carried = np.zeros((len(families), len(place), 3))
-    for row, family in enumerate(families):
-        carried[row, roots == family, 1] = CARRIED_MM / MM.get(work.source.translation_unit, 10.0)
+    carried = carried_shifts(work, resting(work))[:, place]
     order, heirs = joint_order(
-        np.concatenate([np.asarray(work.source.meshes[m].positions, np.float64) for m in shaped]),
+        joined_positions(work, shaped),
         np.concatenate([weights[m][:, place] for m in shaped]),
         sk.matrices_of_vectors(np.concatenate([fit.rotations, np.zeros_like(carried)])),
         np.concatenate([fit.translations, carried]),
@@ -185,12 +186,13 @@ def _fit(
     work: Work,
     meshes: Sequence[int],
     wanted: dict[int, Doubles],
+    jaw: int | None,
     options: FitOptions,
     progress: Progress | None,
 ) -> tuple[Joints, dict[int, Doubles]]:
     """The fit of all meshes of the finest LOD together, and dense weights of each."""
     dna = work.source
-    neutral = np.concatenate([np.asarray(dna.meshes[m].positions, np.float64) for m in meshes])
+    neutral = joined_positions(work, meshes)
     moved = np.concatenate([wanted[m] for m in meshes], axis=1).astype(np.float32)
     edges, begin = [], [0]
     for m in meshes:
@@ -203,7 +205,7 @@ def _fit(
         moved.astype(np.float64),
         dna.joint_names,
         work.positions,
-        jaw=_jaw(work) is not None,
+        jaw=jaw is not None,
     )
     fit = fit_joints(
         neutral,
@@ -255,7 +257,7 @@ def _add_joints(
     dna.joint_row_count = 9 * len(dna.joint_names)
     regions: dict[str, list[str]] = {}
     for name in names:
-        regions.setdefault(name.split("_")[2].rstrip("0123456789AB"), []).append(name)
+        regions.setdefault(name.split("_")[2].rstrip("0123456789"), []).append(name)
     return names, regions
 
 
@@ -268,40 +270,30 @@ def _beside_parents(work: Work, fit: Joints) -> Doubles:
     return np.concatenate([turns @ own[..., :3], (turns @ shifts[..., None])], axis=-1)
 
 
-def _places(work: Work, meshes: Sequence[int], fit: Joints, weights: dict[int, Doubles]) -> Doubles:
+def _places(work: Work, meshes: Sequence[int], fit: Joints, held: Doubles) -> Doubles:
     """float64[new joints, 3]: the middle of what each moves; where it lies, if it moves nothing."""
-    positions = np.concatenate(
-        [np.asarray(work.source.meshes[m].positions, np.float64) for m in meshes]
-    )
-    rows = np.concatenate([weights[m][:, len(work.source.joint_names) :] for m in meshes]) ** 2
+    rows = held**2
     total = rows.sum(axis=0)[:, None]
-    middles = (rows.T @ positions) / np.maximum(total, 1e-30)
+    middles = (rows.T @ joined_positions(work, meshes)) / np.maximum(total, 1e-30)
     return np.where(total > 1e-12, middles, fit.joints[len(given(work)) :])
 
 
-def _effects(
-    work: Work, meshes: Sequence[int], fit: Joints, weights: dict[int, Doubles]
-) -> Doubles:
+def _effects(work: Work, meshes: Sequence[int], motions: Doubles, held: Doubles) -> Doubles:
     """float64[C, new joints]: how far each expression moves a vertex by each joint, mm."""
-    before = len(work.source.joint_names)
-    positions = np.concatenate(
-        [np.asarray(work.source.meshes[m].positions, np.float64) for m in meshes]
-    )
-    rows = np.concatenate([weights[m][:, before:] for m in meshes])
-    motions = _beside_parents(work, fit)
+    positions = joined_positions(work, meshes)
     out = np.zeros(motions.shape[:2])
     for joint in range(motions.shape[1]):
-        held = np.flatnonzero(rows[:, joint])
+        rows = np.flatnonzero(held[:, joint])
         own = motions[:, joint]
-        moved = np.einsum("eik,vk->evi", own[..., :3], positions[held]) + own[:, None, :, 3]
-        lengths = np.linalg.norm(moved - positions[held], axis=2) * rows[held, joint]
+        moved = np.einsum("eik,vk->evi", own[..., :3], positions[rows]) + own[:, None, :, 3]
+        lengths = np.linalg.norm(moved - positions[rows], axis=2) * held[rows, joint]
         out[:, joint] = lengths.max(axis=1, initial=0)
     return out * MM.get(work.source.translation_unit, 10.0)
 
 
 def _add_behavior(
     work: Work,
-    fit: Joints,
+    motions: Doubles,
     effects: Doubles,
     regions: dict[str, list[str]],
     options: RigOptions,
@@ -311,7 +303,6 @@ def _add_behavior(
     before = len(work.source.joint_names)
     # In the parent's frame: its rest matrix carries what is done beside it over.
     frames = sk.world_matrices(dna, np.zeros((len(dna.joint_names), 9)))[work.parents]
-    motions = _beside_parents(work, fit)
     whole = np.zeros((*motions.shape[:2], 4, 4))
     whole[..., :3, :], whole[..., 3, 3] = motions, 1
     carried = np.linalg.inv(frames) @ whole @ frames

@@ -12,11 +12,17 @@ from . import skeleton as sk
 from .between import Between, Ways
 from .fitting import FitOptions, fit_weights
 from .skeleton import Doubles, Ints
-from .work import MM, Work, carriers, dense, family_shares, given
+from .work import (
+    Work,
+    carried_shares,
+    carried_shift,
+    carried_shifts,
+    carriers,
+    dense,
+    given,
+    resting,
+)
 
-# A vertex that follows another joint of the neck than before counts as one that is so far off: a
-# head that is turned moves them about so far against each other.
-CARRIED_MM = 20.0
 # Half the way counts so many times beside the whole, for expressions that go along an arc.
 _HALVES = 1.5
 
@@ -28,8 +34,6 @@ def level_weights(
     mesh: Mesh,
     wanted: Doubles,
     start: Doubles,
-    motions: Doubles,
-    rest: Doubles,
 ) -> Doubles:
     """float64[V, joints]: weights on the joints of a level.
 
@@ -45,11 +49,9 @@ def level_weights(
         mesh: with its skin in the source.
         wanted: float64[E, V, 3], of it.
         start: float64[V, joints], weights to begin with.
-        motions: float64[E, joints, 3, 4] of all joints.
-        rest: float64[joints, 3], where they are.
     """
     work = ways.work
-    extra, shifted, used = _carried(work, mesh, len(rest))
+    extra, shifted, used = _carried(work, mesh)
     halves, half_motions = _halves(ways, mesh, wanted)
     if lod == 0 and not len(extra) and not len(halves):
         return start
@@ -61,47 +63,39 @@ def level_weights(
         np.asarray(mesh.positions, np.float64),
         asked.astype(np.float32),
         sk.mesh_edges(mesh),
-        given=rest[joints],
-        motions=np.concatenate([motions, extra, half_motions])[:, joints],
+        given=ways.rest[joints],
+        motions=np.concatenate([ways.whole, extra, half_motions])[:, joints],
         mirrored=np.array([joints.tolist().index(work.mirrored[j]) for j in joints.tolist()]),
         start=_inherited(work, start, set(joints.tolist()))[:, joints],
         options=replace(options, smoothness=even if lod == 0 else 0.1 * even),
     )
-    return dense(fit, joints, len(rest))
+    return dense(fit, joints, len(ways.rest))
 
 
-def _carried(work: Work, mesh: Mesh, joints: int) -> tuple[Doubles, Doubles, Ints]:
+def _carried(work: Work, mesh: Mesh) -> tuple[Doubles, Doubles, Ints]:
     """What is asked for beside the expressions, so that each vertex stays with its own joint of
     neck and head: motions [n, joints, 3, 4] and displacements [n, V, 3]; and which joints of the
     source take part."""
-    families, shares = family_shares(work, mesh)
-    roots = carriers(work, families)
-    before = len(work.source.joint_names)
-    own = [
-        at
-        for at, f in enumerate(families)
-        if f == work.head or shares[:, at].any() or np.any(roots[before:] == f)
-    ]
-    carrying = [at for at in own if families[at] != work.head]
-    motions = np.zeros((len(carrying), joints, 3, 4)) + np.eye(3, 4)
+    still, shares = resting(work), carried_shares(work, mesh)
+    used = set(carriers(work)[len(work.source.joint_names) :].tolist())
+    own = [at for at, j in enumerate(still) if j == work.head or shares[:, at].any() or j in used]
+    carrying = [at for at in own if still[at] != work.head]
+    shifts = carried_shifts(work, still[carrying])
+    motions = np.zeros((*shifts.shape[:2], 3, 4)) + np.eye(3, 4)
+    motions[..., 3] = shifts
     shifted = np.zeros((len(carrying), len(mesh.positions), 3))
-    shift = CARRIED_MM / MM.get(work.source.translation_unit, 10.0)
-    for row, at in enumerate(carrying):
-        motions[row, roots == families[at], 1, 3] = shift
-        shifted[row, :, 1] = shift * shares[:, at]
-    return motions, shifted, np.concatenate([families[own], given(work)[1:]])
+    shifted[..., 1] = carried_shift(work) * shares[:, carrying].T
+    return motions, shifted, np.concatenate([still[own], given(work)[1:]])
 
 
 def _halves(ways: Ways, mesh: Mesh, wanted: Doubles) -> tuple[Doubles, Doubles]:
     """What is to be half the way of expressions that go along an arc, float64[n, V, 3], and what
     joints do there, float64[n, joints, 3, 4]."""
     between = Between(ways, mesh)
-    turning = np.any(np.abs(ways.work.motions - np.eye(3, 4)) > 1e-9, axis=(1, 2, 3))
-    pivots = {e for pivot in ways.work.pivots for e in pivot.expressions}
-    rows = sorted(pivots | set(np.flatnonzero(turning).tolist()))
+    rows = sorted({*ways.middles, *np.flatnonzero(ways.turning).tolist()})
     halves = np.zeros((len(rows), len(mesh.positions), 3))
     for at, row in enumerate(rows):
-        halves[at] = between.truth(row, wanted[row], 0.5)
+        (halves[at],) = between.truth(row, wanted[row], (0.5,))
     still = np.eye(3, 4)
     return _HALVES * halves, still + _HALVES * (ways.made[0.5][rows] - still)
 

@@ -37,10 +37,7 @@ class Made:
 
     def __init__(self, work: Work, options: RigOptions, weights: dict[int, Doubles]) -> None:
         self.work, self.options, self.weights = work, options, weights
-        dna = work.dna
         self.ways = Ways(work)
-        self.motions = sk.column_motions(dna, sk.column_count(work.source))[work.columns]
-        self.rest = sk.world_matrices(dna, np.zeros((len(dna.joint_names), 9)))[:, :3, 3]
         self.meshes: list[Mesh] = []
         self.names: list[str] = []
         self.listed: list[list[int]] = []
@@ -125,13 +122,11 @@ class Made:
         if rows is None:
             self.meshes.append(mesh)
             return
-        rows = level_weights(
-            self.ways, self.options.fit, lod, mesh, wanted, rows, self.motions, self.rest
-        )
+        rows = level_weights(self.ways, self.options.fit, lod, mesh, wanted, rows)
         if finest is not None:
             self.weights[finest] = rows
         shaped = self.options if lod < self.own else replace(self.options, tolerance_mm=None)
-        made, left = _finish_mesh(self.ways, mesh, rows, self.motions, wanted, shaped)
+        made, left = _finish_mesh(self.ways, mesh, rows, wanted, shaped)
         left.name, left.lod = name, lod
         self.meshes.append(made)
         self.errors.append(left)
@@ -176,7 +171,6 @@ def _finish_mesh(
     ways: Ways,
     mesh: Mesh,
     rows: Doubles,
-    motions: Doubles,
     wanted: Doubles,
     options: RigOptions,
 ) -> tuple[Mesh, MeshErrors]:
@@ -192,7 +186,7 @@ def _finish_mesh(
     found, targets = _no_errors(len(positions), work.names), []
     for row, column in enumerate(work.columns):
         goal = positions + wanted[row]
-        error = np.linalg.norm(sk.skinned(positions, weights, motions[row]) - goal, axis=1) * mm
+        error = np.linalg.norm(sk.skinned(positions, weights, ways.whole[row]) - goal, axis=1) * mm
         found.between_largest[row] = between.largest(row, wanted[row], weights) * mm
         found.motion[row] = np.sqrt((wanted[row] ** 2).sum(axis=1).mean()) * mm
         found.joints_rms[row] = np.sqrt((error**2).mean())
@@ -200,7 +194,7 @@ def _finish_mesh(
         if options.tolerance_mm is not None and column in channel:
             moved = np.flatnonzero(error > options.tolerance_mm)
             if len(moved):
-                shaped = sk.before_skin(goal[moved], weights[moved], motions[row])
+                shaped = sk.before_skin(goal[moved], weights[moved], ways.whole[row])
                 targets.append(
                     BlendShapeTarget(
                         deltas=shaped - positions[moved],

@@ -50,24 +50,23 @@ def joint_names(
     for joint in np.lexsort((positions[:, 0] * left, -positions[:, 1].round(3))).tolist():
         if out[joint]:
             continue
-        pair = sorted({joint, int(mirrored[joint])})
+        pair = sorted({joint, int(mirrored[joint])}, key=lambda j: (-positions[j, 0] * left, j))
+        sides = "LR" if len(pair) == 2 else _side(positions[joint, 0] * left / size)
         word = regions[int(share[:, joint].argmax())]
         word = _WORDS.get(word, word.title())
         names: list[str] = []
         while not names or not taken.isdisjoint(names):
             key = (len(pair) == 2, word)
             counts[key] = counts.get(key, 0) + 1
-            sides = [_side(positions[j, 0] * left, size, len(pair) == 2) for j in pair]
             names = [f"FACIAL_{side}_{word}{counts[key]}" for side in sides]
-        if len(set(names)) < len(names):  # both on one side: no pair that could be told apart
-            names = [f"{name}{letter}" for name, letter in zip(names, "AB", strict=True)]
         for j, name in zip(pair, names, strict=True):
             out[j] = name
         taken.update(names)
     return out
 
 
-def _side(x: float, size: float, paired: bool) -> str:
-    if not paired and abs(x) < 1e-3 * size:
+def _side(x: float) -> str:
+    """Of a joint that has no other one. Args: x  to its left, of the face's width."""
+    if abs(x) < 1e-3:
         return "C"
     return "L" if x > 0 else "R"

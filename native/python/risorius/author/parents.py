@@ -13,7 +13,16 @@ import numpy as np
 import numpy.typing as npt
 
 from .skeleton import Doubles, Ints, matrices_of_vectors
-from .work import Joints, Work, carriers, family_shares, given
+from .work import (
+    Joints,
+    Work,
+    carried_shares,
+    carriers,
+    given,
+    joined_positions,
+    new_weights,
+    resting,
+)
 
 _MINOR = 0.15  # of what a joint holds: so much on another joint of the neck asks for a second one
 _ROOM = 0.08  # of the new joints are kept for these
@@ -43,19 +52,18 @@ def choose_parents(
         weights: float64[V, joints] of each mesh.
         jaw: the joint that opens the mouth, if there is one.
     """
-    first, before = len(given(work)), len(work.source.joint_names)
+    first = len(given(work))
     mirrored = fit.mirrored[first:] - first
-    rows = np.concatenate([weights[m][:, before:] for m in meshes])
-    parts = [family_shares(work, work.source.meshes[m]) for m in meshes]
-    families = parts[0][0]
-    held = rows.T @ np.concatenate([shares for _, shares in parts])
-    if np.abs(work.positions[families, 0]).max() < 1e-3 * np.ptp(work.positions[:, 1]):
+    rows = new_weights(work, meshes, weights)
+    still = resting(work)
+    held = rows.T @ np.concatenate([carried_shares(work, work.source.meshes[m]) for m in meshes])
+    if np.abs(work.positions[still, 0]).max() < 1e-3 * np.ptp(work.positions[:, 1]):
         held += held[mirrored]  # none has a side: both joints of a pair hang on the same
-    out = np.where(held.any(axis=1), families[held.argmax(axis=1)], work.head)
+    out = np.where(held.any(axis=1), still[held.argmax(axis=1)], work.head)
     if jaw is not None:
         # Not what hangs on the neck: the throat goes with the jaw, but stays with the neck.
-        carrier = carriers(work, families)[jaw]
-        out[(out == carrier) & _follow(work, meshes, fit, rows, mirrored, jaw)] = jaw
+        own = out == carriers(work)[jaw]
+        out[own & _follow(work, meshes, fit, rows, mirrored, jaw)] = jaw
     return [int(joint) for joint in out]
 
 
@@ -72,9 +80,9 @@ def room_for_second(
         joints: new ones in all.
     """
     for m in meshes:
-        families, shares = family_shares(work, work.source.meshes[m])
+        shares = carried_shares(work, work.source.meshes[m])
         moved = wanted[m].any(axis=(0, 2))
-        if np.any(shares[moved][:, families != work.head] > _MINOR):
+        if np.any(shares[moved][:, resting(work) != work.head] > _MINOR):
             return int(_ROOM * joints)
     return 0
 
@@ -84,39 +92,36 @@ def second_joints(
     meshes: Sequence[int],
     fit: Joints,
     weights: dict[int, Doubles],
-    parents: list[int],
     room: int,
 ) -> tuple[Joints, dict[int, Doubles], list[int]]:
     """Joints whose vertices hang on two joints of the neck, or on neck and head, get a second one
     that does the same under the other parent: what is turned by hand then moves as it did before.
 
     Args:
-        work: the face.
+        work: the face, parents of new joints chosen.
         meshes: those that were fitted.
         fit: the joints.
         weights: float64[V, joints] of each mesh.
-        parents: of the new joints.
         room: how many there may be.
 
     Returns:
-        All three with the second joints at the end.
+        Joints, weights and parents with those of the second joints at the end.
     """
     first, before = len(given(work)), len(work.source.joint_names)
     mirrored = fit.mirrored
-    work.parents = parents
-    shares = {m: family_shares(work, work.source.meshes[m])[1] for m in meshes}
-    families = family_shares(work, work.source.meshes[meshes[0]])[0]
+    still = resting(work)
+    shares = {m: carried_shares(work, work.source.meshes[m]) for m in meshes}
     held = np.sum([weights[m][:, before:].T @ shares[m] for m in meshes], axis=0)
     held += held[mirrored[first:] - first]
     least = _MINOR * held.sum(axis=1, keepdims=True)
-    held[carriers(work, families)[before:, None] == families] = 0
-    split: list[tuple[int, int]] = []  # new joint, which family the second one is of
+    held[carriers(work)[before:, None] == still] = 0
+    split: list[tuple[int, int]] = []  # new joint, which resting one the second hangs on
     for joint, at in sorted(np.argwhere(held > least).tolist(), key=lambda x: (-held[*x], *x)):
         other = int(mirrored[first + joint]) - first
         pair = [(joint, at)] if other == joint else [(joint, at), (other, at)]
         if (joint, at) not in split and held[other, at] > 0 and len(split) + len(pair) <= room:
             split += pair
-    return _split(work, fit, weights, shares, split, families)
+    return _split(work, fit, weights, shares, split)
 
 
 def _split(
@@ -125,16 +130,15 @@ def _split(
     weights: dict[int, Doubles],
     shares: dict[int, Doubles],
     split: list[tuple[int, int]],
-    families: Ints,
 ) -> tuple[Joints, dict[int, Doubles], list[int]]:
     """Second joints, and the vertices of the first ones divided by what these hang on."""
     first, before = len(given(work)), len(work.source.joint_names)
     count = len(fit.joints)
-    own = carriers(work, families)
+    still, own = resting(work), carriers(work)
     rows = np.array([first + joint for joint, _ in split], np.int64)
     mirrored = fit.mirrored
     numbers = {pair: count + at for at, pair in enumerate(split)}
-    others = [numbers[int(mirrored[first + j]) - first, f] for j, f in split]
+    others = [numbers[int(mirrored[first + j]) - first, at] for j, at in split]
     out = Joints(
         np.concatenate([fit.joints, fit.joints[rows]]),
         np.concatenate([fit.rotations, fit.rotations[:, rows]], axis=1),
@@ -145,10 +149,10 @@ def _split(
     for m, dense in weights.items():
         divided[m] = np.concatenate([dense, np.zeros((len(dense), len(split)))], axis=1)
         for joint in sorted({joint for joint, _ in split}):
-            seconds = [(numbers[j, f] - first + before, f) for j, f in split if j == joint]
+            seconds = [(numbers[j, at] - first + before, at) for j, at in split if j == joint]
             column = before + joint
-            part = {to: shares[m][:, f] for to, f in seconds}
-            part[column] = shares[m][:, list(families).index(own[column])]
+            part = {to: shares[m][:, at] for to, at in seconds}
+            part[column] = shares[m][:, list(still).index(own[column])]
             whole = sum(part.values())
             held = dense[:, column].copy()
             for to, share in part.items():
@@ -156,7 +160,7 @@ def _split(
                 divided[m][:, to] = held * np.where(
                     whole > 0, share / np.maximum(whole, 1e-30), none
                 )
-    return out, divided, [*work.parents, *(int(families[f]) for _, f in split)]
+    return out, divided, [*work.parents, *(int(still[at]) for _, at in split)]
 
 
 def _follow(
@@ -167,9 +171,7 @@ def _follow(
     moving = np.flatnonzero(np.abs(work.motions[:, jaw] - np.eye(3, 4)).max(axis=(1, 2)) > 1e-9)
     own = joint_motions(fit)[moving, first:]
     leading = work.motions[moving, jaw]
-    positions = np.concatenate(
-        [np.asarray(work.source.meshes[m].positions, np.float64) for m in meshes]
-    )
+    positions = joined_positions(work, meshes)
     points = np.column_stack([positions, np.ones(len(positions))])
     still, beside = np.zeros(rows.shape[1]), np.zeros(rows.shape[1])
     for joint in range(rows.shape[1]):

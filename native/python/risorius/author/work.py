@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -17,6 +18,9 @@ from .pivots import Pivot
 from .skeleton import Doubles, Ints
 
 MM = {"cm": 10.0, "m": 1000.0}
+# A vertex that follows another joint of the neck than before counts as one that is so far off: a
+# head that is turned moves them about so far against each other.
+CARRIED_MM = 20.0
 _RIGID_MM = 0.02  # a mesh that its joints bring so near needs no others
 
 
@@ -175,33 +179,23 @@ def needs_joints(work: Work, mesh: Mesh, wanted: Doubles) -> bool:
     return far * MM.get(work.source.translation_unit, 10.0) > _RIGID_MM
 
 
-def family_shares(work: Work, mesh: Mesh) -> tuple[Ints, Doubles]:
-    """The joints that no expression moves, such as head and neck, and how much of each vertex they
-    carry, by themselves and by moving joints below them: float64[V, families], rows with sum 1.
+def resting(work: Work) -> Ints:
+    """The joints of the source that no expression moves, such as spine, neck and head.
 
     To a fit all that rests is alike; which of these a vertex follows when a neck is turned by hand
     is to stay as it was.
-
-    Args:
-        work: the face.
-        mesh: one of its own, or with its skin.
     """
-    count = len(work.source.joint_names)
     moving = set(given(work)[1:].tolist())
-    families = np.array([j for j in range(count) if j not in moving])
-    weights = sk.dense_weights(mesh, count)
-    roots = carriers(work, families)[:count]
-    return families, np.stack([weights[:, roots == f].sum(axis=1) for f in families], axis=1)
+    return np.array([j for j in range(len(work.source.joint_names)) if j not in moving])
 
 
-def carriers(work: Work, families: Ints) -> Ints:
-    """int64[joints]: which of the families carries a joint: itself, or the next above it.
+def carriers(work: Work) -> Ints:
+    """int64[joints]: the resting joint that carries a joint: itself, or the next above it.
 
     Args:
-        work: the face, parents of new joints chosen.
-        families: of family_shares.
+        work: the face; new joints count where their parents are chosen.
     """
-    own = set(families.tolist())
+    own = set(resting(work).tolist())
     parents = [*(int(p) for p in work.source.joint_parents), *work.parents]
     out = []
     for joint in range(len(parents)):
@@ -212,6 +206,59 @@ def carriers(work: Work, families: Ints) -> Ints:
             at = parents[at]
         out.append(at if at in own else work.head)
     return np.array(out, np.int64)
+
+
+def carried_shares(work: Work, mesh: Mesh) -> Doubles:
+    """float64[V, resting]: how much of each vertex the resting joints carry, by themselves and by
+    moving joints below them; rows with sum 1.
+
+    Args:
+        work: the face.
+        mesh: one of its own, or with its skin.
+    """
+    count = len(work.source.joint_names)
+    weights = sk.dense_weights(mesh, count)
+    roots = carriers(work)[:count]
+    return np.stack([weights[:, roots == j].sum(axis=1) for j in resting(work)], axis=1)
+
+
+def carried_shift(work: Work) -> float:
+    """How far what a resting joint carries is shifted with it, in the file's unit: what a neck that
+    is turned by hand does, as an expression would."""
+    return CARRIED_MM / MM.get(work.source.translation_unit, 10.0)
+
+
+def carried_shifts(work: Work, joints: Ints) -> Doubles:
+    """float64[n, joints, 3]: all that hangs on each of these resting joints, shifted with it.
+
+    Args:
+        work: the face, parents of new joints chosen.
+        joints: resting ones.
+    """
+    out = np.zeros((len(joints), len(work.source.joint_names) + len(work.parents), 3))
+    out[..., 1] = carried_shift(work) * (carriers(work) == np.asarray(joints)[:, None])
+    return out
+
+
+def joined_positions(work: Work, meshes: Sequence[int]) -> Doubles:
+    """float64[V, 3]: the vertices of some of the source's meshes, one after the other.
+
+    Args:
+        work: the face.
+        meshes: which.
+    """
+    return np.concatenate([np.asarray(work.source.meshes[m].positions, np.float64) for m in meshes])
+
+
+def new_weights(work: Work, meshes: Sequence[int], weights: dict[int, Doubles]) -> Doubles:
+    """float64[V, new joints]: what new joints hold of these vertices.
+
+    Args:
+        work: the face.
+        meshes: which.
+        weights: float64[V, joints] of each mesh.
+    """
+    return np.concatenate([weights[m][:, len(work.source.joint_names) :] for m in meshes])
 
 
 def given(work: Work) -> Ints:
