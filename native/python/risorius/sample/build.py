@@ -19,6 +19,8 @@ from .. import (
     Psds,
 )
 from ..author import FitOptions, Progress, RigOptions, make_joint_rig
+from ..author.levels import level_name
+from ..author.polygon_mesh import polygon_mesh, vertex_normals
 from ..base.easing import smooth_step
 from ..files import fileio
 from . import expressions as ex
@@ -33,7 +35,6 @@ from .polygons import (
     clip_below,
     compact_uvs,
     subdivide,
-    vertex_normals,
 )
 from .source import PACKAGE, SHA256, TARGETS, BaseMesh, Source, SourceError, fetch
 
@@ -338,23 +339,8 @@ def make_mesh(part: Part, positions: Floats, skin: Floats, weights: Floats) -> M
     if part.name.startswith("head"):
         low, high = uvs.min(axis=0), uvs.max(axis=0)  # the texture need not hold the body
         uvs = (uvs - low) / (high - low)
-    corners = [
-        pair
-        for face, uv_face in zip(polygons.faces, uv_faces, strict=True)
-        for pair in zip(face, uv_face, strict=True)
-    ]
-    layouts, index = np.unique(np.array(corners), axis=0, return_inverse=True)
-    sizes = [len(face) for face in polygons.faces]
-    mesh = Mesh(
-        positions=p * CM,
-        texture_coordinates=uvs,
-        normals=vertex_normals(p, polygons.faces),
-        layout_positions=layouts[:, 0],
-        layout_texture_coordinates=layouts[:, 1],
-        layout_normals=layouts[:, 0],
-        face_offsets=np.concatenate([[0], np.cumsum(sizes)]),
-        face_layouts=index.ravel(),
-    )
+    normals = vertex_normals(p, polygons.faces)
+    mesh = polygon_mesh(p * CM, normals, polygons.faces, uvs, uv_faces)
     add_skin(mesh, weights)
     return mesh
 
@@ -608,10 +594,10 @@ def textures_of_levels(dna: Dna, metadata: dict[str, str]) -> dict[str, str]:
     """
     out = dict(metadata)
     for key, value in metadata.items():
+        kind, mesh, role = key.split(":", 2)
         for lod in range(2, dna.lod_count):
-            other = key.replace("_lod0_", f"_lod{lod}_")
-            if other != key and other.split(":")[1] in dna.mesh_names:
-                out[other] = value
+            if level_name(mesh, lod) in dna.mesh_names:
+                out[f"{kind}:{level_name(mesh, lod)}:{role}"] = value
     return out
 
 

@@ -199,23 +199,3 @@ def _split_faces(
                 [uv_face[corner], uv_point(corner), middle, uv_point(corner + corners - 1)]
             )
     return Polygons(faces, uv_faces, np.array(uvs), vertex_count + face_count + len(edge_number))
-
-
-def vertex_normals(positions: Floats, faces: list[list[int]]) -> Floats:
-    """Unit normals [V, 3], area-weighted means of the faces around.
-
-    Args:
-        positions: float64[V, 3].
-        faces: vertex indices by corner, counter-clockwise seen from outside.
-    """
-    normals = np.zeros_like(positions)
-    for size in {len(face) for face in faces}:
-        table = np.array([face for face in faces if len(face) == size])
-        corners = positions[table]
-        area = np.zeros((len(table), 3))
-        for k in range(1, size - 1):
-            area += np.cross(corners[:, k] - corners[:, 0], corners[:, k + 1] - corners[:, 0])
-        for k in range(size):
-            np.add.at(normals, table[:, k], area)
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    return normals / np.maximum(length, 1e-12)

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...importing import named_json
 from ...importing.gltf import Document, is_glb, is_gltf, open_glb, open_gltf
-from ...importing.source import read_bytes
+from ...importing.source import decode, read_bytes
 from ..skeleton import Doubles, Ints
 from .obj import ObjMesh, ShapeFileError
 
@@ -38,7 +38,7 @@ def read_gltf(path: Path, mesh: str = "") -> tuple[ObjMesh, dict[str, Doubles]]:
     if is_glb(data):
         document = open_glb(path, data)
     else:
-        json = named_json.parse(data.decode("utf-8", "replace"), str(path))
+        json = named_json.parse(decode(data, str(path)), str(path))
         if not is_gltf(json):
             raise ShapeFileError(f"{path}: a glTF was expected")
         document = open_gltf(path, json)

@@ -11,6 +11,7 @@ import numpy as np
 from ... import BlendShapeChannels, BlendShapeTarget, Dna, Mesh
 from ...base.easing import smooth_step
 from ...base.errors import ArgumentError
+from ..polygon_mesh import polygon_mesh, vertex_normals
 from ..skeleton import Doubles
 from .matching import PREFIX
 from .obj import ObjMesh
@@ -139,36 +140,10 @@ def _mesh(source: ObjMesh) -> Mesh:
     uvs, uv_faces = source.uvs, source.uv_faces
     if not len(uvs) or not all(uv_faces):
         uvs, uv_faces = np.zeros((count, 2)), source.faces
-    corners = np.array(
-        [
-            pair
-            for face, uv_face in zip(source.faces, uv_faces, strict=True)
-            for pair in zip(face, uv_face, strict=True)
-        ]
+    mesh = polygon_mesh(
+        positions, vertex_normals(positions, source.faces), source.faces, uvs, uv_faces
     )
-    layouts, index = np.unique(corners, axis=0, return_inverse=True)
-    sizes = [len(face) for face in source.faces]
-    return Mesh(
-        positions=positions,
-        texture_coordinates=uvs,
-        normals=_normals(positions, source.faces),
-        layout_positions=layouts[:, 0],
-        layout_texture_coordinates=layouts[:, 1],
-        layout_normals=layouts[:, 0],
-        face_offsets=np.concatenate([[0], np.cumsum(sizes)]),
-        face_layouts=index.ravel(),
-        skin_offsets=np.arange(count + 1),
-        skin_weights=np.ones(count),
-        skin_joint_indices=np.ones(count, np.int64),
-        maximum_influence_per_vertex=1,
-    )
-
-
-def _normals(positions: Doubles, faces: Sequence[Sequence[int]]) -> Doubles:
-    """float64[V, 3]: area-weighted, of unit length; of vertices without a polygon z."""
-    out = np.zeros_like(positions)
-    for face in faces:
-        points = positions[list(face)]
-        out[list(face)] += np.cross(points, np.roll(points, -1, axis=0)).sum(axis=0)
-    length = np.linalg.norm(out, axis=1, keepdims=True)
-    return np.where(length > 0, out / np.maximum(length, 1e-30), [0.0, 0.0, 1.0])
+    mesh.skin_offsets = np.arange(count + 1)
+    mesh.skin_weights, mesh.skin_joint_indices = np.ones(count), np.ones(count, np.int64)
+    mesh.maximum_influence_per_vertex = 1
+    return mesh
