@@ -11,7 +11,6 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
-from math import radians
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
@@ -61,11 +60,7 @@ def set_expression(controls, name):
         if key.startswith("CTRL_expressions."):
             face[key] = float(values.get(key.removeprefix("CTRL_expressions."), 0.0))
     for bone_name, degrees in TURNED.items():
-        bone = controls.pose.bones[bone_name]
-        bone.rotation_mode = "XYZ"
-        angle = radians(degrees if name == "turned" else 0.0)
-        turn = bone.bone.matrix_local.to_3x3().inverted() @ stage.Vector((0.0, 0.0, angle))
-        bone.rotation_euler = turn
+        demo.turn(controls.pose.bones[bone_name], (0, 0, degrees if name == "turned" else 0))
     controls.update_tag()
 
 

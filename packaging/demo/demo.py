@@ -55,6 +55,18 @@ def curves(action):
     return [curve for bag in bags for curve in bag.fcurves]
 
 
+def turn(bone, degrees):
+    """Turn a pose bone about the scene's axes.
+
+    Args:
+        bone: the pose bone.
+        degrees: about x, y and z.
+    """
+    bone.rotation_mode = "XYZ"
+    to_bone = bone.bone.matrix_local.to_3x3().inverted()
+    bone.rotation_euler = to_bone @ stage.Vector([radians(d) for d in degrees])
+
+
 def act(controls):
     """Key every track on the bone `face` and the turning bones."""
     face = controls.pose.bones["face"]
@@ -72,11 +84,8 @@ def act(controls):
         if bone is None:
             print(f"    no bone {bone_name} to turn", flush=True)
             continue
-        bone.rotation_mode = "XYZ"
-        to_bone = bone.bone.matrix_local.to_3x3().inverted()
         for frame, degrees in keys:
-            turn = to_bone @ stage.Vector([radians(d) for d in degrees])
-            bone.rotation_euler = turn
+            turn(bone, degrees)
             bone.keyframe_insert("rotation_euler", frame=frame, group=bone_name)
     for curve in curves(controls.animation_data.action):
         for point in curve.keyframe_points:

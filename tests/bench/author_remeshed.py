@@ -22,20 +22,18 @@ from risorius.author.input.matching import assign
 from risorius.author.input.obj import ObjMesh
 from risorius.author.input.shape_face import ShapeSet, check_shapes, make_shape_face
 from risorius.cli.author import as_lines
+from risorius.controls.arkit import mapping
 from risorius.sample import build
 from risorius.sample.people import MAN
-from risorius.sample.source import FACE_UNITS, Source, fetch
+from risorius.sample.source import Source, fetch
 
 
 def old_head(source):
     """Positions [V, 3] in cm, polygons and the ARKit units' displacements of the base head."""
     _, parts, positions, _ = build.assemble(source, print, MAN)
     part = next(p for p in parts if p.name == "head_lod1_mesh")
-    units = {}
-    for name in source._zip.namelist():
-        if name.startswith(FACE_UNITS) and name.endswith(".target"):
-            unit = Path(name).stem
-            units[unit] = part.carry(source.face_unit(unit, len(positions))) * build.CM
+    count = len(positions)
+    units = {name: part.carry(source.face_unit(name, count)) * build.CM for name in mapping()}
     return part.carry(positions) * build.CM, part.polygons.faces, units
 
 

@@ -345,10 +345,7 @@ def test_joints_that_are_there_stay(folder):
     weights = np.zeros((len(positions), 4))
     weights[:, 1] = 1
     weights[low] = [0, 0.5, 0.5, 0]
-    vertex, joint = np.nonzero(weights)
-    mesh.skin_offsets = np.concatenate([[0], np.cumsum((weights > 0).sum(axis=1))])
-    mesh.skin_weights, mesh.skin_joint_indices = weights[vertex, joint], joint
-    mesh.maximum_influence_per_vertex = 2
+    set_skin(mesh, weights)
     dna.meshes = [mesh]
     before = {name: posed(dna, {name: 1}) for name in ("jawOpen", "mouthCornerPullL")}
     rig = make_joint_rig(dna, RigOptions(FitOptions(joints=60, rounds=8)))
@@ -391,10 +388,7 @@ def test_what_goes_with_a_jaw_is_its_child(folder):
     mesh = dna.meshes[0]
     share = np.clip((-positions[:, 1] - 2) / 6, 0, 1)
     weights = np.stack([0 * share, 1 - share, share], axis=1)
-    vertex, joint = np.nonzero(weights)
-    mesh.skin_offsets = np.concatenate([[0], np.cumsum((weights > 0).sum(axis=1))])
-    mesh.skin_weights, mesh.skin_joint_indices = weights[vertex, joint], joint
-    mesh.maximum_influence_per_vertex = 2
+    set_skin(mesh, weights)
     kept = [t for t in mesh.blend_shape_targets if t.blend_shape_channel_index != opening]
     chin = face_shapes.bump(positions, 0, -9, 3)[:, None] * [0.0, -0.4, 0.2]
     moved = np.flatnonzero(chin.any(axis=1))
@@ -478,6 +472,14 @@ def test_a_coarser_mesh_hangs_on_the_same_joints(folder):
         goal = oracle.to_blender(rig, positions[kept] + delta)
         error = np.linalg.norm(oracle.vertices(rig, 1, pose) - goal, axis=1)
         assert error.max() < 0.1 * np.linalg.norm(delta, axis=1).max() * METRES
+
+
+def set_skin(mesh, weights):
+    vertex, joint = np.nonzero(weights)
+    counts = (weights > 0).sum(axis=1)
+    mesh.skin_offsets = np.concatenate([[0], np.cumsum(counts)])
+    mesh.skin_weights, mesh.skin_joint_indices = weights[vertex, joint], joint
+    mesh.maximum_influence_per_vertex = int(counts.max())
 
 
 def shape_weights(mesh, joints):

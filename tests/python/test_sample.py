@@ -120,6 +120,16 @@ def sample(request):
     return data, dna, parts, positions, person, units
 
 
+@pytest.fixture(scope="module")
+def packed():
+    """The face that the extension carries."""
+    path = Path(__file__).parents[2] / "build" / "sample" / "man.dna"
+    if not path.is_file():
+        _not_run.add("the extension's sample face")
+        pytest.skip("extra not run: no extension was built here")
+    return risorius.load(path)
+
+
 def skinned(dna, rig, raw, mesh_index, lod):
     """Vertices of a mesh by linear blend skinning in float64, written for this test alone."""
     pose = rig.evaluate(raw, lod=lod)
@@ -177,14 +187,10 @@ def test_extra_each_row_of_the_mapping_gives_back_its_unit(sample, lod):
 
 
 @pytest.mark.parametrize("sample", ["man"], indirect=True)
-def test_extra_the_packed_face_gives_back_its_units(sample):
+def test_extra_the_packed_face_gives_back_its_units(sample, packed):
     """The joints and shapes that the extension's man is made of, within 0.7 mm."""
-    packed = Path(__file__).parents[2] / "build" / "sample" / "man.dna"
     data, before, parts, positions, *_ = sample
-    if not packed.is_file():
-        _not_run.add("the extension's sample face")
-        pytest.skip("extra not run: no extension was built here")
-    dna = risorius.load(packed)
+    dna = packed
     assert dna.raw_control_names == before.raw_control_names
     assert dna.validate() == []
     assert dna.lod_count == 8
@@ -224,12 +230,8 @@ def _carried(dna, mesh_name):
 
 
 @pytest.mark.parametrize("sample", ["man"], indirect=True)
-def test_extra_the_packed_face_turns_its_neck_as_before(sample):
-    packed = Path(__file__).parents[2] / "build" / "sample" / "man.dna"
-    if not packed.is_file():
-        _not_run.add("the extension's sample face")
-        pytest.skip("extra not run: no extension was built here")
-    apart = [_carried(dna, "head_lod0_mesh") for dna in (sample[1], risorius.load(packed))]
+def test_extra_the_packed_face_turns_its_neck_as_before(sample, packed):
+    apart = [_carried(dna, "head_lod0_mesh") for dna in (sample[1], packed)]
     deviation = np.abs(apart[0] - apart[1]).sum(axis=1) / 2
     assert deviation.max() < 0.12
     assert deviation.mean() < 0.003

@@ -124,7 +124,7 @@ class System {
     for (std::size_t j = 0; j < state.joints.size(); ++j) {
       if (state.joints[j].given) continue;
       column_[j] = n++;
-      at_pivot_.push_back(state.joints[j].at_pivot);
+      at_pivot_.push_back(state.joints[j].position != state.joints[j].place);
     }
     size_ = 6 * n;
     core::parallel_for(state.joints.size(), problem.threads, [&](std::size_t from, std::size_t to) {
@@ -498,7 +498,6 @@ void move_joints(const Problem& problem, State& state) {
     Vec3 to = joint.place;
     if (pivot >= 0) to = problem.pivots[static_cast<std::size_t>(pivot)].position;
     if (!problem.mirror.empty() && alone && to.x() != 0.0) to = joint.place;
-    joint.at_pivot = to != joint.place;
     place_at(problem, to, joint);
   }
 }

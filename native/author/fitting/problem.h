@@ -51,7 +51,6 @@ struct Joint {
   Vec3 place = Vec3::Zero();  // the middle of what it moves: its position, if that is no pivot
   std::uint32_t mirrored = 0;
   bool rests = false;              // no expression moves it
-  bool at_pivot = false;           // its position is a pivot
   bool given = false;              // it stays where it is and moves as it did
   std::vector<Mat3> rotations;     // [E]
   std::vector<Vec3> translations;  // [E]

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 MAX_BYTES = 63
+LISTED = 8  # so many labels of a row a sentence names
 
 
 def cut(name: str, limit: int = MAX_BYTES) -> str:
@@ -23,7 +24,7 @@ def cut(name: str, limit: int = MAX_BYTES) -> str:
     return clean.encode("utf-8")[:limit].decode("utf-8", "ignore")
 
 
-def listed(labels: Sequence[str], most: int = 8) -> str:
+def listed(labels: Sequence[str], most: int = LISTED) -> str:
     """Labels for a sentence: the first ones, and how many more there are.
 
     Args:

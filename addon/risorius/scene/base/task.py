@@ -11,6 +11,23 @@ Result = TypeVar("Result")
 Work = Callable[[Callable[[float], None], Callable[[], bool]], Result]
 
 
+def telling(
+    progress: Callable[[float], None], cancelled: Callable[[], bool]
+) -> Callable[[float], bool]:
+    """A progress for work that ends where it is told False.
+
+    Args:
+        progress: of a task's work.
+        cancelled: of the same.
+    """
+
+    def tell(share: float) -> bool:
+        progress(share)
+        return not cancelled()
+
+    return tell
+
+
 class Task(Generic[Result]):
     """Something that takes seconds.
 

@@ -18,8 +18,6 @@ from ..base.blender_types import ArmatureObject, Context, MeshObject
 from ..character import armatures
 from .file_change import Change
 
-_NAMED = 8  # joints that are gone are named one by one up to here
-
 _EPS = float(np.finfo(np.float32).eps)
 
 
@@ -161,8 +159,8 @@ def replace_joints(context: Context, change: Change) -> None:
             shelf.assign(rig.data.bones[name])
     _release(change, moved)
     lost = [old.labels[j] for j in gone.values() if j < len(old.labels)]
-    if len(lost) > _NAMED:
-        change.report.append(f"{len(lost)} joints are gone: {names.listed(lost, _NAMED)}.")
+    if len(lost) > names.LISTED:
+        change.report.append(f"{len(lost)} joints are gone: {names.listed(lost)}.")
     else:
         change.report += [f"The joint {label} is gone." for label in lost]
     added = [label for k, label in enumerate(new.labels) if k not in kept]

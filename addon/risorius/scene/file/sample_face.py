@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ... import native
-from ..base.task import Task
+from ..base.task import Task, telling
 
 
 def sample_task(path: Path, person: str, *, offline: bool) -> Task[bool]:
@@ -21,18 +21,13 @@ def sample_task(path: Path, person: str, *, offline: bool) -> Task[bool]:
     sample = native.sample_module()
 
     def work(progress: Callable[[float], None], cancelled: Callable[[], bool]) -> bool:
-        def tell(share: float) -> bool:
-            progress(share)
-            return not cancelled()
-
         path.parent.mkdir(parents=True, exist_ok=True)
-        wheels = sorted(path.parent.glob("*.whl"))
         sample.build_sample(
             path,
             person=sample.PEOPLE[person],
-            data=wheels[0] if wheels else None,
+            data=_data(path.parent),
             offline=offline,
-            progress=tell,
+            progress=telling(progress, cancelled),
         )
         return True
 
@@ -45,4 +40,9 @@ def can_be_built(folder: Path) -> bool:
     Args:
         folder: where the wheel of data may lie.
     """
-    return bool(sorted(folder.glob("*.whl"))) or bool(native.sample_module().is_fetched())
+    return _data(folder) is not None or bool(native.sample_module().is_fetched())
+
+
+def _data(folder: Path) -> Path | None:
+    """The wheel of data in a folder, or None."""
+    return next(iter(sorted(folder.glob("*.whl"))), None)

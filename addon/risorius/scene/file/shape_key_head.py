@@ -16,7 +16,7 @@ from ...logic.base.errors import FaceError
 from ...logic.base.sentences import told
 from ..base import parts
 from ..base.blender_types import Context, MeshObject
-from ..base.task import Task
+from ..base.task import Task, telling
 
 Doubles = NDArray[np.float64]
 
@@ -111,10 +111,6 @@ def rig_task(
     def work(
         progress: Callable[[float], None], cancelled: Callable[[], bool]
     ) -> tuple[native.JointRig, list[str]]:
-        def tell(share: float) -> bool:
-            progress(share)
-            return not cancelled()
-
         odd = face.check_shapes(shapes)
         dna = face.make_shape_face(shapes, matching.assign(shapes.expressions, {}))
         options = author.RigOptions(
@@ -122,7 +118,7 @@ def rig_task(
             tolerance_mm,
             lods=author.LodOptions(count=levels),
         )
-        rig = author.make_joint_rig(dna, options, tell)
+        rig = author.make_joint_rig(dna, options, telling(progress, cancelled))
         if not cancelled():
             rig.dna.save(path)
         return rig, odd

@@ -240,27 +240,22 @@ class RISORIUS_OT_add_character(RunsBeside, Operator):
 
     def finish(self, context: Context) -> Result:
         """Import what was built."""
-        trouble = self._trouble(self._task.error)
-        if trouble:
-            self.report({"ERROR"}, trouble)
-            return {"CANCELLED"}
-        return self._import(context)
-
-    def _trouble(self, error: Exception | None) -> str:
-        """A sentence where the person could not be built."""
-        try:
-            if error is not None:
-                raise error
-        except OSError as found:
-            return words.say(
+        error = self._task.error
+        if error is None:
+            return self._import(context)
+        if isinstance(error, OSError):
+            trouble = words.say(
                 "The sample face could not be kept in Blender's folder for extensions: {reason}. "
                 "See that you may write there and that the disk has room.",
-                reason=(found.strerror or "").rstrip("."),
+                reason=(error.strerror or "").rstrip("."),
             )
-        except native.user_errors() as found:
-            reason = str(found).rstrip(".")
-            return words.say("The sample face could not be built: {reason}.", reason=reason)
-        return ""
+        elif isinstance(error, native.user_errors()):
+            reason = str(error).rstrip(".")
+            trouble = words.say("The sample face could not be built: {reason}.", reason=reason)
+        else:
+            raise error
+        self.report({"ERROR"}, trouble)
+        return {"CANCELLED"}
 
     def shown(self, share: int) -> str:
         return words.say("Building the face: {share} %, Esc cancels", share=share)
