@@ -41,6 +41,8 @@ for word; do
 done
 [ ${#platforms[@]} -gt 0 ] || platforms=("${all[@]}" sdist)
 failed=0
+# What a file in a wheel says of its time is that of the commit, so that two builds are the same bytes.
+export SOURCE_DATE_EPOCH=${SOURCE_DATE_EPOCH:-$(git -C "$project" log -1 --format=%ct)}
 
 row() { # row NAME COMMAND...: one row; the command's output is in a log
   local name=$1 log="$logs/${1//[^a-zA-Z0-9.]/-}.log"
