@@ -25,6 +25,16 @@ def test_pinned_cloth_is_the_face_of_its_frame(mode, dna_file):
     assert simulations.apart(wanted, {f: wanted[max(f - 1, 1)] for f in FRAMES}) > 1000 * NEAR
 
 
+def test_a_cache_that_begins_below_0_is_refused(dna_file):
+    """Blender reads the last frame of it there, as soon as a face moved."""
+    _rig, item = simulations.moving(dna_file, "LIVE")
+    modifier = simulations.cloth(item)
+    modifier.point_cache.frame_start = -3
+    with pytest.raises(RuntimeError, match="begins at frame -3"):
+        bpy.ops.risorius.bake_physics()
+    assert not modifier.point_cache.is_baked
+
+
 def test_free_cloth_falls_as_on_a_face_of_plain_actions(mode, dna_file):
     rig, item = simulations.moving(dna_file, mode, far=0.0)
     modifier = simulations.cloth(item, pinned=0.5)

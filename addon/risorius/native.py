@@ -155,7 +155,9 @@ def part(name: str) -> ModuleType:
     except ModuleNotFoundError as error:
         if error.name != f"risorius.{name}":
             raise
-        raise UnusableError(f"The native module has no {name}: install the add-on anew.") from error
+        raise UnusableError(
+            told("The native module has no {name}: install the add-on anew.", name=name)
+        ) from error
 
 
 @cache

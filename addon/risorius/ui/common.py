@@ -12,7 +12,7 @@ from ..scene.base import parts
 from ..scene.base.blender_types import ArmatureObject
 from ..scene.character import runtime
 from .blender_types import Context, Operator, OperatorBase, PanelBase
-from .words import say
+from .words import of_error, say
 
 _NO_FACE = "Select a face first."
 MODES = (
@@ -30,7 +30,7 @@ def explain(path: str | Path, error: Exception) -> str:
         error: what reading or writing it raised.
     """
     reason = error.strerror if isinstance(error, OSError) else None
-    text = names.printable(reason or str(error)).strip().rstrip(".")
+    text = names.printable(reason or of_error(error)).strip().rstrip(".")
     name = names.printable(Path(path).name)
     return f"{text}." if name in text else f"{name}: {text}."
 

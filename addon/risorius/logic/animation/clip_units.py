@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.errors import FaceError
+from ..base.sentences import told
 
 Float = NDArray[np.float64]
 HEAD = ("head.yaw", "head.pitch", "head.roll")
@@ -144,7 +145,13 @@ def keys_of(
     frames = timing.frames(times)
     if frames.size and not np.abs(frames).max() <= LAST_FRAME:
         worst = frames[np.argmax(np.abs(frames))]
-        raise ClipError(f"frame {worst:.0f} is beyond what Blender can play ({LAST_FRAME})")
+        raise ClipError(
+            told(
+                "frame {worst:.0f} is beyond what Blender can play ({last_frame})",
+                worst=worst,
+                last_frame=LAST_FRAME,
+            )
+        )
     keys = Keys()
     turned = [HEAD, *EYES.values()]
     angles = {name for group in turned for name in group}

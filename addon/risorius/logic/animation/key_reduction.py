@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base.errors import FaceError
+from ..base.sentences import told
 
 Floats = NDArray[np.float32]
 Times = NDArray[np.float64]
@@ -21,9 +22,15 @@ def frame_list(start: float, end: float, step: float) -> Times:
         ValueError: the end lies before the start, or the step is not above 0.
     """
     if end < start:
-        raise FaceError(f"The range ends at frame {end:g}, before it starts at {start:g}.")
+        raise FaceError(
+            told(
+                "The range ends at frame {end:g}, before it starts at {start:g}.",
+                end=end,
+                start=start,
+            )
+        )
     if not step > 0:
-        raise FaceError(f"A step above 0 was expected, found {step:g}.")
+        raise FaceError(told("A step above 0 was expected, found {step:g}.", step=step))
     return start + step * np.arange(int(np.floor((end - start) / step + 1e-9)) + 1)
 
 

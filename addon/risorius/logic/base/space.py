@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import FaceError
+from .sentences import told
 
 Float = NDArray[np.float64]
 
@@ -125,13 +126,30 @@ def make_space(
         ("face winding order", face_winding_order, ("ccw", "cw")),
     ):
         if word not in known:
-            raise SpaceError(f"The file's {what} {word!r} is not one of {', '.join(known)}.")
+            raise SpaceError(
+                told(
+                    "The file's {what} {word!r} is not one of {known}.",
+                    what=what,
+                    word=word,
+                    known=", ".join(known),
+                )
+            )
     if any(word not in _DIRECTIONS for word in coordinate_system):
-        raise SpaceError(f"The file's axes {tuple(coordinate_system)} are not directions.")
+        raise SpaceError(
+            told(
+                "The file's axes {coordinate_system} are not directions.",
+                coordinate_system=tuple(coordinate_system),
+            )
+        )
     axes = np.array([_DIRECTIONS[word] for word in coordinate_system]).T
     determinant = float(np.linalg.det(axes))
     if abs(determinant) < 0.5:
-        raise SpaceError(f"The file's axes {tuple(coordinate_system)} lie in one plane.")
+        raise SpaceError(
+            told(
+                "The file's axes {coordinate_system} lie in one plane.",
+                coordinate_system=tuple(coordinate_system),
+            )
+        )
     return Space(
         axes=axes,
         scale=_METRES[translation_unit] / (unit_scale or 1.0),

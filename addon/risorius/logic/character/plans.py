@@ -211,19 +211,19 @@ def plan_character(
         SpaceError: axes or units that are not known.
     """
     if not dna.meshes or not dna.mesh_names:
-        raise PlanError("The file has no geometry layer, so there is no face to build.")
+        raise PlanError(told("The file has no geometry layer, so there is no face to build."))
     if not dna.joint_names:
-        raise PlanError("The file has no joints, so there is no face to build.")
+        raise PlanError(told("The file has no joints, so there is no face to build."))
     space = space_of(dna, unit_scale)
     wanted = _mesh_lods(dna)
     chosen = [i for i, levels in enumerate(wanted) if set(levels) & set(lods)]
     if not chosen:
-        raise PlanError("The file has no meshes at the chosen levels of detail.")
+        raise PlanError(told("The file has no meshes at the chosen levels of detail."))
     labels = names.unique_labels(dna.mesh_names)
     meshes = [_plan_mesh(dna, i, labels[i], wanted[i], space) for i in chosen]
     points = np.concatenate([m.positions for m in meshes])
     if not len(points):
-        raise PlanError("The chosen meshes have no vertices, so there is no face to build.")
+        raise PlanError(told("The chosen meshes have no vertices, so there is no face to build."))
     return CharacterPlan(
         name=names.cut(dna.name or fallback_name or "Face", 40),
         space=space,
@@ -299,9 +299,9 @@ def _plan_armature(dna: DnaData, space: Space) -> ArmaturePlan:
     count = len(dna.joint_names)
     offsets, angles = dna.neutral_joint_translations, dna.neutral_joint_rotations
     if not len(parents) == len(offsets) == len(angles) == count:
-        raise PlanError("The file's joint names, parents and neutral pose differ in length.")
+        raise PlanError(told("The file's joint names, parents and neutral pose differ in length."))
     if parents.max(initial=0) >= count:
-        raise PlanError("The file names a parent joint that does not exist.")
+        raise PlanError(told("The file names a parent joint that does not exist."))
     _check_finite(offsets, "neutral joint translations")
     _check_finite(angles, "neutral joint rotations")
     order = _parents_first(parents.tolist())
@@ -331,7 +331,7 @@ def _parents_first(parents: Sequence[int]) -> list[int]:
                 break
             joint = parents[joint]
             if state[joint] == 1:
-                raise PlanError("The file's joints form a circle of parents.")
+                raise PlanError(told("The file's joints form a circle of parents."))
         for link in reversed(chain):
             state[link] = 2
             order.append(link)
@@ -340,12 +340,19 @@ def _parents_first(parents: Sequence[int]) -> list[int]:
 
 def _check(indices: NDArray[np.int64], limit: int, what: str) -> None:
     if len(indices) and int(indices.max()) >= limit:
-        raise PlanError(f"The file's {what} leads to number {int(indices.max())} of {limit}.")
+        raise PlanError(
+            told(
+                "The file's {what} leads to number {max} of {limit}.",
+                what=what,
+                max=int(indices.max()),
+                limit=limit,
+            )
+        )
 
 
 def _check_finite(values: NDArray[np.float32], what: str) -> None:
     if not np.isfinite(values).all():
-        raise PlanError(f"The file's {what} are not all finite numbers.")
+        raise PlanError(told("The file's {what} are not all finite numbers.", what=what))
 
 
 def _plan_mesh(

@@ -428,12 +428,12 @@ def add_sound(
         made = strips.new_sound(name or Path(path).stem, str(path), _free(strips, start), start)
     except RuntimeError as error:
         said = str(error).strip().removeprefix("Error: ")
-        raise clip_units.ClipError(f"no sound strip: {said}") from error
+        raise clip_units.ClipError(told("no sound strip: {said}", said=said)) from error
     strip = cast("bpy.types.SoundStrip", made)
     sound = strip.sound
     if strip.frame_final_duration <= 1 and (sound is None or not sound.samplerate):
         strips.remove(strip)
-        raise clip_units.ClipError("no sound strip: Blender cannot read it")
+        raise clip_units.ClipError(told("no sound strip: Blender cannot read it"))
     return strip
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ... import native
 from ...logic.animation.clip_units import ClipError
+from ...logic.base.sentences import told
 from ..base import parts
 from ..base.blender_types import Context, MeshObject
 from . import clip_actions
@@ -75,7 +76,14 @@ def clip_of(
     table = _stepped(context, keys, frames) if stacked else _read(keys, frames)
     moving = {n: v for n, v in table.items() if (v != v[0]).any() or v[0]}
     if not moving:
-        raise ClipError(f"no shape key of {item.name} moves from frame {begin:g} to {end:g}")
+        raise ClipError(
+            told(
+                "no shape key of {name} moves from frame {begin:g} to {end:g}",
+                name=item.name,
+                begin=begin,
+                end=end,
+            )
+        )
     rate = clip_actions.frame_rate(context.scene)
     return native.module().Clip(
         list(moving),

@@ -18,6 +18,7 @@ import bpy
 from ... import native
 from ...logic.animation import recogniser
 from ...logic.base.errors import FaceError
+from ...logic.base.sentences import told
 from ..base.task import Task
 
 
@@ -76,7 +77,9 @@ def install_recogniser() -> None:
         running = f"Python {sys.version_info.major}.{sys.version_info.minor}"
         running += f" on {platform.system()} {platform.machine()}"
         why = recogniser.reason(f"{done.stdout}\n{done.stderr}", running)
-        raise InstallError(f"{recogniser.PACKAGE} could not be installed: {why}.")
+        raise InstallError(
+            told("{package} could not be installed: {why}.", package=recogniser.PACKAGE, why=why)
+        )
 
 
 def _bundled_pip() -> str:

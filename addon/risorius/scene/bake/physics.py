@@ -28,9 +28,20 @@ def bake(context: Context, rigs: Sequence[ArmatureObject]) -> Sentence:
         BakeError: there is nothing to bake, or a face cannot be at its place in time; what was
             baked of it is freed.
     """
-    count = len(list(caches.of_scene(context.scene)))
+    found = [cache for _key, cache in caches.of_scene(context.scene)]
+    count = len(found)
     if not count:
         raise BakeError(told("There is no simulation with a cache in this scene."))
+    begin = min(cache.frame_start for cache in found)
+    if begin < 0:
+        # It counts a cache's frames without a sign: those below 0 read as the last one.
+        raise BakeError(
+            told(
+                "A simulation's cache begins at frame {begin}. Blender loses baked frames below 0: "
+                "begin it at 0 or later.",
+                begin=begin,
+            )
+        )
     for rig in rigs:
         trouble = controls_ahead.examine(context.scene, rig, parts.controls_there(rig))
         if trouble:

@@ -12,6 +12,7 @@ import zlib
 import bpy
 
 from ...logic.base.errors import FaceError
+from ...logic.base.sentences import told
 
 _BYTES = "risorius_bytes"
 _HASH = "risorius_hash"
@@ -112,10 +113,10 @@ def content(text: bpy.types.Text) -> bytes:
     """
     packed = text.get(_BYTES)
     if not isinstance(packed, bytes):
-        raise ContentError("the Text holds no bytes of a DNA file")
+        raise ContentError(told("the Text holds no bytes of a DNA file"))
     content = _unpack(packed, _limit(text, packed))
     if hash_of(content) != content_hash(text):
-        raise ContentError("its bytes are not those that were imported")
+        raise ContentError(told("its bytes are not those that were imported"))
     return content
 
 
@@ -125,11 +126,16 @@ def _limit(text: bpy.types.Text, packed: bytes) -> int:
     if said is None:
         return _most(packed)
     if not isinstance(said, str) or not said.isdecimal() or len(said) > 15:
-        raise ContentError("the length of its file is no number")
+        raise ContentError(told("the length of its file is no number"))
     if int(said) > _most(packed):
         raise ContentError(
-            f"its file is said to have {int(said):,} bytes, "
-            f"{_most(packed):,} can be in the {len(packed):,} that are there"
+            told(
+                "its file is said to have {said:,} bytes, {most:,} can be in the {packed:,} "
+                "that are there",
+                said=int(said),
+                most=_most(packed),
+                packed=len(packed),
+            )
         )
     return int(said)
 
@@ -142,14 +148,20 @@ def _unpack(packed: bytes, limit: int) -> bytes:
         try:
             piece = unpacking.decompress(rest, min(_PIECE, limit - count + 1))
         except zlib.error as error:
-            raise ContentError("its bytes cannot be unpacked") from error
+            raise ContentError(told("its bytes cannot be unpacked")) from error
         rest = unpacking.unconsumed_tail
         count += len(piece)
         if not pieces and not piece.startswith(_SIGNATURE[: len(piece)]):
-            raise ContentError(f"its bytes begin with {piece[:3]!r} instead of {_SIGNATURE!r}")
+            raise ContentError(
+                told(
+                    "its bytes begin with {piece!r} instead of {signature!r}",
+                    piece=piece[:3],
+                    signature=_SIGNATURE,
+                )
+            )
         if count > limit:
-            raise ContentError(f"its bytes unpack to more than {limit:,}")
+            raise ContentError(told("its bytes unpack to more than {limit:,}", limit=limit))
         if not piece and not rest and not unpacking.eof:
-            raise ContentError("its bytes end too early")
+            raise ContentError(told("its bytes end too early"))
         pieces.append(piece)
     return b"".join(pieces)

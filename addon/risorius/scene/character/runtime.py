@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ... import native
 from ...logic.base import names
+from ...logic.base.sentences import told
 from ...logic.base.space import Space, SpaceError, world_matrices, yaw_pitch
 from ...logic.character import plans
 from ..base import console, parts, storage, written
@@ -123,7 +124,7 @@ def take(armature: ArmatureObject, dna: native.Dna, rig: native.Rig) -> None:
         try:
             _cache[key] = _runtime(dna, rig, key[1])
         except (native.dna_error(), SpaceError, ValueError, LookupError) as error:
-            raise plans.PlanError("The file cannot be evaluated.") from error
+            raise plans.PlanError(told("The file cannot be evaluated.")) from error
 
 
 def unit_of(rig: ArmatureObject) -> float:

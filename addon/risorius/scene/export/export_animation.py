@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from ... import native
 from ...logic.animation import clip_units, key_reduction
 from ...logic.base.names import unique_labels
+from ...logic.base.sentences import told
 from ..animation import actions
 from ..bake import bake_face, baked_shape_keys, baked_tracks, sampling
 from ..base import compat, parts, written
@@ -70,7 +71,9 @@ def sampled(
     """
     for rig in rigs:
         if bake_face.baked(rig) == bake_face.RESULT:
-            raise bake_face.BakeError(f"{rig.name} is baked: choose Back to Live first.")
+            raise bake_face.BakeError(
+                told("{face} is baked: choose Back to Live first.", face=rig.name)
+            )
     frames = key_reduction.frame_list(options.start, options.end, options.step)
     levels = [bake_face.level_of(rig, options.lod) for rig in rigs]
     keys = [k for rig, n in zip(rigs, levels, strict=True) for k in bake_face.animated_keys(rig, n)]

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from ... import native
 from ...logic.base.errors import FaceError
+from ...logic.base.sentences import told
 from ...logic.material import uv_grid
 from ..base import compat
 from ..base.blender_types import MeshObject, Node, NodeTree, Override, Socket
@@ -211,7 +212,9 @@ def _write(mesh: bpy.types.Mesh, corners: NDArray[np.int64], part: NDArray[np.fl
         begins.uv.foreach_get("vector", values)
     layer = layer or mesh.uv_layers.new(name=_LAYER, do_init=False)
     if layer is None:
-        raise FaceError(f"{mesh.name} has eight UV maps: remove one to bake its materials.")
+        raise FaceError(
+            told("{mesh} has eight UV maps: remove one to bake its materials.", mesh=mesh.name)
+        )
     values.reshape(-1, 2)[corners] = part
     layer.uv.foreach_set("vector", values)
 
@@ -268,7 +271,7 @@ def _prepare(stage: bpy.types.Scene, size: int) -> None:
         stage.render.engine = "CYCLES"  # pyright: ignore[reportAttributeAccessIssue]
     except TypeError:
         raise FaceError(
-            "Cycles bakes the materials: enable its add-on, or switch Bake Materials off"
+            told("Cycles bakes the materials: enable its add-on, or switch Bake Materials off")
         ) from None
     cycles: Any = stage.cycles
     cycles.device, cycles.samples = "CPU", 1

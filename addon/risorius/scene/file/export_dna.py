@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ... import native
 from ...logic.base.errors import FaceError
+from ...logic.base.sentences import told
 from ...logic.character import plans, user_edits
 from ..base import console, parts, storage
 from ..base.blender_types import ArmatureObject, Context, MeshObject
@@ -54,11 +55,13 @@ def export(
     options = options or ExportOptions()
     live = runtime.of(rig)
     if live is None:
-        raise ExportError(f"{rig.name} has lost the data of its file.")
+        raise ExportError(told("{face} has lost the data of its file.", face=rig.name))
     try:
         content = storage.content(rig[parts.DNA])
     except storage.ContentError as error:
-        raise ExportError(f"{rig.name} has lost the data of its file: {error}.") from error
+        raise ExportError(
+            told("{face} has lost the data of its file: {why}.", face=rig.name, why=error.args[0])
+        ) from error
     unit = runtime.unit_of(rig)
     levels = tuple(lods.built(rig)) or (0,)
     plan = plans.plan_character(live.dna, rig.name, levels, unit, live.rests)
@@ -88,10 +91,13 @@ def export(
 
 def _check(item: MeshObject, mesh_plan: plans.MeshPlan) -> None:
     if item.mode == "EDIT":
-        raise ExportError(f"{item.name} is in edit mode: leave that first.")
+        raise ExportError(told("{name} is in edit mode: leave that first.", name=item.name))
     if not refit_meshes.has_faces_of(item.data, mesh_plan):
         raise ExportError(
-            f"{item.name} has other vertices or faces than in its file, so it cannot be exported."
+            told(
+                "{name} has other vertices or faces than in its file, so it cannot be exported.",
+                name=item.name,
+            )
         )
 
 
@@ -131,7 +137,13 @@ class _Job:
         count, largest, mean = user_edits.sizes(moves, self._unit)
         self.edited = True
         self.report.append(
-            f"{what}: {count} vertices, at most {largest:.3f} mm, {mean:.3f} mm in the mean."
+            told(
+                "{what}: {count} vertices, at most {largest:.3f} mm, {mean:.3f} mm in the mean.",
+                what=what,
+                count=count,
+                largest=largest,
+                mean=mean,
+            )
         )
 
     def mesh(self, item: MeshObject, mesh_plan: plans.MeshPlan, options: ExportOptions) -> None:
@@ -142,19 +154,33 @@ class _Job:
         if options.neutral and shape.moved.any():
             self._neutral(dna_mesh, shape, mesh_plan)
             rows = np.any(shape.moved != 0, axis=1)
-            self._say(f"{name}, neutral", shape.moved[rows])
+            self._say(told("{name}, neutral", name=name), shape.moved[rows])
         if options.shapes:
             for key, difference in shape.edits.items():
                 self._shape(dna_mesh, shape, key, difference)
                 rows = np.any(difference != 0, axis=1)
                 channel = self._dna.blend_shape_channel_names[shape.channels[key]]
-                self._say(f"{name}, shape {channel}", difference[rows])
+                self._say(
+                    told("{name}, shape {channel}", name=name, channel=channel), difference[rows]
+                )
         if shape.own:
-            self.report.append(f"{name}: keys of your own are not written: {', '.join(shape.own)}.")
+            self.report.append(
+                told(
+                    "{name}: keys of your own are not written: {own}.",
+                    name=name,
+                    own=", ".join(shape.own),
+                )
+            )
         for key in shape.channels:
             block = parts.keys_there(item).key_blocks[key]
             if block.mute or block.vertex_group:
-                self.report.append(f"{name}: the mute or mask of the key {key} is not written.")
+                self.report.append(
+                    told(
+                        "{name}: the mute or mask of the key {key} is not written.",
+                        name=name,
+                        key=key,
+                    )
+                )
 
     def _neutral(
         self, dna_mesh: native.Mesh, shape: refit_meshes.Shape, mesh_plan: plans.MeshPlan
@@ -218,7 +244,9 @@ class _Job:
         dna_mesh.maximum_influence_per_vertex = most
         self.edited = True
         name = self._dna.mesh_names[mesh_plan.index]
-        self.report.append(f"{name}: weights of {len(painted)} vertices.")
+        self.report.append(
+            told("{name}: weights of {count} vertices.", name=name, count=len(painted))
+        )
 
     def joints(self, found: Mapping[int, refit_joints.JointEdit]) -> None:
         """Neutral joints that were moved or turned."""
@@ -236,8 +264,12 @@ class _Job:
                 angles[joint] = self._space.file_rotations(edit.after[None, :3, :3], near)[0]
             self.edited = True
             self.report.append(
-                f"Joint {self._dna.joint_names[joint]}: "
-                f"{edit.distance * self._unit * 1000:.3f} mm, {np.degrees(edit.angle):.3f} degrees."
+                told(
+                    "Joint {joint}: {distance:.3f} mm, {angle:.3f} degrees.",
+                    joint=self._dna.joint_names[joint],
+                    distance=edit.distance * self._unit * 1000,
+                    angle=np.degrees(edit.angle),
+                )
             )
         if found:
             self._dna.neutral_joint_translations = offsets

@@ -12,6 +12,7 @@ from mathutils import Matrix, Vector
 from numpy.typing import NDArray
 
 from ...logic.base import names
+from ...logic.base.sentences import told
 from ...logic.character import plans, user_edits
 from ..base import parts
 from ..base.blender_types import ArmatureObject, Context, MeshObject
@@ -160,15 +161,19 @@ def replace_joints(context: Context, change: Change) -> None:
     _release(change, moved)
     lost = [old.labels[j] for j in gone.values() if j < len(old.labels)]
     if len(lost) > names.LISTED:
-        change.report.append(f"{len(lost)} joints are gone: {names.listed(lost)}.")
+        change.report.append(
+            told("{count} joints are gone: {lost}.", count=len(lost), lost=names.listed(lost))
+        )
     else:
-        change.report += [f"The joint {label} is gone." for label in lost]
+        change.report += [told("The joint {label} is gone.", label=label) for label in lost]
     added = [label for k, label in enumerate(new.labels) if k not in kept]
     if added:
-        change.report.append(f"New joints: {names.listed(added)}.")
+        change.report.append(told("New joints: {added}.", added=names.listed(added)))
     for joint in edited:
         if moved[joint] >= 0:
-            change.report.append(f"Your edit of the joint {old.labels[joint]} was carried over.")
+            change.report.append(
+                told("Your edit of the joint {joint} was carried over.", joint=old.labels[joint])
+            )
 
 
 def _new_rest(

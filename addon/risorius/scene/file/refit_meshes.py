@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...logic.base.sentences import told
 from ...logic.character import plans, user_edits
 from ..base import parts
 from ..base.blender_types import Attribute, MeshObject, Values
@@ -223,15 +224,24 @@ def _back_up(
     things = _things(change, item, old, shape, known)
     bound = [m.name for m in item.modifiers if m.type in _BOUND]
     if bound:
-        change.report.append(f"{item.name} has new faces: bind {', '.join(bound)} again.")
+        change.report.append(
+            told(
+                "{name} has new faces: bind {bound} again.", name=item.name, bound=", ".join(bound)
+            )
+        )
     if not things:
         return
     copy = item.data.copy()
     copy.name = f"{item.data.name} before replace"
     copy.use_fake_user = True
     change.report.append(
-        f"{item.name} has new faces: {', '.join(things)} were carried over by the nearest point "
-        f"as far as that goes; the mesh {copy.name} keeps them as they were."
+        told(
+            "{name} has new faces: {things} were carried over by the nearest point as far as "
+            "that goes; the mesh {copy} keeps them as they were.",
+            name=item.name,
+            things=", ".join(things),
+            copy=copy.name,
+        )
     )
 
 
@@ -252,7 +262,7 @@ def _leave(change: Change, item: MeshObject, old: plans.MeshPlan | None) -> None
         bpy.data.objects.remove(item)
         if data.users == 0:
             bpy.data.meshes.remove(data)
-        change.report.append(f"The mesh {label} is gone.")
+        change.report.append(told("The mesh {label} is gone.", label=label))
         return
     live = meshes.live_block(item)
     if live is not None:
@@ -261,7 +271,11 @@ def _leave(change: Change, item: MeshObject, old: plans.MeshPlan | None) -> None
         item.pop(key, None)
     item.hide_viewport = item.hide_render = True
     change.report.append(
-        f"The mesh {label} is gone from the file; it stays, hidden, for {', '.join(things)}."
+        told(
+            "The mesh {label} is gone from the file; it stays, hidden, for {things}.",
+            label=label,
+            things=", ".join(things),
+        )
     )
 
 
@@ -284,7 +298,13 @@ def _refit_weights(
     for name in [n for n in groups if not groups[n] and n not in after]:
         item.vertex_groups.remove(item.vertex_groups[name])
     if painted:
-        change.report.append(f"{item.name} keeps your weights at {len(painted)} vertices.")
+        change.report.append(
+            told(
+                "{name} keeps your weights at {count} vertices.",
+                name=item.name,
+                count=len(painted),
+            )
+        )
 
 
 def _masks(item: MeshObject) -> set[str]:
@@ -309,7 +329,9 @@ def _refit_corners(
             layer = layer or mesh.uv_layers.new(name="UVMap", do_init=False)
             layer.uv.foreach_set("vector", new.uvs.ravel())
         else:
-            change.report.append(f"{item.name} keeps your UV map; the file has another now.")
+            change.report.append(
+                told("{name} keeps your UV map; the file has another now.", name=item.name)
+            )
     if not _equal(old.positions, new.positions):
         _copy_attributes(mesh, fresh.data)
     if _equal(old.normals, new.normals) and _equal(old.positions, new.positions):
@@ -454,7 +476,11 @@ def _drop_gone_keys(
             block.value = 0.0
             shape.edits.pop(name, None)
             change.report.append(
-                f"The shape {name} of {item.name} is gone from the file; your edited key stays."
+                told(
+                    "The shape {shape} of {name} is gone from the file; your edited key stays.",
+                    shape=name,
+                    name=item.name,
+                )
             )
         else:
             meshes.remove_channel_key(item, block)

@@ -16,6 +16,7 @@ import bpy
 
 from ...logic.base import names
 from ...logic.base.errors import FaceError
+from ...logic.base.sentences import told
 from ...logic.character import plans
 from ..base import console, drivers, parts, written
 from ..base.blender_types import ArmatureObject, Context, MeshObject
@@ -73,12 +74,14 @@ def replace_file(
 def _check(rig: ArmatureObject) -> None:
     controls = parts.controls_of(rig)
     if runtime.of(rig) is None or controls is None:
-        raise ReplaceError(f"{rig.name} has lost its data or its control armature.")
+        raise ReplaceError(told("{face} has lost its data or its control armature.", face=rig.name))
     for item in (rig, controls, *parts.meshes_of(rig)):
         if item.library or item.override_library or item.data.library:
-            raise ReplaceError(f"{item.name} is linked: replace it in the file that it is from.")
+            raise ReplaceError(
+                told("{name} is linked: replace it in the file that it is from.", name=item.name)
+            )
         if item.mode == "EDIT":
-            raise ReplaceError(f"{item.name} is in edit mode: leave that first.")
+            raise ReplaceError(told("{name} is in edit mode: leave that first.", name=item.name))
 
 
 def _options(rig: ArmatureObject, levels: tuple[int, ...], unit: float) -> build.BuildOptions:
@@ -130,14 +133,26 @@ def _array_labels(change: Change) -> dict[str, tuple[list[str], list[str]]]:
 
 def _report_entries(change: Change, entries: drivers.Entries) -> None:
     gone = set(entries.gone)
-    for array, what in ((parts.CHANNELS, "blend shape"), (parts.MAPS, "animated map")):
+    for array, is_gone, drove, is_new in (
+        (
+            parts.CHANNELS,
+            "The blend shape {label} is gone.",
+            "The blend shape {label} is gone: what it drove reads 0 now.",
+            "New blend shapes: {added}.",
+        ),
+        (
+            parts.MAPS,
+            "The animated map {label} is gone.",
+            "The animated map {label} is gone: what it drove reads 0 now.",
+            "New animated maps: {added}.",
+        ),
+    ):
         old, new = _array_labels(change)[array]
         for label in [x for x in old if x not in new]:
-            tail = ": what it drove reads 0 now" if label in gone else ""
-            change.report.append(f"The {what} {label} is gone{tail}.")
+            change.report.append(told(drove if label in gone else is_gone, label=label))
         added = [x for x in new if x not in old]
         if added:
-            change.report.append(f"New {what}s: {names.listed(added)}.")
+            change.report.append(told(is_new, added=names.listed(added)))
 
 
 def _take_properties(change: Change, fresh: ArmatureObject) -> None:
@@ -177,7 +192,7 @@ def _adopt(change: Change, fresh: ArmatureObject, item: MeshObject) -> None:
     label = next(m.label for m in change.new.meshes if m.index == item[parts.MESH])
     was = {names.unique_labels(change.before.dna.mesh_names)[m.index] for m in change.old.meshes}
     if label in was:
-        change.report.append(f"The mesh {label} was deleted here and stays away.")
+        change.report.append(told("The mesh {label} was deleted here and stays away.", label=label))
         return
     for key in [k for k in fresh.keys() if fresh[k] == item]:  # noqa: SIM118  no dict
         del fresh[key]
@@ -196,7 +211,7 @@ def _adopt(change: Change, fresh: ArmatureObject, item: MeshObject) -> None:
     item.name = item.data.name = f"{rig.name.removesuffix('_rig')}_{label}"
     duplicates.retarget_materials(item, rig)
     _share_materials(change, item)
-    change.report.append(f"The mesh {label} is new.")
+    change.report.append(told("The mesh {label} is new.", label=label))
 
 
 def _share_materials(change: Change, item: MeshObject) -> None:
@@ -238,17 +253,19 @@ def _sliders(change: Change) -> None:
             armatures.describe_property(face, control, maximum)
     added = [label for label in new if label not in old]
     if added:
-        change.report.append(f"New controls: {', '.join(added)}.")
+        change.report.append(told("New controls: {added}.", added=", ".join(added)))
     gone = [label for label in old if label not in new and label in face]
     used = drivers.used_controls(controls, gone)
     for label in gone:
         if label in used:
             shown: Any = face.id_properties_ui(label)
             shown.update(description="Not in the present file; its keys are kept")
-            change.report.append(f"The control {label} is gone; its keys and drivers are kept.")
+            change.report.append(
+                told("The control {label} is gone; its keys and drivers are kept.", label=label)
+            )
         else:
             del face[label]
-            change.report.append(f"The control {label} is gone.")
+            change.report.append(told("The control {label} is gone.", label=label))
 
 
 def _keep_report(change: Change) -> None:

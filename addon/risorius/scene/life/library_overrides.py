@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 import bpy
 
 from ...logic.base.errors import FaceError
+from ...logic.base.sentences import told
 from ..base import compat, parts, written
 from ..base.blender_types import ArmatureObject, Context, MeshObject
 from ..character import meshes
@@ -60,7 +61,7 @@ def make_override(
         (r for r in parts.rigs() if r.session_uid not in before and _overrides(r, rig)), None
     )
     if new is None:
-        raise FaceError(f"Blender made no override of {rig.name}.")
+        raise FaceError(told("Blender made no override of {face}.", face=rig.name))
     if shown is not None:
         _take_place(shown, new, root)
     elif isinstance(root, bpy.types.Collection):

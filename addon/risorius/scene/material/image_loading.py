@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...logic.base.sentences import told
 from ...logic.material import image_size, texture_search
 from ..base import sharing, storage
 
@@ -73,13 +74,20 @@ def _room_for(path: Path) -> int:
 
         found = image_size.size_of(read)
     if found is None:
-        raise ValueError(f"The texture {path.name} cannot be read.")
+        raise ValueError(told("The texture {file} cannot be read.", file=path.name))
     width, height, depth = found
     room, limit = width * height * depth, _ONE_IMAGE + _MOST_TIMES * path.stat().st_size
     if room > limit:
         raise ValueError(
-            f"The texture {path.name} of {width:,} x {height:,} pixels stays away: "
-            f"it takes {room:,} bytes, at most {limit:,} are given to a file of its size."
+            told(
+                "The texture {file} of {width:,} x {height:,} pixels stays away: it takes "
+                "{room:,} bytes, at most {limit:,} are given to a file of its size.",
+                file=path.name,
+                width=width,
+                height=height,
+                room=room,
+                limit=limit,
+            )
         )
     return room
 
@@ -117,15 +125,15 @@ class Images:
                 return there
             image = bpy.data.images.load(str(path), check_existing=False)
         except (RuntimeError, OSError):
-            self._complain(f"The texture {path.name} cannot be read.")
+            self._complain(told("The texture {file} cannot be read.", file=path.name))
             return None
         except ValueError as error:
-            self._complain(str(error))
+            self._complain(error.args[0] if error.args else str(error))
             return None
         self.made.append(image)
         set_color_space(image, data)
         if not image.size[0]:  # read lazily: a file of another kind shows itself only now
-            self._complain(f"The texture {path.name} cannot be read.")
+            self._complain(told("The texture {file} cannot be read.", file=path.name))
             self.made.remove(image)
             bpy.data.images.remove(image)
             return None
@@ -133,7 +141,11 @@ class Images:
             image.pack(data=content, data_len=len(content))
             sharing.mark(image, digest)
         else:
-            self._complain(f"The texture {path.name} is large and stays outside the .blend file.")
+            self._complain(
+                told(
+                    "The texture {file} is large and stays outside the .blend file.", file=path.name
+                )
+            )
         return image
 
     def _make_room(self, path: Path) -> None:
@@ -141,8 +153,13 @@ class Images:
         limit = _ALL_IMAGES + _MOST_TIMES * (self._files + size)
         if self._room + room > limit:
             raise ValueError(
-                f"The texture {path.name} stays away: with those before it it takes "
-                f"{self._room + room:,} bytes, at most {limit:,} are given to files of their size."
+                told(
+                    "The texture {file} stays away: with those before it it takes {room:,} bytes, "
+                    "at most {limit:,} are given to files of their size.",
+                    file=path.name,
+                    room=self._room + room,
+                    limit=limit,
+                )
             )
         self._room, self._files = self._room + room, self._files + size
 

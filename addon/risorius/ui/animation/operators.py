@@ -11,6 +11,7 @@ import bpy
 from ... import native
 from ...logic.base.errors import FaceError
 from ...logic.base.names import printable
+from ...logic.base.sentences import told
 from ...scene.animation import retarget_shape_keys
 from ...scene.base import parts
 from ...scene.character import runtime
@@ -231,7 +232,7 @@ def _gains(text: str) -> dict[str, float]:
         except ValueError:
             name = ""
         if not name:
-            raise FaceError(f"gains: name=factor was expected, found {word}")
+            raise FaceError(told("gains: name=factor was expected, found {word}", word=word))
     return table
 
 

@@ -5,6 +5,7 @@
 
 import bpy
 
+from ...logic.base.sentences import told
 from ...scene.bake import bake_face
 from ...scene.base import parts
 from ...scene.base.blender_types import ArmatureObject
@@ -53,7 +54,7 @@ class FacesOperator(FaceOperator):
         """
         found = selected_rigs(context, self.every)
         if not found:
-            raise bake_face.BakeError("No face is selected.")
+            raise bake_face.BakeError(told("No face is selected."))
         return found
 
     @classmethod

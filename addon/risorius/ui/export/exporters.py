@@ -7,6 +7,7 @@ from typing import Protocol
 import bpy
 
 from ...logic.base.errors import FaceError
+from ...logic.base.sentences import told
 from ...scene.base.blender_types import Override
 from ...scene.base.console import quiet
 from ..words import say
@@ -155,4 +156,4 @@ def export(operator: ExportOperator, override: Override, path: Path) -> None:
         except RuntimeError as error:  # what Blender's exporter says of the file or the scene
             raise FaceError(str(error).strip().removeprefix("Error: ")) from error
     if "FINISHED" not in done or not path.exists():
-        raise FaceError(f"Blender's exporter wrote nothing to {path.name}.")
+        raise FaceError(told("Blender's exporter wrote nothing to {file}.", file=path.name))

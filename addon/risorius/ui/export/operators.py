@@ -11,6 +11,7 @@ import bpy
 
 from ... import native
 from ...logic.base.errors import FaceError
+from ...logic.base.sentences import told
 from ...scene.animation.clip_actions import frame_rate
 from ...scene.bake import sampling
 from ...scene.base.blender_types import ArmatureObject
@@ -173,7 +174,7 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, Oper
         frames = len(characters[0][2].frames)
         if self.format in ("RZC", "CSV"):
             if len(characters) > 1:
-                raise FaceError("a file holds the controls of one face: select one")
+                raise FaceError(told("a file holds the controls of one face: select one"))
             scene = context.scene
             clip = export_animation.clip(
                 *characters[0], frame_rate(scene), scene.frame_start, self.maps

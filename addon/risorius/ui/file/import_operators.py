@@ -57,7 +57,7 @@ def import_character(
     if show and not bpy.app.background:
         framing.frame(context, rig)
     for warning in warnings[:5]:
-        operator.report({"WARNING"}, names.printable(str(warning)))
+        operator.report({"WARNING"}, names.printable(words.local(warning)))
     if len(warnings) > 5:
         operator.report(
             {"WARNING"}, words.say("and {count} more warnings", count=len(warnings) - 5)

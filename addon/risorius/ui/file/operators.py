@@ -14,7 +14,7 @@ from ...scene.file import export_dna, replace_dna
 from ...scene.frame import evaluate
 from ..blender_types import Context, ExportHelper, ImportHelper, Menu, Operator, Result
 from ..common import FaceOperator, explain, face_rig, shown_progress
-from ..words import say
+from ..words import local, of_error, say
 
 
 def report_all(operator: Operator, sentences: Sequence[str], shown: int = 8) -> None:
@@ -26,7 +26,7 @@ def report_all(operator: Operator, sentences: Sequence[str], shown: int = 8) -> 
         shown: how many are shown at most.
     """
     for sentence in sentences[:shown]:
-        operator.report({"INFO"}, sentence)
+        operator.report({"INFO"}, local(sentence))
     if len(sentences) > shown:
         operator.report(
             {"INFO"}, say("and {count} more: see the report's text", count=len(sentences) - shown)
@@ -39,7 +39,7 @@ def _replace(operator: Operator, context: Context, path: str) -> Result:
         with shown_progress(context) as progress:
             sentences = replace_dna.replace_file(context, rig, path, progress)
     except replace_dna.ReplaceError as error:
-        operator.report({"ERROR"}, str(error))
+        operator.report({"ERROR"}, of_error(error))
         return {"CANCELLED"}
     except native.user_errors() as error:
         operator.report({"ERROR"}, explain(path, error))
@@ -147,7 +147,7 @@ class RISORIUS_OT_export_dna(_FileOperator, Operator, ExportHelper):
             content, sentences = export_dna.export(context, rig, options)
             fileio.write_bytes(self.filepath, content)
         except export_dna.ExportError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, of_error(error))
             return {"CANCELLED"}
         except native.user_errors() as error:
             self.report({"ERROR"}, explain(self.filepath, error))

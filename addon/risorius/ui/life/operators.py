@@ -13,7 +13,7 @@ from ...scene.frame import evaluate
 from ...scene.life import library_overrides, repair
 from ..blender_types import Context, Operator, Result
 from ..common import usable
-from ..words import say
+from ..words import of_error, say
 
 _NOT_LINKED = "Select a linked face first."
 SHAPES = (
@@ -61,7 +61,7 @@ class RISORIUS_OT_make_override(Operator):
             else:
                 raise FaceError(_NOT_LINKED)
         except native.user_errors() as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, of_error(error))
             return {"CANCELLED"}
         rig.update_tag()
         evaluate.bring_up(context, rig)

@@ -15,7 +15,7 @@ from ...scene.base.blender_types import ArmatureObject
 from ...scene.live import capture, recordings, sessions
 from ..blender_types import Context, Operator, OperatorBase, Result
 from ..common import active_controls, face_rig, usable
-from ..words import say
+from ..words import of_error, say
 from .properties import choices, settings_of
 
 _NOT_STARTED = "Start live capture first."
@@ -56,7 +56,7 @@ class RISORIUS_OT_live_start(Operator):
         try:
             capture.start(face_rig(context), settings_of(context))
         except native.user_errors() as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, of_error(error))
             return {"CANCELLED"}
         return {"FINISHED"}
 

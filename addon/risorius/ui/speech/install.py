@@ -31,7 +31,7 @@ class RISORIUS_OT_install_speech(Operator):
         try:
             speech_task.install_recogniser()
         except native.user_errors() as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, words.of_error(error))
             return {"CANCELLED"}
         self.report({"INFO"}, words.say("PocketSphinx is installed."))
         return {"FINISHED"}

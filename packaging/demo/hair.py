@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: MIT
+"""Hair on a band of cloth, by geometry nodes: what is simulated is the band."""
+
+from __future__ import annotations
+
+import bpy
+
+MM = 0.001
+EACH = 44  # hairs along one edge of the band
+REACH = (2.6 * MM, 2.2 * MM, 2.0 * MM)  # how far a hair may lie beside its edge
+SPREAD = ((0.0, 0.85), (0.3, 1.0), (0.75, 0.8), (1.0, 0.45))  # of that, from root to tip
+ROOTS, TIPS = (0.0, 0.07), (0.72, 1.0)  # where a hair begins and ends, as shares of its edge
+RADIUS = 0.09 * MM
+
+
+def add(tree, kind, inputs=(), **settings):
+    """A node of a tree. Args: inputs  (name or number, value) of its sockets."""
+    node = tree.nodes.new(kind)
+    for key, value in settings.items():
+        setattr(node, key, value)
+    for name, value in inputs:
+        node.inputs[name].default_value = value
+    return node
+
+
+def chance(tree, low, high, seed):
+    """A socket with a random number of each hair."""
+    node = add(tree, "FunctionNodeRandomValue", [(2, low), (3, high), ("Seed", seed)])
+    return node.outputs[1]
+
+
+def offset(tree):
+    """A socket with how far each point lies beside its edge: wide in the middle of a hair."""
+    place = add(tree, "FunctionNodeRandomValue", data_type="FLOAT_VECTOR")
+    place.inputs["Min"].default_value, place.inputs["Max"].default_value = (
+        [-r for r in REACH],
+        REACH,
+    )
+    hair = add(tree, "GeometryNodeFieldOnDomain", domain="CURVE", data_type="FLOAT_VECTOR")
+    along = add(tree, "GeometryNodeSplineParameter")
+    spread = add(tree, "ShaderNodeFloatCurve")
+    points = spread.mapping.curves[0].points
+    for x, y in SPREAD[1:-1]:
+        points.new(x, y)
+    points[0].location, points[-1].location = SPREAD[0], SPREAD[-1]
+    spread.mapping.update()
+    scaled = add(tree, "ShaderNodeVectorMath", operation="SCALE")
+    tree.links.new(place.outputs["Value"], hair.inputs["Value"])
+    tree.links.new(along.outputs["Factor"], spread.inputs["Value"])
+    tree.links.new(hair.outputs["Value"], scaled.inputs[0])
+    tree.links.new(spread.outputs["Value"], scaled.inputs["Scale"])
+    return scaled.outputs[0]
+
+
+def grow(band, material):
+    """Show a band as hair.
+
+    Args:
+        band: an object whose mesh has the attribute `along` at the edges that hairs follow.
+        material: of the hairs.
+    """
+    tree = bpy.data.node_groups.new("Hair", "GeometryNodeTree")
+    for way in ("INPUT", "OUTPUT"):
+        tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
+    name = [("Name", "along")]
+    along = add(tree, "GeometryNodeInputNamedAttribute", name, data_type="BOOLEAN")
+    circle = [("Resolution", 4), ("Radius", RADIUS)]
+    profile = add(tree, "GeometryNodeCurvePrimitiveCircle", circle, mode="RADIUS")
+    curves = add(tree, "GeometryNodeMeshToCurve")
+    smooth = add(tree, "GeometryNodeCurveSplineType", spline_type="CATMULL_ROM")
+    finer = add(tree, "GeometryNodeResampleCurve", [("Count", 60)])
+    several = add(tree, "GeometryNodeDuplicateElements", [("Amount", EACH)], domain="SPLINE")
+    moved = add(tree, "GeometryNodeSetPosition")
+    cut = add(tree, "GeometryNodeTrimCurve", mode="FACTOR")
+    tubes = add(tree, "GeometryNodeCurveToMesh")
+    painted = add(tree, "GeometryNodeSetMaterial", [("Material", material)])
+    links = tree.links
+    links.new(along.outputs["Attribute"], curves.inputs["Selection"])
+    links.new(offset(tree), moved.inputs["Offset"])
+    links.new(chance(tree, *ROOTS, 1), cut.inputs["Start"])
+    links.new(chance(tree, *TIPS, 0), cut.inputs["End"])
+    links.new(profile.outputs["Curve"], tubes.inputs["Profile Curve"])
+    last = add(tree, "NodeGroupInput").outputs[0]
+    for node in (curves, smooth, finer, several, moved, cut, tubes, painted):
+        links.new(last, node.inputs[0])
+        last = node.outputs[0]
+    links.new(last, add(tree, "NodeGroupOutput").inputs[0])
+    band.modifiers.new("Hair", "NODES").node_group = tree
