@@ -56,6 +56,24 @@ def test_a_simulation_of_geometry_nodes_sees_the_face_of_its_frame(mode, dna_fil
     assert simulations.apart(simulations.film(item), wanted) < NEAR
 
 
+def test_a_baked_simulation_of_geometry_nodes_sees_the_face_of_its_frame(mode, dna_file, tmp_path):
+    """Blender keeps what they are after its handlers, so they never were a frame late."""
+    _rig, item = simulations.moving(dna_file, mode, far=0.0)
+    shown = simulations.film(item)
+    wanted = simulations.mean_places(shown)
+    simulations.trail(item)
+    nodes = item.modifiers["Nodes"]
+    nodes.bake_directory = str(tmp_path)
+    if hasattr(nodes, "bake_target"):
+        nodes.bake_target = "DISK"
+    with bpy.context.temp_override(object=item, active_object=item, selected_objects=[item]):
+        assert bpy.ops.object.simulation_nodes_cache_bake(selected=True) == {"FINISHED"}
+    assert any(tmp_path.rglob("*.json"))
+    assert simulations.apart(simulations.film(item, reversed(FRAMES)), wanted) < NEAR
+    late = simulations.mean_places({f: shown[max(f - 1, 1)] for f in FRAMES})
+    assert simulations.apart(late, wanted) > 1000 * NEAR
+
+
 @pytest.mark.parametrize("kind", ["SURFACE_DEFORM", "SHRINKWRAP"])
 def test_what_lies_on_the_face_is_simulated_with_the_face_of_its_frame(kind, mode, dna_file):
     _rig, item = simulations.moving(dna_file, mode)

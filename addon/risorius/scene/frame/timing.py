@@ -9,6 +9,8 @@ from itertools import pairwise
 from statistics import median
 from time import perf_counter
 
+from ...logic.base.sentences import Sentence, told
+
 STAGES = ("controls", "rig", "bones", "shapes")
 _KEPT = 30  # frames that the overlay shows the median of
 
@@ -79,18 +81,28 @@ def _since(moment: float) -> float:
     return (perf_counter() - moment) * 1000
 
 
-def lines() -> list[str]:
+def lines() -> list[Sentence]:
     """What the overlay shows: medians of the last frames, in ms."""
     seen = [f for f in frames if f.characters]
     if not seen:
-        return ["Risorius: no frame yet"]
-    middle = {s: median(f.stages[s] for f in seen) for s in STAGES}
-    apart = [b.begin - a.begin for a, b in pairwise(seen)]
-    rate = f"   {1 / median(apart):.0f} fps" if apart and median(apart) > 0 else ""
+        return [told("Risorius: no frame yet")]
+
+    middle = {stage: median(f.stages[stage] for f in seen) for stage in STAGES}
+    count = seen[-1].characters
+    apart = median([b.begin - a.begin for a, b in pairwise(seen)] or [0.0])
+    head = told("Risorius, faces: {count}", count=count)
+    if apart > 0:
+        head = told("Risorius, faces: {count}   {rate:.0f} fps", count=count, rate=1 / apart)
+    ahead, behind, drawn = (
+        median(getattr(f, name) for f in seen) for name in ("animation", "deform", "drawing")
+    )
     return [
-        f"Risorius, faces: {seen[-1].characters}{rate}",
-        f"Blender: curves, strips, drivers  {median(f.animation for f in seen):.2f} ms",
-        *(f"{stage}  {ms:.2f} ms" for stage, ms in middle.items()),
-        f"Blender: bones, skin, shapes  {median(f.deform for f in seen):.2f} ms",
-        f"Blender: drawing  {median(f.drawing for f in seen):.2f} ms",
+        head,
+        told("Blender: curves, strips, drivers  {ms:.2f} ms", ms=ahead),
+        told("controls  {ms:.2f} ms", ms=middle["controls"]),
+        told("rig  {ms:.2f} ms", ms=middle["rig"]),
+        told("bones  {ms:.2f} ms", ms=middle["bones"]),
+        told("shapes  {ms:.2f} ms", ms=middle["shapes"]),
+        told("Blender: bones, skin, shapes  {ms:.2f} ms", ms=behind),
+        told("Blender: drawing  {ms:.2f} ms", ms=drawn),
     ]

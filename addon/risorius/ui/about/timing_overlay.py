@@ -8,6 +8,7 @@ import bpy
 
 from ...scene.base.blender_types import WindowManager
 from ...scene.frame import timing
+from .. import words
 from ..blender_types import Context
 
 _handles: list[object] = []
@@ -53,7 +54,7 @@ def _draw() -> None:
         blf.shadow(0, 3, 0.0, 0.0, 0.0, 0.9)
         blf.color(0, 1.0, 1.0, 1.0, 1.0)
         blf.position(0, x, y, 0)
-        blf.draw(0, text)
+        blf.draw(0, words.local(text))
         blf.disable(0, blf.SHADOW)
         y += round(size * 1.5)
 
