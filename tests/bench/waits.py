@@ -5,10 +5,10 @@
 
 Runs inside the bpy module or an executable (blender -b --python ... --), with the add-on's zip
 installed. FULL.dna is a file of real size (tests/fullscale/generate.py); ten of SAMPLE.dna stand
-in the file that is opened and saved. The floor is measured in the same scene with the add-on off:
-frames and slider steps by a bare handler that writes the same bones and live keys, two poses in
-turn, that were read off the add-on before; undo by a plain property beside the same write; files
-and modes as they are. Times are medians in ms.
+in the file that is opened and saved. The floor is measured in the same scene with the add-on off,
+in turn with ours, three times each: frames and slider steps by a bare handler that writes the same
+bones and live keys, two poses in turn, that were read off the add-on before; undo by a plain
+property beside the same write; files and modes as they are. Times are medians in ms.
 """
 
 from __future__ import annotations
@@ -40,6 +40,26 @@ def median_ms(action, rounds, before=None):
         action()
         times.append((time.perf_counter() - begin) * 1000)
     return statistics.median(times)
+
+
+def in_turn(package, ours, floor, times=3):
+    """Medians of what both give, one after the other: the add-on is on for ours, off for the floor.
+
+    Args:
+        package: of the add-on.
+        ours, floor: functions that give numbers, all as many.
+        times: how often both are asked.
+    """
+    found = ([], [])
+    for _ in range(times):
+        for switch, ask, kept in (
+            (bpy.ops.preferences.addon_enable, ours, found[0]),
+            (bpy.ops.preferences.addon_disable, floor, found[1]),
+        ):
+            switch(module=package)
+            kept.append(ask())
+    bpy.ops.preferences.addon_enable(module=package)
+    return [np.median(kept, axis=0) for kept in found]
 
 
 def row(name, ours, floor=None, note=""):
@@ -109,11 +129,14 @@ def measure_frames(path, package, counts, frames):
         for frame in (frames // 3, frames // 2):
             bpy.context.scene.frame_set(frame)
             bare.remember()
-        ours = statistics.median(frame_time.step(frames))
-        bpy.ops.preferences.addon_disable(module=package)
-        bpy.app.handlers.frame_change_post.append(bare.write)
-        floor = statistics.median(frame_time.step(frames))
-        bpy.app.handlers.frame_change_post.remove(bare.write)
+
+        def alone(bare=bare):
+            bpy.app.handlers.frame_change_post.append(bare.write)
+            times = statistics.median(frame_time.step(frames))
+            bpy.app.handlers.frame_change_post.remove(bare.write)
+            return times
+
+        ours, floor = in_turn(package, lambda: statistics.median(frame_time.step(frames)), alone)
         row(f"a frame, {count} full-scale", ours, floor, f"{1000 / ours:.0f} fps")
 
 
@@ -142,24 +165,25 @@ def measure_slider(path, package, rounds):
     """A slider's step, and its undo and redo."""
     frame_time.empty_scene(package)
     (controls, rig), *_ = faces(path, 1)
-    bare, drag, name = Bare([rig]), Slider(controls), controls.name
+    bare, drag = Bare([rig]), Slider(controls)
     for _ in range(2):
         drag()
         bpy.context.view_layer.update()
         bare.remember()
-    ours = median_ms(drag, rounds)
-    undone = measure_undo(drag)
-    bpy.ops.preferences.addon_disable(module=package)
 
     def written():
         bare.write()
         bpy.context.view_layer.update()
 
-    drag = Slider(bpy.data.objects[name], written)
-    row("a slider's step to the evaluated mesh", ours, median_ms(drag, rounds))
-    bare_undone = measure_undo(drag)
-    for wait, own, floor in zip(("undo", "redo"), undone, bare_undone, strict=True):
-        row(f"{wait} of a slider's step", own, floor)
+    bare_drag = Slider(controls, written)
+    ours, floor = in_turn(
+        package,
+        lambda: (median_ms(drag, rounds), *measure_undo(drag)),
+        lambda: (median_ms(bare_drag, rounds), *measure_undo(bare_drag)),
+    )
+    waits = ("a slider's step to the evaluated mesh", "undo of a slider's step", "redo of it")
+    for wait, own, bare_own in zip(waits, ours, floor, strict=True):
+        row(wait, own, bare_own)
 
 
 def measure_undo(drag, steps=8):
@@ -200,9 +224,8 @@ def measure_switches(path, package, rounds):
         bpy.ops.object.mode_set(mode="OBJECT")
         bpy.context.view_layer.update()
 
-    ours = median_ms(edit, rounds)
-    bpy.ops.preferences.addon_disable(module=package)
-    row("edit mode, in and out", ours, median_ms(edit, rounds))
+    edited = lambda: median_ms(edit, rounds)  # noqa: E731
+    row("edit mode, in and out", *in_turn(package, edited, edited))
 
 
 def measure_files(path, package, rounds, count=10):
@@ -223,13 +246,12 @@ def measure_files(path, package, rounds, count=10):
             bpy.ops.wm.open_mainfile(filepath=blend)
             bpy.context.view_layer.update()
 
-        saved = median_ms(save, rounds)
+        save()
         size = Path(blend).stat().st_size / 1e6
-        opened = median_ms(load, rounds)
-        bpy.ops.preferences.addon_disable(module=package)
-        floor = median_ms(load, rounds)
-        row(f"opening {count} of {path.stem}", opened, floor, f"{size:.1f} MB")
-        row(f"saving {count} of {path.stem}", saved, median_ms(save, rounds))
+        both = lambda: (median_ms(load, rounds), median_ms(save, rounds))  # noqa: E731
+        ours, floor = in_turn(package, both, both)
+        row(f"opening {count} of {path.stem}", ours[0], floor[0], f"{size:.1f} MB")
+        row(f"saving {count} of {path.stem}", ours[1], floor[1])
 
 
 def main():
