@@ -37,6 +37,10 @@ OWN = re.compile(
 )
 MACHINES = {"win_amd64": "AMD64", "win_arm64": "ARM64"}
 PROCESSORS = {"macosx_11_0_arm64": "ARM64", "macosx_11_0_x86_64": "X86_64"}
+# What zig's linker names in each library; and operator new and delete of its C++ library, which it
+# cannot hide: they are weak, so that macOS takes one of each for all libraries of a process.
+LINKED = re.compile(r"__mh_dylib_header|___dso_handle")
+NEW_AND_DELETE = re.compile(r"__Z(n[aw]m|d[al]Pv)\w*")
 # Whatever Windows 10 has: the C library by its contracts, and the kernel.
 WINDOWS_HAS = re.compile(r"(api-ms-win-crt-[\w-]+|kernel32)\.dll", re.IGNORECASE)
 
@@ -131,8 +135,12 @@ def macos(module: Path, platform: str, program: Path, zig: Path) -> Iterator[str
     libraries = [library.name for library in binary.libraries if library.command.name != "ID_DYLIB"]
     want(libraries == ["/usr/lib/libSystem.B.dylib"], f"it needs {libraries}")
     want(binary.has_code_signature, "it has no LC_CODE_SIGNATURE")
-    exported = [str(s.name) for s in binary.exported_symbols]
-    want(exported == ["_PyInit__native"], f"it exports {exported[:5]}")
+    weak = lief.MachO.ExportInfo.FLAGS.WEAK_DEFINITION
+    exported = {str(s.name): s.export_info for s in binary.exported_symbols}
+    shared = {n for n, info in exported.items() if weak in info.flags_list}
+    ours = [n for n in exported if not LINKED.fullmatch(n)]
+    ours = [n for n in ours if not (n in shared and NEW_AND_DELETE.fullmatch(n))]
+    want(ours == ["_PyInit__native"], f"it exports {ours[:5]}")
     undefined = {str(s.name) for s in binary.imported_symbols}
     yield python_has((n.removeprefix("_") for n in undefined), program)
     known = set(re.findall(r"[\w$.]+", (zig / "libc/darwin/libSystem.tbd").read_text()))
