@@ -65,24 +65,58 @@ def shape(item, name):
     return out.reshape(-1, 3) @ np.array(item.matrix_world.to_3x3()).T
 
 
-def test_what_blender_saves_as_gltf_is_the_same_head(head, tmp_path):
+def _saved_as_gltf(path):
     from risorius.author.input import gltf
 
-    path = tmp_path / "egg.glb"
     bpy.ops.export_scene.gltf(filepath=str(path), use_selection=True, export_morph=True)
-    mesh, moved = gltf.read_gltf(path)
+    return gltf.read_gltf(path)
+
+
+def _saved_as_fbx(path, **options):
+    from risorius.author.input import fbx
+
+    bpy.ops.export_scene.fbx(filepath=str(path), use_selection=True, **options)
+    return fbx.read_fbx(path)
+
+
+_TURNED = {"axis_up": "Z", "axis_forward": "-Y", "global_scale": 0.3}
+_APPLIED = {"bake_space_transform": True, "apply_scale_options": "FBX_SCALE_UNITS"}
+
+
+@pytest.mark.parametrize(
+    ("saved", "scale"),
+    [
+        pytest.param(lambda folder: _saved_as_gltf(folder / "egg.glb"), 1.5, id="glTF"),
+        pytest.param(lambda folder: _saved_as_fbx(folder / "egg.fbx"), 1.5, id="FBX"),
+        pytest.param(
+            lambda folder: _saved_as_fbx(folder / "egg.fbx", **_TURNED), 0.45, id="FBX, z up"
+        ),
+        pytest.param(
+            lambda folder: _saved_as_fbx(folder / "egg.fbx", **_APPLIED), 1.5, id="FBX, applied"
+        ),
+    ],
+)
+def test_what_blender_saves_is_the_same_head(saved, scale, head, tmp_path):
+    head.location, head.scale = (0.02, 0.01, 0.03), (1.5, 1.5, 1.5)
+    bpy.context.view_layer.update()
+    mesh, moved = saved(tmp_path)
     positions, faces = face_shapes.head()
     assert len(mesh.positions) == len(positions)
-    assert len(mesh.faces) == 2 * len(faces)
+    corners = [len(face) for face in mesh.faces]
+    assert sum(corners) - 2 * len(corners) == 2 * len(faces)  # as many triangles
+    assert [len(face) for face in mesh.uv_faces] == corners
+    assert np.ptp(mesh.uvs, axis=0).min() > 0.9
     wanted = face_shapes.expressions(positions)
     assert list(moved) == list(wanted)
     # Blender may put vertices into another order: each is looked for by its place.
-    apart = np.linalg.norm(mesh.positions[:, None] * 100 - positions[None], axis=2)
+    unit = METRES * scale
+    place = np.array([2.0, 3.0, -1.0]) / 1.5
+    apart = np.linalg.norm(mesh.positions[:, None] / unit - positions[None] - place, axis=2)
     places = apart.argmin(axis=1)
     assert sorted(places.tolist()) == list(range(len(positions)))
     assert apart.min(axis=1).max() < 1e-4
     for name, delta in wanted.items():
-        np.testing.assert_allclose(moved[name] * 100, delta[places], atol=1e-4)
+        np.testing.assert_allclose(moved[name] / unit, delta[places], atol=1e-4)
 
 
 def test_the_face_does_what_the_keys_did(head, tmp_path):

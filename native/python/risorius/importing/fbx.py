@@ -32,7 +32,7 @@ TIME_MODES = {
 }  # fmt: skip
 _TOP = {"GlobalSettings", "Objects", "Connections"}
 # Nodes that are skipped unread: they are most of a file's bytes.
-_BULK = {"Geometry", "Video", "Texture", "Material", "Pose", "Implementation"}
+_BULK = frozenset(("Geometry", "Video", "Texture", "Material", "Pose", "Implementation"))
 _SCALARS = {"Y": "<h", "C": "<?", "B": "<?", "I": "<i", "F": "<f", "D": "<d", "L": "<q"}
 _ARRAYS = {"f": "<f4", "d": "<f8", "l": "<i8", "i": "<i4", "b": "<u1", "c": "<u1"}
 _DEEPEST = 32
@@ -101,12 +101,22 @@ def is_text_fbx(text: str) -> bool:
 
 
 class Parser:
-    """The records of a file."""
+    """The records of a file.
 
-    def __init__(self, data: bytes, name: str, budget: Budget) -> None:
+    Args:
+        data: the whole file.
+        name: what errors call it.
+        budget: bounds memory and work.
+        skipped: objects of these kinds are known by name alone.
+    """
+
+    def __init__(
+        self, data: bytes, name: str, budget: Budget, skipped: frozenset[str] = _BULK
+    ) -> None:
         self.data = data
         self.name = name
         self.budget = budget
+        self.skipped = skipped
         if len(data) < 27:
             raise self.fail(len(data), "a header of 27 bytes was expected")
         self.version = struct.unpack_from("<I", data, 23)[0]
@@ -151,7 +161,7 @@ class Parser:
         for _ in range(count):
             value, at = self._value(at, end)
             node.values.append(value)
-        if not (depth == 1 and name in _BULK):
+        if not (depth == 1 and name in self.skipped):
             node.inner = list(self._records(end, stop, depth + 1))
         return node
 
@@ -191,6 +201,7 @@ class Scene:
     """What of a file says how things move.
 
     Attributes:
+        settings: GlobalSettings, or None.
         objects: id -> record.
         parents: id -> (parent's id, property or ""), in the file's order.
         budget: of the file.
@@ -200,7 +211,7 @@ class Scene:
     name: str
     budget: Budget
     ticks: int
-    rate: float
+    settings: Node | None
     objects: dict[int, Node]
     parents: dict[int, list[tuple[int, str]]]
     notes: list[str] = field(default_factory=list)
@@ -233,7 +244,7 @@ def read(data: bytes, name: str, take: str | None = None, budget: Budget | None 
         AnimationFileError: no FBX that can be read, no such stack, nothing of that animated.
         BudgetError: the file unfolds to far more than its size.
     """
-    scene = _scene(Parser(data, name, budget or Budget.of(len(data))))
+    scene = read_scene(Parser(data, name, budget or Budget.of(len(data))))
     stacks, components = scene.of_kind("AnimationStack"), _components(scene)
     channels = {object_name(node) for node in scene.of_kind("Deformer").values()}
     notes = scene.notes
@@ -245,7 +256,7 @@ def read(data: bytes, name: str, take: str | None = None, budget: Budget | None 
         if len(stacks) > 1:
             names = ", ".join(object_name(node) for node in stacks.values())
             notes.append(f"animation {title} is taken of {len(stacks)}: {names[:200]}")
-        times, rows = on_one_clock(list(curves.values()), scene.rate, scene.budget)
+        times, rows = on_one_clock(list(curves.values()), _rate(scene), scene.budget)
         keep = keep_ascending(times, notes)
         clip = make_clip(list(curves), rows[:, keep], times[keep], metadata={"take": title})
         return Take(clip, "fbx", "", notes)
@@ -254,7 +265,13 @@ def read(data: bytes, name: str, take: str | None = None, budget: Budget | None 
     )
 
 
-def _scene(parser: Parser) -> Scene:
+def read_scene(parser: Parser) -> Scene:
+    """The objects of a file and what hangs on what.
+
+    Raises:
+        AnimationFileError: the file is damaged; with the place in it.
+        BudgetError: more than a file of its size may hold.
+    """
     top = parser.top()
     objects = {
         node.values[0]: node
@@ -268,14 +285,19 @@ def _scene(parser: Parser) -> Scene:
             way = str(values[3]) if values[0] == "OP" and len(values) > 3 else ""
             parents[values[1]].append((values[2], way))
     ticks = TICKS_8000 if parser.version >= 8000 else TICKS
-    rate = _rate(top.get("GlobalSettings"))
-    return Scene(parser.name, parser.budget, ticks, rate, objects, parents)
+    return Scene(parser.name, parser.budget, ticks, top.get("GlobalSettings"), objects, parents)
 
 
-def _rate(settings: Node | None) -> float:
+def properties(node: Node | None) -> dict[str, list[Any]]:
+    """Name -> values of what an object, or the scene, says of itself; not what it leaves out."""
+    table = node.first("Properties70") if node is not None else None
+    rows = [p for p in (table.inner if table else []) if len(p.values) > 4]
+    return {str(p.values[0]): p.values[4:] for p in rows}
+
+
+def _rate(scene: Scene) -> float:
     """Frames a second that the scene is made for."""
-    table = settings.first("Properties70") if settings is not None else None
-    rows = {p.values[0]: p.values[-1] for p in (table.inner if table else []) if len(p.values) > 4}
+    rows = {name: values[-1] for name, values in properties(scene.settings).items()}
     custom = rows.get("CustomFrameRate")
     if rows.get("TimeMode") == 14 and isinstance(custom, int | float) and 0 < custom < 1e4:
         return float(custom)

@@ -13,12 +13,13 @@ from ..fitting import FitOptions
 from ..levels import LodOptions
 from ..skeleton import Doubles
 from ..work import RigOptions
-from . import gltf
+from . import fbx, gltf
 from .matching import assign
 from .obj import ShapeFileError, read_obj, read_positions
 from .shape_face import ShapeSet, check_shapes, make_shape_face
 
-_BY_BLENDER = (".fbx", ".usd", ".usdc", ".usda", ".usdz", ".abc", ".blend", ".dae")
+_READERS = {suffix: gltf.read_gltf for suffix in gltf.SUFFIXES} | {fbx.SUFFIX: fbx.read_fbx}
+_BY_BLENDER = (".usd", ".usdc", ".usda", ".usdz", ".abc", ".blend", ".dae")
 _TABLES: dict[str, dict[str, tuple[type, ...]]] = {
     "source": {
         "dna": (str,),
@@ -83,10 +84,10 @@ def read_spec(path: Path) -> Spec:
     suffix = Path(source.get("neutral", "")).suffix.lower()
     if suffix in _BY_BLENDER:
         raise ShapeFileError(
-            f"{path}: source.neutral: OBJ, glTF or GLB was expected, found {suffix}: import it "
-            "into Blender and choose Object > Make Rig from Shape Keys, or save it there as glTF"
+            f"{path}: source.neutral: OBJ, glTF, GLB or FBX was expected, found {suffix}: import "
+            "it into Blender and choose Object > Make Rig from Shape Keys, or save it there as glTF"
         )
-    if "neutral" in source and suffix not in gltf.SUFFIXES and "expressions" not in source:
+    if "neutral" in source and suffix not in _READERS and "expressions" not in source:
         raise ShapeFileError(f"{path}: source.expressions: a folder of OBJ files was expected")
     return Spec(
         path,
@@ -143,8 +144,9 @@ def read_face(spec: Spec) -> tuple[Dna, dict[str, list[str]], list[str]]:
 def _read_shapes(spec: Spec, folder: Path) -> ShapeSet:
     neutral = folder / spec.source["neutral"]
     morphs: dict[str, Doubles] = {}
-    if neutral.suffix.lower() in gltf.SUFFIXES:
-        mesh, morphs = gltf.read_gltf(neutral, spec.source.get("mesh", ""))
+    read = _READERS.get(neutral.suffix.lower())
+    if read is not None:
+        mesh, morphs = read(neutral, spec.source.get("mesh", ""))
         unit = "m"
     else:
         mesh, unit = read_obj(neutral), "cm"

@@ -1,0 +1,298 @@
+# SPDX-License-Identifier: MIT
+"""Binary FBX: the mesh with the most blend shapes, and what each of these adds to it.
+
+Objects, connections and properties are those of Autodesk's FBX SDK (FbxMesh, FbxBlendShape,
+FbxBlendShapeChannel, FbxNode's order of pivots); axes and unit are those of GlobalSettings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ...base.budget import Budget
+from ...importing.fbx import Node, Parser, Scene, is_fbx, object_name, properties, read_scene
+from ...importing.source import read_bytes
+from ..skeleton import Doubles, Ints
+from .obj import ObjMesh, ShapeFileError
+
+SUFFIX = ".fbx"
+_SKIPPED = frozenset(("Video", "Texture", "Material", "Pose", "Implementation"))
+_ORDERS = ("XYZ", "XZY", "YZX", "YXZ", "ZXY", "ZYX")  # about which axis first
+_CENTIMETRE = 0.01
+_DEEPEST = 64  # nodes above a mesh
+
+
+def read_fbx(path: Path, mesh: str = "") -> tuple[ObjMesh, dict[str, Doubles]]:
+    """A mesh in metres, y up, and float64[V, 3] of each of its blend shapes by name.
+
+    Of a channel with several targets that are reached one after the other, the last is taken.
+
+    Args:
+        path: of the file.
+        mesh: its node's name, where a file has several with blend shapes; "": the one with most
+            of them.
+
+    Raises:
+        ShapeFileError: no mesh with blend shapes.
+        AnimationFileError: the file is damaged; with the place in it.
+        BudgetError: more numbers than a file of this size may hold.
+    """
+    data = read_bytes(path)
+    if not is_fbx(data):
+        raise ShapeFileError(f"{path}: a binary FBX was expected")
+    scene = read_scene(Parser(data, str(path), Budget.of(len(data)), _SKIPPED))
+    number = _choose(scene, path, mesh)
+    geometry = scene.objects[number]
+    turn = _axes(scene) @ _to_world(scene, number)
+    points = _triples(scene, geometry, "Vertices")
+    faces, corners = _polygons(scene, geometry, len(points))
+    uvs, uv_corners = _uvs(scene, geometry, len(corners), corners)
+    shapes = {
+        name: _delta(scene, shape, points) @ turn[:3, :3].T
+        for name, shape in _shapes(scene, number)
+    }
+    ends = np.cumsum([len(face) for face in faces])[:-1]
+    uv_faces = [part.tolist() for part in np.split(uv_corners, ends)]
+    return ObjMesh(points @ turn[:3, :3].T + turn[:3, 3], uvs, faces, uv_faces), shapes
+
+
+def _choose(scene: Scene, path: Path, wanted: str) -> int:
+    """The mesh of that name, or the one with most vertices in blend shapes."""
+    best, most, names = -1, 0, []
+    for number, node in scene.of_kind("Geometry").items():
+        if _class_of(node) != "Mesh":
+            continue
+        size = sum(1 + shape.array("Indexes").size for _, shape in _shapes(scene, number))
+        if not size:
+            continue
+        owner = _model_of(scene, number)
+        name = object_name(scene.objects[owner]) if owner else object_name(node)
+        names.append(name)
+        if wanted and wanted == name:
+            return number
+        if size > most:
+            best, most = number, size
+    if best < 0:
+        raise ShapeFileError(f"{path}: a mesh with blend shapes was expected, found none")
+    if wanted:
+        raise ShapeFileError(
+            f"{path}: source.mesh: one of {', '.join(names)} was expected, found {wanted}"
+        )
+    return best
+
+
+def _class_of(node: Node) -> str:
+    return str(node.values[2]) if len(node.values) > 2 else ""
+
+
+def _below(scene: Scene, parent: int, kind: str, tag: str) -> Iterator[tuple[int, Node]]:
+    """Objects of a kind that hang on another, in the file's order."""
+    for number, links in scene.parents.items():
+        node = scene.objects.get(number)
+        if node is not None and node.name == kind and _class_of(node) == tag:
+            scene.budget.work(len(links), "connections")
+            if any(at == parent for at, _ in links):
+                yield number, node
+
+
+def _shapes(scene: Scene, mesh: int) -> list[tuple[str, Node]]:
+    """Name and full target of each channel of a mesh; each name once."""
+    out: dict[str, Node] = {}
+    for blend, _ in _below(scene, mesh, "Deformer", "BlendShape"):
+        for channel, node in _below(scene, blend, "Deformer", "BlendShapeChannel"):
+            targets = [shape for _, shape in _below(scene, channel, "Geometry", "Shape")]
+            if not targets:
+                continue
+            full = node.array("FullWeights")
+            last = int(np.argmax(full)) if full.size == len(targets) else len(targets) - 1
+            name = object_name(node).rpartition(".")[2] or f"channel{len(out)}"
+            while name in out:
+                name += "_"
+            out[name] = targets[last]
+    return list(out.items())
+
+
+def _numbers(scene: Scene, node: Node, name: str) -> npt.NDArray[Any]:
+    found = node.array(name)
+    if found.dtype.kind == "f" and not np.isfinite(found).all():
+        raise _fail(scene, node, f"{name}: finite numbers were expected")
+    return found
+
+
+def _triples(scene: Scene, node: Node, name: str) -> Doubles:
+    found = _numbers(scene, node, name)
+    if found.size % 3:
+        raise _fail(scene, node, f"{name}: triples were expected, found {found.size} numbers")
+    return found.reshape(-1, 3).astype(np.float64)
+
+
+def _fail(scene: Scene, node: Node, what: str) -> ShapeFileError:
+    number = node.values[0] if node.values else ""
+    return ShapeFileError(f"{scene.name}: {node.name} {object_name(node)} ({number}): {what}")
+
+
+def _polygons(scene: Scene, node: Node, count: int) -> tuple[list[list[int]], Ints]:
+    """Vertices of each polygon, and of all corners in a row; the last of a polygon is ~index."""
+    order = _numbers(scene, node, "PolygonVertexIndex").astype(np.int64)
+    last = order < 0
+    corners = np.where(last, ~order, order)
+    if not corners.size or not last[-1] or corners.max() >= count:
+        raise _fail(scene, node, f"PolygonVertexIndex: polygons of {count} vertices were expected")
+    parts = np.split(corners, np.flatnonzero(last)[:-1] + 1)
+    return [part.tolist() for part in parts], corners
+
+
+def _uvs(scene: Scene, node: Node, count: int, corners: Ints) -> tuple[Doubles, Ints]:
+    """The first texture coordinates, and their index at each corner; zeros for none."""
+    layer = node.first("LayerElementUV")
+    if layer is None:
+        return np.zeros((1, 2)), np.zeros(count, np.int64)
+    uvs = _numbers(scene, layer, "UV").astype(np.float64)
+    uvs = uvs[: uvs.size // 2 * 2].reshape(-1, 2)
+    by_vertex = _word(layer, "MappingInformationType") in ("ByVertice", "ByVertex")
+    order = corners if by_vertex else np.arange(count)
+    if _word(layer, "ReferenceInformationType") != "Direct":
+        index = _numbers(scene, layer, "UVIndex").astype(np.int64)
+        if index.size <= order.max():
+            what = f"UVIndex: {order.max() + 1} were expected, found {index.size}"
+            raise _fail(scene, node, what)
+        order = index[order]
+    if not (order.min() >= 0 and order.max() < len(uvs)):
+        raise _fail(scene, node, f"UVIndex: indices below {len(uvs)} were expected")
+    return uvs, order
+
+
+def _word(node: Node, name: str) -> str:
+    found = node.first(name)
+    return str(found.values[0]) if found is not None and found.values else ""
+
+
+def _delta(scene: Scene, shape: Node, points: Doubles) -> Doubles:
+    index = _numbers(scene, shape, "Indexes").astype(np.int64)
+    moved = _triples(scene, shape, "Vertices")
+    if len(moved) != len(index):
+        raise _fail(scene, shape, f"{len(index)} vertices were expected, found {len(moved)}")
+    if index.size and not 0 <= index.min() <= index.max() < len(points):
+        raise _fail(scene, shape, f"Indexes below {len(points)} were expected")
+    scene.budget.hold(points.nbytes, object_name(shape))
+    out = np.zeros_like(points)
+    out[index] = moved
+    return out
+
+
+def _axes(scene: Scene) -> Doubles:
+    """float64[4, 4] from the scene's axes and unit to metres, y up."""
+    rows = {name: values[-1] for name, values in properties(scene.settings).items()}
+
+    def axis(name: str, default: int) -> Doubles:
+        at, sign = rows.get(f"{name}Axis", default), rows.get(f"{name}AxisSign", 1)
+        if at not in (0, 1, 2) or sign not in (1, -1):
+            raise ShapeFileError(f"{scene.name}: GlobalSettings: {name}Axis of 0, 1 or 2 expected")
+        out = np.zeros(3)
+        out[at] = sign
+        return out
+
+    turn = np.stack([axis("Coord", 0), axis("Up", 1), axis("Front", 2)])
+    if abs(np.linalg.det(turn)) < 0.5:
+        raise ShapeFileError(f"{scene.name}: GlobalSettings: three different axes were expected")
+    unit = rows.get("UnitScaleFactor", 1.0)
+    if not isinstance(unit, int | float) or not 0 < unit < 1e9:
+        raise ShapeFileError(f"{scene.name}: GlobalSettings: UnitScaleFactor above 0 expected")
+    out = np.eye(4)
+    out[:3, :3] = turn * float(unit) * _CENTIMETRE
+    return out
+
+
+def _model_of(scene: Scene, number: int) -> int:
+    """The node that an object hangs on; 0 for none."""
+    for parent, way in scene.parents.get(number, []):
+        node = scene.objects.get(parent)
+        if node is not None and node.name == "Model" and not way:
+            return parent
+    return 0
+
+
+def _to_world(scene: Scene, mesh: int) -> Doubles:
+    """float64[4, 4] of a mesh' node and of all above it, column vectors."""
+    at = _model_of(scene, mesh)
+    out = _geometric(scene, scene.objects[at]) if at else np.eye(4)
+    for _ in range(_DEEPEST):
+        if not at:
+            break
+        out = _local(scene, scene.objects[at]) @ out
+        at = _model_of(scene, at)
+    return out
+
+
+def _geometric(scene: Scene, node: Node) -> Doubles:
+    """What moves a node's mesh and not the nodes below it."""
+    read = _Transforms(scene, node)
+    return (
+        read.shift("GeometricTranslation")
+        @ read.turn("GeometricRotation")
+        @ read.size("GeometricScaling")
+    )
+
+
+def _local(scene: Scene, node: Node) -> Doubles:
+    """T Roff Rp Rpre R Rpost^-1 Rp^-1 Soff Sp S Sp^-1, as the SDK's manual says."""
+    read = _Transforms(scene, node)
+    pivot, scaled = read.shift("RotationPivot"), read.shift("ScalingPivot")
+    turned = read.turn("PreRotation") @ read.turn("Lcl Rotation", read.order())
+    turned = turned @ np.linalg.inv(read.turn("PostRotation"))
+    out = read.shift("Lcl Translation") @ read.shift("RotationOffset")
+    out = out @ pivot @ turned @ np.linalg.inv(pivot)
+    sized = scaled @ read.size("Lcl Scaling") @ np.linalg.inv(scaled)
+    return out @ read.shift("ScalingOffset") @ sized
+
+
+class _Transforms:
+    """The matrices that the properties of a node say."""
+
+    def __init__(self, scene: Scene, node: Node) -> None:
+        self._scene, self._node = scene, node
+        self._rows = properties(node)
+
+    def _three(self, name: str, default: float) -> Doubles:
+        values: Sequence[Any] = self._rows.get(name, [default] * 3)
+        good = len(values) == 3 and all(isinstance(v, int | float) for v in values)
+        out = np.array(values if good else [np.nan] * 3, np.float64)
+        if not np.isfinite(out).all():
+            raise _fail(self._scene, self._node, f"{name}: three numbers were expected")
+        return out
+
+    def order(self) -> str:
+        """About which axis a rotation turns first."""
+        number = self._rows.get("RotationOrder", [0])[-1]
+        if not isinstance(number, int) or not 0 <= number < len(_ORDERS):
+            raise _fail(
+                self._scene, self._node, f"RotationOrder: 0 to {len(_ORDERS) - 1} was expected"
+            )
+        return _ORDERS[number]
+
+    def shift(self, name: str) -> Doubles:
+        out = np.eye(4)
+        out[:3, 3] = self._three(name, 0.0)
+        return out
+
+    def size(self, name: str) -> Doubles:
+        return np.diag([*self._three(name, 1.0), 1.0])
+
+    def turn(self, name: str, order: str = "XYZ") -> Doubles:
+        """A rotation in degrees about fixed axes, the first of the order first."""
+        angles = np.radians(self._three(name, 0.0))
+        out = np.eye(4)
+        for letter in order:
+            axis = "XYZ".index(letter)
+            a, b = (axis + 1) % 3, (axis + 2) % 3
+            one = np.eye(4)
+            one[a, a] = one[b, b] = np.cos(angles[axis])
+            one[b, a] = np.sin(angles[axis])
+            one[a, b] = -one[b, a]
+            out = one @ out
+        return out
