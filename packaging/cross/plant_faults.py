@@ -70,7 +70,8 @@ def faults(platform: str) -> Iterator[tuple[str, Plant, str]]:
         yield "another DLL", other_bytes(b"KERNEL32.dll", b"KERNEL3X.dll"), "KERNEL3X"
         yield "a MinGW DLL", other_bytes(b"api-ms-win-crt-heap", b"lib-ms-win-crt-heap"), "lib-ms"
     elif platform.startswith("macosx"):
-        yield "no signature", in_module(without_signature), "LC_CODE_SIGNATURE"
+        if platform.endswith("arm64"):
+            yield "no signature", in_module(without_signature), "LC_CODE_SIGNATURE"
         yield "a name that macOS lacks", other_bytes(b"_memcpy\0", b"_memcpx\0"), "_memcpx"
     else:
         yield "a newer glibc", other_bytes(b"GLIBC_2.17\0", b"GLIBC_2.34\0"), "glibc 2.34"
