@@ -40,6 +40,7 @@ PROCESSORS = {"macosx_11_0_arm64": "ARM64", "macosx_11_0_x86_64": "X86_64"}
 # What zig's linker names in each library; and operator new and delete of its C++ library, which it
 # cannot hide: they are weak, so that macOS takes one of each for all libraries of a process.
 LINKED = re.compile(r"__mh_dylib_header|___dso_handle")
+PYBIND11 = re.compile(r"__?Z\w*8pybind11")  # its exceptions, which it asks to be seen
 NEW_AND_DELETE = re.compile(r"__Z(n[aw]m|d[al]Pv)\w*")
 # Whatever Windows 10 has: the C library by its contracts, and the kernel.
 WINDOWS_HAS = re.compile(r"(api-ms-win-crt-[\w-]+|kernel32)\.dll", re.IGNORECASE)
@@ -112,8 +113,8 @@ def windows(module: Path, platform: str, tag: str, program: Path) -> Iterator[st
     of_python = next(e for e in image.DIRECTORY_ENTRY_IMPORT if e.dll.decode().lower() == own)
     yield python_has((symbol.name.decode() for symbol in of_python.imports), program)
     exported = [symbol.name.decode() for symbol in image.DIRECTORY_ENTRY_EXPORT.symbols]
-    # pybind11 asks for its exceptions too; Windows looks for a name in the one DLL that is named.
-    ours = [name for name in exported if not re.match(r"_Z\w*8pybind11", name)]
+    # Windows looks for a name in the one DLL that is named.
+    ours = [name for name in exported if not PYBIND11.match(name)]
     want(ours == ["PyInit__native"], f"it exports {ours[:5]}")
     flags = image.OPTIONAL_HEADER
     for flag in ("DYNAMIC_BASE", "NX_COMPAT", "HIGH_ENTROPY_VA"):
@@ -140,7 +141,7 @@ def macos(module: Path, platform: str, program: Path, zig: Path) -> Iterator[str
     weak = lief.MachO.ExportInfo.FLAGS.WEAK_DEFINITION
     exported = {str(s.name): s.export_info for s in binary.exported_symbols}
     shared = {n for n, info in exported.items() if weak in info.flags_list}
-    ours = [n for n in exported if not LINKED.fullmatch(n)]
+    ours = [n for n in exported if not LINKED.fullmatch(n) and not PYBIND11.match(n)]
     ours = [n for n in ours if not (n in shared and NEW_AND_DELETE.fullmatch(n))]
     want(ours == ["_PyInit__native"], f"it exports {ours[:5]}")
     undefined = {str(s.name) for s in binary.imported_symbols}
