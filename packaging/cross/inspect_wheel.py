@@ -37,11 +37,11 @@ OWN = re.compile(
 )
 MACHINES = {"win_amd64": "AMD64", "win_arm64": "ARM64"}
 PROCESSORS = {"macosx_11_0_arm64": "ARM64", "macosx_11_0_x86_64": "X86_64"}
-# What zig's linker names in each library; and operator new and delete of its C++ library, which it
-# cannot hide: they are weak, so that macOS takes one of each for all libraries of a process.
+# What zig's linker names in each library; and what it cannot hide: operator new and delete of its C++
+# library, and types. They are weak, so that macOS takes one of each for all libraries of a process.
 LINKED = re.compile(r"__mh_dylib_header|___dso_handle")
 PYBIND11 = re.compile(r"__?Z\w*8pybind11")  # its exceptions, which it asks to be seen
-NEW_AND_DELETE = re.compile(r"__Z(n[aw]m|d[al]Pv)\w*")
+SHARED = re.compile(r"__Z(n[aw]m|d[al]Pv|T[IS])\w*")
 # Whatever Windows 10 has: the C library by its contracts, and the kernel.
 WINDOWS_HAS = re.compile(r"(api-ms-win-crt-[\w-]+|kernel32)\.dll", re.IGNORECASE)
 
@@ -142,7 +142,7 @@ def macos(module: Path, platform: str, program: Path, zig: Path) -> Iterator[str
     exported = {str(s.name): s.export_info for s in binary.exported_symbols}
     shared = {n for n, info in exported.items() if weak in info.flags_list}
     ours = [n for n in exported if not LINKED.fullmatch(n) and not PYBIND11.match(n)]
-    ours = [n for n in ours if not (n in shared and NEW_AND_DELETE.fullmatch(n))]
+    ours = [n for n in ours if not (n in shared and SHARED.fullmatch(n))]
     want(ours == ["_PyInit__native"], f"it exports {ours[:5]}")
     undefined = {str(s.name) for s in binary.imported_symbols}
     yield python_has((n.removeprefix("_") for n in undefined), program)
