@@ -37,7 +37,7 @@ OWN = re.compile(
 )
 MACHINES = {"win_amd64": "AMD64", "win_arm64": "ARM64"}
 PROCESSORS = {"macosx_11_0_arm64": "ARM64", "macosx_11_0_x86_64": "X86_64"}
-# What zig's linker names in each library; and what it cannot hide: types, operator new and delete of
+# What zig names in each library; and what it cannot hide: types, and operator new and delete of
 # its C++ library. They are weak, so that macOS takes one of each for all libraries of a process.
 LINKED = re.compile(r"__mh_dylib_header|___dso_handle")
 PYBIND11 = re.compile(r"__?Z\w*8pybind11")  # its exceptions, which it asks to be seen
