@@ -47,6 +47,11 @@ struct FitOptions {
   bool symmetric = true;       // where the mesh is: mirrored joints and weights
   /// How far the largest error is fought at the cost of the mean: 0 least squares.
   double emphasis = 3.0;
+  /// A joint takes no part in an expression in which it moves no vertex so far, in the shapes'
+  /// unit; the others then take over what it did. 0: all joints take part in all.
+  double least_effect = 0.0;
+  /// Of the second half of the rounds the one is kept whose largest error is the smallest.
+  bool bound = false;
   std::size_t rounds = 20;  // of weights and motions after all joints are there
   std::size_t threads = 0;  // 0: all cores; the result does not depend on it
   std::vector<GivenJoint> given;

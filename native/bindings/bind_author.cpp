@@ -96,7 +96,7 @@ Fit fit_joints(const Doubles& neutral, const Floats& displacements, const Indice
                const Doubles& importance, const Doubles& positions, const Doubles& rotations,
                const Doubles& translations, std::size_t joints, std::size_t influences,
                double smoothness, double emphasis, std::size_t rounds, bool symmetric,
-               std::size_t threads, const Doubles& pivots,
+               std::size_t threads, double least_effect, bool bound, const Doubles& pivots,
                const std::vector<std::vector<std::uint32_t>>& pivot_expressions,
                py::object progress) {
   const author::Shapes input = shapes(neutral, displacements, edges, importance);
@@ -108,6 +108,8 @@ Fit fit_joints(const Doubles& neutral, const Floats& displacements, const Indice
   options.rounds = rounds;
   options.symmetric = symmetric;
   options.threads = threads;
+  options.least_effect = least_effect;
+  options.bound = bound;
   options.given = given_joints(positions, rotations, translations, input.expressions);
   if (static_cast<std::size_t>(pivots.size()) != 3 * pivot_expressions.size()) {
     shape_error("pivots", "(P, 3)", pivots);
@@ -246,8 +248,8 @@ void bind_author(py::module_& m) {
         py::arg("importance"), py::arg("positions"), py::arg("rotations"), py::arg("translations"),
         py::kw_only(), py::arg("joints"), py::arg("influences"), py::arg("smoothness"),
         py::arg("emphasis"), py::arg("rounds"), py::arg("symmetric"), py::arg("threads"),
-        py::arg("pivots"), py::arg("pivot_expressions"), py::arg("progress"),
-        "JointFit: see risorius.author.fitting.");
+        py::arg("least_effect"), py::arg("bound"), py::arg("pivots"), py::arg("pivot_expressions"),
+        py::arg("progress"), "JointFit: see risorius.author.fitting.");
   m.def("fit_weights", &fit_weights, py::arg("neutral"), py::arg("displacements"), py::arg("edges"),
         py::arg("importance"), py::arg("positions"), py::arg("rotations"), py::arg("translations"),
         py::arg("mirrored"), py::arg("start_joints"), py::arg("start_weights"), py::kw_only(),

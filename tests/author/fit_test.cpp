@@ -178,6 +178,84 @@ TEST(Fit, BothSidesOfASymmetricMeshAreAlike) {
   }
 }
 
+/// How far a joint alone moves a vertex in an expression, at most.
+double effect(const Shapes& shapes, const Fit& fit, std::size_t j, std::size_t e) {
+  Fit alone = fit;
+  for (std::size_t other = 0; other < fit.joints.size(); ++other) {
+    if (other != j) alone.motions[other * shapes.expressions + e] = {};
+  }
+  double most = 0.0;
+  for (std::size_t v = 0; v < shapes.vertex_count(); ++v) {
+    const Vector3 p = posed(shapes, alone, v, e);
+    const Vector3& q = shapes.neutral[v];
+    most = std::max(most, std::hypot(p[0] - q[0], p[1] - q[1], p[2] - q[2]));
+  }
+  return most;
+}
+
+/// The same of the other side: joint and expression.
+std::size_t other_side(const Mirror& mirror, const Fit& fit, std::size_t j, std::size_t e,
+                       std::size_t expressions) {
+  return fit.mirrored[j] * expressions + mirror.expressions[e];
+}
+
+bool rests(const JointMotion& m) { return m.rotation == Vector3{} && m.translation == Vector3{}; }
+
+TEST(Fit, JointsLeaveExpressionsInWhichTheyDoLittleAndOthersTakeOver) {
+  const Shapes shapes = two_sides();
+  const Mirror mirror = find_mirror(shapes);
+  const double least = 0.01;
+  FitOptions options = few(12);
+  auto all = fit_joints(shapes, options);
+  options.least_effect = least;
+  options.threads = 1;
+  auto few_each = fit_joints(shapes, options);
+  options.threads = 3;
+  auto again = fit_joints(shapes, options);
+  ASSERT_TRUE(all && few_each && again);
+  EXPECT_EQ(few_each->weights, again->weights);
+  Fit cut = *all;
+  std::size_t resting = 0, small = 0;
+  for (std::size_t j = 0; j < all->joints.size(); ++j) {
+    for (std::size_t e = 0; e < shapes.expressions; ++e) {
+      const std::size_t at = j * shapes.expressions + e;
+      if (effect(shapes, *all, j, e) < least) {
+        cut.motions[at] = {};
+        ++small;
+      }
+      if (e < 2) {  // the third has no other side
+        const std::size_t other = other_side(mirror, *few_each, j, e, shapes.expressions);
+        EXPECT_EQ(rests(few_each->motions[at]), rests(few_each->motions[other]));
+      }
+      if (rests(few_each->motions[at])) ++resting;
+      EXPECT_EQ(few_each->motions[at].rotation, again->motions[at].rotation);
+      EXPECT_EQ(few_each->motions[at].translation, again->motions[at].translation);
+    }
+  }
+  EXPECT_GT(small, 3u);
+  EXPECT_GE(resting, small);
+  EXPECT_LT(largest_error(shapes, *few_each), 0.7 * largest_error(shapes, cut));
+  EXPECT_LT(largest_error(shapes, *few_each), 1.5 * largest_error(shapes, *all));
+}
+
+TEST(Fit, WhatIsBoundIsTheBestOfItsRounds) {
+  const Shapes shapes = two_sides();
+  FitOptions options = few(6);
+  options.emphasis = 8.0;  // which leads some rounds astray
+  bool any = false;
+  for (std::size_t rounds = 5; rounds < 15; ++rounds) {
+    options.rounds = rounds;
+    options.bound = false;
+    auto last = fit_joints(shapes, options);
+    options.bound = true;
+    auto best = fit_joints(shapes, options);
+    ASSERT_TRUE(last && best);
+    EXPECT_LE(largest_error(shapes, *best), 1.001 * largest_error(shapes, *last)) << rounds;
+    any = any || largest_error(shapes, *best) < 0.9 * largest_error(shapes, *last);
+  }
+  EXPECT_TRUE(any);
+}
+
 TEST(Fit, AGivenJointKeepsItsMotionAndGetsWhatItMoves) {
   const Shapes shapes = two_sides();
   GivenJoint head, riser;
@@ -342,6 +420,9 @@ TEST(Fit, SaysWhatItCannotUse) {
   FitOptions options = few(5);
   options.influences = 0;
   EXPECT_NE(says(two_sides(), options).find("influences"), std::string::npos);
+  options = few(5);
+  options.least_effect = -1.0;
+  EXPECT_NE(says(two_sides(), options).find("least_effect"), std::string::npos);
   options = few(5);
   options.given.resize(1);
   options.given[0].motions.resize(2);

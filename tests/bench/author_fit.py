@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Fits of joints to the CC0 head's 52 expressions, beside Dem Bones where it is installed.
 
-python tests/bench/author_fit.py --joints 40 120 400 [--rival]
+python tests/bench/author_fit.py --joints 40 120 400 [--rival] [--bound]
 The rival is EA's own code: pip install py-dem-bones==0.13.1. Both get the same mesh, joints and
 influences; the seconds are wall and CPU.
 """
@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 from risorius.author import FitOptions, fit_joints
+from risorius.author.fitting import bounded
 from risorius.author.skeleton import matrices_of_vectors
 from risorius.sample.source import FACE_UNITS, Source, fetch
 
@@ -70,8 +71,9 @@ def row(name, positions, moved, reached, weights, edges, wall, cpu):
     )
 
 
-def ours(joints, positions, moved, edges):
+def ours(joints, positions, moved, edges, bound):
     rest = np.tile(np.eye(3, 4), (len(moved), 1, 1, 1))
+    options = FitOptions(joints=joints - 1)  # the resting one is a joint too
     begin, cpu = time.perf_counter(), time.process_time()
     fit = fit_joints(
         positions,
@@ -79,7 +81,7 @@ def ours(joints, positions, moved, edges):
         edges.astype(np.uint32),
         given=positions.mean(axis=0)[None],
         motions=rest,
-        options=FitOptions(joints=joints - 1),  # the resting one is a joint too
+        options=bounded(options) if bound else options,
     )
     wall, cpu = time.perf_counter() - begin, time.process_time() - cpu
     weights = np.zeros((len(positions), joints))
@@ -127,6 +129,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--joints", type=int, nargs="+", default=[40, 120])
     parser.add_argument("--rival", action="store_true")
+    parser.add_argument("--bound", action="store_true", help="as risorius author --bound")
     args = parser.parse_args()
     positions, moved, faces = head(fetch())
     edges = edges_of(faces)
@@ -138,7 +141,7 @@ def main():
     line = " ".join(f"{t:>{w}}" for t, w in zip(titles, widths, strict=True))
     print(f"{'':22} {line}")
     for joints in args.joints:
-        ours(joints, positions, moved, edges)
+        ours(joints, positions, moved, edges, args.bound)
         if args.rival:
             rival(joints, positions, moved, faces, edges)
 

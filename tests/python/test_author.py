@@ -19,6 +19,7 @@ from risorius.author import (
     make_joint_rig,
     pivots,
 )
+from risorius.author.fitting import bounded
 from risorius.author.input import matching, shape_face, spec
 from risorius.author.simplify import simplified
 
@@ -321,6 +322,20 @@ def test_threads_change_no_byte(folder, tmp_path):
     assert files[0].read_bytes() == files[1].read_bytes()
 
 
+def test_the_largest_error_is_fought_for_longer(folder, tmp_path):
+    def largest(*more):
+        out = tmp_path / "bound.dna"
+        done = command_line.run(
+            "author", folder / "spec.toml", "-o", out, "--joints-only", "--json", *more, text=True
+        )
+        assert done.returncode == 0, done.stderr
+        return json.loads(done.stdout)["levels"][0]["largest"]
+
+    assert largest("--bound") < 0.9 * largest()
+    more = bounded(FitOptions(rounds=300))
+    assert (more.rounds, more.emphasis, more.bound) == (300, 5.0, True)
+
+
 def test_joints_that_are_there_stay(folder):
     """A neck that has half of the lower vertices still carries them, a jaw keeps its motion."""
     read = spec.read_spec(folder / "spec.toml")
@@ -399,7 +414,8 @@ def test_what_goes_with_a_jaw_is_its_child(folder):
     )
     mesh.blend_shape_targets = kept
     dna.meshes = [mesh]
-    options = RigOptions(FitOptions(joints=40), tolerance_mm=None, lods=LodOptions(count=1))
+    levels = LodOptions(count=1)
+    options = RigOptions(FitOptions(joints=40), None, least_effect_mm=0.02, lods=levels)
     made = make_joint_rig(dna, options).dna
     assert list(made.joint_parents).count(2) >= 3
     for controls, most in (

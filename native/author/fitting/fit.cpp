@@ -23,6 +23,8 @@ using detail::State;
 using detail::Vec3;
 
 constexpr int kRoundsOfWeights = 12;
+// Joints leave an expression step by step: the others have taken over before the next ones go.
+constexpr double kThinning[] = {0.5, 1.0};
 /// Joints lie amid what they move until the last rounds: from a far pivot they turn on their own
 /// worse.
 constexpr std::size_t kRoundsAtPivots = 4;
@@ -257,6 +259,19 @@ State start(Problem& problem, const std::vector<GivenJoint>& given, std::size_t 
   return out;
 }
 
+/// The square of the largest error that counts.
+double largest(const Problem& problem, const std::vector<float>& left) {
+  double out = 0.0;
+  for (std::size_t v = 0; v < problem.vertices; ++v) {
+    const float* r = left.data() + v * problem.expressions * 3;
+    for (std::size_t e = 0; e < problem.expressions; ++e, r += 3) {
+      const double x = double{r[0]}, y = double{r[1]}, z = double{r[2]};
+      out = std::max(out, problem.asked[v] * (x * x + y * y + z * z));
+    }
+  }
+  return out;
+}
+
 /// Vertices whose largest error stands out count more from here on.
 void emphasise(Problem& problem, const std::vector<float>& left, double power) {
   if (power <= 0.0) return;
@@ -398,6 +413,10 @@ core::Status check(const Shapes& shapes, const FitOptions& options) {
     return core::fail(ErrorCode::kInvalidArgument, "influences",
                       "1 to 16 were expected, found " + std::to_string(options.influences));
   }
+  if (!(options.least_effect >= 0.0 && std::isfinite(options.least_effect))) {
+    return core::fail(ErrorCode::kInvalidArgument, "least_effect",
+                      "a finite number from 0 on was expected");
+  }
   for (const double x : {options.smoothness, options.emphasis}) {
     if (!(x >= 0.0 && x <= 100.0)) {
       return core::fail(ErrorCode::kInvalidArgument, "smoothness, emphasis",
@@ -493,15 +512,42 @@ core::Result<Fit> fit_joints(const Shapes& shapes, const FitOptions& options,
       if (!steps.go_on()) return stopped();
     }
   }
+  State best = state;
+  double least = std::numeric_limits<double>::infinity();
   for (std::size_t r = 0; r < options.rounds; ++r) {
-    problem.to_pivots = r + kRoundsAtPivots >= options.rounds;
+    problem.to_pivots =
+        r + kRoundsAtPivots >= options.rounds || (options.bound && 2 * r >= options.rounds);
     improve(problem, state, left);
+    if (options.bound && problem.to_pivots) {
+      State tried = state;
+      std::vector<float> left_then = left;
+      detail::solve_motions(problem, tried, left_then);
+      const double worst = largest(problem, left_then);
+      if (worst < least) {
+        least = worst;
+        best = std::move(tried);
+      }
+    }
     // The last two rounds even out what the new importance asked for.
     if (r + 2 < options.rounds) emphasise(problem, left, options.emphasis);
     if (!steps.go_on()) return stopped();
   }
-  detail::solve_motions(problem, state, left);
+  if (std::isfinite(least)) {
+    state = std::move(best);
+    detail::find_residual(problem, state, left);
+  } else {
+    detail::solve_motions(problem, state, left);
+  }
   if (!steps.go_on()) return stopped();
+  for (const double share : kThinning) {
+    if (options.least_effect <= 0.0) break;
+    detail::thin_out(problem, state, share * options.least_effect * problem.scale);
+    detail::find_residual(problem, state, left);
+    detail::solve_motions(problem, state, left);
+    detail::solve_weights(problem, state);
+    detail::find_residual(problem, state, left);
+    detail::solve_motions(problem, state, left);
+  }
   return pack(problem, state, shapes.expressions);
 }
 

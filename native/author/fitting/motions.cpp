@@ -179,6 +179,22 @@ class System {
   }
   const Factor& at_rest() const { return solver_; }
 
+  /// The lower half of the stiffness of some joints, where they are turned, as a full matrix.
+  /// In: at  by joint its place among them, ascending, or -1
+  template <class Turn>
+  Eigen::MatrixXd among(const std::vector<int>& at, int count, const Turn& turn) const {
+    Eigen::MatrixXd out = Eigen::MatrixXd::Zero(6 * count, 6 * count);
+    for (std::size_t j = 0; j < rows_.size(); ++j) {
+      if (at[j] < 0) continue;
+      for (const Shared& s : rows_[j]) {
+        if (at[s.joint] < 0) continue;
+        out.block<6, 6>(6 * at[s.joint], 6 * at[j]) = block(s, turn(j), turn(s.joint)).transpose();
+      }
+      for (int r = 0; r < 6; ++r) out(6 * at[j] + r, 6 * at[j] + r) += ridge(6 * column_[j] + r);
+    }
+    return out;
+  }
+
   /// The stiffness where joints are turned. In: turn(joint)  its rotation
   template <class Turn>
   Sparse matrix(const Turn& turn) const {
@@ -346,6 +362,27 @@ void take_step(const Problem& problem, State& state, const System& system,
   }
 }
 
+/// The step of an expression that some joints take no part in.
+Eigen::VectorXd solve_few(const State& state, const System& system, std::size_t e,
+                          const Eigen::VectorXd& right) {
+  std::vector<int> at(state.joints.size(), -1);
+  int count = 0;
+  for (std::size_t j = 0; j < at.size(); ++j) {
+    if (system.column(j) >= 0 && !state.joints[j].is_idle(e)) at[j] = count++;
+  }
+  const Eigen::MatrixXd matrix =
+      system.among(at, count, [&](std::size_t j) { return state.joints[j].rotations[e]; });
+  Eigen::VectorXd part(6 * count), out = Eigen::VectorXd::Zero(right.size());
+  for (std::size_t j = 0; j < at.size(); ++j) {
+    if (at[j] >= 0) part.segment<6>(6 * at[j]) = right.segment<6>(6 * system.column(j));
+  }
+  part = matrix.llt().solve(part);
+  for (std::size_t j = 0; j < at.size(); ++j) {
+    if (at[j] >= 0) out.segment<6>(6 * system.column(j)) = part.segment<6>(6 * at[j]);
+  }
+  return out;
+}
+
 /// The step of an expression that turns joints far: conjugate gradients on the stiffness there.
 /// Where neighbours turn alike it is that at rest in the joints' own axes, which is the start.
 Eigen::VectorXd solve_turned(const State& state, const System& system, std::size_t e,
@@ -409,6 +446,11 @@ void solve_motions(const Problem& problem, State& state, std::vector<float>& lef
   core::parallel_for(count, problem.threads, [&](std::size_t from, std::size_t to) {
     for (std::size_t e = from; e < to; ++e) {
       const auto column = static_cast<Eigen::Index>(e);
+      if (std::any_of(state.joints.begin(), state.joints.end(),
+                      [&](const Joint& j) { return j.is_idle(e); })) {
+        step.col(column) = solve_few(state, system, e, right.col(column));
+        continue;
+      }
       const bool turned =
           std::any_of(state.joints.begin(), state.joints.end(), [&](const Joint& j) {
             return j.rotations[e].trace() < 3 - kFar * kFar;  // trace = 1 + 2 cos(angle)
@@ -421,6 +463,60 @@ void solve_motions(const Problem& problem, State& state, std::vector<float>& lef
     }
   });
   take_step(problem, state, system, step, left);
+}
+
+namespace {
+
+/// [E] the expression of the other side, itself in the middle; empty where the mesh has no mirror.
+std::vector<std::size_t> other_sides(const Problem& problem) {
+  std::vector<std::size_t> out;
+  if (problem.mirror.empty()) return out;
+  const auto& known = problem.mirror.expressions;
+  out.assign(problem.expressions, 0);
+  std::size_t added = known.size();  // those that were missing, in order
+  for (std::size_t e = 0; e < known.size(); ++e) {
+    out[e] = known[e] == Mirror::kNone ? added++ : known[e];
+    out[out[e]] = e;
+  }
+  return out;
+}
+
+}  // namespace
+
+void thin_out(const Problem& problem, State& state, double least) {
+  const ByJoint weights = by_joint(state);
+  const std::size_t count = problem.expressions;
+  std::vector<std::vector<bool>> small(state.joints.size());
+  core::parallel_for(state.joints.size(), problem.threads, [&](std::size_t from, std::size_t to) {
+    std::vector<double> most(count);
+    for (std::size_t j = from; j < to; ++j) {
+      most.assign(count, 0.0);
+      for (const auto& entry : weights.of[j]) {
+        const Vec3 p = entry.weight * problem.positions[entry.vertex];
+        for (std::size_t e = 0; e < count; ++e) {
+          const Affine& m = state.joints[j].motions[e];
+          most[e] =
+              std::max(most[e], (m.leftCols<3>() * p + entry.weight * m.col(3)).squaredNorm());
+        }
+      }
+      for (const double square : most) small[j].push_back(square < least * least);
+    }
+  });
+  const std::vector<std::size_t> other = other_sides(problem);
+  for (std::size_t j = 0; j < state.joints.size(); ++j) {
+    Joint& joint = state.joints[j];
+    if (joint.given) continue;
+    joint.idle.resize(count);
+    for (std::size_t e = 0; e < count; ++e) {
+      // Both sides do it, or none.
+      const bool also = other.empty() || small[joint.mirrored][other[e]];
+      if (!small[j][e] || !also) continue;
+      joint.idle[e] = true;
+      joint.rotations[e] = Mat3::Identity();
+      joint.translations[e] = Vec3::Zero();
+      update_motion(joint, e);
+    }
+  }
 }
 
 namespace {

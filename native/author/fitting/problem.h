@@ -55,6 +55,9 @@ struct Joint {
   std::vector<Mat3> rotations;     // [E]
   std::vector<Vec3> translations;  // [E]
   std::vector<Affine> motions;     // [E] of the two above
+  std::vector<bool> idle;          // [E] it takes no part in the expression; empty: in all of them
+
+  bool is_idle(std::size_t expression) const { return !idle.empty() && idle[expression]; }
 };
 
 struct Influence {
@@ -72,6 +75,8 @@ void solve_weights(const Problem& problem, State& state);
 /// Best motions for the weights that there are.
 /// In: left  what remains of the displacements, see find_residual
 void solve_motions(const Problem& problem, State& state, std::vector<float>& left);
+/// Joints leave the expressions in which they move no vertex by `least`, for good.
+void thin_out(const Problem& problem, State& state, double least);
 /// Out: [V][E][3] displacements less what the joints do
 void find_residual(const Problem& problem, const State& state, std::vector<float>& left);
 /// Joints where the given ones leave most, until there are `count`.

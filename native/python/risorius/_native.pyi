@@ -1140,6 +1140,8 @@ def fit_joints(
     rounds: int,
     symmetric: bool,
     threads: int,
+    least_effect: float,
+    bound: bool,
     pivots: npt.ArrayLike,
     pivot_expressions: Sequence[Sequence[int]],
     progress: Callable[[float], bool | None] | None,

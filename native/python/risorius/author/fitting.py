@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +14,7 @@ from .._native import JointFit
 from .pivots import Pivot
 from .skeleton import Doubles, Ints, rotation_vectors
 
-__all__ = ["FitOptions", "JointFit", "Progress", "fit_joints", "fit_weights"]
+__all__ = ["FitOptions", "JointFit", "Progress", "bounded", "fit_joints", "fit_weights"]
 
 Progress = Callable[[float], bool | None]
 
@@ -30,6 +30,15 @@ class FitOptions:
     rounds: int = 20
     symmetric: bool = True  # where the mesh is
     threads: int = 0  # 0: all cores; the result does not depend on it
+    # A joint takes no part in an expression in which it moves no vertex so far, in the mesh' unit.
+    least_effect: float = 0.0
+    bound: bool = False  # of the second half of the rounds, that with the smallest largest error
+
+
+def bounded(options: FitOptions) -> FitOptions:
+    """The same, with the largest error fought for several times as long."""
+    rounds, emphasis = max(options.rounds, 200), max(options.emphasis, 5.0)
+    return replace(options, rounds=rounds, emphasis=emphasis, bound=True)
 
 
 def split_motions(motions: Doubles, positions: Doubles) -> tuple[Doubles, Doubles]:
@@ -88,6 +97,8 @@ def fit_joints(
         rounds=o.rounds,
         symmetric=o.symmetric,
         threads=o.threads,
+        least_effect=o.least_effect,
+        bound=o.bound,
         pivots=np.array([pivot.position for pivot in pivots]).reshape(-1, 3),
         pivot_expressions=[list(pivot.expressions) for pivot in pivots],
         progress=progress,

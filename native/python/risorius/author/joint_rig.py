@@ -87,7 +87,8 @@ def make_joint_rig(
     shaped = [m for m in listed_meshes(dna, 0) if m in needs]
     # The fit is nearly all of the work; levels and weights take what is left of the bar.
     room = room_for_second(work, shaped, wanted, o.fit.joints)
-    own = replace(o.fit, joints=o.fit.joints - room)
+    unit = MM.get(dna.translation_unit, 10.0)
+    own = replace(o.fit, joints=o.fit.joints - room, least_effect=o.least_effect_mm / unit)
     jaw = _jaw(work)
     fit, weights = _fit(work, shaped, wanted, jaw, own, _part(progress, 0.0, 0.8))
     work.parents = choose_parents(work, shaped, fit, weights, jaw)
@@ -104,7 +105,6 @@ def make_joint_rig(
         if progress is not None and progress(0.8 + 0.2 * (lod + 1) / work.levels) is False:
             raise DnaError("stopped")
     made.finish()
-    unit = MM.get(dna.translation_unit, 10.0)
     tallest = max(
         (
             np.ptp(np.asarray(dna.meshes[m].positions, np.float64)[:, 1])

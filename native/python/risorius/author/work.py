@@ -31,8 +31,8 @@ class RigOptions:
     fit: FitOptions = field(default_factory=FitOptions)
     # A blend shape keeps what joints leave of a vertex beyond this, in mm; None: no blend shapes.
     tolerance_mm: float | None = 0.05
-    # A joint does not follow an expression in which it moves no vertex further than this.
-    least_effect_mm: float = 0.02
+    # A joint takes no part in an expression in which it moves no vertex further: others take over.
+    least_effect_mm: float = 0.05
     lods: LodOptions = field(default_factory=LodOptions)
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..author.fitting import bounded
 from ..author.input.spec import read_face, read_spec
 from ..author.joint_rig import JointRig, make_joint_rig
 from ..base.words import counted
@@ -20,8 +21,8 @@ from .pages.authoring import need_plot, write_report
 _DESCRIPTION = """\
 Finds joints, skin weights and joint motions that repeat the expressions of a face, and writes them
 as a DNA file; what joints leave beyond a tolerance stays as blend shapes. SPEC.toml says where the
-face is (a DNA file whose expressions are blend shapes, or a neutral OBJ file and a folder with one
-OBJ file for each expression) and what the rig is to be: docs/authoring.md has every entry."""
+face is (a DNA file whose expressions are blend shapes; a glTF or FBX file; a neutral OBJ file and a
+folder with one for each expression) and what the rig is to be: docs/authoring.md has every entry."""
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -38,6 +39,11 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument(
         "--exact", action="store_true", help="blend shapes for all that joints leave"
+    )
+    parser.add_argument(
+        "--bound",
+        action="store_true",
+        help="fight the largest error for several times as long",
     )
     parser.add_argument(
         "--report", type=Path, metavar="PAGE.html", help="a page with pictures of errors and levels"
@@ -66,7 +72,8 @@ def run(args: argparse.Namespace) -> int:
         require_suffix(args.report, (".html",), "--report")
         fileio.check_writable(args.report)
         need_plot()
-    options = replace(spec.options, fit=replace(spec.options.fit, threads=args.threads))
+    fit = replace(spec.options.fit, threads=args.threads)
+    options = replace(spec.options, fit=bounded(fit) if args.bound else fit)
     if args.joints_only:
         options = replace(options, tolerance_mm=None)
     elif args.exact:

@@ -36,6 +36,7 @@ _TABLES: dict[str, dict[str, tuple[type, ...]]] = {
         "emphasis": (int, float),
         "rounds": (int,),
         "symmetric": (bool,),
+        "bound": (bool,),
         "least_effect_mm": (int, float),
     },
     "shapes": {"tolerance_mm": (int, float), "keep": (bool,)},
