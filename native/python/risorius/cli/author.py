@@ -21,8 +21,8 @@ from .pages.authoring import need_plot, write_report
 _DESCRIPTION = """\
 Finds joints, skin weights and joint motions that repeat the expressions of a face, and writes them
 as a DNA file; what joints leave beyond a tolerance stays as blend shapes. SPEC.toml says where the
-face is (a DNA file whose expressions are blend shapes; a glTF or FBX file; a neutral OBJ file and a
-folder with one for each expression) and what the rig is to be: docs/authoring.md has every entry."""
+face is (a DNA file whose expressions are blend shapes; a glTF or FBX file; a neutral OBJ file and
+a folder with one for each expression) and what the rig is to be: see docs/authoring.md."""
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
