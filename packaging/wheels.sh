@@ -6,10 +6,11 @@
 # They lie in build/wheels; what is known of each is in build/wheels/facts.tsv (cross/facts.py).
 # Prints rows `row<TAB>name<TAB>passed<TAB>failed`; exit code 0 only if nothing failed.
 #
-#   wheels.sh [--twice] [PLATFORM[=PYTHON]...]
+#   wheels.sh [--twice] [--tests] [PLATFORM[=PYTHON]...]
 #       of linux-x64, windows-x64, windows-arm64, macos-arm64, macos-x64 and sdist; without one all.
 #       linux-x64=3.13 is that Python's alone. --twice: each once more, from nothing and elsewhere; the
-#       bytes must be the same
+#       bytes must be the same. --tests: the Python tests of files, locks, threads and commands, by the Linux
+#       wheels (windows.sh runs them by those of Windows)
 set -uo pipefail
 source "$(dirname "$0")/setup.sh"
 source "$project/packaging/cross/zig.sh"
@@ -26,14 +27,16 @@ wheels="$project/build/wheels"
 logs="$project/build/logs/wheels"
 facts="$wheels/facts.tsv"
 twice=
+tests=
 platforms=()
 for word; do
   case $word in
     --twice) twice=yes ;;
+    --tests) tests=yes ;;
     sdist) platforms+=(sdist) ;;
     *)
       [[ -n "${versions[${word%=*}]:-}" && ($word != *=* || " ${versions[${word%=*}]} " == *" ${word#*=} "*) ]] || {
-        echo "wheels.sh: $word is none of --twice, sdist, ${all[*]}, or of no Python of theirs" >&2 && exit 2
+        echo "wheels.sh: $word is none of --twice, --tests, sdist, ${all[*]}, or of no Python of theirs" >&2 && exit 2
       }
       platforms+=("$word")
       ;;
@@ -158,6 +161,7 @@ make_platform() { # make_platform PLATFORM[=PYTHON]
     row "inspected, $name" inspected "$1" "$version"
     [ "$version" != 3.11 ] || row "planted faults are found, $1" faults_found "$1" "$version"
     [ "$1" != linux-x64 ] || row "imported, $name" imported "$version"
+    [ "$1" != linux-x64 ] || [ -z "$tests" ] || row "tests, $name" tested "$version"
     [ -z "$twice" ] || row "same bytes twice, $name" same "$1" "$version"
   done
 }
@@ -176,15 +180,23 @@ sdist_builds() { # the wheel of what is in it is the one of the project, byte fo
   return $code
 }
 
-# linux_run VERSION ARGUMENT...: Debian's Python of that version with NumPy and our wheel, as pip takes it
-# for glibc 2.28
-linux_run() {
-  local version=$1 root folder="$cross/try-$1" program=("/usr/bin/python$1")
+# linux_pip VERSION PACKAGE...: into the folder of that Python, as pip takes it for glibc 2.28
+linux_pip() {
+  local version=$1
   shift
-  rm -rf "$folder"
-  "$build_python" -m pip install -q --target "$folder" --no-deps --only-binary :all: --implementation cp \
-    --python-version "$version" --platform manylinux_2_28_x86_64 --platform manylinux_2_17_x86_64 \
-    "numpy==${numpy_of[$version]}" "$(wheel_of linux-x64 "$version")" || return 1
+  "$build_python" -m pip install -q --target "$cross/try-$version" --only-binary :all: --implementation cp \
+    --python-version "$version" --platform manylinux_2_28_x86_64 --platform manylinux_2_17_x86_64 "$@"
+}
+# linux_run VERSION ARGUMENT...: Debian's Python of that version with NumPy and our wheel
+linux_run() {
+  local version=$1 root folder="$cross/try-$1" program=("/usr/bin/python$1") wheel
+  wheel=$(wheel_of linux-x64 "$version")
+  shift
+  if [ "$(cat "$folder/.wheel" 2> /dev/null)" != "$(sha256sum "$wheel")" ]; then
+    rm -rf "$folder"
+    linux_pip "$version" --no-deps "numpy==${numpy_of[$version]}" "$wheel" || return 1
+    sha256sum "$wheel" > "$folder/.wheel"
+  fi
   if [ -n "${suite_of[$version]:-}" ]; then
     root=$(debian_python "$version") || return 1
     program=("$root/usr/lib/x86_64-linux-gnu/ld-linux-x86-64.so.2" --library-path
@@ -194,6 +206,18 @@ linux_run() {
   PYTHONPATH=$folder "${program[@]}" "$@"
 }
 declare -A numpy_of=([3.11]=1.26.4 [3.13]=2.3.5 [3.14]=2.3.5)
+tested() { # tested PYTHON: what of the tests has to do with the system
+  local log="$logs/pytest-$1.log" said
+  linux_pip "$1" -c <(grep -v ^numpy "$project/packaging/requirements.txt") \
+    "numpy==${numpy_of[$1]}" pytest python-osc xxhash matplotlib || return 1
+  (cd "$project" && RISORIUS_SHARED="$cross/none" PYTHONDONTWRITEBYTECODE=1 linux_run "$1" -m pytest -q \
+    -p no:cacheprovider "${tests_of_the_system[@]}") > "$log" 2>&1
+  local code=$?
+  said=$(tail -n 1 "$log")
+  echo "$said"
+  fact linux-x64 "$1" tests "${said% in *}"
+  return $code
+}
 
 mkdir -p "$wheels" "$logs"
 touch "$facts"

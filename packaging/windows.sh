@@ -16,13 +16,11 @@ facts="$project/build/wheels/facts.tsv"
 windows="$project/build/windows"
 export WINEPREFIX="$windows/prefix" WINEDEBUG=-all WINEDLLOVERRIDES="mscoree,mshtml=" WINEARCH=win64
 wine=/usr/lib/wine/wine64 # where Debian has it
-# What each room of the package does with the system: files, locks, bytes, threads, sockets, processes.
-short=(open_files locking fileio dna_saving rig_files clip_file live interrupts odd_bytes command_check dna_golden
-  rig_golden rig_api command_convert)
+files=("${tests_of_the_system[@]}")
 failed=0
 case "${1:-}" in
   "") versions=(3.11) ;;
-  --all) versions=(3.11 3.13) short=() ;;
+  --all) versions=(3.11 3.13) files=(tests/python) ;;
   *) echo "windows.sh: $1 is not --all" >&2 && exit 2 ;;
 esac
 
@@ -110,9 +108,6 @@ for version in "${versions[@]}"; do
   note "wheel installed, Windows $version" "install-$version" install "$version" "$windows/site-$version" || continue
   cp "$project/packaging/cross/windows_plugin.py" "$windows/site-$version/"
   note "every instruction set, scalar bits, Windows $version in wine" "trial-$version" tried "$version" || continue
-  files=("${short[@]/%/.py}")
-  files=("${files[@]/#/tests/python/test_}")
-  [ ${#short[@]} -gt 0 ] || files=(tests/python)
   tests "$version"
 done
 step ""
