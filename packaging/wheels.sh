@@ -203,7 +203,10 @@ linux_run() {
       "$root/usr/lib/x86_64-linux-gnu" "$root/usr/bin/python$version")
     export PYTHONHOME="$root/usr"
   fi
-  PYTHONPATH=$folder "${program[@]}" "$@"
+  # What starts a Python of its own starts this one, whose loader is not the system's.
+  printf '#!/bin/sh\nexec %s "$@"\n' "${program[*]}" > "$folder/python" && chmod +x "$folder/python"
+  printf 'import sys\n\nsys.executable = "%s"\n' "$folder/python" > "$folder/sitecustomize.py"
+  PYTHONPATH=$folder "$folder/python" "$@"
 }
 declare -A numpy_of=([3.11]=1.26.4 [3.13]=2.3.5 [3.14]=2.3.5)
 tested() { # tested PYTHON: what of the tests has to do with the system

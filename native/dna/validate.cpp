@@ -81,13 +81,23 @@ class Checker {
   }
   void row_counts(const Where& where, const Array<std::uint16_t>& lods, std::size_t rows,
                   std::size_t lod_count) {
-    for (std::size_t l = 0; l < lods.size(); ++l) {
+    std::size_t beyond = 0, first_beyond = 0, more = 0, first_more = 0;
+    for (std::size_t l = lods.size(); l-- > 0;) {
       if (lods[l] > rows) {
-        error(ErrorCode::kInvalidValue, (where + ".lods")[l],
-              std::to_string(lods[l]) + " rows, but the table has " + std::to_string(rows));
+        first_beyond = l;
+        ++beyond;
       } else if (l > 0 && lods[l] > lods[l - 1]) {
-        warn((where + ".lods")[l], "more rows than the LOD before it");
+        first_more = l;
+        ++more;
       }
+    }
+    if (beyond > 0) {
+      error(ErrorCode::kInvalidValue, (where + ".lods")[first_beyond],
+            std::to_string(lods[first_beyond]) + " rows, but the table has " +
+                std::to_string(rows) + and_more(beyond - 1));
+    }
+    if (more > 0) {
+      warn((where + ".lods")[first_more], "more rows than the LOD before it" + and_more(more - 1));
     }
     if (rows > 0 && lods.size() != lod_count) {
       warn(where + ".lods", std::to_string(lods.size()) + " entries, but there are " +

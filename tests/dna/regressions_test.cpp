@@ -116,6 +116,19 @@ TEST(FuzzFind010, RefusesToCompileMoreControlsThanIndicesReach) {
   EXPECT_EQ(promises::evaluation(*dna, 0), "");
 }
 
+// One finding for each level whose rows are beyond the table: more of the heap than a few times
+// the file.
+TEST(FuzzFind011, SaysOnceWhatIsWrongWithTheLevelsOfATable) {
+  const auto findings = checked(find("011-rows-of-levels-beyond-the-table.dna"));
+  const auto of_levels = [](const dna::Finding& f) {
+    return f.error.where.find("blend_shape_channels.lods") != std::string::npos;
+  };
+  EXPECT_LE(std::ranges::count_if(findings, of_levels), 3);
+  EXPECT_TRUE(std::ranges::any_of(findings, [&](const dna::Finding& f) {
+    return of_levels(f) && f.error.message.find("more in this list") != std::string::npos;
+  }));
+}
+
 TEST(FuzzFinds, KeepEveryPromise) {
   std::size_t turn = 0;
   for (const auto& path : testing_support::dna_files(testing_support::data_folder() / "fuzz")) {
