@@ -153,7 +153,8 @@ def part(name: str) -> ModuleType:
     try:
         return import_module(f"risorius.{name}")
     except ModuleNotFoundError as error:
-        if error.name != f"risorius.{name}":
+        # A folder of the package may be missing as well as the file in it.
+        if not error.name or not f"risorius.{name}.".startswith(f"{error.name}."):
             raise
         raise UnusableError(
             told("The native module has no {name}: install the add-on anew.", name=name)

@@ -57,6 +57,17 @@ def put_beside(scene: bpy.types.Scene, rig: ArmatureObject) -> bool:
     return free > 0
 
 
+def put_beside_mesh(rig: ArmatureObject, item: bpy.types.Object) -> None:
+    """Move a new face beside what it was made from.
+
+    Args:
+        rig: the deforming armature, whose file has the mesh' own origin.
+        item: the mesh.
+    """
+    place = item.matrix_world.translation
+    parts.controls_there(rig).location = place + Vector((_GAP * _width(rig), 0.0, 0.0))
+
+
 def _taken(there: Iterable[Vector], spot: Vector, shift: float, reach: float) -> bool:
     return any((at - spot - Vector((shift, 0.0, 0.0))).length < reach for at in there)
 

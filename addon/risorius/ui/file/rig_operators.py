@@ -10,12 +10,14 @@ import bpy
 from ... import native
 from ...scene.base import parts
 from ...scene.base.blender_types import MeshObject
-from ...scene.character import build
+from ...scene.character import build, rig_placement
 from ...scene.file import shape_key_head
+from ...scene.frame import evaluate
 from .. import words
 from ..beside import RunsBeside
 from ..blender_types import Context, ExportHelper, Menu, Operator, Result
 from ..common import explain, usable
+from . import framing
 from .import_operators import import_character
 
 
@@ -97,9 +99,9 @@ class RISORIUS_OT_make_rig(RunsBeside, Operator, ExportHelper):
         rig, odd = task.result
         before = set(bpy.data.objects)
         options = build.BuildOptions(materials=False)
-        if import_character(self, context, self.filepath, options, True) != {"FINISHED"}:
+        if import_character(self, context, self.filepath, options) != {"FINISHED"}:
             return {"CANCELLED"}
-        self._lend_materials(before)
+        self._take_place(context, before)
         for sentence in odd[:5]:
             self.report({"WARNING"}, sentence)
         largest = rig.levels[0].largest_with_shapes
@@ -113,12 +115,18 @@ class RISORIUS_OT_make_rig(RunsBeside, Operator, ExportHelper):
         )
         return {"FINISHED"}
 
-    def _lend_materials(self, before: set[bpy.types.Object]) -> None:
+    def _take_place(self, context: Context, before: set[bpy.types.Object]) -> None:
+        """Beside the head, and with its materials."""
         head = bpy.data.objects.get(self._head)
-        fresh = set(bpy.data.objects) - before
-        made = [mesh for o in fresh if parts.is_rig(o) for mesh in parts.meshes_of(o)]
-        if head is not None and made:
-            shape_key_head.take_materials(made[0], cast(MeshObject, head))
+        made = next((o for o in set(bpy.data.objects) - before if parts.is_rig(o)), None)
+        if head is None or made is None:
+            return
+        shape_key_head.take_materials(parts.meshes_of(made)[0], cast(MeshObject, head))
+        rig_placement.put_beside_mesh(made, head)
+        rig_placement.put_beside(context.scene, made)
+        evaluate.bring_up(context, made)
+        if not bpy.app.background:
+            framing.frame(context, made)
 
     def draw(self, context: Context) -> None:
         layout = self.layout
