@@ -101,6 +101,8 @@ tests() { # tests VERSION
 mkdir -p "$logs"
 trap '/usr/lib/wine/wineserver64 -k 2> /dev/null' EXIT # its services would outlive us
 step "wine" && install_packages wine64 && get_zig && note "wine" wine wine_is_ready || exit 1
+# Its scalar bits are compared with those of the wheel of this machine.
+[ -x "$python" ] || { step "wheel of this machine" && make_venv && build_wheel; } || exit 1
 venv_python="$cross/venv/bin/python"
 for version in "${versions[@]}"; do
   step "Windows, Python $version"
