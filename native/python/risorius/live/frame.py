@@ -39,7 +39,7 @@ class Frame(NamedTuple):
     time: float
     """Seconds on the subject's own clock, never going back: the sender's time, else arrival."""
     arrival: float
-    """Seconds on this machine's monotonic clock."""
+    """Seconds of this machine's perf_counter: finer on Windows than monotonic."""
     sequence: int
     """Counts the subject's frames from 1."""
     names: tuple[str, ...]

@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Iterable, Iterator
-from time import monotonic
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -108,7 +108,7 @@ class Decoder:
         Args:
             data: its bytes.
             sender: who sent it, the subject of its faces.
-            now: seconds on this machine's monotonic clock; None asks it.
+            now: seconds of this machine's perf_counter; None asks it.
 
         Returns:
             The faces that are whole with it.
@@ -117,7 +117,7 @@ class Decoder:
             LiveError: it is no OSC, or has a value that no face has; what came before stays.
         """
         found = list(messages(data))
-        now = monotonic() if now is None else now
+        now = perf_counter() if now is None else now
         face = self._faces.hear(sender, now)
         if face is None:
             face = _Face(sender)

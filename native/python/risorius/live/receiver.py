@@ -13,7 +13,7 @@ import threading
 from collections import Counter, deque
 from importlib import resources
 from statistics import median
-from time import monotonic
+from time import perf_counter
 from typing import NamedTuple
 
 from ..base import toml
@@ -220,7 +220,7 @@ class Receiver:
 
     def status(self, subject: str = "") -> Status:
         """What has come so far."""
-        now = monotonic()
+        now = perf_counter()
         with self._lock:
             found = self._find(subject)
             count = self._counts
@@ -249,27 +249,27 @@ class Receiver:
     def _run(self) -> None:
         listener = self._socket
         assert listener is not None
-        window, seen, spent = monotonic(), 0, 0.0
+        window, seen, spent = perf_counter(), 0, 0.0
         while not self._stop.is_set():
             listener.settimeout(_SILENCE if self._decoder.pending() else 0.1)
             try:
                 data, sender = listener.recvfrom(65536)
             except TimeoutError:
-                self._keep(self._decoder.flush(), monotonic())
+                self._keep(self._decoder.flush(), perf_counter())
                 continue
             except OSError:  # Windows reports here that a packet we sent was refused
                 continue
-            now = monotonic()
+            now = perf_counter()
             if now - window >= _WINDOW:
                 window, seen, spent = now, 0, 0.0
             self._take_in(data, sender[0], now)
-            seen, spent = seen + 1, spent + monotonic() - now
+            seen, spent = seen + 1, spent + perf_counter() - now
             if seen >= _MOST_PACKETS[self.source] or spent >= _BUSIEST:
                 # Packets that come meanwhile wait in the system's buffer and are dropped when it is
                 # full: so a flood takes no time from the viewport.
                 self._counts["floods"] += 1
-                self._stop.wait(max(0.0, window + _WINDOW - monotonic()))
-        self._keep(self._decoder.flush(), monotonic())
+                self._stop.wait(max(0.0, window + _WINDOW - perf_counter()))
+        self._keep(self._decoder.flush(), perf_counter())
 
     def _take_in(self, data: bytes, sender: str, now: float) -> None:
         try:
