@@ -53,15 +53,10 @@ class Checker {
   template <class T>
   void below(const Where& where, const Array<T>& indices, std::size_t limit, const char* space) {
     if (indices.empty() || largest(indices) < limit) return;
-    std::size_t first = 0, more = 0;
-    for (std::size_t i = indices.size(); i-- > 0;) {
-      if (indices[i] < limit) continue;
-      first = i;
-      ++more;
-    }
-    error(ErrorCode::kInvalidIndex, where[first],
-          "index " + std::to_string(indices[first]) + ", but there are " + std::to_string(limit) +
-              " " + space + and_more(more - 1));
+    const Odd odd = find_odd(indices.size(), [&](std::size_t i) { return indices[i] >= limit; });
+    error(ErrorCode::kInvalidIndex, where[odd.first],
+          "index " + std::to_string(indices[odd.first]) + ", but there are " +
+              std::to_string(limit) + " " + space + and_more(odd.count - 1));
   }
   void index(const Where& where, std::size_t value, std::size_t limit, const char* space) {
     if (value < limit) return;
@@ -71,33 +66,25 @@ class Checker {
   }
   void finite(const Where& where, const Array<float>& values) {
     if (known_.finite || core::all_finite(values)) return;
-    std::size_t first = 0, more = 0;
-    for (std::size_t i = values.size(); i-- > 0;) {
-      if (core::is_finite(values[i])) continue;
-      first = i;
-      ++more;
-    }
-    warn(where[first], "not a finite number" + and_more(more - 1));
+    const Odd odd =
+        find_odd(values.size(), [&](std::size_t i) { return !core::is_finite(values[i]); });
+    warn(where[odd.first], "not a finite number" + and_more(odd.count - 1));
   }
   void row_counts(const Where& where, const Array<std::uint16_t>& lods, std::size_t rows,
                   std::size_t lod_count) {
-    std::size_t beyond = 0, first_beyond = 0, more = 0, first_more = 0;
-    for (std::size_t l = lods.size(); l-- > 0;) {
-      if (lods[l] > rows) {
-        first_beyond = l;
-        ++beyond;
-      } else if (l > 0 && lods[l] > lods[l - 1]) {
-        first_more = l;
-        ++more;
-      }
+    const auto is_beyond = [&](std::size_t l) { return lods[l] > rows; };
+    const Odd beyond = find_odd(lods.size(), is_beyond);
+    if (beyond.count > 0) {
+      error(ErrorCode::kInvalidValue, (where + ".lods")[beyond.first],
+            std::to_string(lods[beyond.first]) + " rows, but the table has " +
+                std::to_string(rows) + and_more(beyond.count - 1));
     }
-    if (beyond > 0) {
-      error(ErrorCode::kInvalidValue, (where + ".lods")[first_beyond],
-            std::to_string(lods[first_beyond]) + " rows, but the table has " +
-                std::to_string(rows) + and_more(beyond - 1));
-    }
-    if (more > 0) {
-      warn((where + ".lods")[first_more], "more rows than the LOD before it" + and_more(more - 1));
+    const Odd rising = find_odd(lods.size(), [&](std::size_t l) {
+      return l > 0 && lods[l] > lods[l - 1] && !is_beyond(l);
+    });
+    if (rising.count > 0) {
+      warn((where + ".lods")[rising.first],
+           "more rows than the LOD before it" + and_more(rising.count - 1));
     }
     if (rows > 0 && lods.size() != lod_count) {
       warn(where + ".lods", std::to_string(lods.size()) + " entries, but there are " +
@@ -120,6 +107,20 @@ class Checker {
   }
 
  private:
+  struct Odd {
+    std::size_t first = 0, count = 0;
+  };
+  /// Which of so many is_odd says, the first and how many.
+  template <class IsOdd>
+  static Odd find_odd(std::size_t size, const IsOdd& is_odd) {
+    Odd out;
+    for (std::size_t i = size; i-- > 0;) {
+      if (!is_odd(i)) continue;
+      out.first = i;
+      ++out.count;
+    }
+    return out;
+  }
   static std::string and_more(std::size_t n) {
     return n == 0 ? "" : " (and " + std::to_string(n) + " more in this list)";
   }

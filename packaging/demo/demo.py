@@ -143,13 +143,9 @@ def main():
             progress.step()
 
     timed("render 8 pictures of 512 px", sheet)
-    frames = args.out / "frames"
-    frames.mkdir(exist_ok=True)
-    for old in frames.glob("*.png"):
-        old.unlink()
-    timed(
-        f"render {acting.LAST_FRAME} frames of 480 px", lambda: film(frames, 1, acting.LAST_FRAME)
-    )
+    frames = stage.empty_folder(args.out / "frames")
+    last = acting.LAST_FRAME
+    timed(f"render {last} frames of 480 px", lambda: film(frames, 1, last))
 
 
 if __name__ == "__main__":

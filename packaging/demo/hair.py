@@ -32,10 +32,8 @@ def chance(tree, low, high, seed):
 def offset(tree):
     """A socket with how far each point lies beside its edge: wide in the middle of a hair."""
     place = add(tree, "FunctionNodeRandomValue", data_type="FLOAT_VECTOR")
-    place.inputs["Min"].default_value, place.inputs["Max"].default_value = (
-        [-r for r in REACH],
-        REACH,
-    )
+    place.inputs["Min"].default_value = [-r for r in REACH]
+    place.inputs["Max"].default_value = REACH
     hair = add(tree, "GeometryNodeFieldOnDomain", domain="CURVE", data_type="FLOAT_VECTOR")
     along = add(tree, "GeometryNodeSplineParameter")
     spread = add(tree, "ShaderNodeFloatCurve")

@@ -144,10 +144,7 @@ def render(args):
             scene.render.filepath = str(args.out / f"still_{frame:04d}.png")
             bpy.ops.render.render(write_still=True)
         return
-    frames = args.out / "frames"
-    frames.mkdir(exist_ok=True)
-    for old in frames.glob("*.png"):
-        old.unlink()
+    frames = stage.empty_folder(args.out / "frames")
     scene.render.filepath = str(frames / "frame_####.png")
     stage.render_animation(Progress(scene.frame_end - scene.frame_start + 1, "frame"))
 

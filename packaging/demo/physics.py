@@ -22,11 +22,10 @@ import demo  # noqa: E402
 import hair  # noqa: E402
 import install_extension  # noqa: E402
 import numpy as np  # noqa: E402
+import performance  # noqa: E402
 import scene as stage  # noqa: E402
 
-SETTLE = (
-    30  # frames before the acting, in which cloth comes to lie; the acting begins so much later
-)
+SETTLE = 30  # frames in which cloth comes to lie; the acting begins so much later
 MM = 0.001
 ROOT = (0.020, -0.2, 1.708)  # a ray from here backwards meets the forehead where the lock grows
 LOCK_ROWS, LOCK_COLUMNS = 26, 6
@@ -219,12 +218,8 @@ def follow_skin(thing, head):
 
 
 def bake(controls):
-    for thing in bpy.context.selected_objects:
-        thing.select_set(False)
-    controls.select_set(True)
-    bpy.context.view_layer.objects.active = controls
-    if bpy.ops.risorius.bake_physics() != {"FINISHED"}:
-        raise RuntimeError("Bake Physics did not bake")
+    performance.choose(controls)
+    performance.must(bpy.ops.risorius.bake_physics())
 
 
 def main():
@@ -232,8 +227,7 @@ def main():
     args.out.mkdir(parents=True, exist_ok=True)
     bpy.ops.wm.read_factory_settings(use_empty=True)
     demo.timed("install the extension", lambda: install_extension.install(args.extension))
-    bpy.ops.risorius.import_dna(filepath=str(args.dna), lods=[lod == 0 for lod in range(8)])
-    controls = bpy.context.view_layer.objects.active
+    controls = performance.import_face(args.dna, 0)
     collection = controls.users_collection[0]
     scene = bpy.context.scene
     scene.render.fps = acting.FRAME_RATE
@@ -257,10 +251,7 @@ def main():
         for frame in args.only:
             demo.still(args.out / f"still_{frame:04d}.png", frame, 480)
         return
-    frames = args.out / "frames"
-    frames.mkdir(exist_ok=True)
-    for old in frames.glob("*.png"):
-        old.unlink()
+    frames = stage.empty_folder(args.out / "frames")
     demo.timed("render", lambda: demo.film(frames, SETTLE + 1, last))
 
 

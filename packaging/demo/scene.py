@@ -27,6 +27,14 @@ def end_with(main):
     os._exit(code)
 
 
+def empty_folder(folder):
+    """A folder without pictures of an earlier run; itself."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for old in folder.glob("*.png"):
+        old.unlink()
+    return folder
+
+
 def render_animation(progress):
     """Render the scene's frames; progress.step() is called after each."""
 

@@ -102,7 +102,7 @@ def say(text: str, **values: object) -> str:
 def of_error(error: Exception) -> str:
     """What an error says; in the user's language where a sentence was given to it."""
     first = error.args[0] if error.args else ""
-    return local(first) if isinstance(first, Sentence) else str(error)
+    return say(first) if isinstance(first, Sentence) else str(error)
 
 
 def local(text: str) -> str:

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <string>
 
 #include "author/fitting/problem.h"
@@ -55,8 +56,12 @@ void find_neighbours(const std::vector<Edge>& edges, Problem& problem) {
 void take_displacements(const Shapes& shapes, Problem& problem) {
   std::vector<std::uint32_t> alone;
   if (!problem.mirror.empty()) {
+    problem.other_side.assign(problem.mirror.expressions.begin(), problem.mirror.expressions.end());
     for (std::uint32_t e = 0; e < shapes.expressions; ++e) {
-      if (problem.mirror.expressions[e] == Mirror::kNone) alone.push_back(e);
+      if (problem.mirror.expressions[e] != Mirror::kNone) continue;
+      problem.other_side[e] = problem.other_side.size();
+      problem.other_side.push_back(e);
+      alone.push_back(e);
     }
   }
   problem.expressions = shapes.expressions + alone.size();
@@ -172,16 +177,14 @@ void pair_given(const Problem& problem, const std::vector<GivenJoint>& given,
     joints[best].mirrored = j;
     taken[j] = taken[best] = true;
   }
-  std::size_t e = own;
-  for (std::size_t from = 0; from < own; ++from) {
-    if (problem.mirror.expressions[from] != Mirror::kNone) continue;
+  for (std::size_t e = own; e < problem.expressions; ++e) {
+    const std::size_t from = problem.other_side[e];
     for (Joint& joint : joints) {
       const Joint& other = joints[joint.mirrored];
       joint.rotations[e] = flip * other.rotations[from] * flip;
       joint.translations[e] = flip * other.translations[from];
       detail::update_motion(joint, e);
     }
-    ++e;
   }
 }
 
@@ -259,15 +262,17 @@ State start(Problem& problem, const std::vector<GivenJoint>& given, std::size_t 
   return out;
 }
 
-/// The square of the largest error that counts.
-double largest(const Problem& problem, const std::vector<float>& left) {
-  double out = 0.0;
+/// [V] the square of the largest error of each vertex in any expression, as far as it counts.
+std::vector<double> worst_squares(const Problem& problem, const std::vector<float>& left) {
+  std::vector<double> out(problem.vertices);
   for (std::size_t v = 0; v < problem.vertices; ++v) {
     const float* r = left.data() + v * problem.expressions * 3;
     for (std::size_t e = 0; e < problem.expressions; ++e, r += 3) {
-      const double x = double{r[0]}, y = double{r[1]}, z = double{r[2]};
-      out = std::max(out, problem.asked[v] * (x * x + y * y + z * z));
+      const double square =
+          double{r[0]} * double{r[0]} + double{r[1]} * double{r[1]} + double{r[2]} * double{r[2]};
+      out[v] = std::max(out[v], square);
     }
+    out[v] *= problem.asked[v];
   }
   return out;
 }
@@ -275,17 +280,11 @@ double largest(const Problem& problem, const std::vector<float>& left) {
 /// Vertices whose largest error stands out count more from here on.
 void emphasise(Problem& problem, const std::vector<float>& left, double power) {
   if (power <= 0.0) return;
-  std::vector<double> worst(problem.vertices);
+  std::vector<double> worst = worst_squares(problem, left);
   double mean = 0.0;
-  for (std::size_t v = 0; v < problem.vertices; ++v) {
-    const float* r = left.data() + v * problem.expressions * 3;
-    for (std::size_t e = 0; e < problem.expressions; ++e, r += 3) {
-      const double square =
-          double{r[0]} * double{r[0]} + double{r[1]} * double{r[1]} + double{r[2]} * double{r[2]};
-      worst[v] = std::max(worst[v], square);
-    }
-    worst[v] = std::sqrt(problem.asked[v] * worst[v]);
-    mean += worst[v] / static_cast<double>(problem.vertices);
+  for (double& w : worst) {
+    w = std::sqrt(w);
+    mean += w / static_cast<double>(problem.vertices);
   }
   double sum = 0.0;
   for (std::size_t v = 0; v < problem.vertices; ++v) {
@@ -488,6 +487,33 @@ void improve(const Problem& problem, State& state, std::vector<float>& left) {
   detail::find_residual(problem, state, left);
 }
 
+/// What a round would end at, kept where its largest error is the smallest so far.
+struct Best {
+  std::optional<State> state;
+  double largest = std::numeric_limits<double>::infinity();  // squared
+
+  void take(const Problem& problem, const State& now, std::vector<float> left) {
+    State tried = now;
+    detail::solve_motions(problem, tried, left);
+    const double worst = std::ranges::max(worst_squares(problem, left));
+    if (worst >= largest) return;
+    largest = worst;
+    state = std::move(tried);
+  }
+};
+
+/// Joints leave the expressions in which they do little, and the others take over.
+void thin_out(const Problem& problem, double least_effect, State& state, std::vector<float>& left) {
+  for (const double share : kThinning) {
+    detail::leave_expressions(problem, state, share * least_effect * problem.scale);
+    detail::find_residual(problem, state, left);
+    detail::solve_motions(problem, state, left);
+    detail::solve_weights(problem, state);
+    detail::find_residual(problem, state, left);
+    detail::solve_motions(problem, state, left);
+  }
+}
+
 }  // namespace
 
 core::Result<Fit> fit_joints(const Shapes& shapes, const FitOptions& options,
@@ -512,42 +538,23 @@ core::Result<Fit> fit_joints(const Shapes& shapes, const FitOptions& options,
       if (!steps.go_on()) return stopped();
     }
   }
-  State best = state;
-  double least = std::numeric_limits<double>::infinity();
+  Best best;
   for (std::size_t r = 0; r < options.rounds; ++r) {
     problem.to_pivots =
         r + kRoundsAtPivots >= options.rounds || (options.bound && 2 * r >= options.rounds);
     improve(problem, state, left);
-    if (options.bound && problem.to_pivots) {
-      State tried = state;
-      std::vector<float> left_then = left;
-      detail::solve_motions(problem, tried, left_then);
-      const double worst = largest(problem, left_then);
-      if (worst < least) {
-        least = worst;
-        best = std::move(tried);
-      }
-    }
+    if (options.bound && problem.to_pivots) best.take(problem, state, left);
     // The last two rounds even out what the new importance asked for.
     if (r + 2 < options.rounds) emphasise(problem, left, options.emphasis);
     if (!steps.go_on()) return stopped();
   }
-  if (std::isfinite(least)) {
-    state = std::move(best);
-    detail::find_residual(problem, state, left);
+  if (best.state) {
+    state = std::move(*best.state);
   } else {
     detail::solve_motions(problem, state, left);
   }
   if (!steps.go_on()) return stopped();
-  for (const double share : kThinning) {
-    if (options.least_effect <= 0.0) break;
-    detail::thin_out(problem, state, share * options.least_effect * problem.scale);
-    detail::find_residual(problem, state, left);
-    detail::solve_motions(problem, state, left);
-    detail::solve_weights(problem, state);
-    detail::find_residual(problem, state, left);
-    detail::solve_motions(problem, state, left);
-  }
+  if (options.least_effect > 0.0) thin_out(problem, options.least_effect, state, left);
   return pack(problem, state, shapes.expressions);
 }
 

@@ -467,23 +467,14 @@ void solve_motions(const Problem& problem, State& state, std::vector<float>& lef
 
 namespace {
 
-/// [E] the expression of the other side, itself in the middle; empty where the mesh has no mirror.
-std::vector<std::size_t> other_sides(const Problem& problem) {
-  std::vector<std::size_t> out;
-  if (problem.mirror.empty()) return out;
-  const auto& known = problem.mirror.expressions;
-  out.assign(problem.expressions, 0);
-  std::size_t added = known.size();  // those that were missing, in order
-  for (std::size_t e = 0; e < known.size(); ++e) {
-    out[e] = known[e] == Mirror::kNone ? added++ : known[e];
-    out[out[e]] = e;
-  }
-  return out;
+/// The square of how far a joint moves a vertex by its weight. In: p  the vertex times the weight
+double moved_square(const Affine& motion, const Vec3& p, double weight) {
+  return (motion.leftCols<3>() * p + weight * motion.col(3)).squaredNorm();
 }
 
 }  // namespace
 
-void thin_out(const Problem& problem, State& state, double least) {
+void leave_expressions(const Problem& problem, State& state, double least) {
   const ByJoint weights = by_joint(state);
   const std::size_t count = problem.expressions;
   std::vector<std::vector<bool>> small(state.joints.size());
@@ -494,15 +485,13 @@ void thin_out(const Problem& problem, State& state, double least) {
       for (const auto& entry : weights.of[j]) {
         const Vec3 p = entry.weight * problem.positions[entry.vertex];
         for (std::size_t e = 0; e < count; ++e) {
-          const Affine& m = state.joints[j].motions[e];
-          most[e] =
-              std::max(most[e], (m.leftCols<3>() * p + entry.weight * m.col(3)).squaredNorm());
+          most[e] = std::max(most[e], moved_square(state.joints[j].motions[e], p, entry.weight));
         }
       }
       for (const double square : most) small[j].push_back(square < least * least);
     }
   });
-  const std::vector<std::size_t> other = other_sides(problem);
+  const auto& other = problem.other_side;
   for (std::size_t j = 0; j < state.joints.size(); ++j) {
     Joint& joint = state.joints[j];
     if (joint.given) continue;
@@ -530,8 +519,7 @@ int pivot_of(const Problem& problem, const Joint& joint,
   for (const auto& entry : weights) {
     const Vec3 p = entry.weight * problem.positions[entry.vertex];
     for (std::size_t e = 0; e < problem.expressions; ++e) {
-      const Affine& m = joint.motions[e];
-      const double moved = (m.leftCols<3>() * p + entry.weight * m.col(3)).squaredNorm();
+      const double moved = moved_square(joint.motions[e], p, entry.weight);
       energy[e] += moved;
       all += moved;
     }

@@ -25,6 +25,7 @@ struct Problem {
   std::vector<std::uint32_t> first_neighbour, neighbours;  // of vertices, as rows of a CSR matrix
   std::vector<double> motion;  // [V] root of the summed squares of its displacements
   Mirror mirror;
+  std::vector<std::size_t> other_side;  // [E] the expression of the other side; empty: no mirror
   struct Pivot {
     Vec3 position = Vec3::Zero();
     std::vector<bool> expressions;  // [E]
@@ -76,7 +77,7 @@ void solve_weights(const Problem& problem, State& state);
 /// In: left  what remains of the displacements, see find_residual
 void solve_motions(const Problem& problem, State& state, std::vector<float>& left);
 /// Joints leave the expressions in which they move no vertex by `least`, for good.
-void thin_out(const Problem& problem, State& state, double least);
+void leave_expressions(const Problem& problem, State& state, double least);
 /// Out: [V][E][3] displacements less what the joints do
 void find_residual(const Problem& problem, const State& state, std::vector<float>& left);
 /// Joints where the given ones leave most, until there are `count`.

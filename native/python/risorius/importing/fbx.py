@@ -8,6 +8,7 @@ import zlib
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -88,6 +89,12 @@ class Node:
         node = self.first(name)
         value = node.values[0] if node is not None and node.values else None
         return value.unfold() if isinstance(value, Packed) else np.zeros(0)
+
+    def length(self, name: str) -> int:
+        """How many numbers the array has, as the file says before it is unfolded."""
+        node = self.first(name)
+        value = node.values[0] if node is not None and node.values else None
+        return value.count if isinstance(value, Packed) else 0
 
 
 def is_fbx(data: bytes) -> bool:
@@ -222,6 +229,16 @@ class Scene:
         if curve not in self._keys:
             self._keys[curve] = _keys(self, self.objects[curve], self.notes)
         return self._keys[curve]
+
+    @cached_property
+    def children(self) -> dict[int, list[int]]:
+        """The other way round, in the order of objects in `parents`; each child once."""
+        out: dict[int, list[int]] = {}
+        for child, links in self.parents.items():
+            self.budget.work(len(links), "connections")
+            for parent in dict.fromkeys(at for at, _ in links):
+                out.setdefault(parent, []).append(child)
+        return out
 
     def of_kind(self, kind: str) -> dict[int, Node]:
         return {i: node for i, node in self.objects.items() if node.name == kind}

@@ -18,7 +18,7 @@ from ...base.budget import Budget
 from ...importing.fbx import Node, Parser, Scene, is_fbx, object_name, properties, read_scene
 from ...importing.source import read_bytes
 from ..skeleton import Doubles, Ints
-from .obj import ObjMesh, ShapeFileError
+from .obj import ObjMesh, ShapeFileError, choose_mesh
 
 SUFFIX = ".fbx"
 _SKIPPED = frozenset(("Video", "Texture", "Material", "Pose", "Implementation"))
@@ -63,27 +63,15 @@ def read_fbx(path: Path, mesh: str = "") -> tuple[ObjMesh, dict[str, Doubles]]:
 
 def _choose(scene: Scene, path: Path, wanted: str) -> int:
     """The mesh of that name, or the one with most vertices in blend shapes."""
-    best, most, names = -1, 0, []
+    found = []
     for number, node in scene.of_kind("Geometry").items():
         if _class_of(node) != "Mesh":
             continue
-        size = sum(1 + shape.array("Indexes").size for _, shape in _shapes(scene, number))
-        if not size:
-            continue
-        owner = _model_of(scene, number)
-        name = object_name(scene.objects[owner]) if owner else object_name(node)
-        names.append(name)
-        if wanted and wanted == name:
-            return number
-        if size > most:
-            best, most = number, size
-    if best < 0:
-        raise ShapeFileError(f"{path}: a mesh with blend shapes was expected, found none")
-    if wanted:
-        raise ShapeFileError(
-            f"{path}: source.mesh: one of {', '.join(names)} was expected, found {wanted}"
-        )
-    return best
+        size = sum(1 + shape.length("Indexes") for _, shape in _shapes(scene, number))
+        if size:
+            owner = _model_of(scene, number)
+            found.append((number, object_name(scene.objects[owner] if owner else node), size))
+    return choose_mesh(path, "blend shapes", found, wanted)
 
 
 def _class_of(node: Node) -> str:
@@ -92,12 +80,12 @@ def _class_of(node: Node) -> str:
 
 def _below(scene: Scene, parent: int, kind: str, tag: str) -> Iterator[tuple[int, Node]]:
     """Objects of a kind that hang on another, in the file's order."""
-    for number, links in scene.parents.items():
+    below = scene.children.get(parent, [])
+    scene.budget.work(len(below), "connections")
+    for number in below:
         node = scene.objects.get(number)
         if node is not None and node.name == kind and _class_of(node) == tag:
-            scene.budget.work(len(links), "connections")
-            if any(at == parent for at, _ in links):
-                yield number, node
+            yield number, node
 
 
 def _shapes(scene: Scene, mesh: int) -> list[tuple[str, Node]]:

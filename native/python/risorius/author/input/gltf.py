@@ -13,7 +13,7 @@ from ...importing import named_json
 from ...importing.gltf import Document, is_glb, is_gltf, open_glb, open_gltf
 from ...importing.source import decode, read_bytes
 from ..skeleton import Doubles, Ints
-from .obj import ObjMesh, ShapeFileError
+from .obj import ObjMesh, ShapeFileError, choose_mesh
 
 SUFFIXES = (".glb", ".gltf")
 _COMPRESSED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression")
@@ -53,23 +53,12 @@ def read_gltf(path: Path, mesh: str = "") -> tuple[ObjMesh, dict[str, Doubles]]:
 def _choose(document: Document, path: Path, wanted: str) -> int:
     """The mesh of that name, or the one with most vertices in morph targets."""
     rows = document.json.get("meshes")
-    best, most, names = -1, 0, []
+    found = []
     for number, row in enumerate(rows if isinstance(rows, list) else []):
         size = sum(_targets(p) * _vertices(document, p) for p in _primitives(document, row, number))
         if size:
-            name = row.get("name")
-            names.append(str(name))
-            if wanted and name == wanted:
-                return number
-        if size > most:
-            best, most = number, size
-    if best < 0:
-        raise ShapeFileError(f"{path}: a mesh with morph targets was expected, found none")
-    if wanted:
-        raise ShapeFileError(
-            f"{path}: source.mesh: one of {', '.join(names)} was expected, found {wanted}"
-        )
-    return best
+            found.append((number, str(row.get("name")), size))
+    return choose_mesh(path, "morph targets", found, wanted)
 
 
 def _primitives(document: Document, row: object, number: int) -> list[dict[str, Any]]:

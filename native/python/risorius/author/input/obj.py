@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -56,6 +57,29 @@ def read_obj(path: Path) -> ObjMesh:
     if not positions or not faces:
         raise ShapeFileError(f"{path}: vertices and polygons were expected, found none")
     return ObjMesh(np.array(positions), np.array(uvs).reshape(-1, 2), faces, uv_faces)
+
+
+def choose_mesh(path: Path, what: str, found: Sequence[tuple[int, str, int]], wanted: str) -> int:
+    """The number of the mesh to read of a file that may have several.
+
+    Args:
+        path: of the file.
+        what: its format's word for blend shapes.
+        found: number, name and vertices in blend shapes of each mesh that has any.
+        wanted: its name; "": the one with most.
+
+    Raises:
+        ShapeFileError: none, or none of that name.
+    """
+    if not found:
+        raise ShapeFileError(f"{path}: a mesh with {what} was expected, found none")
+    if not wanted:
+        return max(found, key=lambda row: row[2])[0]
+    for number, name, _ in found:
+        if name == wanted:
+            return number
+    names = ", ".join(name for _, name, _ in found)
+    raise ShapeFileError(f"{path}: source.mesh: one of {names} was expected, found {wanted}")
 
 
 def read_positions(path: Path, count: int) -> Doubles:
