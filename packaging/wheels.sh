@@ -167,8 +167,8 @@ make_platform() { # make_platform PLATFORM[=PYTHON]
 }
 make_sdist() {
   rm -f "$wheels"/risorius-*.tar.gz
-  "$build_python" -m pip wheel --help > /dev/null &&
-    (cd "$project" && "$build_python" -c "from scikit_build_core.build import build_sdist; build_sdist('$wheels')")
+  # In the project it would look at every file of build/, for a quarter of an hour where Windows was run.
+  (cd "$elsewhere" && "$build_python" -c "from scikit_build_core.build import build_sdist; build_sdist('$wheels')")
 }
 sdist_builds() { # the wheel of what is in it is the one of the project, byte for byte
   local work
@@ -239,7 +239,7 @@ PATH="$cross/wheels/bin:$PATH"
 pybind11=$("$build_python" -m pybind11 --cmakedir)
 zig_lib=$("$cross/venv/bin/python" -c \
   'import pathlib, ziglang; print(pathlib.Path(ziglang.__file__).with_name("lib"))')
-[ -z "$twice" ] || copy_elsewhere
+copy_elsewhere
 for platform in "${platforms[@]}"; do
   step "$platform"
   if [ "$platform" = sdist ]; then

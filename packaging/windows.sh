@@ -100,9 +100,11 @@ tests() { # tests VERSION
 
 mkdir -p "$logs"
 trap '/usr/lib/wine/wineserver64 -k 2> /dev/null' EXIT # its services would outlive us
-step "wine" && install_packages wine64 && get_zig && note "wine" wine wine_is_ready || exit 1
-# Its scalar bits are compared with those of the wheel of this machine.
+step "wine" && install_packages wine64 || exit 1
+# Its scalar bits are compared with those of the wheel of this machine; before zig, whose ccache has
+# another kind of compiler.
 [ -x "$python" ] || { step "wheel of this machine" && make_venv && build_wheel; } || exit 1
+step "wine is ready" && get_zig && note "wine" wine wine_is_ready || exit 1
 venv_python="$cross/venv/bin/python"
 for version in "${versions[@]}"; do
   step "Windows, Python $version"
