@@ -7,6 +7,7 @@
 namespace risorius::bindings {
 
 void bind_author(py::module_& m);
+void bind_correct(py::module_& m);
 void bind_clip(py::module_& m);
 void bind_dna(py::module_& m);
 void bind_edit(py::module_& m);
@@ -52,6 +53,7 @@ PYBIND11_MODULE(_native, m) {
   risorius::bindings::bind_rig(m);
   risorius::bindings::bind_edit(m);
   risorius::bindings::bind_author(m);
+  risorius::bindings::bind_correct(m);
   risorius::bindings::bind_files(m);
   risorius::bindings::bind_mixer(m);
   risorius::bindings::bind_clip(m);

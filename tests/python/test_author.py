@@ -571,7 +571,7 @@ def test_bad_input_is_one_sentence(tmp_path):
     neutral.write_text(text, encoding="utf-8")
     plain = path.read_text(encoding="utf-8")
     for change, words in (
-        ("[joint]\n", "joint: one of name, source, joints, shapes, lods, controls was expected"),
+        ("[joint]\n", "joint: one of name, source, joints, shapes, correctives, lods, controls"),
         ("number = 3\n", "joints.number: one of count"),
         ("rounds = 1.5\n", "joints.rounds: 1.5 is of another kind"),
         ("influences = 99\n", "1 to 16 were expected, found 99"),

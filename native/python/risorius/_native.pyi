@@ -1167,6 +1167,68 @@ def fit_weights(
 ) -> JointFit:
     """JointFit with these joints: see risorius.author.fitting."""
 
+class FaultSums:
+    """What is worse than allowed, in one number of each kind."""
+
+    @property
+    def volume(self) -> float:
+        """mm3: depth times area."""
+    @property
+    def deepest(self) -> float:
+        """mm beyond what is allowed."""
+    @property
+    def stretched(self) -> int:
+        """Faces of more than 2.5 times their area."""
+    @property
+    def folded(self) -> int:
+        """Edges whose faces lie on one another."""
+
+class SkinFaults:
+    """What may be wrong with a pose of a skin."""
+
+    def __init__(
+        self, depth: npt.ArrayLike, stretch: npt.ArrayLike, fold: npt.ArrayLike
+    ) -> None: ...
+    @property
+    def depth(self) -> _F32:
+        """float32[V], mm inside of a solid, or of the skin itself."""
+    @property
+    def stretch(self) -> _F32:
+        """float32[F], area beside the neutral one."""
+    @property
+    def fold(self) -> _F32:
+        """float32[inner edges], cosine between the normals of both faces."""
+
+class SkinChecker:
+    """See risorius.author.correctives."""
+
+    def __init__(
+        self,
+        neutral: npt.ArrayLike,
+        face_offsets: npt.ArrayLike,
+        corners: npt.ArrayLike,
+        solids: Sequence[tuple[npt.ArrayLike, _Int]],
+        mm: _Float,
+    ) -> None: ...
+    @property
+    def shown(self) -> npt.NDArray[np.bool_]:
+        """bool[V]: what somebody may see; nothing else is asked to stay outside."""
+    def nearest(self, points: npt.ArrayLike, normals: npt.ArrayLike) -> tuple[_U32, _F64, _F64]:
+        """uint32[n, 3] corners of the nearest triangle of the neutral skin, float64[n, 3] shares of
+        them, float64[n] mm."""
+    def look(self, skin: npt.ArrayLike, solids: Sequence[npt.ArrayLike]) -> SkinFaults:
+        """SkinFaults of a pose."""
+    def sum(self, faults: SkinFaults, allowed: SkinFaults) -> FaultSums:
+        """FaultSums."""
+    def repair(
+        self,
+        skin: npt.ArrayLike,
+        solids: Sequence[npt.ArrayLike],
+        allowed: SkinFaults,
+        without: Sequence[npt.ArrayLike],
+    ) -> tuple[_F64, FaultSums, FaultSums]:
+        """float64[V, 3] to be added, FaultSums before and after."""
+
 def simplify(
     positions: npt.ArrayLike,
     attributes: npt.ArrayLike,

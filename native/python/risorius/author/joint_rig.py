@@ -16,6 +16,7 @@ from ..base.errors import ArgumentError
 from ..rigs.edit import regroup
 from ..rigs.rotation import Convention
 from . import skeleton as sk
+from .combinations import Combination, Combinations
 from .fitting import FitOptions, Progress, fit_joints
 from .levels import LodOptions, extend_levels, joint_budgets, joint_order, level_joints
 from .meshes import Made, count_deltas
@@ -55,6 +56,7 @@ class JointRig:
     deltas_before: int  # vertices times targets
     deltas_after: int
     columns: list[int]  # the input of each expression
+    combinations: list[Combination]  # correctives
 
 
 def make_joint_rig(
@@ -90,7 +92,7 @@ def make_joint_rig(
     unit = MM.get(dna.translation_unit, 10.0)
     own = replace(o.fit, joints=o.fit.joints - room, least_effect=o.least_effect_mm / unit)
     jaw = _jaw(work)
-    fit, weights = _fit(work, shaped, wanted, jaw, own, _part(progress, 0.0, 0.8))
+    fit, weights = _fit(work, shaped, wanted, jaw, own, _part(progress, 0.0, 0.7))
     work.parents = choose_parents(work, shaped, fit, weights, jaw)
     fit, weights, work.parents = second_joints(work, shaped, fit, weights, room)
     _order_levels(work, shaped, fit, weights, o)
@@ -102,9 +104,11 @@ def make_joint_rig(
     made = Made(work, o, weights)
     for lod in range(work.levels):
         made.add_level(lod, wanted, needs)
-        if progress is not None and progress(0.8 + 0.2 * (lod + 1) / work.levels) is False:
+        if progress is not None and progress(0.7 + 0.1 * (lod + 1) / work.levels) is False:
             raise DnaError("stopped")
     made.finish()
+    combinations = _combine(work, o, regions, _part(progress, 0.8, 1.0))
+    made.meshes = list(work.dna.meshes)
     tallest = max(
         (
             np.ptp(np.asarray(dna.meshes[m].positions, np.float64)[:, 1])
@@ -121,7 +125,31 @@ def make_joint_rig(
         count_deltas(dna.meshes),
         count_deltas(work.dna.meshes),
         work.columns,
+        combinations,
     )
+
+
+def _combine(
+    work: Work, options: RigOptions, regions: dict[str, list[str]], progress: Progress | None
+) -> list[Combination]:
+    """What joints and shapes do where correctives fire."""
+    if not work.combined:
+        return []
+    found = Combinations(work, options)
+
+    def tell(share: float) -> None:
+        if progress is not None and progress(share) is False:
+            raise DnaError("stopped")
+
+    found.solve(tell)
+    # One group again: what a joint does stands in one.
+    before = len(work.source.joint_names)
+    columns = sk.column_deltas(work.dna, sk.column_count(work.source))[work.columns, before:, :6]
+    values = np.concatenate([columns.transpose(1, 2, 0), found.values()], axis=2)
+    group = _joint_group(work, values, [*work.columns, *found.order])
+    work.dna.joint_groups = [*work.groups, group]
+    work.dna, _ = regroup(work.dna, regions=regions, combinations=0, timed=0)
+    return found.finish(max(1, work.source.lod_count))
 
 
 def _level_count(dna: Dna, options: LodOptions) -> int:
@@ -316,6 +344,20 @@ def _add_behavior(
     for column in range(len(work.columns)):
         values[:, 3:, column] = sk.euler_angles(convention, local[column])
     values *= (options.least_effect_mm <= effects.T)[:, None]
+    work.groups = list(dna.joint_groups)
+    dna.joint_groups = [*work.groups, _joint_group(work, values, work.columns)]
+    work.dna, _ = regroup(dna, regions=regions, combinations=0, timed=0)
+
+
+def _joint_group(work: Work, values: Doubles, columns: Sequence[int]) -> JointGroup:
+    """A joint group of the new joints.
+
+    Args:
+        work: the face.
+        values: float64[new joints, 6, columns].
+        columns: the inputs.
+    """
+    count = len(values)
     # Joints of the coarsest level first: a level is then the beginning of the rows.
     last = np.array([sum(joint in level for level in work.new) for joint in range(count)])
     order = np.argsort(-last, kind="stable")
@@ -324,12 +366,10 @@ def _add_behavior(
     outputs = (9 * joints[:, None] + np.arange(6)).ravel()
     kept = np.flatnonzero(rows.any(axis=1))
     levels = np.repeat(last[order], 6)[kept]
-    group = JointGroup(
+    return JointGroup(
         lods=[int((levels > lod).sum()) for lod in range(work.levels)],
-        input_indices=work.columns,
+        input_indices=list(columns),
         output_indices=outputs[kept],
         values=rows[kept].astype(np.float32),
         joint_indices=np.arange(count) + len(work.source.joint_names),
     )
-    dna.joint_groups = [*dna.joint_groups, group]
-    work.dna, _ = regroup(dna, regions=regions, combinations=0, timed=0)

@@ -88,6 +88,15 @@ def column_count(dna: Dna) -> int:
     return max(most, dna.joint_column_count, len(dna.raw_control_names))
 
 
+def psd_parts(dna: Dna) -> dict[int, frozenset[int]]:
+    """The raw controls of each corrective, by its input."""
+    out: dict[int, set[int]] = {}
+    rows, columns = np.asarray(dna.psds.rows), np.asarray(dna.psds.columns)
+    for row, column in zip(rows.tolist(), columns.tolist(), strict=True):
+        out.setdefault(int(row), set()).add(int(column))
+    return {row: frozenset(parts) for row, parts in sorted(out.items())}
+
+
 def parent_order(dna: Dna) -> list[int]:
     """Joint indices, parents before their children."""
     parents = [int(p) for p in dna.joint_parents]

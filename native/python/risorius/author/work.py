@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .. import Dna, Mesh
+from .. import Dna, JointGroup, Mesh
 from ..base.errors import ArgumentError
 from . import skeleton as sk
 from .fitting import FitOptions, JointFit
@@ -81,7 +81,7 @@ class Work:
 
     source: Dna
     dna: Dna
-    columns: list[int]  # inputs that move a vertex
+    columns: list[int]  # inputs that move a vertex, but correctives
     names: list[str]  # of these
     motions: Doubles  # [C, J, 3, 4] of the joints that were there
     positions: Doubles  # [J, 3]
@@ -90,6 +90,8 @@ class Work:
     new: list[Ints] = field(default_factory=list)  # joints of each level, among the new ones
     pivots: list[Pivot] = field(default_factory=list)
     mirrored: dict[int, int] = field(default_factory=dict)  # joints of the other side
+    groups: list[JointGroup] = field(default_factory=list)  # of the joints that were there
+    combined: dict[int, frozenset[int]] = field(default_factory=dict)  # correctives: their controls
     parents: list[int] = field(default_factory=list)  # of the new joints
     heirs: dict[int, int] = field(
         default_factory=dict
@@ -107,21 +109,19 @@ def begin(dna: Dna) -> Work:
     motions = sk.column_motions(dna, count)
     moving = np.flatnonzero(deltas.any(axis=(1, 2)))
     shaped = {c for mesh in dna.meshes for c in sk.column_shapes(dna, mesh, count)}
-    columns = sorted(shaped | {int(c) for c in moving})
+    together = {c: on for c, on in sk.psd_parts(dna).items() if c in shaped or c in set(moving)}
+    columns = sorted((shaped | {int(c) for c in moving}) - set(together))
     names = [_column_name(dna, column) for column in columns]
     rest = sk.world_matrices(dna, np.zeros((len(dna.joint_names), 9)))
     work = Work(dna, copy.copy(dna), columns, names, motions[columns], rest[:, :3, 3], 0)
+    work.combined = together
     work.head = _head(work)
     return work
 
 
 def _column_name(dna: Dna, column: int) -> str:
     raw = dna.raw_control_names
-    if column < len(raw):
-        return raw[column]
-    rows = np.asarray(dna.psds.rows, np.int64)
-    parts = np.asarray(dna.psds.columns, np.int64)[rows == column]
-    return " x ".join(raw[int(p)] if p < len(raw) else str(p) for p in parts) or f"input {column}"
+    return raw[column] if column < len(raw) else f"input {column}"
 
 
 def _head(work: Work) -> int:

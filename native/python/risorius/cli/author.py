@@ -6,13 +6,22 @@ from __future__ import annotations
 import argparse
 import json
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from ..anim.reactions import load_exclusives
+from ..author.correctives import (
+    CorrectiveOptions,
+    Found,
+    add_correctives,
+    find_correctives,
+)
 from ..author.fitting import bounded
-from ..author.input.spec import read_face, read_spec
+from ..author.input.spec import Spec, read_face, read_spec
 from ..author.joint_rig import JointRig, make_joint_rig
+from ..author.work import RigOptions
 from ..base.words import counted
 from ..files import fileio
 from .files import CommandLineError, require_suffix
@@ -46,6 +55,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="fight the largest error for several times as long",
     )
     parser.add_argument(
+        "--correctives",
+        type=int,
+        metavar="N",
+        help="find N at most for what goes wrong where expressions meet",
+    )
+    parser.add_argument(
         "--report", type=Path, metavar="PAGE.html", help="a page with pictures of errors and levels"
     )
     parser.add_argument("--threads", type=int, default=0, metavar="N", help="0: one for each core")
@@ -54,11 +69,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    from dataclasses import replace
-
     if args.out is None and not args.names:
         raise CommandLineError("author: -o OUT.dna was expected")
     spec = read_spec(args.spec)
+    options, asked = _options(spec, args), _correctives(spec, args)
     dna, controls, odd = read_face(spec)
     for sentence in odd:
         print(f"note: {sentence}", flush=True)
@@ -72,26 +86,71 @@ def run(args: argparse.Namespace) -> int:
         require_suffix(args.report, (".html",), "--report")
         fileio.check_writable(args.report)
         need_plot()
-    fit = replace(spec.options.fit, threads=args.threads)
-    options = replace(spec.options, fit=bounded(fit) if args.bound else fit)
-    if args.joints_only:
-        options = replace(options, tolerance_mm=None)
-    elif args.exact:
-        options = replace(options, tolerance_mm=0.0)
-    begin, last = time.monotonic(), -1.0
-
-    def say(share: float) -> None:
-        nonlocal last
-        if not args.json and (share - last >= 0.1 or share >= 1):
-            last = share
-            print(f"[{time.monotonic() - begin:5.1f} s] {share:4.0%}", flush=True)
-
+    say = _Clock(quiet=args.json)
+    if asked.most or asked.together:
+        say.line("looking for what goes wrong where expressions meet")
+        found = find_correctives(dna, asked, say)
+        dna = add_correctives(dna, found.skin, [(x.controls, x.shape) for x in found.correctives])
+        say.line("\n".join(as_found(found)))
     rig = make_joint_rig(dna, options, say)
     rig.dna.save(args.out)
     if args.report is not None:
         write_report(args.report, dna, rig, args.out)
     print(json.dumps(as_json(rig)) if args.json else "\n".join(as_lines(rig, args.out)))
     return 0
+
+
+def _options(spec: Spec, args: argparse.Namespace) -> RigOptions:
+    fit = replace(spec.options.fit, threads=args.threads)
+    options = replace(spec.options, fit=bounded(fit) if args.bound else fit)
+    if args.joints_only:
+        return replace(options, tolerance_mm=None)
+    return replace(options, tolerance_mm=0.0) if args.exact else options
+
+
+def _correctives(spec: Spec, args: argparse.Namespace) -> CorrectiveOptions:
+    out = replace(spec.correctives, apart=opposites())
+    if args.correctives is None:
+        return out
+    if args.correctives < 0:
+        raise CommandLineError("author: --correctives: 0 or more was expected")
+    return replace(out, most=args.correctives)
+
+
+class _Clock:
+    """Says how far the work is, at every tenth."""
+
+    def __init__(self, *, quiet: bool) -> None:
+        self._quiet, self._begin, self._last = quiet, time.monotonic(), -1.0
+
+    def line(self, text: str) -> None:
+        """Says what is done now; what comes begins at 0."""
+        self._last = -1.0
+        if not self._quiet:
+            print(text, flush=True)
+
+    def __call__(self, share: float) -> None:
+        if not self._quiet and (share - self._last >= 0.1 or share >= 1):
+            self._last = share
+            print(f"[{time.monotonic() - self._begin:5.1f} s] {share:4.0%}", flush=True)
+
+
+def opposites() -> tuple[tuple[str, str], ...]:
+    """Controls that are never looked at together, without prefix."""
+    pairs = load_exclusives().opposites
+    return tuple((a.rpartition(".")[2], b.rpartition(".")[2]) for a, b in pairs)
+
+
+def as_found(found: Found) -> list[str]:
+    """What was wrong, and what is left of it."""
+    a, b = found.before, found.after
+    return [
+        f"{found.looked_at:,} pairs of expressions, {found.faulty:,} of them wrong; "
+        f"{counted(len(found.correctives), 'corrective')}",
+        f"over all pairs: {a['volume']:,.0f} mm3 inside of something, then {b['volume']:,.0f}; "
+        f"{a['stretched']:,.0f} faces torn, then {b['stretched']:,.0f}; "
+        f"{a['folded']:,.0f} folded, then {b['folded']:,.0f}",
+    ]
 
 
 def as_json(rig: JointRig) -> dict[str, object]:
@@ -109,6 +168,15 @@ def as_json(rig: JointRig) -> dict[str, object]:
                 "largest_with_shapes_mm": level.largest_with_shapes,
             }
             for level in rig.levels
+        ],
+        "combinations": [
+            {
+                "name": c.name,
+                "without_mm": c.before,
+                "joints_largest_mm": c.joints_largest,
+                "largest_mm": c.largest,
+            }
+            for c in rig.combinations
         ],
         "deltas": {"before": rig.deltas_before, "after": rig.deltas_after},
         "meshes": [
@@ -158,6 +226,13 @@ def as_lines(rig: JointRig, path: Path) -> list[str]:
         out.append(
             f"{m.name:26} {rms:8.4f} {100 * rms / rig.height_mm:9.4f} "
             f"{m.joints_largest[worst]:11.3f}  {m.expressions[worst]}"
+        )
+    if rig.combinations:
+        off = max(rig.combinations, key=lambda c: c.joints_largest)
+        out.append(
+            f"{counted(len(rig.combinations), 'combination')}: by joints at most "
+            f"{off.joints_largest:.3f} mm ({off.name}), without them "
+            f"{max(c.before for c in rig.combinations):.3f}"
         )
     largest = rig.levels[0].largest_with_shapes
     out.append(

@@ -14,7 +14,7 @@ from ...base.errors import ArgumentError
 from ..polygon_mesh import polygon_mesh, vertex_normals
 from ..skeleton import Doubles
 from .matching import PREFIX
-from .obj import ObjMesh
+from .obj import ObjMesh, ShapeFileError
 
 _LEAST = 1e-6  # of the mesh' size: a vertex that moves less rests
 
@@ -62,6 +62,60 @@ def check_shapes(shapes: ShapeSet) -> list[str]:
         seen.setdefault(key, name)
     if not moving:
         raise ArgumentError("no expression moves a vertex of the neutral mesh")
+    return out
+
+
+def take_combined(shapes: ShapeSet) -> dict[str, Doubles]:
+    """Sculpts of several expressions at once, whose names are theirs with a + between; they are
+    taken out of the expressions.
+
+    Args:
+        shapes: is changed.
+    """
+    out = {name: delta for name, delta in shapes.expressions.items() if "+" in name}
+    for name in out:
+        del shapes.expressions[name]
+    return out
+
+
+def combined_rows(
+    where: str,
+    shapes: ShapeSet,
+    together: Mapping[str, Doubles],
+    controls: Mapping[str, Sequence[str]],
+    raw: Sequence[str],
+) -> list[tuple[tuple[int, ...], Doubles]]:
+    """The raw controls of each sculpt of several expressions, and float64[V, 3] what it has beside
+    the sum of these and of smaller ones among them.
+
+    Args:
+        where: what errors call the file.
+        shapes: the mesh and its single expressions.
+        together: what take_combined gave.
+        controls: raw controls without prefix by expression.
+        raw: names of all raw controls.
+
+    Raises:
+        ShapeFileError: an expression that is not there.
+    """
+    out: list[tuple[tuple[int, ...], Doubles]] = []
+    used: list[frozenset[str]] = []
+    for name in sorted(together, key=lambda n: (n.count("+"), n)):
+        parts = frozenset(part.strip() for part in name.split("+"))
+        for part in sorted(parts):
+            if part not in controls:
+                known = ", ".join(sorted(controls))
+                raise ShapeFileError(
+                    f"{where}: combination {name}: one of {known} was expected, found {part!r}"
+                )
+        delta = together[name] - sum(shapes.expressions[part] for part in parts)
+        for smaller, (_, part_delta) in zip(used, out, strict=True):
+            if smaller < parts:
+                delta = delta - part_delta
+        named = {c for part in parts for c in (controls[part] or [part])}
+        numbers = sorted(i for i, full in enumerate(raw) if full.removeprefix(PREFIX) in named)
+        used.append(parts)
+        out.append((tuple(numbers), delta))
     return out
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from ... import Dna, load
 from ...base import toml
+from ..correctives import CorrectiveOptions, add_correctives
 from ..fitting import FitOptions
 from ..levels import LodOptions
 from ..skeleton import Doubles
@@ -16,7 +17,7 @@ from ..work import RigOptions
 from . import fbx, gltf
 from .matching import assign
 from .obj import ShapeFileError, read_obj, read_positions
-from .shape_face import ShapeSet, check_shapes, make_shape_face
+from .shape_face import ShapeSet, check_shapes, combined_rows, make_shape_face, take_combined
 
 _READERS = {suffix: gltf.read_gltf for suffix in gltf.SUFFIXES} | {fbx.SUFFIX: fbx.read_fbx}
 _BY_BLENDER = (".usd", ".usdc", ".usda", ".usdz", ".abc", ".blend", ".dae")
@@ -40,6 +41,7 @@ _TABLES: dict[str, dict[str, tuple[type, ...]]] = {
         "least_effect_mm": (int, float),
     },
     "shapes": {"tolerance_mm": (int, float), "keep": (bool,)},
+    "correctives": {"most": (int,), "solids": (list,), "triples": (int,), "together": (list,)},
     "lods": {"count": (int,), "joints": (list,), "vertices": (list,)},
 }
 
@@ -52,6 +54,7 @@ class Spec:
     name: str
     source: dict[str, Any]
     options: RigOptions
+    correctives: CorrectiveOptions = field(default_factory=lambda: CorrectiveOptions(most=0))
     controls: dict[str, str | list[str]] = field(default_factory=dict)
 
 
@@ -95,6 +98,7 @@ def read_spec(path: Path) -> Spec:
         str(table.get("name", path.stem)),
         source,
         _options(path, table),
+        _correctives(path, table.get("correctives", {})),
         dict(table.get("controls", {})),
     )
 
@@ -121,6 +125,23 @@ def _options(path: Path, table: dict[str, Any]) -> RigOptions:
     return RigOptions(FitOptions(**named), tolerance, least, lods)
 
 
+def _correctives(path: Path, table: dict[str, Any]) -> CorrectiveOptions:
+    def names(key: str, rows: object) -> tuple[str, ...]:
+        if not isinstance(rows, list) or not all(isinstance(name, str) for name in rows):
+            raise ShapeFileError(f"{path}: correctives.{key}: names were expected, found {rows!r}")
+        return tuple(rows)
+
+    asked = dict(table)
+    for key in ("most", "triples"):
+        if int(asked.get(key, 0)) < 0:
+            raise ShapeFileError(f"{path}: correctives.{key}: 0 or more was expected")
+    asked.setdefault("most", CorrectiveOptions.most if asked else 0)
+    if "solids" in asked:
+        asked["solids"] = names("solids", asked["solids"])
+    asked["together"] = tuple(names("together", row) for row in asked.get("together", []))
+    return CorrectiveOptions(**asked)
+
+
 def read_face(spec: Spec) -> tuple[Dna, dict[str, list[str]], list[str]]:
     """The face of blend shapes that a spec names.
 
@@ -137,9 +158,12 @@ def read_face(spec: Spec) -> tuple[Dna, dict[str, list[str]], list[str]]:
     if "dna" in spec.source:
         return load(folder / spec.source["dna"]), {}, []
     shapes = _read_shapes(spec, folder)
+    together = take_combined(shapes)
     odd = check_shapes(shapes)
     controls = assign(shapes.expressions, spec.controls)
-    return make_shape_face(shapes, controls), controls, odd
+    dna = make_shape_face(shapes, controls)
+    rows = combined_rows(str(spec.path), shapes, together, controls, dna.raw_control_names)
+    return add_correctives(dna, 0, rows) if rows else dna, controls, odd
 
 
 def _read_shapes(spec: Spec, folder: Path) -> ShapeSet:

@@ -1,0 +1,300 @@
+# SPDX-License-Identifier: MIT
+"""What joints do where expressions meet: their turns do not add up as shapes do.
+
+The face of joints is to lie where the face of shapes lies with all controls of a corrective at 1.
+What its joints add there is solved at that pose (Gauss and Newton); blend shapes keep what they
+leave.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .. import BlendShapeTarget, Dna, Mesh
+from ..rigs.rotation import Convention
+from . import skeleton as sk
+from .skeleton import Doubles, Ints
+from .work import MM, RigOptions, Work, listed_meshes
+
+_STEPS = 3  # of Gauss and Newton
+_OFF_MM = 0.05  # vertices that are further off are solved for, others hold them
+_MOST_OFF, _MOST_HELD = 1500, 500  # of these, evenly
+_MOST_JOINTS, _LEAST_SHARE = 128, 2e-4  # that take part: of what is off, by the one that does most
+_LEAST_WEIGHT = 0.01
+_DAMPING = 0.01
+
+
+@dataclass
+class Combination:
+    """What is left of a corrective's pose on the finest meshes, mm."""
+
+    name: str
+    before: float  # largest, by joints without the corrective
+    joints_largest: float
+    largest: float  # with blend shapes
+
+
+class _Side:
+    """The face of shapes, or that of joints: where it lies with some inputs at 1."""
+
+    def __init__(self, dna: Dna, columns: int) -> None:
+        self.dna, self.columns = dna, columns
+        self.deltas = sk.column_deltas(dna, columns)
+        self.rest = np.linalg.inv(sk.world_matrices(dna, np.zeros_like(self.deltas[0])))
+
+    def worlds(self, active: Sequence[int], extra: Doubles | float = 0.0) -> Doubles:
+        """float64[joints, 4, 4]."""
+        return sk.world_matrices(self.dna, self.deltas[list(active)].sum(axis=0) + extra)
+
+    def motions(self, worlds: Doubles) -> Doubles:
+        return (worlds @ self.rest)[:, :3]
+
+
+class _Skin:
+    """A mesh as both sides have it."""
+
+    def __init__(self, before: Dna, after: Dna, mesh: Mesh, made: Mesh, columns: int) -> None:
+        self.positions = np.asarray(mesh.positions, np.float64)
+        self.weights = sk.dense_weights(mesh, len(before.joint_names))
+        self._own = self.weights.any(axis=0)
+        dense = sk.dense_weights(made, len(after.joint_names))
+        most = int((dense > 0).sum(axis=1).max(initial=1))
+        self._joints = np.argsort(-dense, axis=1, kind="stable")[:, :most]
+        self._held = np.take_along_axis(dense, self._joints, axis=1)
+        self._count = dense.shape[1]
+        self.shapes = sk.column_shapes(before, mesh, columns)
+        self.made_shapes = sk.column_shapes(after, made, columns)
+
+    def hangs_on(self, first: int) -> bool:
+        """Whether a joint from this one on moves it."""
+        return bool(self._held[self._joints >= first].any())
+
+    def goal(self, side: _Side, active: Sequence[int]) -> Doubles:
+        shaped = self.positions + sum((self.shapes[c] for c in active if c in self.shapes), 0.0)
+        motions = side.motions(side.worlds(active))
+        return sk.skinned(shaped, self.weights[:, self._own], motions[self._own])
+
+    def shaped(self, active: Sequence[int]) -> Doubles:
+        """float64[V, 3] of the face of joints, before them."""
+        return np.asarray(
+            self.positions
+            + sum((self.made_shapes[c] for c in active if c in self.made_shapes), 0.0)
+        )
+
+    def made(self, shaped: Doubles, motions: Doubles) -> Doubles:
+        """float64[V, 3]: where the joints bring it."""
+        flat = motions.reshape(len(motions), 12)
+        blended = sum(
+            self._held[:, k, None] * flat[self._joints[:, k]] for k in range(self._held.shape[1])
+        )
+        turned = np.asarray(blended).reshape(-1, 3, 4)
+        return np.einsum("vij,vj->vi", turned[..., :3], shaped) + turned[..., 3]
+
+    def rows(self, at: Ints) -> Doubles:
+        """float64[n, joints]: weights of some vertices."""
+        out = np.zeros((len(at), self._count))
+        np.put_along_axis(out, self._joints[at], self._held[at], axis=1)
+        return out
+
+    def touched(self, joints: Ints) -> Ints:
+        """The vertices that hang on one of these joints."""
+        there = np.zeros(self._count, bool)
+        there[joints] = True
+        return np.flatnonzero((there[self._joints] & (self._held > 0)).any(axis=1))
+
+
+class Combinations:
+    """The correctives of a face, those of few controls first."""
+
+    def __init__(self, work: Work, options: RigOptions) -> None:
+        self.work, self.options = work, options
+        self.columns = sk.column_count(work.source)
+        self.order = sorted(work.combined, key=lambda c: (len(work.combined[c]), c))
+        self.before = _Side(work.source, self.columns)
+        self.after = _Side(work.dna, self.columns)
+        self.mm = MM.get(work.source.translation_unit, 10.0)
+        self.first = len(work.source.joint_names)
+
+    def active(self, column: int) -> list[int]:
+        """Its controls, and the correctives that are 1 where they are, itself last."""
+        on = self.work.combined[column]
+        smaller = [c for c in self.order if c != column and self.work.combined[c] <= on]
+        return [*sorted(on), *smaller, column]
+
+    def solve(self, tell: Callable[[float], None]) -> None:
+        """Joint values of all correctives, as one group more in the face of joints.
+
+        Args:
+            tell: gets the share that is done.
+        """
+        skins = self._skins(0)
+        for at, column in enumerate(self.order):
+            self._solve_one(column, skins)
+            tell((at + 1) / len(self.order))
+
+    def _skins(self, lod: int) -> list[_Skin]:
+        source, dna = self.work.source, self.work.dna
+        out = []
+        for m in listed_meshes(source, lod):
+            made = dna.meshes[dna.mesh_names.index(source.mesh_names[m])]
+            skin = _Skin(source, dna, source.meshes[m], made, self.columns)
+            if skin.hangs_on(self.first):
+                out.append(skin)
+        return out
+
+    def _solve_one(self, column: int, skins: list[_Skin]) -> None:
+        active = self.active(column)
+        rows, joints = self._rows(skins, active)
+        if not len(joints):
+            return
+        convention = Convention.of(self.work.dna)
+        for _ in range(_STEPS):
+            worlds = self.after.worlds(active)
+            left = rows.goal - sk.skinned(rows.shaped, rows.weights, self.after.motions(worlds))
+            step = self._step(joints, worlds, rows, left)
+            values = self.after.deltas[active].sum(axis=0)[joints, 3:6]
+            turned = sk.matrices_of_vectors(step[:, 3:]) @ sk.rotation_matrices(convention, values)
+            self.after.deltas[column, joints, :3] += step[:, :3]
+            self.after.deltas[column, joints, 3:6] += sk.euler_angles(convention, turned) - values
+        self._leave(column, active, rows, joints)
+
+    def _leave(self, column: int, active: list[int], rows: _Rows, joints: Ints) -> None:
+        """Joints that do nothing that is seen take no part in a corrective."""
+        whole = self.after.motions(self.after.worlds(active))
+        plain = self.after.motions(self.after.worlds(active[:-1]))
+        for joint in joints.tolist():
+            at = np.flatnonzero(rows.weights[:, joint])
+            motion = whole[joint] - plain[joint]
+            moved = rows.shaped[at] @ motion[:, :3].T + motion[:, 3]
+            effect = np.linalg.norm(moved, axis=1) * rows.weights[at, joint]
+            if effect.max(initial=0) * self.mm < self.options.least_effect_mm:
+                self.after.deltas[column, joint] = 0
+
+    def _rows(self, skins: list[_Skin], active: list[int]) -> tuple[_Rows, Ints]:
+        """Vertices that joints do not bring where they belong, some that they do; and the new
+        joints that are asked to."""
+        motions = self.after.motions(self.after.worlds(active))
+        parts, found, errors = [], [], []
+        for skin in skins:
+            goal, shaped = skin.goal(self.before, active), skin.shaped(active[:-1])
+            away = np.linalg.norm(goal - skin.made(shaped, motions), axis=1)
+            off = np.flatnonzero(away * self.mm > _OFF_MM)
+            off = off[:: len(off) // _MOST_OFF + 1]
+            parts.append((skin, goal, shaped, off))
+            found.append(skin.rows(off)[:, self.first :])
+            errors.append(away[off])
+        share = (np.concatenate(found) * np.concatenate(errors)[:, None]) ** 2
+        total = share.sum(axis=0)
+        order = np.argsort(-total, kind="stable")[:_MOST_JOINTS]
+        joints = self.first + np.sort(order[total[order] > _LEAST_SHARE * total.max(initial=0)])
+        out = []
+        for skin, goal, shaped, off in parts:
+            hold = np.setdiff1d(skin.touched(joints), off)
+            at = np.concatenate([off, hold[:: len(hold) // _MOST_HELD + 1]])
+            out.append((goal[at], shaped[at], skin.rows(at)))
+        goals, shapes, weights = (np.concatenate(column) for column in zip(*out, strict=True))
+        return _Rows(goals, shapes, weights), joints
+
+    def _step(self, joints: Ints, worlds: Doubles, rows: _Rows, left: Doubles) -> Doubles:
+        """float64[joints, 6]: shifts and rotation vectors in the parents' frames."""
+        count = len(joints)
+        system = np.zeros((len(left), 3, count, 6))
+        parents = [int(self.work.dna.joint_parents[j]) for j in joints]
+        for at, (joint, parent) in enumerate(zip(joints, parents, strict=True)):
+            held = np.flatnonzero(rows.weights[:, joint] > _LEAST_WEIGHT)
+            turn = worlds[parent, :3, :3]
+            place = np.linalg.inv(worlds[parent]) @ worlds[joint]
+            whole = place @ self.after.rest[joint]
+            arms = rows.shaped[held] @ whole[:3, :3].T + whole[:3, 3] - place[:3, 3]
+            cross = np.zeros((len(held), 3, 3))
+            x, y, z = arms.T
+            cross[:, 0, 1], cross[:, 0, 2], cross[:, 1, 2] = z, -y, x
+            cross -= cross.transpose(0, 2, 1)
+            share = rows.weights[held, joint, None, None]
+            system[held, :, at, :3] = share * turn
+            system[held, :, at, 3:] = share * (turn @ cross)
+        flat = system.reshape(-1, 6 * count)
+        normal = flat.T @ flat
+        diagonal = np.diag(normal)
+        normal += np.diag(_DAMPING * diagonal + 1e-6 * diagonal.max(initial=1e-9) + 1e-12)
+        return np.asarray(np.linalg.solve(normal, flat.T @ left.ravel()).reshape(count, 6))
+
+    def values(self) -> Doubles:
+        """float64[new joints, 6, correctives]: what they add, in the order of `order`."""
+        return self.after.deltas[self.order, self.first :, :6].transpose(1, 2, 0)
+
+    def finish(self, lods: int) -> list[Combination]:
+        """Blend shapes for what joints leave, at so many levels; what is left then.
+
+        Args:
+            lods: levels of the source.
+        """
+        work = self.work
+        self.after = _Side(work.dna, self.columns)
+        channels = work.dna.blend_shape_channels
+        channel = {
+            int(c): int(o)
+            for c, o in zip(channels.input_indices, channels.output_indices, strict=True)
+        }
+        out = [Combination(self._name(c), 0.0, 0.0, 0.0) for c in self.order]
+        done: set[str] = set()
+        meshes = list(work.dna.meshes)
+        for lod in range(lods):
+            for m in listed_meshes(work.source, lod):
+                name = work.source.mesh_names[m]
+                if name in done:
+                    continue
+                done.add(name)
+                at = work.dna.mesh_names.index(name)
+                skin = _Skin(work.source, work.dna, work.source.meshes[m], meshes[at], self.columns)
+                if not skin.hangs_on(self.first):
+                    continue
+                targets = list(meshes[at].blend_shape_targets)
+                for found, column in zip(out, self.order, strict=True):
+                    target = self._left(skin, column, found if lod == 0 else None)
+                    if target is not None and column in channel:
+                        target.blend_shape_channel_index = channel[column]
+                        targets.append(target)
+                meshes[at].blend_shape_targets = targets
+        work.dna.meshes = meshes
+        return out
+
+    def _name(self, column: int) -> str:
+        names = self.work.source.raw_control_names
+        return " x ".join(names[c].rpartition(".")[2] for c in sorted(self.work.combined[column]))
+
+    def _left(self, skin: _Skin, column: int, found: Combination | None) -> BlendShapeTarget | None:
+        active = self.active(column)
+        goal, shaped = skin.goal(self.before, active), skin.shaped(active[:-1])
+        motions = self.after.motions(self.after.worlds(active))
+        error = np.linalg.norm(goal - skin.made(shaped, motions), axis=1)
+        error *= self.mm
+        if found is not None:
+            without = self.after.motions(self.after.worlds(active[:-1]))
+            plain = goal - skin.made(shaped, without)
+            found.before = max(found.before, float(np.linalg.norm(plain, axis=1).max()) * self.mm)
+            found.joints_largest = max(found.joints_largest, float(error.max()))
+        tolerance = self.options.tolerance_mm
+        moved = np.flatnonzero(error > (np.inf if tolerance is None else tolerance))
+        if found is not None:
+            rest = np.delete(error, moved)
+            found.largest = max(found.largest, float(rest.max(initial=0)))
+        if not len(moved):
+            return None
+        wanted = sk.before_skin(goal[moved], skin.rows(moved), motions)
+        delta = np.zeros_like(skin.positions)
+        delta[moved] = wanted - shaped[moved]
+        skin.made_shapes[column] = delta
+        return BlendShapeTarget(deltas=delta[moved], vertex_indices=moved)
+
+
+@dataclass
+class _Rows:
+    """Vertices that a corrective's joints are solved for."""
+
+    goal: Doubles
+    shaped: Doubles
+    weights: Doubles

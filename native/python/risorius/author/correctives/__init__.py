@@ -1,0 +1,7 @@
+# SPDX-License-Identifier: MIT
+"""Correctives: what goes wrong where expressions meet, found and repaired."""
+
+from .adding import add_correctives
+from .search import Corrective, CorrectiveOptions, Found, find_correctives
+
+__all__ = ["Corrective", "CorrectiveOptions", "Found", "add_correctives", "find_correctives"]

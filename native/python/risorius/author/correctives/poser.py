@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: MIT
+"""Where combinations of raw controls bring a skin, and what it is to stay out of."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from functools import reduce
+
+import numpy as np
+
+from ... import Dna, Mesh
+from ..._native import SkinChecker, SkinFaults
+from ...base.errors import ArgumentError
+from .. import skeleton as sk
+from ..simplify import fan_triangles
+from ..skeleton import Doubles
+from ..work import MM, listed_meshes
+
+Controls = tuple[int, ...]
+SOLIDS = ("teeth", "eye")  # meshes that a skin is kept out of, by parts of their names
+_NO_SOLIDS = ("lash", "shell", "edge", "cartilage", "saliva")
+
+
+class Poser:
+    """Where raw controls bring the skin and what it must not go into."""
+
+    def __init__(self, dna: Dna, skin: int, solids: Sequence[int]) -> None:
+        self.dna = dna
+        self.controls = len(dna.raw_control_names)
+        self._columns = sk.column_count(dna)
+        self._deltas = sk.column_deltas(dna, self._columns)
+        neutral = np.zeros_like(self._deltas[0])
+        self._rest = np.linalg.inv(sk.world_matrices(dna, neutral))
+        self._meshes = [_Posed(dna, dna.meshes[m], self._columns) for m in (skin, *solids)]
+        self.added: dict[Controls, Doubles] = {}
+        self._psds = sk.psd_parts(dna)
+
+    @property
+    def neutral(self) -> list[Doubles]:
+        return [mesh.positions for mesh in self._meshes]
+
+    def motions(self, on: Controls) -> Doubles | None:
+        """float64[joints, 3, 4], or None where no joint moves."""
+        deltas = self._deltas[self._active(on)].sum(axis=0)
+        if not deltas.any():
+            return None
+        return (sk.world_matrices(self.dna, deltas) @ self._rest)[:, :3]
+
+    def pose(self, on: Controls, *, corrected: bool = True) -> list[Doubles]:
+        """float64[V, 3] of the skin and of each solid.
+
+        Args:
+            on: controls that are 1.
+            corrected: with what was added to it.
+        """
+        motions, columns, out = self.motions(on), self._active(on), []
+        for number, mesh in enumerate(self._meshes):
+            shaped = mesh.positions + sum(
+                (mesh.shapes[c] for c in columns if c in mesh.shapes), 0.0
+            )
+            if number == 0 and corrected:
+                for parts, shape in self.added.items():
+                    if set(parts) <= set(on):
+                        shaped = shaped + shape
+            out.append(shaped if motions is None else sk.skinned(shaped, mesh.weights, motions))
+        return out
+
+    def before_joints(self, on: Controls, displacement: Doubles) -> Doubles:
+        """A displacement of the posed skin as one before the joints.
+
+        Args:
+            on: controls that are 1.
+            displacement: float64[V, 3].
+        """
+        motions = self.motions(on)
+        if motions is None:
+            return displacement
+        weights = self._meshes[0].weights
+        blended = (weights @ motions.reshape(len(motions), 12)).reshape(-1, 3, 4)[..., :3]
+        return np.asarray(np.linalg.solve(blended, displacement[..., None])[..., 0])
+
+    def _active(self, on: Controls) -> list[int]:
+        return [*on, *(column for column, parts in self._psds.items() if parts <= set(on))]
+
+
+class _Posed:
+    def __init__(self, dna: Dna, mesh: Mesh, columns: int) -> None:
+        self.positions = np.asarray(mesh.positions, np.float64)
+        self.weights = sk.dense_weights(mesh, len(dna.joint_names))
+        self.shapes = sk.column_shapes(dna, mesh, columns)
+
+
+def make_checker(dna: Dna, skin: int, solids: Sequence[int]) -> SkinChecker:
+    """A checker of one mesh against others.
+
+    Args:
+        dna: has them.
+        skin: the mesh that is kept out.
+        solids: of which.
+
+    Raises:
+        DnaError: a vertex that is not there, or no finite number.
+    """
+    mesh = dna.meshes[skin]
+    layouts = np.asarray(mesh.layout_positions, np.int64)
+    rows = []
+    for m in solids:
+        solid = dna.meshes[m]
+        places = np.asarray(solid.layout_positions, np.int64)
+        rows.append((places[fan_triangles(solid)].astype(np.uint32), len(solid.positions)))
+    return SkinChecker(
+        np.asarray(mesh.positions, np.float64),
+        np.asarray(mesh.face_offsets, np.uint32),
+        layouts[np.asarray(mesh.face_layouts, np.int64)].astype(np.uint32),
+        rows,
+        MM.get(dna.translation_unit, 10.0),
+    )
+
+
+def skin_and_solids(
+    dna: Dna, solids: Sequence[str] = SOLIDS, lod: int = 0
+) -> tuple[int, list[int]]:
+    """The mesh with most vertices of a level, and what it must not go into.
+
+    Args:
+        dna: has them.
+        solids: parts of the names of meshes that it must not go into.
+        lod: the level.
+
+    Raises:
+        ArgumentError: a face without meshes.
+    """
+    meshes = listed_meshes(dna, lod)
+    if not meshes:
+        raise ArgumentError("a face with meshes was expected")
+    skin = max(meshes, key=lambda m: len(dna.meshes[m].positions))
+
+    def is_solid(name: str) -> bool:
+        lower = name.lower()
+        return any(s in lower for s in solids) and not any(s in lower for s in _NO_SOLIDS)
+
+    return skin, [m for m in meshes if m != skin and is_solid(dna.mesh_names[m])]
+
+
+def worst(all_of: Iterable[SkinFaults]) -> SkinFaults:
+    """Of each entry the worse: what combinations may have, for their parts have it."""
+    return reduce(
+        lambda a, b: SkinFaults(
+            np.maximum(a.depth, b.depth),
+            np.maximum(a.stretch, b.stretch),
+            np.minimum(a.fold, b.fold),
+        ),
+        all_of,
+    )

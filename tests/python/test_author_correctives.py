@@ -1,0 +1,300 @@
+# SPDX-License-Identifier: MIT
+"""Correctives: sculpts of several expressions, and those that are found, by a reader of its own."""
+
+import itertools
+import json
+
+import command_line
+import dna_bytes
+import face_shapes
+import numpy as np
+import pytest
+import risorius
+from risorius.author import RigOptions, make_joint_rig
+from risorius.author.correctives import CorrectiveOptions, add_correctives, find_correctives
+from risorius.author.fitting import FitOptions
+
+PREFIX = "CTRL_expressions."
+SCULPT = "jawOpen+mouthSmileLeft"
+THREE = "jawOpen + mouthSmileLeft + mouthSmileRight"
+
+
+def sculpts(positions):
+    """What the egg does where expressions meet: less of the smile, and a bulge of its own."""
+    single = face_shapes.expressions(positions)
+    bulge = face_shapes.bump(positions, 3, -5, 3)[:, None] * [0, 0, 0.4]
+    two = single["jawOpen"] + 0.6 * single["mouthSmileLeft"] + bulge
+    both = single["jawOpen"] + 0.5 * (single["mouthSmileLeft"] + single["mouthSmileRight"])
+    return {SCULPT: two, THREE: both}
+
+
+@pytest.fixture(scope="module")
+def egg(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("sculpted")
+    face_shapes.write_all(folder)
+    positions, faces = face_shapes.head()
+    for name, delta in sculpts(positions).items():
+        face_shapes.write_obj(folder / "shapes" / f"{name}.obj", positions + delta, faces)
+    spec, out = folder / "spec.toml", folder / "egg.dna"
+    done = command_line.run("author", spec, "-o", out, "--json", text=True)
+    assert done.returncode == 0, done.stderr
+    return folder, dna_bytes.Face(out.read_bytes()), json.loads(done.stdout)
+
+
+def at_one(*names):
+    return {PREFIX + name: 1.0 for name in names}
+
+
+CONTROLS = {
+    SCULPT: ("jawOpen", "mouthCornerPullL"),
+    THREE: ("jawOpen", "mouthCornerPullL", "mouthCornerPullR"),
+}
+
+
+@pytest.mark.parametrize("name", CONTROLS)
+def test_a_sculpt_of_several_is_met_where_all_are_1(egg, name):
+    _, face, _ = egg
+    positions, _ = face_shapes.head()
+    goal = positions + sculpts(positions)[name]
+    error = np.linalg.norm(face.vertices(at_one(*CONTROLS[name])) - goal, axis=1)
+    assert 10 * error.max() < 0.06  # mm: the default tolerance, and rounding
+
+
+def test_single_expressions_stay_what_they_are(egg):
+    _, face, _ = egg
+    positions, _ = face_shapes.head()
+    delta = face_shapes.expressions(positions)["jawOpen"]
+    error = np.linalg.norm(face.vertices(at_one("jawOpen")) - positions - delta, axis=1)
+    assert 10 * error.max() < 0.0505
+
+
+def test_joints_do_most_of_it_and_the_command_says_so(egg):
+    folder, _, said = egg
+    rows = {row["name"]: row for row in said["combinations"]}
+    assert list(rows) == [
+        "jawOpen x mouthCornerPullL",
+        "jawOpen x mouthCornerPullL x mouthCornerPullR",
+    ]
+    for row in rows.values():
+        assert row["joints_largest_mm"] < 0.25 * row["without_mm"]
+        assert row["largest_mm"] <= 0.0505
+    dna = risorius.load(folder / "egg.dna")
+    inputs = {int(i) for group in dna.joint_groups for i in group.input_indices}
+    assert len(dna.raw_control_names) in inputs  # the first corrective moves joints
+
+
+def test_a_sculpt_of_what_is_not_there_is_one_sentence(tmp_path):
+    spec = face_shapes.write_all(tmp_path)
+    positions, faces = face_shapes.head()
+    face_shapes.write_obj(tmp_path / "shapes" / "jawOpen+grin.obj", positions, faces)
+    done = command_line.run("author", spec, "-o", tmp_path / "x.dna", text=True)
+    assert done.returncode == 1
+    assert "combination jawOpen+grin: one of " in done.stderr
+    assert "found 'grin'" in done.stderr
+    assert not (tmp_path / "x.dna").exists()
+
+
+@pytest.mark.parametrize(
+    ("table", "sentence"),
+    [
+        ('most = "many"', "correctives.most: 'many' is of another kind"),
+        ("most = -1", "correctives.most: 0 or more was expected"),
+        ("depth = 3", "correctives.depth: one of most, solids, triples, together was expected"),
+        ("solids = [3]", "correctives.solids: names were expected, found [3]"),
+        ('together = ["jawOpen"]', "correctives.together: names were expected, found 'jawOpen'"),
+        ('together = [["jawOpen", "grin"]]', "correctives: there is no control grin"),
+    ],
+)
+def test_a_wrong_table_is_one_sentence(tmp_path, table, sentence):
+    spec = face_shapes.write_all(tmp_path, more=f"[correctives]\n{table}\n")
+    done = command_line.run("author", spec, "-o", tmp_path / "x.dna", text=True)
+    assert done.returncode == 1
+    assert sentence in done.stderr
+
+
+# A sheet of 40 x 40 mm, 1 mm above a ball of 40 mm, at two levels, with lashes above it. Two
+# controls push it down, softly, each less than 1 mm in the middle; a third far away.
+SIDE = 41
+BALL = np.array([0.0, -21.0, 0.0])
+RADIUS = 20.0
+
+
+def sheet(side):
+    x, z = np.meshgrid(np.linspace(-20, 20, side), np.linspace(20, -20, side))
+    at = np.arange(side * side).reshape(side, side)
+    faces = np.stack([at[:-1, :-1], at[1:, :-1], at[1:, 1:], at[:-1, 1:]], axis=-1)
+    positions = np.stack([x.ravel(), np.zeros(side * side), z.ravel()], axis=1)
+    return positions, faces.reshape(-1, 4)
+
+
+def push(positions, depth, reach, middle=0.0):
+    d = ((positions[:, 0] - middle) ** 2 + positions[:, 2] ** 2) / reach**2
+    return np.where(d < 1, (1 - d) ** 2, 0.0)[:, None] * [0.0, -depth, 0.0]
+
+
+PUSHES = {"a": (0.9, 9.0), "b": (0.8, 14.0), "c": (0.9, 5.0, 14.0), "d": (0.9, 9.0)}
+
+
+def ball():
+    tilt, turn = np.meshgrid(np.linspace(0, np.pi, 41), np.linspace(0, 2 * np.pi, 40, False))
+    way = [np.sin(tilt) * np.cos(turn), np.cos(tilt), -np.sin(tilt) * np.sin(turn)]
+    positions = BALL + RADIUS * np.stack(way, axis=-1).reshape(-1, 3)
+    at = np.arange(40 * 41).reshape(40, 41)
+    after = np.roll(at, -1, axis=0)
+    faces = np.stack([at[:, :-1], at[:, 1:], after[:, 1:], after[:, :-1]], axis=-1)
+    return positions, faces.reshape(-1, 4)
+
+
+def mesh_of(positions, faces):
+    mesh = risorius.Mesh()
+    mesh.positions, mesh.normals = positions / 10, np.tile([0.0, 1.0, 0.0], (len(positions), 1))
+    mesh.texture_coordinates = positions[:, [0, 2]]
+    every = np.arange(len(positions))
+    mesh.layout_positions = mesh.layout_texture_coordinates = mesh.layout_normals = every
+    mesh.face_offsets, mesh.face_layouts = 4 * np.arange(len(faces) + 1), faces.ravel()
+    mesh.skin_offsets = np.arange(len(positions) + 1)
+    mesh.skin_weights, mesh.skin_joint_indices = np.ones(len(positions)), 0 * every
+    mesh.maximum_influence_per_vertex = 1
+    return mesh
+
+
+@pytest.fixture(scope="module")
+def face():
+    parts = {
+        "head_lod0_mesh": sheet(SIDE),
+        "eye_lod0_mesh": ball(),
+        "eyelashes_lod0_mesh": (sheet(7)[0] * [0.3, 1, 0.3] + [0, 1.5, 0], sheet(7)[1]),
+        "head_lod1_mesh": sheet(21),
+    }
+    dna = risorius.Dna()
+    dna.joint_names, dna.joint_parents = ["root"], [0]
+    dna.neutral_joint_translations = dna.neutral_joint_rotations = np.zeros((1, 3))
+    dna.coordinate_system = ("right", "up", "front")
+    dna.raw_control_names = [PREFIX + name for name in PUSHES]
+    dna.blend_shape_channel_names = list(PUSHES)
+    dna.blend_shape_channels = risorius.BlendShapeChannels(
+        lods=[4, 4], input_indices=range(4), output_indices=range(4)
+    )
+    dna.lod_count = 2
+    dna.joint_row_count, dna.joint_column_count = 9, 4
+    meshes, mapping = [], []
+    for m, (name, (positions, faces)) in enumerate(parts.items()):
+        mesh = mesh_of(positions, faces)
+        if not name.startswith("eye_"):
+            mesh.blend_shape_targets = [
+                risorius.BlendShapeTarget(
+                    deltas=push(positions, *how) / 10,
+                    vertex_indices=np.arange(len(positions)),
+                    blend_shape_channel_index=channel,
+                )
+                for channel, how in enumerate(PUSHES.values())
+            ]
+            mapping += [(m, channel) for channel in range(4)]
+        meshes.append(mesh)
+    dna.meshes, dna.mesh_names = meshes, list(parts)
+    dna.mesh_blend_shape_channel_mapping = np.array(mapping)
+    dna.lod_mesh_mapping = [[0, 1, 2], [3]]
+    dna.lod_joint_mapping = [[0], [0]]
+    dna.lod_blend_shape_mapping = [range(4), range(4)]
+    return dna
+
+
+@pytest.fixture(scope="module")
+def corrected(face):
+    shares = []
+    found = find_correctives(face, CorrectiveOptions(apart=(("a", "d"),)), shares.append)
+    rows = [(one.controls, one.shape) for one in found.correctives]
+    assert shares == sorted(shares)
+    return found, dna_bytes.Face(add_correctives(face, found.skin, rows).to_bytes())
+
+
+def skin_of(read, controls, lod=0):
+    """float64[V, 3] of the sheet, mm; other meshes of a level come after it."""
+    side = SIDE if lod == 0 else 21
+    return 10 * read.vertices(controls, lod)[: side * side]
+
+
+def depth(positions):
+    """mm inside of the ball, by its formula; positions in mm."""
+    return RADIUS - np.linalg.norm(positions - BALL, axis=1)
+
+
+def test_pairs_that_go_into_the_ball_are_found_and_no_others(corrected):
+    found, _ = corrected
+    pairs = {one.controls for one in found.correctives if len(one.controls) == 2}
+    assert pairs == {(0, 1), (1, 3)}  # a and d are opposites, c touches nothing
+    assert found.skin == 0
+    assert found.faulty == 2
+    assert found.before["volume"] > 10
+    assert found.after == {"volume": 0.0, "stretched": 0.0, "folded": 0.0}
+
+
+@pytest.mark.parametrize("names", [("a", "b"), ("b", "d")])
+def test_the_written_file_stays_out_of_the_ball_at_every_level(corrected, names):
+    _, read = corrected
+    for lod in (0, 1):
+        posed = skin_of(read, at_one(*names), lod)
+        assert depth(posed).max() < 0.15
+        plain, _ = sheet(SIDE if lod == 0 else 21)
+        linear = plain + sum(push(plain, *PUSHES[name]) for name in names)
+        assert depth(linear).max() > 0.6
+        # Away from the ball all stays, and nowhere is more undone than one of both did.
+        away = np.hypot(plain[:, 0], plain[:, 2]) > 17
+        assert np.abs(posed[away] - linear[away]).max() < 1e-3
+        least = np.min([push(plain, *PUSHES[name])[:, 1] for name in names], axis=0)
+        assert (posed[:, 1] <= least + 0.05).all()
+
+
+def test_lashes_go_with_the_skin(corrected):
+    found, read = corrected
+    (one,) = [x for x in found.correctives if x.controls == (0, 1)]
+    lashes = 10 * read.vertices(at_one("a", "b"))[-49:]
+    plain = sheet(7)[0] * [0.3, 1, 0.3] + [0, 1.5, 0]
+    linear = plain + push(plain, *PUSHES["a"]) + push(plain, *PUSHES["b"])
+    middle = np.linalg.norm(plain[:, [0, 2]], axis=1).argmin()
+    moved = 10 * one.displacement[np.linalg.norm(sheet(SIDE)[0], axis=1).argmin()]
+    assert np.abs(lashes[middle] - linear[middle] - moved).max() < 1e-3
+
+
+def test_single_controls_and_zero_are_as_before(face, corrected):
+    _, read = corrected
+    plain, _ = sheet(SIDE)
+    for name, how in PUSHES.items():
+        assert np.abs(skin_of(read, at_one(name)) - plain - push(plain, *how)).max() < 1e-4
+    assert face.psd_count == 0  # what was given stays as it was
+
+
+def test_half_of_both_undoes_a_quarter(corrected):
+    _, read = corrected
+    plain, _ = sheet(SIDE)
+    whole = skin_of(read, at_one("a", "b")) - plain
+    half = skin_of(read, {PREFIX + "a": 0.5, PREFIX + "b": 0.5}) - plain
+    linear = push(plain, *PUSHES["a"]) + push(plain, *PUSHES["b"])
+    assert np.abs((half - linear / 2) - (whole - linear) / 4).max() < 1e-4
+
+
+def test_it_ends_where_it_is_told_to(face):
+    with pytest.raises(risorius.DnaError, match="stopped"):
+        find_correctives(face, progress=lambda share: False)
+
+
+def test_a_triple_that_pairs_do_not_repair_gets_its_own(face):
+    # Without a limit of its own a, b and d together push 2.6 mm; the pairs with b are repaired.
+    found = find_correctives(face, CorrectiveOptions())
+    assert {one.controls for one in found.correctives} >= {(0, 1), (0, 3), (1, 3)}
+    rows = [(one.controls, one.shape) for one in found.correctives]
+    read = dna_bytes.Face(add_correctives(face, found.skin, rows).to_bytes())
+    allowed = max(
+        depth(skin_of(read, at_one(*pair))).max()
+        for pair in itertools.combinations(("a", "b", "d"), 2)
+    )
+    assert depth(skin_of(read, at_one("a", "b", "d"))).max() < allowed + 0.15
+
+
+def test_the_rig_of_joints_has_them_too(face, corrected):
+    found, _ = corrected
+    dna = add_correctives(face, found.skin, [(x.controls, x.shape) for x in found.correctives])
+    rig = make_joint_rig(dna, RigOptions(FitOptions(joints=30), tolerance_mm=0.05))
+    read = dna_bytes.Face(rig.dna.to_bytes())
+    assert depth(skin_of(read, at_one("a", "b"))).max() < 0.2
+    assert [c.name for c in rig.combinations] == ["a x b", "b x d"]
