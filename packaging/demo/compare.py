@@ -2,8 +2,10 @@
 """Faces side by side in the same expressions: what joints do beside what shapes did.
 
 compare.py -- --extension ZIP --out SHEET.jpg --face NAME=FILE.dna [...] [--size PIXELS]
+    [--combined]
 
-One row for each face, one column for each expression; needs Pillow beside bpy.
+One row for each face, one column for each expression, or (--combined) for combinations that go
+wrong without correctives; needs Pillow beside bpy.
 """
 
 from __future__ import annotations
@@ -34,6 +36,18 @@ EXPRESSIONS = {  # controls of both sides without L and R; of the whole face
     "raised brows": ({"browRaiseIn": 1, "browRaiseOuter": 1, "eyeWiden": 0.4}, {}),
     "turned": ({"neckStretch": 0.5}, {}),
 }  # fmt: skip
+COMBINED = {
+    "shout of seven": ({"mouthStretch": 1, "mouthUpperLipRaise": 1, "mouthLowerLipDepress": 1},
+                       {"jawOpen": 1}),
+    "smile, open jaw": ({"mouthCornerPull": 1}, {"jawOpen": 1}),
+    "pressed lips, mouth down": ({"mouthPressD": 1}, {"mouthDown": 1}),
+    "smile, stretched": ({"mouthCornerPull": 1, "mouthStretch": 1}, {}),
+    "blink, squint": ({"eyeBlink": 1, "eyeSquintInner": 1}, {}),
+    "blink, look down": ({"eyeBlink": 1, "eyeLookDown": 1}, {}),
+}  # fmt: skip
+# Where the camera looks: a share of the height above the lowest point, and how near.
+MOUTH, EYES = (0.40, 2.3), (0.60, 2.6)
+LOOKS = dict(zip(COMBINED, [(0.42, 1.5), MOUTH, MOUTH, MOUTH, EYES, EYES], strict=True))
 TURNED = {"neck": 16.0, "head": 18.0}  # degrees about the vertical
 
 
@@ -42,18 +56,20 @@ def parse():
     parser.add_argument("--extension", type=Path, required=True)
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--face", nargs="+", required=True, metavar="NAME=FILE")
+    parser.add_argument("--combined", action="store_true", help="combinations of expressions")
     parser.add_argument("--size", type=int, default=320)
     return parser.parse_args(install_extension.arguments())
 
 
-def set_expression(controls, name):
+def set_expression(controls, name, expressions):
     """Put a face into one of the expressions.
 
     Args:
         controls: its control armature.
         name: of the expression.
+        expressions: what each is.
     """
-    both, whole = EXPRESSIONS[name]
+    both, whole = expressions[name]
     values = {f"{control}{side}": v for control, v in both.items() for side in LEFT_RIGHT} | whole
     face = controls.pose.bones["face"]
     for key in list(face.keys()):
@@ -64,21 +80,36 @@ def set_expression(controls, name):
     controls.update_tag()
 
 
-def render_row(path, folder, size):
+def look_at(collection, name):
+    """Turn the camera to what an expression is about."""
+    share, near = LOOKS[name]
+    low, high = stage.bounds(collection)
+    camera = bpy.context.scene.camera
+    camera.data.lens = 85 * near
+    middle = (low + high) / 2
+    middle.z = low.z + share * (high.z - low.z)
+    stage.aim(camera, middle)
+
+
+def render_row(path, folder, size, expressions):
     """Pictures of a face in all expressions, as files by expression.
 
     Args:
         path: of the DNA file.
         folder: where the pictures go.
         size: of a picture, pixels.
+        expressions: what each is.
     """
     for item in list(bpy.data.objects):
         bpy.data.objects.remove(item)
     controls = demo.import_face(path)
-    stage.build(controls.users_collection[0])
+    collection = controls.users_collection[0]
+    stage.build(collection)
     out = {}
-    for number, name in enumerate(EXPRESSIONS):
-        set_expression(controls, name)
+    for number, name in enumerate(expressions):
+        set_expression(controls, name, expressions)
+        if name in LOOKS:
+            look_at(collection, name)
         out[name] = folder / f"{path.stem}_{number}.png"
         demo.still(out[name], number + 1, size)
     return out
@@ -94,9 +125,10 @@ def sheet(rows, size):
     label = max(22, size // 12)
     font = ImageFont.load_default(size=label * 0.62)
     height = label + len(rows) * (size + label)
-    out = Image.new("RGB", (len(EXPRESSIONS) * size, height), (24, 26, 30))
+    names = list(next(iter(rows.values())))
+    out = Image.new("RGB", (len(names) * size, height), (24, 26, 30))
     draw = ImageDraw.Draw(out)
-    for column, name in enumerate(EXPRESSIONS):
+    for column, name in enumerate(names):
         draw.text((column * size + 8, 4), name, fill=(215, 218, 222), font=font)
     for row, (face, pictures) in enumerate(rows.items()):
         y = label + row * (size + label)
@@ -112,11 +144,12 @@ def main():
     bpy.ops.wm.read_factory_settings(use_empty=True)
     install_extension.install(args.extension)
     rows = {}
+    expressions = COMBINED if args.combined else EXPRESSIONS
     with tempfile.TemporaryDirectory() as folder:
         for face in args.face:
             name, _, path = face.partition("=")
-            rows[name] = render_row(Path(path), Path(folder), args.size)
-            print(f"    {name}: {len(EXPRESSIONS)} pictures", flush=True)
+            rows[name] = render_row(Path(path), Path(folder), args.size, expressions)
+            print(f"    {name}: {len(expressions)} pictures", flush=True)
         sheet(rows, args.size).save(args.out, quality=88)
     print(args.out, flush=True)
 

@@ -109,7 +109,7 @@ def begin(dna: Dna) -> Work:
     motions = sk.column_motions(dna, count)
     moving = np.flatnonzero(deltas.any(axis=(1, 2)))
     shaped = {c for mesh in dna.meshes for c in sk.column_shapes(dna, mesh, count)}
-    together = {c: on for c, on in sk.psd_parts(dna).items() if c in shaped or c in set(moving)}
+    together = sk.psd_parts(dna)
     columns = sorted((shaped | {int(c) for c in moving}) - set(together))
     names = [_column_name(dna, column) for column in columns]
     rest = sk.world_matrices(dna, np.zeros((len(dna.joint_names), 9)))

@@ -176,10 +176,15 @@ def add_joint_motion(
 
 
 def corrective_displacements(out: dict[str, Expression]) -> dict[tuple[str, str], Floats]:
-    """What to add where two controls meet; (a, b) fires with the product of both."""
+    """What to add where two controls meet; (a, b) fires with the product of both.
+
+    Where a shape adds nothing joints do: an open jaw under closed lips turns them.
+    """
     lower = lip_masks(out["jawOpen"].displacement)["D"][:, None]
     result: dict[tuple[str, str], Floats] = {}
     for side in ("L", "R"):
+        for lip in ("U", "D"):
+            result[("jawOpen", f"mouthLipsTogether{lip}{side}")] = np.zeros((len(lower), 3))
         # The open jaw stretches the lower lip: a smile cannot lift it as far.
         smile = out[f"mouthCornerPull{side}"].displacement
         result[("jawOpen", f"mouthCornerPull{side}")] = -0.3 * lower * smile
