@@ -3,6 +3,7 @@
 
 import itertools
 import json
+from types import SimpleNamespace
 
 import command_line
 import dna_bytes
@@ -12,6 +13,7 @@ import pytest
 import risorius
 from risorius.author import RigOptions, make_joint_rig
 from risorius.author.correctives import CorrectiveOptions, add_correctives, find_correctives
+from risorius.author.correctives.search import triples_of
 from risorius.author.fitting import FitOptions
 
 PREFIX = "CTRL_expressions."
@@ -158,25 +160,27 @@ def mesh_of(positions, faces):
     return mesh
 
 
-@pytest.fixture(scope="module")
-def face():
+def make_face(pushes, turning=None):
+    """A face of these pushes; `turning` also turns everything about x, by 25 degrees."""
+    count = len(pushes)
     parts = {
         "head_lod0_mesh": sheet(SIDE),
         "eye_lod0_mesh": ball(),
         "eyelashes_lod0_mesh": (sheet(7)[0] * [0.3, 1, 0.3] + [0, 1.5, 0], sheet(7)[1]),
+        "hat_lod0_mesh": (sheet(7)[0] * [0.3, 1, 0.3] + [0, 15, 0], sheet(7)[1]),
         "head_lod1_mesh": sheet(21),
     }
     dna = risorius.Dna()
     dna.joint_names, dna.joint_parents = ["root"], [0]
     dna.neutral_joint_translations = dna.neutral_joint_rotations = np.zeros((1, 3))
     dna.coordinate_system = ("right", "up", "front")
-    dna.raw_control_names = [PREFIX + name for name in PUSHES]
-    dna.blend_shape_channel_names = list(PUSHES)
+    dna.raw_control_names = [PREFIX + name for name in pushes]
+    dna.blend_shape_channel_names = list(pushes)
     dna.blend_shape_channels = risorius.BlendShapeChannels(
-        lods=[4, 4], input_indices=range(4), output_indices=range(4)
+        lods=[count] * 2, input_indices=range(count), output_indices=range(count)
     )
     dna.lod_count = 2
-    dna.joint_row_count, dna.joint_column_count = 9, 4
+    dna.joint_row_count, dna.joint_column_count = 9, count
     meshes, mapping = [], []
     for m, (name, (positions, faces)) in enumerate(parts.items()):
         mesh = mesh_of(positions, faces)
@@ -187,16 +191,31 @@ def face():
                     vertex_indices=np.arange(len(positions)),
                     blend_shape_channel_index=channel,
                 )
-                for channel, how in enumerate(PUSHES.values())
+                for channel, how in enumerate(pushes.values())
             ]
-            mapping += [(m, channel) for channel in range(4)]
+            mapping += [(m, channel) for channel in range(count)]
         meshes.append(mesh)
     dna.meshes, dna.mesh_names = meshes, list(parts)
     dna.mesh_blend_shape_channel_mapping = np.array(mapping)
-    dna.lod_mesh_mapping = [[0, 1, 2], [3]]
+    dna.lod_mesh_mapping = [[0, 1, 2, 3], [4]]
     dna.lod_joint_mapping = [[0], [0]]
-    dna.lod_blend_shape_mapping = [range(4), range(4)]
+    dna.lod_blend_shape_mapping = [range(count)] * 2
+    if turning is not None:
+        dna.joint_groups = [
+            risorius.JointGroup(
+                lods=[1, 1],
+                input_indices=[list(pushes).index(turning)],
+                output_indices=[3],
+                values=np.array([[25.0]], np.float32),
+                joint_indices=[0],
+            )
+        ]
     return dna
+
+
+@pytest.fixture(scope="module")
+def face():
+    return make_face(PUSHES)
 
 
 @pytest.fixture(scope="module")
@@ -248,12 +267,59 @@ def test_the_written_file_stays_out_of_the_ball_at_every_level(corrected, names)
 def test_lashes_go_with_the_skin(corrected):
     found, read = corrected
     (one,) = [x for x in found.correctives if x.controls == (0, 1)]
-    lashes = 10 * read.vertices(at_one("a", "b"))[-49:]
+    lashes = 10 * read.vertices(at_one("a", "b"))[-98:-49]
     plain = sheet(7)[0] * [0.3, 1, 0.3] + [0, 1.5, 0]
     linear = plain + push(plain, *PUSHES["a"]) + push(plain, *PUSHES["b"])
     middle = np.linalg.norm(plain[:, [0, 2]], axis=1).argmin()
     moved = 10 * one.displacement[np.linalg.norm(sheet(SIDE)[0], axis=1).argmin()]
     assert np.abs(lashes[middle] - linear[middle] - moved).max() < 1e-3
+
+
+def test_what_is_far_from_the_skin_stays(corrected):
+    _, read = corrected
+    hat = 10 * read.vertices(at_one("a", "b"))[-49:]
+    plain = sheet(7)[0] * [0.3, 1, 0.3] + [0, 15, 0]
+    linear = plain + push(plain, *PUSHES["a"]) + push(plain, *PUSHES["b"])
+    assert np.abs(hat - linear).max() < 1e-4
+
+
+def test_what_one_does_alone_is_no_fault_of_a_pair():
+    found = find_correctives(make_face({"deep": (3.0, 16.0), "c": PUSHES["c"]}))
+    assert found.looked_at == 1
+    assert found.faulty == 0
+    assert found.correctives == []
+
+
+def test_a_corrective_of_what_turns_is_written_before_the_joints():
+    pushes = {"a": PUSHES["a"], "b": PUSHES["b"]}
+    found = find_correctives(make_face(pushes, "b"))
+    (one,) = found.correctives
+    rows = [(one.controls, one.shape)]
+    read = dna_bytes.Face(add_correctives(make_face(pushes, "b"), found.skin, rows).to_bytes())
+    turn = np.radians(25.0)
+    turned = np.array(
+        [[1, 0, 0], [0, np.cos(turn), np.sin(turn)], [0, -np.sin(turn), np.cos(turn)]]
+    )
+    plain, _ = sheet(SIDE)
+    linear = plain + push(plain, *pushes["a"]) + push(plain, *pushes["b"])
+    posed = skin_of(read, at_one("a", "b"))
+    assert (
+        np.abs(posed - linear @ turned - 10 * one.displacement).max() < 0.02
+    )  # what is less is left out
+    assert depth(posed @ turned.T).max() < 0.15
+    assert depth(linear).max() > 0.6
+
+
+def test_triples_are_those_of_repaired_pairs_the_worst_first():
+    def fault(volume):
+        return SimpleNamespace(volume=volume, stretched=0, folded=0)
+
+    pairs = {(0, 1): 50.0, (1, 2): 40.0, (0, 2): 0.0, (1, 3): 90.0, (0, 3): 0.0, (4, 5): 70.0}
+    sums = {on: fault(volume) for on, volume in pairs.items()}
+    search = SimpleNamespace(found=dict.fromkeys([(0, 1), (1, 2), (1, 3), (4, 5)]))
+    # 2 and 3 do not meet; 0 and 2 do, and are right by themselves.
+    assert triples_of(search, sums, 9) == [(0, 1, 3), (0, 1, 2)]
+    assert triples_of(search, sums, 1) == [(0, 1, 3)]
 
 
 def test_single_controls_and_zero_are_as_before(face, corrected):

@@ -202,7 +202,7 @@ def find_correctives(
     for kind in KINDS:
         out.before[kind] = float(sum(getattr(s, kind) for s in sums.values()))
         out.after[kind] = float(sum(getattr(s, kind) for s in ends.values()))
-    triples = _triples(search, sums, o.triples)
+    triples = triples_of(search, sums, o.triples)
     rest = max(0, o.most - len(search.found))
     wrong = dict(zip(triples, search.sums(triples, (0.7, 0.8)), strict=True))
     search.repair(_worst_of(wrong, rest), (0.8, 0.9))
@@ -224,8 +224,14 @@ def _worst_of(sums: dict[Controls, FaultSums], most: int) -> list[Controls]:
     return sorted(bad, key=lambda on: (-severity(sums[on]), on))[:most]
 
 
-def _triples(search: Search, pairs: dict[Controls, FaultSums], most: int) -> list[Controls]:
-    """Three controls that meet, of which two pairs at least are repaired: the worst of these."""
+def triples_of(search: Search, pairs: dict[Controls, FaultSums], most: int) -> list[Controls]:
+    """Three controls that meet, of which two pairs at least are repaired: the worst of these.
+
+    Args:
+        search: has found correctives of pairs.
+        pairs: what is wrong in each pair that meets.
+        most: at most so many.
+    """
     near: dict[int, set[int]] = {}
     for a, b in search.found:
         near.setdefault(a, set()).add(b)
