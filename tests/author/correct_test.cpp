@@ -162,6 +162,25 @@ TEST(Correct, WhatTwoPartsDoTogetherIsRepairedNearTheFaultAlone) {
   EXPECT_LE(std::ranges::max(look(check, scene.pose(mended)).depth), SkinChecker::kDepth + 1e-3f);
 }
 
+TEST(Correct, WhatDoesMostAtAVertexStays) {
+  const Scene scene;
+  const SkinChecker check = checker(scene);
+  // The narrow push does nothing beyond 7 mm, where the wide one does all there is.
+  const auto narrow = scene.pushed(0.95, 7.0), wide = scene.pushed(0.6, 14.0);
+  auto both = narrow;
+  for (std::size_t v = 0; v < both.size(); ++v) both[v][2] += wide[v][2];
+  const auto allowed = worse(look(check, scene.pose(narrow)), look(check, scene.pose(wide)));
+  auto repair = check.repair(scene.pose(both), allowed, {wide, narrow});
+  ASSERT_TRUE(repair) << repair.error().describe();
+  EXPECT_EQ(repair->after.volume, 0.0);
+  for (std::uint32_t v = 0; v < both.size(); ++v) {
+    const double away = std::hypot(x_of(v), y_of(v));
+    if (away > 7.1) {
+      EXPECT_LT(std::abs(repair->displacement[v][2]), 0.01) << v;
+    }
+  }
+}
+
 TEST(Correct, WhatOnePartDoesByItselfIsNoFault) {
   const Scene scene;
   const SkinChecker check = checker(scene);
@@ -173,8 +192,8 @@ TEST(Correct, WhatOnePartDoesByItselfIsNoFault) {
       std::ranges::all_of(repair->displacement, [](const Vector3& x) { return x == Vector3{}; }));
 }
 
-TEST(Correct, TheSkinInItselfIsFoundWhereItTouchedNothingBefore) {
-  // Two sheets that look at each other, 1 mm apart, are one skin; the upper one goes down by 2.
+/// Two sheets as one skin, 1 mm apart. In: apart  they look away from each other, as a thin plate
+Scene sheets(bool apart) {
   Scene scene;
   const std::size_t count = scene.skin.neutral.size(), faces = scene.skin.corners.size();
   scene.skin.solids.clear();
@@ -187,10 +206,18 @@ TEST(Correct, TheSkinInItselfIsFoundWhereItTouchedNothingBefore) {
     for (const std::size_t k : {3u, 2u, 1u, 0u}) {
       scene.skin.corners.push_back(scene.skin.corners[c + k] + static_cast<std::uint32_t>(count));
     }
+    if (apart) std::reverse(scene.skin.corners.end() - 4, scene.skin.corners.end());
+    if (apart) std::reverse(scene.skin.corners.begin() + c, scene.skin.corners.begin() + c + 4);
     scene.skin.face_offsets.push_back(static_cast<std::uint32_t>(scene.skin.corners.size()));
   }
+  return scene;
+}
+
+TEST(Correct, TheSkinInItselfIsFoundWhereItTouchedNothingBefore) {
+  const Scene scene = sheets(false);
   const SkinChecker check = checker(scene);
-  auto positions = scene.skin.neutral;
+  const std::size_t count = scene.skin.neutral.size() / 2;
+  auto positions = scene.skin.neutral;  // the upper one goes down by 2, through the lower one
   for (std::size_t v = count; v < positions.size(); ++v) positions[v][2] -= 2.0;
   const auto found = look(check, {positions, {}});
   // Between sheets so near no light leaves but at their rim: what is shown there is found.
@@ -204,6 +231,14 @@ TEST(Correct, TheSkinInItselfIsFoundWhereItTouchedNothingBefore) {
   EXPECT_GT(inside, 80u);
   EXPECT_NEAR(deepest, 1.0, 1e-5);
   EXPECT_FALSE(check.shown()[kMiddle]);
+}
+
+TEST(Correct, AThinPlateTouchesNothing) {
+  const Scene scene = sheets(true);
+  const SkinChecker check = checker(scene);
+  auto positions = scene.skin.neutral;
+  for (std::size_t v = positions.size() / 2; v < positions.size(); ++v) positions[v][2] -= 0.5;
+  EXPECT_EQ(std::ranges::max(look(check, {positions, {}}).depth), 0.0f);
 }
 
 TEST(Correct, TheNearestPlaceIsThatOfTheFormula) {
