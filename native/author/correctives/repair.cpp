@@ -86,7 +86,7 @@ std::vector<std::uint32_t> fault_vertices(const Work& work, const Look& look) {
     out.insert(out.end(), edge.begin(), edge.end());
   }
   std::ranges::sort(out);
-  out.erase(std::ranges::unique(out).begin(), out.end());
+  out.erase(std::unique(out.begin(), out.end()), out.end());
   return out;
 }
 

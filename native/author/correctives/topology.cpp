@@ -58,7 +58,7 @@ void find_neighbours(Topology& out) {
   out.first_neighbour.push_back(0);
   for (auto& row : near) {
     std::ranges::sort(row);
-    row.erase(std::ranges::unique(row).begin(), row.end());
+    row.erase(std::unique(row.begin(), row.end()), row.end());
     out.neighbours.insert(out.neighbours.end(), row.begin(), row.end());
     out.first_neighbour.push_back(static_cast<std::uint32_t>(out.neighbours.size()));
   }
