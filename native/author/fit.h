@@ -85,6 +85,18 @@ struct StartWeights {
   std::vector<float> weights;         // [V][influences]
 };
 
+/// Motions of new joints whose weights are known: what a rig of one face does on another one of the
+/// same topology.
+/// In: shapes   of the other face
+///     options  joints (all), given, pivots, emphasis, least_effect and threads of it count
+///     weights  by the joints of all, the given ones first, as a Fit has them
+///     at       [new joints] the pivot that a joint is at; kInTheMiddle: of what it moves
+/// Out: a Fit with these weights; each joint is its own other side
+/// Fails: as fit_joints; kInvalidLength, kInvalidIndex, kInvalidValue (weights, at)
+core::Result<Fit> fit_motions(const Shapes& shapes, const FitOptions& options,
+                              const StartWeights& weights, const std::vector<std::uint32_t>& at);
+inline constexpr std::uint32_t kInTheMiddle = 0xffffffffu;
+
 /// Weights of another mesh on joints that move as they do: a coarser level of detail.
 /// In: joints   with the motions of each of the shapes' expressions
 ///     options  influences, smoothness, threads

@@ -129,6 +129,15 @@ Fit fit_joints(const Doubles& neutral, const Floats& displacements, const Indice
   return unwrap(std::move(result));
 }
 
+author::StartWeights start_weights_of(const Indices& joints, const Floats& weights) {
+  if (joints.ndim() != 2 || weights.ndim() != 2) shape_error("start", "(V, n)", joints);
+  author::StartWeights out;
+  out.influences = static_cast<std::size_t>(joints.shape(1));
+  out.joints.assign(joints.data(), joints.data() + joints.size());
+  out.weights.assign(weights.data(), weights.data() + weights.size());
+  return out;
+}
+
 Fit fit_weights(const Doubles& neutral, const Floats& displacements, const Indices& edges,
                 const Doubles& importance, const Doubles& positions, const Doubles& rotations,
                 const Doubles& translations, const Indices& mirrored, const Indices& start_joints,
@@ -147,16 +156,34 @@ Fit fit_weights(const Doubles& neutral, const Floats& displacements, const Indic
     }
     for (std::size_t j = 0; j < joints.size(); ++j) joints[j].mirrored = mirrored.data()[j];
   }
-  author::StartWeights start;
-  if (start_joints.ndim() != 2 || start_weights.ndim() != 2) {
-    shape_error("start", "(V, n)", start_joints);
-  }
-  start.influences = static_cast<std::size_t>(start_joints.shape(1));
-  start.joints.assign(start_joints.data(), start_joints.data() + start_joints.size());
-  start.weights.assign(start_weights.data(), start_weights.data() + start_weights.size());
+  const author::StartWeights start = start_weights_of(start_joints, start_weights);
   auto result = [&] {
     const py::gil_scoped_release released;
     return author::fit_weights(input, joints, options, start);
+  }();
+  return unwrap(std::move(result));
+}
+
+Fit fit_motions(const Doubles& neutral, const Floats& displacements, const Indices& edges,
+                const Doubles& positions, const Doubles& rotations, const Doubles& translations,
+                const Indices& weight_joints, const Floats& weights, const Doubles& pivots,
+                const std::vector<std::uint32_t>& at, double emphasis, std::size_t threads,
+                double least_effect) {
+  const author::Shapes input = shapes(neutral, displacements, edges, Doubles(0));
+  author::FitOptions options;
+  options.emphasis = emphasis;
+  options.threads = threads;
+  options.least_effect = least_effect;
+  options.given = given_joints(positions, rotations, translations, input.expressions);
+  options.joints = options.given.size() + at.size();
+  options.pivots.resize(static_cast<std::size_t>(pivots.size()) / 3);
+  for (std::size_t i = 0; i < options.pivots.size(); ++i) {
+    std::copy_n(pivots.data() + 3 * i, 3, options.pivots[i].position.begin());
+  }
+  const author::StartWeights start = start_weights_of(weight_joints, weights);
+  auto result = [&] {
+    const py::gil_scoped_release released;
+    return author::fit_motions(input, options, start, at);
   }();
   return unwrap(std::move(result));
 }
@@ -255,6 +282,11 @@ void bind_author(py::module_& m) {
         py::arg("mirrored"), py::arg("start_joints"), py::arg("start_weights"), py::kw_only(),
         py::arg("influences"), py::arg("smoothness"), py::arg("symmetric"), py::arg("threads"),
         "JointFit with these joints: see risorius.author.fitting.");
+  m.def("fit_motions", &fit_motions, py::arg("neutral"), py::arg("displacements"), py::arg("edges"),
+        py::arg("positions"), py::arg("rotations"), py::arg("translations"),
+        py::arg("weight_joints"), py::arg("weights"), py::kw_only(), py::arg("pivots"),
+        py::arg("at"), py::arg("emphasis"), py::arg("threads"), py::arg("least_effect"),
+        "JointFit with these weights: see risorius.author.fitting.");
   m.def("simplify", &simplify, py::arg("positions"), py::arg("attributes"), py::arg("triangles"),
         py::arg("count"), "See risorius.author.simplify.");
 }

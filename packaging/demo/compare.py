@@ -2,10 +2,10 @@
 """Faces side by side in the same expressions: what joints do beside what shapes did.
 
 compare.py -- --extension ZIP --out SHEET.jpg --face NAME=FILE.dna [...] [--size PIXELS]
-    [--combined]
+    [--combined | --only EXPRESSION [...]]
 
 One row for each face, one column for each expression, or (--combined) for combinations that go
-wrong without correctives; needs Pillow beside bpy.
+wrong without correctives, or for some of both; needs Pillow beside bpy.
 """
 
 from __future__ import annotations
@@ -45,6 +45,7 @@ COMBINED = {
     "blink, squint": ({"eyeBlink": 1, "eyeSquintInner": 1}, {}),
     "blink, look down": ({"eyeBlink": 1, "eyeLookDown": 1}, {}),
 }  # fmt: skip
+ASLEEP = {"asleep": ({"eyeBlink": 1, "eyeLookDown": 0.3, "browDown": 0.1}, {"jawOpen": 0.12})}
 # Where the camera looks: a share of the height above the lowest point, and how near.
 MOUTH, EYES = (0.40, 2.3), (0.60, 2.6)
 LOOKS = dict(zip(COMBINED, [(0.42, 1.5), MOUTH, MOUTH, MOUTH, EYES, EYES], strict=True))
@@ -57,6 +58,7 @@ def parse():
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--face", nargs="+", required=True, metavar="NAME=FILE")
     parser.add_argument("--combined", action="store_true", help="combinations of expressions")
+    parser.add_argument("--only", nargs="+", choices=[*EXPRESSIONS, *COMBINED, *ASLEEP])
     parser.add_argument("--size", type=int, default=320)
     return parser.parse_args(install_extension.arguments())
 
@@ -145,6 +147,9 @@ def main():
     install_extension.install(args.extension)
     rows = {}
     expressions = COMBINED if args.combined else EXPRESSIONS
+    if args.only:
+        known = EXPRESSIONS | COMBINED | ASLEEP
+        expressions = {name: known[name] for name in args.only}
     with tempfile.TemporaryDirectory() as folder:
         for face in args.face:
             name, _, path = face.partition("=")

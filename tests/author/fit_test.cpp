@@ -357,6 +357,102 @@ TEST(Fit, WeightsGoOnFromThoseOfTheFinerMesh) {
             core::ErrorCode::kInvalidLength);
 }
 
+/// A sheet like another one, half as wide and twice as deep, and so is what it does.
+Shapes reshaped(Shapes shapes) {
+  for (Vector3& p : shapes.neutral) p = {0.5 * p[0], p[1], 2.0 * p[2] + 0.1 * p[1]};
+  for (std::size_t i = 0; i < shapes.displacements.size(); i += 3) {
+    shapes.displacements[i] *= 0.5f;
+    shapes.displacements[i + 2] *= 2.0f;
+  }
+  return shapes;
+}
+
+TEST(Fit, AnotherFaceOfTheTopologyTakesJointsAndWeightsOver) {
+  const Shapes shapes = two_sides(), other = reshaped(two_sides());
+  FitOptions options = few(9);
+  options.given.resize(1);
+  auto fit = fit_joints(shapes, options);
+  ASSERT_TRUE(fit) << fit.error().describe();
+  const StartWeights weights{fit->influences, fit->weight_joints, fit->weights};
+  const std::vector<std::uint32_t> middles(8, kInTheMiddle);
+  // On the same sheet what was found is found again, and the weights stay.
+  auto same = fit_motions(shapes, options, weights, middles);
+  ASSERT_TRUE(same) << same.error().describe();
+  EXPECT_LT(largest_error(shapes, *same), 1.2 * largest_error(shapes, *fit));
+  EXPECT_EQ(same->weight_joints, fit->weight_joints);
+  for (std::size_t i = 0; i < fit->weights.size(); ++i) {
+    EXPECT_NEAR(same->weights[i], fit->weights[i], 1e-6f);
+  }
+  auto there = fit_motions(other, options, weights, middles);
+  ASSERT_TRUE(there) << there.error().describe();
+  auto own = fit_joints(other, options);  // joints and weights that are made for it
+  ASSERT_TRUE(own);
+  EXPECT_LT(largest_error(other, *there), 3.0 * largest_error(other, *own));
+  for (std::size_t j = 1; j < 9; ++j) {  // in the middle of the squares of what each moves
+    Vector3 sum{};
+    double total = 0.0;
+    for (std::size_t v = 0; v < other.vertex_count(); ++v) {
+      for (std::size_t i = v * fit->influences; i < (v + 1) * fit->influences; ++i) {
+        if (fit->weight_joints[i] != j) continue;
+        const double square = double{fit->weights[i]} * double{fit->weights[i]};
+        for (std::size_t k = 0; k < 3; ++k) sum[k] += square * other.neutral[v][k];
+        total += square;
+      }
+    }
+    for (std::size_t k = 0; k < 3; ++k) EXPECT_NEAR(there->joints[j][k], sum[k] / total, 1e-6);
+  }
+}
+
+TEST(Fit, JointsOfAnotherFaceLieAtItsPivots) {
+  const Shapes shapes = two_sides();
+  FitOptions options = few(9);
+  options.given.resize(1);
+  auto fit = fit_joints(shapes, options);
+  ASSERT_TRUE(fit);
+  const StartWeights weights{fit->influences, fit->weight_joints, fit->weights};
+  options.pivots.push_back({{0.5, 0.0, -0.4}, {2}});
+  std::vector<std::uint32_t> at(8, kInTheMiddle);
+  at[3] = 0;
+  auto there = fit_motions(shapes, options, weights, at);
+  ASSERT_TRUE(there) << there.error().describe();
+  EXPECT_NEAR(there->joints[4][0], 0.5, 1e-9);
+  EXPECT_NEAR(there->joints[4][2], -0.4, 1e-9);
+  EXPECT_NEAR(there->joints[3][2], 0.0, 1e-9);
+  EXPECT_LT(largest_error(shapes, *there), 2.0 * largest_error(shapes, *fit));
+}
+
+TEST(Fit, WhatAnotherFaceCannotTakeOverIsSaid) {
+  const Shapes shapes = two_sides();
+  FitOptions options = few(9);
+  options.given.resize(1);
+  auto fit = fit_joints(shapes, options);
+  ASSERT_TRUE(fit);
+  StartWeights weights{fit->influences, fit->weight_joints, fit->weights};
+  std::vector<std::uint32_t> at(8, kInTheMiddle);
+  at[2] = 1;  // there is no pivot
+  auto refused = fit_motions(shapes, options, weights, at);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, core::ErrorCode::kInvalidIndex);
+  EXPECT_EQ(refused.error().where, "at[2]");
+  at.pop_back();  // one joint less than there are
+  at[2] = kInTheMiddle;
+  refused = fit_motions(shapes, options, weights, at);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, core::ErrorCode::kInvalidArgument);
+  at.push_back(kInTheMiddle);
+  weights.joints[7] = 9;
+  weights.weights[7] = 0.5f;
+  refused = fit_motions(shapes, options, weights, at);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, core::ErrorCode::kInvalidIndex);
+  options.given[0].motions.resize(3);
+  options.given[0].motions[1].translation = {0.0, 0.0, 0.1};  // none rests
+  weights.joints[7] = 0;
+  refused = fit_motions(shapes, options, weights, at);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, core::ErrorCode::kInvalidArgument);
+}
+
 TEST(Fit, JointsOfBothSidesAtOnePlaceAreToldApart) {
   const Shapes shapes = two_sides();
   // Two joints of each side turn about one point, each in an expression of its own.

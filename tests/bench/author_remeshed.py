@@ -30,11 +30,11 @@ from risorius.sample.source import Source, fetch
 
 def old_head(source):
     """Positions [V, 3] in cm, polygons and the ARKit units' displacements of the base head."""
-    _, parts, positions, _ = build.assemble(source, print, MAN)
+    _, parts, body = build.assemble(source, print, MAN)
     part = next(p for p in parts if p.name == "head_lod1_mesh")
-    count = len(positions)
+    count = len(body.positions)
     units = {name: part.carry(source.face_unit(name, count)) * build.CM for name in mapping()}
-    return part.carry(positions) * build.CM, part.polygons.faces, units
+    return part.carry(body.positions) * build.CM, part.polygons.faces, units
 
 
 def remeshed(positions, faces, voxel):

@@ -24,6 +24,7 @@ using detail::State;
 using detail::Vec3;
 
 constexpr int kRoundsOfWeights = 12;
+constexpr std::size_t kRoundsOfMotions = 8;  // of Gauss and Newton
 // Joints leave an expression step by step: the others have taken over before the next ones go.
 constexpr double kThinning[] = {0.5, 1.0};
 /// Joints lie amid what they move until the last rounds: from a far pivot they turn on their own
@@ -514,6 +515,30 @@ void thin_out(const Problem& problem, double least_effect, State& state, std::ve
   }
 }
 
+/// New joints that rest, each in the middle of what it moves or at its pivot.
+core::Status take_new_joints(const Problem& problem, const StartWeights& weights,
+                             const std::vector<std::uint32_t>& at, State& state) {
+  using core::ErrorCode;
+  const std::size_t given = state.joints.size();
+  for (std::size_t j = 0; j < at.size(); ++j) {
+    if (at[j] == kInTheMiddle || at[j] < problem.pivots.size()) continue;
+    return core::fail(
+        ErrorCode::kInvalidIndex, "at[" + std::to_string(j) + "]",
+        "pivot " + std::to_string(at[j]) + " of " + std::to_string(problem.pivots.size()));
+  }
+  state.joints.resize(given + at.size());
+  for (std::size_t j = given; j < state.joints.size(); ++j) {
+    state.joints[j].mirrored = static_cast<std::uint32_t>(j);
+    detail::rest(state.joints[j], problem.expressions);
+  }
+  RISORIUS_TRY(take_start(weights, state));
+  detail::move_joints(problem, state);
+  for (std::size_t j = 0; j < at.size(); ++j) {
+    if (at[j] != kInTheMiddle) state.joints[given + j].position = problem.pivots[at[j]].position;
+  }
+  return core::ok();
+}
+
 }  // namespace
 
 core::Result<Fit> fit_joints(const Shapes& shapes, const FitOptions& options,
@@ -555,6 +580,39 @@ core::Result<Fit> fit_joints(const Shapes& shapes, const FitOptions& options,
   }
   if (!steps.go_on()) return stopped();
   if (options.least_effect > 0.0) thin_out(problem, options.least_effect, state, left);
+  return pack(problem, state, shapes.expressions);
+}
+
+core::Result<Fit> fit_motions(const Shapes& shapes, const FitOptions& options,
+                              const StartWeights& weights, const std::vector<std::uint32_t>& at) {
+  FitOptions own = options;
+  own.symmetric = false;  // as symmetric as the shapes and the weights are
+  RISORIUS_TRY(check(shapes, own));
+  Problem problem = make_problem(shapes, own);
+  take_pivots(own.pivots, problem);
+  State state = start(problem, own.given, shapes.expressions);
+  if (state.joints.size() + at.size() != own.joints || own.given.size() != state.joints.size()) {
+    return core::fail(core::ErrorCode::kInvalidArgument, "given",
+                      "a joint that rests and " + std::to_string(own.joints) +
+                          " joints in all were expected, found " +
+                          std::to_string(own.given.size() + at.size()));
+  }
+  RISORIUS_TRY(take_new_joints(problem, weights, at, state));
+  problem.influences = std::max(weights.influences, std::size_t{1});
+  std::vector<float> left;
+  for (std::size_t round = 0; round < kRoundsOfMotions; ++round) {
+    detail::find_residual(problem, state, left);
+    if (round > 1 && round + 2 < kRoundsOfMotions) emphasise(problem, left, own.emphasis);
+    detail::solve_motions(problem, state, left);
+  }
+  for (const double share : kThinning) {
+    if (own.least_effect <= 0.0) break;
+    detail::leave_expressions(problem, state, share * own.least_effect * problem.scale);
+    for (int round = 0; round < 2; ++round) {
+      detail::find_residual(problem, state, left);
+      detail::solve_motions(problem, state, left);
+    }
+  }
   return pack(problem, state, shapes.expressions);
 }
 

@@ -1167,6 +1167,24 @@ def fit_weights(
 ) -> JointFit:
     """JointFit with these joints: see risorius.author.fitting."""
 
+def fit_motions(
+    neutral: npt.ArrayLike,
+    displacements: npt.ArrayLike,
+    edges: npt.ArrayLike,
+    positions: npt.ArrayLike,
+    rotations: npt.ArrayLike,
+    translations: npt.ArrayLike,
+    weight_joints: npt.ArrayLike,
+    weights: npt.ArrayLike,
+    *,
+    pivots: npt.ArrayLike,
+    at: Sequence[int],
+    emphasis: float,
+    threads: int,
+    least_effect: float,
+) -> JointFit:
+    """JointFit with these weights: see risorius.author.fitting."""
+
 class FaultSums:
     """What is worse than allowed, in one number of each kind."""
 

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
 """Joint rigs made from expressions."""
 
-from .fitting import FitOptions, JointFit, Progress, fit_joints, fit_weights
+from .fitting import FitOptions, JointFit, Progress, fit_joints, fit_motions, fit_weights
 from .joint_rig import JointRig, make_joint_rig
 from .levels import LodOptions
+from .reference import Reference
 from .work import Level, MeshErrors, RigOptions
 
 __all__ = [
@@ -14,8 +15,10 @@ __all__ = [
     "LodOptions",
     "MeshErrors",
     "Progress",
+    "Reference",
     "RigOptions",
     "fit_joints",
+    "fit_motions",
     "fit_weights",
     "make_joint_rig",
 ]

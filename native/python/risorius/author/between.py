@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from .. import Dna, Mesh
-from . import skeleton as sk
+from .geometry import skeleton as sk
+from .geometry.skeleton import Doubles
 from .pivots import arc
-from .skeleton import Doubles
 from .work import Work
 
 SHARES = (0.25, 0.5, 0.75)

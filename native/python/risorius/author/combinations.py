@@ -15,8 +15,8 @@ import numpy as np
 
 from .. import BlendShapeTarget, Dna, Mesh
 from ..rigs.rotation import Convention
-from . import skeleton as sk
-from .skeleton import Doubles, Ints
+from .geometry import skeleton as sk
+from .geometry.skeleton import Doubles, Ints
 from .work import MM, RigOptions, Work, listed_meshes
 
 _STEPS = 3  # of Gauss and Newton

@@ -11,8 +11,8 @@ import numpy.typing as npt
 
 from .. import _native
 from .._native import JointFit
+from .geometry.skeleton import Doubles, Ints, rotation_vectors
 from .pivots import Pivot
-from .skeleton import Doubles, Ints, rotation_vectors
 
 __all__ = ["FitOptions", "JointFit", "Progress", "bounded", "fit_joints", "fit_weights"]
 
@@ -102,6 +102,52 @@ def fit_joints(
         pivots=np.array([pivot.position for pivot in pivots]).reshape(-1, 3),
         pivot_expressions=[list(pivot.expressions) for pivot in pivots],
         progress=progress,
+    )
+
+
+def fit_motions(
+    neutral: Doubles,
+    displacements: npt.NDArray[np.float32],
+    edges: npt.NDArray[np.uint32],
+    *,
+    given: Doubles,
+    motions: Doubles,
+    weights: Doubles,
+    pivots: Sequence[Pivot],
+    at: Sequence[int | None],
+    options: FitOptions | None = None,
+) -> JointFit:
+    """What new joints do on a face of the same topology as the one that their weights are of.
+
+    Args:
+        neutral: float64[V, 3].
+        displacements: float32[E, V, 3] of each expression at 1.
+        edges: uint32[n, 2] of the polygons.
+        given: float64[J, 3], joints that stay where they are.
+        motions: float64[E, J, 3, 4] of the given joints; one at least rests in all expressions.
+        weights: float64[V, J + new joints].
+        pivots: points that joints may be placed at.
+        at: [new joints] the pivot of each; None: it lies in the middle of what it moves.
+        options: emphasis, threads and least_effect of it count.
+
+    Raises:
+        DnaError: a value that is not finite, no motion at all, a joint or pivot that is not there.
+    """
+    o = options or FitOptions()
+    rotations, translations = split_motions(motions, given)
+    return _native.fit_motions(
+        neutral,
+        displacements,
+        edges,
+        given,
+        rotations,
+        translations,
+        *_rows(weights),
+        pivots=np.array([pivot.position for pivot in pivots]).reshape(-1, 3),
+        at=[0xFFFFFFFF if pivot is None else pivot for pivot in at],
+        emphasis=o.emphasis,
+        threads=o.threads,
+        least_effect=o.least_effect,
     )
 
 

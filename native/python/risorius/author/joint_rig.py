@@ -15,15 +15,16 @@ from .. import Dna, DnaError, JointGroup
 from ..base.errors import ArgumentError
 from ..rigs.edit import regroup
 from ..rigs.rotation import Convention
-from . import skeleton as sk
 from .combinations import Combination, Combinations
 from .fitting import FitOptions, Progress, fit_joints
+from .geometry import skeleton as sk
+from .geometry.skeleton import Doubles
 from .levels import LodOptions, extend_levels, joint_budgets, joint_order, level_joints
 from .meshes import Made, count_deltas
 from .naming import joint_names
 from .parents import choose_parents, joint_motions, room_for_second, second_joints
-from .pivots import find_pivots
-from .skeleton import Doubles
+from .pivots import Pivot, find_pivots
+from .reference import Reference, reference_of, refit
 from .work import (
     MM,
     Joints,
@@ -57,12 +58,14 @@ class JointRig:
     deltas_after: int
     columns: list[int]  # the input of each expression
     combinations: list[Combination]  # correctives
+    reference: Reference  # what other people's faces take over
 
 
 def make_joint_rig(
     dna: Dna,
     options: RigOptions | None = None,
     progress: Progress | None = None,
+    like: Reference | None = None,
 ) -> JointRig:
     """The same face with new joints that do what its blend shapes did.
 
@@ -73,10 +76,13 @@ def make_joint_rig(
         dna: a face with blend shapes; it stays as it is.
         options: how many joints, and what blend shapes keep.
         progress: told the share that is done, 0 to 1; False stops.
+        like: of a joint rig of the same topology whose joints, weights and levels this face is to
+            have: only what they do is found, in a part of the time.
 
     Raises:
         DnaError: a value that is not finite, nothing that moves, or progress said False.
-        ValueError: no mesh, a joint that changes its size, no joint that rests.
+        ValueError: no mesh, a joint that changes its size, no joint that rests, a face of another
+            topology than `like`.
     """
     o = options or RigOptions()
     o.lods.check()
@@ -87,21 +93,23 @@ def make_joint_rig(
     if not needs & set(listed_meshes(dna, 0)):
         raise ArgumentError("no mesh of LOD 0 has a blend shape that an expression moves")
     shaped = [m for m in listed_meshes(dna, 0) if m in needs]
-    # The fit is nearly all of the work; levels and weights take what is left of the bar.
-    room = room_for_second(work, shaped, wanted, o.fit.joints)
     unit = MM.get(dna.translation_unit, 10.0)
-    own = replace(o.fit, joints=o.fit.joints - room, least_effect=o.least_effect_mm / unit)
-    jaw = _jaw(work)
-    fit, weights = _fit(work, shaped, wanted, jaw, own, _part(progress, 0.0, 0.7))
-    work.parents = choose_parents(work, shaped, fit, weights, jaw)
-    fit, weights, work.parents = second_joints(work, shaped, fit, weights, room)
-    _order_levels(work, shaped, fit, weights, o)
+    o = replace(o, fit=replace(o.fit, least_effect=o.least_effect_mm / unit))
+    if like is None:
+        # The fit is nearly all of the work; levels and weights take what is left of the bar.
+        fit, weights = _new_joints(work, shaped, wanted, o, _part(progress, 0.0, 0.7))
+    else:
+        like.check(work)
+        work.levels = len(like.levels)
+        work.pivots = _pivots(work, shaped, wanted, _jaw(work))
+        fit, weights = refit(work, like, shaped, wanted, o)
     beside = _beside_parents(work, fit)
     held = new_weights(work, shaped, weights)
     effects = _effects(work, shaped, beside, held)
-    names, regions = _add_joints(work, fit, effects, _places(work, shaped, fit, held))
+    names = like.names if like else _names(work, fit, effects, _places(work, shaped, fit, held))
+    regions = _add_joints(work, fit, names)
     _add_behavior(work, beside, effects, regions, o)
-    made = Made(work, o, weights)
+    made = Made(work, o, weights, like)
     for lod in range(work.levels):
         made.add_level(lod, wanted, needs)
         if progress is not None and progress(0.7 + 0.1 * (lod + 1) / work.levels) is False:
@@ -126,7 +134,26 @@ def make_joint_rig(
         count_deltas(work.dna.meshes),
         work.columns,
         combinations,
+        reference_of(work, fit, made.triangles, work.dna),
     )
+
+
+def _new_joints(
+    work: Work,
+    shaped: list[int],
+    wanted: dict[int, Doubles],
+    options: RigOptions,
+    progress: Progress | None,
+) -> tuple[Joints, dict[int, Doubles]]:
+    """Joints and dense weights of the finest meshes; parents and levels into the work."""
+    room = room_for_second(work, shaped, wanted, options.fit.joints)
+    own = replace(options.fit, joints=options.fit.joints - room)
+    jaw = _jaw(work)
+    fit, weights = _fit(work, shaped, wanted, jaw, own, progress)
+    work.parents = choose_parents(work, shaped, fit, weights, jaw)
+    fit, weights, work.parents = second_joints(work, shaped, fit, weights, room)
+    _order_levels(work, shaped, fit, weights, options)
+    return fit, weights
 
 
 def _combine(
@@ -227,14 +254,7 @@ def _fit(
         edges.append(sk.mesh_edges(dna.meshes[m]) + np.uint32(begin[-1]))
         begin.append(begin[-1] + len(dna.meshes[m].positions))
     used = given(work)
-    work.pivots = find_pivots(
-        work.names,
-        neutral,
-        moved.astype(np.float64),
-        dna.joint_names,
-        work.positions,
-        jaw=jaw is not None,
-    )
+    work.pivots = _pivots(work, meshes, wanted, jaw)
     fit = fit_joints(
         neutral,
         moved,
@@ -258,17 +278,34 @@ def _fit(
     return found, parts
 
 
-def _add_joints(
-    work: Work, fit: Joints, effects: Doubles, places: Doubles
-) -> tuple[list[str], dict[str, list[str]]]:
-    """The new joints at the end of the Dna's; their names, and by region."""
+def _pivots(
+    work: Work, meshes: Sequence[int], wanted: dict[int, Doubles], jaw: int | None
+) -> list[Pivot]:
+    moved = np.concatenate([wanted[m] for m in meshes], axis=1).astype(np.float32)
+    return find_pivots(
+        work.names,
+        joined_positions(work, meshes),
+        moved.astype(np.float64),
+        work.source.joint_names,
+        work.positions,
+        jaw=jaw is not None,
+    )
+
+
+def _names(work: Work, fit: Joints, effects: Doubles, places: Doubles) -> list[str]:
+    """Names of the new joints, by where they are and what moves them."""
     dna = work.dna
     first = len(given(work))
-    positions = fit.joints[first:]
     left = -1 if dna.coordinate_system[0] == "left" else 1
-    taken = set(dna.joint_names)
     pairs = fit.mirrored[first:] - first
-    names = joint_names(places, effects, pairs, work.names, left=left, taken=taken)
+    taken = set(dna.joint_names)
+    return joint_names(places, effects, pairs, work.names, left=left, taken=taken)
+
+
+def _add_joints(work: Work, fit: Joints, names: list[str]) -> dict[str, list[str]]:
+    """The new joints at the end of the Dna's; their names by region."""
+    dna = work.dna
+    positions = fit.joints[len(given(work)) :]
     rest = sk.world_matrices(dna, np.zeros((len(dna.joint_names), 9)))[work.parents]
     local = np.linalg.solve(rest[:, :3, :3], (positions - rest[:, :3, 3])[..., None])[..., 0]
     dna.joint_names = [*dna.joint_names, *names]
@@ -286,7 +323,7 @@ def _add_joints(
     regions: dict[str, list[str]] = {}
     for name in names:
         regions.setdefault(name.split("_")[2].rstrip("0123456789"), []).append(name)
-    return names, regions
+    return regions
 
 
 def _beside_parents(work: Work, fit: Joints) -> Doubles:

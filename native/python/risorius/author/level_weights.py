@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from .. import Mesh
-from . import skeleton as sk
 from .between import Between, Ways
 from .fitting import FitOptions, fit_weights
-from .skeleton import Doubles, Ints
+from .geometry import skeleton as sk
+from .geometry.skeleton import Doubles, Ints
 from .work import (
     Work,
     carried_shares,

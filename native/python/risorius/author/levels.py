@@ -16,7 +16,7 @@ import numpy as np
 
 from .. import Dna
 from ..base.errors import ArgumentError
-from .skeleton import Doubles, Ints
+from .geometry.skeleton import Doubles, Ints
 
 # Of what LOD 0 has, about as in faces that are made by hand: joints stay longer than vertices.
 _JOINTS = (1.0, 0.8, 0.6, 0.45, 0.3, 0.2, 0.12, 0.06)

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from .. import Dna, Mesh
-from . import skeleton as sk
-from .skeleton import Doubles
+from .geometry import skeleton as sk
+from .geometry.skeleton import Doubles
 from .work import MM
 
 

@@ -10,12 +10,13 @@ from dataclasses import replace
 import numpy as np
 
 from .. import BlendShapeTarget, Dna, Mesh
-from . import skeleton as sk
 from .between import Between, Ways
+from .geometry import skeleton as sk
+from .geometry.simplify import fewer_triangles, simplified
+from .geometry.skeleton import Doubles, Ints
 from .level_weights import level_weights
 from .levels import level_name, mesh_budget, vertex_budgets
-from .simplify import simplified
-from .skeleton import Doubles
+from .reference import Reference
 from .work import (
     MM,
     Level,
@@ -35,8 +36,15 @@ def count_deltas(meshes: Sequence[Mesh]) -> int:
 class Made:
     """Meshes of all levels as they are made, one level after the other."""
 
-    def __init__(self, work: Work, options: RigOptions, weights: dict[int, Doubles]) -> None:
-        self.work, self.options, self.weights = work, options, weights
+    def __init__(
+        self,
+        work: Work,
+        options: RigOptions,
+        weights: dict[int, Doubles],
+        like: Reference | None = None,
+    ) -> None:
+        self.work, self.options, self.weights, self.like = work, options, weights, like
+        self.triangles: dict[str, Ints] = {}  # of the coarse meshes, in layouts of the fine ones
         self.ways = Ways(work)
         self.meshes: list[Mesh] = []
         self.names: list[str] = []
@@ -75,15 +83,23 @@ class Made:
         share = self.budgets[lod] / max(1, self.budgets[0])
         for m in listed_meshes(source, 0):
             mesh, name = source.meshes[m], source.mesh_names[m]
-            budget = mesh_budget(name, len(mesh.positions), share)
-            if not budget:
+            triangles = self._triangles(lod, name, mesh, wanted[m], share)
+            if not len(triangles):
                 continue
-            coarse, kept = simplified(mesh, wanted[m], budget)
-            if len(kept):
-                _set_skin(coarse, sk.dense_weights(mesh, len(source.joint_names))[kept])
-                name = level_name(name, lod)
-                start = self.weights[m][kept] if m in needs else None
-                self._add(lod, coarse, name, wanted[m][:, kept], start)
+            coarse, kept = simplified(mesh, triangles)
+            _set_skin(coarse, sk.dense_weights(mesh, len(source.joint_names))[kept])
+            name = level_name(name, lod)
+            self.triangles[name] = triangles
+            start = self.weights[m][kept] if m in needs else None
+            self._add(lod, coarse, name, wanted[m][:, kept], start)
+
+    def _triangles(self, lod: int, name: str, mesh: Mesh, wanted: Doubles, share: float) -> Ints:
+        """int64[n, 3]: what a coarse mesh keeps of the fine one's layouts; none: it is left out."""
+        none = np.zeros((0, 3), np.int64)
+        if self.like is not None:
+            return self.like.triangles.get(level_name(name, lod), none)
+        budget = mesh_budget(name, len(mesh.positions), share)
+        return fewer_triangles(mesh, wanted, budget) if budget else none
 
     def _start(self, mesh: Mesh) -> Doubles:
         """Dense weights of the nearest vertices of the finest level."""
@@ -122,7 +138,10 @@ class Made:
         if rows is None:
             self.meshes.append(mesh)
             return
-        rows = level_weights(self.ways, self.options.fit, lod, mesh, wanted, rows)
+        if self.like is not None:
+            rows = self.like.weights[name]
+        else:
+            rows = level_weights(self.ways, self.options.fit, lod, mesh, wanted, rows)
         if finest is not None:
             self.weights[finest] = rows
         shaped = self.options if lod < self.own else replace(self.options, tolerance_mm=None)

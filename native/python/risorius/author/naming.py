@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..controls.regions import TITLES, region_of
-from .skeleton import Doubles, Ints
+from .geometry.skeleton import Doubles, Ints
 
 _WORDS = {"brow": "Brow", "eye": "Eye", "nose": "Nose", "cheek": "Cheek", "mouth": "Mouth"}
 _WORDS |= {"jaw": "JawSkin", "tongue": "Tongue", "teeth": "Teeth", "neck": "Neck"}

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from .skeleton import Doubles, Ints, matrices_of_vectors
+from .geometry.skeleton import Doubles, Ints, matrices_of_vectors
 from .work import (
     Joints,
     Work,

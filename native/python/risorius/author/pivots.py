@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .skeleton import Doubles, rotation_vectors
+from .geometry.skeleton import Doubles, rotation_vectors
 
 _LID = re.compile(r"eye(Blink|Widen|Squint|LidPress|Relax|UpperLid|LowerLid|LookUp|LookDown)")
 _JAW = re.compile(r"jaw(Open|OpenExtreme|Left|Right)$")

@@ -11,11 +11,11 @@ import numpy as np
 
 from .. import Dna, JointGroup, Mesh
 from ..base.errors import ArgumentError
-from . import skeleton as sk
 from .fitting import FitOptions, JointFit
+from .geometry import skeleton as sk
+from .geometry.skeleton import Doubles, Ints
 from .levels import LodOptions
 from .pivots import Pivot
-from .skeleton import Doubles, Ints
 
 MM = {"cm": 10.0, "m": 1000.0}
 # A vertex that follows another joint of the neck than before counts as one that is so far off: a

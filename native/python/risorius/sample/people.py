@@ -1,22 +1,34 @@
 # SPDX-License-Identifier: MIT
-"""Who can be built: shares of the data's body shapes, and colours."""
+"""Who can be built: age, build, origin and features as shares of the data's shapes; colours."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from ..base import toml
+from ..base.errors import ArgumentError
 
 Colour = tuple[float, float, float]
+ORIGINS = ("caucasian", "african", "asian")
+YEARS = (5.0, 90.0)
+# Years at which each of the data's ages is the whole of a face.
+_AGES = ((1.0, "baby"), (11.0, "child"), (20.0, "young"), (32.0, "young"), (90.0, "old"))
+_COLOURS = ("skin", "flush", "lids", "lips", "hair", "brows")
 
 
 @dataclass(frozen=True)
 class Person:
-    """A sample person. Colours are sRGB in [0, 1]."""
+    """A sample person. Colours are sRGB in [0, 1]; the keys are said in cast.toml."""
 
     name: str
     gender: str
     age: int
-    shape: dict[str, float]
-    """Target of the data -> weight."""
+    origin: dict[str, float]
     skin: Colour
     flush: Colour
     lids: Colour
@@ -24,47 +36,143 @@ class Person:
     hair: Colour
     brows: Colour
     beard: float
-    """Opacity of its shadow."""
     iris: tuple[Colour, Colour]
     """At the pupil, at the rim."""
+    muscle: float = 0.5
+    weight: float = 0.5
+    features: dict[str, float] = field(default_factory=dict)
+
+    def shape(self) -> dict[str, float]:
+        """Body shapes of the data -> weights. Features are not in it, see Source.feature."""
+        ages: dict[str, float] = {}
+        for (low, young), (high, old) in itertools.pairwise(_AGES):
+            if low <= self.age <= high:
+                up = (self.age - low) / (high - low)
+                ages = {}
+                for name, share in ((young, 1 - up), (old, up)):
+                    ages[name] = ages.get(name, 0.0) + share
+                break
+        out: dict[str, float] = {}
+        for age, part in ages.items():
+            for muscle, strong in _levels("muscle", self.muscle):
+                for weight, heavy in _levels("weight", self.weight):
+                    name = f"macrodetails/universal-{self.gender}-{age}-{muscle}-{weight}"
+                    out[name] = part * strong * heavy
+        for origin, share in self.origin.items():
+            for age, part in ages.items():
+                out[f"macrodetails/{origin}-{self.gender}-{age}"] = share * part
+        return {name: weight for name, weight in out.items() if weight}
 
 
-MAN = Person(
-    name="Sample",
-    gender="male",
-    age=28,
-    shape={
-        "macrodetails/universal-male-young-averagemuscle-averageweight": 1.0,
-        "macrodetails/caucasian-male-young": 0.6,
-        "macrodetails/african-male-young": 0.2,
-        "macrodetails/asian-male-young": 0.2,
-    },
-    skin=(0.79, 0.60, 0.50),
-    flush=(0.78, 0.46, 0.40),
-    lids=(0.62, 0.42, 0.36),
-    lips=(0.66, 0.38, 0.36),
-    hair=(0.20, 0.15, 0.13),
-    brows=(0.13, 0.085, 0.06),
-    beard=0.16,
-    iris=((0.42, 0.30, 0.16), (0.25, 0.29, 0.26)),
-)
-WOMAN = Person(
-    name="SampleWoman",
-    gender="female",
-    age=31,
-    shape={
-        "macrodetails/universal-female-young-averagemuscle-averageweight": 1.0,
-        "macrodetails/african-female-young": 0.65,
-        "macrodetails/caucasian-female-young": 0.2,
-        "macrodetails/asian-female-young": 0.15,
-    },
-    skin=(0.50, 0.335, 0.255),
-    flush=(0.50, 0.26, 0.20),
-    lids=(0.35, 0.215, 0.165),
-    lips=(0.47, 0.235, 0.215),
-    hair=(0.085, 0.065, 0.055),
-    brows=(0.06, 0.042, 0.034),
-    beard=0.0,
-    iris=((0.26, 0.15, 0.075), (0.15, 0.085, 0.05)),
-)
-PEOPLE = {"man": MAN, "woman": WOMAN}
+def _levels(what: str, value: float) -> list[tuple[str, float]]:
+    low, high = ("min", "average") if value <= 0.5 else ("average", "max")
+    up = 2 * value if value <= 0.5 else 2 * value - 1
+    return [(f"{low}{what}", 1 - up), (f"{high}{what}", up)]
+
+
+class _Reader:
+    """Takes the keys of one person and says where one is not as it should be."""
+
+    def __init__(self, where: str, table: dict[str, Any]) -> None:
+        self.where, self.table = where, dict(table)
+
+    def fail(self, key: str, expected: str, found: object) -> ArgumentError:
+        return ArgumentError(f"{self.where}: {key}: {expected} was expected, found {found!r}")
+
+    def take(self, key: str, convert: Callable[[str, Any], Any]) -> dict[str, Any]:
+        return {key: convert(key, self.table.pop(key))} if key in self.table else {}
+
+    def number(self, low: float, high: float) -> Callable[[str, Any], float]:
+        def convert(key: str, value: Any) -> float:
+            real = isinstance(value, int | float) and not isinstance(value, bool)
+            if not real or not low <= value <= high:
+                raise self.fail(key, f"a number from {low:g} to {high:g}", value)
+            return float(value)
+
+        return convert
+
+    def age(self, key: str, value: Any) -> int:
+        return round(self.number(*YEARS)(key, value))
+
+    def text(self, key: str, value: Any) -> str:
+        if not isinstance(value, str) or not value.isidentifier():
+            raise self.fail(key, "letters and digits, a letter first,", value)
+        return value
+
+    def gender(self, key: str, value: Any) -> str:
+        if value not in ("female", "male"):
+            raise self.fail(key, '"female" or "male"', value)
+        return str(value)
+
+    def shares(self, key: str, value: Any) -> dict[str, float]:
+        if not isinstance(value, dict):
+            raise self.fail(key, "a table", value)
+        return {name: self.number(0, 1)(f"{key}.{name}", x) for name, x in value.items()}
+
+    def origin(self, key: str, value: Any) -> dict[str, float]:
+        out = self.shares(key, value)
+        unknown = [name for name in out if name not in ORIGINS]
+        if unknown:
+            raise self.fail(key, f"a share of {', '.join(ORIGINS)}", unknown[0])
+        if abs(sum(out.values()) - 1) > 1e-3:
+            raise self.fail(key, "shares that are 1 together", round(sum(out.values()), 3))
+        return out
+
+    def colour(self, key: str, value: Any) -> Colour:
+        if not isinstance(value, list) or len(value) != 3:
+            raise self.fail(key, "three numbers from 0 to 1", value)
+        red, green, blue = (self.number(0, 1)(key, x) for x in value)
+        return red, green, blue
+
+    def iris(self, key: str, value: Any) -> tuple[Colour, Colour]:
+        if not isinstance(value, list) or len(value) != 2:
+            raise self.fail(key, "a colour at the pupil and one at the rim", value)
+        return self.colour(key, value[0]), self.colour(key, value[1])
+
+
+def _person(where: str, table: dict[str, Any], like: Person | None) -> Person:
+    """A person of a table. Raises ValueError with the key that is wrong."""
+    read = _Reader(where, table)
+    values: dict[str, Any] = dict(vars(like)) if like else {}
+    values |= read.take("name", read.text) | read.take("gender", read.gender)
+    values |= read.take("age", read.age) | read.take("origin", read.origin)
+    values |= read.take("features", read.shares) | read.take("iris", read.iris)
+    for key in ("muscle", "weight", "beard"):
+        values |= read.take(key, read.number(0, 1))
+    for key in _COLOURS:
+        values |= read.take(key, read.colour)
+    if read.table:
+        raise ArgumentError(f"{where}: {next(iter(read.table))}: a person has no such key")
+    needed = [k for k, f in Person.__dataclass_fields__.items() if k not in values]
+    needed = [k for k in needed if k not in ("muscle", "weight", "features")]
+    if needed:
+        raise ArgumentError(f"{where}: {needed[0]} is missing, and no `like` has it")
+    return Person(**values)
+
+
+def _cast() -> dict[str, Person]:
+    text = files(__package__).joinpath("cast.toml").read_text(encoding="utf-8")
+    return {key: _person(f"cast.toml, {key}", t, None) for key, t in toml.parse(text).items()}
+
+
+PEOPLE = _cast()
+MAN = PEOPLE["man"]
+
+
+def read_person(path: Path) -> Person:
+    """A person of a file of one's own.
+
+    Args:
+        path: TOML, with the keys that cast.toml says.
+
+    Raises:
+        OSError: it cannot be read.
+        ValueError: no TOML, or a key that is not as it should be.
+    """
+    table = toml.read(path)
+    like = table.pop("like", None)
+    if like is not None and like not in PEOPLE:
+        raise ArgumentError(
+            f"{path}: like: one of {', '.join(PEOPLE)} was expected, found {like!r}"
+        )
+    return _person(str(path), table, PEOPLE[like] if like else None)

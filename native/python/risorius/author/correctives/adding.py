@@ -10,9 +10,9 @@ import numpy as np
 
 from ... import BlendShapeTarget, Dna, Mesh, Psds
 from ...base.errors import ArgumentError
-from .. import skeleton as sk
-from ..polygon_mesh import vertex_normals
-from ..skeleton import Doubles, Ints
+from ..geometry import skeleton as sk
+from ..geometry.polygon_mesh import vertex_normals
+from ..geometry.skeleton import Doubles, Ints
 from ..work import MM, listed_meshes
 from .poser import Controls, make_checker, skin_and_solids
 

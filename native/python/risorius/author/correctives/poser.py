@@ -11,9 +11,9 @@ import numpy as np
 from ... import Dna, Mesh
 from ..._native import SkinChecker, SkinFaults
 from ...base.errors import ArgumentError
-from .. import skeleton as sk
-from ..simplify import fan_triangles
-from ..skeleton import Doubles
+from ..geometry import skeleton as sk
+from ..geometry.simplify import fan_triangles
+from ..geometry.skeleton import Doubles
 from ..work import MM, listed_meshes
 
 Controls = tuple[int, ...]

@@ -21,7 +21,7 @@ from ... import Dna, DnaError
 from ..._native import FaultSums, SkinFaults
 from ...base.errors import ArgumentError
 from ..fitting import Progress
-from ..skeleton import Doubles
+from ..geometry.skeleton import Doubles
 from ..work import MM
 from .poser import SOLIDS, Controls, Poser, make_checker, skin_and_solids, worst
 

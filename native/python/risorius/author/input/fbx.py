@@ -17,7 +17,7 @@ import numpy.typing as npt
 from ...base.budget import Budget
 from ...importing.fbx import Node, Parser, Scene, is_fbx, object_name, properties, read_scene
 from ...importing.source import read_bytes
-from ..skeleton import Doubles, Ints
+from ..geometry.skeleton import Doubles, Ints
 from .obj import ObjMesh, ShapeFileError, choose_mesh
 
 SUFFIX = ".fbx"

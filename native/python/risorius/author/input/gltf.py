@@ -12,7 +12,7 @@ import numpy as np
 from ...importing import named_json
 from ...importing.gltf import Document, is_glb, is_gltf, open_glb, open_gltf
 from ...importing.source import decode, read_bytes
-from ..skeleton import Doubles, Ints
+from ..geometry.skeleton import Doubles, Ints
 from .obj import ObjMesh, ShapeFileError, choose_mesh
 
 SUFFIXES = (".glb", ".gltf")

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ...base.errors import RisoriusError
-from ..skeleton import Doubles
+from ..geometry.skeleton import Doubles
 
 
 class ShapeFileError(RisoriusError, ValueError):

@@ -11,8 +11,8 @@ import numpy as np
 from ... import BlendShapeChannels, BlendShapeTarget, Dna, Mesh
 from ...base.easing import smooth_step
 from ...base.errors import ArgumentError
-from ..polygon_mesh import polygon_mesh, vertex_normals
-from ..skeleton import Doubles
+from ..geometry.polygon_mesh import polygon_mesh, vertex_normals
+from ..geometry.skeleton import Doubles
 from .matching import PREFIX
 from .obj import ObjMesh, ShapeFileError
 

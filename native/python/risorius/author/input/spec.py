@@ -11,8 +11,8 @@ from ... import Dna, load
 from ...base import toml
 from ..correctives import CorrectiveOptions, add_correctives
 from ..fitting import FitOptions
+from ..geometry.skeleton import Doubles
 from ..levels import LodOptions
-from ..skeleton import Doubles
 from ..work import RigOptions
 from . import fbx, gltf
 from .matching import assign

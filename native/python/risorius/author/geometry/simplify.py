@@ -8,7 +8,7 @@ import copy
 import numpy as np
 import numpy.typing as npt
 
-from .. import Mesh, _native
+from ... import Mesh, _native
 from .skeleton import Doubles, Ints
 
 _UV = 0.5  # of the texture's width counts as much as of the mesh' size
@@ -46,8 +46,8 @@ def _attributes(mesh: Mesh, displacements: Doubles, size: float) -> Doubles:
     return np.column_stack([_UV * own, _MOTION * (moved @ main)[places]])
 
 
-def simplified(mesh: Mesh, displacements: Doubles, vertices: int) -> tuple[Mesh, Ints]:
-    """A mesh with about so many vertices, some of those that it has; no skin and no shapes.
+def fewer_triangles(mesh: Mesh, displacements: Doubles, vertices: int) -> Ints:
+    """int64[n, 3]: triangles of a mesh' layouts with about so many vertices, some of those it has.
 
     What the texture and the expressions do is kept beside the form. Borders and seams stay where
     they are; where there are so many seams that nothing can be taken away, each vertex keeps one
@@ -57,9 +57,6 @@ def simplified(mesh: Mesh, displacements: Doubles, vertices: int) -> tuple[Mesh,
         mesh: stays as it is.
         displacements: float64[E, V, 3], what expressions add to its vertices.
         vertices: at most, where it can be.
-
-    Returns:
-        The new mesh of triangles, and which vertices of the fine one its own are.
     """
     positions = np.asarray(mesh.positions, np.float64)
     places = np.asarray(mesh.layout_positions, np.int64)
@@ -73,7 +70,7 @@ def simplified(mesh: Mesh, displacements: Doubles, vertices: int) -> tuple[Mesh,
         welded = of.ravel()[triangles].astype(np.uint32)
         found = _fewer(points[first], attributes[first, 2:], welded, places[first], vertices)
         found = np.asarray(first, np.uint32)[found]
-    return _corners_of(mesh, np.asarray(found, np.int64))
+    return np.asarray(found, np.int64)
 
 
 def _fewer(
@@ -91,8 +88,16 @@ def _fewer(
     return found
 
 
-def _corners_of(mesh: Mesh, triangles: Ints) -> tuple[Mesh, Ints]:
-    """The mesh with these triangles of its layouts alone, and the vertices that it kept."""
+def simplified(mesh: Mesh, triangles: Ints) -> tuple[Mesh, Ints]:
+    """The mesh with these triangles of its layouts alone, without skin and shapes.
+
+    Args:
+        mesh: stays as it is.
+        triangles: int64[n, 3], of fewer_triangles, for it or for one of the same topology.
+
+    Returns:
+        The new mesh of triangles, and which vertices of the fine one its own are.
+    """
     layouts, corners = np.unique(triangles, return_inverse=True)
 
     def kept(of: object) -> tuple[Ints, Ints]:

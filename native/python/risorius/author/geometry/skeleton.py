@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from .. import Dna, Mesh
-from ..rigs.rotation import Convention
+from ... import Dna, Mesh
+from ...rigs.rotation import Convention
 
 Doubles = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]

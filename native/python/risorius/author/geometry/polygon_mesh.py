@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .. import Mesh
+from ... import Mesh
 
 Floats = npt.NDArray[Any]  # NumPy's stubs lose the type in arithmetic
 

@@ -1,0 +1,246 @@
+# SPDX-License-Identifier: MIT
+"""A joint rig as what other faces of the same topology take over: joints, weights, levels.
+
+The fit is made once; another person's joints then only learn what they do on that person. All
+people so made have the same joints, which is what mixes them.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import struct
+import zipfile
+import zlib
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from .. import Dna, Mesh, _native
+from ..base.errors import ArgumentError
+from .fitting import fit_motions
+from .geometry import skeleton as sk
+from .geometry.skeleton import Doubles, Ints
+from .work import Joints, RigOptions, Work, given, joined_positions
+
+_FORMAT = 1
+_DAMAGED = (
+    ValueError,
+    LookupError,
+    TypeError,
+    AttributeError,
+    RuntimeError,
+    EOFError,
+    OSError,
+    MemoryError,
+    struct.error,
+    zipfile.BadZipFile,
+    zlib.error,
+)
+Arrays = dict[str, npt.NDArray[np.float32] | Ints]
+
+
+@dataclass
+class Reference:
+    """What a joint rig has beside the motions, which are another person's own."""
+
+    face: dict[str, list[int]]  # mesh of the source -> vertices, corners
+    joints: list[str]  # of the source
+    expressions: list[str]
+    names: list[str]  # of the new joints
+    parents: list[int]
+    mirrored: list[int]  # of each new joint that of the other side
+    pivots: list[int | None]  # of each new joint
+    levels: list[list[int]]  # new joints of each
+    weights: dict[str, Doubles] = field(default_factory=dict)  # mesh -> [V, joints]
+    triangles: dict[str, Ints] = field(default_factory=dict)  # coarse mesh -> [n, 3], fine layouts
+
+    def check(self, work: Work) -> None:
+        """Raises ValueError where a face is of another topology, or has other controls.
+
+        Args:
+            work: the face.
+        """
+        for what, own, other in (
+            ("joints", list(work.source.joint_names), self.joints),
+            ("expressions", work.names, self.expressions),
+            ("meshes", list(work.source.mesh_names), list(self.face)),
+        ):
+            if own == other:
+                continue
+            missing = [n for n in other if n not in own] or [n for n in own if n not in other]
+            named = f", such as {missing[0]}" if missing else " in another order"
+            raise ArgumentError(
+                f"the face has other {what} than the one whose joints it is to have{named}"
+            )
+        for name, mesh in zip(work.source.mesh_names, work.source.meshes, strict=True):
+            found = _counts(mesh)
+            if found != self.face[name]:
+                raise ArgumentError(
+                    f"{name}: {self.face[name][0]} vertices and {self.face[name][1]} corners were "
+                    f"expected, as the face has whose joints it is to have, found {found[0]} and "
+                    f"{found[1]}"
+                )
+
+    def to_bytes(self) -> bytes:
+        """A file of NumPy's; read by from_bytes."""
+        arrays: Arrays = {}
+        for name, rows in self.weights.items():
+            vertex, joint = np.nonzero(rows)
+            arrays[f"weights/{name}"] = np.column_stack([vertex, joint])
+            arrays[f"values/{name}"] = rows[vertex, joint].astype(np.float32)
+        arrays |= {f"triangles/{name}": rows for name, rows in self.triangles.items()}
+        named = {
+            key: getattr(self, key)
+            for key in self.__dataclass_fields__
+            if key not in ("weights", "triangles")
+        }
+        text = json.dumps({"format": _FORMAT, **named}).encode()
+        out = io.BytesIO()
+        np.savez_compressed(out, about=np.frombuffer(text, np.uint8), **arrays)
+        return out.getvalue()
+
+    @staticmethod
+    def from_bytes(data: bytes) -> Reference:
+        """The reference of a file. Raises ValueError where it is none.
+
+        Args:
+            data: of the file.
+        """
+        try:
+            with np.load(io.BytesIO(data), allow_pickle=False) as file:
+                about = json.loads(file["about"].tobytes())
+                if about.pop("format") != _FORMAT:
+                    raise ValueError("another format")
+                out = Reference(**about)
+                joints = len(out.joints) + len(out.names)
+                for key in file.files:
+                    kind, _, name = key.partition("/")
+                    if kind == "triangles":
+                        out.triangles[name] = file[key].astype(np.int64)
+                    elif kind == "weights":
+                        at = file[key]
+                        rows = np.zeros((int(at[:, 0].max()) + 1, joints))
+                        rows[at[:, 0], at[:, 1]] = file[f"values/{name}"]
+                        out.weights[name] = rows
+        except _DAMAGED as error:
+            raise ArgumentError(f"no reference of a joint rig: {error}") from None
+        return out
+
+    @staticmethod
+    def read(path: Path) -> Reference:
+        """As from_bytes, of a file.
+
+        Args:
+            path: of it.
+        """
+        return Reference.from_bytes(path.read_bytes())
+
+
+def fingerprint() -> bytes:
+    """32 bytes that are others where joints may be found otherwise: of module and folder."""
+    known = hashlib.sha256(Path(_native.__file__ or "").read_bytes())
+    for entry in sorted(Path(__file__).parent.rglob("*.py")):
+        known.update(entry.read_bytes())
+    return known.digest()
+
+
+def _counts(mesh: Mesh) -> list[int]:
+    return [len(mesh.positions), len(mesh.face_layouts)]
+
+
+def reference_of(work: Work, fit: Joints, triangles: dict[str, Ints], dna: Dna) -> Reference:
+    """What other faces take over of a joint rig that is made.
+
+    Args:
+        work: the face, its levels chosen.
+        fit: its joints.
+        triangles: of its coarse meshes.
+        dna: the face of joints.
+    """
+    first, before = len(given(work)), len(work.source.joint_names)
+    points = [pivot.position for pivot in work.pivots]
+    at = [
+        next((k for k, point in enumerate(points) if np.allclose(point, p, atol=1e-6)), None)
+        for p in fit.joints[first:]
+    ]
+    out = Reference(
+        {n: _counts(m) for n, m in zip(work.source.mesh_names, work.source.meshes, strict=True)},
+        list(work.source.joint_names),
+        list(work.names),
+        [str(n) for n in list(dna.joint_names)[before:]],
+        [int(p) for p in work.parents],
+        [int(m) for m in fit.mirrored[first:] - first],
+        at,
+        [[int(j) for j in level] for level in work.new],
+        triangles=triangles,
+    )
+    for name, mesh in zip(dna.mesh_names, dna.meshes, strict=True):
+        rows = sk.dense_weights(mesh, len(dna.joint_names))
+        if rows[:, before:].any():
+            out.weights[name] = rows
+    return out
+
+
+def refit(
+    work: Work,
+    reference: Reference,
+    shaped: list[int],
+    wanted: dict[int, Doubles],
+    options: RigOptions,
+) -> tuple[Joints, dict[int, Doubles]]:
+    """What the joints of a reference do on another face, and their weights on its finest meshes.
+
+    Args:
+        work: the other face; gets levels and parents.
+        reference: checked.
+        shaped: the meshes that are fitted.
+        wanted: float64[E, V, 3] of each mesh.
+        options: of the fit.
+
+    Raises:
+        ValueError: other meshes move than on the face that the reference is of.
+    """
+    dna = work.source
+    work.new = [np.array(level, np.int64) for level in reference.levels]
+    work.parents = list(reference.parents)
+    weights = {
+        m: reference.weights[dna.mesh_names[m]]
+        for m in shaped
+        if dna.mesh_names[m] in reference.weights
+    }
+    if sorted(weights) != sorted(shaped):
+        raise ArgumentError("meshes move that the face whose joints it is to have leaves still")
+    used = given(work)
+    own = np.concatenate([used, np.arange(len(reference.names)) + len(dna.joint_names)])
+    edges, begin = [], 0
+    for m in shaped:
+        edges.append(sk.mesh_edges(dna.meshes[m]) + np.uint32(begin))
+        begin += len(dna.meshes[m].positions)
+    # What hangs on resting joints hangs on the head to the fit: they all rest.
+    rows = np.concatenate([weights[m] for m in shaped])
+    others = np.setdiff1d(np.arange(rows.shape[1]), own)
+    rows[:, work.head] += rows[:, others].sum(axis=1)
+    found = fit_motions(
+        joined_positions(work, shaped),
+        np.concatenate([wanted[m] for m in shaped], axis=1).astype(np.float32),
+        np.concatenate(edges),
+        given=work.positions[used],
+        motions=work.motions[:, used],
+        weights=rows[:, own],
+        pivots=work.pivots,
+        at=reference.pivots,
+        options=options.fit,
+    )
+    first = len(used)
+    mirrored = np.concatenate([np.arange(first), first + np.array(reference.mirrored, np.int64)])
+    joints = Joints(
+        np.asarray(found.joints),
+        np.asarray(found.rotations),
+        np.asarray(found.translations),
+        mirrored,
+    )
+    return joints, weights

@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: MIT
+"""The joints that all sample people share: found on the man once, kept among the user's caches."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+from pathlib import Path
+
+from ..author import Reference, RigOptions
+from ..author.reference import fingerprint
+from ..base.errors import ArgumentError
+from ..files import fileio
+from .source import SHA256, downloads
+
+
+def _path(options: RigOptions) -> Path:
+    """Its name is another one for each version of what it depends on."""
+    known = hashlib.sha256(f"{SHA256} {options}".encode() + fingerprint())
+    for entry in sorted(Path(__file__).parent.iterdir()):
+        if entry.suffix in (".py", ".toml"):
+            known.update(entry.read_bytes())
+    return downloads() / f"joints-{known.hexdigest()[:16]}.npz"
+
+
+def kept(options: RigOptions) -> Reference | None:
+    """The reference of these options, if this version of Risorius has made one here.
+
+    Args:
+        options: of the joint rig.
+    """
+    try:
+        return Reference.read(_path(options))
+    except (OSError, ArgumentError):
+        return None
+
+
+def keep(options: RigOptions, reference: Reference) -> None:
+    """Keeps a reference, in place of those of other versions; where it cannot, it is made again.
+
+    Args:
+        options: of the joint rig.
+        reference: of the man.
+    """
+    path = _path(options)
+    with contextlib.suppress(OSError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        for old in path.parent.glob("joints-*.npz"):
+            old.unlink()
+        fileio.write_bytes(path, reference.to_bytes())
