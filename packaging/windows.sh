@@ -39,8 +39,9 @@ install() { # install VERSION SITE
   if [ ! -e "$stamp" ]; then
     rm -rf "$2" && "${as_pip[@]}" "$2" -c <(grep -v ^numpy "$project/packaging/requirements.txt") \
       "numpy==${numpy_of[$1]}" pytest colorama python-osc xxhash matplotlib || return 1
-    # wine 8 has no WMI, which 3.13 asks what the system is called.
-    printf 'import sys\n\nsys.modules["_wmi"] = None\n' > "$2/sitecustomize.py" && touch "$stamp"
+    # wine 8 has no WMI, which 3.13 asks what the system is called, and not how 3.13 copies files.
+    printf '%s\n' 'import sys' 'import _winapi' 'sys.modules["_wmi"] = None' \
+      'vars(_winapi).pop("CopyFile2", None)' > "$2/sitecustomize.py" && touch "$stamp"
   fi
   rm -rf "$2"/risorius* && "${as_pip[@]}" "$2" --no-deps "$wheel"
 }

@@ -113,7 +113,7 @@ def test_pictures_are_those_beside_the_file_and_no_other(tmp_path):
     ("options", "code", "said"),
     [
         (["-o", "page.txt"], 2, "-o: a name ending in .html or .htm was expected"),
-        (["-o", "no/page.html"], 1, "no/page.html: cannot write it"),
+        (["-o", "no/page.html"], 1, f"{Path('no/page.html')}: cannot write it"),
         (["--sound", "voice.wav"], 2, "--sound: it goes with a clip"),
         (["--clip", "take.rzc", "--sound", "voice.flac"], 2, "--sound: a name ending in .wav"),
         (["--lods", "fine"], 2, "--lods: two levels as in 0:2 were expected"),

@@ -321,7 +321,7 @@ def test_without_room_the_target_is_named_and_the_old_file_stays(kind, tmp_path)
 @pytest.mark.parametrize(
     ("clip", "dna", "message"),
     [
-        ("absent.csv", "core.dna", "No such file"),
+        ("absent.csv", "core.dna", "absent.csv: cannot read it"),
         ("clip.csv", "absent.dna", "absent.dna"),
         ("bad.csv", "core.dna", "bad.csv"),
         ("clip.csv", "bad.csv", "bad.csv"),
