@@ -198,7 +198,7 @@ class RISORIUS_OT_add_character(RunsBeside, Operator):
             ("woman", "Woman", "A woman of 31; data (48 MB) are downloaded once"),
             ("girl", "Girl", "A girl of 8; data (48 MB) are downloaded once"),
             ("lady", "Lady", "A woman of 58; data (48 MB) are downloaded once"),
-            ("fighter", "Fighter", "A man of 42, strong features; data (48 MB) are downloaded once"),
+            ("fighter", "Fighter", "A man of 42, strong; data (48 MB) are downloaded once"),
             ("elder", "Elder", "A man of 75; data (48 MB) are downloaded once"),
         ],
         default="man",
