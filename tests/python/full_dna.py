@@ -237,7 +237,7 @@ def _other_arrays(value: np.ndarray) -> Iterator[np.ndarray]:
     for at in {0, value.size // 2, value.size - 1} if value.size else ():
         for change in (1, -1):
             out = value.copy()
-            if value.dtype.kind == "u" and out.flat[at] + change < 0:
+            if value.dtype.kind == "u" and int(out.flat[at]) + change < 0:
                 continue
             out.flat[at] += change if value.dtype.kind == "u" else change / 4
             yield out

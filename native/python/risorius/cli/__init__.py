@@ -17,7 +17,6 @@ from collections.abc import Sequence
 from .. import __version__
 from ..base.errors import RisoriusError, sentence
 from . import (
-    author,
     batch,
     bench,
     check,
@@ -26,10 +25,10 @@ from . import (
     edit,
     info,
     live,
-    sample,
     speech,
 )
 from . import eval as evaluate
+from .faces import author, mix, sample
 from .files import CommandLineError
 from .pages import plot, web
 
@@ -87,6 +86,7 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
         bench,
         edit,
         author,
+        mix,
         clip,
         speech,
         live,

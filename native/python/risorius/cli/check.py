@@ -10,6 +10,7 @@ from typing import Any
 import risorius
 
 from ..base.words import counted
+from ..mixing import difference
 from .files import InputError, from_json, summary
 
 _DESCRIPTION = """\
@@ -25,6 +26,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("files", nargs="+", metavar="FILE")
     parser.add_argument("--json", action="store_true", help="for a program")
     parser.add_argument("--strict", action="store_true", help="a warning fails like an error")
+    parser.add_argument(
+        "--mix", action="store_true", help="and whether each can be mixed with the first one"
+    )
     parser.set_defaults(func=run)
 
 
@@ -100,6 +104,24 @@ def lines(facts: dict[str, Any]) -> list[str]:
     return out
 
 
+def _mixes(everything: list[dict[str, Any]], *, quiet: bool) -> None:
+    """Adds to what is said of sound files whether they can be mixed with the first of them."""
+    sound = [facts for facts in everything if facts["ok"]]
+    first = risorius.load(sound[0]["file"]) if sound else None
+    for facts in sound[1:]:
+        assert first is not None
+        why = difference(first, risorius.load(facts["file"]))
+        facts["mixes"] = why is None
+        facts["ok"] = why is None
+        if why:
+            facts["mixes_not"] = why
+        if not quiet:
+            other = sound[0]["file"]
+            print(
+                f"{facts['file']}: " + (f"cannot be mixed: {why}" if why else f"mixes with {other}")
+            )
+
+
 def run(args: argparse.Namespace) -> int:
     everything = []
     for name in args.files:
@@ -107,6 +129,8 @@ def run(args: argparse.Namespace) -> int:
         everything.append(facts)
         if not args.json:
             print("\n".join(lines(facts)), flush=True)
+    if args.mix:
+        _mixes(everything, quiet=args.json)
     bad = sum(not facts["ok"] for facts in everything)
     if args.json:
         print(json.dumps({"ok": bad == 0, "files": everything}, indent=2))

@@ -11,6 +11,7 @@ from typing import Any
 
 import risorius
 
+from ..mixing import difference
 from . import diff
 from .files import CommandLineError
 
@@ -25,6 +26,13 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     info.add_argument("file", type=Path, nargs="?")
     info.add_argument("--diff", nargs=2, metavar=("A", "B"), help="what differs between two files")
     info.add_argument("--all", action="store_true", help="with --diff: do not shorten lists")
+    info.add_argument(
+        "--mix-with",
+        nargs="+",
+        metavar="FACE",
+        help="which of these can be mixed with the file (risorius mix), and why others cannot; the "
+        "exit code is 1 where one cannot",
+    )
     info.add_argument("--json", action="store_true", help="for a program")
     info.set_defaults(func=run)
 
@@ -142,11 +150,26 @@ def page(facts: dict[str, Any]) -> str:
     return "\n".join(out)
 
 
+def _mixes(first: str, others: list[str], *, as_json: bool) -> int:
+    """Says of each file whether it can be mixed with the first, else why not."""
+    face = risorius.load(first)
+    found = {name: difference(face, risorius.load(name)) for name in others}
+    if as_json:
+        print(json.dumps(found, indent=2))
+    else:
+        for name, why in found.items():
+            print(f"{name}: " + (f"cannot be mixed: {why}" if why else f"mixes with {first}"))
+    return int(any(found.values()))
+
+
 def run(args: argparse.Namespace) -> int:
-    if (args.file is None) == (args.diff is None) or (args.all and not args.diff):
+    one = (args.file is None) != (args.diff is None)
+    if not one or (args.all and not args.diff) or (args.mix_with and args.diff):
         raise CommandLineError("info: either FILE or --diff A B [--all] was expected")
     if args.diff:
         return diff.run(*args.diff, everything=args.all, as_json=args.json)
+    if args.mix_with:
+        return _mixes(str(args.file), args.mix_with, as_json=args.json)
     facts = describe(risorius.load(args.file))
     print(json.dumps(facts, indent=2) if args.json else page(facts))
     return 0

@@ -6,12 +6,10 @@ Colours are sRGB in [0, 1]; lengths are decimetres.
 
 from __future__ import annotations
 
-import struct
-import zlib
-
 import numpy as np
 
 from ..base.easing import smooth_step
+from ..files.png import png
 from .expressions import Expression
 from .part import Part
 from .people import Person
@@ -21,24 +19,6 @@ HEAD_SIZE = 2048
 EYE_SIZE = 1024
 MASK_SIZE = 512
 LASH_SIZE = (4096, 256, 330)  # width, height, hairs over the strips' whole length
-
-
-def png(image: Floats) -> bytes:
-    """An 8-bit PNG of float [h, w] or [h, w, 3] in [0, 1]; row 0 is the bottom (v = 0)."""
-    pixels = np.clip(np.rint(image[::-1] * 255), 0, 255).astype(np.uint8)
-    height, width = pixels.shape[:2]
-    kind = 0 if pixels.ndim == 2 else 2
-    rows = np.zeros((height, 1 + width * (1 if kind == 0 else 3)), np.uint8)
-    rows[:, 1:] = pixels.reshape(height, -1)
-
-    def chunk(name: bytes, data: bytes) -> bytes:
-        crc = zlib.crc32(name + data)
-        return struct.pack(">I", len(data)) + name + data + struct.pack(">I", crc)
-
-    header = struct.pack(">IIBBBBB", width, height, 8, kind, 0, 0, 0)
-    body = zlib.compress(rows.tobytes(), 6)
-    signature = b"\x89PNG\r\n\x1a\n"
-    return signature + chunk(b"IHDR", header) + chunk(b"IDAT", body) + chunk(b"IEND", b"")
 
 
 def shrunk(image: Floats, side: int) -> Floats:

@@ -11,21 +11,21 @@ from pathlib import Path
 
 import numpy as np
 
-from ..anim.reactions import load_exclusives
-from ..author.correctives import (
+from ...anim.reactions import load_exclusives
+from ...author.correctives import (
     CorrectiveOptions,
     Found,
     add_correctives,
     find_correctives,
 )
-from ..author.fitting import bounded
-from ..author.input.spec import Spec, read_face, read_spec
-from ..author.joint_rig import JointRig, make_joint_rig
-from ..author.work import RigOptions
-from ..base.words import counted
-from ..files import fileio
-from .files import CommandLineError, require_suffix
-from .pages.authoring import need_plot, write_report
+from ...author.fitting import bounded
+from ...author.input.spec import Spec, read_face, read_spec
+from ...author.joint_rig import JointRig, make_joint_rig
+from ...author.work import RigOptions
+from ...base.words import counted
+from ...files import fileio
+from ..files import CommandLineError, require_suffix
+from ..pages.authoring import need_plot, write_report
 
 _DESCRIPTION = """\
 Finds joints, skin weights and joint motions that repeat the expressions of a face, and writes them

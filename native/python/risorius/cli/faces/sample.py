@@ -7,9 +7,9 @@ import argparse
 import time
 from pathlib import Path
 
-from ..base.errors import ArgumentError
-from ..sample.build import NEW_JOINTS
-from ..sample.people import PEOPLE, read_person
+from ...base.errors import ArgumentError
+from ...sample.build import NEW_JOINTS
+from ...sample.people import PEOPLE, read_person
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -45,7 +45,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    from ..sample import build_sample
+    from ...sample import build_sample
 
     who = args.person
     if who not in PEOPLE and not who.endswith(".toml"):

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: MIT
+"""PNG files as this package writes them: 8 bits, grey or colour, rows as they are."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
+_SIGNATURE = b"\x89PNG\r\n\x1a\n"
+_MOST_TEXELS = 1 << 26
+
+
+def png(image: Floats) -> bytes:
+    """An 8-bit PNG of float [h, w] or [h, w, 3] in [0, 1]; row 0 is the bottom (v = 0)."""
+    pixels = np.clip(np.rint(image[::-1] * 255), 0, 255).astype(np.uint8)
+    height, width = pixels.shape[:2]
+    kind = 0 if pixels.ndim == 2 else 2
+    rows = np.zeros((height, 1 + width * (1 if kind == 0 else 3)), np.uint8)
+    rows[:, 1:] = pixels.reshape(height, -1)
+
+    def chunk(name: bytes, data: bytes) -> bytes:
+        crc = zlib.crc32(name + data)
+        return struct.pack(">I", len(data)) + name + data + struct.pack(">I", crc)
+
+    header = struct.pack(">IIBBBBB", width, height, 8, kind, 0, 0, 0)
+    body = zlib.compress(rows.tobytes(), 6)
+    return _SIGNATURE + chunk(b"IHDR", header) + chunk(b"IDAT", body) + chunk(b"IEND", b"")
+
+
+def read_png(data: bytes) -> Floats | None:
+    """An image that png wrote, or None where it is another kind of file, or damaged.
+
+    Args:
+        data: of the file.
+
+    Returns:
+        float64[h, w] or [h, w, 3] in [0, 1]; row 0 is the bottom.
+    """
+    if data[:8] != _SIGNATURE or len(data) < 33 or data[12:16] != b"IHDR":
+        return None
+    width, height, depth, kind, *others = struct.unpack(">IIBBBBB", data[16:29])
+    values = {0: 1, 2: 3}.get(kind, 0)
+    if depth != 8 or any(others) or not 0 < width * height * values <= 3 * _MOST_TEXELS:
+        return None
+    body = _body(data, height * (1 + width * values))
+    rows = np.frombuffer(body, np.uint8).reshape(height, -1) if body else None
+    if rows is None or rows[:, 0].any():  # another program's, which predicts rows
+        return None
+    pixels = rows[:, 1:].reshape((height, width, 3) if values == 3 else (height, width))
+    return np.asarray(pixels[::-1] / 255.0)
+
+
+def _body(data: bytes, size: int) -> bytes:
+    """The rows, unpacked; none where they are not of this size."""
+    unpacked, out = zlib.decompressobj(), b""
+    try:
+        for kind, part in _chunks(data):
+            if kind == b"IDAT":
+                out += unpacked.decompress(part, size + 1 - len(out))
+    except zlib.error:
+        return b""
+    return out if len(out) == size else b""
+
+
+def _chunks(data: bytes) -> list[tuple[bytes, bytes]]:
+    out, at = [], 8
+    while at + 8 <= len(data):
+        (length,) = struct.unpack(">I", data[at : at + 4])
+        out.append((data[at + 4 : at + 8], data[at + 8 : at + 8 + length]))
+        at += 12 + length
+    return out

@@ -1,0 +1,8 @@
+# SPDX-License-Identifier: MIT
+"""New faces from some that have the same topology and controls, mixed by region."""
+
+from .compatible import check_compatible, difference
+from .mix import Mix, mix_faces
+from .regions import REGIONS, Masks
+
+__all__ = ["REGIONS", "Masks", "Mix", "check_compatible", "difference", "mix_faces"]

@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: MIT
+"""Textures of mixed faces: those of the parents laid over each other, where all have them.
+
+Skin has one tone: its pictures are mixed by the shares of the whole, also where a region has
+others; those of eyes by the shares of their region. Only pictures that this package wrote are
+mixed; of others the leading parent's file is taken as it is.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Sequence
+from pathlib import Path
+
+from .. import Dna
+from ..author.geometry.skeleton import Doubles
+from ..files.png import png, read_png
+from .mix import Mix
+from .regions import Masks
+
+_KEY = "texture:"
+
+
+def texture_folder(path: Path) -> Path:
+    """Where the textures of a DNA file lie.
+
+    Args:
+        path: of the file.
+    """
+    return path.with_name(path.stem + "_textures")
+
+
+def mix_textures(
+    parents: Sequence[Dna], paths: Sequence[Path], mix: Mix, masks: Masks
+) -> tuple[dict[str, bytes], list[str]]:
+    """The textures that the leading parent's metadata name.
+
+    Args:
+        parents: compatible ones.
+        paths: of their files.
+        mix: their shares.
+        masks: of the first one's regions.
+
+    Returns:
+        File name -> bytes, and the names of those that could not be mixed and are the leading
+        parent's own.
+    """
+    whole = mix.whole()
+    most = int(whole.argmax())
+    meshes = list(parents[0].mesh_names)
+    files: dict[str, bytes] = {}
+    own: list[str] = []
+    for key, name in parents[most].metadata.items():
+        mesh = key.split(":")[1] if key.startswith(_KEY) and key.count(":") >= 2 else ""
+        if mesh not in meshes or name in files or Path(name).name != name:
+            continue
+        data = [_data(p, path, key) for p, path in zip(parents, paths, strict=True)]
+        leading = data[most]
+        if leading is None:
+            continue
+        part = masks.meshes[meshes.index(mesh)]
+        rigid = len(part) > 0 and (part == part[0]).all() and part[0].max() == 1
+        shares = mix.table()[int(part[0].argmax())] if rigid else whole
+        mixed = _mixed(data, shares)
+        files[name] = leading if mixed is None else mixed
+        if mixed is None:
+            own.append(name)
+    return files, own
+
+
+def _data(parent: Dna, path: Path, key: str) -> bytes | None:
+    name = parent.metadata.get(key, "")
+    if not name or Path(name).name != name:
+        return None
+    for folder in (texture_folder(path), path.parent):
+        with contextlib.suppress(OSError):
+            return (folder / name).read_bytes()
+    return None
+
+
+def _mixed(data: Sequence[bytes | None], shares: Doubles) -> bytes | None:
+    """A picture of the parents' pictures, or None where they do not go together."""
+    counted = [i for i, share in enumerate(shares) if share > 0]
+    images = {i: read_png(data[i] or b"") for i in counted}
+    shapes = {None if image is None else image.shape for image in images.values()}
+    if len(shapes) != 1 or None in shapes:
+        return None
+    if len(counted) == 1:
+        return data[counted[0]]
+    return png(sum(shares[i] * image for i, image in images.items() if image is not None))
