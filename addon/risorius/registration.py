@@ -20,6 +20,7 @@ from .ui import (
     layers,
     life,
     live,
+    mixing,
     speech,
     words,
 )
@@ -29,6 +30,7 @@ from .ui.face import channel_preview, paste_flipped
 from .ui.file import import_operators, rig_operators
 from .ui.file import operators as file_operators
 from .ui.live import properties as live_properties
+from .ui.mixing import properties as mixing_properties
 
 # Panels of one bl_order stand in the order in which they are registered.
 CLASSES = (
@@ -44,6 +46,7 @@ CLASSES = (
     *expressions.CLASSES,
     *layers.CLASSES,
     *live.CLASSES,
+    *mixing.CLASSES,
 )
 
 
@@ -67,6 +70,7 @@ def _window_properties() -> dict[str, object]:
         ),
         "risorius_show_timing": timing_overlay.show_property(),
         "risorius_live": bpy.props.PointerProperty(type=live_properties.RISORIUS_PG_live),
+        "risorius_mix": bpy.props.PointerProperty(type=mixing_properties.RISORIUS_PG_mix),
         "risorius_test": channel_preview.weight_property(),
     }
 

@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Blender takes properties where Python has annotations:
+# pyright: reportInvalidTypeForm=false
+"""Operators of Mix Faces: which faces, the preview, the file."""
+
+from pathlib import Path
+
+import bpy
+
+from ... import native
+from ...scene.base import parts
+from ...scene.character import build
+from ...scene.mixing import parents
+from ..blender_types import Context, ExportHelper, ImportHelper, Operator, Result
+from ..common import explain, shown_progress, usable
+from ..file.import_operators import import_character
+from ..words import of_error, say
+from .properties import choices, follow, paths_of, shares_of
+
+
+def _add(operator: Operator, context: Context, paths: list[str]) -> Result:
+    """Adds faces to those that are mixed; those that do not go together are said and left out."""
+    chosen = choices(context)
+    added = 0
+    for path in paths:
+        known = paths_of(context)
+        if path in known:
+            continue
+        try:
+            why = parents.refused(known[0] if known else path, path)
+        except (OSError, *native.user_errors()) as error:
+            operator.report({"ERROR"}, explain(path, error))
+            continue
+        if why:
+            operator.report({"ERROR"}, why)
+            continue
+        chosen.parents.add().path = path
+        added += 1
+    follow(context)
+    return {"FINISHED"} if added else {"CANCELLED"}
+
+
+class _Usable:
+    """Operators that need the native module."""
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        return usable(cls)  # type: ignore[arg-type]  # pyright: ignore
+
+
+class RISORIUS_OT_mix_add(_Usable, Operator, ImportHelper):
+    """Add faces of the same topology to those that are mixed"""
+
+    bl_idname = "risorius.mix_add"
+    bl_label = "Add Face Files"
+
+    filename_ext = ".dna"
+    filter_glob: bpy.props.StringProperty(default="*.dna", options={"HIDDEN"})
+    directory: bpy.props.StringProperty(subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})
+    files: bpy.props.CollectionProperty(
+        type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"}
+    )
+
+    def execute(self, context: Context) -> Result:
+        names = [file.name for file in self.files if file.name]
+        paths = [str(Path(self.directory) / name) for name in names] or [self.filepath]
+        return _add(self, context, paths)
+
+
+class RISORIUS_OT_mix_add_scene(_Usable, Operator):
+    """Add the files of this scene's faces to those that are mixed"""
+
+    bl_idname = "risorius.mix_add_scene"
+    bl_label = "Add the Scene's Faces"
+
+    def execute(self, context: Context) -> Result:
+        paths = [bpy.path.abspath(rig.get(parts.SOURCE, "")) for rig in parts.rigs(linked=True)]
+        paths = [path for path in dict.fromkeys(paths) if path]
+        if not paths:
+            self.report({"ERROR"}, say("There is no face in this scene."))
+            return {"CANCELLED"}
+        return _add(self, context, paths)
+
+
+class RISORIUS_OT_mix_remove(Operator):
+    """Take this face out of those that are mixed"""
+
+    bl_idname = "risorius.mix_remove"
+    bl_label = "Remove"
+
+    index: bpy.props.IntProperty(options={"HIDDEN"})
+
+    def execute(self, context: Context) -> Result:
+        rows = choices(context).parents
+        if not 0 <= self.index < len(rows):
+            return {"CANCELLED"}
+        rows.remove(self.index)
+        if rows:
+            follow(context)
+        else:
+            parents.hide(context)
+            parents.forget()
+        return {"FINISHED"}
+
+
+class _Mixes(_Usable):
+    """Operators that need faces to mix."""
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        if not super().poll(context):
+            return False
+        if not choices(context).parents:
+            cls.poll_message_set(say("Add faces first."))  # type: ignore[attr-defined]  # pyright: ignore
+            return False
+        return True
+
+
+class RISORIUS_OT_mix_preview(_Mixes, Operator):
+    """Show the mix as a mesh that follows the sliders; press again to take it away"""
+
+    bl_idname = "risorius.mix_preview"
+    bl_label = "Preview"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context: Context) -> Result:
+        if parents.preview(context) is not None:
+            parents.hide(context)
+            return {"FINISHED"}
+        shares, regions = shares_of(context)
+        try:
+            parents.show(context, paths_of(context), shares, regions)
+        except (OSError, *native.user_errors()) as error:
+            self.report({"ERROR"}, explain(getattr(error, "filename", None) or "", error))
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
+class RISORIUS_OT_mix_write(_Mixes, Operator, ExportHelper):
+    """Write the mix as a DNA file with its textures, and import it"""
+
+    bl_idname = "risorius.mix_write"
+    bl_label = "Write Mixed Face"
+    bl_options = {"REGISTER", "UNDO"}
+
+    filename_ext = ".dna"
+    filter_glob: bpy.props.StringProperty(default="*.dna", options={"HIDDEN"})
+    use_import: bpy.props.BoolProperty(
+        name="Import", description="Import the face that is written", default=True
+    )
+
+    def execute(self, context: Context) -> Result:
+        shares, regions = shares_of(context)
+        paths = paths_of(context)
+        try:
+            with shown_progress(context) as progress:
+                own = parents.write(self.filepath, paths, shares, regions, progress)
+        except parents.MixError as error:
+            self.report({"ERROR"}, of_error(error))
+            return {"CANCELLED"}
+        except (OSError, *native.user_errors()) as error:
+            # Of a parent that is gone, its name.
+            name = getattr(error, "filename", None) or self.filepath
+            self.report({"ERROR"}, explain(name, error))
+            return {"CANCELLED"}
+        if own:
+            self.report(
+                {"WARNING"},
+                say("Not mixed, as another program wrote them: {names}", names=", ".join(own)),
+            )
+        if not self.use_import:
+            return {"FINISHED"}
+        parents.hide(context)
+        return import_character(self, context, self.filepath, build.BuildOptions())
+
+
+CLASSES = (
+    RISORIUS_OT_mix_add,
+    RISORIUS_OT_mix_add_scene,
+    RISORIUS_OT_mix_remove,
+    RISORIUS_OT_mix_preview,
+    RISORIUS_OT_mix_write,
+)
