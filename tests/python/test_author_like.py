@@ -9,7 +9,14 @@ import face_shapes
 import numpy as np
 import pytest
 import risorius
-from risorius.author import FitOptions, LodOptions, Reference, RigOptions, make_joint_rig
+from risorius.author import (
+    FitOptions,
+    LodOptions,
+    Reference,
+    RigOptions,
+    find_reference,
+    make_joint_rig,
+)
 from risorius.author.input import spec
 from risorius.base.errors import ArgumentError
 
@@ -101,6 +108,11 @@ def test_taking_over_ones_own_joints_changes_little(people):
     again = make_joint_rig(dna, OPTIONS, like=first.reference)
     assert again.levels[0].rms < 1.1 * first.levels[0].rms
     assert [e.name for e in again.errors] == [e.name for e in first.errors]
+
+
+def test_a_reference_can_be_had_without_the_rig(people):
+    dna, first, _, _ = people
+    assert find_reference(dna, OPTIONS).to_bytes() == first.reference.to_bytes()
 
 
 def without_a_vertex(dna):

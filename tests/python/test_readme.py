@@ -13,7 +13,16 @@ from conftest import GOLDEN, PROJECT
 from risorius import Clip, cli
 from risorius.controls import arkit
 
-SLOW = ("plot", "web", "edit", "speech", "live", "sample", "bench")  # parsed, and tested elsewhere
+SLOW = (
+    "plot",
+    "web",
+    "edit",
+    "speech",
+    "live",
+    "sample",
+    "bench",
+    "mix",
+)  # parsed, and tested elsewhere
 BLOCKS = re.findall(r"^```(\w*)\n(.*?)^```", (PROJECT / "README.md").read_text(), re.M | re.S)
 
 
@@ -55,7 +64,7 @@ def command(line):
 def test_every_kind_of_block_is_known():
     assert {kind for kind, _ in BLOCKS} == {"", "bash", "python"}
     used = {(command(line) or ["-"])[0] for line in lines()}
-    every = {"info", "check", "convert", "eval", "sample", "plot", "bench", "edit", "clip",
+    every = {"info", "check", "convert", "eval", "sample", "plot", "bench", "edit", "mix", "clip",
              "speech", "live", "batch", "web"}  # fmt: skip
     assert used - {"-"} == every
 

@@ -2,7 +2,7 @@
 """Joint rigs made from expressions."""
 
 from .fitting import FitOptions, JointFit, Progress, fit_joints, fit_motions, fit_weights
-from .joint_rig import JointRig, make_joint_rig
+from .joint_rig import JointRig, find_reference, make_joint_rig
 from .levels import LodOptions
 from .reference import Reference
 from .work import Level, MeshErrors, RigOptions
@@ -17,6 +17,7 @@ __all__ = [
     "Progress",
     "Reference",
     "RigOptions",
+    "find_reference",
     "fit_joints",
     "fit_motions",
     "fit_weights",

@@ -84,7 +84,59 @@ def make_joint_rig(
         ValueError: no mesh, a joint that changes its size, no joint that rests, a face of another
             topology than `like`.
     """
-    o = options or RigOptions()
+    work, fit, made, regions = _made(dna, options or RigOptions(), progress, like)
+    made.finish()
+    names = list(work.dna.joint_names)[len(dna.joint_names) :]
+    combinations = _combine(work, made.options, regions, _part(progress, 0.8, 1.0))
+    made.meshes = list(work.dna.meshes)
+    tallest = max(
+        (
+            np.ptp(np.asarray(dna.meshes[m].positions, np.float64)[:, 1])
+            for m in listed_meshes(dna, 0)
+        ),
+        default=0,
+    )
+    return JointRig(
+        work.dna,
+        names,
+        made.errors,
+        made.levels(),
+        float(tallest) * MM.get(dna.translation_unit, 10.0),
+        count_deltas(dna.meshes),
+        count_deltas(work.dna.meshes),
+        work.columns,
+        combinations,
+        reference_of(work, fit, made),
+    )
+
+
+def find_reference(
+    dna: Dna, options: RigOptions | None = None, progress: Progress | None = None
+) -> Reference:
+    """As make_joint_rig, of what other faces take over alone: quicker than the whole rig.
+
+    Args:
+        dna: a face with blend shapes; it stays as it is.
+        options: how many joints there are to be.
+        progress: told the share that is done, 0 to 1; False stops.
+
+    Raises:
+        DnaError: as make_joint_rig.
+        ValueError: as make_joint_rig.
+    """
+    work, fit, made, _ = _made(dna, options or RigOptions(), progress, None, whole=False)
+    return reference_of(work, fit, made)
+
+
+def _made(
+    dna: Dna,
+    o: RigOptions,
+    progress: Progress | None,
+    like: Reference | None,
+    *,
+    whole: bool = True,
+) -> tuple[Work, Joints, Made, dict[str, list[str]]]:
+    """Joints, what they do, and the meshes of all levels; whole: with shapes and errors."""
     o.lods.check()
     work = begin(dna)
     work.levels = _level_count(dna, o.lods)
@@ -109,33 +161,12 @@ def make_joint_rig(
     names = like.names if like else _names(work, fit, effects, _places(work, shaped, fit, held))
     regions = _add_joints(work, fit, names)
     _add_behavior(work, beside, effects, regions, o)
-    made = Made(work, o, weights, like)
+    made = Made(work, o, weights, like, whole=whole)
     for lod in range(work.levels):
         made.add_level(lod, wanted, needs)
         if progress is not None and progress(0.7 + 0.1 * (lod + 1) / work.levels) is False:
             raise DnaError("stopped")
-    made.finish()
-    combinations = _combine(work, o, regions, _part(progress, 0.8, 1.0))
-    made.meshes = list(work.dna.meshes)
-    tallest = max(
-        (
-            np.ptp(np.asarray(dna.meshes[m].positions, np.float64)[:, 1])
-            for m in listed_meshes(dna, 0)
-        ),
-        default=0,
-    )
-    return JointRig(
-        work.dna,
-        names,
-        made.errors,
-        made.levels(),
-        float(tallest) * unit,
-        count_deltas(dna.meshes),
-        count_deltas(work.dna.meshes),
-        work.columns,
-        combinations,
-        reference_of(work, fit, made.triangles, work.dna),
-    )
+    return work, fit, made, regions
 
 
 def _new_joints(

@@ -42,7 +42,19 @@ class Made:
         options: RigOptions,
         weights: dict[int, Doubles],
         like: Reference | None = None,
+        *,
+        whole: bool = True,
     ) -> None:
+        """Begins.
+
+        Args:
+            work: the face, its joints made.
+            options: what is to be made.
+            weights: float64[V, joints] of the finest meshes.
+            like: what is taken over.
+            whole: with blend shapes and errors, else with weights alone.
+        """
+        self.whole = whole
         self.work, self.options, self.weights, self.like = work, options, weights, like
         self.triangles: dict[str, Ints] = {}  # of the coarse meshes, in layouts of the fine ones
         self.ways = Ways(work)
@@ -144,6 +156,11 @@ class Made:
             rows = level_weights(self.ways, self.options.fit, lod, mesh, wanted, rows)
         if finest is not None:
             self.weights[finest] = rows
+        if not self.whole:
+            made = copy.copy(mesh)
+            _set_skin(made, rows)
+            self.meshes.append(made)
+            return
         shaped = self.options if lod < self.own else replace(self.options, tolerance_mm=None)
         made, left = _finish_mesh(self.ways, mesh, rows, wanted, shaped)
         left.name, left.lod = name, lod

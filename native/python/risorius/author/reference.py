@@ -15,11 +15,12 @@ import zipfile
 import zlib
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-from .. import Dna, Mesh, _native
+from .. import Mesh, _native
 from ..base.errors import ArgumentError
 from .fitting import fit_motions
 from .geometry import skeleton as sk
@@ -152,15 +153,21 @@ def _counts(mesh: Mesh) -> list[int]:
     return [len(mesh.positions), len(mesh.face_layouts)]
 
 
-def reference_of(work: Work, fit: Joints, triangles: dict[str, Ints], dna: Dna) -> Reference:
+class _Meshes(Protocol):
+    names: list[str]
+    meshes: list[Mesh]
+    triangles: dict[str, Ints]
+
+
+def reference_of(work: Work, fit: Joints, made: _Meshes) -> Reference:
     """What other faces take over of a joint rig that is made.
 
     Args:
         work: the face, its levels chosen.
         fit: its joints.
-        triangles: of its coarse meshes.
-        dna: the face of joints.
+        made: its meshes.
     """
+    dna = work.dna
     first, before = len(given(work)), len(work.source.joint_names)
     points = [pivot.position for pivot in work.pivots]
     at = [
@@ -176,9 +183,9 @@ def reference_of(work: Work, fit: Joints, triangles: dict[str, Ints], dna: Dna) 
         [int(m) for m in fit.mirrored[first:] - first],
         at,
         [[int(j) for j in level] for level in work.new],
-        triangles=triangles,
+        triangles=made.triangles,
     )
-    for name, mesh in zip(dna.mesh_names, dna.meshes, strict=True):
+    for name, mesh in zip(made.names, made.meshes, strict=True):
         rows = sk.dense_weights(mesh, len(dna.joint_names))
         if rows[:, before:].any():
             out.weights[name] = rows

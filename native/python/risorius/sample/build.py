@@ -18,7 +18,7 @@ from .. import (
     Mesh,
     Psds,
 )
-from ..author import FitOptions, Progress, RigOptions, make_joint_rig
+from ..author import FitOptions, Progress, RigOptions, find_reference, make_joint_rig
 from ..author.geometry.polygon_mesh import polygon_mesh, vertex_normals
 from ..author.levels import level_name
 from ..files import fileio
@@ -460,8 +460,8 @@ def joint_face(dna: Dna, man: Callable[[], Dna] | None, joints: int, steps: Step
     begins = _FIT_BEGINS
     if like is None:
         steps.at(begins, f"finding {joints} joints that all people have (once)")
-        whole = make_joint_rig(man(), options, steps.share_of(begins, _REFIT_BEGINS))
-        like, begins = whole.reference, _REFIT_BEGINS
+        like = find_reference(man(), options, steps.share_of(begins, _REFIT_BEGINS))
+        begins = _REFIT_BEGINS
         references.keep(options, like)
     steps.at(begins, f"finding what {joints} joints do here")
     return make_joint_rig(dna, options, steps.share_of(begins, 1.0), like).dna
