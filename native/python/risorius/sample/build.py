@@ -23,7 +23,7 @@ from ..author.geometry.polygon_mesh import polygon_mesh, vertex_normals
 from ..author.levels import level_name
 from ..files import fileio
 from . import expressions as ex
-from . import references
+from . import references, wrinkles
 from .body import JOINTS, NECK_CUT, NECK_SLOPE, REACH, Body
 from .controls import gui_table
 from .paint import HEAD_SIZE, paint_textures
@@ -40,6 +40,8 @@ from .source import PACKAGE, SHA256, BaseMesh, Source, SourceError, fetch
 
 CM = 10.0  # the data are in decimetres
 NEW_JOINTS = 250
+FLUSH = ("head_flush_L", "head_flush_R")
+NO_WRINKLES = 4  # the level from which on there are none
 _FIT_BEGINS = 0.2  # of the whole time
 _REFIT_BEGINS = 0.7
 TOLERANCE_MM = 0.1  # what joints leave beyond it stays in blend shapes
@@ -241,13 +243,13 @@ def add_definition(
     dna.neutral_joint_rotations = np.zeros_like(local)
     dna.raw_control_names = [ex.PREFIX + name for name in raw]
     dna.blend_shape_channel_names = channels
-    dna.animated_map_names = ["head_flush_L", "head_flush_R"]
+    dna.animated_map_names = [*FLUSH, *wrinkles.map_names()]
     dna.mesh_names = [part.name for part in parts]
     half = len(parts) // 2
     dna.lod_mesh_mapping = [range(half), range(half, len(parts))]
     dna.lod_joint_mapping = [range(len(names))] * 2
     dna.lod_blend_shape_mapping = [range(len(channels))] * 2
-    dna.lod_animated_map_mapping = [range(2)] * 2
+    dna.lod_animated_map_mapping = [range(len(dna.animated_map_names))] * 2
 
 
 def add_gui(dna: Dna, raw: list[str]) -> None:
@@ -326,16 +328,36 @@ def add_behavior(
     dna.blend_shape_channels = BlendShapeChannels(
         lods=[count] * 2, input_indices=range(count), output_indices=range(count)
     )
-    flush = []
+    maps = []
     for output, side in enumerate("LR"):
         for name, slope in (
             ("mouthCornerPull", 0.25),
             ("eyeCheekRaise", 0.2),
             ("mouthCheekBlow", 0.35),
         ):
-            flush.append((raw.index(name + side), output, 0, 1, slope, 0))
-        flush.append((raw.index("jawOpenExtreme"), output, 0, 1, 0.35, 0))
-    dna.animated_maps = AnimatedMaps(lods=[len(flush)] * 2, conditionals=conditionals(flush))
+            maps.append((raw.index(name + side), output, 0, 1, slope, 0))
+        maps.append((raw.index("jawOpenExtreme"), output, 0, 1, 0.35, 0))
+    for name, number, slope in wrinkles.drivers():
+        maps.append((raw.index(name), len(FLUSH) + number, 0, 1, slope, 0))
+    dna.animated_maps = AnimatedMaps(lods=[len(maps)] * 2, conditionals=conditionals(maps))
+
+
+def leave_maps(dna: Dna) -> None:
+    """Coarse levels show no wrinkles: they list what flushes alone.
+
+    Args:
+        dna: is changed; its maps and what drives them begin with what flushes.
+    """
+    outputs = dna.animated_maps.conditionals.output_indices
+    flush = int((np.asarray(outputs) < len(FLUSH)).sum())
+    maps = dna.animated_maps
+    maps.lods = [n if lod < NO_WRINKLES else flush for lod, n in enumerate(map(int, maps.lods))]
+    dna.animated_maps = maps
+    mapping = dna.lod_animated_map_mapping
+    listed = [list(map(int, mapping[lod])) for lod in range(dna.lod_count)]
+    dna.lod_animated_map_mapping = [
+        row if lod < NO_WRINKLES else row[: len(FLUSH)] for lod, row in enumerate(listed)
+    ]
 
 
 def add_targets(mesh: Mesh, deltas: list[Floats]) -> None:
@@ -523,6 +545,7 @@ def build_sample(
     if joints:
         man = None if body.man is body else lambda: assemble(source, lambda _: None)[0]
         dna = joint_face(dna, man, joints, steps)
+    leave_maps(dna)
     dna.metadata = METADATA | textures_of_levels(dna, metadata)
     files = {path: dna.to_bytes()} | {folder / name: data for name, data in textures.items()}
     fileio.write_all(files)

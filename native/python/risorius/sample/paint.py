@@ -10,6 +10,7 @@ import numpy as np
 
 from ..base.easing import smooth_step
 from ..files.png import png
+from . import wrinkles
 from .expressions import Expression
 from .part import Part
 from .people import Person
@@ -329,6 +330,31 @@ def vessels(random: np.random.Generator, angle_limit: float) -> Floats:
     return image
 
 
+def head_wrinkles(
+    person: Person, head: Part, uvs: Floats, positions: Floats, units: dict[str, Expression]
+) -> tuple[dict[str, Floats], dict[int, str]]:
+    """Pictures of masks and of the sets' normals by file name, and the file of each set.
+
+    Args:
+        person: has the age.
+        head: the mesh, not subdivided.
+        uvs: float64[T, 2] in [0, 1].
+        positions: float64[v, 3] of its vertices, decimetres.
+        units: what each raw control does, by its name.
+    """
+    folds = wrinkles.vertex_folds(head, uvs, positions, units)
+    values = np.column_stack([positions, *folds.values()])
+    image, covered = bake(head.polygons, uvs, values, wrinkles.SIZE)
+    places = bleed(image[..., :3], covered)
+    parts = {name: image[..., 3 + 4 * k : 7 + 4 * k] for k, name in enumerate(folds)}
+    # Folds of a face of eight are a third as deep as at thirty, at eighty twice as deep.
+    strength = float(np.interp(person.age, (8, 30, 80), (0.35, 1.0, 2.0)))
+    masks, reliefs = wrinkles.paint_wrinkles(parts, places, strength)
+    files = {f"{name}_msk.png": mask for name, mask in masks.items()}
+    sets = {number: f"head_normal_wm{number}.png" for number in reliefs}
+    return files | {sets[number]: relief for number, relief in reliefs.items()}, sets
+
+
 def paint_textures(
     person: Person,
     positions: Floats,
@@ -371,6 +397,11 @@ def paint_textures(
         files[f"head_flush_{side}.png"] = png(mask)
         for lod in (0, 1):
             out[f"texture:head_lod{lod}_mesh:map:head_flush_{side}"] = f"head_flush_{side}.png"
+    wrinkled, sets = head_wrinkles(person, head, uvs, p, units)
+    files |= {name: png(image) for name, image in wrinkled.items()}
+    for number, name in sets.items():
+        for lod in (0, 1):
+            out[f"texture:head_lod{lod}_mesh:normal:{number}"] = name
     for lod in (0, 1):
         out[f"texture:head_lod{lod}_mesh:color"] = "head_color.png"
         out[f"texture:eyelashes_lod{lod}_mesh:alpha"] = "lash_alpha.png"

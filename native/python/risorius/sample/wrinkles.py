@@ -1,0 +1,248 @@
+# SPDX-License-Identifier: MIT
+"""Where skin folds: masks of expressions from how far they compress it, and the folds' relief.
+
+A fold lies across the way that skin is pushed together, so its lines follow from the expression:
+the smallest stretch of each polygon says how deep, its direction where to (line integral
+convolution of noise: Cabral and Leedom, "Imaging Vector Fields Using Line Integral Convolution",
+1993). Names are those of MetaHuman's maps and masks, so that programs which know these show them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.easing import smooth_step
+from .expressions import Expression
+from .part import Part
+from .polygons import Floats, Ints, Polygons
+
+SIZE = 512  # texels of a side
+_LEAST = 0.03  # of its length that skin loses before it folds
+_FULL = 0.22  # and where folds are as deep as they get
+_DEPTH = 0.006  # decimetres
+_LINES = 26  # texels of a side along which noise is drawn into a line
+_FINE, _COARSE = 1.6, 4.5  # texels: the widths between which folds lie
+_SEED = 23
+
+
+@dataclass(frozen=True)
+class Region:
+    """A mask: which set of textures it shows, and what drives it."""
+
+    number: int  # of the set, 1 to 3
+    drivers: Mapping[str, float]  # raw control without its side -> how much of the mask at 1
+
+
+REGIONS = {
+    "blink": Region(1, {"eyeBlink": 1.0}),
+    "browsRaiseInner": Region(1, {"browRaiseIn": 1.0}),
+    "browsRaiseOuter": Region(1, {"browRaiseOuter": 1.0}),
+    "chinRaise": Region(1, {"jawChinRaiseD": 1.0}),
+    "squintInner": Region(1, {"eyeSquintInner": 1.0}),
+    "browsDown": Region(2, {"browDown": 1.0}),
+    "mouthStretch": Region(2, {"mouthStretch": 1.0}),
+    "neckStretch": Region(2, {"neckStretch": 1.0}),
+    "noseWrinkler": Region(2, {"noseWrinkle": 1.0}),
+    "cheekRaiseOuter": Region(3, {"eyeCheekRaise": 1.0}),
+    "smile": Region(3, {"mouthCornerPull": 1.0, "mouthSharpCornerPull": 0.6}),
+}
+SETS = (1, 2, 3)
+
+
+def map_names() -> list[str]:
+    """Animated maps, in the order of REGIONS, left before right."""
+    return [
+        f"head_wm{region.number}_normal_{mask_name(name, side)}"
+        for name, region in REGIONS.items()
+        for side in "LR"
+    ]
+
+
+def mask_name(region: str, side: str) -> str:
+    """The name of a mask, which its file has too: head_wm1_blink_L.
+
+    Args:
+        region: one of REGIONS.
+        side: L or R.
+    """
+    return f"head_wm{REGIONS[region].number}_{region}_{side}"
+
+
+def drivers() -> list[tuple[str, int, float]]:
+    """(raw control, map, slope) of each that drives a map."""
+    out = []
+    number = 0
+    for region in REGIONS.values():
+        for side in "LR":
+            out += [(control + side, number, slope) for control, slope in region.drivers.items()]
+            number += 1
+    return out
+
+
+class _Surface:
+    """The head's polygons as triangles, at rest, with their texture coordinates."""
+
+    def __init__(self, polygons: Polygons, uvs: Floats, positions: Floats) -> None:
+        corners, places = [], []
+        for face, uv_face in zip(polygons.faces, polygons.uv_faces, strict=True):
+            for k in range(1, len(face) - 1):
+                corners.append((face[0], face[k], face[k + 1]))
+                places.append((uv_face[0], uv_face[k], uv_face[k + 1]))
+        self.corners: Ints = np.array(corners)
+        self.vertices = len(positions)
+        self.rest = _frames(positions[self.corners])
+        uv = uvs[np.array(places)]
+        edges = np.stack([uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]], axis=2)
+        size = np.linalg.det(edges)
+        flat = np.abs(size) < 1e-12
+        edges[flat] = np.eye(2)
+        # From the triangle's own plane to the texture's.
+        self.to_uv = edges @ np.linalg.inv(self.rest)
+
+    def folds(self, moved: Floats) -> Floats:
+        """float64[V, 4]: how far skin is pushed together at each vertex (0 to 1), and the lines of
+        the folds in the texture as a tensor xx, xy, yy.
+
+        Args:
+            moved: float64[V, 3], where the vertices are with the expression.
+        """
+        change = _frames(moved[self.corners]) @ np.linalg.inv(self.rest)
+        _, stretch, right = np.linalg.svd(change)
+        depth = np.clip((1 - stretch[:, 1] - _LEAST) / (_FULL - _LEAST), 0, 1)
+        along = right[:, 0]  # the other axis than the one that is pushed together
+        lines = np.einsum("tij,tj->ti", self.to_uv, along)
+        lines /= np.maximum(np.linalg.norm(lines, axis=1, keepdims=True), 1e-12)
+        x, y = lines.T
+        rows = np.column_stack([depth, depth * x * x, depth * x * y, depth * y * y])
+        sums, count = np.zeros((self.vertices, 4)), np.zeros(self.vertices)
+        for k in range(3):
+            np.add.at(sums, self.corners[:, k], rows)
+            np.add.at(count, self.corners[:, k], 1)
+        return np.asarray(sums / np.maximum(count, 1)[:, None])
+
+
+def _frames(triangles: Floats) -> Floats:
+    """float64[n, 2, 2]: the two edges of each triangle in a plane of its own."""
+    a, b = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    length = np.maximum(np.linalg.norm(a, axis=1), 1e-12)
+    first = a / length[:, None]
+    along = (b * first).sum(axis=1)
+    across = np.linalg.norm(b - along[:, None] * first, axis=1)
+    zero = np.zeros_like(length)
+    out = np.stack([np.stack([length, along], axis=1), np.stack([zero, across], axis=1)], axis=1)
+    out[across < 1e-9] = np.eye(2)
+    return out
+
+
+def vertex_folds(
+    part: Part, uvs: Floats, positions: Floats, units: Mapping[str, Expression]
+) -> dict[str, Floats]:
+    """float64[V, 4] of each mask by its name, see _Surface.folds.
+
+    Args:
+        part: the head.
+        uvs: float64[T, 2] in [0, 1].
+        positions: float64[v, 3] of its vertices, decimetres.
+        units: what each raw control does, by its name.
+    """
+    surface = _Surface(part.polygons, uvs, positions)
+    out = {}
+    for name, region in REGIONS.items():
+        for side in "LR":
+            control = next(iter(region.drivers)) + side
+            moved = positions + part.carry(units[control].displacement)
+            out[mask_name(name, side)] = surface.folds(moved)
+    return out
+
+
+def blurred(image: Floats, width: float) -> Floats:
+    """An image [h, w, ...] evened out by a Gaussian, held at its rims.
+
+    Args:
+        image: float64[h, w, ...].
+        width: standard deviation, texels.
+    """
+    reach = int(np.ceil(3 * width))
+    kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
+    kernel /= kernel.sum()
+    for axis in (0, 1):
+        padded = np.pad(
+            image, [(reach, reach) if a == axis else (0, 0) for a in range(image.ndim)], "edge"
+        )
+        image = sum(
+            share * np.take(padded, range(k, k + image.shape[axis]), axis)
+            for k, share in enumerate(kernel)
+        )
+    return np.asarray(image)
+
+
+def relief(tensors: Floats) -> Floats:
+    """float64[h, w]: folds along the lines of a field of tensors, from -1 (deepest) to 0.
+
+    Args:
+        tensors: float64[h, w, 3], xx, xy, yy of the lines in the texture; 0 where nothing folds.
+    """
+    size = len(tensors)
+    xx, xy, yy = np.moveaxis(blurred(tensors, 3.0), 2, 0)
+    angle = 0.5 * np.arctan2(2 * xy, xx - yy)
+    step = np.stack([np.cos(angle), np.sin(angle)], axis=2)
+    noise = np.random.default_rng(_SEED).normal(size=(size, size))
+    total = noise.copy()
+    rows, columns = np.mgrid[0:size, 0:size].astype(float)
+    for way in (1, -1):
+        x, y = columns.copy(), rows.copy()
+        heading = way * step
+        for _ in range(_LINES):
+            x, y = x + heading[..., 0], y + heading[..., 1]
+            i = np.clip(np.rint(y).astype(int), 0, size - 1)
+            j = np.clip(np.rint(x).astype(int), 0, size - 1)
+            total += noise[i, j]
+            here = step[i, j]
+            turned = (here * heading).sum(axis=2, keepdims=True) < 0
+            heading = np.where(turned, -here, here)
+    band = blurred(total, _FINE) - blurred(total, _COARSE)
+    band /= band.std() or 1.0
+    # Valleys are narrow and hills are round.
+    return -smooth_step(np.clip(band, 0, 2) / 2)
+
+
+def normals(heights: Floats, places: Floats) -> Floats:
+    """float64[h, w, 3] in [0, 1]: the normals of a relief in the texture's own axes.
+
+    Args:
+        heights: float64[h, w], decimetres.
+        places: float64[h, w, 3], where each texel is on the head, decimetres.
+    """
+    slopes = []
+    for axis in (1, 0):
+        length = np.linalg.norm(np.gradient(places, axis=axis), axis=2)
+        typical = np.median(length[length > 1e-6])
+        length = np.clip(length, 0.3 * typical, 3 * typical)
+        slopes.append(np.gradient(heights, axis=axis) / length)
+    out = np.stack([-slopes[0], -slopes[1], np.ones_like(heights)], axis=2)
+    out /= np.linalg.norm(out, axis=2, keepdims=True)
+    return np.asarray(0.5 + 0.5 * out)
+
+
+def paint_wrinkles(
+    folds: Mapping[str, Floats], places: Floats, strength: float
+) -> tuple[dict[str, Floats], dict[int, Floats]]:
+    """Masks float64[h, w] by name, and the normals of each set.
+
+    Args:
+        folds: float64[h, w, 4] of each mask in the texture.
+        places: float64[h, w, 3], where each texel is on the head, decimetres.
+        strength: 1 that of a face of 30 years.
+    """
+    masks = {name: np.clip(blurred(image[..., 0], 2.0), 0, 1) for name, image in folds.items()}
+    reliefs = {}
+    for number in SETS:
+        own = [image for name, image in folds.items() if name.startswith(f"head_wm{number}_")]
+        there = np.clip(sum(m for n, m in masks.items() if n.startswith(f"head_wm{number}_")), 0, 1)
+        height = relief(np.sum([image[..., 1:] for image in own], axis=0))
+        height *= strength * _DEPTH * smooth_step(np.clip(2 * there, 0, 1))
+        reliefs[number] = normals(height, places)
+    return masks, reliefs
