@@ -330,8 +330,50 @@ def vessels(random: np.random.Generator, angle_limit: float) -> Floats:
     return image
 
 
+def bake_some(polygons: Polygons, uvs: Floats, values: Floats, size: int) -> Floats:
+    """As bake, of the faces alone whose first value is above 0 at a corner: float64[size, size, k].
+
+    Args:
+        polygons: the mesh.
+        uvs: float64[T, 2] in [0, 1].
+        values: float64[V, k].
+        size: texels of a side.
+    """
+    there = values[:, 0] > 1e-3
+    some = [k for k, face in enumerate(polygons.faces) if there[face].any()]
+    part = Polygons(
+        [polygons.faces[k] for k in some],
+        [polygons.uv_faces[k] for k in some],
+        polygons.uvs,
+        polygons.vertex_count,
+    )
+    return bake(part, uvs, values, size)[0]
+
+
+def fold_strength(person: Person, place: Floats, eye: Floats) -> Floats:
+    """float64[h, w]: how deep folds are, less on the fat of the cheeks, which bulges instead.
+
+    Args:
+        person: has the age.
+        place: float64[h, w, 3], each texel's place on the head, decimetres.
+        eye: float64[3], the left eye's middle.
+    """
+    # Of a face of eight they are a third as deep as at thirty, at eighty nearly twice.
+    age = float(np.interp(person.age, (8, 30, 80), (0.35, 1.0, 1.9)))
+    x, y = np.abs(place[:, :, 0]), place[:, :, 1] - eye[1]
+    cheek = np.exp(-(((x - 0.44) / 0.19) ** 2) - ((y + 0.42) / 0.24) ** 2)
+    jowl = np.exp(-(((x - 0.5) / 0.22) ** 2) - ((y + 0.85) / 0.25) ** 2)
+    return np.asarray(age * (1 - 0.9 * np.clip(cheek + jowl, 0, 1)))
+
+
 def head_wrinkles(
-    person: Person, head: Part, uvs: Floats, positions: Floats, units: dict[str, Expression]
+    person: Person,
+    head: Part,
+    uvs: Floats,
+    positions: Floats,
+    place: Floats,
+    eye: Floats,
+    units: dict[str, Expression],
 ) -> tuple[dict[str, Floats], dict[int, str]]:
     """Pictures of masks and of the sets' normals by file name, and the file of each set.
 
@@ -340,19 +382,23 @@ def head_wrinkles(
         head: the mesh, not subdivided.
         uvs: float64[T, 2] in [0, 1].
         positions: float64[v, 3] of its vertices, decimetres.
+        place: float64[HEAD_SIZE, HEAD_SIZE, 3], each texel's place on the head, decimetres.
+        eye: float64[3], the left eye's middle.
         units: what each raw control does, by its name.
     """
     folds = wrinkles.vertex_folds(head, uvs, positions, units)
-    values = np.column_stack([positions, *folds.values()])
-    image, covered = bake(head.polygons, uvs, values, wrinkles.SIZE)
-    places = bleed(image[..., :3], covered)
-    parts = {name: image[..., 3 + 4 * k : 7 + 4 * k] for k, name in enumerate(folds)}
-    # Folds of a face of eight are a third as deep as at thirty, at eighty twice as deep.
-    strength = float(np.interp(person.age, (8, 30, 80), (0.35, 1.0, 2.0)))
-    masks, reliefs = wrinkles.paint_wrinkles(parts, places, strength)
-    files = {f"{name}_msk.png": mask for name, mask in masks.items()}
-    sets = {number: f"head_normal_wm{number}.png" for number in reliefs}
-    return files | {sets[number]: relief for number, relief in reliefs.items()}, sets
+    strength = fold_strength(person, place, eye)
+    files: dict[str, Floats] = {}
+    sets: dict[int, str] = {}
+    for number in wrinkles.SETS:
+        whole = np.zeros((HEAD_SIZE, HEAD_SIZE, 4))
+        for name in wrinkles.masks_of(number):
+            image = bake_some(head.polygons, uvs, folds[name], HEAD_SIZE)
+            files[f"{name}_msk.png"] = np.clip(shrunk(image[..., 0], MASK_SIZE), 0, 1)
+            whole += image
+        sets[number] = f"head_normal_wm{number}.png"
+        files[sets[number]] = wrinkles.relief_normals(whole, place, strength)
+    return files, sets
 
 
 def paint_textures(
@@ -397,7 +443,7 @@ def paint_textures(
         files[f"head_flush_{side}.png"] = png(mask)
         for lod in (0, 1):
             out[f"texture:head_lod{lod}_mesh:map:head_flush_{side}"] = f"head_flush_{side}.png"
-    wrinkled, sets = head_wrinkles(person, head, uvs, p, units)
+    wrinkled, sets = head_wrinkles(person, head, uvs, p, place, eye, units)
     files |= {name: png(image) for name, image in wrinkled.items()}
     for number, name in sets.items():
         for lod in (0, 1):

@@ -19,12 +19,13 @@ from .expressions import Expression
 from .part import Part
 from .polygons import Floats, Ints, Polygons
 
-SIZE = 512  # texels of a side
-_LEAST = 0.03  # of its length that skin loses before it folds
-_FULL = 0.22  # and where folds are as deep as they get
-_DEPTH = 0.006  # decimetres
-_LINES = 26  # texels of a side along which noise is drawn into a line
-_FINE, _COARSE = 1.6, 4.5  # texels: the widths between which folds lie
+_LEAST = 0.015  # of its length that skin loses before it folds
+_FULL = 0.15  # and where folds are as deep as they get
+_ROUNDS = 3  # of neighbours over which folds are evened out: skin is stiffer than a mesh
+_DEPTH = 0.007  # decimetres
+_LINES = 24  # texels to either side along which noise is drawn into a line
+_FINE, _COARSE = 1.5, 3.5  # texels: the widths between which folds lie
+_TILE = 512  # texels after which the noise begins again
 _SEED = 23
 
 
@@ -69,6 +70,15 @@ def mask_name(region: str, side: str) -> str:
         side: L or R.
     """
     return f"head_wm{REGIONS[region].number}_{region}_{side}"
+
+
+def masks_of(number: int) -> list[str]:
+    """The masks that show a set.
+
+    Args:
+        number: of the set.
+    """
+    return [mask_name(n, side) for n, r in REGIONS.items() if r.number == number for side in "LR"]
 
 
 def drivers() -> list[tuple[str, int, float]]:
@@ -121,7 +131,19 @@ class _Surface:
         for k in range(3):
             np.add.at(sums, self.corners[:, k], rows)
             np.add.at(count, self.corners[:, k], 1)
-        return np.asarray(sums / np.maximum(count, 1)[:, None])
+        out = sums / np.maximum(count, 1)[:, None]
+        for _ in range(_ROUNDS):
+            out = self._evened(out)
+        return out
+
+    def _evened(self, values: Floats) -> Floats:
+        """Each vertex half itself, half the mean of its triangles."""
+        middles = values[self.corners].mean(axis=1)
+        sums, count = np.zeros_like(values), np.zeros(len(values))
+        for k in range(3):
+            np.add.at(sums, self.corners[:, k], middles)
+            np.add.at(count, self.corners[:, k], 1)
+        return np.asarray(0.5 * values + 0.5 * sums / np.maximum(count, 1)[:, None])
 
 
 def _frames(triangles: Floats) -> Floats:
@@ -179,34 +201,37 @@ def blurred(image: Floats, width: float) -> Floats:
     return np.asarray(image)
 
 
-def relief(tensors: Floats) -> Floats:
+def relief(tensors: Floats, there: Floats) -> Floats:
     """float64[h, w]: folds along the lines of a field of tensors, from -1 (deepest) to 0.
 
     Args:
-        tensors: float64[h, w, 3], xx, xy, yy of the lines in the texture; 0 where nothing folds.
+        tensors: float64[h, w, 3], xx, xy, yy of the lines in the texture.
+        there: bool[h, w], where they are asked for.
     """
     size = len(tensors)
-    xx, xy, yy = np.moveaxis(blurred(tensors, 3.0), 2, 0)
+    noise = np.random.default_rng(_SEED).normal(size=(_TILE, _TILE))
+    band = blurred(noise, _FINE) - blurred(noise, _COARSE)
+    xx, xy, yy = np.moveaxis(tensors, 2, 0)
     angle = 0.5 * np.arctan2(2 * xy, xx - yy)
     step = np.stack([np.cos(angle), np.sin(angle)], axis=2)
-    noise = np.random.default_rng(_SEED).normal(size=(size, size))
-    total = noise.copy()
-    rows, columns = np.mgrid[0:size, 0:size].astype(float)
+    rows, columns = np.nonzero(there)
+    total = band[rows % _TILE, columns % _TILE]
     for way in (1, -1):
-        x, y = columns.copy(), rows.copy()
-        heading = way * step
+        x, y = columns.astype(float), rows.astype(float)
+        heading = way * step[rows, columns]
         for _ in range(_LINES):
-            x, y = x + heading[..., 0], y + heading[..., 1]
+            x, y = x + heading[:, 0], y + heading[:, 1]
             i = np.clip(np.rint(y).astype(int), 0, size - 1)
             j = np.clip(np.rint(x).astype(int), 0, size - 1)
-            total += noise[i, j]
+            total += band[i % _TILE, j % _TILE]
             here = step[i, j]
-            turned = (here * heading).sum(axis=2, keepdims=True) < 0
+            turned = (here * heading).sum(axis=1, keepdims=True) < 0
             heading = np.where(turned, -here, here)
-    band = blurred(total, _FINE) - blurred(total, _COARSE)
-    band /= band.std() or 1.0
+    total /= total.std() or 1.0
+    out = np.zeros((size, size))
     # Valleys are narrow and hills are round.
-    return -smooth_step(np.clip(band, 0, 2) / 2)
+    out[rows, columns] = -smooth_step(np.clip(total, 0, 2) / 2)
+    return out
 
 
 def normals(heights: Floats, places: Floats) -> Floats:
@@ -227,22 +252,15 @@ def normals(heights: Floats, places: Floats) -> Floats:
     return np.asarray(0.5 + 0.5 * out)
 
 
-def paint_wrinkles(
-    folds: Mapping[str, Floats], places: Floats, strength: float
-) -> tuple[dict[str, Floats], dict[int, Floats]]:
-    """Masks float64[h, w] by name, and the normals of each set.
+def relief_normals(folds: Floats, places: Floats, strength: Floats) -> Floats:
+    """float64[h, w, 3] in [0, 1]: the normals of all folds of a set.
 
     Args:
-        folds: float64[h, w, 4] of each mask in the texture.
+        folds: float64[h, w, 4], sums of vertex_folds in the texture.
         places: float64[h, w, 3], where each texel is on the head, decimetres.
-        strength: 1 that of a face of 30 years.
+        strength: float64[h, w], how deep folds are: 1 as on a forehead of 30 years.
     """
-    masks = {name: np.clip(blurred(image[..., 0], 2.0), 0, 1) for name, image in folds.items()}
-    reliefs = {}
-    for number in SETS:
-        own = [image for name, image in folds.items() if name.startswith(f"head_wm{number}_")]
-        there = np.clip(sum(m for n, m in masks.items() if n.startswith(f"head_wm{number}_")), 0, 1)
-        height = relief(np.sum([image[..., 1:] for image in own], axis=0))
-        height *= strength * _DEPTH * smooth_step(np.clip(2 * there, 0, 1))
-        reliefs[number] = normals(height, places)
-    return masks, reliefs
+    depth = np.clip(folds[..., 0], 0, 1)
+    height = relief(folds[..., 1:], depth > 0.01)
+    height *= strength * _DEPTH * smooth_step(np.clip(3 * depth, 0, 1))
+    return normals(height, places)
