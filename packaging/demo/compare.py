@@ -46,6 +46,12 @@ COMBINED = {
     "blink, look down": ({"eyeBlink": 1, "eyeLookDown": 1}, {}),
 }  # fmt: skip
 ASLEEP = {"asleep": ({"eyeBlink": 1, "eyeLookDown": 0.3, "browDown": 0.1}, {"jawOpen": 0.12})}
+FOLDS = {
+    "brows up": ({"browRaiseIn": 1, "browRaiseOuter": 1}, {}),
+    "frown": ({"browDown": 1, "noseWrinkle": 0.8}, {}),
+    "grin": ({"mouthCornerPull": 1, "eyeCheekRaise": 1, "eyeSquintInner": 0.6}, {}),
+    "chin": ({"jawChinRaiseD": 1, "jawChinRaiseU": 0.5}, {}),
+}
 # Where the camera looks: a share of the height above the lowest point, and how near.
 MOUTH, EYES = (0.40, 2.3), (0.60, 2.6)
 LOOKS = dict(zip(COMBINED, [(0.42, 1.5), MOUTH, MOUTH, MOUTH, EYES, EYES], strict=True))
@@ -58,7 +64,7 @@ def parse():
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--face", nargs="+", required=True, metavar="NAME=FILE")
     parser.add_argument("--combined", action="store_true", help="combinations of expressions")
-    parser.add_argument("--only", nargs="+", choices=[*EXPRESSIONS, *COMBINED, *ASLEEP])
+    parser.add_argument("--only", nargs="+", choices=[*EXPRESSIONS, *COMBINED, *ASLEEP, *FOLDS])
     parser.add_argument("--size", type=int, default=320)
     return parser.parse_args(install_extension.arguments())
 
@@ -148,7 +154,7 @@ def main():
     rows = {}
     expressions = COMBINED if args.combined else EXPRESSIONS
     if args.only:
-        known = EXPRESSIONS | COMBINED | ASLEEP
+        known = EXPRESSIONS | COMBINED | ASLEEP | FOLDS
         expressions = {name: known[name] for name in args.only}
     with tempfile.TemporaryDirectory() as folder:
         for face in args.face:

@@ -249,6 +249,7 @@ def files(faces, tmp_path):
         folder = tmp_path / f"{dna.name}_textures"
         folder.mkdir()
         folder.joinpath("skin.png").write_bytes(png(np.full((4, 8, 3), 0.2 * (number + 1))))
+        folder.joinpath("head_wm1_blink_L_msk.png").write_bytes(png(np.full((4, 4), 0.4 * number)))
     return tmp_path
 
 
@@ -266,6 +267,8 @@ def test_the_command_writes_a_face_with_its_textures(files, faces, capsys):
     np.testing.assert_array_equal(child.meshes[0].positions, expected.meshes[0].positions)
     skin = read_png((files / "child_textures" / "skin.png").read_bytes())
     np.testing.assert_allclose(skin, 0.75 * 0.2 + 0.25 * 0.4, atol=0.003)
+    mask = read_png((files / "child_textures" / "head_wm1_blink_L_msk.png").read_bytes())
+    np.testing.assert_allclose(mask, 0.25 * 0.4, atol=0.003)
     assert main(["info", str(out), "--mix-with", str(files / "one.dna")]) == 0
     assert "mixes with" in capsys.readouterr().out
 

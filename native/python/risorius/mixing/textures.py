@@ -19,6 +19,7 @@ from .mix import Mix
 from .regions import Masks
 
 _KEY = "texture:"
+_MASKS = "*_msk.png"  # of wrinkles, which are known by their names alone
 
 
 def texture_folder(path: Path) -> Path:
@@ -65,13 +66,19 @@ def mix_textures(
         files[name] = leading if mixed is None else mixed
         if mixed is None:
             own.append(name)
+    for mask in sorted(texture_folder(paths[most]).glob(_MASKS)):
+        data = [_bytes(path, mask.name) for path in paths]
+        files[mask.name] = _mixed(data, whole) or mask.read_bytes()
     return files, own
 
 
 def _data(parent: Dna, path: Path, key: str) -> bytes | None:
     name = parent.metadata.get(key, "")
-    if not name or Path(name).name != name:
-        return None
+    return _bytes(path, name) if name and Path(name).name == name else None
+
+
+def _bytes(path: Path, name: str) -> bytes | None:
+    """A file beside a DNA file or in its folder of textures, if it is there."""
     for folder in (texture_folder(path), path.parent):
         with contextlib.suppress(OSError):
             return (folder / name).read_bytes()
