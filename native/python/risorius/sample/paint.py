@@ -444,7 +444,7 @@ def paint_textures(
         for lod in (0, 1):
             out[f"texture:head_lod{lod}_mesh:map:head_flush_{side}"] = f"head_flush_{side}.png"
     wrinkled, sets = head_wrinkles(person, head, uvs, p, place, eye, units)
-    files |= {name: png(image) for name, image in wrinkled.items()}
+    files |= {name: png(shrunk(image, largest)) for name, image in wrinkled.items()}
     for number, name in sets.items():
         for lod in (0, 1):
             out[f"texture:head_lod{lod}_mesh:normal:{number}"] = name
