@@ -118,8 +118,8 @@ build_wheel() {
 # sample_face: prints the folder of the face that each zip carries; made again when its code changed.
 sample_face() {
   local folder="$project/build/sample" code stamp
-  code=$(cat "$project"/native/python/risorius/{sample,author}/*.py "$project"/native/author/*{,/*}.{h,cpp} \
-    2>/dev/null | sha256sum | cut -c1-16)
+  code=$(cat "$project"/native/python/risorius/{sample,author}/{,*/}*.{py,toml} \
+    "$project"/native/author/*{,/*}.{h,cpp} 2>/dev/null | sha256sum | cut -c1-16)
   stamp="$folder/.$code"
   if [ ! -e "$stamp" ]; then
     rm -rf "$folder" && mkdir -p "$folder" &&

@@ -182,6 +182,7 @@ class Body:
         positions: float64[V, 3], decimetres.
         joints: positions of the joints by name.
         units: what each raw control does.
+        further_correctives: float64[V, 3] of sticky lips and the like, by their two raw controls.
         man: the man's, for the man himself this.
         weights: float64[V, 7], skin weights.
     """
@@ -204,11 +205,17 @@ class Body:
         self.joints = joint_positions(self.positions, groups, size)
         if other is None:
             self.units = ex.split_units(source, self.positions)
-            self.units |= ex.extra_units(source, self.positions)
+            self.units |= ex.extra_units(source, self.positions, person.origin)
+            self.further_correctives = ex.add_further_units(
+                self.units, source, base, groups, self.positions, person.origin
+            )
         else:
             self.units = {
                 name: ex.Expression(self.carried(unit.displacement))
                 for name, unit in other.units.items()
+            }
+            self.further_correctives = {
+                pair: self.carried(shape) for pair, shape in other.further_correctives.items()
             }
         ex.add_joint_motion(self.units, groups, self.positions, self.joints)
         if other is None:

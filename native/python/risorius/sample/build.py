@@ -26,6 +26,7 @@ from . import expressions as ex
 from . import references, wrinkles
 from .body import JOINTS, NECK_CUT, NECK_SLOPE, REACH, Body
 from .controls import gui_table
+from .further import CONTROLS_OF_CODE
 from .paint import HEAD_SIZE, paint_textures
 from .part import Part
 from .people import MAN, Person
@@ -41,6 +42,7 @@ from .source import PACKAGE, SHA256, BaseMesh, Source, SourceError, fetch
 CM = 10.0  # the data are in decimetres
 NEW_JOINTS = 250
 FLUSH = ("head_flush_L", "head_flush_R")
+DELTA_STEP = 2.0**-11  # centimetres: 5 micrometres
 NO_WRINKLES = 4  # the level from which on there are none
 _FIT_BEGINS = 0.2  # of the whole time
 _REFIT_BEGINS = 0.7
@@ -260,12 +262,10 @@ def add_gui(dna: Dna, raw: list[str]) -> None:
         raw: names of the raw controls without their prefix.
     """
     table = gui_table()
-    dna.gui_control_names = [gui for gui, _, _ in table]
-    rows = []
-    for g, (_, up, down) in enumerate(table):
-        rows.append((g, raw.index(up), 0, 1, 1, 0))
-        if down:
-            rows.append((g, raw.index(down), -1, 0, -1, 0))
+    dna.gui_control_names = [gui for gui, _ in table]
+    rows = [
+        (g, raw.index(name), *where) for g, (_, leads) in enumerate(table) for name, where in leads
+    ]
     dna.gui_to_raw = conditionals(rows)
 
 
@@ -395,7 +395,7 @@ def assemble(
     say("reading 52 ARKit units and the further ones")
     body = Body(source, base, person)
     positions, groups, joints, units = body.positions, body.groups, body.joints, body.units
-    correctives = ex.corrective_displacements(units)
+    correctives = ex.corrective_displacements(units) | body.further_correctives
     raw = list(units)
     pairs = list(correctives)
     channels = raw + ["_x_".join(pair) for pair in pairs]
@@ -421,6 +421,21 @@ def assemble(
     dna.meshes = meshes
     dna.mesh_blend_shape_channel_mapping = np.array(mapping)
     return dna, parts, body
+
+
+def round_targets(dna: Dna) -> None:
+    """Deltas as multiples of DELTA_STEP, which pack to a third; each is off by half of it at most.
+
+    Args:
+        dna: its meshes are changed.
+    """
+    meshes = list(dna.meshes)
+    for mesh in meshes:
+        targets = list(mesh.blend_shape_targets)
+        for target in targets:
+            target.deltas = np.round(np.asarray(target.deltas) / DELTA_STEP) * DELTA_STEP
+        mesh.blend_shape_targets = targets
+    dna.meshes = meshes
 
 
 class Steps:
@@ -546,7 +561,9 @@ def build_sample(
         man = None if body.man is body else lambda: assemble(source, lambda _: None)[0]
         dna = joint_face(dna, man, joints, steps)
     leave_maps(dna)
-    dna.metadata = METADATA | textures_of_levels(dna, metadata)
+    round_targets(dna)
+    by_code = {"controls_by_code": " ".join(CONTROLS_OF_CODE)}
+    dna.metadata = METADATA | by_code | textures_of_levels(dna, metadata)
     files = {path: dna.to_bytes()} | {folder / name: data for name, data in textures.items()}
     fileio.write_all(files)
     return dna

@@ -5,21 +5,34 @@
 # {s} stands for the side.
 SIDED = [
     ("CTRL_{s}_brow_down.ty", "browDown", ""),
+    ("CTRL_{s}_brow_lateral.ty", "browLateral", ""),
+    ("CTRL_{s}_ear_up.ty", "earUp", ""),
     ("CTRL_{s}_brow_raiseIn.ty", "browRaiseIn", ""),
     ("CTRL_{s}_brow_raiseOut.ty", "browRaiseOuter", ""),
     ("CTRL_{s}_eye_blink.ty", "eyeBlink", "eyeWiden"),
+    ("CTRL_{s}_eye_lidPress.ty", "eyeLidPress", ""),
+    ("CTRL_{s}_eye_faceScrunch.ty", "eyeFaceScrunch", ""),
+    ("CTRL_{s}_eye_eyelidU.ty", "eyeUpperLidUp", "eyeRelax"),
+    ("CTRL_{s}_eye_eyelidD.ty", "eyeLowerLidUp", "eyeLowerLidDown"),
+    ("CTRL_{s}_eye_pupil.ty", "eyePupilWide", "eyePupilNarrow"),
+    ("CTRL_{s}_eyelashes_tweakerIn.ty", "eyelashesUpIN", "eyelashesDownIN"),
+    ("CTRL_{s}_eyelashes_tweakerOut.ty", "eyelashesUpOUT", "eyelashesDownOUT"),
     ("CTRL_{s}_eye_squintInner.ty", "eyeSquintInner", ""),
     ("CTRL_{s}_eye_cheekRaise.ty", "eyeCheekRaise", ""),
     ("CTRL_{s}_eye.ty", "eyeLookUp", "eyeLookDown"),
     ("CTRL_{s}_eye.tx", "eyeLookLeft", "eyeLookRight"),
     ("CTRL_{s}_nose.ty", "noseWrinkle", "noseNostrilDepress"),
     ("CTRL_{s}_nose.tx", "noseNostrilDilate", "noseNostrilCompress"),
-    ("CTRL_{s}_mouth_suckBlow.ty", "mouthCheekBlow", ""),
+    ("CTRL_{s}_nose_wrinkleUpper.ty", "noseWrinkleUpper", ""),
+    ("CTRL_{s}_nose_nasolabialDeepen.ty", "noseNasolabialDeepen", ""),
+    ("CTRL_{s}_mouth_suckBlow.ty", "mouthCheekBlow", "mouthCheekSuck"),
+    ("CTRL_{s}_mouth_lipsBlow.ty", "mouthLipsBlow", ""),
     ("CTRL_{s}_mouth_upperLipRaise.ty", "mouthUpperLipRaise", ""),
     ("CTRL_{s}_mouth_lowerLipDepress.ty", "mouthLowerLipDepress", ""),
     ("CTRL_{s}_mouth_cornerPull.ty", "mouthCornerPull", ""),
     ("CTRL_{s}_mouth_sharpCornerPull.ty", "mouthSharpCornerPull", ""),
     ("CTRL_{s}_mouth_stretch.ty", "mouthStretch", ""),
+    ("CTRL_{s}_mouth_stretchLipsClose.ty", "mouthStretchLipsClose", ""),
     ("CTRL_{s}_mouth_dimple.ty", "mouthDimple", ""),
     ("CTRL_{s}_mouth_cornerDepress.ty", "mouthCornerDepress", ""),
     ("CTRL_{s}_mouth_pressU.ty", "mouthPressU", ""),
@@ -31,8 +44,17 @@ SIDED = [
     ("CTRL_{s}_mouth_lipsTogetherU.ty", "mouthLipsTogetherU", ""),
     ("CTRL_{s}_mouth_lipsTogetherD.ty", "mouthLipsTogetherD", ""),
     ("CTRL_{s}_mouth_lipsPressU.ty", "mouthLipsPress", ""),
-    ("CTRL_{s}_mouth_lipsRollU.ty", "mouthUpperLipRollIn", ""),
-    ("CTRL_{s}_mouth_lipsRollD.ty", "mouthLowerLipRollIn", ""),
+    ("CTRL_{s}_mouth_lipsRollU.ty", "mouthUpperLipRollIn", "mouthUpperLipRollOut"),
+    ("CTRL_{s}_mouth_lipsRollD.ty", "mouthLowerLipRollIn", "mouthLowerLipRollOut"),
+    ("CTRL_{s}_mouth_corner.ty", "mouthCornerUp", "mouthCornerDown"),
+    ("CTRL_{s}_mouth_corner.tx", "mouthCornerWide", "mouthCornerNarrow"),
+    ("CTRL_{s}_mouth_lipBiteU.ty", "mouthUpperLipBite", ""),
+    ("CTRL_{s}_mouth_lipBiteD.ty", "mouthLowerLipBite", ""),
+    ("CTRL_{s}_mouth_lipsTowardsTeethU.ty", "mouthUpperLipTowardsTeeth", ""),
+    ("CTRL_{s}_mouth_lipsTowardsTeethD.ty", "mouthLowerLipTowardsTeeth", ""),
+    ("CTRL_{s}_jaw_clench.ty", "jawClench", ""),
+    ("CTRL_{s}_jaw_chinCompress.ty", "jawChinCompress", ""),
+    ("CTRL_{s}_neck_mastoidContract.ty", "neckMastoidContract", ""),
     ("CTRL_{s}_jaw_ChinRaiseU.ty", "jawChinRaiseU", ""),
     ("CTRL_{s}_jaw_ChinRaiseD.ty", "jawChinRaiseD", ""),
     ("CTRL_{s}_neck_stretch.ty", "neckStretch", ""),
@@ -44,14 +66,88 @@ MIDDLE = [
     ("CTRL_C_jaw.tx", "jawLeft", "jawRight"),
     ("CTRL_C_jaw_fwdBack.ty", "jawFwd", "jawBack"),
     ("CTRL_C_jaw_openExtreme.ty", "jawOpenExtreme", ""),
-    ("CTRL_C_tongue_inOut.ty", "tongueOut", ""),
+    ("CTRL_neck_throatUpDown.ty", "neckThroatUp", "neckThroatDown"),
+    ("CTRL_neck_digastricUpDown.ty", "neckDigastricUp", "neckDigastricDown"),
+    ("CTRL_neck_throatExhaleInhale.ty", "neckThroatExhale", "neckThroatInhale"),
+    ("CTRL_C_tongue_inOut.ty", "tongueOut", "tongueIn"),
+    ("CTRL_C_tongue_move.ty", "tongueUp", "tongueDown"),
+    ("CTRL_C_tongue_move.tx", "tongueLeft", "tongueRight"),
+    ("CTRL_C_tongue_press.ty", "tonguePress", ""),
+    ("CTRL_C_tongue_wideNarrow.ty", "tongueWide", "tongueNarrow"),
+    ("CTRL_C_tongue_bendTwist.ty", "tongueBendUp", "tongueBendDown"),
+    ("CTRL_C_tongue_bendTwist.tx", "tongueTwistLeft", "tongueTwistRight"),
+    ("CTRL_C_tongue_roll.ty", "tongueRoll", ""),
+    ("CTRL_C_tongue_tipMove.ty", "tongueTipUp", "tongueTipDown"),
+    ("CTRL_C_tongue_tipMove.tx", "tongueTipLeft", "tongueTipRight"),
+    ("CTRL_C_tongue_thickThin.ty", "tongueThick", "tongueThin"),
 ]
+# Of the upper and the lower lip, {v} is U or D; and of the teeth.
+LIPS = [
+    ("CTRL_{s}_mouth_towards{v}.ty", "mouthLipsTowards{v}", ""),
+    ("CTRL_{s}_mouth_tighten{v}.ty", "mouthLipsTighten{v}", ""),
+    ("CTRL_{s}_mouth_stickyInner{v}.ty", "mouthSticky{v}IN", ""),
+    ("CTRL_{s}_mouth_stickyOuter{v}.ty", "mouthSticky{v}OUT", ""),
+    ("CTRL_{s}_mouth_pushPull{v}.ty", "mouthLipsPush{v}", "mouthLipsPull{v}"),
+    ("CTRL_{s}_mouth_thickness{v}.ty", "mouthLipsThick{v}", "mouthLipsThin{v}"),
+    ("CTRL_{s}_mouth_thicknessInward{v}.ty", "mouthLipsThickInward{v}", "mouthLipsThinInward{v}"),
+    ("CTRL_{s}_mouth_cornerSharpness{v}.ty", "mouthCornerSharpen{v}", "mouthCornerRounder{v}"),
+]
+LIPS_MIDDLE = [
+    ("CTRL_C_mouth_sticky{v}.ty", "mouthSticky{v}C", ""),
+    ("CTRL_C_mouth_lipShift{v}.ty", "mouth{lip}LipShiftLeft", "mouth{lip}LipShiftRight"),
+    ("CTRL_C_teeth{v}.ty", "teethUp{v}", "teethDown{v}"),
+    ("CTRL_C_teeth{v}.tx", "teethLeft{v}", "teethRight{v}"),
+    ("CTRL_C_teeth_fwdBack{v}.ty", "teethFwd{v}", "teethBack{v}"),
+]
+# GUI control, raw controls one after the other as it goes from 0 to 1: these stay, those pass.
+STICKY = ("CTRL_{s}_mouth_lipSticky.ty", [f"mouthLipsSticky{{s}}Ph{n}" for n in (1, 2, 3)])
+SWALLOW = ("CTRL_C_neck_swallow.ty", [f"neckSwallowPh{n}" for n in (1, 2, 3, 4)])
+# Of a conditional: from, to, slope, cut.
+Range = tuple[float, float, float, float]
 
 
-def gui_table() -> list[tuple[str, str, str]]:
-    """(GUI control, raw control of its positive half, of its negative half or "")."""
+def gui_table() -> list[tuple[str, list[tuple[str, Range]]]]:
+    """GUI controls, each with the raw controls that it leads to and in which range."""
     rows = []
-    for gui, up, down in SIDED:
-        for side in ("L", "R"):
+    for side in "LR":
+        for gui, up, down in SIDED:
             rows.append((gui.format(s=side), up + side, down + side if down else ""))
-    return rows + MIDDLE
+        for gui, up, down in LIPS:
+            for v in "UD":
+                both = (up.format(v=v) + side, down.format(v=v) + side if down else "")
+                rows.append((gui.format(s=side, v=v), *both))
+    rows += MIDDLE
+    for gui, up, down in LIPS_MIDDLE:
+        for v, lip in (("U", "Upper"), ("D", "Lower")):
+            rows.append((gui.format(v=v), up.format(v=v, lip=lip), down.format(v=v, lip=lip)))
+    table = [(gui, _two_sided(up, down)) for gui, up, down in rows]
+    for side in "LR":
+        gui, phases = STICKY
+        table.append((gui.format(s=side), _filling([name.format(s=side) for name in phases])))
+    table.append((SWALLOW[0], _passing(SWALLOW[1])))
+    return table
+
+
+def _two_sided(up: str, down: str) -> list[tuple[str, Range]]:
+    return [(up, (0, 1, 1, 0)), *([(down, (-1, 0, -1, 0))] if down else [])]
+
+
+def _filling(names: list[str]) -> list[tuple[str, Range]]:
+    """One after the other goes from 0 to 1 and stays."""
+    count = len(names)
+    out: list[tuple[str, Range]] = []
+    for k, name in enumerate(names):
+        out.append((name, (k / count, (k + 1) / count, count, -k)))
+        if k + 1 < count:
+            out.append((name, ((k + 1) / count, 1, 0, 1)))
+    return out
+
+
+def _passing(names: list[str]) -> list[tuple[str, Range]]:
+    """One after the other comes and goes; each begins where the one before is whole."""
+    count = len(names) + 1
+    out: list[tuple[str, Range]] = []
+    for k, name in enumerate(names):
+        out.append((name, (k / count, (k + 1) / count, count, -k)))
+        out.append((name, ((k + 1) / count, (k + 2) / count, -count, k + 2)))
+    return out

@@ -3,17 +3,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from ..base.easing import smooth_step
 from ..controls.arkit import mapping
-from .polygons import Floats
-from .source import TARGETS, Source
+from .further import find_places, further_units, unit_shape
+from .polygons import Floats, Ints
+from .source import BaseMesh, Source
 
 PREFIX = "CTRL_expressions."
-UNITS = TARGETS + "expression/units/caucasian/"
+_BROWS = [f"eyebrows-{side}-{way}" for side in ("left", "right") for way in ("down", "up")]
 
 
 @dataclass
@@ -107,18 +109,20 @@ def split_units(source: Source, positions: Floats) -> dict[str, Expression]:
     return out
 
 
-def extra_units(source: Source, positions: Floats) -> dict[str, Expression]:
+def extra_units(
+    source: Source, positions: Floats, origin: Mapping[str, float]
+) -> dict[str, Expression]:
     """Controls beyond ARKit that the FACS-like targets of the data can show.
 
     Args:
         source: the data that they come from.
         positions: float64[V, 3], decimetres; they tell left from right.
+        origin: shares of the data's origins, together 1.
     """
-    count = len(positions)
     sides = side_masks(positions)
 
     def unit(name: str) -> Floats:
-        return source.target(f"{UNITS}{name}.target.gz", count)
+        return unit_shape(source, origin, name, len(positions))
 
     out = {}
     halves = {
@@ -136,6 +140,38 @@ def extra_units(source: Source, positions: Floats) -> dict[str, Expression]:
     out["mouthUp"] = Expression(unit("mouth-elevation"))
     out["mouthDown"] = Expression(unit("mouth-depression"))
     return out
+
+
+def add_further_units(
+    out: dict[str, Expression],
+    source: Source,
+    base: BaseMesh,
+    groups: dict[str, Ints],
+    positions: Floats,
+    origin: Mapping[str, float],
+) -> dict[tuple[str, str], Floats]:
+    """Give a face what its data do not show as units: all that further.toml has.
+
+    Args:
+        out: the expressions by name; the further ones are added.
+        source: the data.
+        base: the base mesh.
+        groups: vertex indices by group of the base mesh.
+        positions: float64[V, 3], decimetres.
+        origin: shares of the data's origins, together 1.
+
+    Returns:
+        float64[V, 3] of its correctives by their two raw controls.
+    """
+    count = len(positions)
+    brows = sum(np.abs(unit_shape(source, origin, name, count)) for name in _BROWS)
+    jaw_open = out["jawOpen"].displacement
+    places = find_places(base, positions, groups, jaw_open, np.asarray(brows))
+    units = {name: unit.displacement for name, unit in out.items()}
+    further, correctives = further_units(source, origin, places, units, side_masks(positions))
+    for name, displacement in further.items():
+        out[name] = Expression(displacement)
+    return correctives
 
 
 def add_joint_motion(

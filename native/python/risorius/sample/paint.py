@@ -56,41 +56,57 @@ def noise(size: int, cells: int, random: np.random.Generator) -> Floats:
     return rows[:, low] * (1 - t) + rows[:, low + 1] * t
 
 
-def bake(polygons: Polygons, uvs: Floats, values: Floats, size: int) -> tuple[Floats, Floats]:
-    """Values of vertices as an image in texture space.
+class Raster:
+    """Which corners each texel lies between, and where: found once, for any values of vertices.
 
-    Args:
-        polygons: the mesh.
-        uvs: float64[T, 2] in [0, 1].
-        values: float64[V, k].
-        size: texels of a side.
-
-    Returns:
-        float64[size, size, k], and bool[size, size]: which texels a face covers.
+    Attributes:
+        covered: bool[size, size]: which texels a face covers.
     """
-    image = np.zeros((size, size, values.shape[1]))
-    covered = np.zeros((size, size), bool)
-    for face, uv_face in zip(polygons.faces, polygons.uv_faces, strict=True):
-        for k in range(1, len(face) - 1):
-            corners = [0, k, k + 1]
-            uv = uvs[[uv_face[c] for c in corners]] * size - 0.5
-            low = np.maximum(np.floor(uv.min(axis=0)).astype(int) - 1, 0)
-            high = np.minimum(np.ceil(uv.max(axis=0)).astype(int) + 2, size)
-            if (high <= low).any():
-                continue
-            (ax, ay), (bx, by), (cx, cy) = uv
-            area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
-            if abs(area) < 1e-9:
-                continue
-            x, y = np.meshgrid(np.arange(low[0], high[0]), np.arange(low[1], high[1]))
-            b = ((x - ax) * (cy - ay) - (cx - ax) * (y - ay)) / area
-            c = ((bx - ax) * (y - ay) - (x - ax) * (by - ay)) / area
-            a = 1 - b - c
-            inside = (a >= -1e-3) & (b >= -1e-3) & (c >= -1e-3)
-            weights = np.stack([a[inside], b[inside], c[inside]], axis=1)
-            image[y[inside], x[inside]] = weights @ values[[face[i] for i in corners]]
-            covered[y[inside], x[inside]] = True
-    return image, covered
+
+    def __init__(self, polygons: Polygons, uvs: Floats, size: int) -> None:
+        """Finds the texels of all faces; of two on the same texel the later one has it.
+
+        Args:
+            polygons: the mesh.
+            uvs: float64[T, 2] in [0, 1].
+            size: texels of a side.
+        """
+        self._corners = np.zeros((size, size, 3), np.int32)
+        self._shares = np.zeros((size, size, 3), np.float32)
+        self.covered = np.zeros((size, size), bool)
+        for face, uv_face in zip(polygons.faces, polygons.uv_faces, strict=True):
+            for k in range(1, len(face) - 1):
+                corners = [0, k, k + 1]
+                uv = uvs[[uv_face[c] for c in corners]] * size - 0.5
+                self._triangle([face[c] for c in corners], uv)
+
+    def _triangle(self, vertices: list[int], uv: Floats) -> None:
+        low = np.maximum(np.floor(uv.min(axis=0)).astype(int) - 1, 0)
+        high = np.minimum(np.ceil(uv.max(axis=0)).astype(int) + 2, len(self.covered))
+        (ax, ay), (bx, by), (cx, cy) = uv
+        area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
+        if (high <= low).any() or abs(area) < 1e-9:
+            return
+        x, y = np.meshgrid(np.arange(low[0], high[0]), np.arange(low[1], high[1]))
+        b = ((x - ax) * (cy - ay) - (cx - ax) * (y - ay)) / area
+        c = ((bx - ax) * (y - ay) - (x - ax) * (by - ay)) / area
+        a = 1 - b - c
+        inside = (a >= -1e-3) & (b >= -1e-3) & (c >= -1e-3)
+        rows, columns = y[inside], x[inside]
+        self._shares[rows, columns] = np.stack([a[inside], b[inside], c[inside]], axis=1)
+        self._corners[rows, columns] = vertices
+        self.covered[rows, columns] = True
+
+    def image(self, values: Floats) -> Floats:
+        """float64[size, size, k]: values of vertices; 0 where no face is.
+
+        Args:
+            values: float64[V, k].
+        """
+        out = np.zeros((*self.covered.shape, values.shape[1]))
+        corners, shares = self._corners[self.covered], self._shares[self.covered]
+        out[self.covered] = sum(shares[:, k, None] * values[corners[:, k]] for k in range(3))
+        return out
 
 
 def bleed(image: Floats, covered: Floats, steps: int = 8) -> Floats:
@@ -211,7 +227,7 @@ def lip_mask(part: Part, positions: Floats, place: Floats, units: dict[str, Expr
 def paint_head(
     person: Person,
     part: Part,
-    uvs: Floats,
+    raster: Raster,
     positions: Floats,
     eye: Floats,
     units: dict[str, Expression],
@@ -221,7 +237,7 @@ def paint_head(
     Args:
         person: has the colours.
         part: the head.
-        uvs: float64[T, 2] in [0, 1].
+        raster: of its texture, HEAD_SIZE texels a side.
         positions: float64[v, 3], positions of its vertices, decimetres.
         eye: float64[3], the left eye's middle.
         units: what each raw control does, by its name.
@@ -232,7 +248,7 @@ def paint_head(
         for n in ("eyeBlinkL", "eyeBlinkR")
     )
     lids = smooth(0.1, 0.8, blink / blink.max())
-    image, covered = bake(part.polygons, uvs, np.column_stack([positions, lids]), HEAD_SIZE)
+    image, covered = raster.image(np.column_stack([positions, lids])), raster.covered
     place = image[:, :, :3]
     lips = lip_mask(part, positions, place, units)
     colour = np.ones((HEAD_SIZE, HEAD_SIZE, 3)) * np.array(person.skin)
@@ -330,26 +346,6 @@ def vessels(random: np.random.Generator, angle_limit: float) -> Floats:
     return image
 
 
-def bake_some(polygons: Polygons, uvs: Floats, values: Floats, size: int) -> Floats:
-    """As bake, of the faces alone whose first value is above 0 at a corner: float64[size, size, k].
-
-    Args:
-        polygons: the mesh.
-        uvs: float64[T, 2] in [0, 1].
-        values: float64[V, k].
-        size: texels of a side.
-    """
-    there = values[:, 0] > 1e-3
-    some = [k for k, face in enumerate(polygons.faces) if there[face].any()]
-    part = Polygons(
-        [polygons.faces[k] for k in some],
-        [polygons.uv_faces[k] for k in some],
-        polygons.uvs,
-        polygons.vertex_count,
-    )
-    return bake(part, uvs, values, size)[0]
-
-
 def fold_strength(person: Person, place: Floats, eye: Floats) -> Floats:
     """float64[h, w]: how deep folds are, less on the fat of the cheeks, which bulges instead.
 
@@ -370,6 +366,7 @@ def head_wrinkles(
     person: Person,
     head: Part,
     uvs: Floats,
+    raster: Raster,
     positions: Floats,
     place: Floats,
     eye: Floats,
@@ -381,6 +378,7 @@ def head_wrinkles(
         person: has the age.
         head: the mesh, not subdivided.
         uvs: float64[T, 2] in [0, 1].
+        raster: of its texture, HEAD_SIZE texels a side.
         positions: float64[v, 3] of its vertices, decimetres.
         place: float64[HEAD_SIZE, HEAD_SIZE, 3], each texel's place on the head, decimetres.
         eye: float64[3], the left eye's middle.
@@ -391,11 +389,11 @@ def head_wrinkles(
     files: dict[str, Floats] = {}
     sets: dict[int, str] = {}
     for number in wrinkles.SETS:
-        whole = np.zeros((HEAD_SIZE, HEAD_SIZE, 4))
-        for name in wrinkles.masks_of(number):
-            image = bake_some(head.polygons, uvs, folds[name], HEAD_SIZE)
-            files[f"{name}_msk.png"] = np.clip(shrunk(image[..., 0], MASK_SIZE), 0, 1)
-            whole += image
+        names = wrinkles.masks_of(number)
+        depths = np.column_stack([folds[name][:, 0] for name in names])
+        masks = np.clip(shrunk(raster.image(depths), MASK_SIZE), 0, 1)
+        files |= {f"{name}_msk.png": masks[..., k] for k, name in enumerate(names)}
+        whole = raster.image(np.asarray(sum(folds[name] for name in names)))
         sets[number] = f"head_normal_wm{number}.png"
         files[sets[number]] = wrinkles.relief_normals(whole, place, strength)
     return files, sets
@@ -427,7 +425,8 @@ def paint_textures(
     p = head.carry(positions)
     eye_parts = [part for part in parts if part.name.startswith("eyeLeft")]
     eye = eye_parts[0].carry(positions).mean(axis=0)
-    colour, place = paint_head(person, head, uvs, p, eye, units)
+    raster = Raster(head.polygons, uvs, HEAD_SIZE)
+    colour, place = paint_head(person, head, raster, p, eye, units)
     files = {
         "head_color.png": png(shrunk(colour, largest)),
         "eye_color.png": png(shrunk(paint_eye(person), largest)),
@@ -443,7 +442,7 @@ def paint_textures(
         files[f"head_flush_{side}.png"] = png(mask)
         for lod in (0, 1):
             out[f"texture:head_lod{lod}_mesh:map:head_flush_{side}"] = f"head_flush_{side}.png"
-    wrinkled, sets = head_wrinkles(person, head, uvs, p, place, eye, units)
+    wrinkled, sets = head_wrinkles(person, head, uvs, raster, p, place, eye, units)
     files |= {name: png(shrunk(image, largest)) for name, image in wrinkled.items()}
     for number, name in sets.items():
         for lod in (0, 1):
