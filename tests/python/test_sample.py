@@ -207,7 +207,7 @@ def test_extra_the_packed_face_gives_back_its_units(sample, packed):
     assert 250 <= len(dna.joint_names) <= 257
     deltas = [sum(len(t.vertex_indices) for m in d.meshes for t in m.blend_shape_targets)
               for d in (before, dna)]  # fmt: skip
-    assert deltas[1] < 0.5 * deltas[0]
+    assert deltas[1] < 0.65 * deltas[0]
     rig = risorius.Rig(dna)
     worst = 0.0
     for unit, row in mapping().items():

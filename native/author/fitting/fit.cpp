@@ -72,12 +72,12 @@ void take_displacements(const Shapes& shapes, Problem& problem) {
   for (std::size_t v = 0; v < problem.vertices; ++v) {
     float* out = problem.displacements.data() + v * problem.expressions * 3;
     const float* own = shapes.of_vertex(v);
-    for (std::size_t x = 0; x < 3 * shapes.expressions; ++x) *out++ = own[x] * scale;
-    for (const std::uint32_t e : alone) {
-      const float* other = shapes.of_vertex(problem.mirror.vertices[v]) + 3 * e;
-      *out++ = -other[0] * scale;
-      *out++ = other[1] * scale;
-      *out++ = other[2] * scale;
+    for (std::size_t k = 0; k < 3; ++k) {
+      for (std::size_t e = 0; e < shapes.expressions; ++e) *out++ = own[3 * e + k] * scale;
+      for (const std::uint32_t e : alone) {
+        const float* other = shapes.of_vertex(problem.mirror.vertices[v]) + 3 * e;
+        *out++ = (k == 0 ? -other[k] : other[k]) * scale;
+      }
     }
     double sum = 0.0;
     const float* d = problem.of_vertex(v);
@@ -200,9 +200,10 @@ void find_nearest_given(Problem& problem, const std::vector<Joint>& joints) {
         if (joints[j].rests) continue;
         const float* d = problem.of_vertex(v);
         double error = 0.0;
-        for (std::size_t e = 0; e < problem.expressions && error < least; ++e, d += 3) {
+        const std::size_t count = problem.expressions;
+        for (std::size_t e = 0; e < count && error < least; ++e) {
           const detail::Affine& m = joints[j].motions[e];
-          const Vec3 wanted(double{d[0]}, double{d[1]}, double{d[2]});
+          const Vec3 wanted(double{d[e]}, double{d[count + e]}, double{d[2 * count + e]});
           error += (m.leftCols<3>() * p + m.col(3) - wanted).squaredNorm();
         }
         if (error < least) {
@@ -267,13 +268,13 @@ State start(Problem& problem, const std::vector<GivenJoint>& given, std::size_t 
 std::vector<double> worst_squares(const Problem& problem, const std::vector<float>& left) {
   std::vector<double> out(problem.vertices);
   for (std::size_t v = 0; v < problem.vertices; ++v) {
-    const float* r = left.data() + v * problem.expressions * 3;
-    for (std::size_t e = 0; e < problem.expressions; ++e, r += 3) {
-      const double square =
-          double{r[0]} * double{r[0]} + double{r[1]} * double{r[1]} + double{r[2]} * double{r[2]};
-      out[v] = std::max(out[v], square);
+    const std::size_t count = problem.expressions;
+    const float *x = left.data() + v * count * 3, *y = x + count, *z = y + count;
+    float most = 0.0f;
+    for (std::size_t e = 0; e < count; ++e) {
+      most = std::max(most, x[e] * x[e] + y[e] * y[e] + z[e] * z[e]);
     }
-    out[v] *= problem.asked[v];
+    out[v] = double{most} * problem.asked[v];
   }
   return out;
 }

@@ -229,29 +229,37 @@ void gradient(const Problem& problem, const Joint& joint,
               const std::vector<ByJoint::Entry>& weights, const std::vector<float>& left,
               std::vector<Vec6>& out) {
   const std::size_t count = problem.expressions;
-  // Sums of r and of (v - c) r^T; the turned arm's torque follows from the second.
-  std::vector<Eigen::Matrix<double, 4, 3>> sums(count, Eigen::Matrix<double, 4, 3>::Zero());
+  // Sums of r and of (v - c) r^T; the turned arm's torque follows from the second. One row of all
+  // expressions for each of the four and each axis of r.
+  std::vector<float> sums(12 * count, 0.0f);
   for (const auto& entry : weights) {
     const double s = problem.importance[entry.vertex] * entry.weight;
     const Vec3 arm = s * (problem.positions[entry.vertex] - joint.position);
     const float* r = left.data() + std::size_t{entry.vertex} * count * 3;
-    for (std::size_t e = 0; e < count; ++e, r += 3) {
-      const double x = double{r[0]}, y = double{r[1]}, z = double{r[2]};
-      auto& m = sums[e];
-      for (int k = 0; k < 3; ++k) {
-        m(k, 0) += arm[k] * x;
-        m(k, 1) += arm[k] * y;
-        m(k, 2) += arm[k] * z;
+    const auto x = static_cast<float>(arm[0]), y = static_cast<float>(arm[1]);
+    const auto z = static_cast<float>(arm[2]), w = static_cast<float>(s);
+    float* sum = sums.data();
+    for (std::size_t k = 0; k < 3; ++k, r += count, sum += 4 * count) {
+      for (std::size_t e = 0; e < count; ++e) {
+        sum[e] += x * r[e];
+        sum[count + e] += y * r[e];
+        sum[2 * count + e] += z * r[e];
+        sum[3 * count + e] += w * r[e];
       }
-      m(3, 0) += s * x;
-      m(3, 1) += s * y;
-      m(3, 2) += s * z;
     }
   }
   for (std::size_t e = 0; e < count; ++e) {
-    const Mat3 m = joint.rotations[e] * sums[e].topRows<3>();  // sum of (R arm) r^T
+    Mat3 arms;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto at = static_cast<Eigen::Index>(k);
+      const float* sum = sums.data() + 4 * k * count + e;
+      for (std::size_t x = 0; x < 3; ++x) {
+        arms(static_cast<Eigen::Index>(x), at) = double{sum[x * count]};
+      }
+      out[e][3 + at] = double{sum[3 * count]};
+    }
+    const Mat3 m = joint.rotations[e] * arms;  // sum of (R arm) r^T
     out[e].head<3>() = Vec3(m(1, 2) - m(2, 1), m(2, 0) - m(0, 2), m(0, 1) - m(1, 0));
-    out[e].tail<3>() = sums[e].row(3).transpose();
   }
 }
 
@@ -275,29 +283,34 @@ void update_motion(Joint& joint, std::size_t e) {
 }
 
 void find_residual(const Problem& problem, const State& state, std::vector<float>& left) {
-  const std::size_t count = problem.expressions;
-  left.resize(problem.displacements.size());
+  const std::size_t count = problem.expressions, joints = state.joints.size();
+  // [J][12][E] what moves a vertex, one row of all expressions for each number of the motion.
+  std::vector<float> motions(joints * 12 * count);
+  for (std::size_t j = 0; j < joints; ++j) {
+    if (state.joints[j].rests) continue;
+    for (std::size_t e = 0; e < count; ++e) {
+      const double* m = state.joints[j].motions[e].data();
+      float* out = motions.data() + 12 * j * count + e;
+      for (std::size_t x = 0; x < 12; ++x) out[x * count] = static_cast<float>(m[x]);
+    }
+  }
+  left = problem.displacements;
   core::parallel_for(problem.vertices, problem.threads, [&](std::size_t from, std::size_t to) {
-    std::vector<double> sum(3 * count);
     for (std::size_t v = from; v < to; ++v) {
-      const float* d = problem.of_vertex(v);
-      for (std::size_t x = 0; x < 3 * count; ++x) sum[x] = double{d[x]};
-      const Vec3& p = problem.positions[v];
+      const Eigen::Vector3f p = problem.positions[v].cast<float>();
       for (const Influence& i : state.weights[v]) {
-        const Joint& joint = state.joints[i.joint];
-        if (joint.rests) continue;
-        const Vec3 weighted = i.weight * p;
-        for (std::size_t e = 0; e < count; ++e) {
-          const Affine& m = joint.motions[e];
-          for (int k = 0; k < 3; ++k) {
-            sum[3 * e + static_cast<std::size_t>(k)] -= m(k, 0) * weighted[0] +
-                                                        m(k, 1) * weighted[1] +
-                                                        m(k, 2) * weighted[2] + m(k, 3) * i.weight;
+        if (state.joints[i.joint].rests) continue;
+        const auto weight = static_cast<float>(i.weight);
+        const float wx = weight * p.x(), wy = weight * p.y(), wz = weight * p.z();
+        const float* m = motions.data() + 12 * i.joint * count;
+        float* out = left.data() + v * 3 * count;
+        for (std::size_t k = 0; k < 3; ++k, m += 4 * count, out += count) {
+          for (std::size_t e = 0; e < count; ++e) {
+            out[e] -=
+                m[e] * wx + m[count + e] * wy + m[2 * count + e] * wz + m[3 * count + e] * weight;
           }
         }
       }
-      float* out = left.data() + v * 3 * count;
-      for (std::size_t x = 0; x < 3 * count; ++x) out[x] = static_cast<float>(sum[x]);
     }
   });
 }
@@ -310,10 +323,9 @@ std::vector<double> energies(const Problem& problem, const std::vector<float>& l
   std::vector<double> out(count);
   core::parallel_for(count, problem.threads, [&](std::size_t from, std::size_t to) {
     for (std::size_t v = 0; v < problem.vertices; ++v) {
-      const float* r = left.data() + (v * count + from) * 3;
-      for (std::size_t e = from; e < to; ++e, r += 3) {
-        const double x = double{r[0]}, y = double{r[1]}, z = double{r[2]};
-        out[e] += problem.importance[v] * (x * x + y * y + z * z);
+      const float *x = left.data() + v * count * 3, *y = x + count, *z = y + count;
+      for (std::size_t e = from; e < to; ++e) {
+        out[e] += problem.importance[v] * double{x[e] * x[e] + y[e] * y[e] + z[e] * z[e]};
       }
     }
   });

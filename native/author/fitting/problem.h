@@ -19,9 +19,11 @@ using Mat3 = Eigen::Matrix3d;
 struct Problem {
   std::size_t vertices = 0, expressions = 0, influences = 0, threads = 0;
   Vec3 middle = Vec3::Zero();
-  double scale = 1.0;                // from the input's unit to the fit's
-  std::vector<Vec3> positions;       // [V]
-  std::vector<float> displacements;  // [V][E][3], mirrored expressions that were missing at the end
+  double scale = 1.0;           // from the input's unit to the fit's
+  std::vector<Vec3> positions;  // [V]
+  // [V][3][E], because most loops go over all expressions of one axis; mirrored expressions that
+  // were missing at the end
+  std::vector<float> displacements;
   std::vector<std::uint32_t> first_neighbour, neighbours;  // of vertices, as rows of a CSR matrix
   std::vector<double> motion;  // [V] root of the summed squares of its displacements
   Mirror mirror;
@@ -78,7 +80,7 @@ void solve_weights(const Problem& problem, State& state);
 void solve_motions(const Problem& problem, State& state, std::vector<float>& left);
 /// Joints leave the expressions in which they move no vertex by `least`, for good.
 void leave_expressions(const Problem& problem, State& state, double least);
-/// Out: [V][E][3] displacements less what the joints do
+/// Out: [V][3][E] displacements less what the joints do
 void find_residual(const Problem& problem, const State& state, std::vector<float>& left);
 /// Joints where the given ones leave most, until there are `count`.
 void add_joints(const Problem& problem, State& state, const std::vector<float>& left,

@@ -234,10 +234,13 @@ std::vector<Influence> best_weights(const Problem& problem, const State& state, 
     double sum = 0.0;
     if (!joint.rests) {
       const float* d = problem.of_vertex(v);
-      for (std::size_t e = 0; e < problem.expressions; ++e, d += 3) {
+      const std::size_t count = problem.expressions;
+      for (std::size_t e = 0; e < count; ++e) {
         const Affine& m = joint.motions[e];
-        for (int k = 0; k < 3; ++k) {
-          sum += double{d[k]} * (m(k, 0) * p.x() + m(k, 1) * p.y() + m(k, 2) * p.z() + m(k, 3));
+        for (std::size_t k = 0; k < 3; ++k) {
+          const auto row = m.row(static_cast<Eigen::Index>(k));
+          sum += double{d[k * count + e]} *
+                 (row[0] * p.x() + row[1] * p.y() + row[2] * p.z() + row[3]);
         }
       }
     }
