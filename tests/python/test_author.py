@@ -332,7 +332,8 @@ def test_the_largest_error_is_fought_for_longer(folder, tmp_path):
         assert done.returncode == 0, done.stderr
         return json.loads(done.stdout)["lods"][0]["largest_mm"]
 
-    assert largest("--bound") < 0.98 * largest()  # where 200 rounds end differs by a compiler's rounding
+    # Where 200 rounds end differs by what a compiler rounds.
+    assert largest("--bound") < 0.98 * largest()
     more = bounded(FitOptions(rounds=300))
     assert (more.rounds, more.emphasis, more.bound) == (300, 5.0, True)
 
