@@ -237,9 +237,12 @@ def _other_arrays(value: np.ndarray) -> Iterator[np.ndarray]:
     for at in {0, value.size // 2, value.size - 1} if value.size else ():
         for change in (1, -1):
             out = value.copy()
-            if value.dtype.kind == "u" and int(out.flat[at]) + change < 0:
+            if value.dtype.kind != "u":
+                out.flat[at] += change / 4
+            elif 0 <= int(out.flat[at]) + change <= np.iinfo(value.dtype).max:
+                out.flat[at] = int(out.flat[at]) + change  # NumPy 2 adds no -1 to what has no sign
+            else:
                 continue
-            out.flat[at] += change if value.dtype.kind == "u" else change / 4
             yield out
     if value.dtype.kind == "f" and value.size:
         for special in (np.nan, -value.flat[0] if value.flat[0] == 0 else np.inf):
