@@ -29,6 +29,13 @@ def shot(name):
     subprocess.run(["import", "-window", "root", str(OUT / f"{name}.png")], check=True)
 
 
+def changed(one, other):
+    """Root mean square of what differs between two pictures of the screen, of black to white."""
+    command = ["compare", "-metric", "RMSE", OUT / f"{one}.png", OUT / f"{other}.png", "null:"]
+    done = subprocess.run(command, stderr=subprocess.PIPE, text=True, check=False)
+    return float(done.stderr.split("(")[1].split(")")[0])
+
+
 def repository():
     """Index of the repository of this trial, and its module."""
     for index, repo in enumerate(bpy.context.preferences.extensions.repos):
@@ -142,11 +149,14 @@ def install():
     yield 3.0
     shot("3-face")
     moved = moves()
+    with window():
+        bpy.context.area.tag_redraw()  # as a slider that is dragged does
     yield 3.0
     shot("4-jaw-open")
+    seen = changed("3-face", "4-jaw-open")
     bpy.ops.wm.save_as_mainfile(filepath=str(OUT / "face.blend"))
     yield {"sync": synced, "install": made, "add": added, "moved": moved,
-           "version": native().addon_version()}  # fmt: skip
+           "seen": seen, "version": native().addon_version()}  # fmt: skip
 
 
 def update():

@@ -35,6 +35,7 @@ def checks(
     yield "the version before runs", of("install", "version") == before
     yield "Add > Face without a network", of("install", "add") == done
     yield "its jaw moves", (of("install", "moved") or 0) > 1000
+    yield "the window shows it", (of("install", "seen") or 0) > 0.003
     yield "updated with the face open", of("update", "update") == done
     yield "the open session says restart", "restart Blender" in (of("update", "problem") or "")
     yield "the next start has the new version", of("after", "version") == version
