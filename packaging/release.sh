@@ -42,7 +42,9 @@ checked
 step "wheels"
 compgen -G "$project/build/dist/risorius-$version-cp311-*.whl" > /dev/null || build_wheel
 gather_wheels
-step "sample face"
+step "sample face" # made by what is released: the venv may hold a wheel of another day
+released=$(printf '%s\n' "${wheels[@]}" | grep -- '-cp311-cp311-.*linux.*x86_64' | head -n 1)
+"$python" -m pip install -q --no-deps --force-reinstall "$released"
 sample=$(sample_face)
 step "extensions and their repository"
 rm -rf "$out" && mkdir -p "$out"

@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
 
 import bpy
 import numpy as np
@@ -247,10 +248,13 @@ class Graph:
 
     def tidy(self) -> None:
         """Lay the nodes out in columns by their distance from the output."""
+        sources = defaultdict(list)  # found once: a socket's own links search the whole tree
+        for link in self.tree.links:
+            sources[link.to_node].append(link.from_node)
         column = {}
-        for node in reversed(self._sources_first()):
+        for node in reversed(self._sources_first(sources)):
             place = column.setdefault(node, 0)
-            for source in _sources(node):
+            for source in sources[node]:
                 column[source] = max(column.get(source, 0), place + 1)
         rows = {}
         for node in self.tree.nodes:
@@ -258,9 +262,13 @@ class Graph:
             node.location = (400 - 240 * place, 300 - 220 * rows.get(place, 0))
             rows[place] = rows.get(place, 0) + 1
 
-    def _sources_first(self) -> list[Node]:
-        """Nodes that reach the output, each after all those that feed it."""
-        order, seen, stack = [], {self.output}, [(self.output, iter(_sources(self.output)))]
+    def _sources_first(self, sources: Mapping[Node, list[Node]]) -> list[Node]:
+        """Nodes that reach the output, each after all those that feed it.
+
+        Args:
+            sources: the nodes that feed a node.
+        """
+        order, seen, stack = [], {self.output}, [(self.output, iter(sources[self.output]))]
         while stack:
             node, rest = stack[-1]
             source = next((s for s in rest if s not in seen), None)
@@ -269,9 +277,5 @@ class Graph:
                 stack.pop()
             else:
                 seen.add(source)
-                stack.append((source, iter(_sources(source))))
+                stack.append((source, iter(sources[source])))
         return order
-
-
-def _sources(node: Node) -> list[Node]:
-    return [link.from_node for socket in node.inputs for link in socket.links]
