@@ -50,6 +50,9 @@ from .base.errors import RisoriusError
 from .base.version import __version__ as __version__
 from .rigs.cache import compile_cached
 from .rigs.load import Finding, check, load
+from .solving.drag import Solved, best_controls, solve_drag
+from .solving.handles import place_handles
+from .solving.surface import Surface
 
 __all__ = [
     "AnimatedMaps",
@@ -91,12 +94,17 @@ __all__ = [
     "RbfSolver",
     "Rig",
     "RisoriusError",
+    "Solved",
+    "Surface",
     "TwistSwingBehavior",
     "TwistSwingSetup",
     "available_simd",
+    "best_controls",
     "check",
     "compile_cached",
     "expressions",
     "idle",
     "load",
+    "place_handles",
+    "solve_drag",
 ]
