@@ -20,6 +20,7 @@ from ...logic.base.sentences import Sentence, told
 from ..base import compat, parts
 from ..base.blender_types import Animated, ArmatureObject
 from ..character import armatures, runtime
+from . import curve_colours
 
 LINEAR = 1  # the number of the interpolation "LINEAR"
 _ROTATIONS = {"QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle"}
@@ -117,7 +118,7 @@ def make_action(
     bag = compat.add_curves(action, controls)
     groups = _Groups(bag)
     for curve in keys.controls:
-        group = groups.named(armatures.key_group(curve.name))
+        group = groups.of_slider(curve.name)
         _add(bag, group, parts.property_path(curve.name), 0, curve.frames, curve.values)
     for bone, (frames, turns) in keys.turns.items():
         if bone in controls.pose.bones:
@@ -142,6 +143,13 @@ class _Groups:
         if name not in self.made:
             self.made[name] = self.bag.groups.new(name)
         return self.made[name]
+
+    def of_slider(self, label: str) -> bpy.types.ActionGroup:
+        """The group of a slider's region, in its colour."""
+        group = self.named(armatures.key_group(label))
+        if group.color_set == "DEFAULT":
+            curve_colours.colour_group(group, native.regions().of_slider(label))
+        return group
 
 
 def _span(frames: NDArray[np.float64], whole: bool) -> tuple[float, float]:

@@ -13,7 +13,7 @@ from ... import native
 from ...logic.animation import clip_units as clip_logic
 from ..base import parts
 from ..base.blender_types import ArmatureObject
-from ..character import armatures, runtime
+from ..character import runtime
 from . import actions, clip_actions
 
 CATALOG = "Faces"
@@ -78,20 +78,6 @@ def apply(
         face[name] = min(max(value, lowest[name]), maximum)
     controls.update_tag()
     return list(goals)
-
-
-def key(rig: ArmatureObject, names: Iterable[str], frame: float) -> None:
-    """Insert keys on sliders at a frame, of the values that they have now.
-
-    Args:
-        rig: deforming armature of the character.
-        names: of the sliders, as Blender's properties are called.
-        frame: of the scene; need not be whole.
-    """
-    controls = parts.controls_there(rig)
-    for name in names:
-        path = parts.property_path(name)
-        controls.keyframe_insert(path, frame=frame, group=armatures.key_group(name))
 
 
 def make_assets(rig: ArmatureObject) -> tuple[list[bpy.types.Action], list[str]]:

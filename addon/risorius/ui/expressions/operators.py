@@ -3,16 +3,18 @@
 # pyright: reportInvalidTypeForm=false
 """Operators that set the sliders to an expression, and make pose assets of expressions."""
 
+from collections.abc import Collection
+
 import bpy
 
-from ...scene.animation import expressions
-from ...scene.frame import evaluate
+from ...scene.animation import expressions, keying
 from ..blender_types import Context, Operator, Result
 from ..common import FaceOperator, face_rig
+from ..hand.base import HandOperator
 from ..words import say
 
 
-class RISORIUS_OT_expression(FaceOperator, Operator):
+class RISORIUS_OT_expression(HandOperator, Operator):
     """Move the sliders to an expression"""
 
     bl_idname = "risorius.expression"
@@ -25,17 +27,16 @@ class RISORIUS_OT_expression(FaceOperator, Operator):
     only: bpy.props.BoolProperty(name="Rest of the Face at Rest", default=True)
     key: bpy.props.BoolProperty(name="Key", description="At the current frame")
 
-    def execute(self, context: Context) -> Result:
+    def move(self, context: Context) -> Collection[str] | None:
         rig = face_rig(context)
         found = expressions.all_expressions().get(self.expression)
         if found is None:
             self.report({"ERROR"}, say("There is no expression {name}.", name=self.expression))
-            return {"CANCELLED"}
+            return None
         names = expressions.apply(rig, found, self.strength, self.only)
-        if self.key:
-            expressions.key(rig, names, context.scene.frame_current)
-        evaluate.bring_up(context, rig)
-        return {"FINISHED"}
+        if self.key and self.at == "NOW":
+            keying.key(context, rig, names)
+        return names
 
 
 class RISORIUS_OT_make_pose_assets(FaceOperator, Operator):

@@ -3,16 +3,19 @@
 # pyright: reportInvalidTypeForm=false
 """Operators on a face that is there: reset, keys, level of detail, shapes, overdrive."""
 
+from collections.abc import Collection
+
 import bpy
 
 from ... import native
+from ...scene.animation import keying
 from ...scene.base import parts
-from ...scene.base.blender_types import ArmatureObject
-from ...scene.character import armatures, build, runtime, sides
+from ...scene.character import build, runtime
 from ...scene.frame import evaluate
 from ...scene.life import duplicates, library_overrides
 from ..blender_types import Context, Operator, Result
 from ..common import MODES, FaceOperator, face_controls, face_rig
+from ..hand.base import HandOperator
 from ..words import say
 
 
@@ -25,7 +28,7 @@ def _labels(context: Context, region: str = "") -> list[str]:
     ]
 
 
-class RISORIUS_OT_reset(FaceOperator, Operator):
+class RISORIUS_OT_reset(HandOperator, Operator):
     """Set controls to rest and the head, neck and eye bones straight"""
 
     bl_idname = "risorius.reset"
@@ -35,19 +38,19 @@ class RISORIUS_OT_reset(FaceOperator, Operator):
         name="Region", description="Only this region; empty for all", options={"SKIP_SAVE"}
     )
 
-    def execute(self, context: Context) -> Result:
+    def move(self, context: Context) -> Collection[str]:
         controls = face_controls(context)
         face = controls.pose.bones[parts.FACE]
         live = runtime.there(face_rig(context))
         rests = dict(zip(live.labels, live.rests, strict=True))
-        for label in _labels(context, self.region):
+        labels = _labels(context, self.region)
+        for label in labels:
             face[label] = rests[label]
         if not self.region:
             for bone in controls.pose.bones:
                 bone.matrix_basis.identity()
         controls.update_tag()
-        context.view_layer.update()
-        return {"FINISHED"}
+        return labels
 
 
 class RISORIUS_OT_key(FaceOperator, Operator):
@@ -61,31 +64,14 @@ class RISORIUS_OT_key(FaceOperator, Operator):
     )
 
     def execute(self, context: Context) -> Result:
-        controls = face_controls(context)
-        led = sides.followers(controls)  # they have the keys of those that lead them
-        labels = [label for label in _labels(context, self.region) if label not in led]
+        labels = _labels(context, self.region)
+        bones = [] if self.region else keying.pose_of(face_controls(context)).bones
+        count = keying.key(context, face_rig(context), labels, bones)
         frame = context.scene.frame_current
-        for label in labels:
-            controls.keyframe_insert(
-                parts.property_path(label), frame=frame, group=armatures.key_group(label)
-            )
-        if not self.region:
-            self._key_bones(controls, frame)
         self.report(
-            {"INFO"}, say("{count} controls keyed at frame {frame}", count=len(labels), frame=frame)
+            {"INFO"}, say("{count} controls keyed at frame {frame}", count=count, frame=frame)
         )
         return {"FINISHED"}
-
-    @staticmethod
-    def _key_bones(controls: ArmatureObject, frame: int) -> None:
-        for name in ("neck", "head", "eye_L", "eye_R"):
-            bone = controls.pose.bones.get(name)
-            if bone is not None:
-                euler = bone.rotation_mode not in {"QUATERNION", "AXIS_ANGLE"}
-                path = "rotation_euler" if euler else f"rotation_{bone.rotation_mode.lower()}"
-                bone.keyframe_insert(path, frame=frame, group=name)
-        if "eyes" in controls.pose.bones:
-            controls.pose.bones["eyes"].keyframe_insert("location", frame=frame, group="eyes")
 
 
 class RISORIUS_OT_set_shape_mode(FaceOperator, Operator):

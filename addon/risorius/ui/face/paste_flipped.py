@@ -8,6 +8,7 @@ pastes as they are. So its command is followed by a step that puts them left for
 operator in its place on the same keys, and where Blender's own was called from a menu, once more.
 """
 
+from collections.abc import Collection
 from typing import Any
 
 import bpy
@@ -18,9 +19,9 @@ from ...logic.character import slider_rows
 from ...scene.base import parts
 from ...scene.base.blender_types import ArmatureObject, current_context
 from ...scene.character import sides
-from ...scene.frame import evaluate
-from ..blender_types import Context, Menu, Operator, Result
-from ..common import FaceOperator, active_controls, face_controls, face_rig
+from ..blender_types import Context, Menu, Operator
+from ..common import active_controls, face_controls, face_rig
+from ..hand.base import HandOperator
 from ..words import say
 
 _MARK = 0.3215  # no hand sets a slider to it
@@ -35,7 +36,7 @@ def _posed_controls(context: Context) -> ArmatureObject | None:
     return controls if controls is not None and context.pose_object == controls else None
 
 
-class RISORIUS_OT_paste_pose_flipped(FaceOperator, Operator):
+class RISORIUS_OT_paste_pose_flipped(HandOperator, Operator):
     """Paste the copied pose left for right, with the sliders of the face"""
 
     bl_idname = "risorius.paste_pose_flipped"
@@ -54,25 +55,29 @@ class RISORIUS_OT_paste_pose_flipped(FaceOperator, Operator):
             return False
         return True
 
-    def execute(self, context: Context) -> Result:
+    def move(self, context: Context) -> Collection[str] | None:
         rig, controls = face_rig(context), face_controls(context)
         before = sides.values_of(rig)
         face = controls.pose.bones[parts.FACE]
         for name in before:
             face[name] = _MARK
+        tools = context.scene.tool_settings
+        # Blender would key the sliders as it pastes them, before they are turned over.
+        auto, tools.use_keyframe_insert_auto = tools.use_keyframe_insert_auto, False
         try:
             bpy.ops.pose.paste(flipped=True, selected_mask=self.selected)
         except RuntimeError as error:  # nothing was copied
             sides.restore(rig, before)
             self.report({"ERROR"}, str(error).strip().removeprefix("Error: "))
-            return {"CANCELLED"}
+            return None
+        finally:
+            tools.use_keyframe_insert_auto = auto
         pasted = {
             name: value for name, value in sides.values_of(rig).items() if not _is_mark(value)
         }
         sides.restore(rig, before)
         sides.put(rig, slider_rows.flipped(pasted, native.regions()))
-        evaluate.bring_up(context, rig)
-        return {"FINISHED"}
+        return pasted
 
 
 def _is_mark(value: float) -> bool:

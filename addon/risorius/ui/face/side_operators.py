@@ -3,6 +3,8 @@
 # pyright: reportInvalidTypeForm=false
 """Operators on the two sides of a face, and poses that are copied and pasted."""
 
+from collections.abc import Collection
+
 import bpy
 
 from ... import native
@@ -11,6 +13,7 @@ from ...scene.character import sides
 from ...scene.frame import evaluate
 from ..blender_types import Context, Operator, Result
 from ..common import FaceOperator, face_controls, face_rig
+from ..hand.base import HandOperator
 from ..words import say
 
 _copied: dict[str, float] = {}  # the sliders that were copied last, of any face
@@ -31,7 +34,7 @@ def _from_left() -> object:
     )
 
 
-class RISORIUS_OT_mirror(FaceOperator, Operator):
+class RISORIUS_OT_mirror(HandOperator, Operator):
     """Swap left and right of the face, as in a mirror"""
 
     bl_idname = "risorius.mirror"
@@ -39,14 +42,13 @@ class RISORIUS_OT_mirror(FaceOperator, Operator):
 
     region: _only_region()
 
-    def execute(self, context: Context) -> Result:
+    def move(self, context: Context) -> Collection[str]:
         rig = face_rig(context)
         sides.mirror(rig, self.region)
-        evaluate.bring_up(context, rig)
-        return {"FINISHED"}
+        return sides.values_of(rig, self.region)
 
 
-class RISORIUS_OT_copy_side(FaceOperator, Operator):
+class RISORIUS_OT_copy_side(HandOperator, Operator):
     """Make one side of the face like the other; the eyes go on looking the same way"""
 
     bl_idname = "risorius.copy_side"
@@ -55,13 +57,12 @@ class RISORIUS_OT_copy_side(FaceOperator, Operator):
     region: _only_region()
     from_left: _from_left()
 
-    def execute(self, context: Context) -> Result:
+    def move(self, context: Context) -> Collection[str]:
         rig = face_rig(context)
         count = sides.copy_across(rig, self.from_left, self.region)
         if not count:
             self.report({"WARNING"}, say("No control here has two sides that are free."))
-        evaluate.bring_up(context, rig)
-        return {"FINISHED"}
+        return sides.values_of(rig, self.region) if count else ()
 
 
 class RISORIUS_OT_link_sides(FaceOperator, Operator):
@@ -112,7 +113,7 @@ class RISORIUS_OT_copy_pose(FaceOperator, Operator):
         return {"FINISHED"}
 
 
-class RISORIUS_OT_paste_pose(FaceOperator, Operator):
+class RISORIUS_OT_paste_pose(HandOperator, Operator):
     """Paste the sliders that were copied"""
 
     bl_idname = "risorius.paste_pose"
@@ -141,15 +142,14 @@ class RISORIUS_OT_paste_pose(FaceOperator, Operator):
             text = "Paste the sliders that were copied, left for right"
         return bpy.app.translations.pgettext_tip(text) or text
 
-    def execute(self, context: Context) -> Result:
+    def move(self, context: Context) -> Collection[str]:
         rig, values = face_rig(context), dict(_copied)
         if self.flipped:
             values = slider_rows.flipped(values, native.regions())
         count = sides.put(rig, values)
         if not count:
             self.report({"WARNING"}, say("This face has none of the copied controls."))
-        evaluate.bring_up(context, rig)
-        return {"FINISHED"}
+        return values
 
 
 CLASSES = (

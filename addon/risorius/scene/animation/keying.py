@@ -1,0 +1,402 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Keys as Blender's own edits insert them: auto-key, keying set, only needed, kind, group.
+
+Whoever moves sliders or bones of the controls for the animator does it within `by_hand`, or tells
+`changed` when it is done.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import bpy
+
+from ...logic.base.errors import FaceError
+from ...logic.base.sentences import told
+from ..base import compat, parts
+from ..base.blender_types import ArmatureObject, Context
+from ..character import armatures, runtime
+from . import clip_actions, curve_colours
+
+if TYPE_CHECKING:
+    from bpy.stub_internal.rna_enums import (
+        BeztripleInterpolationModeItems,
+        BeztripleKeyframeTypeItems,
+        KeyframeHandleTypeItems,
+    )
+
+_NEAR = 1e-6  # values that are the same
+_AT = 1e-3  # frames that are the same
+
+
+@dataclass(frozen=True)
+class Rules:
+    """What Blender's settings say of new keys.
+
+    Attributes:
+        insert: whether keys are inserted at all.
+        replace: only where a curve has a key at the frame already.
+        available: only on curves that are there already.
+        needed: only where the curve shows another value.
+        kind: of key, as KEYFRAME or EXTREME.
+        interpolation, handles: of the first keys of a curve; later ones are as those before them.
+        keying_set: the only set whose paths are keyed, or None.
+    """
+
+    insert: bool = True
+    replace: bool = False
+    available: bool = False
+    needed: bool = False
+    kind: BeztripleKeyframeTypeItems = "KEYFRAME"
+    interpolation: BeztripleInterpolationModeItems = "BEZIER"
+    handles: KeyframeHandleTypeItems = "AUTO_CLAMPED"
+    keying_set: bpy.types.KeyingSet | None = None
+
+
+@dataclass(frozen=True)
+class Pose:
+    """What an animator moves on the controls of a face.
+
+    Attributes:
+        sliders: by their names.
+        bones: data path -> numbers, of each control bone's turn and place.
+    """
+
+    sliders: Mapping[str, float]
+    bones: Mapping[str, tuple[float, ...]]
+
+
+def rules_of(context: Context, auto: bool = True) -> Rules:
+    """The settings of the scene and the preferences.
+
+    Args:
+        context: gives both.
+        auto: for what an edit leaves behind it by itself, which takes auto-key; else for keys that
+            the animator asked for.
+    """
+    tools, edit = context.scene.tool_settings, context.preferences.edit
+    needed = getattr(edit, "use_keyframe_insert_needed", False)
+    if auto:
+        needed = getattr(edit, "use_auto_keyframe_insert_needed", needed)
+    only_set = auto and tools.use_keyframe_insert_keyingset
+    return Rules(
+        insert=tools.use_keyframe_insert_auto if auto else True,
+        replace=auto and tools.auto_keying_mode == "REPLACE_KEYS",
+        available=auto and getattr(edit, "use_keyframe_insert_available", False),
+        needed=needed,
+        kind=tools.keyframe_type,
+        interpolation=edit.keyframe_new_interpolation_type,
+        handles=edit.keyframe_new_handle_type,
+        keying_set=context.scene.keying_sets_all.active if only_set else None,
+    )
+
+
+def pose_of(controls: ArmatureObject) -> Pose:
+    """What the controls show now: the original values, as a hand moves them."""
+    rig = parts.rig_of(controls)
+    assert rig is not None
+    face = controls.pose.bones[parts.FACE]
+    sliders = {n: float(face[n]) for n in runtime.there(rig).labels if n in face}
+    bones = {
+        path: tuple(controls.path_resolve(path))
+        for bone in controls.pose.bones
+        for path in _paths_of(bone)
+    }
+    return Pose(sliders, bones)
+
+
+def _paths_of(bone: bpy.types.PoseBone) -> list[str]:
+    """The data paths of a control bone that an animator moves: what is locked is not keyed."""
+    names = [] if all(bone.lock_rotation) else [clip_actions.rotation_path(bone)]
+    names += [] if all(bone.lock_location) else ["location"]
+    return [f'pose.bones["{bpy.utils.escape_identifier(bone.name)}"].{name}' for name in names]
+
+
+def curves_by_path(controls: ArmatureObject) -> dict[str, list[bpy.types.FCurve]]:
+    """Data path -> the F-curves of it, of the action that the controls play."""
+    data = controls.animation_data
+    found: dict[str, list[bpy.types.FCurve]] = {}
+    if data is not None and data.action is not None:
+        for curve in compat.curves_for(data.action, controls):
+            found.setdefault(curve.data_path, []).append(curve)
+    return found
+
+
+def by_hand(
+    context: Context,
+    rig: ArmatureObject,
+    move: Callable[[], Collection[str] | None],
+    at_selected: bool = False,
+) -> int:
+    """Move controls as Blender's own edits do: what is keyed after it is up to the user's settings.
+
+    Args:
+        context: has the settings and the current frame.
+        rig: the character.
+        move: moves sliders and bones from what they show now; gives the names of the sliders that
+            it had in its hands, whether they changed or not, or None where it did nothing.
+        at_selected: do it at every frame with a selected key of this face, with keys of what
+            changed, instead of at the current frame.
+
+    Returns:
+        How many properties were keyed.
+
+    Raises:
+        FaceError: no key is selected.
+    """
+    controls = parts.controls_there(rig)
+    if at_selected:
+        return _at_selected(context, controls, move)
+    before = pose_of(controls)
+    touched = move()
+    if touched is None:
+        return 0
+    labels, paths = _moved(before, pose_of(controls))
+    keyed = curves_by_path(controls)
+    held = [n for n in touched if n not in labels and parts.property_path(n) in keyed]
+    return changed(context, rig, [*labels, *held], paths)
+
+
+def changed(
+    context: Context, rig: ArmatureObject, labels: Iterable[str], bones: Iterable[str] = ()
+) -> int:
+    """Key what an edit changed at the current frame, if Blender's settings say so.
+
+    Args:
+        context: has the settings and the frame.
+        rig: the character.
+        labels: sliders that were set.
+        bones: data paths of control bones that were moved, as Pose has them.
+
+    Returns:
+        How many properties were keyed.
+    """
+    rules = rules_of(context)
+    if not rules.insert:
+        return 0
+    controls = parts.controls_there(rig)
+    return insert(controls, labels, bones, context.scene.frame_current, rules)
+
+
+def key(
+    context: Context, rig: ArmatureObject, labels: Iterable[str], bones: Iterable[str] = ()
+) -> int:
+    """Insert the keys that the animator asked for, at the current frame.
+
+    Args:
+        context: has the settings and the frame.
+        rig: the character.
+        labels: its sliders.
+        bones: data paths of control bones, as Pose has them.
+
+    Returns:
+        How many properties were keyed.
+    """
+    controls, rules = parts.controls_there(rig), rules_of(context, auto=False)
+    return insert(controls, labels, bones, context.scene.frame_current, rules)
+
+
+def _moved(before: Pose, after: Pose) -> tuple[list[str], list[str]]:
+    """The sliders and the bones' paths that differ."""
+    labels = [n for n, v in after.sliders.items() if abs(v - before.sliders.get(n, v)) > _NEAR]
+    paths = [
+        path
+        for path, values in after.bones.items()
+        if path in before.bones
+        and max(abs(a - b) for a, b in zip(values, before.bones[path], strict=True)) > _NEAR
+    ]
+    return labels, paths
+
+
+def selected_frames(controls: ArmatureObject) -> list[float]:
+    """The frames of the selected keys of a face, each once, in their order."""
+    found = {
+        round(key.co.x, 3)
+        for path, curves in curves_by_path(controls).items()
+        if path.startswith("pose.bones")
+        for curve in curves
+        for key in curve.keyframe_points
+        if key.select_control_point
+    }
+    return sorted(found)
+
+
+def pose_at(controls: ArmatureObject, frame: float, now: Pose) -> Pose:
+    """What the action of the controls shows at a frame; what has no curve stands as it is.
+
+    Args:
+        controls: the control armature.
+        frame: of the action; need not be whole.
+        now: what it shows at present.
+    """
+    keyed = curves_by_path(controls)
+    sliders = dict(now.sliders)
+    for name in sliders:
+        for curve in keyed.get(parts.property_path(name), ()):
+            sliders[name] = curve.evaluate(frame)
+    bones = {}
+    for path, values in now.bones.items():
+        numbers = list(values)
+        for curve in keyed.get(path, ()):
+            numbers[curve.array_index] = curve.evaluate(frame)
+        bones[path] = tuple(numbers)
+    return Pose(sliders, bones)
+
+
+def show(controls: ArmatureObject, pose: Pose) -> None:
+    """Set the controls to a pose.
+
+    Args:
+        controls: the control armature.
+        pose: from pose_of or pose_at.
+    """
+    face = controls.pose.bones[parts.FACE]
+    for name, value in pose.sliders.items():
+        face[name] = value
+    for path, values in pose.bones.items():
+        place = controls.path_resolve(path)
+        for index, value in enumerate(values):
+            place[index] = value
+    controls.update_tag()
+
+
+def _at_selected(
+    context: Context, controls: ArmatureObject, move: Callable[[], Collection[str] | None]
+) -> int:
+    """`by_hand` at the frames of selected keys."""
+    frames = selected_frames(controls)
+    if not frames:
+        raise FaceError(told("Select keys of this face first: there is no selected key."))
+    now, rules, made = pose_of(controls), rules_of(context, auto=False), []
+    # All poses are read before the first key is set: a first key of a curve holds at all frames.
+    for frame in frames:
+        before = pose_at(controls, frame, now)
+        show(controls, before)
+        touched = move()
+        after = pose_of(controls)
+        if touched is not None:
+            made.append((frame, after, *_moved(before, after)))
+    count = 0
+    for frame, after, labels, paths in made:
+        show(controls, after)
+        count += insert(controls, labels, paths, frame, rules)
+    show(controls, pose_at(controls, context.scene.frame_current_final, now))
+    return count
+
+
+def insert(
+    controls: ArmatureObject,
+    labels: Iterable[str],
+    bones: Iterable[str],
+    frame: float,
+    rules: Rules,
+) -> int:
+    """Insert keys of the values that the controls show now.
+
+    Args:
+        controls: the control armature.
+        labels: its sliders that are keyed; those with a driver are left out.
+        bones: data paths of its bones.
+        frame: of the scene; need not be whole.
+        rules: what may be keyed, and how.
+
+    Returns:
+        How many properties were keyed.
+    """
+    keyed, driven = curves_by_path(controls), _driven(controls)
+    wanted = [(parts.property_path(n), armatures.key_group(n)) for n in labels]
+    wanted += [(path, path.split('"')[1]) for path in bones]
+    count = 0
+    for path, group in wanted:
+        curves = keyed.get(path, [])
+        if path in driven or not _may(controls, path, curves, frame, rules):
+            continue
+        controls.keyframe_insert(path, frame=frame, group=group, keytype=rules.kind)
+        count += 1
+        data = controls.animation_data
+        assert data is not None
+        assert data.action is not None
+        bag = compat.bag_for(data.action, controls)
+        if not curves and bag is not None:
+            curves = _new_curves(bag, path)
+        for curve in curves:
+            _finish(curve, rules)
+    return count
+
+
+def _driven(controls: ArmatureObject) -> set[str]:
+    data = controls.animation_data
+    return {curve.data_path for curve in data.drivers} if data is not None else set()
+
+
+def _new_curves(bag: bpy.types.ActionChannelbag, path: str) -> list[bpy.types.FCurve]:
+    """The curves of a property that had none, with the colour of its region."""
+    curves = [c for c in (bag.fcurves.find(path, index=i) for i in range(4)) if c is not None]
+    label = curve_colours.label_of(path)
+    if label:
+        for curve in curves:
+            curve_colours.colour_curve(curve, label)
+    return curves
+
+
+def _finish(curve: bpy.types.FCurve, rules: Rules) -> None:
+    """Give the first keys of a curve what the preferences say; Blender does it for its own only."""
+    if len(curve.keyframe_points) > 2:
+        return  # a later key is like the one before it
+    for key in (
+        curve.keyframe_points[-1:] if len(curve.keyframe_points) > 1 else curve.keyframe_points
+    ):
+        key.interpolation = rules.interpolation
+        key.handle_left_type = key.handle_right_type = rules.handles
+    curve.update()
+
+
+def _may(
+    controls: ArmatureObject,
+    path: str,
+    curves: Collection[bpy.types.FCurve],
+    frame: float,
+    rules: Rules,
+) -> bool:
+    """Whether a property is keyed at a frame."""
+    if rules.keying_set is not None and not in_set(controls, rules.keying_set, path):
+        return False
+    if not curves:
+        return not (rules.available or rules.replace)
+    if rules.replace and not any(_key_at(curve, frame) for curve in curves):
+        return False
+    return not rules.needed or any(
+        abs(curve.evaluate(frame) - _value(controls, path, curve.array_index)) > _NEAR
+        or curve.is_empty
+        for curve in curves
+    )
+
+
+def _key_at(curve: bpy.types.FCurve, frame: float) -> bool:
+    return any(abs(key.co.x - frame) < _AT for key in curve.keyframe_points)
+
+
+def _value(controls: ArmatureObject, path: str, index: int) -> float:
+    value = controls.path_resolve(path)
+    return float(value if isinstance(value, (bool, int, float)) else value[index])
+
+
+def in_set(controls: ArmatureObject, keying_set: bpy.types.KeyingSet, path: str) -> bool:
+    """Whether a keying set has a property of the controls.
+
+    Args:
+        controls: the control armature.
+        keying_set: one of the scene, with paths; or one of Blender's own, which say by their names
+            what of a bone they key.
+        path: a data path.
+    """
+    if keying_set.is_path_absolute:
+        return any(p.id == controls and p.data_path == path for p in keying_set.paths)
+    name = keying_set.bl_idname
+    if "Character" in name or "Available" in name:
+        return "Character" in name or path in curves_by_path(controls)
+    if path.endswith('"]'):
+        return "CProp" in name
+    return "Delta" not in name and ("Loc" if path.endswith("location") else "Rot") in name

@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Blender takes properties where Python has annotations:
+# pyright: reportInvalidTypeForm=false
+"""The base class of operators that move controls as the animator's hand does."""
+
+from collections.abc import Collection
+
+import bpy
+
+from ...logic.base.errors import FaceError
+from ...scene.animation import keying
+from ...scene.frame import evaluate
+from ..blender_types import Context, Result
+from ..common import FaceOperator, face_rig
+from ..words import of_error
+
+MOMENTS = (
+    ("NOW", "Current Frame", "Keys are inserted as Blender's auto-key and keying sets say"),
+    ("SELECTED", "Selected Keys", "At each frame that has a selected key of this face"),
+)
+
+
+class HandOperator(FaceOperator):
+    """What all operators share that move sliders or control bones.
+
+    They say in `move` what they do; when keys are inserted, and which, is said in one place.
+    """
+
+    at: bpy.props.EnumProperty(
+        name="At", description="Which frames are changed", items=MOMENTS, options={"SKIP_SAVE"}
+    )
+
+    def move(self, context: Context) -> Collection[str] | None:
+        """Move the controls from what they show now.
+
+        Returns:
+            The sliders that it had in its hands; None where it did nothing, and has said why.
+        """
+        raise NotImplementedError
+
+    def execute(self, context: Context) -> Result:
+        rig, done = face_rig(context), []
+
+        def move() -> Collection[str] | None:
+            touched = self.move(context)
+            done.append(touched is not None)
+            return touched
+
+        try:
+            keying.by_hand(context, rig, move, self.at == "SELECTED")
+        except FaceError as error:
+            self.report({"ERROR"}, of_error(error))
+            return {"CANCELLED"}
+        evaluate.bring_up(context, rig)
+        return {"FINISHED"} if any(done) else {"CANCELLED"}

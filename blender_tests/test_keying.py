@@ -1,0 +1,272 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators that move controls key as Blender's own edits do; poses between poses; tweaks."""
+
+import bpy
+import pytest
+from support import scene
+
+PREFIX = "CTRL_expressions."
+JAW, LEFT, RIGHT, BROW = "jawOpen", "mouthCornerPullL", "mouthCornerPullR", "browDownL"
+
+
+@pytest.fixture
+def rig(dna_file):
+    rig = scene.load(dna_file)
+    bpy.context.view_layer.objects.active = scene.controls(rig)
+    return rig
+
+
+@pytest.fixture
+def auto():
+    """Auto-key is on, at frame 10, and every preference is what Blender ships."""
+    tools, edit = bpy.context.scene.tool_settings, bpy.context.preferences.edit
+    names = ("use_auto_keyframe_insert_needed", "use_keyframe_insert_needed")
+    names += ("use_keyframe_insert_available", "keyframe_new_interpolation_type")
+    before = {name: getattr(edit, name) for name in names}
+    for name in names[:3]:
+        setattr(edit, name, False)
+    tools.use_keyframe_insert_auto = True
+    bpy.context.scene.frame_set(10)
+    yield tools
+    tools.use_keyframe_insert_auto = False
+    for name, value in before.items():
+        setattr(edit, name, value)
+
+
+def value(rig, name):
+    return scene.face(rig)[PREFIX + name]
+
+
+def path_of(name):
+    return f'pose.bones["face"]["{PREFIX}{name}"]'
+
+
+def keys(rig, name):
+    """Frame -> value of a slider's keys."""
+    if (
+        scene.controls(rig).animation_data is None
+        or scene.controls(rig).animation_data.action is None
+    ):
+        return {}
+    found = [c for c in scene.curves(scene.controls(rig)) if c.data_path == path_of(name)]
+    return {k.co.x: round(k.co.y, 5) for c in found for k in c.keyframe_points}
+
+
+def curve(rig, name):
+    return next(c for c in scene.curves(scene.controls(rig)) if c.data_path == path_of(name))
+
+
+def key(rig, name, **values):
+    """Keys on a slider: f5=0.3."""
+    for frame, number in values.items():
+        scene.face(rig)[PREFIX + name] = number
+        scene.controls(rig).keyframe_insert(path_of(name), frame=int(frame[1:]))
+
+
+def select_keys(rig, *frames):
+    for one in scene.curves(scene.controls(rig)):
+        for point in one.keyframe_points:
+            point.select_control_point = point.co.x in frames
+
+
+def _start(rig):
+    """A lopsided face, of which a copy is in Blender's clipboard and in ours."""
+    scene.set_controls(rig, mouthCornerPullL=0.8, mouthCornerPullR=0.1, jawOpen=0.5)
+
+
+def _paste(rig, **flags):
+    bpy.ops.risorius.copy_pose(region="mouth")
+    scene.set_controls(rig, mouthCornerPullL=0.3, mouthCornerPullR=0.2)
+    return bpy.ops.risorius.paste_pose(**flags)
+
+
+def _paste_blenders(rig):
+    bpy.ops.object.mode_set(mode="POSE")
+    bpy.ops.pose.copy()
+    done = bpy.ops.risorius.paste_pose_flipped()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    return done
+
+
+# What moves controls, with what is called and the sliders that it sets to which values.
+HANDS = {
+    "risorius.reset": (lambda rig: bpy.ops.risorius.reset(), {LEFT: 0.0, RIGHT: 0.0, JAW: 0.0}),
+    "risorius.mirror": (lambda rig: bpy.ops.risorius.mirror(), {LEFT: 0.1, RIGHT: 0.8}),
+    "risorius.copy_side": (lambda rig: bpy.ops.risorius.copy_side(), {RIGHT: 0.8}),
+    "risorius.paste_pose": (lambda rig: _paste(rig, flipped=True), {LEFT: 0.1, RIGHT: 0.8}),
+    "risorius.paste_pose_flipped": (_paste_blenders, {LEFT: 0.1, RIGHT: 0.8}),
+    "risorius.expression": (
+        lambda rig: bpy.ops.risorius.expression(expression="joy"),
+        {JAW: None, LEFT: None, RIGHT: None},
+    ),
+}
+
+# What moves no slider and no control bone, or keeps its own keys, by the reason.
+OTHERS = {
+    "files, faces and what is shown of them": "add_character attach_body bake bake_physics "
+    "bring_back describe detach_body export_animation export_dna export_web import_dna "
+    "install_speech make_override make_rig mix_add mix_add_scene mix_preview mix_remove mix_write "
+    "reload replace_dna separate self_test set_lod set_lod_by_distance set_shape_mode "
+    "test_channel unbake",
+    "makes an action of its own": "import_animation import_arkit_rig speak",
+    "keys what stands": "key",
+    "the range of sliders: keys are cut as well": "set_overdrive",
+    "drivers; each side shows what it showed": "link_sides",
+    "reads the controls": "copy_pose make_pose_assets",
+    "lies above the sliders": "layer_add layer_remove layer_move layer_duplicate layer_warp "
+    "layers_to_nla fire unfire",
+    "a hand of its own, without keys; at its end all stands as before": "live_start live_stop "
+    "live_record live_finish live_discard live_neutral live_subject",
+}
+
+
+def _all_operators():
+    words = scene.submodule("registration").CLASSES
+    return {c.bl_idname for c in words if issubclass(c, bpy.types.Operator)}
+
+
+def test_every_operator_is_known_to_move_controls_or_not():
+    others = {f"risorius.{name}" for names in OTHERS.values() for name in names.split()}
+    assert sorted(_all_operators()) == sorted(others | set(HANDS))
+    base = scene.submodule("ui.hand.base").HandOperator
+    classes = scene.submodule("registration").CLASSES
+    assert {c.bl_idname for c in classes if issubclass(c, base)} == set(HANDS)
+
+
+@pytest.mark.parametrize("name", HANDS)
+def test_auto_key_keys_what_an_operator_moved(rig, auto, name):
+    _start(rig)
+    call, wanted = HANDS[name]
+    assert call(rig) == {"FINISHED"}
+    for slider, number in wanted.items():
+        found = keys(rig, slider)
+        assert list(found) == [10.0], (slider, found)
+        assert found[10.0] == pytest.approx(value(rig, slider), abs=1e-5)
+        if number is not None:
+            assert found[10.0] == pytest.approx(number, abs=1e-5)
+    assert keys(rig, BROW) == {} or name == "risorius.expression"
+
+
+@pytest.mark.parametrize("name", HANDS)
+def test_without_auto_key_nothing_is_keyed(rig, auto, name):
+    auto.use_keyframe_insert_auto = False
+    _start(rig)
+    assert HANDS[name][0](rig) == {"FINISHED"}
+    assert scene.controls(rig).animation_data is None
+
+
+def test_the_active_keying_set_says_what_is_keyed(rig, auto):
+    _start(rig)
+    made = bpy.context.scene.keying_sets.new(idname="mouth", name="mouth")
+    made.paths.add(scene.controls(rig), path_of(LEFT))
+    auto.use_keyframe_insert_keyingset = True
+    assert bpy.ops.risorius.mirror() == {"FINISHED"}
+    assert (list(keys(rig, LEFT)), keys(rig, RIGHT)) == ([10.0], {})
+    auto.use_keyframe_insert_keyingset = False
+    assert bpy.ops.risorius.mirror() == {"FINISHED"}
+    assert list(keys(rig, RIGHT)) == [10.0]
+
+
+def test_blenders_own_keying_sets_say_it_by_their_names(rig, auto):
+    _start(rig)
+    scene.controls(rig).pose.bones["head"].rotation_quaternion = (0.9, 0.2, 0.3, 0.1)
+    auto.use_keyframe_insert_keyingset = True
+    sets = bpy.context.scene.keying_sets_all
+    sets.active = sets["Rotation"]
+    bpy.ops.risorius.mirror()
+    assert {c.data_path for c in scene.curves(scene.controls(rig))} == {
+        'pose.bones["head"].rotation_quaternion'
+    }
+    sets.active = sets["Whole Character"]
+    bpy.ops.risorius.mirror()
+    assert list(keys(rig, LEFT)) == [10.0]
+
+
+def test_replace_changes_keys_that_are_there_and_adds_none(rig, auto):
+    key(rig, LEFT, f10=0.3)
+    key(rig, RIGHT, f1=0.2)
+    _start(rig)
+    auto.auto_keying_mode = "REPLACE_KEYS"
+    bpy.ops.risorius.mirror()
+    auto.auto_keying_mode = "ADD_REPLACE_KEYS"
+    assert keys(rig, LEFT) == {10.0: 0.1}
+    assert keys(rig, RIGHT) == {1.0: 0.2}
+
+
+def test_only_insert_needed_and_only_available(rig, auto):
+    key(rig, JAW, f1=0.5, f20=0.5)
+    key(rig, LEFT, f1=0.0, f20=0.0)
+    _start(rig)
+    edit = bpy.context.preferences.edit
+    edit.use_auto_keyframe_insert_needed = edit.use_keyframe_insert_available = True
+    bpy.ops.risorius.mirror()
+    assert list(keys(rig, LEFT)) == [1.0, 10.0, 20.0]
+    assert list(keys(rig, JAW)) == [1.0, 20.0]  # in hand, and already there
+    assert keys(rig, RIGHT) == {}  # has no curve
+    edit.use_auto_keyframe_insert_needed = edit.use_keyframe_insert_available = False
+    bpy.ops.risorius.mirror()
+    assert list(keys(rig, JAW)) == [1.0, 10.0, 20.0]  # what is in hand is held
+    assert list(keys(rig, RIGHT)) == [10.0]
+
+
+def test_keys_are_of_the_chosen_kind_and_interpolation(rig, auto):
+    bpy.context.preferences.edit.keyframe_new_interpolation_type = "CONSTANT"
+    auto.keyframe_type = "EXTREME"
+    _start(rig)
+    bpy.ops.risorius.mirror()
+    auto.keyframe_type = "KEYFRAME"
+    point = curve(rig, LEFT).keyframe_points[0]
+    assert (point.interpolation, point.type) == ("CONSTANT", "EXTREME")
+
+
+def test_what_a_driver_leads_is_not_keyed(rig, auto):
+    _start(rig)
+    scene.controls(rig).driver_add(path_of(RIGHT))
+    bpy.ops.risorius.reset()
+    assert keys(rig, RIGHT) == {}
+    assert list(keys(rig, LEFT)) == [10.0]
+
+
+def test_bones_are_keyed_where_they_were_turned(rig, auto):
+    bones = scene.controls(rig).pose.bones
+    bones["head"].rotation_quaternion = (0.9, 0.2, 0.3, 0.1)
+    bones["eyes"].location = (0.1, 0.0, 0.0)
+    bpy.ops.risorius.reset()
+    paths = {c.data_path for c in scene.curves(scene.controls(rig))}
+    assert paths == {'pose.bones["head"].rotation_quaternion', 'pose.bones["eyes"].location'}
+
+
+def test_an_operator_works_at_the_frames_of_selected_keys(rig):
+    key(rig, LEFT, f1=0.8, f5=0.6, f9=0.4)
+    key(rig, JAW, f1=0.2)
+    scene.set_controls(rig, mouthCornerPullR=0.3)  # without a curve: it stands
+    select_keys(rig, 1.0, 9.0)
+    bpy.context.scene.frame_set(5)
+    assert bpy.ops.risorius.mirror(at="SELECTED") == {"FINISHED"}
+    assert keys(rig, LEFT) == {1.0: 0.3, 5.0: 0.6, 9.0: 0.3}
+    assert keys(rig, RIGHT) == {1.0: 0.8, 9.0: 0.4}
+    assert keys(rig, JAW) == {1.0: 0.2}
+    assert value(rig, LEFT) == pytest.approx(0.6)  # frame 5 is shown as before
+    assert value(rig, RIGHT) == pytest.approx(curve(rig, RIGHT).evaluate(5.0))
+
+
+def test_without_selected_keys_the_operator_says_so(rig):
+    key(rig, LEFT, f1=0.8)
+    select_keys(rig)
+    with pytest.raises(RuntimeError, match="Select keys of this face first"):
+        bpy.ops.risorius.mirror(at="SELECTED")
+    assert keys(rig, LEFT) == {1.0: 0.8}
+
+
+def test_new_curves_have_the_colour_of_their_region(rig, auto):
+    _start(rig)
+    bpy.ops.risorius.mirror()
+    scene.set_controls(rig, browDownL=0.5)
+    bpy.ops.risorius.reset()
+    left, right, brow = (curve(rig, n) for n in (LEFT, RIGHT, BROW))
+    assert (left.group.name, brow.group.name) == ("Mouth", "Brows")
+    assert left.group == right.group
+    assert left.group.color_set == "CUSTOM"
+    assert tuple(left.group.colors.normal) != tuple(brow.group.colors.normal)
+    assert left.color_mode == "CUSTOM"
+    assert tuple(left.color) != tuple(right.color)  # told apart within the region
