@@ -22,6 +22,16 @@ def planted(part, path, text):
     return [line for line in violations(part, files) if "are the most" not in line]
 
 
+TOP = """CHANGELOG.md CMakeLists.txt CMakePresets.json LICENSE README.md addon blender_tests docs
+native packaging pyproject.toml tests"""
+
+
+def test_nothing_lies_at_the_top_that_was_left_there():
+    made = [line.rstrip("/") for line in (ROOT / ".gitignore").read_text().splitlines()]
+    names = [entry.name for entry in ROOT.iterdir() if not entry.name.startswith(".")]
+    assert sorted(set(names) - set(made)) == TOP.split()
+
+
 @pytest.mark.parametrize("part", ROOMS)
 def test_every_file_keeps_to_the_plan(part):
     assert len(files_of(part)) > 10

@@ -3,6 +3,7 @@
 
 import os
 import tomllib
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 
@@ -10,9 +11,20 @@ import numpy as np
 import pytest
 import risorius
 from conftest import _not_run, no_room
+from risorius import expressions as poses
+from risorius.author import Reference
 from risorius.cli import main
 from risorius.controls.arkit import mapping
-from risorius.sample import build, expressions, paint, people, polygons, proportions, source
+from risorius.sample import (
+    build,
+    expressions,
+    paint,
+    people,
+    polygons,
+    proportions,
+    references,
+    source,
+)
 
 ARKIT = """browDownLeft browDownRight browInnerUp browOuterUpLeft browOuterUpRight cheekPuff
 cheekSquintLeft cheekSquintRight eyeBlinkLeft eyeBlinkRight eyeLookDownLeft eyeLookDownRight
@@ -225,6 +237,11 @@ def test_extra_the_packed_face_gives_back_its_units(sample, packed):
     assert worst < 0.07
 
 
+def test_extra_the_packed_face_has_what_all_expressions_ask_for(packed):
+    assert poses.check(packed.raw_control_names) == {}
+    assert "E" in poses.check([n for n in packed.raw_control_names if "mouthStretchL" not in n])
+
+
 def _carried(dna, mesh_name):
     """float64[V, 4]: how much spine, the two of the neck and the head carry of each vertex."""
     carriers = ["spine_04", "neck_01", "neck_02", "head"]
@@ -369,6 +386,67 @@ def test_an_unknown_person_is_one_sentence(tmp_path, capsys):
     )
 
 
+@pytest.fixture
+def asked(monkeypatch):
+    """What the command asks build_sample for."""
+    calls = []
+
+    def build_sample(path, **options):
+        calls.append(options)
+        return risorius.Dna()
+
+    monkeypatch.setattr("risorius.sample.build_sample", build_sample)
+    return calls
+
+
+def test_a_spec_says_what_the_rig_is_to_be(tmp_path, asked):
+    out = str(tmp_path / "p.dna")
+    own = tmp_path / "own.toml"
+    own.write_text("[joints]\ncount = 40\n[lods]\ncount = 3\n[correctives]\nmost = 7\n")
+    assert main(["sample", "build", out, "--spec", "full"]) == 0
+    assert main(["sample", "build", out, "--spec", str(own)]) == 0
+    assert main(["sample", "build", out, "--spec", str(own), "--joints", "0"]) == 0
+    assert main(["sample", "build", out]) == 0
+    full, spec, shapes, plain = asked
+    assert (full["rig"].fit.joints, full["rig"].lods.count) == (800, 8)
+    assert full["correctives"].most > 900
+    assert ("jawLeft", "jawRight") in full["correctives"].apart
+    assert (spec["rig"].fit.joints, spec["rig"].lods.count) == (40, 3)
+    assert spec["correctives"].most == shapes["correctives"].most == 7
+    assert shapes["rig"] is None
+    assert (plain["rig"].fit.joints, plain["correctives"].most) == (250, 0)
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ('[source]\ndna = "x.dna"', "source: a person of the sample has its own"),
+        ("[joints]\ncount = true", "joints.count: True is of another kind"),
+        ("[correctives]\nmost = -1", "correctives.most: 0 or more was expected"),
+        (None, "--spec: full or a .toml was expected, found "),
+    ],
+)
+def test_a_spec_that_makes_no_sense_is_one_sentence(tmp_path, asked, capsys, text, sentence):
+    path = tmp_path / ("s.txt" if text is None else "s.toml")
+    path.write_text(text or "")
+    assert main(["sample", "build", str(tmp_path / "p.dna"), "--spec", str(path)]) == 1
+    error = capsys.readouterr().err
+    assert sentence in error
+    assert error.count("\n") == 1
+    assert asked == []
+
+
+def test_joints_of_several_sizes_are_kept_side_by_side(tmp_path, monkeypatch):
+    monkeypatch.setenv("RISORIUS_CACHE", str(tmp_path))
+    (tmp_path / "joints-0123456789abcdef.npz").write_bytes(b"another version's")
+    few, many = (replace(build.RIG, fit=replace(build.RIG.fit, joints=n)) for n in (3, 4))
+    made = Reference({"m": [1, 1]}, ["head"], ["e"], ["j"], [0], [0], [None], [[0]])
+    references.keep(few, made)
+    references.keep(many, replace(made, names=["k"]))
+    assert [references.kept(o).names for o in (few, many)] == [["j"], ["k"]]
+    assert len(list(tmp_path.iterdir())) == 2
+
+
 def test_a_displacement_is_carried_by_the_change_of_form():
     """A sheet that is stretched and sheared: what moves along an edge still does so."""
     side = 12
@@ -422,7 +500,7 @@ def test_without_room_neither_the_sample_nor_its_textures_are_there(tmp_path, mo
     monkeypatch.setattr(build, "assemble", lambda *_: (risorius.Dna(), [], _Nobody()))
     monkeypatch.setattr(build, "paint_textures", lambda *_: textures)
     path = tmp_path / "s.dna"
-    options = {"data": tmp_path, "say": lambda text: None, "joints": 0}
+    options = {"data": tmp_path, "say": lambda text: None, "rig": None}
     with no_room(50_000), pytest.raises(OSError, match=r"head_color\.png"):
         build.build_sample(path, **options)
     assert list(tmp_path.iterdir()) == []

@@ -19,6 +19,7 @@ from .. import (
     Psds,
 )
 from ..author import FitOptions, Progress, RigOptions, find_reference, make_joint_rig
+from ..author.correctives import CorrectiveOptions, add_correctives, find_correctives
 from ..author.geometry.polygon_mesh import polygon_mesh, vertex_normals
 from ..author.levels import level_name
 from ..files import fileio
@@ -45,8 +46,11 @@ FLUSH = ("head_flush_L", "head_flush_R")
 DELTA_STEP = 2.0**-11  # centimetres: 5 micrometres
 NO_WRINKLES = 4  # the level from which on there are none
 _FIT_BEGINS = 0.2  # of the whole time
+_SEARCH_ENDS = 0.4
 _REFIT_BEGINS = 0.7
 TOLERANCE_MM = 0.1  # what joints leave beyond it stays in blend shapes
+RIG = RigOptions(FitOptions(joints=NEW_JOINTS), tolerance_mm=TOLERANCE_MM)
+NO_SEARCH = CorrectiveOptions(most=0)
 PARTS = {  # mesh -> groups, subdivisions at LOD 0 and 1
     "head": (["body"], 1, 0),
     "teeth": (["helper-upper-teeth", "helper-lower-teeth"], 1, 0),
@@ -476,7 +480,25 @@ class Steps:
         return tell
 
 
-def joint_face(dna: Dna, man: Callable[[], Dna] | None, joints: int, steps: Steps) -> Dna:
+def search_correctives(dna: Dna, options: CorrectiveOptions, steps: Steps) -> Dna:
+    """The face with correctives of what goes wrong where its expressions meet.
+
+    Args:
+        dna: the face of blend shapes; it stays as it is.
+        options: how many; with most 0 the face is given back as it is.
+        steps: told how far it is.
+    """
+    if not options.most and not options.together:
+        return dna
+    steps.at(_FIT_BEGINS, "looking for what goes wrong where expressions meet")
+    found = find_correctives(dna, options, steps.share_of(_FIT_BEGINS, _SEARCH_ENDS))
+    steps.say(f"{len(found.correctives)} correctives found in {found.looked_at} pairs and triples")
+    return add_correctives(dna, found.skin, [(c.controls, c.shape) for c in found.correctives])
+
+
+def joint_face(
+    dna: Dna, man: Callable[[], Dna] | None, options: RigOptions, steps: Steps, begins: float
+) -> Dna:
     """The face with joints in place of most of what its blend shapes do, and coarser levels.
 
     The joints are found on the man, once for all people; another's learn what they do there.
@@ -484,17 +506,17 @@ def joint_face(dna: Dna, man: Callable[[], Dna] | None, joints: int, steps: Step
     Args:
         dna: the face of blend shapes.
         man: makes that of the man; None: it is he.
-        joints: new ones.
+        options: how many joints, and what blend shapes keep.
         steps: told how far it is.
+        begins: the share of the work that is done.
     """
-    options = RigOptions(FitOptions(joints=joints), tolerance_mm=TOLERANCE_MM)
+    joints = options.fit.joints
     if man is None:
-        steps.at(_FIT_BEGINS, f"finding {joints} joints, weights and levels of detail")
-        rig = make_joint_rig(dna, options, steps.share_of(_FIT_BEGINS, 1.0))
+        steps.at(begins, f"finding {joints} joints, weights and levels of detail")
+        rig = make_joint_rig(dna, options, steps.share_of(begins, 1.0))
         references.keep(options, rig.reference)
         return rig.dna
     like = references.kept(options)
-    begins = _FIT_BEGINS
     if like is None:
         steps.at(begins, f"finding {joints} joints that all people have (once)")
         like = find_reference(man(), options, steps.share_of(begins, _REFIT_BEGINS))
@@ -524,7 +546,8 @@ def build_sample(
     path: Path,
     *,
     person: Person = MAN,
-    joints: int = NEW_JOINTS,
+    rig: RigOptions | None = RIG,
+    correctives: CorrectiveOptions = NO_SEARCH,
     data: Path | None = None,
     offline: bool = False,
     texture_size: int = HEAD_SIZE,
@@ -536,7 +559,8 @@ def build_sample(
     Args:
         path: the DNA file; the textures go into the folder <stem>_textures beside it.
         person: who.
-        joints: new ones that the expressions are done by; 0: blend shapes alone, and two levels.
+        rig: the joints that the expressions are done by; None: blend shapes alone, two levels.
+        correctives: which are looked for beside those of all people.
         data: the wheel of data, instead of fetching it.
         offline: do not download.
         texture_size: no texture has more texels than a square of this side.
@@ -557,9 +581,11 @@ def build_sample(
     textures, metadata = paint_textures(
         person, body.man.positions, body.man.units, parts, texture_size
     )
-    if joints:
+    begins = _SEARCH_ENDS if correctives.most or correctives.together else _FIT_BEGINS
+    dna = search_correctives(dna, correctives, steps)
+    if rig is not None:
         man = None if body.man is body else lambda: assemble(source, lambda _: None)[0]
-        dna = joint_face(dna, man, joints, steps)
+        dna = joint_face(dna, man, rig, steps, begins)
     leave_maps(dna)
     round_targets(dna)
     by_code = {"controls_by_code": " ".join(CONTROLS_OF_CODE)}

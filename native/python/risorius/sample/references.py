@@ -15,12 +15,13 @@ from .source import SHA256, downloads
 
 
 def _path(options: RigOptions) -> Path:
-    """Its name is another one for each version of what it depends on."""
-    known = hashlib.sha256(f"{SHA256} {options}".encode() + fingerprint())
+    """Its name begins alike for one version of what it depends on."""
+    known = hashlib.sha256(SHA256.encode() + fingerprint())
     for entry in sorted(Path(__file__).parent.iterdir()):
         if entry.suffix in (".py", ".toml"):
             known.update(entry.read_bytes())
-    return downloads() / f"joints-{known.hexdigest()[:16]}.npz"
+    asked = hashlib.sha256(str(options).encode()).hexdigest()
+    return downloads() / f"joints-{known.hexdigest()[:16]}-{asked[:8]}.npz"
 
 
 def kept(options: RigOptions) -> Reference | None:
@@ -45,6 +46,8 @@ def keep(options: RigOptions, reference: Reference) -> None:
     path = _path(options)
     with contextlib.suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
+        version = path.name.rpartition("-")[0]
         for old in path.parent.glob("joints-*.npz"):
-            old.unlink()
+            if not old.name.startswith(version):
+                old.unlink()
         fileio.write_bytes(path, reference.to_bytes())

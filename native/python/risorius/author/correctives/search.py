@@ -80,14 +80,14 @@ class Search:
         self.poser = Poser(dna, self.skin, self.solids)
         self.names = [name.rpartition(".")[2] for name in dna.raw_control_names]
         self.found: dict[Controls, Corrective] = {}
-        mm = MM.get(dna.translation_unit, 10.0)
+        self.mm = MM.get(dna.translation_unit, 10.0)
         neutral = self.poser.neutral
         self._faults: dict[Controls, SkinFaults] = {(): self._look(neutral)}
         self._moves: list[npt.NDArray[np.bool_]] = []
         for control in range(self.poser.controls):
             pose = self.poser.pose((control,))
             self._faults[(control,)] = self._look(pose)
-            self._moves.append(np.linalg.norm(pose[0] - neutral[0], axis=1) * mm > _MOVED_MM)
+            self._moves.append(np.linalg.norm(pose[0] - neutral[0], axis=1) * self.mm > _MOVED_MM)
 
     def _look(self, pose: list[Doubles]) -> SkinFaults:
         return self.checker.look(pose[0], pose[1:])
@@ -143,7 +143,7 @@ class Search:
             return Corrective(on, moved, self.poser.before_joints(on, moved), before, after)
 
         for one in self._all(mend, combinations, share):
-            if one.displacement.any():
+            if np.linalg.norm(one.displacement, axis=1).max(initial=0) * self.mm > _MOVED_MM:
                 self.found[one.controls] = one
         self.poser.added = {on: one.shape for on, one in self.found.items()}
         self._faults = {on: f for on, f in self._faults.items() if len(on) < 2}

@@ -65,23 +65,7 @@ def read_spec(path: Path) -> Spec:
         ShapeFileError: no TOML, or a table, a name or a kind of value that is not known.
         OSError: the file cannot be read.
     """
-    try:
-        table = toml.parse(path.read_text(encoding="utf-8"))
-    except ValueError as error:
-        raise ShapeFileError(f"{path}: {error}") from None
-    for name, rows in table.items():
-        if name in ("name", "controls"):
-            continue
-        if name not in _TABLES or not isinstance(rows, dict):
-            known = ", ".join(["name", *_TABLES, "controls"])
-            raise ShapeFileError(f"{path}: {name}: one of {known} was expected")
-        for key, value in rows.items():
-            kinds = _TABLES[name].get(key)
-            if kinds is None:
-                known = ", ".join(_TABLES[name])
-                raise ShapeFileError(f"{path}: {name}.{key}: one of {known} was expected")
-            if not isinstance(value, kinds) or (isinstance(value, bool) and bool not in kinds):
-                raise ShapeFileError(f"{path}: {name}.{key}: {value!r} is of another kind")
+    table = _read_tables(path)
     source = table.get("source", {})
     if ("dna" in source) == ("neutral" in source):
         raise ShapeFileError(f"{path}: source: either dna or neutral was expected")
@@ -101,6 +85,41 @@ def read_spec(path: Path) -> Spec:
         _correctives(path, table.get("correctives", {})),
         dict(table.get("controls", {})),
     )
+
+
+def read_options(path: Path) -> tuple[RigOptions, CorrectiveOptions]:
+    """What a rig is to be, of a SPEC.toml that leaves out whose: without [source] and [controls].
+
+    Raises:
+        ShapeFileError: as read_spec, or it names a source or controls.
+        OSError: the file cannot be read.
+    """
+    table = _read_tables(path)
+    for name in ("source", "controls", "name"):
+        if name in table:
+            raise ShapeFileError(f"{path}: {name}: a person of the sample has its own")
+    return _options(path, table), _correctives(path, table.get("correctives", {}))
+
+
+def _read_tables(path: Path) -> dict[str, Any]:
+    try:
+        table = toml.parse(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise ShapeFileError(f"{path}: {error}") from None
+    for name, rows in table.items():
+        if name in ("name", "controls"):
+            continue
+        if name not in _TABLES or not isinstance(rows, dict):
+            known = ", ".join(["name", *_TABLES, "controls"])
+            raise ShapeFileError(f"{path}: {name}: one of {known} was expected")
+        for key, value in rows.items():
+            kinds = _TABLES[name].get(key)
+            if kinds is None:
+                known = ", ".join(_TABLES[name])
+                raise ShapeFileError(f"{path}: {name}.{key}: one of {known} was expected")
+            if not isinstance(value, kinds) or (isinstance(value, bool) and bool not in kinds):
+                raise ShapeFileError(f"{path}: {name}.{key}: {value!r} is of another kind")
+    return table
 
 
 def _options(path: Path, table: dict[str, Any]) -> RigOptions:

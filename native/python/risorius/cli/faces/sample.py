@@ -5,11 +5,17 @@ from __future__ import annotations
 
 import argparse
 import time
+from dataclasses import replace
+from importlib import resources
 from pathlib import Path
 
+from ...author.correctives import CorrectiveOptions
+from ...author.input.spec import read_options
+from ...author.work import RigOptions
 from ...base.errors import ArgumentError
-from ...sample.build import NEW_JOINTS
+from ...sample.build import NEW_JOINTS, NO_SEARCH, RIG
 from ...sample.people import PEOPLE, read_person
+from .author import opposites
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -27,10 +33,16 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     build.add_argument(
         "--joints",
         type=int,
-        default=NEW_JOINTS,
         metavar="N",
-        help="new joints that the expressions are done by (default: %(default)s); 0: blend shapes "
-        "alone, without coarser levels of detail",
+        help=f"new joints that the expressions are done by (default: {NEW_JOINTS}, or the "
+        "spec's); 0: blend shapes alone, without coarser levels of detail",
+    )
+    build.add_argument(
+        "--spec",
+        metavar="SPEC",
+        help="what the rig is to be: full (800 joints, up to 1,000 correctives found by "
+        "themselves; takes half an hour of CPU), or a .toml with the tables of risorius author but "
+        "the source",
     )
     build.add_argument("--data", type=Path, help="the wheel of data, instead of downloading it")
     build.add_argument("--offline", action="store_true", help="use the cached data only")
@@ -52,6 +64,8 @@ def run(args: argparse.Namespace) -> int:
         raise ArgumentError(f"--person: {', '.join(PEOPLE)} or a .toml was expected, found {who!r}")
     person = PEOPLE[who] if who in PEOPLE else read_person(Path(who))
 
+    rig, correctives = _rig(args.spec, args.joints)
+
     begin = time.monotonic()
 
     def say(text: str) -> None:
@@ -60,7 +74,8 @@ def run(args: argparse.Namespace) -> int:
     dna = build_sample(
         args.out,
         person=person,
-        joints=args.joints,
+        rig=rig,
+        correctives=correctives,
         data=args.data,
         offline=args.offline,
         texture_size=args.texture_size,
@@ -70,6 +85,21 @@ def run(args: argparse.Namespace) -> int:
     say(
         f"{args.out}: {len(dna.meshes)} meshes, {vertices} vertices, "
         f"{len(dna.joint_names)} joints, {len(dna.raw_control_names)} raw controls, "
-        f"{dna.lod_count} levels"
+        f"{dna.psd_count} correctives, {dna.lod_count} levels"
     )
     return 0
+
+
+def _rig(spec: str | None, joints: int | None) -> tuple[RigOptions | None, CorrectiveOptions]:
+    """What the rig is to be, None without joints, and which correctives are looked for."""
+    rig, correctives = RIG, NO_SEARCH
+    if spec == "full":
+        with resources.as_file(resources.files("risorius.sample") / "full.toml") as path:
+            rig, correctives = read_options(path)
+    elif spec is not None and spec.endswith(".toml"):
+        rig, correctives = read_options(Path(spec))
+    elif spec is not None:
+        raise ArgumentError(f"--spec: full or a .toml was expected, found {spec!r}")
+    if joints is not None:
+        rig = replace(rig, fit=replace(rig.fit, joints=joints))
+    return rig if rig.fit.joints else None, replace(correctives, apart=opposites())
