@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <ctime>
 #include <vector>
 
 namespace risorius::bench {
@@ -16,6 +17,23 @@ double wall_seconds_of(F f) {
   const auto start = std::chrono::steady_clock::now();
   f();
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// The time in which this process had a core: what others take of a busy machine is not in it.
+template <class F>
+double own_seconds_of(F f) {
+#ifdef CLOCK_PROCESS_CPUTIME_ID
+  const auto now = [] {
+    timespec t{};
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+    return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+  };
+  const double start = now();
+  f();
+  return now() - start;
+#else
+  return wall_seconds_of(f);
+#endif
 }
 
 /// Touches 256 MB, more than every cache holds.

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <fstream>
 #include <random>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -14,6 +15,7 @@ namespace risorius::bench {
 struct Frames {
   std::size_t count = 0, controls = 0;
   std::vector<float> values;  // [count, controls]
+  std::string name;           // as the table has it
   const float* at(std::size_t frame) const { return values.data() + frame * controls; }
 };
 
@@ -26,7 +28,7 @@ inline Frames make_frames(std::size_t controls, std::size_t active) {
   std::vector<std::size_t> order(controls);
   for (std::size_t i = 0; i < controls; ++i) order[i] = i;
   std::ranges::shuffle(order, random);
-  Frames frames{kCount, controls, std::vector<float>(kCount * controls, 0.0f)};
+  Frames frames{kCount, controls, std::vector<float>(kCount * controls, 0.0f), ""};
   for (std::size_t f = 0; f < kCount; ++f) {
     if (active < controls && f % 2 == 1) {
       std::swap(order[random() % active], order[active + random() % (controls - active)]);
@@ -42,7 +44,7 @@ inline Frames read_frames(const char* path, std::size_t controls) {
   if (!file) return {};
   const auto size = static_cast<std::size_t>(file.tellg());
   if (size % (4 * controls) != 0) return {};
-  Frames frames{size / (4 * controls), controls, std::vector<float>(size / 4)};
+  Frames frames{size / (4 * controls), controls, std::vector<float>(size / 4), ""};
   file.seekg(0);
   file.read(reinterpret_cast<char*>(frames.values.data()), static_cast<std::streamsize>(size));
   return frames;

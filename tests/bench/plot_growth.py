@@ -20,25 +20,30 @@ PANELS = {
     "faces": ("faces or frames at once", "us each"),
     "cores": ("cores, 64 faces on each", "us each"),
 }
-OURS, CSR = "#0b6e8f", "#b3541e"
+OURS, CSR, READ = "#0b6e8f", "#b3541e", "#7a7a7a"
+Point = tuple[float, float, float | None, float | None]
 
 
-def read(path: Path) -> tuple[str, dict[str, list[tuple[float, float, float | None]]]]:
-    """The first line's text, and per panel its points: x, us, us of csr or None; by x."""
+def read(path: Path) -> tuple[str, dict[str, list[Point]]]:
+    """The first line, and per panel its points by x: x, us, us of csr and read or None."""
     lines = path.read_text(encoding="utf-8").splitlines()
-    points: dict[str, list[tuple[float, float, float | None]]] = {name: [] for name in PANELS}
+    points: dict[str, list[Point]] = {name: [] for name in PANELS}
     for row in csv.DictReader(lines[1:]):
-        base = float(row["csr"]) if row["csr"] else None
-        points[row["what"]].append((float(row["x"]), float(row["us"]), base))
+        csr, tight = (float(row[name]) if row[name] else None for name in ("csr", "read"))
+        points[row["what"]].append((float(row["x"]), float(row["us"]), csr, tight))
     return lines[0].removeprefix("# "), {name: sorted(p) for name, p in points.items()}
 
 
-def draw(about: str, points: dict[str, list[tuple[float, float, float | None]]], out: Path) -> None:
+def draw(about: str, points: dict[str, list[Point]], out: Path) -> None:
     figure, axes = plt.subplots(1, len(PANELS), figsize=(15, 3.9), layout="constrained")
     for axis, (name, (x_label, y_label)) in zip(axes, PANELS.items(), strict=True):
-        xs, ours, bases = zip(*points[name], strict=True)
-        if any(b is not None for b in bases):
-            axis.loglog(xs, bases, "o-", color=CSR, ms=3, lw=1, label="scalar CSR")
+        xs, ours, csr, tight = zip(*points[name], strict=True)
+        for other, color, label in (
+            (csr, CSR, "scalar CSR"),
+            (tight, READ, "tight read of the active columns"),
+        ):
+            if any(b is not None for b in other):
+                axis.loglog(xs, other, "o-", color=color, ms=3, lw=1, label=label)
         axis.loglog(xs, ours, "o-", color=OURS, ms=4, lw=1.5, label="Risorius")
         axis.set_xlabel(x_label)
         axis.set_ylabel(y_label)

@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: MIT
 // The evaluator against a scalar CSR matrix:
-//   rig_bench FILE.dna [FRAMES20.f32 FRAMES60.f32 FRAMES_ALL.f32] [--sweep] [options of the
-//   library]
+//   rig_bench FILE.dna [FRAMES20.f32 FRAMES60.f32 FRAMES_ALL.f32] [--sweep] [--progress]
+//   [--clip FRAMES.f32] [options of the library]
 // Frames are little-endian float32[frames, raw controls]; without files their like is made.
-// --sweep measures how cost grows instead, and prints a row per point: what, x, us, us of csr.
+// --sweep measures how cost grows instead, and prints a row per point: what, x, us, us
+//   of csr, us of the tight read.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
 #include <cstdio>
 #include <cstring>
+#include <deque>
 #include <functional>
 #include <map>
 #include <memory>
@@ -20,8 +22,10 @@
 #include "bench/csr.h"
 #include "bench/frames.h"
 #include "bench/machine.h"
+#include "bench/tight_read.h"
 #include "bytes/source.h"
 #include "compile/compile.h"
+#include "core/aligned.h"
 #include "dna/file/parse.h"
 #include "rig/block.h"
 #include "rig/stages/evaluate.h"
@@ -32,36 +36,13 @@ namespace {
 using namespace risorius;
 using bench::Frames;
 
-// A row of the table: what it is measured against, and what was asked of it.
+// A row of the table: what it is measured against, the tight read of its own active columns and
+// what was asked of it. With a read: at most kReads times it and kBeside us.
 struct Line {
-  const char *name, *base, *asked;
+  std::string name, base, read, asked;
+  double bytes = 0;  // of the active columns
 };
-constexpr Line kLines[] = {{"csr, 20 active", "", ""},
-                           {"csr, 60 active", "", ""},
-                           {"csr, all active", "", ""},
-                           {"one face, 20 active", "csr, 20 active", "60"},
-                           {"one face, 60 active", "csr, 60 active", "40"},
-                           {"one face, all active", "csr, all active", ""},
-                           {"float16, 20 active", "csr, 20 active", ""},
-                           {"float16, 60 active", "csr, 60 active", ""},
-                           {"float16, all active", "csr, all active", ""},
-                           {"quaternions, 60 active", "csr, 60 active", "30"},
-                           {"csr, LOD 4, 60 active", "", ""},
-                           {"LOD 4, 60 active", "csr, LOD 4, 60 active", ""},
-                           {"csr, cold, 60 active", "", ""},
-                           {"cold, 60 active", "csr, cold, 60 active", "25"},
-                           {"float16, cold, 60 active", "csr, cold, 60 active", ""},
-                           {"crowd of 64, 20 active", "csr, 20 active", ""},
-                           {"crowd of 64, 60 active", "csr, 60 active", "100"},
-                           {"crowd of 64, all active", "csr, all active", ""},
-                           {"clip of 1000, 60 active", "csr, 60 active", "100"},
-                           {"clip, two cores, 60 active", "csr, 60 active", ""},
-                           {"two cores, 64 faces each", "csr, 60 active", ""},
-                           {"no change", "", ""},
-                           {"LOD switched and evaluated", "", ""},
-                           {"compile", "", ""},
-                           {"open a block, header checked", "", ""},
-                           {"open a block, all checked", "", ""}};
+constexpr double kReads = 1.3, kBeside = 1.3;
 
 std::shared_ptr<rig::Rig> compiled(const dna::Dna& dna,
                                    compile::Precision precision = compile::Precision::kFloat32,
@@ -115,8 +96,9 @@ void add_cold(const std::string& name, Step step, const Frames& frames) {
   b->UseManualTime()->Iterations(1)->Repetitions(61);
 }
 
-// Many frames or faces at once, in as many threads. By the clock on the wall, in several rounds:
-// to begin a thread on an idle core of a virtual machine takes as long as hundreds of frames.
+// Many frames or faces at once, in as many threads: several by the clock on the wall and in rounds,
+// since to begin a thread on an idle core of a virtual machine takes as long as hundreds of frames;
+// one by its own clock, which does not run while others have the core.
 void add_batch(const std::string& name, std::shared_ptr<const rig::Rig> rig, const Frames& frames,
                std::size_t count, std::size_t threads, std::size_t rounds = 1) {
   auto* b = benchmark::RegisterBenchmark(name.c_str(), [=, &frames](benchmark::State& state) {
@@ -138,33 +120,49 @@ void add_batch(const std::string& name, std::shared_ptr<const rig::Rig> rig, con
                               out[2].data() + begin * sizes[2], out[3].data() + begin * sizes[3]});
       }
     };
+    const auto all = [&] {
+      std::vector<std::thread> others;
+      for (std::size_t t = 1; t < threads; ++t) others.emplace_back(part, t);
+      part(0);
+      for (std::thread& other : others) other.join();
+    };
     for (auto _ : state) {
-      const double seconds = bench::wall_seconds_of([&] {
-        std::vector<std::thread> others;
-        for (std::size_t t = 1; t < threads; ++t) others.emplace_back(part, t);
-        part(0);
-        for (std::thread& other : others) other.join();
-      });
+      const double seconds =
+          threads == 1 ? bench::own_seconds_of(all) : bench::wall_seconds_of(all);
       state.SetIterationTime(seconds / static_cast<double>(n * rounds));
     }
   });
   b->UseManualTime()->Iterations(static_cast<benchmark::IterationCount>(2000 / count + 2));
 }
 
-// The least that any evaluation of everything has to do.
-template <class T>
-void add_read(const char* name, std::span<const T> values) {
-  benchmark::RegisterBenchmark(name, [values](benchmark::State& state) {
+// The least that an evaluation of these frames has to do. Out: the mean of the bytes.
+double add_read(const std::string& name, std::shared_ptr<const rig::Rig> rig, const Frames& frames,
+                std::uint32_t lod) {
+  auto reads = std::make_shared<bench::Reads>(bench::reads_of(*rig, frames, lod));
+  const double bytes = reads->bytes;
+  benchmark::RegisterBenchmark(name.c_str(), [=, &frames](benchmark::State& state) {
+    std::size_t f = 0;
     for (auto _ : state) {
-      std::uint64_t sums[16] = {};
-      const auto* words = reinterpret_cast<const std::uint64_t*>(values.data());
-      const std::size_t n = values.size_bytes() / 8;
-      for (std::size_t i = 0; i + 16 <= n; i += 16) {
-        for (std::size_t l = 0; l < 16; ++l) sums[l] += words[i + l];
-      }
-      benchmark::DoNotOptimize(sums);
+      benchmark::DoNotOptimize(bench::tight_read(bench::values_of(*rig), reads->at(f)));
+      f = (f + 1) % frames.count;
     }
   });
+  return bytes;
+}
+
+// The poses of a clip, written past the caches: the time of one.
+void add_store(const std::string& name, std::shared_ptr<const rig::Rig> rig, std::size_t count) {
+  auto* b = benchmark::RegisterBenchmark(name.c_str(), [=](benchmark::State& state) {
+    const std::size_t pose = std::size_t{rig->joint_count} * rig->joint_stride +
+                             rig->blend_shape_count + rig->animated_map_count + rig->control_count;
+    core::AlignedVector<float> out(simd::rounded_up(count * pose));
+    for (auto _ : state) {
+      const double seconds =
+          bench::own_seconds_of([&] { bench::streaming_store(out.data(), out.size() * 4); });
+      state.SetIterationTime(seconds / static_cast<double>(count));
+    }
+  });
+  b->UseManualTime()->Iterations(4);
 }
 
 std::size_t kept_coefficients(const rig::Rig& rig, std::uint32_t lod) {
@@ -183,32 +181,24 @@ class Suite {
   Suite(const dna::Dna& dna, const std::vector<Frames>& frames) : dna_(dna), frames_(frames) {
     rig_ = compiled(dna);
     half_ = compiled(dna, compile::Precision::kFloat16);
+    turned_ = compiled(dna, compile::Precision::kFloat32, compile::Rotation::kQuaternion);
     coarse_ = std::min<std::uint32_t>(4, rig_->lod_count - 1);
   }
 
   void add_all() {
-    static const char* const kActive[] = {"20 active", "60 active", "all active"};
-    for (std::size_t a = 0; a < 3; ++a) {
-      const std::string active = kActive[a];
-      add("csr, " + active, csr(dna_, 0), frames_[a]);
-      add("one face, " + active, one_face(rig_, 0), frames_[a]);
-      add("float16, " + active, one_face(half_, 0), frames_[a]);
-      add_batch("crowd of 64, " + active, rig_, frames_[a], 64, 1);
-    }
-    const Frames& some = frames_[1];
-    add("quaternions, 60 active",
-        one_face(compiled(dna_, compile::Precision::kFloat32, compile::Rotation::kQuaternion), 0),
-        some);
-    add("csr, LOD 4, 60 active", csr(dna_, coarse_), some);
-    add("LOD 4, 60 active", one_face(rig_, coarse_), some);
+    for (const Frames& frames : frames_) add_frames(frames);
+    const Frames& some = *std::ranges::find(frames_, "60 active", &Frames::name);
+    add_ours("quaternions", turned_, some, 0, "70x");
+    add_ours("LOD 4", rig_, some, coarse_, "0.45 of LOD 0", ", LOD 4");
+    row("csr, cold, 60 active");
     add_cold("csr, cold, 60 active", csr(dna_, 0), some);
-    add_cold("cold, 60 active", one_face(rig_, 0), some);
-    add_cold("float16, cold, 60 active", one_face(half_, 0), some);
-    add_batch("two cores, 64 faces each", rig_, some, 128, 2, 60);
-    add_batch("clip of 1000, 60 active", rig_, some, 1000, 1);
-    add_batch("clip, two cores, 60 active", rig_, some, 1000, 2, 8);
-    add_read("read float32", rig_->joint_values);
-    add_read("read float16", half_->joint_halves);
+    add_cold(row("cold, 60 active", "csr, cold, 60 active", "20x"), one_face(rig_, 0), some);
+    add_cold(row("float16, cold, 60 active", "csr, cold, 60 active"), one_face(half_, 0), some);
+    add_batch(row("two cores, 64 faces each", "csr, 60 active"), rig_, some, 128, 2, 60);
+    add_batch(row("clip of 1000, 60 active", "csr, 60 active", "crowd + 1.2 stores"), rig_, some,
+              1000, 1);
+    add_batch(row("clip, two cores, 60 active", "csr, 60 active"), rig_, some, 1000, 2, 8);
+    add_store(row("streaming store of a pose"), rig_, 1000);
     add_instance(some);
     add_making();
   }
@@ -223,20 +213,12 @@ class Suite {
     const std::size_t values = rig_->joint_values.size() - simd::kWidest;
     std::printf("%s, %s, commit %s, %s kernels\n", bench::processor().c_str(), bench::compiler(),
                 bench::commit(), rig_->kernels->name);
-    std::printf("%zu coefficients, %.0f of them not 0 (padding: none); csr takes %.2f ns each\n\n",
-                values, coefficients, at("csr, all active") / coefficients);
-    std::printf("%-30s %11s %10s %8s\n", "", "us", "times csr", "asked");
-    for (const Line& line : kLines) {
-      if (at(line.name) == 0) continue;
-      std::printf("%-30s %11.3f", line.name, at(line.name) / 1e3);
-      if (at(line.base) > 0) std::printf(" %10.1f %8s", at(line.base) / at(line.name), line.asked);
-      std::puts("");
-    }
-    std::printf(
-        "\nall active, times a plain read of the values (asked: at most 1.25 and 1.5):\n"
-        "  float32 %.2f, float16 %.2f\n",
-        at("one face, all active") / at("read float32"),
-        at("float16, all active") / at("read float16"));
+    std::printf("%zu coefficients, %.0f of them not 0; csr takes %.2f ns each\n\n", values,
+                coefficients, at("csr, all active") / coefficients);
+    std::printf("%-30s %11s %10s %8s %8s %8s  %s\n", "", "us", "times csr", "KB", "read us",
+                "reads", "asked");
+    for (const Line& line : lines_) print_line(line, at);
+    std::printf("\nreads: what is beyond %.1f us, in tight reads of the active columns\n", kBeside);
     std::printf("LOD 4 has %.2f of the coefficients and takes %.2f of the time\n",
                 static_cast<double>(kept_coefficients(*rig_, coarse_)) /
                     static_cast<double>(kept_coefficients(*rig_, 0)),
@@ -248,7 +230,46 @@ class Suite {
   }
 
  private:
+  // A row of the table. Out: its name
+  const std::string& row(const std::string& name, const std::string& base = "",
+                         const std::string& asked = "", const std::string& read = "",
+                         double bytes = 0) {
+    lines_.push_back({name, base, read, asked, bytes});
+    return lines_.back().name;
+  }
+  // The face, the sparse matrix and the read of its own columns.
+  void add_ours(const std::string& what, const std::shared_ptr<rig::Rig>& rig, const Frames& frames,
+                std::uint32_t lod, const std::string& asked, const std::string& level = "") {
+    const std::string base = "csr" + level + ", " + frames.name;
+    if (lod > 0) add(row(base), csr(dna_, lod), frames);
+    const std::string name = what + ", " + frames.name, read = "read for " + name;
+    const double bytes = add_read(read, rig, frames, lod);
+    add(row(name, base, asked, read, bytes), one_face(rig, lod), frames);
+  }
+  void add_frames(const Frames& frames) {
+    static const std::map<std::string, std::string> kCrowd = {{"60 active", "180x"},
+                                                              {"all active", "25x"}};
+    add(row("csr, " + frames.name), csr(dna_, 0), frames);
+    add_ours("one face", rig_, frames, 0, frames.name == "1 active" ? "1.4 us" : "1.3 reads");
+    add_ours("float16", half_, frames, 0, "1.3 reads");
+    const auto crowd = kCrowd.find(frames.name);
+    add_batch(row("crowd of 64, " + frames.name, "csr, " + frames.name,
+                  crowd == kCrowd.end() ? "" : crowd->second),
+              rig_, frames, 64, 1);
+  }
+  template <class At>
+  static void print_line(const Line& line, At at) {
+    const double us = at(line.name) / 1e3, read = at(line.read) / 1e3;
+    if (us == 0) return;
+    std::printf("%-30s %11.3f", line.name.c_str(), us);
+    at(line.base) > 0 ? std::printf(" %10.1f", at(line.base) / at(line.name))
+                      : std::printf(" %10s", "");
+    read > 0 ? std::printf(" %8.0f %8.3f %8.2f", line.bytes / 1e3, read, (us - kBeside) / read)
+             : std::printf(" %8s %8s %8s", "", "", "");
+    std::printf("  %s\n", line.asked.c_str());
+  }
   void add_instance(const Frames& frames) {
+    for (const char* name : {"no change", "LOD switched and evaluated"}) row(name);
     benchmark::RegisterBenchmark("no change", [this, &frames](benchmark::State& state) {
       rig::Instance face(*rig_);
       for (auto _ : state) benchmark::DoNotOptimize(face.evaluate(frames.at(0)).joints.data());
@@ -266,12 +287,13 @@ class Suite {
         });
   }
   void add_making() {
+    row("compile", "", "2 ms");
     benchmark::RegisterBenchmark("compile", [this](benchmark::State& state) {
       for (auto _ : state) benchmark::DoNotOptimize(compiled(dna_));
     });
     for (const bool full : {false, true}) {
       benchmark::RegisterBenchmark(
-          full ? "open a block, all checked" : "open a block, header checked",
+          row(full ? "open a block, all checked" : "open a block, header checked").c_str(),
           [this, full](benchmark::State& state) {
             for (auto _ : state) {
               auto rig = rig::open_rig(rig_->block(), rig_,
@@ -285,8 +307,9 @@ class Suite {
 
   const dna::Dna& dna_;
   const std::vector<Frames>& frames_;
-  std::shared_ptr<rig::Rig> rig_, half_;
+  std::shared_ptr<rig::Rig> rig_, half_, turned_;
   std::uint32_t coarse_ = 0;
+  std::deque<Line> lines_;
 };
 
 // How cost grows: each point as "what/x" beside "csr what/x".
@@ -301,7 +324,9 @@ class Sweep {
     for (std::size_t n = 1; n < raw; n += std::max<std::size_t>(1, n / 2)) add_active(n);
     add_active(raw);
     for (std::uint32_t lod = 0; lod < rig_->lod_count; ++lod) {
-      pair("LOD", kept_coefficients(*rig_, lod), one_face(rig_, lod), csr(dna_, lod), frames_);
+      const std::size_t kept = kept_coefficients(*rig_, lod);
+      pair("LOD", kept, one_face(rig_, lod), csr(dna_, lod), frames_);
+      add_read("read LOD/" + std::to_string(kept), rig_, frames_, lod);
     }
     for (std::size_t n = dna_.behavior.joint_groups.size(); n > 0; n /= 2) add_groups(n);
     for (const std::size_t n : {1u, 2u, 4u, 8u, 16u, 64u, 256u, 1000u}) {
@@ -313,15 +338,17 @@ class Sweep {
   }
 
   void print(const Medians& ns) const {
-    std::printf("# %s, %s, commit %s, %s kernels\nwhat,x,us,csr\n", bench::processor().c_str(),
+    std::printf("# %s, %s, commit %s, %s kernels\nwhat,x,us,csr,read\n", bench::processor().c_str(),
                 bench::compiler(), bench::commit(), rig_->kernels->name);
     for (const auto& [name, time] : ns) {
-      if (name.starts_with("csr ")) continue;
+      if (name.starts_with("csr ") || name.starts_with("read ")) continue;
       const std::size_t slash = name.find('/');
-      const auto base = ns.find("csr " + name);
+      const auto base = ns.find("csr " + name), read = ns.find("read " + name);
       std::printf("%s,%s,%.4f,", name.substr(0, slash).c_str(), name.substr(slash + 1).c_str(),
                   time / 1e3);
       if (base != ns.end()) std::printf("%.4f", base->second / 1e3);
+      std::printf(",");
+      if (read != ns.end()) std::printf("%.4f", read->second / 1e3);
       std::puts("");
     }
   }
@@ -335,6 +362,7 @@ class Sweep {
   void add_active(std::size_t n) {
     made_.push_back(std::make_unique<Frames>(bench::make_frames(rig_->raw_count, n)));
     pair("active controls", n, one_face(rig_, 0), csr(dna_, 0), *made_.back());
+    add_read("read active controls/" + std::to_string(n), rig_, *made_.back(), 0);
   }
   // The same face with some of its joint groups only.
   void add_groups(std::size_t n) {
@@ -344,7 +372,8 @@ class Sweep {
                                           groups.begin() + static_cast<std::ptrdiff_t>(n));
     auto rig = compiled(*smaller_.back());
     const std::size_t joints = rig->joints_written.size();
-    pair("joints", joints, one_face(std::move(rig), 0), csr(*smaller_.back(), 0), frames_);
+    pair("joints", joints, one_face(rig, 0), csr(*smaller_.back(), 0), frames_);
+    add_read("read joints/" + std::to_string(joints), std::move(rig), frames_, 0);
   }
 
   const dna::Dna& dna_;
@@ -385,12 +414,44 @@ core::Result<dna::Dna> read(const char* path) {
   return dna::parse(**source);
 }
 
+// One set of frames, read from a file or made. Out: false, having said so, where the file is none.
+bool add_frames(const std::string& name, std::size_t raw, std::size_t active, const char* file,
+                std::vector<Frames>& out) {
+  Frames frames = file != nullptr ? bench::read_frames(file, raw) : bench::make_frames(raw, active);
+  if (frames.count == 0) {
+    std::fprintf(stderr, "rig_bench: %s: frames of %zu float32 were expected\n", file, raw);
+    return false;
+  }
+  frames.name = name;
+  out.push_back(std::move(frames));
+  return true;
+}
+
+// The sets of frames that the table goes through.
+// In: files  of 20, of 60 and of all controls, or nullptr
+//     clip   frames of a real clip, or nullptr
+bool list_frames(std::size_t raw, char** files, const char* clip, std::vector<Frames>& out) {
+  for (const std::size_t active : {1u, 5u, 20u, 60u, 100u, 140u, 190u}) {
+    // The rows that others are compared with are there for small faces too.
+    if (active >= raw && active != 20 && active != 60) continue;
+    const char* file = files == nullptr ? nullptr
+                       : active == 20   ? files[0]
+                       : active == 60   ? files[1]
+                                        : nullptr;
+    const std::string name = std::to_string(active) + " active";
+    if (!add_frames(name, raw, std::min(active, raw), file, out)) return false;
+  }
+  if (!add_frames("all active", raw, raw, files == nullptr ? nullptr : files[2], out)) return false;
+  return clip == nullptr || add_frames("clip's frames", raw, raw, clip, out);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   if (argc < 2) {
     std::fputs(
-        "usage: rig_bench FILE.dna [FRAMES20 FRAMES60 FRAMES_ALL] [--sweep] [--progress] "
+        "usage: rig_bench FILE.dna [FRAMES20 FRAMES60 FRAMES_ALL] [--sweep] [--progress] [--clip "
+        "FRAMES] "
         "[options]\n",
         stderr);
     return 2;
@@ -406,26 +467,16 @@ int main(int argc, char** argv) {
     return 1;
   }
   const bool files = argc >= 5 && argv[2][0] != '-';
-  std::vector<Frames> frames;
-  for (std::size_t a = 0; a < 3; ++a) {
-    const std::size_t active[] = {std::min<std::size_t>(20, raw), std::min<std::size_t>(60, raw),
-                                  raw};
-    auto list = files ? bench::read_frames(argv[2 + a], raw) : bench::make_frames(raw, active[a]);
-    if (list.count == 0) {
-      std::fprintf(stderr, "rig_bench: %s: frames of %zu float32 were expected\n", argv[2 + a],
-                   raw);
-      return 1;
-    }
-    frames.push_back(std::move(list));
-  }
-  const int first = files ? 5 : 2;
-  int option = first;
+  int option = files ? 5 : 2;
   const auto asked_for = [&](const char* name) {
     const bool found = option < argc && std::strcmp(argv[option], name) == 0;
     option += found ? 1 : 0;
     return found;
   };
   const bool sweep = asked_for("--sweep"), progress = asked_for("--progress");
+  const char* clip = asked_for("--clip") && option < argc ? argv[option++] : nullptr;
+  std::vector<Frames> frames;
+  if (!list_frames(raw, files ? argv + 2 : nullptr, clip, frames)) return 1;
   std::string repetitions = "--benchmark_repetitions=9",
               mixed = "--benchmark_enable_random_interleaving=true",
               time = "--benchmark_min_time=0.05";
@@ -435,7 +486,7 @@ int main(int argc, char** argv) {
   benchmark::Initialize(&count, arguments.data());
   if (benchmark::ReportUnrecognizedArguments(count, arguments.data())) return 2;
   Suite suite(*dna, frames);
-  Sweep growth(*dna, frames[1]);
+  Sweep growth(*dna, *std::ranges::find(frames, "60 active", &Frames::name));
   sweep ? growth.add_all() : suite.add_all();
   Reporter reporter(progress);
   benchmark::RunSpecifiedBenchmarks(&reporter);

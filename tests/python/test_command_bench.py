@@ -37,18 +37,20 @@ def test_the_table_has_every_row_that_was_asked_for(capfd: pytest.CaptureFixture
         "one face, 20 active",
         "one face, 60 active",
         "one face, all active",
+        "float16, all active",
         "quaternions, 60 active",
         "LOD 4, 60 active",
         "cold, 60 active",
         "crowd of 64, 60 active",
         "clip of 1000, 60 active",
         "clip, two cores, 60 active",
+        "streaming store of a pose",
         "no change",
         "compile",
     ):
         assert number_of(text, row.ljust(30)) > 0, row
     assert "commit " in text
-    assert "times a plain read" in text
+    assert "in tight reads of the active columns" in text
 
 
 @pytest.mark.usefixtures("quick")
@@ -56,7 +58,7 @@ def test_a_sweep_is_csv(capfd: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["bench", str(MEDIUM), "--quick", "--sweep"]) == 0
     comment, header, *rows = capfd.readouterr().out.splitlines()
     assert comment.startswith("# ")
-    assert header == "what,x,us,csr"
+    assert header == "what,x,us,csr,read"
     whats = {row.split(",")[0] for row in rows}
     assert whats == {"active controls", "LOD", "joints", "faces", "cores"}
     assert all(float(row.split(",")[2]) > 0 for row in rows)

@@ -27,6 +27,8 @@ us         microseconds for one face and one frame, median
 csr        a plain sparse matrix (compressed sparse rows) times the controls: the yardstick
 times csr  how many times faster than that; asked: how many were aimed at for a face of full size
 active     controls that are not 0; one face: as an animation plays it, from warm caches
+KB, read   bytes of the active columns, and how long the tightest loop takes to read just these
+reads      what an evaluation takes beyond 1.3 us, in such reads
 cold       from memory, after other work has had the caches; crowd, clip: many poses in one call
 """
 

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: MIT
+// The least that an evaluation has to do: to read the columns of the controls that are active.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "bench/frames.h"
+#include "rig/rig.h"
+
+namespace risorius::bench {
+
+/// Whole cache lines one after the other, counted from the begin of a matrix.
+struct Lines {
+  std::uint32_t first = 0, count = 0;
+};
+
+/// Reads lines by the widest registers of this CPU into eight sums, so that no read waits for
+/// another.
+/// In:  memory  begins on a cache line
+/// Out: a number that depends on each of them
+std::uint64_t tight_read(const void* memory, std::span<const Lines> lines);
+
+/// Fills memory by stores that go past the caches, where this CPU has them.
+/// In: memory  begins on a cache line
+///     bytes   of whole lines
+void streaming_store(void* memory, std::size_t bytes);
+
+/// What the frames of one set need of a Rig's matrices.
+struct Reads {
+  std::vector<Lines> lines;         // of all frames
+  std::vector<std::size_t> begins;  // [frames + 1]: where a frame's lines begin
+  double bytes = 0;                 // of the active columns' values, the mean of all frames
+  std::span<const Lines> at(std::size_t frame) const {
+    return std::span(lines).subspan(begins[frame], begins[frame + 1] - begins[frame]);
+  }
+};
+/// In: lod  below the number of LODs
+Reads reads_of(const rig::Rig& rig, const Frames& frames, std::uint32_t lod);
+
+/// The Rig's matrices: float32 or float16.
+inline const void* values_of(const rig::Rig& rig) {
+  return rig.is_half() ? static_cast<const void*>(rig.joint_halves.data())
+                       : static_cast<const void*>(rig.joint_values.data());
+}
+
+}  // namespace risorius::bench
