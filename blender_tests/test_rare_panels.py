@@ -18,8 +18,36 @@ def rig(dna_file):
 
 def test_without_a_face_the_panel_offers_one():
     layout = drawn(bpy.types.RISORIUS_PT_character)
-    assert layout.operators == ["risorius.add_character", "risorius.import_dna"]
-    assert "No face is selected." in layout.text()
+    assert layout.operators == [
+        *("risorius.add_character", "risorius.import_dna"),
+        "risorius.key",
+        *("risorius.import_animation", "risorius.speak"),
+    ]
+    steps = [text for text in layout.labels if text[:1].isdigit()]
+    assert steps == ["1. Get a face", "2. Move it", "3. Animate it"]
+    assert "No face is selected" not in layout.text()
+
+
+def test_of_two_faces_the_panel_says_that_none_is_selected(rig, dna_file):
+    scene.load(dna_file)
+    bpy.context.view_layer.objects.active = None
+    layout = drawn(bpy.types.RISORIUS_PT_character)
+    assert "No face is selected: click on one." in layout.text()
+
+
+def test_a_fresh_face_has_a_hint_until_it_moves_or_it_is_dismissed(rig):
+    def says():
+        return "drag a slider" in drawn(bpy.types.RISORIUS_PT_character).text()
+
+    assert says()
+    scene.set_controls(rig, jawOpen=0.3)
+    assert not says()
+    scene.set_controls(rig, jawOpen=0.0)
+    assert says()
+    assert bpy.ops.risorius.hide_hints() == {"FINISHED"}
+    assert not says()
+    bpy.context.preferences.addons[scene.MODULE].preferences.hints = True
+    assert says()
 
 
 def test_without_the_native_module_the_panel_says_so(rig, monkeypatch):

@@ -22,6 +22,7 @@ from .ui import (
     live,
     mixing,
     speech,
+    why,
     words,
 )
 from .ui.about import manual, preferences, timing_overlay
@@ -31,6 +32,9 @@ from .ui.file import import_operators, rig_operators
 from .ui.file import operators as file_operators
 from .ui.live import properties as live_properties
 from .ui.mixing import properties as mixing_properties
+from .ui.why import overlay as why_overlay
+from .ui.why import panel as why_panel
+from .ui.why import properties as why_properties
 
 # Panels of one bl_order stand in the order in which they are registered.
 CLASSES = (
@@ -45,6 +49,7 @@ CLASSES = (
     *speech.CLASSES,
     *expressions.CLASSES,
     *layers.CLASSES,
+    *why.CLASSES,
     *live.CLASSES,
     *mixing.CLASSES,
 )
@@ -71,6 +76,7 @@ def _window_properties() -> dict[str, object]:
         "risorius_show_timing": timing_overlay.show_property(),
         "risorius_live": bpy.props.PointerProperty(type=live_properties.RISORIUS_PG_live),
         "risorius_mix": bpy.props.PointerProperty(type=mixing_properties.RISORIUS_PG_mix),
+        "risorius_why": bpy.props.PointerProperty(type=why_properties.RISORIUS_PG_why),
         "risorius_test": channel_preview.weight_property(),
     }
 
@@ -107,6 +113,7 @@ def register() -> None:
     handlers.register()
     paste_flipped.register()
     capture.register()
+    why_overlay.start()
     bpy.app.timers.register(_refresh_once, first_interval=0.0)
 
 
@@ -123,6 +130,8 @@ def unregister() -> None:
         return
     if bpy.app.timers.is_registered(_refresh_once):
         bpy.app.timers.unregister(_refresh_once)
+    why_panel.stop()
+    why_overlay.stop()
     capture.unregister()
     paste_flipped.unregister()
     handlers.unregister()

@@ -30,6 +30,10 @@ class Recorder:
         assert icon in ICONS, icon
         self.labels.append(text)
 
+    def progress(self, text="", factor=0.0, **_options):
+        assert 0.0 <= factor <= 1.0
+        self.labels.append(text)
+
     def prop(self, owner, path, icon="NONE", **_options):
         assert icon in ICONS, icon
         owner.path_resolve(path)

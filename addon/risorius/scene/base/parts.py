@@ -36,6 +36,9 @@ CHANNEL_VARIABLE = "risorius_channel"  # name of the driver variable of our keys
 TEST = (
     "risorius_test"  # on the deforming armature: a channel's test override, see channel_preview.py
 )
+LOOK = "risorius_look"  # on the deforming armature: what of the face is shown, see look_masks.py
+HEAT = "risorius_heat"  # on the same: which heat map it shows; on its meshes: the colours of that
+HEAT_BEFORE = "risorius_heat_before"  # on a Mesh with such colours: what was active before them
 BAKED = "risorius_baked"  # on rig or controls: what was baked; the rig's is not live meanwhile
 MAPS = "maps"  # on the deforming armature: values of the animated maps
 CHANNELS = "channels"  # on the deforming armature: values of the channels

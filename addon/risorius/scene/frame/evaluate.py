@@ -20,7 +20,16 @@ from ..animation import layers
 from ..base import drivers, parts, written
 from ..base.blender_types import ArmatureObject, Context, Depsgraph
 from ..character import lods, rig_placement, runtime
-from . import bone_writer, channel_preview, controls_ahead, inputs, lateness, live_keys, timing
+from . import (
+    bone_writer,
+    channel_preview,
+    controls_ahead,
+    inputs,
+    lateness,
+    live_keys,
+    look_masks,
+    timing,
+)
 
 _pauses: list[bool] = []
 _ahead: dict[int, _Ahead] = {}  # deforming armature -> what was done before this frame
@@ -180,12 +189,14 @@ def evaluate(
         lod = lods.choose(rig, seen, depsgraph)
     lod = min(max(lod, 0), max(live.rig.lod_count - 1, 0))
     test = channel_preview.override(rig, raw, depsgraph.scene)
-    state = (raw.tobytes(), lod, test, *((name, *turn) for name, turn in turns.items()))
+    look = look_masks.for_frame(rig, rendering or depsgraph.mode == "RENDER")
+    state = (raw.tobytes(), lod, (test, look), *((name, *turn) for name, turn in turns.items()))
     if not written.is_new(written.inputs, rig, state) and not force:
         timing.looked(times[0])
         return False
     times.append(perf_counter())
-    pose = live.rig.evaluate(raw, lod)
+    pose = live.rig.evaluate(look_masks.raw_of(look, raw, live), lod)
+    look_masks.apply(look, pose, live, lod)
     channel_preview.apply(test, pose.blend_shapes)
     times.append(perf_counter())
     taken = bone_writer.write(rig, live, pose.joints, turns, depsgraph)

@@ -15,7 +15,17 @@ from ..animation import layer_mixing, layers
 from ..base import console, parts, sharing, written
 from ..base.blender_types import ArmatureObject, Depsgraph, current_context
 from ..character import lods, rig_placement, runtime
-from ..frame import caches, channel_preview, controls_ahead, evaluate, lateness, timing
+from ..frame import (
+    caches,
+    channel_preview,
+    controls_ahead,
+    evaluate,
+    lateness,
+    look_masks,
+    timing,
+)
+from ..why import causes, displacement, heat
+from ..why import present as why_present
 from . import applied_transforms, bone_edits, duplicates, migrations, repair
 
 # objects: session uids of those seen; mended: of characters that were mended at the last update.
@@ -62,6 +72,7 @@ def _render_ended(*_arguments: object) -> None:
     for rig in parts.rigs():
         controls = parts.controls_of(rig)
         apart = lods.by_distance(rig) or lods.render_level(rig) != lods.viewport_level(rig)
+        apart = apart or not look_masks.of(rig).is_whole
         if apart and controls is not None:
             written.forget()
             controls.update_tag()
@@ -175,6 +186,8 @@ def _loaded(*_arguments: object) -> None:
             controls_ahead.note_evaluated(context.scene)
         repair.heal_all()
         written.forget()
+        look_masks.take_away()  # of a file that Blender saved by itself, before a crash
+        heat.end_all()
         refresh()
     _restored()
 
@@ -191,6 +204,8 @@ def _restored(*_arguments: object) -> None:
     layer_mixing.forget()
     applied_transforms.forget()
     bone_edits.forget()
+    causes.forget()
+    heat.follow_undo()
     _state["objects"] = frozenset()
     if native.problem():
         return
@@ -213,8 +228,23 @@ def _before_save(*_arguments: object) -> None:
     console.say(*duplicates.separate_all())
     console.say(*migrations.bring_up_all())  # whose late caches are free now
     _end_tests()
+    heat.take_away()
+    if look_masks.take_away():
+        refresh()
     repair.remove_dead()
     console.say(*sharing.share())
+
+
+@persistent
+def _saved(*_arguments: object) -> None:
+    """What no file shall have, the session has again."""
+    if native.problem():
+        return
+    if look_masks.give_back():
+        refresh()
+    layer = current_context().view_layer
+    if layer is not None and layer.depsgraph is not None:
+        heat.give_back(cast("Depsgraph", layer.depsgraph))
 
 
 @persistent
@@ -244,6 +274,8 @@ _HANDLERS = (
     ("undo_post", _restored),
     ("redo_post", _restored),
     ("save_pre", _before_save),
+    ("save_post", _saved),
+    ("save_post_fail", _saved),
     ("render_init", _end_tests),
     ("render_init", _render_begins),
     ("render_complete", _render_ended),
@@ -261,7 +293,10 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Remove the handlers and drop all compiled data."""
+    """Remove the handlers and drop all compiled data; faces are whole and without colours."""
+    heat.end_all()
+    if look_masks.take_away():
+        refresh()
     for name, handler in reversed(_HANDLERS):
         present = getattr(bpy.app.handlers, name)
         if handler in present:
@@ -270,4 +305,7 @@ def unregister() -> None:
     lateness.forget()
     layer_mixing.forget()
     sharing.forget()
+    causes.forget()
+    displacement.forget()
+    why_present.forget()
     runtime.forget()

@@ -121,4 +121,18 @@ class RISORIUS_OT_self_test(Operator):
         return {"FINISHED"}
 
 
-CLASSES = (RISORIUS_OT_describe, RISORIUS_OT_self_test)
+class RISORIUS_OT_hide_hints(Operator):
+    """Do not say again what to do with a new face; the preferences bring it back"""
+
+    bl_idname = "risorius.hide_hints"
+    bl_label = "Hide First Steps"
+
+    def execute(self, context: Context) -> Result:
+        addon = context.preferences.addons.get(native.ADDON)
+        if addon is not None:
+            addon.preferences.hints = False  # type: ignore[attr-defined]
+            context.preferences.is_dirty = True
+        return {"FINISHED"}
+
+
+CLASSES = (RISORIUS_OT_describe, RISORIUS_OT_self_test, RISORIUS_OT_hide_hints)

@@ -53,6 +53,12 @@ class RISORIUS_Preferences(AddonPreferences):
         ),
     )
 
+    hints: bpy.props.BoolProperty(
+        name="First Steps",
+        description="Say beside a face that nobody has moved yet what to do with it",
+        default=True,
+    )
+
     def draw(self, context: Context) -> None:
         works, text = self_test()
         words.show(self.layout, text, "CHECKMARK" if works else "ERROR")
@@ -60,6 +66,7 @@ class RISORIUS_Preferences(AddonPreferences):
         if compat.notice():
             words.write(self.layout, compat.notice(), "INFO")
         self.layout.prop(self, "sides")
+        self.layout.prop(self, "hints")
         if works:
             draw_preferences(self.layout)
 

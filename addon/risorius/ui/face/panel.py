@@ -45,15 +45,55 @@ class RISORIUS_PT_character(FacePanel, Panel):
         for operator, icon, text in buttons:
             shown = text if ruler.fits(text) else ""  # its tooltip says the same
             row.operator(operator, text=shown, icon=icon, translate=False).region = ""
+        _draw_hint(layout, context, rig)
         draw_state(layout, rig)
         for warning in plans.layer_warnings(live.rig.ignored_layers):
             words.write(layout, warning, "INFO")
 
 
 def _draw_start(layout: UILayout) -> None:
-    words.write(layout, "No face is selected.", "INFO")
+    """What one does first. Buttons of later steps are grey and say in their tooltip what lacks."""
+    if any(parts.rigs()):
+        words.write(layout, "No face is selected: click on one.", "INFO")
+    _draw_step(layout, words.say("1. Get a face"))
     layout.operator("risorius.add_character", text="Add a Face", icon="USER")
     layout.operator("risorius.import_dna", text="Import DNA", icon="IMPORT")
+    _draw_step(layout, words.say("2. Move it"))
+    words.write(layout, "Sliders, expressions and bones come with the face.")
+    layout.operator("risorius.key", text="Key All", icon="KEYFRAME_HLT").region = ""
+    _draw_step(layout, words.say("3. Animate it"))
+    layout.operator("risorius.import_animation", icon="IMPORT")
+    layout.operator("risorius.speak", icon="SPEAKER")
+
+
+def _draw_step(layout: UILayout, text: str) -> None:
+    layout.separator()
+    words.show(layout, text)
+
+
+def _draw_hint(layout: UILayout, context: Context, rig: ArmatureObject) -> None:
+    """What to do with a face that nobody has moved yet, until it is read or done."""
+    addon = context.preferences.addons.get(native.ADDON)
+    if addon is None or not addon.preferences.hints or not _is_at_rest(rig):
+        return
+    box = layout.box()
+    row = box.row()
+    words.show(row, words.say("First steps"), "LIGHT")
+    row.operator("risorius.hide_hints", text="", icon="X")
+    words.write(box, "Open a region under Controls and drag a slider: the face follows.")
+    words.write(box, "Key All holds the pose at this frame; Layers and Animation play over it.")
+
+
+def _is_at_rest(rig: ArmatureObject) -> bool:
+    """Whether no slider was moved and nothing plays."""
+    live, controls = runtime.of(rig), parts.controls_of(rig)
+    if live is None or controls is None:
+        return False
+    played = controls.animation_data
+    if played is not None and (played.action is not None or len(played.nla_tracks)):
+        return False
+    face = controls.pose.bones[parts.FACE]
+    return all(face.get(n, r) == r for n, r in zip(live.labels, live.rests, strict=True))
 
 
 def _draw_detail(layout: UILayout, rig: ArmatureObject) -> None:

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The colours of heat maps: from blue-violet over green to yellow.
+
+Brightness alone tells the order, so that it is the same ramp for those who confuse colours, and on
+grey paper (the ramp is known as viridis).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+# sRGB, at equal steps.
+ANCHORS = (
+    (0.267, 0.005, 0.329),
+    (0.283, 0.141, 0.458),
+    (0.254, 0.265, 0.530),
+    (0.207, 0.372, 0.553),
+    (0.164, 0.471, 0.558),
+    (0.128, 0.567, 0.551),
+    (0.135, 0.659, 0.518),
+    (0.267, 0.749, 0.441),
+    (0.478, 0.821, 0.318),
+    (0.741, 0.873, 0.150),
+    (0.993, 0.906, 0.144),
+)
+
+
+def colours(shares: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Colours in sRGB.
+
+    Args:
+        shares: float64[n], 0 at the cool end, 1 at the hot one; what lies outside has the end's.
+
+    Returns:
+        float32[n, 4], opaque.
+    """
+    table = np.array(ANCHORS)
+    steps = np.linspace(0.0, 1.0, len(table))
+    out = np.ones((len(shares), 4), np.float32)
+    for channel in range(3):
+        out[:, channel] = np.interp(shares, steps, table[:, channel])
+    return out
+
+
+def linear(srgb: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Scene-linear colours of sRGB ones, float32[n, 4]; alpha stays.
+
+    Args:
+        srgb: float32[n, 4].
+    """
+    out = srgb.copy()
+    low = srgb[:, :3] / 12.92
+    high = ((srgb[:, :3] + 0.055) / 1.055) ** 2.4
+    out[:, :3] = np.where(srgb[:, :3] <= 0.04045, low, high)
+    return out

@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is left out of a face's look: all controls but some (solo), its joints, shapes or maps.
+
+The controls themselves stay as they are, so that nothing is keyed, baked or exported otherwise. It
+lives on the deforming armature, where undo finds it, but in no file: saving takes it away and gives
+it back. Renders show the whole face unless the user asks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import native
+from ..base import parts, written
+from ..base.blender_types import ArmatureObject
+from ..character import runtime
+
+KINDS = ("JOINTS", "SHAPES", "MAPS")
+_held: dict[int, str] = {}  # deforming armature -> what was taken from it while a file is saved
+
+
+@dataclass(frozen=True)
+class Look:
+    """What of a face is shown.
+
+    Attributes:
+        solo: labels of the controls that alone are shown; none: all are.
+        muted: those of KINDS that rest.
+        in_renders: whether that holds for renders too.
+    """
+
+    solo: frozenset[str] = frozenset()
+    muted: frozenset[str] = frozenset()
+    in_renders: bool = False
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether nothing is left out."""
+        return not self.solo and not self.muted
+
+
+WHOLE = Look()
+
+
+def of(rig: ArmatureObject) -> Look:
+    """What of a character is shown. Args: rig  its deforming armature."""
+    kept = rig.get(parts.LOOK)
+    if not isinstance(kept, str):
+        return WHOLE
+    renders, muted, *solo = kept.split("\n")
+    return Look(frozenset(solo), frozenset(muted.split()), renders == "1")
+
+
+def put(rig: ArmatureObject, look: Look) -> None:
+    """Choose what of a character is shown; the caller evaluates afterwards.
+
+    Args:
+        rig: its deforming armature.
+        look: what shall be shown of it.
+    """
+    if look.is_whole:
+        rig.pop(parts.LOOK, None)
+    else:
+        muted = " ".join(sorted(look.muted))
+        rig[parts.LOOK] = "\n".join((str(int(look.in_renders)), muted, *sorted(look.solo)))
+
+
+def solo(rig: ArmatureObject, names: Collection[str]) -> None:
+    """Show these controls alone; what is muted stays so.
+
+    Args:
+        rig: deforming armature.
+        names: labels of controls; none: all are shown again.
+    """
+    put(rig, replace(of(rig), solo=frozenset(names)))
+
+
+def mute(rig: ArmatureObject, kind: str, on: bool) -> None:
+    """Let joints, shapes or maps rest, or move again.
+
+    Args:
+        rig: deforming armature.
+        kind: of KINDS.
+        on: whether they rest.
+    """
+    look = of(rig)
+    put(rig, replace(look, muted=look.muted | {kind} if on else look.muted - {kind}))
+
+
+def for_frame(rig: ArmatureObject, is_render: bool) -> Look:
+    """What holds for this evaluation.
+
+    Args:
+        rig: deforming armature.
+        is_render: whether the frame is rendered.
+    """
+    look = of(rig)
+    return WHOLE if is_render and not look.in_renders else look
+
+
+def raw_of(look: Look, raw: NDArray[np.float32], live: runtime.Runtime) -> NDArray[np.float32]:
+    """The raw controls that are evaluated.
+
+    Args:
+        look: what is shown.
+        raw: float32[R], what the controls ask for.
+        live: the Runtime of the character.
+
+    Returns:
+        float32[R]: those that are not shown rest.
+    """
+    if not look.solo:
+        return raw
+    alone = np.array([label in look.solo for label in live.labels])
+    return np.where(alone, raw, np.array(live.rests, np.float32)).astype(np.float32)
+
+
+def apply(look: Look, pose: native.Pose, live: runtime.Runtime, lod: int) -> None:
+    """Let what is muted rest, in place.
+
+    Args:
+        look: what is shown.
+        pose: of the character's rig, changed.
+        live: its Runtime.
+        lod: the level of the pose.
+    """
+    if not look.muted:
+        return
+    rest = live.rig.evaluate(np.array(live.rests, np.float32), lod)
+    if "JOINTS" in look.muted:
+        pose.joints[:] = rest.joints
+    if "SHAPES" in look.muted:
+        pose.blend_shapes[:] = rest.blend_shapes
+    if "MAPS" in look.muted:
+        pose.animated_maps[:] = rest.animated_maps
+
+
+def take_away() -> bool:
+    """Show all characters whole, for a file that is saved. Returns whether one was not."""
+    _held.clear()
+    for rig in parts.rigs():
+        if parts.LOOK in rig:
+            _held[rig.session_uid] = rig[parts.LOOK]
+            del rig[parts.LOOK]
+            bring_up_later(rig)
+    return bool(_held)
+
+
+def give_back() -> bool:
+    """After `take_away`: each has again what it had. Returns whether one had something."""
+    given = bool(_held)
+    for rig in parts.rigs():
+        kept = _held.pop(rig.session_uid, None)
+        if kept is not None:
+            rig[parts.LOOK] = kept
+            bring_up_later(rig)
+    _held.clear()
+    return given
+
+
+def bring_up_later(rig: ArmatureObject) -> None:
+    """Let the next update evaluate a character anew."""
+    written.forget()
+    controls = parts.controls_of(rig)
+    if controls is not None:
+        controls.update_tag()

@@ -1,0 +1,324 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What moves a vertex, which correctives fire, which take part in a control: in millimetres."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import native
+from ..base import parts
+from ..base.blender_types import ArmatureObject
+from . import displacement, present
+
+Poses = tuple[NDArray[np.float32], NDArray[np.float32]]  # joints and shapes, of one or of many
+_LEAST = 1e-3  # millimetres that are no movement: float32 of a head that stands 1.7 m high
+_MOST_FIRING = 24  # correctives whose reach is computed, those of the largest values
+_found: dict[int, Found] = {}  # deforming armature -> what was last found of it
+_fired: dict[int, tuple[object, list[Cause]]] = {}
+
+
+@dataclass(frozen=True)
+class Cause:
+    """What moves something.
+
+    Attributes:
+        control: index in raw | corrective | network | pose.
+        name: in lists.
+        is_raw: whether it is a raw control, which has a slider.
+        value: that it has now.
+        now: millimetres by which it moves it now.
+        full: millimetres between its rest and its full value, all others as now; 0: no raw control.
+        label: of its slider, where it has one.
+    """
+
+    control: int
+    name: str
+    is_raw: bool
+    value: float
+    now: float
+    full: float = 0.0
+    label: str = ""
+
+
+@dataclass(frozen=True)
+class Found:
+    """What moves a vertex.
+
+    Attributes:
+        mesh, vertex: which one.
+        moved: millimetres that it is away from neutral.
+        causes: those that move it, the strongest first.
+    """
+
+    mesh: int
+    vertex: int
+    moved: float
+    causes: list[Cause]
+
+
+@dataclass(frozen=True)
+class Part:
+    """A corrective that a control takes part in.
+
+    Attributes:
+        control: index of the corrective.
+        name: in lists.
+        value: now.
+        others: (name, value) of its other factors.
+    """
+
+    control: int
+    name: str
+    value: float
+    others: list[tuple[str, float]]
+
+
+def of_vertex(rig: ArmatureObject, mesh: int, vertex: int) -> Found | None:
+    """What moves a vertex at the pose of now; kept until `last` is asked, None for a lost face.
+
+    Args:
+        rig: deforming armature.
+        mesh: index of the mesh in the file.
+        vertex: of the mesh.
+    """
+    now = present.of(rig)
+    if now is None:
+        return None
+    live, raw = now.live, now.raw
+    unit = displacement.millimetres(rig)
+    count = len(raw)
+    rows = np.tile(raw, (2 * count + 2, 1))
+    each = np.arange(count)
+    rows[each, each] = now.rests
+    rows[count + each, each] = 1.0
+    rows[-1] = now.rests
+    batch = live.rig.evaluate_batch(rows, now.lod)
+    places = displacement.at_vertex(live, mesh, vertex, batch.joints, batch.blend_shapes) * unit
+    here = places[2 * count]
+    added = np.linalg.norm(here - places[:count], axis=1)
+    full = np.linalg.norm(places[count : 2 * count] - places[:count], axis=1)
+    causes = [
+        Cause(
+            control=i,
+            name=present.name_of(live, i),
+            is_raw=True,
+            value=float(raw[i]),
+            now=float(added[i]),
+            full=float(full[i]),
+            label=live.labels[i],
+        )
+        for i in np.flatnonzero(np.maximum(added, full) > _LEAST).tolist()
+    ]
+    without = _without(now, firing(now))
+    if without:
+        poses = tuple(np.stack([w[i] for w in without.values()]) for i in (0, 1))
+        apart = displacement.at_vertex(live, mesh, vertex, *poses) * unit - here
+        values = live.rig.evaluate(raw, now.lod).controls
+        for control, far in zip(without, np.linalg.norm(apart, axis=1).tolist(), strict=True):
+            if far > _LEAST:
+                name = present.name_of(live, control)
+                causes.append(Cause(control, name, False, float(values[control]), far))
+    causes.sort(key=lambda c: (-c.now, -c.full, c.control))
+    moved = float(np.linalg.norm(here - places[-1]))
+    found = _found[rig.session_uid] = Found(mesh, vertex, moved, causes)
+    return found
+
+
+def last(rig: ArmatureObject) -> Found | None:
+    """What `of_vertex` last found. Args: rig  deforming armature."""
+    return _found.get(rig.session_uid)
+
+
+def firing(now: present.Present) -> list[int]:
+    """Correctives and poses that are on, by index, the largest values first.
+
+    Args:
+        now: of the face.
+    """
+    values = np.asarray(now.live.rig.evaluate(now.raw, now.lod).controls)
+    count = len(now.raw)
+    on = np.flatnonzero(values[count:] != 0) + count
+    return [int(i) for i in on[np.argsort(-np.abs(values[on]), kind="stable")]]
+
+
+def _without(now: present.Present, controls: list[int]) -> dict[int, Poses]:
+    """The pose of now without what each of some controls gives it.
+
+    Args:
+        now: of the face.
+        controls: indices in raw | corrective | network | pose, that are on.
+    """
+    live = now.live
+    if not controls:
+        return {}
+    pose = live.rig.evaluate(now.raw, now.lod)
+    names = present.names_of(live)
+    given = native.part("explain.joints").contributions(live.dna, pose, now.lod, names)
+    shapes = _shapes_by(now)
+    out = {}
+    for control in controls:
+        joints, weights = pose.joints.copy(), pose.blend_shapes.copy()
+        for joint, by in given.items():
+            if control in by:
+                joints[joint] -= by[control].astype(np.float32)
+        weights[shapes.get(control, [])] = 0.0
+        out[control] = (joints, weights)
+    return out
+
+
+def _shapes_by(now: present.Present) -> Mapping[int, list[int]]:
+    """Each control with the channels that it alone drives."""
+    table = now.live.dna.blend_shape_channels
+    count = int(table.lods[now.lod]) if now.lod < len(table.lods) else 0
+    found: dict[int, list[int]] = {}
+    pairs = zip(table.input_indices[:count], table.output_indices[:count], strict=True)
+    for control, channel in pairs:
+        found.setdefault(int(control), []).append(int(channel))
+    return found
+
+
+def without(now: present.Present, control: int) -> Poses:
+    """The pose of now without what a corrective gives it: joints and shapes.
+
+    Args:
+        now: of the face.
+        control: index of the corrective.
+    """
+    return _without(now, [control])[control]
+
+
+def strongest(rig: ArmatureObject, count: int = 8) -> list[Cause]:
+    """The correctives that fire now, those first that move a vertex most.
+
+    Of very many the largest values are looked at only. `now` is of the vertex that each moves most.
+
+    Args:
+        rig: deforming armature.
+        count: how many are given.
+    """
+    now = present.of(rig)
+    if now is None:
+        return []
+    key = (id(now.live), now.raw.tobytes(), now.lod)
+    kept = _fired.get(rig.session_uid)
+    if kept is None or kept[0] != key:
+        kept = _fired[rig.session_uid] = (key, _strongest(rig, now))
+    return kept[1][:count]
+
+
+def is_known(rig: ArmatureObject) -> bool:
+    """Whether `strongest` has its answer already. Args: rig  deforming armature."""
+    now, kept = present.of(rig), _fired.get(rig.session_uid)
+    return now is None or (
+        kept is not None and kept[0] == (id(now.live), now.raw.tobytes(), now.lod)
+    )
+
+
+def known(rig: ArmatureObject) -> list[Cause]:
+    """What `strongest` last found, maybe of a pose of before. Args: rig  deforming armature."""
+    return list(_fired.get(rig.session_uid, (None, []))[1])
+
+
+def _strongest(rig: ArmatureObject, now: present.Present) -> list[Cause]:
+    live, unit = now.live, displacement.millimetres(rig)
+    pose = live.rig.evaluate(now.raw, now.lod)
+    meshes = displacement.meshes_at(rig, now.lod)
+    at = {
+        mesh: displacement.vertices(live, mesh, pose.joints, pose.blend_shapes) for mesh in meshes
+    }
+    out = []
+    for control, poses in _without(now, firing(now)[:_MOST_FIRING]).items():
+        far = [
+            np.linalg.norm(displacement.vertices(live, m, *poses) - at[m], axis=1) for m in meshes
+        ]
+        most = max((float(f.max()) for f in far if len(f)), default=0.0) * unit
+        name = present.name_of(live, control)
+        out.append(Cause(control, name, False, float(pose.controls[control]), most))
+    return sorted(out, key=lambda c: (-c.now, c.control))
+
+
+def parts_of(rig: ArmatureObject, control: int) -> list[Part]:
+    """The correctives that a control takes part in, those that are on first.
+
+    Args:
+        rig: deforming armature.
+        control: index of the raw control.
+    """
+    now = present.of(rig)
+    if now is None:
+        return []
+    values = now.live.rig.evaluate(now.raw, now.lod).controls
+    found = [
+        Part(
+            corrective,
+            present.name_of(now.live, corrective),
+            float(values[corrective]),
+            [(present.name_of(now.live, c), float(values[c])) for c in factors if c != control],
+        )
+        for corrective, factors in present.factors_of(now.live).items()
+        if control in factors
+    ]
+    return sorted(found, key=lambda part: (-abs(part.value), len(part.others), part.control))
+
+
+def sliders_of(rig: ArmatureObject, control: int) -> list[str]:
+    """The raw controls that a control hangs on, by their labels: itself, or all its factors.
+
+    Args:
+        rig: deforming armature.
+        control: index in raw | corrective | network | pose.
+    """
+    now = present.of(rig)
+    if now is None:
+        return []
+    factors, labels = present.factors_of(now.live), now.live.labels
+    waiting, seen = [control], set[int]()
+    while waiting:
+        one = waiting.pop()
+        if one not in seen:
+            seen.add(one)
+            waiting.extend(factors.get(one, ()))
+    return [labels[i] for i in sorted(seen) if i < len(labels)]
+
+
+def control_of(rig: ArmatureObject, label: str) -> int:
+    """The index of a raw control by its label, -1 where the face has none of that name.
+
+    Args:
+        rig: deforming armature.
+        label: name of the slider.
+    """
+    now = present.of(rig)
+    return now.live.labels.index(label) if now is not None and label in now.live.labels else -1
+
+
+def nearest(rig: ArmatureObject, item: int, place: NDArray[np.float64]) -> int:
+    """The vertex of a mesh that lies nearest to a place, as the face shows now; -1: there is none.
+
+    Args:
+        rig: deforming armature.
+        item: index of the mesh in the file.
+        place: float64[3] in the space of the rig, Blender units.
+    """
+    now = present.of(rig)
+    if now is None:
+        return -1
+    pose = now.pose()
+    points = displacement.vertices(now.live, item, pose.joints, pose.blend_shapes)
+    return int(np.argmin(np.linalg.norm(points - place, axis=1)))
+
+
+def mesh_of(item: object) -> int:
+    """The index in the file of a mesh object of a character, -1 for any other object."""
+    get = getattr(item, "get", None)
+    return int(get(parts.MESH, -1)) if get is not None else -1
+
+
+def forget() -> None:
+    """Let go of all that was found: after load and undo, session uids may mean others."""
+    _found.clear()
+    _fired.clear()

@@ -1,0 +1,303 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Heat maps: how far something moves each vertex, as a colour attribute of the face's meshes.
+
+Materials stay as they are: the solid view shows the attribute. What of it is there is a property of
+the deforming armature, so that undo finds it; a file never has any of it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from time import perf_counter
+from typing import cast
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import native
+from ...logic.base import heat_ramp
+from ...logic.base.errors import FaceError
+from ...logic.base.sentences import told
+from ..animation import layers
+from ..base import parts
+from ..base.blender_types import (
+    ArmatureObject,
+    Attribute,
+    Depsgraph,
+    MeshObject,
+    current_context,
+)
+from ..character import runtime
+from . import causes, displacement, heat_views, layer_share, present
+
+KINDS = ("CONTROL", "POSE", "CORRECTIVE", "LAYER")
+_LEAST = 0.01  # millimetres at the hot end at least: noise shall not glow
+_shown: dict[int, object] = {}  # deforming armature -> what its colours were computed from
+_held: dict[int, tuple[str, str]] = {}  # deforming armature -> its map while a file is saved
+_PAUSE = 0.15  # seconds between two looks at whether the pose is another one
+
+
+@dataclass(frozen=True)
+class Heat:
+    """What a heat map shows.
+
+    Attributes:
+        kind: CONTROL: how far a control reaches from neutral, POSE: how far the pose of now is
+            from neutral, CORRECTIVE: what one adds now, LAYER: what one adds now.
+        what: label of the control, number of the corrective or of the layer's place.
+        most: millimetres at the hot end.
+    """
+
+    kind: str
+    what: str
+    most: float
+
+
+def of(rig: ArmatureObject) -> Heat | None:
+    """The heat map that a character shows. Args: rig  its deforming armature."""
+    kept = rig.get(parts.HEAT)
+    if not isinstance(kept, str):
+        return None
+    kind, most, what = kept.split("\n", 2)
+    return Heat(kind, what, float(most))
+
+
+def show(rig: ArmatureObject, kind: str, what: str, depsgraph: Depsgraph) -> Heat:
+    """Colour the meshes of a character.
+
+    Args:
+        rig: its deforming armature.
+        kind, what: see Heat.
+        depsgraph: where layers are read.
+
+    Raises:
+        FaceError: there is no such control, corrective or layer, or nothing can be coloured.
+    """
+    now = present.of(rig)
+    if now is None:
+        raise FaceError(told("This face shows no controls now."))
+    far = _distances(rig, now, kind, what, depsgraph)
+    unit = displacement.millimetres(rig)
+    most = max([float(f.max()) * unit for f in far.values() if len(f)], default=0.0)
+    coloured = 0
+    for item in parts.meshes_of(rig):
+        values = far.get(int(item[parts.MESH]))
+        if values is not None and _is_as_imported(item, len(values)):
+            _write(item, values * unit / max(most, _LEAST))
+            coloured += 1
+        else:
+            _take_off(item)
+    if not coloured:
+        raise FaceError(told("No mesh of {name} has the vertices of its file.", name=rig.name))
+    heat = Heat(kind, what, most)
+    rig[parts.HEAT] = "\n".join((kind, repr(most), what))
+    _shown[rig.session_uid] = _state(now, kind)
+    heat_views.show()
+    watch()
+    return heat
+
+
+def _is_as_imported(item: MeshObject, count: int) -> bool:
+    data = item.data
+    is_ours = data.library is None and data.override_library is None
+    return is_ours and item.mode != "EDIT" and len(data.vertices) == count
+
+
+def _distances(
+    rig: ArmatureObject, now: present.Present, kind: str, what: str, depsgraph: Depsgraph
+) -> dict[int, NDArray[np.float64]]:
+    """Mesh -> how far each of its vertices is moved, in Blender units."""
+    one, other = _pair(rig, now, kind, what, depsgraph)
+    meshes = displacement.meshes_at(rig, now.lod)
+    return {m: displacement.distances(now.live, m, one, other) for m in meshes}
+
+
+def _pair(
+    rig: ArmatureObject, now: present.Present, kind: str, what: str, depsgraph: Depsgraph
+) -> tuple[causes.Poses, causes.Poses]:
+    """The two poses that are compared."""
+    evaluate = now.live.rig.evaluate
+    if kind == "CONTROL":
+        if what not in now.live.labels:
+            raise FaceError(told("{name} has no control {control}.", name=rig.name, control=what))
+        raised = now.rests
+        raised[now.live.labels.index(what)] = 1.0
+        return _poses(evaluate(raised, now.lod)), _poses(evaluate(now.rests, now.lod))
+    if kind == "POSE":
+        return _poses(now.pose()), _poses(evaluate(now.rests, now.lod))
+    if kind == "CORRECTIVE":
+        here = _poses(evaluate(now.raw, now.lod))
+        return here, causes.without(now, int(what))
+    with_it, without_it = layer_share.raw_pair(rig, now.live, int(what), depsgraph)
+    return _poses(evaluate(with_it, now.lod)), _poses(evaluate(without_it, now.lod))
+
+
+def _poses(pose: native.Pose) -> causes.Poses:
+    return pose.joints, pose.blend_shapes
+
+
+def _state(now: present.Present, kind: str) -> object:
+    """What the colours of a kind hang on."""
+    return (now.lod, None) if kind == "CONTROL" else (now.lod, now.raw.tobytes(), now.look)
+
+
+def _write(item: MeshObject, shares: NDArray[np.float64]) -> None:
+    """Give a mesh its colours. Args: shares  float64[V], 0 to 1."""
+    held = item.data.color_attributes
+    layer: Attribute = held.get(parts.HEAT)
+    if layer is not None and (layer.domain != "POINT" or len(layer.data) != len(shares)):
+        held.remove(layer)
+        layer = None
+    if layer is None:
+        if parts.HEAT_BEFORE not in item.data:
+            names = (held.active_color_name or "", held.default_color_name or "")
+            item.data[parts.HEAT_BEFORE] = "\n".join(names)
+        layer = held.new(parts.HEAT, "FLOAT_COLOR", "POINT")
+    held.active_color_name = layer.name
+    flat = heat_ramp.linear(heat_ramp.colours(shares)).ravel()
+    layer.data.foreach_set("color", flat)
+    item.data.update_tag()
+
+
+def _take_off(item: MeshObject) -> None:
+    """Take a mesh its colours, and give it back the active ones that it had."""
+    data = item.data
+    held = data.color_attributes
+    layer = held.get(parts.HEAT)
+    if layer is not None:
+        held.remove(layer)
+        data.update_tag()
+    if parts.HEAT_BEFORE in data:
+        active, default = data[parts.HEAT_BEFORE].split("\n", 1)
+        del data[parts.HEAT_BEFORE]
+        if active in held:
+            held.active_color_name = active
+        if default in held:
+            held.default_color_name = default
+
+
+def hide(rig: ArmatureObject) -> bool:
+    """Take the heat map of a character away; views go back where no other face has one.
+
+    Args:
+        rig: its deforming armature.
+
+    Returns:
+        Whether there was one.
+    """
+    had = rig.pop(parts.HEAT, None) is not None
+    _shown.pop(rig.session_uid, None)
+    for item in parts.meshes_of(rig):
+        _take_off(item)
+    if not any(parts.HEAT in other for other in parts.rigs()):
+        heat_views.give_back()
+    return had
+
+
+def take_away() -> None:
+    """No heat map in a file that is saved; `give_back` brings them again."""
+    _held.clear()
+    for rig in parts.rigs():
+        heat = of(rig)
+        if heat is not None:
+            _held[rig.session_uid] = (heat.kind, heat.what)
+            hide(rig)
+
+
+def give_back(depsgraph: Depsgraph) -> None:
+    """Show again what `take_away` took. Args: depsgraph  where layers are read."""
+    for rig in parts.rigs():
+        kept = _held.pop(rig.session_uid, None)
+        if kept is not None:
+            _show_again(rig, *kept, depsgraph)
+    _held.clear()
+
+
+def end_all() -> None:
+    """Take all heat maps away: before the add-on goes, and after a file was loaded."""
+    _held.clear()
+    for rig in parts.rigs():
+        if parts.HEAT in rig:
+            hide(rig)
+    _shown.clear()
+    if bpy.app.timers.is_registered(_look):
+        bpy.app.timers.unregister(_look)
+    heat_views.give_back()
+
+
+def follow_undo() -> None:
+    """After undo and redo: views show colours where there are some, and else do not."""
+    _shown.clear()
+    if any(parts.HEAT in rig for rig in parts.rigs()):
+        heat_views.show()
+        watch()
+    else:
+        heat_views.give_back()
+
+
+def refresh(rig: ArmatureObject, depsgraph: Depsgraph) -> bool:
+    """Colour a character anew where its pose is another one. Returns whether it was.
+
+    Args:
+        rig: its deforming armature, with a heat map.
+        depsgraph: where layers are read.
+    """
+    heat, now = of(rig), present.of(rig)
+    if heat is None or now is None or _shown.get(rig.session_uid) == _state(now, heat.kind):
+        return False
+    _show_again(rig, heat.kind, heat.what, depsgraph)
+    return True
+
+
+def _show_again(rig: ArmatureObject, kind: str, what: str, depsgraph: Depsgraph) -> None:
+    try:
+        show(rig, kind, what, depsgraph)
+    except (FaceError, ValueError, LookupError):
+        hide(rig)  # what it showed is gone: a layer, a corrective that no longer fires
+
+
+def watch() -> None:
+    """Let the colours follow the pose."""
+    if not bpy.app.timers.is_registered(_look):
+        bpy.app.timers.register(_look, first_interval=_PAUSE)
+
+
+def _look() -> float | None:
+    """Look whether a pose is another one; so often that the colours take a quarter of the time."""
+    begin = perf_counter()
+    shown = [rig for rig in parts.rigs() if parts.HEAT in rig]
+    if not shown:
+        return None
+    if bpy.app.is_job_running("RENDER"):
+        return _PAUSE
+    layer = current_context().view_layer
+    for rig in shown:
+        if layer is not None and layer.depsgraph is not None:
+            refresh(rig, cast(Depsgraph, layer.depsgraph))
+    return max(_PAUSE, 3.0 * (perf_counter() - begin))
+
+
+def title(rig: ArmatureObject, heat: Heat) -> str:
+    """What a heat map shows, in a sentence.
+
+    Args:
+        rig: deforming armature of the face.
+        heat: its heat map.
+    """
+    if heat.kind == "POSE":
+        return told("Moved from neutral")
+    if heat.kind == "CONTROL":
+        return told("Reach of {name}", name=heat.what.rpartition(".")[2])
+    live, controls = runtime.of(rig), parts.controls_of(rig)
+    if heat.kind == "CORRECTIVE":
+        name = present.name_of(live, int(heat.what)) if live is not None else heat.what
+        return told("Added by {name}", name=name)
+    places = layers.places(controls) if controls is not None else ()
+    name = places[int(heat.what)].name if int(heat.what) < len(places) else heat.what
+    return told("Added by layer {name}", name=name)
+
+
+def forget() -> None:
+    """Session uids may mean others."""
+    _shown.clear()

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""3D views that show colours while there is a heat map, and what they showed before."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, cast
+
+import bpy
+
+_SETTINGS = ("type", "color_type", "light")
+# Pointer of a view -> its settings of before. A view has no name and outlives undo.
+_before: dict[int, dict[str, str]] = {}
+
+
+def _views() -> Iterator[bpy.types.SpaceView3D]:
+    for screen in bpy.data.screens:
+        for area in screen.areas:
+            for space in area.spaces:
+                if space.type == "VIEW_3D":
+                    yield cast("bpy.types.SpaceView3D", space)
+
+
+def show() -> None:
+    """Let all 3D views show the active colours of meshes."""
+    for view in _views():
+        if view.as_pointer() not in _before:
+            shading = view.shading
+            _before[view.as_pointer()] = {n: getattr(shading, n) for n in _SETTINGS}
+            shading.type = "SOLID"
+            shading.color_type = "VERTEX"
+            shading.light = "STUDIO"
+            for area in view.id_data.areas if isinstance(view.id_data, bpy.types.Screen) else ():
+                area.tag_redraw()
+
+
+def give_back() -> None:
+    """Let all 3D views show what they showed before; what the user changed meanwhile stays."""
+    for view in _views():
+        before = _before.pop(view.as_pointer(), None)
+        shading: Any = view.shading
+        if before is None or (shading.type, shading.color_type) != ("SOLID", "VERTEX"):
+            continue
+        # The kind of colours and of light belongs to the solid view: it is set while that is shown.
+        shading.light, shading.color_type = before["light"], before["color_type"]
+        shading.type = before["type"]
+    _before.clear()
+
+
+def are_shown() -> bool:
+    """Whether views show colours for us."""
+    return bool(_before)

@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a layer adds: the controls with it and without it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...logic.animation import clip_units
+from ...logic.base.errors import FaceError
+from ...logic.base.sentences import told
+from ..animation import layer_mixing, layers
+from ..base import parts
+from ..base.blender_types import ArmatureObject, Depsgraph
+from ..character import runtime
+from ..frame import inputs
+
+HEAD_ANGLES = len(clip_units.HEAD)  # which the mixer has after the controls
+Controls = NDArray[np.float32]
+
+
+def raw_pair(
+    rig: ArmatureObject, live: runtime.Runtime, place: int, depsgraph: Depsgraph
+) -> tuple[Controls, Controls]:
+    """The raw controls of now, with a layer and without it: float32[R] each.
+
+    How it turns the head is not in it: that is no control.
+
+    Args:
+        rig: deforming armature.
+        live: Runtime of the character.
+        place: of the layer among the settings.
+        depsgraph: where the controls are read.
+
+    Raises:
+        FaceError: there is no such layer, or it cannot be played.
+    """
+    controls = parts.controls_there(rig)
+    maximum = parts.maximum_of(controls)
+    seen = controls.evaluated_get(depsgraph)
+    with_it, _ = inputs.read_inputs(seen, live, depsgraph, maximum)
+    stack = layer_mixing.compiled(controls, live, depsgraph.scene, maximum)
+    if place not in stack.places or not layers.has_any(controls):
+        raise FaceError(told("This layer plays nothing now."))
+    at = stack.places.index(place)
+    layer = stack.layers[at]
+    # One that was solo and is muted would let others through: one that moves nothing does not.
+    stack.layers[at] = replace(layer, mask=np.zeros(len(live.labels) + HEAD_ANGLES, np.float32))
+    stack.weights = ()  # so that the mixer takes its layers anew
+    try:
+        without_it, _ = inputs.read_inputs(seen, live, depsgraph, maximum)
+    finally:
+        stack.layers[at] = layer
+        stack.weights = ()
+    return with_it, without_it

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a face shows now, and what its controls are called."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import native
+from ..base import parts, written
+from ..base.blender_types import ArmatureObject
+from ..character import lods, runtime
+from ..frame import inputs, look_masks
+
+Factors = dict[int, list[int]]
+# id of a Runtime -> itself, its ControlNames, the factors of its correctives
+_known: dict[int, tuple[runtime.Runtime, native.ControlNames, Factors]] = {}
+
+
+@dataclass(frozen=True)
+class Present:
+    """A face at the pose that it has.
+
+    Attributes:
+        live: Runtime of the character.
+        raw: float32[R] raw controls, with bones and layers, whatever is left out of the look.
+        lod: the level that is shown.
+        look: what of it is shown.
+    """
+
+    live: runtime.Runtime
+    raw: NDArray[np.float32]
+    lod: int
+    look: look_masks.Look
+
+    @property
+    def rests(self) -> NDArray[np.float32]:
+        """float32[R], all controls at rest."""
+        return np.array(self.live.rests, np.float32)
+
+    def pose(self) -> native.Pose:
+        """What is shown."""
+        pose = self.live.rig.evaluate(look_masks.raw_of(self.look, self.raw, self.live), self.lod)
+        look_masks.apply(self.look, pose, self.live, self.lod)
+        return pose
+
+
+def of(rig: ArmatureObject) -> Present | None:
+    """What a character shows now; None where its data or its controls are lost, or it is baked.
+
+    Args:
+        rig: its deforming armature.
+    """
+    live, controls = runtime.of(rig), parts.controls_of(rig)
+    if live is None or controls is None or parts.BAKED in rig:
+        return None
+    state = written.inputs.get(rig.session_uid)
+    if isinstance(state, tuple):
+        raw, lod = np.frombuffer(state[0], np.float32), int(state[1])
+    else:  # nothing was evaluated since undo or load
+        raw, lod = inputs.read_sliders(controls, live), lods.viewport_level(rig)
+    return Present(live, raw, lod, look_masks.of(rig))
+
+
+def _known_of(live: runtime.Runtime) -> tuple[runtime.Runtime, native.ControlNames, Factors]:
+    kept = _known.get(id(live))
+    if kept is None or kept[0] is not live:
+        factors: Factors = {}
+        pairs = zip(live.dna.psds.rows.tolist(), live.dna.psds.columns.tolist(), strict=True)
+        for row, column in pairs:
+            factors.setdefault(row, []).append(column)
+        names = native.part("controls.control_names").ControlNames(live.dna)
+        kept = _known[id(live)] = (live, names, factors)
+    return kept
+
+
+def names_of(live: runtime.Runtime) -> native.ControlNames:
+    """The names of the vector raw | corrective | network | pose of a file, as explain has them."""
+    return _known_of(live)[1]
+
+
+def factors_of(live: runtime.Runtime) -> Factors:
+    """Each corrective with the controls that it is the product of."""
+    return _known_of(live)[2]
+
+
+def name_of(live: runtime.Runtime, control: int) -> str:
+    """What a control is called in lists: its last part; a corrective by its shape or its factors.
+
+    Args:
+        live: Runtime of the character.
+        control: index in raw | corrective | network | pose.
+    """
+    names = names_of(live)
+    if names.kind(control) != "corrective":
+        return str(names.short(control))
+    shape = str(names.name(control)).partition(" (")[2].rstrip(")")
+    if shape:
+        return shape
+    factors = [str(names.short(c)) for c in factors_of(live).get(control, ())]
+    return " x ".join(factors) or str(names.name(control))
+
+
+def forget() -> None:
+    """Let go of all names."""
+    _known.clear()

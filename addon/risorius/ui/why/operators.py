@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Blender takes properties where Python has annotations:
+# pyright: reportInvalidTypeForm=false
+"""Solo, mute, heat maps."""
+
+from dataclasses import replace
+
+import bpy
+
+from ... import native
+from ...logic.base.errors import FaceError
+from ...logic.base.sentences import told
+from ...scene.frame import evaluate, look_masks
+from ...scene.why import causes, heat
+from ..blender_types import Context, Operator, Result
+from ..common import FaceOperator, face_rig
+from ..words import of_error, say
+from .properties import choices
+
+MUTED = (
+    ("JOINTS", "Joints", "All joints rest"),
+    ("SHAPES", "Shapes", "All blend shapes rest"),
+    ("MAPS", "Maps", "All animated maps rest: wrinkles and blush"),
+)
+
+
+class RISORIUS_OT_solo(FaceOperator, Operator):
+    """Show this control alone: all others rest in the view; their values and keys stay"""
+
+    bl_idname = "risorius.solo"
+    bl_label = "Solo"
+
+    control: bpy.props.StringProperty(
+        name="Control", description="Name of the slider; empty for the one that is looked at"
+    )
+    corrective: bpy.props.IntProperty(
+        name="Corrective",
+        description="Instead of a control: all that this corrective is the product of",
+        default=-1,
+        options={"HIDDEN", "SKIP_SAVE"},
+    )
+    extend: bpy.props.BoolProperty(
+        name="Extend", description="Beside those that are shown already", options={"SKIP_SAVE"}
+    )
+
+    def execute(self, context: Context) -> Result:
+        rig = face_rig(context)
+        name = self.control or choices(context).control
+        names = [name]
+        if self.corrective >= 0:
+            names = causes.sliders_of(rig, self.corrective)
+        elif causes.control_of(rig, name) < 0:
+            self.report(
+                {"ERROR"}, say("{name} has no control {control}.", name=rig.name, control=name)
+            )
+            return {"CANCELLED"}
+        before = look_masks.of(rig).solo if self.extend else frozenset[str]()
+        look_masks.solo(rig, before | set(names))
+        evaluate.bring_up(context, rig)
+        return {"FINISHED"}
+
+
+class RISORIUS_OT_mute(FaceOperator, Operator):
+    """Let the joints, the shapes or the maps of the face rest in the view, or move again"""
+
+    bl_idname = "risorius.mute"
+    bl_label = "Mute"
+
+    kind: bpy.props.EnumProperty(name="Kind", description="What rests", items=MUTED)
+    enable: bpy.props.BoolProperty(
+        name="Mute", description="Whether they rest; else they move again", default=True
+    )
+
+    def execute(self, context: Context) -> Result:
+        rig = face_rig(context)
+        look_masks.mute(rig, self.kind, self.enable)
+        evaluate.bring_up(context, rig)
+        return {"FINISHED"}
+
+
+class RISORIUS_OT_show_all(FaceOperator, Operator):
+    """Show the whole face again: end solo and mute"""
+
+    bl_idname = "risorius.show_all"
+    bl_label = "Show the Whole Face"
+
+    def execute(self, context: Context) -> Result:
+        rig = face_rig(context)
+        look_masks.put(rig, look_masks.WHOLE)
+        evaluate.bring_up(context, rig)
+        return {"FINISHED"}
+
+
+class RISORIUS_OT_mask_renders(FaceOperator, Operator):
+    """Whether renders leave out too what is left out of the view"""
+
+    bl_idname = "risorius.mask_renders"
+    bl_label = "In Renders Too"
+
+    enable: bpy.props.BoolProperty(
+        name="In Renders Too", description="Whether renders leave it out too", default=True
+    )
+
+    def execute(self, context: Context) -> Result:
+        rig = face_rig(context)
+        look_masks.put(rig, replace(look_masks.of(rig), in_renders=self.enable))
+        return {"FINISHED"}
+
+
+class RISORIUS_OT_heat(FaceOperator, Operator):
+    """Colour the face by how far it is moved; materials stay, one click takes the colours away"""
+
+    bl_idname = "risorius.heat"
+    bl_label = "Heat Map"
+
+    kind: bpy.props.EnumProperty(
+        name="Kind",
+        description="What moves it",
+        items=(
+            ("POSE", "From Neutral", "How far the pose of now is from neutral"),
+            ("CONTROL", "Reach of a Control", "How far a control moves the neutral face"),
+            ("CORRECTIVE", "A Corrective", "What a corrective adds to the pose of now"),
+            ("LAYER", "A Layer", "What a layer adds to the pose of now"),
+            ("OFF", "Off", "Take the colours away; views show what they showed before"),
+        ),
+    )
+    what: bpy.props.StringProperty(
+        name="What",
+        description="Name of the control, number of the corrective, place of the layer; empty: the "
+        "control or layer that is chosen",
+    )
+
+    def execute(self, context: Context) -> Result:
+        rig = face_rig(context)
+        if self.kind == "OFF":
+            heat.hide(rig)
+            return {"FINISHED"}
+        what = self.what
+        if not what and self.kind == "CONTROL":
+            what = choices(context).control
+        try:
+            if self.kind in ("CORRECTIVE", "LAYER") and not what.isdigit():
+                raise FaceError(told("Choose a corrective or a layer first."))
+            shown = heat.show(rig, self.kind, what, context.evaluated_depsgraph_get())
+        except native.user_errors() as error:
+            self.report({"ERROR"}, of_error(error))
+            return {"CANCELLED"}
+        text = say("{what}: up to {most:.2f} mm", what=heat.title(rig, shown), most=shown.most)
+        self.report({"INFO"}, text)
+        return {"FINISHED"}
+
+
+CLASSES = (
+    RISORIUS_OT_solo,
+    RISORIUS_OT_mute,
+    RISORIUS_OT_show_all,
+    RISORIUS_OT_mask_renders,
+    RISORIUS_OT_heat,
+)

@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The panel See Why."""
+
+import bpy
+
+from ...scene.animation import layers
+from ...scene.base import parts
+from ...scene.base.blender_types import ArmatureObject, current_context
+from ...scene.frame import look_masks
+from ...scene.why import causes, heat, present
+from .. import words
+from ..blender_types import Context, Panel, UILayout
+from ..common import FaceOnlyPanel, face_controls, face_rig
+from .overlay import look_in_words
+from .properties import choices
+
+_ROWS = 10  # of a list
+_soon: list[bool] = []  # whether the strongest correctives are asked for, a moment after a change
+
+
+class RISORIUS_PT_why(FaceOnlyPanel, Panel):
+    bl_idname = "RISORIUS_PT_why"
+    bl_label = "See Why"
+    bl_order = 1
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: Context) -> None:
+        layout, rig = self.layout, face_rig(context)
+        if present.of(rig) is None:
+            words.write(layout, "This face shows no controls now.", "INFO")
+            return
+        look = look_masks.of(rig)
+        if not look.is_whole:
+            _draw_left_out(layout, look)
+        _draw_mutes(layout, look)
+        _draw_heat(layout, rig, context)
+        _draw_vertex(layout, rig)
+        header, body = layout.panel("RISORIUS_PT_why_control", default_closed=True)
+        header.label(text="A Control and Its Correctives", text_ctxt=words.CONTEXT)
+        if body is not None:
+            _draw_control(body, rig, context, look)
+        header, body = layout.panel("RISORIUS_PT_why_strongest", default_closed=True)
+        header.label(text="Strongest Correctives", text_ctxt=words.CONTEXT)
+        if body is not None:
+            _draw_strongest(body, rig)
+
+
+def _draw_left_out(layout: UILayout, look: look_masks.Look) -> None:
+    box = layout.box()
+    box.alert = True
+    words.write(box, look_in_words(look), "ERROR")
+    box.alert = False
+    box.operator("risorius.show_all", icon="LOOP_BACK")
+    row = box.row()
+    row.operator("risorius.mask_renders", depress=look.in_renders).enable = not look.in_renders
+    if not look.in_renders:
+        words.write(box, "Renders, keys and exports have the whole face.")
+
+
+def _draw_mutes(layout: UILayout, look: look_masks.Look) -> None:
+    row = layout.row(align=True)
+    row.label(text="Mute", text_ctxt=words.CONTEXT)
+    for kind, text in (("JOINTS", "Joints"), ("SHAPES", "Shapes"), ("MAPS", "Maps")):
+        button = row.operator("risorius.mute", text=text, depress=kind in look.muted)
+        button.kind, button.enable = kind, kind not in look.muted
+
+
+def _draw_heat(layout: UILayout, rig: ArmatureObject, context: Context) -> None:
+    shown = heat.of(rig)
+    column = layout.column(align=True)
+    row = column.row(align=True)
+    on = shown is not None and shown.kind == "POSE"
+    row.operator(
+        "risorius.heat", text="From Neutral", icon="SHADING_RENDERED", depress=on
+    ).kind = "POSE"
+    if shown is not None:
+        row.operator("risorius.heat", text="", icon="X").kind = "OFF"
+        words.show(column, words.say(heat.title(rig, shown)))
+        words.show(column, words.say("0 (violet) to {most:.2f} mm (yellow)", most=shown.most))
+    controls = face_controls(context)
+    for place, layer in layers.ordered(controls):
+        depress = shown is not None and (shown.kind, shown.what) == ("LAYER", str(place))
+        text = words.say("What {name} Adds", name=layer.name)
+        button = column.operator("risorius.heat", text=text, depress=depress, translate=False)
+        button.kind, button.what = "LAYER", str(place)
+
+
+def _draw_vertex(layout: UILayout, rig: ArmatureObject) -> None:
+    layout.operator("risorius.why_vertex", icon="EYEDROPPER")
+    found = causes.last(rig)
+    if found is None:
+        return
+    column = layout.column(align=True)
+    head = words.say("Vertex {vertex}, {moved:.2f} mm", vertex=found.vertex, moved=found.moved)
+    words.show(column, head)
+    for cause in found.causes[:_ROWS]:
+        _draw_cause(column, cause, max(found.moved, found.causes[0].now))
+    _draw_more(column, len(found.causes) - _ROWS)
+
+
+def _draw_more(layout: UILayout, count: int) -> None:
+    if count > 0:
+        words.show(layout, words.say("and {count} more", count=count))
+
+
+def _draw_cause(layout: UILayout, cause: causes.Cause, most: float) -> None:
+    """A line: name, millimetres, its heat map, it alone."""
+    row = layout.row(align=True)
+    if cause.now:
+        text = words.say("{name}  {now:.2f} mm", name=cause.name, now=cause.now)
+    else:
+        text = words.say("{name}  could {full:.2f} mm", name=cause.name, full=cause.full)
+    row.progress(text=text, factor=min(cause.now / most, 1.0) if most else 0.0, translate=False)
+    button = row.operator("risorius.heat", text="", icon="SHADING_RENDERED")
+    solo = row.operator("risorius.solo", text="", icon="SOLO_ON")
+    if cause.is_raw:
+        button.kind, button.what = "CONTROL", cause.label
+        solo.control = cause.label
+    else:
+        button.kind, button.what = "CORRECTIVE", str(cause.control)
+        solo.corrective = cause.control
+
+
+def _draw_control(
+    layout: UILayout, rig: ArmatureObject, context: Context, look: look_masks.Look
+) -> None:
+    chosen = choices(context)
+    layout.prop(chosen, "control", text="", icon="VIEWZOOM")
+    control = causes.control_of(rig, chosen.control)
+    if control < 0:
+        return
+    row = layout.row(align=True)
+    alone = look.solo == {chosen.control}
+    row.operator("risorius.solo", icon="SOLO_ON", depress=alone).control = chosen.control
+    button = row.operator("risorius.heat", text="Reach", icon="SHADING_RENDERED")
+    button.kind, button.what = "CONTROL", chosen.control
+    layout.prop(chosen, "show_graph")
+    column = layout.column(align=True)
+    found = causes.parts_of(rig, control)
+    if not found:
+        words.show(column, words.say("No correctives."))
+    for part in found[:_ROWS]:
+        others = ", ".join(f"{name} {value:.2f}" for name, value in part.others)
+        row = column.row(align=True)
+        text = f"{part.name}  {part.value:.2f}"
+        row.progress(text=text, factor=min(max(part.value, 0.0), 1.0), translate=False)
+        words.show(column, f"   x {others}")
+    _draw_more(column, len(found) - _ROWS)
+
+
+def _draw_strongest(layout: UILayout, rig: ArmatureObject) -> None:
+    if not causes.is_known(rig):
+        _ask_soon()
+    fired = causes.known(rig)
+    column = layout.column(align=True)
+    if not fired:
+        words.show(column, words.say("No corrective fires."))
+    for cause in fired[:_ROWS]:
+        _draw_cause(column, cause, fired[0].now)
+
+
+def _ask_soon() -> None:
+    """Compute the list when the hand rests for a moment: a drag shall not wait for it."""
+    if not _soon:
+        _soon.append(True)
+        bpy.app.timers.register(_ask, first_interval=0.2)
+
+
+def _ask() -> None:
+    _soon.clear()
+    for rig in parts.rigs():
+        causes.strongest(rig)
+    for window in current_context().window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                area.tag_redraw()
+
+
+def stop() -> None:
+    """Ask for nothing any more."""
+    if bpy.app.timers.is_registered(_ask):
+        bpy.app.timers.unregister(_ask)
+    _soon.clear()
+
+
+CLASSES = (RISORIUS_PT_why,)

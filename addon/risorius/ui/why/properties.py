@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Blender takes properties where Python has annotations:
+# pyright: reportInvalidTypeForm=false
+"""What the user looks at in See Why; it goes with the window."""
+
+from collections.abc import Iterator
+from typing import cast
+
+import bpy
+
+from ...logic.character import slider_words
+from ...scene.base import parts
+from ...scene.character import runtime
+from ..blender_types import Context
+
+
+def _labels(_self: bpy.types.PropertyGroup, given: bpy.types.Context, typed: str) -> Iterator[str]:
+    """The sliders of the active face that have the typed words."""
+    rig = parts.active_rig(cast(Context, given))
+    live = runtime.of(rig) if rig is not None else None
+    labels = live.labels if live is not None else ()
+    return (label for label in labels if slider_words.matches(label, typed))
+
+
+class RISORIUS_PG_why(bpy.types.PropertyGroup):
+    """What the user looks at."""
+
+    control: bpy.props.StringProperty(
+        name="Control",
+        description="The slider that is looked at: its reach, its correctives, it alone",
+        search=_labels,
+        search_options={"SORT"},
+    )
+    show_graph: bpy.props.BoolProperty(
+        name="Draw in the View",
+        description="Draw the control and its correctives over the 3D view, with values",
+    )
+
+
+def choices(context: Context) -> RISORIUS_PG_why:
+    """What the user looks at. Args: context  Blender context."""
+    return cast(RISORIUS_PG_why, context.window_manager.risorius_why)  # type: ignore[attr-defined]
+
+
+CLASSES = (RISORIUS_PG_why,)
