@@ -112,6 +112,7 @@ OTHERS = {
     "keys what stands": "key",
     "the range of sliders: keys are cut as well": "set_overdrive",
     "drivers; each side shows what it showed": "link_sides",
+    "what is shown, and why": "heat hide_hints mask_renders mute show_all solo why_vertex",
     "reads the controls": "copy_pose make_pose_assets",
     "lies above the sliders": "layer_add layer_remove layer_move layer_duplicate layer_warp "
     "layers_to_nla fire unfire",
