@@ -39,6 +39,9 @@ def test_a_fresh_face_has_a_hint_until_it_moves_or_it_is_dismissed(rig):
     def says():
         return "drag a slider" in drawn(bpy.types.RISORIUS_PT_character).text()
 
+    addons = bpy.context.preferences.addons
+    entry = addons.new()  # tests enable the add-on without one
+    entry.module = scene.MODULE
     assert says()
     scene.set_controls(rig, jawOpen=0.3)
     assert not says()
@@ -46,8 +49,9 @@ def test_a_fresh_face_has_a_hint_until_it_moves_or_it_is_dismissed(rig):
     assert says()
     assert bpy.ops.risorius.hide_hints() == {"FINISHED"}
     assert not says()
-    bpy.context.preferences.addons[scene.MODULE].preferences.hints = True
+    addons[scene.MODULE].preferences.hints = True
     assert says()
+    addons.remove(addons[scene.MODULE])
 
 
 def test_without_the_native_module_the_panel_says_so(rig, monkeypatch):

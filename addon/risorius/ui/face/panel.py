@@ -74,7 +74,8 @@ def _draw_step(layout: UILayout, text: str) -> None:
 def _draw_hint(layout: UILayout, context: Context, rig: ArmatureObject) -> None:
     """What to do with a face that nobody has moved yet, until it is read or done."""
     addon = context.preferences.addons.get(native.ADDON)
-    if addon is None or not addon.preferences.hints or not _is_at_rest(rig):
+    hidden = addon is not None and not getattr(addon.preferences, "hints", True)
+    if hidden or not _is_at_rest(rig):
         return
     box = layout.box()
     row = box.row()

@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: MIT
+"""A pointer and a keyboard on a Blender's window, its screen as an array, and questions to it."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from PIL import Image
+
+Pixels = npt.NDArray[np.int16]  # rows, columns, red green blue
+WIDTH, HEIGHT = 1280, 800
+PATIENCE = 240.0  # seconds for what a busy machine may take; waiting ends as soon as it is so
+_PYTHON = "ctrl+c"  # over a button: copies the command that it runs
+_PATH = "ctrl+shift+alt+c"  # over a field: copies the path of its value
+
+
+class LateError(Exception):
+    """Something did not come to be, in a time that is long for every machine."""
+
+
+class Hand:
+    """Moves the pointer of a display; asks Blender only to know where things are and what is so."""
+
+    def __init__(self, talk: Path, out: Path, blender: subprocess.Popen[bytes]) -> None:
+        self.talk, self.out, self.blender = talk, out, blender
+        self.count = 0
+
+    # ---- questions
+
+    def ask(self, name: str, **arguments: object) -> Any:
+        """What a function of inside.py gives.
+
+        Args:
+            name: of the function.
+            arguments: of it.
+
+        Raises:
+            RuntimeError: it failed, or Blender is gone.
+            LateError: no answer.
+        """
+        number, self.count = self.count, self.count + 1
+        part = self.talk / "ask.part"
+        part.write_text(json.dumps({"name": name, "arguments": arguments}), encoding="utf-8")
+        part.rename(self.talk / f"ask-{number}.json")
+        answer = self.talk / f"answer-{number}.json"
+        end = time.monotonic() + PATIENCE
+        while not answer.exists():
+            if self.blender.poll() is not None:
+                raise RuntimeError(f"Blender ended while it was asked for {name}")
+            if time.monotonic() > end:
+                raise LateError(f"no answer to {name}")
+            time.sleep(0.02)
+        given = json.loads(answer.read_text(encoding="utf-8"))
+        if "error" in given:
+            raise RuntimeError(given["error"])
+        return given["value"]
+
+    def wait(self, what: str, holds: Callable[[], Any], patience: float = PATIENCE) -> Any:
+        """Wait until something holds.
+
+        Args:
+            what: in words, for the one who reads that it never did.
+            holds: gives what is true in the end.
+            patience: seconds.
+
+        Raises:
+            LateError: it never held.
+        """
+        end = time.monotonic() + patience
+        while True:
+            value = holds()
+            if value:
+                return value
+            if time.monotonic() > end:
+                raise LateError(what)
+            time.sleep(0.1)
+
+    # ---- the pointer
+
+    def do(self, *words: object) -> None:
+        """One command of xdotool."""
+        subprocess.run(["xdotool", *map(str, words)], check=True)
+
+    def move(self, x: float, y: float) -> None:
+        """Put the pointer somewhere; Blender knows of it when this returns."""
+        self.do("mousemove", "--sync", round(x), round(y) - 1)
+        self.do("mousemove", "--sync", round(x), round(y))
+        self.ask("ready")
+
+    def click(self, x: float, y: float, button: int = 1) -> None:
+        self.move(x, y)
+        self.do("click", button)
+        self.ask("ready")
+
+    def drag(self, start: tuple[float, float], end: tuple[float, float], steps: int = 8) -> None:
+        """Press, go there in steps, let go. Args: start, end  on the screen; steps  on the way."""
+        self.begin_drag(start)
+        self.go(start, end, steps)
+        self.do("mouseup", 1)
+        self.ask("ready")
+
+    def begin_drag(self, start: tuple[float, float]) -> None:
+        self.move(*start)
+        self.do("mousedown", 1)
+        self.ask("ready")
+
+    def go(self, start: tuple[float, float], end: tuple[float, float], steps: int = 8) -> None:
+        """Move in steps, each of which Blender has seen."""
+        for number in range(1, steps + 1):
+            share = number / steps
+            at = [a + (b - a) * share for a, b in zip(start, end, strict=True)]
+            self.do("mousemove", "--sync", round(at[0]), round(at[1]))
+            self.ask("ready")
+
+    def key(self, keys: str) -> None:
+        self.do("key", keys)
+        self.ask("ready")
+
+    def type(self, text: str) -> None:
+        self.do("type", "--delay", 30, text)
+        self.ask("ready")
+
+    # ---- what stands under the pointer
+
+    def under(self, x: float, y: float, keys: str) -> str:
+        """What the shortcut of the button at a place copies; empty where there is none."""
+        self.ask("clipboard", text=" ")
+        self.move(x, y)
+        self.key(keys)
+        return str(self.ask("clipboard")).strip()
+
+    def find(self, pattern: str, of_field: bool = False, columns: tuple[float, ...] = (0.5,),
+             area: list[int] | None = None, step: int = 10) -> tuple[float, float]:  # fmt: skip
+        """Where in the sidebar the button is that runs a command, or the field of a value.
+
+        Each place is asked by the shortcuts that Blender has for it, so this needs no knowledge of
+        the layout.
+
+        Args:
+            pattern: regular expression of the command or of the path of the value.
+            of_field: whether it is a value.
+            columns: where across the sidebar it is looked for, 0 to 1.
+            area: left, top, width, height instead of the sidebar.
+            step: pixels from one place to the next.
+
+        Raises:
+            LateError: it is not there.
+        """
+        left, top, width, height = area or self.ask("layout")["sidebar"]
+        keys = _PATH if of_field else _PYTHON
+        for column in columns:
+            x = left + (width - 24) * column
+            for y in range(top + 6, top + height - 4, step):
+                if re.search(pattern, self.under(x, y, keys)):
+                    return x, y
+        raise LateError(f"no button or field {pattern!r} in the sidebar")
+
+    # ---- the screen
+
+    def screen(self) -> Pixels:
+        """The whole screen, int16[height, width, 3]."""
+        command = ["import", "-window", "root", "-depth", "8", "rgb:-"]
+        raw = subprocess.run(command, stdout=subprocess.PIPE, check=True).stdout
+        return np.frombuffer(raw, np.uint8).reshape(HEIGHT, WIDTH, 3).astype(np.int16)
+
+    def still(self) -> Pixels:
+        """The screen when two looks at it in a row are the same."""
+        seen = self.screen()
+        end = time.monotonic() + PATIENCE
+        while True:
+            time.sleep(0.4)
+            now = self.screen()
+            if np.array_equal(now, seen):
+                return now
+            if time.monotonic() > end:
+                raise LateError("the screen never stands still")
+            seen = now
+
+    def picture(self, name: str, box: tuple[int, int, int, int] | None = None) -> None:
+        """Keep the screen as OUT/NAME.png. Args: box  left, top, right, bottom of a part."""
+        pixels = self.still().astype(np.uint8)
+        image = Image.fromarray(pixels)
+        (image.crop(box) if box else image).save(self.out / f"{name}.png")
+
+
+def difference(one: Pixels, other: Pixels, box: list[float]) -> float:
+    """Share of the pixels in a box that differ, visibly.
+
+    Args:
+        one, other: screens.
+        box: left, top, right, bottom.
+    """
+    left, top, right, bottom = (round(max(v, 0)) for v in box)
+    part = np.abs(one[top:bottom, left:right] - other[top:bottom, left:right]).max(axis=2)
+    return float((part > 12).mean()) if part.size else 0.0

@@ -1,0 +1,283 @@
+# SPDX-License-Identifier: MIT
+"""Answers, in a Blender with a window, what drive.py asks of it; the hand itself is the X server's.
+
+    blender --python inside.py -- TALK
+
+TALK is a folder: ask-N.json comes, answer-N.json goes, N from 0 on. What is asked are the functions of
+this file by their names. Questions are answered by the event loop, so that an answer also says that
+what the pointer did before has been dealt with.
+"""
+
+import json
+import os
+import sys
+import traceback
+from pathlib import Path
+
+import bpy
+import numpy as np
+from bpy_extras import view3d_utils
+
+TALK = Path(sys.argv[sys.argv.index("--") + 1])
+_next = [0]
+_drawn, _watched = {}, set()
+
+
+def window():
+    return bpy.context.window_manager.windows[0]
+
+
+def view():
+    """The 3D view of the main window: area, its drawing region, its sidebar."""
+    area = next(a for a in window().screen.areas if a.type == "VIEW_3D")
+    regions = {r.type: r for r in area.regions}
+    return area, regions["WINDOW"], regions["UI"]
+
+
+def rectangle(item):
+    """Of an area or region: left, top, width, height on the screen."""
+    return [item.x, window().height - item.y - item.height, item.width, item.height]
+
+
+def over(area, region):
+    return bpy.context.temp_override(window=window(), area=area, region=region)
+
+
+def rig():
+    return next((o for o in bpy.data.objects if "risorius_controls" in o), None)
+
+
+def face():
+    return rig()["risorius_controls"].pose.bones["face"]
+
+
+def module(name):
+    """A module of the add-on."""
+    return sys.modules[f"bl_ext.user_default.risorius.{name}"]
+
+
+# ---- what is asked
+
+
+def ready():
+    """Versions, and what areas there are."""
+    return {
+        "blender": bpy.app.version_string,
+        "areas": {a.type: rectangle(a) for a in window().screen.areas},
+    }
+
+
+def layout():
+    """Where the 3D view and its sidebar are."""
+    _area, drawing, sidebar = view()
+    return {"view": rectangle(drawing), "sidebar": rectangle(sidebar)}
+
+
+def show_tab(wide=0):
+    """The sidebar with our tab."""
+    area, _drawing, sidebar = view()
+    area.spaces.active.show_region_ui = True
+    try:
+        sidebar.active_panel_category = "Risorius"
+    except (AttributeError, TypeError):  # before it was first drawn
+        return False
+    area.tag_redraw()
+    return sidebar.active_panel_category == "Risorius"
+
+
+def quiet():
+    """No splash, the file browser in this window, no cube; a light that shows relief."""
+    preferences = bpy.context.preferences
+    preferences.view.show_splash = False
+    preferences.view.filebrowser_display_type = "SCREEN"
+    preferences.view.show_tooltips = False
+    preferences.use_preferences_save = False
+    for name in ("Cube", "Light"):
+        if name in bpy.data.objects:
+            bpy.data.objects.remove(bpy.data.objects[name])
+    return True
+
+
+def clipboard(text=None):
+    """What a button's shortcut copied; or put another text there."""
+    manager = bpy.context.window_manager
+    if text is not None:
+        manager.clipboard = text
+    return manager.clipboard
+
+
+def state():
+    """What the face has now."""
+    found = rig()
+    operators = bpy.context.window_manager.operators
+    out = {
+        "face": found is not None,
+        "frame": bpy.context.scene.frame_current,
+        "areas": sorted(a.type for a in window().screen.areas),
+        "last": operators[-1].bl_idname if operators else "",
+    }
+    if found is None:
+        return out
+    controls = found["risorius_controls"]
+    action = controls.animation_data.action if controls.animation_data else None
+    return out | {
+        "sliders": {k: float(v) for k, v in face().items() if isinstance(v, int | float) and v},
+        "layers": [y.name for y in controls.risorius_layers if not y.removed],
+        "keyed": action is not None,
+        "look": found.get("risorius_look", ""),
+        "heat": found.get("risorius_heat", ""),
+        "mode": controls.mode,
+        "keys": sorted(controls.keys()),
+    }
+
+
+def head():
+    """The mesh that has most vertices of those that are shown."""
+    shown = [o for o in bpy.data.objects if o.get("risorius_rig") and o.type == "MESH"]
+    shown = [o for o in shown if "dna_mesh" in o and o.visible_get()]
+    return max(shown, key=lambda o: len(o.data.vertices))
+
+
+def points():
+    """float64[V, 3] of the head as it is shown, in the world."""
+    seen = head().evaluated_get(bpy.context.evaluated_depsgraph_get())
+    flat = np.empty(len(seen.data.vertices) * 3, np.float32)
+    seen.data.vertices.foreach_get("co", flat)
+    world = np.array(seen.matrix_world)
+    return flat.reshape(-1, 3).astype(float) @ world[:3, :3].T + world[:3, 3]
+
+
+def on_screen(place):
+    """A place of the world on the screen, or None behind the eye."""
+    area, drawing, _sidebar = view()
+    at = view3d_utils.location_3d_to_region_2d(drawing, area.spaces.active.region_3d, place)
+    if at is None:
+        return None
+    left, top, _width, height = rectangle(drawing)
+    return [left + at.x, top + height - at.y]
+
+
+def face_box():
+    """Where the head lies on the screen: left, top, right, bottom."""
+    spots = np.array([on_screen(p) for p in points()[::7]])
+    return [*spots.min(axis=0), *spots.max(axis=0)]
+
+
+def moved_by(control):
+    """Where on the screen the vertex is that a control moves most, and the vertex."""
+    live = module("scene.character.runtime").of(rig())
+    rests = np.array(live.rests, np.float32)
+    raised = rests.copy()
+    raised[live.labels.index(control)] = 1.0
+    poses = [live.rig.evaluate(raw) for raw in (raised, rests)]
+    pairs = [(p.joints, p.blend_shapes) for p in poses]
+    far = module("scene.why.displacement").distances(live, int(head()["dna_mesh"]), *pairs)
+    vertex = int(np.argmax(far))
+    return {"vertex": vertex, "at": on_screen(points()[vertex])}
+
+
+def vertex_at(vertex):
+    """Where a vertex of the head is now: in the world and on the screen."""
+    place = points()[vertex]
+    return {"world": place.tolist(), "at": on_screen(place)}
+
+
+def bone_at(name):
+    """Where the middle of a bone of the controls is on the screen."""
+    controls = rig()["risorius_controls"]
+    bone = controls.pose.bones[name]
+    return on_screen(controls.matrix_world @ ((bone.head + bone.tail) / 2))
+
+
+def bones():
+    return [b.name for b in rig()["risorius_controls"].pose.bones]
+
+
+def has(operator):
+    """Whether there is an operator of this name."""
+    group, _, name = operator.partition(".")
+    return name in dir(getattr(bpy.ops, group))
+
+
+def found_causes():
+    """What See Why last found of a vertex."""
+    found = module("scene.why.causes").last(rig())
+    return None if found is None else {"vertex": found.vertex, "first": found.causes[0].name}
+
+
+def settle():
+    """The view from the front on the face, as an import leaves it."""
+    area, drawing, _sidebar = view()
+    with over(area, drawing):
+        bpy.ops.view3d.view_axis(type="FRONT")
+    area.spaces.active.region_3d.view_perspective = "ORTHO"
+    area.spaces.active.overlay.show_floor = False
+    return True
+
+
+def center(zoom=1.0):
+    """The face in the middle of the view, so high that it fills it."""
+    area, _drawing, _sidebar = view()
+    spots = points()
+    eye = area.spaces.active.region_3d
+    eye.view_location = (spots.min(axis=0) + spots.max(axis=0)) / 2
+    eye.view_distance = float(np.ptp(spots[:, 2])) * 1.9 / zoom
+    return True
+
+
+def watch(panel):
+    """Count from now on how often a section of the tab is drawn: only open ones are."""
+    kind = getattr(bpy.types, panel)
+    draw = kind.draw
+
+    def counted(self, context):
+        _drawn[panel] = _drawn.get(panel, 0) + 1
+        draw(self, context)
+
+    if panel not in _watched:
+        _watched.add(panel)
+        kind.draw = counted
+    return True
+
+
+def drawn(panel):
+    """Whether a section is drawn when the sidebar is drawn now."""
+    _drawn[panel] = 0
+    _area, _drawing, sidebar = view()
+    sidebar.tag_redraw()
+    with bpy.context.temp_override(window=window()):
+        bpy.ops.wm.redraw_timer(type="DRAW_WIN", iterations=1)
+    return _drawn[panel] > 0
+
+
+def run(code):
+    """Python that sets the scene for a picture; the checks never use it."""
+    exec(code, globals())  # noqa: S102
+    return True
+
+
+def leave():
+    """End Blender, without a word on unsaved work."""
+    sys.stdout.flush()
+    os._exit(0)
+
+
+def answer():
+    """Answer all that is asked, and come again."""
+    while True:
+        path = TALK / f"ask-{_next[0]}.json"
+        if not path.exists():
+            return 0.02
+        given = json.loads(path.read_text(encoding="utf-8"))
+        try:
+            reply = {"value": globals()[given["name"]](**given["arguments"])}
+        except Exception:  # noqa: BLE001  the driver prints it
+            reply = {"error": traceback.format_exc()}
+        done = TALK / f"answer-{_next[0]}.json"
+        part = done.with_suffix(".part")
+        part.write_text(json.dumps(reply), encoding="utf-8")
+        part.rename(done)
+        _next[0] += 1
+
+
+bpy.app.timers.register(answer, first_interval=0.5, persistent=True)
