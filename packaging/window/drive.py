@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
 """An animator's hand in the real window of a Blender, and whether the face followed; see window.sh.
 
-    python drive.py OUT NAME DNA COMMAND...
+    python drive.py OUT USER STEPS COMMAND...
 
-OUT gets pictures and logs; COMMAND starts Blender, inside.py and the folder TALK come after it. Prints
+OUT gets pictures and logs; USER is the folder of this Blender's user, with inside.py and man.dna;
+STEPS are names of functions of this file, with commas, or nothing; COMMAND starts Blender. Prints
 rows `row<TAB>check<TAB>passed<TAB>failed`, and `say` for what this Blender or the extension lacks.
 """
 
@@ -197,7 +198,9 @@ def add_layer(hand: Hand, _dna: Path) -> Iterator[Check]:
     x, y = hand.find(r"risorius\.layer_remove", columns=(0.97, 0.93, 1.0))
     hand.click(x, y - 21)  # the plus above the minus is a menu, which no shortcut names
     hand.still()
-    entry = hand.find(r"risorius\.layer_add\(.*IDLE", area=[round(x) - 210, round(y) - 160, 190, 330])
+    entry = hand.find(
+        r"risorius\.layer_add\(.*IDLE", area=[round(x) - 210, round(y) - 160, 190, 330]
+    )
     hand.click(*entry)
     hand.wait("a layer is there", lambda: hand.ask("state")["layers"])
     yield "a layer is added by its menu", len(hand.ask("state")["layers"]) == 1
@@ -256,7 +259,10 @@ def see_why(hand: Hand, _dna: Path) -> Iterator[Check]:
     corner = hand.ask("moved_by", control=SMILE[0])
     hand.click(*corner["at"])
     found = hand.wait("a vertex is found", lambda: hand.ask("found_causes"))
-    yield "a click on the corner of the mouth lists what moves it", found["first"].startswith("mouth")
+    yield (
+        "a click on the corner of the mouth lists what moves it",
+        found["first"].startswith("mouth"),
+    )
     hand.still()
     hand.picture("why")
     hand.click(*hand.find(r"risorius\.heat\(.*OFF", columns=(0.96, 0.92, 1.0)))
@@ -312,18 +318,19 @@ def hand_over(hand: Hand, name: str) -> None:
 
 def main() -> int:
     """See above; exit code 0 only if nothing failed."""
-    out, dna, wanted, *command = sys.argv[1:]
+    out, user, wanted, *command = sys.argv[1:]
     folder = Path(out)
-    with tempfile.TemporaryDirectory(prefix="talk", dir=folder) as talk:
+    with tempfile.TemporaryDirectory(prefix="talk", dir=user) as talk:
         log = (folder / "blender.log").open("wb")
-        here = Path(__file__).resolve().parent
         arguments = ["--window-geometry", "0", "0", str(WIDTH), str(HEIGHT), "-noaudio"]
-        arguments += ["--python", str(here / "inside.py"), "--", talk]
+        arguments += ["--python", str(Path(user) / "inside.py"), "--", talk]
         blender = subprocess.Popen([*command, *arguments], stdout=log, stderr=log)
         try:
             hand = Hand(Path(talk), folder, blender)
             print(f"say\tBlender {hand.ask('ready')['blender']}", flush=True)
-            return 1 if run(hand, Path(dna), [w for w in wanted.split(",") if w]) else 0
+            return (
+                1 if run(hand, Path(user) / "man.dna", [w for w in wanted.split(",") if w]) else 0
+            )
         finally:
             blender.kill()
             blender.wait()

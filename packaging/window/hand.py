@@ -16,7 +16,7 @@ import numpy.typing as npt
 from PIL import Image
 
 Pixels = npt.NDArray[np.int16]  # rows, columns, red green blue
-WIDTH, HEIGHT = 1280, 800
+WIDTH, HEIGHT = 1440, 900
 PATIENCE = 240.0  # seconds for what a busy machine may take; waiting ends as soon as it is so
 _PYTHON = "ctrl+c"  # over a button: copies the command that it runs
 _PATH = "ctrl+shift+alt+c"  # over a field: copies the path of its value

@@ -3,8 +3,8 @@
 
     blender --python inside.py -- TALK
 
-TALK is a folder: ask-N.json comes, answer-N.json goes, N from 0 on. What is asked are the functions of
-this file by their names. Questions are answered by the event loop, so that an answer also says that
+TALK is a folder: ask-N.json comes, answer-N.json goes, N from 0 on. What is asked are the functions
+of this file by their names. Questions are answered by the event loop, so that an answer also says that
 what the pointer did before has been dealt with.
 """
 
@@ -86,9 +86,8 @@ def show_tab(wide=0):
 
 
 def quiet():
-    """No splash, the file browser in this window, no cube; a light that shows relief."""
+    """The file browser in this window, no cube; a light that shows relief."""
     preferences = bpy.context.preferences
-    preferences.view.show_splash = False
     preferences.view.filebrowser_display_type = "SCREEN"
     preferences.view.show_tooltips = False
     preferences.use_preferences_save = False
@@ -252,7 +251,7 @@ def drawn(panel):
 
 def run(code):
     """Python that sets the scene for a picture; the checks never use it."""
-    exec(code, globals())  # noqa: S102
+    exec(code, globals())
     return True
 
 
@@ -280,4 +279,5 @@ def answer():
         _next[0] += 1
 
 
+bpy.context.preferences.view.show_splash = False
 bpy.app.timers.register(answer, first_interval=0.5, persistent=True)
