@@ -4,8 +4,8 @@
     blender --python inside.py -- TALK
 
 TALK is a folder: ask-N.json comes, answer-N.json goes, N from 0 on. What is asked are the functions
-of this file by their names. Questions are answered by the event loop, so that an answer also says that
-what the pointer did before has been dealt with.
+of this file by their names. Questions are answered by the event loop, so that an answer also says
+that what the pointer did before has been dealt with.
 """
 
 import json
