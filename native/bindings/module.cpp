@@ -14,6 +14,7 @@ void bind_edit(py::module_& m);
 void bind_files(py::module_& m);
 void bind_mixer(py::module_& m);
 void bind_rig(py::module_& m);
+void bind_solve(py::module_& m);
 
 namespace {
 
@@ -51,6 +52,7 @@ PYBIND11_MODULE(_native, m) {
   m.attr("DnaError") = pybind11::handle(risorius::bindings::dna_error_type);
   risorius::bindings::bind_dna(m);
   risorius::bindings::bind_rig(m);
+  risorius::bindings::bind_solve(m);
   risorius::bindings::bind_edit(m);
   risorius::bindings::bind_author(m);
   risorius::bindings::bind_correct(m);

@@ -50,6 +50,7 @@ from .base.errors import RisoriusError
 from .base.version import __version__ as __version__
 from .rigs.cache import compile_cached
 from .rigs.load import Finding, check, load
+from .solving.clip import SolvedClip, solve_clip
 from .solving.drag import Solved, best_controls, solve_drag
 from .solving.handles import place_handles
 from .solving.surface import Surface
@@ -95,6 +96,7 @@ __all__ = [
     "Rig",
     "RisoriusError",
     "Solved",
+    "SolvedClip",
     "Surface",
     "TwistSwingBehavior",
     "TwistSwingSetup",
@@ -106,5 +108,6 @@ __all__ = [
     "idle",
     "load",
     "place_handles",
+    "solve_clip",
     "solve_drag",
 ]

@@ -1027,6 +1027,43 @@ class BoneSpace:
     def evaluate(self, joints: npt.ArrayLike) -> tuple[_F32, _F32, _F32]:
         """float32[J, 9] of a Pose -> (location[n, 3], rotation[n, 4] w x y z, scale[n, 3])."""
 
+class Skins:
+    """See risorius.Surface."""
+
+    def __init__(self, dna: Dna, rig: Rig, lod: _Int) -> None: ...
+
+class Probe:
+    """Some points of Skins: uint32[P, 2], mesh and vertex."""
+
+    def __init__(self, skins: Skins, points: npt.ArrayLike) -> None: ...
+    def positions(self, raw: npt.ArrayLike) -> _F64:
+        """float32[R] -> float64[P, 3]."""
+    def linearise(self, raw: npt.ArrayLike, highest: npt.ArrayLike, free: npt.ArrayLike) -> None:
+        """Keeps what each control does to the points at a pose."""
+    def jacobian(self) -> _F32:
+        """float32[P, 3, R], as linearise found it."""
+    def normal_matrix(self) -> _F64:
+        """float64[R, R]: its J^T J."""
+    def gradient(self, residual: npt.ArrayLike) -> _F64:
+        """float64[P, 3] -> float64[R]: its J^T residual."""
+
+def least_change(
+    a: npt.ArrayLike, b: npt.ArrayLike, low: npt.ArrayLike, high: npt.ArrayLike, ridge: _Float
+) -> _F64:
+    """The x in [low, high] with the least |a x - b|^2 + ridge |x|^2."""
+
+def descend(
+    h: npt.ArrayLike,
+    g: npt.ArrayLike,
+    low: npt.ArrayLike,
+    high: npt.ArrayLike,
+    rest: npt.ArrayLike,
+    sparse: npt.ArrayLike,
+    start: npt.ArrayLike,
+    tolerance: _Float = 1e-5,
+) -> _F64:
+    """The x in [low, high] with the least 1/2 x^T h x - g^T x + sparse |x - rest|."""
+
 def rig_block_version() -> int:
     """Of Rig.to_bytes; others are refused."""
 

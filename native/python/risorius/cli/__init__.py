@@ -28,7 +28,7 @@ from . import (
     speech,
 )
 from . import eval as evaluate
-from .faces import author, mix, sample
+from .faces import author, mix, sample, solve
 from .files import CommandLineError
 from .pages import plot, web
 
@@ -89,6 +89,7 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
         mix,
         clip,
         speech,
+        solve,
         live,
         batch,
     )

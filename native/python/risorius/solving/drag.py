@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from .._native import Probe, least_change
 from ..base.errors import ArgumentError
 from .surface import Doubles, Floats, Surface, limits, vector
 
@@ -40,8 +41,8 @@ class Solved(NamedTuple):
 class _Drag:
     """A drag, looked through: m rows are wanted coordinates."""
 
-    surface: Surface
-    points: list[tuple[int, int]]
+    probe: Probe
+    free: npt.NDArray[np.bool_]  # [R]
     targets: Doubles  # [P, 3]
     axes: Doubles  # [P, k, 3]
     roots: Doubles  # [P]: roots of weights
@@ -49,11 +50,7 @@ class _Drag:
     high: Doubles  # [R]
 
     def positions(self, raw: Doubles) -> Doubles:
-        out = np.zeros((len(self.points), 3))
-        for mesh, rows in self._by_mesh():
-            vertices = [self.points[i][1] for i in rows]
-            out[rows] = self.surface.positions(raw, mesh, vertices)
-        return out
+        return self.probe.positions(raw)
 
     def residual(self, positions: Doubles) -> Doubles:
         """float64[m]: what is missing."""
@@ -62,19 +59,13 @@ class _Drag:
 
     def jacobian(self, raw: Doubles) -> Doubles:
         """float64[m, R]"""
-        out = np.zeros((len(self.points), 3, len(raw)))
-        for mesh, rows in self._by_mesh():
-            vertices = [self.points[i][1] for i in rows]
-            out[rows] = self.surface.jacobian(raw, mesh, vertices, self.low, self.high)
+        self.probe.linearise(raw, self.high, self.free)
+        out = self.probe.jacobian()
         along = np.einsum("pki,pir->pkr", self.axes, out) * self.roots[:, None, None]
         return np.asarray(along.reshape(-1, len(raw)))
 
     def error(self, residual: Doubles) -> float:
         return float(np.sqrt(residual @ residual / max(1e-300, float(self.roots @ self.roots))))
-
-    def _by_mesh(self) -> list[tuple[int, list[int]]]:
-        meshes = sorted({mesh for mesh, _ in self.points})
-        return [(m, [i for i, p in enumerate(self.points) if p[0] == m]) for m in meshes]
 
 
 def _drag(
@@ -102,10 +93,10 @@ def _drag(
         raise ArgumentError(f"weights: numbers from 0 were expected, found {weight.min():g}")
     low, high = limits(len(raw), lowest, highest)
     low, high = np.minimum(low, raw), np.maximum(high, raw)
-    held = ~vector("free", True if free is None else free, len(raw)).astype(bool)
-    low[held] = high[held] = raw[held]
-    pairs = [(int(mesh), int(vertex)) for mesh, vertex in points]
-    return _Drag(surface, pairs, wanted, along, np.sqrt(weight), low, high)
+    loose = vector("free", True if free is None else free, len(raw)).astype(bool)
+    low[~loose] = high[~loose] = raw[~loose]
+    probe = surface.probe(np.asarray(points, np.int64).reshape(count, 2))
+    return _Drag(probe, loose, wanted, along, np.sqrt(weight), low, high)
 
 
 def solve_drag(
@@ -148,55 +139,56 @@ def solve_drag(
     at = vector("raw", raw, len(surface.rig.raw_control_names))
     if method not in METHODS:
         raise ArgumentError(f"method: {' or '.join(METHODS)} was expected, found {method!r}")
-    drag = _drag(surface, at, points, targets, axes, weights, free, lowest, highest)
-    begin = at.copy()
-    for _ in range(max(1, rounds)):
-        jacobian = drag.jacobian(at)
-        missing = drag.residual(drag.positions(at))
-        if method == "transpose":
-            at = _transposed(drag, jacobian, missing, at)
-            continue
-        ridge = (smallest * float(np.sqrt((jacobian**2).sum(axis=0).max(initial=0)))) ** 2
-        goal = missing + jacobian @ (at - begin)
-        step = _bounded(jacobian, goal, drag.low - begin, drag.high - begin, max(ridge, 1e-20))
-        at = begin + step
+    begin = at
+    drag = _drag(surface, begin, points, targets, axes, weights, free, lowest, highest)
+    if method == "transpose":
+        at = _transposed(drag, at, rounds)
+    else:
+        at = _least_squares(drag, at, smallest, rounds)
     positions = drag.positions(at)
     error = drag.error(drag.residual(positions))
     change = float(np.linalg.norm(at - begin))
     return Solved(at.astype(np.float32), positions.astype(np.float32), error, change)
 
 
-def _bounded(a: Doubles, b: Doubles, low: Doubles, high: Doubles, ridge: float) -> Doubles:
-    """The x in [low, high] with the least |a x - b|^2 + ridge |x|^2."""
-    dual = np.zeros(len(b))
-
-    def inside(y: Doubles) -> Doubles:
-        return np.asarray(np.clip(a.T @ y / ridge, low, high))
-
-    for _ in range(60):
-        x = inside(dual)
-        slope = dual + a @ x - b
-        if np.linalg.norm(slope) <= 1e-9 * max(1e-30, float(np.linalg.norm(b))):
-            break
-        loose = a[:, (x > low) & (x < high)]
-        step = np.linalg.solve(np.eye(len(b)) + loose @ loose.T / ridge, -slope)
-        size = 1.0
-        while size > 1e-6:
-            tried = dual + size * step
-            if np.linalg.norm(tried + a @ inside(tried) - b) < np.linalg.norm(slope):
+def _least_squares(drag: _Drag, begin: Doubles, smallest: float, rounds: int) -> Doubles:
+    """Gauss-Newton, whose whole change from the begin is kept small, with halved steps."""
+    at, missing = begin, drag.residual(drag.positions(begin))
+    price = -1.0
+    for _ in range(max(1, rounds)):
+        jacobian = drag.jacobian(at)
+        if price < 0:  # the same all along, so that what one round gains no other gives away
+            strongest = float((jacobian**2).sum(axis=0).max(initial=0))
+            price = max(smallest**2 * strongest, 1e-20)
+        low, high = drag.low - begin, drag.high - begin
+        goal = missing + jacobian @ (at - begin)
+        step = begin + least_change(jacobian, goal, low, high, price) - at
+        worth = missing @ missing + price * ((at - begin) @ (at - begin))
+        gained = 0.0
+        for share in (1.0, 0.5, 0.25):
+            tried = at + share * step
+            left = drag.residual(drag.positions(tried))
+            gained = float(worth - left @ left - price * ((tried - begin) @ (tried - begin)))
+            if gained > 0:
+                at, missing = tried, left
                 break
-            size /= 2
-        dual = dual + size * step
-    return inside(dual)
+        if gained <= 1e-6 * worth:
+            break
+    return at
 
 
-def _transposed(drag: _Drag, jacobian: Doubles, missing: Doubles, at: Doubles) -> Doubles:
-    toward = jacobian.T @ missing
-    reach = jacobian @ toward
-    if not reach.any():
-        return at
-    size = float(reach @ missing / (reach @ reach))
-    return np.asarray(np.clip(at + size * toward, drag.low, drag.high))
+def _transposed(drag: _Drag, at: Doubles, rounds: int) -> Doubles:
+    """Down the slope, each time as far as is best by the derivatives; in the limits."""
+    for _ in range(max(1, 3 * rounds)):
+        jacobian, missing = drag.jacobian(at), drag.residual(drag.positions(at))
+        toward = jacobian.T @ missing
+        toward[((at <= drag.low) & (toward < 0)) | ((at >= drag.high) & (toward > 0))] = 0
+        reach = jacobian @ toward
+        if not reach @ reach > 0:
+            break
+        size = float(reach @ missing / (reach @ reach))
+        at = np.clip(at + size * toward, drag.low, drag.high)
+    return at
 
 
 def best_controls(
@@ -236,9 +228,31 @@ def best_controls(
     drag = _drag(surface, at, [point], goal, along, None, free, lowest, highest)
     jacobian, missing = drag.jacobian(at), drag.residual(drag.positions(at))
     square = (jacobian**2).sum(axis=0)
-    wanted = at + jacobian.T @ missing / np.maximum(square, 1e-30)
-    value = np.clip(wanted, drag.low, drag.high)
-    left = np.linalg.norm(missing[:, None] - jacobian * (value - at), axis=0)
-    better = np.flatnonzero((left < np.linalg.norm(missing) * (1 - 1e-6)) & (value != at))
-    order = better[np.argsort(left[better], kind="stable")]
-    return [(int(i), float(value[i]), float(left[i])) for i in order[:count]]
+    toward = np.clip(at + jacobian.T @ missing / np.maximum(square, 1e-30), drag.low, drag.high)
+    left = np.linalg.norm(missing[:, None] - jacobian * (toward - at), axis=0)
+    order = np.argsort(left, kind="stable")[: 2 * count]
+    found = [_alone(drag, at, int(control)) for control in order if toward[control] != at[control]]
+    before = float(np.linalg.norm(missing)) * (1 - 1e-6)
+    return sorted((f for f in found if f[2] < before), key=lambda f: f[2])[:count]
+
+
+def _alone(drag: _Drag, begin: Doubles, control: int) -> tuple[int, float, float]:
+    """The best value of one control, and what is then missing: by secants, as the face bends."""
+    low, high = float(drag.low[control]), float(drag.high[control])
+    places = np.linspace(low, high, 5)
+    at = begin.copy()
+
+    def missing(value: float) -> Doubles:
+        at[control] = value
+        return drag.residual(drag.positions(at))
+
+    first = min(places, key=lambda value: float(np.linalg.norm(missing(float(value)))))
+    value = float(first)
+    for _ in range(3):
+        here, step = missing(value), 1 / 256 if value + 1 / 256 <= high else -1 / 256
+        slope = (missing(value + step) - here) / step
+        if not slope @ slope > 0:
+            break
+        value = float(np.clip(value - slope @ here / (slope @ slope), low, high))
+    value = min(value, float(first), key=lambda v: float(np.linalg.norm(missing(v))))
+    return control, value, float(np.linalg.norm(missing(value)))

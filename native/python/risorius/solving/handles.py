@@ -2,7 +2,8 @@
 """Where a face wants to be dragged: few vertices, where the controls reach most.
 
 The idea of optimal handles: Jin Huat Kim and Karan Singh, "Optimizing UI Layouts for Deformable
-Face-Rig Manipulation", ACM Transactions on Graphics 40 (4), 2021. Here by a greedy choice.
+Face-Rig Manipulation", ACM Transactions on Graphics 40 (4), 2021. They choose by integer
+programming; here one after the other, each for what those before it cannot do.
 """
 
 from __future__ import annotations
@@ -11,11 +12,16 @@ import numpy as np
 import numpy.typing as npt
 
 from ..base.errors import ArgumentError
-from .surface import Surface
+from .surface import Doubles, Floats, Surface
+
+_MOST_CANDIDATES = 3000
+_CHUNK = 1024  # vertices whose Jacobian is made at a time
 
 
 def place_handles(surface: Surface, mesh: int, count: int = 24) -> npt.NDArray[np.int64]:
-    """int64[n], n at most count: vertices of a mesh that make good handles, best first.
+    """int64[n]: vertices of a mesh that make good handles, best first; n is at most count.
+
+    Where the face is the same left and right, so are they.
 
     Args:
         surface: the face.
@@ -27,19 +33,96 @@ def place_handles(surface: Surface, mesh: int, count: int = 24) -> npt.NDArray[n
     """
     if count < 1:
         raise ArgumentError(f"count: 1 or more was expected, found {count}")
-    rest = surface.rig.initial_raw_controls
-    places = surface.positions(rest, mesh).astype(np.float64)
+    places = surface.positions(surface.rig.initial_raw_controls, mesh).astype(np.float64)
+    if not len(places):
+        return np.zeros(0, np.int64)
+    size = float(np.ptp(places, axis=0).max())
+    candidates = _shown(places, surface, size)
+    candidates = candidates[:: max(1, -(-len(candidates) // _MOST_CANDIDATES))]
+    reach = _reach(surface, mesh, candidates)
+    mirrored = _mirrored(places, surface.side, surface.up, size)
     chosen: list[int] = []
-    reach = np.zeros(len(places))
-    for part in np.array_split(np.arange(len(places)), max(1, len(places) // 2000)):
-        reach[part] = np.linalg.norm(surface.jacobian(rest, mesh, part), axis=(1, 2))
-    size = float(np.ptp(places, axis=0).max(initial=0)) / 12
-    near = np.full(len(places), np.inf)
-    for _ in range(count):
-        score = reach * np.minimum(1, near / max(size, 1e-30))
-        best = int(np.argmax(score)) if len(score) else 0
-        if not len(score) or score[best] <= 0:
+    near = np.full(len(candidates), np.inf)
+    while len(chosen) < count:
+        left = np.sqrt((reach**2).sum(axis=(1, 2)))
+        score = left * np.minimum(1, near / (size / 10))
+        best = int(np.argmax(score))
+        if not score[best] > 1e-6 * size:
             break
-        chosen.append(best)
-        near = np.minimum(near, np.linalg.norm(places - places[best], axis=1))
+        pair = [int(candidates[best])]
+        if mirrored[pair[0]] not in (-1, pair[0]) and len(chosen) + 2 <= count:
+            pair.append(int(mirrored[pair[0]]))
+        for vertex in pair:
+            if vertex not in chosen:
+                chosen.append(vertex)
+            near = np.minimum(near, np.linalg.norm(places[candidates] - places[vertex], axis=1))
+        _leave_out(reach, surface, mesh, pair)
     return np.array(chosen, np.int64)
+
+
+def _shown(places: Doubles, surface: Surface, size: float) -> npt.NDArray[np.int64]:
+    """The vertices that lie outside as one looks at the face: not the inside of the mouth.
+
+    Args:
+        places: float64[V, 3].
+        surface: knows which axis is which.
+        size: of the mesh.
+    """
+    depth = places @ surface.front
+    flat = places[:, [surface.side, surface.up]]
+    cells = np.floor((flat - flat.min(axis=0)) / (size / 50))
+    cell = cells.astype(np.int64)
+    grid = np.full((cell[:, 0].max() + 3, cell[:, 1].max() + 3), -np.inf)
+    np.maximum.at(grid, (cell[:, 0] + 1, cell[:, 1] + 1), depth)
+    return np.flatnonzero(depth > grid[cell[:, 0] + 1, cell[:, 1] + 1] - size / 40)
+
+
+def _reach(surface: Surface, mesh: int, vertices: npt.NDArray[np.int64]) -> Floats:
+    """float32[n, 3, R]: what each control does at rest."""
+    rest = surface.rig.initial_raw_controls
+    parts = [vertices[i : i + _CHUNK] for i in range(0, len(vertices), _CHUNK)]
+    return np.concatenate([surface.jacobian(rest, mesh, part) for part in parts])
+
+
+def _mirrored(places: Doubles, side: int, up: int, size: float) -> npt.NDArray[np.int64]:
+    """int64[V]: the vertex on the other side, itself in the middle, -1 where there is none.
+
+    Args:
+        places: float64[V, 3].
+        side: the axis from side to side.
+        up: the axis upwards.
+        size: of the mesh.
+    """
+    near = size / 300
+    middle = (places[:, side].min() + places[:, side].max()) / 2
+    other = places.copy()
+    other[:, side] = (0.0 if abs(middle) < size / 50 else 2 * middle) - places[:, side]
+    order = np.argsort(places[:, up], kind="stable")
+    heights = places[order, up]
+    begins = np.searchsorted(heights, other[:, up] - near)
+    ends = np.searchsorted(heights, other[:, up] + near)
+    out = np.full(len(places), -1)
+    for vertex in range(len(places)):
+        rows = order[begins[vertex] : ends[vertex]]
+        if len(rows):
+            apart = np.abs(places[rows] - other[vertex]).sum(axis=1)
+            nearest = int(np.argmin(apart))
+            if apart[nearest] < near:
+                out[vertex] = rows[nearest]
+    return out
+
+
+def _leave_out(reach: Floats, surface: Surface, mesh: int, vertices: list[int]) -> None:
+    """Takes from all what dragging these vertices already does.
+
+    Args:
+        reach: float32[n, 3, R], changed.
+        surface: the face.
+        mesh: an index into dna.meshes.
+        vertices: that were chosen.
+    """
+    rows = surface.jacobian(surface.rig.initial_raw_controls, mesh, np.array(vertices))
+    _, values, directions = np.linalg.svd(rows.reshape(-1, rows.shape[2]), full_matrices=False)
+    for value, direction in zip(values, directions, strict=True):
+        if value > 1e-3 * values[0]:
+            reach -= (reach @ direction)[..., None] * direction

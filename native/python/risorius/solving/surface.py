@@ -3,34 +3,37 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 
-from .._native import Dna, Rig
+from .._native import Dna, Probe, Rig, Skins
 from ..base.errors import ArgumentError
-from ..rigs.rotation import Convention
 
 Floats = npt.NDArray[np.float32]
 Doubles = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
-STEP = 1.0 / 256
+MM = {"cm": 10.0, "m": 1000.0}
 
 
 class Surface:
-    """The meshes of one LOD, skinned and shaped as the evaluated rig says.
+    """The meshes of a face, skinned and shaped as the evaluated rig says.
 
     Positions are in the file's units and axes. What turns the neck or the head outside of the
     face's own controls takes no part: it is the head's own space.
 
     Attributes:
-        mesh_indices: the meshes of the LOD, indices into dna.meshes.
-        vertex_counts: of each mesh of the file, whether it is one of the LOD or not.
-        lod: the level of detail.
         rig: the compiled face.
+        lod: the level of detail that is evaluated.
+        mesh_indices: the meshes of that LOD, indices into dna.meshes.
+        vertex_counts: of each mesh of the file.
+        mm: millimetres of the file's unit.
+        side, up: which axis goes from side to side, and which up or down.
+        front: float64[3], the direction in which the face looks.
     """
 
     def __init__(self, dna: Dna, rig: Rig, lod: int = 0) -> None:
-        """Take what is needed of a face.
+        """Take a copy of what is needed of a face.
 
         Args:
             dna: the file, with its geometry.
@@ -38,20 +41,26 @@ class Surface:
             lod: from 0, below the number of LODs.
 
         Raises:
-            ValueError: a LOD or a rig that does not fit.
+            DnaError: lists that do not fit each other, a rig that does not fit the file.
+            ValueError: a LOD that is not there.
         """
-        if rig.rotation != "euler" or rig.joint_count != len(dna.joint_names):
-            raise ArgumentError(
-                f"rig: Euler angles of {len(dna.joint_names)} joints were expected, found "
-                f"{rig.rotation} of {rig.joint_count}"
-            )
-        if not 0 <= lod < max(1, rig.lod_count):
-            raise ArgumentError(f"lod: 0 to {rig.lod_count - 1} was expected, found {lod}")
+        _below("lod: a LOD", lod, max(1, rig.lod_count))
+        self._skins = Skins(dna, rig, lod)
         self.rig, self.lod = rig, lod
         self.mesh_indices = [int(m) for m in dna.lod_mesh_mapping[lod]]
         self.vertex_counts = [len(mesh.positions) for mesh in dna.meshes]
-        self._dna = dna
-        self._rest = np.linalg.inv(self._world(np.zeros((1, rig.joint_count, 9))))[0]
+        self.mm = MM.get(dna.translation_unit, 10.0)
+        self._look_at_axes(dna.coordinate_system)
+
+    def _look_at_axes(self, directions: Sequence[str]) -> None:
+        """What the file's axes are: left and right, up, and float64[3] to the front."""
+        kinds = {"left": 0, "right": 0, "up": 1, "down": 1, "front": 2, "back": 2}
+        axes = [kinds.get(name, -1) for name in directions]
+        if sorted(axes) != [0, 1, 2]:
+            axes, directions = [0, 1, 2], ("left", "up", "front")
+        self.side, self.up = axes.index(0), axes.index(1)
+        self.front = np.zeros(3)
+        self.front[axes.index(2)] = 1.0 if directions[axes.index(2)] == "front" else -1.0
 
     def positions(
         self, raw: npt.ArrayLike, mesh: int, vertices: npt.ArrayLike | None = None
@@ -66,8 +75,9 @@ class Surface:
         Raises:
             ValueError: an index that is out of range, a value that is no number.
         """
-        rows = self._rows(mesh, vertices)
-        return self._posed(self._raw(raw)[None], mesh, rows)[0].astype(np.float32)
+        at = self.controls(raw)
+        probe = self.probe(self._points(mesh, vertices))
+        return probe.positions(at).astype(np.float32)
 
     def jacobian(
         self,
@@ -91,85 +101,55 @@ class Surface:
         Raises:
             ValueError: an index that is out of range, a value that is no number.
         """
-        at = self._raw(raw)
-        rows = self._rows(mesh, vertices)
+        at = self.controls(raw)
         _, high = limits(len(at), lowest, highest)
-        step = np.where(at + STEP <= high, STEP, -STEP)
-        poses = np.concatenate([at[None], at + np.diag(step)])
-        out = self._posed(poses, mesh, rows)
-        return np.moveaxis((out[1:] - out[0]) / step[:, None, None], 0, -1).astype(np.float32)
+        probe = self.probe(self._points(mesh, vertices))
+        probe.linearise(at, high, np.ones(len(at), bool))
+        return probe.jacobian()
 
-    def _raw(self, raw: npt.ArrayLike) -> Doubles:
-        return vector("raw", raw, len(self.rig.raw_control_names))
+    def probe(self, points: npt.NDArray[np.int64]) -> Probe:
+        """Points of the surface that can be asked often.
 
-    def _rows(self, mesh: int, vertices: npt.ArrayLike | None) -> Ints:
-        if mesh not in range(len(self.vertex_counts)):
-            raise ArgumentError(
-                f"mesh: an index below {len(self.vertex_counts)} was expected, found {mesh}"
-            )
-        count = self.vertex_counts[mesh]
-        if vertices is None:
-            return np.arange(count)
-        rows = np.asarray(vertices)
+        Args:
+            points: int64[P, 2], mesh and vertex.
+
+        Raises:
+            ValueError: an index that is out of range.
+        """
+        counts = np.array([*self.vertex_counts, 0])
+        mesh, vertex = points.T
+        known = (mesh >= 0) & (mesh < len(self.vertex_counts))
+        good = known & (vertex >= 0) & (vertex < counts[np.where(known, mesh, -1)])
+        if not good.all():
+            at = int(np.argmin(good))
+            _below(f"points[{at}]: a mesh", int(mesh[at]), len(self.vertex_counts))
+            _below(f"points[{at}]: a vertex", int(vertex[at]), self.vertex_counts[mesh[at]])
+        return Probe(self._skins, points.astype(np.uint32))
+
+    def controls(self, raw: npt.ArrayLike) -> Floats:
+        """float32[R] of what a caller gave.
+
+        Raises:
+            ValueError: another shape, a value that is no number.
+        """
+        return vector("raw", raw, self.control_count).astype(np.float32)
+
+    @property
+    def control_count(self) -> int:
+        """R, the raw controls."""
+        return len(self.rig.initial_raw_controls)
+
+    def _points(self, mesh: int, vertices: npt.ArrayLike | None) -> npt.NDArray[np.int64]:
+        _below("mesh: an index", mesh, len(self.vertex_counts))
+        rows = np.arange(self.vertex_counts[mesh]) if vertices is None else np.asarray(vertices)
         if rows.ndim != 1 or (rows.size and rows.dtype.kind not in "iu"):
             raise ArgumentError("vertices: a list of whole numbers was expected")
-        if rows.size and not (rows.min() >= 0 and rows.max() < count):
-            found = int(rows[(rows < 0) | (rows >= count)][0])
-            raise ArgumentError(f"vertices: indices below {count} were expected, found {found}")
-        return rows.astype(np.int64)
+        return np.stack([np.full(len(rows), mesh, np.int64), rows.astype(np.int64)], axis=1)
 
-    def _posed(self, raw: Doubles, mesh: int, rows: Ints) -> Doubles:
-        pose = self.rig.evaluate_batch(raw.astype(np.float32), lod=self.lod, threads=1)
-        moves = self._world(pose.joints.astype(np.float64)) @ self._rest
-        geometry = self._dna.meshes[mesh]
-        points = np.ones((len(raw), len(rows), 4))
-        points[..., :3] = geometry.positions[rows]
-        place = np.full(self.vertex_counts[mesh], -1)
-        place[rows] = np.arange(len(rows))
-        for target in geometry.blend_shape_targets:
-            weights = pose.blend_shapes[:, target.blend_shape_channel_index].astype(np.float64)
-            at = place[target.vertex_indices]
-            if weights.any() and (at >= 0).any():
-                add = weights[:, None, None] * target.deltas[at >= 0].astype(np.float64)
-                points[:, at[at >= 0], :3] += add
-        out = np.zeros((len(raw), len(rows), 3))
-        offsets = geometry.skin_offsets.astype(np.int64)
-        counts = offsets[rows + 1] - offsets[rows]
-        for i in range(int(counts.max(initial=0))):
-            used = np.flatnonzero(counts > i)
-            at = offsets[rows[used]] + i
-            joint = geometry.skin_joint_indices[at].astype(np.int64)
-            weight = geometry.skin_weights[at].astype(np.float64)
-            moved = np.einsum("nvij,nvj->nvi", moves[:, joint, :3], points[:, used])
-            out[:, used] += weight[:, None] * moved
-        return out
 
-    def _world(self, deltas: Doubles) -> Doubles:
-        dna, convention = self._dna, Convention.of(self._dna)
-        angles = dna.neutral_joint_rotations.astype(np.float64) + deltas[..., 3:6]
-        angles = angles * convention.signs * convention.radians
-        turn = np.broadcast_to(np.eye(3), (*angles.shape[:-1], 3, 3))
-        for axis in convention.order:
-            c, s = np.cos(angles[..., axis]), np.sin(angles[..., axis])
-            i, j = (axis + 1) % 3, (axis + 2) % 3
-            step = np.zeros((*angles.shape[:-1], 3, 3))
-            step[..., axis, axis] = 1
-            step[..., i, i] = step[..., j, j] = c
-            step[..., j, i], step[..., i, j] = s, -s
-            turn = step @ turn
-        out = np.zeros((*deltas.shape[:-1], 4, 4))
-        out[..., :3, :3] = turn * (1 + deltas[..., 6:9])[..., None, :]
-        out[..., :3, 3] = dna.neutral_joint_translations.astype(np.float64) + deltas[..., :3]
-        out[..., 3, 3] = 1
-        done = set[int]()
-        while len(done) < len(dna.joint_parents):
-            for joint, parent in enumerate(int(p) for p in dna.joint_parents):
-                if joint in done or (parent != joint and parent not in done):
-                    continue
-                if parent != joint:
-                    out[:, joint] = out[:, parent] @ out[:, joint]
-                done.add(joint)
-        return out
+def _below(what: str, found: int, end: int) -> None:
+    if not 0 <= found < end:
+        raise ArgumentError(f"{what} below {end} was expected, found {found}")
 
 
 def vector(name: str, values: npt.ArrayLike, count: int) -> Doubles:

@@ -1,0 +1,453 @@
+# SPDX-License-Identifier: MIT
+"""Control curves from a mesh that moves: the solver of a drag on all of a face, frame by frame.
+
+First each frame by itself, from where the frame before it ended: the controls that bring the mesh
+nearest, few of them and within their limits: each has a price, of what noise alone would make of
+it. Then the controls that were worth theirs, without it, all frames together, with a price on how
+suddenly a control changes its speed. What is noise is measured, so that a clean mesh gives its
+curves back and a noisy one gives quiet ones.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from .._native import descend
+from ..anim.clip import Clip
+from ..base.errors import ArgumentError, RisoriusError
+from .surface import Doubles, Floats, Surface, limits, vector
+
+Progress = Callable[[float], object]
+_CHUNK = 24  # frames that are solved in a row
+_AROUND = 8  # frames before and behind a chunk that its curves are smoothed with
+_FLOOR_MM = 0.004  # of what is taken for noise
+_WORTH = 3.0  # standard errors of a control's value that its price is
+_LEAST = 0.01  # a control that never goes further is not used
+_SUDDEN = (0.004, 0.2)  # least and most usual change of a step from frame to frame, at 30 a second
+_SOON = 0.1  # a control's change from which on derivatives are made anew
+_ENOUGH = 5e-4  # a control's change that is none
+
+
+class CancelledError(RisoriusError):
+    """progress said False."""
+
+    code = "cancelled"
+
+
+class SolvedClip(NamedTuple):
+    """A moving mesh as curves, and what they leave."""
+
+    clip: Clip
+    frame_residual: Floats
+    """float32[F]: root of the mean square of the vertices' distances, in the file's unit."""
+    vertex_residual: dict[int, Floats]
+    """By mesh, float32[V]: the same over the frames."""
+    largest: float
+    """Of all vertices in all frames, in the file's unit."""
+    noise: float
+    """What of the mesh was taken for noise: a standard deviation in the file's unit."""
+
+
+@dataclass
+class _Job:
+    """What stays the same in all frames."""
+
+    surface: Surface
+    points: npt.NDArray[np.int64]  # [P, 2]: that are looked at
+    targets: Floats  # [F, P, 3]
+    low: Doubles  # [R]
+    high: Doubles
+    rest: Doubles
+    free: npt.NDArray[np.bool_]
+    sparse: float
+    smooth: float
+    rate: float
+    sigma: float  # what a vertex may be off, in the file's unit
+    told: Progress | None
+    share: float  # of the whole for each frame and pass
+    done: float = 0.0
+    stop: list[bool] = field(default_factory=list)
+
+    def tell(self) -> None:
+        self.done += self.share
+        if self.stop or (self.told is not None and self.told(min(1.0, self.done)) is False):
+            self.stop.append(True)
+            raise CancelledError("the solve was cancelled")
+
+
+class _Frame:
+    """One frame being solved: derivatives at a pose near by, and what is missing."""
+
+    def __init__(self, job: _Job) -> None:
+        self._job = job
+        self._probe = job.surface.probe(job.points)
+        self._at: Doubles | None = None
+        self.matrix = np.zeros((0, 0))
+
+    def linearise(self, raw: Doubles, within: float) -> bool:
+        """Derivatives at a pose, unless they were made at one so near. Returns: made anew."""
+        if self._at is not None and np.abs(raw - self._at).max() <= within:
+            return False
+        self._probe.linearise(raw, self._job.high, self._job.free)
+        self.matrix = self._probe.normal_matrix()
+        self._at = raw.copy()
+        return True
+
+    def is_at(self, raw: Doubles) -> bool:
+        """Whether the derivatives are those of the pose."""
+        return self._at is not None and bool((raw == self._at).all())
+
+    def forget(self) -> None:
+        """The next derivatives are made anew."""
+        self._at = None
+
+    def missing(self, raw: Doubles, frame: int) -> Doubles:
+        return np.asarray(self._job.targets[frame] - self._probe.positions(raw))
+
+    def pull(self, missing: Doubles) -> Doubles:
+        """What each control could do for it: J^T missing."""
+        return self._probe.gradient(missing)
+
+
+def solve_clip(
+    surface: Surface,
+    frames: npt.ArrayLike | Mapping[int, npt.ArrayLike],
+    *,
+    rate: float,
+    start: float = 0.0,
+    neutral: npt.ArrayLike | Mapping[int, npt.ArrayLike] | None = None,
+    sparse: float = 1.0,
+    smooth: float = 1.0,
+    free: npt.ArrayLike | None = None,
+    lowest: npt.ArrayLike | None = None,
+    highest: npt.ArrayLike | None = None,
+    most_points: int = 4000,
+    threads: int = 0,
+    progress: Progress | None = None,
+) -> SolvedClip:
+    """The curves of the controls that repeat a moving mesh.
+
+    Args:
+        surface: the face.
+        frames: float32[F, V, 3] of a mesh of the face, by its index in dna.meshes; an array alone
+            is the first mesh of the LOD. The file's unit and axes, the head held still.
+        rate: frames per second.
+        start: seconds, the time of the first frame.
+        neutral: float[V, 3] of what moves, at rest, by mesh as frames: then its movement is taken
+            and not its shape, as for another face of the same topology. None: the face's own.
+        sparse: how much a control's amount costs; 0 nothing, 1 as is usual.
+        smooth: how much a sudden change costs; 0 nothing, 1 as is usual.
+        free: bool[R], which controls may move; None is all but the parts of rotations.
+        lowest, highest: float[R] or one number: the limits; None is 0 and 1.
+        most_points: how many vertices are looked at; the residual is of all.
+        threads: that work at once; 0 is all cores. The result does not depend on it.
+        progress: told the share that is done, 0 to 1; False stops.
+
+    Returns:
+        The clip has a curve for each control that moves at all.
+
+    Raises:
+        ValueError: an argument that makes no sense; the sentence names it.
+        CancelledError: progress said False.
+    """
+    wanted = _meshes("frames", surface, frames, 3)
+    count = _frame_count(wanted)
+    _check_numbers(rate=rate, sparse=sparse, smooth=smooth)
+    moved = _moved(surface, wanted, neutral)
+    low, high = limits(surface.control_count, lowest, highest)
+    rest = surface.rig.initial_raw_controls.astype(np.float64)
+    low, high = np.minimum(low, rest), np.maximum(high, rest)
+    loose = _loose(surface, free)
+    low[~loose] = high[~loose] = rest[~loose]
+    points = _points(surface, wanted, high, loose, most_points)
+    targets = np.concatenate(
+        [moved[m][:, points[points[:, 0] == m, 1]] for m in sorted(wanted)], axis=1
+    )
+    noise = _noise(targets)
+    job = _Job(
+        surface, points, targets, low, high, rest, loose, sparse, smooth, rate,
+        float(np.hypot(noise, _FLOOR_MM / surface.mm)), progress, 1 / (3 * count),
+    )  # fmt: skip
+    workers = threads or os.cpu_count() or 1
+    begins = _begins(job, count)
+    left = np.mean([_left(job, raw, f) for f, raw in begins.items()])
+    job.sigma = max(job.sigma, float(np.sqrt(left)))  # another face is never wholly repeated
+    curves = _alone(job, count, begins, workers)
+    curves = _together(job, curves, workers)
+    return _result(job, curves, moved, rate, start, noise)
+
+
+def _begins(job: _Job, count: int) -> dict[int, Doubles]:
+    """float64[R] of the first frame of each chunk, one after the other."""
+    frame, at, out = _Frame(job), job.rest, {}
+    for begin in range(0, count, _CHUNK):
+        at = out[begin] = _nearest(job, frame, begin, at, 12)
+        job.tell()
+    return out
+
+
+def _alone(job: _Job, count: int, begins: dict[int, Doubles], workers: int) -> Doubles:
+    """float64[F, R]: each frame by itself."""
+    curves = np.tile(job.rest, (count, 1))
+
+    def chunk(begin: int) -> None:
+        frame, at = _Frame(job), begins[begin]
+        for f in range(begin, min(begin + _CHUNK, count)):
+            at = curves[f] = _nearest(job, frame, f, at, 8)
+            job.tell()
+
+    with ThreadPoolExecutor(workers) as pool:
+        list(pool.map(chunk, begins))
+    return curves
+
+
+def _prices(job: _Job, matrix: Doubles) -> Doubles:
+    """float64[R]: what noise alone makes of a control's pull, some times over."""
+    return job.sparse * _WORTH * np.sqrt(np.maximum(np.diag(matrix), 0)) / job.sigma
+
+
+def _nearest(job: _Job, frame: _Frame, index: int, start: Doubles, rounds: int) -> Doubles:
+    """float64[R]: the controls of a frame by itself."""
+    at, missing = start, frame.missing(start, index)
+    scale = job.sigma**-2
+    for _ in range(rounds):
+        frame.linearise(at, _SOON)
+        prices = _prices(job, frame.matrix)
+
+        def worth(raw: Doubles, left: Doubles, prices: Doubles = prices) -> float:
+            return float(scale / 2 * (left**2).sum() + prices @ np.abs(raw - job.rest))
+
+        aim = scale * (frame.pull(missing) + frame.matrix @ at)
+        goal = descend(scale * frame.matrix, aim, job.low, job.high, job.rest, prices, at)
+        step, before = goal - at, worth(at, missing)
+        for share in (1.0, 0.5, 0.2):
+            left = frame.missing(at + share * step, index)
+            if worth(at + share * step, left) < before:
+                at, missing = at + share * step, left
+                break
+        else:
+            if frame.is_at(at):
+                break
+            frame.forget()
+            continue
+        if np.abs(step).max() <= _ENOUGH:
+            break
+    return at
+
+
+def _together(job: _Job, curves: Doubles, workers: int) -> Doubles:
+    """float64[F, R]: all frames with a price on sudden changes, chunk by chunk with what is around.
+
+    A chunk starts from the frames by themselves, so that chunks can be solved at the same time.
+    Only what moved there moves here, without its price.
+    """
+    count = len(curves)
+    used = np.flatnonzero(np.abs(curves - job.rest).max(axis=0) > (_LEAST if job.sparse else 0))
+    if not len(used):
+        return curves
+    out = np.tile(job.rest, (count, 1))
+    stiff = _stiffness(job, curves, used)
+
+    def chunk(begin: int) -> None:
+        first, end = max(0, begin - _AROUND), min(count, begin + _CHUNK + _AROUND)
+        frame = _Frame(job)
+        near = curves[first:end, used]
+        matrices: list[Doubles] = []
+        aims: list[Doubles] = []
+        for f in range(first, end):
+            at = np.where(np.isin(np.arange(len(job.rest)), used), curves[f], job.rest)
+            if frame.linearise(at, _SOON) or not matrices:
+                matrix = frame.matrix[np.ix_(used, used)] / job.sigma**2
+            matrices.append(matrix)
+            pull = frame.pull(frame.missing(at, f))[used] / job.sigma**2
+            aims.append(pull + matrix @ near[f - first])
+            if begin <= f < begin + _CHUNK:
+                job.tell()
+        near = _smoothed(job, near.copy(), used, stiff, matrices, aims)
+        out[begin : begin + _CHUNK, used] = near[begin - first : begin - first + _CHUNK]
+
+    with ThreadPoolExecutor(workers) as pool:
+        list(pool.map(chunk, range(0, count, _CHUNK)))
+    return out
+
+
+def _stiffness(job: _Job, curves: Doubles, used: npt.NDArray[np.intp]) -> Doubles:
+    """float64[used]: the price of a sudden change of each control.
+
+    One over the square of how suddenly it usually changes: what its curve does, less what noise
+    makes of it, so that a blink stays sharp while a slow jaw is held quiet.
+    """
+    if len(curves) < 3:
+        return np.zeros(len(used))
+    frame = _Frame(job)
+    frame.linearise(np.median(curves, axis=0), 0.0)
+    matrix = frame.matrix[np.ix_(used, used)]
+    ridge = 1e-9 * max(float(np.trace(matrix)), 1e-30)
+    noise = 6 * job.sigma**2 * np.diag(np.linalg.inv(matrix + ridge * np.eye(len(used))))
+    sudden = (np.diff(curves[:, used], 2, axis=0) ** 2).mean(axis=0)
+    least, most = (limit * (30.0 / job.rate) ** 2 for limit in _SUDDEN)
+    return job.smooth / np.clip(sudden - noise, least**2, most**2)
+
+
+def _smoothed(
+    job: _Job,
+    curves: Doubles,
+    used: npt.NDArray[np.intp],
+    stiff: Doubles,
+    matrices: list[Doubles],
+    aims: list[Doubles],
+) -> Doubles:
+    """float64[n, used]: forwards and backwards through the frames until none changes any more."""
+    count = len(curves)
+    bend = np.diff(np.eye(count), 2, axis=0) if count > 2 else np.zeros((0, count))
+    bends = bend.T @ bend  # [n, n]
+    diagonal = np.arange(len(used))
+    low, high, rest = job.low[used], job.high[used], job.rest[used]
+    price = np.full(len(used), job.sparse)
+    for _ in range(20):
+        before = curves.copy()
+        for f in [*range(count), *reversed(range(count - 1))]:
+            matrix = matrices[f].copy()
+            matrix[diagonal, diagonal] += stiff * bends[f, f]
+            pull = aims[f] - stiff * (bends[f] @ curves - bends[f, f] * curves[f])
+            curves[f] = descend(matrix, pull, low, high, rest, price, curves[f])
+        if np.abs(curves - before).max() < _ENOUGH:
+            break
+    return curves
+
+
+def _result(
+    job: _Job, curves: Doubles, moved: dict[int, Floats], rate: float, start: float, noise: float
+) -> SolvedClip:
+    surface = job.surface
+    frame_sum, largest, total = np.zeros(len(curves)), 0.0, 0
+    by_vertex: dict[int, Floats] = {}
+    for mesh, target in moved.items():
+        count = surface.vertex_counts[mesh]
+        probe = surface.probe(np.stack([np.full(count, mesh), np.arange(count)], axis=1))
+        vertex_sum = np.zeros(count)
+        for f, raw in enumerate(curves):
+            square = ((target[f] - probe.positions(raw)) ** 2).sum(axis=1)
+            vertex_sum += square
+            frame_sum[f] += square.sum()
+            largest = max(largest, float(square.max(initial=0)))
+            if mesh == min(moved):
+                job.tell()
+        by_vertex[mesh] = np.sqrt(vertex_sum / len(curves)).astype(np.float32)
+        total += count
+    used = np.flatnonzero(np.abs(curves - job.rest).max(axis=0) > _ENOUGH)
+    names = surface.rig.raw_control_names
+    clip = Clip([names[i] for i in used], curves.T[used], rate, start=start)
+    frame = np.sqrt(frame_sum / max(1, total)).astype(np.float32)
+    return SolvedClip(clip, frame, by_vertex, float(np.sqrt(largest)), noise)
+
+
+def _left(job: _Job, raw: Doubles, frame: int) -> float:
+    """The mean square of what is missing of a coordinate."""
+    probe = job.surface.probe(job.points)
+    return float(((job.targets[frame] - probe.positions(raw)) ** 2).mean())
+
+
+def _noise(targets: Floats) -> float:
+    """The standard deviation of what changes at random from frame to frame.
+
+    Fourth differences leave little of a movement and sqrt(70) times the noise.
+    """
+    if len(targets) < 5:
+        return 0.0
+    part = targets[:, :: max(1, targets.shape[1] // 500)]
+    return float(np.median(np.abs(np.diff(part, 4, axis=0))) / 0.6745 / np.sqrt(70))
+
+
+def _points(
+    surface: Surface,
+    wanted: dict[int, Floats],
+    high: Doubles,
+    free: npt.NDArray[np.bool_],
+    most: int,
+) -> npt.NDArray[np.int64]:
+    """int64[P, 2]: the vertices that a control moves at rest, evenly taken."""
+    if most < 1:
+        raise ArgumentError(f"most_points: 1 or more was expected, found {most}")
+    rest = surface.rig.initial_raw_controls
+    found = []
+    for mesh in sorted(wanted):
+        every = np.arange(surface.vertex_counts[mesh])
+        for part in np.array_split(every, len(every) // 1024 + 1):
+            points = np.stack([np.full(len(part), mesh), part], axis=1)
+            probe = surface.probe(points)
+            probe.linearise(rest, high, free)
+            moves = np.abs(probe.jacobian()).max(axis=(1, 2), initial=0) * surface.mm > 0.1
+            found.append(points[moves])
+    points = np.concatenate(found)
+    if not len(points):
+        raise ArgumentError("frames: a mesh that controls move was expected, found none")
+    return points[:: -(-len(points) // most)]
+
+
+def _meshes(
+    name: str, surface: Surface, values: npt.ArrayLike | Mapping[int, npt.ArrayLike], axes: int
+) -> dict[int, Floats]:
+    given = values if isinstance(values, Mapping) else {surface.mesh_indices[0]: values}
+    out = {}
+    for mesh, value in given.items():
+        if mesh not in range(len(surface.vertex_counts)):
+            end = len(surface.vertex_counts)
+            raise ArgumentError(f"{name}: meshes below {end} were expected, found {mesh}")
+        array = np.asarray(value, np.float32)
+        count = surface.vertex_counts[mesh]
+        if array.ndim != axes or array.shape[-2:] != (count, 3):
+            shape = f"[F, {count}, 3]" if axes == 3 else f"[{count}, 3]"
+            raise ArgumentError(
+                f"{name}: {shape} was expected for mesh {mesh}, found {list(array.shape)}"
+            )
+        if not np.isfinite(array).all():
+            raise ArgumentError(f"{name}: finite numbers were expected for mesh {mesh}")
+        out[int(mesh)] = array
+    if not out:
+        raise ArgumentError(f"{name}: one mesh at least was expected, found 0")
+    return out
+
+
+def _frame_count(frames: dict[int, Floats]) -> int:
+    counts = {len(array) for array in frames.values()}
+    if len(counts) > 1 or 0 in counts:
+        raise ArgumentError(f"frames: as many of each mesh were expected, found {sorted(counts)}")
+    return counts.pop()
+
+
+def _check_numbers(**numbers: float) -> None:
+    for name, value in numbers.items():
+        if not (np.isfinite(value) and (value > 0 or (value == 0 and name != "rate"))):
+            least = "above 0" if name == "rate" else "from 0"
+            raise ArgumentError(f"{name}: a number {least} was expected, found {value}")
+
+
+def _moved(
+    surface: Surface,
+    wanted: dict[int, Floats],
+    neutral: npt.ArrayLike | Mapping[int, npt.ArrayLike] | None,
+) -> dict[int, Floats]:
+    """Where the face's own vertices are wanted, float32[F, V, 3] by mesh."""
+    if neutral is None:
+        return wanted
+    own = _meshes("neutral", surface, neutral, 2)
+    if missing := sorted(set(wanted) - set(own)):
+        raise ArgumentError(f"neutral: mesh {missing[0]} was expected as well")
+    rest = surface.rig.initial_raw_controls
+    return {m: frames - own[m] + surface.positions(rest, m) for m, frames in wanted.items()}
+
+
+def _loose(surface: Surface, free: npt.ArrayLike | None) -> npt.NDArray[np.bool_]:
+    if free is not None:
+        return vector("free", free, surface.control_count).astype(bool)
+    parts = {f"{stem}{part}" for stem in (".", ".q") for part in "xyzw"}
+    names = surface.rig.raw_control_names
+    return np.array([not any(name.endswith(part) for part in parts) for name in names], bool)

@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: MIT
+"""Meshes that move, from files, brought to where a face lies."""
+
+from __future__ import annotations
+
+import os
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from ..base.errors import RisoriusError
+from .surface import Doubles, Floats
+
+_SCALES = 10.0 ** np.arange(-3, 4)
+_NEAR = 0.03  # of a face's size: a mesh nearer than this to an even placement is meant to be there
+
+
+class PerformanceError(RisoriusError):
+    """A performance that cannot be used."""
+
+    code = "performance"
+
+
+class Performance(NamedTuple):
+    """The vertices of one mesh in time."""
+
+    frames: Floats
+    """float32[F, V, 3]"""
+    rate: float
+    """Frames per second."""
+    start: float
+    """Seconds, the time of the first frame."""
+    neutral: Floats | None
+    """float32[V, 3]: at rest, where the file has it."""
+    note: str = ""
+    """How it was brought to the face, or empty."""
+
+
+def read_performance(
+    path: str | os.PathLike[str], name: str | None = None, counts: Mapping[int, int] | None = None
+) -> Performance:
+    """Read an Alembic file (.abc) or an .npz with vertices [F, V, 3], perhaps rate and neutral.
+
+    Args:
+        path: the file.
+        name: of the mesh in an Alembic file; None: the first that fits.
+        counts: which numbers of vertices fit; None: any.
+
+    Raises:
+        PerformanceError: another kind of file, one that is damaged, no such mesh.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix not in (".abc", ".npz"):
+        raise PerformanceError(f"{path}: a name ending in .abc or .npz was expected")
+    fitting = None if counts is None else set(counts.values())
+    take = _alembic(path, name, fitting) if suffix == ".abc" else _arrays(path)
+    if not np.isfinite(take.frames).all():
+        raise PerformanceError(f"{path}: finite vertices were expected")
+    return take
+
+
+def _arrays(path: str | os.PathLike[str]) -> Performance:
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            values = {name: file[name] for name in file.files}
+    except (ValueError, zipfile.BadZipFile, EOFError, KeyError) as error:
+        raise PerformanceError(f"{path}: an .npz file was expected: {error}") from error
+    frames = values.get("vertices")
+    if frames is None or frames.ndim != 3 or frames.shape[2] != 3 or not len(frames):
+        found = "none" if frames is None else list(frames.shape)
+        raise PerformanceError(f"{path}: vertices of shape [F, V, 3] were expected, found {found}")
+    neutral = values.get("neutral")
+    if neutral is not None and neutral.shape != frames.shape[1:]:
+        raise PerformanceError(
+            f"{path}: neutral of shape {list(frames.shape[1:])} was expected, found "
+            f"{list(neutral.shape)}"
+        )
+    rate = float(values.get("rate", np.float64(30.0)))
+    if not (np.isfinite(rate) and rate > 0):
+        raise PerformanceError(f"{path}: a rate above 0 was expected, found {rate}")
+    own = None if neutral is None else neutral.astype(np.float32)
+    return Performance(frames.astype(np.float32), rate, 0.0, own)
+
+
+def _alembic(
+    path: str | os.PathLike[str], name: str | None, fitting: set[int] | None
+) -> Performance:
+    try:
+        from alembic3d import Abc, AbcGeom  # type: ignore[import-not-found, unused-ignore]
+    except ImportError as error:
+        raise PerformanceError(
+            f"{path}: Alembic needs the package alembic3d: pip install risorius[alembic]"
+        ) from error
+    if not Path(path).is_file():
+        raise PerformanceError(f"{path}: there is no such file")
+    try:
+        archive = Abc.IArchive(os.fspath(path))
+    except RuntimeError as error:
+        raise PerformanceError(f"{path}: an Alembic file was expected") from error
+    seen: list[str] = []
+    chosen: list[Any] = []
+
+    def visit(parent: Any) -> None:
+        for number in range(parent.getNumChildren()):
+            child = parent.getChild(number)
+            if not AbcGeom.IPolyMesh.matches(child.getHeader()):
+                visit(child)
+                continue
+            schema = AbcGeom.IPolyMesh(parent, child.getName()).getSchema()
+            names = {child.getName(), parent.getName()}
+            count = len(schema.getValue(Abc.ISampleSelector(0)).getPositions())
+            seen.append(f"{parent.getName()} of {count} vertices")
+            if (name is None or name in names) and (fitting is None or count in fitting):
+                chosen.append(schema)
+
+    visit(archive.getTop())
+    if not chosen:
+        wanted = name or " or ".join(str(count) for count in sorted(fitting or ())) + " vertices"
+        found = ", ".join(seen) or "no mesh"
+        raise PerformanceError(f"{path}: a mesh {wanted} was expected, found {found}")
+    return _samples(path, chosen[0], Abc)
+
+
+def _samples(path: str | os.PathLike[str], schema: Any, library: Any) -> Performance:
+    count = schema.getNumSamples()
+    rows = []
+    for sample in range(count):
+        value = schema.getValue(library.ISampleSelector(sample)).getPositions()
+        rows.append(np.array([(p.x, p.y, p.z) for p in value], np.float32))
+        if rows[-1].shape != rows[0].shape:
+            raise PerformanceError(
+                f"{path}: {len(rows[0])} vertices in every frame were expected, found "
+                f"{len(rows[-1])} in frame {sample}"
+            )
+    sampling = schema.getTimeSampling()
+    times = [float(sampling.getSampleTime(i)) for i in range(count)]
+    rate = (count - 1) / (times[-1] - times[0]) if count > 1 and times[-1] > times[0] else 30.0
+    return Performance(np.stack(rows), rate, times[0], None)
+
+
+def fitted(take: Performance, positions: npt.ArrayLike) -> Performance:
+    """The performance in a face's unit and axes.
+
+    Vertex by vertex the same topology: so the turn, the unit and the place that bring the first
+    frame nearest to the face are known. Where they are as good as a turn by right angles, a unit of
+    ten times another and no move, these are meant.
+
+    Args:
+        take: the performance.
+        positions: float[V, 3], the face at rest.
+    """
+    own = np.asarray(positions, np.float64)
+    first = np.asarray(take.frames[0] if take.neutral is None else take.neutral, np.float64)
+    size = float(np.ptp(own, axis=0).max(initial=0))
+    turn, scale, move = _similarity(first, own)
+    even = np.zeros((3, 3))
+    even[np.arange(3), np.abs(turn).argmax(axis=1)] = 1
+    even *= np.sign(turn)
+    near = float(_SCALES[np.abs(np.log(_SCALES) - np.log(max(scale, 1e-30))).argmin()])
+    apart = float(np.sqrt((((near * first @ even.T) - own) ** 2).sum(axis=1).mean()))
+    note = ""
+    if abs(np.linalg.det(even)) > 0.5 and apart < _NEAR * size:
+        turn, scale, move = even, near, np.zeros(3)
+        if scale != 1 or not np.array_equal(even, np.eye(3)):
+            note = f"{scale:g} times as large, axes turned"
+    else:
+        note = f"{scale:.4g} times as large, turned and moved to where it fits best"
+
+    def brought(points: Floats) -> Floats:
+        return (scale * points.astype(np.float64) @ turn.T + move).astype(np.float32)
+
+    neutral = None if take.neutral is None else brought(take.neutral)
+    return take._replace(frames=brought(take.frames), neutral=neutral, note=note)
+
+
+def _similarity(source: Doubles, target: Doubles) -> tuple[Doubles, float, Doubles]:
+    """The turn, scale and move with the least |scale turn source + move - target| (Umeyama 1991).
+
+    Args:
+        source, target: float64[V, 3].
+    """
+    a, b = source - source.mean(axis=0), target - target.mean(axis=0)
+    u, values, v = np.linalg.svd(b.T @ a)
+    signs = np.array([1.0, 1.0, np.sign(np.linalg.det(u @ v)) or 1.0])
+    turn = (u * signs) @ v
+    spread = float((a**2).sum())
+    scale = float((values * signs).sum()) / spread if spread > 0 else 1.0
+    return turn, scale, target.mean(axis=0) - scale * turn @ source.mean(axis=0)

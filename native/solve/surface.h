@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: MIT
+// Surface: the skins of a face, ready to be asked where a pose of its rig brings a vertex.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "core/result.h"
+#include "dna/dna.h"
+#include "rig/rig.h"
+
+namespace risorius::solve {
+
+/// Rows of a 3x4 matrix: what takes a column vector.
+using Matrix = std::array<double, 12>;
+
+struct Influence {
+  std::uint32_t joint;
+  float weight;
+};
+/// What a blend shape channel at 1 adds to a vertex before it is skinned.
+struct Shape {
+  std::uint32_t channel;
+  std::array<float, 3> delta;
+};
+
+/// A mesh of the file, by vertex: what belongs to vertex v lies between begins[v] and begins[v +
+/// 1].
+struct SkinMesh {
+  std::vector<std::array<float, 3>> positions;  // file units
+  std::vector<std::uint32_t> influence_begins;
+  std::vector<Influence> influences;
+  std::vector<std::uint32_t> shape_begins;
+  std::vector<Shape> shapes;
+};
+
+struct Surface {
+  std::shared_ptr<const rig::Rig> rig;
+  std::uint32_t lod = 0;
+  std::vector<std::uint32_t> parents;   // a root is its own
+  std::vector<std::uint32_t> order;     // joints, parents first
+  std::vector<Matrix> neutral_inverse;  // of each joint's place in the neutral pose
+  std::vector<SkinMesh> meshes;
+};
+
+/// Copies what is needed of a face. A vertex without weights stays where its shapes bring it.
+/// In:     rig  compiled from dna, with Euler angles as rotation
+///         lod  below the number of LODs
+/// Errors: as of dna::validate; invalid_argument: a rig or a LOD that does not fit
+core::Result<Surface> make_surface(const dna::Dna& dna, std::shared_ptr<const rig::Rig> rig,
+                                   std::uint32_t lod);
+
+/// A joint's place in its parent.
+/// In: delta  its nine numbers of a Pose
+Matrix local_matrix(const rig::Rig& rig, std::uint32_t joint, const float* delta);
+/// a * b: b acts first.
+Matrix multiply(const Matrix& a, const Matrix& b);
+
+}  // namespace risorius::solve

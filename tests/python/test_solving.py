@@ -1,0 +1,284 @@
+# SPDX-License-Identifier: MIT
+"""Drags on a skin, handles, and curves from a mesh that moves."""
+
+import numpy as np
+import pytest
+import risorius
+from risorius.solving.clip import CancelledError
+from skin_oracle import skinned, small_face
+
+JAW, LEFT, RIGHT, PUFF, TWIN, IDLE, WIDEN = range(7)
+
+
+@pytest.fixture(scope="module")
+def face():
+    dna = small_face()
+    return dna, risorius.Surface(dna, risorius.Rig(dna))
+
+
+def raw(**values):
+    out = np.zeros(7, np.float32)
+    for name, value in values.items():
+        out[globals()[name.upper()]] = value
+    return out
+
+
+def pose(face, controls):
+    dna, surface = face
+    return skinned(dna, surface.rig.evaluate(controls))
+
+
+POSES = [raw(), raw(jaw=0.6, left=0.3), raw(jaw=1, left=1, right=0.4, puff=0.7, widen=0.5)]
+
+
+@pytest.mark.parametrize("controls", POSES)
+def test_positions_are_those_of_the_skinned_pose(face, controls):
+    np.testing.assert_allclose(face[1].positions(controls, 0), pose(face, controls), atol=2e-5)
+    some = [17, 3, 170]
+    found = face[1].positions(controls, 0, some)
+    np.testing.assert_allclose(found, pose(face, controls)[some], atol=2e-5)
+
+
+def test_derivatives_are_differences_of_the_skinned_pose(face):
+    at = POSES[1]
+    vertices = [30, 75, 100]
+    found = face[1].jacobian(at, 0, vertices)
+    assert found.shape == (3, 3, 7)
+    for control in range(7):
+        step = np.zeros(7, np.float32)
+        step[control] = 1 / 64
+        apart = pose(face, at + step)[vertices] - pose(face, at - step)[vertices]
+        np.testing.assert_allclose(found[..., control], apart * 32, atol=0.02)
+
+
+def test_a_drag_arrives_with_the_smallest_change(face):
+    _, surface = face
+    at, vertex = POSES[1], 45
+    target = surface.positions(raw(jaw=0.5, left=0.6, right=0.1), 0, [vertex])[0]
+    solved = risorius.solve_drag(surface, at, [(0, vertex)], [target])
+    np.testing.assert_allclose(solved.positions[0], target, atol=2e-3)
+    np.testing.assert_allclose(pose(face, solved.raw)[vertex], target, atol=2e-3)
+    assert solved.raw.min() >= 0
+    assert solved.raw.max() <= 1
+    assert solved.raw[IDLE] == 0
+    assert solved.change == pytest.approx(np.linalg.norm(solved.raw - at), abs=1e-5)
+    # As the textbook has it, where no limit is in the way: the pseudo-inverse of the Jacobian.
+    small = surface.positions(at, 0, [vertex])[0] + [0.0, 0.004, 0.002]
+    free = {"lowest": -1, "highest": 2, "smallest": 1e-6}
+    step = risorius.solve_drag(surface, at, [(0, vertex)], [small], **free).raw - at
+    jacobian = surface.jacobian(at, 0, [vertex], -1, 2)[0].astype(np.float64)
+    np.testing.assert_allclose(step, np.linalg.pinv(jacobian) @ [0, 0.004, 0.002], atol=2e-4)
+
+
+def test_equal_controls_share_a_drag(face):
+    surface = face[1]
+    vertex = 14 * 7
+    target = surface.positions(raw(jaw=0.4), 0, [vertex])
+    solved = risorius.solve_drag(surface, raw(), [(0, vertex)], target)
+    assert solved.raw[JAW] == pytest.approx(solved.raw[TWIN], abs=1e-3)
+    assert solved.raw[JAW] > 0.1
+
+
+def test_a_drag_on_the_screen_leaves_the_depth_free(face):
+    surface = face[1]
+    vertex = 14 * 6 + 7
+    here = surface.positions(raw(), 0, [vertex])[0]
+    target = here + np.array([0.02, 0.02, 5.0])
+    flat = [np.eye(3)[:2]]
+    solved = risorius.solve_drag(surface, raw(), [(0, vertex)], [target], axes=flat)
+    assert solved.error < 2e-3
+    np.testing.assert_allclose(solved.positions[0, :2], target[:2], atol=2e-3)
+    assert abs(solved.positions[0, 2] - here[2]) < 1.5
+
+
+def test_a_pin_holds_a_point_and_a_mask_a_control(face):
+    surface = face[1]
+    moved, held = 14 * 3 + 5, 14 * 10 + 5
+    here = surface.positions(raw(), 0, [moved, held])
+    target = surface.positions(raw(left=0.6, right=0.5), 0, [moved])[0]
+    points, targets = [(0, moved), (0, held)], [target, here[1]]
+    pinned = risorius.solve_drag(surface, raw(), points, targets, weights=[1, 4])
+    assert np.linalg.norm(pinned.positions[1] - here[1]) < 0.01
+    free = np.arange(7) != LEFT
+    masked = risorius.solve_drag(surface, raw(), points[:1], targets[:1], free=free)
+    assert masked.raw[LEFT] == 0
+    assert masked.error > pinned.error
+
+
+def test_the_transpose_moves_only_what_moves_the_point(face):
+    surface = face[1]
+    vertex = 14 * 3 + 5
+    target = surface.positions(raw(left=0.3), 0, [vertex])
+    solved = risorius.solve_drag(surface, raw(), [(0, vertex)], target, method="transpose")
+    before = np.linalg.norm(target - surface.positions(raw(), 0, [vertex]))
+    assert solved.error < 0.25 * before
+    reach = np.abs(surface.jacobian(raw(), 0, [vertex])[0]).max(axis=0)
+    assert (solved.raw[reach < 1e-6] == 0).all()
+
+
+def test_what_cannot_be_reached_ends_at_the_limits(face):
+    surface = face[1]
+    vertex = 14 * 7
+    far = surface.positions(raw(), 0, [vertex])[0] + [0, -50, 0]
+    solved = risorius.solve_drag(surface, raw(), [(0, vertex)], [far])
+    assert solved.raw[JAW] == 1
+    assert solved.raw[TWIN] == 1
+    assert ((solved.raw >= 0) & (solved.raw <= 1)).all()
+
+
+def test_the_best_control_is_the_one_that_was_moved(face):
+    surface = face[1]
+    vertex = 14 * 3 + 5
+    target = surface.positions(raw(left=0.7), 0, [vertex])[0]
+    ranked = risorius.best_controls(surface, raw(), (0, vertex), target)
+    control, value, left = ranked[0]
+    assert control == LEFT
+    assert value == pytest.approx(0.7, abs=0.01)
+    assert left < 0.01
+    assert [row[2] for row in ranked] == sorted(row[2] for row in ranked)
+    assert IDLE not in [row[0] for row in ranked]
+
+
+def test_handles_are_few_spread_and_alike_on_both_sides(face):
+    dna, surface = face
+    found = risorius.place_handles(surface, 0, count=8)
+    assert 4 <= len(set(found.tolist())) == len(found) <= 8
+    places = dna.meshes[0].positions[found]
+    apart = np.linalg.norm(places[:, None] - places, axis=2)[~np.eye(len(found), dtype=bool)]
+    assert apart.min() > 0.9
+    mirrored = {(round(-x, 3), round(y, 3)) for x, y, _ in places.tolist()}
+    assert mirrored == {(round(x, 3), round(y, 3)) for x, y, _ in places.tolist()}
+    reach = np.linalg.norm(surface.jacobian(raw(), 0, np.arange(196)), axis=(1, 2))
+    assert reach[found].mean() > np.median(reach)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"points": [], "targets": np.zeros((0, 3))}, "points: one at least was expected, found 0"),
+        ({"points": [(0, 999)]}, "a vertex below 196 was expected, found 999"),
+        ({"points": [(3, 0)]}, "a mesh below 1 was expected, found 3"),
+        ({"points": [(0, -1)]}, "a vertex below 196 was expected, found -1"),
+        ({"targets": [[0, np.nan, 0]]}, "targets: finite numbers"),
+        ({"targets": [[0, 0]]}, r"targets: .* shape \[1, 3\]"),
+        ({"weights": [-1]}, "weights: numbers from 0"),
+        ({"axes": np.eye(3)}, "axes: finite numbers"),
+        ({"raw": np.zeros(3)}, "raw: 7 numbers"),
+        ({"lowest": 0.5, "highest": 0.25}, r"lowest\[0\]: at most highest\[0\] 0.25"),
+        ({"method": "newton"}, "least_squares or transpose"),
+    ],
+)
+def test_what_makes_no_sense_is_one_sentence(face, change, said):
+    given = {"raw": raw(), "points": [(0, 5)], "targets": [[0, 0, 0]], **change}
+    with pytest.raises(risorius.RisoriusError, match=said):
+        risorius.solve_drag(face[1], **given)
+
+
+def performance(face, frames=40):
+    """Curves of four controls that are seen, and float32[F, V, 3]."""
+    t = np.arange(frames) / 30
+    curves = np.zeros((frames, 7), np.float32)
+    curves[:, JAW] = 0.5 - 0.5 * np.cos(7 * t)
+    curves[:, LEFT] = np.clip(np.sin(3 * t), 0, 1)
+    curves[:, RIGHT] = np.clip(1.3 * np.sin(2 * t + 0.4), 0, 1)
+    curves[10:20, PUFF] = 0.8
+    vertices = np.stack([face[1].positions(row, 0) for row in curves])
+    return curves, vertices
+
+
+FREE = [control != TWIN for control in range(7)]
+
+
+def table(clip, names):
+    out = np.zeros((clip.frame_count, len(names)), np.float32)
+    for name, curve in zip(clip.names, clip.curves, strict=True):
+        out[:, names.index(name)] = curve
+    return out
+
+
+def test_a_baked_clip_comes_back(face):
+    dna, surface = face
+    curves, vertices = performance(face)
+    told = []
+    solved = risorius.solve_clip(surface, vertices, rate=30, free=FREE, progress=told.append)
+    found = table(solved.clip, list(dna.raw_control_names))
+    assert np.abs(found - curves).max() < 0.02
+    assert solved.largest * surface.mm < 0.1
+    assert (solved.clip.rate, solved.clip.frame_count) == (30, 40)
+    assert not {"CTRL_expressions.idle", "CTRL_expressions.widen"} & set(solved.clip.names)
+    assert told == sorted(told)
+    assert told[-1] == pytest.approx(1, abs=0.01)
+    # What is told of the residual is what a mesh of these curves leaves.
+    left = np.stack([pose(face, row) for row in found]) - vertices
+    rms = np.sqrt((left**2).sum(axis=2).mean(axis=1))
+    np.testing.assert_allclose(solved.frame_residual, rms, atol=1e-4)
+
+
+def test_controls_that_do_the_same_agree_on_the_mesh_only(face):
+    _, surface = face
+    curves, vertices = performance(face, 8)
+    solved = risorius.solve_clip(surface, vertices, rate=30)
+    found = table(solved.clip, list(face[0].raw_control_names))
+    assert solved.largest * surface.mm < 0.1
+    np.testing.assert_allclose(found[:, JAW] + found[:, TWIN], curves[:, JAW], atol=0.02)
+
+
+def test_a_noisy_mesh_gives_quiet_curves(face):
+    dna, surface = face
+    curves, vertices = performance(face)
+    noise = np.random.default_rng(5).normal(0, 0.1, vertices.shape)  # 1 mm
+    solved = risorius.solve_clip(surface, vertices + noise, rate=30, free=FREE)
+    found = table(solved.clip, list(dna.raw_control_names))
+    assert solved.noise * surface.mm == pytest.approx(1, abs=0.15)
+
+    def flicker(values):
+        smooth = np.delete(values, PUFF, axis=1)  # which jumps
+        return np.sqrt((np.diff(smooth, 2, axis=0) ** 2).mean())
+
+    loose = risorius.solve_clip(surface, vertices + noise, rate=30, free=FREE, smooth=0, sparse=0)
+    unquiet = table(loose.clip, list(dna.raw_control_names))
+    assert flicker(found) < 1.1 * flicker(curves)
+    assert flicker(found - curves) < 0.5 * flicker(unquiet - curves)
+    assert np.sqrt(((found - curves) ** 2).mean()) < 0.05
+
+
+def test_another_face_of_the_topology_gives_its_movement(face):
+    dna, surface = face
+    curves, vertices = performance(face, 12)
+    other = dna.meshes[0].positions * [1.0, 1.1, 0.9] + [0.3, 0.0, 0.0]
+    moved = vertices - dna.meshes[0].positions + other
+    solved = risorius.solve_clip(surface, moved, rate=30, neutral=other, free=FREE)
+    found = table(solved.clip, list(dna.raw_control_names))
+    assert np.abs(found - curves).max() < 0.02
+
+
+def test_the_result_does_not_depend_on_threads(face):
+    _, vertices = performance(face, 30)
+    one, two = (
+        risorius.solve_clip(face[1], vertices, rate=30, threads=threads) for threads in (1, 2)
+    )
+    np.testing.assert_array_equal(one.clip.curves, two.clip.curves)
+
+
+def test_a_solve_can_be_cancelled(face):
+    _, vertices = performance(face, 30)
+    with pytest.raises(CancelledError, match="cancelled"):
+        risorius.solve_clip(face[1], vertices, rate=30, progress=lambda share: share < 0.2)
+
+
+@pytest.mark.parametrize(
+    ("frames", "change", "said"),
+    [
+        (np.zeros((2, 5, 3)), {}, r"frames: \[F, 196, 3\] was expected for mesh 0"),
+        (np.full((2, 196, 3), np.nan), {}, "frames: finite numbers"),
+        (np.zeros((0, 196, 3)), {}, "frames: as many"),
+        ({4: np.zeros((2, 196, 3))}, {}, "frames: meshes below 1 were expected, found 4"),
+        ({}, {}, "frames: one mesh at least"),
+        (np.zeros((2, 196, 3)), {"rate": 0}, "rate: a number above 0 was expected, found 0"),
+        (np.zeros((2, 196, 3)), {"smooth": -1}, "smooth: a number from 0"),
+        (np.zeros((2, 196, 3)), {"neutral": np.zeros((5, 3))}, "neutral: "),
+    ],
+)
+def test_frames_that_make_no_sense_are_one_sentence(face, frames, change, said):
+    with pytest.raises(risorius.RisoriusError, match=said):
+        risorius.solve_clip(face[1], frames, **{"rate": 30, **change})
