@@ -13,6 +13,7 @@ from .ui import (
     about,
     animation,
     bake,
+    drag,
     export,
     expressions,
     face,
@@ -27,6 +28,8 @@ from .ui import (
 )
 from .ui.about import manual, preferences, timing_overlay
 from .ui.animation import operators as animation_operators
+from .ui.drag import drawing as drag_drawing
+from .ui.drag import properties as drag_properties
 from .ui.face import channel_preview, paste_flipped
 from .ui.file import import_operators, rig_operators
 from .ui.file import operators as file_operators
@@ -44,6 +47,7 @@ CLASSES = (
     *life.CLASSES,
     *bake.CLASSES,
     *export.CLASSES,
+    *drag.CLASSES,
     *face.CLASSES,
     *animation.CLASSES,
     *speech.CLASSES,
@@ -75,6 +79,7 @@ def _window_properties() -> dict[str, object]:
         ),
         "risorius_show_timing": timing_overlay.show_property(),
         "risorius_live": bpy.props.PointerProperty(type=live_properties.RISORIUS_PG_live),
+        "risorius_drag": bpy.props.PointerProperty(type=drag_properties.RISORIUS_PG_drag),
         "risorius_mix": bpy.props.PointerProperty(type=mixing_properties.RISORIUS_PG_mix),
         "risorius_why": bpy.props.PointerProperty(type=why_properties.RISORIUS_PG_why),
         "risorius_test": channel_preview.weight_property(),
@@ -137,6 +142,7 @@ def unregister() -> None:
     handlers.unregister()
     manual.unregister()
     timing_overlay.stop()
+    drag_drawing.stop()
     bpy.types.VIEW3D_MT_object.remove(rig_operators.draw_make_rig)
     bpy.types.MESH_MT_shape_key_context_menu.remove(rig_operators.draw_make_rig)
     bpy.types.VIEW3D_MT_add.remove(import_operators.draw_add)

@@ -45,6 +45,7 @@ CHANNELS = "channels"  # on the deforming armature: values of the channels
 FACE = "face"  # the bone of the control armature that bears the controls
 PART = "risorius_part"  # on the control armature's bones: what each is, whatever its name
 PULL = "risorius_pull"  # on the deforming armature: its driver keeps the controls evaluated
+PINS = "risorius_pins"  # on the control armature: mesh and vertex of each pin of a drag, flat
 
 
 def rigs(linked: bool = False) -> list[ArmatureObject]:

@@ -37,6 +37,7 @@ class Runtime:
         anchors: joints of neck, head and eyes.
         look: control name -> yaw or pitch (radians) that a value of 1 gives; by side.
         morphs: mesh index -> risorius.Morph.
+        surfaces: level of detail -> risorius.Surface.
     """
 
     dna: native.Dna
@@ -50,6 +51,7 @@ class Runtime:
     anchors: plans.Anchors
     look: dict[str, list[tuple[int, float, float]]]
     morphs: dict[int, native.Morph] = field(default_factory=dict)
+    surfaces: dict[int, native.Surface] = field(default_factory=dict)
 
     def morph(self, mesh_index: int) -> native.Morph:
         """The compiled shapes of a mesh, made when first asked for."""
@@ -58,6 +60,12 @@ class Runtime:
                 self.dna, mesh_index, matrix=self.space.delta_matrix
             )
         return self.morphs[mesh_index]
+
+    def surface(self, lod: int) -> native.Surface:
+        """The meshes of a level as a function of the controls, made when first asked for."""
+        if lod not in self.surfaces:
+            self.surfaces[lod] = native.module().Surface(self.dna, self.rig, lod=lod)
+        return self.surfaces[lod]
 
     def bone_space(self, joints: Sequence[int]) -> native.BoneSpace:
         """The native conversion of poses for bones that stand for these joints."""

@@ -10,6 +10,7 @@ from .. import words
 from ..bake.panel import draw_state
 from ..blender_types import Context, Icon, Panel, UILayout
 from ..common import FaceOnlyPanel, FacePanel, face_controls, face_rig
+from ..drag import panel as drag_panel
 from ..life.panel import draw_trouble
 
 
@@ -46,6 +47,7 @@ class RISORIUS_PT_character(FacePanel, Panel):
             shown = text if ruler.fits(text) else ""  # its tooltip says the same
             row.operator(operator, text=shown, icon=icon, translate=False).region = ""
         _draw_hint(layout, context, rig)
+        drag_panel.draw_button(layout, context)
         draw_state(layout, rig)
         for warning in plans.layer_warnings(live.rig.ignored_layers):
             words.write(layout, warning, "INFO")

@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From a face's own space, in which controls are solved for, to where Blender shows it.
+
+Between them lie the turns of the neck and head bones, what the user did to joints that the
+evaluator leaves alone, the rig's place and the file's axes and unit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from mathutils import Matrix, Quaternion
+from numpy.typing import NDArray
+
+from ..base import parts
+from ..base.blender_types import ArmatureObject, Depsgraph
+from ..character import runtime
+
+Float = NDArray[np.float64]
+
+_STRAIGHT = np.eye(4)
+
+
+class HeadTurns:
+    """What turns the head beside the face's own controls, at one moment.
+
+    Holds Blender objects: it is made, used and dropped within one operator.
+    """
+
+    def __init__(
+        self,
+        rig: ArmatureObject,
+        live: runtime.Runtime,
+        turns: Mapping[str, Quaternion],
+        depsgraph: Depsgraph,
+    ) -> None:
+        """Look at a face.
+
+        Args:
+            rig: the deforming armature, the original.
+            live: its Runtime.
+            turns: "neck" and "head" -> Quaternion in the armature's axes, as read_inputs gives.
+            depsgraph: where the rig was evaluated.
+        """
+        seen = rig.evaluated_get(depsgraph)
+        self._live, self._bones, self._rests = live, seen.pose.bones, rig.data.bones
+        self._names = {b[parts.JOINT]: b.name for b in rig.data.bones if parts.JOINT in b}
+        self._place = np.array(seen.matrix_world)
+        self._parts: dict[int, Matrix] = {}
+        neck, head = live.anchors.neck, live.anchors.head
+        for joint in neck if "neck" in turns else ():
+            part = Quaternion().slerp(turns["neck"], 1.0 / len(neck))
+            self._parts[joint] = part.to_matrix().to_4x4()
+        if head is not None and "head" in turns:
+            self._parts[head] = turns["head"].to_matrix().to_4x4()
+        self._known: dict[int, Float] = {}
+
+    def at(self, mesh: int, vertices: NDArray[np.int64]) -> Float:
+        """The affine maps from the file's space to the world: float64[V, 4, 4].
+
+        Args:
+            mesh: its index in the DNA.
+            vertices: int64[V] of it.
+        """
+        data, space = self._live.dna.meshes[mesh], self._live.space
+        offsets = np.asarray(data.skin_offsets)
+        joints, weights = np.asarray(data.skin_joint_indices), np.asarray(data.skin_weights)
+        maps = np.empty((len(vertices), 4, 4))
+        for row, vertex in enumerate(vertices.tolist()):
+            held = slice(int(offsets[vertex]), int(offsets[vertex + 1]))
+            mixed = np.zeros((4, 4))
+            for joint, weight in zip(joints[held].tolist(), weights[held].tolist(), strict=True):
+                mixed += weight * self.of_joint(joint)
+            maps[row] = mixed if held.stop > held.start else _STRAIGHT
+        return self._place @ maps @ _file_matrix(space.axes, space.scale)
+
+    def positions(self, mesh: int, points: NDArray[np.float32]) -> Float:
+        """All vertices of a mesh where the scene has them: float64[V, 3] in the world.
+
+        Args:
+            mesh: its index in the DNA.
+            points: float32[V, 3] of the face's own space.
+        """
+        data, space = self._live.dna.meshes[mesh], self._live.space
+        count = len(points)
+        owner = np.repeat(np.arange(count), np.diff(np.asarray(data.skin_offsets, np.int64)))
+        joints, weights = np.asarray(data.skin_joint_indices), np.asarray(data.skin_weights)
+        zones: dict[bytes, tuple[Float, list[int]]] = {}
+        for joint in np.unique(joints).tolist():
+            turn = self.of_joint(joint)
+            zones.setdefault(turn.tobytes(), (turn, []))[1].append(joint)
+        whole = np.concatenate([space.points(points), np.ones((count, 1))], axis=1)
+        result = np.zeros((count, 4))
+        for turn, held in zones.values():
+            there = np.isin(joints, held)
+            share = np.bincount(owner[there], weights[there].astype(np.float64), count)
+            result += share[:, None] * (whole @ turn.T)
+        bare = np.diff(np.asarray(data.skin_offsets, np.int64)) == 0
+        result[bare] = whole[bare]
+        return (result @ self._place.T)[:, :3]
+
+    def of_joint(self, joint: int) -> Float:
+        """What a joint does now on top of what the controls ask for: float64[4, 4].
+
+        In the armature's axes; a turn of a joint goes on to all that hangs on it.
+        """
+        if joint not in self._known:
+            parent = int(self._live.dna.joint_parents[joint])
+            above = _STRAIGHT if parent == joint else self.of_joint(parent)
+            self._known[joint] = self._added(joint, parent, above)
+        return self._known[joint]
+
+    def _added(self, joint: int, parent: int, above: Float) -> Float:
+        name = self._names.get(joint)
+        if name is None or (joint not in self._parts and joint in self._live.owned):
+            return above
+        carrier = Matrix() if parent == joint else self._skin(parent)
+        if joint in self._parts:
+            pivot = self._rests[name].matrix_local @ self._bones[name].location
+            about = Matrix.Translation(pivot) @ self._parts[joint] @ Matrix.Translation(-pivot)
+            return np.array(carrier @ about @ carrier.inverted_safe()) @ above
+        return np.array(self._skin(joint) @ carrier.inverted_safe()) @ above
+
+    def _skin(self, joint: int) -> Matrix:
+        name = self._names.get(joint)
+        if name is None:
+            return Matrix()
+        return self._bones[name].matrix @ self._rests[name].matrix_local.inverted_safe()
+
+
+def _file_matrix(axes: Float, scale: float) -> Float:
+    matrix = np.eye(4)
+    matrix[:3, :3] = axes * scale
+    return matrix

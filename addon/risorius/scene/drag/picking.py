@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which vertex of which face lies under a ray through the scene."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import cast
+
+import bpy
+import numpy as np
+from mathutils import Matrix, Vector
+from numpy.typing import NDArray
+
+from ...logic.base.errors import FaceError
+from ...logic.base.sentences import told
+from ..base import parts
+from ..base.blender_types import ArmatureObject, Context
+from ..character import runtime
+from ..frame import inputs
+from .head_turns import HeadTurns
+from .skin import Point, Skin
+
+_FAR = 0.05  # of the face's size: a hit farther from all vertices is another's skin
+_THROUGH = 16  # objects that are drawn as wires or bounds, and looked through
+
+
+@dataclass
+class Hit:
+    """What a ray meets.
+
+    Attributes:
+        rig: the character.
+        point: mesh and vertex of its DNA.
+        place: float64[3] of that vertex in the world.
+    """
+
+    rig: ArmatureObject
+    point: Point
+    place: NDArray[np.float64]
+
+
+def under(context: Context, origin: Vector, direction: Vector) -> Hit | None:
+    """The vertex of a face that a ray meets first, or None where it meets another thing.
+
+    Args:
+        context: its scene is looked at, as the viewport evaluated it.
+        origin, direction: of the ray, in the world; the direction of length 1.
+
+    Raises:
+        FaceError: the face is another file's, or has lost its DNA.
+    """
+    met = _first(context, origin, direction)
+    if met is None:
+        return None
+    item, place, index, matrix = met
+    rig = parts.rig_of(item) if parts.MESH in item else None
+    if rig is None or np.abs(np.array(matrix) - np.array(item.matrix_world)).max() > 1e-4:
+        return None  # no face, or an instance of one
+    if rig.library is not None:
+        name = rig.name.removesuffix("_rig")
+        raise FaceError(told("{name} is linked: make a library override of it first.", name=name))
+    live = runtime.of(rig)
+    if live is None or parts.controls_of(rig) is None:
+        raise FaceError(told("This face has lost its controls or its DNA."))
+    return _nearest(context, rig, live, item, np.array(place), index)
+
+
+def _first(
+    context: Context, origin: Vector, direction: Vector
+) -> tuple[bpy.types.Object, Vector, int, Matrix] | None:
+    """The first object that is drawn as a solid: it, where, which polygon, where it stands."""
+    depsgraph = context.evaluated_depsgraph_get()
+    for _ in range(_THROUGH):
+        met, place, _normal, index, item, matrix = context.scene.ray_cast(
+            depsgraph, origin, direction
+        )
+        if not met or item is None:
+            return None
+        original = cast(bpy.types.Object, item.original)
+        if original.display_type not in ("WIRE", "BOUNDS"):
+            return original, place, index, matrix
+        origin = place + direction * 1e-4
+    return None
+
+
+def _nearest(
+    context: Context,
+    rig: ArmatureObject,
+    live: runtime.Runtime,
+    item: bpy.types.Object,
+    place: NDArray[np.float64],
+    index: int,
+) -> Hit | None:
+    """The vertex of a face's mesh nearest to where a ray met it."""
+    mesh, skin = int(item[parts.MESH]), Skin.of(context, rig, live)
+    if mesh not in skin.surface.mesh_indices:
+        return None
+    corners = skin.corners(mesh, index)
+    if corners is not None:
+        best = min(corners, key=lambda corner: float(np.linalg.norm(corner[1] - place)))
+        return Hit(rig, (mesh, best[0]), best[1])
+    places = computed(context, rig, live, skin, mesh)
+    far = np.linalg.norm(places - place, axis=1)
+    nearest = int(np.argmin(far))
+    if far[nearest] > _FAR * skin.size * max(np.abs(np.array(item.matrix_world)[:3, :3]).max(), 0):
+        return None
+    return Hit(rig, (mesh, nearest), places[nearest])
+
+
+def computed(
+    context: Context, rig: ArmatureObject, live: runtime.Runtime, skin: Skin, mesh: int
+) -> NDArray[np.float64]:
+    """Vertices of a mesh below all other modifiers: float64[V, 3] in the world.
+
+    Args:
+        context: has the scene that is seen.
+        rig, live: the character and its Runtime.
+        skin: of it.
+        mesh: its number in the DNA.
+    """
+    depsgraph, controls = context.evaluated_depsgraph_get(), parts.controls_there(rig)
+    seen, maximum = controls.evaluated_get(depsgraph), parts.maximum_of(controls)
+    raw, turns = inputs.read_inputs(seen, live, depsgraph, maximum)
+    rest = skin.surface.positions(raw, mesh)
+    return HeadTurns(rig, live, turns, depsgraph).positions(mesh, rest)
+
+
+def places(
+    context: Context, rig: ArmatureObject, live: runtime.Runtime, points: list[Point]
+) -> list[NDArray[np.float64]]:
+    """Where points of a face are seen: float64[3] each, in the world.
+
+    Args:
+        context: has the scene that is seen.
+        rig, live: the character and its Runtime.
+        points: mesh and vertex of each; those of another level of detail are left out.
+    """
+    if not points:
+        return []
+    skin, found = Skin.of(context, rig, live), []
+    for mesh, vertex in points:
+        at = skin.seen_at((mesh, vertex))
+        if at is None and mesh in skin.surface.mesh_indices:
+            at = computed(context, rig, live, skin, mesh)[vertex]
+        if at is not None:
+            found.append(at)
+    return found

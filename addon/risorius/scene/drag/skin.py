@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The skin of a face as it is seen: its vertices in the world, and which one is under a place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import native
+from ..base import parts, written
+from ..base.blender_types import ArmatureObject, Context, Depsgraph, MeshObject
+from ..character import lods, runtime
+
+Float = NDArray[np.float64]
+Point = tuple[int, int]  # a mesh of the DNA, one of its vertices
+
+_BESIDE = 0.02  # of the face's size: how far off the middle a mirrored vertex may be
+
+
+@dataclass
+class Skin:
+    """A face's meshes in the scene. Holds Blender objects: it lives within one operator.
+
+    Attributes:
+        surface: the face in its own space, at the level of detail that is seen.
+        items: mesh object by its number in the DNA.
+        size: of the face, in Blender units.
+        depsgraph: where it is seen.
+        pressed: float64[3] where the dragged vertex was seen at the press, or None.
+    """
+
+    surface: native.Surface
+    items: dict[int, MeshObject]
+    size: float
+    depsgraph: Depsgraph
+    live: runtime.Runtime
+    pressed: Float | None = None
+
+    @classmethod
+    def of(cls, context: Context, rig: ArmatureObject, live: runtime.Runtime) -> Skin:
+        """The skin of a character.
+
+        Args:
+            context: has the scene that is seen.
+            rig: the character.
+            live: its Runtime.
+        """
+        last = written.inputs.get(rig.session_uid)
+        level = lods.expected(rig, False, last[1] if isinstance(last, tuple) else None)
+        level = min(max(level, 0), max(live.rig.lod_count - 1, 0))
+        surface = live.surface(level)
+        items = {i[parts.MESH]: i for i in parts.meshes_of(rig)}
+        first = surface.mesh_indices[0] if surface.mesh_indices else 0
+        places = np.asarray(live.dna.meshes[first].positions)
+        size = float(np.ptp(places, axis=0).max(initial=0.0)) * live.space.scale
+        return cls(surface, items, size or 1.0, context.evaluated_depsgraph_get(), live)
+
+    def show(self, context: Context) -> None:
+        """Bring the face up to its sliders. Args: context  its view layer is evaluated."""
+        context.view_layer.update()  # the handler of updates writes the bones
+        context.view_layer.update()
+        self.depsgraph = context.evaluated_depsgraph_get()
+
+    def seen(self, mesh: int) -> Float | None:
+        """Vertices of a mesh as Blender shows them: float64[V, 3] in the world.
+
+        None where it is hidden, or what lies above the armature makes other vertices.
+
+        Args:
+            mesh: its number in the DNA.
+        """
+        data, place = self._evaluated(mesh)
+        if data is None:
+            return None
+        flat = np.empty(3 * len(data.vertices), np.float32)
+        data.vertices.foreach_get("co", flat)
+        return flat.reshape(-1, 3).astype(np.float64) @ place[:3, :3].T + place[:3, 3]
+
+    def seen_at(self, point: Point) -> Float | None:
+        """One vertex as `seen` gives it: float64[3] or None. Args: point  mesh and vertex."""
+        data, place = self._evaluated(point[0])
+        if data is None:
+            return None
+        return place[:3, :3] @ np.array(data.vertices[point[1]].co, np.float64) + place[:3, 3]
+
+    def corners(self, mesh: int, polygon: int) -> list[tuple[int, Float]] | None:
+        """The vertices of a polygon with their places in the world; None as of `seen`.
+
+        Args:
+            mesh: its number in the DNA.
+            polygon: index of it in the evaluated mesh.
+        """
+        data, place = self._evaluated(mesh)
+        if data is None or not 0 <= polygon < len(data.polygons):
+            return None
+        found = [
+            (v, np.array(data.vertices[v].co, np.float64)) for v in data.polygons[polygon].vertices
+        ]
+        return [(v, place[:3, :3] @ co + place[:3, 3]) for v, co in found]
+
+    def _evaluated(self, mesh: int) -> tuple[bpy.types.Mesh | None, Float]:
+        item = self.items.get(mesh)
+        seen = item.evaluated_get(self.depsgraph) if item is not None else None
+        if item is None or seen is None or not seen.is_evaluated or item.mode == "EDIT":
+            return None, np.eye(4)
+        data = seen.data
+        assert isinstance(data, bpy.types.Mesh)
+        same = len(data.vertices) == len(item.data.vertices) == self.surface.vertex_counts[mesh]
+        return (data if same else None), np.array(seen.matrix_world)
+
+    def mirrored(self, point: Point) -> Point | None:
+        """The vertex that lies where a mirror shows one, on the face at rest; None without one.
+
+        Args:
+            point: mesh and vertex; one of the middle is its own.
+        """
+        at = self._rest(point[0])[point[1]] * (-1.0, 1.0, 1.0)
+        best: tuple[float, Point] | None = None
+        for mesh in [point[0], *(m for m in self.surface.mesh_indices if m != point[0])]:
+            places = self._rest(mesh)
+            if not len(places):
+                continue
+            far = np.linalg.norm(places - at, axis=1)
+            nearest = int(np.argmin(far))
+            if best is None or far[nearest] < best[0] - 1e-3 * self.size:
+                best = (float(far[nearest]), (mesh, nearest))
+        return best[1] if best is not None and best[0] < _BESIDE * self.size else None
+
+    def _rest(self, mesh: int) -> Float:
+        return self.live.space.points(np.asarray(self.live.dna.meshes[mesh].positions))

@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The sliders of a face as something to solve for: what each does to the face that is seen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import native
+from ..animation import layer_mixing, layers
+from ..base import parts
+from ..base.blender_types import ArmatureObject, Depsgraph
+from ..character import runtime, sides
+from ..frame import inputs
+
+Float = NDArray[np.float64]
+
+_TRIED = 1.0 / 64  # of a slider, to see what layers above it let through
+_LEAST = 1e-3  # of a slider's change that must come through
+
+
+@dataclass
+class Sliders:
+    """Sliders and what is seen of them, as they were when a drag began.
+
+    Attributes:
+        before: property name -> its value, to give it back.
+        start: float64[R] the sliders.
+        seen: float32[R] the raw controls of the face, with layers and eye bones.
+        gain: float64[R] how much of a slider's change is seen.
+        free: bool[R] which can be moved.
+        low, high: float64[R] the limits of `seen`.
+        linked: (leader, follower) indices of sides that are linked.
+    """
+
+    before: dict[str, float]
+    start: Float
+    seen: NDArray[np.float32]
+    gain: Float
+    free: NDArray[np.bool_]
+    low: Float
+    high: Float
+    linked: list[tuple[int, int]]
+
+    def values(self, raw: NDArray[np.float32]) -> Float:
+        """The sliders that show these raw controls: float64[R]. Args: raw  float32[R]."""
+        change = raw.astype(np.float64) - self.seen
+        moved = self.free & (np.abs(change) > 1e-7)
+        values = np.where(moved, self.start + change / self.gain, self.start)
+        for leader, follower in self.linked:
+            if moved[leader] or moved[follower]:
+                values[leader] = (values[leader] + values[follower]) / 2
+        return values
+
+
+def read(rig: ArmatureObject, live: runtime.Runtime, depsgraph: Depsgraph) -> Sliders:
+    """Look at the sliders of a face.
+
+    Args:
+        rig: the deforming armature.
+        live: its Runtime.
+        depsgraph: where its controls were evaluated.
+    """
+    controls = parts.controls_there(rig)
+    bone, seen = controls.pose.bones[parts.FACE], controls.evaluated_get(depsgraph)
+    maximum = parts.maximum_of(controls)
+    raw, _turns = inputs.read_inputs(seen, live, depsgraph, maximum)
+    start = inputs.read_sliders(seen, live).astype(np.float64)
+    gain = _gains(seen, live, depsgraph, maximum, start)
+    where = {label: i for i, label in enumerate(live.labels)}
+    followers = sides.followers(controls)
+    linked = [(where[a], where[b]) for b, a in followers.items() if a in where and b in where]
+    driven = _driven(controls) - set(followers)
+    there = np.array([n in bone and n not in driven for n in live.labels], bool)
+    lowest = np.array(live.lowest, np.float64)
+    one, other = raw + gain * (lowest - start), raw + gain * (maximum - start)
+    return Sliders(
+        before={name: bone[name] for name in live.labels if name in bone},
+        start=start,
+        seen=raw,
+        gain=np.where(np.abs(gain) > _LEAST, gain, 1.0),
+        free=there & (np.abs(gain) > _LEAST),
+        low=np.minimum(one, other),
+        high=np.maximum(one, other),
+        linked=linked,
+    )
+
+
+def write(
+    rig: ArmatureObject, live: runtime.Runtime, sliders: Sliders, raw: NDArray[np.float32]
+) -> list[str]:
+    """Set the sliders so that the face shows raw controls.
+
+    Args:
+        rig: the character.
+        live: its Runtime.
+        sliders: as they were when the drag began.
+        raw: float32[R].
+
+    Returns:
+        The names of those that differ from what they were.
+    """
+    controls = parts.controls_there(rig)
+    bone, maximum = controls.pose.bones[parts.FACE], parts.maximum_of(controls)
+    followers = {follower for _, follower in sliders.linked}
+    moved = []
+    for i, value in enumerate(sliders.values(raw).tolist()):
+        name = live.labels[i]
+        if name not in sliders.before or i in followers:
+            continue
+        if value == sliders.start[i]:
+            bone[name] = sliders.before[name]
+            continue
+        low, high = min(live.lowest[i], sliders.start[i]), max(maximum, sliders.start[i])
+        bone[name] = min(max(value, low), high)
+        moved.append(name)
+    controls.update_tag()
+    return moved
+
+
+def restore(rig: ArmatureObject, sliders: Sliders) -> None:
+    """Give all sliders what they had.
+
+    Args:
+        rig: the character.
+        sliders: as they were when the drag began.
+    """
+    sides.restore(rig, sliders.before)
+    parts.controls_there(rig).update_tag()
+
+
+def mirrored_indices(live: runtime.Runtime) -> NDArray[np.int64]:
+    """int64[R]: the partner of each control in a mirror; itself where it has none."""
+    where = {label: i for i, label in enumerate(live.labels)}
+    partner = native.regions().mirrored
+    return np.array([where.get(partner(n), i) for n, i in where.items()], np.int64)
+
+
+def of_region(live: runtime.Runtime, region: str) -> NDArray[np.bool_]:
+    """bool[R]: the controls of a region. Args: live  the Runtime; region  its name."""
+    of_slider = native.regions().of_slider
+    return np.array([of_slider(label) == region for label in live.labels], bool)
+
+
+def _gains(
+    seen: ArmatureObject,
+    live: runtime.Runtime,
+    depsgraph: Depsgraph,
+    maximum: float,
+    start: Float,
+) -> Float:
+    """What comes through the layers of a small change of each slider: 1 without layers.
+
+    Each is tried alone: of two that exclude each other, as looking left and right, a rule of the
+    layers lets only one through.
+    """
+    gain = np.ones(len(start))
+    if not layers.has_any(seen.original):
+        return gain
+
+    def mixed(values: NDArray[np.float32]) -> NDArray[np.float32]:
+        return layer_mixing.mix(seen, live, values, None, depsgraph, maximum)[0]
+
+    base = start.astype(np.float32)
+    before = mixed(base)
+    for i in range(len(base)):
+        tried = base.copy()
+        tried[i] += _TRIED if base[i] + _TRIED <= maximum else -_TRIED
+        gain[i] = (float(mixed(tried)[i]) - float(before[i])) / (float(tried[i]) - float(base[i]))
+    return gain
+
+
+def _driven(controls: ArmatureObject) -> set[str]:
+    """The sliders that a driver moves, by name."""
+    data = controls.animation_data
+    paths = {curve.data_path for curve in data.drivers} if data is not None else set()
+    bone = controls.pose.bones[parts.FACE]
+    return {n for n in bone.keys() if parts.property_path(n) in paths} if paths else set()  # noqa: SIM118

@@ -1,0 +1,345 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One drag of a face, from the press to the release: targets in the scene to sliders.
+
+Each target is solved for from the pose at the press, so a face is what the cursor's place makes it,
+whatever way the cursor took.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import native
+from ...logic.base.errors import FaceError
+from ...logic.base.sentences import told
+from ..animation import keying
+from ..base import parts, written
+from ..base.blender_types import ArmatureObject, Context
+from ..character import runtime
+from ..frame import inputs
+from . import pins, sliders
+from .head_turns import HeadTurns
+from .skin import Point, Skin
+
+Float = NDArray[np.float64]
+
+_STILL = 1e-6  # of the face's size that a control must move a point by
+_SMALL = 0.01  # of the largest change: what is smaller is not worth a key
+
+
+@dataclass(frozen=True)
+class Options:
+    """How a drag is solved.
+
+    Attributes:
+        symmetric: the mirrored point goes the mirrored way.
+        method: of risorius.solve_drag.
+        single: only the one control that does it best moves; with `symmetric` its partner too.
+        choice: which one: 0 is the best, 1 the next.
+        region: only controls of the region of the point.
+    """
+
+    symmetric: bool = False
+    method: str = "least_squares"
+    single: bool = False
+    choice: int = 0
+    region: bool = False
+
+
+@dataclass
+class _Anchors:
+    """The points of a drag as they were at the press.
+
+    Attributes:
+        points: the dragged one, its mirror if there is one, then pins.
+        dragged: how many of them are pulled.
+        rest: float64[P, 3] in the file's space.
+        world: float64[P, 3] in the scene.
+        maps: float64[P, 3, 3] from directions of the file to those of the world.
+    """
+
+    points: list[Point]
+    dragged: int
+    rest: Float
+    world: Float
+    maps: Float
+
+
+@dataclass
+class Stroke:
+    """A drag that is going on. Made by `begin`; it ends with `finish` or `restore`.
+
+    Holds Blender objects: it lives within one operator.
+
+    Attributes:
+        rig, live: the character and its Runtime.
+        point: (mesh, vertex) that is dragged.
+        options: how; may change while it goes on.
+        raw: float32[R] what the face shows now.
+        best: controls that do it alone, best first: (index, value, remaining distance).
+    """
+
+    rig: ArmatureObject
+    live: runtime.Runtime
+    point: Point
+    options: Options
+    skin: Skin
+    state: sliders.Sliders
+    turns: HeadTurns
+    reach: NDArray[np.float32]  # [3, R] what each control does to the point, file units
+    raw: NDArray[np.float32]
+    best: list[tuple[int, float, float]] = field(default_factory=list)
+    _anchors: dict[bool, _Anchors] = field(default_factory=dict)
+    _apart: Float = field(default_factory=lambda: np.zeros(3))  # seen less predicted, world
+
+    @property
+    def start(self) -> Float:
+        """float64[3]: where the point was at the press, in the world."""
+        return self._of().world[0]
+
+    @property
+    def dragged_region(self) -> str:
+        """The region whose control moves the point most."""
+        strongest = int(np.argmax(np.linalg.norm(self.reach, axis=0) * self.state.free))
+        return native.regions().of_slider(self.live.labels[strongest])
+
+    def to(self, context: Context, target: Float, view: Float | None = None) -> Float:
+        """Drag the point to a place and show the face.
+
+        Args:
+            context: its view layer is evaluated.
+            target: float64[3] in the world.
+            view: float64[3] a direction along which the place of the point is free; None for none.
+
+        Returns:
+            float64[3]: where the point is then.
+        """
+        self.raw, predicted = self._solve(target - self._apart, view, self._free(target, view))
+        sliders.write(self.rig, self.live, self.state, self.raw)
+        at = self._seen(context)
+        self._apart = np.clip(at - predicted, -self.skin.size, self.skin.size)
+        return at
+
+    def finish(self, context: Context, target: Float, view: Float | None = None) -> list[str]:
+        """Bring the point to its place, by the controls that count, and insert keys.
+
+        Args:
+            context: has the settings for keys.
+            target, view: as for `to`.
+
+        Returns:
+            The names of the sliders that moved.
+        """
+        self.to(context, target, view)
+        change = np.abs(self.raw - self.state.seen)
+        held = self._free(target, view) & (change >= _SMALL * change.max(initial=0.0))
+        for _ in range(2):  # once more where bones of the head move with the controls
+            self.raw, predicted = self._solve(target - self._apart, view, held)
+            sliders.write(self.rig, self.live, self.state, self.raw)
+            at = self._seen(context)
+            was, self._apart = self._apart, at - predicted
+            if np.linalg.norm(self._apart - was) < 1e-5 * self.skin.size:
+                break
+        sliders.restore(self.rig, self.state)
+        moved: list[str] = []
+
+        def move() -> Collection[str]:
+            moved.extend(sliders.write(self.rig, self.live, self.state, self.raw))
+            return moved
+
+        keying.by_hand(context, self.rig, move)
+        self.skin.show(context)
+        return moved
+
+    def restore(self, context: Context) -> None:
+        """Give the face back what it was at the press. Args: context  its view layer is shown."""
+        sliders.restore(self.rig, self.state)
+        self.raw = self.state.seen
+        self.skin.show(context)
+
+    def moved(self, count: int = 3) -> list[tuple[str, float]]:
+        """The controls that changed most, with their change. Args: count  how many at most."""
+        change = (self.raw - self.state.seen).astype(np.float64)
+        order = np.argsort(-np.abs(change), kind="stable")[:count]
+        return [(self.live.labels[i], float(change[i])) for i in order if abs(change[i]) > 1e-3]
+
+    def heat(self) -> tuple[Float, Float]:
+        """The dragged mesh: float64[V, 3] vertices in the world, float64[V] how far each moved."""
+        mesh = self.point[0]
+        now = self.skin.surface.positions(self.raw, mesh)
+        was = self.skin.surface.positions(self.state.seen, mesh)
+        far = np.linalg.norm(now.astype(np.float64) - was, axis=1) * self.live.space.scale
+        seen = self.skin.seen(mesh)
+        return (self.turns.positions(mesh, now) if seen is None else seen), far
+
+    def _free(self, target: Float, view: Float | None) -> NDArray[np.bool_]:
+        free = self.state.free.copy()
+        for _, follower in self.state.linked:
+            free[follower] = True
+        if self.options.region:
+            free &= sliders.of_region(self.live, self.dragged_region)
+        if not self.options.single:
+            self.best = []
+            return free
+        anchors = self._of()
+        goal, axes = self._goal(anchors, target - self._apart, view)
+        self.best = native.module().best_controls(
+            self.skin.surface, self.state.seen, self.point, goal[0], axes=axes[0], free=free,
+            lowest=self.state.low, highest=self.state.high,
+        )  # fmt: skip
+        only = np.zeros(len(free), bool)
+        if self.best:
+            chosen = self.best[self.options.choice % len(self.best)][0]
+            only[chosen] = True
+            if self.options.symmetric:
+                only[sliders.mirrored_indices(self.live)[chosen]] = True
+        return only & free
+
+    def _solve(
+        self, target: Float, view: Float | None, free: NDArray[np.bool_]
+    ) -> tuple[NDArray[np.float32], Float]:
+        """float32[R] and where the point should be seen with it."""
+        anchors = self._of()
+        goal, axes = self._goal(anchors, target, view)
+        solved = native.module().solve_drag(
+            self.skin.surface, self.state.seen, anchors.points, goal, axes=axes, free=free,
+            lowest=self.state.low, highest=self.state.high, method=self.options.method,
+        )  # fmt: skip
+        moved = solved.positions[0].astype(np.float64) - anchors.rest[0]
+        return solved.raw, anchors.world[0] + anchors.maps[0] @ moved
+
+    def _goal(self, anchors: _Anchors, target: Float, view: Float | None) -> tuple[Float, Float]:
+        """Targets float64[P, 3] and axes float64[P, 3, 3] of the file's space."""
+        goal, axes = anchors.rest.copy(), np.tile(np.eye(3), (len(anchors.points), 1, 1))
+        shift = np.linalg.solve(anchors.maps[0], target - anchors.world[0])
+        goal[0] += shift
+        if view is not None:
+            # Along a screen two directions count; a third of no length leaves the depth free.
+            rows = _across(view) @ anchors.maps[0]
+            axes[0, :2] = rows / np.linalg.norm(rows, axis=1, keepdims=True)
+            axes[0, 2] = 0.0
+        if anchors.dragged == 2:
+            flip = _flip(self.live)
+            goal[1] += flip @ shift
+            axes[1] = axes[0] @ flip
+        return goal, axes
+
+    def _of(self) -> _Anchors:
+        symmetric = self.options.symmetric or bool(self.state.linked)
+        if symmetric not in self._anchors:
+            self._anchors[symmetric] = self._make_anchors(symmetric)
+        return self._anchors[symmetric]
+
+    def _make_anchors(self, symmetric: bool) -> _Anchors:
+        points = [self.point]
+        other = self.skin.mirrored(self.point) if symmetric else None
+        points += [other] if other is not None else []
+        dragged = len(points)
+        held = pins.of(self.rig, self.skin.surface.vertex_counts)
+        shown = set(self.skin.surface.mesh_indices)
+        points += [p for p in held if p not in points and p[0] in shown]
+        maps = np.stack([self.turns.at(m, np.array([v], np.int64))[0] for m, v in points])
+        raw = self.state.seen
+        rest = np.stack([self.skin.surface.positions(raw, m, [v])[0] for m, v in points])
+        world = np.einsum("pij,pj->pi", maps[:, :3, :3], rest) + maps[:, :3, 3]
+        if not self._anchors and self.skin.pressed is not None:
+            world[0] = self.skin.pressed
+        elif self._anchors:
+            world[0] = next(iter(self._anchors.values())).world[0]
+        return _Anchors(points, dragged, rest.astype(np.float64), world, maps[:, :3, :3])
+
+    def _seen(self, context: Context) -> Float:
+        """Where the point is after the face was evaluated."""
+        self.skin.show(context)
+        if written.is_refused(self.rig):
+            self.restore(context)
+            raise FaceError(_REFUSED)
+        at = self.skin.seen_at(self.point)
+        if at is None:
+            mesh, vertex = self.point
+            rest = self.skin.surface.positions(self.raw, mesh, [vertex])[0]
+            matrix = self.turns.at(mesh, np.array([vertex], np.int64))[0]
+            at = matrix[:3, :3] @ rest + matrix[:3, 3]
+        return at
+
+
+_REFUSED = told("Blender lets nobody write to this override: make it fully editable first.")
+
+
+def begin(context: Context, rig: ArmatureObject, point: Point, options: Options) -> Stroke:
+    """Take hold of a point of a face.
+
+    Args:
+        context: has the scene that is seen.
+        rig: the character.
+        point: (mesh, vertex) of its DNA.
+        options: how it is dragged.
+
+    Raises:
+        FaceError: a face that cannot be dragged now, or a point that nothing moves.
+    """
+    live = _usable(context, rig)
+    depsgraph = context.evaluated_depsgraph_get()
+    skin = Skin.of(context, rig, live)
+    mesh, vertex = point
+    if mesh not in skin.surface.mesh_indices:
+        raise FaceError(told("Mesh {mesh} is not shown at this level of detail.", mesh=mesh))
+    if not 0 <= vertex < skin.surface.vertex_counts[mesh]:
+        found, count = vertex, skin.surface.vertex_counts[mesh]
+        raise FaceError(
+            told("A vertex below {count} was expected, found {found}.", count=count, found=found)
+        )
+    state = sliders.read(rig, live, depsgraph)
+    reach = skin.surface.jacobian(state.seen, mesh, [vertex], lowest=state.low, highest=state.high)
+    strongest = np.linalg.norm(reach[0], axis=0)
+    if not (strongest[state.free] * live.space.scale > _STILL * skin.size).any():
+        led = (strongest * live.space.scale > _STILL * skin.size).any()
+        raise FaceError(_LED if led else _NOTHING)
+    controls = parts.controls_there(rig).evaluated_get(depsgraph)
+    maximum = parts.maximum_of(parts.controls_there(rig))
+    turns = HeadTurns(
+        rig, live, inputs.read_inputs(controls, live, depsgraph, maximum)[1], depsgraph
+    )
+    skin.pressed = skin.seen_at(point)
+    return Stroke(rig, live, point, options, skin, state, turns, reach[0], state.seen)
+
+
+_NOTHING = told("No control of this face moves this point.")
+_LED = told("What moves this point is led by drivers or layers: drag there has no effect.")
+
+
+def _usable(context: Context, rig: ArmatureObject) -> runtime.Runtime:
+    """The Runtime of a face that can be dragged now."""
+    name = rig.name.removesuffix("_rig")
+    if rig.library is not None:
+        raise FaceError(told("{name} is linked: make a library override of it first.", name=name))
+    if parts.BAKED in rig:
+        raise FaceError(told("This face is baked: choose Back to Live first."))
+    if parts.controls_of(rig) is None or runtime.of(rig) is None:
+        raise FaceError(told("This face has lost its controls or its DNA."))
+    if context.screen is not None and context.screen.is_animation_playing:
+        raise FaceError(told("Stop the animation first: a face is dragged on a frame that stays."))
+    depsgraph = context.evaluated_depsgraph_get()
+    if not parts.controls_there(rig).evaluated_get(depsgraph).is_evaluated:
+        raise FaceError(told("{name} is hidden: show it first.", name=name))
+    if not rig.evaluated_get(depsgraph).is_evaluated:
+        raise FaceError(told("{name} is hidden: show it first.", name=name))
+    return runtime.there(rig)
+
+
+def _across(view: Float) -> Float:
+    """float64[2, 3]: two unit vectors at right angles to a direction and to each other."""
+    along = view / np.linalg.norm(view)
+    least = np.eye(3)[int(np.argmin(np.abs(along)))]
+    one = np.cross(along, least)
+    one /= np.linalg.norm(one)
+    return np.stack([one, np.cross(along, one)])
+
+
+def _flip(live: runtime.Runtime) -> Float:
+    """float64[3, 3]: left for right, in the file's axes."""
+    return live.space.axes.T @ np.diag([-1.0, 1.0, 1.0]) @ live.space.axes

@@ -1,0 +1,178 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is drawn over the 3D views while faces are dragged: points, pins, what moves, names.
+
+The handlers are there only while something is to be drawn; `stop` takes them away.
+"""
+
+from dataclasses import dataclass, field
+from typing import Any, cast
+
+import blf
+import bpy
+import gpu
+import numpy as np
+from bpy_extras import view3d_utils
+from gpu_extras.batch import batch_for_shader
+from mathutils import Vector
+from numpy.typing import NDArray
+
+from ..blender_types import Context
+
+Float = NDArray[np.float64]
+Float32 = NDArray[np.float32]
+Colour = tuple[float, float, float, float]
+
+HELD: Colour = (1.0, 0.55, 0.1, 1.0)  # the point that is dragged
+OFFERED: Colour = (1.0, 1.0, 1.0, 0.9)  # the one that a press would take
+PIN: Colour = (0.2, 0.75, 1.0, 1.0)
+_HOT = np.array((1.0, 0.45, 0.05))
+_SHOWN = 0.04  # of the farthest move: what moves less is not coloured
+_MOST = 0.55  # opacity of what moves farthest
+_LIFT = 0.002  # of the distance to the viewer that colours lie above the skin
+
+
+@dataclass
+class Shown:
+    """What is drawn now.
+
+    Attributes:
+        points: places in the world with a colour and a radius in pixels at an interface of 1.
+        lines: of text beside the first point.
+        places: float64[V, 3] vertices of the coloured mesh, or None.
+        far: float64[V] how far each moved.
+        triangles: int32[T, 3] of that mesh.
+    """
+
+    points: list[tuple[Float, Colour, float]] = field(default_factory=list)
+    lines: list[str] = field(default_factory=list)
+    places: Float | None = None
+    far: Float | None = None
+    triangles: NDArray[np.int32] | None = None
+
+
+make_batch: Any = batch_for_shader  # the stub knows of no arrays
+_now = [Shown()]
+_handles: list[object] = []
+_users: set[str] = set()
+
+
+def start(user: str) -> None:
+    """Draw from now on. Args: user  the operator that asks; `end` with the same name."""
+    _users.add(user)
+    if not _handles:
+        view = bpy.types.SpaceView3D
+        _handles.append(view.draw_handler_add(_draw_heat, (), "WINDOW", "POST_VIEW"))
+        _handles.append(view.draw_handler_add(_draw_marks, (), "WINDOW", "POST_PIXEL"))
+
+
+def show(context: Context, shown: Shown) -> None:
+    """Draw this. Args: context  whose views are drawn anew; shown  what."""
+    _now[0] = shown
+    tag(context)
+
+
+def tag(context: Context) -> None:
+    """Have all 3D views drawn anew. Args: context  has the window manager."""
+    for window in context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                area.tag_redraw()
+
+
+def end(context: Context, user: str) -> None:
+    """Draw no more for an operator. Args: context  whose views are drawn anew; user  as `start`."""
+    _users.discard(user)
+    if not _users:
+        stop()
+    show(context, Shown())
+
+
+def stop() -> None:
+    """Take the drawing away."""
+    _users.clear()
+    while _handles:
+        handle: Any = _handles.pop()
+        bpy.types.SpaceView3D.draw_handler_remove(handle, "WINDOW")
+
+
+def is_drawing() -> bool:
+    """Whether there are handlers."""
+    return bool(_handles)
+
+
+def colours_of(far: Float) -> Float32:
+    """float32[V, 4]: what moves farthest is the most opaque. Args: far  float64[V] moves."""
+    most = float(far.max(initial=0.0))
+    share = np.clip(far / most, 0.0, 1.0) if most > 0 else np.zeros(len(far))
+    colours = np.empty((len(far), 4), np.float32)
+    colours[:, :3] = _HOT
+    colours[:, 1] += 0.4 * (1.0 - share)  # yellow where it is little
+    colours[:, 3] = _MOST * np.sqrt(share)
+    return colours
+
+
+def _view() -> bpy.types.RegionView3D | None:
+    """The view of the region that is drawn."""
+    return cast("bpy.types.RegionView3D | None", cast(Context, bpy.context).region_data)
+
+
+def _draw_heat() -> None:
+    shown, view = _now[0], _view()
+    if shown.places is None or shown.far is None or shown.triangles is None or view is None:
+        return
+    most = float(shown.far.max(initial=0.0))
+    if most <= 0.0:
+        return
+    warm = (shown.far > _SHOWN * most)[shown.triangles].any(axis=1)
+    eye = np.array(view.view_matrix.inverted().translation)
+    lifted = shown.places + _LIFT * (eye - shown.places)
+    shader = gpu.shader.from_builtin("SMOOTH_COLOR")
+    content = {"pos": lifted.astype(np.float32), "color": colours_of(shown.far)}
+    batch = make_batch(shader, "TRIS", content, indices=shown.triangles[warm])
+    gpu.state.blend_set("ALPHA")
+    gpu.state.depth_test_set("LESS_EQUAL")
+    gpu.state.face_culling_set("BACK")
+    batch.draw(shader)
+    gpu.state.face_culling_set("NONE")
+    gpu.state.depth_test_set("NONE")
+    gpu.state.blend_set("NONE")
+
+
+def _draw_marks() -> None:
+    context, shown = cast(Context, bpy.context), _now[0]
+    region, data = context.region, _view()
+    if region is None or data is None or not shown.points:
+        return
+    scale = context.preferences.system.ui_scale
+    first = None
+    for place, colour, radius in shown.points:
+        at = view3d_utils.location_3d_to_region_2d(region, data, Vector(place.tolist()))
+        if at is None:
+            continue
+        first = first or at
+        _disc(at, radius * scale + 1.5, (0.0, 0.0, 0.0, 0.8))
+        _disc(at, radius * scale, colour)
+    size = round(12 * scale)
+    if first is None:
+        return
+    for row, text in enumerate(shown.lines):
+        blf.size(0, size)
+        blf.enable(0, blf.SHADOW)
+        blf.shadow(0, 3, 0.0, 0.0, 0.0, 0.9)
+        blf.color(0, 1.0, 1.0, 1.0, 1.0)
+        blf.position(0, first.x + 16 * scale, first.y + (10 - 16 * row) * scale, 0)
+        blf.draw(0, text)
+        blf.disable(0, blf.SHADOW)
+
+
+def _disc(at: Vector, radius: float, colour: Colour) -> None:
+    angles = np.linspace(0.0, 2.0 * np.pi, 21)
+    rim = np.stack([at.x + radius * np.cos(angles), at.y + radius * np.sin(angles)], axis=1)
+    corners = np.concatenate([[(at.x, at.y)], rim]).astype(np.float32)
+    fan = [(0, i, i + 1) for i in range(1, 21)]
+    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
+    batch = make_batch(shader, "TRIS", {"pos": corners}, indices=fan)
+    gpu.state.blend_set("ALPHA")
+    shader.uniform_float("color", colour)
+    batch.draw(shader)
+    gpu.state.blend_set("NONE")

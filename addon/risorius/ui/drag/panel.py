@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The choices of a drag, behind the arrow beside its button."""
+
+from ...scene.base import parts
+from ...scene.character import runtime
+from ...scene.drag import pins
+from .. import words
+from ..blender_types import Context, Panel, UILayout
+from ..common import FaceOnlyPanel, face_rig
+from . import properties
+
+
+def draw_button(layout: UILayout, context: Context) -> None:
+    """The button that begins to drag, with its choices. Args: layout, context  of a panel."""
+    row = layout.row(align=True)
+    row.operator("risorius.drag_mode", icon="VIEW_PAN")
+    row.popover(panel="RISORIUS_PT_drag", text="", icon="DOWNARROW_HLT")
+
+
+class RISORIUS_PT_drag(FaceOnlyPanel, Panel):
+    bl_idname = "RISORIUS_PT_drag"
+    bl_label = "Drag the Face"
+    bl_options = {"INSTANCED"}
+
+    def draw(self, context: Context) -> None:
+        layout, choices = self.layout, properties.choices_of(context)
+        layout.prop(choices, "symmetric")
+        layout.prop(choices, "region")
+        layout.prop(choices, "heat")
+        layout.row().prop(choices, "method", expand=True)
+        rig = face_rig(context)
+        live = runtime.of(rig)
+        if live is None or parts.controls_of(rig) is None:
+            return
+        count = len(pins.of(rig, [len(m.positions) for m in live.dna.meshes]))
+        row = layout.row()
+        words.show(row, words.say("{count} pins", count=count), "PINNED")
+        row.operator("risorius.clear_pins", text="Remove All", icon="X")
+
+
+CLASSES = (RISORIUS_PT_drag,)

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Blender takes properties where Python has annotations:
+# pyright: reportInvalidTypeForm=false
+"""How a face is dragged: choices of the window, no part of the file."""
+
+from typing import cast
+
+import bpy
+
+from ..blender_types import Context
+
+METHODS = (
+    ("LEAST_SQUARES", "Exact", "The smallest change of all sliders that brings the point there"),
+    (
+        "TRANSPOSE",
+        "Gentle",
+        "Only sliders that move this point, by as much as they do: it may lag, but surprises less",
+    ),
+)
+
+
+def symmetric_property() -> object:
+    """Of the choices and of each drag, as the two below."""
+    return bpy.props.BoolProperty(
+        name="Symmetric",
+        description="The point on the other side goes the mirrored way",
+        options={"SKIP_SAVE"},
+    )
+
+
+def method_property() -> object:
+    return bpy.props.EnumProperty(
+        name="Method", description="How sliders are found", items=METHODS, options={"SKIP_SAVE"}
+    )
+
+
+def region_property() -> object:
+    return bpy.props.BoolProperty(
+        name="Region Only",
+        description="Only sliders of the region of the face that is dragged",
+        options={"SKIP_SAVE"},
+    )
+
+
+class RISORIUS_PG_drag(bpy.types.PropertyGroup):
+    symmetric: symmetric_property()
+    method: method_property()
+    region: region_property()
+    heat: bpy.props.BoolProperty(
+        name="Colour What Moves",
+        description="Colour the skin by how far it moves in a drag",
+        default=True,
+        options={"SKIP_SAVE"},
+    )
+
+
+def choices_of(context: Context) -> RISORIUS_PG_drag:
+    """The choices of this window manager."""
+    return cast(RISORIUS_PG_drag, context.window_manager.risorius_drag)  # type: ignore[attr-defined]
+
+
+CLASSES = (RISORIUS_PG_drag,)

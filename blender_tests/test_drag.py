@@ -1,0 +1,274 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Dragging the face: a vertex goes where it is dragged, within the limits of the sliders."""
+
+import bpy
+import numpy as np
+import pytest
+import risorius
+from mathutils import Quaternion, Vector
+from support import oracle, scene
+from support.faces import small_face
+
+HEAD = 0  # number of the head's mesh in the small face
+VERTEX = 70
+PREFIX = "CTRL_expressions."
+POSE = {"jawOpen": 0.4, "mouthCornerPullL": 0.3}
+
+
+@pytest.fixture
+def rig(dna_file):
+    rig = scene.load(dna_file)
+    bpy.context.view_layer.objects.active = scene.controls(rig)
+    return rig
+
+
+@pytest.fixture
+def two_sided(tmp_path):
+    """A face whose left and right controls do the mirrored thing, by blend shapes alone."""
+    dna = small_face(name="Sides", head_grid=(7, 8))
+    dna.raw_control_names = [PREFIX + "mouthCornerPullL", PREFIX + "mouthCornerPullR"]
+    dna.gui_to_raw = risorius.Conditionals()
+    dna.joint_groups = []
+    rest = np.asarray(dna.meshes[HEAD].positions)
+    path = tmp_path / "sides.dna"
+    dna.save(str(path))
+    return path, rest
+
+
+def place(rig, vertex=VERTEX, mesh=HEAD):
+    """float64[3]: where Blender shows a vertex."""
+    return scene.evaluated(scene.meshes(rig)[mesh])[vertex]
+
+
+def sliders(rig):
+    return {k: v for k, v in scene.face(rig).items() if isinstance(v, float)}
+
+
+def drag(offset, vertex=VERTEX, **options):
+    return bpy.ops.risorius.drag(
+        mesh=HEAD, vertex=vertex, offset=list(map(float, offset)), **options
+    )
+
+
+def reach(rig, path, vertex=VERTEX, values=POSE):
+    """How far sliders at some values would move a vertex: the oracle's answer, float64[3]."""
+    dna = risorius.load(str(path))
+    raw = scene.raw_of(rig, path)
+    was = oracle.vertices(dna, HEAD, risorius.Rig(dna).evaluate(raw))[vertex]
+    for name, value in values.items():
+        raw[list(dna.raw_control_names).index(PREFIX + name)] = value
+    return oracle.vertices(dna, HEAD, risorius.Rig(dna).evaluate(raw))[vertex] - was
+
+
+def follows(rig, was, offset, share=0.01, vertex=VERTEX):
+    return np.linalg.norm(place(rig, vertex) - was - offset) < share * np.linalg.norm(offset)
+
+
+def test_a_point_goes_where_it_is_dragged(rig, dna_file):
+    offset, was = reach(rig, dna_file), place(rig)
+    assert np.linalg.norm(offset) > 1e-3
+    assert drag(offset) == {"FINISHED"}
+    assert follows(rig, was, offset)
+    raw = scene.raw_of(rig, dna_file)
+    assert scene.error_against_oracle(rig, dna_file, raw) < scene.TOLERANCE
+
+
+def test_of_what_is_out_of_reach_the_sliders_stay_within_limits(rig, dna_file):
+    assert drag(40 * reach(rig, dna_file)) == {"FINISHED"}
+    values = np.array(list(sliders(rig).values()))
+    assert values.min() >= 0.0
+    assert values.max() == 1.0
+
+
+def test_a_turned_head_on_a_moved_face_drags_right(rig, dna_file):
+    controls, offset = scene.controls(rig), reach(rig, dna_file)
+    controls.matrix_world = Quaternion((0.3, 0.5, -0.2, 0.7)).to_matrix().to_4x4() * 2.0
+    controls.location = (3.0, -2.0, 1.0)
+    for bone, turn in (("head", (0.8, 0.1, 0.5, -0.2)), ("neck", (0.9, 0.3, -0.2, 0.1))):
+        controls.pose.bones[bone].rotation_mode = "QUATERNION"
+        controls.pose.bones[bone].rotation_quaternion = Quaternion(turn).normalized()
+    scene.update(controls)
+    scene.update(rig)
+    was = place(rig)
+    scene.set_controls(rig, **POSE)
+    offset = place(rig) - was  # the same pose, seen on the turned head
+    scene.set_controls(rig, **dict.fromkeys(POSE, 0.0))
+    assert follows(rig, was, np.zeros(3) + 1e-9, share=1e3)
+    assert drag(offset) == {"FINISHED"}
+    assert follows(rig, was, offset)
+
+
+def test_along_the_view_the_depth_is_free(rig, dna_file):
+    offset, was, view = reach(rig, dna_file), place(rig), np.array([0.3, -0.8, 0.2])
+    view /= np.linalg.norm(view)
+    assert drag(offset + 0.5 * view, view=view.tolist()) == {"FINISHED"}
+    left = place(rig) - was - offset
+    assert np.linalg.norm(left - view * (left @ view)) < 0.01 * np.linalg.norm(offset)
+
+
+def test_one_slider_alone(rig, dna_file):
+    offset = reach(rig, dna_file, values={"jawOpen": 0.5})
+    was = place(rig)
+    assert drag(offset, single=True) == {"FINISHED"}
+    moved = {k: v for k, v in sliders(rig).items() if v}
+    assert list(moved) == [PREFIX + "jawOpen"]
+    assert moved[PREFIX + "jawOpen"] == pytest.approx(0.5, abs=0.01)
+    assert follows(rig, was, offset, 0.03)
+    bpy.ops.risorius.reset()
+    assert drag(offset, single=True, choice=1) == {"FINISHED"}
+    other = {k for k, v in sliders(rig).items() if v}
+    assert len(other) == 1
+    assert PREFIX + "jawOpen" not in other
+
+
+def test_only_sliders_of_the_region(rig, dna_file):
+    assert drag(reach(rig, dna_file), region=True) == {"FINISHED"}
+    of_slider = scene.submodule("native").regions().of_slider
+    assert len({of_slider(k) for k, v in sliders(rig).items() if v}) == 1
+
+
+def test_a_pin_holds_and_is_saved(rig, dna_file, tmp_path):
+    held = 75
+    offset, was = reach(rig, dna_file), place(rig, held)
+    drag(offset)
+    loose = np.linalg.norm(place(rig, held) - was)
+    bpy.ops.risorius.reset()
+    assert bpy.ops.risorius.pin(mesh=HEAD, vertex=held) == {"FINISHED"}
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "pin.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "pin.blend"))
+    rig = next(o for o in bpy.data.objects if "risorius_controls" in o)
+    assert list(scene.controls(rig)["risorius_pins"]) == [HEAD, held]
+    drag(offset)
+    assert np.linalg.norm(place(rig, held) - was) < 0.75 * loose
+    assert bpy.ops.risorius.pin(mesh=HEAD, vertex=held) == {"FINISHED"}  # and out again
+    assert "risorius_pins" not in scene.controls(rig)
+
+
+def test_keys_are_inserted_on_what_moved_if_auto_key_is_on(rig, dna_file):
+    tools = bpy.context.scene.tool_settings
+    drag(reach(rig, dna_file))
+    assert scene.controls(rig).animation_data is None
+    bpy.ops.risorius.reset()
+    bpy.context.scene.frame_set(12)
+    tools.use_keyframe_insert_auto = True
+    drag(reach(rig, dna_file), single=True)
+    tools.use_keyframe_insert_auto = False
+    moved = {f'pose.bones["face"]["{k}"]' for k, v in sliders(rig).items() if v}
+    keyed = {
+        c.data_path: [k.co.x for k in c.keyframe_points] for c in scene.curves(scene.controls(rig))
+    }
+    assert keyed == {path: [12.0] for path in moved}
+
+
+def test_through_layers_above_the_sliders_the_seen_point_follows(rig):
+    bpy.ops.risorius.layer_add(kind="EXPRESSION", source="joy")
+    scene.controls(rig).risorius_layers[0].weight = 0.5
+    scene.update(scene.controls(rig))
+    was = place(rig)
+    scene.set_controls(rig, jawOpen=0.4, browDownL=0.3)
+    offset = place(rig) - was
+    scene.set_controls(rig, jawOpen=0.0, browDownL=0.0)
+    assert drag(offset) == {"FINISHED"}
+    assert follows(rig, was, offset, 0.03)
+
+
+def test_sliders_with_drivers_stay(rig, dna_file):
+    for name in sliders(rig):
+        curve = scene.controls(rig).driver_add(f'pose.bones["face"]["{name}"]')
+        curve.driver.type = "SUM"
+    scene.update(scene.controls(rig))
+    with pytest.raises(RuntimeError, match="led by drivers or layers"):
+        drag(reach(rig, dna_file))
+
+
+def test_modifiers_above_that_make_other_vertices(rig, dna_file):
+    head = scene.meshes(rig)[HEAD]
+    offset, was = reach(rig, dna_file), place(rig)
+    head.modifiers.new("Smooth", "SUBSURF").levels = 1
+    scene.update(head)
+    assert drag(offset) == {"FINISHED"}
+    head.modifiers.remove(head.modifiers["Smooth"])
+    scene.update(head)
+    assert follows(rig, was, offset)
+
+
+def test_what_lies_under_a_ray(rig):
+    picking = scene.submodule("scene.drag.picking")
+    head = scene.meshes(rig)[HEAD]
+    for name in ("", "SUBSURF"):
+        if name:
+            head.modifiers.new("More", name).levels = 1
+            scene.update(head)
+        for vertex in (45, 70, 100):
+            at = oracle_place(rig, vertex)
+            toward = Vector((0.0, 1.0, 0.0))
+            hit = picking.under(bpy.context, Vector(at) - toward, toward)
+            assert hit.rig == rig
+            assert hit.point == (HEAD, vertex)
+            assert np.linalg.norm(hit.place - at) < 2e-4
+    assert picking.under(bpy.context, Vector((0, 0, 50)), Vector((0, 0, 1))) is None
+
+
+def oracle_place(rig, vertex):
+    """Where a vertex of the face at rest lies."""
+    data = scene.meshes(rig)[HEAD].data
+    return np.array(data.vertices[vertex].co)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "sentence"),
+    [
+        (lambda rig: bpy.ops.risorius.bake(), "is baked"),
+        (lambda rig: hide(rig, scene.controls(rig), rig), "is hidden"),
+        (lambda rig: rig.pop("risorius_dna"), "lost its controls or its DNA"),
+    ],
+)
+def test_faces_that_cannot_be_dragged_say_why(rig, spoil, sentence):
+    before = None
+    spoil(rig)
+    before = sliders(rig)
+    with pytest.raises(RuntimeError, match=sentence):
+        drag((0.0, 0.0, 0.01))
+    assert sliders(rig) == before
+
+
+def hide(rig, *items):
+    for item in (*items, *scene.meshes(rig).values()):
+        item.hide_viewport = True
+    bpy.context.view_layer.update()
+
+
+def test_points_that_nothing_moves_or_that_are_not_there(rig, dna_file):
+    for values, sentence in (
+        ({"mesh": 2, "vertex": 0}, "level of detail"),
+        ({"mesh": HEAD, "vertex": 10**6}, "below 168 was expected"),
+    ):
+        with pytest.raises(RuntimeError, match=sentence):
+            bpy.ops.risorius.drag(offset=(0, 0, 0.01), **values)
+
+
+def test_restoring_gives_every_slider_its_bits_back(rig, dna_file):
+    scene.set_controls(rig, jawOpen=0.1, mouthCornerPullL=0.7, browDownL=1.3)
+    before, was = sliders(rig), scene.snapshot(rig)
+    stroke = scene.submodule("scene.drag.stroke")
+    held = stroke.begin(bpy.context, rig, (HEAD, VERTEX), stroke.Options(symmetric=True))
+    for step in (0.3, 1.0, -4.0):
+        held.to(bpy.context, held.start + step * reach(rig, dna_file))
+    assert sliders(rig) != before
+    held.restore(bpy.context)
+    assert sliders(rig) == before
+    assert np.array_equal(scene.snapshot(rig), was)
+
+
+def test_a_drag_depends_on_its_end_and_not_on_its_way(rig, dna_file):
+    stroke = scene.submodule("scene.drag.stroke")
+    offset = reach(rig, dna_file)
+    held = stroke.begin(bpy.context, rig, (HEAD, VERTEX), stroke.Options())
+    for step in (-3.0, 9.0, 0.2):
+        held.to(bpy.context, held.start + step * offset)
+    held.finish(bpy.context, held.start + offset)
+    winding = sliders(rig)
+    bpy.ops.risorius.reset()
+    drag(offset)
+    straight = sliders(rig)
+    assert winding == pytest.approx(straight, abs=1e-4)
