@@ -5,7 +5,7 @@ The handlers are there only while something is to be drawn; `stop` takes them aw
 """
 
 from dataclasses import dataclass, field
-from typing import Any, cast
+from typing import cast
 
 import blf
 import bpy
@@ -50,7 +50,6 @@ class Shown:
     triangles: NDArray[np.int32] | None = None
 
 
-make_batch: Any = batch_for_shader  # the stub knows of no arrays
 _now = [Shown()]
 _handles: list[object] = []
 _users: set[str] = set()
@@ -91,8 +90,7 @@ def stop() -> None:
     """Take the drawing away."""
     _users.clear()
     while _handles:
-        handle: Any = _handles.pop()
-        bpy.types.SpaceView3D.draw_handler_remove(handle, "WINDOW")
+        bpy.types.SpaceView3D.draw_handler_remove(_handles.pop(), "WINDOW")
 
 
 def is_drawing() -> bool:
@@ -128,7 +126,7 @@ def _draw_heat() -> None:
     lifted = shown.places + _LIFT * (eye - shown.places)
     shader = gpu.shader.from_builtin("SMOOTH_COLOR")
     content = {"pos": lifted.astype(np.float32), "color": colours_of(shown.far)}
-    batch = make_batch(shader, "TRIS", content, indices=shown.triangles[warm])
+    batch = batch_for_shader(shader, "TRIS", content, indices=shown.triangles[warm])  # pyright: ignore  arrays
     gpu.state.blend_set("ALPHA")
     gpu.state.depth_test_set("LESS_EQUAL")
     gpu.state.face_culling_set("BACK")
@@ -171,8 +169,9 @@ def _disc(at: Vector, radius: float, colour: Colour) -> None:
     corners = np.concatenate([[(at.x, at.y)], rim]).astype(np.float32)
     fan = [(0, i, i + 1) for i in range(1, 21)]
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
-    batch = make_batch(shader, "TRIS", {"pos": corners}, indices=fan)
+    batch = batch_for_shader(shader, "TRIS", {"pos": corners.tolist()}, indices=fan)
     gpu.state.blend_set("ALPHA")
+    shader.bind()
     shader.uniform_float("color", colour)
     batch.draw(shader)
     gpu.state.blend_set("NONE")
