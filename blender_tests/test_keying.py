@@ -108,7 +108,8 @@ OTHERS = {
     "install_speech make_override make_rig mix_add mix_add_scene mix_preview mix_remove mix_write "
     "reload replace_dna separate self_test set_lod set_lod_by_distance set_shape_mode "
     "test_channel unbake",
-    "makes an action of its own": "import_animation import_arkit_rig speak",
+    "makes an action or keys of its own": "import_animation import_arkit_rig speak blink",
+    "what the eyes' target hangs on": "gaze_target",
     "keys what stands": "key",
     "the range of sliders: keys are cut as well": "set_overdrive",
     "drivers; each side shows what it showed": "link_sides",

@@ -7,6 +7,7 @@ from . import native
 from .language import tables
 from .scene.animation import layer_properties
 from .scene.base import compat, console
+from .scene.character import gaze_settings
 from .scene.life import handlers
 from .scene.live import capture
 from .ui import (
@@ -18,6 +19,7 @@ from .ui import (
     expressions,
     face,
     file,
+    hand,
     layers,
     life,
     live,
@@ -49,6 +51,7 @@ CLASSES = (
     *export.CLASSES,
     *drag.CLASSES,
     *face.CLASSES,
+    *hand.CLASSES,
     *animation.CLASSES,
     *speech.CLASSES,
     *expressions.CLASSES,
@@ -102,6 +105,7 @@ def register() -> None:
         words.give_context(cls)
         bpy.utils.register_class(cls)
     layer_properties.register()
+    gaze_settings.register()
     for name, choice in _window_properties().items():
         setattr(bpy.types.WindowManager, name, choice)
     bpy.types.TOPBAR_MT_file_import.append(import_operators.draw_import)
@@ -151,6 +155,7 @@ def unregister() -> None:
     bpy.types.TOPBAR_MT_file_import.remove(import_operators.draw_import)
     for name in reversed(_window_properties()):
         delattr(bpy.types.WindowManager, name)
+    gaze_settings.unregister()
     layer_properties.unregister()
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

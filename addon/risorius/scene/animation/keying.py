@@ -68,13 +68,14 @@ class Pose:
     bones: Mapping[str, tuple[float, ...]]
 
 
-def rules_of(context: Context, auto: bool = True) -> Rules:
+def rules_of(context: Context, auto: bool = True, exact: bool = False) -> Rules:
     """The settings of the scene and the preferences.
 
     Args:
         context: gives both.
         auto: for what an edit leaves behind it by itself, which takes auto-key; else for keys that
             the animator asked for.
+        exact: insert also what seems not to be needed, for keys that make a shape together.
     """
     tools, edit = context.scene.tool_settings, context.preferences.edit
     needed = getattr(edit, "use_keyframe_insert_needed", False)
@@ -85,7 +86,7 @@ def rules_of(context: Context, auto: bool = True) -> Rules:
         insert=tools.use_keyframe_insert_auto if auto else True,
         replace=auto and tools.auto_keying_mode == "REPLACE_KEYS",
         available=auto and getattr(edit, "use_keyframe_insert_available", False),
-        needed=needed,
+        needed=needed and not exact,
         kind=tools.keyframe_type,
         interpolation=edit.keyframe_new_interpolation_type,
         handles=edit.keyframe_new_handle_type,

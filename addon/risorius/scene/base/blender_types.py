@@ -36,6 +36,9 @@ if TYPE_CHECKING:
         risorius_layer_rules: bool  # see layer_properties, as the two below
         risorius_layers_index: int
         risorius_reactions_index: int
+        risorius_converge: float  # see gaze_settings, as the two below
+        risorius_lids: float
+        risorius_body_turn: float
 
         @property
         def pose(self) -> bpy.types.Pose: ...

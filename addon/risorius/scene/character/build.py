@@ -16,7 +16,7 @@ from ...logic.material import texture_search
 from ..base import compat, form, parts, sharing, storage, written
 from ..base.blender_types import ArmatureObject, Context, MeshObject
 from ..material import materials
-from . import armatures, lods, meshes, runtime
+from . import armatures, gaze_settings, lods, meshes, runtime
 
 
 @dataclass(frozen=True)
@@ -130,6 +130,7 @@ def _build(
     assert options.unit is not None  # import_file has filled it in
     _connect(plan, rig, controls, text, file.path, options.unit)
     runtime.take(rig, file.dna, file.rig)
+    gaze_settings.begin(controls, runtime.there(rig))
     progress(0.4)
     built = []
     for number, mesh_plan in enumerate(plan.meshes):

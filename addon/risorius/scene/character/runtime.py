@@ -36,8 +36,10 @@ class Runtime:
         rest: float64[J, 4, 4] neutral joints.
         anchors: joints of neck, head and eyes.
         look: control name -> yaw or pitch (radians) that a value of 1 gives; by side.
+        lids: the controls that close and widen an eye, by eyeBlink or eyeWiden and the side.
         morphs: mesh index -> risorius.Morph.
         surfaces: level of detail -> risorius.Surface.
+        chains: joint -> Chain.
     """
 
     dna: native.Dna
@@ -50,8 +52,16 @@ class Runtime:
     rest: NDArray[np.float64]
     anchors: plans.Anchors
     look: dict[str, list[tuple[int, float, float]]]
+    lids: dict[str, int]
     morphs: dict[int, native.Morph] = field(default_factory=dict)
     surfaces: dict[int, native.Surface] = field(default_factory=dict)
+    chains: dict[int, Chain] = field(default_factory=dict)
+
+    def chain(self, joint: int) -> Chain:
+        """The joints from the root to one, read when first asked for."""
+        if joint not in self.chains:
+            self.chains[joint] = _chain(self.dna, self.space, joint)
+        return self.chains[joint]
 
     def morph(self, mesh_index: int) -> native.Morph:
         """The compiled shapes of a mesh, made when first asked for."""
@@ -79,6 +89,30 @@ class Runtime:
             sequence=space.sequence,
             signs=space.signs,
         )
+
+
+@dataclass
+class Chain:
+    """The joints from the root to one of them.
+
+    Attributes:
+        joints: their numbers, int64[n].
+        angles: float64[n, 3] neutral rotations in the file's units.
+        offsets: float64[n, 3] neutral translations in Blender's units and axes.
+    """
+
+    joints: NDArray[np.int64]
+    angles: NDArray[np.float64]
+    offsets: NDArray[np.float64]
+
+
+def _chain(dna: native.Dna, space: Space, joint: int) -> Chain:
+    parents, found = dna.joint_parents, [joint]
+    while int(parents[found[-1]]) != found[-1]:
+        found.append(int(parents[found[-1]]))
+    joints = np.array(found[::-1], np.int64)
+    angles = np.asarray(dna.neutral_joint_rotations, np.float64)[joints]
+    return Chain(joints, angles, space.points(dna.neutral_joint_translations[joints]))
 
 
 _cache: dict[tuple[str, float], Runtime | None] = {}
@@ -179,8 +213,12 @@ def _runtime(dna: native.Dna, rig: native.Rig, unit: float) -> Runtime:
         rest=rest,
         anchors=anchors,
         look={},
+        lids={},
     )
     runtime.look = _measure_look(runtime)
+    lids = {f"{kind}{side}" for kind in ("eyeBlink", "eyeWiden") for side in "LR"}
+    short = [name.rsplit(".", 1)[-1] for name in dna.raw_control_names]
+    runtime.lids = {name: i for i, name in enumerate(short) if name in lids}
     return runtime
 
 

@@ -131,7 +131,8 @@ def _glance(seen: ArmatureObject) -> tuple[object, ...]:
     matrices = np.empty(16 * len(bones), np.float32)
     bones.foreach_get("matrix", matrices)
     place = np.array(seen.matrix_world).tobytes()
-    return tuple(bones[parts.FACE].values()), matrices.tobytes(), place
+    gaze = seen.risorius_converge, seen.risorius_lids, seen.risorius_body_turn
+    return tuple(bones[parts.FACE].values()), matrices.tobytes(), place, gaze
 
 
 def _is_simple(rig: ArmatureObject, seen: ArmatureObject) -> bool:

@@ -15,6 +15,7 @@ from ..animation import layer_mixing
 from ..base import parts
 from ..base.blender_types import ArmatureObject, Depsgraph
 from ..character import rig_placement, runtime
+from . import gaze
 
 Turns = dict[str, Quaternion]  # "neck", "head": in the armature's axes
 
@@ -88,10 +89,13 @@ def complete(
         raw, and the turns with the body's, as `read_inputs` gives them.
     """
     turns = rig_placement.body_turns(seen.original, depsgraph)
+    share = seen.risorius_body_turn
+    if share < 1.0:  # a turn that is left as it is stays the same to the bit
+        turns = {name: Quaternion().slerp(turn, share) for name, turn in turns.items()}
     for name, turn in own.items():
         if turn is not None:
             turns[name] = turns[name] @ turn if name in turns else turn
-    _add_look(seen, live, raw, maximum)
+    _add_look(seen, live, raw, maximum, turns)
     return raw, turns
 
 
@@ -125,33 +129,26 @@ def _turn(seen: ArmatureObject, bone: bpy.types.PoseBone | None) -> Quaternion |
     return turn if turn.angle else None
 
 
-def _moved(seen: ArmatureObject, target: bpy.types.PoseBone | None) -> Vector:
-    """How far the eyes' target was moved, in the armature's axes."""
-    if target is None or _rests(target):
-        return Vector()
-    local = seen.convert_space(
-        pose_bone=target, matrix=target.matrix, from_space="POSE", to_space="LOCAL"
-    )
-    return target.bone.matrix_local.to_3x3() @ local.translation
-
-
 def _add_look(
-    seen: ArmatureObject, live: runtime.Runtime, raw: NDArray[np.float32], maximum: float
+    seen: ArmatureObject,
+    live: runtime.Runtime,
+    raw: NDArray[np.float32],
+    maximum: float,
+    turns: Turns,
 ) -> None:
-    """Add what the eye bones and their target ask for to the look controls."""
+    """Add what the eye bones and their target ask for to the look controls; the lids follow."""
     bones = seen.pose.bones
-    target = bones.get("eyes")
-    moved = _moved(seen, target)
-    for side, controls in live.look.items():
-        bone = bones.get(f"eye_{side}")
+    eyes = {side: bones[f"eye_{side}"] for side in live.look if f"eye_{side}" in bones}
+    target = gaze.target_of(seen, live, turns)
+    asked = {}
+    if target is not None:
+        centres = {side: bone.bone.head_local for side, bone in eyes.items()}
+        asked = gaze.asked(live, raw, target, centres, maximum)
+    for side, bone in eyes.items():
         turn = _turn(seen, bone)
-        if bone is None or (turn is None and not moved.length_squared > 1e-18):
+        if turn is None and side not in asked:
             continue
-        start = target.bone.head_local - bone.bone.head_local if target else _AHEAD
-        before, after = yaw_pitch(start), yaw_pitch(start + moved)
-        own = yaw_pitch((turn or Quaternion()) @ _AHEAD)
-        yaw, pitch = after[0] - before[0] + own[0], after[1] - before[1] + own[1]
-        for index, yaw_at_one, pitch_at_one in controls:
-            asked = yaw / yaw_at_one if yaw_at_one else pitch / pitch_at_one
-            if asked > 1e-6:
-                raw[index] = min(raw[index] + asked, max(maximum, raw[index]))
+        yaw, pitch = yaw_pitch((turn or Quaternion()) @ _AHEAD)
+        more = asked.get(side, (0.0, 0.0))
+        gaze.add_look(live, raw, side, yaw + more[0], pitch + more[1], maximum)
+    gaze.follow_lids(live, raw, seen.risorius_lids, maximum)

@@ -1,2 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Moving controls by hand: keys, poses between poses, tweaks, favourites, the pie menu."""
+"""Moving controls by hand: keys, poses between poses, tweaks, gaze, favourites, the pie menu."""
+
+from . import gaze
+
+CLASSES = (*gaze.CLASSES,)

@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How the eyes and the head of a character follow, as properties of its control armature."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ...language import tables
+from ..base.blender_types import ArmatureObject
+from . import runtime
+
+_OVERRIDE: Any = {"LIBRARY_OVERRIDABLE"}
+
+
+def _changed(self: bpy.types.bpy_struct, _context: bpy.types.Context) -> None:
+    """Let Blender evaluate the character."""
+    owner = self.id_data
+    assert owner is not None
+    owner.update_tag()
+
+
+def _factor(name: str, default: float, description: str) -> object:
+    return bpy.props.FloatProperty(
+        name=name,
+        default=default,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+        description=description,
+        override=_OVERRIDE,
+        translation_context=tables.CONTEXT,
+        update=_changed,
+    )
+
+
+def _all() -> dict[str, object]:
+    """By their names. What a file does not say is as it was before there was such a property."""
+    return {
+        "risorius_converge": _factor(
+            "Eyes Meet",
+            0.0,
+            "Both eyes look at the target itself; at 0 they stay side by side. They come together "
+            "as the target leaves its place",
+        ),
+        "risorius_lids": _factor(
+            "Lids Follow",
+            0.0,
+            "How far the lids go along with a gaze up or down, beyond what the rig does by itself",
+        ),
+        "risorius_body_turn": _factor(
+            "Body's Turn", 1.0, "How much of the turns of the body's neck and head the face takes"
+        ),
+    }
+
+
+def register() -> None:
+    """Add them to objects."""
+    for name, kind in _all().items():
+        setattr(bpy.types.Object, name, kind)
+
+
+def unregister() -> None:
+    """Take them away; what files hold of them stays."""
+    for name in _all():
+        delattr(bpy.types.Object, name)
+
+
+def begin(controls: ArmatureObject, live: runtime.Runtime) -> None:
+    """Give a new face what serves it best.
+
+    Args:
+        controls: its control armature.
+        live: its Runtime.
+    """
+    controls.risorius_converge = 1.0
+    controls.risorius_lids = 0.0 if moves_lids(live) else 0.5
+
+
+def moves_lids(live: runtime.Runtime) -> bool:
+    """Whether the look controls of a rig move more than the eyes themselves."""
+    eyes = set(live.anchors.eyes.values())
+    for controls in live.look.values():
+        for index, _yaw, pitch in controls:
+            if not pitch:
+                continue
+            raw = np.array(live.rests, np.float32)
+            still = live.rig.evaluate(raw)
+            raw[index] = 1.0
+            pose = live.rig.evaluate(raw)
+            others = [j for j in np.flatnonzero((pose.joints != still.joints).any(axis=1))]
+            if set(map(int, others)) - eyes or (pose.blend_shapes != still.blend_shapes).any():
+                return True
+    return False

@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blinks with their timing: as keys of the lids' sliders, or in a layer above them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+
+from ..animation import keying, layer_properties, layers
+from ..base import compat, parts
+from ..base.blender_types import ArmatureObject
+from ..character import armatures, runtime
+
+_MARK = "risorius_blinks"  # on the action of a layer of blinks
+
+
+@dataclass(frozen=True)
+class Blink:
+    """How the eyes close and open, in frames of the scene.
+
+    Attributes:
+        close, hold, open: how long each part lasts.
+        strength: how far the lids close, 0 to 1.
+        offset: by how much the character's right eye is later than its left; negative: earlier.
+        sides: L, R or both.
+    """
+
+    close: float = 3.0
+    hold: float = 1.0
+    open: float = 5.0
+    strength: float = 1.0
+    offset: float = 0.0
+    sides: str = "LR"
+
+    def begin(self, frame: float, side: str) -> float:
+        """When an eye begins to close. Args: frame  of the blink, side  L or R."""
+        return frame + (self.offset if side == "R" else 0.0)
+
+    def keys(self, begin: float, before: float, after: float) -> list[tuple[float, float]]:
+        """Frames and values of the keys of one eye.
+
+        Args:
+            begin: when it begins to close.
+            before, after: what the slider shows where the blink begins and ends.
+        """
+        shut = begin + self.close
+        most = max(self.strength, before, after)  # an eye that is shut already stays so
+        return [
+            (begin, before),
+            (shut, most),
+            *([(shut + self.hold, most)] if self.hold > 0.0 else []),
+            (shut + self.hold + self.open, after),
+        ]
+
+
+def sliders(live: runtime.Runtime, sides: str) -> dict[str, str]:
+    """The sliders that close the eyes, by side. Args: live  the Runtime, sides  L, R or both."""
+    found = {side: live.lids.get(f"eyeBlink{side}") for side in sides}
+    return {side: live.labels[i] for side, i in found.items() if i is not None}
+
+
+def key(rig: ArmatureObject, frame: float, blink: Blink, rules: keying.Rules) -> int:
+    """Key a blink on the sliders; keys that lay within it go.
+
+    Args:
+        rig: the character.
+        frame: where it begins.
+        blink: its timing.
+        rules: how keys are made.
+
+    Returns:
+        How many keys were set.
+    """
+    controls, count = parts.controls_there(rig), 0
+    face = controls.pose.bones[parts.FACE]
+    for side, label in sliders(runtime.there(rig), blink.sides).items():
+        path = parts.property_path(label)
+        curve = next(iter(keying.curves_by_path(controls).get(path, ())), None)
+        now = float(face[label])
+        begin = blink.begin(frame, side)
+        end = begin + blink.close + blink.hold + blink.open
+        ends = [curve.evaluate(at) if curve else now for at in (begin, end)]
+        if curve is not None:
+            within = [k for k in curve.keyframe_points if begin - 1e-3 < k.co.x < end + 1e-3]
+            for point in reversed(within):
+                curve.keyframe_points.remove(point)
+        for at, value in blink.keys(begin, *ends):
+            face[label] = value
+            count += keying.insert(controls, [label], (), at, rules)
+        face[label] = now
+    return count
+
+
+def layer_of(controls: ArmatureObject) -> layer_properties.RISORIUS_PG_layer | None:
+    """The layer of a character that has its blinks, or None."""
+    found = (y for y in layers.of(controls) if y.action is not None and y.action.get(_MARK))
+    return next(found, None)
+
+
+def add_to_layer(rig: ArmatureObject, frame: float, blink: Blink) -> None:
+    """Put a blink into the layer of blinks, which counts where it closes the eyes further.
+
+    Args:
+        rig: the character.
+        frame: where it begins.
+        blink: its timing.
+    """
+    controls = parts.controls_there(rig)
+    layer = layer_of(controls)
+    if layer is None:
+        action = bpy.data.actions.new(f"{rig.name.removesuffix('_rig')} blinks")
+        action[_MARK] = True
+        compat.add_curves(action, controls)
+    else:
+        action = layer.action
+    bag = compat.bag_for(action, controls)
+    assert bag is not None
+    for side, label in sliders(runtime.there(rig), blink.sides).items():
+        path = parts.property_path(label)
+        curve = bag.fcurves.find(path)
+        if curve is None:
+            curve = bag.fcurves.new(path)
+            title = armatures.key_group(label)
+            curve.group = bag.groups.get(title) or bag.groups.new(title)
+        keys = blink.keys(blink.begin(frame, side), 0.0, 0.0)
+        for point in [k for k in curve.keyframe_points if keys[0][0] <= k.co.x <= keys[-1][0]][
+            ::-1
+        ]:
+            curve.keyframe_points.remove(point)
+        for at, value in keys:
+            curve.keyframe_points.insert(at, value, options={"FAST"})
+        curve.update()
+    if layer is None:
+        layers.add(controls, "ACTION", "Blinks", action=action, blend="MAXIMUM", extend="NOTHING")
+        layer = layer_of(controls)
+    assert layer is not None
+    layer.start = action.frame_range[0]
+    controls.update_tag()
