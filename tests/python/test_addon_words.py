@@ -136,6 +136,7 @@ def sources() -> Iterator[Path]:
     yield from sorted((ADDON / "ui").rglob("*.py"))
     yield ADDON / "registration.py"
     yield ADDON / "scene" / "animation" / "layer_properties.py"
+    yield ADDON / "scene" / "character" / "gaze_settings.py"
 
 
 def sources_of_sentences() -> Iterator[Path]:

@@ -22,36 +22,28 @@ def _changed(self: bpy.types.bpy_struct, _context: bpy.types.Context) -> None:
     owner.update_tag()
 
 
-def _factor(name: str, default: float, description: str) -> object:
-    return bpy.props.FloatProperty(
-        name=name,
-        default=default,
-        min=0.0,
-        max=1.0,
-        subtype="FACTOR",
-        description=description,
-        override=_OVERRIDE,
-        translation_context=tables.CONTEXT,
-        update=_changed,
-    )
-
-
 def _all() -> dict[str, object]:
     """By their names. What a file does not say is as it was before there was such a property."""
+    shared: Any = {"min": 0.0, "max": 1.0, "subtype": "FACTOR", "override": _OVERRIDE}
+    shared |= {"update": _changed, "translation_context": tables.CONTEXT}
     return {
-        "risorius_converge": _factor(
-            "Eyes Meet",
-            0.0,
-            "Both eyes look at the target itself; at 0 they stay side by side. They come together "
-            "as the target leaves its place",
+        "risorius_converge": bpy.props.FloatProperty(
+            name="Eyes Meet",
+            description="Both eyes look at the target itself; at 0 they stay side by side. They "
+            "come together as the target leaves its place",
+            **shared,
         ),
-        "risorius_lids": _factor(
-            "Lids Follow",
-            0.0,
-            "How far the lids go along with a gaze up or down, beyond what the rig does by itself",
+        "risorius_lids": bpy.props.FloatProperty(
+            name="Lids Follow",
+            description="How far the lids go along with a gaze up or down, beyond what the rig "
+            "does by itself",
+            **shared,
         ),
-        "risorius_body_turn": _factor(
-            "Body's Turn", 1.0, "How much of the turns of the body's neck and head the face takes"
+        "risorius_body_turn": bpy.props.FloatProperty(
+            name="Body's Turn",
+            description="How much of the turns of the body's neck and head the face takes",
+            default=1.0,
+            **shared,
         ),
     }
 

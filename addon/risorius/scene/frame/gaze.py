@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import bpy
 import numpy as np
-from mathutils import Quaternion, Vector
+from mathutils import Matrix, Quaternion, Vector
 from numpy.typing import NDArray
 
 from ...logic.base.space import yaw_pitch
@@ -22,8 +22,10 @@ from ..character import runtime
 
 Float = NDArray[np.float64]
 
+CONSTRAINT = "Risorius Gaze"  # by it the target hangs on something else than the head
 STEPS = 4  # measured on the sample: the second leaves less than a thousandth of a degree
 _ENOUGH = 2e-5  # radians: a thousandth of a degree
+_STRAIGHT = Matrix.Identity(4)
 _AHEAD = np.array([0.0, -1.0, 0.0])
 _BLEND = 0.25  # of its distance: how far a target is moved until the eyes meet on it
 _LIDS = 0.5  # how far the lids go at full gaze and full amount
@@ -33,14 +35,16 @@ _LIDS = 0.5  # how far the lids go at full gaze and full amount
 class Target:
     """What the eyes look at.
 
+    Both in the control armature's axes, for a head that is not turned.
+
     Attributes:
-        point: in the control armature's axes, for a head that is not turned.
-        rest: where the target stands at rest, likewise: from there the eyes look ahead.
-        meet: 0: both eyes turn as far as the target went, 1: both look at the point.
+        rest: where the target stands at rest: from there the eyes look ahead.
+        moved: how far it is from there.
+        meet: 0: both eyes turn as far as the target went, 1: both look at the target.
     """
 
-    point: Float
-    rest: Float
+    rest: Vector
+    moved: Vector
     meet: float
 
 
@@ -57,18 +61,22 @@ def target_of(
     bone = seen.pose.bones.get("eyes")
     if bone is None:
         return None
-    rest = np.array(bone.bone.head_local)
-    held = any(not c.mute and c.influence > 0.0 for c in bone.constraints)
-    if held:  # by something that does not turn with the head
-        point = _unturned(live, np.array(bone.matrix.translation), turns)
-        return Target(point, rest, seen.risorius_converge)
-    moved = bone.bone.matrix_local.to_3x3() @ _local(seen, bone)
+    rest: Vector = bone.bone.head_local
+    hold = bone.constraints.get(CONSTRAINT)
+    if hold is not None and not hold.mute:  # it does not turn with the head
+        there = np.array(bone.matrix.translation[:], np.float64)
+        point = Vector(_unturned(live, there, turns).tolist())
+        return Target(rest, point - rest, seen.risorius_converge)
+    if not bone.constraints and bone.matrix_basis == _STRAIGHT:
+        return None
+    moved: Vector = bone.bone.matrix_local.to_3x3() @ _local(seen, bone)
     if not moved.length_squared > 1e-18:
         return None
-    reach = min(moved.length / (_BLEND * max(np.linalg.norm(rest - _middle(seen)), 1e-9)), 1.0)
+    far = (rest - _middle(seen)).length
+    reach = min(moved.length / max(_BLEND * far, 1e-9), 1.0)
     # At rest the eyes look straight ahead: they come together as the target leaves its place.
-    meet = float(seen.risorius_converge) * reach * reach * (3.0 - 2.0 * reach)
-    return Target(rest + np.array(moved), rest, meet)
+    meet = seen.risorius_converge * float(np.sin(reach * np.pi / 2.0)) ** 2
+    return Target(rest, moved, meet)
 
 
 def _local(seen: ArmatureObject, bone: bpy.types.PoseBone) -> Vector:
@@ -77,14 +85,11 @@ def _local(seen: ArmatureObject, bone: bpy.types.PoseBone) -> Vector:
     ).translation
 
 
-def _middle(seen: ArmatureObject) -> Float:
+def _middle(seen: ArmatureObject) -> Vector:
     """Between the eyes."""
-    heads = [
-        np.array(seen.pose.bones[n].bone.head_local)
-        for n in ("eye_L", "eye_R")
-        if n in seen.pose.bones
-    ]
-    return np.mean(heads, axis=0) if heads else np.zeros(3)
+    bones = seen.pose.bones
+    heads = [bones[n].bone.head_local for n in ("eye_L", "eye_R") if n in bones]
+    return sum(heads, Vector()) / max(len(heads), 1)
 
 
 def asked(
@@ -107,11 +112,8 @@ def asked(
     Returns:
         side -> float64[2] radians, as far as the controls reach.
     """
-    if not target.meet:  # as files of before there was a choice: the turn of the target alone
-        return {
-            side: np.subtract(yaw_pitch(target.point - at), yaw_pitch(target.rest - at))
-            for side, at in ((side, np.array(centre)) for side, centre in centres.items())
-        }
+    if not target.meet:
+        return {side: _idle_turn(target, centre) for side, centre in centres.items()}
     trial = raw.copy()
     for controls in live.look.values():
         for index, _yaw, _pitch in controls:
@@ -122,7 +124,7 @@ def asked(
         deltas = live.rig.evaluate(trial).joints
         worst = 0.0
         for side, centre in centres.items():
-            wrong = _error(live, deltas, side, np.array(centre), target)
+            wrong = _error(live, deltas, side, centre, target)
             if live.anchors.eyes.get(side) is None:
                 wrong = wrong - angles[side]  # nothing turns that could be looked at
             before = angles[side]
@@ -136,18 +138,27 @@ def asked(
     return angles
 
 
+def _idle_turn(target: Target, centre: Vector) -> Float:
+    """How far an eye turns that only goes with the target; to the bit as in files of before."""
+    start = target.rest - centre
+    before, after = yaw_pitch(start), yaw_pitch(start + target.moved)
+    return np.array((after[0] - before[0], after[1] - before[1]))
+
+
 def _error(
-    live: runtime.Runtime, deltas: NDArray[np.float32], side: str, centre: Float, target: Target
+    live: runtime.Runtime, deltas: NDArray[np.float32], side: str, centre: Vector, target: Target
 ) -> Float:
     """How far an eye looks past what it is to look at: yaw and pitch."""
     joint, ahead = live.anchors.eyes.get(side), _AHEAD
-    there = centre
+    still, rest = np.array(centre[:], np.float64), np.array(target.rest[:], np.float64)
+    there = still
     if joint is not None:
         moved, turn = frame_of(live, joint, deltas)
-        there = centre + target.meet * (moved - centre)
+        there = still + target.meet * (moved - still)
         ahead = turn @ live.rest[joint][:3, :3].T @ _AHEAD
-    wanted = np.array(yaw_pitch(target.point - there))
-    idle = np.array(yaw_pitch(target.rest - centre)) * (1.0 - target.meet)
+    point = rest + np.array(target.moved[:], np.float64)
+    wanted = np.array(yaw_pitch(point - there))
+    idle = np.array(yaw_pitch(rest - still)) * (1.0 - target.meet)
     return wanted - idle - np.array(yaw_pitch(ahead))
 
 

@@ -9,8 +9,8 @@ import bpy
 
 from ..base import parts
 from ..base.blender_types import ArmatureObject, Context
+from ..frame.gaze import CONSTRAINT
 
-CONSTRAINT = "Risorius Gaze"
 _OWN = "risorius_gaze"  # on an Empty that was made to hold a target
 
 
