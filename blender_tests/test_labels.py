@@ -133,7 +133,7 @@ def test_layers_and_reactions_can_be_read(rig, language):
     panel, controls = ui("layers.panel"), scene.controls(rig)
     props = scene.submodule("scene.animation.layer_properties")
     for kind in ("IDLE", "EXPRESSION"):
-        known = next(iter(scene.submodule("scene.animation.expressions").all_expressions()))
+        known = next(iter(scene.submodule("scene.expressions.assets").all_expressions()))
         bpy.ops.risorius.layer_add(kind=kind, source=known if kind == "EXPRESSION" else "")
         layer = controls.risorius_layers[-1]
         layout = Part()
@@ -226,7 +226,7 @@ def test_menus_offer_every_expression_and_the_actions_that_fit(rig):
     bpy.data.actions.new("Walks")
     menus, expressions = ui("layers.menus"), ui("expressions.menus")
     assert texts(drawn(menus.RISORIUS_MT_actions, bpy.context)) == ["Speaks"]
-    known = scene.submodule("scene.animation.expressions").all_expressions().values()
+    known = scene.submodule("scene.expressions.assets").all_expressions().values()
     shown = []
     for kind in menus._ADD:
         group = kind.bl_idname.rpartition("_")[2]
@@ -234,7 +234,7 @@ def test_menus_offer_every_expression_and_the_actions_that_fit(rig):
         assert texts(drawn(kind, bpy.context)) == labels != []
         assert texts(drawn(getattr(bpy.types, f"RISORIUS_MT_set_{group}"), bpy.context)) == labels
         shown.append(kind.bl_label)
-    assert texts(drawn(expressions.RISORIUS_MT_expressions, bpy.context))[:-1] == shown
+    assert texts(drawn(expressions.RISORIUS_MT_expressions, bpy.context))[:-3] == shown
     add = texts(drawn(menus.RISORIUS_MT_layer_add, bpy.context))
     assert add == ["From Active Action", "Action", "Idle Life", *shown]
     fire = texts(drawn(menus.RISORIUS_MT_fire, bpy.context))

@@ -32,6 +32,8 @@ from .ui.about import manual, preferences, timing_overlay
 from .ui.animation import operators as animation_operators
 from .ui.drag import drawing as drag_drawing
 from .ui.drag import properties as drag_properties
+from .ui.expressions import previews as expression_previews
+from .ui.expressions import properties as expression_properties
 from .ui.face import channel_preview, paste_flipped
 from .ui.file import import_operators, rig_operators
 from .ui.file import operators as file_operators
@@ -85,6 +87,9 @@ def _window_properties() -> dict[str, object]:
         "risorius_drag": bpy.props.PointerProperty(type=drag_properties.RISORIUS_PG_drag),
         "risorius_mix": bpy.props.PointerProperty(type=mixing_properties.RISORIUS_PG_mix),
         "risorius_why": bpy.props.PointerProperty(type=why_properties.RISORIUS_PG_why),
+        "risorius_expressions": bpy.props.PointerProperty(
+            type=expression_properties.RISORIUS_PG_expressions
+        ),
         "risorius_test": channel_preview.weight_property(),
     }
 
@@ -147,6 +152,7 @@ def unregister() -> None:
     manual.unregister()
     timing_overlay.stop()
     drag_drawing.stop()
+    expression_previews.forget()
     bpy.types.VIEW3D_MT_object.remove(rig_operators.draw_make_rig)
     bpy.types.MESH_MT_shape_key_context_menu.remove(rig_operators.draw_make_rig)
     bpy.types.VIEW3D_MT_add.remove(import_operators.draw_add)

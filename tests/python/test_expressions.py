@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+import tomllib
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from risorius import expressions
@@ -149,3 +152,60 @@ def test_those_that_come_along_have_each_name_once(recwarn):
 def test_an_unknown_name_is_said():
     with pytest.raises(ValueError, match="joi: an expression such as joy"):
         expressions.get("joi")
+
+
+SAVED = Expression(
+    "big_grin",
+    'Big "Grin" \u00e4\t\x7f',
+    "own",
+    "C:\\a \u2603.",
+    {"CTRL_expressions.mouthCornerPullL": 0.3, "turn.x": -0.25, "jawOpen": 1.5},
+    ("mouth", "jaw"),
+)
+
+
+def test_what_is_written_is_read_again(tmp_path):
+    text = expressions.text_of(SAVED)
+    (tmp_path / "grin.toml").write_text(text, encoding="utf-8")
+    assert expressions.load(tmp_path / "grin.toml") == {"big_grin": SAVED}
+    assert expressions.of_text(text) == {"big_grin": SAVED}
+    table = tomllib.loads(text)  # by a reader that is not ours
+    assert table["format"] == expressions.FORMAT == 1
+    row = table["expressions"]["big_grin"]
+    assert row["weights"] == dict(SAVED.weights)
+    assert (row["label"], row["regions"]) == (SAVED.label, ["mouth", "jaw"])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("format = 1", "format = 2", "a newer Risorius: format 1 at most was expected, found 2"),
+        ("format = 1", "format = 'x'", "format: a whole number was expected, found 'x'"),
+        ("format = 1", "", "a weight from 0 to 1 was expected, found -0.25"),
+        ("1.5", "1.6", "jawOpen: a weight from -1 to 1.5 was expected, found 1.6"),
+        ("1.5", "nan", "a weight from -1 to 1.5 was expected, found nan"),
+        ('["mouth", "jaw"]', '["mout"]', r"regions such as mouth were expected, found \['mout'\]"),
+        ('["mouth", "jaw"]', '"mouth"', "regions such as mouth were expected, found 'mouth'"),
+    ],
+)
+def test_refuses_saved_ones(tmp_path, old, new, sentence):
+    text = expressions.text_of(SAVED)
+    assert old in text
+    path = tmp_path / "grin.toml"
+    path.write_text(text.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(ValueError, match=sentence) as error:
+        expressions.load(path)
+    assert str(path) in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("weights", "sentence"),
+    [
+        ({"a": 1.6}, "big_grin: a: a weight from -1 to 1.5 was expected, found 1.6"),
+        ({"a": float("nan")}, "found nan"),
+        ({"a*": 0.5}, r"big_grin: a\*: a name without \*"),
+    ],
+)
+def test_what_cannot_be_read_again_is_not_written(weights, sentence):
+    with pytest.raises(ValueError, match=sentence):
+        expressions.text_of(replace(SAVED, weights=weights))

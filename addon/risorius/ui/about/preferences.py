@@ -59,6 +59,12 @@ class RISORIUS_Preferences(AddonPreferences):
         default=True,
     )
 
+    expression_library: bpy.props.StringProperty(
+        name="Expression Library",
+        description="Folder of expressions that all files share; empty for the extension's own",
+        subtype="DIR_PATH",
+    )
+
     def draw(self, context: Context) -> None:
         works, text = self_test()
         words.show(self.layout, text, "CHECKMARK" if works else "ERROR")
@@ -67,6 +73,7 @@ class RISORIUS_Preferences(AddonPreferences):
             words.write(self.layout, compat.notice(), "INFO")
         self.layout.prop(self, "sides")
         self.layout.prop(self, "hints")
+        self.layout.prop(self, "expression_library")
         if works:
             draw_preferences(self.layout)
 

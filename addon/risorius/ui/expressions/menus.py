@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Menus with one entry per expression."""
 
-from ...scene.animation import expressions
+from ...scene.expressions import assets
 from ..blender_types import Context, Menu
 from ..words import mark
 from .operators import RISORIUS_OT_expression, RISORIUS_OT_make_pose_assets
 
 
 def _expressions_of(group: str) -> list[tuple[str, str]]:
-    return [(e.name, e.label) for e in expressions.groups().get(group, ())]
+    return [(e.name, e.label) for e in assets.groups().get(group, ())]
 
 
 def expression_menu(group: str, title: str, operator: str) -> type[Menu]:
@@ -48,6 +48,9 @@ class RISORIUS_MT_expressions(Menu):
             self.layout.menu(menu.bl_idname)
         self.layout.separator()
         self.layout.operator(RISORIUS_OT_make_pose_assets.bl_idname, icon="ASSET_MANAGER")
+        self.layout.operator_context = "INVOKE_DEFAULT"
+        self.layout.operator("risorius.import_expressions", icon="IMPORT")
+        self.layout.operator("risorius.export_expressions", icon="EXPORT")
 
 
 CLASSES = (*_SET, RISORIUS_MT_expressions)

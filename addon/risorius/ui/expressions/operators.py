@@ -1,42 +1,177 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Blender takes properties where Python has annotations:
 # pyright: reportInvalidTypeForm=false
-"""Operators that set the sliders to an expression, and make pose assets of expressions."""
+"""Operators that bring an expression onto the sliders: at once, or by dragging."""
 
 from collections.abc import Collection
+from typing import Any, cast
 
 import bpy
 
-from ...scene.animation import expressions, keying
+from ... import native
+from ...logic.animation import expression_mix
+from ...scene.animation import keying
+from ...scene.character import sides
+from ...scene.expressions import assets, library, poses
+from ...scene.frame import evaluate
 from ..blender_types import Context, Operator, Result
 from ..common import FaceOperator, face_rig
 from ..hand.base import HandOperator
-from ..words import say
+from ..words import of_error, say
+from .properties import choices, region_items
+
+_REACH = 300.0  # pixels of a drag for a strength of 1
+_MOST = 1.0
 
 
-class RISORIUS_OT_expression(HandOperator, Operator):
-    """Move the sliders to an expression"""
+class Mixes(HandOperator):
+    """The properties that say how an expression is mixed in."""
+
+    expression: bpy.props.StringProperty(name="Expression")
+    strength: bpy.props.FloatProperty(
+        name="Strength", default=1.0, min=0.0, max=_MOST, subtype="FACTOR"
+    )
+    only: bpy.props.BoolProperty(name="Rest of the Face at Rest", default=True)
+    flip: bpy.props.BoolProperty(name="Flip", description="Left for right")
+    additive: bpy.props.BoolProperty(
+        name="Additive", description="Add to what the face does; nothing goes to rest"
+    )
+    regions: bpy.props.EnumProperty(
+        name="Regions",
+        description="Only these regions are moved; none for all",
+        items=region_items,
+        options={"ENUM_FLAG"},
+    )
+    key: bpy.props.BoolProperty(name="Key", description="At the current frame")
+
+    def way(self) -> expression_mix.Way:
+        return expression_mix.Way(
+            self.strength, self.only, self.flip, self.additive, frozenset(self.regions)
+        )
+
+    def item(self, context: Context) -> library.Item:
+        """The expression. Raises: LibraryError: there is none of the name."""
+        items, _ = library.all_items(library.folder(context))
+        return library.find(items, self.expression)
+
+    def move(self, context: Context) -> Collection[str] | None:
+        rig = face_rig(context)
+        try:
+            item = self.item(context)
+            names = poses.apply(rig, item, self.way())
+        except native.user_errors() as error:
+            self.report({"ERROR"}, of_error(error))
+            return None
+        choices(context).active = item.expression.name
+        if self.key and self.at == "NOW":
+            keying.key(context, rig, names)
+        return names
+
+    def draw(self, context: Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        layout.prop(self, "strength")
+        column = layout.column()
+        column.active = not self.additive
+        column.prop(self, "only")
+        layout.prop(self, "flip")
+        layout.prop(self, "additive")
+        layout.prop(self, "key")
+        layout.use_property_split = False
+        layout.column_flow(columns=3, align=True).prop(self, "regions")
+
+
+class Applies(Mixes):
+    """Sets an expression at once."""
+
+    def invoke(self, context: Context, event: bpy.types.Event) -> Result:
+        # Ctrl flips in Blender's pose library too.
+        self.flip, self.additive = self.flip != event.ctrl, self.additive != event.shift
+        return self.execute(context)
+
+
+class Blends(Mixes):
+    """Blends an expression in by the mouse; one undo step, and Esc leaves no trace."""
+
+    bl_options = {"REGISTER", "UNDO", "GRAB_CURSOR", "BLOCKING"}
+
+    def invoke(self, context: Context, event: bpy.types.Event) -> Result:
+        rig = face_rig(context)
+        try:
+            self._item = self.item(context)
+            poses.goals(rig, self._item, self.way())
+        except native.user_errors() as error:
+            self.report({"ERROR"}, of_error(error))
+            return {"CANCELLED"}
+        self._before, self._shown = sides.values_of(rig), True
+        self._flip, self.strength, self._x = self.flip, 0.0, event.mouse_x
+        context.window_manager.modal_handler_add(self)
+        self._follow(context)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: Context, event: bpy.types.Event) -> Result:
+        if event.type in {"ESC", "RIGHTMOUSE"}:
+            self.cancel(context)
+            return {"CANCELLED"}
+        if event.type in {"LEFTMOUSE", "RET", "NUMPAD_ENTER"}:
+            # A press where one has clicked before, the release of one who drags.
+            context.workspace.status_text_set(None)
+            return self.execute(context)
+        if event.type == "MOUSEMOVE":
+            step = expression_mix.dragged(event.mouse_x - self._x, _REACH, event.shift)
+            self.strength, self._x = self.strength + step, event.mouse_x
+        elif event.type == "A" and event.value == "PRESS":
+            self.additive = not self.additive
+        elif event.type == "TAB" and event.value == "PRESS":
+            self._shown = not self._shown
+        elif event.type not in {"LEFT_CTRL", "RIGHT_CTRL"}:
+            return {"RUNNING_MODAL"}
+        self.flip = self._flip != event.ctrl
+        self._follow(context)
+        return {"RUNNING_MODAL"}
+
+    def _follow(self, context: Context) -> None:
+        """Show the blend, or with Tab what was before."""
+        rig = face_rig(context)
+        sides.restore(rig, self._before)
+        if self._shown:
+            poses.apply(rig, self._item, self.way(), self._before)
+        evaluate.bring_up(context, rig)
+        context.workspace.status_text_set(
+            say(
+                "{label} {share} %    Ctrl: flip, A: additive, Tab: what was before, Shift: fine, "
+                "click: keep, Esc: cancel",
+                label=self._item.expression.label,
+                share=round(self.strength * 100),
+            )
+        )
+
+    def cancel(self, context: Context) -> None:
+        rig = face_rig(context)
+        sides.restore(rig, self._before)
+        evaluate.bring_up(context, rig)
+        context.workspace.status_text_set(None)
+
+    def execute(self, context: Context) -> Result:
+        if hasattr(self, "_before"):  # what the drag has shown is no start
+            sides.restore(face_rig(context), self._before)
+            del self._before
+        return super().execute(context)
+
+
+# Blender loses a registered class that another one is derived from: the shelf's have bases too.
+class RISORIUS_OT_expression(Applies, Operator):
+    """Move the sliders to an expression. Ctrl: left for right, Shift: added to the face"""
 
     bl_idname = "risorius.expression"
     bl_label = "Expression"
 
-    expression: bpy.props.StringProperty(name="Expression")
-    strength: bpy.props.FloatProperty(
-        name="Strength", default=1.0, min=0.0, max=1.0, subtype="FACTOR"
-    )
-    only: bpy.props.BoolProperty(name="Rest of the Face at Rest", default=True)
-    key: bpy.props.BoolProperty(name="Key", description="At the current frame")
 
-    def move(self, context: Context) -> Collection[str] | None:
-        rig = face_rig(context)
-        found = expressions.all_expressions().get(self.expression)
-        if found is None:
-            self.report({"ERROR"}, say("There is no expression {name}.", name=self.expression))
-            return None
-        names = expressions.apply(rig, found, self.strength, self.only)
-        if self.key and self.at == "NOW":
-            keying.key(context, rig, names)
-        return names
+class RISORIUS_OT_blend_expression(Blends, Operator):
+    """Blend an expression in by moving the mouse: to the right more, to the left less"""
+
+    bl_idname = "risorius.blend_expression"
+    bl_label = "Blend Expression"
 
 
 class RISORIUS_OT_make_pose_assets(FaceOperator, Operator):
@@ -46,11 +181,13 @@ class RISORIUS_OT_make_pose_assets(FaceOperator, Operator):
     bl_label = "Expressions as Pose Assets"
 
     def execute(self, context: Context) -> Result:
-        made, notes = expressions.make_assets(face_rig(context))
+        made, notes = assets.make_assets(face_rig(context))
         for note in notes:
             self.report({"WARNING"}, note)
         self.report({"INFO"}, say("{count} pose assets", count=len(made)))
+        if not bpy.app.background:
+            cast(Any, bpy.ops).risorius.render_thumbnails("INVOKE_DEFAULT")  # gives them pictures
         return {"FINISHED"}
 
 
-CLASSES = (RISORIUS_OT_expression, RISORIUS_OT_make_pose_assets)
+CLASSES = (RISORIUS_OT_expression, RISORIUS_OT_blend_expression, RISORIUS_OT_make_pose_assets)

@@ -5,8 +5,9 @@
 
 import bpy
 
-from ...scene.animation import expressions, layer_properties, layers, layers_nla
+from ...scene.animation import layer_properties, layers, layers_nla
 from ...scene.base.blender_types import ArmatureObject
+from ...scene.expressions import assets
 from ...scene.frame import evaluate
 from ..blender_types import Context, Operator, Result
 from ..common import FaceOperator, face_controls, face_rig
@@ -56,7 +57,7 @@ class RISORIUS_OT_layer_add(FaceOperator, Operator):
         if self.kind == "ACTION":
             return self._add_action(context, rig, controls)
         if self.kind == "EXPRESSION":
-            known = expressions.all_expressions()
+            known = assets.all_expressions()
             if self.source not in known:
                 self.report({"ERROR"}, say("There is no expression {name}.", name=self.source))
                 return {"CANCELLED"}

@@ -10,23 +10,28 @@ from ..base.errors import ArgumentError
 from .regions import expand_sides
 
 
-def named_weights(table: Mapping[str, Any], prefix: str, where: str) -> dict[str, float]:
+def named_weights(
+    table: Mapping[str, Any], prefix: str, where: str, lowest: float = 0.0, highest: float = 1.0
+) -> dict[str, float]:
     """{control: weight} with both sides of what ends in *; a name given in full counts more.
 
     Args:
         table: name -> weight, out of a TOML file.
         prefix: stands before the name of each control in the result.
         where: what errors call the table.
+        lowest, highest: what a weight may be.
 
     Raises:
-        ValueError: a weight that is no number in [0, 1].
+        ValueError: a weight that is no number in [lowest, highest].
     """
     out: dict[str, float] = {}
     for name in sorted(table, key=lambda name: -name.count("*")):
         weight = table[name]
-        if isinstance(weight, bool) or not isinstance(weight, int | float) or not 0 <= weight <= 1:
+        known = isinstance(weight, int | float) and not isinstance(weight, bool)
+        if not known or not lowest <= weight <= highest:
             raise ArgumentError(
-                f"{where}: {name}: a weight from 0 to 1 was expected, found {weight!r}"
+                f"{where}: {name}: a weight from {lowest:g} to {highest:g} was expected, "
+                f"found {weight!r}"
             )
         for control in expand_sides(name):
             out[prefix + control] = float(weight)

@@ -2,11 +2,13 @@
 """Expressions: named poses on the standard raw controls, data files that one can edit and share.
 
 The files beside this one hold six emotions, fifteen visemes and more; any file of their form can be
-loaded. A name that ends in * stands for both sides, in ** for the four lip quarters.
+loaded, and `text_of` writes one. A name that ends in * stands for both sides, in ** for the four
+lip quarters. A file may say the number of its form: `format = 1`.
 """
 
 from __future__ import annotations
 
+import json
 import os
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
@@ -20,9 +22,13 @@ import numpy.typing as npt
 
 from ..base import toml
 from ..base.errors import ArgumentError
+from ..controls.regions import REGIONS
 from ..controls.weights import named_weights
 
 FILES = ("emotions.toml", "visemes.toml", "faces.toml")
+FORMAT = 1
+"""Of the files that text_of writes: a newer one is refused."""
+_SAVED = (-1.0, 1.5)  # the weights of a file that says its form: rotations, and overdrive
 VISEMES = ("sil", "PP", "FF", "TH", "DD", "kk", "CH", "SS", "nn", "RR", "aa", "E", "I", "O", "U")
 
 
@@ -36,7 +42,9 @@ class Expression:
     """ "emotion", "viseme" or what else a file says; pose libraries sort by it."""
     description: str
     weights: Mapping[str, float]
-    """By raw control as a DNA spells it, in [0, 1]; the others are 0."""
+    """By raw control as a DNA spells it, in [0, 1], of saved ones in [-1, 1.5]; others are 0."""
+    regions: tuple[str, ...] = ()
+    """Those whose other controls it brings to rest; none: those of its weights."""
 
 
 class Lack(NamedTuple):
@@ -60,6 +68,15 @@ def load(path: str | os.PathLike[str] | None = None) -> dict[str, Expression]:
     if path is None:
         return dict(_own())
     return _parsed(toml.read(path), os.fspath(path))
+
+
+def of_text(text: str) -> dict[str, Expression]:
+    """Expressions by name, of the text of a file.
+
+    Raises:
+        ValueError: as load.
+    """
+    return _parsed(toml.parse(text), "an expression")
 
 
 def get(name: str) -> Expression:
@@ -110,6 +127,42 @@ def pose_vector(expression: str | Expression, rig_names: Sequence[str]) -> npt.N
     return np.array([weights.get(name, 0.0) for name in rig_names], np.float32)
 
 
+def text_of(expression: Expression) -> str:
+    """One expression as the TOML file that load reads, with the number of its form.
+
+    Raises:
+        ValueError: a weight beyond [-1, 1.5], or a control whose name ends in *.
+    """
+    for control, weight in expression.weights.items():
+        if not _SAVED[0] <= weight <= _SAVED[1]:
+            raise ArgumentError(
+                f"{expression.name}: {control}: a weight from {_SAVED[0]:g} to {_SAVED[1]:g} was "
+                f"expected, found {weight!r}"
+            )
+        if control.endswith("*"):
+            raise ArgumentError(
+                f"{expression.name}: {control}: a name without * at its end was expected"
+            )
+    key = _quoted(expression.name)
+    lines = [
+        f"format = {FORMAT}",
+        "",
+        f"[expressions.{key}]",
+        f"label = {_quoted(expression.label)}",
+        f"group = {_quoted(expression.group)}",
+        f"description = {_quoted(expression.description)}",
+        f"regions = [{', '.join(map(_quoted, expression.regions))}]",
+        f"[expressions.{key}.weights]",
+    ]
+    lines += [f"{_quoted(c)} = {float(w)!r}" for c, w in expression.weights.items()]
+    return "\n".join(lines) + "\n"
+
+
+def _quoted(text: str) -> str:
+    """A string as TOML has it, which escapes what JSON does and DEL as well."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
 @cache
 def _own() -> dict[str, Expression]:
     folder = resources.files(__package__)
@@ -133,27 +186,43 @@ def _joined(found: Mapping[str, Mapping[str, Expression]]) -> dict[str, Expressi
 
 
 def _parsed(table: dict[str, Any], where: str) -> dict[str, Expression]:
+    number = table.get("format", 0)
+    if isinstance(number, bool) or not isinstance(number, int) or number < 0:
+        raise ArgumentError(f"{where}: format: a whole number was expected, found {number!r}")
+    if number > FORMAT:
+        raise ArgumentError(
+            f"{where}: it was written by a newer Risorius: format {FORMAT} at most was expected, "
+            f"found {number}"
+        )
     prefix, group = table.get("prefix", ""), table.get("group", "")
     rows = table.get("expressions")
     if not isinstance(rows, dict) or not isinstance(prefix, str) or not isinstance(group, str):
         raise ArgumentError(f"{where}: a table of expressions was expected, found {sorted(table)}")
-    return {name: _expression(name, row, prefix, group, where) for name, row in rows.items()}
+    reach = _SAVED if number else (0.0, 1.0)
+    return {name: _expression(name, row, prefix, group, where, reach) for name, row in rows.items()}
 
 
-def _expression(name: str, row: Any, prefix: str, group: str, where: str) -> Expression:
+def _expression(
+    name: str, row: Any, prefix: str, group: str, where: str, reach: tuple[float, float]
+) -> Expression:
     place = f"{where}: {name}"
     if not isinstance(row, dict) or not isinstance(row.get("weights"), dict):
         raise ArgumentError(f"{place}: a table with weights was expected, found {row!r}")
-    unknown = set(row) - {"label", "group", "description", "weights"}
+    unknown = set(row) - {"label", "group", "description", "weights", "regions"}
     if unknown:
         raise ArgumentError(
-            f"{place}: label, group, description and weights were expected, "
+            f"{place}: label, group, description, regions and weights were expected, "
             f"found {sorted(unknown)[0]}"
         )
+    regions = row.get("regions", [])
+    strange = regions if not isinstance(regions, list) else [r for r in regions if r not in REGIONS]
+    if strange:
+        raise ArgumentError(f"{place}: regions such as mouth were expected, found {strange!r}")
     return Expression(
         name,
         str(row.get("label", name)),
         str(row.get("group", group)),
         str(row.get("description", "")),
-        named_weights(row["weights"], prefix, place),
+        named_weights(row["weights"], prefix, place, *reach),
+        tuple(regions),
     )

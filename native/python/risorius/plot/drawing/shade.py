@@ -37,6 +37,11 @@ class Surface:
 
 def triangles_of(mesh: risorius.Mesh) -> Ints:
     """The faces of a mesh as fans of triangles: int64[F, 3] of position indices."""
+    return np.asarray(mesh.layout_positions, np.int64)[corners_of(mesh)]
+
+
+def corners_of(mesh: risorius.Mesh) -> Ints:
+    """The faces of a mesh as fans of triangles: int64[F, 3] of layouts."""
     offsets = np.asarray(mesh.face_offsets, np.int64)
     layouts = np.asarray(mesh.face_layouts, np.int64)
     if len(offsets) < 2:
@@ -44,8 +49,7 @@ def triangles_of(mesh: risorius.Mesh) -> Ints:
     fans = np.maximum(np.diff(offsets) - 2, 0)
     first = np.repeat(offsets[:-1], fans)
     step = np.arange(fans.sum()) - np.repeat(np.cumsum(fans) - fans, fans)
-    corners = layouts[np.stack([first, first + step + 1, first + step + 2], axis=1)]
-    return np.asarray(mesh.layout_positions, np.int64)[corners]
+    return layouts[np.stack([first, first + step + 1, first + step + 2], axis=1)]
 
 
 def surface(meshes: list[risorius.Mesh], paints: list[Floats], axes: Floats) -> Surface:
@@ -67,11 +71,19 @@ def surface(meshes: list[risorius.Mesh], paints: list[Floats], axes: Floats) -> 
     places, faces = np.concatenate(points), np.concatenate(triangles)
     faces = faces[np.all(np.isfinite(places[faces]).reshape(len(faces), 9), axis=1)]
     whole = np.concatenate(paint) if paint else np.ones(0)
-    return Surface(places, _normals(places, faces), faces, whole)
+    return Surface(places, vertex_normals(places, faces), faces, whole)
 
 
-def _normals(points: Floats, triangles: Ints) -> Floats:
-    """Area-weighted vertex normals; the file's own may be missing or split along seams."""
+def vertex_normals(points: Floats, triangles: Ints) -> Floats:
+    """Area-weighted vertex normals; the file's own may be missing or split along seams.
+
+    Args:
+        points: float64[V, 3].
+        triangles: int64[F, 3].
+
+    Returns:
+        float64[V, 3] of length 1, or 0 where no triangle has an area.
+    """
     a, b, c = (points[triangles[:, i]] for i in range(3))
     across = np.cross(b - a, c - a)
     normals = np.zeros_like(points)
@@ -105,7 +117,7 @@ def render(
     screen[:, 0] = (shape.points[:, 0] - left) * scale - 0.5
     screen[:, 1] = (top - shape.points[:, 1]) * scale - 0.5
     screen[:, 2] = shape.points[:, 2] * scale
-    face, weights = _depth_buffer(screen, shape.triangles, (high, wide))
+    face, weights = depth_buffer(screen, shape.triangles, (high, wide))
     hit = np.flatnonzero(face >= 0)
     picture = np.zeros((high * wide, 4))
     corners = shape.triangles[face[hit]]
@@ -117,8 +129,17 @@ def render(
     return _averaged(picture.reshape(high, wide, 4), smooth)
 
 
-def _depth_buffer(screen: Floats, triangles: Ints, size: tuple[int, int]) -> tuple[Ints, Floats]:
-    """The nearest triangle at each pixel, or -1, and the weights of its corners there."""
+def depth_buffer(screen: Floats, triangles: Ints, size: tuple[int, int]) -> tuple[Ints, Floats]:
+    """The nearest triangle at each pixel, or -1, and the weights of its corners there.
+
+    Args:
+        screen: float64[V, 3], x to the right and y down in pixels, z towards who looks.
+        triangles: int64[F, 3].
+        size: height and width in pixels.
+
+    Returns:
+        int64[h * w] and float64[h * w, 3].
+    """
     nearest = np.full(size[0] * size[1], -np.inf)
     face = np.full(len(nearest), -1)
     weights = np.zeros((len(nearest), 3))

@@ -1,20 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Expressions on the sliders: set, keyed, or as pose assets in a catalogue of the file."""
+"""Expressions as pose assets of this file, in catalogues, with their pictures."""
 
 from __future__ import annotations
 
 import uuid
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import bpy
+import numpy as np
 
 from ... import native
 from ...logic.animation import clip_units as clip_logic
-from ..base import parts
+from ..animation import actions, clip_actions
 from ..base.blender_types import ArmatureObject
 from ..character import runtime
-from . import actions, clip_actions
+from . import poses, thumbnails
+from .library import MARK
 
 CATALOG = "Faces"
 _NAMESPACE = uuid.UUID("6f0a5c9e-2f0b-4d2e-9a3b-0d9f6f0b7a11")
@@ -35,51 +38,6 @@ def groups() -> dict[str, list[native.Expression]]:
     return found
 
 
-def weights_for(live: runtime.Runtime, expression: native.Expression) -> dict[str, float]:
-    """The sliders of an expression, without those the face lacks.
-
-    Args:
-        live: the character's Runtime.
-        expression: risorius.expressions.Expression, whose weights go by the DNA's control names.
-
-    Returns:
-        Property name -> value.
-    """
-    sliders = clip_actions.sliders_of(live)
-    return {sliders[n]: float(w) for n, w in expression.weights.items() if n in sliders}
-
-
-def apply(
-    rig: ArmatureObject,
-    expression: native.Expression,
-    strength: float,
-    others_to_rest: bool = False,
-) -> list[str]:
-    """Move the sliders towards an expression.
-
-    Args:
-        rig: the character.
-        expression: risorius Expression.
-        strength: 1 sets it, 0 changes nothing.
-        others_to_rest: bring all other sliders to rest by the same share.
-
-    Returns:
-        The property names of the sliders that it concerns.
-    """
-    live, face, controls = runtime.there(rig), parts.face_bone(rig), parts.controls_there(rig)
-    assert face is not None
-    goals = weights_for(live, expression)
-    if others_to_rest:
-        goals = {**dict(zip(live.labels, live.rests, strict=True)), **goals}
-    maximum, lowest = parts.maximum_of(controls), dict(zip(live.labels, live.lowest, strict=True))
-    goals = {name: goal for name, goal in goals.items() if name in face}
-    for name, goal in goals.items():
-        value = float(face[name]) * (1.0 - strength) + goal * strength
-        face[name] = min(max(value, lowest[name]), maximum)
-    controls.update_tag()
-    return list(goals)
-
-
 def make_assets(rig: ArmatureObject) -> tuple[list[bpy.types.Action], list[str]]:
     """Make a pose asset of every expression that this face can show.
 
@@ -95,30 +53,27 @@ def make_assets(rig: ArmatureObject) -> tuple[list[bpy.types.Action], list[str]]
     live = runtime.there(rig)
     made, left_out = [], []
     for expression in all_expressions().values():
-        weights = weights_for(live, expression)
-        if expression.weights and not weights:
+        if expression.weights and not poses.weights_for(live, expression):
             left_out.append(expression.label)
             continue
-        made.append(_asset(rig, live, expression, weights))
-    notes = _write_catalogs({e.group for e in all_expressions().values()})
+        made.append(make_asset(rig, expression))
+    notes = write_catalogs({e.group for e in all_expressions().values()})
     if left_out:
         notes.append(f"This face has no control of: {', '.join(left_out)}.")
     return made, notes
 
 
-def _asset(
-    rig: ArmatureObject,
-    live: runtime.Runtime,
-    expression: native.Expression,
-    weights: Mapping[str, float],
-) -> bpy.types.Action:
-    held = regions_of(expression, weights)
-    pose = {
-        label: rest
-        for label, rest in zip(live.labels, live.rests, strict=True)
-        if native.regions().of_slider(label) in held
-    }
-    pose.update(weights)
+def make_asset(rig: ArmatureObject, expression: native.Expression) -> bpy.types.Action:
+    """Make the pose asset of an expression, with its picture where there is one.
+
+    Args:
+        rig: the character.
+        expression: one that the face can show.
+
+    Returns:
+        The action; one of the same name that nobody edited is replaced.
+    """
+    pose = poses.pose_for(runtime.there(rig), expression)
     clip = native.module().Clip(list(pose), [[value] for value in pose.values()])
     name = f"Face {expression.label}"
     old = bpy.data.actions.get(name)
@@ -132,18 +87,53 @@ def _asset(
     asset.catalog_id = str(catalog_id(expression.group))
     asset.description = expression.description
     asset.tags.new(expression.group, skip_if_exists=True)
+    for region in sorted(
+        poses.held_by(expression, poses.weights_for(runtime.there(rig), expression))
+    ):
+        asset.tags.new(region, skip_if_exists=True)
+    # On the asset's data too: a shelf knows that of other files' assets without loading them.
+    action[MARK] = asset[MARK] = native.part("expressions").text_of(expression)
+    give_picture(action, picture_of(rig, expression))
     return action
 
 
-def regions_of(expression: native.Expression, weights: Iterable[str]) -> set[str]:
-    """The regions that an expression moves; a viseme always the whole mouth.
+def picture_of(rig: ArmatureObject, expression: native.Expression) -> Path:
+    """The file of an expression's picture on a character, whether it is there or not.
 
     Args:
+        rig: the character.
         expression: risorius.expressions.Expression.
-        weights: the names of its sliders on this face, from weights_for.
     """
-    held = {native.regions().of_slider(name) for name in weights}
-    return held | {"mouth", "jaw", "tongue"} if expression.group == "viseme" else held
+    weights = poses.weights_for(runtime.there(rig), expression)
+    return thumbnails.path_of(thumbnails.look_of(rig), weights)
+
+
+def give_picture(action: bpy.types.Action, path: Path) -> bool:
+    """Let an asset show a picture in libraries and shelves.
+
+    Args:
+        action: the asset.
+        path: of the PNG file.
+
+    Returns:
+        Whether there was such a picture.
+    """
+    try:
+        image = native.part("files.png").read_png(path.read_bytes())
+    except OSError:
+        return False
+    if image is None:
+        return False
+    shown = action.preview_ensure()
+    if shown is None:
+        return False
+    height, width = image.shape[:2]
+    pixels = np.ones((height, width, 4), np.float32)
+    pixels[..., :3] = image
+    shown.image_size = (width, height)
+    floats: Any = shown.image_pixels_float
+    floats.foreach_set(pixels.ravel())
+    return True
 
 
 def catalog_id(group: str) -> uuid.UUID:
@@ -151,8 +141,11 @@ def catalog_id(group: str) -> uuid.UUID:
     return uuid.uuid5(_NAMESPACE, group)
 
 
-def _write_catalogs(wanted: Iterable[str]) -> list[str]:
+def write_catalogs(wanted: Iterable[str]) -> list[str]:
     """Name the catalogues in the file beside the .blend, where Blender keeps them.
+
+    Args:
+        wanted: groups of expressions.
 
     Returns:
         Sentences for the user.
@@ -172,7 +165,8 @@ def _add_catalogs(path: Path, wanted: Iterable[str]) -> None:
     for group in sorted(wanted):
         number = str(catalog_id(group))
         if number not in text:
-            title = f"{group[:1].upper()}{group[1:]}s"
+            plain = "".join(c for c in group if c not in ":/\\\n") or "own"
+            title = f"{plain[:1].upper()}{plain[1:]}s"
             text = f"{text.rstrip()}\n{number}:{CATALOG}/{title}:{CATALOG}-{title}\n"
     # The file belongs to every .blend of the folder: it is whole at all times.
     native.part("files.fileio").write_text(path, text)

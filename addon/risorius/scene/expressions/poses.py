@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Expressions on the sliders of a face, and the face as an expression."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping
+
+from ... import native
+from ...logic.animation import expression_mix
+from ...logic.animation.expression_mix import Way
+from ...logic.base.sentences import told
+from ..animation import clip_actions
+from ..base.blender_types import ArmatureObject
+from ..character import runtime, sides
+from .library import RISORIUS, Item, LibraryError
+
+_MOUTH = {"mouth", "jaw", "tongue"}
+
+
+def weights_for(live: runtime.Runtime, expression: native.Expression) -> dict[str, float]:
+    """The sliders of an expression, without those the face lacks.
+
+    Args:
+        live: the character's Runtime.
+        expression: risorius.expressions.Expression, whose weights go by the DNA's control names.
+
+    Returns:
+        Property name -> value.
+    """
+    sliders = clip_actions.sliders_of(live)
+    return {sliders[n]: float(w) for n, w in expression.weights.items() if n in sliders}
+
+
+def check(live: runtime.Runtime, item: Item) -> None:
+    """Whether a face can show an expression; one of Risorius' own may lack some of its controls.
+
+    Args:
+        live: the character's Runtime.
+        item: of the grid.
+
+    Raises:
+        LibraryError: it was made for another rig.
+    """
+    sliders = clip_actions.sliders_of(live)
+    weights = item.expression.weights
+    lacking = [name for name in weights if name not in sliders]
+    if len(lacking) == len(weights) > 0 or (lacking and item.source != RISORIUS):
+        raise LibraryError(
+            told(
+                "{label} was made for another rig: this face lacks {count} of its {all} controls, "
+                "such as {name}.",
+                label=item.expression.label,
+                count=len(lacking),
+                all=len(weights),
+                name=lacking[0],
+            )
+        )
+
+
+def goals(
+    rig: ArmatureObject, item: Item, way: Way, present: Mapping[str, float] | None = None
+) -> dict[str, float]:
+    """The values that an expression gives the sliders that it concerns.
+
+    Args:
+        rig: the character.
+        item: of the grid.
+        way: how it is mixed in.
+        present: values to start from; None for those of now.
+
+    Raises:
+        LibraryError: it was made for another rig.
+    """
+    live = runtime.there(rig)
+    check(live, item)
+    return expression_mix.mixed(
+        sides.values_of(rig) if present is None else present,
+        weights_for(live, item.expression),
+        dict(zip(live.labels, live.rests, strict=True)),
+        way,
+        native.regions(),
+        item.expression.regions,
+    )
+
+
+def apply(
+    rig: ArmatureObject, item: Item, way: Way, present: Mapping[str, float] | None = None
+) -> list[str]:
+    """Move the sliders towards an expression.
+
+    Args:
+        rig: the character.
+        item: of the grid.
+        way: how it is mixed in.
+        present: values to start from; None for those of now.
+
+    Returns:
+        The property names of the sliders that it concerns.
+
+    Raises:
+        LibraryError: it was made for another rig; nothing is moved then.
+    """
+    values = goals(rig, item, way, present)
+    sides.put(rig, values)
+    return list(values)
+
+
+def captured(
+    rig: ArmatureObject,
+    name: str,
+    label: str,
+    group: str,
+    regions: Collection[str] = (),
+) -> native.Expression:
+    """What a face shows now as an expression.
+
+    Args:
+        rig: the character.
+        name: of the expression.
+        label: what it is called.
+        group: its category.
+        regions: that it holds; none: all that have a slider off its rest.
+
+    Raises:
+        LibraryError: all sliders of these regions are at rest.
+    """
+    live = runtime.there(rig)
+    values = sides.values_of(rig)
+    rests = dict(zip(live.labels, live.rests, strict=True))
+    known = native.regions()
+    moved = expression_mix.regions_in_use(values, rests, known)
+    held = [region for region in known.titles if region in (set(regions) or moved)]
+    names = dict(zip(live.labels, clip_actions.dna_names(live, live.labels), strict=True))
+    weights = {
+        names[label]: round(value, 6)
+        for label, value in values.items()
+        if known.of_slider(label) in held and abs(value - rests[label]) > 1e-6
+    }
+    if not weights:
+        raise LibraryError(told("Move some sliders first: this face is at rest."))
+    return native.part("expressions").Expression(name, label, group, "", weights, tuple(held))
+
+
+def held_by(expression: native.Expression, weights: Iterable[str]) -> set[str]:
+    """The regions that an expression holds; a viseme always the whole mouth.
+
+    Args:
+        expression: risorius.expressions.Expression.
+        weights: the names of its sliders on this face, from weights_for.
+    """
+    if expression.regions:
+        return set(expression.regions)
+    held = {native.regions().of_slider(name) for name in weights}
+    return held | _MOUTH if expression.group == "viseme" else held
+
+
+def pose_for(live: runtime.Runtime, expression: native.Expression) -> dict[str, float]:
+    """All sliders of the regions that an expression holds, as its pose asset has them.
+
+    Args:
+        live: the character's Runtime.
+        expression: risorius.expressions.Expression.
+
+    Returns:
+        Property name -> value.
+    """
+    weights = weights_for(live, expression)
+    held = held_by(expression, weights)
+    pose = {
+        label: rest
+        for label, rest in zip(live.labels, live.rests, strict=True)
+        if native.regions().of_slider(label) in held
+    }
+    return {**pose, **weights}

@@ -1,0 +1,234 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pictures of expressions on the character at hand, kept in files by the hash of what they show.
+
+The files lie in the extension's own folder, so that every .blend with this character has them.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import native
+from ...logic.base.names import without_lod
+from ...logic.character import plans
+from ..base import parts, sharing, storage
+from ..base.blender_types import ArmatureObject
+from ..character import runtime
+from . import library, portrait
+
+_MOST_FACES = 5000  # of a mesh that is drawn, where a level of detail has one so small
+_TEXELS = 640  # of an image, each way: a picture shows no more
+_MOST_FILES = 3000  # that are kept; the oldest go
+_DIM = {"teeth": 0.9, "tongue": 0.75, "gum": 0.7}  # the mouth lies in the shade
+_GLOSS = {"eyes": 0.45, "teeth": 0.3, "skin": 0.07}
+
+
+class Job(NamedTuple):
+    """A picture to be made: where, and of which sliders by property name."""
+
+    path: Path
+    sliders: Mapping[str, float]
+
+
+def look_of(rig: ArmatureObject) -> str:
+    """What tells one character's pictures from another's: its DNA, its images, the way of drawing.
+
+    Args:
+        rig: the character.
+    """
+    held = [storage.content_hash(rig.get(parts.DNA)), str(portrait.VERSION), str(portrait.SIZE)]
+    for item in parts.meshes_of(rig):
+        for material in item.data.materials:
+            image = _image_of(material)
+            if image is not None:
+                held += [image.name, str(image.get(sharing.DIGEST) or image.size[:])]
+    return hashlib.sha1("\n".join(held).encode(), usedforsecurity=False).hexdigest()
+
+
+def path_of(look: str, sliders: Mapping[str, float]) -> Path:
+    """The file of a picture.
+
+    Args:
+        look: of look_of.
+        sliders: of the expression, by property name.
+    """
+    text = look + repr(sorted((name, round(value, 4)) for name, value in sliders.items()))
+    name = hashlib.sha1(text.encode(), usedforsecurity=False).hexdigest()
+    return library.own_folder("thumbnails") / f"{name}.png"
+
+
+def sitter_of(rig: ArmatureObject) -> portrait.Sitter | None:
+    """What the pictures of a character are drawn from, or None where it has no mesh.
+
+    Args:
+        rig: the character.
+    """
+    live = runtime.there(rig)
+    names = live.dna.mesh_names
+    paints = {}  # by the mesh's name without its level: all levels share their materials
+    for item in parts.meshes_of(rig):
+        index = int(item.get(parts.MESH, -1))
+        if 0 <= index < len(names):
+            paints.setdefault(without_lod(names[index]), list(item.data.materials))
+    pixels: dict[str, NDArray[np.float32]] = {}
+    pieces = [
+        _piece(live, index, paints.get(without_lod(names[index]), []), pixels)
+        for index in _meshes(live)
+    ]
+    return portrait.Sitter(live, tuple(pieces)) if pieces else None
+
+
+def _meshes(live: runtime.Runtime) -> list[int]:
+    """Of each mesh of the finest level the finest form with few enough faces, else the coarsest."""
+    dna = live.dna
+    rows = dna.lod_mesh_mapping.rows or [range(len(dna.meshes))]
+    chosen: dict[str, int] = {}
+    for row in rows:
+        for index in map(int, row):
+            base = without_lod(dna.mesh_names[index]) if index < len(dna.meshes) else ""
+            if (
+                not base
+                or plans.kind_of(base) == "wet"
+                or (row is not rows[0] and base not in chosen)
+            ):
+                continue
+            if base not in chosen or len(dna.meshes[chosen[base]].face_offsets) > _MOST_FACES:
+                chosen[base] = index
+    return list(chosen.values())
+
+
+def _piece(
+    live: runtime.Runtime,
+    index: int,
+    materials: Sequence[bpy.types.Material | None],
+    pixels: dict[str, NDArray[np.float32]],
+) -> portrait.Piece:
+    mesh, kind = live.dna.meshes[index], plans.kind_of(live.dna.mesh_names[index])
+    corners = native.part("plot.drawing.shade").corners_of(mesh)
+    triangles = np.asarray(mesh.layout_positions, np.int64)[corners]
+    uvs = np.zeros((*corners.shape, 2))
+    if len(mesh.texture_coordinates) and len(mesh.layout_texture_coordinates):
+        layouts = np.asarray(mesh.layout_texture_coordinates, np.int64)[corners]
+        uvs = np.asarray(mesh.texture_coordinates, np.float64)[:, :2][layouts]
+    colors = np.tile(_color_of(materials[0] if materials else None), (len(triangles), 1))
+    if kind == "eyes" and len(materials) > 1:
+        colors[_iris(live, np.asarray(mesh.positions)[triangles].mean(axis=1))] = _color_of(
+            materials[1]
+        )
+    image = next((i for i in map(_image_of, materials) if i is not None), None)
+    return portrait.Piece(
+        index=index,
+        triangles=triangles,
+        uvs=uvs,
+        colors=colors * _DIM.get(kind, 1.0),
+        image=_pixels(image, pixels) if image is not None else None,
+        gloss=_GLOSS.get(kind, 0.1),
+        hairs=kind == "lashes",
+        weights=portrait.skin_of(mesh, len(live.dna.joint_names)),
+        shapes=portrait.shapes_of(mesh),
+    )
+
+
+def _iris(live: runtime.Runtime, places: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """Which places on eyeballs are iris: those around the axis of the nearest eye."""
+    points = live.space.points(places)
+    eyes = [live.rest[joint][:3, 3] for joint in live.anchors.eyes.values()]
+    if not eyes:
+        return np.zeros(len(points), bool)
+    off = np.stack([points - eye for eye in eyes])
+    nearest = np.linalg.norm(off, axis=2).argmin(axis=0)
+    own = off[nearest, np.arange(len(points))]
+    radius = np.linalg.norm(own, axis=1).max(initial=1e-9)
+    return (own[:, 1] < 0) & (np.hypot(own[:, 0], own[:, 2]) < 0.45 * radius)
+
+
+def _image_of(material: bpy.types.Material | None) -> bpy.types.Image | None:
+    """The colour's image, which is the active node where there is one: see materials.py; of lashes
+    the one with the hairs."""
+    tree = material.node_tree if material is not None else None
+    if tree is None:
+        return None
+    active = tree.nodes.active
+    nodes: list[Any] = [active] if active is not None and active.type == "TEX_IMAGE" else []
+    nodes += [n for n in tree.nodes if n.type == "TEX_IMAGE" and n.label == "Alpha"]
+    return next((n.image for n in nodes if n.image is not None and n.image.size[0]), None)
+
+
+def _color_of(material: bpy.types.Material | None) -> list[float]:
+    """The colour of the solid view, as it is seen."""
+    linear = np.array(material.diffuse_color[:3] if material is not None else (0.5, 0.5, 0.5))
+    low = linear * 12.92
+    return (
+        np.where(linear < 0.0031308, low, 1.055 * linear ** (1 / 2.4) - 0.055).clip(0, 1).tolist()
+    )
+
+
+def _pixels(
+    image: bpy.types.Image, known: dict[str, NDArray[np.float32]]
+) -> NDArray[np.float32] | None:
+    """float32[h, w, 4] of an image made small; its alpha, or its lightness where it has none."""
+    if image.name_full not in known:
+        copy = image.copy()
+        try:
+            width, height = (min(int(side), _TEXELS) for side in image.size)
+            if (width, height) != tuple(image.size):
+                copy.scale(width, height)
+            held = np.empty(width * height * 4, np.float32)
+            floats: Any = copy.pixels
+            floats.foreach_get(held)
+        except (RuntimeError, TypeError):  # its file is gone
+            return None
+        finally:
+            bpy.data.images.remove(copy)
+        table = held.reshape(height, width, 4)
+        if image.channels < 4 or table[..., 3].min() > 0.99:
+            table[..., 3] = table[..., :3].mean(axis=2)
+        known[image.name_full] = table
+    return known[image.name_full]
+
+
+def make(
+    sitter: portrait.Sitter,
+    jobs: Sequence[Job],
+    progress: Callable[[float], None] = lambda _share: None,
+    cancelled: Callable[[], bool] = lambda: False,
+) -> int:
+    """Draw pictures and write their files; touches nothing of Blender's.
+
+    Args:
+        sitter: the character.
+        jobs: the pictures.
+        progress: takes the share that is done, 0 to 1.
+        cancelled: asks whether to end.
+
+    Returns:
+        How many were made.
+
+    Raises:
+        OSError: a file cannot be written.
+    """
+    png, write = native.part("files.png").png, native.part("files.fileio").write_bytes
+    for number, job in enumerate(jobs):
+        if cancelled():
+            return number
+        write(job.path, png(portrait.draw(sitter, job.sliders)))
+        progress((number + 1) / len(jobs))
+    return len(jobs)
+
+
+def tidy() -> int:
+    """Remove the oldest pictures where there are too many of them; how many were removed."""
+    with os.scandir(library.own_folder("thumbnails")) as entries:
+        files = [(e.stat().st_mtime, Path(e.path)) for e in entries if e.name.endswith(".png")]
+    old = sorted(files)[: max(0, len(files) - _MOST_FILES)]
+    for _, path in old:
+        path.unlink(missing_ok=True)
+    return len(old)

@@ -1,0 +1,352 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Blender takes properties where Python has annotations:
+# pyright: reportInvalidTypeForm=false
+"""Operators on the library of expressions: save, change, star, take along, and their pictures."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import bpy
+
+from ... import native
+from ...logic.base.errors import FaceError
+from ...logic.base.sentences import told
+from ...scene.base.blender_types import ArmatureObject, current_context
+from ...scene.base.task import Task
+from ...scene.character import runtime
+from ...scene.expressions import assets, library, poses, thumbnails
+from ..beside import RunsBeside
+from ..blender_types import Context, Operator, OperatorBase, Result
+from ..common import FaceOperator, face_rig
+from ..words import of_error, say
+from . import previews
+from .properties import choices, region_items
+
+_AT_ONCE = 3  # pictures after which the sidebar is drawn again
+
+
+def redraw(context: Context) -> None:
+    """Show new pictures: the sidebars of all windows are drawn again, and nothing else."""
+    for window in context.window_manager.windows:
+        for area in window.screen.areas:
+            for region in area.regions if area.type == "VIEW_3D" else ():
+                if region.type == "UI":
+                    region.tag_redraw()
+
+
+class RISORIUS_OT_render_thumbnails(RunsBeside, FaceOperator, Operator):
+    """Draw the pictures of all expressions on this face; Esc ends it"""
+
+    bl_idname = "risorius.render_thumbnails"
+    bl_label = "Draw Pictures"
+    bl_options = set()
+    baked_too = True
+
+    again: bpy.props.BoolProperty(
+        name="All Anew", description="Also pictures that are there", options={"SKIP_SAVE"}
+    )
+
+    def invoke(self, context: Context, event: bpy.types.Event) -> Result:
+        self.wait_beside()
+        return self.execute(context)
+
+    def execute(self, context: Context) -> Result:
+        rig = face_rig(context)
+        items, _ = library.all_items(library.folder(context))
+        jobs = previews.jobs_of(rig, list(items.values()))
+        missing = [job for job in jobs if self.again or not job.path.is_file()]
+        sitter = thumbnails.sitter_of(rig) if missing else None
+        if sitter is None:
+            text = (
+                "This face has no mesh that can be drawn." if missing else "All pictures are there."
+            )
+            self.report({"INFO"}, say(text))
+            return {"FINISHED"}
+        self._count, self._redrawn = len(missing), 0
+        return self.begin(
+            context,
+            Task(lambda progress, ended: thumbnails.make(sitter, missing, progress, ended)),
+        )
+
+    def finish(self, context: Context) -> Result:
+        error = self._running.error
+        if error is not None and not isinstance(error, native.user_errors()):
+            raise error
+        previews.forget()
+        redraw(context)
+        if error is not None:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        thumbnails.tidy()
+        self._give_pictures(context)
+        self.report({"INFO"}, say("{count} pictures", count=self._running.result))
+        return {"FINISHED"}
+
+    @staticmethod
+    def _give_pictures(context: Context) -> None:
+        """Pose assets of this face show the new pictures too."""
+        rig = face_rig(context)
+        for action in bpy.data.actions:
+            expression = library.of_action(action)
+            if expression is not None and action.library is None:
+                assets.give_picture(action, assets.picture_of(rig, expression))
+
+    def shown(self, share: int) -> str:
+        done = round(share * self._count / 100)
+        if done >= self._redrawn + _AT_ONCE:  # drawing costs the time that pictures need
+            self._redrawn = done
+            redraw(current_context())
+        return say(
+            "Pictures of expressions: {done} of {count}. Esc ends it.",
+            done=done,
+            count=self._count,
+        )
+
+    def cancelled_text(self) -> str:
+        redraw(current_context())
+        return say("Pictures are left out.")
+
+
+class _LibraryOperator(FaceOperator):
+    """What operators on expressions of one's own share: one sentence for what goes wrong."""
+
+    def execute(self, context: Context) -> Result:
+        try:
+            self.work(context)
+        except native.user_errors() as error:
+            self.report({"ERROR"}, of_error(error))
+            return {"CANCELLED"}
+        redraw(context)
+        return {"FINISHED"}
+
+    def work(self, context: Context) -> None:
+        """Do it. Raises: what a user can mend."""
+        raise NotImplementedError
+
+
+def _put(
+    context: Context, rig: ArmatureObject, expression: "native.Expression", shared: bool
+) -> None:
+    """An expression of one's own as a pose asset of this file, and in the library."""
+    picture = assets.picture_of(rig, expression)
+    sitter = None if picture.is_file() else thumbnails.sitter_of(rig)
+    if sitter is not None:
+        weights = poses.weights_for(sitter.live, expression)
+        thumbnails.make(sitter, [thumbnails.Job(picture, weights)])
+    if shared:
+        held = picture.read_bytes() if picture.is_file() else b""
+        library.write(library.folder(context), expression, held)
+    assets.make_asset(rig, expression)
+
+
+class RISORIUS_OT_save_expression(_LibraryOperator, Operator):
+    """Save what the face shows as an expression: a pose asset, and for other files if chosen"""
+
+    bl_idname = "risorius.save_expression"
+    bl_label = "Save Expression"
+
+    label: bpy.props.StringProperty(
+        name="Name", description="Empty: the panel's, else a number", options={"SKIP_SAVE"}
+    )
+    group: bpy.props.StringProperty(
+        name="Category", description="Empty: the panel's", options={"SKIP_SAVE"}
+    )
+    regions: bpy.props.EnumProperty(
+        name="Regions",
+        description="What it holds; none for all regions that are not at rest",
+        items=region_items,
+        options={"ENUM_FLAG", "SKIP_SAVE"},
+    )
+    shared: bpy.props.EnumProperty(
+        name="Shared Library",
+        description="Whether it is saved for all files as well",
+        items=(
+            ("PANEL", "As in the Panel", ""),
+            ("YES", "In the Library", ""),
+            ("NO", "In This File Only", ""),
+        ),
+        options={"SKIP_SAVE"},
+    )
+
+    def work(self, context: Context) -> None:
+        chosen, rig = choices(context), face_rig(context)
+        items, _ = library.all_items(library.folder(context))
+        label = (self.label or chosen.new_label).strip()
+        group = (self.group or chosen.new_group).strip() or "own"
+        if not label:
+            label = library.free_label(items, say("Expression"))
+        name = library.name_for(label)
+        if not name:
+            raise library.LibraryError(told("A name with a letter in it is needed."))
+        if name in items:
+            raise library.LibraryError(
+                told("There is an expression {label} already.", label=items[name].expression.label)
+            )
+        expression = poses.captured(rig, name, label, group, self.regions)
+        shared = chosen.to_library if self.shared == "PANEL" else self.shared == "YES"
+        _put(context, rig, expression, shared)
+        for note in assets.write_catalogs([group]) if bpy.data.filepath else ():
+            self.report({"WARNING"}, note)
+        chosen.active, chosen.new_label = name, ""
+        self.report({"INFO"}, say("{label} was saved.", label=label))
+
+
+class _OfOne(_LibraryOperator):
+    """On one expression; empty: the one that was clicked last."""
+
+    expression: bpy.props.StringProperty(name="Expression", options={"SKIP_SAVE"})
+
+    def item(self, context: Context) -> library.Item:
+        """The expression. Raises: LibraryError: there is none of the name."""
+        items, _ = library.all_items(library.folder(context))
+        return library.find(items, self.expression or choices(context).active)
+
+
+class RISORIUS_OT_update_expression(_OfOne, Operator):
+    """Give an expression of one's own what the face shows now"""
+
+    bl_idname = "risorius.update_expression"
+    bl_label = "Update Expression"
+
+    def work(self, context: Context) -> None:
+        rig, item = face_rig(context), self.item(context)
+        library.check_own(item)
+        old = item.expression
+        expression = poses.captured(rig, old.name, old.label, old.group)
+        _put(context, rig, replace(expression, description=old.description), item.path is not None)
+
+
+class RISORIUS_OT_rename_expression(_OfOne, Operator):
+    """Give an expression of one's own another name or category"""
+
+    bl_idname = "risorius.rename_expression"
+    bl_label = "Rename Expression"
+
+    label: bpy.props.StringProperty(name="Name", options={"SKIP_SAVE"})
+    group: bpy.props.StringProperty(name="Category", options={"SKIP_SAVE"})
+
+    def invoke(self, context: Context, event: bpy.types.Event) -> Result:
+        try:
+            item = self.item(context)
+            library.check_own(item)
+        except FaceError as error:
+            self.report({"ERROR"}, of_error(error))
+            return {"CANCELLED"}
+        self.label, self.group = item.expression.label, item.expression.group
+        return context.window_manager.invoke_props_dialog(self)
+
+    def work(self, context: Context) -> None:
+        rig, item = face_rig(context), self.item(context)
+        library.check_own(item)
+        items, _ = library.all_items(library.folder(context))
+        label = self.label.strip() or item.expression.label
+        name = library.name_for(label)
+        if name in items and name != item.expression.name:
+            raise library.LibraryError(
+                told("There is an expression {label} already.", label=items[name].expression.label)
+            )
+        group = self.group.strip() or item.expression.group
+        new = replace(item.expression, name=name, label=label, group=group)
+        poses.check(runtime.there(rig), item)
+        _put(context, rig, new, item.path is not None)
+        if name != item.expression.name:
+            library.remove(item)
+        if item.expression.name in library.favourites():
+            library.set_favourite([item.expression.name], False)
+            library.set_favourite([name], True)
+        choices(context).active = name
+
+
+class RISORIUS_OT_delete_expression(_OfOne, Operator):
+    """Delete an expression of one's own, here and in the library"""
+
+    bl_idname = "risorius.delete_expression"
+    bl_label = "Delete Expression"
+
+    def invoke(self, context: Context, event: bpy.types.Event) -> Result:
+        return context.window_manager.invoke_confirm(self, event)
+
+    def work(self, context: Context) -> None:
+        item = self.item(context)
+        library.remove(item)
+        library.set_favourite([item.expression.name], False)
+        choices(context).active = ""
+
+
+class RISORIUS_OT_star_expression(_OfOne, Operator):
+    """Favourites have a star and a category of their own"""
+
+    bl_idname = "risorius.star_expression"
+    bl_label = "Favourite"
+    bl_options = set()
+
+    on: bpy.props.BoolProperty(name="Favourite", default=True, options={"SKIP_SAVE"})
+
+    def work(self, context: Context) -> None:
+        library.set_favourite([self.item(context).expression.name], self.on)
+
+
+class _OfFolder(_LibraryOperator, OperatorBase):
+    """On a folder that the user chooses."""
+
+    directory: bpy.props.StringProperty(name="Folder", subtype="DIR_PATH")
+    filter_folder: bpy.props.BoolProperty(default=True, options={"HIDDEN"})
+
+    def invoke(self, context: Context, event: bpy.types.Event) -> Result:
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def chosen(self) -> Path:
+        return Path(bpy.path.abspath(self.directory))
+
+
+class RISORIUS_OT_export_expressions(_OfFolder, Operator):
+    """Write one's own expressions into a folder, one TOML file and one picture each"""
+
+    bl_idname = "risorius.export_expressions"
+    bl_label = "Export Expressions"
+    bl_options = set()
+
+    def work(self, context: Context) -> None:
+        rig = face_rig(context)
+        items, _ = library.all_items(library.folder(context))
+        own = [item.expression for item in items.values() if item.source != library.RISORIUS]
+        if not own:
+            raise library.LibraryError(told("There are no expressions of your own."))
+        for expression in own:
+            picture = assets.picture_of(rig, expression)
+            held = picture.read_bytes() if picture.is_file() else b""
+            library.write(self.chosen(), expression, held)
+        self.report({"INFO"}, say("{count} expressions", count=len(own)))
+
+
+class RISORIUS_OT_import_expressions(_OfFolder, Operator):
+    """Take the expressions of a folder into the library, all or none"""
+
+    bl_idname = "risorius.import_expressions"
+    bl_label = "Import Expressions"
+    bl_options = set()
+
+    def work(self, context: Context) -> None:
+        found = library.read_all(self.chosen())
+        items, _ = library.all_items(library.folder(context))
+        for expression in found:
+            if expression.name in items:
+                raise library.LibraryError(
+                    told("There is an expression {label} already.", label=expression.label)
+                )
+        for expression in found:
+            library.write(library.folder(context), expression)
+        self.report({"INFO"}, say("{count} expressions", count=len(found)))
+
+
+CLASSES = (
+    RISORIUS_OT_render_thumbnails,
+    RISORIUS_OT_save_expression,
+    RISORIUS_OT_update_expression,
+    RISORIUS_OT_rename_expression,
+    RISORIUS_OT_delete_expression,
+    RISORIUS_OT_star_expression,
+    RISORIUS_OT_export_expressions,
+    RISORIUS_OT_import_expressions,
+)

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The pictures of expressions as icons of Blender, loaded when they are first drawn."""
+
+from pathlib import Path
+from typing import Any
+
+import bpy
+import bpy.utils.previews
+
+from ...scene.base.blender_types import ArmatureObject
+from ...scene.character import runtime
+from ...scene.expressions import poses, thumbnails
+from ...scene.expressions.library import Item
+
+_held: dict[str, Any] = {}  # "icons": Blender's collection of them
+
+
+def icon_of(path: Path) -> int:
+    """The number of the icon that shows a picture, or 0 while there is no such file."""
+    icons = _held.setdefault("icons", bpy.utils.previews.new()) if not _held else _held["icons"]
+    key = str(path)
+    if key not in icons:
+        if not path.is_file():
+            return 0
+        icons.load(key, key, "IMAGE")
+    return icons[key].icon_id
+
+
+def forget() -> None:
+    """Drop all icons: at the end, and where pictures are made anew."""
+    if _held:
+        bpy.utils.previews.remove(_held.pop("icons"))
+
+
+def jobs_of(rig: ArmatureObject, items: list[Item]) -> list[thumbnails.Job]:
+    """The pictures of expressions on a character, as many as expressions.
+
+    Args:
+        rig: the character.
+        items: expressions of the grid.
+    """
+    live, look = runtime.there(rig), thumbnails.look_of(rig)
+    weights = [poses.weights_for(live, item.expression) for item in items]
+    return [thumbnails.Job(thumbnails.path_of(look, held), held) for held in weights]

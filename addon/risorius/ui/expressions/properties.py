@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Blender takes properties where Python has annotations:
+# pyright: reportInvalidTypeForm=false
+"""How the grid of expressions is shown and what a click does; it goes with the window."""
+
+from typing import cast
+
+import bpy
+
+from ... import native
+from ..blender_types import Context, Item
+from ..words import say
+
+ALL, STARRED = "ALL", "STARRED"
+_known: dict[str, list[Item]] = {}  # Blender keeps no names of items that a function gives
+
+
+def region_items(_self: object, _context: object) -> list[tuple[str, str, str, int]]:
+    """The regions of a face, for a choice of some.
+
+    Args:
+        _self, _context: Blender's.
+    """
+    titles = native.regions().titles.items()
+    items = [(name, say(title), "", 1 << place) for place, (name, title) in enumerate(titles)]
+    return cast("list[tuple[str, str, str, int]]", _known.setdefault("regions", items))  # type: ignore[arg-type]
+
+
+def remember_categories(groups: list[str]) -> None:
+    """Let the categories that there are be chosen.
+
+    Args:
+        groups: of expressions, in their order.
+    """
+    named = {"emotion": say("Emotions"), "face": say("Faces"), "viseme": say("Visemes")}
+    items = [(ALL, say("All"), say("All expressions"))]
+    items.append((STARRED, say("Favourites"), say("Those with a star")))
+    items += [(group, named.get(group, group), "") for group in groups if group]
+    if items != _known.get("categories"):
+        _known["categories"] = items
+
+
+def _categories(_self: object, _context: object) -> list[Item]:
+    if "categories" not in _known:
+        remember_categories([])
+    return _known["categories"]
+
+
+class RISORIUS_PG_expressions(bpy.types.PropertyGroup):
+    """What the user chose."""
+
+    search: bpy.props.StringProperty(
+        name="Search",
+        description="Show only the expressions with these words",
+        options={"TEXTEDIT_UPDATE", "SKIP_SAVE"},
+    )
+    category: bpy.props.EnumProperty(
+        name="Category", description="Which expressions are shown", items=_categories
+    )
+    size: bpy.props.FloatProperty(
+        name="Size", description="Of the pictures", default=5.0, min=2.0, max=12.0
+    )
+    strength: bpy.props.FloatProperty(
+        name="Strength",
+        description="How much of the expression a click sets",
+        default=1.0,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+    )
+    flip: bpy.props.BoolProperty(
+        name="Flip", description="Left for right; also a click with Ctrl held"
+    )
+    additive: bpy.props.BoolProperty(
+        name="Additive",
+        description="Add to what the face does; also a click with Shift held",
+    )
+    only: bpy.props.BoolProperty(
+        name="Rest of the Face at Rest",
+        description="Sliders that the expression does not move go to rest",
+        default=True,
+    )
+    regions: bpy.props.EnumProperty(
+        name="Regions",
+        description="Only these regions are moved; none for all",
+        items=region_items,
+        options={"ENUM_FLAG"},
+    )
+    active: bpy.props.StringProperty(name="Expression")
+    new_label: bpy.props.StringProperty(
+        name="Name", description="Of the expression that is saved; empty for a number"
+    )
+    new_group: bpy.props.StringProperty(
+        name="Category", description="Of the expression that is saved", default="own"
+    )
+    to_library: bpy.props.BoolProperty(
+        name="Shared Library",
+        description="Save it for all files as well, in the folder of the preferences",
+        default=True,
+    )
+
+
+def choices(context: Context) -> RISORIUS_PG_expressions:
+    """What the user chose.
+
+    Args:
+        context: Blender context.
+    """
+    return cast(RISORIUS_PG_expressions, context.window_manager.risorius_expressions)  # type: ignore[attr-defined]
+
+
+CLASSES = (RISORIUS_PG_expressions,)
