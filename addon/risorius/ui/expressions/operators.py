@@ -85,6 +85,12 @@ class Applies(Mixes):
     """Sets an expression at once."""
 
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:
+        """A click.
+
+        Args:
+            context: of the operator.
+            event: tells which keys are held.
+        """
         # Ctrl flips in Blender's pose library too.
         self.flip, self.additive = self.flip != event.ctrl, self.additive != event.shift
         return self.execute(context)
@@ -96,6 +102,12 @@ class Blends(Mixes):
     bl_options = {"REGISTER", "UNDO", "GRAB_CURSOR", "BLOCKING"}
 
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:
+        """Begin to drag.
+
+        Args:
+            context: of the operator.
+            event: tells where the mouse is.
+        """
         rig = face_rig(context)
         try:
             self._item = self.item(context)
@@ -110,6 +122,12 @@ class Blends(Mixes):
         return {"RUNNING_MODAL"}
 
     def modal(self, context: Context, event: bpy.types.Event) -> Result:
+        """Follow the mouse and the keys.
+
+        Args:
+            context: of the operator.
+            event: each that Blender has meanwhile.
+        """
         if event.type in {"ESC", "RIGHTMOUSE"}:
             self.cancel(context)
             return {"CANCELLED"}
