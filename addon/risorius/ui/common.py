@@ -10,7 +10,7 @@ from ..logic.base import names
 from ..logic.base.errors import FaceError
 from ..scene.base import parts
 from ..scene.base.blender_types import ArmatureObject
-from ..scene.character import runtime
+from ..scene.character import board, runtime
 from .blender_types import Context, Operator, OperatorBase, PanelBase
 from .words import of_error, say
 
@@ -96,6 +96,7 @@ class FaceOperator(OperatorBase):
     bl_options = {"REGISTER", "UNDO"}
     whole_face = True  # the face must have its controls and its DNA
     baked_too = False  # a face that plays baked actions will do
+    by_sliders = False  # it works on sliders alone: the face board must not lead
 
     @classmethod
     def poll(cls, context: Context) -> bool:
@@ -111,6 +112,11 @@ class FaceOperator(OperatorBase):
             return False
         if parts.BAKED in rig and not cls.baked_too:
             cls.poll_message_set(say("This face is baked: choose Back to Live first."))
+            return False
+        if cls.by_sliders and board.leads_face(rig):
+            cls.poll_message_set(
+                say("The board leads this face: choose Sliders in the panel Controls first.")
+            )
             return False
         return True
 

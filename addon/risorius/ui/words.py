@@ -126,6 +126,17 @@ def show(layout: UILayout, text: str, icon: Icon = "NONE") -> None:
     layout.label(text=text, icon=icon, translate=False)
 
 
+def bar(layout: UILayout, value: float) -> None:
+    """A number from 0 to 1 as a bar that cannot be moved.
+
+    Args:
+        layout: of the panel.
+        value: the number.
+    """
+    number = format(value, ".2f")
+    layout.progress(factor=value, type="BAR", text=number, translate=False)
+
+
 def follow_language() -> None:
     """Give Blender our words in the user's language; they are read when it is first chosen."""
     locale = bpy.app.translations.locale or ""

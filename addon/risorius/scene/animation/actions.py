@@ -90,15 +90,33 @@ def write(
     action[BAKED_ACTION] = True
     action.use_frame_range = True
     action.frame_start, action.frame_end = float(frames[0]), float(frames[-1])
-    bag = compat.add_curves(action, owner)
-    times = np.asarray(frames, np.float32)
     moving = [t for t in tracks if t.now is None or (t.values != _flat(t.now)).any()]
-    for track, values, keep in _reduced(frames, moving, error, counts):
+    add_tracks(compat.add_curves(action, owner), frames, moving, error, counts)
+    stamp(action)
+    return action, compat.slot_for(action, owner)
+
+
+def add_tracks(
+    bag: bpy.types.ActionChannelbag,
+    frames: NDArray[np.float64],
+    tracks: Sequence[Track],
+    error: float,
+    counts: Counts,
+) -> None:
+    """Add a curve for each value of tracks.
+
+    Args:
+        bag: what holds the F-curves of an action; none of theirs.
+        frames: float64[N].
+        tracks: Tracks.
+        error: see reduce_keys; 0 keeps a key at every frame.
+        counts: Counts, added to.
+    """
+    times = np.asarray(frames, np.float32)
+    for track, values, keep in _reduced(frames, tracks, error, counts):
         for column in range(values.shape[1]):
             curve = _new_curve(bag, track, track.first + column if track.indexed else 0)
             _fill(curve, times[keep[:, column]], values[keep[:, column], column])
-    stamp(action)
-    return action, compat.slot_for(action, owner)
 
 
 def _flat(value: npt.ArrayLike) -> NDArray[np.float32]:

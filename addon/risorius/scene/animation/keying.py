@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING
 
 import bpy
 
+from ... import native
 from ...logic.base.errors import FaceError
 from ...logic.base.sentences import told
 from ..base import compat, parts
 from ..base.blender_types import ArmatureObject, Context
-from ..character import armatures, runtime
+from ..character import armatures, board, runtime
 from . import clip_actions, curve_colours
 
 if TYPE_CHECKING:
@@ -95,17 +96,33 @@ def rules_of(context: Context, auto: bool = True, exact: bool = False) -> Rules:
 
 
 def pose_of(controls: ArmatureObject) -> Pose:
-    """What the controls show now: the original values, as a hand moves them."""
+    """What the controls show now: the original values, as a hand moves them.
+
+    Of the sliders and the handles of a face board those that lead.
+    """
     rig = parts.rig_of(controls)
     assert rig is not None
     face = controls.pose.bones[parts.FACE]
-    sliders = {n: float(face[n]) for n in runtime.there(rig).labels if n in face}
+    live = runtime.there(rig)
+    reached, handles = _led(controls, live)
+    sliders = {n: float(face[n]) for n in live.labels if n in face and n not in reached}
+    idle = set() if reached else handles
     bones = {
         path: tuple(controls.path_resolve(path))
         for bone in controls.pose.bones
+        if bone.name not in idle and bone.name not in runtime.BOARD_BONES
         for path in _paths_of(bone)
     }
     return Pose(sliders, bones)
+
+
+def _led(controls: ArmatureObject, live: runtime.Runtime) -> tuple[set[str], set[str]]:
+    """The sliders that the face board leads, none where it does not; and its handles' bones."""
+    handles = {handle.bone for handle in live.handles}
+    if not board.leads(controls, live):
+        return set(), handles
+    led = zip(live.labels, live.table.reached, strict=True)
+    return {label for label, reached in led if reached}, handles
 
 
 def _paths_of(bone: bpy.types.PoseBone) -> list[str]:
@@ -156,8 +173,15 @@ def by_hand(
         return 0
     labels, paths = _moved(before, pose_of(controls))
     keyed = curves_by_path(controls)
-    held = [n for n in touched if n not in labels and parts.property_path(n) in keyed]
-    return changed(context, rig, [*labels, *held], paths)
+    held = [
+        n
+        for n in touched
+        if n in before.sliders and n not in labels and parts.property_path(n) in keyed
+    ]
+    led = [n for n in touched if n not in before.sliders]
+    places = [board.path_of(h.bone) for h in board.handles_of_labels(rig, led)] if led else []
+    held_paths = [path for path in places if path in keyed and path not in paths]
+    return changed(context, rig, [*labels, *held], [*paths, *held_paths])
 
 
 def changed(
@@ -307,14 +331,15 @@ def insert(
         How many properties were keyed.
     """
     keyed, driven = curves_by_path(controls), _driven(controls)
-    wanted = [(parts.property_path(n), armatures.key_group(n)) for n in labels]
-    wanted += [(path, path.split('"')[1]) for path in bones]
     count = 0
-    for path, group in wanted:
+    for path, group, axes in _wanted(controls, labels, bones):
         curves = keyed.get(path, [])
         if path in driven or not _may(controls, path, curves, frame, rules):
             continue
-        controls.keyframe_insert(path, frame=frame, group=group, keytype=rules.kind)
+        for index in axes:
+            controls.keyframe_insert(
+                path, index=index, frame=frame, group=group, keytype=rules.kind
+            )
         count += 1
         data = controls.animation_data
         assert data is not None
@@ -325,6 +350,34 @@ def insert(
         for curve in curves:
             _finish(curve, rules)
     return count
+
+
+def _wanted(
+    controls: ArmatureObject, labels: Iterable[str], bones: Iterable[str]
+) -> list[tuple[str, str, list[int]]]:
+    """Data paths with their groups and the indices that are keyed, -1 for all.
+
+    Of sliders that a face board leads its handles are keyed, each in the ways that it goes.
+    """
+    rig = parts.rig_of(controls)
+    assert rig is not None
+    live = runtime.there(rig)
+    reached, _handles = _led(controls, live)
+    asked = list(labels)
+    led = board.handles_of_labels(rig, [n for n in asked if n in reached]) if reached else []
+    paths = dict.fromkeys([*bones, *(board.path_of(handle.bone) for handle in led)])
+    found = [(parts.property_path(n), armatures.key_group(n), [-1]) for n in asked]
+    wanted = [row for row, name in zip(found, asked, strict=True) if name not in reached]
+    by_path = {board.path_of(handle.bone): handle for handle in live.handles}
+    titles = native.regions().titles
+    for path in paths:
+        handle = by_path.get(path)
+        if handle is None:
+            wanted.append((path, path.split('"')[1], [-1]))
+            continue
+        axes = [axis for axis, way in enumerate((handle.x, handle.y)) if way is not None]
+        wanted.append((path, titles[handle.region], axes))
+    return wanted
 
 
 def _driven(controls: ArmatureObject) -> set[str]:

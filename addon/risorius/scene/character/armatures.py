@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any, cast
 
@@ -161,15 +161,53 @@ def pull_controls(rig: ArmatureObject, controls: ArmatureObject) -> None:
         assert curve.driver is not None
         curve.driver.type = "SUM"
         for bone in controls.pose.bones:
-            variable = curve.driver.variables.new()
-            variable.type = "TRANSFORMS"
-            target = variable.targets[0]
-            target.id, target.bone_target = controls, bone.name
-            target.transform_type, target.transform_space = "SCALE_X", "LOCAL_SPACE"
+            _pull(curve.driver, controls, bone.name)
     assert curve.driver is not None
     for variable in curve.driver.variables:
         if variable.targets[0].id != controls:
             variable.targets[0].id = controls
+
+
+def _pull(driver: bpy.types.Driver, controls: ArmatureObject, bone: str) -> None:
+    variable = driver.variables.new()
+    variable.type = "TRANSFORMS"
+    target = variable.targets[0]
+    target.id, target.bone_target = controls, bone
+    target.transform_type, target.transform_space = "SCALE_X", "LOCAL_SPACE"
+
+
+def _pulling(rig: ArmatureObject) -> bpy.types.Driver | None:
+    data = rig.animation_data
+    curve = data.drivers.find(f'["{parts.PULL}"]') if data else None
+    return curve.driver if curve is not None else None
+
+
+def pull_more(rig: ArmatureObject, controls: ArmatureObject) -> None:
+    """Let Blender evaluate bones of the controls that are new, too, see `pull_controls`.
+
+    Args:
+        rig: the deforming armature.
+        controls: the control armature; its evaluated copy has its bones already.
+    """
+    driver = _pulling(rig)
+    if driver is not None:
+        pulled = {variable.targets[0].bone_target for variable in driver.variables}
+        for bone in controls.pose.bones:
+            if bone.name not in pulled:
+                _pull(driver, controls, bone.name)
+
+
+def pull_less(rig: ArmatureObject, bones: Collection[str]) -> None:
+    """Let go of bones of the controls that are to be removed.
+
+    Args:
+        rig: the deforming armature.
+        bones: their names.
+    """
+    driver = _pulling(rig)
+    for variable in list(driver.variables) if driver is not None else ():
+        if driver is not None and variable.targets[0].bone_target in bones:
+            driver.variables.remove(variable)
 
 
 def lock_place(item: bpy.types.Object) -> None:

@@ -87,6 +87,34 @@ def make(made: list[bpy.types.ID], character: str, bone: str) -> bpy.types.Objec
     return item
 
 
+def drawn(name: str, lines: Sequence[Line]) -> bpy.types.Object:
+    """Open lines as a wire mesh, in no collection.
+
+    Args:
+        name: of the new datablocks.
+        lines: each as corners in the xy plane.
+    """
+    corners: list[tuple[float, float, float]] = []
+    edges = []
+    for line in lines:
+        first = len(corners)
+        corners += [(x, y, 0.0) for x, y in line]
+        edges += [(first + i, first + i + 1) for i in range(len(line) - 1)]
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(corners, edges, [])
+    return bpy.data.objects.new(name, mesh)
+
+
+def disc(name: str) -> bpy.types.Object:
+    """A filled disc of radius 1, which is easily hit by the mouse. Args: name  of it."""
+    mesh = bpy.data.meshes.new(name)
+    ring = [(x, y, 0.0) for x, y in _ring()]
+    # Two faces: Blender draws none from behind, where some handles are seen from.
+    back = range(2 * _COUNT - 1, _COUNT - 1, -1)
+    mesh.from_pydata([*ring, *ring], [], [range(_COUNT), back])
+    return bpy.data.objects.new(name, mesh)
+
+
 def place(bone: bpy.types.PoseBone, name: str) -> None:
     """Turn and size the outline so that it surrounds what the bone turns, and colour it.
 
@@ -107,11 +135,21 @@ def place(bone: bpy.types.PoseBone, name: str) -> None:
         bone.custom_shape_rotation_euler = (math.pi / 2, 0.0, 0.0)
         if name != "eyes":
             bone.custom_shape_translation = (0.0, bone.length * 1.5, 0.0)
+    colour(bone, _COLOURS[name])
+
+
+def colour(bone: bpy.types.PoseBone, normal: tuple[float, float, float]) -> None:
+    """Colour a bone: brighter where it is selected.
+
+    Args:
+        bone: any pose bone.
+        normal: red, green, blue where it is not.
+    """
     look = bone.color
     assert look is not None
     look.palette = "CUSTOM"
     colours = look.custom
     assert colours is not None
-    colours.normal = _COLOURS[name]
-    colours.select = [0.5 + 0.5 * part for part in _COLOURS[name]]
-    colours.active = [0.75 + 0.25 * part for part in _COLOURS[name]]
+    colours.normal = normal
+    colours.select = [0.5 + 0.5 * part for part in normal]
+    colours.active = [0.75 + 0.25 * part for part in normal]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +17,13 @@ from ... import native
 from ...logic.base import names
 from ...logic.base.sentences import told
 from ...logic.base.space import Space, SpaceError, world_matrices, yaw_pitch
-from ...logic.character import plans
+from ...logic.character import board_layout, board_table, plans
 from ..base import console, parts, storage, written
 from ..base.blender_types import ArmatureObject
 
+# The bones of the control armature beside those of a face board.
+CONTROL_BONES = (parts.FACE, "neck", "head", "eyes", "eye_L", "eye_R")
+BOARD_BONES = ("board", "board_frames")  # by which a board is taken, and what is drawn on it
 DEFAULT_EYE_ANGLE = float(np.radians(30.0))
 
 
@@ -76,6 +80,23 @@ class Runtime:
         if lod not in self.surfaces:
             self.surfaces[lod] = native.module().Surface(self.dna, self.rig, lod=lod)
         return self.surfaces[lod]
+
+    @cached_property
+    def table(self) -> board_table.BoardTable:
+        """The GUI controls: the file's, else made of its raw controls."""
+        if not self.dna.gui_control_names:
+            return board_table.of_raw_controls(self.labels, self.lowest)
+        rows = self.dna.gui_to_raw
+        lines = (rows.from_values, rows.to_values, rows.slope_values, rows.cut_values)
+        columns = np.stack([rows.input_indices, rows.output_indices, *lines])
+        return board_table.of_file(self.dna.gui_control_names, columns, len(self.labels))
+
+    @cached_property
+    def handles(self) -> list[board_layout.Handle]:
+        """The sliders of the face board, which lie nowhere yet."""
+        ways = [board_layout.UP] * len(self.table.names)
+        region_of = native.regions().of_slider
+        return board_layout.handles_of(self.table, ways, region_of, (*CONTROL_BONES, *BOARD_BONES))
 
     def bone_space(self, joints: Sequence[int]) -> native.BoneSpace:
         """The native conversion of poses for bones that stand for these joints."""

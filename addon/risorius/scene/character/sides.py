@@ -13,7 +13,7 @@ from ... import native
 from ...logic.character import slider_rows
 from ..base import compat, parts
 from ..base.blender_types import ArmatureObject
-from . import runtime
+from . import board, runtime
 
 _FLIP = Matrix.Diagonal((-1.0, 1.0, 1.0, 1.0))
 _TWIN = "twin"  # name of the variable of the drivers that let one side follow the other
@@ -21,24 +21,21 @@ _OTHER_BONE = {"eye_L": "eye_R", "eye_R": "eye_L"}
 
 
 def values_of(rig: ArmatureObject, region: str = "") -> dict[str, float]:
-    """The sliders of a face, or of one region, with their values.
+    """The sliders of a face, or of one region, with their values; the board's where it leads.
 
     Args:
         rig: the character.
         region: its name; empty for all.
     """
-    face = parts.face_bone(rig)
-    assert face is not None
     of_slider = native.regions().of_slider
-    return {
-        label: float(face[label])
-        for label in runtime.there(rig).labels
-        if label in face and (not region or of_slider(label) == region)
-    }
+    values = board.raw_now(rig)
+    return {n: v for n, v in values.items() if not region or of_slider(n) == region}
 
 
 def put(rig: ArmatureObject, values: Mapping[str, float]) -> int:
     """Set sliders, within their limits; those that follow others and those that are not there stay.
+
+    Where the face board leads, it is brought as near as it comes.
 
     Args:
         rig: the character.
@@ -50,6 +47,10 @@ def put(rig: ArmatureObject, values: Mapping[str, float]) -> int:
     face, controls, live = parts.face_bone(rig), parts.controls_there(rig), runtime.there(rig)
     assert face is not None
     maximum, led = parts.maximum_of(controls), followers(controls)
+    if board.leads(controls, live):
+        asked = {n: v for n, v in values.items() if n in face}
+        board.put_raw(rig, asked)
+        return len(asked)
     count = 0
     for label, lowest in zip(live.labels, live.lowest, strict=True):
         if label in values and label in face and label not in led:
@@ -88,7 +89,10 @@ def mirror_bones(controls: ArmatureObject) -> None:
     """Turn the bones of a control armature as in a mirror; each eye takes the other's turn."""
     bones = controls.pose.bones
     turned = {}
-    for bone in bones:
+    for name in runtime.CONTROL_BONES:
+        bone = bones.get(name)
+        if bone is None:
+            continue
         rest = bone.bone.matrix_local
         turned[_OTHER_BONE.get(bone.name, bone.name)] = (
             _FLIP @ rest @ bone.matrix_basis @ rest.inverted() @ _FLIP

@@ -8,7 +8,7 @@ stays, and so does everything that is not the file's.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, cast
 
@@ -20,7 +20,7 @@ from ...logic.base.sentences import told
 from ...logic.character import plans
 from ..base import console, drivers, parts, written
 from ..base.blender_types import ArmatureObject, Context, MeshObject
-from ..character import armatures, build, lods, runtime
+from ..character import armatures, board, board_bones, build, lods, runtime
 from ..life import duplicates
 from . import refit_joints, refit_meshes
 from .file_change import Change
@@ -64,8 +64,10 @@ def replace_file(
         now = tuple(lods.built(fresh))
         new = plans.plan_character(after.dna, rig.name, now, unit, after.rests)
         change = Change(rig, before, after, old, new, report=list(warnings))
+        led, places = board.leads_face(rig), board.places_of(parts.controls_there(rig), before)
         _exchange(context, change, fresh)
         progress(0.95)
+        _renew_board(context, change, led, places)
     context.view_layer.update()
     _keep_report(change)
     return change.report
@@ -266,6 +268,37 @@ def _sliders(change: Change) -> None:
         else:
             del face[label]
             change.report.append(told("The control {label} is gone.", label=label))
+
+
+def _renew_board(
+    context: Context,
+    change: Change,
+    led: bool,
+    places: Mapping[str, tuple[float, ...]],
+) -> None:
+    """A face board of the new file's GUI controls; sliders of the same names stay where they are.
+
+    Args:
+        context: with a view layer.
+        change: what was replaced by what.
+        led: whether the board led before.
+        places: bone -> place of each handle before.
+    """
+    if not places or board.is_same(change.before, change.after):
+        return
+    controls = parts.controls_there(change.rig)
+    board_bones.remove(context, change.rig)
+    if board_bones.add(context, change.rig):
+        board.put_places(controls, change.after, places)
+        board.set_lead(controls, led)
+    old = {handle.bone for handle in change.before.handles}
+    new = {handle.bone for handle in change.after.handles}
+    if new - old:
+        listed = names.listed(sorted(new - old))
+        change.report.append(told("New on the face board: {names}.", names=listed))
+    if old - new:
+        listed = names.listed(sorted(old - new))
+        change.report.append(told("Gone from the face board: {names}.", names=listed))
 
 
 def _keep_report(change: Change) -> None:

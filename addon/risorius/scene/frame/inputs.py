@@ -14,7 +14,7 @@ from ...logic.base.space import yaw_pitch
 from ..animation import layer_mixing
 from ..base import parts
 from ..base.blender_types import ArmatureObject, Depsgraph
-from ..character import rig_placement, runtime
+from ..character import board, rig_placement, runtime
 from . import gaze
 
 Turns = dict[str, Quaternion]  # "neck", "head": in the armature's axes
@@ -61,7 +61,7 @@ def read_mixed(
         Quaternion in the armature's axes or None, without the body's.
     """
     bones = seen.pose.bones
-    raw = read_sliders(seen, live)
+    raw = read_leading(seen, live)
     own = {name: _turn(seen, bones.get(name)) for name in ("neck", "head")}
     raw, own["head"] = layer_mixing.mix(seen, live, raw, own["head"], depsgraph, maximum)
     return raw, own
@@ -97,6 +97,22 @@ def complete(
             turns[name] = turns[name] @ turn if name in turns else turn
     _add_look(seen, live, raw, maximum, turns)
     return raw, turns
+
+
+def read_leading(seen: ArmatureObject, live: runtime.Runtime) -> NDArray[np.float32]:
+    """Read what leads the face: the sliders, or the face board.
+
+    Args:
+        seen: the evaluated control armature.
+        live: the character's Runtime.
+
+    Returns:
+        float32[R].
+    """
+    if not board.leads(seen.original, live):
+        return read_sliders(seen, live)
+    others = None if live.table.reached.all() else read_sliders(seen, live)
+    return board.raw_of(board.read(seen, live), live, others)
 
 
 def read_sliders(seen: ArmatureObject, live: runtime.Runtime) -> NDArray[np.float32]:

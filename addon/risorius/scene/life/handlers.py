@@ -14,7 +14,7 @@ from ... import native
 from ..animation import layer_mixing, layers
 from ..base import console, parts, sharing, written
 from ..base.blender_types import ArmatureObject, Depsgraph, current_context
-from ..character import lods, rig_placement, runtime
+from ..character import board, lods, rig_placement, runtime
 from ..frame import (
     caches,
     channel_preview,
@@ -83,6 +83,7 @@ def _updated(scene: bpy.types.Scene, depsgraph: Depsgraph) -> None:
     """React to edits of control armatures; writes here tag the rig only, so it ends at once."""
     controls_ahead.note_evaluated(scene)
     controls_ahead.note_edit()
+    board.note_edit()
     # While a render runs beside the interface, only its own frames are written.
     if _state["busy"] or bpy.app.is_job_running("RENDER") or native.problem():
         return
@@ -206,6 +207,7 @@ def _restored(*_arguments: object) -> None:
     bone_edits.forget()
     causes.forget()
     heat.follow_undo()
+    board.forget()
     _state["objects"] = frozenset()
     if native.problem():
         return

@@ -56,7 +56,7 @@ def _bone_names(controls: ArmatureObject) -> list[str]:
         return []
     done = []
     for bone in bones:
-        wanted = bone.get(parts.PART)
+        wanted = bone.get(parts.PART) or bone.get(parts.BOARD)
         if wanted and wanted != bone.name and wanted not in bones:
             done.append(f"The bone {bone.name} of {controls.name} was named {wanted} again.")
             bone.name = wanted

@@ -14,7 +14,7 @@ import bpy
 from ... import native
 from ...logic.animation.clip_units import ClipError
 from ...logic.base import names
-from ..animation import actions, clip_actions, layers
+from ..animation import actions, board_keys, clip_actions, layers
 from ..base import parts
 from ..base.blender_types import ArmatureObject
 
@@ -81,6 +81,7 @@ def finish(
     )
     if take.full:
         report.notes.append(f"The take is full: {take.full} faces were left out.")
+    report.notes += board_keys.onto_leader(rig, report.action)
     layers.keep_weights(controls, clip_actions.play(rig, report.action))
     scene.frame_end = max(scene.frame_end, round(report.last))
     _waiting.remove(recording)

@@ -10,7 +10,7 @@ import bpy
 from ... import native
 from ...logic.animation.clip_units import ClipError
 from ...logic.base.names import printable
-from ...scene.animation import actions, clip_actions, layers
+from ...scene.animation import actions, board_keys, clip_actions, layers
 from ...scene.frame import evaluate
 from ..blender_types import Context, UILayout
 from ..common import FaceOperator, face_controls, face_rig
@@ -84,6 +84,8 @@ class PlacesClip(FaceOperator):
         )
         made = clip_actions.make_action(rig, clip, timing, name, with_eyes)
         notes = [*notes, *made.notes]
+        if self.target != "LAYER":
+            notes += [say(note) for note in board_keys.onto_leader(rig, made.action)]
         if self.target == "ACTION":
             before = clip_actions.play(rig, made.action)
             layers.keep_weights(face_controls(context), before)

@@ -11,9 +11,10 @@ from ...language import tables
 from ...logic.base.control_words import PREFIX
 from ...logic.character import slider_rows, slider_words
 from ...scene.base import parts
-from ...scene.character import runtime, sides
+from ...scene.character import board, runtime, sides
 from .. import words
 from ..blender_types import Context, Icon, Panel, UILayout
+from ..board.panel import draw_lead
 from ..common import FaceOnlyPanel, as_seen, face_controls, face_rig
 
 _ICONS: dict[str, Icon] = {
@@ -46,6 +47,10 @@ class RISORIUS_PT_controls(FaceOnlyPanel, Panel):
         manager = context.window_manager
         search, only_used = manager.risorius_search, manager.risorius_only_used
         followers = sides.followers(controls)
+        led = draw_lead(layout, controls, live)
+        if led:
+            words.write(layout, "The board leads: the sliders show what it gives.", "INFO")
+        given = board.given(rig) if led else {}
         _draw_tools(layout, context, bool(followers))
         shown = [name for name in live.labels if name in face and _is_found(name, search)]
         if only_used:
@@ -54,12 +59,12 @@ class RISORIUS_PT_controls(FaceOnlyPanel, Panel):
         for region, names in _regions(tuple(shown)):
             if search or only_used:
                 _draw_region_header(layout.row(), region)
-                _draw_sliders(context, layout, face, region, names, followers)
+                _draw_sliders(context, layout, face, region, names, followers, given)
                 continue
             header, body = layout.panel(f"RISORIUS_PT_region_{region}", default_closed=True)
             _draw_region_header(header, region)
             if body is not None:
-                _draw_sliders(context, body, face, region, names, followers)
+                _draw_sliders(context, body, face, region, names, followers, given)
         if not shown:
             nothing = "No control has these words." if search else "All controls are at rest."
             words.write(layout, nothing, "INFO")
@@ -118,15 +123,16 @@ def _draw_sliders(
     face: bpy.types.PoseBone,
     region: str,
     names: Sequence[str],
-    followers: Mapping[str, str] | None = None,
+    followers: Mapping[str, str],
+    given: Mapping[str, float],
 ) -> None:
     """One line per control; both its sides share it, a long name stands above.
 
-    Of two sides that are linked the one that leads is shown.
+    Of two sides that are linked the one that leads is shown. What the board gives is shown as it
+    is: a slider that does nothing is none.
     """
     column = layout.column(align=True)
     ruler = words.Ruler(context, _TITLE)
-    followers = followers or {}
     lines = _rows(tuple(names), region, as_seen(context))
     if any(line.is_pair for line in lines):
         _draw_sides(column, bool(followers))
@@ -139,7 +145,9 @@ def _draw_sliders(
             row = column
         row = row.row(align=True)
         for name in line.sliders:
-            if followers.get(name) not in names:
+            if name in given:
+                words.bar(row, given[name])
+            elif followers.get(name) not in names:
                 quoted = bpy.utils.escape_identifier(name)
                 row.prop(face, f'["{quoted}"]', text="", slider=True)
 

@@ -10,7 +10,7 @@ import bpy
 from ... import native
 from ...scene.animation import keying
 from ...scene.base import parts
-from ...scene.character import build, runtime
+from ...scene.character import board, build, runtime
 from ...scene.frame import evaluate
 from ...scene.life import duplicates, library_overrides
 from ..blender_types import Context, Operator, Result
@@ -40,15 +40,19 @@ class RISORIUS_OT_reset(HandOperator, Operator):
 
     def move(self, context: Context) -> Collection[str]:
         controls = face_controls(context)
-        face = controls.pose.bones[parts.FACE]
-        live = runtime.there(face_rig(context))
-        rests = dict(zip(live.labels, live.rests, strict=True))
+        face, rig = controls.pose.bones[parts.FACE], face_rig(context)
+        live = runtime.there(rig)
+        led = board.leads(controls, live)
         labels = _labels(context, self.region)
-        for label in labels:
-            face[label] = rests[label]
+        for i, label in enumerate(live.labels):
+            if label in labels and not (led and live.table.reached[i]):
+                face[label] = live.rests[i]
+        if led:
+            board.reset(controls, board.handles_in(rig, self.region))
         if not self.region:
             for bone in controls.pose.bones:
-                bone.matrix_basis.identity()
+                if parts.BOARD not in bone.bone:
+                    bone.matrix_basis.identity()
         controls.update_tag()
         return labels
 

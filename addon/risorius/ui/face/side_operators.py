@@ -70,6 +70,7 @@ class RISORIUS_OT_link_sides(FaceOperator, Operator):
 
     bl_idname = "risorius.link_sides"
     bl_label = "Link Left and Right"
+    by_sliders = True
 
     enable: bpy.props.BoolProperty(name="Link", default=True, options={"SKIP_SAVE"})
     from_left: _from_left()

@@ -12,6 +12,7 @@ from ...logic.base import names
 from ...logic.base.errors import FaceError
 from ...scene.animation import clip_actions
 from ...scene.base.blender_types import ArmatureObject
+from ...scene.character import board
 from ...scene.live import capture, recordings, sessions
 from ..blender_types import Context, Operator, OperatorBase, Result
 from ..common import active_controls, face_rig, usable
@@ -50,7 +51,14 @@ class RISORIUS_OT_live_start(Operator):
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        return usable(cls) and _has_controls(cls, context)
+        if not usable(cls) or not _has_controls(cls, context):
+            return False
+        if board.leads_face(face_rig(context)):
+            cls.poll_message_set(
+                say("The board leads this face: choose Sliders in the panel Controls first.")
+            )
+            return False
+        return True
 
     def execute(self, context: Context) -> Result:
         try:

@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""GUI controls that give wanted raw controls, as near as the board comes to them.
+
+The way back is not unique: a least-squares fit within the controls' ranges. Each control in turn
+goes to its best value while the others stay; between the breaks of its lines that is a formula, so
+each step is exact and none makes it worse.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .board_table import BoardTable, Doubles
+
+_SWEEPS = 12
+_ENOUGH = 1e-7  # a sweep that moves nothing further ends it
+_REST = 1e-10  # of two values that are as good, the one nearer to rest
+
+
+@dataclass(frozen=True)
+class Loss:
+    """What a conversion loses: the raw controls that differ most.
+
+    Attributes:
+        largest: the largest difference of a raw control at any frame.
+        worst: names with their largest difference, the worst first, none below what is seen.
+    """
+
+    largest: float = 0.0
+    worst: tuple[tuple[str, float], ...] = ()
+
+
+def fit(table: BoardTable, raw: ArrayLike, start: ArrayLike) -> Doubles:
+    """Bounded least squares over the GUI controls.
+
+    Args:
+        table: of the face.
+        raw: float[N, R], the raw controls that are wanted.
+        start: float[N, G], where the search begins.
+
+    Returns:
+        float64[N, G] within the ranges.
+    """
+    wanted = np.asarray(raw, np.float64)
+    gui = np.clip(np.asarray(start, np.float64), table.lowest, table.highest)
+    totals = table.sums(gui)
+    movable = [g for g in range(len(table.names)) if table.outputs_of(g)]
+    for _sweep in range(_SWEEPS):
+        moved = 0.0
+        for index in movable:
+            outputs = table.outputs_of(index)
+            own = table.part(index, gui[:, index])
+            others = totals[:, outputs] - own
+            best = _best(table, index, wanted[:, outputs], others)
+            moved = max(moved, float(np.abs(best - gui[:, index]).max(initial=0.0)))
+            gui[:, index] = best
+            totals[:, outputs] = others + table.part(index, best)
+        if moved < _ENOUGH:
+            break
+    return gui
+
+
+def _best(table: BoardTable, index: int, wanted: Doubles, others: Doubles) -> Doubles:
+    """float64[N]: the best value of one control while the others give what they give."""
+    breaks = table.breaks_of(index)
+    tried = [np.full(len(wanted), end) for end in breaks]
+    for low, high in pairwise(breaks):
+        inner = low + (high - low) * np.array([0.25, 0.75])
+        at = table.part(index, inner)
+        slope = (at[1] - at[0]) / (inner[1] - inner[0])
+        weight = float(slope @ slope)
+        if weight > 0.0:
+            cut = at[0] - slope * inner[0]
+            tried.append(np.clip((wanted - others - cut) @ slope / weight, low, high))
+    costs = np.stack(
+        [
+            ((np.clip(others + table.part(index, v), 0.0, 1.0) - wanted) ** 2).sum(axis=1)
+            + _REST * np.abs(v)
+            for v in tried
+        ]
+    )
+    return np.stack(tried)[costs.argmin(axis=0), np.arange(len(wanted))]
+
+
+def loss(
+    labels: list[str], wanted: ArrayLike, given: ArrayLike, which: NDArray[np.bool_], seen: float
+) -> Loss:
+    """What a conversion loses.
+
+    Args:
+        labels: names of the raw controls.
+        wanted, given: float[N, R] before and after.
+        which: bool[R], the controls that were converted.
+        seen: differences below it are not named.
+    """
+    off = np.abs(np.asarray(wanted, np.float64) - np.asarray(given, np.float64))
+    most = np.where(which, off.max(axis=0, initial=0.0), 0.0)
+    order = np.argsort(-most, kind="stable")
+    worst = tuple((labels[i], float(most[i])) for i in order if most[i] > seen)
+    return Loss(float(most.max(initial=0.0)), worst)

@@ -1,0 +1,550 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where each slider of the face board lies, and what is drawn around it.
+
+Lengths are in units of the board: a handle that goes by 1 changes its GUI control by 1. The board
+is seen from the front, x to the viewer's right, y up; the character's left lies on the right. What
+has a name that animators know lies where the face has it; all else lies in rows by region.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ..base import names
+from . import board_letters, slider_words
+from .board_letters import Point
+from .board_table import BoardTable, Doubles
+
+Line = list[Point]
+RIGHT, LEFT, UP, DOWN = (1, 0), (-1, 0), (0, 1), (0, -1)
+Direction = tuple[int, int]
+
+_TEXT, _TITLE = 0.29, 0.46  # heights of letters
+_TRACK = 0.34  # width of a slider's frame
+_GAP = 0.3  # between sliders
+_MARGIN = 0.6  # around all
+_LONGEST = 10  # letters of a label in one line
+_WIDEST, _LINES = 14, 4  # letters of a word, and lines, that are shown of a long name
+_NARROWEST = 31.0  # of the board
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One way in which a handle goes.
+
+    Attributes:
+        gui: index of the GUI control.
+        low, high: how far the handle goes, in the board's units; 0 is rest.
+        unit: value of the GUI control for one unit: 1, but for controls of another size.
+        way: where the handle goes on the board when the value grows.
+    """
+
+    gui: int
+    low: float
+    high: float
+    unit: float
+    way: Direction
+
+
+@dataclass(frozen=True)
+class Handle:
+    """A slider of the board.
+
+    Attributes:
+        bone: name of its bone.
+        side: "L" or "R", the character's own, or "" for the middle.
+        region: of the face.
+        stem: its name without prefix and side: eye_blink.
+        x, y: the ways of its bone's own axes; None where it does not go.
+        place: where it rests.
+    """
+
+    bone: str
+    side: str
+    region: str
+    stem: str
+    x: Axis | None
+    y: Axis | None
+    place: Point = (0.0, 0.0)
+
+    @property
+    def axes(self) -> tuple[Axis, ...]:
+        return tuple(axis for axis in (self.x, self.y) if axis is not None)
+
+    def box(self) -> tuple[float, float, float, float]:
+        """Left, bottom, right, top of what the handle can reach, from where it rests."""
+        left = bottom = right = top = 0.0
+        for axis in self.axes:
+            for end in (axis.low, axis.high):
+                x, y = end * axis.way[0], end * axis.way[1]
+                left, right = min(left, x), max(right, x)
+                bottom, top = min(bottom, y), max(top, y)
+        return left, bottom, right, top
+
+
+@dataclass(frozen=True)
+class Board:
+    """All of a face board.
+
+    Attributes:
+        handles: its sliders.
+        lines: what is drawn around them: frames and labels.
+        border: the outline of the board and its title, by which it is taken.
+        width, height: of its outline; its middle is at 0, 0.
+    """
+
+    handles: tuple[Handle, ...]
+    lines: tuple[Line, ...]
+    border: tuple[Line, ...]
+    width: float
+    height: float
+
+
+# Columns from the outer side of the face inwards, each from the top down; then those of the middle.
+_Columns = tuple[tuple[str, ...], ...]
+_FACE: tuple[tuple[str, _Columns, _Columns], ...] = (
+    (
+        "Brows",
+        (("brow_raiseout",), ("brow_down",), ("brow_lateral",), ("brow_raisein",)),
+        (),
+    ),
+    (
+        "Eyes",
+        (
+            ("eye_lidpress", "eye_facescrunch"),
+            ("eyelashes_tweakerout",),
+            ("eyelashes_tweakerin",),
+            ("eye_squintinner", "eye_cheekraise"),
+            ("eye_pupil",),
+            ("eye_eyelidd",),
+            ("eye_eyelidu",),
+            ("eye_blink",),
+            ("eye",),
+        ),
+        (("eye_parallellook",),),
+    ),
+    (
+        "Nose and Cheeks",
+        (
+            ("ear_up",),
+            ("mouth_lipsblow",),
+            ("mouth_suckblow",),
+            ("nose_nasolabialdeepen", "nose_wrinkleupper"),
+            ("nose",),
+        ),
+        (),
+    ),
+    (
+        "Mouth",
+        (
+            ("mouth_lipsticky",),
+            ("mouth_stretchlipsclose", "mouth_stretch"),
+            ("mouth_dimple", "mouth_cornerdepress"),
+            ("mouth_sharpcornerpull", "mouth_cornerpull"),
+            ("mouth_corner",),
+            ("mouth_upperlipraise", "mouth_lowerlipdepress"),
+        ),
+        (("mouth",),),
+    ),
+    (
+        "Jaw and Neck",
+        (
+            ("neck_mastoidcontract",),
+            ("neck_stretch",),
+            ("jaw_clench",),
+            ("jaw_chincompress",),
+            ("jaw_chinraiseu", "jaw_chinraised"),
+        ),
+        (
+            ("neck_throatupdown",),
+            ("neck_digastricupdown",),
+            ("jaw_openextreme",),
+            ("jaw",),
+            ("jaw_fwdback",),
+            ("neck_throatexhaleinhale",),
+            ("neck_swallow",),
+        ),
+    ),
+)
+# Labels of names that are long, or say nothing without their region.
+_LABELS = {
+    "eyelashes_tweakerin": "Lashes In", "eyelashes_tweakerout": "Lashes Out", "eye": "Look",
+    "eye_eyelidu": "Upper Lid", "eye_eyelidd": "Lower Lid", "ear_up": "Ear Up",
+    "mouth_stretchlipsclose": "Stretch Close", "mouth_sharpcornerpull": "Sharp Pull",
+    "mouth_upperlipraise": "Upper Raise", "mouth_lowerlipdepress": "Lower Depress",
+    "nose_nasolabialdeepen": "Nasolabial", "neck_throatupdown": "Throat",
+    "neck_digastricupdown": "Digastric", "neck_throatexhaleinhale": "Exhale Inhale",
+    "mouth_lipstowardsteeth": "Towards Teeth", "mouth_thicknessinwardu": "Inward Upper",
+    "mouth_thicknessinwardd": "Inward Lower", "mouth_cornersharpnessu": "Sharp Upper",
+    "mouth_cornersharpnessd": "Sharp Lower", "jaw_chinraiseu": "Chin Upper",
+    "jaw_chinraised": "Chin Lower", "mouth_lipspressu": "Lips Press",
+    "teeth_fwdbacku": "Upper Fwd", "teeth_fwdbackd": "Lower Fwd",
+}  # fmt: skip
+_PREFIX = re.compile(r"^CTRL_(?:([LRC])_)?")
+_LAST_SIDE = re.compile(r"[LR](?=$|Ph\d$)")
+_BESIDE = re.compile(r"(Left|Right)(?=[A-Z_]|$)")
+_DOWNWARDS = re.compile(r"(Down|Depress|Open|Blink)(?=[A-Z_]|$)")
+_CLEAR = 0.05  # a movement to one side that is less tells nothing
+_LIP = re.compile(r"[UD]$")
+
+
+@dataclass
+class _Cell:
+    """Sliders with one label below them. Of each slider: where its frame's corner lies."""
+
+    width: float
+    height: float
+    label: list[str]
+    inside: list[tuple[Handle, float, float]] = field(default_factory=list)
+
+
+@dataclass
+class _Block:
+    """What has one title: cells at places from its upper left corner."""
+
+    title: str
+    width: float = 0.0
+    height: float = 0.0
+    cells: list[tuple[_Cell, float, float]] = field(default_factory=list)
+
+
+def is_beside(table: BoardTable, raw_names: Sequence[str], gui: int) -> bool:
+    """Whether a handle goes left and right when a GUI control changes.
+
+    Args:
+        table: the GUI controls.
+        raw_names: of all raw controls.
+        gui: index of the control.
+    """
+    if table.names[gui].endswith(".tx"):
+        return True
+    led = [slider_words.short_name(raw_names[raw]) for raw in table.outputs_of(gui)]
+    return bool(led) and all(_BESIDE.search(name) for name in led)
+
+
+def is_middle(table: BoardTable, gui: int) -> bool:
+    """Whether a GUI control is of no side. Args: table  the controls; gui  index of one."""
+    return not _side_of(_bone_of(table.names[gui])[0])
+
+
+def ways_of(
+    table: BoardTable, raw_names: Sequence[str], sideways: Mapping[int, float]
+) -> list[Direction]:
+    """Where the handle of each GUI control goes when its value grows: as the face goes.
+
+    Args:
+        table: the GUI controls.
+        raw_names: of all raw controls; words in them tell most ways.
+        sideways: of some controls how far the face goes to its own left, -1 to 1, as measured.
+
+    Returns:
+        Of each RIGHT, LEFT, UP or DOWN, as the viewer sees them.
+    """
+    raised: dict[int, str] = {}
+    for row in table.rows:
+        if row.slope > 0.0 and row.high > 0.0:
+            raised.setdefault(row.gui, slider_words.short_name(raw_names[row.raw]))
+    found = []
+    for gui, name in enumerate(table.names):
+        led = raised.get(gui, "")
+        if not is_beside(table, raw_names, gui):
+            found.append(DOWN if _DOWNWARDS.search(led) else UP)
+            continue
+        word = _BESIDE.search(led)
+        side = {"L": 1.0, "R": -1.0}.get(_side_of(_bone_of(name)[0]), 1.0)  # outwards
+        share = (1.0 if word[0] == "Left" else -1.0) if word else side
+        if abs(sideways.get(gui, 0.0)) > _CLEAR:
+            share = sideways[gui]
+        found.append(RIGHT if share > 0.0 else LEFT)
+    return found
+
+
+def handles_of(
+    table: BoardTable,
+    ways: Sequence[Direction],
+    region_of: Callable[[str], str],
+    taken: Iterable[str] = (),
+) -> list[Handle]:
+    """The sliders of a table: tx and ty of one name are one.
+
+    Args:
+        table: the GUI controls.
+        ways: of each, from ways_of.
+        region_of: the region of a stem.
+        taken: names that no bone must get.
+
+    Returns:
+        Handles that lie nowhere yet; none for a control that leads nowhere.
+    """
+    found: dict[str, Handle] = {}
+    for gui, name in enumerate(table.names):
+        low, high = float(table.lowest[gui]), float(table.highest[gui])
+        unit = max(-low, high)
+        if not table.outputs_of(gui) or not unit > 0.0:
+            continue
+        unit = 1.0 if 0.5 <= unit <= 1.5 else unit
+        axis = Axis(gui, low / unit, high / unit, unit, ways[gui])
+        bone, is_x = _bone_of(name)
+        side, stem = _side_of(bone), _stem_of(bone)
+        handle = found.get(bone) or Handle(bone, side, region_of(stem), stem, None, None)
+        found[bone] = replace(handle, x=axis) if is_x else replace(handle, y=axis)
+    labels = names.unique_labels(found, taken)
+    return [
+        _upright(replace(handle, bone=label))
+        for handle, label in zip(found.values(), labels, strict=True)
+    ]
+
+
+def _upright(handle: Handle) -> Handle:
+    """Of a handle with both ways the one lies across the other."""
+    if handle.x is None or handle.y is None or handle.y.way in (UP, DOWN):
+        return handle
+    return replace(handle, y=replace(handle.y, way=UP))
+
+
+def _bone_of(name: str) -> tuple[str, bool]:
+    """The bone of a GUI control, and whether it goes along the bone's x axis."""
+    stem, _, axis = name.rpartition(".")
+    if stem and axis in ("tx", "ty"):
+        return stem, axis == "tx"
+    return name, False
+
+
+def _side_of(bone: str) -> str:
+    found = _PREFIX.match(bone)
+    if found and found[1]:
+        return found[1].replace("C", "")
+    last = _LAST_SIDE.search(bone)
+    return last[0] if last else ""
+
+
+def _stem_of(bone: str) -> str:
+    """A bone's name without prefix and side."""
+    found = _PREFIX.match(bone)
+    if found and found[1]:
+        return bone[found.end() :]
+    return _LAST_SIDE.sub("", slider_words.short_name(_PREFIX.sub("", bone))) or bone
+
+
+def lay_out(handles: Iterable[Handle], titles: Mapping[str, str], is_own: bool = False) -> Board:
+    """Lay out a board.
+
+    Args:
+        handles: its sliders.
+        titles: heading of each region, in the order in which they are shown.
+        is_own: their names are ours, made of the raw controls': all lie in rows by region.
+    """
+    left = list(handles)
+    blocks = []
+    for title, sides, middle in () if is_own else _FACE:
+        block = _face_block(title, sides, middle, left)
+        if block is not None:
+            blocks.append([block])
+    used = {h.bone for row in blocks for b in row for c, _x, _y in b.cells for h, *_ in c.inside}
+    left = [handle for handle in left if handle.bone not in used]
+    width = max([_NARROWEST, *(block.width for row in blocks for block in row)])
+    known = {title for title, _sides, _middle in _FACE}
+    named = {r: "Lips" if r == "mouth" and t in known and blocks else t for r, t in titles.items()}
+    rest = [_region_block(t, [h for h in left if h.region == r], width) for r, t in named.items()]
+    blocks += _shelves([block for block in rest if block is not None], width)
+    return _drawn(blocks, width)
+
+
+def _label(stem: str, region: str) -> list[str]:
+    """A label in short lines."""
+    words = _LABELS.get(stem.lower()) or slider_words.title_in_region(stem, region, sided=False)
+    text = words.upper()
+    rows: list[str] = []
+    for word in text.split():
+        if rows and len(rows[-1]) + 1 + len(word) <= _LONGEST:
+            rows[-1] += f" {word}"
+        else:
+            rows.append(word[:_WIDEST])
+    return rows[:_LINES] or ["-"]
+
+
+def _cell(rows: Sequence[Sequence[Handle]], label: list[str]) -> _Cell:
+    """Sliders in rows with a label below. Args: rows  from the top down, from left to right."""
+    boxes = [[_frame(h) for h in row] for row in rows]
+    widths = [sum(f[2] - f[0] for f in row) + _GAP * (len(row) - 1) for row in boxes]
+    heights = [max(f[3] - f[1] for f in row) for row in boxes]
+    text = max(board_letters.width(line, _TEXT) for line in label)
+    cell = _Cell(max([text, *widths]), 0.0, label)
+    down = 0.0
+    for row, row_boxes, width, height in zip(rows, boxes, widths, heights, strict=True):
+        across = (cell.width - width) / 2
+        for handle, (start, b, end, t) in zip(row, row_boxes, strict=True):
+            cell.inside.append((handle, across - start, down - t - (height - (t - b)) / 2))
+            across += end - start + _GAP
+        down -= height + _GAP
+    cell.height = -down - _GAP + 0.16 + len(label) * 1.4 * _TEXT
+    return cell
+
+
+def _frame(handle: Handle) -> tuple[float, float, float, float]:
+    """Left, bottom, right, top of a slider's frame, from where its handle rests."""
+    left, bottom, right, top = handle.box()
+    half = _TRACK / 2
+    return left - half, bottom - half, right + half, top + half
+
+
+def _face_block(
+    title: str, sides: _Columns, middle: _Columns, left: Sequence[Handle]
+) -> _Block | None:
+    """A part of the face whose names are known, or None where nothing of it is there."""
+    by_name = {(h.side, h.stem.lower()): h for h in left}
+
+    def columns(side: str, wanted: _Columns) -> list[list[_Cell]]:
+        found = []
+        for column in wanted:
+            there = [by_name[side, n] for n in column if (side, n) in by_name]
+            if there:
+                found.append([_cell([[h]], _label(h.stem, h.region)) for h in there])
+        return found
+
+    outer, inner = columns("R", sides), columns("L", sides)[::-1]
+    row = [*outer, *columns("", middle), *inner]
+    if not row:
+        return None
+    block = _Block(title)
+    stacked = [column for column in row if len(column) > 1]
+    second = max((column[0].height for column in stacked), default=0.0) + _GAP / 2
+    for column in row:
+        wide = max(cell.width for cell in column)
+        for number, cell in enumerate(column):
+            down = -second * number
+            block.cells.append((cell, block.width + (wide - cell.width) / 2, down))
+            block.height = max(block.height, cell.height - down)
+        block.width += wide + _GAP
+    block.width -= _GAP
+    return block
+
+
+def _region_block(title: str, handles: Sequence[Handle], width: float) -> _Block | None:
+    """All else of a region, in rows; or None where there is nothing."""
+    if not handles:
+        return None
+    block = _Block(title)
+    rows = _rows_of(_cells_of(handles), width - 2 * _MARGIN)
+    widths = [sum(cell.width + _GAP for cell in row) - _GAP for row in rows]
+    block.width = max(widths)
+    for row, wide in zip(rows, widths, strict=True):
+        across = (block.width - wide) / 2
+        for cell in row:
+            block.cells.append((cell, across, -block.height))
+            across += cell.width + _GAP
+        block.height += max(cell.height for cell in row) + _GAP
+    block.height -= _GAP
+    return block
+
+
+def _rows_of(cells: Sequence[_Cell], width: float) -> list[list[_Cell]]:
+    """Cells in as few rows as there is room for, none much longer than the others."""
+    total = sum(cell.width + _GAP for cell in cells)
+    share = total / max(1.0, np.ceil(total / width))
+    rows: list[list[_Cell]] = [[]]
+    taken = 0.0
+    for cell in cells:
+        if rows[-1] and (taken + cell.width / 2 > share or taken + cell.width > width):
+            rows.append([])
+            taken = 0.0
+        rows[-1].append(cell)
+        taken += cell.width + _GAP
+    return rows
+
+
+def _cells_of(handles: Sequence[Handle]) -> list[_Cell]:
+    """Both sides of a control, and the upper and lower lip, in one cell; tall ones last."""
+    groups: dict[str, list[Handle]] = {}
+    stems = {h.stem for h in handles}
+    for handle in handles:
+        key = _LIP.sub("", handle.stem)
+        short = handle.box()[3] - handle.box()[1] < 1.5
+        both = short and {f"{key}U", f"{key}D"} <= stems and handle.side
+        groups.setdefault(key if both else handle.stem, []).append(handle)
+    cells = []
+    for stem, members in groups.items():
+        upper = [h for h in members if h.stem in (f"{stem}U", stem)]
+        lower = [h for h in members if h not in upper]
+        order = {"R": 0, "": 1, "L": 2}
+        rows = [sorted(row, key=lambda h: order[h.side]) for row in (upper, lower) if row]
+        cells.append(_cell(rows, _label(stem, members[0].region)))
+    return sorted(cells, key=lambda cell: round(cell.height, 1))
+
+
+def _shelves(blocks: Sequence[_Block], width: float) -> list[list[_Block]]:
+    """Blocks beside each other where there is room."""
+    rows: list[list[_Block]] = []
+    for block in blocks:
+        taken = sum(b.width + 2 * _MARGIN for b in rows[-1]) if rows else width
+        if rows and taken + block.width <= width:
+            rows[-1].append(block)
+        else:
+            rows.append([block])
+    return rows
+
+
+def _drawn(rows: Sequence[Sequence[_Block]], width: float) -> Board:
+    """Places and lines of all that is in the blocks."""
+    handles: list[Handle] = []
+    lines: list[Line] = []
+    down = -_MARGIN
+    for row in rows:
+        used = sum(block.width for block in row) + 2 * _MARGIN * (len(row) - 1)
+        across = (width - used) / 2
+        lines.append([(0.0, down), (width, down)])
+        room = across - board_letters.width(row[0].title, _TITLE)
+        below = _GAP if len(row) == 1 and room > _GAP else _TITLE + 0.5
+        for block in row:
+            left = across if len(row) > 1 else 0.0
+            lines += board_letters.lines(block.title, left, down - 0.2 - _TITLE, _TITLE)
+            for cell, x, y in block.cells:
+                _draw(cell, across + x, down - below + y, handles, lines)
+            across += block.width + 2 * _MARGIN
+        down -= max(block.height for block in row) + below + _GAP
+    height = -down
+    total, middle = width + 2 * _MARGIN, (width / 2, down / 2)
+    corners = [(-_MARGIN, 0.0), (width + _MARGIN, 0.0), (width + _MARGIN, down), (-_MARGIN, down)]
+    shifted = [_moved(line, middle) for line in lines]
+    placed = [replace(h, place=_moved([h.place], middle)[0]) for h in handles]
+    border = [_moved([*corners, corners[0]], middle)]
+    return Board(tuple(placed), tuple(shifted), tuple(border), total, height)
+
+
+def _draw(cell: _Cell, x: float, y: float, handles: list[Handle], lines: list[Line]) -> None:
+    """Put a cell's sliders and lines where its upper left corner lies."""
+    for handle, across, down in cell.inside:
+        place = (x + across, y + down)
+        handles.append(replace(handle, place=place))
+        lines += [_moved(line, (-place[0], -place[1])) for line in _track(handle)]
+    bottom = y - cell.height
+    for number, text in enumerate(reversed(cell.label)):
+        start = x + (cell.width - board_letters.width(text, _TEXT)) / 2
+        lines += board_letters.lines(text, start, bottom + number * 1.4 * _TEXT, _TEXT)
+
+
+def _track(handle: Handle) -> list[Line]:
+    """A slider's frame, with marks where it rests."""
+    left, bottom, right, top = _frame(handle)
+    frame = [(left, bottom), (right, bottom), (right, top), (left, top), (left, bottom)]
+    if handle.x is not None and handle.y is not None:
+        return [frame, [(left, 0.0), (right, 0.0)], [(0.0, bottom), (0.0, top)]]
+    mark = (
+        [(left, 0.0), (right, 0.0)] if top - bottom > right - left else [(0.0, bottom), (0.0, top)]
+    )
+    return [frame, mark]
+
+
+def _moved(line: Sequence[Point], by: Point) -> Line:
+    return [(x - by[0], y - by[1]) for x, y in line]
+
+
+def limits(handles: Sequence[Handle]) -> tuple[Doubles, Doubles]:
+    """float64[H, 2]: the least and the greatest places of handles along their own axes."""
+    ends = [[(a.low, a.high) if a else (0.0, 0.0) for a in (h.x, h.y)] for h in handles]
+    both = np.array(ends, np.float64).reshape(-1, 2, 2)
+    return both[:, :, 0], both[:, :, 1]

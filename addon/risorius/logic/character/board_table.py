@@ -1,0 +1,229 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""GUI controls as a table: which raw controls each leads to, and how far it goes.
+
+The table is the file's own; a file without GUI controls gets one made of the names of its raw
+controls: one slider each, opposites (Up and Down, Wide and Narrow) on one, both directions of what
+goes up, down, left and right on one handle.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import slider_words
+
+Doubles = NDArray[np.float64]
+Whole = NDArray[np.intp]
+
+_BESIDE = ("Left", "Right")
+_ABOVE = ("Up", "Down")
+_OPPOSITES = (
+    _BESIDE, _ABOVE, ("Out", "In"), ("Wide", "Narrow"), ("Fwd", "Back"), ("Thick", "Thin"),
+    ("Push", "Pull"), ("Blow", "Suck"), ("Sharpen", "Rounder"), ("Dilate", "Compress"),
+    ("Exhale", "Inhale"),
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Row:
+    """Of a conditional: where from <= value <= to, slope * value + cut is added to an output.
+
+    Attributes:
+        gui, raw: indices of the GUI control and of the raw control.
+        low, high: the range of the GUI control in which it holds.
+        slope, cut: of the line.
+    """
+
+    gui: int
+    raw: int
+    low: float
+    high: float
+    slope: float
+    cut: float
+
+
+@dataclass(frozen=True)
+class BoardTable:
+    """GUI controls of a face.
+
+    Attributes:
+        names: of the GUI controls: CTRL_L_eye_blink.ty.
+        rows: in the file's order; of rows with one control and one output the first that holds
+            counts.
+        raw_count: R, how many raw controls the face has.
+        is_own: made of the raw controls' names, because the file has no GUI controls.
+    """
+
+    names: tuple[str, ...]
+    rows: tuple[Row, ...]
+    raw_count: int
+    is_own: bool = False
+    _pieces: dict[int, list[tuple[int, list[Row]]]] = field(default_factory=dict, repr=False)
+
+    def __post_init__(self) -> None:
+        for gui in range(len(self.names)):
+            found: dict[int, list[Row]] = {}
+            for row in self.rows:
+                if row.gui == gui:
+                    found.setdefault(row.raw, []).append(row)
+            self._pieces[gui] = list(found.items())
+
+    @cached_property
+    def lowest(self) -> Doubles:
+        """float64[G]: the least value of each control; 0 is always among its values."""
+        out = np.zeros(len(self.names))
+        for row in self.rows:
+            out[row.gui] = min(out[row.gui], row.low)
+        return out
+
+    @cached_property
+    def highest(self) -> Doubles:
+        """float64[G]: the greatest value of each control."""
+        out = np.zeros(len(self.names))
+        for row in self.rows:
+            out[row.gui] = max(out[row.gui], row.high)
+        return out
+
+    @cached_property
+    def reached(self) -> NDArray[np.bool_]:
+        """bool[R]: the raw controls that some GUI control leads to; others stay with sliders."""
+        out = np.zeros(self.raw_count, bool)
+        out[[row.raw for row in self.rows]] = True
+        return out
+
+    def outputs_of(self, gui: int) -> list[int]:
+        """The raw controls that a GUI control leads to. Args: gui  its index."""
+        return [raw for raw, _rows in self._pieces[gui]]
+
+    def breaks_of(self, gui: int) -> list[float]:
+        """Where the lines of a GUI control begin and end, with 0. Args: gui  its index."""
+        ends = {0.0, float(self.lowest[gui]), float(self.highest[gui])}
+        for _raw, rows in self._pieces[gui]:
+            ends.update(end for row in rows for end in (row.low, row.high))
+        return sorted(ends)
+
+    def part(self, gui: int, values: ArrayLike) -> Doubles:
+        """What one GUI control alone adds to its outputs, before they are held in 0..1.
+
+        Args:
+            gui: its index.
+            values: float[N].
+
+        Returns:
+            float64[N, outputs of it].
+        """
+        v = np.asarray(values, np.float64)
+        out = np.zeros((len(v), len(self._pieces[gui])))
+        for column, (_raw, rows) in enumerate(self._pieces[gui]):
+            free = np.ones(len(v), bool)
+            for row in rows:
+                holds = free & (row.low <= v) & (v <= row.high)
+                out[holds, column] = row.slope * v[holds] + row.cut
+                free &= ~holds
+        return out
+
+    def raw(self, gui: ArrayLike) -> Doubles:
+        """Raw controls of GUI values.
+
+        Args:
+            gui: float[N, G].
+
+        Returns:
+            float64[N, R] in 0..1; 0 where nothing leads.
+        """
+        return np.clip(self.sums(np.asarray(gui, np.float64)), 0.0, 1.0)
+
+    @cached_property
+    def _straight(self) -> tuple[Whole, Whole, NDArray[np.float32]]:
+        """Of an own table, whose lines go through 0: inputs, outputs, slopes."""
+        rows = self.rows
+        return (
+            np.array([row.gui for row in rows], np.intp),
+            np.array([row.raw for row in rows], np.intp),
+            np.array([row.slope for row in rows], np.float32),
+        )
+
+    def own_raw(self, gui: NDArray[np.float32]) -> NDArray[np.float32]:
+        """`raw` of one pose for a table that is_own, at once. Args: gui  float32[G]."""
+        inputs, outputs, slopes = self._straight
+        raw = np.zeros(self.raw_count, np.float32)
+        raw[outputs] = np.clip(gui[inputs] * slopes, 0.0, 1.0)
+        return raw
+
+    def sums(self, gui: Doubles) -> Doubles:
+        """float64[N, R] as `raw`, before they are held in 0..1. Args: gui  float64[N, G]."""
+        out = np.zeros((len(gui), self.raw_count))
+        for index in range(len(self.names)):
+            if self._pieces[index]:
+                out[:, self.outputs_of(index)] += self.part(index, gui[:, index])
+        return out
+
+
+def of_file(names: Sequence[str], columns: ArrayLike, raw: int) -> BoardTable:
+    """The table of a file.
+
+    Args:
+        names: its GUI controls.
+        columns: float[6, rows] of its conditionals: inputs, outputs, from, to, slopes, cuts.
+        raw: how many raw controls it has.
+
+    Returns:
+        BoardTable; without the rows that are no numbers, or that can hold for no value.
+    """
+    rows = []
+    for numbers in np.asarray(columns, np.float64).T:
+        gui, out, low, high, slope, cut = numbers.tolist()
+        if np.isfinite(numbers).all() and low <= high and gui < len(names) and out < raw:
+            rows.append(Row(int(gui), int(out), low, high, slope, cut))
+    return BoardTable(tuple(names), tuple(rows), raw)
+
+
+def of_raw_controls(labels: Sequence[str], lowest: Sequence[float]) -> BoardTable:
+    """A table for a file without GUI controls.
+
+    Args:
+        labels: the names of its raw controls.
+        lowest: the least value of each; what goes below 0 is a part of a rotation and is left out.
+
+    Returns:
+        BoardTable of GUI controls called by what they do: `CTRL_jawOpen.ty`,
+        `CTRL_eyeLookL.tx`.
+    """
+    short = {label: slider_words.short_name(label) for label in labels}
+    index = {short[label]: i for i, label in enumerate(labels) if lowest[i] >= 0.0}
+    names: list[str] = []
+    rows: list[Row] = []
+    done: set[str] = set()
+    for name, raw in index.items():
+        if name in done:
+            continue
+        up, down, gui = _pair(name, index)
+        done |= {name, up, down}
+        names.append(gui if gui not in names else f"CTRL_{name}.ty")
+        here = len(names) - 1
+        rows.append(Row(here, index.get(up, raw), 0.0, 1.0, 1.0, 0.0))
+        if down:
+            rows.append(Row(here, index[down], -1.0, 0.0, -1.0, 0.0))
+    return BoardTable(tuple(names), tuple(rows), len(labels), is_own=True)
+
+
+def _pair(name: str, index: dict[str, int]) -> tuple[str, str, str]:
+    """What raises a slider, what lowers it or "", and its name with its axis."""
+    for pair in _OPPOSITES:
+        for one, other in (pair, pair[::-1]):
+            for found in re.finditer(rf"{one}(?=[A-Z_]|$)", name):
+                before, after = name[: found.start()], name[found.end() :]
+                if before + other + after not in index or not (before or after):
+                    continue
+                two = pair in (_ABOVE, _BESIDE)
+                stem = before + ("" if two else pair[0] + pair[1]) + after
+                axis = "tx" if pair == _BESIDE else "ty"
+                up, down = before + pair[0] + after, before + pair[1] + after
+                return up, down, f"CTRL_{stem}.{axis}"
+    return name, "", f"CTRL_{name}.ty"

@@ -1,0 +1,410 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The face board of a character: what its bones ask for, and whether it or the sliders lead.
+
+A handle's place in its own axes is the value of its GUI control, wherever board, armature and face
+stand. What no GUI control leads to stays with the sliders. Of what moves a face one leads: all that
+reads or sets "the pose" asks here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import cast
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+from numpy.typing import NDArray
+
+from ...logic.character import board_fit, board_layout
+from ..base import parts
+from ..base.blender_types import ArmatureObject
+from . import runtime
+
+RANGE = "Range"  # the constraint of a handle that is ours
+SEEN = 0.0005  # a raw control that is off by less is not worth a word
+_BY_BOARD, _BY_SLIDERS = "BOARD", "SLIDERS"
+Floats = NDArray[np.float32]
+
+
+@dataclass
+class _Places:
+    """Where the values of handles stand among the places of an armature's bones.
+
+    Attributes:
+        names: of all its pose bones, in order; other names, other places.
+        live: whose handles they are.
+        at: int[n] indices into the flat float[bones, 3] of places.
+        gui: int[n] the GUI control of each.
+        low, high, unit: float32[n] how far it goes, and its value for one unit.
+        moved: handles that constraints of the user's move: their bone and their axes.
+    """
+
+    names: tuple[str, ...]
+    live: runtime.Runtime
+    at: NDArray[np.intp]
+    gui: NDArray[np.intp]
+    low: Floats
+    high: Floats
+    unit: Floats
+    moved: list[tuple[str, list[tuple[int, int]]]] | None = None
+
+
+_places: dict[int, _Places] = {}  # session uid of a control armature -> its places
+
+
+def forget() -> None:
+    """After load and undo session uids may mean others."""
+    _places.clear()
+
+
+def note_edit() -> None:
+    """Something was edited: a handle may have got a constraint."""
+    for places in _places.values():
+        places.moved = None
+
+
+def _handles_there(controls: ArmatureObject, live: runtime.Runtime) -> list[board_layout.Handle]:
+    bones = controls.pose.bones
+    return [handle for handle in live.handles if handle.bone in bones]
+
+
+def is_there(controls: ArmatureObject, live: runtime.Runtime | None) -> bool:
+    """Whether a character has a face board, or something of it.
+
+    Args:
+        controls: its control armature.
+        live: its Runtime.
+    """
+    bones = controls.pose.bones
+    return live is not None and any(handle.bone in bones for handle in live.handles)
+
+
+def missing(controls: ArmatureObject, live: runtime.Runtime) -> list[str]:
+    """The handles that a board has lost; all of them where there is no board is none.
+
+    Args:
+        controls: control armature of the character.
+        live: its Runtime.
+    """
+    bones = controls.pose.bones
+    gone = [handle.bone for handle in live.handles if handle.bone not in bones]
+    return gone if len(gone) < len(live.handles) else []
+
+
+def leads(controls: ArmatureObject, live: runtime.Runtime | None) -> bool:
+    """Whether the face board moves a face, else its sliders do.
+
+    Args:
+        controls: its control armature, the original one.
+        live: its Runtime.
+    """
+    wanted = controls.get(parts.LEAD) == _BY_BOARD and parts.BAKED not in controls
+    return wanted and is_there(controls, live)
+
+
+def leads_face(rig: ArmatureObject) -> bool:
+    """`leads` of a character. Args: rig  its deforming armature."""
+    controls = parts.controls_of(rig)
+    return controls is not None and leads(controls, runtime.of(rig))
+
+
+def set_lead(controls: ArmatureObject, by_board: bool) -> None:
+    """Choose what moves a face; its pose is not converted.
+
+    Args:
+        controls: its control armature.
+        by_board: the board, else the sliders.
+    """
+    controls[parts.LEAD] = _BY_BOARD if by_board else _BY_SLIDERS
+    controls.property_overridable_library_set(f'["{parts.LEAD}"]', True)
+    controls.update_tag()
+
+
+def read(seen: ArmatureObject, live: runtime.Runtime) -> Floats:
+    """The GUI controls that the handles ask for, within their ranges.
+
+    Args:
+        seen: the control armature, evaluated or the original one.
+        live: the character's Runtime.
+
+    Returns:
+        float32[G]; what is no number, and what has lost its handle, is at rest.
+    """
+    places = _places_of(seen, live)
+    flat = np.empty(3 * len(places.names), np.float32)
+    seen.pose.bones.foreach_get("location", flat)
+    gui = np.zeros(len(live.table.names), np.float32)
+    values = np.clip(flat[places.at], places.low, places.high) * places.unit
+    if not np.isfinite(values).all():
+        values[~np.isfinite(values)] = 0.0
+    gui[places.gui] = values
+    for bone, axes in places.moved or ():
+        _read_moved(seen, seen.pose.bones[bone], places, axes, gui)
+    return gui
+
+
+def _places_of(seen: ArmatureObject, live: runtime.Runtime) -> _Places:
+    bones = seen.pose.bones
+    names, uid = tuple(bones.keys()), seen.original.session_uid
+    places = _places.get(uid)
+    if places is None or places.names != names or places.live is not live:
+        places = _places[uid] = _compiled(names, live)
+    # Without an interface scripts edit and step without an update between.
+    if places.moved is None or bpy.app.background:
+        axes: dict[str, list[tuple[int, int]]] = {}
+        for row, at in enumerate(places.at.tolist()):
+            axes.setdefault(names[at // 3], []).append((row, at % 3))
+        places.moved = [
+            (name, rows)
+            for name, rows in axes.items()
+            if any(constraint.name != RANGE for constraint in bones[name].constraints)
+        ]
+    return places
+
+
+def _compiled(names: tuple[str, ...], live: runtime.Runtime) -> _Places:
+    where = {name: place for place, name in enumerate(names)}
+    rows = [
+        (3 * where[handle.bone] + axis, way.gui, way.low, way.high, way.unit)
+        for handle in live.handles
+        if handle.bone in where
+        for axis, way in enumerate((handle.x, handle.y))
+        if way is not None
+    ]
+    columns = np.array(rows, np.float64).reshape(-1, 5).T
+    at, gui = columns[:2].astype(np.intp)
+    low, high, unit = columns[2:].astype(np.float32)
+    return _Places(names, live, at, gui, low, high, unit)
+
+
+def _read_moved(
+    seen: ArmatureObject,
+    bone: bpy.types.PoseBone,
+    places: _Places,
+    axes: Iterable[tuple[int, int]],
+    gui: Floats,
+) -> None:
+    """Read a handle where the user's constraints hold it."""
+    local: Matrix = seen.convert_space(
+        pose_bone=bone, matrix=bone.matrix, from_space="POSE", to_space="LOCAL"
+    )
+    for row, axis in axes:
+        value = local.translation[axis]
+        held = min(max(value, float(places.low[row])), float(places.high[row]))
+        gui[places.gui[row]] = held * float(places.unit[row]) if np.isfinite(value) else 0.0
+
+
+def raw_of(gui: Floats, live: runtime.Runtime, sliders: Floats | None) -> Floats:
+    """Raw controls of GUI controls.
+
+    Args:
+        gui: float32[G].
+        live: the character's Runtime.
+        sliders: float32[R] for what no GUI control leads to; None for rest.
+
+    Returns:
+        float32[R].
+    """
+    table = live.table
+    raw = table.own_raw(gui) if table.is_own else live.rig.gui_to_raw(gui)
+    others = np.array(live.rests, np.float32) if sliders is None else sliders
+    return np.where(table.reached, raw, others)
+
+
+def raw_now(rig: ArmatureObject) -> dict[str, float]:
+    """The pose of a face by the names of its sliders, whatever leads.
+
+    Args:
+        rig: the character.
+
+    Returns:
+        Of each slider that is there; what the board gives where it leads.
+    """
+    live, face, controls = runtime.there(rig), parts.face_bone(rig), parts.controls_there(rig)
+    assert face is not None
+    values = {label: float(face[label]) for label in live.labels if label in face}
+    if not leads(controls, live):
+        return values
+    return values | {label: value for label, value in given(rig).items() if label in values}
+
+
+def given(rig: ArmatureObject) -> dict[str, float]:
+    """What a board that leads gives, by the names of the sliders that it leads to.
+
+    Args:
+        rig: the character.
+    """
+    live = runtime.there(rig)
+    raw = raw_of(read(parts.controls_there(rig), live), live, None).tolist()
+    return {label: raw[i] for i, label in enumerate(live.labels) if live.table.reached[i]}
+
+
+def put_raw(rig: ArmatureObject, values: Mapping[str, float]) -> board_fit.Loss:
+    """Bring the board to raw controls, as near as it comes; it begins from where it stands.
+
+    Args:
+        rig: a character with a face board.
+        values: by the names of its sliders; those that the board does not lead to are set on the
+            sliders.
+
+    Returns:
+        What is lost.
+    """
+    live, controls = runtime.there(rig), parts.controls_there(rig)
+    face = parts.face_bone(rig)
+    assert face is not None
+    now = {**raw_now(rig), **values}
+    wanted = np.array([now.get(label, 0.0) for label in live.labels])
+    reached = live.table.reached
+    for i, label in enumerate(live.labels):
+        if not reached[i] and label in values and label in face:
+            face[label] = values[label]
+    gui = fit(live, wanted[None], read(controls, live)[None])
+    write(controls, live, gui[0])
+    given = live.table.raw(gui)
+    return board_fit.loss(live.labels, wanted[None], given, reached, SEEN)
+
+
+def fit(
+    live: runtime.Runtime, raw: NDArray[np.float64], start: Floats | None = None
+) -> NDArray[np.float64]:
+    """GUI controls that give raw controls, as near as they come.
+
+    Args:
+        live: the character's Runtime.
+        raw: float[N, R].
+        start: float[N, G], where the search begins; None for what the table reversed gives.
+
+    Returns:
+        float64[N, G].
+    """
+    if start is None and live.table.is_own:
+        start = np.zeros((len(raw), len(live.table.names)), np.float32)
+    elif start is None:
+        rows = np.asarray(raw, np.float32)
+        start = np.stack([live.rig.raw_to_gui(np.ascontiguousarray(row)) for row in rows])
+    return board_fit.fit(live.table, raw, start)
+
+
+def write(controls: ArmatureObject, live: runtime.Runtime, gui: NDArray[np.float64]) -> None:
+    """Bring the handles to GUI values.
+
+    Args:
+        controls: control armature of the character, the original one.
+        live: its Runtime.
+        gui: float[G], within the ranges.
+    """
+    for handle in _handles_there(controls, live):
+        bone = controls.pose.bones[handle.bone]
+        for axis, way in enumerate((handle.x, handle.y)):
+            if way is not None:
+                bone.location[axis] = float(gui[way.gui]) / way.unit
+    controls.update_tag()
+
+
+def handles_of_labels(rig: ArmatureObject, labels: Iterable[str]) -> list[board_layout.Handle]:
+    """The handles that lead to sliders, those that are there.
+
+    Args:
+        rig: the character.
+        labels: names of sliders.
+    """
+    live = runtime.there(rig)
+    wanted = {i for i, label in enumerate(live.labels) if label in set(labels)}
+    return [
+        handle
+        for handle in _handles_there(parts.controls_there(rig), live)
+        if any(wanted.intersection(live.table.outputs_of(way.gui)) for way in handle.axes)
+    ]
+
+
+def handles_in(rig: ArmatureObject, region: str = "") -> list[board_layout.Handle]:
+    """The handles of a region that are there.
+
+    Args:
+        rig: the character.
+        region: its name; empty for all.
+    """
+    there = _handles_there(parts.controls_there(rig), runtime.there(rig))
+    return [handle for handle in there if not region or handle.region == region]
+
+
+def reset(controls: ArmatureObject, handles: Iterable[board_layout.Handle]) -> None:
+    """Bring handles to rest.
+
+    Args:
+        controls: control armature of the character, the original one.
+        handles: of its board.
+    """
+    for handle in handles:
+        controls.pose.bones[handle.bone].location = (0.0, 0.0, 0.0)
+    controls.update_tag()
+
+
+def places_of(controls: ArmatureObject, live: runtime.Runtime) -> dict[str, tuple[float, ...]]:
+    """Where the handles that are there stand, by their bones.
+
+    Args:
+        controls: control armature of the character.
+        live: its Runtime.
+    """
+    there = _handles_there(controls, live)
+    bones = controls.pose.bones
+    return {handle.bone: (*bones[handle.bone].location[:],) for handle in there}
+
+
+def put_places(
+    controls: ArmatureObject, live: runtime.Runtime, places: Mapping[str, tuple[float, ...]]
+) -> None:
+    """Bring handles to where they stood.
+
+    Args:
+        controls: control armature of the character.
+        live: its Runtime.
+        places: from places_of; bones that are not there are passed over.
+    """
+    for handle in _handles_there(controls, live):
+        if handle.bone in places:
+            controls.pose.bones[handle.bone].location = places[handle.bone]
+    controls.update_tag()
+
+
+def is_same(one: runtime.Runtime, other: runtime.Runtime) -> bool:
+    """Whether two faces have the same handles. Args: one, other  their Runtimes."""
+    return one.handles == other.handles
+
+
+def _selecting(bone: bpy.types.PoseBone) -> bpy.types.Bone:
+    """What says whether a bone is selected: since 5.0 the pose bone."""
+    return cast("bpy.types.Bone", bone) if hasattr(bone, "select") else bone.bone
+
+
+def is_selected(controls: ArmatureObject, bone: str) -> bool:
+    """Whether a handle is selected.
+
+    Args:
+        controls: control armature.
+        bone: name of its bone, which is there.
+    """
+    return bool(_selecting(controls.pose.bones[bone]).select)
+
+
+def select(controls: ArmatureObject, bones: Iterable[str], extend: bool) -> None:
+    """Select handles.
+
+    Args:
+        controls: control armature.
+        bones: names of theirs.
+        extend: keep what is selected.
+    """
+    chosen = set(bones)
+    for bone in controls.pose.bones:
+        if bone.name in chosen or not extend:
+            _selecting(bone).select = bone.name in chosen
+
+
+def path_of(bone: str) -> str:
+    """The data path of a handle's place, from its armature object. Args: bone  its name."""
+    return f'pose.bones["{bpy.utils.escape_identifier(bone)}"].location'

@@ -1,0 +1,277 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The bones of a face board: built beside the head, mended, taken away.
+
+The bone `board` holds all of it at the board's scale, by a constraint: so the place of a handle is
+the value of its GUI control, which actions carry from face to face whatever its size.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import bpy
+import numpy as np
+from mathutils import Vector
+from numpy.typing import NDArray
+
+from ... import native
+from ...logic.base.space import world_matrices
+from ...logic.character import board_layout
+from ...logic.character.board_layout import Board, Handle
+from ..base import parts
+from ..base.blender_types import ArmatureObject, Context
+from . import armatures, board, bone_shapes, runtime
+
+COLLECTION = "Face Board"
+BORDER, FRAMES = runtime.BOARD_BONES
+_SHARE = 1.3  # height of the board over that of the head
+_AWAY = 0.42  # from the head to the board, over the size of the head
+_SIDE_COLOURS = {"L": (0.25, 0.6, 1.0), "R": (1.0, 0.35, 0.3), "": (1.0, 0.8, 0.2)}
+_LINE_COLOUR = (0.8, 0.8, 0.82)
+_BORDER_COLOUR = (0.25, 0.75, 0.45)
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Where a board stands: its middle, and Blender units for one of its own."""
+
+    middle: Vector
+    unit: float
+
+
+def add(context: Context, rig: ArmatureObject) -> int:
+    """Build the face board of a character, or those bones of it that are missing.
+
+    Args:
+        context: with a view layer.
+        rig: the character, whose control armature is of this file.
+
+    Returns:
+        How many handles were made.
+    """
+    live, controls = runtime.there(rig), parts.controls_there(rig)
+    regions = native.regions()
+    ways = board_layout.ways_of(live.table, live.labels, _sideways(live))
+    taken = (*runtime.CONTROL_BONES, *runtime.BOARD_BONES)
+    planned = board_layout.handles_of(live.table, ways, regions.of_slider, taken)
+    layout = board_layout.lay_out(planned, regions.titles, live.table.is_own)
+    new = [handle for handle in layout.handles if handle.bone not in controls.data.bones]
+    bars = [name for name in runtime.BOARD_BONES if name not in controls.data.bones]
+    if not new and not bars:
+        return 0
+    if controls.data.users > 1:
+        controls.data = controls.data.copy()
+    place = _beside(rig, live, layout)
+    with (
+        armatures.kept_selection(context),
+        armatures.edit_armature(context, controls.data) as edit_bones,
+    ):
+        _build(edit_bones, [*bars], new, layout, place.middle)
+    context.view_layer.update()
+    _dress(controls, layout, [*bars, *(handle.bone for handle in new)], place.unit)
+    _show_bones(controls, [*bars, *(handle.bone for handle in new)])
+    armatures.pull_more(rig, controls)
+    context.view_layer.update()
+    return len(new)
+
+
+def remove(context: Context, rig: ArmatureObject) -> int:
+    """Take the face board of a character away; keys on it stay in their actions.
+
+    Args:
+        context: with a view layer.
+        rig: the character, whose control armature is of this file.
+
+    Returns:
+        How many bones were removed.
+    """
+    controls = parts.controls_there(rig)
+    there = [bone.name for bone in controls.data.bones if parts.BOARD in bone]
+    shapes = {controls.pose.bones[name].custom_shape for name in there} - {None}
+    for name in there:
+        controls.pose.bones[name].custom_shape = None
+    armatures.pull_less(rig, there)
+    with (
+        armatures.kept_selection(context),
+        armatures.edit_armature(context, controls.data) as edit_bones,
+    ):
+        for name in there:
+            edit_bones.remove(edit_bones[name])
+    shelf = controls.data.collections.get(COLLECTION)
+    if shelf is not None and not len(shelf.bones):
+        controls.data.collections.remove(shelf)
+    unused = [shape for shape in shapes if shape is not None and not shape.users]
+    meshes = [shape.data for shape in unused]
+    bpy.data.batch_remove(unused)
+    bpy.data.batch_remove([mesh for mesh in meshes if mesh is not None and not mesh.users])
+    context.view_layer.update()
+    return len(there)
+
+
+def show(controls: ArmatureObject, visible: bool) -> None:
+    """Show or hide the bones of the board.
+
+    Args:
+        controls: control armature of the character.
+        visible: whether they are seen.
+    """
+    shelf = controls.data.collections.get(COLLECTION)
+    if shelf is not None and controls.data.library is None:
+        shelf.is_visible = visible
+
+
+def _sideways(live: runtime.Runtime) -> dict[int, float]:
+    """How far controls of the middle move the face to its own left, over all that they move it.
+
+    Names do not tell: jawLeft may be the viewer's.
+    """
+    table = live.table
+    chosen = [
+        gui
+        for gui in range(len(table.names))
+        if board_layout.is_middle(table, gui)
+        and board_layout.is_beside(table, live.labels, gui)
+        and table.highest[gui] > 0.0
+    ]
+    if not chosen:
+        return {}
+    gui = np.zeros((len(chosen), len(table.names)))
+    gui[range(len(chosen)), chosen] = table.highest[chosen]
+    rests = np.array(live.rests, np.float32)
+    raw = np.where(table.reached, table.raw(gui), rests)
+    poses = live.rig.evaluate_batch(np.ascontiguousarray(raw, np.float32)).joints
+    still = _points(live, live.rig.evaluate(rests).joints)
+    found = {}
+    for index, joints in zip(chosen, poses, strict=True):
+        moved = _points(live, joints) - still
+        length = float(np.linalg.norm(moved, axis=1).sum())
+        found[index] = float(moved[:, 0].sum()) / length if length else 0.0
+    return found
+
+
+def _points(live: runtime.Runtime, deltas: NDArray[np.float32]) -> NDArray[np.float64]:
+    """float64[J, 3] in Blender units: where the joints are. Args: deltas  of a pose."""
+    dna, space = live.dna, live.space
+    angles = np.asarray(dna.neutral_joint_rotations, np.float64)
+    if live.rig.rotation == "euler":
+        angles = angles + deltas[:, 3:6]
+    places = np.asarray(dna.neutral_joint_translations, np.float64) + deltas[:, :3]
+    parents = np.asarray(dna.joint_parents)
+    return world_matrices(space.rotations(angles), space.points(places), parents)[:, :3, 3]
+
+
+def _beside(rig: ArmatureObject, live: runtime.Runtime, layout: Board) -> _Place:
+    """Where the board goes: beside the head, as high as that."""
+    corners = [live.rest[:, :3, 3].min(axis=0), live.rest[:, :3, 3].max(axis=0)]
+    for item in parts.meshes_of(rig):
+        points = np.empty(3 * len(item.data.vertices), np.float32)
+        item.data.vertices.foreach_get("co", points)
+        if len(points):
+            corners += [points.reshape(-1, 3).min(axis=0), points.reshape(-1, 3).max(axis=0)]
+    low, high = np.min(corners, axis=0), np.max(corners, axis=0)
+    size = float((high - low).max())
+    unit = size * _SHARE / layout.height
+    middle = (low + high) / 2
+    x = high[0] + size * _AWAY + layout.width * unit / 2
+    return _Place(Vector((x, float(middle[1]), float(middle[2]))), unit)
+
+
+def _build(
+    edit_bones: bpy.types.ArmatureEditBones,
+    bars: Sequence[str],
+    new: Sequence[Handle],
+    layout: Board,
+    middle: Vector,
+) -> None:
+    """Bones in the board's own units around its middle; the scale of `board` makes them small."""
+    for name in bars:
+        bone = edit_bones.new(name)
+        head = middle + Vector((0.0, 0.3, 0.0)) if name == FRAMES else middle  # behind handles
+        bone.head, bone.tail = head, head + Vector((0.0, 0.0, 1.0))
+        bone.use_deform = False
+    if FRAMES in bars:
+        edit_bones[FRAMES].parent = edit_bones[BORDER]
+    root = edit_bones[BORDER]
+    for handle in layout.handles:
+        if handle in new:
+            bone = edit_bones.new(handle.bone)
+            up = handle.y.way if handle.y is not None else board_layout.UP
+            right = handle.x.way if handle.x is not None else (up[1], -up[0])
+            x, y, z = root.head
+            head = Vector((x + handle.place[0], y, z + handle.place[1]))
+            bone.head, bone.tail = head, head + 0.5 * Vector((up[0], 0.0, up[1]))
+            bone.align_roll((0.0, right[1] * up[0] - right[0] * up[1], 0.0))
+            bone.use_deform = False
+        else:
+            bone = edit_bones[handle.bone]
+        bone.parent = root
+    if FRAMES in edit_bones:
+        edit_bones[FRAMES].parent = root
+
+
+def _dress(controls: ArmatureObject, layout: Board, names: Sequence[str], unit: float) -> None:
+    """Give new bones their looks, limits and locks."""
+    name = controls.name.removesuffix("_controls")
+    disc: bpy.types.Object | None = None
+    for bone in controls.pose.bones:
+        if bone.name in names:
+            controls.data.bones[bone.name][parts.BOARD] = bone.name
+            bone.use_custom_shape_bone_size = False
+            bone.rotation_mode = "XYZ"
+            bone.lock_scale = (True, True, True)
+    if BORDER in names:
+        bone = controls.pose.bones[BORDER]
+        bone.custom_shape = bone_shapes.drawn(f"{name}_shape_board", layout.border)
+        bone_shapes.colour(bone, _BORDER_COLOUR)
+        limit = bone.constraints.new("LIMIT_SCALE")
+        limit.name, limit.owner_space = board.RANGE, "LOCAL"
+        for axis in "xyz":
+            for end in ("min", "max"):
+                setattr(limit, f"use_{end}_{axis}", True)
+                setattr(limit, f"{end}_{axis}", unit)
+    if FRAMES in names:
+        bone = controls.pose.bones[FRAMES]
+        bone.custom_shape = bone_shapes.drawn(f"{name}_shape_board_frames", layout.lines)
+        bone_shapes.colour(bone, _LINE_COLOUR)
+        bone.bone.hide_select = True
+        bone.lock_location = bone.lock_rotation = (True, True, True)
+    for handle in layout.handles:
+        bone = controls.pose.bones[handle.bone]
+        if handle.bone in names:
+            disc = disc or _disc(controls, layout, f"{name}_shape_handle")
+            bone.custom_shape = disc
+            _limit(bone, handle)
+
+
+def _disc(controls: ArmatureObject, layout: Board, name: str) -> bpy.types.Object:
+    """The shape of all handles, which others of this board may have already."""
+    bones = controls.pose.bones
+    worn = (bones[handle.bone].custom_shape for handle in layout.handles)
+    return next((w for w in worn if w is not None), None) or bone_shapes.disc(name)
+
+
+def _limit(bone: bpy.types.PoseBone, handle: Handle) -> None:
+    """Look, locks and range of a handle."""
+    wide = 0.3 if handle.x is not None and handle.y is not None else 0.2
+    bone.custom_shape_scale_xyz = (wide, wide, wide)
+    bone_shapes.colour(bone, _SIDE_COLOURS[handle.side])
+    bone.lock_location = (handle.x is None, handle.y is None, True)
+    bone.lock_rotation = (True, True, True)
+    bone.lock_rotation_w = True
+    limit: Any = bone.constraints.new("LIMIT_LOCATION")
+    limit.name, limit.owner_space, limit.use_transform_limit = board.RANGE, "LOCAL", True
+    for axis, way in zip("xyz", (handle.x, handle.y, None), strict=True):
+        for end in ("min", "max"):
+            setattr(limit, f"use_{end}_{axis}", True)
+        setattr(limit, f"min_{axis}", way.low if way is not None else 0.0)
+        setattr(limit, f"max_{axis}", way.high if way is not None else 0.0)
+
+
+def _show_bones(controls: ArmatureObject, names: Sequence[str]) -> None:
+    """Put bones into the board's bone collection."""
+    data = controls.data
+    shelf = data.collections.get(COLLECTION) or data.collections.new(COLLECTION)
+    for name in names:
+        shelf.assign(data.bones[name])

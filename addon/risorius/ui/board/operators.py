@@ -1,0 +1,237 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Blender takes properties where Python has annotations:
+# pyright: reportInvalidTypeForm=false
+"""Operators on the face board."""
+
+from collections.abc import Collection
+
+import bpy
+
+from ... import native
+from ...logic.base import names
+from ...scene.animation import board_keys
+from ...scene.base.blender_types import ArmatureObject
+from ...scene.character import board, board_bones, runtime
+from ...scene.frame import evaluate
+from ...scene.live import sessions
+from ..blender_types import Context, Operator, Result
+from ..common import FaceOperator, active_controls, face_controls, face_rig
+from ..hand.base import HandOperator
+from ..words import say
+
+LEADERS = (
+    ("SLIDERS", "Sliders", "The sliders of the panel move the face"),
+    ("BOARD", "Board", "The face board moves the face; the sliders show what it gives"),
+)
+
+
+def _regions(_self: object, _context: object) -> list[tuple[str, str, str]]:
+    titles = native.regions().titles
+    return [("ALL", "All", ""), *((region.upper(), title, "") for region, title in titles.items())]
+
+
+class _OwnArmature(FaceOperator):
+    """What operators share that make or remove bones of the controls."""
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        if not super().poll(context):
+            return False
+        data = face_controls(context).data
+        if data.library is not None or data.override_library is not None:
+            cls.poll_message_set(
+                say("The controls are linked: give the face its board in their own file.")
+            )
+            return False
+        return True
+
+
+class _OnBoard(HandOperator):
+    """What operators share that need a face board that leads."""
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        if not super().poll(context):
+            return False
+        if not board.leads_face(face_rig(context)):
+            cls.poll_message_set(say("The face board does not lead this face."))
+            return False
+        return True
+
+
+class RISORIUS_OT_add_board(_OwnArmature, Operator):
+    """Put a board of sliders beside the head, or bring back those of it that were deleted"""
+
+    bl_idname = "risorius.add_board"
+    bl_label = "Add Face Board"
+
+    def execute(self, context: Context) -> Result:
+        rig, controls = face_rig(context), face_controls(context)
+        live = runtime.there(rig)
+        if not live.handles:
+            self.report({"ERROR"}, say("This file has no control that a board could move."))
+            return {"CANCELLED"}
+        new = not board.is_there(controls, live)
+        count = board_bones.add(context, rig)
+        if new:
+            self._lead(rig)
+        evaluate.bring_up(context, rig)
+        self.report({"INFO"}, say("{count} sliders on the face board", count=count))
+        return {"FINISHED"}
+
+    def _lead(self, rig: ArmatureObject) -> None:
+        """Let a new board lead, unless keys of sliders would stand still by that."""
+        if board_keys.animates_sliders(rig):
+            self.report(
+                {"INFO"},
+                say("The sliders have keys and go on leading: choose Board to convert them."),
+            )
+            return
+        lost = board_keys.lost(board_keys.switch(rig, by_board=True, with_keys=False).loss)
+        if lost is not None:
+            self.report({"WARNING"}, say(lost))
+
+
+class RISORIUS_OT_remove_board(_OwnArmature, Operator):
+    """Take the face board away; its pose goes to the sliders, keys stay in their actions"""
+
+    bl_idname = "risorius.remove_board"
+    bl_label = "Remove Face Board"
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        if not super().poll(context):
+            return False
+        if not _has_board(context):
+            cls.poll_message_set(say("This face has no board."))
+            return False
+        return True
+
+    def execute(self, context: Context) -> Result:
+        rig = face_rig(context)
+        if board.leads_face(rig):
+            board_keys.switch(rig, by_board=False, with_keys=True)
+        board_bones.remove(context, rig)
+        evaluate.bring_up(context, rig)
+        return {"FINISHED"}
+
+
+def _has_board(context: Context) -> bool:
+    controls = active_controls(context)
+    return controls is not None and board.is_there(controls, runtime.of(face_rig(context)))
+
+
+class RISORIUS_OT_lead(FaceOperator, Operator):
+    """Choose what moves the face: its sliders or its board. The pose goes over to it"""
+
+    bl_idname = "risorius.lead"
+    bl_label = "Lead"
+
+    by: bpy.props.EnumProperty(name="By", description="What moves the face", items=LEADERS)
+    use_keys: bpy.props.BoolProperty(
+        name="Convert Keys",
+        description="Convert the keys of the action, in a copy; the action of before is kept",
+        default=True,
+    )
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        if not super().poll(context):
+            return False
+        if not _has_board(context):
+            cls.poll_message_set(say("This face has no board: add one first."))
+            return False
+        if sessions.of(active_controls(context)) is not None:
+            cls.poll_message_set(say("Live capture moves the sliders of this face: stop it first."))
+            return False
+        return True
+
+    def execute(self, context: Context) -> Result:
+        rig, by_board = face_rig(context), self.by == "BOARD"
+        if board.leads_face(rig) == by_board:
+            return {"CANCELLED"}
+        done = board_keys.switch(rig, by_board, self.use_keys)
+        evaluate.bring_up(context, rig)
+        lost = board_keys.lost(done.loss)
+        if lost is not None:
+            self.report({"WARNING"}, say(lost))
+        if done.kept is not None:
+            self.report(
+                {"INFO"},
+                say(
+                    "{curves} curves were converted; the action {action} was kept.",
+                    curves=done.curves,
+                    action=done.kept.name,
+                ),
+            )
+        if done.idle:
+            self.report(
+                {"WARNING"},
+                say(
+                    "Keys that move nothing while this leads: {actions}.",
+                    actions=names.listed(done.idle),
+                ),
+            )
+        return {"FINISHED"}
+
+
+class RISORIUS_OT_reset_board(_OnBoard, Operator):
+    """Bring sliders of the face board to rest"""
+
+    bl_idname = "risorius.reset_board"
+    bl_label = "Reset Board"
+
+    selected: bpy.props.BoolProperty(
+        name="Selected Only", description="Only those that are selected", options={"SKIP_SAVE"}
+    )
+
+    def move(self, context: Context) -> Collection[str] | None:
+        rig, controls = face_rig(context), face_controls(context)
+        chosen = board.handles_in(rig)
+        if self.selected:
+            chosen = [h for h in chosen if board.is_selected(controls, h.bone)]
+        if not chosen:
+            self.report({"WARNING"}, say("No slider of the board is selected."))
+            return None
+        board.reset(controls, chosen)
+        live = runtime.there(rig)
+        led = (live.table.outputs_of(way.gui) for h in chosen for way in h.axes)
+        return {live.labels[i] for outputs in led for i in outputs}
+
+
+class RISORIUS_OT_select_board(FaceOperator, Operator):
+    """Select the sliders of a region on the face board"""
+
+    bl_idname = "risorius.select_board"
+    bl_label = "Select on Board"
+
+    region: bpy.props.EnumProperty(name="Region", items=_regions)
+    extend: bpy.props.BoolProperty(
+        name="Add to Selection", description="Keep what is selected", options={"SKIP_SAVE"}
+    )
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        if not super().poll(context):
+            return False
+        if not _has_board(context):
+            cls.poll_message_set(say("This face has no board: add one first."))
+            return False
+        return True
+
+    def execute(self, context: Context) -> Result:
+        rig, controls = face_rig(context), face_controls(context)
+        region = "" if self.region == "ALL" else self.region.lower()
+        chosen = [handle.bone for handle in board.handles_in(rig, region)]
+        board.select(controls, chosen, self.extend)
+        self.report({"INFO"}, say("{count} sliders are selected", count=len(chosen)))
+        return {"FINISHED"} if chosen else {"CANCELLED"}
+
+
+CLASSES = (
+    RISORIUS_OT_add_board,
+    RISORIUS_OT_remove_board,
+    RISORIUS_OT_lead,
+    RISORIUS_OT_reset_board,
+    RISORIUS_OT_select_board,
+)

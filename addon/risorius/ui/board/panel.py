@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The panel Face Board in Options, and what leads as the panel Controls shows it."""
+
+from ...scene.base.blender_types import ArmatureObject
+from ...scene.character import board, runtime
+from .. import words
+from ..blender_types import Context, Panel, UILayout
+from ..common import FaceOnlyPanel, face_controls, face_rig
+from .operators import LEADERS
+
+
+def draw_lead(layout: UILayout, controls: ArmatureObject, live: runtime.Runtime) -> bool:
+    """What leads the face, as a choice; nothing where there is no board.
+
+    Args:
+        layout: of the panel.
+        controls: control armature of the face.
+        live: its Runtime.
+
+    Returns:
+        Whether the board leads.
+    """
+    if not board.is_there(controls, live):
+        return False
+    led = board.leads(controls, live)
+    row = layout.row(align=True)
+    for by, text, _tip in LEADERS:
+        row.operator("risorius.lead", text=text, depress=led == (by == "BOARD")).by = by
+    return led
+
+
+class RISORIUS_PT_board(FaceOnlyPanel, Panel):
+    bl_idname = "RISORIUS_PT_board"
+    bl_label = "Face Board"
+    bl_parent_id = "RISORIUS_PT_options"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: Context) -> None:
+        layout = self.layout
+        controls, live = face_controls(context), runtime.of(face_rig(context))
+        if live is None:
+            return
+        if not board.is_there(controls, live):
+            layout.operator("risorius.add_board", icon="ADD")
+            return
+        led = draw_lead(layout, controls, live)
+        gone = board.missing(controls, live)
+        if gone:
+            words.write(layout, words.say("{count} of its sliders are gone.", count=len(gone)))
+            layout.operator("risorius.add_board", text="Bring Back", icon="LOOP_BACK")
+        if led:
+            row = layout.row(align=True)
+            button = row.operator("risorius.reset_board", text="Reset Selected", icon="LOOP_BACK")
+            button.selected = True
+            row.operator("risorius.reset_board", text="Reset All").selected = False
+        layout.operator_menu_enum("risorius.select_board", "region", icon="RESTRICT_SELECT_OFF")
+        layout.operator("risorius.remove_board", icon="TRASH")
+
+
+CLASSES = (RISORIUS_PT_board,)
