@@ -198,9 +198,8 @@ def add_layer(hand: Hand, _dna: Path) -> Iterator[Check]:
     x, y = hand.find(r"risorius\.layer_remove", columns=(0.97, 0.93, 1.0))
     hand.click(x, y - 21)  # the plus above the minus is a menu, which no shortcut names
     hand.still()
-    entry = hand.find(
-        r"risorius\.layer_add\(.*IDLE", area=[round(x) - 210, round(y) - 160, 190, 330]
-    )
+    menu = [round(x) - 10, round(y) - 30, 150, 330]
+    entry = hand.find(r"risorius\.layer_add\(.*IDLE", columns=(0.4,), area=menu)
     hand.click(*entry)
     hand.wait("a layer is there", lambda: hand.ask("state")["layers"])
     yield "a layer is added by its menu", len(hand.ask("state")["layers"]) == 1
@@ -235,6 +234,8 @@ def open_section(hand: Hand, *panels: str) -> None:
         hand.ask("watch", panel=panel)
         for y in range(top + height - 8, top + 8, -9):
             hand.click(left + 60, y)
+            hand.ask("draw_again", panel=panel)
+            hand.ask("ready")
             if hand.ask("drawn", panel=panel):
                 break
             hand.click(left + 60, y)

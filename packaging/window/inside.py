@@ -91,6 +91,7 @@ def quiet():
     preferences.view.filebrowser_display_type = "SCREEN"
     preferences.view.show_tooltips = False
     preferences.use_preferences_save = False
+    preferences.system.use_region_overlap = False  # a click beside the sections is nobody's
     for name in ("Cube", "Light"):
         if name in bpy.data.objects:
             bpy.data.objects.remove(bpy.data.objects[name])
@@ -239,13 +240,16 @@ def watch(panel):
     return True
 
 
-def drawn(panel):
-    """Whether a section is drawn when the sidebar is drawn now."""
+def draw_again(panel):
+    """Let the sidebar be drawn anew, which it is before the next question is answered."""
     _drawn[panel] = 0
     _area, _drawing, sidebar = view()
     sidebar.tag_redraw()
-    with bpy.context.temp_override(window=window()):
-        bpy.ops.wm.redraw_timer(type="DRAW_WIN", iterations=1)
+    return True
+
+
+def drawn(panel):
+    """Whether a section was drawn since `draw_again`."""
     return _drawn[panel] > 0
 
 

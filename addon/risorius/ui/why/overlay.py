@@ -98,7 +98,8 @@ def _draw() -> None:
         return
     pen = _Pen(context)
     gpu.state.blend_set("ALPHA")
-    x, y = 20.0 * pen.scale + _tools(context), 24.0 * pen.scale
+    # Above the settings of the last operator, which lie in this corner.
+    x, y = 20.0 * pen.scale + _tools(context), 72.0 * pen.scale
     if shown is not None:
         y = _draw_ramp(pen, rig, shown, x, y)
     if not look.is_whole:

@@ -21,8 +21,7 @@ _soon: list[bool] = []  # whether the strongest correctives are asked for, a mom
 class RISORIUS_PT_why(FaceOnlyPanel, Panel):
     bl_idname = "RISORIUS_PT_why"
     bl_label = "See Why"
-    bl_parent_id = "RISORIUS_PT_options"  # one more section does not fit a laptop's window
-    bl_order = 0
+    bl_order = 1
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: Context) -> None:
