@@ -133,6 +133,7 @@ OTHERS = {
     "makes an action or keys of its own": "import_animation import_arkit_rig speak blink",
     "what the eyes' target hangs on": "gaze_target",
     "keys what stands": "key",
+    "a hand on the skin, which keys at its end": "drag drag_mode pin clear_pins",
     "the range of sliders: keys are cut as well": "set_overdrive",
     "drivers; each side shows what it showed": "link_sides",
     "what is shown, and why": "heat hide_hints mask_renders mute show_all solo why_vertex",

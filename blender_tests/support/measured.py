@@ -117,6 +117,12 @@ class Part:
     def menu(self, name, text=None, icon="NONE", **_options):
         self._button(local(getattr(bpy.types, name).bl_label if text is None else text), icon)
 
+    def popover(self, panel, text=None, icon="NONE", **_options):
+        self._button(local(getattr(bpy.types, panel).bl_label if text is None else text), icon)
+
+    def progress(self, text="", translate=True, **_options):
+        self._leaf(text, width_of(text) + _MARGIN)
+
     def _button(self, text, icon):
         there = width_of(text) + (_ICON if icon != "NONE" else 0)
         if text:
