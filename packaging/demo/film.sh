@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-# Sourced by demo.sh, performance.sh and physics.sh: what comes before and after each film. Sets: out, zip.
+# Sourced by demo.sh, performance.sh, physics.sh and cast.sh: what comes before and after each film. Sets: out, zip.
 source "$(dirname "${BASH_SOURCE[0]}")/../setup.sh"
 
 # begin_film NAME: the folder build/NAME, and what is built from nothing
@@ -20,7 +20,7 @@ fresh_blender() {
 end_film() {
   local sound=()
   [ $# -lt 3 ] || sound=(-i "$3" -c:a aac -b:a 96k)
-  ffmpeg -y -loglevel error -framerate 24 -start_number "$1" -i "$out/frames/frame_%04d.png" "${sound[@]}" \
+  ffmpeg -y -loglevel error -framerate "${rate:-24}" -start_number "$1" -i "$out/frames/frame_%04d.png" "${sound[@]}" \
     -c:v libx264 -crf "${crf:-20}" -pix_fmt yuv420p -movflags +faststart "$out/$2"
 }
 # tell FILE...: how long it took, and what to look at

@@ -2,6 +2,7 @@
 """Time per frame of faces in Blender, against the plain way, in one run.
 
     python tests/bench/frame_time.py FULL.dna [--sample SAMPLE.dna] --extension ZIP [--frames N]
+                                     [--clip CLIP.rzc]
 
 Runs inside the bpy module or an executable (blender -b --python ... --), with the add-on's zip
 installed. FULL.dna is a file of real size (tests/fullscale/generate.py): 60 of its controls change
@@ -13,6 +14,8 @@ is `scene.frame_set` with the whole dependency graph; drawing is not in it.
                                  and all key values to the originals, in bulk; real keys, no drivers
     plain way, loops             the same, written one by one
     curves only                  nothing follows the controls
+
+With --clip a clip (tests/bench/real_frames.py) is imported and plays in place of these keys.
 
 With --sample ten of these characters stand in one scene at their lowest level of detail.
 """
@@ -95,6 +98,21 @@ def animate(controls, frames):
         data.action = None
 
 
+def play(controls, clip, frames):
+    """What moves the controls: a clip, or without one keys of our own.
+
+    Args:
+        controls: the control armature.
+        clip: a file, or None.
+        frames: how many are played.
+    """
+    if clip is None:
+        animate(controls, frames)
+        return
+    bpy.context.view_layer.objects.active = controls
+    bpy.ops.risorius.import_animation(filepath=str(clip))
+
+
 def step(frames):
     """All times in ms of one frame."""
     scene = bpy.context.scene
@@ -175,14 +193,14 @@ def row(way, times, note, base=None):
     return middle
 
 
-def measure_full(path, package, frames):
+def measure_full(path, package, frames, clip):
     """The full-scale scene, each way. The plain way comes first: the others are told by it."""
     print("| way | median ms | min ms | fps | times the plain way | |\n|---|---|---|---|---|---|")
     base = None
     for loops in (False, True):
         empty_scene(package)
         controls, rig, _ = import_face(path, "KEYS")
-        animate(controls, frames)
+        play(controls, clip, frames)
         count = plain_way(controls, rig, path, loops)
         times = step(frames)
         base = base or statistics.median(times)
@@ -190,7 +208,7 @@ def measure_full(path, package, frames):
     for mode in ("LIVE", "KEYS", "AUTO"):
         empty_scene(package)
         controls, rig, seconds = import_face(path, mode)
-        animate(controls, frames)
+        play(controls, clip, frames)
         times = step(frames)
         stages = own_time(package, frames)
         words = ", ".join(f"{name} {ms:.2f}" for name, ms in stages.items())
@@ -220,10 +238,11 @@ def main():
     parser.add_argument("--sample", type=Path)
     parser.add_argument("--extension", type=Path, required=True)
     parser.add_argument("--frames", type=int, default=40)
+    parser.add_argument("--clip", type=Path)
     args = parser.parse_args(install_extension.arguments())
     package = install_extension.install(args.extension)
     print(machine())
-    measure_full(args.full, package, args.frames)
+    measure_full(args.full, package, args.frames, args.clip)
     if args.sample:
         measure_crowd(args.sample, package, args.frames)
 

@@ -96,6 +96,22 @@ def test_a_sculpt_of_what_is_not_there_is_one_sentence(tmp_path):
     assert not (tmp_path / "x.dna").exists()
 
 
+def test_a_sculpt_of_another_topology_is_one_sentence(tmp_path):
+    spec = face_shapes.write_all(tmp_path)
+    positions, faces = face_shapes.head()
+    last = len(positions) - 1
+    rest = [face for face in faces if max(face) < last]
+    sculpt = tmp_path / "shapes" / "jawOpen+mouthSmileLeft.obj"
+    face_shapes.write_obj(sculpt, positions[:last], rest)
+    done = command_line.run("author", spec, "-o", tmp_path / "x.dna", text=True)
+    assert done.returncode == 1
+    assert done.stderr == (
+        f"risorius: {sculpt}: {last + 1} vertices were expected, as the neutral mesh has, "
+        f"found {last}\n"
+    )
+    assert not (tmp_path / "x.dna").exists()
+
+
 @pytest.mark.parametrize(
     ("table", "sentence"),
     [

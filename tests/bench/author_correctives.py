@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: MIT
+"""What correctives that are found by themselves mend, by how many there are, and what they undo.
+
+    risorius sample build man.dna --joints 0
+    python tests/bench/author_correctives.py man.dna [--counts 100 300 500 1000]
+
+Looks at all pairs of expressions that move some vertices together and are no opposites, repairs the
+worst first and measures each pair again with its corrective. *Undone*: of vertices that are moved
+by 0.5 mm at least and have no fault of their own, those that keep less than nine tenths of the
+linear sum's motion. *Worse*: pairs in which anything is deeper by 0.1 mm, or a face by 1 % larger
+beyond 2.5 times, than without. *Held out*: the correctives that the face has are taken away, and
+the search repairs their pairs: how far what it makes is from what was given.
+"""
+
+from __future__ import annotations
+
+import argparse
+import copy
+import time
+from pathlib import Path
+
+import numpy as np
+import risorius
+from risorius.author.correctives import CorrectiveOptions
+from risorius.author.correctives.poser import Poser
+from risorius.author.correctives.search import KINDS, Search, severity
+from risorius.author.geometry.skeleton import psd_parts
+from risorius.cli.faces.author import opposites
+
+COUNTS = (100, 300, 500, 1000, 2000)
+MOVED_MM, KEPT, REACH_MM = 0.5, 0.9, 10.0
+TORN = 2.5
+
+
+def corners_of(mesh):
+    """The vertices of each polygon, as one row of both."""
+    layouts = np.asarray(mesh.layout_positions, np.int64)
+    corners = layouts[np.asarray(mesh.face_layouts, np.int64)]
+    faces = np.repeat(np.arange(len(mesh.face_offsets) - 1), np.diff(mesh.face_offsets))
+    return corners, faces
+
+
+def undone(search, on, mesh):
+    """How many vertices a corrective holds back that have no fault: (looked at, held back, those of
+    them further than REACH_MM from a fault, those that it changes at all).
+
+    Args:
+        search: has repaired the pair.
+        on: the pair.
+        mesh: the skin.
+    """
+    neutral = search.poser.neutral[0]
+    linear = search.poser.pose(on, corrected=False)[0]
+    made = search.poser.pose(on)[0]
+    faults, allowed = search.checker.look(linear, search.poser.pose(on)[1:]), search.allowed(on)
+    bad = np.asarray(faults.depth) > np.maximum(np.asarray(allowed.depth), 0.1)
+    corners, faces = corners_of(mesh)
+    torn = np.asarray(faults.stretch) > np.maximum(np.asarray(allowed.stretch), TORN)
+    bad[corners[torn[faces]]] = True
+    way = linear - neutral
+    length = np.linalg.norm(way, axis=1)
+    free = ~bad & (length * search.mm > MOVED_MM)
+    kept = np.einsum("vi,vi->v", made - neutral, way)[free] / length[free] ** 2
+    held = kept < KEPT
+    changed = np.linalg.norm(made - linear, axis=1)[free] * search.mm > 0.01
+    far = 0
+    if bad.any():
+        places = linear[free][held]
+        gaps = np.linalg.norm(places[:, None] - linear[bad][None], axis=2)
+        far = int((gaps.min(axis=1, initial=np.inf) * search.mm > REACH_MM).sum())
+    return free.sum(), held.sum(), far, changed.sum()
+
+
+def worse(search, on):
+    """Whether anything is worse than without the corrective.
+
+    Args:
+        search: has repaired the pair.
+        on: the pair.
+    """
+    solids = search.poser.pose(on)[1:]
+    a = search.checker.look(search.poser.pose(on, corrected=False)[0], solids)
+    b = search.faults(on)
+    deeper = np.asarray(b.depth).max() > np.asarray(a.depth).max() + 0.1
+    larger = np.asarray(b.stretch).max() > max(TORN, 1.01 * np.asarray(a.stretch).max())
+    return deeper or larger
+
+
+def held_out(dna):
+    """Lines: pairs that the face has correctives of, as these make them and as the search does.
+
+    Args:
+        dna: the face.
+    """
+    bare = copy.copy(dna)
+    bare.psds = risorius.Psds(rows=[], columns=[], values=np.zeros(0, np.float32))
+    search = Search(bare, CorrectiveOptions(apart=opposites()), None)
+    truth = Poser(dna, search.skin, search.solids)
+    given = {tuple(sorted(on)) for on in psd_parts(dna).values() if len(on) == 2}
+    out, means, moving_means = [], [], []
+    for on in sorted(given):
+        search.repair([on], (0.0, 1.0))
+        sculpted, plain = truth.pose(on)[0], search.poser.pose(on, corrected=False)[0]
+        moved = np.linalg.norm(sculpted - plain, axis=1) * search.mm
+        off = np.linalg.norm(search.poser.pose(on)[0] - sculpted, axis=1) * search.mm
+        touched = (moved > 0.1) | (off > 0.1)
+        if not touched.any():
+            continue
+        means.append(off[touched].mean())
+        moving = np.linalg.norm(sculpted - truth.neutral[0], axis=1) * search.mm > 0.1
+        moving_means.append(off[moving].mean())
+        out.append(
+            f"  {' x '.join(search.names[c] for c in on):32} sculpted {moved.max():5.2f} mm, "
+            f"mean {moved[touched].mean():5.2f}; found is {means[-1]:5.2f} off in the mean, "
+            f"{off.max():5.2f} at most, {moving_means[-1]:5.2f} in the mean of what moves"
+        )
+    out.append(
+        f"held out: {np.mean(means):.2f} mm in the mean of what {len(means)} pairs change, "
+        f"{np.mean(moving_means):.2f} of what moves"
+    )
+    return out
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("face", type=Path)
+    parser.add_argument("--counts", type=int, nargs="*", default=COUNTS)
+    parser.add_argument("--most", type=int, default=100_000, help="pairs that are repaired")
+    parser.add_argument("--looked-at", type=int, default=400, help="for what is undone")
+    parser.add_argument("--held-out", action="store_true", help="that alone")
+    args = parser.parse_args()
+    begin, cpu = time.monotonic(), time.process_time()
+    dna = risorius.load(args.face)
+    if args.held_out:
+        print("\n".join(held_out(dna)))
+        return
+    search = Search(dna, CorrectiveOptions(apart=opposites()), None)
+    pairs = search.pairs()
+    sums = dict(zip(pairs, search.sums(pairs, (0.0, 1.0)), strict=True))
+    wrong = sorted((p for p in pairs if severity(sums[p]) > 0), key=lambda p: -severity(sums[p]))
+    bad = [p for p in wrong if severity(sums[p]) > 0.1]
+    print(
+        f"{len(pairs):,} pairs, {len(wrong):,} wrong, {len(bad):,} of them by more than is left "
+        f"alone; {time.process_time() - cpu:.0f} s of CPU",
+        flush=True,
+    )
+    search.repair(bad[: args.most], (0.0, 1.0))
+    made = [p for p in bad if p in search.found]
+    print(f"{'correctives':>11} {'mm3 inside':>11} {'torn':>7} {'folded':>7}")
+    for count in sorted({0, len(made), *(n for n in args.counts if n < len(made))}):
+        mended = set(made[:count])
+        left = {p: search.found[p].after if p in mended else s for p, s in sums.items()}
+        row = [sum(getattr(s, kind) for s in left.values()) for kind in KINDS]
+        print(f"{count:11,} {row[0]:11,.0f} {row[1]:7,.0f} {row[2]:7,.0f}", flush=True)
+    some = made[:: max(1, len(made) // args.looked_at)]
+    mesh = dna.meshes[search.skin]
+    counted = np.sum([undone(search, on, mesh) for on in some], axis=0)
+    print(
+        f"{len(some)} of them: {counted[0]:,} vertices that move and have no fault; {counted[3]:,} "
+        f"are changed, {counted[1]:,} keep less than {KEPT:.0%}, {counted[2]:,} of these more than "
+        f"{REACH_MM:.0f} mm from a fault"
+    )
+    print(f"worse in {sum(worse(search, on) for on in some)} of them")
+    print(f"{time.process_time() - cpu:.0f} s of CPU, {time.monotonic() - begin:.0f} s")
+
+
+if __name__ == "__main__":
+    main()
