@@ -18,6 +18,7 @@ import pytest
 import risorius
 from conftest import GOLDEN, SHARED, require_extra
 from risorius import _native
+from risorius.author.joint_rig import grouped
 from risorius.cli import main
 from risorius.rigs import edit
 from test_rig_random import assert_near, random_face, random_group, random_raw
@@ -670,3 +671,42 @@ def test_a_full_scale_face():
     again, told = edit.regroup(giant(dna), timed=0)
     assert told.before.groups == 1
     assert again.to_bytes() == out.to_bytes()
+
+
+def _face_of(values):
+    """A face of one joint group: float[joints, controls], what each does to x of each joint."""
+    joints, controls = values.shape
+    dna = risorius.Dna()
+    dna.joint_names = [f"j{i}" for i in range(joints)]
+    dna.joint_parents = [0] * joints
+    dna.neutral_joint_translations = dna.neutral_joint_rotations = np.zeros((joints, 3))
+    dna.raw_control_names = [f"c{i}" for i in range(controls)]
+    dna.lod_count, dna.lod_joint_mapping = 1, [range(joints)]
+    dna.joint_row_count, dna.joint_column_count = 9 * joints, controls
+    dna.joint_groups = [
+        risorius.JointGroup(
+            lods=[joints],
+            input_indices=range(controls),
+            output_indices=9 * np.arange(joints),
+            values=values.astype(np.float32),
+            joint_indices=range(joints),
+        )
+    ]
+    return dna
+
+
+@pytest.mark.parametrize(
+    ("values", "groups"),
+    [
+        # One control drives one joint: by region 4 x 4 of which 4 are not 0, by drivers 4 x 1.
+        (np.eye(4), 4),
+        # Two controls drive two joints each: half is empty, which a region may be.
+        (np.kron(np.eye(2), np.ones((2, 2))), 1),
+        (np.ones((4, 4)), 1),
+    ],
+)
+def test_a_new_face_has_groups_by_region_unless_these_are_mostly_empty(values, groups):
+    dna = _face_of(values)
+    made = grouped(dna, {"mouth": list(dna.joint_names)})
+    assert len(made.joint_groups) == groups
+    np.testing.assert_array_equal(matrix(made, 0), matrix(dna, 0))

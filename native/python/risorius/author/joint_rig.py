@@ -44,6 +44,8 @@ from .work import (
     resting,
 )
 
+_EMPTY = 2.0  # groups by region may be so many times larger than those by what drives joints
+
 
 @dataclass
 class JointRig:
@@ -206,8 +208,22 @@ def _combine(
     values = np.concatenate([columns.transpose(1, 2, 0), found.values()], axis=2)
     group = _joint_group(work, values, [*work.columns, *found.order])
     work.dna.joint_groups = [*work.groups, group]
-    work.dna, _ = regroup(work.dna, regions=regions, combinations=0, timed=0)
+    work.dna = grouped(work.dna, regions)
     return found.finish(max(1, work.source.lod_count))
+
+
+def grouped(dna: Dna, regions: dict[str, list[str]]) -> Dna:
+    """The same face with joint groups by region, or by what drives joints where these are far
+    smaller: a thousand correctives move a few joints of a region each.
+
+    Args:
+        dna: a face; it stays as it is.
+        regions: names of joints by region.
+    """
+    out, by_region = regroup(dna, regions=regions, combinations=0, timed=0)
+    other, by_drivers = regroup(dna, combinations=0, timed=0)
+    far_smaller = _EMPTY * by_drivers.after.coefficients < by_region.after.coefficients
+    return other if far_smaller else out
 
 
 def _level_count(dna: Dna, options: LodOptions) -> int:
