@@ -190,6 +190,57 @@ def drag_slider(hand: Hand, _dna: Path) -> Iterator[Check]:
     hand.ask("run", code="bpy.context.window_manager.risorius_search = ''")
 
 
+def drag_skin(hand: Hand, _dna: Path) -> Iterator[Check]:
+    """The skin itself: the corner of the mouth is dragged by the pointer."""
+    if not hand.ask("has", operator="risorius.drag_mode"):
+        raise NotThereError("risorius.drag_mode")
+    clear(hand)
+    look_at_face(hand)
+    ready_tab(hand)
+    hand.click(*hand.find(r"risorius\.drag_mode"))
+    corner = hand.ask("moved_by", control=SMILE[0])
+    start = corner["at"]
+    end = (start[0] + 14, start[1] - 12)
+    hand.begin_drag(start)
+    hand.go(start, end)
+    hand.picture("skin-dragged")
+    at = hand.ask("vertex_at", vertex=corner["vertex"])["at"]
+    apart = max(abs(a - b) for a, b in zip(at, end, strict=True))
+    yield f"the vertex is within 2 pixels of the pointer ({apart:.1f})", apart <= 2
+    hand.key("Escape")
+    hand.do("mouseup", 1)
+    sliders = hand.ask("state")["sliders"]
+    yield "Esc while it is dragged gives all sliders back what they had", sliders == {}
+    hand.move(*start)
+    hand.drag(start, end)
+    sliders = hand.ask("state")["sliders"]
+    at = hand.ask("vertex_at", vertex=corner["vertex"])["at"]
+    apart = max(abs(a - b) for a, b in zip(at, end, strict=True))
+    yield f"let go it stays within 2 pixels ({apart:.1f})", apart <= 2 and len(sliders) > 0
+    yield "and the last operator was one drag", hand.ask("state")["last"] == "RISORIUS_OT_drag"
+    hand.do("keydown", "ctrl")
+    hand.begin_drag(end)
+    hand.go(end, (end[0], end[1] + 25))
+    hand.picture("skin-one-slider")
+    hand.key("Escape")
+    hand.do("mouseup", 1)
+    hand.do("keyup", "ctrl")
+    yield "one slider by Ctrl, and Esc: as before", hand.ask("state")["sliders"] == sliders
+    hand.move(WIDTH * 0.3, HEIGHT * 0.5)
+    hand.key("ctrl+z")
+    hand.wait("undone", lambda: hand.ask("state")["sliders"] == {})
+    yield "Ctrl-Z takes the drag back while the mode goes on", True
+    hand.do("keydown", "shift")
+    hand.click(*start)
+    hand.do("keyup", "shift")
+    yield "Shift and click pins", "risorius_pins" in hand.ask("state")["keys"]
+    hand.picture("skin-pin")
+    hand.click(*start)
+    hand.key("Escape")
+    hand.move(WIDTH * 0.3, HEIGHT * 0.7)
+    yield "Esc ends it, nothing is drawn any more", not hand.ask("drawing")
+
+
 def add_layer(hand: Hand, _dna: Path) -> Iterator[Check]:
     """A layer by its menu: idle life, which moves the face when frames play."""
     clear(hand)
@@ -287,7 +338,7 @@ bpy.context.view_layer.update()
 view()[0].tag_redraw()
 """
 
-STEPS: tuple[Step, ...] = (start, drag_slider, add_layer, see_why, import_file)
+STEPS: tuple[Step, ...] = (start, drag_slider, drag_skin, add_layer, see_why, import_file)
 
 
 def run(hand: Hand, dna: Path, wanted: list[str]) -> int:

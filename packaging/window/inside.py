@@ -182,6 +182,11 @@ def vertex_at(vertex):
     return {"world": place.tolist(), "at": on_screen(place)}
 
 
+def drawing():
+    """Whether a drag of the skin draws over the views."""
+    return module("ui.drag.drawing").is_drawing()
+
+
 def bone_at(name):
     """Where the middle of a bone of the controls is on the screen."""
     controls = rig()["risorius_controls"]

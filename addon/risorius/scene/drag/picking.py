@@ -17,10 +17,12 @@ from ..base import parts
 from ..base.blender_types import ArmatureObject, Context
 from ..character import runtime
 from ..frame import inputs
+from . import handles
 from .head_turns import HeadTurns
 from .skin import Point, Skin
 
 _FAR = 0.05  # of the face's size: a hit farther from all vertices is another's skin
+NEAR = 0.06  # of the face's size: a handle farther from what is under the cursor is hidden by it
 _THROUGH = 16  # objects that are drawn as wires or bounds, and looked through
 
 
@@ -145,3 +147,24 @@ def places(
         if at is not None:
             found.append(at)
     return found
+
+
+def handles_of(
+    context: Context, rig: ArmatureObject, live: runtime.Runtime
+) -> list[tuple[Point, NDArray[np.float64]]]:
+    """The handles of a face that is seen: each point with its place in the world.
+
+    Args:
+        context: has the scene that is seen.
+        rig, live: the character and its Runtime.
+    """
+    points = handles.of(Skin.of(context, rig, live).surface)
+    found = places(context, rig, live, points)
+    return list(zip(points, found, strict=False))
+
+
+def size_of(rig: ArmatureObject, live: runtime.Runtime) -> float:
+    """How large a face is in the world. Args: rig, live  the character and its Runtime."""
+    first = np.asarray(live.dna.meshes[0].positions) if live.dna.meshes else np.zeros((1, 3))
+    across = float(np.ptp(first, axis=0).max()) * live.space.scale
+    return across * float(np.abs(np.array(rig.matrix_world)[:3, :3]).max())

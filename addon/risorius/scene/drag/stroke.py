@@ -94,6 +94,7 @@ class Stroke:
     raw: NDArray[np.float32]
     best: list[tuple[int, float, float]] = field(default_factory=list)
     _anchors: dict[bool, _Anchors] = field(default_factory=dict)
+    _was: NDArray[np.float32] | None = None  # [V, 3] of the dragged mesh at the press, file space
     _apart: Float = field(default_factory=lambda: np.zeros(3))  # seen less predicted, world
 
     @property
@@ -170,9 +171,10 @@ class Stroke:
     def heat(self) -> tuple[Float, Float]:
         """The dragged mesh: float64[V, 3] vertices in the world, float64[V] how far each moved."""
         mesh = self.point[0]
+        if self._was is None:
+            self._was = self.skin.surface.positions(self.state.seen, mesh)
         now = self.skin.surface.positions(self.raw, mesh)
-        was = self.skin.surface.positions(self.state.seen, mesh)
-        far = np.linalg.norm(now.astype(np.float64) - was, axis=1) * self.live.space.scale
+        far = np.linalg.norm(now.astype(np.float64) - self._was, axis=1) * self.live.space.scale
         seen = self.skin.seen(mesh)
         return (self.turns.positions(mesh, now) if seen is None else seen), far
 

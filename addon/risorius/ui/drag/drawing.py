@@ -24,6 +24,7 @@ Colour = tuple[float, float, float, float]
 
 HELD: Colour = (1.0, 0.55, 0.1, 1.0)  # the point that is dragged
 OFFERED: Colour = (1.0, 1.0, 1.0, 0.9)  # the one that a press would take
+HANDLE: Colour = (1.0, 0.8, 0.3, 0.75)
 PIN: Colour = (0.2, 0.75, 1.0, 1.0)
 _HOT = np.array((1.0, 0.45, 0.05))
 _SHOWN = 0.04  # of the farthest move: what moves less is not coloured
@@ -129,9 +130,7 @@ def _draw_heat() -> None:
     batch = batch_for_shader(shader, "TRIS", content, indices=shown.triangles[warm])  # pyright: ignore  arrays
     gpu.state.blend_set("ALPHA")
     gpu.state.depth_test_set("LESS_EQUAL")
-    gpu.state.face_culling_set("BACK")
     batch.draw(shader)
-    gpu.state.face_culling_set("NONE")
     gpu.state.depth_test_set("NONE")
     gpu.state.blend_set("NONE")
 

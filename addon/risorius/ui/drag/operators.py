@@ -19,6 +19,7 @@ from ..words import of_error, say
 from . import drawing, properties, view
 
 _ENDS = {"ESC", "RIGHTMOUSE"}
+_NEAR = 9  # pixels, at an interface of 1, within which a press takes a handle
 _ONE = {"LEFT_CTRL", "RIGHT_CTRL"}
 
 
@@ -80,7 +81,7 @@ class RISORIUS_OT_drag(Operator):
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:
         where = view.under(context, event)
         try:
-            hit = picking.under(context, *where.ray(where.mouse(event))) if where else None
+            hit = _pick(context, where, event) if where else None
             if where is None or hit is None:
                 self.report({"WARNING"}, say("Point at the skin of a face."))
                 return {"CANCELLED"}
@@ -225,7 +226,7 @@ class RISORIUS_OT_drag_mode(Operator):
         if event.type not in ("MOUSEMOVE", "LEFTMOUSE") or where is None:
             return {"PASS_THROUGH"}
         try:
-            hit = picking.under(context, *where.ray(where.mouse(event)))
+            hit = _pick(context, where, event)
         except FaceError as error:
             self.report({"WARNING"}, of_error(error))
             return {"PASS_THROUGH"}
@@ -317,6 +318,23 @@ def _counts(live: runtime.Runtime) -> list[int]:
     return [len(mesh.positions) for mesh in live.dna.meshes]
 
 
+def _pick(context: Context, where: view.View, event: bpy.types.Event) -> picking.Hit | None:
+    """The point that a press would take: a handle that is near, else what lies under the cursor."""
+    mouse = where.mouse(event)
+    hit = picking.under(context, *where.ray(mouse))
+    live = runtime.of(hit.rig) if hit is not None else None
+    if hit is None or live is None or not properties.choices_of(context).handles:
+        return hit
+    near = _NEAR * context.preferences.system.ui_scale
+    for point, place in picking.handles_of(context, hit.rig, live):
+        pixel = where.pixel(place)
+        if pixel is None or (pixel - mouse).length > near:
+            continue
+        if np.linalg.norm(place - hit.place) < picking.NEAR * picking.size_of(hit.rig, live):
+            return picking.Hit(hit.rig, point, place)
+    return hit
+
+
 def _offer(context: Context, hit: picking.Hit | None) -> None:
     """Show the point that a press would take, and the pins of its face."""
     shown = drawing.Shown()
@@ -324,8 +342,11 @@ def _offer(context: Context, hit: picking.Hit | None) -> None:
         shown.points.append((hit.place, drawing.OFFERED, 4.0))
     rig = hit.rig if hit is not None else parts.active_rig(context)
     live = runtime.of(rig) if rig is not None else None
-    if rig is not None and live is not None:
+    if rig is not None and live is not None and parts.controls_of(rig) is not None:
         shown.points += _pins_of(context, rig, live)
+        if properties.choices_of(context).handles:
+            places = picking.handles_of(context, rig, live)
+            shown.points += [(place, drawing.HANDLE, 3.0) for _, place in places]
     drawing.show(context, shown)
 
 

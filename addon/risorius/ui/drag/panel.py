@@ -26,6 +26,7 @@ class RISORIUS_PT_drag(FaceOnlyPanel, Panel):
         layout, choices = self.layout, properties.choices_of(context)
         layout.prop(choices, "symmetric")
         layout.prop(choices, "region")
+        layout.prop(choices, "handles")
         layout.prop(choices, "heat")
         layout.row().prop(choices, "method", expand=True)
         rig = face_rig(context)

@@ -46,6 +46,12 @@ class RISORIUS_PG_drag(bpy.types.PropertyGroup):
     symmetric: symmetric_property()
     method: method_property()
     region: region_property()
+    handles: bpy.props.BoolProperty(
+        name="Show Handles",
+        description="Some points where dragging reaches most; any other can be dragged as well",
+        default=True,
+        options={"SKIP_SAVE"},
+    )
     heat: bpy.props.BoolProperty(
         name="Colour What Moves",
         description="Colour the skin by how far it moves in a drag",
