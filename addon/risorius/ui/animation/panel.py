@@ -5,6 +5,7 @@ from .. import words
 from ..blender_types import Context, Panel
 from ..common import FaceOnlyPanel, face_controls
 from ..expressions.menus import RISORIUS_MT_expressions
+from .mesh_operators import RISORIUS_OT_curves_from_mesh
 from .operators import RISORIUS_OT_import_animation, RISORIUS_OT_import_arkit_rig
 from .place_clip import report_of
 
@@ -21,6 +22,7 @@ class RISORIUS_PT_animation(FaceOnlyPanel, Panel):
         column.operator_context = "INVOKE_DEFAULT"
         column.operator(RISORIUS_OT_import_animation.bl_idname, icon="IMPORT")
         column.operator(RISORIUS_OT_import_arkit_rig.bl_idname, icon="SHAPEKEY_DATA")
+        column.operator(RISORIUS_OT_curves_from_mesh.bl_idname, icon="MESH_DATA")
         column.operator("risorius.speak", icon="SPEAKER")
         column.menu(RISORIUS_MT_expressions.bl_idname, icon="USER")
         data = face_controls(context).animation_data

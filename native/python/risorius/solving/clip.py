@@ -30,7 +30,7 @@ _AROUND = 8  # frames before and behind a chunk that its curves are smoothed wit
 _FLOOR_MM = 0.004  # of what is taken for noise
 _WORTH = 3.0  # standard errors of a control's value that its price is
 _LEAST = 0.01  # a control that never goes further is not used
-_SUDDEN = (0.004, 0.2)  # least and most usual change of a step from frame to frame, at 30 a second
+_SUDDEN = (0.004, 0.5)  # least and most usual change of a step from frame to frame, at 30 a second
 _SOON = 0.1  # a control's change from which on derivatives are made anew
 _ENOUGH = 5e-4  # a control's change that is none
 
@@ -270,7 +270,7 @@ def _together(job: _Job, curves: Doubles, workers: int) -> Doubles:
             aims.append(pull + matrix @ near[f - first])
             if begin <= f < begin + _CHUNK:
                 job.tell()
-        near = _smoothed(job, near.copy(), used, stiff, matrices, aims)
+        near = _smoothed(job, near.copy(), used, stiff[first : end - 2], matrices, aims)
         out[begin : begin + _CHUNK, used] = near[begin - first : begin - first + _CHUNK]
 
     with ThreadPoolExecutor(workers) as pool:
@@ -279,21 +279,27 @@ def _together(job: _Job, curves: Doubles, workers: int) -> Doubles:
 
 
 def _stiffness(job: _Job, curves: Doubles, used: npt.NDArray[np.intp]) -> Doubles:
-    """float64[used]: the price of a sudden change of each control.
+    """float64[F - 2, used]: the price of a sudden change of each control, around each frame.
 
     One over the square of how suddenly it usually changes: what its curve does, less what noise
-    makes of it, so that a blink stays sharp while a slow jaw is held quiet.
+    makes of it; where it plainly does more, as much as it does. So a blink stays sharp while a slow
+    jaw is held quiet.
     """
     if len(curves) < 3:
-        return np.zeros(len(used))
+        return np.zeros((0, len(used)))
     frame = _Frame(job)
     frame.linearise(np.median(curves, axis=0), 0.0)
     matrix = frame.matrix[np.ix_(used, used)]
     ridge = 1e-9 * max(float(np.trace(matrix)), 1e-30)
     noise = 6 * job.sigma**2 * np.diag(np.linalg.inv(matrix + ridge * np.eye(len(used))))
-    sudden = (np.diff(curves[:, used], 2, axis=0) ** 2).mean(axis=0)
+    sudden = np.diff(curves[:, used], 2, axis=0) ** 2
+    plain = np.where(sudden > 9 * noise, sudden, 0)
+    near = plain.copy()
+    near[1:] = np.maximum(near[1:], plain[:-1])
+    near[:-1] = np.maximum(near[:-1], plain[1:])
+    usual = np.median(sudden, axis=0) / 0.455 - noise  # of a normal distribution's square
     least, most = (limit * (30.0 / job.rate) ** 2 for limit in _SUDDEN)
-    return job.smooth / np.clip(sudden - noise, least**2, most**2)
+    return job.smooth / np.clip(np.maximum(near, usual), least**2, most**2)
 
 
 def _smoothed(
@@ -307,7 +313,7 @@ def _smoothed(
     """float64[n, used]: forwards and backwards through the frames until none changes any more."""
     count = len(curves)
     bend = np.diff(np.eye(count), 2, axis=0) if count > 2 else np.zeros((0, count))
-    bends = bend.T @ bend  # [n, n]
+    bends = np.einsum("ti,tc,tj->ijc", bend, stiff, bend)  # [n, n, used]
     diagonal = np.arange(len(used))
     low, high, rest = job.low[used], job.high[used], job.rest[used]
     price = np.full(len(used), job.sparse)
@@ -315,8 +321,8 @@ def _smoothed(
         before = curves.copy()
         for f in [*range(count), *reversed(range(count - 1))]:
             matrix = matrices[f].copy()
-            matrix[diagonal, diagonal] += stiff * bends[f, f]
-            pull = aims[f] - stiff * (bends[f] @ curves - bends[f, f] * curves[f])
+            matrix[diagonal, diagonal] += bends[f, f]
+            pull = aims[f] - (bends[f] * curves).sum(axis=0) + bends[f, f] * curves[f]
             curves[f] = descend(matrix, pull, low, high, rest, price, curves[f])
         if np.abs(curves - before).max() < _ENOUGH:
             break

@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A mesh of a face's own topology, moving by whatever means, as curves of the face's controls."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, cast
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import native
+from ...logic.animation.clip_units import ClipError
+from ...logic.base import heat_ramp
+from ...logic.base.sentences import told
+from ..base import parts
+from ..base.blender_types import ArmatureObject, Context, MeshObject
+from ..base.task import Task, telling
+from ..character import runtime
+from . import clip_actions
+
+RESIDUAL = "risorius_residual"  # colour attribute of a face's mesh
+_HOTTEST_MM = 2.0  # what is left over of a vertex and shown in the hottest colour, at least
+MOST_FRAMES = 20_000
+Floats = NDArray[np.float32]
+
+
+def sources(context: Context, rig: ArmatureObject) -> list[MeshObject]:
+    """Mesh objects of the scene with as many vertices as a mesh of a face, that are not its own.
+
+    Args:
+        context: has the scene.
+        rig: the face.
+    """
+    live = runtime.there(rig)
+    counts = {len(mesh.positions) for mesh in live.dna.meshes}
+    items = [item for item in context.scene.objects if item.type == "MESH"]
+    meshes = cast(list[MeshObject], items)
+    return [m for m in meshes if len(m.data.vertices) in counts and parts.rig_of(m) != rig]
+
+
+def source_of(context: Context, rig: ArmatureObject) -> MeshObject | None:
+    """The one to take from: a selected one, else the only one, else None.
+
+    Args:
+        context: has the scene.
+        rig: the face.
+    """
+    there = sources(context, rig)
+    selected = cast(list[MeshObject], context.selected_objects)
+    chosen = [item for item in selected if item in there]
+    if chosen:
+        return chosen[0]
+    return there[0] if len(there) == 1 else None
+
+
+def meant(rig: ArmatureObject, item: MeshObject) -> tuple[int, int]:
+    """The LOD and the mesh of a face's DNA that a source has the vertices of.
+
+    Args:
+        rig: the face.
+        item: one of `sources`.
+
+    Raises:
+        ClipError: there is none.
+    """
+    dna = runtime.there(rig).dna
+    count = len(item.data.vertices)
+    for lod in range(dna.lod_count):
+        for mesh in dna.lod_mesh_mapping[lod]:
+            if len(dna.meshes[mesh].positions) == count:
+                return lod, int(mesh)
+    raise ClipError(told("{name} has the vertices of no mesh of this face.", name=item.name))
+
+
+def recorded(
+    context: Context, item: MeshObject, first: int, last: int, progress: Callable[[float], None]
+) -> Floats:
+    """float32[F, V, 3]: an object's evaluated vertices in its own space, frame by frame.
+
+    Args:
+        context: scene and view layer.
+        item: a mesh object with all its modifiers.
+        first, last: frames.
+        progress: told the share that is done.
+
+    Raises:
+        ClipError: no frame or too many, a modifier that changes how many vertices there are.
+    """
+    count = last - first + 1
+    if not 1 <= count <= MOST_FRAMES:
+        raise ClipError(
+            told("1 to {most} frames were expected, found {count}.", most=MOST_FRAMES, count=count)
+        )
+    scene = context.scene
+    before = scene.frame_current, scene.frame_subframe
+    vertices = len(item.data.vertices)
+    out = np.empty((count, vertices, 3), np.float32)
+    try:
+        for row in range(count):
+            scene.frame_set(first + row)
+            seen = item.evaluated_get(context.evaluated_depsgraph_get())
+            mesh = seen.to_mesh()
+            if len(mesh.vertices) != vertices:
+                raise ClipError(
+                    told("{name}: a modifier changes its number of vertices.", name=item.name)
+                )
+            mesh.vertices.foreach_get("co", out[row].ravel())
+            seen.to_mesh_clear()
+            progress((row + 1) / count)
+    finally:
+        scene.frame_set(before[0], subframe=before[1])
+    return out
+
+
+def rest_of(item: MeshObject) -> Floats:
+    """float32[V, 3]: an object's vertices without keys and modifiers."""
+    keys = item.data.shape_keys
+    points = item.data.vertices if keys is None else keys.reference_key.data
+    out = np.empty(len(item.data.vertices) * 3, np.float32)
+    cast(Any, points).foreach_get("co", out)
+    return out.reshape(-1, 3)
+
+
+class MeshCurvesTask(Task["native.SolvedClip"]):
+    """Curves of a recorded mesh on their way, made in a thread.
+
+    Attributes:
+        mesh: the mesh of the DNA.
+        mm: millimetres of the file's unit.
+    """
+
+    def __init__(
+        self,
+        rig: ArmatureObject,
+        item: MeshObject,
+        frames: Floats,
+        rate: float,
+        *,
+        relative: bool,
+        sparse: float,
+        smooth: float,
+    ) -> None:
+        """Look at Blender's things while the caller's thread may.
+
+        Args:
+            rig: the face.
+            item: that was recorded.
+            frames: float32[F, V, 3], as `recorded` gives them.
+            rate: frames per second.
+            relative: the movement is taken and not the shape.
+            sparse, smooth: as of risorius.solve_clip.
+
+        Raises:
+            ClipError: a mesh that is none of the face's. DnaError: a face that cannot be solved for.
+        """
+        live = runtime.there(rig)
+        lod, self.mesh = meant(rig, item)
+        surface = native.module().Surface(live.dna, live.rig, lod)
+        self.mm = float(surface.mm)
+        made = native.part("solving.performance")
+        take = made.Performance(frames, rate, 0.0, rest_of(item))
+        own = np.asarray(live.dna.meshes[self.mesh].positions)
+
+        def work(
+            progress: Callable[[float], None], cancelled: Callable[[], bool]
+        ) -> native.SolvedClip:
+            fitted = made.fitted(take, own)
+            return native.module().solve_clip(
+                surface,
+                {self.mesh: fitted.frames},
+                rate=rate,
+                neutral={self.mesh: fitted.neutral} if relative else None,
+                sparse=sparse,
+                smooth=smooth,
+                progress=telling(progress, cancelled),
+            )
+
+        super().__init__(work)
+
+
+def show_residual(rig: ArmatureObject, mesh: int, residual: Floats) -> float:
+    """Paint what is left over onto a face's mesh, as a colour attribute.
+
+    Args:
+        rig: the face.
+        mesh: of the DNA.
+        residual: float32[V] in mm.
+
+    Returns:
+        The mm of the hottest colour; 0 where the face has no such mesh.
+    """
+    hottest = max(_HOTTEST_MM, float(residual.max(initial=0)))
+    colours = heat_ramp.linear(heat_ramp.colours(residual.astype(np.float64) / hottest))
+    for item in parts.meshes_of(rig):
+        if item.get("dna_mesh") != mesh or len(item.data.vertices) != len(residual):
+            continue
+        there = item.data.color_attributes.get(RESIDUAL)
+        if there is not None:
+            item.data.color_attributes.remove(there)
+        made = item.data.color_attributes.new(RESIDUAL, "FLOAT_COLOR", "POINT")
+        cast(Any, made).data.foreach_set("color", np.ascontiguousarray(colours, np.float32).ravel())
+        item.data.color_attributes.active_color = made
+        return hottest
+    return 0.0
+
+
+def rate_of(scene: bpy.types.Scene) -> float:
+    """Frames per second."""
+    return clip_actions.frame_rate(scene)
