@@ -17,8 +17,19 @@ from .logic.base.face_regions import FaceRegions
 from .logic.base.sentences import told
 
 if TYPE_CHECKING:  # names for annotations: nothing else may import the wheel
-    from risorius import BoneSpace, Clip, Dna, Layer, Mesh, Mixer, Morph, Pose, Rig  # noqa: F401
-    from risorius import SolvedClip, Surface  # noqa: F401
+    from risorius import (  # noqa: F401  # noqa: F401
+        BoneSpace,
+        Clip,
+        Dna,
+        Layer,
+        Mesh,
+        Mixer,
+        Morph,
+        Pose,
+        Rig,
+        SolvedClip,
+        Surface,
+    )
     from risorius.anim.reactions import Reaction  # noqa: F401
     from risorius.author import JointRig  # noqa: F401
     from risorius.author.input.shape_face import ShapeSet  # noqa: F401

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, cast
+from typing import cast
 
 import bpy
 import numpy as np
@@ -15,12 +15,11 @@ from ...logic.animation.clip_units import ClipError
 from ...logic.base import heat_ramp
 from ...logic.base.sentences import told
 from ..base import parts
-from ..base.blender_types import ArmatureObject, Context, MeshObject
+from ..base.blender_types import ArmatureObject, Attribute, Context, MeshObject
 from ..base.task import Task, telling
 from ..character import runtime
 from . import clip_actions
 
-RESIDUAL = "risorius_residual"  # colour attribute of a face's mesh
 _HOTTEST_MM = 2.0  # what is left over of a vertex and shown in the hottest colour, at least
 MOST_FRAMES = 20_000
 Floats = NDArray[np.float32]
@@ -117,9 +116,11 @@ def recorded(
 def rest_of(item: MeshObject) -> Floats:
     """float32[V, 3]: an object's vertices without keys and modifiers."""
     keys = item.data.shape_keys
-    points = item.data.vertices if keys is None else keys.reference_key.data
     out = np.empty(len(item.data.vertices) * 3, np.float32)
-    cast(Any, points).foreach_get("co", out)
+    if keys is None:
+        item.data.vertices.foreach_get("co", out)
+    else:
+        keys.reference_key.points.foreach_get("co", out)
     return out.reshape(-1, 3)
 
 
@@ -153,7 +154,8 @@ class MeshCurvesTask(Task["native.SolvedClip"]):
             sparse, smooth: as of risorius.solve_clip.
 
         Raises:
-            ClipError: a mesh that is none of the face's. DnaError: a face that cannot be solved for.
+            ClipError: a mesh that is none of the face's.
+            DnaError: a face that cannot be solved for.
         """
         live = runtime.there(rig)
         lod, self.mesh = meant(rig, item)
@@ -194,14 +196,16 @@ def show_residual(rig: ArmatureObject, mesh: int, residual: Floats) -> float:
     hottest = max(_HOTTEST_MM, float(residual.max(initial=0)))
     colours = heat_ramp.linear(heat_ramp.colours(residual.astype(np.float64) / hottest))
     for item in parts.meshes_of(rig):
-        if item.get("dna_mesh") != mesh or len(item.data.vertices) != len(residual):
+        if item.get(parts.MESH) != mesh or len(item.data.vertices) != len(residual):
             continue
-        there = item.data.color_attributes.get(RESIDUAL)
-        if there is not None:
-            item.data.color_attributes.remove(there)
-        made = item.data.color_attributes.new(RESIDUAL, "FLOAT_COLOR", "POINT")
-        cast(Any, made).data.foreach_set("color", np.ascontiguousarray(colours, np.float32).ravel())
-        item.data.color_attributes.active_color = made
+        held = item.data.color_attributes
+        layer: Attribute = held.get(parts.RESIDUAL)
+        if layer is not None:
+            held.remove(layer)
+        layer = held.new(parts.RESIDUAL, "FLOAT_COLOR", "POINT")
+        layer.data.foreach_set("color", colours.ravel())
+        held.active_color_name = layer.name
+        item.data.update_tag()
         return hottest
     return 0.0
 

@@ -25,6 +25,7 @@ BODY_NECK = "risorius_body_neck"  # on the control armature: bones of the body, 
 BODY_HEAD = "risorius_body_head"  # the same for the head
 MESH_PREFIX = "risorius_mesh_"  # + number, on the deforming armature: a mesh
 MESH = "dna_mesh"  # on a mesh object: its number in the DNA
+RESIDUAL = "risorius_residual"  # colours of a mesh: what solved curves leave of another
 LODS = "dna_lods"  # on a mesh object: the levels that show it
 JOINT = "dna_joint"  # on a bone: its number in the DNA
 HIDDEN_PREFIX = "risorius_"  # + flag, on a mesh: what was last written to the flag

@@ -27,7 +27,7 @@ class RISORIUS_OT_curves_from_mesh(RunsBeside, PlacesClip, Operator):
 
     source: bpy.props.StringProperty(
         name="Object",
-        description="A mesh with the face's own vertices; empty: the selected one, else the only one",
+        description="A mesh with the face's own vertices; empty: the selected, else the only one",
         options={"SKIP_SAVE"},
     )
     first: bpy.props.IntProperty(name="First Frame", description="Of what is taken", default=1)
