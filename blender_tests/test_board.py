@@ -303,6 +303,37 @@ def test_operators_work_on_the_board_where_it_leads(rig, board_file):
     assert handle(rig, PULL_R).location.y > 0.6
 
 
+def test_blenders_pose_pasted_flipped_swaps_sides_on_the_board(rig):
+    put(rig, **{PULL_L: (0.0, 0.7), LOOK: (0.4, 0.2)})
+    bpy.context.view_layer.objects.active = scene.controls(rig)
+    bpy.ops.object.mode_set(mode="POSE")
+    bpy.ops.risorius.select_board(region="MOUTH")
+    bpy.ops.pose.copy()
+    put(rig, **{PULL_L: (0.0, 0.1)})
+    sliders = dict(scene.face(rig).items())
+    assert bpy.ops.risorius.paste_pose_flipped() == {"FINISHED"}
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert handle(rig, PULL_R).location.to_tuple(4) == (0.0, 0.7, 0.0)
+    assert handle(rig, PULL_L).location.to_tuple(4) == (0.0, 0.0, 0.0)
+    assert handle(rig, LOOK).location.to_tuple(4) == (0.4, 0.2, 0.0)  # it was not copied
+    assert dict(scene.face(rig).items()) == sliders
+
+
+def test_a_drag_moves_the_board_where_it_leads(rig, board_file):
+    put(rig, **{JAW: (0.0, 0.2)})
+    sliders = dict(scene.face(rig).items())
+    vertex, item = 12, scene.meshes(rig)[1]  # of the teeth: the jaw's
+    before = scene.evaluated(item)[vertex]
+    put(rig, **{JAW: (0.0, 0.8)})
+    goal = scene.evaluated(item)[vertex]
+    put(rig, **{JAW: (0.0, 0.2)})
+    bpy.ops.risorius.drag(mesh=1, vertex=vertex, offset=tuple(goal - before))
+    there = scene.evaluated(item)[vertex]
+    assert np.linalg.norm(there - goal) < 0.2 * np.linalg.norm(goal - before)
+    assert dict(scene.face(rig).items()) == sliders
+    assert handle(rig, JAW).location.y > 0.4
+
+
 def test_what_works_on_sliders_alone_says_who_leads(rig):
     with pytest.raises(RuntimeError, match="The board leads this face"):
         bpy.ops.risorius.link_sides()

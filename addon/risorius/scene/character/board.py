@@ -24,6 +24,7 @@ from . import runtime
 
 RANGE = "Range"  # the constraint of a handle that is ours
 SEEN = 0.0005  # a raw control that is off by less is not worth a word
+_NEAR = 1e-6  # numbers that are the same
 _BY_BOARD, _BY_SLIDERS = "BOARD", "SLIDERS"
 Floats = NDArray[np.float32]
 
@@ -369,6 +370,38 @@ def put_places(
         if handle.bone in places:
             controls.pose.bones[handle.bone].location = places[handle.bone]
     controls.update_tag()
+
+
+def mark(rig: ArmatureObject, sign: float) -> None:
+    """Mark all handles, to see which of them Blender pastes onto.
+
+    Args:
+        rig: the character.
+        sign: what no hand sets; it goes where a handle has no way.
+    """
+    for handle in handles_in(rig):
+        parts.controls_there(rig).pose.bones[handle.bone].location[2] = sign
+
+
+def pasted_flipped(rig: ArmatureObject, sign: float) -> dict[str, float]:
+    """What Blender pasted flipped onto marked handles, by the names of sliders, not yet flipped.
+
+    Blender turns each place over and knows no partners.
+
+    Args:
+        rig: the character, which the board leads.
+        sign: the mark.
+    """
+    live, controls = runtime.there(rig), parts.controls_there(rig)
+    labels: set[str] = set()
+    for handle in _handles_there(controls, live):
+        place = controls.pose.bones[handle.bone].location
+        if abs(place[2] - sign) > _NEAR:
+            place[0] = -place[0]
+            labels |= {
+                live.labels[i] for way in handle.axes for i in live.table.outputs_of(way.gui)
+            }
+    return {label: value for label, value in given(rig).items() if label in labels}
 
 
 def is_same(one: runtime.Runtime, other: runtime.Runtime) -> bool:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import cast
 
 import bpy
@@ -60,17 +61,39 @@ def put(rig: ArmatureObject, values: Mapping[str, float]) -> int:
     return count
 
 
-def restore(rig: ArmatureObject, values: Mapping[str, float]) -> None:
-    """Give sliders the values that they had, whatever their limits.
+@dataclass(frozen=True)
+class Held:
+    """What sliders and handles of a face board were, to give it back exactly.
+
+    Attributes:
+        sliders: name -> value.
+        places: bone -> place of each handle.
+    """
+
+    sliders: Mapping[str, float]
+    places: Mapping[str, tuple[float, ...]]
+
+
+def hold(rig: ArmatureObject) -> Held:
+    """What a face shows now, whoever leads it. Args: rig  the character."""
+    face, live, controls = parts.face_bone(rig), runtime.there(rig), parts.controls_there(rig)
+    assert face is not None
+    sliders = {label: face[label] for label in live.labels if label in face}
+    return Held(sliders, board.places_of(controls, live))
+
+
+def restore(rig: ArmatureObject, held: Held) -> None:
+    """Give sliders and handles what they had, whatever their limits.
 
     Args:
         rig: the character.
-        values: by the names of the sliders.
+        held: from `hold`.
     """
     face = parts.face_bone(rig)
     assert face is not None
-    for label, value in values.items():
+    for label, value in held.sliders.items():
         face[label] = value
+    board.put_places(parts.controls_there(rig), runtime.there(rig), held.places)
 
 
 def mirror(rig: ArmatureObject, region: str = "") -> None:

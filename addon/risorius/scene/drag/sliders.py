@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from ... import native
 from ..animation import layer_mixing, layers
 from ..base import parts
 from ..base.blender_types import ArmatureObject, Depsgraph
-from ..character import runtime, sides
+from ..character import board, runtime, sides
 from ..frame import inputs
 
 Float = NDArray[np.float64]
@@ -33,6 +33,7 @@ class Sliders:
         free: bool[R] which can be moved.
         low, high: float64[R] the limits of `seen`.
         linked: (leader, follower) indices of sides that are linked.
+        places: bone -> place of each handle of a face board that leads; empty where none does.
     """
 
     before: dict[str, float]
@@ -43,6 +44,7 @@ class Sliders:
     low: Float
     high: Float
     linked: list[tuple[int, int]]
+    places: dict[str, tuple[float, ...]] = field(default_factory=dict)
 
     def values(self, raw: NDArray[np.float32]) -> Float:
         """The sliders that show these raw controls: float64[R]. Args: raw  float32[R]."""
@@ -67,7 +69,7 @@ def read(rig: ArmatureObject, live: runtime.Runtime, depsgraph: Depsgraph) -> Sl
     bone, seen = controls.pose.bones[parts.FACE], controls.evaluated_get(depsgraph)
     maximum = parts.maximum_of(controls)
     raw, _turns = inputs.read_inputs(seen, live, depsgraph, maximum)
-    start = inputs.read_sliders(seen, live).astype(np.float64)
+    start = inputs.read_leading(seen, live).astype(np.float64)
     gain = _gains(seen, live, depsgraph, maximum, start)
     where = {label: i for i, label in enumerate(live.labels)}
     followers = sides.followers(controls)
@@ -85,6 +87,7 @@ def read(rig: ArmatureObject, live: runtime.Runtime, depsgraph: Depsgraph) -> Sl
         low=np.minimum(one, other),
         high=np.maximum(one, other),
         linked=linked,
+        places=board.places_of(controls, live) if board.leads(controls, live) else {},
     )
 
 
@@ -103,6 +106,8 @@ def write(
         The names of those that differ from what they were.
     """
     controls = parts.controls_there(rig)
+    if sliders.places:
+        return _write_board(rig, live, sliders, raw)
     bone, maximum = controls.pose.bones[parts.FACE], parts.maximum_of(controls)
     followers = {follower for _, follower in sliders.linked}
     moved = []
@@ -120,6 +125,21 @@ def write(
     return moved
 
 
+def _write_board(
+    rig: ArmatureObject, live: runtime.Runtime, sliders: Sliders, raw: NDArray[np.float32]
+) -> list[str]:
+    """`write` where the face board leads: it comes as near as it can, from where it stood."""
+    board.put_places(parts.controls_there(rig), live, sliders.places)
+    values = sliders.values(raw)
+    moved = {
+        live.labels[i]: float(values[i])
+        for i in np.flatnonzero(values != sliders.start)
+        if live.labels[i] in sliders.before
+    }
+    sides.put(rig, moved)
+    return list(moved)
+
+
 def restore(rig: ArmatureObject, sliders: Sliders) -> None:
     """Give all sliders what they had.
 
@@ -127,7 +147,7 @@ def restore(rig: ArmatureObject, sliders: Sliders) -> None:
         rig: the character.
         sliders: as they were when the drag began.
     """
-    sides.restore(rig, sliders.before)
+    sides.restore(rig, sides.Held(sliders.before, sliders.places))
     parts.controls_there(rig).update_tag()
 
 

@@ -60,7 +60,7 @@ def of(rig: ArmatureObject) -> Present | None:
     if isinstance(state, tuple):
         raw, lod = np.frombuffer(state[0], np.float32), int(state[1])
     else:  # nothing was evaluated since undo or load
-        raw, lod = inputs.read_sliders(controls, live), lods.viewport_level(rig)
+        raw, lod = inputs.read_leading(controls, live), lods.viewport_level(rig)
     return Present(live, raw, lod, look_masks.of(rig))
 
 

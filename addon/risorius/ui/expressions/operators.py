@@ -115,7 +115,7 @@ class Blends(Mixes):
         except native.user_errors() as error:
             self.report({"ERROR"}, of_error(error))
             return {"CANCELLED"}
-        self._before, self._shown = sides.values_of(rig), True
+        self._before, self._held, self._shown = sides.values_of(rig), sides.hold(rig), True
         self._flip, self.strength, self._x = self.flip, 0.0, event.mouse_x
         context.window_manager.modal_handler_add(self)
         self._follow(context)
@@ -151,7 +151,7 @@ class Blends(Mixes):
     def _follow(self, context: Context) -> None:
         """Show the blend, or with Tab what was before."""
         rig = face_rig(context)
-        sides.restore(rig, self._before)
+        sides.restore(rig, self._held)
         if self._shown:
             poses.apply(rig, self._item, self.way(), self._before)
         evaluate.bring_up(context, rig)
@@ -166,13 +166,13 @@ class Blends(Mixes):
 
     def cancel(self, context: Context) -> None:
         rig = face_rig(context)
-        sides.restore(rig, self._before)
+        sides.restore(rig, self._held)
         evaluate.bring_up(context, rig)
         context.workspace.status_text_set(None)
 
     def execute(self, context: Context) -> Result:
         if hasattr(self, "_before"):  # what the drag has shown is no start
-            sides.restore(face_rig(context), self._before)
+            sides.restore(face_rig(context), self._held)
             del self._before
         return super().execute(context)
 

@@ -18,7 +18,7 @@ from ... import native
 from ...logic.character import slider_rows
 from ...scene.base import parts
 from ...scene.base.blender_types import ArmatureObject, current_context
-from ...scene.character import sides
+from ...scene.character import board, sides
 from ..blender_types import Context, Menu, Operator
 from ..common import active_controls, face_controls, face_rig
 from ..hand.base import HandOperator
@@ -57,10 +57,12 @@ class RISORIUS_OT_paste_pose_flipped(HandOperator, Operator):
 
     def move(self, context: Context) -> Collection[str] | None:
         rig, controls = face_rig(context), face_controls(context)
-        before = sides.values_of(rig)
+        before, led = sides.hold(rig), board.leads_face(rig)
         face = controls.pose.bones[parts.FACE]
-        for name in before:
+        for name in before.sliders:
             face[name] = _MARK
+        if led:
+            board.mark(rig, _MARK)
         tools = context.scene.tool_settings
         # Blender would key the sliders as it pastes them, before they are turned over.
         auto, tools.use_keyframe_insert_auto = tools.use_keyframe_insert_auto, False
@@ -72,9 +74,10 @@ class RISORIUS_OT_paste_pose_flipped(HandOperator, Operator):
             return None
         finally:
             tools.use_keyframe_insert_auto = auto
-        pasted = {
-            name: value for name, value in sides.values_of(rig).items() if not _is_mark(value)
-        }
+        values = {name: float(face[name]) for name in before.sliders}
+        pasted = {name: value for name, value in values.items() if not _is_mark(value)}
+        if led:
+            pasted = board.pasted_flipped(rig, _MARK)
         sides.restore(rig, before)
         sides.put(rig, slider_rows.flipped(pasted, native.regions()))
         return pasted

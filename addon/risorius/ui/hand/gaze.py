@@ -7,7 +7,7 @@ import bpy
 
 from ...scene.animation import keying
 from ...scene.base import parts
-from ...scene.character import rig_placement, runtime
+from ...scene.character import board, rig_placement, runtime
 from ...scene.frame import evaluate
 from ...scene.hand import blinks, gaze_target
 from .. import words
@@ -107,6 +107,10 @@ class RISORIUS_OT_blink(FaceOperator, Operator):
         rig, controls = face_rig(context), face_controls(context)
         if not blinks.sliders(runtime.there(rig), self.sides):
             self.report({"ERROR"}, say("This face has no control that closes an eye."))
+            return {"CANCELLED"}
+        if self.kind == "KEYS" and board.leads(controls, runtime.there(rig)):
+            text = "The board leads this face: choose As Layer, or Sliders in the panel Controls."
+            self.report({"ERROR"}, say(text))
             return {"CANCELLED"}
         frames = [float(context.scene.frame_current)]
         if self.at == "SELECTED":
