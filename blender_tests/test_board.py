@@ -170,7 +170,8 @@ def test_a_keyed_board_renders(rig, board_file, tmp_path):
     _key_jaw(rig)
     render = bpy.context.scene.render
     render.engine, render.resolution_x, render.resolution_y = "CYCLES", 8, 8
-    bpy.context.scene.cycles.samples = 1
+    cycles = bpy.context.scene.cycles
+    cycles.samples, cycles.use_denoising, cycles.device = 1, False, "CPU"
     bpy.context.scene.camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
     bpy.context.scene.collection.objects.link(bpy.context.scene.camera)
     bpy.context.scene.frame_start = bpy.context.scene.frame_end = 5
@@ -260,8 +261,8 @@ def test_keys_of_handles_go_into_groups_by_region(rig):
 
 def test_auto_key_keys_handles_that_operators_moved(rig):
     put(rig, **{PULL_L: (0.0, 0.7), JAW: (0.0, 0.5)})
-    tools = bpy.context.scene.tool_settings
-    tools.use_keyframe_insert_auto = True
+    tools, edit = bpy.context.scene.tool_settings, bpy.context.preferences.edit
+    tools.use_keyframe_insert_auto, edit.use_keyframe_insert_available = True, False
     bpy.context.scene.frame_set(7)
     bpy.ops.risorius.mirror()
     bpy.ops.risorius.reset_board()
@@ -295,7 +296,7 @@ def test_operators_work_on_the_board_where_it_leads(rig, board_file):
     assert dict(scene.face(rig).items()) == sliders  # none of them was touched
     bpy.ops.risorius.select_board(region="EYE")
     bones = scene.controls(rig).pose.bones
-    chosen = [b.name for b in bones if getattr(b, "select", None) or b.bone.select]
+    chosen = [b.name for b in bones if (b if hasattr(b, "select") else b.bone).select]
     assert chosen == [LOOK]
     put(rig, **{LOOK: (0.3, 0.3)})
     bpy.ops.risorius.reset_board(selected=True)
