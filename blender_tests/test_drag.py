@@ -7,7 +7,6 @@ import pytest
 import risorius
 from mathutils import Quaternion, Vector
 from support import oracle, scene
-from support.faces import small_face
 
 HEAD = 0  # number of the head's mesh in the small face
 VERTEX = 70
@@ -23,16 +22,21 @@ def rig(dna_file):
 
 
 @pytest.fixture
-def two_sided(tmp_path):
-    """A face whose left and right controls do the mirrored thing, by blend shapes alone."""
-    dna = small_face(name="Sides", head_grid=(7, 8))
-    dna.raw_control_names = [PREFIX + "mouthCornerPullL", PREFIX + "mouthCornerPullR"]
-    dna.gui_to_raw = risorius.Conditionals()
-    dna.joint_groups = []
-    rest = np.asarray(dna.meshes[HEAD].positions)
-    path = tmp_path / "sides.dna"
-    dna.save(str(path))
-    return path, rest
+def man():
+    """The sample face, which is alike left and right, with the corner of its mouth."""
+    bpy.ops.risorius.add_character()
+    rig = next(o for o in bpy.data.objects if "risorius_controls" in o)
+    scene.set_controls(rig, mouthCornerPullL=1.0)
+    head = scene.meshes(rig)[HEAD]
+    far = np.linalg.norm(scene.evaluated(head) - rest_of(head), axis=1)
+    scene.set_controls(rig, mouthCornerPullL=0.0)
+    return rig, int(np.argmax(far))
+
+
+def rest_of(head):
+    flat = np.empty(3 * len(head.data.vertices), np.float32)
+    head.data.vertices.foreach_get("co", flat)
+    return flat.reshape(-1, 3).astype(np.float64)
 
 
 def place(rig, vertex=VERTEX, mesh=HEAD):
@@ -119,6 +123,40 @@ def test_one_slider_alone(rig, dna_file):
     other = {k for k, v in sliders(rig).items() if v}
     assert len(other) == 1
     assert PREFIX + "jawOpen" not in other
+
+
+@pytest.mark.parametrize("linked", [False, True])
+def test_the_other_side_goes_the_mirrored_way(man, linked):
+    rig, corner = man
+    rest = rest_of(scene.meshes(rig)[HEAD])
+    flip = np.array((-1.0, 1.0, 1.0))
+    other = int(np.argmin(np.linalg.norm(rest - rest[corner] * flip, axis=1)))
+    if linked:
+        bpy.ops.risorius.link_sides(enable=True, from_left=False)
+    offset = np.array((0.004, 0.0, 0.006))
+    assert drag(offset, vertex=corner, symmetric=not linked) == {"FINISHED"}
+    bpy.context.view_layer.update()
+    assert follows(rig, rest[corner], offset, 0.05, vertex=corner)
+    assert follows(rig, rest[other], offset * flip, 0.1, vertex=other)
+
+
+def test_gently_the_point_comes_nearer(rig, dna_file):
+    offset, was = reach(rig, dna_file), place(rig)
+    assert drag(offset, method="TRANSPOSE") == {"FINISHED"}
+    assert follows(rig, was, offset, 0.6)
+
+
+def test_handles_lie_apart_on_both_sides(man):
+    rig, _corner = man
+    picking = scene.submodule("scene.drag.picking")
+    live = scene.submodule("scene.character.runtime").of(rig)
+    found = picking.handles_of(bpy.context, rig, live)
+    places = np.array([place for _, place in found])
+    assert 12 <= len(found) <= 20
+    assert {mesh for (mesh, _), _ in found} == {HEAD}
+    gaps = np.linalg.norm(places[:, None] - places[None], axis=2) + np.eye(len(places))
+    assert gaps.min() > 0.003
+    assert min((places[:, 0] > 0.01).sum(), (places[:, 0] < -0.01).sum()) >= 4
 
 
 def test_only_sliders_of_the_region(rig, dna_file):

@@ -241,6 +241,67 @@ def drag_skin(hand: Hand, _dna: Path) -> Iterator[Check]:
     yield "Esc ends it, nothing is drawn any more", not hand.ask("drawing")
 
 
+def drag_in_views(hand: Hand, _dna: Path) -> Iterator[Check]:
+    """The skin of a turned head, in a perspective, through a camera, and in one of four views."""
+    if not hand.ask("has", operator="risorius.drag_mode"):
+        raise NotThereError("risorius.drag_mode")
+    clear(hand)
+    look_at_face(hand)
+    ready_tab(hand)
+    vertex = hand.ask("moved_by", control=SMILE[0])["vertex"]
+    hand.click(*hand.find(r"risorius\.drag_mode"))
+    for name, code in VIEWS.items():
+        hand.ask("run", code=code)
+        hand.still()
+        start = hand.ask("seen_in_front", vertex=vertex)
+        end = (start[0] + 9, start[1] - 8)
+        hand.move(*start)
+        hand.drag(start, end)
+        at = hand.ask("seen_in_front", vertex=vertex)
+        apart = max(abs(a - b) for a, b in zip(at, end, strict=True))
+        moved = len(hand.ask("state")["sliders"]) > 0
+        yield f"{name}: within 2 pixels of the pointer ({apart:.1f})", apart <= 2 and moved
+        hand.picture("skin-" + name.replace(" ", "-"))
+        hand.ask("run", code=REST)
+    hand.move(WIDTH * 0.3, HEIGHT * 0.5)
+    hand.key("Escape")
+    hand.ask("run", code=ONE_VIEW)
+
+
+VIEWS = {
+    "a turned head in perspective": """
+head = rig()["risorius_controls"].pose.bones["head"]
+head.rotation_mode = "XYZ"
+head.rotation_euler = (0.2, 0.3, 0.4)
+bpy.context.view_layer.update()
+eye = view()[0].spaces.active.region_3d
+eye.view_perspective = "PERSP"
+""",
+    "through a camera": """
+eye, camera = view()[0].spaces.active.region_3d, bpy.context.scene.camera
+spots = points()
+camera.location = (spots.min(axis=0) + spots.max(axis=0)) / 2 + np.array((0.0, -1.2, 0.0))
+camera.rotation_euler = (np.pi / 2, 0.0, 0.0)
+bpy.context.view_layer.update()
+eye.view_perspective = "CAMERA"
+""",
+    "one of four views": """
+eye = view()[0].spaces.active.region_3d
+eye.view_perspective = "PERSP"
+with over(*view()[:2]):
+    bpy.ops.screen.region_quadview()
+spots = points()
+for one in view()[0].spaces.active.region_quadviews:
+    one.view_location = (spots.min(axis=0) + spots.max(axis=0)) / 2
+    one.view_distance = float(np.ptp(spots[:, 2])) * 1.9
+""",
+}
+ONE_VIEW = """
+with over(*view()[:2]):
+    bpy.ops.screen.region_quadview()
+"""
+
+
 def add_layer(hand: Hand, _dna: Path) -> Iterator[Check]:
     """A layer by its menu: idle life, which moves the face when frames play."""
     clear(hand)
@@ -338,7 +399,15 @@ bpy.context.view_layer.update()
 view()[0].tag_redraw()
 """
 
-STEPS: tuple[Step, ...] = (start, drag_slider, drag_skin, add_layer, see_why, import_file)
+STEPS: tuple[Step, ...] = (
+    start,
+    drag_slider,
+    drag_skin,
+    drag_in_views,
+    add_layer,
+    see_why,
+    import_file,
+)
 
 
 def run(hand: Hand, dna: Path, wanted: list[str]) -> int:

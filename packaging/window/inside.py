@@ -182,6 +182,17 @@ def vertex_at(vertex):
     return {"world": place.tolist(), "at": on_screen(place)}
 
 
+def seen_in_front(vertex):
+    """Where a vertex of the head is in the view that shows the face most from the front: of one
+    view or four."""
+    area, _drawing, _sidebar = view()
+    regions = [r for r in area.regions if r.type == "WINDOW" and r.data is not None]
+    region = max(regions, key=lambda r: -r.data.view_matrix.inverted().col[2].y)
+    at = view3d_utils.location_3d_to_region_2d(region, region.data, points()[vertex])
+    left, top, _width, height = rectangle(region)
+    return [left + at.x, top + height - at.y]
+
+
 def drawing():
     """Whether a drag of the skin draws over the views."""
     return module("ui.drag.drawing").is_drawing()

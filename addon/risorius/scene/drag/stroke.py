@@ -21,6 +21,7 @@ from ..base import parts, written
 from ..base.blender_types import ArmatureObject, Context
 from ..character import runtime
 from ..frame import inputs
+from ..live import sessions
 from . import pins, sliders
 from .head_turns import HeadTurns
 from .skin import Point, Skin
@@ -325,6 +326,8 @@ def _usable(context: Context, rig: ArmatureObject) -> runtime.Runtime:
         raise FaceError(told("This face has lost its controls or its DNA."))
     if context.screen is not None and context.screen.is_animation_playing:
         raise FaceError(told("Stop the animation first: a face is dragged on a frame that stays."))
+    if sessions.of(parts.controls_of(rig)) is not None:
+        raise FaceError(told("This face follows a live capture: stop that first."))
     depsgraph = context.evaluated_depsgraph_get()
     if not parts.controls_there(rig).evaluated_get(depsgraph).is_evaluated:
         raise FaceError(told("{name} is hidden: show it first.", name=name))

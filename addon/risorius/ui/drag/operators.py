@@ -3,6 +3,8 @@
 # pyright: reportInvalidTypeForm=false
 """Drag the face itself: one drag, the mode in which each press is one, and pins."""
 
+from itertools import count
+
 import bpy
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +20,7 @@ from ..common import FaceOperator, as_seen, face_rig, usable
 from ..words import of_error, say
 from . import drawing, properties, view
 
+_numbers = count()
 _ENDS = {"ESC", "RIGHTMOUSE"}
 _NEAR = 9  # pixels, at an interface of 1, within which a press takes a handle
 _ONE = {"LEFT_CTRL", "RIGHT_CTRL"}
@@ -201,7 +204,7 @@ class RISORIUS_OT_drag_mode(Operator):
     bl_label = "Drag the Face"
     bl_options = {"REGISTER"}
 
-    _running: list["RISORIUS_OT_drag_mode"] = []
+    _running: list[int] = []  # the number of the one that runs; the class has them, not operators
 
     @classmethod
     def poll(cls, context: Context) -> bool:
@@ -211,14 +214,15 @@ class RISORIUS_OT_drag_mode(Operator):
         if self._running:
             self._running.clear()  # the same button ends it: the other sees that it is not there
             return {"FINISHED"}
-        self._running.append(self)
+        self._number = next(_numbers)
+        self._running.append(self._number)
         drawing.start(self.bl_idname)
         context.window_manager.modal_handler_add(self)
         _say_keys(context)
         return {"RUNNING_MODAL"}
 
     def modal(self, context: Context, event: bpy.types.Event) -> Result:
-        if self not in self._running:
+        if self._number not in self._running:
             return self._stop(context, {"CANCELLED"})
         if event.type == "ESC" and event.value == "PRESS":
             return self._stop(context, {"FINISHED"})
@@ -253,7 +257,7 @@ class RISORIUS_OT_drag_mode(Operator):
         self._stop(context, {"CANCELLED"})
 
     def _stop(self, context: Context, result: Result) -> Result:
-        self._running[:] = [one for one in self._running if one is not self]
+        self._running[:] = [n for n in self._running if n != self._number]
         drawing.end(context, self.bl_idname)
         context.workspace.status_text_set(None)
         return result
