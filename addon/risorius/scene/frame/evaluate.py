@@ -225,6 +225,11 @@ def bring_up(context: Context, rig: ArmatureObject) -> None:
     context.view_layer.update()
     evaluate(rig, context.evaluated_depsgraph_get(), force=True)
     context.view_layer.update()
+    # Nothing is left to be evaluated after an operator, so 5.2 would draw no view again.
+    for window in context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                area.tag_redraw()
 
 
 def refused(rig: ArmatureObject) -> list[bpy.types.Object]:
