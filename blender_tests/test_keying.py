@@ -2,8 +2,10 @@
 """Operators that move controls key as Blender's own edits do; poses between poses; tweaks."""
 
 import bpy
+import numpy as np
 import pytest
 from support import scene
+from support.layout import drawn
 
 PREFIX = "CTRL_expressions."
 JAW, LEFT, RIGHT, BROW = "jawOpen", "mouthCornerPullL", "mouthCornerPullR", "browDownL"
@@ -118,6 +120,10 @@ HANDS = {
         lambda rig: _asset(rig, bpy.ops.risorius.blend_pose_asset),
         {JAW: None, LEFT: None, RIGHT: None},
     ),
+    "risorius.breakdown": (
+        lambda rig: bpy.ops.risorius.breakdown(kind="REST", factor=0.5),
+        {LEFT: 0.4, RIGHT: 0.05, JAW: 0.25},
+    ),
 }
 
 # What brings the rest of the face to rest.
@@ -132,6 +138,7 @@ OTHERS = {
     "test_channel unbake",
     "makes an action or keys of its own": "import_animation import_arkit_rig speak blink",
     "what the eyes' target hangs on": "gaze_target",
+    "what is shown, and where edits go": "next_key tweak colour_curves favourite shortcut",
     "keys what stands": "key",
     "a hand on the skin, which keys at its end": "drag drag_mode pin clear_pins",
     "the range of sliders: keys are cut as well": "set_overdrive",
@@ -142,7 +149,8 @@ OTHERS = {
     "files of expressions": "rename_expression delete_expression star_expression "
     "export_expressions import_expressions",
     "who leads; the pose stays": "add_board remove_board lead",
-    "selects": "select_board",
+    "keys at the end of each drag, by keying.by_hand": "drag drag_mode",
+    "selects, pins": "select_board pin clear_pins",
     "lies above the sliders": "layer_add layer_remove layer_move layer_duplicate layer_warp "
     "layers_to_nla fire unfire",
     "a hand of its own, without keys; at its end all stands as before": "live_start live_stop "
@@ -302,3 +310,220 @@ def test_new_curves_have_the_colour_of_their_region(rig, auto):
     assert tuple(left.group.colors.normal) != tuple(brow.group.colors.normal)
     assert left.color_mode == "CUSTOM"
     assert tuple(left.color) != tuple(right.color)  # told apart within the region
+
+
+def test_to_the_next_key_of_a_control_and_of_all(rig):
+    key(rig, LEFT, f2=0.1, f8=0.2, f30=0.1)
+    key(rig, JAW, f5=0.1, f12=0.2)
+    scene_, go = bpy.context.scene, bpy.ops.risorius.next_key
+    scene_.frame_set(4)
+    frames = []
+    for options in (
+        {"control": PREFIX + LEFT},
+        {"control": PREFIX + LEFT},
+        {"control": PREFIX + JAW, "forward": False},
+        {"forward": False},
+        {"region": "mouth"},
+        {"region": "jaw", "forward": False},
+        {},
+    ):
+        assert go(**options) == {"FINISHED"}
+        frames.append(scene_.frame_current)
+    assert frames == [8, 30, 12, 8, 30, 12, 30]
+    assert go(control=PREFIX + BROW) == {"CANCELLED"}
+
+
+def _two_poses(rig):
+    """Poses at 10 and 20, of a mouth that opens while the head turns; shown is frame 14."""
+    key(rig, JAW, f10=0.2, f20=0.8)
+    key(rig, LEFT, f10=0.6, f20=0.0)
+    head = scene.controls(rig).pose.bones["head"]
+    for frame, turn in ((10, (1, 0, 0, 0)), (20, (0.8, 0, 0.6, 0))):
+        head.rotation_quaternion = turn
+        head.keyframe_insert("rotation_quaternion", frame=frame)
+    scene.set_controls(rig, browDownL=0.3)  # without keys
+    bpy.context.scene.frame_set(14)
+    return head
+
+
+@pytest.mark.parametrize("factor", [0.0, 0.25, 1.0, 1.2])
+def test_a_breakdown_lies_between_the_poses(rig, auto, factor):
+    head = _two_poses(rig)
+    assert bpy.ops.risorius.breakdown(factor=factor) == {"FINISHED"}
+    jaw, left = 0.2 + 0.6 * factor, max(0.6 - 0.6 * factor, 0.0)
+    assert value(rig, JAW) == pytest.approx(jaw, abs=1e-5)
+    assert value(rig, LEFT) == pytest.approx(left, abs=1e-5)
+    assert value(rig, BROW) == pytest.approx(0.3)
+    wanted = np.array([1 - 0.2 * factor, 0, 0.6 * factor, 0])
+    wanted /= np.linalg.norm(wanted)
+    assert tuple(head.rotation_quaternion) == pytest.approx(tuple(wanted), abs=1e-5)
+    assert keys(rig, JAW) == {10.0: 0.2, 14.0: pytest.approx(jaw, abs=1e-5), 20.0: 0.8}
+    assert keys(rig, BROW) == {}
+
+
+def test_a_breakdown_of_a_region_and_of_selected_curves(rig):
+    _two_poses(rig)
+    for one in scene.curves(scene.controls(rig)):
+        one.select = one.data_path == path_of(JAW)
+    before = value(rig, LEFT)
+    bpy.ops.risorius.breakdown(factor=1.0, which="SELECTED")
+    assert value(rig, JAW) == pytest.approx(0.8)
+    assert value(rig, LEFT) == before
+    bpy.ops.risorius.breakdown(factor=0.0, which="REGION", region="mouth")
+    assert value(rig, JAW) == pytest.approx(0.8)
+    assert value(rig, LEFT) == pytest.approx(0.6)
+
+
+def test_relaxed_a_pose_lies_on_the_line_and_pushed_further_away(rig):
+    _two_poses(rig)
+    scene.set_controls(rig, jawOpen=0.9)
+    line = 0.2 + 0.6 * 0.4
+    bpy.ops.risorius.breakdown(kind="NEIGHBOURS", factor=0.5)
+    assert value(rig, JAW) == pytest.approx((0.9 + line) / 2, abs=1e-5)
+    scene.set_controls(rig, jawOpen=0.5)
+    bpy.ops.risorius.breakdown(kind="NEIGHBOURS", factor=-0.5)
+    assert value(rig, JAW) == pytest.approx(0.5 + 0.5 * (0.5 - line), abs=1e-5)
+
+
+def test_towards_rest_and_away_from_it(rig):
+    scene.set_controls(rig, jawOpen=0.4, browDownL=0.9)
+    bpy.ops.risorius.breakdown(kind="REST", factor=0.25)
+    assert value(rig, JAW) == pytest.approx(0.3)
+    bpy.ops.risorius.breakdown(kind="REST", factor=-1.0)
+    assert value(rig, JAW) == pytest.approx(0.6)
+    assert value(rig, BROW) == 1.0  # within its limits
+
+
+def test_selected_keys_become_breakdowns_of_those_around_them(rig):
+    key(rig, JAW, f1=0.0, f5=0.9, f6=0.1, f11=1.0)
+    select_keys(rig, 5.0, 6.0)
+    bpy.ops.risorius.breakdown(kind="BREAKDOWN", factor=0.5, at="SELECTED")
+    assert keys(rig, JAW) == {1.0: 0.0, 5.0: 0.5, 6.0: 0.5, 11.0: 1.0}
+
+
+def test_a_breakdown_without_keys_says_so(rig):
+    with pytest.raises(RuntimeError, match="There is no key of these controls before"):
+        bpy.ops.risorius.breakdown()
+
+
+def shown(rig, frame, index=0):
+    """A raw control as the face takes it, with layers."""
+    bpy.context.scene.frame_set(frame)
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    seen = scene.controls(rig).evaluated_get(depsgraph)
+    live = scene.submodule("scene.character.runtime").of(rig)
+    return float(scene.submodule("scene.frame.inputs").read_inputs(seen, live, depsgraph)[0][index])
+
+
+def test_a_tweak_shows_what_was_asked_and_touches_no_key(rig):
+    key(rig, JAW, f1=0.2, f40=0.6)
+    below = {f: shown(rig, f) for f in range(1, 41)}
+    points = [tuple(p.co) for p in curve(rig, JAW).keyframe_points]
+    assert bpy.ops.risorius.tweak(first=10, last=30, fade=4) == {"FINISHED"}
+    for frame, wanted in ((18, 0.9), (25, 0.3), (11, 0.35)):
+        bpy.context.scene.frame_set(frame)
+        scene.set_controls(rig, jawOpen=wanted - (shown(rig, frame) - value(rig, JAW)))
+        assert bpy.ops.risorius.key() == {"FINISHED"}
+        assert shown(rig, frame) == pytest.approx(wanted, abs=1e-4)
+        assert value(rig, JAW) == pytest.approx(below[frame], abs=1e-5)
+    assert [tuple(p.co) for p in curve(rig, JAW).keyframe_points] == points
+    for frame in (*range(1, 11), *range(30, 41)):
+        assert shown(rig, frame) == pytest.approx(below[frame], abs=1e-6), frame
+    assert bpy.ops.risorius.tweak(enable=False) == {"FINISHED"}
+    bpy.context.scene.frame_set(20)
+    bpy.ops.risorius.key()
+    assert 20.0 in keys(rig, JAW)  # keys are keys again
+    assert shown(rig, 18) == pytest.approx(0.9, abs=1e-4)
+
+
+def test_operators_go_into_the_tweak_also_of_sliders_without_keys(rig):
+    scene.set_controls(rig, mouthCornerPullL=0.5, mouthCornerPullR=0.1)
+    bpy.ops.risorius.tweak(first=10, last=30, fade=0)
+    bpy.context.scene.frame_set(20)
+    assert bpy.ops.risorius.mirror() == {"FINISHED"}
+    assert [shown(rig, 20, i) for i in (1, 2)] == pytest.approx([0.1, 0.5], abs=1e-5)
+    assert [shown(rig, 5, i) for i in (1, 2)] == pytest.approx([0.5, 0.1], abs=1e-5)
+    assert scene.controls(rig).animation_data is None
+
+
+def test_outside_the_tweak_an_operator_changes_nothing_and_says_so(rig):
+    _start(rig)
+    bpy.ops.risorius.tweak(first=10, last=30)
+    bpy.context.scene.frame_set(40)
+    with pytest.raises(RuntimeError, match="The tweak lies between the frames 10 and 30"):
+        bpy.ops.risorius.mirror()
+    assert value(rig, LEFT) == pytest.approx(0.8)
+    with pytest.raises(RuntimeError, match="two frames or more"):
+        bpy.ops.risorius.tweak(first=10, last=11)
+
+
+def test_a_tweak_is_baked_like_all_else(rig):
+    key(rig, JAW, f1=0.2, f40=0.6)
+    bpy.ops.risorius.tweak(first=10, last=30, fade=4)
+    bpy.context.scene.frame_set(20)
+    scene.set_controls(rig, jawOpen=0.9)
+    bpy.ops.risorius.key()
+    bpy.context.scene.frame_start, bpy.context.scene.frame_end = 18, 22
+    bpy.context.scene.frame_set(20)
+    before = scene.snapshot(rig)
+    assert bpy.ops.risorius.bake() == {"FINISHED"}
+    bpy.context.scene.frame_set(18)
+    bpy.context.scene.frame_set(20)
+    np.testing.assert_allclose(scene.snapshot(rig), before, atol=1e-5)
+
+
+def test_curves_of_before_get_groups_and_colours(rig):
+    for name in (JAW, LEFT, RIGHT):
+        scene.controls(rig).keyframe_insert(path_of(name), frame=1)
+    assert bpy.ops.risorius.colour_curves() == {"FINISHED"}
+    groups = {name: curve(rig, name).group for name in (JAW, LEFT, RIGHT)}
+    assert [groups[n].name for n in (JAW, LEFT, RIGHT)] == ["Jaw", "Mouth", "Mouth"]
+    colours = {n: tuple(round(c, 3) for c in curve(rig, n).color) for n in groups}
+    assert len(set(colours.values())) == 3
+    assert {curve(rig, n).color_mode for n in groups} == {"CUSTOM"}
+
+
+@pytest.fixture
+def preferences():
+    """The add-on's, which a user has."""
+    addons = bpy.context.preferences.addons
+    entry = addons.new()
+    entry.module = scene.MODULE
+    yield entry.preferences
+    addons.remove(entry)
+
+
+def test_favourites_are_kept_in_the_file_and_by_the_user(rig, dna_file, preferences):
+    names = "\n".join(PREFIX + n for n in (LEFT, RIGHT))
+    assert bpy.ops.risorius.favourite(controls=names) == {"FINISHED"}
+    of = scene.submodule("ui.hand.favourites").favourites_of
+    assert of(bpy.context) == [PREFIX + LEFT, PREFIX + RIGHT]
+    other = scene.load(dna_file)  # a face that has none of its own takes the user's
+    bpy.context.view_layer.objects.active = scene.controls(other)
+    assert of(bpy.context) == [PREFIX + LEFT, PREFIX + RIGHT]
+    bpy.ops.risorius.favourite(controls=PREFIX + JAW)
+    bpy.ops.risorius.favourite(controls=PREFIX + LEFT)  # again: it goes
+    assert of(bpy.context) == [PREFIX + RIGHT, PREFIX + JAW]
+    bpy.context.view_layer.objects.active = scene.controls(rig)
+    assert of(bpy.context) == [PREFIX + LEFT, PREFIX + RIGHT]
+    scene.set_controls(rig, mouthCornerPullL=0.8, jawOpen=0.8)
+    bpy.ops.risorius.breakdown(kind="REST", which="FAVOURITES", factor=1.0)
+    assert (value(rig, LEFT), value(rig, JAW)) == pytest.approx((0.0, 0.8))
+
+
+def test_the_panels_offer_it_and_no_key_is_taken(rig):
+    offered = drawn(scene.submodule("ui.hand.panel").RISORIUS_PT_hand).operators
+    assert {"risorius.next_key", "risorius.breakdown", "risorius.tweak"} <= set(offered)
+    assert "risorius.blink" in drawn(scene.submodule("ui.hand.gaze").RISORIUS_PT_gaze).operators
+    favourites = scene.submodule("ui.face.favourites_panel").RISORIUS_PT_favourites
+    assert not favourites.poll(bpy.context)
+    bpy.ops.risorius.favourite(controls=PREFIX + JAW)
+    assert favourites.poll(bpy.context)
+    drawn(favourites)
+    bpy.context.window_manager.risorius_stars = True
+    panel = drawn(scene.submodule("ui.face.controls_panel").RISORIUS_PT_controls)
+    assert "risorius.favourite" in panel.operators
+    bpy.context.window_manager.risorius_stars = False
+    config = bpy.context.window_manager.keyconfigs.addon
+    for keymap in config.keymaps if config is not None else ():
+        assert not [i for i in keymap.keymap_items if "RISORIUS_MT_pie" in str(i.properties)]

@@ -95,7 +95,7 @@ def test_the_names_of_all_sliders_can_be_read(rig):
     regions = scene.submodule("native").regions()
     for region, shown in words.group_controls(names, regions).items():
         listed = [names[index] for index in shown]
-        ui("face.controls_panel")._draw_sliders(bpy.context, layout, face, region, listed, {}, {})
+        ui("face.controls_panel").draw_sliders(bpy.context, layout, face, region, listed, {}, {})
     assert layout.cut(SIDEBAR) == []
     words = texts(layout)
     assert {"Upper Lip Towards Teeth", "Lower Lip Depress", "Dimple"} <= set(words)
@@ -128,7 +128,7 @@ def test_all_sections_are_seen_at_once_on_a_laptop(rig, monkeypatch):
 def test_a_slider_whose_name_is_short_has_one_line():
     face = dict.fromkeys(("CTRL_expressions.jawOpen", "CTRL_expressions.jawChinRaiseDL"), 0.0)
     layout = Part()
-    ui("face.controls_panel")._draw_sliders(bpy.context, layout, face, "jaw", list(face), {}, {})
+    ui("face.controls_panel").draw_sliders(bpy.context, layout, face, "jaw", list(face), {}, {})
     (column,) = layout.children
     assert [part.kind for part in column.children] == ["split", "split"]
 

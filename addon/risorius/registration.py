@@ -35,7 +35,7 @@ from .ui.drag import drawing as drag_drawing
 from .ui.drag import properties as drag_properties
 from .ui.expressions import previews as expression_previews
 from .ui.expressions import properties as expression_properties
-from .ui.face import channel_preview, paste_flipped
+from .ui.face import channel_preview, favourites_panel, paste_flipped
 from .ui.file import import_operators, rig_operators
 from .ui.file import operators as file_operators
 from .ui.live import properties as live_properties
@@ -84,6 +84,12 @@ def _window_properties() -> dict[str, object]:
             description="Show only the controls that are not at rest or have keys",
             options={"SKIP_SAVE"},
         ),
+        "risorius_stars": bpy.props.BoolProperty(
+            name="Stars",
+            translation_context=tables.CONTEXT,
+            description="Show a star beside each control: those with one are favourites",
+            options={"SKIP_SAVE"},
+        ),
         "risorius_show_timing": timing_overlay.show_property(),
         "risorius_live": bpy.props.PointerProperty(type=live_properties.RISORIUS_PG_live),
         "risorius_drag": bpy.props.PointerProperty(type=drag_properties.RISORIUS_PG_drag),
@@ -121,6 +127,7 @@ def register() -> None:
     bpy.types.VIEW3D_MT_add.append(import_operators.draw_add)
     bpy.types.MESH_MT_shape_key_context_menu.append(rig_operators.draw_make_rig)
     bpy.types.VIEW3D_MT_object.append(rig_operators.draw_make_rig)
+    bpy.types.UI_MT_button_context_menu.append(favourites_panel.draw_button_menu)
     trouble = native.problem()
     manual.register()
     for sentence in (trouble, compat.notice()):
@@ -155,6 +162,7 @@ def unregister() -> None:
     timing_overlay.stop()
     drag_drawing.stop()
     expression_previews.forget()
+    bpy.types.UI_MT_button_context_menu.remove(favourites_panel.draw_button_menu)
     bpy.types.VIEW3D_MT_object.remove(rig_operators.draw_make_rig)
     bpy.types.MESH_MT_shape_key_context_menu.remove(rig_operators.draw_make_rig)
     bpy.types.VIEW3D_MT_add.remove(import_operators.draw_add)

@@ -19,7 +19,7 @@ from ...logic.base.sentences import told
 from ..base import compat, parts
 from ..base.blender_types import ArmatureObject, Context
 from ..character import armatures, board, runtime
-from . import clip_actions, curve_colours
+from . import clip_actions, curve_colours, tweaks
 
 if TYPE_CHECKING:
     from bpy.stub_internal.rna_enums import (
@@ -147,6 +147,7 @@ def by_hand(
     rig: ArmatureObject,
     move: Callable[[], Collection[str] | None],
     at_selected: bool = False,
+    at: Callable[[float], object] | None = None,
 ) -> int:
     """Move controls as Blender's own edits do: what is keyed after it is up to the user's settings.
 
@@ -157,16 +158,19 @@ def by_hand(
             it had in its hands, whether they changed or not, or None where it did nothing.
         at_selected: do it at every frame with a selected key of this face, with keys of what
             changed, instead of at the current frame.
+        at: is told the frame before each move.
 
     Returns:
         How many properties were keyed.
 
     Raises:
-        FaceError: no key is selected.
+        FaceError: no key is selected; a tweak is on that does not reach here. All stands as before.
     """
     controls = parts.controls_there(rig)
     if at_selected:
-        return _at_selected(context, controls, move)
+        return _at_selected(context, controls, move, at)
+    if at is not None:
+        at(context.scene.frame_current_final)
     before = pose_of(controls)
     touched = move()
     if touched is None:
@@ -181,13 +185,19 @@ def by_hand(
     led = [n for n in touched if n not in before.sliders]
     places = [board.path_of(h.bone) for h in board.handles_of_labels(rig, led)] if led else []
     held_paths = [path for path in places if path in keyed and path not in paths]
-    return changed(context, rig, [*labels, *held], [*paths, *held_paths])
+    try:
+        return changed(context, rig, [*labels, *held], [*paths, *held_paths])
+    except FaceError:
+        show(controls, before)
+        raise
 
 
 def changed(
     context: Context, rig: ArmatureObject, labels: Iterable[str], bones: Iterable[str] = ()
 ) -> int:
     """Key what an edit changed at the current frame, if Blender's settings say so.
+
+    While a tweak is on, sliders go into that instead.
 
     Args:
         context: has the settings and the frame.
@@ -198,17 +208,18 @@ def changed(
     Returns:
         How many properties were keyed.
     """
-    rules = rules_of(context)
+    rules, controls = rules_of(context), parts.controls_there(rig)
+    if tweaks.of(controls) is not None:
+        return tweaks.take(controls, labels, context.scene.frame_current_final)
     if not rules.insert:
         return 0
-    controls = parts.controls_there(rig)
     return insert(controls, labels, bones, context.scene.frame_current, rules)
 
 
 def key(
     context: Context, rig: ArmatureObject, labels: Iterable[str], bones: Iterable[str] = ()
 ) -> int:
-    """Insert the keys that the animator asked for, at the current frame.
+    """Insert the keys that the animator asked for, at the current frame, or into the tweak.
 
     Args:
         context: has the settings and the frame.
@@ -220,6 +231,8 @@ def key(
         How many properties were keyed.
     """
     controls, rules = parts.controls_there(rig), rules_of(context, auto=False)
+    if tweaks.of(controls) is not None:
+        return tweaks.take(controls, labels, context.scene.frame_current_final)
     return insert(controls, labels, bones, context.scene.frame_current, rules)
 
 
@@ -288,9 +301,14 @@ def show(controls: ArmatureObject, pose: Pose) -> None:
 
 
 def _at_selected(
-    context: Context, controls: ArmatureObject, move: Callable[[], Collection[str] | None]
+    context: Context,
+    controls: ArmatureObject,
+    move: Callable[[], Collection[str] | None],
+    at: Callable[[float], object] | None,
 ) -> int:
     """`by_hand` at the frames of selected keys."""
+    if tweaks.of(controls) is not None:
+        raise FaceError(told("A tweak is on: end it first, or work at the current frame."))
     frames = selected_frames(controls)
     if not frames:
         raise FaceError(told("Select keys of this face first: there is no selected key."))
@@ -299,6 +317,8 @@ def _at_selected(
     for frame in frames:
         before = pose_at(controls, frame, now)
         show(controls, before)
+        if at is not None:
+            at(frame)
         touched = move()
         after = pose_of(controls)
         if touched is not None:

@@ -61,6 +61,7 @@ if TYPE_CHECKING:
 
         risorius_search: str
         risorius_only_used: bool
+        risorius_stars: bool
         risorius_show_timing: bool
         risorius_live: bpy.types.PropertyGroup
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import bpy
 
-from ..animation import keying, layer_properties, layers
+from ..animation import keying, layer_mixing, layer_properties, layers
 from ..base import compat, parts
 from ..base.blender_types import ArmatureObject
 from ..character import armatures, runtime
@@ -136,4 +136,5 @@ def add_to_layer(rig: ArmatureObject, frame: float, blink: Blink) -> None:
         layer = layer_of(controls)
     assert layer is not None
     layer.start = action.frame_range[0]
+    layer_mixing.note_edits([action])  # nothing plays it that Blender would tell of
     controls.update_tag()

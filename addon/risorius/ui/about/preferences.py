@@ -13,6 +13,7 @@ from ... import native
 from ...scene.base import compat
 from .. import words
 from ..blender_types import AddonPreferences, Context
+from ..hand import pie
 from ..speech.install import draw_preferences
 
 
@@ -64,6 +65,7 @@ class RISORIUS_Preferences(AddonPreferences):
         description="Folder of expressions that all files share; empty for the extension's own",
         subtype="DIR_PATH",
     )
+    favourites: bpy.props.StringProperty(options={"HIDDEN"})
 
     def draw(self, context: Context) -> None:
         works, text = self_test()
@@ -72,6 +74,7 @@ class RISORIUS_Preferences(AddonPreferences):
         if compat.notice():
             words.write(self.layout, compat.notice(), "INFO")
         self.layout.prop(self, "sides")
+        pie.draw_preferences(self.layout, context)
         self.layout.prop(self, "hints")
         self.layout.prop(self, "expression_library")
         if works:

@@ -5,6 +5,7 @@ from . import (
     body_operators,
     channel_preview,
     controls_panel,
+    favourites_panel,
     lod_operators,
     operators,
     panel,
@@ -19,6 +20,7 @@ CLASSES = (
     *side_operators.CLASSES,
     *paste_flipped.CLASSES,
     *panel.CLASSES,
+    *favourites_panel.CLASSES,
     *controls_panel.CLASSES,
     *channel_preview.CLASSES,
 )

@@ -16,6 +16,7 @@ from .. import words
 from ..blender_types import Context, Icon, Panel, UILayout
 from ..board.panel import draw_lead
 from ..common import FaceOnlyPanel, as_seen, face_controls, face_rig
+from ..hand.favourites import favourites_of
 
 _ICONS: dict[str, Icon] = {
     "brow": "MOD_CURVE",
@@ -59,12 +60,12 @@ class RISORIUS_PT_controls(FaceOnlyPanel, Panel):
         for region, names in _regions(tuple(shown)):
             if search or only_used:
                 _draw_region_header(layout.row(), region)
-                _draw_sliders(context, layout, face, region, names, followers, given)
+                draw_sliders(context, layout, face, region, names, followers, given)
                 continue
             header, body = layout.panel(f"RISORIUS_PT_region_{region}", default_closed=True)
             _draw_region_header(header, region)
             if body is not None:
-                _draw_sliders(context, body, face, region, names, followers, given)
+                draw_sliders(context, body, face, region, names, followers, given)
         if not shown:
             nothing = "No control has these words." if search else "All controls are at rest."
             words.write(layout, nothing, "INFO")
@@ -93,6 +94,7 @@ def _draw_tools(layout: UILayout, context: Context, linked: bool) -> None:
     row = column.row(align=True)
     row.prop(manager, "risorius_search", text="", icon="VIEWZOOM")
     row.prop(manager, "risorius_only_used", text="", icon="FILTER")
+    row.prop(manager, "risorius_stars", text="", icon="SOLO_OFF")
     row = column.row(align=True)
     row.operator("risorius.mirror", text="Mirror", icon="MOD_MIRROR").region = ""
     button = row.operator("risorius.link_sides", text="Link", icon="LINKED", depress=linked)
@@ -117,7 +119,7 @@ def _draw_region_header(layout: UILayout, region: str) -> None:
     row.operator("risorius.key", text="", icon="KEY_HLT").region = region
 
 
-def _draw_sliders(
+def draw_sliders(
     context: Context,
     layout: UILayout,
     face: bpy.types.PoseBone,
@@ -130,10 +132,20 @@ def _draw_sliders(
 
     Of two sides that are linked the one that leads is shown. What the board gives is shown as it
     is: a slider that does nothing is none.
+
+    Args:
+        context: of the panel.
+        layout: of the panel.
+        face: the bone that bears the sliders.
+        region: what stands above them.
+        names: the sliders.
+        followers: those that follow another one, with the one that leads.
+        given: what the face board gives, by the names of its sliders.
     """
     column = layout.column(align=True)
     ruler = words.Ruler(context, _TITLE)
     lines = _rows(tuple(names), region, as_seen(context))
+    starred = favourites_of(context) if context.window_manager.risorius_stars else None
     if any(line.is_pair for line in lines):
         _draw_sides(column, bool(followers))
     for line in lines:
@@ -150,6 +162,10 @@ def _draw_sliders(
             elif followers.get(name) not in names:
                 quoted = bpy.utils.escape_identifier(name)
                 row.prop(face, f'["{quoted}"]', text="", slider=True)
+        if starred is not None:
+            icon = "SOLO_ON" if set(line.sliders) <= set(starred) else "SOLO_OFF"
+            button = row.operator("risorius.favourite", text="", icon=icon)
+            button.controls = "\n".join(line.sliders)
 
 
 def _draw_sides(column: UILayout, linked: bool) -> None:

@@ -8,6 +8,7 @@ from collections.abc import Collection
 import bpy
 
 from ... import native
+from ...logic.base.errors import FaceError
 from ...scene.animation import keying
 from ...scene.base import parts
 from ...scene.character import board, build, runtime
@@ -16,7 +17,7 @@ from ...scene.life import duplicates, library_overrides
 from ..blender_types import Context, Operator, Result
 from ..common import MODES, FaceOperator, face_controls, face_rig
 from ..hand.base import HandOperator
-from ..words import say
+from ..words import of_error, say
 
 
 def _labels(context: Context, region: str = "") -> list[str]:
@@ -70,7 +71,12 @@ class RISORIUS_OT_key(FaceOperator, Operator):
     def execute(self, context: Context) -> Result:
         labels = _labels(context, self.region)
         bones = [] if self.region else keying.pose_of(face_controls(context)).bones
-        count = keying.key(context, face_rig(context), labels, bones)
+        try:
+            count = keying.key(context, face_rig(context), labels, bones)
+        except FaceError as error:
+            self.report({"ERROR"}, of_error(error))
+            return {"CANCELLED"}
+        evaluate.bring_up(context, face_rig(context))
         frame = context.scene.frame_current
         self.report(
             {"INFO"}, say("{count} controls keyed at frame {frame}", count=count, frame=frame)

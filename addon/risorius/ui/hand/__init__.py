@@ -1,6 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Moving controls by hand: keys, poses between poses, tweaks, gaze, favourites, the pie menu."""
 
-from . import gaze
+from . import favourites, gaze, operators, panel, pie
 
-CLASSES = (*gaze.CLASSES,)
+CLASSES = (
+    *operators.CLASSES,
+    *favourites.CLASSES,
+    *panel.CLASSES,
+    *gaze.CLASSES,
+    *pie.CLASSES,
+)

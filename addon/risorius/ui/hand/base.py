@@ -38,6 +38,9 @@ class HandOperator(FaceOperator):
         """
         raise NotImplementedError
 
+    def stand_at(self, frame: float) -> None:
+        """Is told before each move which frame it is for."""
+
     def execute(self, context: Context) -> Result:
         rig, done = face_rig(context), []
 
@@ -47,7 +50,7 @@ class HandOperator(FaceOperator):
             return touched
 
         try:
-            keying.by_hand(context, rig, move, self.at == "SELECTED")
+            keying.by_hand(context, rig, move, self.at == "SELECTED", self.stand_at)
         except FaceError as error:
             self.report({"ERROR"}, of_error(error))
             return {"CANCELLED"}

@@ -1,0 +1,190 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Poses between poses: a breakdown of those before and after, nearer to them, nearer to rest."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass
+
+from ...logic.base.errors import FaceError
+from ...logic.base.sentences import told
+from ..animation import keying
+from ..base import parts
+from ..base.blender_types import ArmatureObject
+from ..character import runtime, sides
+
+_AT = 1e-3  # frames that are the same
+
+
+@dataclass(frozen=True)
+class Neighbours:
+    """The poses on both sides of a frame.
+
+    Attributes:
+        before, after: the poses.
+        share: where the frame lies between them, 0 to 1.
+    """
+
+    before: keying.Pose
+    after: keying.Pose
+    share: float
+
+
+def key_frames(controls: ArmatureObject, paths: Collection[str] | None = None) -> list[float]:
+    """The frames of a face's keys, each once, in their order.
+
+    Args:
+        controls: the control armature.
+        paths: data paths whose keys count; None: all sliders and control bones.
+    """
+    found = {
+        round(key.co.x, 3)
+        for path, curves in keying.curves_by_path(controls).items()
+        if (path in paths if paths is not None else path.startswith("pose.bones"))
+        for curve in curves
+        for key in curve.keyframe_points
+    }
+    return sorted(found)
+
+
+def next_key(
+    controls: ArmatureObject, frame: float, forward: bool, paths: Collection[str] | None = None
+) -> float | None:
+    """The frame of the next or the last key, or None where there is none.
+
+    Args:
+        controls, paths: as of key_frames.
+        frame: where one stands.
+        forward: the next one, else the one before.
+    """
+    frames = key_frames(controls, paths)
+    there = [f for f in frames if (f > frame + _AT if forward else f < frame - _AT)]
+    return (there[0] if forward else there[-1]) if there else None
+
+
+def neighbours(
+    controls: ArmatureObject,
+    frame: float,
+    now: keying.Pose,
+    paths: Collection[str],
+    skipped: Collection[float] = (),
+) -> Neighbours:
+    """The poses at the last key before a frame and at the first after it.
+
+    Args:
+        controls: the control armature.
+        frame: where one stands.
+        now: what it shows.
+        paths: data paths whose keys count.
+        skipped: frames whose keys do not count.
+
+    Returns:
+        Neighbours; where there are keys on one side only, its pose is on both.
+
+    Raises:
+        FaceError: there is no key on either side.
+    """
+    frames = [f for f in key_frames(controls, paths) if f not in skipped]
+    before = max((f for f in frames if f < frame - _AT), default=None)
+    after = min((f for f in frames if f > frame + _AT), default=None)
+    first, last = (
+        (before if before is not None else after),
+        (after if after is not None else before),
+    )
+    if first is None or last is None:
+        raise FaceError(told("There is no key of these controls before this frame or after it."))
+    share = (frame - first) / (last - first) if last > first else 0.5
+    poses = (keying.pose_at(controls, at, now) for at in (first, last))
+    return Neighbours(*poses, share)
+
+
+def paths_of(controls: ArmatureObject, labels: Iterable[str], bones: bool) -> set[str]:
+    """The data paths of sliders, and those of the control bones if asked for.
+
+    Args:
+        controls: the control armature.
+        labels: the sliders.
+        bones: whether the bones' are wanted too.
+    """
+    own = {parts.property_path(label) for label in labels}
+    return own | set(keying.pose_of(controls).bones) if bones else own
+
+
+def selected_paths(controls: ArmatureObject) -> set[str]:
+    """The data paths of the F-curves of a face that are selected in the animation editors."""
+    keyed = keying.curves_by_path(controls)
+    return {path for path, curves in keyed.items() if any(curve.select for curve in curves)}
+
+
+def move(
+    rig: ArmatureObject,
+    now: keying.Pose,
+    goal: keying.Pose,
+    factor: float,
+    paths: Collection[str],
+) -> list[str]:
+    """Move controls from a pose towards another one.
+
+    Args:
+        rig: the character.
+        now, goal: the poses.
+        factor: 1 reaches the goal, 0 changes nothing, below 0 goes away from it.
+        paths: data paths of those that move.
+
+    Returns:
+        The sliders among them.
+    """
+    controls = parts.controls_there(rig)
+    values = {
+        name: value + (goal.sliders[name] - value) * factor
+        for name, value in now.sliders.items()
+        if parts.property_path(name) in paths
+    }
+    sides.put(rig, values)
+    for path, start in now.bones.items():
+        if path in paths:
+            place = controls.path_resolve(path)
+            for index, value in enumerate(_blended(path, start, goal.bones[path], factor)):
+                place[index] = value
+    controls.update_tag()
+    return list(values)
+
+
+def _blended(
+    path: str, start: tuple[float, ...], goal: tuple[float, ...], factor: float
+) -> list[float]:
+    """Numbers between; quaternions the shorter way, and of length 1."""
+    if not path.endswith("rotation_quaternion"):
+        return [a + (b - a) * factor for a, b in zip(start, goal, strict=True)]
+    sign = -1.0 if sum(a * b for a, b in zip(start, goal, strict=True)) < 0.0 else 1.0
+    mixed = [a + (sign * b - a) * factor for a, b in zip(start, goal, strict=True)]
+    length = sum(part * part for part in mixed) ** 0.5 or 1.0
+    return [part / length for part in mixed]
+
+
+def rest_pose(rig: ArmatureObject, now: keying.Pose) -> keying.Pose:
+    """All at rest. Args: rig  the character, now  what it shows, for the names."""
+    live = runtime.there(rig)
+    rests = dict(zip(live.labels, live.rests, strict=True))
+    bones: Mapping[str, tuple[float, ...]] = {
+        path: (1.0, 0.0, 0.0, 0.0)
+        if path.endswith("quaternion")
+        else (0.0, *values[1:])
+        if path.endswith("axis_angle")
+        else (0.0,) * len(values)
+        for path, values in now.bones.items()
+    }
+    return keying.Pose({name: rests[name] for name in now.sliders}, bones)
+
+
+def mixed(first: keying.Pose, second: keying.Pose, share: float) -> keying.Pose:
+    """The pose between two.
+
+    Args:
+        first, second: the poses.
+        share: 0 gives the first, 1 the second.
+    """
+    return keying.Pose(
+        {n: v + (second.sliders[n] - v) * share for n, v in first.sliders.items()},
+        {p: tuple(_blended(p, v, second.bones[p], share)) for p, v in first.bones.items()},
+    )

@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sliders that an animator keeps at hand: of this file, else the user's own."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+from ..base import parts
+from ..base.blender_types import ArmatureObject
+
+_LIST = "risorius_favourites"  # on the control armature: names of sliders, a line each
+
+
+def of(controls: ArmatureObject, users: str) -> list[str]:
+    """The favourites of a face that it has.
+
+    Args:
+        controls: its control armature.
+        users: the user's own, a line each, for faces of files that have none.
+    """
+    text = controls.get(_LIST)
+    face = controls.pose.bones[parts.FACE]
+    names = (text if isinstance(text, str) else users).split("\n")
+    return [name for name in dict.fromkeys(names) if name in face]
+
+
+def toggle(controls: ArmatureObject, names: Collection[str], users: str) -> str:
+    """Put sliders among the favourites of a file, or take them away.
+
+    Args:
+        controls: control armature of the face.
+        names: sliders; where all are there already they go.
+        users: as of `of`.
+
+    Returns:
+        The new list, a line each.
+    """
+    there = of(controls, users)
+    if all(name in there for name in names):
+        there = [name for name in there if name not in names]
+    else:
+        there += [name for name in names if name not in there]
+    controls[_LIST] = "\n".join(there)
+    controls.property_overridable_library_set(f'["{_LIST}"]', True)
+    return controls[_LIST]

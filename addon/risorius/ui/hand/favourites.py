@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Blender takes properties where Python has annotations:
+# pyright: reportInvalidTypeForm=false
+"""Favourite sliders: the star beside a slider."""
+
+from typing import Any
+
+import bpy
+
+from ... import native
+from ...scene.hand import favourites
+from ..blender_types import Context, Operator, Result
+from ..common import FaceOperator, face_controls
+
+
+def _preferences(context: Context) -> Any:  # noqa: ANN401  the class lies in a room above
+    addon = context.preferences.addons.get(native.ADDON)
+    return addon.preferences if addon is not None else None
+
+
+def favourites_of(context: Context) -> list[str]:
+    """The favourites of the active face."""
+    users = getattr(_preferences(context), "favourites", "")
+    return favourites.of(face_controls(context), users)
+
+
+class RISORIUS_OT_favourite(FaceOperator, Operator):
+    """Put a control among the favourites, or take it away"""
+
+    bl_idname = "risorius.favourite"
+    bl_label = "Favourite"
+    baked_too = True
+
+    controls: bpy.props.StringProperty(
+        name="Controls", description="Names of sliders, a line each", options={"SKIP_SAVE"}
+    )
+
+    def execute(self, context: Context) -> Result:
+        kept = _preferences(context)
+        names = self.controls.split("\n")
+        now = favourites.toggle(face_controls(context), names, getattr(kept, "favourites", ""))
+        if kept is not None:
+            kept.favourites = now
+            context.preferences.is_dirty = True
+        return {"FINISHED"}
+
+
+CLASSES = (RISORIUS_OT_favourite,)
