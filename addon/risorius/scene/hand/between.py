@@ -94,8 +94,8 @@ def neighbours(
     if first is None or last is None:
         raise FaceError(told("There is no key of these controls before this frame or after it."))
     share = (frame - first) / (last - first) if last > first else 0.5
-    poses = (keying.pose_at(controls, at, now) for at in (first, last))
-    return Neighbours(*poses, share)
+    before_it, after_it = (keying.pose_at(controls, at, now) for at in (first, last))
+    return Neighbours(before_it, after_it, share)
 
 
 def paths_of(controls: ArmatureObject, labels: Iterable[str], bones: bool) -> set[str]:
