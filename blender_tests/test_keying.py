@@ -136,7 +136,8 @@ OTHERS = {
     "install_speech make_override make_rig mix_add mix_add_scene mix_preview mix_remove mix_write "
     "reload replace_dna separate self_test set_lod set_lod_by_distance set_shape_mode "
     "test_channel unbake",
-    "makes an action or keys of its own": "import_animation import_arkit_rig speak blink",
+    "makes an action or keys of its own": "import_animation import_arkit_rig speak blink "
+    "curves_from_mesh",
     "what the eyes' target hangs on": "gaze_target",
     "what is shown, and where edits go": "next_key tweak colour_curves favourite shortcut",
     "keys what stands": "key",

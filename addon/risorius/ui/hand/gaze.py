@@ -134,7 +134,7 @@ class RISORIUS_OT_blink(FaceOperator, Operator):
 class RISORIUS_PT_gaze(FaceOnlyPanel, Panel):
     bl_idname = "RISORIUS_PT_gaze"
     bl_label = "Eyes and Head"
-    bl_parent_id = "RISORIUS_PT_hand"  # the sections of the tab are to be seen at once
+    bl_parent_id = "RISORIUS_PT_animation"
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: Context) -> None:

@@ -10,8 +10,7 @@ from ..common import FaceOnlyPanel, face_controls
 class RISORIUS_PT_hand(FaceOnlyPanel, Panel):
     bl_idname = "RISORIUS_PT_hand"
     bl_label = "By Hand"
-    bl_order = 1
-    bl_options = {"DEFAULT_CLOSED"}
+    bl_parent_id = "RISORIUS_PT_animation"  # the sections of the tab are to be seen at once
 
     def draw(self, context: Context) -> None:
         layout = self.layout
