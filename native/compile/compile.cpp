@@ -13,6 +13,7 @@
 #include <tuple>
 
 #include "compile/parts.h"
+#include "core/finite.h"
 #include "dna/controls.h"
 #include "dna/size.h"
 #include "dna/validate.h"
@@ -273,6 +274,37 @@ std::vector<ColumnEntry> list_columns(const Groups& groups, RigData& out, Used& 
   return entries;
 }
 
+// The columns once more, by group and then by control.
+void list_by_group(const std::vector<ColumnEntry>& entries, RigData& out) {
+  std::vector<std::uint32_t> next;
+  std::uint32_t begin = 0;
+  for (rig::JointGroup& g : out.joint_groups) {
+    next.push_back(g.columns_begin = begin);
+    begin += g.column_count;
+  }
+  out.group_columns.resize(entries.size());
+  for (std::size_t i = 0; i < entries.size(); ++i) {
+    out.group_columns[next[entries[i].group]++] = {out.joint_columns[i].offset, entries[i].control};
+  }
+}
+
+// What each control costs at each LOD, and all of them.
+void count_reads(const std::vector<ColumnEntry>& entries, RigData& out) {
+  const std::size_t stride = out.control_count + std::size_t{1};
+  out.control_reads.resize(out.lod_count * stride);
+  for (std::uint32_t l = 0; l < out.lod_count; ++l) {
+    rig::ControlReads* reads = out.control_reads.data() + l * stride;
+    for (const ColumnEntry& e : entries) {
+      if (e.group >= out.live_groups[l]) continue;
+      const std::uint32_t rows = out.joint_group_lods[e.group * out.lod_count + l];
+      for (rig::ControlReads* r : {reads + e.control, reads + out.control_count}) {
+        r->values += rows;
+        ++r->columns;
+      }
+    }
+  }
+}
+
 Status compile_columns(const Groups& groups, RigData& out, Used& used) {
   const std::vector<ColumnEntry> entries = list_columns(groups, out, used);
   std::vector<std::vector<std::uint32_t>> offsets;
@@ -280,11 +312,14 @@ Status compile_columns(const Groups& groups, RigData& out, Used& used) {
   std::uint64_t end = 0;
   out.joint_column_begins.assign(out.control_count + std::size_t{1}, 0);
   for (const ColumnEntry& e : entries) {
+    // A column begins on whole vectors, unless it is shorter than one: those lie side by side.
+    const std::uint32_t rows = out.joint_groups[e.group].row_count;
+    if (rows >= simd::kWidest) end = simd::rounded_up(end);
     const auto offset = static_cast<std::uint32_t>(end);
     offsets[e.group][e.column] = offset;
     out.joint_columns.push_back({offset, e.group});
     ++out.joint_column_begins[e.control + std::size_t{1}];
-    end += out.joint_groups[e.group].row_count;
+    end += rows;
     if (end > UINT32_MAX - simd::kWidest) {
       return fail(ErrorCode::kLimitExceeded, "behavior.joint_groups",
                   "the matrices of all groups hold more values than an index of 32 bits reaches");
@@ -292,11 +327,14 @@ Status compile_columns(const Groups& groups, RigData& out, Used& used) {
   }
   std::partial_sum(out.joint_column_begins.begin(), out.joint_column_begins.end(),
                    out.joint_column_begins.begin());
+  list_by_group(entries, out);
   out.joint_values.resize(static_cast<std::size_t>(end) + simd::kWidest);  // kernels read on
   for (std::size_t i = 0; i < offsets.size(); ++i) {
     transpose(groups[i]->values.data(), out.joint_groups[i].row_count, offsets[i],
               out.joint_values.data());
   }
+  // A column at rest may be read where that costs less, but 0 times infinity is no 0.
+  if (core::all_finite(out.joint_values)) count_reads(entries, out);
   return ok();
 }
 
@@ -328,7 +366,19 @@ std::vector<simd::Piece> pieces_of(std::span<const std::uint32_t> rows, std::siz
   return pieces;
 }
 
+// The blocks that each group's rows reach.
+void find_blocks(RigData& out) {
+  for (rig::JointGroup& g : out.joint_groups) {
+    const auto rows = std::span(out.joint_outputs).subspan(g.rows_begin, g.row_count);
+    if (rows.empty()) continue;
+    const auto [least, most] = std::ranges::minmax(rows);
+    g.blocks_begin = static_cast<std::uint32_t>(least / simd::kPlaces);
+    g.blocks_end = static_cast<std::uint32_t>(most / simd::kPlaces + 1);
+  }
+}
+
 void compile_pieces(const Groups& groups, RigData& out) {
+  find_blocks(out);
   std::vector<std::uint32_t> file_order(groups.size());
   std::iota(file_order.begin(), file_order.end(), 0u);
   std::ranges::sort(file_order, {}, [&](std::uint32_t i) { return groups[i]; });
@@ -440,6 +490,13 @@ Status compile_channels_and_maps(const dna::Dna& dna, RigData& out) {
   }
   out.shape_inputs.assign(s.input_indices.begin(), s.input_indices.end());
   out.shape_outputs.assign(s.output_indices.begin(), s.output_indices.end());
+  const auto follows = [](const std::vector<std::uint16_t>& list, std::size_t i) {
+    return i == 0 || list[i] == list[i - 1] + 1;
+  };
+  while (out.shape_run < out.shape_inputs.size() && follows(out.shape_inputs, out.shape_run) &&
+         follows(out.shape_outputs, out.shape_run)) {
+    ++out.shape_run;
+  }
   return ok();
 }
 

@@ -56,12 +56,22 @@ struct Watch {
 /// A joint group: a dense matrix that turns some controls into some joint attributes.
 ///
 /// The matrix is stored column by column, a column for each control, in joint_values or
-/// joint_halves. Columns have row_count values and no padding. The columns of one control in all
-/// groups lie side by side, so that a control is one run of memory.
+/// joint_halves. The columns of one control in all groups lie side by side, so that a control is
+/// one run of memory. Columns of kWidest rows and more begin on whole vectors; others have no
+/// padding.
 struct JointGroup {
   std::uint32_t row_count = 0;
-  std::uint32_t column_count = 0;  // columns that hold at least one value other than 0
-  std::uint32_t rows_begin = 0;    // this group's first row among the rows of all groups
+  std::uint32_t column_count = 0;   // columns that hold at least one value other than 0
+  std::uint32_t rows_begin = 0;     // this group's first row among the rows of all groups
+  std::uint32_t columns_begin = 0;  // its first column in group_columns
+  // The blocks of joint attributes that its rows reach at any LOD: see joint_pieces.
+  std::uint32_t blocks_begin = 0, blocks_end = 0;
+};
+
+/// What one control, or all together, have in the joint groups of a LOD.
+struct ControlReads {
+  std::uint32_t values = 0;   // coefficients that an evaluation reads
+  std::uint32_t columns = 0;  // in that many columns
 };
 
 /// One column of a joint group, as it is listed at its control.
@@ -225,7 +235,9 @@ struct RigHeader {
   std::uint32_t widest_layer = 0;      // rows of the largest layer of a network
   std::uint32_t solver_inputs = 0, solver_poses = 0;  // of the largest solver
   std::uint32_t mask_count = 0;                       // regions of networks
-  std::uint32_t joint_stride = 9;                     // attributes of a joint; with quaternions 10
+  // So many leading channels follow each other, as do their controls: one copy serves them all.
+  std::uint32_t shape_run = 0;
+  std::uint32_t joint_stride = 9;  // attributes of a joint; with quaternions 10
   EulerConvention euler;
   // Networks may move joints in another system of axes than the face's. Then ml_converted is 1,
   // v * ml_basis takes a vector of theirs into ours, and ml_euler says how they spell Euler angles.
@@ -278,7 +290,13 @@ struct RigArrays {
   A<simd::Piece> extra_pieces;
   A<std::uint32_t> joint_column_begins;  // [controls + 1]: where each control's columns begin
   A<JointColumn> joint_columns;          // by control, then by group
-  A<std::uint16_t> joints_written;       // joints that any group moves at any LOD, ascending
+  // The same columns by group, then by control, for frames in which most of them are active. A
+  // weight is a control.
+  A<simd::Column> group_columns;
+  // [LODs, controls + 1]: of each control, and last of all. Empty where a coefficient is not
+  // finite: then a column at rest must not be read.
+  A<ControlReads> control_reads;
+  A<std::uint16_t> joints_written;  // joints that any group moves at any LOD, ascending
 
   // Joints that are turned by quaternions.
   A<QuaternionJoint> quaternion_joints;
@@ -330,7 +348,8 @@ constexpr void for_each_array(R& r, F f) {
   f(r.step_begins), f(r.steps);
   f(r.joint_groups), f(r.live_groups), f(r.joint_group_lods), f(r.joint_values), f(r.joint_halves);
   f(r.joint_outputs), f(r.joint_pieces), f(r.extra_begins), f(r.extra_pieces);
-  f(r.joint_column_begins), f(r.joint_columns), f(r.joints_written);
+  f(r.joint_column_begins), f(r.joint_columns), f(r.group_columns), f(r.control_reads);
+  f(r.joints_written);
   f(r.quaternion_joints), f(r.quaternion_columns), f(r.quaternion_terms);
   f(r.quaternion_column_begins), f(r.quaternion_column_list), f(r.euler_joints);
   f(r.euler_joint_lods);

@@ -68,6 +68,9 @@ void check_sizes(const Rig& r, IndexCheck& c) {
   c.demand("live_groups", r.live_groups.size() == lods);
   c.demand("euler_joint_lods", r.euler_joint_lods.size() == lods);
   c.demand("joint_values", r.joint_values.empty() || r.joint_halves.empty());
+  c.demand("group_columns", r.group_columns.size() == r.joint_columns.size());
+  c.demand("control_reads",
+           r.control_reads.empty() || r.control_reads.size() == lods * (r.control_count + 1));
   c.demand("joint_column_begins", r.joint_column_begins.size() == r.control_count + std::size_t{1});
   c.demand("shape_outputs", r.shape_outputs.size() == r.shape_inputs.size());
   c.demand("shape_lods", r.shape_lods.empty() || r.shape_lods.size() == lods);
@@ -97,6 +100,18 @@ void check_correctives(const Rig& r, IndexCheck& c) {
   }
 }
 
+// Each is read as a column of its group.
+void check_group_columns(const Rig& r, std::uint64_t values, IndexCheck& c) {
+  std::size_t i = 0;
+  for (const JointGroup& g : r.joint_groups) {
+    for (std::uint32_t n = 0; n < g.column_count && i < r.group_columns.size(); ++n, ++i) {
+      const simd::Column& column = r.group_columns[i];
+      const std::uint64_t end = column.offset + std::uint64_t{simd::rounded_up(g.row_count)};
+      c.demand("group_columns", end <= values && column.weight < r.control_count);
+    }
+  }
+}
+
 void check_groups(const Rig& r, IndexCheck& c) {
   const std::uint64_t values = r.is_half() ? r.joint_halves.size() : r.joint_values.size();
   c.below("joint_outputs", r.joint_outputs, std::uint64_t{r.joint_count} * r.joint_stride);
@@ -111,13 +126,16 @@ void check_groups(const Rig& r, IndexCheck& c) {
     // A first value is read even of a column without rows.
     c.demand("joint_columns", end <= values && column.offset < values);
   }
-  std::uint64_t rows = 0;
+  check_group_columns(r, values, c);
+  std::uint64_t rows = 0, begin = 0;
   for (std::size_t i = 0; i < columns.size(); ++i) {
     const JointGroup& g = r.joint_groups[i];
     // One after the other: a kernel writes whole registers, into the rows of the group that
     // follows.
-    c.demand("joint_groups", columns[i] == g.column_count && g.rows_begin == rows);
+    c.demand("joint_groups",
+             columns[i] == g.column_count && g.rows_begin == rows && g.columns_begin == begin);
     rows += g.row_count;
+    begin += g.column_count;
     for (std::uint32_t l = 0; l < r.lod_count; ++l) {
       c.demand("joint_group_lods", r.joint_group_lods[i * r.lod_count + l] <= g.row_count);
     }
@@ -149,6 +167,19 @@ void check_live_pieces(const Rig& r, std::uint32_t lod, IndexCheck& c) {
   demand("extra_pieces", r.extra_pieces.subspan(extra[0], extra[1] - extra[0]));
 }
 
+// The extra pieces of a LOD are looked up by their blocks.
+bool in_order(const Rig& r) {
+  for (std::size_t l = 0; l + 1 < r.extra_begins.size(); ++l) {
+    const std::uint32_t* begin = r.extra_begins.data() + l;
+    if (begin[0] > begin[1] || begin[1] > r.extra_pieces.size() ||
+        !std::ranges::is_sorted(r.extra_pieces.subspan(begin[0], begin[1] - begin[0]), {},
+                                &simd::Piece::block)) {
+      return false;
+    }
+  }
+  return true;
+}
+
 void check_pieces(const Rig& r, IndexCheck& c) {
   const std::uint64_t places = std::uint64_t{r.joint_count} * r.joint_stride;
   const std::uint64_t blocks = (places + simd::kPlaces - 1) / simd::kPlaces;
@@ -166,6 +197,15 @@ void check_pieces(const Rig& r, IndexCheck& c) {
   for (const simd::Piece& p : r.extra_pieces) {
     c.demand("extra_pieces", p.block < blocks && (p.block + 1u < blocks || (p.mask & ~last) == 0));
   }
+  // A block outside of what its groups say would be left out while they move.
+  for (const JointGroup& g : r.joint_groups) {
+    c.demand("joint_groups", g.blocks_begin <= g.blocks_end && g.blocks_end <= blocks);
+    for (std::uint32_t row = 0; row < g.row_count && c.status(); ++row) {
+      const std::size_t block = r.joint_outputs[g.rows_begin + row] / simd::kPlaces;
+      c.demand("joint_groups", g.blocks_begin <= block && block < g.blocks_end);
+    }
+  }
+  c.demand("extra_pieces", in_order(r));
   for (std::uint32_t lod = 0; lod < r.lod_count && c.status(); ++lod) check_live_pieces(r, lod, c);
 }
 
@@ -308,6 +348,15 @@ void check_gui_ranges(const Rig& r, IndexCheck& c) {
   c.below("gui_range_rows", r.gui_range_rows, r.gui_rows.size(), [](std::uint32_t v) { return v; });
 }
 
+// Whether the first of them follow each other.
+bool is_run(View<std::uint16_t> list, std::size_t count) {
+  if (count > list.size()) return false;
+  for (std::size_t i = 1; i < count; ++i) {
+    if (list[i] != list[i - 1] + 1) return false;
+  }
+  return true;
+}
+
 void check_table(const char* where, View<ConditionalRow> rows, std::uint64_t inputs,
                  std::uint64_t outputs, IndexCheck& c) {
   for (std::size_t i = 0; i < rows.size(); ++i) {
@@ -341,6 +390,7 @@ Status detail::check_everything(const Rig& r) {
   check_gui_ranges(r, c);
   c.below("shape_inputs", r.shape_inputs, r.control_count);
   c.below("shape_outputs", r.shape_outputs, r.blend_shape_count);
+  c.demand("header", is_run(r.shape_inputs, r.shape_run) && is_run(r.shape_outputs, r.shape_run));
   const auto most = [](std::uint32_t v) { return v; };
   c.below("shape_lods", r.shape_lods, r.shape_inputs.size() + 1, most);
   c.below("map_lods", r.map_lods, r.map_rows.size() + 1, most);

@@ -17,25 +17,27 @@ Workspace make_workspace(const Rig& rig) {
   work.active.resize(std::size_t{rig.control_count} + 1);  // one is written past the last
   work.candidates.resize(rig.psds.size() + 1);
   work.psd_bits.resize((std::size_t{rig.psd_count} + 63) / 64);
-  work.column_begins.resize(rig.joint_groups.size() + 2);
+  work.column_ends.resize(rig.joint_groups.size());
   work.columns.resize(rig.joint_columns.size());
   work.rows.resize(detail::rows_size(rig));
+  work.live_blocks.resize(rig.lod_count == 0 ? 0 : rig.joint_pieces.size() / rig.lod_count);
   work.last_controls.resize(rig.control_count);
   work.products.resize(rig.quaternion_joints.size());
   work.quaternion_bits.resize((rig.quaternion_columns.size() + 63) / 64);
   work.solver.resize(std::size_t{rig.solver_inputs} + 2 * std::size_t{rig.solver_poses});
   work.masks.assign(rig.mask_count, 1.0f);
   work.operation_values.resize(rig.operation_values);
-  for (auto& layer : work.layers) layer.resize(simd::rounded_up(rig.widest_layer));
+  // Behind what a layer reads lies the weight of its biases.
+  for (auto& layer : work.layers) {
+    layer.resize(simd::rounded_up(std::size_t{rig.widest_layer}) + 1);
+    layer.back() = 1.0f;
+  }
   work.layer_columns.resize(std::size_t{rig.widest_layer} + 1);
   return work;
 }
 
 Workspace make_batch_workspace(const Rig& rig) {
   Workspace work = make_workspace(rig);
-  // One more: kernels begin at a pointer even where there is nothing to read.
-  work.column_offsets.resize(rig.joint_columns.size() + 1);
-  work.column_weights.resize((rig.joint_columns.size() + 1) * simd::kFrames);
   work.rows.resize(detail::rows_size(rig) * simd::kFrames);
   work.frame_weights.resize(std::size_t{rig.control_count} * simd::kFrames);
   work.union_bits.resize((std::size_t{rig.control_count} + 63) / 64);

@@ -32,9 +32,16 @@ inline PoseView view(Pose& pose) {
           pose.controls.data()};
 }
 
+/// How the columns of the joint groups are gone through.
+enum class Traversal : std::uint8_t {
+  kCounted,  // by whichever of the two moves fewer bytes in the frame
+  kListed,   // those of active controls, which are listed first
+  kWhole     // all of them, in the order of group_columns, where no coefficient forbids it
+};
+
 /// The scratch memory of an evaluation. Threads that evaluate at the same time need one each; its
 /// alignment keeps two of them out of one cache line, where they would slow each other down. Only
-/// masks mean something to a caller.
+/// masks, traversal and whole_frames mean something to a caller.
 struct alignas(128) Workspace {
   // Which controls are not 0.
   std::vector<std::uint16_t> active;  // these controls, ascending; the first active_count count
@@ -48,9 +55,12 @@ struct alignas(128) Workspace {
   std::vector<std::uint64_t> psd_bits;    // a bit for each corrective control that is not 0
   std::vector<float> last_controls;       // [controls]: the controls before the correctives ran
   // Joint groups.
-  std::vector<std::uint32_t> column_begins;  // [groups + 1]: where a group's columns begin below
-  std::vector<simd::Column> columns;         // the columns of active controls, by group
-  core::AlignedVector<float> rows;           // the rows of all groups
+  Traversal traversal = Traversal::kCounted;
+  std::size_t whole_frames = 0;            // evaluations that read all columns
+  std::vector<std::uint32_t> column_ends;  // [groups]: where a group's active columns end below
+  std::vector<simd::Column> columns;       // the columns of active controls, as in group_columns
+  core::AlignedVector<float> rows;         // the rows of all groups
+  std::vector<std::uint8_t> live_blocks;   // [blocks]: 1 where a group that does not rest writes
   // Rotations by quaternions.
   std::vector<Quaternion> products;            // [quaternion joints]
   std::vector<std::uint64_t> quaternion_bits;  // a bit for each active column; 0 between calls
@@ -61,10 +71,8 @@ struct alignas(128) Workspace {
   core::AlignedVector<float> layers[2];         // what a layer of a network reads and writes
   std::vector<simd::Column> layer_columns;      // the columns of a layer whose inputs are not 0
   // For evaluate_frames, which evaluates kFrames frames together.
-  std::vector<std::uint64_t> union_bits;      // a bit for each control that is not 0 in any frame
-  std::vector<float> frame_weights;           // [controls, kFrames]: their values
-  std::vector<std::uint32_t> column_offsets;  // [columns]: as columns has them
-  std::vector<float> column_weights;          // [columns, kFrames]
+  std::vector<std::uint64_t> union_bits;  // a bit for each control that is not 0 in any frame
+  std::vector<float> frame_weights;       // [controls, kFrames]: their values; 0 between calls
 };
 
 /// A pose and a workspace of the sizes that the rig needs.

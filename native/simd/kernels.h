@@ -16,7 +16,8 @@ namespace risorius::simd {
 /// behind its last one: rows are not padded, a kernel reads on into the next column and its caller
 /// passes the surplus over.
 inline constexpr std::size_t kWidest = 16;
-constexpr std::size_t rounded_up(std::size_t rows) {
+template <class T>
+constexpr T rounded_up(T rows) {
   return (rows + kWidest - 1) / kWidest * kWidest;
 }
 /// Frames that a batch kernel takes at once.
@@ -38,7 +39,7 @@ inline void prefetch(const void* address) {
 /// A column of a matrix and what it is multiplied by.
 struct Column {
   std::uint32_t offset = 0;  // of its first value
-  float weight = 0;
+  std::uint32_t weight = 0;  // which of the weights
 };
 
 /// Sixteen places: those whose bit is set take the values from `from` on, one after the other.
@@ -62,20 +63,20 @@ struct EulerTurns {
 struct Kernels {
   const char* name;
 
-  /// out[r] = sum over i of columns[i].weight * values[columns[i].offset + r].
+  /// out[r] = sum over i of weights[columns[i].weight] * values[columns[i].offset + r].
   /// In:   values   of all matrices
   ///       n        columns
   /// Out:  out      float32[rounded_up(rows)], overwritten; beyond rows anything
-  void (*columns)(const float* values, const Column* columns, std::size_t n, float* out,
-                  std::size_t rows);
+  void (*columns)(const float* values, const Column* columns, std::size_t n, const float* weights,
+                  float* out, std::size_t rows);
   /// The same from IEEE half floats, none of them infinite.
   void (*half_columns)(const std::uint16_t* values, const Column* columns, std::size_t n,
-                       float* out, std::size_t rows);
-  /// The same for kFrames frames: weights float32[n, kFrames], frame f at out + f * stride.
-  void (*batch_columns)(const float* values, const std::uint32_t* offsets, const float* weights,
-                        std::size_t n, float* out, std::size_t stride, std::size_t rows);
-  void (*batch_half_columns)(const std::uint16_t* values, const std::uint32_t* offsets,
-                             const float* weights, std::size_t n, float* out, std::size_t stride,
+                       const float* weights, float* out, std::size_t rows);
+  /// The same for kFrames frames: weights float32[.., kFrames], frame f at out + f * stride.
+  void (*batch_columns)(const float* values, const Column* columns, std::size_t n,
+                        const float* weights, float* out, std::size_t stride, std::size_t rows);
+  void (*batch_half_columns)(const std::uint16_t* values, const Column* columns, std::size_t n,
+                             const float* weights, float* out, std::size_t stride,
                              std::size_t rows);
   /// Fills n blocks of kPlaces with their pieces, other places with 0.
   /// In: from  kPlaces values may be read from any piece's first on

@@ -18,7 +18,7 @@ namespace {
 
 struct V {
   using Reg = __m512;
-  static constexpr std::size_t kLanes = 16, kBlocks = 4, kBatchBlocks = 3;
+  static constexpr std::size_t kLanes = 16, kBlocks = 8, kBatchBlocks = 3;
   static constexpr int kBatchFrames = 8;
   RISORIUS_INLINE static Reg zero() { return _mm512_setzero_ps(); }
   RISORIUS_INLINE static Reg set(float v) { return _mm512_set1_ps(v); }

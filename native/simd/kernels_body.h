@@ -20,12 +20,13 @@ namespace {
 
 // kCount registers of rows of one frame.
 template <int kCount, class T>
-RISORIUS_TARGET void block(const T* values, const Column* columns, std::size_t n, float* out) {
+RISORIUS_TARGET void block(const T* values, const Column* columns, std::size_t n,
+                           const float* weights, float* out) {
   V::Reg sums[kCount];
   for (int b = 0; b < kCount; ++b) sums[b] = V::zero();
   for (std::size_t i = 0; i < n; ++i) {
     const T* column = values + columns[i].offset;
-    const V::Reg weight = V::set(columns[i].weight);
+    const V::Reg weight = V::set(weights[columns[i].weight]);
     for (int b = 0; b < kCount; ++b) {
       sums[b] = V::madd(weight, V::load(column + b * V::kLanes), sums[b]);
     }
@@ -35,19 +36,19 @@ RISORIUS_TARGET void block(const T* values, const Column* columns, std::size_t n
 
 // kCount registers of rows of V::kBatchFrames frames: each value read serves them all.
 template <int kCount, class T>
-RISORIUS_TARGET void batch_block(const T* values, const std::uint32_t* offsets,
-                                 const float* weights, std::size_t n, float* out,
-                                 std::size_t stride) {
+RISORIUS_TARGET void batch_block(const T* values, const Column* columns, std::size_t n,
+                                 const float* weights, float* out, std::size_t stride) {
   V::Reg sums[V::kBatchFrames][kCount];
   for (int f = 0; f < V::kBatchFrames; ++f) {
     for (int b = 0; b < kCount; ++b) sums[f][b] = V::zero();
   }
   for (std::size_t i = 0; i < n; ++i) {
-    const T* column = values + offsets[i];
+    const T* column = values + columns[i].offset;
+    const float* own = weights + std::size_t{columns[i].weight} * kFrames;
     V::Reg rows[kCount];
     for (int b = 0; b < kCount; ++b) rows[b] = V::load(column + b * V::kLanes);
     for (int f = 0; f < V::kBatchFrames; ++f) {
-      const V::Reg weight = V::set(weights[i * kFrames + static_cast<std::size_t>(f)]);
+      const V::Reg weight = V::set(own[f]);
       for (int b = 0; b < kCount; ++b) sums[f][b] = V::madd(weight, rows[b], sums[f][b]);
     }
   }
@@ -79,22 +80,23 @@ void for_blocks(std::size_t rows, std::size_t most, F f) {
 }
 
 template <class T>
-void columns(const T* values, const Column* list, std::size_t n, float* out, std::size_t rows) {
+void columns(const T* values, const Column* list, std::size_t n, const float* weights, float* out,
+             std::size_t rows) {
   static constexpr auto kTable =
       block_table<T>(std::make_integer_sequence<int, static_cast<int>(V::kBlocks)>{});
   for_blocks(rows, V::kBlocks, [&](std::size_t at, std::size_t count) {
-    kTable[count - 1](values + at * V::kLanes, list, n, out + at * V::kLanes);
+    kTable[count - 1](values + at * V::kLanes, list, n, weights, out + at * V::kLanes);
   });
 }
 
 template <class T>
-void batch_columns(const T* values, const std::uint32_t* offsets, const float* weights,
-                   std::size_t n, float* out, std::size_t stride, std::size_t rows) {
+void batch_columns(const T* values, const Column* list, std::size_t n, const float* weights,
+                   float* out, std::size_t stride, std::size_t rows) {
   static constexpr auto kTable =
       batch_block_table<T>(std::make_integer_sequence<int, static_cast<int>(V::kBatchBlocks)>{});
   for (std::size_t f = 0; f < kFrames; f += V::kBatchFrames) {
     for_blocks(rows, V::kBatchBlocks, [&](std::size_t at, std::size_t count) {
-      kTable[count - 1](values + at * V::kLanes, offsets, weights + f, n,
+      kTable[count - 1](values + at * V::kLanes, list, n, weights + f,
                         out + f * stride + at * V::kLanes, stride);
     });
   }

@@ -15,23 +15,25 @@ float widened(float v) { return v; }
 float widened(std::uint16_t v) { return from_half(v); }
 
 template <class T>
-void columns(const T* values, const Column* list, std::size_t n, float* out, std::size_t rows) {
+void columns(const T* values, const Column* list, std::size_t n, const float* weights, float* out,
+             std::size_t rows) {
   for (std::size_t r = 0; r < rows; ++r) out[r] = 0.0f;
   for (std::size_t i = 0; i < n; ++i) {
     const T* column = values + list[i].offset;
-    for (std::size_t r = 0; r < rows; ++r) out[r] += list[i].weight * widened(column[r]);
+    const float weight = weights[list[i].weight];
+    for (std::size_t r = 0; r < rows; ++r) out[r] += weight * widened(column[r]);
   }
 }
 
 template <class T>
-void batch_columns(const T* values, const std::uint32_t* offsets, const float* weights,
-                   std::size_t n, float* out, std::size_t stride, std::size_t rows) {
+void batch_columns(const T* values, const Column* list, std::size_t n, const float* weights,
+                   float* out, std::size_t stride, std::size_t rows) {
   for (std::size_t f = 0; f < kFrames; ++f) {
     float* to = out + f * stride;
     for (std::size_t r = 0; r < rows; ++r) to[r] = 0.0f;
     for (std::size_t i = 0; i < n; ++i) {
-      const T* column = values + offsets[i];
-      const float weight = weights[i * kFrames + f];
+      const T* column = values + list[i].offset;
+      const float weight = weights[std::size_t{list[i].weight} * kFrames + f];
       for (std::size_t r = 0; r < rows; ++r) to[r] += weight * widened(column[r]);
     }
   }

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <ctime>
 #include <functional>
+#include <limits>
+#include <numeric>
 #include <ostream>
 
 #include "rig/block.h"
@@ -213,13 +215,40 @@ TEST(Compile, RigKeepsNothingOfTheDna) {
   EXPECT_EQ(evaluate_once(rig, {1.0f, 0.5f}).blend_shapes[0], 0.5f);
 }
 
-TEST(Compile, ColumnsHaveNoPadding) {
+TEST(Compile, ShortColumnsHaveNoPadding) {
   const dna::Dna dna = good_face();
   const rig::Rig rig = must_compile(dna);
   std::size_t values = 0;
   for (const dna::JointGroup& g : dna.behavior.joint_groups) values += g.values.size();
   EXPECT_LE(rig.joint_values.size(), values + simd::kWidest);
   EXPECT_EQ(reinterpret_cast<std::uintptr_t>(rig.joint_values.data()) % 64, 0u);
+}
+
+TEST(Compile, ColumnsOfAVectorAndMoreBeginOnWholeOnes) {
+  dna::Dna dna = make_face(2, 0, 5);
+  std::vector<std::uint16_t> outputs(17);
+  std::iota(outputs.begin(), outputs.end(), std::uint16_t{0});
+  dna.behavior.joint_groups =
+      std::vector{make_group({17, 0}, {0, 1}, outputs, std::vector<float>(34, 1.0f)),
+                  make_group({2, 0}, {0, 1}, {18, 19}, {1, 1, 1, 1})};
+  const rig::Rig rig = must_compile(dna);
+  ASSERT_EQ(rig.joint_columns.size(), 4u);
+  for (const rig::JointColumn& column : rig.joint_columns) {
+    if (rig.joint_groups[column.group].row_count == 17) {
+      EXPECT_EQ(column.offset % simd::kWidest, 0u);
+    } else {
+      EXPECT_EQ(column.offset % simd::kWidest, 1u) << "behind the 17 rows";
+    }
+  }
+}
+
+TEST(Compile, AColumnAtRestMayNotBeReadWhereACoefficientIsNotFinite) {
+  dna::Dna dna = make_face(1, 0, 1);
+  dna.behavior.joint_groups = std::vector{make_group({1, 0}, {0}, {0}, {1.0f})};
+  EXPECT_EQ(must_compile(dna).control_reads.size(), 4u);  // [LODs, controls + 1]
+  const float infinity = std::numeric_limits<float>::infinity();
+  dna.behavior.joint_groups = std::vector{make_group({1, 0}, {0}, {0}, {infinity})};
+  EXPECT_TRUE(must_compile(dna).control_reads.empty());
 }
 
 TEST(Compile, TheLastGroupThatTurnsAQuaternionJointWinsWhateverItsLods) {

@@ -221,6 +221,57 @@ TEST(Block, RowsOfGroupsFollowEachOther) {
   EXPECT_EQ(refused_field(rows), "rig.joint_groups");
 }
 
+TEST(Block, ColumnsByGroupStayInTheirMatrix) {
+  const Rig rig = must_compile(face_with_everything());
+  BlockBytes control = bytes_of(rig), offset = bytes_of(rig);
+  first_of(control, rig, std::span(rig.group_columns)).weight = rig.control_count;
+  EXPECT_EQ(refused_field(control), "rig.group_columns");
+  first_of(offset, rig, std::span(rig.group_columns)).offset =
+      static_cast<std::uint32_t>(rig.joint_values.size());
+  EXPECT_EQ(refused_field(offset), "rig.group_columns");
+  BlockBytes begin = bytes_of(rig);
+  first_of(begin, rig, std::span(rig.joint_groups)).columns_begin = 1;
+  EXPECT_EQ(refused_field(begin), "rig.joint_groups");
+}
+
+// A block that its group does not name would keep the attributes of the frame before.
+TEST(Block, GroupsNameTheBlocksThatTheyWrite) {
+  const Rig rig = must_compile(face_with_everything());
+  for (const bool beyond : {false, true}) {
+    BlockBytes changed = bytes_of(rig);
+    JointGroup& group = first_of(changed, rig, std::span(rig.joint_groups));
+    group.blocks_end = beyond ? 0x10000000u : group.blocks_begin;
+    EXPECT_EQ(refused_field(changed), "rig.joint_groups");
+  }
+}
+
+// They are looked up by their blocks.
+TEST(Block, ExtraPiecesOutOfOrderAreRefused) {
+  dna::Dna dna = make_face(1, 0, 4);
+  dna.behavior.joint_groups = std::vector{make_group({4, 4}, {0}, {2, 0, 22, 20}, {1, 2, 3, 4})};
+  const Rig rig = must_compile(dna);
+  ASSERT_EQ(rig.extra_pieces.size(), 4u);  // one in each block of each LOD
+  BlockBytes changed = bytes_of(rig);
+  first_of(changed, rig, std::span(rig.extra_pieces)).block = 2;
+  EXPECT_EQ(refused_field(changed), "rig.extra_pieces");
+}
+
+TEST(Block, ChannelsOfARunFollowEachOther) {
+  dna::Dna dna = make_face(3, 0, 1);
+  dna.definition.blend_shape_channel_names = names("shape", 3);
+  dna.behavior.blend_shape_channels.lods = {3, 2};
+  dna.behavior.blend_shape_channels.input_indices = {1, 2, 0};
+  dna.behavior.blend_shape_channels.output_indices = {0, 1, 2};
+  const Rig rig = must_compile(dna);
+  EXPECT_EQ(rig.shape_run, 2u);
+  constexpr std::size_t kRigHeader = 32;  // behind magic, byte order, sizes and hash
+  for (const std::uint32_t run : {3u, 4u}) {
+    BlockBytes changed = bytes_of(rig);
+    std::memcpy(changed.data() + kRigHeader + offsetof(RigHeader, shape_run), &run, sizeof(run));
+    EXPECT_EQ(refused_field(changed), "rig.header") << run;
+  }
+}
+
 // Counts that no array backs: a small block must not ask for a large workspace.
 TEST(Block, ScratchIsHeldAgainstTheBlock) {
   const Rig rig = must_compile(face_with_everything());

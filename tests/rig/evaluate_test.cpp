@@ -258,6 +258,26 @@ TEST(EvaluateShapes, CopyTheirControlUnclampedAndTheLastWins) {
 
 // ---- faces with nothing in them
 
+TEST(EvaluateShapes, ARunOfChannelsIsCutByTheLodAndLeavesTheOthersZero) {
+  dna::Dna dna = make_face(3, 0, 1);
+  dna.definition.blend_shape_channel_names = names("shape", 6);
+  dna.behavior.blend_shape_channels.lods = {4, 2};
+  dna.behavior.blend_shape_channels.input_indices = {0, 1, 2, 0};
+  dna.behavior.blend_shape_channels.output_indices = {1, 2, 3, 5};
+  const Rig rig = must_compile(dna);
+  EXPECT_EQ(rig.shape_run, 3u);
+  Workspace work = make_workspace(rig);
+  Pose pose = make_pose(rig);
+  for (const auto& [lod, expected] :
+       {std::pair{0u, std::vector{0.0f, 2.0f, 3.0f, 4.0f, 0.0f, 2.0f}},
+        std::pair{1u, std::vector{0.0f, 2.0f, 3.0f, 0.0f, 0.0f, 0.0f}}}) {
+    std::fill(pose.blend_shapes.begin(), pose.blend_shapes.end(), kNan);
+    const float raw[3] = {2.0f, 3.0f, 4.0f};
+    evaluate(rig, raw, lod, true, work, pose);
+    EXPECT_EQ(pose.blend_shapes, expected) << lod;
+  }
+}
+
 TEST(Evaluate, EmptyFaceGivesAnEmptyPose) {
   const Rig rig = must_compile(dna::Dna{});
   const Pose pose = evaluate_once(rig, {});

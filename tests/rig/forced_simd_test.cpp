@@ -16,7 +16,8 @@ dna::Dna one_group() {
 
 int calls = 0;
 
-void spy(const float*, const simd::Column*, std::size_t, float* out, std::size_t rows) {
+void spy(const float*, const simd::Column*, std::size_t, const float*, float* out,
+         std::size_t rows) {
   ++calls;
   for (std::size_t r = 0; r < rows; ++r) out[r] = 42.0f;
 }

@@ -55,10 +55,11 @@ std::vector<std::uint32_t> every_second(std::size_t n, std::size_t rows) {
   return offsets;
 }
 
-std::vector<Column> columns_of(const std::vector<std::uint32_t>& offsets, const float* weights,
-                               std::size_t n, std::size_t step = 1) {
+// Column i has weight i.
+std::vector<Column> columns_of(const std::vector<std::uint32_t>& offsets, std::size_t n) {
   std::vector<Column> columns;
-  for (std::size_t i = 0; i < n; ++i) columns.push_back({offsets[i], weights[i * step]});
+  for (std::size_t i = 0; i < n; ++i)
+    columns.push_back({offsets[i], static_cast<std::uint32_t>(i)});
   return columns;
 }
 
@@ -109,10 +110,10 @@ TEST_P(SimdKernels, SumWithinTheRoundingOfItsTerms) {
       const std::vector<float> weights = random_weights(n, random);
       const std::vector<std::uint32_t> offsets = every_second(n, rows);
       std::vector<float> out(rounded_up(rows), 1e30f);
-      kernels_.columns(m.values.data(), columns_of(offsets, weights.data(), n).data(), n,
+      kernels_.columns(m.values.data(), columns_of(offsets, n).data(), n, weights.data(),
                        out.data(), rows);
       expect_sums(m, offsets, weights.data(), 1, n, out.data());
-      kernels_.half_columns(half.values.data(), columns_of(offsets, weights.data(), n).data(), n,
+      kernels_.half_columns(half.values.data(), columns_of(offsets, n).data(), n, weights.data(),
                             out.data(), rows);
       expect_sums(half, offsets, weights.data(), 1, n, out.data());
     }
@@ -182,21 +183,23 @@ TEST_P(SimdKernels, AFrameOfABatchHasTheBitsOfTheFrameAlone) {
     const Matrix<std::uint16_t> half = halves(m);
     const std::vector<float> weights = random_weights(n * kFrames, random);
     const std::vector<std::uint32_t> offsets = every_second(n, rows);
-    std::vector<float> batch(stride * kFrames), alone(stride);
+    const std::vector<Column> columns = columns_of(offsets, n);
+    std::vector<float> batch(stride * kFrames), alone(stride), own(n);
     for (const bool is_half : {false, true}) {
       if (is_half) {
-        kernels_.batch_half_columns(half.values.data(), offsets.data(), weights.data(), n,
+        kernels_.batch_half_columns(half.values.data(), columns.data(), n, weights.data(),
                                     batch.data(), stride, rows);
       } else {
-        kernels_.batch_columns(m.values.data(), offsets.data(), weights.data(), n, batch.data(),
+        kernels_.batch_columns(m.values.data(), columns.data(), n, weights.data(), batch.data(),
                                stride, rows);
       }
       for (std::size_t f = 0; f < kFrames; ++f) {
-        const std::vector<Column> one = columns_of(offsets, weights.data() + f, n, kFrames);
+        for (std::size_t i = 0; i < n; ++i) own[i] = weights[i * kFrames + f];
         if (is_half) {
-          kernels_.half_columns(half.values.data(), one.data(), n, alone.data(), rows);
+          kernels_.half_columns(half.values.data(), columns.data(), n, own.data(), alone.data(),
+                                rows);
         } else {
-          kernels_.columns(m.values.data(), one.data(), n, alone.data(), rows);
+          kernels_.columns(m.values.data(), columns.data(), n, own.data(), alone.data(), rows);
         }
         for (std::size_t r = 0; r < rows; ++r) {
           ASSERT_EQ(std::bit_cast<std::uint32_t>(batch[f * stride + r]),
@@ -217,7 +220,7 @@ TEST_P(SimdKernels, ReadOnlyTheActiveColumns) {
   const std::vector<float> weights = random_weights(10, random);
   const std::vector<std::uint32_t> offsets = every_second(10, m.rows);
   std::vector<float> out(64);
-  kernels_.columns(m.values.data(), columns_of(offsets, weights.data(), 10).data(), 10, out.data(),
+  kernels_.columns(m.values.data(), columns_of(offsets, 10).data(), 10, weights.data(), out.data(),
                    64);
   for (const float v : out) ASSERT_FALSE(std::isnan(v));
 }
@@ -334,7 +337,7 @@ TEST_P(SimdKernels, WriteNoFurtherThanTheWidestVector) {
     const std::vector<float> weights = random_weights(3, random);
     const std::vector<std::uint32_t> offsets = every_second(3, rows);
     std::vector<float> out(rounded_up(rows) + 64, 7.0f);
-    kernels_.columns(m.values.data(), columns_of(offsets, weights.data(), 3).data(), 3, out.data(),
+    kernels_.columns(m.values.data(), columns_of(offsets, 3).data(), 3, weights.data(), out.data(),
                      rows);
     for (std::size_t r = rounded_up(rows); r < out.size(); ++r) ASSERT_EQ(out[r], 7.0f) << rows;
   }
@@ -353,10 +356,10 @@ void expect_bits(const Kernels& a, const Kernels& b) {
   for (const bool is_half : {false, true}) {
     for (const auto& [kernels, out] : {std::pair(&a, &first), std::pair(&b, &second)}) {
       if (is_half) {
-        kernels->half_columns(half.values.data(), columns_of(offsets, weights.data(), 100).data(),
-                              100, out->data(), 200);
+        kernels->half_columns(half.values.data(), columns_of(offsets, 100).data(), 100,
+                              weights.data(), out->data(), 200);
       } else {
-        kernels->columns(m.values.data(), columns_of(offsets, weights.data(), 100).data(), 100,
+        kernels->columns(m.values.data(), columns_of(offsets, 100).data(), 100, weights.data(),
                          out->data(), 200);
       }
     }

@@ -234,6 +234,22 @@ std::string batch(const rig::Rig& rig, const Controls& raw, std::uint32_t lod, b
   return kKept;
 }
 
+// All columns or those of active controls: one pose. A product too small for a float may leave a
+// sum at -0, which a column at rest makes 0.
+std::string traversals(const rig::Rig& rig, const Controls& raw, std::uint32_t lod, Origin origin) {
+  rig::Workspace work = rig::make_workspace(rig);
+  rig::Pose listed = rig::make_pose(rig), whole = rig::make_pose(rig);
+  work.traversal = rig::Traversal::kListed;
+  rig::evaluate(rig, raw.data(), lod, true, work, listed);
+  work.traversal = rig::Traversal::kWhole;
+  rig::evaluate(rig, raw.data(), lod, true, work, whole);
+  return origin == Origin::kForged ||
+                 std::ranges::equal(listed.joints, whole.joints,
+                                    [](float a, float b) { return a == b || (a != a && b != b); })
+             ? kKept
+             : "both ways through the columns give one pose";
+}
+
 std::string instance(const rig::Rig& rig, const Controls& raw, std::uint32_t lod, Origin origin) {
   rig::Instance face(rig);
   face.set_lod(lod);
@@ -253,6 +269,7 @@ std::string evaluate_rig(const rig::Rig& rig, const Controls& raw, std::vector<r
   for (std::uint32_t lod = 0; lod <= std::min(rig.lod_count, 3u); ++lod) {
     poses.push_back(pose_of(rig, raw, lod, true));
     if (std::string b = batch(rig, raw, lod, lod % 2 == 0, origin); !b.empty()) return b;
+    if (std::string b = traversals(rig, raw, lod, origin); !b.empty()) return b;
     if (std::string b = instance(rig, raw, lod, origin); !b.empty()) return b;
   }
   if (rig.lod_count > 4) poses.push_back(pose_of(rig, raw, rig.lod_count - 1, true));

@@ -27,26 +27,18 @@ class Block {
       : rig_(rig), work_(work), first_(first), count_(count) {}
 
   void joints(std::uint32_t lod) noexcept {
-    list_columns(rig_.live_groups[lod]);
-    const std::size_t stride = detail::rows_size(rig_);
+    const std::span active(work_.active.data(), list_union());
+    const simd::Column* columns = detail::list_columns(rig_, lod, active, work_);
     for (std::size_t i = 0; i < rig_.live_groups[lod]; ++i) {
       const std::uint32_t rows = rig_.joint_group_lods[i * rig_.lod_count + lod];
-      if (rows == 0) continue;
-      const std::size_t begin = work_.column_begins[i];
-      const std::size_t columns = work_.column_begins[i + 1] - begin;
-      const std::uint32_t* offsets = work_.column_offsets.data() + begin;
-      const float* weights = work_.column_weights.data() + begin * kFrames;
-      float* out = work_.rows.data() + rig_.joint_groups[i].rows_begin;
-      if (rig_.is_half()) {
-        rig_.kernels->batch_half_columns(rig_.joint_halves.data(), offsets, weights, columns, out,
-                                         stride, rows);
-      } else {
-        rig_.kernels->batch_columns(rig_.joint_values.data(), offsets, weights, columns, out,
-                                    stride, rows);
-      }
+      if (rows > 0) sum(rig_.joint_groups[i], i, columns, rows);
+    }
+    for (const std::uint16_t control : active) {
+      float* weights = work_.frame_weights.data() + std::size_t{control} * kFrames;
+      std::fill(weights, weights + kFrames, 0.0f);
     }
     for (std::size_t f = 0; f < count_; ++f) {
-      detail::place_rows(rig_, lod, work_.rows.data() + f * stride,
+      detail::place_rows(rig_, lod, work_, work_.rows.data() + f * stride_,
                          first_.joints + f * rig_.joint_count * rig_.joint_stride);
     }
   }
@@ -62,22 +54,21 @@ class Block {
   }
 
  private:
-  // As for one frame, of every control that any of the frames uses. Leaves the weights clear.
-  void list_columns(std::uint32_t live) noexcept {
-    const std::size_t n = list_union();
-    const std::span active(work_.active.data(), n);
-    detail::count_columns(rig_, live, active, work_.column_begins.data());
-    std::uint32_t* next = work_.column_begins.data() + 1;
-    for (const std::uint16_t control : active) {
-      float* weights = work_.frame_weights.data() + std::size_t{control} * kFrames;
-      detail::for_columns(rig_, control, live, [&](const JointColumn& column) {
-        const std::size_t at = next[column.group]++;
-        work_.column_offsets[at] = column.offset;
-        std::copy(weights, weights + kFrames, work_.column_weights.data() + at * kFrames);
-      });
-      std::fill(weights, weights + kFrames, 0.0f);
+  void sum(const JointGroup& g, std::size_t i, const simd::Column* columns,
+           std::uint32_t rows) noexcept {
+    const std::size_t count = work_.column_ends[i] - g.columns_begin;
+    if (count == 0 && !detail::shows(g, work_)) return;
+    const float* weights = work_.frame_weights.data();
+    float* out = work_.rows.data() + g.rows_begin;
+    if (rig_.is_half()) {
+      rig_.kernels->batch_half_columns(rig_.joint_halves.data(), columns + g.columns_begin, count,
+                                       weights, out, stride_, rows);
+    } else {
+      rig_.kernels->batch_columns(rig_.joint_values.data(), columns + g.columns_begin, count,
+                                  weights, out, stride_, rows);
     }
   }
+  // The controls that any of the frames uses, ascending, at the begin of work.active.
   std::size_t list_union() noexcept {
     std::size_t n = 0;
     for (std::size_t word = 0; word < work_.union_bits.size(); ++word) {
@@ -94,6 +85,7 @@ class Block {
   Workspace& work_;
   PoseView first_;
   std::size_t count_;
+  std::size_t stride_ = detail::rows_size(rig_);
 };
 
 void evaluate_block(const Rig& rig, const float* raw, std::size_t count, std::uint32_t lod,

@@ -37,14 +37,15 @@ void activate(const MlLayer& layer, float* values, std::uint32_t count) noexcept
 void run_layer(const Rig& rig, const MlLayer& layer, std::uint32_t rows, const float* in,
                std::uint32_t inputs, Workspace& work, float* out) noexcept {
   std::size_t n = 0;
-  const auto add = [&](std::uint32_t column, float weight) {
-    work.layer_columns[n++] = {layer.weights_begin + column * layer.rows, weight};
+  const auto add = [&](std::uint32_t column, std::size_t weight) {
+    work.layer_columns[n++] = {layer.weights_begin + column * layer.rows,
+                               static_cast<std::uint32_t>(weight)};
   };
-  add(0, 1.0f);
+  add(0, work.layers[0].size() - 1);
   for (std::uint32_t i = 0; i < std::min(inputs, layer.columns); ++i) {
-    if (in[i] != 0.0f) add(i + 1, in[i]);
+    if (in[i] != 0.0f) add(i + 1, i);
   }
-  rig.kernels->columns(rig.ml_weights.data(), work.layer_columns.data(), n, out, rows);
+  rig.kernels->columns(rig.ml_weights.data(), work.layer_columns.data(), n, in, out, rows);
   activate(layer, out, rows);
 }
 

@@ -60,11 +60,16 @@ void for_columns(const Rig& rig, std::size_t control, std::uint32_t live, F f) n
     f(column);
   }
 }
-/// Where each group's list of active columns begins, one entry late: as a list is filled its next
-/// place is begins[group + 1], which ends as the begin of the list after it.
-/// Out: begins  [live + 2]
-void count_columns(const Rig& rig, std::uint32_t live, std::span<const std::uint16_t> active,
-                   std::uint32_t* begins) noexcept;
+/// The columns that a frame, or frames together, need: those of active controls, or all where
+/// reading the others costs less than listing. Out: columns by group; those of group i are from
+/// its columns_begin up to work.column_ends[i].
+/// In:  active  controls, ascending
+/// Out: work    also live_blocks
+const simd::Column* list_columns(const Rig& rig, std::uint32_t lod,
+                                 std::span<const std::uint16_t> active, Workspace& work) noexcept;
+/// Whether a group without active columns has rows in a block that others write: then its rows
+/// must be 0.
+bool shows(const JointGroup& group, const Workspace& work) noexcept;
 
 /// The first rotation attribute of a joint.
 inline float* rotation_of(const Rig& rig, float* joints, std::uint32_t joint) noexcept {
@@ -80,8 +85,11 @@ inline void store_rotation(const Rig& rig, const Quaternion& q, float* to) noexc
   for (std::size_t a = 0; a < 3; ++a) to[a] = angles[a];
 }
 
-/// Brings the rows of all groups to their joint attributes; attributes without a row become 0.
+/// Brings the rows of all groups to their joint attributes; attributes without a row, and those of
+/// blocks that rest, become 0.
 /// In:  rows    [rows of all groups] and a vector more
+///      work    as list_columns left it
 /// Out: joints  [joints, stride]
-void place_rows(const Rig& rig, std::uint32_t lod, const float* rows, float* joints) noexcept;
+void place_rows(const Rig& rig, std::uint32_t lod, const Workspace& work, const float* rows,
+                float* joints) noexcept;
 }  // namespace risorius::rig::detail

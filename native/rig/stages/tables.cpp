@@ -57,9 +57,13 @@ void raw_to_gui(const Rig& rig, const float* raw, float* gui) noexcept {
 }
 
 void detail::channels_and_maps(const Rig& rig, std::uint32_t lod, const PoseView& pose) noexcept {
-  std::fill(pose.blend_shapes, pose.blend_shapes + rig.blend_shape_count, 0.0f);
   const std::uint32_t shapes = rig.shape_lods.empty() ? 0 : rig.shape_lods[lod];
-  for (std::uint32_t i = 0; i < shapes; ++i) {
+  const std::uint32_t run = std::min(shapes, rig.shape_run);
+  float* to = pose.blend_shapes + (run > 0 ? rig.shape_outputs[0] : 0);
+  std::fill(pose.blend_shapes, to, 0.0f);
+  if (run > 0) to = std::copy_n(pose.controls + rig.shape_inputs[0], run, to);
+  std::fill(to, pose.blend_shapes + rig.blend_shape_count, 0.0f);
+  for (std::uint32_t i = run; i < shapes; ++i) {
     pose.blend_shapes[rig.shape_outputs[i]] = pose.controls[rig.shape_inputs[i]];
   }
   const std::uint32_t rows = rig.map_lods.empty() ? 0 : rig.map_lods[lod];

@@ -1,0 +1,229 @@
+// SPDX-License-Identifier: MIT
+// The two ways through the columns of the joint groups: those of active controls, which are listed,
+// and all of them.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <random>
+
+#include "rig/stages/instance.h"
+#include "support/face.h"
+
+namespace risorius::rig {
+namespace {
+
+using namespace testing_support;
+
+constexpr std::size_t kRaw = 24, kJoints = 40;
+
+// Groups of one row to many vectors, at every LOD fewer rows; some write each other's attributes,
+// and between them are attributes that none writes.
+dna::Dna many_groups() {
+  std::mt19937 random(11);
+  std::uniform_real_distribution<float> value(-2.0f, 2.0f);
+  dna::Dna dna = make_face(kRaw, 0, kJoints, 3);
+  std::vector<dna::JointGroup> groups;
+  std::uint16_t first = 0;
+  constexpr std::uint16_t kRows[] = {1, 16, 90, 33, 5, 64, 17, 7};
+  for (const std::uint16_t rows : kRows) {
+    std::vector<std::uint16_t> inputs, outputs;
+    for (std::uint16_t c = 0; c < kRaw; ++c) {
+      if (random() % 4 != 0) inputs.push_back(c);
+    }
+    for (std::uint16_t r = 0; r < rows; ++r)
+      outputs.push_back(static_cast<std::uint16_t>(first + r));
+    std::ranges::shuffle(outputs, random);
+    std::vector<float> values(rows * inputs.size());
+    for (float& v : values) v = random() % 8 == 0 ? 0.0f : value(random);
+    const auto half = static_cast<std::uint16_t>(rows / 2);
+    groups.push_back(make_group({rows, half, static_cast<std::uint16_t>(rows == 90 ? 0 : half / 2)},
+                                inputs, outputs, values));
+    first = static_cast<std::uint16_t>(first + rows + (rows == 33 ? 30 : rows == 64 ? -3 : 2));
+  }
+  dna.behavior.joint_groups = groups;
+  return dna;
+}
+
+std::vector<float> some_active(std::size_t n, std::uint32_t seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> value(-1.0f, 1.0f);
+  std::vector<float> raw(kRaw, 0.0f);
+  for (std::size_t i = 0; i < n; ++i) raw[(i * 7 + seed) % kRaw] = value(random);
+  return raw;
+}
+
+// What a row is, by the file's own matrix in doubles, and how far a sum may be from it.
+struct Expected {
+  double value = 0, bound = 0;
+};
+std::vector<Expected> expected(const dna::Dna& dna, const std::vector<float>& raw,
+                               std::uint32_t lod) {
+  std::vector<Expected> out(kJoints * 9);
+  for (const dna::JointGroup& g : dna.behavior.joint_groups) {
+    const std::size_t columns = g.input_indices.size();
+    for (std::size_t r = 0; r < g.lods[lod]; ++r) {
+      Expected& e = out[g.output_indices[r]] = {};
+      for (std::size_t c = 0; c < columns; ++c) {
+        const double term = double{g.values[r * columns + c]} * raw[g.input_indices[c]];
+        e.value += term;
+        e.bound += std::fabs(term);
+      }
+      e.bound *= (static_cast<double>(columns) + 1) * std::numeric_limits<float>::epsilon();
+    }
+  }
+  return out;
+}
+
+Pose evaluate_by(const Rig& rig, Workspace& work, Traversal traversal,
+                 const std::vector<float>& raw, std::uint32_t lod) {
+  Pose pose = make_pose(rig);
+  std::ranges::fill(pose.joints, kNan);  // whatever was there
+  work.traversal = traversal;
+  evaluate(rig, raw.data(), lod, true, work, pose);
+  return pose;
+}
+
+class Traversals : public testing::TestWithParam<std::string> {
+ protected:
+  const simd::Kernels* kernels_ = simd::find_kernels(GetParam().c_str());
+  const dna::Dna dna_ = many_groups();
+};
+
+TEST_P(Traversals, GiveTheSumsOfTheFile) {
+  const Rig rig = must_compile(dna_, kernels_);
+  Workspace work = make_workspace(rig);  // one for all frames: nothing of a frame stays
+  std::size_t whole = 0;
+  for (const std::size_t active : {kRaw, std::size_t{0}, std::size_t{1}, std::size_t{9}, kRaw}) {
+    for (std::uint32_t lod = 0; lod < 3; ++lod) {
+      const std::vector<float> raw = some_active(active, static_cast<std::uint32_t>(active + lod));
+      const auto sums = expected(dna_, raw, lod);
+      for (const Traversal way : {Traversal::kWhole, Traversal::kListed}) {
+        whole += way == Traversal::kWhole ? 1 : 0;
+        const Pose pose = evaluate_by(rig, work, way, raw, lod);
+        EXPECT_EQ(work.whole_frames, whole);
+        for (std::size_t i = 0; i < sums.size(); ++i) {
+          ASSERT_LE(std::fabs(pose.joints[i] - sums[i].value), sums[i].bound)
+              << "attribute " << i << ", " << active << " active, LOD " << lod;
+        }
+      }
+    }
+  }
+}
+
+TEST_P(Traversals, GiveTheSameBitsInBothWidths) {
+  for (const auto precision : {compile::Precision::kFloat32, compile::Precision::kFloat16}) {
+    compile::CompileOptions options;
+    options.kernels = kernels_;
+    options.precision = precision;
+    const auto rig = compile::compile(dna_, options);
+    ASSERT_TRUE(rig.has_value());
+    Workspace work = make_workspace(*rig);
+    for (std::size_t active = 0; active <= kRaw; ++active) {
+      const std::vector<float> raw = some_active(active, 3);
+      for (std::uint32_t lod = 0; lod < 3; ++lod) {
+        EXPECT_EQ(evaluate_by(*rig, work, Traversal::kWhole, raw, lod).joints,
+                  evaluate_by(*rig, work, Traversal::kListed, raw, lod).joints);
+      }
+    }
+  }
+}
+
+TEST_P(Traversals, OfABatchGiveTheBitsOfTheFrameAlone) {
+  constexpr std::size_t kCount = 8;
+  const Rig rig = must_compile(dna_, kernels_);
+  std::vector<float> frames;
+  for (std::uint32_t f = 0; f < kCount; ++f) {
+    const std::vector<float> raw = some_active(f * 3, f);
+    frames.insert(frames.end(), raw.begin(), raw.end());
+  }
+  Workspace alone = make_workspace(rig), work = make_batch_workspace(rig);
+  for (const Traversal way : {Traversal::kWhole, Traversal::kListed}) {
+    work.traversal = way;
+    work.whole_frames = 0;
+    for (std::uint32_t lod = 0; lod < 3; ++lod) {
+      Pose all = make_pose(rig);
+      const std::size_t joints = all.joints.size();
+      all.joints.assign(joints * kCount, kNan);
+      all.controls.resize(all.controls.size() * kCount);
+      evaluate_frames(rig, frames.data(), kCount, lod, true, work, view(all));
+      for (std::size_t f = 0; f < kCount; ++f) {
+        const std::vector<float> raw(frames.begin() + static_cast<std::ptrdiff_t>(f * kRaw),
+                                     frames.begin() + static_cast<std::ptrdiff_t>((f + 1) * kRaw));
+        const Pose one = evaluate_by(rig, alone, Traversal::kListed, raw, lod);
+        EXPECT_TRUE(std::equal(one.joints.begin(), one.joints.end(),
+                               all.joints.begin() + static_cast<std::ptrdiff_t>(f * joints)));
+      }
+    }
+    EXPECT_EQ(work.whole_frames, way == Traversal::kWhole ? 3u : 0u);
+  }
+}
+
+TEST_P(Traversals, KeepNanInTheGroupsThatHaveItAsAColumn) {
+  const Rig rig = must_compile(dna_, kernels_);
+  Workspace work = make_workspace(rig);
+  std::vector<float> raw = some_active(kRaw, 5);
+  const Pose clean = evaluate_by(rig, work, Traversal::kListed, raw, 0);
+  raw[4] = kNan;
+  const Pose listed = evaluate_by(rig, work, Traversal::kListed, raw, 0),
+             whole = evaluate_by(rig, work, Traversal::kWhole, raw, 0);
+  std::size_t spoilt = 0;
+  for (std::size_t i = 0; i < clean.joints.size(); ++i) {
+    EXPECT_EQ(std::isnan(listed.joints[i]), std::isnan(whole.joints[i])) << i;
+    spoilt += std::isnan(whole.joints[i]) ? 1 : 0;
+    if (!std::isnan(whole.joints[i])) {
+      EXPECT_EQ(whole.joints[i], clean.joints[i]);
+    }
+  }
+  EXPECT_GT(spoilt, 0u);
+  EXPECT_LT(spoilt, clean.joints.size());
+}
+
+INSTANTIATE_TEST_SUITE_P(Every, Traversals, testing::ValuesIn([] {
+                           std::vector<std::string> all;
+                           for (const simd::Kernels* k :
+                                {&simd::scalar_kernels(), simd::sse4_kernels(),
+                                 simd::avx2_kernels(), simd::avx512_kernels(),
+                                 simd::neon_kernels()}) {
+                             if (k != nullptr) all.emplace_back(k->name);
+                           }
+                           return all;
+                         }()),
+                         [](const auto& about) { return about.param; });
+
+TEST(Traversal, IsChosenByTheBytesThatItMoves) {
+  // Columns of 90 rows, 360 bytes: listing one moves 32. With 11 of 12 active the last one's bytes
+  // and the list of all, 360 + 12 * 8, are more than 11 * 32; of columns of two rows they are less.
+  for (const auto& [rows, eleven] :
+       {std::pair{std::uint16_t{90}, 0u}, std::pair{std::uint16_t{2}, 1u}}) {
+    dna::Dna dna = make_face(12, 0, 10, 1);
+    std::vector<std::uint16_t> inputs(12), outputs(rows);
+    for (std::uint16_t i = 0; i < 12; ++i) inputs[i] = i;
+    for (std::uint16_t i = 0; i < rows; ++i) outputs[i] = i;
+    dna.behavior.joint_groups = std::vector{
+        make_group({rows}, inputs, outputs, std::vector<float>(rows * std::size_t{12}, 1.0f))};
+    const Rig rig = must_compile(dna);
+    Workspace work = make_workspace(rig);
+    std::vector<float> raw(12, 1.0f);
+    evaluate_by(rig, work, Traversal::kCounted, raw, 0);
+    EXPECT_EQ(work.whole_frames, 1u) << "nothing rests";
+    raw[7] = 0.0f;
+    evaluate_by(rig, work, Traversal::kCounted, raw, 0);
+    EXPECT_EQ(work.whole_frames, 1u + eleven) << rows << " rows";
+    std::ranges::fill(raw, 0.0f);
+    evaluate_by(rig, work, Traversal::kCounted, raw, 0);
+    EXPECT_EQ(work.whole_frames, 1u + eleven) << "everything rests";
+  }
+}
+
+TEST(Traversal, NeverReadsAColumnAtRestThatIsNotFinite) {
+  dna::Dna dna = make_face(2, 0, 1, 1);
+  dna.behavior.joint_groups =
+      std::vector{make_group({1}, {0, 1}, {0}, {1.0f, std::numeric_limits<float>::infinity()})};
+  const Rig rig = must_compile(dna);
+  Workspace work = make_workspace(rig);
+  EXPECT_EQ(evaluate_by(rig, work, Traversal::kWhole, {1.0f, 0.0f}, 0).joints[0], 1.0f);
+  EXPECT_EQ(work.whole_frames, 0u);
+}
+
+}  // namespace
+}  // namespace risorius::rig
