@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <random>
+#include <utility>
 
 #include "rig/stages/instance.h"
 #include "support/face.h"
@@ -155,6 +156,32 @@ TEST_P(Traversals, OfABatchGiveTheBitsOfTheFrameAlone) {
       }
     }
     EXPECT_EQ(work.whole_frames, way == Traversal::kWhole ? 3u : 0u);
+  }
+}
+
+// A group that rests beside one that moves must not show what it was in the frame before.
+TEST_P(Traversals, LeaveNothingOfTheFrameBefore) {
+  const Rig rig = must_compile(dna_, kernels_);
+  Workspace work = make_batch_workspace(rig), fresh = make_workspace(rig);
+  const std::vector<float> before = some_active(kRaw, 1);
+  for (std::size_t control = 0; control < kRaw; ++control) {
+    std::vector<float> raw(kRaw, 0.0f), frames;
+    raw[control] = 1.0f;
+    const Pose expected = evaluate_by(rig, fresh, Traversal::kWhole, raw, 0);
+    evaluate_by(rig, work, Traversal::kListed, before, 0);
+    EXPECT_EQ(evaluate_by(rig, work, Traversal::kListed, raw, 0).joints, expected.joints);
+    Pose all = make_pose(rig);
+    all.joints.resize(all.joints.size() * simd::kFrames);
+    all.controls.resize(all.controls.size() * simd::kFrames);
+    for (const std::vector<float>* frame : {&before, &std::as_const(raw)}) {
+      frames.clear();
+      for (std::size_t f = 0; f < simd::kFrames; ++f) {
+        frames.insert(frames.end(), frame->begin(), frame->end());
+      }
+      evaluate_frames(rig, frames.data(), simd::kFrames, 0, true, work, view(all));
+    }
+    EXPECT_TRUE(std::equal(expected.joints.begin(), expected.joints.end(),
+                           all.joints.end() - std::ptrdiff_t(expected.joints.size())));
   }
 }
 
