@@ -676,6 +676,7 @@ def test_the_catalogues_are_whole_for_whoever_reads_them(rig, tmp_path):
 def test_idle_life_is_that_of_its_seed(blinker):
     from risorius.anim.idle import idle
 
+    scene.controls(blinker).risorius_lids = 0.0  # else a gaze moves the lids too
     entry = _entry(blinker, kind="IDLE", seed=7, start=5.0, length=240.0)
     wanted = idle(7, 10.0)
     for frame in (5, 33, 100, 200.5):

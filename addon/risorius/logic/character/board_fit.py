@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .board_table import BoardTable, Doubles
 
-_SWEEPS = 12
+_SWEEPS = 40  # of controls that share outputs each halves what is left
 _ENOUGH = 1e-7  # a sweep that moves nothing further ends it
 _RIGHT = 1e-9  # a raw control that is off by less is right
 _REST = 1e-10  # of two values that are as good, the one nearer to rest
@@ -52,10 +52,10 @@ def fit(table: BoardTable, raw: ArrayLike, start: ArrayLike) -> Doubles:
     movable = [g for g in range(len(table.names)) if table.outputs_of(g)]
     for _sweep in range(_SWEEPS):
         moved = 0.0
-        off = np.abs(np.clip(totals, 0.0, 1.0) - wanted).max(axis=0, initial=0.0) > _RIGHT
         for index in movable:
             outputs = table.outputs_of(index)
-            if not off[outputs].any():
+            given = np.clip(totals[:, outputs], 0.0, 1.0)
+            if np.abs(given - wanted[:, outputs]).max(initial=0.0) <= _RIGHT:
                 continue  # it gives what is wanted: while a hand drags, most do
             own = table.part(index, gui[:, index])
             others = totals[:, outputs] - own
