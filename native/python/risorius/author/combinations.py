@@ -25,6 +25,7 @@ _MOST_OFF, _MOST_HELD = 1500, 500  # of these, evenly
 _MOST_JOINTS, _LEAST_SHARE = 128, 2e-4  # that take part: of what is off, by the one that does most
 _LEAST_WEIGHT = 0.01
 _DAMPING = 0.01
+_AXES = np.eye(3)
 
 
 @dataclass
@@ -201,26 +202,26 @@ class Combinations:
     def _step(self, joints: Ints, worlds: Doubles, rows: _Rows, left: Doubles) -> Doubles:
         """float64[joints, 6]: shifts and rotation vectors in the parents' frames."""
         count = len(joints)
-        system = np.zeros((len(left), 3, count, 6))
-        parents = [int(self.work.dna.joint_parents[j]) for j in joints]
-        for at, (joint, parent) in enumerate(zip(joints, parents, strict=True)):
+        above = worlds[np.asarray(self.work.dna.joint_parents, np.int64)[joints]]
+        turns = above[:, :3, :3]
+        places = np.linalg.inv(above) @ worlds[joints]
+        wholes = places @ self.after.rest[joints]
+        # A joint's columns lie side by side, so that each is filled in one piece.
+        system = np.zeros((count, 6, len(left), 3))
+        for at, joint in enumerate(joints):
             held = np.flatnonzero(rows.weights[:, joint] > _LEAST_WEIGHT)
-            turn = worlds[parent, :3, :3]
-            place = np.linalg.inv(worlds[parent]) @ worlds[joint]
-            whole = place @ self.after.rest[joint]
-            arms = rows.shaped[held] @ whole[:3, :3].T + whole[:3, 3] - place[:3, 3]
-            cross = np.zeros((len(held), 3, 3))
-            x, y, z = arms.T
-            cross[:, 0, 1], cross[:, 0, 2], cross[:, 1, 2] = z, -y, x
-            cross -= cross.transpose(0, 2, 1)
-            share = rows.weights[held, joint, None, None]
-            system[held, :, at, :3] = share * turn
-            system[held, :, at, 3:] = share * (turn @ cross)
-        flat = system.reshape(-1, 6 * count)
-        normal = flat.T @ flat
+            whole = wholes[at]
+            arms = rows.shaped[held] @ whole[:3, :3].T + whole[:3, 3] - places[at, :3, 3]
+            share = rows.weights[held, joint, None]
+            for axis in range(3):
+                turned = np.cross(_AXES[axis], arms) @ turns[at].T
+                system[at, axis, held] = share * turns[at, :, axis]
+                system[at, 3 + axis, held] = share * turned
+        flat = system.reshape(6 * count, -1)
+        normal = flat @ flat.T
         diagonal = np.diag(normal)
         normal += np.diag(_DAMPING * diagonal + 1e-6 * diagonal.max(initial=1e-9) + 1e-12)
-        return np.asarray(np.linalg.solve(normal, flat.T @ left.ravel()).reshape(count, 6))
+        return np.asarray(np.linalg.solve(normal, flat @ left.ravel()).reshape(count, 6))
 
     def values(self) -> Doubles:
         """float64[new joints, 6, correctives]: what they add, in the order of `order`."""

@@ -97,17 +97,23 @@ def psd_parts(dna: Dna) -> dict[int, frozenset[int]]:
     return {row: frozenset(parts) for row, parts in sorted(out.items())}
 
 
+def joint_levels(dna: Dna) -> list[Ints]:
+    """Joint indices by their depth in the tree: roots first, each level hangs on the one before."""
+    parents = np.asarray(dna.joint_parents, np.int64)
+    depth, at = np.zeros_like(parents), np.arange(len(parents))
+    for _ in range(len(parents)):
+        above = parents[at]
+        deeper = above != at
+        if not deeper.any():
+            break
+        depth += deeper
+        at = above
+    return [np.flatnonzero(depth == level) for level in range(int(depth.max(initial=-1)) + 1)]
+
+
 def parent_order(dna: Dna) -> list[int]:
     """Joint indices, parents before their children."""
-    parents = [int(p) for p in dna.joint_parents]
-    depth = []
-    for joint in range(len(parents)):
-        steps, at = 0, joint
-        while parents[at] != at and steps < len(parents):
-            at = parents[at]
-            steps += 1
-        depth.append(steps)
-    return sorted(range(len(parents)), key=lambda joint: (depth[joint], joint))
+    return [int(joint) for level in joint_levels(dna) for joint in level]
 
 
 def column_deltas(dna: Dna, columns: int) -> Doubles:
@@ -140,10 +146,9 @@ def world_matrices(dna: Dna, deltas: Doubles) -> Doubles:
     local[..., :3, 3] = np.asarray(dna.neutral_joint_translations, np.float64) + deltas[..., :3]
     local[..., 3, 3] = 1
     out = local.copy()
-    for joint in parent_order(dna):
-        parent = int(dna.joint_parents[joint])
-        if parent != joint:
-            out[..., joint, :, :] = out[..., parent, :, :] @ local[..., joint, :, :]
+    parents = np.asarray(dna.joint_parents, np.int64)
+    for level in joint_levels(dna)[1:]:
+        out[..., level, :, :] = out[..., parents[level], :, :] @ local[..., level, :, :]
     return out
 
 
