@@ -76,6 +76,41 @@ std::vector<rig::ConditionalRow> compile_table(const dna::Conditionals& source) 
   return rows;
 }
 
+// Whether a run adds something where its input is 0.
+bool adds_at_rest(const std::vector<rig::ConditionalRow>& rows, std::size_t begin) {
+  for (std::size_t i = begin; i < rows[begin].run_end; ++i) {
+    const rig::ConditionalRow& row = rows[i];
+    if (row.from <= 0.0f && 0.0f <= row.to) return row.slope * 0.0f + row.cut != 0.0f;
+  }
+  return false;
+}
+
+std::vector<rig::RowRun> runs_of(const std::vector<rig::ConditionalRow>& rows) {
+  std::vector<rig::RowRun> runs;
+  for (std::size_t i = 0; i < rows.size(); i = rows[i].run_end) {
+    runs.push_back({rows[i].input, static_cast<std::uint16_t>(adds_at_rest(rows, i) ? 1 : 0),
+                    static_cast<std::uint32_t>(i)});
+  }
+  return runs;
+}
+
+// The channels of each control. Left empty where two of them have one output.
+void list_shapes_of_controls(RigData& out) {
+  std::vector<bool> taken(std::size_t{UINT16_MAX} + 1);
+  for (const std::uint16_t output : out.shape_outputs) {
+    if (taken[output]) return;
+    taken[output] = true;
+  }
+  out.shape_begins.assign(out.control_count + std::size_t{1}, 0);
+  for (const std::uint16_t input : out.shape_inputs) ++out.shape_begins[input + std::size_t{1}];
+  std::partial_sum(out.shape_begins.begin(), out.shape_begins.end(), out.shape_begins.begin());
+  std::vector<std::uint32_t> next = out.shape_begins;
+  out.shapes_of_controls.resize(out.shape_inputs.size());
+  for (std::size_t i = 0; i < out.shape_inputs.size(); ++i) {
+    out.shapes_of_controls[next[out.shape_inputs[i]]++] = static_cast<std::uint16_t>(i);
+  }
+}
+
 // Bounds of a row as a number that sorts: -0 is 0, and what is no number equals nothing.
 std::uint64_t bounds_key(const rig::ConditionalRow& row) {
   const auto bits = [](float v) { return std::uint64_t{std::bit_cast<std::uint32_t>(v + 0.0f)}; };
@@ -497,6 +532,8 @@ Status compile_channels_and_maps(const dna::Dna& dna, RigData& out) {
          follows(out.shape_outputs, out.shape_run)) {
     ++out.shape_run;
   }
+  out.map_runs = runs_of(out.map_rows);
+  list_shapes_of_controls(out);
   return ok();
 }
 

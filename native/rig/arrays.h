@@ -37,6 +37,13 @@ struct ConditionalRow {
   std::uint32_t run_end = 0;
 };
 
+/// A run of rows of a conditional table.
+struct RowRun {
+  std::uint16_t input = 0;
+  std::uint16_t wakes = 0;  // 1: it adds something where its input is 0, so it is never passed over
+  std::uint32_t begin = 0;  // its first row
+};
+
 /// A corrective ("pose space deformation", hence Psd): a control that corrects what some controls
 /// give together, as lips that are pulled and pressed at once. It is min(1, weight * the product of
 /// its factors), where each factor is another control clamped to [0, 1].
@@ -334,8 +341,13 @@ struct RigArrays {
   // shape_lods[lod] of them.
   A<std::uint16_t> shape_inputs, shape_outputs;
   A<std::uint32_t> shape_lods;  // [LODs]
+  // The channels of each control, as indices into shape_inputs, for frames in which most controls
+  // rest. Both are empty where two channels are one: there the last one counts, at rest too.
+  A<std::uint32_t> shape_begins;  // [controls + 1]
+  A<std::uint16_t> shapes_of_controls;
   // The table from controls to animated maps. A LOD has the first map_lods[lod] rows.
   A<ConditionalRow> map_rows;
+  A<RowRun> map_runs;         // its runs, ascending
   A<std::uint32_t> map_lods;  // [LODs]
 };
 
@@ -357,7 +369,8 @@ constexpr void for_each_array(R& r, F f) {
   f(r.rbf_poses), f(r.rbf_pose_inputs), f(r.rbf_outputs);
   f(r.ml_operations), f(r.ml_segments), f(r.ml_controls), f(r.ml_layers), f(r.ml_layer_rows);
   f(r.ml_weights), f(r.ml_joints), f(r.ml_joint_lods), f(r.twist_swings), f(r.twist_swing_outputs);
-  f(r.shape_inputs), f(r.shape_outputs), f(r.shape_lods), f(r.map_rows), f(r.map_lods);
+  f(r.shape_inputs), f(r.shape_outputs), f(r.shape_lods), f(r.shape_begins);
+  f(r.shapes_of_controls), f(r.map_rows), f(r.map_runs), f(r.map_lods);
 }
 
 template <class T>

@@ -393,7 +393,13 @@ Status detail::check_everything(const Rig& r) {
   c.demand("header", is_run(r.shape_inputs, r.shape_run) && is_run(r.shape_outputs, r.shape_run));
   const auto most = [](std::uint32_t v) { return v; };
   c.below("shape_lods", r.shape_lods, r.shape_inputs.size() + 1, most);
+  c.demand("shape_begins",
+           r.shape_begins.empty() || r.shape_begins.size() == r.control_count + std::size_t{1});
+  c.begins("shape_begins", r.shape_begins, r.shapes_of_controls.size());
+  c.below("shapes_of_controls", r.shapes_of_controls, r.shape_inputs.size());
   c.below("map_lods", r.map_lods, r.map_rows.size() + 1, most);
+  c.below("map_runs", r.map_runs, r.control_count, [](const RowRun& run) { return run.input; });
+  c.below("map_runs", r.map_runs, r.map_rows.size(), [](const RowRun& run) { return run.begin; });
   check_table("gui_rows", r.gui_rows, r.gui_count, r.raw_count, c);
   check_table("map_rows", r.map_rows, r.control_count, r.animated_map_count, c);
   return c.status();

@@ -235,6 +235,31 @@ TEST(Block, ColumnsByGroupStayInTheirMatrix) {
 }
 
 // A block that its group does not name would keep the attributes of the frame before.
+TEST(Block, ChannelsAndRunsStayInWhatTheyCountIn) {
+  dna::Dna dna = face_with_everything();
+  dna.definition.blend_shape_channel_names = names("shape", 2);
+  dna.behavior.blend_shape_channels.lods = {2, 2};
+  dna.behavior.blend_shape_channels.input_indices = {2, 0};
+  dna.behavior.blend_shape_channels.output_indices = {1, 0};
+  dna.definition.animated_map_names = names("map", 1);
+  dna.behavior.animated_maps.lods = {1, 1};
+  dna.behavior.animated_maps.conditionals = {{1}, {0}, {0.0f}, {1.0f}, {1.0f}, {0.0f}};
+  const Rig rig = must_compile(dna);
+  BlockBytes begins = bytes_of(rig), shape = bytes_of(rig), input = bytes_of(rig),
+             row = bytes_of(rig);
+  first_of(begins, rig, std::span(rig.shape_begins)) = 1000;
+  EXPECT_EQ(refused_field(begins), "rig.shape_begins");
+  first_of(shape, rig, std::span(rig.shapes_of_controls)) =
+      static_cast<std::uint16_t>(rig.shape_inputs.size());
+  EXPECT_EQ(refused_field(shape), "rig.shapes_of_controls");
+  first_of(input, rig, std::span(rig.map_runs)).input =
+      static_cast<std::uint16_t>(rig.control_count);
+  EXPECT_EQ(refused_field(input), "rig.map_runs");
+  first_of(row, rig, std::span(rig.map_runs)).begin =
+      static_cast<std::uint32_t>(rig.map_rows.size());
+  EXPECT_EQ(refused_field(row), "rig.map_runs");
+}
+
 TEST(Block, GroupsNameTheBlocksThatTheyWrite) {
   const Rig rig = must_compile(face_with_everything());
   for (const bool beyond : {false, true}) {

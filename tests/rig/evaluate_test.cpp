@@ -2,8 +2,11 @@
 // The semantics of each stage on faces small enough to be worked out by hand.
 #include "rig/stages/evaluate.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
+#include <random>
 
 #include "rig/stages/instance.h"
 #include "rig/stages/tables.h"
@@ -243,7 +246,90 @@ TEST(EvaluateMaps, LodUsesLeadingRowsEvenInsideARun) {
   EXPECT_EQ(evaluate_once(rig, {0.25f}, 1).animated_maps[0], 0.25f);
 }
 
+// What is passed over while its input rests adds nothing: against the rows, one after the other.
+TEST(EvaluateMaps, ManyRowsOfManyControlsAreTheirSumInOrder) {
+  constexpr std::uint16_t kRaw = 40, kMaps = 7;
+  constexpr std::size_t kRows = 300;
+  std::mt19937 random(5);
+  const auto number = [&](int low, int high) {
+    return static_cast<float>(std::uniform_int_distribution(low * 8, high * 8)(random)) / 8;
+  };
+  dna::Dna dna = make_face(kRaw, 0, 1);
+  dna.definition.animated_map_names = names("map", kMaps);
+  dna::Conditionals& rows = dna.behavior.animated_maps.conditionals;
+  std::vector<std::uint16_t> inputs, outputs;
+  std::vector<float> from, to, slope, cut;
+  for (std::size_t i = 0; i < kRows; ++i) {
+    const bool same = i > 0 && random() % 2 == 0;  // as the row before, so of its run
+    inputs.push_back(same ? inputs.back() : static_cast<std::uint16_t>(random() % kRaw));
+    outputs.push_back(same ? outputs.back() : static_cast<std::uint16_t>(random() % kMaps));
+    from.push_back(number(-1, 1)), to.push_back(number(-1, 1));
+    slope.push_back(number(-1, 1) / 3), cut.push_back(random() % 4 == 0 ? number(-1, 1) / 7 : 0.0f);
+  }
+  rows = {inputs, outputs, from, to, slope, cut};
+  dna.behavior.animated_maps.lods = {kRows, kRows / 2 + 1};
+  const Rig rig = must_compile(dna);
+  for (int frame = 0; frame < 60; ++frame) {
+    std::vector<float> raw(kRaw);
+    for (float& v : raw) v = static_cast<int>(random() % 60) < frame ? number(-1, 1) : 0.0f;
+    if (frame % 10 == 9) raw[random() % kRaw] = kNan;
+    for (const std::uint32_t lod : {0u, 1u}) {
+      std::vector<float> sums(kMaps);
+      const std::size_t count = lod == 0 ? kRows : kRows / 2 + 1;
+      bool found = false;  // a row of the run that counts
+      for (std::size_t i = 0; i < count; ++i) {
+        const bool begins = i == 0 || inputs[i] != inputs[i - 1] || outputs[i] != outputs[i - 1];
+        const float v = raw[inputs[i]];
+        const bool holds = std::min(from[i], to[i]) <= v && v <= std::max(from[i], to[i]);
+        found = !begins && found;
+        if (!found && (holds || std::isnan(v))) sums[outputs[i]] += slope[i] * v + cut[i];
+        found = found || holds;
+      }
+      const Pose pose = evaluate_once(rig, raw, lod);
+      for (std::size_t m = 0; m < kMaps; ++m) {
+        const float wanted = sums[m] < 0.0f ? 0.0f : (sums[m] > 1.0f ? 1.0f : sums[m]);
+        if (std::isnan(wanted)) {
+          EXPECT_TRUE(std::isnan(pose.animated_maps[m]));
+        } else {
+          EXPECT_EQ(pose.animated_maps[m], wanted) << frame << " " << lod << " " << m;
+        }
+      }
+    }
+  }
+}
+
 // ---- blend shapes
+
+// Whether controls name their channels or channels look at their controls.
+TEST(EvaluateShapes, ChannelsFollowTheirControlsHoweverManyAreActive) {
+  constexpr std::uint16_t kRaw = 64, kShapes = 150;
+  std::mt19937 random(6);
+  dna::Dna dna = make_face(kRaw, 0, 1);
+  dna.definition.blend_shape_channel_names = names("shape", kShapes + 2);
+  std::vector<std::uint16_t> inputs(kShapes), outputs(kShapes);
+  std::iota(outputs.begin(), outputs.end(), std::uint16_t{1});
+  std::ranges::shuffle(outputs, random);
+  for (std::uint16_t& input : inputs) input = static_cast<std::uint16_t>(random() % kRaw);
+  dna.behavior.blend_shape_channels.lods = {kShapes, 90};
+  dna.behavior.blend_shape_channels.input_indices = inputs;
+  dna.behavior.blend_shape_channels.output_indices = outputs;
+  const Rig rig = must_compile(dna);
+  ASSERT_EQ(rig.shape_begins.size(), kRaw + 1u);
+  Workspace work = make_batch_workspace(rig);
+  for (const std::size_t active : {0, 1, 9, 64}) {
+    std::vector<float> raw(kRaw);
+    for (std::size_t c = 0; c < active; ++c) raw[c * 7u % kRaw] = 1.0f + static_cast<float>(c);
+    for (const std::uint32_t lod : {0u, 1u}) {
+      std::vector<float> wanted(kShapes + 2u);
+      for (std::size_t i = 0; i < (lod == 0 ? kShapes : 90u); ++i)
+        wanted[outputs[i]] = raw[inputs[i]];
+      Pose pose = make_pose(rig);
+      std::fill(pose.blend_shapes.begin(), pose.blend_shapes.end(), kNan);
+      evaluate(rig, raw.data(), lod, true, work, view(pose));
+      EXPECT_EQ(pose.blend_shapes, wanted) << active << " " << lod;
+    }
+  }
+}
 
 TEST(EvaluateShapes, CopyTheirControlUnclampedAndTheLastWins) {
   dna::Dna dna = make_face(2, 0, 1);

@@ -95,7 +95,7 @@ void evaluate_block(const Rig& rig, const float* raw, std::size_t count, std::ui
     const PoseView pose = frame_of(rig, first, f);
     detail::begin(rig, raw + f * rig.raw_count, lod, settle, work, pose.controls);
     block.take(f);
-    detail::channels_and_maps(rig, lod, pose);
+    detail::channels_and_maps(rig, lod, work, pose);
   }
   block.joints(lod);
   for (std::size_t f = 0; f < count; ++f) {

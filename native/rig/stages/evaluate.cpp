@@ -44,7 +44,7 @@ void begin(const Rig& rig, const float* raw, std::uint32_t lod, bool settle, Wor
 void outputs(const Rig& rig, std::uint32_t lod, Workspace& work, const PoseView& pose) noexcept {
   joint_groups(rig, lod, work, pose);
   rotations(rig, lod, work, pose);
-  channels_and_maps(rig, lod, pose);
+  channels_and_maps(rig, lod, work, pose);
 }
 
 }  // namespace detail

@@ -48,7 +48,8 @@ void quaternion_joints(const Rig& rig, std::uint32_t lod, Workspace& work,
                        const PoseView& pose) noexcept;
 void twist_and_swing(const Rig& rig, const PoseView& pose) noexcept;
 void ml_joints(const Rig& rig, std::uint32_t lod, const PoseView& pose) noexcept;
-void channels_and_maps(const Rig& rig, std::uint32_t lod, const PoseView& pose) noexcept;
+void channels_and_maps(const Rig& rig, std::uint32_t lod, const Workspace& work,
+                       const PoseView& pose) noexcept;
 
 /// Calls f with each column of a control in groups below live.
 template <class F>

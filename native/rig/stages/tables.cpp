@@ -10,17 +10,67 @@ namespace risorius::rig {
 
 namespace {
 
-void evaluate_rows(std::span<const ConditionalRow> rows, const float* in, float* out,
-                   std::size_t outputs) noexcept {
-  std::fill(out, out + outputs, 0.0f);
-  for (std::size_t i = 0; i < rows.size();) {
-    const ConditionalRow& row = rows[i];
-    const float v = in[row.input];
+// What a run adds at v, the value of its input: one row, or for NaN all of them.
+void add_run(std::span<const ConditionalRow> run, float v, float* out) noexcept {
+  for (const ConditionalRow& row : run) {
     const bool holds = row.from <= v && v <= row.to;
     if (holds || v != v) out[row.output] += row.slope * v + row.cut;
-    i = holds ? row.run_end : i + 1;
+    if (holds) break;
   }
-  for (std::size_t o = 0; o < outputs; ++o) out[o] = detail::clamp01(out[o]);
+}
+
+void clamp(float* values, std::size_t count) noexcept {
+  for (std::size_t i = 0; i < count; ++i) values[i] = detail::clamp01(values[i]);
+}
+
+// Few controls move many maps' rows: a run whose input rests is passed over unless it adds
+// something even then. Sums keep the order of the rows; what is left out is + 0.
+void maps(const Rig& rig, std::uint32_t lod, const PoseView& pose) noexcept {
+  float* out = pose.animated_maps;
+  std::fill(out, out + rig.animated_map_count, 0.0f);
+  const std::uint32_t rows = rig.map_lods.empty() ? 0 : rig.map_lods[lod];
+  for (const RowRun& run : rig.map_runs) {
+    if (run.begin >= rows) break;
+    const float v = pose.controls[run.input];
+    if (v == 0.0f && run.wakes == 0) continue;
+    const std::uint32_t end = std::min(rig.map_rows[run.begin].run_end, rows);
+    add_run(rig.map_rows.subspan(run.begin, end - run.begin), v, out);
+  }
+  clamp(out, rig.animated_map_count);
+}
+
+// By counted bytes: every channel looks at its control, or the active controls name theirs.
+bool lists_channels(const Rig& rig, std::uint32_t run, std::uint32_t shapes,
+                    std::size_t active) noexcept {
+  constexpr std::size_t kLooked = 2 * sizeof(std::uint16_t) + 2 * sizeof(float),
+                        kNamed = 2 * sizeof(std::uint32_t) + sizeof(std::uint16_t) + kLooked;
+  return !rig.shape_begins.empty() &&
+         active * kNamed + run * sizeof(float) < (shapes - run) * kLooked;
+}
+
+void channels(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> active,
+              const PoseView& pose) noexcept {
+  const std::uint32_t shapes = rig.shape_lods.empty() ? 0 : rig.shape_lods[lod];
+  const std::uint32_t run = std::min(shapes, rig.shape_run);
+  float* const out = pose.blend_shapes;
+  if (lists_channels(rig, run, shapes, active.size())) {
+    std::fill(out, out + rig.blend_shape_count, 0.0f);
+    for (const std::uint16_t control : active) {
+      const std::uint32_t end = rig.shape_begins[control + std::size_t{1}];
+      for (std::uint32_t i = rig.shape_begins[control]; i < end; ++i) {
+        const std::uint16_t shape = rig.shapes_of_controls[i];
+        if (shape < shapes) out[rig.shape_outputs[shape]] = pose.controls[control];
+      }
+    }
+    return;
+  }
+  float* to = out + (run > 0 ? rig.shape_outputs[0] : 0);
+  std::fill(out, to, 0.0f);
+  if (run > 0) to = std::copy_n(pose.controls + rig.shape_inputs[0], run, to);
+  std::fill(to, out + rig.blend_shape_count, 0.0f);
+  for (std::uint32_t i = run; i < shapes; ++i) {
+    out[rig.shape_outputs[i]] = pose.controls[rig.shape_inputs[i]];
+  }
 }
 
 bool inside(const ConditionalRow& row, float raw, float& in) noexcept {
@@ -31,7 +81,13 @@ bool inside(const ConditionalRow& row, float raw, float& in) noexcept {
 }  // namespace
 
 void gui_to_raw(const Rig& rig, const float* gui, float* raw) noexcept {
-  evaluate_rows(rig.gui_rows, gui, raw, rig.raw_count);
+  std::fill(raw, raw + rig.raw_count, 0.0f);
+  for (std::size_t i = 0; i < rig.gui_rows.size();) {
+    const ConditionalRow& first = rig.gui_rows[i];
+    add_run(rig.gui_rows.subspan(i, first.run_end - i), gui[first.input], raw);
+    i = first.run_end;
+  }
+  clamp(raw, rig.raw_count);
 }
 
 void raw_to_gui(const Rig& rig, const float* raw, float* gui) noexcept {
@@ -56,19 +112,10 @@ void raw_to_gui(const Rig& rig, const float* raw, float* gui) noexcept {
   }
 }
 
-void detail::channels_and_maps(const Rig& rig, std::uint32_t lod, const PoseView& pose) noexcept {
-  const std::uint32_t shapes = rig.shape_lods.empty() ? 0 : rig.shape_lods[lod];
-  const std::uint32_t run = std::min(shapes, rig.shape_run);
-  float* to = pose.blend_shapes + (run > 0 ? rig.shape_outputs[0] : 0);
-  std::fill(pose.blend_shapes, to, 0.0f);
-  if (run > 0) to = std::copy_n(pose.controls + rig.shape_inputs[0], run, to);
-  std::fill(to, pose.blend_shapes + rig.blend_shape_count, 0.0f);
-  for (std::uint32_t i = run; i < shapes; ++i) {
-    pose.blend_shapes[rig.shape_outputs[i]] = pose.controls[rig.shape_inputs[i]];
-  }
-  const std::uint32_t rows = rig.map_lods.empty() ? 0 : rig.map_lods[lod];
-  evaluate_rows(rig.map_rows.first(rows), pose.controls, pose.animated_maps,
-                rig.animated_map_count);
+void detail::channels_and_maps(const Rig& rig, std::uint32_t lod, const Workspace& work,
+                               const PoseView& pose) noexcept {
+  channels(rig, lod, {work.active.data(), work.active_count}, pose);
+  maps(rig, lod, pose);
 }
 
 }  // namespace risorius::rig
