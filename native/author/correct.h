@@ -48,6 +48,7 @@ struct FaultSums {
   double volume = 0.0;        // mm3: depth times area
   double deepest = 0.0;       // mm beyond what is allowed
   std::size_t stretched = 0;  // faces of more than kStretch times their area
+  double widest = 0.0;        // times its area, of the most stretched of these
   std::size_t folded = 0;     // edges whose faces lie on one another
 };
 

@@ -63,6 +63,7 @@ void bind_correct(py::module_& m) {
       .def_readonly("volume", &FaultSums::volume, "mm3: depth times area.")
       .def_readonly("deepest", &FaultSums::deepest, "mm beyond what is allowed.")
       .def_readonly("stretched", &FaultSums::stretched, "Faces of more than 2.5 times their area.")
+      .def_readonly("widest", &FaultSums::widest, "Times its area, of the most stretched of these.")
       .def_readonly("folded", &FaultSums::folded, "Edges whose faces lie on one another.");
   py::class_<SkinFaults>(m, "SkinFaults", "What may be wrong with a pose of a skin.")
       .def(py::init(&faults), py::arg("depth"), py::arg("stretch"), py::arg("fold"))

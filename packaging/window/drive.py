@@ -14,58 +14,25 @@ import subprocess
 import sys
 import tempfile
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
+from board_and_grid import board, grid
+from common import (
+    JAW,
+    REST,
+    SMILE,
+    Check,
+    NotThereError,
+    Step,
+    clear,
+    has_face,
+    look_at_face,
+    open_section,
+    ready_tab,
+    slider,
+)
 from hand import HEIGHT, WIDTH, Hand, LateError, difference
-
-JAW = "CTRL_expressions.jawOpen"
-SMILE = ("CTRL_expressions.mouthCornerPullL", "CTRL_expressions.mouthCornerPullR")
-Check = tuple[str, bool]
-Step = Callable[[Hand, Path], Iterator[Check]]
-
-
-class NotThereError(Exception):
-    """The extension has no such thing."""
-
-
-def slider(hand: Hand, name: str = JAW) -> float:
-    return float(hand.ask("state")["sliders"].get(name, 0.0))
-
-
-def has_face(hand: Hand) -> bool:
-    return bool(hand.ask("state")["face"])
-
-
-def ready_tab(hand: Hand) -> None:
-    hand.wait("the tab Risorius is shown", lambda: hand.ask("show_tab"))
-    hand.still()
-
-
-def look_at_face(hand: Hand) -> None:
-    """The face alone in the view, from the front."""
-    hand.ask("settle")
-    hand.ask("center")
-    hand.still()
-
-
-def clear(hand: Hand) -> None:
-    """A face at rest, without layers, keys and colours."""
-    hand.ask("run", code=REST)
-    hand.still()
-
-
-REST = """
-c = rig()["risorius_controls"]
-c.animation_data_clear()
-while len([y for y in c.risorius_layers if not y.removed]):
-    bpy.ops.risorius.layer_remove()
-with over(*view()[:2]):
-    bpy.ops.risorius.heat(kind="OFF")
-    bpy.ops.risorius.show_all()
-    bpy.ops.risorius.reset()
-bpy.context.scene.frame_set(1)
-"""
 
 
 def start(hand: Hand, _dna: Path) -> Iterator[Check]:
@@ -328,34 +295,6 @@ def add_layer(hand: Hand, _dna: Path) -> Iterator[Check]:
     clear(hand)
 
 
-def open_section(hand: Hand, *panels: str) -> None:
-    """Fold all sections of the tab but one that lies in another, by clicks on their headers.
-
-    Headers have no shortcut that names them. So all are folded, and from below each is clicked on
-    until the wanted one is drawn; one that is not wanted is folded again. What lies below the one
-    that is looked for is folded, so that no click meets a button.
-
-    Args:
-        panels: the section, after the one that it lies in.
-    """
-    left, top, _width, height = hand.ask("layout")["sidebar"]
-    hand.do("keydown", "ctrl")
-    hand.click(left + 60, top + 14)
-    hand.do("keyup", "ctrl")
-    for panel in panels:
-        hand.ask("watch", panel=panel)
-        for y in range(top + height - 8, top + 8, -9):
-            hand.click(left + 60, y)
-            hand.ask("draw_again", panel=panel)
-            hand.ask("ready")
-            if hand.ask("drawn", panel=panel):
-                break
-            hand.click(left + 60, y)
-        else:
-            raise LateError(f"no section {panel}")
-    hand.still()
-
-
 def see_why(hand: Hand, _dna: Path) -> Iterator[Check]:
     """Heat map, a vertex under the pointer, solo: by clicks."""
     clear(hand)
@@ -404,8 +343,10 @@ STEPS: tuple[Step, ...] = (
     drag_slider,
     drag_skin,
     drag_in_views,
+    grid,
     add_layer,
     see_why,
+    board,
     import_file,
 )
 

@@ -137,6 +137,10 @@ class Hand:
         self.key(keys)
         return str(self.ask("clipboard")).strip()
 
+    def is_button(self, x: float, y: float) -> bool:
+        """Whether a button that runs something, or a value, is at a place."""
+        return bool(self.under(x, y, _PYTHON) or self.under(x, y, _PATH))
+
     def find(self, pattern: str, of_field: bool = False, columns: tuple[float, ...] = (0.5,),
              area: list[int] | None = None, step: int = 10) -> tuple[float, float]:  # fmt: skip
         """Where in the sidebar the button is that runs a command, or the field of a value.

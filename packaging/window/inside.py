@@ -198,15 +198,57 @@ def drawing():
     return module("ui.drag.drawing").is_drawing()
 
 
-def bone_at(name):
+def bone_at(bone):
     """Where the middle of a bone of the controls is on the screen."""
-    controls = rig()["risorius_controls"]
-    bone = controls.pose.bones[name]
-    return on_screen(controls.matrix_world @ ((bone.head + bone.tail) / 2))
+    return on_screen(bone_in_world(bone))
 
 
 def bones():
     return [b.name for b in rig()["risorius_controls"].pose.bones]
+
+
+def active_bone():
+    """The bone that was clicked last."""
+    bone = bpy.context.active_pose_bone
+    return bone.name if bone else ""
+
+
+def is_modal():
+    """Whether an operator has the pointer."""
+    return len(window().modal_operators) > 0
+
+
+def show_all_of_board():
+    """The face and its board in the view."""
+    area, _drawing, _sidebar = view()
+    spots = np.array([p for n in bones() for p in [bone_in_world(n)] if n.startswith("CTRL_")])
+    spots = np.concatenate([points(), spots])
+    eye = area.spaces.active.region_3d
+    eye.view_location = (spots.min(axis=0) + spots.max(axis=0)) / 2
+    eye.view_distance = float(max(np.ptp(spots[:, 0]) * 1.3, np.ptp(spots[:, 2]) * 1.9))
+    return True
+
+
+def bone_in_world(name):
+    """The middle of a bone of the controls."""
+    controls = rig()["risorius_controls"]
+    bone = controls.pose.bones[name]
+    return controls.matrix_world @ ((bone.head + bone.tail) / 2)
+
+
+def board_leads():
+    """Whether the board leads the face."""
+    return bool(module("scene.character.board").leads_face(rig()))
+
+
+def pictures_drawn(expression):
+    """Whether the picture of an expression is there."""
+    previews = module("ui.expressions.previews")
+    items, _troubles = module("scene.expressions.library").all_items(
+        module("scene.expressions.library").folder(bpy.context)
+    )
+    jobs = previews.jobs_of(rig(), [items[expression]])
+    return all(previews.icon_of(job.path) for job in jobs)
 
 
 def has(operator):

@@ -111,6 +111,7 @@ TEST(Correct, DepthIsThatBelowTheBallsSurface) {
   ASSERT_TRUE(sums);
   EXPECT_NEAR(sums->deepest, 2.0, 0.01);
   EXPECT_GT(sums->volume, 30.0);
+  EXPECT_EQ(sums->widest, 0.0);
 }
 
 TEST(Correct, StretchIsAreaAndAFoldIsACosine) {
@@ -126,6 +127,7 @@ TEST(Correct, StretchIsAreaAndAFoldIsACosine) {
   const auto sums = check.sum(found, rest);
   ASSERT_TRUE(sums);
   EXPECT_EQ(sums->stretched, kSheet - 1);
+  EXPECT_NEAR(sums->widest, 3.0, 1e-5);
   EXPECT_EQ(sums->folded, 2 * (kSheet - 1));
   EXPECT_NEAR(std::ranges::max(found.stretch), 3.0, 1e-5);
   EXPECT_NEAR(std::ranges::min(found.fold), -1.0, 1e-5);

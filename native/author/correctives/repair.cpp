@@ -222,7 +222,7 @@ void solve(Work& work, const std::vector<Vec3>& base) {
 
 bool is_no_worse(const FaultSums& a, const FaultSums& b) {
   return a.volume <= b.volume && a.deepest <= b.deepest + 0.01 && a.stretched <= b.stretched &&
-         a.folded <= b.folded;
+         a.widest <= 1.005 * b.widest && a.folded <= b.folded;
 }
 
 /// How much of what was wrong is left; 0 where nothing is.

@@ -297,7 +297,9 @@ FaultSums sum_faults(const Topology& topology, const SkinFaults& faults,
     out.deepest = std::max(out.deepest, beyond);
   }
   for (std::size_t f = 0; f < faults.stretch.size(); ++f) {
-    out.stretched += is_stretched(topology, faults, allowed, f);
+    if (!is_stretched(topology, faults, allowed, f)) continue;
+    ++out.stretched;
+    out.widest = std::max(out.widest, double{faults.stretch[f]});
   }
   for (std::size_t h = 0; h < faults.fold.size(); ++h) {
     out.folded += is_folded(faults, allowed, h);

@@ -1235,6 +1235,9 @@ class FaultSums:
     def stretched(self) -> int:
         """Faces of more than 2.5 times their area."""
     @property
+    def widest(self) -> float:
+        """Times its area, of the most stretched of these."""
+    @property
     def folded(self) -> int:
         """Edges whose faces lie on one another."""
 

@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: MIT
+"""The face board and the pictures of expressions, by a hand."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from common import Check, clear, look_at_face, open_section, ready_tab, scroll, slider
+from hand import WIDTH, Hand, difference
+
+HANDLE = "CTRL_C_jaw"
+JOY = r"risorius\.expression\(.*expression=.joy."
+BLEND_JOY = r"risorius\.blend_expression\(.*expression=.joy."
+
+
+def board(hand: Hand, _dna: Path) -> Iterator[Check]:
+    """A board is added, a handle is moved by the pointer, who leads is switched, it is removed."""
+    clear(hand)
+    look_at_face(hand)
+    open_section(hand, "RISORIUS_PT_options", "RISORIUS_PT_board")
+    scroll(hand)
+    hand.click(*hand.find(r"risorius\.add_board"))
+    hand.wait("a board is there", lambda: HANDLE in hand.ask("bones"))
+    hand.ask("show_all_of_board")
+    before, box = hand.still(), hand.ask("face_box")
+    at = hand.ask("bone_at", bone=HANDLE)
+    hand.click(*at)
+    hand.key("ctrl+Tab")
+    hand.wait("pose mode", lambda: hand.ask("state")["mode"] == "POSE")
+    hand.click(*at)
+    yield "a click selects the handle of the jaw", hand.ask("active_bone") == HANDLE
+    hand.move(at[0] + 2, at[1])
+    hand.key("g")
+    hand.go(at, (at[0], at[1] + 60))
+    hand.picture("board")
+    led = slider(hand)
+    hand.do("click", 1)
+    hand.wait("the move has ended", lambda: not hand.ask("is_modal"))
+    after = hand.still()
+    yield f"G and a move of the pointer: the jaw opens ({led:.2f})", led > 0.1
+    yield "and the face moves with it", difference(before, after, box) > 0.02
+    ready_tab(hand)
+    hand.click(*hand.find(r"risorius\.lead\(.*SLIDERS", columns=(0.3, 0.2, 0.4)))
+    hand.wait("the sliders lead", lambda: not hand.ask("board_leads"))
+    yield "Sliders: the pose has gone over", abs(slider(hand) - led) < 0.01
+    yield "and the face stays as it is", difference(after, hand.still(), box) < 0.02
+    hand.move(WIDTH * 0.3, HEIGHT_OF_NOTHING)
+    hand.key("ctrl+z")
+    hand.wait("the board leads again", lambda: hand.ask("board_leads"))
+    yield "Ctrl-Z: the board leads again", abs(slider(hand) - led) < 0.01
+    hand.click(*hand.find(r"risorius\.remove_board"))
+    hand.wait("the board is gone", lambda: HANDLE not in hand.ask("bones"))
+    yield "removed, no bone of it is left", slider(hand) == 0.0 or slider(hand) > 0.1
+    hand.ask("run", code="bpy.ops.object.mode_set(mode='OBJECT')")
+    clear(hand)
+
+
+HEIGHT_OF_NOTHING = 500  # in the view, where no face lies
+
+
+def grid(hand: Hand, _dna: Path) -> Iterator[Check]:
+    """The pictures of expressions: drawn, clicked, blended in by dragging, taken back."""
+    clear(hand)
+    look_at_face(hand)
+    open_section(hand, "RISORIUS_PT_animation", "RISORIUS_PT_expressions")
+    hand.ask("run", code="bpy.context.window_manager.risorius_expressions.search = 'joy'")
+    scroll(hand)
+    hand.wait("pictures are drawn", lambda: hand.ask("pictures_drawn", expression="joy"))
+    hand.still()
+    before, box = hand.still(), hand.ask("face_box")
+    place = hand.find(JOY, columns=(0.25, 0.4))
+    hand.click(*place)
+    hand.wait("joy", lambda: hand.ask("state")["sliders"])
+    after = hand.still()
+    yield "a click on an expression sets it", difference(before, after, box) > 0.02
+    hand.picture("grid")
+    hand.move(WIDTH * 0.3, HEIGHT_OF_NOTHING)
+    hand.key("ctrl+z")
+    hand.wait("undone", lambda: not hand.ask("state")["sliders"])
+    yield "Ctrl-Z takes it back", difference(before, hand.still(), box) < 0.01
+    arrow = hand.find(BLEND_JOY, columns=(0.97, 0.93, 1.0))
+    hand.click(*arrow)
+    hand.go(arrow, (arrow[0] - 120, arrow[1]))
+    hand.go((arrow[0] - 120, arrow[1]), (arrow[0] + 40, arrow[1]))
+    half = hand.ask("state")["sliders"]
+    hand.picture("grid-blend")
+    hand.key("Escape")
+    hand.wait("as before", lambda: not hand.ask("state")["sliders"])
+    yield "the double arrow and a move blend it in", len(half) > 0
+    yield "Esc gives all back", difference(before, hand.still(), box) < 0.01
+    hand.ask("run", code="bpy.context.window_manager.risorius_expressions.search = ''")

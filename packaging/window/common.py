@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: MIT
+"""What several steps of drive.py do with the window."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from hand import Hand, LateError
+
+JAW = "CTRL_expressions.jawOpen"
+SMILE = ("CTRL_expressions.mouthCornerPullL", "CTRL_expressions.mouthCornerPullR")
+Check = tuple[str, bool]
+Step = Callable[[Hand, Path], Iterator[Check]]
+
+
+class NotThereError(Exception):
+    """The extension has no such thing."""
+
+
+def slider(hand: Hand, name: str = JAW) -> float:
+    return float(hand.ask("state")["sliders"].get(name, 0.0))
+
+
+def has_face(hand: Hand) -> bool:
+    return bool(hand.ask("state")["face"])
+
+
+def ready_tab(hand: Hand) -> None:
+    hand.wait("the tab Risorius is shown", lambda: hand.ask("show_tab"))
+    hand.still()
+
+
+def look_at_face(hand: Hand) -> None:
+    """The face alone in the view, from the front."""
+    hand.ask("settle")
+    hand.ask("center")
+    hand.still()
+
+
+def clear(hand: Hand) -> None:
+    """A face at rest, without layers, keys and colours."""
+    hand.ask("run", code=REST)
+    hand.still()
+
+
+REST = """
+c = rig()["risorius_controls"]
+c.animation_data_clear()
+while len([y for y in c.risorius_layers if not y.removed]):
+    bpy.ops.risorius.layer_remove()
+with over(*view()[:2]):
+    bpy.ops.risorius.heat(kind="OFF")
+    bpy.ops.risorius.show_all()
+    bpy.ops.risorius.reset()
+bpy.context.scene.frame_set(1)
+"""
+
+
+def open_section(hand: Hand, *panels: str) -> None:
+    """Fold all sections of the tab but one that lies in another, by clicks on their headers.
+
+    Headers have no shortcut that names them. So all are folded, and from below each is clicked on
+    until the wanted one is drawn; one that is not wanted is folded again. Buttons and values, which
+    have such shortcuts, are left alone.
+
+    Args:
+        panels: the section, after the one that it lies in.
+    """
+    scroll(hand, -40)
+    left, top, _width, height = hand.ask("layout")["sidebar"]
+    hand.do("keydown", "ctrl")
+    hand.click(left + 60, top + 14)
+    hand.do("keyup", "ctrl")
+    for panel in panels:
+        hand.ask("watch", panel=panel)
+        for y in range(top + height - 8, top + 8, -9):
+            if hand.is_button(left + 60, y):
+                continue
+            hand.click(left + 60, y)
+            hand.ask("draw_again", panel=panel)
+            hand.ask("ready")
+            if hand.ask("drawn", panel=panel):
+                break
+            hand.key("Escape")  # a menu, if it was one
+            hand.click(left + 60, y)
+            hand.key("Escape")
+        else:
+            raise LateError(f"no section {panel}")
+        scroll(hand, 25 if panel != panels[-1] else 0)  # what it holds may lie below the window
+    hand.still()
+
+
+def scroll(hand: Hand, notches: int = 25) -> None:
+    """Turn the wheel over the sidebar. Args: notches  down; below 0 up."""
+    left, top, width, height = hand.ask("layout")["sidebar"]
+    hand.move(left + width - 40, top + height / 2)
+    for _ in range(abs(notches)):
+        hand.do("click", 5 if notches > 0 else 4)
+    hand.ask("ready")
+    hand.still()
