@@ -3,7 +3,8 @@
 # Runs all Blender tests in every Blender that is supported and prints the table version x test
 # file, as Markdown: the bpy modules of the oldest 4.2, the newest 4.2 LTS, 4.5 LTS and 5.0, and
 # the programs that packaging/blenders.sh made. Each installs the same zip, EEVEE included. About
-# 4 minutes for each version. Exit code 0 only if all tests passed in all of them.
+# 4 minutes for each version. In the programs a real pointer then does what an animator does
+# (packaging/window.sh). Exit code 0 only if all passed in all of them.
 #
 #   ./packaging/matrix.sh [PREFIX] [-- PYTEST ARGUMENTS]
 #       PREFIX as given to blenders.sh; BLENDER= names one more program, BPY= other bpy versions
@@ -38,7 +39,7 @@ run() { # run NAME KEY COMMAND...: the tests in one Blender, with a user folder 
   [ "$code" -eq 0 ] || tail -n 15 "$logs/$key.log" >&2
   reports+=("$name=$logs/$key.xml")
 }
-arguments=("$@")
+arguments=("$@") windows=()
 
 for version in ${BPY-4.2.0 4.2.23 4.5.15 5.0.1}; do
   if venv_python=$(bpy_venv "$version"); then
@@ -56,8 +57,15 @@ for program in "$prefix-trixie/blender.sh" "$prefix-sid/blender.sh" ${BLENDER:-}
     reports+=("$program=missing")
     continue
   fi
+  windows+=("$program")
   run "$version" "$(echo "$version" | tr ' ' -)" "$program" -b --factory-startup -noaudio \
     --python-exit-code 1 --python blender_tests/run.py --
 done
 "$python" packaging/matrix_table.py "${reports[@]}" | tee "$logs/table.md"
-exit "${PIPESTATUS[0]}"
+code=${PIPESTATUS[0]}
+# A hand in the real windows: rows name, passed, failed; its pictures lie beside.
+if [ ${#windows[@]} -gt 0 ] && [ ${#arguments[@]} -eq 0 ]; then
+  ZIP="$zip" packaging/window.sh "$logs/window" "${windows[@]}" | tee "$logs/window.tsv"
+  [ "${PIPESTATUS[0]}" -eq 0 ] || code=1
+fi
+exit "$code"

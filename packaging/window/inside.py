@@ -241,6 +241,11 @@ def board_leads():
     return bool(module("scene.character.board").leads_face(rig()))
 
 
+def given_by_board(control):
+    """What the board gives of a raw control."""
+    return float(module("scene.character.board").given(rig()).get(control, 0.0))
+
+
 def pictures_drawn(expression):
     """Whether the picture of an expression is there."""
     previews = module("ui.expressions.previews")

@@ -24,7 +24,8 @@ import risorius
 from risorius.author.correctives import CorrectiveOptions
 from risorius.author.correctives.poser import Poser
 from risorius.author.correctives.search import KINDS, Search, severity
-from risorius.author.geometry.skeleton import psd_parts
+from risorius.author.geometry import skeleton as sk
+from risorius.author.work import MM
 from risorius.cli.faces.author import opposites
 
 COUNTS = (100, 300, 500, 1000, 2000)
@@ -96,7 +97,7 @@ def held_out(dna):
     bare.psds = risorius.Psds(rows=[], columns=[], values=np.zeros(0, np.float32))
     search = Search(bare, CorrectiveOptions(apart=opposites()), None)
     truth = Poser(dna, search.skin, search.solids)
-    given = {tuple(sorted(on)) for on in psd_parts(dna).values() if len(on) == 2}
+    given = {tuple(sorted(on)) for on in sk.psd_parts(dna).values() if len(on) == 2}
     out, means, moving_means = [], [], []
     for on in sorted(given):
         search.repair([on], (0.0, 1.0))
@@ -121,6 +122,33 @@ def held_out(dna):
     return out
 
 
+def far_moved(dna):
+    """float64[correctives]: how far each moves a vertex of the head, in mm, with its controls at 1
+    and the correctives of fewer of them at work.
+
+    Args:
+        dna: a face of any joints and shapes.
+    """
+    columns = sk.column_count(dna)
+    head = max(dna.meshes, key=lambda mesh: len(mesh.positions))
+    deltas, shapes = sk.column_deltas(dna, columns), sk.column_shapes(dna, head, columns)
+    rest = np.linalg.inv(sk.world_matrices(dna, np.zeros_like(deltas[0])))
+    weights, neutral = sk.dense_weights(head, len(dna.joint_names)), np.float64(head.positions)
+    parts = sk.psd_parts(dna)
+
+    def posed(active):
+        worlds = sk.world_matrices(dna, deltas[active].sum(axis=0))
+        shaped = neutral + sum((shapes[c] for c in active if c in shapes), 0.0)
+        return sk.skinned(shaped, weights, (worlds @ rest)[..., :3, :])
+
+    out = []
+    for column, on in parts.items():
+        active = [*on, *(c for c, own in parts.items() if c != column and own <= on)]
+        moved = posed([*active, column]) - posed(active)
+        out.append(np.linalg.norm(moved, axis=1).max() * MM[dna.translation_unit])
+    return np.array(out)
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("face", type=Path)
@@ -128,11 +156,17 @@ def main():
     parser.add_argument("--most", type=int, default=100_000, help="pairs that are repaired")
     parser.add_argument("--looked-at", type=int, default=400, help="for what is undone")
     parser.add_argument("--held-out", action="store_true", help="that alone")
+    parser.add_argument("--moves", action="store_true", help="how far each moves, that alone")
     args = parser.parse_args()
     begin, cpu = time.monotonic(), time.process_time()
     dna = risorius.load(args.face)
     if args.held_out:
         print("\n".join(held_out(dna)))
+        return
+    if args.moves:
+        moved = far_moved(dna)
+        row = ", ".join(f"{(moved >= mm).sum():,} {mm} mm" for mm in (0.05, 0.1, 0.5, 1, 2, 5))
+        print(f"{len(moved):,} correctives; so many move a vertex by at least: {row}")
         return
     search = Search(dna, CorrectiveOptions(apart=opposites()), None)
     pairs = search.pairs()
