@@ -22,8 +22,8 @@ import time
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
+import frame_time  # isort: skip  before bpy: it gives Blender a user folder of its own
 import bpy
-import frame_time
 import install_extension
 import numpy as np
 
