@@ -68,27 +68,34 @@ def open_section(hand: Hand, *panels: str) -> None:
         panels: the section, after the one that it lies in.
     """
     scroll(hand, -40)
-    left, top, _width, height = hand.ask("layout")["sidebar"]
+    left, top, _width, _height = hand.ask("layout")["sidebar"]
     hand.do("keydown", "ctrl")
     hand.click(left + 60, top + 14)
     hand.do("keyup", "ctrl")
     for panel in panels:
         hand.ask("watch", panel=panel)
-        for y in range(top + height - 8, top + 8, -9):
-            if hand.is_button(left + 60, y):
-                continue
-            hand.click(left + 60, y)
-            hand.ask("draw_again", panel=panel)
-            hand.ask("ready")
-            if hand.ask("drawn", panel=panel):
-                break
-            hand.key("Escape")  # a menu, if it was one
-            hand.click(left + 60, y)
-            hand.key("Escape")
-        else:
-            raise LateError(f"no section {panel}")
-        scroll(hand, 25 if panel != panels[-1] else 0)  # what it holds may lie below the window
+        if not _opened(hand, panel):
+            scroll(hand)  # it lies below the window's end
+            if not _opened(hand, panel):
+                raise LateError(f"no section {panel}")
     hand.still()
+
+
+def _opened(hand: Hand, panel: str) -> bool:
+    """Click on what may be a header, from below, until the section is drawn."""
+    left, top, _width, height = hand.ask("layout")["sidebar"]
+    for y in range(top + height - 8, top + 8, -9):
+        if hand.is_button(left + 60, y):
+            continue
+        hand.click(left + 60, y)
+        hand.ask("draw_again", panel=panel)
+        hand.ask("ready")
+        if hand.ask("drawn", panel=panel):
+            return True
+        hand.key("Escape")  # a menu, if it was one
+        hand.click(left + 60, y)
+        hand.key("Escape")
+    return False
 
 
 def scroll(hand: Hand, notches: int = 25) -> None:

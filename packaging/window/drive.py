@@ -33,6 +33,7 @@ from common import (
     slider,
 )
 from hand import HEIGHT, WIDTH, Hand, LateError, difference
+from shot import shot
 
 
 def start(hand: Hand, _dna: Path) -> Iterator[Check]:
@@ -346,6 +347,7 @@ STEPS: tuple[Step, ...] = (
     grid,
     add_layer,
     see_why,
+    shot,
     board,
     import_file,
 )

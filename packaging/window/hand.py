@@ -158,7 +158,7 @@ class Hand:
         Raises:
             LateError: it is not there.
         """
-        left, top, width, height = area or self.ask("layout")["sidebar"]
+        left, top, width, height = (area or self.ask("layout")["sidebar"])[:4]
         keys = _PATH if of_field else _PYTHON
         for column in columns:
             x = left + (width - 24) * column

@@ -241,6 +241,29 @@ def board_leads():
     return bool(module("scene.character.board").leads_face(rig()))
 
 
+def timeline_at(frame):
+    """Where on the screen a frame is in the timeline's ruler."""
+    area = next(a for a in window().screen.areas if a.type == "DOPESHEET_EDITOR")
+    region = next(r for r in area.regions if r.type == "WINDOW")
+    x, _y = region.view2d.view_to_region(frame, 0, clip=False)
+    left, top, _width, _height = rectangle(region)
+    return [left + x, top + 10]
+
+
+def timeline_header():
+    """The timeline's header on the screen, and the scene's last frame."""
+    area = next(a for a in window().screen.areas if a.type == "DOPESHEET_EDITOR")
+    region = next(r for r in area.regions if r.type == "HEADER")
+    return [*rectangle(region), bpy.context.scene.frame_end]
+
+
+def keyed_frames():
+    """Frames at which the action of the face has keys."""
+    data = rig()["risorius_controls"].animation_data
+    curves = module("scene.base.compat").curves_of(data.action) if data and data.action else []
+    return sorted({round(p.co.x) for c in curves for p in c.keyframe_points})
+
+
 def given_by_board(control):
     """What the board gives of a raw control."""
     return float(module("scene.character.board").given(rig()).get(control, 0.0))

@@ -1,0 +1,311 @@
+# SPDX-License-Identifier: MIT
+"""Thirty poses, each by sliders, by the face board and by dragging the skin: what a hand does.
+
+    python tests/bench/posing_tasks.py man.dna
+
+A hand that knows its face: it knows which sliders or handles a pose needs, and, dragging, tries
+nothing in vain (of the vertices that are furthest off it takes the drag that helps most). Counted
+are presses and releases of the pointer's button: a click is two of them, a drag is two; those of
+keys (Ctrl held for one slider, Tab for the next) stand behind a +. To begin to drag costs a click.
+Pixels are those that
+the pointer travels, on the layouts of the add-on: sliders of 75 or 150 pixels in rows of 22 below
+headings that are opened by a click, a board 285 pixels high, a head of 1.25 pixels a millimetre.
+A slider or handle is set to the pixel. A drag is one of the add-on's: least squares on the screen
+(both axes, depth free) or, with a key held, one slider alone, symmetric where the pose is. Dragging
+ends when a tenth of the way is left, at as many drags as sliders are needed, or when no drag brings
+a twentieth of what is left. Error: root of the mean square over vertices that the pose moves by
+0.1 mm, in mm; *way* is what it is at rest.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import statistics
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import risorius
+from risorius.controls import regions
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python"))
+import test_addon_logic  # noqa: F401  registers the package of the logic
+
+board_table = importlib.import_module("risorius_addon_logic.character.board_table")
+board_fit = importlib.import_module("risorius_addon_logic.character.board_fit")
+board_layout = importlib.import_module("risorius_addon_logic.character.board_layout")
+
+HEADING, ROW, WIDTH = 24, 22, 150.0  # pixels
+BOARD_HEIGHT, PIXELS_A_MM = 285.0, 1.25
+AWAY = 420.0  # from the face to the sidebar
+ENOUGH, WORTH, CANDIDATES = 0.1, 0.05, 10
+TASKS: dict[str, dict[str, float]] = {
+    "left eye half closed": {"eyeBlinkL": 0.5},
+    "both eyes closed": {"eyeBlink": 1.0},
+    "wink": {"eyeBlinkR": 1.0, "eyeCheekRaiseR": 0.6, "mouthCornerPullR": 0.3},
+    "eyes wide": {"eyeWiden": 0.9},
+    "squint": {"eyeSquintInner": 0.8, "eyeCheekRaise": 0.3},
+    "brows up": {"browRaiseIn": 0.9, "browRaiseOuter": 0.9},
+    "one brow up": {"browRaiseInL": 0.7, "browRaiseOuterL": 1.0},
+    "frown": {"browDown": 0.9, "browLateral": 0.6},
+    "worried brows": {"browRaiseIn": 0.9, "browLateral": 0.5},
+    "smirk": {"mouthCornerPullL": 0.6, "mouthDimpleL": 0.3},
+    "smile": {"mouthCornerPull": 0.7, "eyeCheekRaise": 0.3},
+    "broad smile": {"mouthCornerPull": 1.0, "eyeCheekRaise": 0.6, "mouthUpperLipRaise": 0.3},
+    "sad mouth": {"mouthCornerDepress": 0.7, "jawChinRaiseD": 0.4},
+    "mouth to the left": {"mouthLeft": 0.7},
+    "jaw open": {"jawOpen": 0.6},
+    "jaw to the right": {"jawRight": 0.8},
+    "jaw forward, a little open": {"jawFwd": 0.7, "jawOpen": 0.2},
+    "kiss": {"mouthLipsPurseU": 0.8, "mouthLipsPurseD": 0.8},
+    "oh": {"jawOpen": 0.35, "mouthFunnelU": 0.7, "mouthFunnelD": 0.7},
+    "ee": {"jawOpen": 0.15, "mouthStretch": 0.6, "mouthCornerPull": 0.3},
+    "lips pressed": {"mouthPressU": 0.8, "mouthPressD": 0.8},
+    "upper lip up": {"mouthUpperLipRaise": 0.8},
+    "lower lip down": {"mouthLowerLipDepress": 0.8},
+    "sneer": {"noseWrinkleL": 0.9, "mouthUpperLipRaiseL": 0.6},
+    "disgust": {"noseWrinkle": 0.8, "mouthUpperLipRaise": 0.5, "browDown": 0.5},
+    "cheeks blown": {"mouthCheekBlow": 0.8},
+    "anger": {"browDown": 1.0, "eyeSquintInner": 0.5, "noseWrinkle": 0.4, "mouthPressU": 0.4},
+    "fear": {"browRaiseIn": 0.8, "browLateral": 0.4, "eyeWiden": 0.7, "mouthStretch": 0.5},
+    "surprise": {"browRaiseIn": 0.9, "browRaiseOuter": 0.9, "eyeWiden": 0.6, "jawOpen": 0.5},
+    "shout": {"jawOpen": 0.9, "mouthStretch": 0.5, "browDown": 0.6, "noseWrinkle": 0.4},
+}
+
+
+@dataclass
+class Done:
+    """What a hand did: presses and releases of the button and of keys, pixels, mm that are left."""
+
+    events: int = 0
+    keys: int = 0
+    pixels: float = 0.0
+    error: float = 0.0
+    at: tuple[float, float] = (0.0, 0.0)
+
+    def go(self, x: float, y: float) -> None:
+        self.pixels += float(np.hypot(x - self.at[0], y - self.at[1]))
+        self.at = (x, y)
+
+    def click(self, x: float, y: float) -> None:
+        self.go(x, y)
+        self.events += 2
+
+    def drag(self, start: tuple[float, float], end: tuple[float, float]) -> None:
+        self.go(*start)
+        self.go(*end)
+        self.events += 2
+
+
+class Face:
+    """The head, its controls, and how far a pose is from another."""
+
+    def __init__(self, dna: risorius.Dna) -> None:
+        self.dna = dna
+        self.surface = risorius.Surface(dna, risorius.Rig(dna))
+        self.names = [n.removeprefix("CTRL_expressions.") for n in dna.raw_control_names]
+        self.mesh = max(range(len(dna.meshes)), key=lambda m: len(dna.meshes[m].positions))
+        self.rest = self.at(np.zeros(len(self.names)))
+        self.mm = {"cm": 10.0, "m": 1000.0}[dna.translation_unit]
+        axes = [a for a in range(3) if not self.surface.front[a]]
+        self.screen = np.eye(3)[axes]
+        span = np.ptp(self.rest, axis=0)
+        self.middle = (self.rest.min(axis=0) + self.rest.max(axis=0)) / 2
+        self.shown = self.rest @ self.surface.front > (self.middle @ self.surface.front) - 0.1 * (
+            span @ np.abs(self.surface.front)
+        )
+        columns = dna.gui_to_raw
+        numbers = [columns.input_indices, columns.output_indices, columns.from_values]
+        numbers += [columns.to_values, columns.slope_values, columns.cut_values]
+        self.table = board_table.of_file(list(dna.gui_control_names), numbers, len(self.names))
+
+    def at(self, raw):
+        return self.surface.positions(raw, self.mesh).astype(float)
+
+    def pixel(self, place):
+        """Where a place is on the screen, from the middle of the face."""
+        return tuple(self.screen @ (place - self.middle) * self.mm * PIXELS_A_MM)
+
+    def raw_of(self, task):
+        """float64[R] of a pose; a name without a side is both."""
+        out = np.zeros(len(self.names))
+        for name, value in task.items():
+            sides = [n for n in (name, name + "L", name + "R") if n in self.names]
+            assert sides, name
+            for side in sides:
+                out[self.names.index(side)] = value
+        return out
+
+
+def apart(face, places, wanted, moving):
+    """mm, root of the mean square."""
+    off = np.linalg.norm(places - wanted, axis=1)[moving] * face.mm
+    return float(np.sqrt((off**2).mean()))
+
+
+def by_sliders(face, goal):
+    """Each control at its slider, in regions that are opened."""
+    done, raw, opened = Done(), np.zeros_like(goal), {}
+    headings = list(regions.TITLES)
+    rows = {r: [] for r in headings}
+    for name in face.names:
+        stem = name[:-1] if name[-1:] in "LR" and name[:-1] + "L" in face.names else name
+        region = regions.region_of("CTRL_expressions." + name)
+        if region in rows and stem not in rows[region]:
+            rows[region].append(stem)
+    done.at = (-AWAY, 0.0)
+    for control in sorted(np.flatnonzero(goal), key=lambda c: headings.index(
+            regions.region_of("CTRL_expressions." + face.names[c]))):  # fmt: skip
+        name = face.names[control]
+        region = regions.region_of("CTRL_expressions." + name)
+        above = sum(
+            len(rows[r]) * ROW for r in opened if headings.index(r) < headings.index(region)
+        )
+        top = headings.index(region) * HEADING + above
+        if region not in opened:
+            done.click(20.0, top)
+            opened[region] = True
+        paired = name[-1:] in "LR" and name[:-1] in rows[region]
+        row = rows[region].index(name[:-1] if paired else name)
+        wide = WIDTH / 2 if paired else WIDTH
+        left = 60.0 + (wide if paired and name.endswith("L") else 0.0)
+        way = round(goal[control] * wide)
+        y = top + HEADING + row * ROW
+        done.drag((left, y), (left + way, y))
+        raw[control] = way / wide
+    return done, raw
+
+
+def by_board(face, goal):
+    """Each handle that the pose needs, both ways of one in one drag."""
+    table = face.table
+    ways = board_layout.ways_of(table, list(face.dna.raw_control_names), {})
+    handles = board_layout.handles_of(table, ways, regions.region_of)
+    board = board_layout.lay_out(handles, regions.TITLES)
+    unit = BOARD_HEIGHT / board.height
+    gui = board_fit.fit(table, goal[None], np.zeros((1, len(table.names))))[0]
+    done, used = Done(), np.zeros_like(gui)
+    for handle in board.handles:
+        way = [0.0, 0.0]
+        for number, axis in enumerate((handle.x, handle.y)):
+            if axis is not None and abs(gui[axis.gui]) > 1e-3:
+                pixels = round(gui[axis.gui] / axis.unit * unit)
+                way[number] = float(pixels)
+                used[axis.gui] = np.clip(pixels / unit * axis.unit, axis.low, axis.high)
+        if any(way):
+            x, y = handle.place[0] * unit + 250.0, handle.place[1] * unit
+            done.drag((x, y), (x + way[0], y + way[1]))
+    return done, np.asarray(table.raw(used[None]))[0]
+
+
+def by_drags(face, goal, moving, most):
+    """Drags of the skin, each the one that helps most."""
+    done, raw = Done(), np.zeros_like(goal)
+    wanted = face.at(goal)
+    mirrored = is_mirrored(face, goal)
+    done.click(AWAY, -150.0)  # Drag the Face
+    way = left = apart(face, face.rest, wanted, moving)
+    for _ in range(most):
+        if left <= ENOUGH * way:
+            break
+        found = best_drag(face, raw, wanted, moving, mirrored)
+        if found is None or found[0] > left - WORTH * way:
+            break
+        left, raw, start, end, held = found
+        done.drag(face.pixel(start), face.pixel(end))
+        done.keys += held
+    return done, raw
+
+
+def is_mirrored(face, goal):
+    """Whether a pose is the same on both sides."""
+    both = [(n, n[:-1] + "R") for n in face.names if n.endswith("L") and n[:-1] + "R" in face.names]
+    return all(goal[face.names.index(a)] == goal[face.names.index(b)] for a, b in both)
+
+
+def best_drag(face, raw, wanted, moving, mirrored):
+    """(mm left, controls, from, to, keys) of the drag that leaves least; None if none helps."""
+    here = face.at(raw)
+    off = np.linalg.norm((wanted - here) @ face.screen.T, axis=1) * (moving & face.shown)
+    picked, order = [], np.argsort(-off)
+    for vertex in order:  # some that lie apart
+        near = [v for v in picked if np.linalg.norm(face.rest[v] - face.rest[vertex]) * face.mm < 6]
+        if not near and off[vertex] > 0:
+            picked.append(int(vertex))
+        if len(picked) == CANDIDATES:
+            break
+    out = None
+    for vertex in picked:
+        for solved, keys in solutions(face, raw, vertex, wanted, mirrored):
+            left = apart(face, face.at(solved), wanted, moving)
+            if out is None or left < out[0]:
+                out = (left, solved, here[vertex], wanted[vertex], keys)
+    return out
+
+
+def solutions(face, raw, vertex, wanted, mirrored):
+    """(controls, events of keys) of what a drag of this vertex may do."""
+    points, targets = [(face.mesh, vertex)], [wanted[vertex]]
+    side = face.surface.side
+    if mirrored and abs(face.rest[vertex, side] - face.middle[side]) * face.mm > 3:
+        flip = face.rest[vertex].copy()
+        flip[side] = 2 * face.middle[side] - flip[side]
+        twin = int(np.linalg.norm(face.rest - flip, axis=1).argmin())
+        points.append((face.mesh, twin))
+        targets.append(wanted[twin])
+    axes = np.tile(face.screen, (len(points), 1, 1))
+    solved = risorius.solve_drag(face.surface, raw, points, targets, axes=axes)
+    yield np.asarray(solved.raw, float), 0  # no key held
+    alone = risorius.best_controls(
+        face.surface, raw, points[0], targets[0], axes=face.screen, count=3
+    )
+    for tab, (control, value, _left) in enumerate(alone):
+        out = raw.copy()
+        out[control] = value
+        name = face.names[control]
+        if len(points) > 1 and name[-1:] in "LR":
+            twin = name[:-1] + ("R" if name.endswith("L") else "L")
+            if twin in face.names:
+                out[face.names.index(twin)] = value
+        yield out, 2 + 2 * tab  # Ctrl down and up, Tab
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("face", type=Path)
+    args = parser.parse_args()
+    face = Face(risorius.load(args.face))
+    print("| pose | way mm | sliders: events, px, mm | board | drags |\n|---|---|---|---|---|")
+    events = []
+    for title, task in TASKS.items():
+        goal = face.raw_of(task)
+        wanted = face.at(goal)
+        moving = np.linalg.norm(wanted - face.rest, axis=1) * face.mm > 0.1
+        rows = [by_sliders(face, goal), by_board(face, goal)]
+        rows.append(by_drags(face, goal, moving, int((goal != 0).sum())))
+        cells = []
+        for done, raw in rows:
+            done.error = apart(face, face.at(raw), wanted, moving)
+            keys = f" + {done.keys}" if done.keys else ""
+            cells.append(f"{done.events}{keys}, {done.pixels:,.0f}, {done.error:.2f}")
+        events.append([(d.events, d.pixels, d.error) for d, _ in rows])
+        way = apart(face, face.rest, wanted, moving)
+        print(f"| {title} | {way:.2f} | {' | '.join(cells)} |", flush=True)
+    table = np.array(events)
+    middles = np.median(table, axis=0)
+    middle = [f"{row[0]:.0f}, {row[1]:,.0f}, {row[2]:.2f}" for row in middles]
+    print(f"| **median** | | {' | '.join(middle)} |")
+    for i, word in enumerate(("events", "pixels")):
+        share = statistics.median(table[:, 2, i] / table[:, 0, i])
+        print(f"{word}: drags take {share:.2f} of what sliders take, in the median")
+    more = [int((goal != 0).sum()) > 1 for goal in map(face.raw_of, TASKS.values())]
+    share = statistics.median((table[:, 2, 0] / table[:, 0, 0])[more])
+    print(f"events of the {sum(more)} poses of more than one slider: {share:.2f}")
+    share = statistics.median((table[:, 2, 0] - 2) / table[:, 0, 0])
+    print(f"events without the click that begins to drag: {share:.2f}")
+
+
+if __name__ == "__main__":
+    main()
