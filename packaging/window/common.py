@@ -28,7 +28,7 @@ def has_face(hand: Hand) -> bool:
 
 def ready_tab(hand: Hand) -> None:
     hand.wait("the tab Risorius is shown", lambda: hand.ask("show_tab"))
-    hand.still()
+    scroll(hand, -40)
 
 
 def look_at_face(hand: Hand) -> None:
