@@ -95,6 +95,7 @@ def _play(hand: Hand) -> Iterator[Check]:
     header = hand.ask("timeline_header")
     columns = tuple(1.0 - 0.015 * step for step in range(40))
     place = hand.find("frame_end", of_field=True, columns=columns, area=header)
+    hand.move(place[0] - 30, place[1])  # at its end is an arrow, which adds one
     hand.do("click", "--repeat", 2, "--delay", 60, 1)
     hand.key("ctrl+a")
     hand.type(str(LAST))
