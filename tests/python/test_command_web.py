@@ -16,7 +16,7 @@ from conftest import GOLDEN
 from risorius import Clip, web
 from risorius.cli import main
 from risorius.controls.regions import TITLES
-from risorius.sample.paint import png
+from risorius.files.png import png
 from risorius.web import page as pages
 
 MEDIUM = GOLDEN / "medium.dna"

@@ -28,7 +28,8 @@ from . import references, wrinkles
 from .body import JOINTS, NECK_CUT, NECK_SLOPE, REACH, Body
 from .controls import gui_table
 from .further import CONTROLS_OF_CODE
-from .paint import HEAD_SIZE, paint_textures
+from .paint.skin import HEAD_SIZE
+from .paint.textures import paint_textures
 from .part import Part
 from .people import MAN, Person
 from .polygons import (
