@@ -7,13 +7,14 @@ import numpy as np
 
 from ..base.easing import smooth_step
 from . import expressions as ex
-from .people import MAN, Person
+from .lips import Mouth, sealed
+from .people import MODEL, Person
 from .polygons import Floats, Ints
 from .proportions import Proportions
 from .source import TARGETS, BaseMesh, Source
 
 FLOOR = 8.168  # what lies under the soles, in decimetres below the data's origin
-NECK_CUT = 5.53  # of height less NECK_SLOPE times the distance from the middle, in the base mesh
+NECK_CUT = 5.36  # of height less NECK_SLOPE times the distance from the middle, in the base mesh
 NECK_SLOPE = 0.35
 TEETH_SHOW = 0.035
 REACH = 1.3  # the hands are as high as the neck, but not as near
@@ -51,6 +52,9 @@ def shaped(source: Source, base: BaseMesh, person: Person) -> Floats:
         out += weight * source.target(f"{TARGETS}{name}.target.gz", count)
     for name, weight in person.features.items():
         out += weight * source.feature(name, count)
+    for name, weight in person.asymmetry.items():
+        side = "l" if weight > 0 else "r"
+        out += abs(weight) * source.feature(f"asym/asym-{name}-{side}", count)
     return out
 
 
@@ -175,7 +179,8 @@ def skin_weights(
 class Body:
     """A person before there are meshes: where all is, and what each raw control does.
 
-    All people have the man's skin weights and his units, these in their own proportions.
+    All people have the skin weights and units of a model, the man with two sides that are alike,
+    these in their own proportions.
 
     Attributes:
         groups: vertex indices by group of the base mesh.
@@ -183,16 +188,17 @@ class Body:
         joints: positions of the joints by name.
         units: what each raw control does.
         further_correctives: float64[V, 3] of sticky lips and the like, by their two raw controls.
-        man: the man's, for the man himself this.
+        man: the model's, for the model itself this.
         weights: float64[V, 7], skin weights.
     """
 
     def __init__(self, source: Source, base: BaseMesh, person: Person) -> None:
         self.groups = groups = group_indices(base)
-        man = person.shape() == MAN.shape() and person.features == MAN.features
-        other = None if man else Body(source, base, MAN)
+        model = person.shape() == MODEL.shape() and person.features == MODEL.features
+        model = model and not any(person.asymmetry.values())
+        other = None if model else Body(source, base, MODEL)
         self.positions = shaped(source, base, person)
-        self.positions[:, 1] += FLOOR if man else -self.positions[groups["body"], 1].min()
+        self.positions[:, 1] += FLOOR if model else -self.positions[groups["body"], 1].min()
         self.man: Body = self
         self._change: Proportions | None = None
         size = 1.0
@@ -201,6 +207,8 @@ class Body:
             size = head_size(base, self.positions) / head_size(base, other.positions)
             self._change = Proportions(base, groups, other.positions, self.positions)
         jaw_open = self.carried(source.face_unit("jawOpen", len(self.positions)))
+        pucker = self.carried(source.face_unit("mouthPucker", len(self.positions)))
+        self.positions = sealed(Mouth(base, pucker, jaw_open), self.positions)
         show_upper_teeth(self.positions, groups, jaw_open, size)
         self.joints = joint_positions(self.positions, groups, size)
         if other is None:

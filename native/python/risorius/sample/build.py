@@ -26,6 +26,7 @@ from ..files import fileio
 from . import expressions as ex
 from . import references, wrinkles
 from .body import JOINTS, NECK_CUT, NECK_SLOPE, REACH, Body
+from .clothes import shirt
 from .controls import gui_table
 from .further import CONTROLS_OF_CODE
 from .paint.skin import HEAD_SIZE
@@ -40,6 +41,7 @@ from .polygons import (
     subdivide,
 )
 from .source import PACKAGE, SHA256, BaseMesh, Source, SourceError, fetch
+from .teeth import mouth_parts
 
 CM = 10.0  # the data are in decimetres
 NEW_JOINTS = 250
@@ -54,7 +56,6 @@ RIG = RigOptions(FitOptions(joints=NEW_JOINTS), tolerance_mm=TOLERANCE_MM)
 NO_SEARCH = CorrectiveOptions(most=0)
 PARTS = {  # mesh -> groups, subdivisions at LOD 0 and 1
     "head": (["body"], 1, 0),
-    "teeth": (["helper-upper-teeth", "helper-lower-teeth"], 1, 0),
     "tongue": (["helper-tongue"], 1, 0),
     "eyeLeft": (["helper-l-eye"], 2, 1),
     "eyeRight": (["helper-r-eye"], 2, 1),
@@ -115,6 +116,8 @@ def make_parts(base: BaseMesh) -> list[Part]:
                 part.polygons, operator = subdivide(part.polygons)
                 part.operators.append(operator)
             out.append(part)
+        out += mouth_parts(base, lod)
+        out.append(shirt(base, lod))
     return out
 
 
@@ -415,12 +418,13 @@ def assemble(
     for number, part in enumerate(parts):
         p, w = part.carry(positions), part.carry(weights)
         mesh = make_mesh(part, positions, positions[groups["body"]], w)
-        deltas = []
-        for unit in units.values():
-            here = ex.Expression(part.carry(unit.displacement), unit.joints)
-            deltas.append(bind_displacement(p, w, here, joints))
-        deltas += [part.carry(delta) for delta in correctives.values()]
-        add_targets(mesh, deltas)
+        if not part.rests:
+            deltas = []
+            for unit in units.values():
+                here = ex.Expression(part.carry(unit.displacement), unit.joints)
+                deltas.append(bind_displacement(p, w, here, joints))
+            deltas += [part.carry(delta) for delta in correctives.values()]
+            add_targets(mesh, deltas)
         mapping += [(number, t.blend_shape_channel_index) for t in mesh.blend_shape_targets]
         meshes.append(mesh)
     dna.meshes = meshes

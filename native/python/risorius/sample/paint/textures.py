@@ -11,6 +11,7 @@ from ..expressions import Expression
 from ..part import Part
 from ..people import Person
 from ..polygons import Floats
+from .cloth import paint_cloth
 from .eyes import paint_eye
 from .images import shrunk
 from .lashes import paint_lashes
@@ -105,6 +106,7 @@ def paint_textures(
         "head_color.png": png(shrunk(colour, largest)),
         "eye_color.png": png(shrunk(paint_eye(person), largest)),
         "lash_alpha.png": png(shrunk(paint_lashes(), largest)),
+        "shirt_color.png": png(paint_cloth(person.shirt)),
     }
     step = HEAD_SIZE // MASK_SIZE
     small = place[::step, ::step]
@@ -124,6 +126,7 @@ def paint_textures(
     for lod in (0, 1):
         out[f"texture:head_lod{lod}_mesh:color"] = "head_color.png"
         out[f"texture:eyelashes_lod{lod}_mesh:alpha"] = "lash_alpha.png"
+        out[f"texture:shirt_lod{lod}_mesh:color"] = "shirt_color.png"
         for eye_side in ("Left", "Right"):
             out[f"texture:eye{eye_side}_lod{lod}_mesh:color"] = "eye_color.png"
     return files, out
