@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """A shirt, so that neck and shoulders end well: cut from the base mesh's tights, with a collar.
 
-The tights follow every body of the data. All that is added are affine combinations of their vertices.
+The tights follow every body of the data; all that is added are affine combinations of their
+vertices.
 Lengths are decimetres, places those of the base mesh.
 """
 
@@ -66,9 +67,8 @@ def shirt(base: BaseMesh, lod: int) -> Part:
     # A shoulder may be as high as the collar; only what is near the neck is cut.
     collar = y + COLLAR_SLOPE * z - 0.5 * np.clip(np.abs(x) - 0.7, 0, None)
     for field, level in ((y, HEM), (-collar, -COLLAR), (-np.abs(x), -SHOULDER)):
-        for operator in operators:
-            field = operator.apply(field[:, None])[:, 0]
-        polygons, operator = clip_below(polygons, field, level)
+        heights = Part("", polygons, operators).carry(field[:, None])[:, 0]
+        polygons, operator = clip_below(polygons, heights, level)
         operators.append(operator)
     part = Part(f"shirt_lod{lod}_mesh", compact_uvs(polygons), operators, rests=True)
     positions = part.carry(base.positions)

@@ -6,6 +6,8 @@ Lengths are decimetres.
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 from .polygons import Floats, Ints, Polygons, subdivide
@@ -67,14 +69,15 @@ def gap_across(mouth: Mouth, points: Floats) -> tuple[Floats, Floats]:
         points: float64[v, 3] of its subdivided vertices.
 
     Returns:
-        float64[n] places across, and float64[n] heights of the gap there; negative where they overlap.
+        float64[n] places across, and float64[n] heights of the gap there, below 0 where they
+        overlap.
     """
     upper, lower = (points[rim] for rim in rims(mouth, points))
     edges = np.linspace(
         max(upper[:, 0].min(), lower[:, 0].min()), min(upper[:, 0].max(), lower[:, 0].max()), _BINS
     )
     places, gaps = [], []
-    for low, high in zip(edges[:-1], edges[1:], strict=True):
+    for low, high in itertools.pairwise(edges):
         above = upper[(upper[:, 0] >= low) & (upper[:, 0] <= high), 1]
         below = lower[(lower[:, 0] >= low) & (lower[:, 0] <= high), 1]
         if len(above) and len(below):
