@@ -27,6 +27,7 @@ class Look:
         vertices: of the finest mesh.
         has_uvs: whether it has a UV map.
         simple: leave out subsurface, relief and maps.
+        cornea: whether the face has a mesh of corneas over its eyes.
         uses: what the animated maps do.
         areas: areas of a face that this mesh has.
         found: texture_search.TexturePlan.
@@ -47,6 +48,7 @@ class Look:
     areas: set[str]
     found: texture_search.TexturePlan
     images: image_loading.Images
+    cornea: bool = False
     atlas: bpy.types.Image | None = None
     places: dict[str, tuple[int, int, int, int]] = field(default_factory=dict)
     offsets: dict[str, bool] = field(default_factory=dict)

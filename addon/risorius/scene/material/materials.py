@@ -97,6 +97,7 @@ def _look(
         areas=areas,
         found=found,
         images=images,
+        cornea=any("cornea" in m.base.lower() for m in plan.meshes),
     )
     if mesh.kind == "skin" and areas and found.masks and not simple:
         wanted = {u.region for u in uses} & set(found.masks)

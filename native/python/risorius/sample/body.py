@@ -7,6 +7,7 @@ import numpy as np
 
 from ..base.easing import smooth_step
 from . import expressions as ex
+from .eyes import Eyes, with_eyeballs
 from .lips import Mouth, sealed
 from .people import MODEL, Person
 from .polygons import Floats, Ints
@@ -172,7 +173,8 @@ def skin_weights(
     weights *= (1 - jaw)[:, None]
     weights[:, 4] = jaw
     for column, letter in ((5, "l"), (6, "r")):
-        weights[groups[f"helper-{letter}-eye"]] = np.eye(len(JOINTS))[column]
+        for name in ("helper-{}-eye", "eyeball-{}", "cornea-{}"):
+            weights[groups[name.format(letter)]] = np.eye(len(JOINTS))[column]
     return weights
 
 
@@ -188,26 +190,37 @@ class Body:
         joints: positions of the joints by name.
         units: what each raw control does.
         further_correctives: float64[V, 3] of sticky lips and the like, by their two raw controls.
+        eyes: where they are and how their lids rest.
+        eye_correctives: float64[V, 3], what keeps lids on the eyes, by their two raw controls.
         man: the model's, for the model itself this.
         weights: float64[V, 7], skin weights.
     """
 
     def __init__(self, source: Source, base: BaseMesh, person: Person) -> None:
+        base = with_eyeballs(base)
         self.groups = groups = group_indices(base)
         model = person.shape() == MODEL.shape() and person.features == MODEL.features
         model = model and not any(person.asymmetry.values())
         other = None if model else Body(source, base, MODEL)
         self.positions = shaped(source, base, person)
         self.positions[:, 1] += FLOOR if model else -self.positions[groups["body"], 1].min()
+        self.eyes = Eyes(base, groups, self.positions, person.age)
+        self._raw = self.positions.copy()  # as the data have them
         self.man: Body = self
         self._change: Proportions | None = None
         size = 1.0
         if other is not None:
             self.man = other
             size = head_size(base, self.positions) / head_size(base, other.positions)
-            self._change = Proportions(base, groups, other.positions, self.positions)
-        jaw_open = self.carried(source.face_unit("jawOpen", len(self.positions)))
-        pucker = self.carried(source.face_unit("mouthPucker", len(self.positions)))
+            self._change = Proportions(base, groups, other._raw, self._raw)
+        count = len(self.positions)
+        wide = {
+            side[0]: self.carried(source.face_unit(f"eyeWide{side}", count))
+            for side in ("Left", "Right")
+        }
+        self.eyes.open(self.positions, wide)
+        jaw_open = self.carried(source.face_unit("jawOpen", count))
+        pucker = self.carried(source.face_unit("mouthPucker", count))
         self.positions = sealed(Mouth(base, pucker, jaw_open), self.positions)
         show_upper_teeth(self.positions, groups, jaw_open, size)
         self.joints = joint_positions(self.positions, groups, size)
@@ -219,12 +232,16 @@ class Body:
             )
         else:
             self.units = {
-                name: ex.Expression(self.carried(unit.displacement))
-                for name, unit in other.units.items()
+                name: ex.Expression(self.carried(way)) for name, way in other._ways.items()
             }
             self.further_correctives = {
                 pair: self.carried(shape) for pair, shape in other.further_correctives.items()
             }
+        self._ways = {name: unit.displacement for name, unit in self.units.items()}
+        moved = dict(self._ways)
+        self.eye_correctives = self.eyes.move(moved)
+        for name, way in moved.items():
+            self.units[name].displacement = way
         ex.add_joint_motion(self.units, groups, self.positions, self.joints)
         if other is None:
             jaw = self.units["jawOpen"]

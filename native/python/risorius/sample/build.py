@@ -28,6 +28,7 @@ from . import references, wrinkles
 from .body import JOINTS, NECK_CUT, NECK_SLOPE, REACH, Body
 from .clothes import shirt
 from .controls import gui_table
+from .eyes import eye_parts, with_eyeballs
 from .further import CONTROLS_OF_CODE
 from .paint.skin import HEAD_SIZE
 from .paint.textures import paint_textures
@@ -35,6 +36,7 @@ from .part import Part
 from .people import MAN, Person
 from .polygons import (
     Floats,
+    Ints,
     Polygons,
     clip_below,
     compact_uvs,
@@ -57,8 +59,6 @@ NO_SEARCH = CorrectiveOptions(most=0)
 PARTS = {  # mesh -> groups, subdivisions at LOD 0 and 1
     "head": (["body"], 1, 0),
     "tongue": (["helper-tongue"], 1, 0),
-    "eyeLeft": (["helper-l-eye"], 2, 1),
-    "eyeRight": (["helper-r-eye"], 2, 1),
     "eyelashes": ([f"helper-{s}-eyelashes-{i}" for s in "lr" for i in (1, 2)], 1, 0),
 }
 METADATA = {
@@ -89,15 +89,20 @@ def lash_uvs(polygons: Polygons, positions: Floats, skin: Floats) -> tuple[Float
     return np.column_stack([np.abs(positions[:, 0]), v]), polygons.faces
 
 
-def make_parts(base: BaseMesh) -> list[Part]:
-    """Every mesh at both LODs."""
+def make_parts(base: BaseMesh, groups: dict[str, Ints]) -> list[Part]:
+    """Every mesh at both LODs.
+
+    Args:
+        base: the base mesh with its eyeballs.
+        groups: vertex indices by group.
+    """
     count = len(base.positions)
     out = []
     for lod in (0, 1):
-        for name, (groups, *levels) in PARTS.items():
+        for name, (own, *levels) in PARTS.items():
             corners = [
                 face
-                for group in groups
+                for group in own
                 for face in base.faces[group]
                 if abs(base.positions[face[0][0], 0]) < REACH
             ]
@@ -118,6 +123,7 @@ def make_parts(base: BaseMesh) -> list[Part]:
             out.append(part)
         out += mouth_parts(base, lod)
         out.append(shirt(base, lod))
+        out += eye_parts(base, groups, lod)
     return out
 
 
@@ -175,24 +181,6 @@ def add_skin(mesh: Mesh, weights: Floats) -> None:
     mesh.maximum_influence_per_vertex = int((kept > 0).sum(axis=1).max())
 
 
-def eye_uvs(polygons: Polygons, positions: Floats) -> tuple[Floats, list[list[int]]]:
-    """Azimuthal equidistant map of an eyeball: the pupil in the middle, the back at the rim.
-
-    Args:
-        polygons: the eyeball, looking along +z.
-        positions: float64[v, 3].
-
-    Returns:
-        float64[v, 2], and the indices into it by face and corner.
-    """
-    ray = positions - positions.mean(axis=0)
-    ray /= np.linalg.norm(ray, axis=1, keepdims=True)
-    angle = np.arccos(np.clip(ray[:, 2], -1, 1)) / np.pi
-    around = np.arctan2(ray[:, 1], ray[:, 0])
-    uvs = 0.5 + 0.5 * angle[:, None] * np.stack([np.cos(around), np.sin(around)], axis=1)
-    return uvs, polygons.faces
-
-
 def make_mesh(part: Part, positions: Floats, skin: Floats, weights: Floats) -> Mesh:
     """Geometry and skin of a part, in centimetres.
 
@@ -205,8 +193,6 @@ def make_mesh(part: Part, positions: Floats, skin: Floats, weights: Floats) -> M
     p = part.carry(positions)
     polygons = part.polygons
     uvs, uv_faces = polygons.uvs, polygons.uv_faces
-    if part.name.startswith("eyeL") or part.name.startswith("eyeR"):
-        uvs, uv_faces = eye_uvs(polygons, p)
     if part.name.startswith("eyelashes"):
         near = np.abs(skin - p.mean(axis=0))
         uvs, uv_faces = lash_uvs(polygons, p, skin[(near[:, 1] < 0.3) & (near[:, 2] < 0.3)])
@@ -399,16 +385,17 @@ def assemble(
         say: is told what is being done, a sentence at a time.
         person: whom to make.
     """
-    base = source.base_mesh()
+    base = with_eyeballs(source.base_mesh())
     say("reading 52 ARKit units and the further ones")
     body = Body(source, base, person)
     positions, groups, joints, units = body.positions, body.groups, body.joints, body.units
     correctives = ex.corrective_displacements(units) | body.further_correctives
+    correctives |= body.eye_correctives
     raw = list(units)
     pairs = list(correctives)
     channels = raw + ["_x_".join(pair) for pair in pairs]
     say(f"{len(raw)} raw controls, {len(pairs)} correctives; meshes and LODs")
-    parts = make_parts(base)
+    parts = make_parts(base, groups)
     weights = body.weights
     dna = Dna()
     add_definition(dna, person, parts, joints, raw, channels)
