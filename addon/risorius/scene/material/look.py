@@ -29,6 +29,7 @@ class Look:
         simple: leave out subsurface, relief and maps.
         uses: what the animated maps do.
         areas: areas of a face that this mesh has.
+        border: whether the mesh has an open border away from the face.
         found: texture_search.TexturePlan.
         images: loads them.
         atlas, places: image with the wrinkle masks, and where in it each region's is.
@@ -47,6 +48,7 @@ class Look:
     areas: set[str]
     found: texture_search.TexturePlan
     images: image_loading.Images
+    border: bool = False
     atlas: bpy.types.Image | None = None
     places: dict[str, tuple[int, int, int, int]] = field(default_factory=dict)
     offsets: dict[str, bool] = field(default_factory=dict)

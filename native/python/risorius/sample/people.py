@@ -18,6 +18,7 @@ ORIGINS = ("caucasian", "african", "asian")
 YEARS = (5.0, 90.0)
 # Years at which each of the data's ages is the whole of a face.
 _AGES = ((1.0, "baby"), (11.0, "child"), (20.0, "young"), (32.0, "young"), (90.0, "old"))
+_OPTIONAL = ("muscle", "weight", "freckles", "scalp", "features")
 _COLOURS = ("skin", "flush", "lids", "lips", "hair", "brows")
 
 
@@ -40,6 +41,8 @@ class Person:
     """At the pupil, at the rim."""
     muscle: float = 0.5
     weight: float = 0.5
+    freckles: float = 0.0
+    scalp: float = 0.5
     features: dict[str, float] = field(default_factory=dict)
 
     def shape(self) -> dict[str, float]:
@@ -137,14 +140,14 @@ def _person(where: str, table: dict[str, Any], like: Person | None) -> Person:
     values |= read.take("name", read.text) | read.take("gender", read.gender)
     values |= read.take("age", read.age) | read.take("origin", read.origin)
     values |= read.take("features", read.shares) | read.take("iris", read.iris)
-    for key in ("muscle", "weight", "beard"):
+    for key in ("muscle", "weight", "beard", "freckles", "scalp"):
         values |= read.take(key, read.number(0, 1))
     for key in _COLOURS:
         values |= read.take(key, read.colour)
     if read.table:
         raise ArgumentError(f"{where}: {next(iter(read.table))}: a person has no such key")
     needed = [k for k, f in Person.__dataclass_fields__.items() if k not in values]
-    needed = [k for k in needed if k not in ("muscle", "weight", "features")]
+    needed = [k for k in needed if k not in _OPTIONAL]
     if needed:
         raise ArgumentError(f"{where}: {needed[0]} is missing, and no `like` has it")
     return Person(**values)
