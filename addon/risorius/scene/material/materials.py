@@ -63,6 +63,7 @@ def build_materials(
         areas = _add_attributes(item.data, mesh, frame)
         if mesh.base not in by_base:
             look = _look(plan, mesh, rig, frame, uses, areas, found, images, simple)
+            look.border = skin_material.BORDER in item.data.attributes
             by_base[mesh.base] = _build(plan, look, made)
         for material in by_base[mesh.base]:
             item.data.materials.append(material)
@@ -193,6 +194,7 @@ def _add_attributes(
         unit = frame.unit if frame else float(np.ptp(plan.positions[:, 0]))
         _add(mesh, eye_mouth_materials.TEETH, _tooth_coordinates(plan.positions, unit))
     elif plan.kind == "skin" and frame is not None:
+        _add_border(mesh, plan.positions, frame)
         return _add_areas(mesh, plan.positions, frame)
     return set()
 
@@ -202,6 +204,22 @@ def _add(
 ) -> None:
     attribute: Attribute = mesh.attributes.new(name, "FLOAT_VECTOR", "POINT")
     attribute.data.foreach_set("vector", np.ascontiguousarray(values, np.float32).ravel())
+
+
+def _add_border(
+    mesh: bpy.types.Mesh, points: NDArray[np.float32], frame: skin_folds.FaceFrame
+) -> None:
+    """Write how near an open border is; nothing where there is none away from the face."""
+    edges = np.empty(2 * len(mesh.edges), np.int32)
+    mesh.edges.foreach_get("vertices", edges)
+    used = np.empty(len(mesh.loops), np.int32)
+    mesh.loops.foreach_get("edge_index", used)
+    faces = np.bincount(used, minlength=len(mesh.edges))
+    open_ones = np.unique(edges.reshape(-1, 2)[faces == 1])
+    near = skin_folds.border_share(points, open_ones, frame)
+    if near.any():
+        attribute: Attribute = mesh.attributes.new(skin_material.BORDER, "FLOAT", "POINT")
+        attribute.data.foreach_set("value", near)
 
 
 def _add_areas(

@@ -30,6 +30,7 @@ from .clothes import shirt
 from .controls import gui_table
 from .eyes import eye_parts, with_eyeballs
 from .further import CONTROLS_OF_CODE
+from .paint.layout import packed
 from .paint.skin import HEAD_SIZE
 from .paint.textures import paint_textures
 from .part import Part
@@ -116,6 +117,8 @@ def make_parts(base: BaseMesh, groups: dict[str, Ints]) -> list[Part]:
             aside = np.hypot(base.positions[:, 0], 0.35)  # round in front, no point
             height = base.positions[:, 1] - NECK_SLOPE * aside
             polygons, operator = clip_below(polygons, height, NECK_CUT)
+            if name == "head":
+                polygons.uvs = packed(polygons)
             part = Part(f"{name}_lod{lod}_mesh", compact_uvs(polygons), [operator])
             for _ in range(levels[lod]):
                 part.polygons, operator = subdivide(part.polygons)
@@ -196,9 +199,6 @@ def make_mesh(part: Part, positions: Floats, skin: Floats, weights: Floats) -> M
     if part.name.startswith("eyelashes"):
         near = np.abs(skin - p.mean(axis=0))
         uvs, uv_faces = lash_uvs(polygons, p, skin[(near[:, 1] < 0.3) & (near[:, 2] < 0.3)])
-    if part.name.startswith("head"):
-        low, high = uvs.min(axis=0), uvs.max(axis=0)  # the texture need not hold the body
-        uvs = (uvs - low) / (high - low)
     normals = vertex_normals(p, polygons.faces)
     mesh = polygon_mesh(p * CM, normals, polygons.faces, uvs, uv_faces)
     add_skin(mesh, weights)

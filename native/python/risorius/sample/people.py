@@ -18,7 +18,7 @@ ORIGINS = ("caucasian", "african", "asian")
 YEARS = (5.0, 90.0)
 # Years at which each of the data's ages is the whole of a face.
 _AGES = ((1.0, "baby"), (11.0, "child"), (20.0, "young"), (32.0, "young"), (90.0, "old"))
-_OPTIONAL = ("shirt", "muscle", "weight", "features", "asymmetry")
+_OPTIONAL = ("shirt", "muscle", "weight", "freckles", "scalp", "features", "asymmetry")
 _COLOURS = ("skin", "flush", "lids", "lips", "hair", "brows", "shirt")
 
 
@@ -42,6 +42,8 @@ class Person:
     shirt: Colour = (0.22, 0.24, 0.28)
     muscle: float = 0.5
     weight: float = 0.5
+    freckles: float = 0.0
+    scalp: float = 0.5
     features: dict[str, float] = field(default_factory=dict)
     asymmetry: dict[str, float] = field(default_factory=dict)
     """Shapes of the data that make one side unlike the other -> -1 (the right) to 1 (the left)."""
@@ -145,7 +147,7 @@ def _person(where: str, table: dict[str, Any], like: Person | None) -> Person:
     values |= read.take("age", read.age) | read.take("origin", read.origin)
     values |= read.take("features", read.shares) | read.take("iris", read.iris)
     values |= read.take("asymmetry", read.sided)
-    for key in ("muscle", "weight", "beard"):
+    for key in ("muscle", "weight", "beard", "freckles", "scalp"):
         values |= read.take(key, read.number(0, 1))
     for key in _COLOURS:
         values |= read.take(key, read.colour)
