@@ -28,6 +28,7 @@ from . import references, wrinkles
 from .body import JOINTS, NECK_CUT, NECK_SLOPE, REACH, Body
 from .controls import gui_table
 from .further import CONTROLS_OF_CODE
+from .hair import add_hair, grow_hair, hair_textures
 from .paint.skin import HEAD_SIZE
 from .paint.textures import paint_textures
 from .part import Part
@@ -58,7 +59,6 @@ PARTS = {  # mesh -> groups, subdivisions at LOD 0 and 1
     "tongue": (["helper-tongue"], 1, 0),
     "eyeLeft": (["helper-l-eye"], 2, 1),
     "eyeRight": (["helper-r-eye"], 2, 1),
-    "eyelashes": ([f"helper-{s}-eyelashes-{i}" for s in "lr" for i in (1, 2)], 1, 0),
 }
 METADATA = {
     "licence": "CC0-1.0",
@@ -67,25 +67,6 @@ METADATA = {
     "source_sha256": SHA256,
     "generator": "risorius sample build",
 }
-
-
-def lash_uvs(polygons: Polygons, positions: Floats, skin: Floats) -> tuple[Floats, list[list[int]]]:
-    """u along the lid, v from the root (0) to the tip (1): what a texture of lashes needs.
-
-    Args:
-        polygons: the lashes.
-        positions: float64[lash vertices, 3], decimetres.
-        skin: float64[S, 3], the vertices of the lids; the distance to them is the height of a hair.
-
-    Returns:
-        float64[lash vertices, 2], and the indices into it by face and corner.
-    """
-    gap = np.empty(len(positions))
-    for begin in range(0, len(positions), 256):
-        rows = positions[begin : begin + 256]
-        gap[begin : begin + 256] = np.linalg.norm(rows[:, None] - skin[None], axis=2).min(axis=1)
-    v = np.clip(gap / np.quantile(gap, 0.95), 0, 1)
-    return np.column_stack([np.abs(positions[:, 0]), v]), polygons.faces
 
 
 def make_parts(base: BaseMesh) -> list[Part]:
@@ -190,13 +171,12 @@ def eye_uvs(polygons: Polygons, positions: Floats) -> tuple[Floats, list[list[in
     return uvs, polygons.faces
 
 
-def make_mesh(part: Part, positions: Floats, skin: Floats, weights: Floats) -> Mesh:
+def make_mesh(part: Part, positions: Floats, weights: Floats) -> Mesh:
     """Geometry and skin of a part, in centimetres.
 
     Args:
         part: of the base mesh.
         positions: float64[V, 3], all vertices of the base mesh, decimetres.
-        skin: float64[S, 3], the body's vertices among them.
         weights: float64[v, 7], skin weights of the part's own vertices.
     """
     p = part.carry(positions)
@@ -204,9 +184,6 @@ def make_mesh(part: Part, positions: Floats, skin: Floats, weights: Floats) -> M
     uvs, uv_faces = polygons.uvs, polygons.uv_faces
     if part.name.startswith("eyeL") or part.name.startswith("eyeR"):
         uvs, uv_faces = eye_uvs(polygons, p)
-    if part.name.startswith("eyelashes"):
-        near = np.abs(skin - p.mean(axis=0))
-        uvs, uv_faces = lash_uvs(polygons, p, skin[(near[:, 1] < 0.3) & (near[:, 2] < 0.3)])
     if part.name.startswith("head"):
         low, high = uvs.min(axis=0), uvs.max(axis=0)  # the texture need not hold the body
         uvs = (uvs - low) / (high - low)
@@ -399,7 +376,7 @@ def assemble(
     base = source.base_mesh()
     say("reading 52 ARKit units and the further ones")
     body = Body(source, base, person)
-    positions, groups, joints, units = body.positions, body.groups, body.joints, body.units
+    positions, joints, units = body.positions, body.joints, body.units
     correctives = ex.corrective_displacements(units) | body.further_correctives
     raw = list(units)
     pairs = list(correctives)
@@ -414,7 +391,7 @@ def assemble(
     meshes, mapping = [], []
     for number, part in enumerate(parts):
         p, w = part.carry(positions), part.carry(weights)
-        mesh = make_mesh(part, positions, positions[groups["body"]], w)
+        mesh = make_mesh(part, positions, w)
         deltas = []
         for unit in units.values():
             here = ex.Expression(part.carry(unit.displacement), unit.joints)
@@ -587,10 +564,14 @@ def build_sample(
     if rig is not None:
         man = None if body.man is body else lambda: assemble(source, lambda _: None)[0]
         dna = joint_face(dna, man, rig, steps, begins)
+    grown = grow_hair(person, body, source.base_mesh(), parts, CM)
+    add_hair(dna, grown)
+    hairs, shown = hair_textures(person, dna, grown, texture_size)
     leave_maps(dna)
     round_targets(dna)
     by_code = {"controls_by_code": " ".join(CONTROLS_OF_CODE)}
-    dna.metadata = METADATA | by_code | textures_of_levels(dna, metadata)
+    dna.metadata = METADATA | by_code | textures_of_levels(dna, metadata) | shown
+    textures |= hairs
     files = {path: dna.to_bytes()} | {folder / name: data for name, data in textures.items()}
     fileio.write_all(files)
     return dna

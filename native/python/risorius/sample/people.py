@@ -18,7 +18,11 @@ ORIGINS = ("caucasian", "african", "asian")
 YEARS = (5.0, 90.0)
 # Years at which each of the data's ages is the whole of a face.
 _AGES = ((1.0, "baby"), (11.0, "child"), (20.0, "young"), (32.0, "young"), (90.0, "old"))
+HAIR_STYLES = ("none", "crop", "receding", "long", "bun", "afro")
+BEARD_STYLES = ("none", "full", "short", "goatee", "moustache")
 _COLOURS = ("skin", "flush", "lids", "lips", "hair", "brows")
+_OPTIONAL = ("muscle", "weight", "features", "hair_length", "hair_curl", "hair_grey")
+_OPTIONAL += ("hair_style", "beard_style")
 
 
 @dataclass(frozen=True)
@@ -41,6 +45,11 @@ class Person:
     muscle: float = 0.5
     weight: float = 0.5
     features: dict[str, float] = field(default_factory=dict)
+    hair_style: str = "crop"
+    hair_length: float = 1.0
+    hair_curl: float = 0.0
+    hair_grey: float = 0.0
+    beard_style: str = "none"
 
     def shape(self) -> dict[str, float]:
         """Body shapes of the data -> weights. Features are not in it, see Source.feature."""
@@ -99,6 +108,14 @@ class _Reader:
             raise self.fail(key, "letters and digits, a letter first,", value)
         return value
 
+    def one_of(self, names: tuple[str, ...]) -> Callable[[str, Any], str]:
+        def convert(key: str, value: Any) -> str:
+            if value not in names:
+                raise self.fail(key, f"one of {', '.join(names)}", value)
+            return str(value)
+
+        return convert
+
     def gender(self, key: str, value: Any) -> str:
         if value not in ("female", "male"):
             raise self.fail(key, '"female" or "male"', value)
@@ -137,14 +154,17 @@ def _person(where: str, table: dict[str, Any], like: Person | None) -> Person:
     values |= read.take("name", read.text) | read.take("gender", read.gender)
     values |= read.take("age", read.age) | read.take("origin", read.origin)
     values |= read.take("features", read.shares) | read.take("iris", read.iris)
-    for key in ("muscle", "weight", "beard"):
+    for key in ("muscle", "weight", "beard", "hair_curl", "hair_grey"):
         values |= read.take(key, read.number(0, 1))
+    values |= read.take("hair_length", read.number(0.3, 2))
+    values |= read.take("hair_style", read.one_of(HAIR_STYLES))
+    values |= read.take("beard_style", read.one_of(BEARD_STYLES))
     for key in _COLOURS:
         values |= read.take(key, read.colour)
     if read.table:
         raise ArgumentError(f"{where}: {next(iter(read.table))}: a person has no such key")
     needed = [k for k, f in Person.__dataclass_fields__.items() if k not in values]
-    needed = [k for k in needed if k not in ("muscle", "weight", "features")]
+    needed = [k for k in needed if k not in _OPTIONAL]
     if needed:
         raise ArgumentError(f"{where}: {needed[0]} is missing, and no `like` has it")
     return Person(**values)

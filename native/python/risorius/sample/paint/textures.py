@@ -13,7 +13,6 @@ from ..people import Person
 from ..polygons import Floats
 from .eyes import paint_eye
 from .images import shrunk
-from .lashes import paint_lashes
 from .raster import Raster
 from .skin import HEAD_SIZE, paint_head
 
@@ -91,7 +90,7 @@ def paint_textures(
 
     Returns:
         File name -> bytes of a PNG; and metadata for the DNA: texture:<mesh>:<role> -> file name;
-        the roles are color, alpha, and map:<animated map>, a mask of where that map shows.
+        the roles are color and map:<animated map>, a mask of where that map shows.
     """
     head = next(part for part in parts if part.name.startswith("head") and not part.operators[1:])
     uvs = head.polygons.uvs
@@ -104,7 +103,6 @@ def paint_textures(
     files = {
         "head_color.png": png(shrunk(colour, largest)),
         "eye_color.png": png(shrunk(paint_eye(person), largest)),
-        "lash_alpha.png": png(shrunk(paint_lashes(), largest)),
     }
     step = HEAD_SIZE // MASK_SIZE
     small = place[::step, ::step]
@@ -123,7 +121,6 @@ def paint_textures(
             out[f"texture:head_lod{lod}_mesh:normal:{number}"] = name
     for lod in (0, 1):
         out[f"texture:head_lod{lod}_mesh:color"] = "head_color.png"
-        out[f"texture:eyelashes_lod{lod}_mesh:alpha"] = "lash_alpha.png"
         for eye_side in ("Left", "Right"):
             out[f"texture:eye{eye_side}_lod{lod}_mesh:color"] = "eye_color.png"
     return files, out
