@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...logic.character import plans
 from ...logic.material import animated_maps, skin_folds, texture_search
 from ..base.blender_types import ArmatureObject, Attribute, MeshObject
-from . import cloth_material, eye_mouth_materials, nodes, skin_material
+from . import cloth_material, eye_mouth_materials, hair_material, nodes, skin_material
 from .image_loading import Images
 from .look import Look
 from .nodes import Graph
@@ -27,6 +27,7 @@ _VIEW_COLORS = {
     "lashes": (0.03, 0.02, 0.015, 0.3),
     "wet": (1.0, 1.0, 1.0, 0.0),
     "cloth": (0.10, 0.11, 0.13, 1.0),
+    "hair": (0.05, 0.035, 0.025, 0.5),
 }
 _IRIS_COLOR = (0.035, 0.02, 0.012, 1.0)
 _IRIS_RADIUS = 0.47  # of the eye's: where its limbus ends, see eyes
@@ -119,6 +120,8 @@ def _build(
         skin_material.Skin(graph, look).build()
     elif look.kind == "cloth":
         cloth_material.build(graph, look)
+    elif look.kind == "hair":
+        hair_material.build(graph, look)
     else:
         eye_mouth_materials.build(graph, look)
     graph.tidy()
@@ -141,7 +144,7 @@ def _choose_picture(look: Look, graph: Graph) -> None:
     """
     pictures = [n for n in graph.tree.nodes if n.type == "TEX_IMAGE" and n.image is not None]
     colors = [n for n in pictures if n.image == look.image("color")]
-    if look.kind == "lashes":  # cards: without alpha they would hide the eyes
+    if look.kind in ("lashes", "hair"):  # cards: without alpha they would hide the eyes
         colors = [n for n in colors if n.image.channels == 4]
     patterns = [n for n in graph.tree.nodes if n.type in ("TEX_NOISE", "TEX_VORONOI")]
     graph.tree.nodes.active = next(iter([*colors, *patterns]), None)

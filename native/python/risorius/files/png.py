@@ -15,11 +15,15 @@ _MOST_TEXELS = 1 << 26
 
 
 def png(image: Floats) -> bytes:
-    """An 8-bit PNG of float [h, w] or [h, w, 3] in [0, 1]; row 0 is the bottom (v = 0)."""
+    """An 8-bit PNG of float [h, w], [h, w, 3] or [h, w, 4] in [0, 1]; row 0 is the bottom (v = 0).
+
+    The fourth value is the opacity, which the colour is not multiplied with.
+    """
     pixels = np.clip(np.rint(image[::-1] * 255), 0, 255).astype(np.uint8)
     height, width = pixels.shape[:2]
-    kind = 0 if pixels.ndim == 2 else 2
-    rows = _predicted(pixels.reshape(height, -1), 1 if kind == 0 else 3)
+    values = 1 if pixels.ndim == 2 else pixels.shape[2]
+    kind = {1: 0, 3: 2, 4: 6}[values]
+    rows = _predicted(pixels.reshape(height, -1), values)
 
     def chunk(name: bytes, data: bytes) -> bytes:
         crc = zlib.crc32(name + data)
@@ -55,19 +59,20 @@ def read_png(data: bytes) -> Floats | None:
         data: of the file.
 
     Returns:
-        float64[h, w] or [h, w, 3] in [0, 1]; row 0 is the bottom.
+        float64[h, w], [h, w, 3] or [h, w, 4] in [0, 1]; row 0 is the bottom.
     """
     if data[:8] != _SIGNATURE or len(data) < 33 or data[12:16] != b"IHDR":
         return None
     width, height, depth, kind, *others = struct.unpack(">IIBBBBB", data[16:29])
-    values = {0: 1, 2: 3}.get(kind, 0)
+    values = {0: 1, 2: 3, 6: 4}.get(kind, 0)
     if depth != 8 or any(others) or not 0 < width * height * values <= 3 * _MOST_TEXELS:
         return None
     body = _body(data, height * (1 + width * values))
     rows = np.frombuffer(body, np.uint8).reshape(height, -1) if body else None
     if rows is None or rows[:, 0].max(initial=0) > 2:  # another program's, which predicts more
         return None
-    pixels = _unpredicted(rows, values).reshape((height, width, 3)[: 2 + (values == 3)])
+    pixels = _unpredicted(rows, values)
+    pixels = pixels.reshape((height, width, values) if values > 1 else (height, width))
     return np.asarray(pixels[::-1] / 255.0)
 
 

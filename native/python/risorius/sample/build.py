@@ -30,6 +30,7 @@ from .clothes import shirt
 from .controls import gui_table
 from .eyes import eye_parts, with_eyeballs
 from .further import CONTROLS_OF_CODE
+from .hair import add_hair, grow_hair, hair_textures
 from .paint.layout import packed
 from .paint.skin import HEAD_SIZE
 from .paint.textures import paint_textures
@@ -60,7 +61,6 @@ NO_SEARCH = CorrectiveOptions(most=0)
 PARTS = {  # mesh -> groups, subdivisions at LOD 0 and 1
     "head": (["body"], 1, 0),
     "tongue": (["helper-tongue"], 1, 0),
-    "eyelashes": ([f"helper-{s}-eyelashes-{i}" for s in "lr" for i in (1, 2)], 1, 0),
 }
 METADATA = {
     "licence": "CC0-1.0",
@@ -69,25 +69,6 @@ METADATA = {
     "source_sha256": SHA256,
     "generator": "risorius sample build",
 }
-
-
-def lash_uvs(polygons: Polygons, positions: Floats, skin: Floats) -> tuple[Floats, list[list[int]]]:
-    """u along the lid, v from the root (0) to the tip (1): what a texture of lashes needs.
-
-    Args:
-        polygons: the lashes.
-        positions: float64[lash vertices, 3], decimetres.
-        skin: float64[S, 3], the vertices of the lids; the distance to them is the height of a hair.
-
-    Returns:
-        float64[lash vertices, 2], and the indices into it by face and corner.
-    """
-    gap = np.empty(len(positions))
-    for begin in range(0, len(positions), 256):
-        rows = positions[begin : begin + 256]
-        gap[begin : begin + 256] = np.linalg.norm(rows[:, None] - skin[None], axis=2).min(axis=1)
-    v = np.clip(gap / np.quantile(gap, 0.95), 0, 1)
-    return np.column_stack([np.abs(positions[:, 0]), v]), polygons.faces
 
 
 def make_parts(base: BaseMesh, groups: dict[str, Ints]) -> list[Part]:
@@ -184,21 +165,17 @@ def add_skin(mesh: Mesh, weights: Floats) -> None:
     mesh.maximum_influence_per_vertex = int((kept > 0).sum(axis=1).max())
 
 
-def make_mesh(part: Part, positions: Floats, skin: Floats, weights: Floats) -> Mesh:
+def make_mesh(part: Part, positions: Floats, weights: Floats) -> Mesh:
     """Geometry and skin of a part, in centimetres.
 
     Args:
         part: of the base mesh.
         positions: float64[V, 3], all vertices of the base mesh, decimetres.
-        skin: float64[S, 3], the body's vertices among them.
         weights: float64[v, 7], skin weights of the part's own vertices.
     """
     p = part.carry(positions)
     polygons = part.polygons
     uvs, uv_faces = polygons.uvs, polygons.uv_faces
-    if part.name.startswith("eyelashes"):
-        near = np.abs(skin - p.mean(axis=0))
-        uvs, uv_faces = lash_uvs(polygons, p, skin[(near[:, 1] < 0.3) & (near[:, 2] < 0.3)])
     normals = vertex_normals(p, polygons.faces)
     mesh = polygon_mesh(p * CM, normals, polygons.faces, uvs, uv_faces)
     add_skin(mesh, weights)
@@ -388,14 +365,14 @@ def assemble(
     base = with_eyeballs(source.base_mesh())
     say("reading 52 ARKit units and the further ones")
     body = Body(source, base, person)
-    positions, groups, joints, units = body.positions, body.groups, body.joints, body.units
+    positions, joints, units = body.positions, body.joints, body.units
     correctives = ex.corrective_displacements(units) | body.further_correctives
     correctives |= body.eye_correctives
     raw = list(units)
     pairs = list(correctives)
     channels = raw + ["_x_".join(pair) for pair in pairs]
     say(f"{len(raw)} raw controls, {len(pairs)} correctives; meshes and LODs")
-    parts = make_parts(base, groups)
+    parts = make_parts(base, body.groups)
     weights = body.weights
     dna = Dna()
     add_definition(dna, person, parts, joints, raw, channels)
@@ -404,7 +381,7 @@ def assemble(
     meshes, mapping = [], []
     for number, part in enumerate(parts):
         p, w = part.carry(positions), part.carry(weights)
-        mesh = make_mesh(part, positions, positions[groups["body"]], w)
+        mesh = make_mesh(part, positions, w)
         if not part.rests:
             deltas = []
             for unit in units.values():
@@ -578,10 +555,14 @@ def build_sample(
     if rig is not None:
         man = None if body.man is body else lambda: assemble(source, lambda _: None)[0]
         dna = joint_face(dna, man, rig, steps, begins)
+    grown = grow_hair(person, body, source.base_mesh(), parts, CM)
+    add_hair(dna, grown)
+    hairs, shown = hair_textures(person, dna, grown, texture_size)
     leave_maps(dna)
     round_targets(dna)
     by_code = {"controls_by_code": " ".join(CONTROLS_OF_CODE)}
-    dna.metadata = METADATA | by_code | textures_of_levels(dna, metadata)
+    dna.metadata = METADATA | by_code | textures_of_levels(dna, metadata) | shown
+    textures |= hairs
     files = {path: dna.to_bytes()} | {folder / name: data for name, data in textures.items()}
     fileio.write_all(files)
     return dna

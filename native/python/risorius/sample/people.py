@@ -18,7 +18,11 @@ ORIGINS = ("caucasian", "african", "asian")
 YEARS = (5.0, 90.0)
 # Years at which each of the data's ages is the whole of a face.
 _AGES = ((1.0, "baby"), (11.0, "child"), (20.0, "young"), (32.0, "young"), (90.0, "old"))
-_OPTIONAL = ("shirt", "muscle", "weight", "freckles", "scalp", "features", "asymmetry")
+HAIR_STYLES = ("none", "crop", "receding", "long", "bun", "afro")
+BEARD_STYLES = ("none", "full", "short", "goatee", "moustache")
+_OPTIONAL = ("muscle", "weight", "features", "asymmetry", "freckles", "scalp", "shirt")
+_OPTIONAL += ("hair_length", "hair_curl", "hair_grey")
+_OPTIONAL += ("hair_style", "beard_style")
 _COLOURS = ("skin", "flush", "lids", "lips", "hair", "brows", "shirt")
 
 
@@ -47,6 +51,11 @@ class Person:
     features: dict[str, float] = field(default_factory=dict)
     asymmetry: dict[str, float] = field(default_factory=dict)
     """Shapes of the data that make one side unlike the other -> -1 (the right) to 1 (the left)."""
+    hair_style: str = "crop"
+    hair_length: float = 1.0
+    hair_curl: float = 0.0
+    hair_grey: float = 0.0
+    beard_style: str = "none"
 
     def shape(self) -> dict[str, float]:
         """Body shapes of the data -> weights. Features are not in it, see Source.feature."""
@@ -105,6 +114,14 @@ class _Reader:
             raise self.fail(key, "letters and digits, a letter first,", value)
         return value
 
+    def one_of(self, names: tuple[str, ...]) -> Callable[[str, Any], str]:
+        def convert(key: str, value: Any) -> str:
+            if value not in names:
+                raise self.fail(key, f"one of {', '.join(names)}", value)
+            return str(value)
+
+        return convert
+
     def gender(self, key: str, value: Any) -> str:
         if value not in ("female", "male"):
             raise self.fail(key, '"female" or "male"', value)
@@ -147,8 +164,11 @@ def _person(where: str, table: dict[str, Any], like: Person | None) -> Person:
     values |= read.take("age", read.age) | read.take("origin", read.origin)
     values |= read.take("features", read.shares) | read.take("iris", read.iris)
     values |= read.take("asymmetry", read.sided)
-    for key in ("muscle", "weight", "beard", "freckles", "scalp"):
+    for key in ("muscle", "weight", "beard", "freckles", "scalp", "hair_curl", "hair_grey"):
         values |= read.take(key, read.number(0, 1))
+    values |= read.take("hair_length", read.number(0.3, 2))
+    values |= read.take("hair_style", read.one_of(HAIR_STYLES))
+    values |= read.take("beard_style", read.one_of(BEARD_STYLES))
     for key in _COLOURS:
         values |= read.take(key, read.colour)
     if read.table:

@@ -29,8 +29,12 @@ _CLEAR = 0.0015  # of the ball's radius: the shell lies above the ball
 _IRIS_RINGS = np.array([0.0, 0.06, 0.16, 0.28, 0.42, 0.56, 0.70, 0.83, 0.93, 1.0])
 _ROOT, _MIDDLE, _RIM = 0.05, 0.13, 0.09
 _HOLE = 0.28  # how deep the pupil is, in radii of the iris
-_BEHIND = np.array([0.02, 0.06, 0.11, 0.17, 0.25, 0.35, 0.47, 0.60, 0.75, 0.92, 1.12, 1.4, 1.8, 2.25])
-_CORNEA_RINGS = np.array([0.06, 0.14, 0.24, 0.34, 0.44, 0.53, 0.61, 0.68, 0.75, 0.82, 0.89, 0.95, 1.0])
+_BEHIND = np.array(
+    [0.02, 0.06, 0.11, 0.17, 0.25, 0.35, 0.47, 0.60, 0.75, 0.92, 1.12, 1.4, 1.8, 2.25]
+)
+_CORNEA_RINGS = np.array(
+    [0.06, 0.14, 0.24, 0.34, 0.44, 0.53, 0.61, 0.68, 0.75, 0.82, 0.89, 0.95, 1.0]
+)
 # What the coarse level keeps of the rings: the others are near these.
 _COARSE_BALL = [0, 1, 2, 4, 6, 8, 10, 11, 12, 15, 17, 19, 21, 22, 23, 24, 25, 26]
 _COARSE_CORNEA = [1, 3, 5, 7, 9, 12]
@@ -179,7 +183,10 @@ def with_eyeballs(base: BaseMesh) -> BaseMesh:
     for side in "lr":
         for name, shape, coarse in _PARTS:
             points, places = shape.points(), shape.uvs()
-            for ending, rings, step in (("", list(range(len(shape.away))), 1), ("-coarse", coarse, 2)):
+            for ending, rings, step in (
+                ("", list(range(len(shape.away))), 1),
+                ("-coarse", coarse, 2),
+            ):
                 corners = shape.faces(0, rings, step)
                 faces[f"{name}-{side}{ending}"] = [
                     [(first + c, first_uv + c) for c in face] for face in corners
@@ -201,7 +208,9 @@ def gaze(side: str) -> Floats:
     return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
 
 
-def seat(positions: Floats, groups: dict[str, Ints], side: str, middle: Floats, radius: float) -> None:
+def seat(
+    positions: Floats, groups: dict[str, Ints], side: str, middle: Floats, radius: float
+) -> None:
     """Put an eyeball and its cornea into a face.
 
     Args:

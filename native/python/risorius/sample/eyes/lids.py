@@ -121,7 +121,9 @@ class Lids:
         return np.asarray(length - self.radius * eyeball.surface(angle))
 
 
-def place_ball(positions: Floats, groups: dict[str, Ints], rings: Ints, side: str) -> tuple[Floats, float]:
+def place_ball(
+    positions: Floats, groups: dict[str, Ints], rings: Ints, side: str
+) -> tuple[Floats, float]:
     """Middle and radius of the ball that the lids of the data fit.
 
     Args:
@@ -198,7 +200,9 @@ def closing(lids: Lids, blink: Floats) -> tuple[Floats, Floats]:
     edge = np.append(np.arange(LOWER.start, LOWER.stop), [0, TEMPLE])
     share = np.zeros(COLUMNS)
     for column in range(UPPER.start, UPPER.stop):
-        share[column] = _meeting(before[ROOT + 2, column], way[ROOT + 2, column], closed[ROOT + 2, edge])
+        share[column] = _meeting(
+            before[ROOT + 2, column], way[ROOT + 2, column], closed[ROOT + 2, edge]
+        )
     share = _even(share, np.abs(way[ROOT + 2, :, 1]) > 2 * MM)
     whole = before + share[:, None] * way
     for row in range(ROOT, ROOT + 4):

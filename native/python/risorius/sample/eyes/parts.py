@@ -18,7 +18,14 @@ _BALLS = {
 }
 # Sections of the caruncle: how far from the corner in columns, how far in on the rim, how high it is
 # over the line between both rims, in thicknesses of a lid.
-_MOUND = ((0, 0.35, -0.02), (0, 1.0, 0.10), (1, 1.5, 0.20), (2, 1.9, 0.22), (3, 2.15, 0.08), (3, 2.7, -0.15))
+_MOUND = (
+    (0, 0.35, -0.02),
+    (0, 1.0, 0.10),
+    (1, 1.5, 0.20),
+    (2, 1.9, 0.22),
+    (3, 2.15, 0.08),
+    (3, 2.7, -0.15),
+)
 Row = dict[int, float]  # shares by vertex of the base mesh, together 1
 
 
@@ -129,7 +136,9 @@ def _tears(rings: Ints) -> tuple[list[Row], list[list[int]], Floats]:
         meets = _rim(rings, 2.2, column)
         above = _rim(rings, 2.2, facing)
         skin, deep = _rim(rings, 0.0, column), _rim(rings, 3.0, column)
-        out = lambda row, share, skin=skin, deep=deep: _mixed((1, row), (share, skin), (-share, deep))
+        out = lambda row, share, skin=skin, deep=deep: _mixed(
+            (1, row), (share, skin), (-share, deep)
+        )
         ball = out(_mixed((0.945, meets), (0.055, above)), 0.03)
         lid = out(_rim(rings, 1.62, column), 0.02)
         under = out(_rim(rings, 1.45, column), -0.02)

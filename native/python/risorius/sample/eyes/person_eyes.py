@@ -27,7 +27,9 @@ class Eyes:
         lids: by "l" and "r".
     """
 
-    def __init__(self, base: BaseMesh, groups: dict[str, Ints], positions: Floats, age: float) -> None:
+    def __init__(
+        self, base: BaseMesh, groups: dict[str, Ints], positions: Floats, age: float
+    ) -> None:
         """Put eyeballs into a face; the lids are still where the data have them.
 
         Args:

@@ -30,9 +30,7 @@ def find_rings(base: BaseMesh, groups: dict[str, Ints]) -> dict[str, Ints]:
     return {side: _rings(base, groups, faces, edges, side) for side in "lr"}
 
 
-def _rings(
-    base: BaseMesh, groups: dict[str, Ints], faces: Faces, edges: Edges, side: str
-) -> Ints:
+def _rings(base: BaseMesh, groups: dict[str, Ints], faces: Faces, edges: Edges, side: str) -> Ints:
     first = _lash_ring(base, groups, faces, edges, side)
     ahead = [_beside(first, faces, edges, way) for way in (0, 1)]
     # The ring towards the socket lies nearer to the eye's middle.

@@ -111,9 +111,7 @@ def _iris(person: Person, around: Floats, reach: Floats, random: np.random.Gener
     return blend(colour, (0.004, 0.004, 0.004), 1 - smooth(-0.02, 0.012, reach))
 
 
-def _crypts(
-    around: Floats, reach: Floats, frill: Floats, random: np.random.Generator
-) -> Floats:
+def _crypts(around: Floats, reach: Floats, frill: Floats, random: np.random.Generator) -> Floats:
     """float64[h, w] from 0 to 1: gaps between the fibres, lozenges along them, most at the frill."""
     out = np.zeros_like(around)
     for _ in range(_CRYPTS):
@@ -180,6 +178,11 @@ def _draw(image: Floats, points: Floats) -> None:
     y = (0.5 + points[:, 1] * np.sin(points[:, 0])) * EYE_SIZE - 0.5
     i, j = np.floor(y).astype(int), np.floor(x).astype(int)
     s, t = y - i, x - j
-    for down, aside, share in ((0, 0, (1 - s) * (1 - t)), (0, 1, (1 - s) * t), (1, 0, s * (1 - t)), (1, 1, s * t)):
+    for down, aside, share in (
+        (0, 0, (1 - s) * (1 - t)),
+        (0, 1, (1 - s) * t),
+        (1, 0, s * (1 - t)),
+        (1, 1, s * t),
+    ):
         rows, columns = np.clip(i + down, 0, EYE_SIZE - 1), np.clip(j + aside, 0, EYE_SIZE - 1)
         np.maximum.at(image, (rows, columns), np.sqrt(share) * points[:, 2])

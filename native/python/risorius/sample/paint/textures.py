@@ -16,7 +16,6 @@ from ..polygons import Floats
 from .cloth import paint_cloth
 from .eyes import paint_eye
 from .images import enlarged, shrunk, smooth
-from .lashes import paint_lashes
 from .raster import Raster, filled
 from .regions import find_face
 from .relief import heights, normals, roughness
@@ -183,7 +182,7 @@ def paint_textures(
 
     Returns:
         File name -> bytes of a PNG; and metadata for the DNA: texture:<mesh>:<role> -> file name;
-        the roles are color, normal, roughness, alpha, normal:<set of wrinkles>, and
+        the roles are color, normal, roughness, normal:<set of wrinkles>, and
         map:<animated map>, a mask of where that map shows.
     """
     coarse = next(part for part in parts if part.name == "head_lod1_mesh")
@@ -198,7 +197,6 @@ def paint_textures(
     files |= flush_masks(coarse, positions, eye)
     files |= folded.pictures | {
         "eye_color.png": paint_eye(person),
-        "lash_alpha.png": paint_lashes(),
         "shirt_color.png": paint_cloth(person.shirt),
     }
     out = {}
@@ -211,7 +209,6 @@ def paint_textures(
     for lod in (0, 1):
         for role in ("color", "normal", "roughness"):
             out[f"texture:head_lod{lod}_mesh:{role}"] = f"head_{role}.png"
-        out[f"texture:eyelashes_lod{lod}_mesh:alpha"] = "lash_alpha.png"
         out[f"texture:shirt_lod{lod}_mesh:color"] = "shirt_color.png"
         for eye_side in ("Left", "Right"):
             out[f"texture:eye{eye_side}_lod{lod}_mesh:color"] = "eye_color.png"
