@@ -149,11 +149,15 @@ def _denoise(cycles):
 
 def _develop(view):
     """The contrast of a print; Blenders with a small colour configuration know some of it only."""
-    names = _choices(view, "view_transform")
-    view.view_transform = next(n for n in ("AgX", "Filmic", "Standard") if n in names)
-    looks = ("AgX - Medium High Contrast", "Medium High Contrast", "None")
-    view.look = next(n for n in looks if n in _choices(view, "look"))
+    _choose(view, "view_transform", ("AgX", "Filmic", "Standard"))
+    _choose(view, "look", ("AgX - Medium High Contrast", "Medium High Contrast", "None"))
 
 
-def _choices(owner, name):
-    return {item.identifier for item in owner.bl_rna.properties[name].enum_items}
+def _choose(owner, name, wanted):
+    """The first of the choices that there is; the list of such a property is not in its type."""
+    for choice in wanted:
+        try:
+            setattr(owner, name, choice)
+        except TypeError:
+            continue
+        return

@@ -17,14 +17,15 @@ Triple = tuple[float, float, float]
 GROWN = 0.063  # metres between the eyes of the head that the numbers are made for
 LENS = 100.0  # mm: a portrait lens on SENSOR
 SENSOR = 24.0  # mm, height of a full frame; the frame's height is what is fitted
-_HEIGHT = 0.50  # of the picture at the eyes: head and shoulders
-_HEADROOM = 0.045  # at least, above the hair
+_HEIGHT = 0.46  # of the picture at the eyes: head and shoulders
+_HEADROOM = 0.028  # at least, above the hair
 _EDGE = 0.01  # the picture ends so far above the mesh's lower end
 _CHIN = 0.13  # below the eyes, and in any picture
 _THIRD = 1.0 / 3.0  # the eyes' place from the upper edge
 _ASIDE = 8.0  # degrees: the camera sees more of the side that the key leaves to the fill
 _ABOVE = 0.045  # the camera's height above the eyes
-_WALL = 1.7  # from the eyes to the backdrop
+_DEPTH = 0.075  # from the eyes back to the middle of the head, which stands in the middle
+_WALL = 1.7  # from there to the backdrop
 _WALL_SIZE = (6.0, 4.0)
 
 
@@ -53,10 +54,11 @@ class Studio:
 
     Attributes:
         camera: its place.
-        target: the middle of the picture at the depth of the eyes.
+        target: the middle of the picture.
         lens: mm, on a sensor SENSOR high.
         lamps: key, fill and rim.
-        wall: middle of the backdrop, which faces the camera's side.
+        wall: middle of the backdrop, behind the head as the camera sees it.
+        wall_turn: radians about z by which it faces the camera.
         wall_size: its width and height.
         glow: radius of the lighter middle of the backdrop.
     """
@@ -66,6 +68,7 @@ class Studio:
     lens: float
     lamps: tuple[Lamp, ...]
     wall: Triple
+    wall_turn: float
     wall_size: tuple[float, float]
     glow: float
 
@@ -78,7 +81,7 @@ _LAMPS: tuple[_Row, ...] = (
     ("Fill", 42.0, 4.0, 2.0, (1.5, 1.5), 0.25, (0.86, 0.93, 1.0)),
     ("Rim", 148.0, 38.0, 1.35, (0.45, 0.9), 1.3, (0.93, 0.97, 1.0)),
 )
-_EXPOSURE = 2.6  # irradiance of the key at the face, in W/m2
+_EXPOSURE = 4.6  # irradiance of the key at the face, in W/m2
 
 
 def plan(apart: float, low: Sequence[float], high: Sequence[float]) -> Studio:
@@ -97,14 +100,19 @@ def plan(apart: float, low: Sequence[float], high: Sequence[float]) -> Studio:
     height, lift = _frame(unit, low[2], high[2])
     away = height * LENS / SENSOR
     turn = math.radians(_ASIDE)
+    towards = (math.sin(turn), -math.cos(turn))  # from the head to the camera
+    middle = (0.0, _DEPTH * unit)
+    camera = [m + (away + _DEPTH * unit) * t for m, t in zip(middle, towards, strict=True)]
+    wall = [m - max(_WALL * unit, high[1] + unit) * t for m, t in zip(middle, towards, strict=True)]
     return Studio(
-        camera=(away * math.sin(turn), -away * math.cos(turn), _ABOVE * unit),
-        target=(0.0, 0.0, lift),
+        camera=(camera[0], camera[1], _ABOVE * unit),
+        target=(middle[0], middle[1], lift),
         lens=LENS,
         lamps=tuple(_lamp(row, unit) for row in _LAMPS),
-        wall=(0.0, max(_WALL * unit, high[1] + unit), 0.0),
+        wall=(wall[0], wall[1], 0.0),
+        wall_turn=turn,
         wall_size=(_WALL_SIZE[0] * unit, _WALL_SIZE[1] * unit),
-        glow=1.05 * unit,
+        glow=0.62 * unit,
     )
 
 

@@ -15,8 +15,8 @@ from ..base import parts
 from ..base.blender_types import ArmatureObject, Context, MeshObject, NodeTree
 from ..character import runtime
 
-_MIDDLE = (0.105, 0.112, 0.122, 1.0)  # of the backdrop, behind the head
-_EDGE = (0.016, 0.018, 0.022, 1.0)
+_MIDDLE = (0.115, 0.121, 0.130, 1.0)  # of the backdrop, behind the head
+_EDGE = (0.010, 0.011, 0.014, 1.0)
 
 
 def add(context: Context, rig: ArmatureObject, scene_camera: bool) -> bpy.types.Collection:
@@ -121,7 +121,8 @@ def _backdrop(name: str, plan: studio_plan.Studio, place: Matrix) -> MeshObject:
     mesh.from_pydata([(-x, 0, -z), (x, 0, -z), (x, 0, z), (-x, 0, z)], [], [(0, 1, 2, 3)])
     mesh.materials.append(_paper(name, plan.glow))
     thing = bpy.data.objects.new(name, mesh)
-    thing.matrix_world = place @ Matrix.Translation(Vector(plan.wall))
+    turn = Matrix.Rotation(plan.wall_turn, 4, "Z")
+    thing.matrix_world = place @ Matrix.Translation(Vector(plan.wall)) @ turn
     return thing
 
 

@@ -296,10 +296,10 @@ def draw_import(self: Menu, _context: Context) -> None:
     self.layout.operator(RISORIUS_OT_import_dna.bl_idname, text="MetaHuman DNA (.dna)")
 
 
-class RISORIUS_MT_add_face(Menu):
+class RISORIUS_MT_sample(Menu):
     """Who is added, and with what."""
 
-    bl_idname = "RISORIUS_MT_add_face"
+    bl_idname = "RISORIUS_MT_sample"
     bl_label = "Face"
 
     def draw(self, context: Context) -> None:
@@ -307,14 +307,14 @@ class RISORIUS_MT_add_face(Menu):
         layout.operator_context = "INVOKE_REGION_WIN"
         layout.operator_enum(RISORIUS_OT_add_character.bl_idname, "person")
         layout.separator()
-        layout.menu(RISORIUS_MT_add_face_studio.bl_idname, icon="CAMERA_DATA")
+        layout.menu(RISORIUS_MT_sample_studio.bl_idname, icon="CAMERA_DATA")
         layout.operator("risorius.add_studio", text="Studio for This Face", icon="LIGHT_AREA")
 
 
-class RISORIUS_MT_add_face_studio(Menu):
+class RISORIUS_MT_sample_studio(Menu):
     """Who is added with camera, lights and backdrop."""
 
-    bl_idname = "RISORIUS_MT_add_face_studio"
+    bl_idname = "RISORIUS_MT_sample_studio"
     bl_label = "With Studio"
 
     def draw(self, context: Context) -> None:
@@ -330,13 +330,13 @@ class RISORIUS_MT_add_face_studio(Menu):
 
 def draw_add(self: Menu, _context: Context) -> None:
     """Entry of the 3D view's Add menu."""
-    self.layout.menu(RISORIUS_MT_add_face.bl_idname, icon="USER")
+    self.layout.menu(RISORIUS_MT_sample.bl_idname, icon="USER")
 
 
 CLASSES = (
     RISORIUS_OT_import_dna,
     RISORIUS_FH_dna,
     RISORIUS_OT_add_character,
-    RISORIUS_MT_add_face,
-    RISORIUS_MT_add_face_studio,
+    RISORIUS_MT_sample,
+    RISORIUS_MT_sample_studio,
 )
