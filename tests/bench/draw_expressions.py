@@ -57,7 +57,7 @@ class Face:
         from mathutils import Vector
 
         camera = self.scene.camera
-        height, away, lens = (0.365, 1.5, 125) if near else (0.54, 2.6, 150)
+        height, away, lens = (0.365, 1.5, 83) if near else (0.54, 2.6, 100)
         aim = Vector((self.middle_x, self.low.y + 0.1 * self.unit, 0))
         aim.z = self.low.z + height * self.unit
         camera.location = aim + Vector((0.15 * away, -away, 0.02)) * self.unit
