@@ -237,6 +237,4 @@ def test_extra_rings_are_where_one_subdivision_brings_them(faces):
     _, operator = polygons.subdivide(mesh)
     finer = operator.apply(face.positions)
     inner = eye.rings[1:-1]
-    np.testing.assert_allclose(
-        finer[inner], smoothed(eye.grid(face.positions))[1:-1], atol=1e-9
-    )
+    np.testing.assert_allclose(finer[inner], smoothed(eye.grid(face.positions))[1:-1], atol=1e-9)
