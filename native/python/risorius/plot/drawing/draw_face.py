@@ -19,7 +19,7 @@ from .paper import MUTED, Canvas, heading, rgb
 Floats = npt.NDArray[np.float64]
 
 # Clear films and lashes, which a renderer draws see-through: as clay they would hide the eyes.
-_FILMS = ("eyeshell", "eyeedge", "eyelash", "saliva", "cartilage")
+_FILMS = ("eyeshell", "cornea", "eyeedge", "eyelash", "saliva", "cartilage")
 _MARGIN = 0.04
 
 

@@ -112,7 +112,7 @@ def _iris(person: Person, around: Floats, reach: Floats, random: np.random.Gener
 
 
 def _crypts(around: Floats, reach: Floats, frill: Floats, random: np.random.Generator) -> Floats:
-    """float64[h, w] from 0 to 1: gaps between the fibres, lozenges along them, most at the frill."""
+    """float64[h, w] from 0 to 1: gaps between the fibres, lozenges, most of them at the frill."""
     out = np.zeros_like(around)
     for _ in range(_CRYPTS):
         where, at = random.uniform(), random.choice([0.06, 0.16, 0.30]) + random.normal(0, 0.04)
