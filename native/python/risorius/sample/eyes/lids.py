@@ -15,10 +15,11 @@ from .rings import COLUMNS, LOWER, ROOT, TEMPLE, UPPER, smoothed
 
 # How far the rings from the lashes' roots to the inner rim lie above the eye, in mm: the skin's
 # edge, the middle of the rim, where it touches, and what is hidden in the ball.
-_HEIGHTS = np.array([1.55, 0.85, 0.12, -0.55])
+_HEIGHTS = np.array([1.55, 0.85, 0.22, -0.55])
 _EDGE = slice(ROOT, ROOT + len(_HEIGHTS))
 _FADE = np.array([0.85, 0.65, 0.45, 0.25, 0.1, 0.0, 0.0, 0.0])  # of the rings outside of it
 _STEPS = 10
+_LIFT = 0.38  # mm: what lids are higher in a whole look, since they do not go round in half of one
 # Degrees that a look at 1 turns an eye, and how much further its lids go than the data's, whose
 # eyes turn by a third of that.
 LOOKS = {"Up": (25.0, 1.4), "Down": (30.0, 1.9), "Left": (32.0, 1.8), "Right": (32.0, 1.8)}
@@ -84,17 +85,18 @@ class Lids:
         """float64[13, COLUMNS, 3]: values of the rings' vertices."""
         return np.asarray(values[self.rings])
 
-    def seated(self, grid: Floats, turn: Floats | None = None) -> Floats:
+    def seated(self, grid: Floats, turn: Floats | None = None, lift: float = 0.0) -> Floats:
         """A grid whose rim lies on the eye, what is around it drawn along.
 
         Args:
             grid: float64[13, COLUMNS, 3].
             turn: float64[3, 3], what the eye is turned by; None: it rests.
+            lift: mm, how much higher than at rest.
         """
         gaze = eyeball.gaze(self.side)[:, 2]
         gaze = gaze if turn is None else turn @ gaze
         out = grid.copy()
-        heights = (_HEIGHTS * MM * self.radius / (_RADIUS * MM))[:, None]
+        heights = ((_HEIGHTS + lift) * self.radius / _RADIUS)[:, None]
         for _ in range(_STEPS):
             arm = smoothed(out) - self.middle
             length = np.linalg.norm(arm, axis=2)
@@ -158,7 +160,7 @@ def open_lids(lids: Lids, widen: Floats) -> Floats:
     travel = smoothed(lids.grid(widen))[ROOT + 2, UPPER, 1]
     top = int(edge[UPPER, 1].argmax())
     share = (lids.openness * iris - edge[UPPER, 1][top]) / travel[top]
-    opened = max(share, 0.0) * widen
+    opened = max(share, -0.4) * widen
     lids.rest += opened
     grid = lids.grid(lids.rest)
     down = -0.98 * iris - edge[LOWER, 1].min()
@@ -298,7 +300,8 @@ def on_the_ball(lids: Lids, way: Floats, turn: Floats | None = None) -> Floats:
     if turn is None and np.linalg.norm(grid[_EDGE], axis=2).max() < _MOVES:
         return way
     out = way.copy()
-    out[lids.rings] = lids.seated(lids.grid(lids.rest) + grid, turn) - lids.grid(lids.rest)
+    lift = 0.0 if turn is None else _LIFT
+    out[lids.rings] = lids.seated(lids.grid(lids.rest) + grid, turn, lift) - lids.grid(lids.rest)
     return out
 
 
@@ -315,7 +318,7 @@ def stays_closed(lids: Lids, blink: Floats, other: Floats, turn: Floats | None) 
     rows[:ROOT] = np.linspace(0, 1, ROOT)
     there = lids.grid(lids.rest + blink) + (1 - rows)[:, None, None] * lids.grid(other)
     out = np.zeros_like(blink)
-    out[lids.rings] = lids.seated(there, turn) - lids.grid(lids.rest + blink + other)
+    out[lids.rings] = lids.seated(there, turn, _LIFT) - lids.grid(lids.rest + blink + other)
     return out
 
 
