@@ -14,6 +14,7 @@ from .further import find_places, further_units, unit_shape
 from .polygons import Floats, Ints
 from .source import BaseMesh, Source
 
+_CHEEK_BALL = 0.035  # decimetres
 PREFIX = "CTRL_expressions."
 _BROWS = [f"eyebrows-{side}-{way}" for side in ("left", "right") for way in ("down", "up")]
 
@@ -211,6 +212,23 @@ def add_joint_motion(
             expression.joints[f"FACIAL_{side}_Eye"] = (rotation, np.zeros(3))
 
 
+def cheek_mass(units: dict[str, Expression], side: str) -> Floats:
+    """float64[V, 3]: the fat of a cheek that a true smile pushes up into a ball, decimetres.
+
+    It lies where raising the cheek moves most, and swells there to the front and aside.
+
+    Args:
+        units: what each raw control does, by its name.
+        side: L or R.
+    """
+    raised = units[f"eyeCheekRaise{side}"].displacement
+    pulled = units[f"mouthCornerPull{side}"].displacement
+    both = np.linalg.norm(raised, axis=1) * np.linalg.norm(pulled, axis=1)
+    share = smooth_step(both / max(float(both.max()), 1e-9))
+    aside = 1.0 if side == "L" else -1.0
+    return np.asarray(share[:, None] * _CHEEK_BALL * [0.35 * aside, 0.25, 0.9])
+
+
 def corrective_displacements(out: dict[str, Expression]) -> dict[tuple[str, str], Floats]:
     """What to add where two controls meet; (a, b) fires with the product of both.
 
@@ -233,6 +251,8 @@ def corrective_displacements(out: dict[str, Expression]) -> dict[tuple[str, str]
         share = np.zeros(len(blink))
         share[near] = np.minimum(0.25, lid_rise[near].max() / max(travel.max(), 1e-9))
         result[(f"eyeBlink{side}", f"eyeCheekRaise{side}")] = -share[:, None] * blink
+        lifted = cheek_mass(out, side)
+        result[(f"mouthCornerPull{side}", f"eyeCheekRaise{side}")] = lifted
         for lips in ("mouthFunnel", "mouthLipsPurse"):
             # Lips that are pushed forward keep touching the teeth line less when the jaw drops.
             result[("jawOpen", f"{lips}D{side}")] = -0.25 * out[f"{lips}D{side}"].displacement
