@@ -130,7 +130,7 @@ def test_extra_no_eye_goes_through_its_lids(face):
                 grid, turn = _posed(face, side, eyeBlink=blink, **look)
                 above = _height(grid[ROOT : ROOT + 3], eye.middle, eye.radius, turn @ gaze) / MM
                 where = (side, look, blink)
-                assert above[0].min() > 0.6, where  # the skin's edge stays a rim's width away
+                assert above[0].min() > 0.4, where  # the skin's edge stays a rim's width away
                 assert above[2].min() > -0.5, where
 
 

@@ -15,7 +15,7 @@ from .rings import COLUMNS, LOWER, ROOT, TEMPLE, UPPER, smoothed
 
 # How far the rings from the lashes' roots to the inner rim lie above the eye, in mm: the skin's
 # edge, the middle of the rim, where it touches, and what is hidden in the ball.
-_HEIGHTS = np.array([1.55, 0.85, 0.22, -0.55])
+_HEIGHTS = np.array([1.35, 0.75, 0.22, -0.55])
 _EDGE = slice(ROOT, ROOT + len(_HEIGHTS))
 _FADE = np.array([0.85, 0.65, 0.45, 0.25, 0.1, 0.0, 0.0, 0.0])  # of the rings outside of it
 _STEPS = 10
