@@ -13,7 +13,7 @@ from . import eyeball, lids
 from .lids import Lids
 from .rings import ROOT, find_rings
 
-_AGES, _OPEN = (8, 30, 75), (0.78, 0.68, 0.54)  # how far upper lids are above the eye's middle
+_AGES, _OPEN = (8, 30, 75), (0.78, 0.70, 0.60)  # how far upper lids are above the eye's middle
 _SIDES = (("l", "L"), ("r", "R"))
 _LASH_RINGS = slice(ROOT - 1, ROOT + 1)
 Units = dict[str, Floats]
