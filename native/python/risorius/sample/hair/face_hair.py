@@ -6,16 +6,16 @@ from __future__ import annotations
 import numpy as np
 
 from ...base.easing import smooth_step
+from ..paint.atlas import tile
 from ..people import Person
 from ..polygons import Floats, Ints
-from ..paint.atlas import tile
 from .growth import curled, grow, tangent
 from .places import beard_density, brow_density, brow_place, brow_width
 from .strips import Strips, joined, make_strips, unit
 from .surface import Surface
 
 _BROW_SPACING = 0.0115  # decimetres between the roots of two cards
-_BEARD_SPACING = 0.034
+_BEARD_SPACING = 0.042
 _LASHES = {"U": (48, 0.098), "D": (26, 0.050)}  # cards of a lid, longest hair in decimetres
 
 
@@ -202,17 +202,21 @@ def beard(surface: Surface, lips: Floats, person: Person) -> Strips | None:
     flow = np.column_stack([0.25 * man[:, 0], -np.ones(len(man)), 0.15 * (man[:, 2] < 0.0)])
     over = (man[:, 1] > -0.74) & (np.abs(man[:, 0]) < 0.34) & (man[:, 2] > 0.1)
     flow[over] = np.column_stack(
-        [np.sign(man[over, 0]) * (0.25 + 2.2 * np.abs(man[over, 0])), -np.ones(over.sum()), 0 * over[over]]
+        [
+            np.sign(man[over, 0]) * (0.25 + 2.2 * np.abs(man[over, 0])),
+            -np.ones(over.sum()),
+            0 * over[over],
+        ]
     )
     flow = flow + 0.22 * random.normal(0, 1, flow.shape)
     rise = np.radians(random.uniform(28, 50, n)), np.radians(random.uniform(2, 25, n))
     near = np.flatnonzero((man[:, 1] < 0.1) & (man[:, 2] > -0.9))
-    points, out = grow(surface, roots, flow, length, rise, 4, near, least=0.004, fall=0.5)
+    points, out = grow(surface, roots, flow, length, rise, 3, near, least=0.004, fall=0.5)
     if person.hair_curl:
         wind = 0.03 * person.hair_curl * random.uniform(0.5, 1, n)
         points = curled(points, out, wind, np.full(n, 0.8), random)
     tiles = tile("beard", random.integers(0, 8, n))
-    half = 0.021 * surface.scale * random.uniform(0.8, 1.25, n)
+    half = 0.025 * surface.scale * random.uniform(0.8, 1.25, n)
     turns = np.radians(random.uniform(-35, 35, n))
-    taper = np.array([0.9, 1.0, 0.9, 0.65])
+    taper = np.array([0.9, 1.0, 0.7])
     return make_strips(points, out, half, taper, tiles, roots, turns)

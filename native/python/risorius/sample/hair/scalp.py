@@ -8,9 +8,9 @@ from collections.abc import Callable
 import numpy as np
 
 from ...base.easing import smooth_step
+from ..paint.atlas import tile
 from ..people import Person
 from ..polygons import Floats
-from ..paint.atlas import tile
 from .growth import curled, grow, tangent
 from .places import hairline_height, wavy
 from .strips import Strips, joined, make_strips, unit
@@ -103,7 +103,8 @@ def _short(
     thin_top: float,
 ) -> Strips:
     random = np.random.default_rng(seed)
-    roots, inside = _roots(surface, 0.043, random, recession, 1.0, thin_top)
+    spacing = 0.043 if recession == 0 else 0.056
+    roots, inside = _roots(surface, spacing, random, recession, 1.0, thin_top)
     n = len(roots)
     man = roots.of(surface.man)
     high = smooth_step((man[:, 1] - 0.30) / 0.40)
@@ -122,7 +123,7 @@ def _short(
     low = 16 + 34 * high + 16 * fore * (recession == 0)
     rise = np.radians(low + random.uniform(-7, 9, n)), np.radians(2 + 12 * high + 0 * low)
     points, out = grow(surface, roots, flow, length, rise, 4, _scalp_vertices(surface), 0.006)
-    half = (0.024 + 0.026 * high) * surface.scale * random.uniform(0.8, 1.25, n)
+    half = (0.024 + 0.026 * high) * surface.scale * (spacing / 0.043) * random.uniform(0.8, 1.25, n)
     half *= 0.55 + 0.45 * smooth_step(inside / 0.1)
     turns = np.radians(random.uniform(-1, 1, n) * (6 + 28 * high))
     taper = np.array([0.85, 1.0, 0.95, 0.7])

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..polygons import Floats, Ints
 from ..paint.atlas import tile_corners
+from ..polygons import Floats, Ints
 from .surface import Roots
 
 

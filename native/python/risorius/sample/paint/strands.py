@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .atlas import ATLAS_SIZE, TILES
 from ..people import Colour, Person
 from ..polygons import Floats
+from .atlas import ATLAS_SIZE, TILES
 
 _GREY = (0.74, 0.73, 0.71)
 _LASH_DARK = 0.3  # of the brows' colour
