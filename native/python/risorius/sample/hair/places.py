@@ -53,20 +53,23 @@ def wavy(points: Floats, random: np.random.Generator, waves: float, count: int =
     return np.asarray(np.sin(points @ ways.T + turns).sum(axis=1) / np.sqrt(count))
 
 
-def hairline_height(points: Floats, recession: float = 0.0, sideburn: float = 1.0) -> Floats:
+def hairline_height(
+    points: Floats, recession: float = 0.0, sideburn: float = 1.0, low: float = 0.0
+) -> Floats:
     """float64[n]: how far inside the hairline a place is, negative outside of it.
 
     Args:
         points: float64[n, 3], of the man.
         recession: how far the line has gone back above the temples and the forehead, 0 to 1.
         sideburn: how much of the hair before the ear there is, 0 to 1.
+        low: how much lower and rounder the line over the forehead is, as on women, 0 to 1.
     """
     line = _LINE.copy()
     line[_NO_SIDEBURN, 1] = (1 - sideburn) * 0.1 + sideburn * line[_NO_SIDEBURN, 1]
     x, back, up = np.abs(points[:, 0]), points[:, 2].copy(), points[:, 1].copy()
     front = smooth_step((back + 0.75) / 0.4)
     corner = np.exp(-(((x - 0.40) / 0.16) ** 2))
-    gone = 0.05 * corner + recession * (0.30 + 0.35 * corner)
+    gone = (0.05 - 0.09 * low) * corner + recession * (0.30 + 0.35 * corner) - 0.045 * low
     up -= front * gone * smooth_step((up - 0.25) / 0.3)
     inside = up > np.interp(back, line[:, 0], line[:, 1])
     place = np.column_stack([back, up])

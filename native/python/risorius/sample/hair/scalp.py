@@ -46,10 +46,11 @@ def _roots(
     recession: float = 0.0,
     sideburn: float = 1.0,
     thin_top: float = 0.0,
+    low: float = 0.0,
 ) -> tuple[Roots, Floats]:
     """Roots inside of an uneven hairline, and how far inside each is, decimetres of the man."""
     man = surface.man
-    inside = hairline_height(man, recession, sideburn)
+    inside = hairline_height(man, recession, sideburn, low)
     inside = inside + 0.016 * wavy(man, random, 3.0) + 0.008 * wavy(man, random, 9.0)
     density = smooth_step((inside + 0.012) / 0.05)
     bald = smooth_step((man[:, 1] - 0.55) / 0.3)
@@ -165,7 +166,7 @@ def long(surface: Surface, person: Person) -> Strips:
         person: `hair_length` is a share of the usual.
     """
     random = np.random.default_rng(34)
-    roots, inside = _roots(surface, 0.082, random, 0.0, 0.7)
+    roots, inside = _roots(surface, 0.072, random, 0.0, 0.7, low=1.0)
     n = len(roots)
     man = roots.of(surface.man)
     flow = parted_flow(surface)
@@ -174,10 +175,10 @@ def long(surface: Surface, person: Person) -> Strips:
     way = 0.85 * (man[:, 1] + 0.55) + 1.15
     length = np.clip(way, 1.0, 2.6) * person.hair_length * surface.scale
     length *= random.uniform(0.88, 1.08, n)
-    rise = np.radians(random.uniform(10, 24, n)), np.zeros(n)
+    rise = np.radians(random.uniform(6, 14, n)), np.zeros(n)
     above = np.flatnonzero(surface.man[:, 1] > -1.9)
-    least = (0.008 + 0.05 * random.random(n)) * surface.scale
-    points, out = grow(surface, roots, flow, length, rise, 10, above, least, 0.62, 0.55)
+    least = (0.006 + 0.03 * random.random(n)) * surface.scale
+    points, out = grow(surface, roots, flow, length, rise, 10, above, least, 0.5, 0.55, 1.2)
     wave = 0.05 * (0.25 + person.hair_curl) * random.uniform(0.5, 1.2, n)
     points = curled(points, out, wave, random.uniform(0.5, 1.6, n), random)
     half = (0.062 - 0.022 * (inside < 0.08)) * surface.scale * random.uniform(0.8, 1.2, n)
@@ -217,7 +218,7 @@ def bun(surface: Surface, person: Person) -> Strips:
         person: `hair_length` is a share of the knot's size.
     """
     random = np.random.default_rng(35)
-    roots, inside = _roots(surface, 0.078, random, 0.0, 0.45)
+    roots, inside = _roots(surface, 0.066, random, 0.0, 0.45, low=0.7)
     n = len(roots)
     man = roots.of(surface.man)
     knot = int(((surface.man - _KNOT) ** 2).sum(axis=1).argmin())
@@ -226,11 +227,11 @@ def bun(surface: Surface, person: Person) -> Strips:
     flow = tangent(flow + 0.05 * random.normal(0, 1, flow.shape), surface.normals)
     length = 1.12 * np.linalg.norm(man - _KNOT, axis=1) * surface.scale
     length = np.minimum(length, 1.5 * surface.scale) * random.uniform(0.9, 1.0, n)
-    rise = np.radians(random.uniform(6, 16, n)), np.zeros(n)
+    rise = np.radians(random.uniform(3, 9, n)), np.zeros(n)
     above = _scalp_vertices(surface)
-    least = (0.006 + 0.028 * random.random(n)) * surface.scale
-    points, outside = grow(surface, roots, flow, length, rise, 8, above, least, 0.3)
-    half = (0.058 - 0.02 * (inside < 0.07)) * surface.scale * random.uniform(0.8, 1.2, n)
+    least = (0.004 + 0.014 * random.random(n)) * surface.scale
+    points, outside = grow(surface, roots, flow, length, rise, 8, above, least, 0.3, hug=1.2)
+    half = (0.064 - 0.02 * (inside < 0.07)) * surface.scale * random.uniform(0.8, 1.2, n)
     turns = np.radians(random.uniform(-5, 5, n))
     taper = np.interp(np.linspace(0, 1, 8), [0, 0.2, 0.7, 1], [0.75, 1.0, 0.8, 0.45])
     tiles = _tiles(inside, random, 0.04)
