@@ -6,8 +6,8 @@ from __future__ import annotations
 from .look import Look
 from .nodes import Graph
 
-_ROUGH = 0.42
-_SHINE = 0.3  # as of metal: hair reflects in its own colour, also where it is seen from aside
+_ROUGH = 0.5
+_SHINE = 0.16  # as of metal: hair reflects in its own colour, also where it is seen from aside
 _DRAWN_OUT = 0.5  # how far the highlight is drawn out across the hairs
 _BARE = (0.06, 0.045, 0.035)  # linear colour without a picture
 

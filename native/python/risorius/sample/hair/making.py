@@ -79,7 +79,8 @@ def _lips(head: Part, man: Body) -> Floats:
         for name, unit in man.units.items()
         if "LipRollIn" in name or "LipsRollIn" in name
     )
-    return np.clip(np.asarray(roll) / 0.03, 0, 1)
+    share = np.asarray(roll) / max(float(np.max(roll)), 1e-9)
+    return np.clip((share - 0.5) / 0.2, 0, 1)
 
 
 def add_hair(dna: Dna, grown: Grown) -> None:

@@ -134,18 +134,15 @@ def beard_density(points: Floats, normals: Floats, lips: Floats, style: str) -> 
     """
     x, y, z = np.abs(points[:, 0]), points[:, 1], points[:, 2]
     # From before the ear down over the cheek to the corner of the mouth.
-    cheek = np.interp(z, [-0.62, -0.45, -0.2, 0.0, 0.15], [-0.10, -0.22, -0.46, -0.56, -0.62])
-    under = np.interp(z, [-0.6, -0.3, 0.0, 0.3], [-0.90, -1.02, -1.17, -1.22])
+    cheek = np.interp(z, [-0.62, -0.45, -0.2, 0.0, 0.15], [-0.10, -0.22, -0.46, -0.56, -0.66])
+    under = np.interp(z, [-0.6, -0.3, 0.0, 0.3], [-0.90, -1.02, -1.20, -1.30])
     edge = smooth_step((cheek - y) / 0.10) * smooth_step((y - under) / 0.12)
     edge *= smooth_step((z + 0.66) / 0.08)
-    moustache = smooth_step((0.30 - x) / 0.05) * smooth_step((y + 0.70) / 0.03)
-    moustache *= smooth_step((-0.52 - y) / 0.05) * (z > 0.15)
-    lip_side = smooth_step((y + 0.62) / 0.06) * (x < 0.3) * (z > 0.1)
-    below = smooth_step((-0.80 - y) / 0.05)
-    bare = np.exp(-(((x - 0.17) / 0.07) ** 2) - ((y + 0.86) / 0.05) ** 2)  # beside the soul patch
-    chin = smooth_step((0.33 - x) / 0.10) * smooth_step((z + 0.02) / 0.12)
-    full = edge * np.maximum(1 - lip_side, moustache) * (1 - 0.75 * bare * (z > 0.1))
-    goatee = np.maximum(moustache, chin * below * edge * (1 - 0.8 * bare))
-    goatee = np.maximum(goatee, edge * chin * (x > 0.22) * (y < -0.6))
+    moustache = smooth_step((0.33 - x) / 0.05) * smooth_step((y + 0.76) / 0.04)
+    moustache *= smooth_step((-0.52 - y) / 0.05) * (z > 0.12)
+    chin = smooth_step((0.36 - x) / 0.10) * smooth_step((z + 0.02) / 0.12) * edge
+    bare = np.exp(-(((x - 0.17) / 0.07) ** 2) - ((y + 0.88) / 0.05) ** 2)  # beside the soul patch
+    full = np.maximum(edge * (1 - 0.7 * bare * (z > 0.1)), moustache)
+    goatee = np.maximum(moustache, chin * smooth_step((-0.66 - y) / 0.05) * (1 - 0.8 * bare))
     shape = {"full": full, "short": full, "goatee": goatee, "moustache": moustache}[style]
     return np.asarray(shape * (1 - np.clip(1.5 * lips, 0, 1)))

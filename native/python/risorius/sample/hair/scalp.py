@@ -47,15 +47,21 @@ def _roots(
     sideburn: float = 1.0,
     thin_top: float = 0.0,
     low: float = 0.0,
+    even: bool = True,
 ) -> tuple[Roots, Floats]:
-    """Roots inside of an uneven hairline, and how far inside each is, decimetres of the man."""
+    """Roots inside of an uneven hairline, and how far inside each is, decimetres of the man.
+
+    Those of short hair are not even: it lies flat at the sides and stands up on top.
+    """
     man = surface.man
     inside = hairline_height(man, recession, sideburn, low)
     inside = inside + 0.016 * wavy(man, random, 3.0) + 0.008 * wavy(man, random, 9.0)
     density = smooth_step((inside + 0.012) / 0.05)
     bald = smooth_step((man[:, 1] - 0.55) / 0.3)
-    density = density * (1 - thin_top * bald) * (1 - 0.5 * smooth_step((man[:, 1] - 0.4) / 0.3))
-    density = density * (1 - 0.3 * smooth_step((inside - 0.08) / 0.1))
+    density = density * (1 - thin_top * bald)
+    if not even:
+        density = density * (1 - 0.5 * smooth_step((man[:, 1] - 0.4) / 0.3))
+        density = density * (1 - 0.3 * smooth_step((inside - 0.08) / 0.1))
     density[surface.man_normals[:, 1] < -0.8] = 0
     roots = surface.scattered(density, spacing, random)
     return roots, roots.of(inside[:, None])[:, 0]
@@ -105,7 +111,7 @@ def _short(
 ) -> Strips:
     random = np.random.default_rng(seed)
     spacing = 0.043 if recession == 0 else 0.056
-    roots, inside = _roots(surface, spacing, random, recession, 1.0, thin_top)
+    roots, inside = _roots(surface, spacing, random, recession, 1.0, thin_top, even=False)
     n = len(roots)
     man = roots.of(surface.man)
     high = smooth_step((man[:, 1] - 0.30) / 0.40)
@@ -146,7 +152,9 @@ def afro(surface: Surface, person: Person) -> Strips:
     length *= 0.35 + 0.65 * smooth_step(inside / 0.22)
     flow = tangent(random.normal(0, 1, surface.man.shape), surface.normals)
     rise = np.radians(random.uniform(45, 88, n)), np.radians(random.uniform(10, 80, n))
-    points, out = grow(surface, roots, flow, length, rise, 4, _scalp_vertices(surface), 0.01, 0.7)
+    rows = 4 if person.hair_length > 0.6 else 3
+    near = _scalp_vertices(surface)
+    points, out = grow(surface, roots, flow, length, rise, rows, near, 0.01, 0.7)
     wind = 0.05 * person.hair_curl * person.hair_length * random.uniform(0.6, 1.2, n)
     points = curled(points, out, wind, random.uniform(0.6, 1.3, n), random)
     half = 0.075 * (0.5 + 0.5 * person.hair_length) * random.uniform(0.8, 1.2, n)
@@ -154,7 +162,7 @@ def afro(surface: Surface, person: Person) -> Strips:
     middle = np.array([0.0, 0.1, -0.75])
     out = unit(out + 0.6 * unit(man - middle)[:, None])
     turns = random.uniform(0, np.pi, n)
-    taper = np.array([0.7, 1.0, 1.1, 0.95])
+    taper = np.array([0.7, 1.0, 1.1, 0.95])[-rows:]
     return make_strips(points, out, half, taper, _tiles(inside, random, 0.05), roots, turns)
 
 
@@ -166,7 +174,7 @@ def long(surface: Surface, person: Person) -> Strips:
         person: `hair_length` is a share of the usual.
     """
     random = np.random.default_rng(34)
-    roots, inside = _roots(surface, 0.072, random, 0.0, 0.7, low=1.0)
+    roots, inside = _roots(surface, 0.098, random, 0.0, 0.7, low=1.0)
     n = len(roots)
     man = roots.of(surface.man)
     flow = parted_flow(surface)
@@ -181,7 +189,7 @@ def long(surface: Surface, person: Person) -> Strips:
     points, out = grow(surface, roots, flow, length, rise, 10, above, least, 0.5, 0.55, 1.2)
     wave = 0.05 * (0.25 + person.hair_curl) * random.uniform(0.5, 1.2, n)
     points = curled(points, out, wave, random.uniform(0.5, 1.6, n), random)
-    half = (0.062 - 0.022 * (inside < 0.08)) * surface.scale * random.uniform(0.8, 1.2, n)
+    half = (0.085 - 0.03 * (inside < 0.08)) * surface.scale * random.uniform(0.8, 1.2, n)
     turns = np.radians(random.uniform(-10, 10, n))
     taper = np.interp(np.linspace(0, 1, 10), [0, 0.2, 0.8, 1], [0.7, 1.0, 1.0, 0.75])
     tiles = _tiles(inside, random, 0.05)
@@ -218,7 +226,7 @@ def bun(surface: Surface, person: Person) -> Strips:
         person: `hair_length` is a share of the knot's size.
     """
     random = np.random.default_rng(35)
-    roots, inside = _roots(surface, 0.066, random, 0.0, 0.45, low=0.7)
+    roots, inside = _roots(surface, 0.085, random, 0.0, 0.45, low=0.7)
     n = len(roots)
     man = roots.of(surface.man)
     knot = int(((surface.man - _KNOT) ** 2).sum(axis=1).argmin())
@@ -230,10 +238,10 @@ def bun(surface: Surface, person: Person) -> Strips:
     rise = np.radians(random.uniform(3, 9, n)), np.zeros(n)
     above = _scalp_vertices(surface)
     least = (0.004 + 0.014 * random.random(n)) * surface.scale
-    points, outside = grow(surface, roots, flow, length, rise, 8, above, least, 0.3, hug=1.2)
-    half = (0.064 - 0.02 * (inside < 0.07)) * surface.scale * random.uniform(0.8, 1.2, n)
+    points, outside = grow(surface, roots, flow, length, rise, 7, above, least, 0.3, hug=1.2)
+    half = (0.075 - 0.025 * (inside < 0.07)) * surface.scale * random.uniform(0.8, 1.2, n)
     turns = np.radians(random.uniform(-5, 5, n))
-    taper = np.interp(np.linspace(0, 1, 8), [0, 0.2, 0.7, 1], [0.75, 1.0, 0.8, 0.45])
+    taper = np.interp(np.linspace(0, 1, 7), [0, 0.2, 0.7, 1], [0.75, 1.0, 0.8, 0.45])
     tiles = _tiles(inside, random, 0.04)
     drawn = make_strips(points, outside, half, taper, tiles, roots, turns)
     size = 0.27 * surface.scale * person.hair_length
@@ -245,7 +253,7 @@ def _knot(
     root: Roots, middle: Floats, axis: Floats, size: float, random: np.random.Generator
 ) -> Strips:
     """Strips wound about an axis into a ball, those inside of it opaque."""
-    count, rows = 64, 8
+    count, rows = 64, 7
     across = unit(np.cross(axis, [1.0, 0.0, 0.0]))
     other = np.cross(axis, across)
     inner = np.arange(count) < 24
