@@ -17,6 +17,7 @@ from .strips import Strips, joined, make_strips, unit
 from .surface import Roots, Surface
 
 _WHORL = np.array([0.10, 0.86, -1.40])  # where hair turns about the crown, of the man
+_PARTING = 0.10  # how far to his left hair is parted
 _DENSE, _THIN = 5, 3  # tiles of each sort
 
 
@@ -48,10 +49,12 @@ def _roots(
     thin_top: float = 0.0,
     low: float = 0.0,
     even: bool = True,
+    fine: float = 0.0,
 ) -> tuple[Roots, Floats]:
     """Roots inside of an uneven hairline, and how far inside each is, decimetres of the man.
 
-    Those of short hair are not even: it lies flat at the sides and stands up on top.
+    Those of short hair are not even: it lies flat at the sides and stands up on top. Those of
+    long hair are finer at the edge, and with `fine` 1 also at a parting.
     """
     man = surface.man
     inside = hairline_height(man, recession, sideburn, low)
@@ -62,6 +65,12 @@ def _roots(
     if not even:
         density = density * (1 - 0.5 * smooth_step((man[:, 1] - 0.4) / 0.3))
         density = density * (1 - 0.3 * smooth_step((inside - 0.08) / 0.1))
+    if fine:
+        parting = np.exp(-(((man[:, 0] - _PARTING) / 0.09) ** 2)) * smooth_step(
+            (man[:, 1] - 0.5) / 0.2
+        )
+        within = smooth_step((inside - 0.05) / 0.08) * (1 - fine * parting)
+        density = density * (1 - 0.6 * within)
     density[surface.man_normals[:, 1] < -0.8] = 0
     roots = surface.scattered(density, spacing, random)
     return roots, roots.of(inside[:, None])[:, 0]
@@ -174,7 +183,7 @@ def long(surface: Surface, person: Person) -> Strips:
         person: `hair_length` is a share of the usual.
     """
     random = np.random.default_rng(34)
-    roots, inside = _roots(surface, 0.098, random, 0.0, 0.7, low=1.0)
+    roots, inside = _roots(surface, 0.066, random, 0.0, 0.7, low=1.0, fine=1.0)
     n = len(roots)
     man = roots.of(surface.man)
     flow = parted_flow(surface)
@@ -186,12 +195,14 @@ def long(surface: Surface, person: Person) -> Strips:
     rise = np.radians(random.uniform(6, 14, n)), np.zeros(n)
     above = np.flatnonzero(surface.man[:, 1] > -1.9)
     least = (0.006 + 0.03 * random.random(n)) * surface.scale
-    points, out = grow(surface, roots, flow, length, rise, 10, above, least, 0.5, 0.55, 1.2)
+    points, out = grow(surface, roots, flow, length, rise, 9, above, least, 0.5, 0.55, 1.2)
     wave = 0.05 * (0.25 + person.hair_curl) * random.uniform(0.5, 1.2, n)
     points = curled(points, out, wave, random.uniform(0.5, 1.6, n), random)
-    half = (0.085 - 0.03 * (inside < 0.08)) * surface.scale * random.uniform(0.8, 1.2, n)
+    half = (
+        (0.026 + 0.056 * smooth_step(inside / 0.14)) * surface.scale * random.uniform(0.8, 1.2, n)
+    )
     turns = np.radians(random.uniform(-10, 10, n))
-    taper = np.interp(np.linspace(0, 1, 10), [0, 0.2, 0.8, 1], [0.7, 1.0, 1.0, 0.75])
+    taper = np.interp(np.linspace(0, 1, 9), [0, 0.2, 0.8, 1], [0.7, 1.0, 1.0, 0.75])
     tiles = _tiles(inside, random, 0.05)
     return make_strips(points, out, half, taper, tiles, roots, turns, held=0.0)
 
@@ -204,9 +215,12 @@ def parted_flow(surface: Surface) -> Floats:
     """
     man = surface.man
     x, y, z = man.T
-    aside = np.tanh((x - 0.10) / 0.06)
+    aside = np.tanh((x - _PARTING) / 0.03)
     top = smooth_step((y - 0.35) / 0.45)
     flow = np.column_stack([1.0 * aside * top, -0.55 - 0.6 * (1 - top), -0.35 - 0.1 * top])
+    fore = smooth_step((z + 0.5) / 0.5) * top
+    flow[:, 1] += 0.4 * fore
+    flow[:, 2] -= 0.55 * fore
     # Before and above the ears it goes back, under them it falls.
     before = smooth_step((z + 0.95) / 0.3) * smooth_step((y + 0.35) / 0.25) * (1 - top)
     flow[:, 2] -= 0.9 * before
@@ -226,7 +240,7 @@ def bun(surface: Surface, person: Person) -> Strips:
         person: `hair_length` is a share of the knot's size.
     """
     random = np.random.default_rng(35)
-    roots, inside = _roots(surface, 0.085, random, 0.0, 0.45, low=0.7)
+    roots, inside = _roots(surface, 0.060, random, 0.0, 0.45, low=0.7, fine=0.01)
     n = len(roots)
     man = roots.of(surface.man)
     knot = int(((surface.man - _KNOT) ** 2).sum(axis=1).argmin())
@@ -238,10 +252,10 @@ def bun(surface: Surface, person: Person) -> Strips:
     rise = np.radians(random.uniform(3, 9, n)), np.zeros(n)
     above = _scalp_vertices(surface)
     least = (0.004 + 0.014 * random.random(n)) * surface.scale
-    points, outside = grow(surface, roots, flow, length, rise, 7, above, least, 0.3, hug=1.2)
-    half = (0.075 - 0.025 * (inside < 0.07)) * surface.scale * random.uniform(0.8, 1.2, n)
+    points, outside = grow(surface, roots, flow, length, rise, 6, above, least, 0.3, hug=1.2)
+    half = (0.022 + 0.05 * smooth_step(inside / 0.14)) * surface.scale * random.uniform(0.8, 1.2, n)
     turns = np.radians(random.uniform(-5, 5, n))
-    taper = np.interp(np.linspace(0, 1, 7), [0, 0.2, 0.7, 1], [0.75, 1.0, 0.8, 0.45])
+    taper = np.interp(np.linspace(0, 1, 6), [0, 0.2, 0.7, 1], [0.75, 1.0, 0.8, 0.45])
     tiles = _tiles(inside, random, 0.04)
     drawn = make_strips(points, outside, half, taper, tiles, roots, turns)
     size = 0.27 * surface.scale * person.hair_length
@@ -253,7 +267,7 @@ def _knot(
     root: Roots, middle: Floats, axis: Floats, size: float, random: np.random.Generator
 ) -> Strips:
     """Strips wound about an axis into a ball, those inside of it opaque."""
-    count, rows = 64, 7
+    count, rows = 64, 6
     across = unit(np.cross(axis, [1.0, 0.0, 0.0]))
     other = np.cross(axis, across)
     inner = np.arange(count) < 24
