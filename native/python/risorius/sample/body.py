@@ -212,6 +212,7 @@ class Body:
         self.positions[:, 1] += FLOOR if model else -self.positions[groups["body"], 1].min()
         self.eyes = Eyes(base, groups, self.positions, person.age)
         self._raw = self.positions.copy()  # as the data have them
+        self._ways: dict[str, Floats] = {}  # likewise, of the raw controls
         self.man: Body = self
         self._change: Proportions | None = None
         size = 1.0
