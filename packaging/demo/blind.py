@@ -3,8 +3,8 @@
 
     blind.py SHEET.jpg KEY.json --old FOLDER --new FOLDER [--size 512] [--columns 4] [--seed N]
 
-Pictures are paired by their file names. The sheet bears numbers only; what each is stands in the key,
-which whoever judges does not open.
+Pictures are paired by their file names. The sheet bears numbers only; what each is stands in the
+key, which whoever judges does not open.
 """
 
 from __future__ import annotations
