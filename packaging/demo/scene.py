@@ -125,7 +125,7 @@ def render_settings(scene):
     cycles.max_bounces = 3
     cycles.diffuse_bounces = 2
     cycles.glossy_bounces = 2
-    cycles.transparent_max_bounces = 4
+    cycles.transparent_max_bounces = 24  # cards of hair lie over each other
     cycles.caustics_reflective = cycles.caustics_refractive = False
     cycles.use_fast_gi = False
     scene.render.use_persistent_data = True

@@ -302,7 +302,6 @@ def test_extra_each_cheek_flushes_on_its_side(sample, monkeypatch):
     monkeypatch.setattr(paint, "HEAD_SIZE", 256)
     monkeypatch.setattr(paint, "MASK_SIZE", 64)
     monkeypatch.setattr(paint, "paint_eye", lambda _: np.zeros((1, 1, 3)))
-    monkeypatch.setattr(paint, "paint_lashes", lambda: np.zeros((1, 1)))
     monkeypatch.setattr(paint, "png", lambda image: image)
     files, _ = paint.paint_textures(person, body.man.positions, body.man.units, parts)
     left, right = files["head_flush_L.png"], files["head_flush_R.png"]

@@ -32,11 +32,13 @@ _LAYER_WORDS = {
 }
 _KINDS = (
     ("lashes", ("lash", "eyebrow")),
+    ("hair", ("hair", "brows", "beard")),
     ("wet", ("eyeshell", "eyeedge", "saliva", "tear", "fluid", "cornea")),
     ("gum", ("cartilage", "caruncle", "gum")),
     ("eyes", ("eye",)),
     ("teeth", ("teeth", "tooth")),
     ("tongue", ("tongue",)),
+    ("cloth", ("shirt", "cloth", "garment")),
 )
 
 
@@ -71,7 +73,7 @@ class MeshPlan:
         index: number in the DNA.
         label: the name after `<character>_`.
         base: the name without its LOD: meshes with one base share a material.
-        kind: skin, eyes, teeth, tongue, lashes, wet or gum.
+        kind: skin, eyes, teeth, tongue, lashes, hair, wet, gum or cloth.
         lods: levels of detail that show it.
         positions: float32[V, 3].
         face_starts: int32[F], first corner of each face.

@@ -7,13 +7,15 @@ import numpy as np
 
 from ..base.easing import smooth_step
 from . import expressions as ex
-from .people import MAN, Person
+from .eyes import Eyes, with_eyeballs
+from .lips import Mouth, sealed
+from .people import MODEL, Person
 from .polygons import Floats, Ints
 from .proportions import Proportions
 from .source import TARGETS, BaseMesh, Source
 
 FLOOR = 8.168  # what lies under the soles, in decimetres below the data's origin
-NECK_CUT = 5.53  # of height less NECK_SLOPE times the distance from the middle, in the base mesh
+NECK_CUT = 5.36  # of height less NECK_SLOPE times the distance from the middle, in the base mesh
 NECK_SLOPE = 0.35
 TEETH_SHOW = 0.035
 REACH = 1.3  # the hands are as high as the neck, but not as near
@@ -51,6 +53,9 @@ def shaped(source: Source, base: BaseMesh, person: Person) -> Floats:
         out += weight * source.target(f"{TARGETS}{name}.target.gz", count)
     for name, weight in person.features.items():
         out += weight * source.feature(name, count)
+    for name, weight in person.asymmetry.items():
+        side = "l" if weight > 0 else "r"
+        out += abs(weight) * source.feature(f"asym/asym-{name}-{side}", count)
     return out
 
 
@@ -168,14 +173,16 @@ def skin_weights(
     weights *= (1 - jaw)[:, None]
     weights[:, 4] = jaw
     for column, letter in ((5, "l"), (6, "r")):
-        weights[groups[f"helper-{letter}-eye"]] = np.eye(len(JOINTS))[column]
+        for name in ("helper-{}-eye", "eyeball-{}", "cornea-{}"):
+            weights[groups[name.format(letter)]] = np.eye(len(JOINTS))[column]
     return weights
 
 
 class Body:
     """A person before there are meshes: where all is, and what each raw control does.
 
-    All people have the man's skin weights and his units, these in their own proportions.
+    All people have the skin weights and units of a model, the man with two sides that are alike,
+    these in their own proportions.
 
     Attributes:
         groups: vertex indices by group of the base mesh.
@@ -183,24 +190,38 @@ class Body:
         joints: positions of the joints by name.
         units: what each raw control does.
         further_correctives: float64[V, 3] of sticky lips and the like, by their two raw controls.
-        man: the man's, for the man himself this.
+        eyes: where they are and how their lids rest.
+        eye_correctives: float64[V, 3], what keeps lids on the eyes, by their two raw controls.
+        man: the model's, for the model itself this.
         weights: float64[V, 7], skin weights.
     """
 
     def __init__(self, source: Source, base: BaseMesh, person: Person) -> None:
+        base = with_eyeballs(base)
         self.groups = groups = group_indices(base)
-        man = person.shape() == MAN.shape() and person.features == MAN.features
-        other = None if man else Body(source, base, MAN)
+        model = person.shape() == MODEL.shape() and person.features == MODEL.features
+        model = model and not any(person.asymmetry.values())
+        other = None if model else Body(source, base, MODEL)
         self.positions = shaped(source, base, person)
-        self.positions[:, 1] += FLOOR if man else -self.positions[groups["body"], 1].min()
+        self.positions[:, 1] += FLOOR if model else -self.positions[groups["body"], 1].min()
+        self.eyes = Eyes(base, groups, self.positions, person.age)
+        self._raw = self.positions.copy()  # as the data have them
         self.man: Body = self
         self._change: Proportions | None = None
         size = 1.0
         if other is not None:
             self.man = other
             size = head_size(base, self.positions) / head_size(base, other.positions)
-            self._change = Proportions(base, groups, other.positions, self.positions)
-        jaw_open = self.carried(source.face_unit("jawOpen", len(self.positions)))
+            self._change = Proportions(base, groups, other._raw, self._raw)
+        count = len(self.positions)
+        wide = {
+            side[0]: self.carried(source.face_unit(f"eyeWide{side}", count))
+            for side in ("Left", "Right")
+        }
+        self.eyes.open(self.positions, wide)
+        jaw_open = self.carried(source.face_unit("jawOpen", count))
+        pucker = self.carried(source.face_unit("mouthPucker", count))
+        self.positions = sealed(Mouth(base, pucker, jaw_open), self.positions)
         show_upper_teeth(self.positions, groups, jaw_open, size)
         self.joints = joint_positions(self.positions, groups, size)
         if other is None:
@@ -211,12 +232,16 @@ class Body:
             )
         else:
             self.units = {
-                name: ex.Expression(self.carried(unit.displacement))
-                for name, unit in other.units.items()
+                name: ex.Expression(self.carried(way)) for name, way in other._ways.items()
             }
             self.further_correctives = {
                 pair: self.carried(shape) for pair, shape in other.further_correctives.items()
             }
+        self._ways = {name: unit.displacement for name, unit in self.units.items()}
+        moved = dict(self._ways)
+        self.eye_correctives = self.eyes.move(moved)
+        for name, way in moved.items():
+            self.units[name].displacement = way
         ex.add_joint_motion(self.units, groups, self.positions, self.joints)
         if other is None:
             jaw = self.units["jawOpen"]

@@ -26,20 +26,26 @@ from ..files import fileio
 from . import expressions as ex
 from . import references, wrinkles
 from .body import JOINTS, NECK_CUT, NECK_SLOPE, REACH, Body
+from .clothes import shirt
 from .controls import gui_table
+from .eyes import eye_parts, with_eyeballs
 from .further import CONTROLS_OF_CODE
+from .hair import add_hair, grow_hair, hair_textures
+from .paint.layout import packed
 from .paint.skin import HEAD_SIZE
 from .paint.textures import paint_textures
 from .part import Part
 from .people import MAN, Person
 from .polygons import (
     Floats,
+    Ints,
     Polygons,
     clip_below,
     compact_uvs,
     subdivide,
 )
 from .source import PACKAGE, SHA256, BaseMesh, Source, SourceError, fetch
+from .teeth import mouth_parts
 
 CM = 10.0  # the data are in decimetres
 NEW_JOINTS = 250
@@ -54,11 +60,7 @@ RIG = RigOptions(FitOptions(joints=NEW_JOINTS), tolerance_mm=TOLERANCE_MM)
 NO_SEARCH = CorrectiveOptions(most=0)
 PARTS = {  # mesh -> groups, subdivisions at LOD 0 and 1
     "head": (["body"], 1, 0),
-    "teeth": (["helper-upper-teeth", "helper-lower-teeth"], 1, 0),
     "tongue": (["helper-tongue"], 1, 0),
-    "eyeLeft": (["helper-l-eye"], 2, 1),
-    "eyeRight": (["helper-r-eye"], 2, 1),
-    "eyelashes": ([f"helper-{s}-eyelashes-{i}" for s in "lr" for i in (1, 2)], 1, 0),
 }
 METADATA = {
     "licence": "CC0-1.0",
@@ -69,34 +71,20 @@ METADATA = {
 }
 
 
-def lash_uvs(polygons: Polygons, positions: Floats, skin: Floats) -> tuple[Floats, list[list[int]]]:
-    """u along the lid, v from the root (0) to the tip (1): what a texture of lashes needs.
+def make_parts(base: BaseMesh, groups: dict[str, Ints]) -> list[Part]:
+    """Every mesh at both LODs.
 
     Args:
-        polygons: the lashes.
-        positions: float64[lash vertices, 3], decimetres.
-        skin: float64[S, 3], the vertices of the lids; the distance to them is the height of a hair.
-
-    Returns:
-        float64[lash vertices, 2], and the indices into it by face and corner.
+        base: the base mesh with its eyeballs.
+        groups: vertex indices by group.
     """
-    gap = np.empty(len(positions))
-    for begin in range(0, len(positions), 256):
-        rows = positions[begin : begin + 256]
-        gap[begin : begin + 256] = np.linalg.norm(rows[:, None] - skin[None], axis=2).min(axis=1)
-    v = np.clip(gap / np.quantile(gap, 0.95), 0, 1)
-    return np.column_stack([np.abs(positions[:, 0]), v]), polygons.faces
-
-
-def make_parts(base: BaseMesh) -> list[Part]:
-    """Every mesh at both LODs."""
     count = len(base.positions)
     out = []
     for lod in (0, 1):
-        for name, (groups, *levels) in PARTS.items():
+        for name, (own, *levels) in PARTS.items():
             corners = [
                 face
-                for group in groups
+                for group in own
                 for face in base.faces[group]
                 if abs(base.positions[face[0][0], 0]) < REACH
             ]
@@ -110,11 +98,16 @@ def make_parts(base: BaseMesh) -> list[Part]:
             aside = np.hypot(base.positions[:, 0], 0.35)  # round in front, no point
             height = base.positions[:, 1] - NECK_SLOPE * aside
             polygons, operator = clip_below(polygons, height, NECK_CUT)
+            if name == "head":
+                polygons.uvs = packed(polygons)
             part = Part(f"{name}_lod{lod}_mesh", compact_uvs(polygons), [operator])
             for _ in range(levels[lod]):
                 part.polygons, operator = subdivide(part.polygons)
                 part.operators.append(operator)
             out.append(part)
+        out += mouth_parts(base, lod)
+        out.append(shirt(base, lod))
+        out += eye_parts(base, groups, lod)
     return out
 
 
@@ -172,44 +165,17 @@ def add_skin(mesh: Mesh, weights: Floats) -> None:
     mesh.maximum_influence_per_vertex = int((kept > 0).sum(axis=1).max())
 
 
-def eye_uvs(polygons: Polygons, positions: Floats) -> tuple[Floats, list[list[int]]]:
-    """Azimuthal equidistant map of an eyeball: the pupil in the middle, the back at the rim.
-
-    Args:
-        polygons: the eyeball, looking along +z.
-        positions: float64[v, 3].
-
-    Returns:
-        float64[v, 2], and the indices into it by face and corner.
-    """
-    ray = positions - positions.mean(axis=0)
-    ray /= np.linalg.norm(ray, axis=1, keepdims=True)
-    angle = np.arccos(np.clip(ray[:, 2], -1, 1)) / np.pi
-    around = np.arctan2(ray[:, 1], ray[:, 0])
-    uvs = 0.5 + 0.5 * angle[:, None] * np.stack([np.cos(around), np.sin(around)], axis=1)
-    return uvs, polygons.faces
-
-
-def make_mesh(part: Part, positions: Floats, skin: Floats, weights: Floats) -> Mesh:
+def make_mesh(part: Part, positions: Floats, weights: Floats) -> Mesh:
     """Geometry and skin of a part, in centimetres.
 
     Args:
         part: of the base mesh.
         positions: float64[V, 3], all vertices of the base mesh, decimetres.
-        skin: float64[S, 3], the body's vertices among them.
         weights: float64[v, 7], skin weights of the part's own vertices.
     """
     p = part.carry(positions)
     polygons = part.polygons
     uvs, uv_faces = polygons.uvs, polygons.uv_faces
-    if part.name.startswith("eyeL") or part.name.startswith("eyeR"):
-        uvs, uv_faces = eye_uvs(polygons, p)
-    if part.name.startswith("eyelashes"):
-        near = np.abs(skin - p.mean(axis=0))
-        uvs, uv_faces = lash_uvs(polygons, p, skin[(near[:, 1] < 0.3) & (near[:, 2] < 0.3)])
-    if part.name.startswith("head"):
-        low, high = uvs.min(axis=0), uvs.max(axis=0)  # the texture need not hold the body
-        uvs = (uvs - low) / (high - low)
     normals = vertex_normals(p, polygons.faces)
     mesh = polygon_mesh(p * CM, normals, polygons.faces, uvs, uv_faces)
     add_skin(mesh, weights)
@@ -396,16 +362,17 @@ def assemble(
         say: is told what is being done, a sentence at a time.
         person: whom to make.
     """
-    base = source.base_mesh()
+    base = with_eyeballs(source.base_mesh())
     say("reading 52 ARKit units and the further ones")
     body = Body(source, base, person)
-    positions, groups, joints, units = body.positions, body.groups, body.joints, body.units
+    positions, joints, units = body.positions, body.joints, body.units
     correctives = ex.corrective_displacements(units) | body.further_correctives
+    correctives |= body.eye_correctives
     raw = list(units)
     pairs = list(correctives)
     channels = raw + ["_x_".join(pair) for pair in pairs]
     say(f"{len(raw)} raw controls, {len(pairs)} correctives; meshes and LODs")
-    parts = make_parts(base)
+    parts = make_parts(base, body.groups)
     weights = body.weights
     dna = Dna()
     add_definition(dna, person, parts, joints, raw, channels)
@@ -414,13 +381,14 @@ def assemble(
     meshes, mapping = [], []
     for number, part in enumerate(parts):
         p, w = part.carry(positions), part.carry(weights)
-        mesh = make_mesh(part, positions, positions[groups["body"]], w)
-        deltas = []
-        for unit in units.values():
-            here = ex.Expression(part.carry(unit.displacement), unit.joints)
-            deltas.append(bind_displacement(p, w, here, joints))
-        deltas += [part.carry(delta) for delta in correctives.values()]
-        add_targets(mesh, deltas)
+        mesh = make_mesh(part, positions, w)
+        if not part.rests:
+            deltas = []
+            for unit in units.values():
+                here = ex.Expression(part.carry(unit.displacement), unit.joints)
+                deltas.append(bind_displacement(p, w, here, joints))
+            deltas += [part.carry(delta) for delta in correctives.values()]
+            add_targets(mesh, deltas)
         mapping += [(number, t.blend_shape_channel_index) for t in mesh.blend_shape_targets]
         meshes.append(mesh)
     dna.meshes = meshes
@@ -587,10 +555,14 @@ def build_sample(
     if rig is not None:
         man = None if body.man is body else lambda: assemble(source, lambda _: None)[0]
         dna = joint_face(dna, man, rig, steps, begins)
+    grown = grow_hair(person, body, source.base_mesh(), parts, CM)
+    add_hair(dna, grown)
+    hairs, shown = hair_textures(person, dna, grown, texture_size)
     leave_maps(dna)
     round_targets(dna)
     by_code = {"controls_by_code": " ".join(CONTROLS_OF_CODE)}
-    dna.metadata = METADATA | by_code | textures_of_levels(dna, metadata)
+    dna.metadata = METADATA | by_code | textures_of_levels(dna, metadata) | shown
+    textures |= hairs
     files = {path: dna.to_bytes()} | {folder / name: data for name, data in textures.items()}
     fileio.write_all(files)
     return dna

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,12 @@ ORIGINS = ("caucasian", "african", "asian")
 YEARS = (5.0, 90.0)
 # Years at which each of the data's ages is the whole of a face.
 _AGES = ((1.0, "baby"), (11.0, "child"), (20.0, "young"), (32.0, "young"), (90.0, "old"))
-_COLOURS = ("skin", "flush", "lids", "lips", "hair", "brows")
+HAIR_STYLES = ("none", "crop", "receding", "long", "bun", "afro")
+BEARD_STYLES = ("none", "full", "short", "goatee", "moustache")
+_OPTIONAL = ("muscle", "weight", "features", "asymmetry", "freckles", "scalp", "shirt")
+_OPTIONAL += ("hair_length", "hair_curl", "hair_grey")
+_OPTIONAL += ("hair_style", "beard_style")
+_COLOURS = ("skin", "flush", "lids", "lips", "hair", "brows", "shirt")
 
 
 @dataclass(frozen=True)
@@ -38,9 +43,19 @@ class Person:
     beard: float
     iris: tuple[Colour, Colour]
     """At the pupil, at the rim."""
+    shirt: Colour = (0.22, 0.24, 0.28)
     muscle: float = 0.5
     weight: float = 0.5
+    freckles: float = 0.0
+    scalp: float = 0.5
     features: dict[str, float] = field(default_factory=dict)
+    asymmetry: dict[str, float] = field(default_factory=dict)
+    """Shapes of the data that make one side unlike the other -> -1 (the right) to 1 (the left)."""
+    hair_style: str = "crop"
+    hair_length: float = 1.0
+    hair_curl: float = 0.0
+    hair_grey: float = 0.0
+    beard_style: str = "none"
 
     def shape(self) -> dict[str, float]:
         """Body shapes of the data -> weights. Features are not in it, see Source.feature."""
@@ -99,15 +114,26 @@ class _Reader:
             raise self.fail(key, "letters and digits, a letter first,", value)
         return value
 
+    def one_of(self, names: tuple[str, ...]) -> Callable[[str, Any], str]:
+        def convert(key: str, value: Any) -> str:
+            if value not in names:
+                raise self.fail(key, f"one of {', '.join(names)}", value)
+            return str(value)
+
+        return convert
+
     def gender(self, key: str, value: Any) -> str:
         if value not in ("female", "male"):
             raise self.fail(key, '"female" or "male"', value)
         return str(value)
 
-    def shares(self, key: str, value: Any) -> dict[str, float]:
+    def shares(self, key: str, value: Any, low: float = 0) -> dict[str, float]:
         if not isinstance(value, dict):
             raise self.fail(key, "a table", value)
-        return {name: self.number(0, 1)(f"{key}.{name}", x) for name, x in value.items()}
+        return {name: self.number(low, 1)(f"{key}.{name}", x) for name, x in value.items()}
+
+    def sided(self, key: str, value: Any) -> dict[str, float]:
+        return self.shares(key, value, -1)
 
     def origin(self, key: str, value: Any) -> dict[str, float]:
         out = self.shares(key, value)
@@ -137,14 +163,18 @@ def _person(where: str, table: dict[str, Any], like: Person | None) -> Person:
     values |= read.take("name", read.text) | read.take("gender", read.gender)
     values |= read.take("age", read.age) | read.take("origin", read.origin)
     values |= read.take("features", read.shares) | read.take("iris", read.iris)
-    for key in ("muscle", "weight", "beard"):
+    values |= read.take("asymmetry", read.sided)
+    for key in ("muscle", "weight", "beard", "freckles", "scalp", "hair_curl", "hair_grey"):
         values |= read.take(key, read.number(0, 1))
+    values |= read.take("hair_length", read.number(0.3, 2))
+    values |= read.take("hair_style", read.one_of(HAIR_STYLES))
+    values |= read.take("beard_style", read.one_of(BEARD_STYLES))
     for key in _COLOURS:
         values |= read.take(key, read.colour)
     if read.table:
         raise ArgumentError(f"{where}: {next(iter(read.table))}: a person has no such key")
     needed = [k for k, f in Person.__dataclass_fields__.items() if k not in values]
-    needed = [k for k in needed if k not in ("muscle", "weight", "features")]
+    needed = [k for k in needed if k not in _OPTIONAL]
     if needed:
         raise ArgumentError(f"{where}: {needed[0]} is missing, and no `like` has it")
     return Person(**values)
@@ -157,6 +187,7 @@ def _cast() -> dict[str, Person]:
 
 PEOPLE = _cast()
 MAN = PEOPLE["man"]
+MODEL = replace(MAN, asymmetry={})  # the same on both sides: what all others take after
 
 
 def read_person(path: Path) -> Person:

@@ -22,7 +22,7 @@ from .polygons import Floats, Ints, Polygons
 _LEAST = 0.015  # of its length that skin loses before it folds
 _FULL = 0.15  # and where folds are as deep as they get
 _ROUNDS = 3  # of neighbours over which folds are evened out: skin is stiffer than a mesh
-_DEPTH = 0.007  # decimetres
+DEPTH = 0.007  # decimetres
 _LINES = 24  # texels to either side along which noise is drawn into a line
 _FINE, _COARSE = 1.5, 3.5  # texels: the widths between which folds lie
 _TILE = 512  # texels after which the noise begins again
@@ -252,15 +252,13 @@ def normals(heights: Floats, places: Floats) -> Floats:
     return np.asarray(0.5 + 0.5 * out)
 
 
-def relief_normals(folds: Floats, places: Floats, strength: Floats) -> Floats:
-    """float64[h, w, 3] in [0, 1]: the normals of all folds of a set.
+def fold_heights(folds: Floats, strength: Floats) -> Floats:
+    """float64[h, w]: the relief of all folds of a set, decimetres, 0 where there are none.
 
     Args:
         folds: float64[h, w, 4], sums of vertex_folds in the texture.
-        places: float64[h, w, 3], where each texel is on the head, decimetres.
         strength: float64[h, w], how deep folds are: 1 as on a forehead of 30 years.
     """
     depth = np.clip(folds[..., 0], 0, 1)
     height = relief(folds[..., 1:], depth > 0.01)
-    height *= strength * _DEPTH * smooth_step(np.clip(3 * depth, 0, 1))
-    return normals(height, places)
+    return np.asarray(height * strength * DEPTH * smooth_step(np.clip(3 * depth, 0, 1)))

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair on cards: opacity by the picture, a soft highlight drawn out across the hairs."""
+
+from __future__ import annotations
+
+from .look import Look
+from .nodes import Graph
+
+_ROUGH = 0.42
+_SHINE = 0.3  # as of metal: hair reflects in its own colour, also where it is seen from aside
+_DRAWN_OUT = 0.5  # how far the highlight is drawn out across the hairs
+_BARE = (0.06, 0.045, 0.035)  # linear colour without a picture
+
+
+def build(graph: Graph, look: Look) -> None:
+    """Fill the tree of the material of scalp hair, brows or a beard.
+
+    Args:
+        graph: of the material, with its shader and its output.
+        look: sizes and textures of the mesh.
+    """
+    picture = look.image("color")
+    if picture is None:
+        graph.set(Base_Color=_BARE, Roughness=0.6, Specular_Ior_Level=0.2)
+        return
+    node = graph.image(picture, label="Colour")
+    graph.set(Base_Color=node.outputs["Color"], Roughness=_ROUGH)
+    graph.set(Metallic=_SHINE, Specular_Ior_Level=0.0)
+    if picture.channels == 4:
+        graph.set(Alpha=node.outputs["Alpha"])
+        see_through(graph)
+    if look.simple:
+        return
+    graph.set(Normal=outward_normal(graph))
+    along = graph.node("Tangent")
+    along.direction_type = "UV_MAP"
+    graph.set(Anisotropic=_DRAWN_OUT, Tangent=along.outputs["Tangent"])
+
+
+def outward_normal(graph: Graph) -> object:
+    """The normal that the file has, on both sides of a card: it is the skin's, not the card's.
+
+    Renderers turn a normal round where a face is seen from behind.
+    """
+    geometry = graph.node("NewGeometry")
+    both = graph.math("MULTIPLY_ADD", geometry.outputs["Backfacing"], -2.0, 1.0)
+    scaled = graph.node("VectorMath")
+    scaled.operation = "SCALE"
+    graph.put(geometry.outputs["Normal"], scaled.inputs[0])
+    graph.put(both, scaled.inputs["Scale"])
+    return scaled.outputs[0]
+
+
+def see_through(graph: Graph) -> None:
+    """Light and sight pass where there is no hair; EEVEE dithers it."""
+    material = graph.material
+    material.surface_render_method = "DITHERED"
+    material.use_transparency_overlap = False
+    if hasattr(material, "use_transparent_shadow"):
+        material.use_transparent_shadow = True

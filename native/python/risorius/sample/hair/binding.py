@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: MIT
+"""Cards as meshes of a Dna: each vertex has the weights and shapes of the skin that it stands on.
+
+They join a face when it is done: what moves the skin moves its hair as well, whatever the skin was
+fitted with, and the fit has none of them to do.
+"""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from ... import BlendShapeTarget, Dna, Mesh
+from ...author.geometry import skeleton as sk
+from ...author.geometry.polygon_mesh import polygon_mesh
+from ..polygons import Floats
+from .strips import Strips, card_faces, card_vertices
+from .surface import Roots, nearest_places
+
+_LEAST_WEIGHT = 0.01
+_MOST_INFLUENCES = 8
+
+
+def head_of(dna: Dna, lod: int) -> Mesh | None:
+    """The head's mesh of a level, if it has one."""
+    for m in (int(i) for i in dna.lod_mesh_mapping[lod]):
+        if re.match(r"head_lod\d+_mesh$", dna.mesh_names[m]):
+            return dna.meshes[m]
+    return None
+
+
+def corners_of(mesh: Mesh) -> tuple[Floats, Floats]:
+    """int64[T, 3], triangles by vertex, and int64[V, n], those about each vertex."""
+    offsets = np.asarray(mesh.face_offsets, np.int64)
+    layouts = np.asarray(mesh.layout_positions, np.int64)[np.asarray(mesh.face_layouts, np.int64)]
+    sizes = np.diff(offsets)
+    parts = []
+    for size in np.unique(sizes).tolist():
+        rows = layouts[offsets[:-1][sizes == size][:, None] + np.arange(size)]
+        parts += [rows[:, [0, k, k + 1]] for k in range(1, size - 1)]
+    triangles = np.concatenate(parts)
+    counts = np.bincount(triangles.ravel(), minlength=len(mesh.positions))
+    order = np.argsort(triangles.ravel(), kind="stable")
+    starts = np.cumsum(counts) - counts
+    at = starts[:, None] + np.minimum(np.arange(counts.max()), np.maximum(counts - 1, 0)[:, None])
+    return triangles, order[np.minimum(at, len(order) - 1)] // 3
+
+
+def holds(mesh: Mesh, strips: Strips, unit: float) -> Roots:
+    """The place of the skin that each vertex of the cards moves with.
+
+    Args:
+        mesh: the head.
+        strips: the cards.
+        unit: of the mesh, in theirs.
+    """
+    positions = np.asarray(mesh.positions, np.float64) / unit
+    triangles, around = corners_of(mesh)
+    foot = strips.points[:, :1]
+    own = np.where(strips.held[:, None, None] > 0, strips.points, foot)
+    rows = nearest_places(positions, triangles, around, own.reshape(-1, 3))
+    return Roots(np.repeat(rows.corners, 2, axis=0), np.repeat(rows.shares, 2, axis=0))
+
+
+def card_mesh(strips: Strips, unit: float) -> Mesh:
+    """The cards without skin and shapes.
+
+    Args:
+        strips: the cards, decimetres.
+        unit: of the mesh, in theirs.
+    """
+    positions, normals = card_vertices(strips)
+    faces, uvs = card_faces(strips)
+    return polygon_mesh(positions * unit, normals, faces, uvs, faces)
+
+
+def bind(dna: Dna, mesh: Mesh, head: Mesh, places: Roots, least: float, rigid: bool) -> None:
+    """Give cards the skin weights and shapes of the places that they stand on.
+
+    Args:
+        dna: has the joints.
+        mesh: the cards; gets weights and shapes.
+        head: the skin.
+        places: on it, of each vertex of the cards.
+        least: shapes that move none of them further are left out, in the mesh' unit.
+        rigid: what the skin moves less than that hangs on the joint of the head alone.
+    """
+    weights = places.of(sk.dense_weights(head, len(dna.joint_names)))
+    if rigid:
+        still = _still(dna, head, places, least)
+        weights[still] = np.eye(weights.shape[1])[list(dna.joint_names).index("head")]
+    most = min(_MOST_INFLUENCES, weights.shape[1])
+    few = np.partition(weights, -most, axis=1)[:, [-most]]
+    weights = np.where((weights >= few) & (weights > _LEAST_WEIGHT), weights, 0)
+    weights /= weights.sum(axis=1, keepdims=True)
+    vertex, joint = np.nonzero(weights)
+    counts = (weights > 0).sum(axis=1)
+    mesh.skin_offsets = np.concatenate([[0], np.cumsum(counts)])
+    mesh.skin_weights, mesh.skin_joint_indices = weights[vertex, joint], joint
+    mesh.maximum_influence_per_vertex = int(counts.max())
+    targets = []
+    for target in head.blend_shape_targets:
+        delta = np.zeros((len(head.positions), 3))
+        delta[np.asarray(target.vertex_indices, np.int64)] = np.asarray(target.deltas)
+        own = places.of(delta)
+        far = np.abs(own).max(axis=1)
+        if far.max(initial=0) < least:
+            continue
+        moved = np.flatnonzero(far > least / 4)
+        channel = int(target.blend_shape_channel_index)
+        targets.append(
+            BlendShapeTarget(
+                deltas=own[moved], vertex_indices=moved, blend_shape_channel_index=channel
+            )
+        )
+    mesh.blend_shape_targets = targets
+
+
+def _still(dna: Dna, head: Mesh, places: Roots, least: float) -> Floats:
+    """bool[n]: which places no control of the face moves further, and no neck carries."""
+    used, rows = np.unique(places.corners, return_inverse=True)
+    count = len(dna.raw_control_names)
+    motions = sk.column_motions(dna, sk.column_count(dna))[:count]
+    weights = sk.dense_weights(head, len(dna.joint_names))[used]
+    positions = np.asarray(head.positions, np.float64)[used]
+    shapes = sk.column_shapes(dna, head, count)
+    below = [j for j in range(len(dna.joint_names)) if not _hangs_on_head(dna, j)]
+    far = np.where(weights[:, below].sum(axis=1) > _LEAST_WEIGHT, np.inf, 0.0)
+    for column, name in enumerate(dna.raw_control_names):
+        if re.search(r"\.(head|neck)", name):
+            continue
+        shape = shapes[column][used] if column in shapes else 0.0
+        moved = sk.skinned(positions + shape, weights, motions[column])
+        far = np.maximum(far, np.linalg.norm(moved - positions, axis=1))
+    return np.asarray(far[rows.reshape(places.corners.shape)].max(axis=1) < least)
+
+
+def _hangs_on_head(dna: Dna, joint: int) -> bool:
+    for _ in range(len(dna.joint_names)):
+        if dna.joint_names[joint] == "head":
+            return True
+        joint = int(dna.joint_parents[joint])
+    return False
+
+
+def append_mesh(dna: Dna, name: str, mesh: Mesh, lods: list[int]) -> None:
+    """One more mesh at the end of a Dna.
+
+    Args:
+        dna: is changed.
+        name: of the mesh.
+        mesh: finished.
+        lods: the levels that show it.
+    """
+    number = len(dna.mesh_names)
+    dna.mesh_names = [*dna.mesh_names, name]
+    dna.meshes = [*dna.meshes, mesh]
+    mapping = dna.lod_mesh_mapping
+    rows = [[int(i) for i in mapping[lod]] for lod in range(dna.lod_count)]
+    dna.lod_mesh_mapping = [r + [number] * (lod in lods) for lod, r in enumerate(rows)]
+    pairs = [(number, int(t.blend_shape_channel_index)) for t in mesh.blend_shape_targets]
+    before = np.asarray(dna.mesh_blend_shape_channel_mapping, np.int64).reshape(-1, 2)
+    after = np.array(pairs, np.int64).reshape(-1, 2)
+    dna.mesh_blend_shape_channel_mapping = np.concatenate([before, after])

@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: MIT
+"""All hair of a person, and its meshes at the levels that show them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ... import Dna
+from ...files.png import png
+from ..body import Body
+from ..paint.images import shrunk
+from ..paint.strands import paint_strands
+from ..part import Part
+from ..people import Person
+from ..polygons import Floats
+from ..source import BaseMesh
+from .binding import append_mesh, bind, card_mesh, head_of, holds
+from .controls import add_lash_controls
+from .face_hair import beard, brows, lash_curves, lashes
+from .scalp import STYLES
+from .strips import Strips
+from .surface import Surface
+
+PICTURE = "hair_color.png"
+NO_HAIR = 4  # the level from which on there are no cards
+_SHARES = (1.0, 0.6, 0.36, 0.2)  # of the strips, by level
+_ROWS = (99, 4, 3, 3)
+_LEAST_MM = {"hair": 1.0, "brows": 0.15, "beard": 0.15, "eyelashes": 0.1}
+_MM = 10.0  # of a centimetre
+
+
+@dataclass
+class Grown:
+    """The hair of a person by mesh: hair, brows, beard, eyelashes; what there is none of is not
+    in it."""
+
+    strips: dict[str, Strips]
+    unit: float  # of the Dna's meshes, in decimetres
+
+
+def grow_hair(person: Person, body: Body, base: BaseMesh, parts: list[Part], unit: float) -> Grown:
+    """Grow all hair of a person.
+
+    Args:
+        person: has the styles.
+        body: the person's.
+        base: the base mesh.
+        parts: the meshes; the head of LOD 0 is grown on.
+        unit: of the Dna's meshes, in decimetres.
+    """
+    head = next(p for p in parts if p.name == "head_lod0_mesh")
+    man = body.man
+    eye = man.positions[body.groups["helper-l-eye"]].mean(axis=0)
+    at = head.carry(body.positions)
+    surface = Surface(head.polygons, at, head.carry(man.positions), eye)
+    lines = {}
+    for letter in "lr":
+        for number, lid in ((1, "D"), (2, "U")):
+            faces = base.faces[f"helper-{letter}-eyelashes-{number}"]
+            table = np.array([[corner[0] for corner in face] for face in faces])
+            lines[letter.upper() + lid] = lash_curves(body.positions, table)
+    found: dict[str, Strips | None] = {
+        "hair": STYLES[person.hair_style](surface, person) if person.hair_style in STYLES else None,
+        "brows": brows(surface, person),
+        "beard": beard(surface, _lips(head, man), person),
+        "eyelashes": lashes(surface, lines, person),
+    }
+    return Grown({name: s for name, s in found.items() if s is not None}, unit)
+
+
+def _lips(head: Part, man: Body) -> Floats:
+    """float64[V]: 1 where lips that roll in go far, and in the mouth behind them."""
+    roll = sum(
+        np.linalg.norm(head.carry(unit.displacement), axis=1)
+        for name, unit in man.units.items()
+        if "LipRollIn" in name or "LipsRollIn" in name
+    )
+    return np.clip(np.asarray(roll) / 0.03, 0, 1)
+
+
+def add_hair(dna: Dna, grown: Grown) -> None:
+    """Add the cards of all levels to a finished face.
+
+    Args:
+        dna: the face; gets the meshes.
+        grown: the hair.
+    """
+    for lod in range(min(dna.lod_count, NO_HAIR)):
+        head = head_of(dna, lod)
+        if head is None:
+            continue
+        for name, strips in grown.strips.items():
+            shown = strips if lod == 0 else strips.coarser(_SHARES[lod], _ROWS[lod])
+            mesh = card_mesh(shown, grown.unit)
+            places = holds(head, shown, grown.unit)
+            bind(dna, mesh, head, places, _LEAST_MM[name] / _MM, name == "hair")
+            if name == "eyelashes":
+                add_lash_controls(dna, mesh, shown.rows, lod)
+            append_mesh(dna, f"{name}_lod{lod}_mesh", mesh, [lod])
+
+
+def hair_textures(
+    person: Person, dna: Dna, grown: Grown, largest: int
+) -> tuple[dict[str, bytes], dict[str, str]]:
+    """The picture of the hairs, and metadata that say which meshes show it, and how.
+
+    `texture:<mesh>:color` -> file name; `hair:<mesh>` -> "rows=R" of its cards, which stand one
+    after the other, two vertices in a row, from root to tip: renderers of strands follow them.
+
+    Args:
+        person: has the colours.
+        dna: has the meshes.
+        grown: the hair.
+        largest: no texture has more texels than a square of this side.
+    """
+    metadata = {}
+    for name in dna.mesh_names:
+        kind = name.partition("_lod")[0]
+        if kind not in grown.strips:
+            continue
+        metadata[f"texture:{name}:color"] = PICTURE
+        lod = int(name.partition("_lod")[2].partition("_")[0])
+        rows = grown.strips[kind].rows
+        metadata[f"hair:{name}"] = f"rows={min(rows, _ROWS[lod])}"
+    return {PICTURE: png(shrunk(paint_strands(person), largest))}, metadata

@@ -1,0 +1,277 @@
+# SPDX-License-Identifier: MIT
+"""Hair of the scalp by style: short crops, receding, a bun, long hair, tight curls."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ...base.easing import smooth_step
+from ..paint.atlas import tile
+from ..people import Person
+from ..polygons import Floats
+from .growth import curled, grow, tangent
+from .places import hairline_height, wavy
+from .strips import Strips, joined, make_strips, unit
+from .surface import Roots, Surface
+
+_WHORL = np.array([0.10, 0.86, -1.40])  # where hair turns about the crown, of the man
+_DENSE, _THIN = 5, 3  # tiles of each sort
+
+
+def whorl_flow(surface: Surface, side: float) -> Floats:
+    """float64[V, 3]: hair from the whorl of the crown outward, turning where it begins.
+
+    Args:
+        surface: the head.
+        side: how far the hair over the forehead is combed to his right, 0 to 1.
+    """
+    man, normals = surface.man, surface.man_normals
+    away = tangent(man - _WHORL, normals)
+    distance = np.linalg.norm(man - _WHORL, axis=1)
+    swirl = np.cross(normals, away) * (0.9 * np.exp(-distance / 0.3))[:, None]
+    flow = away + swirl
+    down = smooth_step((np.abs(normals[:, 0]) - 0.45) / 0.4)[:, None]
+    flow = flow * (1 - down) + down * np.array([0.0, -1.0, -0.12])
+    front = smooth_step((man[:, 2] + 0.7) / 0.7) * smooth_step((man[:, 1] - 0.45) / 0.25)
+    flow = flow + (side * front)[:, None] * np.array([-0.9, 0.25, 0.1])
+    return tangent(flow, surface.normals)
+
+
+def _roots(
+    surface: Surface,
+    spacing: float,
+    random: np.random.Generator,
+    recession: float = 0.0,
+    sideburn: float = 1.0,
+    thin_top: float = 0.0,
+) -> tuple[Roots, Floats]:
+    """Roots inside of an uneven hairline, and how far inside each is, decimetres of the man."""
+    man = surface.man
+    inside = hairline_height(man, recession, sideburn)
+    inside = inside + 0.016 * wavy(man, random, 3.0) + 0.008 * wavy(man, random, 9.0)
+    density = smooth_step((inside + 0.012) / 0.05)
+    bald = smooth_step((man[:, 1] - 0.55) / 0.3)
+    density = density * (1 - thin_top * bald) * (1 - 0.5 * smooth_step((man[:, 1] - 0.4) / 0.3))
+    density = density * (1 - 0.3 * smooth_step((inside - 0.08) / 0.1))
+    density[surface.man_normals[:, 1] < -0.8] = 0
+    roots = surface.scattered(density, spacing, random)
+    return roots, roots.of(inside[:, None])[:, 0]
+
+
+def _tiles(inside: Floats, random: np.random.Generator, edge: float = 0.07) -> Floats:
+    """Thin tiles at the hairline and here and there, dense ones elsewhere."""
+    n = len(inside)
+    thin = (inside < edge * random.uniform(0.4, 1.3, n)) | (random.random(n) < 0.12)
+    numbers = np.where(thin, _DENSE + random.integers(0, _THIN, n), random.integers(0, _DENSE, n))
+    return tile("scalp", numbers)
+
+
+def _scalp_vertices(surface: Surface) -> Floats:
+    man = surface.man
+    return np.flatnonzero((hairline_height(man) > -0.25) & (man[:, 1] > -0.95))
+
+
+def crop(surface: Surface, person: Person) -> Strips:
+    """Short hair: some centimetres on top, brushed aside, shorter at the sides and the nape.
+
+    Args:
+        surface: the head.
+        person: `hair_length` is a share of the usual.
+    """
+    return _short(surface, person, 31, recession=0.0, top=0.32, sides=0.22, thin_top=0.0)
+
+
+def receding(surface: Surface, person: Person) -> Strips:
+    """An old man's: gone back over the temples, thin on top, combed back.
+
+    Args:
+        surface: the head.
+        person: `hair_length` is a share of the usual.
+    """
+    return _short(surface, person, 32, recession=0.75, top=0.30, sides=0.20, thin_top=0.55)
+
+
+def _short(
+    surface: Surface,
+    person: Person,
+    seed: int,
+    recession: float,
+    top: float,
+    sides: float,
+    thin_top: float,
+) -> Strips:
+    random = np.random.default_rng(seed)
+    roots, inside = _roots(surface, 0.043, random, recession, 1.0, thin_top)
+    n = len(roots)
+    man = roots.of(surface.man)
+    high = smooth_step((man[:, 1] - 0.30) / 0.40)
+    fore = smooth_step((man[:, 2] + 0.5) / 0.6) * high
+    length = sides + (top - sides) * high + 0.10 * fore
+    length *= 0.5 + 0.5 * smooth_step(inside / 0.2)
+    nape = smooth_step((-0.25 - man[:, 1]) / 0.3)
+    length *= (1 - 0.45 * nape) * person.hair_length * surface.scale * random.uniform(0.75, 1.2, n)
+    flow = whorl_flow(surface, 0.9 if recession == 0 else 0.3)
+    if recession:
+        back = tangent(np.tile([0.15, 0.1, -1.0], (len(flow), 1)), surface.normals)
+        comb = smooth_step((surface.man[:, 1] - 0.2) / 0.3)[:, None]
+        flow = tangent(flow * (1 - comb) + comb * back, surface.normals)
+    clump = 0.14 * np.column_stack([wavy(surface.man, random, 6.0) for _ in range(3)])
+    flow = flow + clump + 0.10 * random.normal(0, 1, flow.shape)
+    low = 16 + 34 * high + 16 * fore * (recession == 0)
+    rise = np.radians(low + random.uniform(-7, 9, n)), np.radians(2 + 12 * high + 0 * low)
+    points, out = grow(surface, roots, flow, length, rise, 4, _scalp_vertices(surface), 0.006)
+    half = (0.024 + 0.026 * high) * surface.scale * random.uniform(0.8, 1.25, n)
+    half *= 0.55 + 0.45 * smooth_step(inside / 0.1)
+    turns = np.radians(random.uniform(-1, 1, n) * (6 + 28 * high))
+    taper = np.array([0.85, 1.0, 0.95, 0.7])
+    return make_strips(points, out, half, taper, _tiles(inside, random), roots, turns)
+
+
+def afro(surface: Surface, person: Person) -> Strips:
+    """Tight curls that stand away from the head on all sides.
+
+    Args:
+        surface: the head.
+        person: `hair_length` is a share of four centimetres.
+    """
+    random = np.random.default_rng(33)
+    roots, inside = _roots(surface, 0.062, random, 0.0, 0.6)
+    n = len(roots)
+    man = roots.of(surface.man)
+    length = 0.42 * person.hair_length * surface.scale * random.uniform(0.75, 1.15, n)
+    length *= 0.35 + 0.65 * smooth_step(inside / 0.22)
+    flow = tangent(random.normal(0, 1, surface.man.shape), surface.normals)
+    rise = np.radians(random.uniform(45, 88, n)), np.radians(random.uniform(10, 80, n))
+    points, out = grow(surface, roots, flow, length, rise, 4, _scalp_vertices(surface), 0.01, 0.7)
+    wind = 0.05 * person.hair_curl * person.hair_length * random.uniform(0.6, 1.2, n)
+    points = curled(points, out, wind, random.uniform(0.6, 1.3, n), random)
+    half = 0.075 * (0.5 + 0.5 * person.hair_length) * random.uniform(0.8, 1.2, n)
+    half *= (0.55 + 0.45 * smooth_step(inside / 0.12)) * surface.scale
+    middle = np.array([0.0, 0.1, -0.75])
+    out = unit(out + 0.6 * unit(man - middle)[:, None])
+    turns = random.uniform(0, np.pi, n)
+    taper = np.array([0.7, 1.0, 1.1, 0.95])
+    return make_strips(points, out, half, taper, _tiles(inside, random, 0.05), roots, turns)
+
+
+def long(surface: Surface, person: Person) -> Strips:
+    """Hair to the shoulders, parted beside the middle, behind the face.
+
+    Args:
+        surface: the head.
+        person: `hair_length` is a share of the usual.
+    """
+    random = np.random.default_rng(34)
+    roots, inside = _roots(surface, 0.082, random, 0.0, 0.7)
+    n = len(roots)
+    man = roots.of(surface.man)
+    flow = parted_flow(surface)
+    flow = tangent(flow + 0.10 * random.normal(0, 1, flow.shape), surface.normals)
+    # Each hair ends at about the same height: what begins higher is longer.
+    way = 0.85 * (man[:, 1] + 0.55) + 1.15
+    length = np.clip(way, 1.0, 2.6) * person.hair_length * surface.scale
+    length *= random.uniform(0.88, 1.08, n)
+    rise = np.radians(random.uniform(10, 24, n)), np.zeros(n)
+    above = np.flatnonzero(surface.man[:, 1] > -1.9)
+    least = (0.008 + 0.05 * random.random(n)) * surface.scale
+    points, out = grow(surface, roots, flow, length, rise, 10, above, least, 0.62, 0.55)
+    wave = 0.05 * (0.25 + person.hair_curl) * random.uniform(0.5, 1.2, n)
+    points = curled(points, out, wave, random.uniform(0.5, 1.6, n), random)
+    half = (0.062 - 0.022 * (inside < 0.08)) * surface.scale * random.uniform(0.8, 1.2, n)
+    turns = np.radians(random.uniform(-10, 10, n))
+    taper = np.interp(np.linspace(0, 1, 10), [0, 0.2, 0.8, 1], [0.7, 1.0, 1.0, 0.75])
+    tiles = _tiles(inside, random, 0.05)
+    return make_strips(points, out, half, taper, tiles, roots, turns, held=0.0)
+
+
+def parted_flow(surface: Surface) -> Floats:
+    """float64[V, 3]: hair that falls to both sides of a parting and back behind the ears.
+
+    Args:
+        surface: the head.
+    """
+    man = surface.man
+    x, y, z = man.T
+    aside = np.tanh((x - 0.10) / 0.06)
+    top = smooth_step((y - 0.35) / 0.45)
+    flow = np.column_stack([1.0 * aside * top, -0.55 - 0.6 * (1 - top), -0.35 - 0.1 * top])
+    # Before and above the ears it goes back, under them it falls.
+    before = smooth_step((z + 0.95) / 0.3) * smooth_step((y + 0.35) / 0.25) * (1 - top)
+    flow[:, 2] -= 0.9 * before
+    low = smooth_step((-0.35 - y) / 0.25)[:, None]
+    flow = flow * (1 - low) + low * np.array([0.0, -1.0, 0.0])
+    return tangent(flow, surface.normals)
+
+
+_KNOT = np.array([0.0, 0.46, -1.72])  # where a bun sits, of the man
+
+
+def bun(surface: Surface, person: Person) -> Strips:
+    """Hair drawn back to a knot.
+
+    Args:
+        surface: the head.
+        person: `hair_length` is a share of the knot's size.
+    """
+    random = np.random.default_rng(35)
+    roots, inside = _roots(surface, 0.078, random, 0.0, 0.45)
+    n = len(roots)
+    man = roots.of(surface.man)
+    knot = int(((surface.man - _KNOT) ** 2).sum(axis=1).argmin())
+    at, out = surface.positions[knot], surface.normals[knot]
+    flow = tangent(_KNOT - surface.man, surface.normals)
+    flow = tangent(flow + 0.05 * random.normal(0, 1, flow.shape), surface.normals)
+    length = 1.12 * np.linalg.norm(man - _KNOT, axis=1) * surface.scale
+    length = np.minimum(length, 1.5 * surface.scale) * random.uniform(0.9, 1.0, n)
+    rise = np.radians(random.uniform(6, 16, n)), np.zeros(n)
+    above = _scalp_vertices(surface)
+    least = (0.006 + 0.028 * random.random(n)) * surface.scale
+    points, outside = grow(surface, roots, flow, length, rise, 8, above, least, 0.3)
+    half = (0.058 - 0.02 * (inside < 0.07)) * surface.scale * random.uniform(0.8, 1.2, n)
+    turns = np.radians(random.uniform(-5, 5, n))
+    taper = np.interp(np.linspace(0, 1, 8), [0, 0.2, 0.7, 1], [0.75, 1.0, 0.8, 0.45])
+    tiles = _tiles(inside, random, 0.04)
+    drawn = make_strips(points, outside, half, taper, tiles, roots, turns)
+    size = 0.27 * surface.scale * person.hair_length
+    wound = _knot(surface.nearest(at[None]), at + 0.72 * size * out, out, size, random)
+    return joined([drawn, wound])
+
+
+def _knot(
+    root: Roots, middle: Floats, axis: Floats, size: float, random: np.random.Generator
+) -> Strips:
+    """Strips wound about an axis into a ball, those inside of it opaque."""
+    count, rows = 64, 8
+    across = unit(np.cross(axis, [1.0, 0.0, 0.0]))
+    other = np.cross(axis, across)
+    inner = np.arange(count) < 24
+    begin = np.where(inner, np.arange(count) * 0.7, random.uniform(0, 2 * np.pi, count))
+    t = np.linspace(0, 1, rows)
+    around = begin[:, None] + np.radians(np.where(inner, 150, 190))[:, None] * t
+    low = np.where(inner, np.linspace(-0.9, 1.2, count) * 0 - 0.2, random.uniform(-0.7, 0.5, count))
+    up = low[:, None] + np.where(inner, 1.1, random.uniform(0.5, 1.1, count))[:, None] * t
+    up = np.minimum(up, 1.35)
+    ray = (
+        np.cos(up)[..., None]
+        * (np.cos(around)[..., None] * across + np.sin(around)[..., None] * other)
+        + np.sin(up)[..., None] * axis
+    )
+    flat = np.where(inner, 0.9, random.uniform(0.97, 1.06, count))[:, None, None]
+    points = middle + size * flat * ray
+    half = np.where(inner, 0.62, random.uniform(0.16, 0.26, count)) * size
+    numbers = np.arange(count)
+    tiles = np.where(inner, tile("solid", numbers), tile("scalp", numbers % _DENSE))
+    roots = Roots(np.repeat(root.corners, count, 0), np.repeat(root.shares, count, 0))
+    taper = np.interp(t, [0, 0.15, 0.85, 1], [0.8, 1.0, 1.0, 0.6])
+    return make_strips(points, ray, half, taper, tiles, roots, held=0.0)
+
+
+STYLES: dict[str, Callable[[Surface, Person], Strips]] = {
+    "crop": crop,
+    "receding": receding,
+    "afro": afro,
+    "long": long,
+    "bun": bun,
+}

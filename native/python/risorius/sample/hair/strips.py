@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: MIT
+"""Strips of hair: guides with a width, which become cards of a mesh or strands of a render."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..paint.atlas import tile_corners
+from ..polygons import Floats, Ints
+from .surface import Roots
+
+
+def unit(vectors: Floats) -> Floats:
+    """float64[..., 3] made 1 long; zero stays zero."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.asarray(vectors / np.maximum(length, 1e-12))
+
+
+@dataclass
+class Strips:
+    """Strips with the same number of rows, from root to tip.
+
+    Attributes:
+        points: float64[n, rows, 3], the guide of each, decimetres.
+        sides: float64[n, rows, 3], from its middle to its left edge.
+        normals: float64[n, rows, 3], unit: how it is lit, and the side that it shows outside.
+        tiles: int64[n], of the atlas.
+        roots: the place of each on the skin.
+        held: float64[n], 1: each row moves with the skin under it; 0: with the root.
+    """
+
+    points: Floats
+    sides: Floats
+    normals: Floats
+    tiles: Ints
+    roots: Roots
+    held: Floats
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    @property
+    def rows(self) -> int:
+        """Points of each guide."""
+        return int(self.points.shape[1])
+
+    def taken(self, chosen: Ints) -> Strips:
+        """Some of them, by number or mask."""
+        return Strips(
+            self.points[chosen],
+            self.sides[chosen],
+            self.normals[chosen],
+            self.tiles[chosen],
+            self.roots.taken(chosen),
+            self.held[chosen],
+        )
+
+    def coarser(self, share: float, rows: int) -> Strips:
+        """Fewer and wider ones that cover as much.
+
+        Args:
+            share: of the strips that stay.
+            rows: of each that stay.
+        """
+        count = max(1, round(share * len(self)))
+        chosen = np.unique(np.linspace(0, len(self) - 1, count).round().astype(int))
+        out = self.taken(chosen)
+        at = np.linspace(0, self.rows - 1, min(rows, self.rows)).round().astype(int)
+        out.points, out.normals = out.points[:, at], out.normals[:, at]
+        out.sides = out.sides[:, at] * (len(self) / len(chosen)) ** 0.85
+        return out
+
+
+def make_strips(
+    points: Floats,
+    outside: Floats,
+    half_width: Floats,
+    taper: Floats,
+    tiles: Ints,
+    roots: Roots,
+    turns: Floats | None = None,
+    held: float = 1.0,
+) -> Strips:
+    """Strips along guides, their faces turned outside.
+
+    Args:
+        points: float64[n, rows, 3].
+        outside: float64[n, rows, 3], away from the skin.
+        half_width: float64[n], decimetres.
+        taper: float64[rows], of the width.
+        tiles: int64[n].
+        roots: the place of each on the skin.
+        turns: float64[n], radians about its own direction by which each is turned.
+        held: of Strips, for all.
+    """
+    way = unit(np.gradient(points, axis=1))
+    side = unit(np.cross(way, outside))
+    if turns is not None:
+        up = np.cross(side, way)
+        c, s = np.cos(turns)[:, None, None], np.sin(turns)[:, None, None]
+        side = c * side + s * up
+    sides = side * half_width[:, None, None] * taper[None, :, None]
+    return Strips(points, sides, unit(outside), tiles, roots, np.full(len(points), held))
+
+
+def joined(parts: list[Strips]) -> Strips:
+    """Strips with the same number of rows as one."""
+    return Strips(
+        *(np.concatenate([getattr(p, k) for p in parts]) for k in ("points", "sides", "normals")),
+        np.concatenate([p.tiles for p in parts]),
+        Roots(
+            np.concatenate([p.roots.corners for p in parts]),
+            np.concatenate([p.roots.shares for p in parts]),
+        ),
+        np.concatenate([p.held for p in parts]),
+    )
+
+
+def card_vertices(strips: Strips) -> tuple[Floats, Floats]:
+    """float64[V, 3] each: positions and normals; left and right by row, strip after strip."""
+    left, right = strips.points + strips.sides, strips.points - strips.sides
+    positions = np.stack([left, right], axis=2).reshape(-1, 3)
+    normals = np.repeat(strips.normals.reshape(-1, 3), 2, axis=0)
+    return positions, normals
+
+
+def card_faces(strips: Strips) -> tuple[list[list[int]], Floats]:
+    """Faces by vertex, counter-clockwise seen from outside, and float64[V, 2] texture places."""
+    n, rows = len(strips), strips.rows
+    first = 2 * (np.arange(n)[:, None] * rows + np.arange(rows - 1)).reshape(-1)
+    faces = np.stack([first + 1, first, first + 2, first + 3], axis=1)
+    low, high = tile_corners(strips.tiles)
+    along = np.concatenate(
+        [np.zeros((n, 1)), np.cumsum(np.linalg.norm(np.diff(strips.points, axis=1), axis=2), 1)],
+        axis=1,
+    )
+    along /= np.maximum(along[:, -1:], 1e-12)
+    v = low[:, None, 1] + along * (high - low)[:, None, 1]
+    u = np.stack([low[:, 0], high[:, 0]], axis=1)[:, None, :].repeat(rows, axis=1)
+    uvs = np.stack([u, v[..., None].repeat(2, axis=2)], axis=-1).reshape(-1, 2)
+    return faces.tolist(), uvs

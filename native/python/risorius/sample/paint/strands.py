@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: MIT
+"""The hairs on the cards of scalp, brows, lashes and beard: colour and opacity in one picture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..people import Colour, Person
+from ..polygons import Floats
+from .atlas import ATLAS_SIZE, TILES
+
+_GREY = (0.74, 0.73, 0.71)
+_LASH_DARK = 0.3  # of the brows' colour
+
+
+@dataclass
+class _Hairs:
+    """How the hairs of a kind of tile are.
+
+    Attributes:
+        counts: in the tiles, one after the other.
+        thick: half a hair at its root, texels, least and most.
+        length: of the tile's height, least and most.
+        begin: of the tile's height, where roots lie at most.
+        lean: how far hairs lean aside, of the tile's width.
+        bend: how far they bend.
+        wave: how far they wave, of the tile's width.
+        waves: over the length.
+        gather: how far tips come together in the middle, 0 to 1.
+        taper: where a hair begins to get thinner, of its length.
+    """
+
+    counts: tuple[int, ...]
+    thick: tuple[float, float]
+    length: tuple[float, float]
+    begin: float = 0.0
+    lean: float = 0.05
+    bend: float = 0.05
+    wave: float = 0.0
+    waves: float = 2.0
+    gather: float = 0.0
+    taper: float = 0.0
+
+
+def _kinds(person: Person) -> dict[str, _Hairs]:
+    curl = person.hair_curl
+    thin = (1.3, 2.1) if curl < 0.6 else (1.0, 1.7)
+    wave, waves = 0.16 * curl, 1.5 + 7.0 * curl
+    long = person.hair_style in ("long", "bun")
+    length = (0.75, 1.0) if long else (0.5, 1.0)
+    begin = 0.06 if long else 0.3
+    scalp = (46, 42, 38, 44, 40, 20, 15, 10)
+    return {
+        "scalp": _Hairs(
+            scalp, thin, length, begin, 0.08, 0.08, wave, waves, 0.25 if not long else 0.1, 0.45
+        ),
+        "brows": _Hairs((5, 4, 5, 3, 4, 4, 3, 5), (1.9, 2.7), (0.6, 1.0), 0.25, 0.16, 0.16),
+        "lashes": _Hairs((3, 2, 3, 2) * 4, (2.4, 3.3), (0.7, 1.0), 0.0, 0.12, 0.16, gather=0.35),
+        "beard": _Hairs(
+            (9, 8, 10, 7, 9, 6, 5, 8),
+            (1.5, 2.3),
+            (0.5, 1.0),
+            0.2,
+            0.14,
+            0.2,
+            0.05 + 0.12 * curl,
+            1 + 4 * curl,
+        ),
+        "solid": _Hairs((70, 70, 70, 70), (1.4, 2.2), (0.9, 1.0), 0.3, 0.05, 0.05),
+    }
+
+
+def _shades(colour: Colour, grey: float, count: int, random: np.random.Generator) -> Floats:
+    """float64[count, 3]: colours of single hairs."""
+    own = np.array(colour) * random.uniform(0.78, 1.28, (count, 1))
+    own = own + random.normal(0, 0.012, (count, 1)) * [1.2, 0.6, 0.2]  # some are redder
+    white = np.array(_GREY) * random.uniform(0.8, 1.1, (count, 1))
+    return np.asarray(np.where(random.random((count, 1)) < grey, white, own))
+
+
+def _paint_tile(
+    hairs: _Hairs,
+    number: int,
+    size: tuple[int, int],
+    colour: Colour,
+    grey: float,
+    random: np.random.Generator,
+) -> Floats:
+    """float64[height, width, 4]: hairs from the root (row 0) to the tip, later ones on top."""
+    width, height = size
+    image = np.zeros((height, width, 4))
+    v = (np.arange(height) + 0.5) / height
+    count = hairs.counts[number % len(hairs.counts)]
+    tint = random.uniform(0.9, 1.12)
+    shades = tint * _shades(colour, grey, count, random)
+    image[..., :3] = 0.8 * shades.mean(axis=0)
+    places = (np.arange(count) + random.uniform(0.1, 0.9, count)) / count
+    for place, shade in zip(random.permutation(places), shades, strict=True):
+        begin = random.uniform(0, hairs.begin)
+        length = begin + (1 - begin) * random.uniform(*hairs.length)
+        s = np.clip((v - begin) / (length - begin), 0, 1)
+        lean, bend = random.normal(0, hairs.lean), random.normal(0, hairs.bend)
+        middle = 0.05 + 0.9 * place + lean * s + bend * s**2
+        middle = middle + hairs.gather * s * (0.5 - middle)
+        turn = random.uniform(0, 2 * np.pi)
+        waves = hairs.waves * random.uniform(0.85, 1.15)
+        middle = middle + hairs.wave * np.minimum(2 * s, 1) * np.sin(2 * np.pi * waves * v + turn)
+        half = random.uniform(*hairs.thick) * np.sqrt(
+            np.clip((1 - s) / max(1 - hairs.taper, 1e-6), 0, 1)
+        )
+        half = np.where((v >= begin) & (v <= length), np.maximum(half, 0.35), 0)
+        _lay(image, middle * width, half, shade, s, random.uniform(0.85, 1.0))
+    return image
+
+
+def _lay(
+    image: Floats, middle: Floats, half: Floats, shade: Floats, along: Floats, strength: float
+) -> None:
+    """Lay one hair over a tile.
+
+    Args:
+        image: float64[h, w, 4], is changed.
+        middle: float64[h], its column by row.
+        half: float64[h], half its width; 0 where it is not.
+        shade: float64[3].
+        along: float64[h], 0 at its root, 1 at its tip.
+        strength: opacity.
+    """
+    width = image.shape[1]
+    low = int(np.clip(middle.min() - 4, 0, width))
+    high = int(np.clip(middle.max() + 5, 0, width))
+    if high <= low:
+        return
+    x = np.arange(low, high) + 0.5
+    gap = np.abs(x[None, :] - middle[:, None])
+    cover = np.clip(half[:, None] - gap + 0.5, 0, 1) * (half[:, None] > 0) * strength
+    # A hair is round, and lighter towards its tip.
+    round_ = 1 - 0.3 * np.clip(gap / np.maximum(half[:, None], 0.5), 0, 1) ** 2
+    tone = (0.78 + 0.42 * along)[:, None] * round_
+    colour = shade * tone[..., None]
+    part = image[:, low:high]
+    part[..., :3] += (colour - part[..., :3]) * cover[..., None]
+    part[..., 3] = np.maximum(part[..., 3], cover)
+
+
+def paint_strands(person: Person) -> Floats:
+    """float64[ATLAS_SIZE, ATLAS_SIZE, 4]: sRGB colour and opacity of the person's hairs.
+
+    Args:
+        person: has the colours, how curly hair is, and how much of it is grey.
+    """
+    random = np.random.default_rng(11)
+    image = np.zeros((ATLAS_SIZE, ATLAS_SIZE, 4))
+    image[..., :3] = person.hair
+    lash = tuple(_LASH_DARK * c for c in person.brows)
+    colours: dict[str, tuple[Colour, float]] = {
+        "scalp": (person.hair, person.hair_grey),
+        "brows": (person.brows, 0.5 * person.hair_grey),
+        "lashes": ((lash[0], lash[1], lash[2]), 0.0),
+        "beard": (person.hair, person.hair_grey),
+        "solid": (person.hair, person.hair_grey),
+    }
+    for kind, hairs in _kinds(person).items():
+        left, low, width, height, count = TILES[kind]
+        colour, grey = colours[kind]
+        for k in range(count):
+            tile = _paint_tile(hairs, k, (width, height), colour, grey, random)
+            if kind == "solid":
+                tile[..., 3] = np.maximum(tile[..., 3], np.where(tile[..., 3] > 0, 1, 0.97))
+            image[low : low + height, left + k * width : left + (k + 1) * width] = tile
+    return np.clip(image, 0, 1)
