@@ -385,8 +385,9 @@ def assemble(
         mesh = make_mesh(part, positions, w)
         if not part.rests:
             deltas = []
-            for unit in units.values():
-                here = ex.Expression(part.carry(unit.displacement), unit.joints)
+            for name, unit in units.items():
+                whole = unit.displacement - correctives.get((name, name), 0.0)
+                here = ex.Expression(part.carry(whole), unit.joints)
                 deltas.append(bind_displacement(p, w, here, joints))
             deltas += [part.carry(delta) for delta in correctives.values()]
             add_targets(mesh, deltas)

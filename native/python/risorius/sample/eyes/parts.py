@@ -56,7 +56,7 @@ def eye_parts(base: BaseMesh, groups: dict[str, Ints], lod: int) -> list[Part]:
             uvs.append(places)
         polygons = Polygons(faces, faces, np.concatenate(uvs), len(rows))
         part = Part(f"{name}_lod{lod}_mesh", polygons, [_operator(rows, len(base.positions))])
-        for _ in range(2 - lod):
+        for _ in range(1 - lod):
             part.polygons, operator = subdivide(part.polygons)
             part.operators.append(operator)
         out.append(part)
