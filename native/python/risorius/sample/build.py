@@ -25,6 +25,7 @@ from ..author.levels import level_name
 from ..files import fileio
 from . import expressions as ex
 from . import references, wrinkles
+from .askew import askew, set_askew
 from .body import JOINTS, NECK_CUT, NECK_SLOPE, REACH, Body
 from .clothes import shirt
 from .controls import gui_table
@@ -556,6 +557,7 @@ def build_sample(
     if rig is not None:
         man = None if body.man is body else lambda: assemble(source, lambda _: None)[0]
         dna = joint_face(dna, man, rig, steps, begins)
+    set_askew(dna, parts, body, askew(source, body, person), CM)
     grown = grow_hair(person, body, source.base_mesh(), parts, CM)
     add_hair(dna, grown)
     hairs, shown = hair_textures(person, dna, grown, texture_size)
