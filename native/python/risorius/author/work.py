@@ -162,9 +162,6 @@ def displacements(work: Work, mesh: Mesh) -> Doubles:
 def needs_joints(work: Work, mesh: Mesh, wanted: Doubles) -> bool:
     """Whether blend shapes move the mesh, and not the joints that are there alone (an eyeball).
 
-    What hangs on one moving joint as a whole keeps its shapes too, such as an eye's pupil: joints
-    of the skin around it would bend it.
-
     Args:
         work: the face.
         mesh: one of its own.
@@ -174,9 +171,6 @@ def needs_joints(work: Work, mesh: Mesh, wanted: Doubles) -> bool:
         return False
     positions = np.asarray(mesh.positions, np.float64)
     weights = sk.dense_weights(mesh, len(work.source.joint_names))
-    carrying = np.flatnonzero(weights.max(axis=0) > 0)
-    if len(carrying) == 1 and not np.allclose(work.motions[:, carrying[0]], np.eye(3, 4)):
-        return False
     far = 0.0
     for row in range(len(work.columns)):
         if wanted[row].any():
