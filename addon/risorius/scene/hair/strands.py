@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cards of hair as Blender's hair curves, in renders: a modifier that follows the cards.
+"""Cards of hair as Blender's hair curves, in renders: curves whose nodes follow the cards.
 
 Each card is a guide with a width. Strands lie across it, go where its deformed vertices go, and
 take the place of the cards in renders; the viewport and exports keep the cards.
@@ -16,16 +16,17 @@ from ..base import compat, parts
 from ..base.blender_types import ArmatureObject, MeshObject, Node, NodeTree, Socket
 from ..character import runtime
 
-MODIFIER = "Strands"
+STRANDS = "risorius_strands"  # on a mesh of cards: the object that renders show instead
 _TREE = "Risorius Strands"
 _PLACE = "strand_uv"  # attribute of the curves: where in the picture their colour is
+_DEEPER = 1.35  # exponent of a fibre's colour
 _ROWS = re.compile(r"rows=(\d+)")
 # Name of a mesh begins -> strands of a card, radius at the root in metres, share that is cut off.
 _KINDS = {
-    "hair": (22, 0.000045, 0.45),
-    "brows": (4, 0.00004, 0.35),
-    "beard": (9, 0.00005, 0.5),
-    "eyelashes": (3, 0.00005, 0.25),
+    "hair": (24, 0.00006, 0.45),
+    "brows": (4, 0.00005, 0.35),
+    "beard": (9, 0.00006, 0.5),
+    "eyelashes": (3, 0.00006, 0.25),
 }
 
 
@@ -48,9 +49,14 @@ def cards(rig: ArmatureObject) -> Iterator[tuple[MeshObject, str, int]]:
             yield item, name, int(found[1])
 
 
+def _strands_of(item: MeshObject) -> bpy.types.Object | None:
+    found = item.get(STRANDS)
+    return found if isinstance(found, bpy.types.Object) else None
+
+
 def are_shown(rig: ArmatureObject) -> bool:
     """Whether renders of a character show strands."""
-    return any(MODIFIER in item.modifiers for item, _, _ in cards(rig))
+    return any(_strands_of(item) is not None for item, _, _ in cards(rig))
 
 
 def show(rig: ArmatureObject, unit: float) -> int:
@@ -63,14 +69,25 @@ def show(rig: ArmatureObject, unit: float) -> int:
     count = 0
     for item, name, rows in cards(rig):
         kind = next((k for k in _KINDS if name.startswith(k)), None)
-        if kind is None:
+        if kind is None or item.hide_render:
             continue
-        if MODIFIER not in item.modifiers:
-            modifier = item.modifiers.new(MODIFIER, "NODES")
-            modifier.node_group = _tree(item, rows, kind, unit)
-            modifier.show_viewport = False
+        if _strands_of(item) is None:
+            _add(item, rows, kind, unit)
         count += 1
     return count
+
+
+def _add(item: MeshObject, rows: int, kind: str, unit: float) -> None:
+    data = bpy.data.hair_curves.new(f"{item.name}_strands")
+    thing = bpy.data.objects.new(f"{item.name}_strands", data)
+    for collection in item.users_collection:
+        collection.objects.link(thing)
+    thing.parent = item
+    modifier = thing.modifiers.new(_TREE, "NODES")
+    modifier.node_group = _tree(item, rows, kind, unit)
+    thing.hide_viewport = thing.hide_select = True
+    parts.point(item, STRANDS, thing)
+    item.hide_render = True
 
 
 def hide(rig: ArmatureObject) -> None:
@@ -80,13 +97,23 @@ def hide(rig: ArmatureObject) -> None:
         rig: the deforming armature.
     """
     for item, _, _ in cards(rig):
-        modifier = item.modifiers.get(MODIFIER)
-        if modifier is None:
+        thing = _strands_of(item)
+        if thing is None:
             continue
-        tree = modifier.node_group
-        item.modifiers.remove(modifier)
-        if tree is not None and tree.users == 0:
+        data = thing.data
+        trees = [m.node_group for m in thing.modifiers if m.type == "NODES"]
+        bpy.data.objects.remove(thing)
+        bpy.data.hair_curves.remove(data)
+        for tree in trees:
+            materials = [
+                n.inputs["Material"].default_value for n in tree.nodes if n.type == "SET_MATERIAL"
+            ]
             bpy.data.node_groups.remove(tree)
+            for material in materials:
+                if material is not None and not material.users:
+                    bpy.data.materials.remove(material)
+        del item[STRANDS]
+        item.hide_render = False
 
 
 class _Tree:
@@ -146,7 +173,8 @@ def _tree(item: MeshObject, rows: int, kind: str, unit: float) -> NodeTree:
     for way in ("INPUT", "OUTPUT"):
         tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
     g = _Tree(tree)
-    mesh = g.node("NodeGroupInput").outputs[0]
+    source = g.node("GeometryNodeObjectInfo", {"Object": item}, transform_space="RELATIVE")
+    mesh = source.outputs["Geometry"]
     count = each * len(item.data.vertices) // (2 * rows)
     line = g.node("GeometryNodeCurvePrimitiveLine")
     line = g.node("GeometryNodeResampleCurve", {"Curve": line.outputs[0], "Count": rows})
@@ -224,7 +252,11 @@ def _material(item: MeshObject) -> bpy.types.Material:
         image.image = pictures[0].image
         tree.links.new(spot.outputs["Vector"], image.inputs["Vector"])
         tree.links.new(image.outputs["Color"], shader.inputs["Base Color"])
-        tree.links.new(image.outputs["Color"], fibre.inputs["Color"])
+        # Light goes through several fibres: what the picture shows is what they give together.
+        deep = tree.nodes.new("ShaderNodeGamma")
+        deep.inputs["Gamma"].default_value = _DEEPER
+        tree.links.new(image.outputs["Color"], deep.inputs["Color"])
+        tree.links.new(deep.outputs["Color"], fibre.inputs["Color"])
     cycles = tree.nodes.new("ShaderNodeOutputMaterial")
     cycles.target, output.target = "CYCLES", "EEVEE"
     tree.links.new(fibre.outputs[0], cycles.inputs["Surface"])

@@ -27,6 +27,7 @@ from .surface import Surface
 PICTURE = "hair_color.png"
 NO_HAIR = 4  # the level from which on there are no cards
 _SHARES = (1.0, 0.42, 0.2, 0.1)  # of the strips, by level
+_MOST_VERTICES = 12_000  # of all cards at LOD 0
 _OWN = ("hair", "beard")
 _ROWS = (99, 4, 3, 3)
 _LEAST_MM = {"hair": 1.0, "brows": 0.15, "beard": 0.15, "eyelashes": 0.1}
@@ -69,7 +70,17 @@ def grow_hair(person: Person, body: Body, base: BaseMesh, parts: list[Part], uni
         "beard": beard(surface, _lips(head, man), person),
         "eyelashes": lashes(surface, lines, person),
     }
-    return Grown({name: s for name, s in found.items() if s is not None}, unit)
+    return Grown(_within_budget({name: s for name, s in found.items() if s is not None}), unit)
+
+
+def _within_budget(strips: dict[str, Strips]) -> dict[str, Strips]:
+    """Fewer and wider cards on the scalp where all together have too many vertices."""
+    counts = {name: 2 * len(s) * s.rows for name, s in strips.items()}
+    over = sum(counts.values()) - _MOST_VERTICES
+    if over > 0 and "hair" in strips:
+        share = max(0.2, 1 - over / counts["hair"])
+        strips = strips | {"hair": strips["hair"].coarser(share, strips["hair"].rows)}
+    return strips
 
 
 def _lips(head: Part, man: Body) -> Floats:
