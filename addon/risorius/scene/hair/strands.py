@@ -21,12 +21,13 @@ _TREE = "Risorius Strands"
 _PLACE = "strand_uv"  # attribute of the curves: where in the picture their colour is
 _DEEPER = 1.35  # exponent of a fibre's colour
 _ROWS = re.compile(r"rows=(\d+)")
-# Name of a mesh begins -> strands of a card, radius at the root in metres, share that is cut off.
+# Name of a mesh begins -> strands of a card, radius at the root and how far tips part, in metres,
+# and the share that is cut off at most.
 _KINDS = {
-    "hair": (24, 0.00006, 0.45),
-    "brows": (4, 0.00005, 0.35),
-    "beard": (9, 0.00006, 0.5),
-    "eyelashes": (3, 0.00006, 0.25),
+    "hair": (26, 0.00006, 0.0025, 0.45),
+    "brows": (4, 0.00005, 0.0004, 0.35),
+    "beard": (9, 0.00006, 0.0015, 0.5),
+    "eyelashes": (3, 0.00006, 0.0003, 0.25),
 }
 
 
@@ -168,7 +169,7 @@ class _Tree:
 
 def _tree(item: MeshObject, rows: int, kind: str, unit: float) -> NodeTree:
     """Nodes that turn the cards of a mesh into strands."""
-    each, radius, cut = _KINDS[kind]
+    each, radius, apart, cut = _KINDS[kind]
     tree = bpy.data.node_groups.new(_TREE, "GeometryNodeTree")
     for way in ("INPUT", "OUTPUT"):
         tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
@@ -194,9 +195,18 @@ def _tree(item: MeshObject, rows: int, kind: str, unit: float) -> NodeTree:
     across = g.math("ADD", across, g.math("MULTIPLY", lean, g.math("DIVIDE", row, rows)))
     place = g.node("GeometryNodeInputPosition").outputs[0]
     ends = [g.taken(mesh, place, i, "FLOAT_VECTOR") for i in (left, right)]
+    parted = g.node("FunctionNodeRandomValue", {"ID": strand, "Seed": 4}, data_type="FLOAT_VECTOR")
+    parted.inputs["Min"].default_value = [-apart / unit] * 3
+    parted.inputs["Max"].default_value = [apart / unit] * 3
+    aside = g.node("ShaderNodeVectorMath", {0: parted.outputs["Value"]}, operation="SCALE")
+    g.put(g.math("DIVIDE", row, rows - 1), aside.inputs["Scale"])
     moved = g.node(
         "GeometryNodeSetPosition",
-        {"Geometry": real.outputs[0], "Position": g.between(ends[0], ends[1], across)},
+        {
+            "Geometry": real.outputs[0],
+            "Position": g.between(ends[0], ends[1], across),
+            "Offset": aside.outputs[0],
+        },
     )
     uv = g.node("GeometryNodeInputNamedAttribute", data_type="FLOAT_VECTOR")
     uv.inputs["Name"].default_value = item.data.uv_layers[0].name if item.data.uv_layers else ""

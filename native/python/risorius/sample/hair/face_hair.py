@@ -148,7 +148,7 @@ def lashes(surface: Surface, lines: dict[str, Floats], person: Person) -> Strips
         fan = np.interp(t, [0, 0.35, 0.7, 1.0], [-0.55, 0.0, 0.55, 1.05])
         fan += random.normal(0, 0.08, count)
         grown = np.interp(t, [0, 0.25, 0.7, 0.92, 1.0], [0.45, 0.75, 1.0, 0.9, 0.6])
-        size = 1.12 if person.gender == "female" or person.age < 14 else 1.0
+        size = 1.08 if person.gender == "female" or person.age < 14 else 0.85
         length = long * surface.scale * size * grown * random.uniform(0.85, 1.1, count)
         if upper:
             first, last = np.radians(random.uniform(-6, 8, count)), np.radians(78.0)
