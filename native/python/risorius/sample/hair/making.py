@@ -18,7 +18,7 @@ from ..people import Person
 from ..polygons import Floats
 from ..source import BaseMesh
 from .binding import append_mesh, bind, card_mesh, head_of, holds
-from .controls import add_lash_controls
+from .controls import add_lash_controls, add_lid_turns
 from .face_hair import beard, brows, lash_curves, lashes
 from .scalp import STYLES
 from .strips import Strips
@@ -112,6 +112,7 @@ def add_hair(dna: Dna, grown: Grown) -> None:
         places = holds(head, shown, grown.unit)
         bind(dna, mesh, head, places, _LEAST_MM[name] / _MM, name == "hair")
         if name == "eyelashes":
+            add_lid_turns(dna, mesh, shown.rows, lod)
             add_lash_controls(dna, mesh, shown.rows, lod)
         append_mesh(dna, f"{name}_lod{lod}_mesh", mesh, [lod])
 
