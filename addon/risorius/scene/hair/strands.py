@@ -18,6 +18,7 @@ from ..character import runtime
 
 STRANDS = "risorius_strands"  # on a mesh of cards: the object that renders show instead
 _TREE = "Risorius Strands"
+_CARDS = "Cards"  # input of the modifier: the mesh that is followed
 _PLACE = "strand_uv"  # attribute of the curves: where in the picture their colour is
 _DEEPER = 1.35  # exponent of a fibre's colour
 _ROWS = re.compile(r"rows=(\d+)")
@@ -85,7 +86,9 @@ def _add(item: MeshObject, rows: int, kind: str, unit: float) -> None:
         collection.objects.link(thing)
     thing.parent = item
     modifier = thing.modifiers.new(_TREE, "NODES")
-    modifier.node_group = _tree(item, rows, kind, unit)
+    modifier.node_group = tree = _tree(item, rows, kind, unit)
+    # An input of the modifier, so that a copied face has strands that follow its own cards.
+    modifier[tree.interface.items_tree[_CARDS].identifier] = item
     thing.hide_viewport = thing.hide_select = True
     parts.point(item, STRANDS, thing)
     item.hide_render = True
@@ -174,7 +177,9 @@ def _tree(item: MeshObject, rows: int, kind: str, unit: float) -> NodeTree:
     for way in ("INPUT", "OUTPUT"):
         tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
     g = _Tree(tree)
-    source = g.node("GeometryNodeObjectInfo", {"Object": item}, transform_space="RELATIVE")
+    tree.interface.new_socket(_CARDS, in_out="INPUT", socket_type="NodeSocketObject")
+    given = g.node("NodeGroupInput").outputs[_CARDS]
+    source = g.node("GeometryNodeObjectInfo", {"Object": given}, transform_space="RELATIVE")
     mesh = source.outputs["Geometry"]
     count = each * len(item.data.vertices) // (2 * rows)
     line = g.node("GeometryNodeCurvePrimitiveLine")
@@ -208,35 +213,63 @@ def _tree(item: MeshObject, rows: int, kind: str, unit: float) -> NodeTree:
             "Offset": aside.outputs[0],
         },
     )
+    stored = _store_place(g, item, mesh, moved.outputs[0], (left, right, across))
+    finished = _finish(g, stored, 2 * rows + 2, 1.0 - cut, radius / unit)
+    painted = g.node("GeometryNodeSetMaterial", {"Geometry": finished, "Material": _material(item)})
+    out = g.node("NodeGroupOutput")
+    tree.links.new(painted.outputs[0], out.inputs[0])
+    return tree
+
+
+def _store_place(
+    g: _Tree, item: MeshObject, mesh: Socket, curves: Socket, where: tuple[Socket, Socket, Socket]
+) -> Socket:
+    """Curves that know where in the cards' picture each point is.
+
+    Args:
+        g: the tree.
+        item: the cards.
+        mesh: the cards as they are deformed.
+        curves: the strands.
+        where: numbers of the vertices left and right of a point, and where it is between them.
+    """
+    left, right, across = where
     uv = g.node("GeometryNodeInputNamedAttribute", data_type="FLOAT_VECTOR")
     uv.inputs["Name"].default_value = item.data.uv_layers[0].name if item.data.uv_layers else ""
     value = next(s for s in uv.outputs if s.enabled)
     ends = [g.taken(mesh, value, i, "FLOAT_VECTOR") for i in (left, right)]
     stored = g.node(
         "GeometryNodeStoreNamedAttribute",
-        {"Geometry": moved.outputs[0], "Name": _PLACE},
+        {"Geometry": curves, "Name": _PLACE},
         data_type="FLOAT_VECTOR",
         domain="POINT",
     )
     spot = g.between(ends[0], ends[1], across)
     g.put(spot, next(s for s in stored.inputs if s.name == "Value" and s.enabled))
+    return stored.outputs[0]
+
+
+def _finish(g: _Tree, curves: Socket, points: int, least: float, radius: float) -> Socket:
+    """Strands as smooth curves of many lengths that taper to their tips.
+
+    Args:
+        g: the tree.
+        curves: the strands.
+        points: of each.
+        least: of the length, what a strand has at least.
+        radius: at the root, in Blender units.
+    """
     round_ = g.node("GeometryNodeCurveSplineType", spline_type="CATMULL_ROM")
-    g.put(stored.outputs[0], round_.inputs["Curve"])
-    finer = g.node("GeometryNodeResampleCurve", {"Curve": round_.outputs[0], "Count": 2 * rows + 2})
+    g.put(curves, round_.inputs["Curve"])
+    finer = g.node("GeometryNodeResampleCurve", {"Curve": round_.outputs[0], "Count": points})
     number = g.node("GeometryNodeInputIndex").outputs[0]
-    whole = g.random(1.0 - cut, 1.0, 3, number)
+    whole = g.random(least, 1.0, 3, number)
     trimmed = g.node("GeometryNodeTrimCurve", {"Curve": finer.outputs[0]}, mode="FACTOR")
     g.put(whole, next(s for s in trimmed.inputs if s.name == "End" and s.enabled))
     along = g.node("GeometryNodeSplineParameter").outputs["Factor"]
-    thick = g.math("MULTIPLY", g.math("SUBTRACT", 1.0, g.math("POWER", along, 3.0)), radius / unit)
+    thick = g.math("MULTIPLY", g.math("SUBTRACT", 1.0, g.math("POWER", along, 3.0)), radius)
     sized = g.node("GeometryNodeSetCurveRadius", {"Curve": trimmed.outputs[0], "Radius": thick})
-    painted = g.node(
-        "GeometryNodeSetMaterial",
-        {"Geometry": sized.outputs[0], "Material": _material(item)},
-    )
-    out = g.node("NodeGroupOutput")
-    tree.links.new(painted.outputs[0], out.inputs[0])
-    return tree
+    return sized.outputs[0]
 
 
 def _material(item: MeshObject) -> bpy.types.Material:
