@@ -131,11 +131,11 @@ WHOLE = [name for name in HANDS if "express" in name or "asset" in name]
 
 # What moves no slider and no control bone, or keeps its own keys, by the reason.
 OTHERS = {
-    "files, faces and what is shown of them": "add_character attach_body bake bake_physics "
-    "bring_back describe detach_body export_animation export_dna export_web import_dna "
-    "install_speech make_override make_rig mix_add mix_add_scene mix_preview mix_remove mix_write "
-    "reload replace_dna separate self_test set_lod set_lod_by_distance set_shape_mode "
-    "test_channel unbake",
+    "files, faces and what is shown of them": "add_character add_studio attach_body bake "
+    "bake_physics bring_back describe detach_body export_animation export_dna export_web "
+    "import_dna install_speech make_override make_rig mix_add mix_add_scene mix_preview "
+    "mix_remove mix_write reload replace_dna separate self_test set_lod set_lod_by_distance "
+    "set_shape_mode test_channel unbake",
     "makes an action or keys of its own": "import_animation import_arkit_rig speak blink "
     "curves_from_mesh",
     "what the eyes' target hangs on": "gaze_target",

@@ -93,7 +93,7 @@ def look_at(collection, name):
     share, near = LOOKS[name]
     low, high = stage.bounds(collection)
     camera = bpy.context.scene.camera
-    camera.data.lens = 85 * near
+    camera.data.lens = 100 * near
     middle = (low + high) / 2
     middle.z = low.z + share * (high.z - low.z)
     stage.aim(camera, middle)

@@ -21,6 +21,7 @@ import install_extension  # noqa: E402
 import scene as stage  # noqa: E402
 
 ENDINGS = {"GLTF": "glb", "FBX": "fbx", "USD": "usdc", "ALEMBIC": "abc"}
+STUDIO = "studio.blend"  # the original's, in which the others stand too
 FRAMES = (37, 51)  # a smile; an open mouth with the teeth in it
 
 
@@ -50,7 +51,10 @@ def original(args):
         )
         if done != {"FINISHED"}:
             raise RuntimeError(f"the export gave {done}")
-    pictures(args, controls.users_collection[0], "ORIGINAL")
+    bpy.context.scene.frame_set(FRAMES[0])
+    studio = stage.build(controls.users_collection[0])
+    bpy.data.libraries.write(str(args.out / STUDIO), {studio})
+    pictures(args, "ORIGINAL")
 
 
 def read(args):
@@ -66,7 +70,14 @@ def read(args):
     else:
         bpy.ops.wm.alembic_import(filepath=str(path), as_background_job=False)
         clothe(path.with_name(path.stem + "_textures"))
-    pictures(args, bpy.context.scene.collection, args.read)
+    with bpy.data.libraries.load(str(args.out / STUDIO)) as (there, wanted):
+        wanted.collections = there.collections
+    scene = bpy.context.scene
+    scene.collection.children.link(wanted.collections[0])
+    scene.camera = next(o for o in wanted.collections[0].objects if o.type == "CAMERA")
+    stage.darken(scene)
+    stage.render_settings(scene)
+    pictures(args, args.read)
 
 
 def clothe(folder):
@@ -88,10 +99,8 @@ def clothe(folder):
             tree.links.new(node.outputs["Color"], shader.inputs["Roughness"])
 
 
-def pictures(args, collection, name):
+def pictures(args, name):
     scene = bpy.context.scene
-    scene.frame_set(FRAMES[0])
-    stage.build(collection)
     scene.render.resolution_x = scene.render.resolution_y = args.size
     for frame in FRAMES:
         scene.frame_set(frame)

@@ -106,16 +106,18 @@ def stand_side_by_side(man, woman):
 
 
 def build_stage(man, woman):
+    """The man's studio, moved to the middle between the two, from farther away."""
     collection = man.users_collection[0]
-    stage.build(collection)
+    studio = stage.build(collection)
+    for thing in studio.objects:
+        thing.location.x += (woman.location.x - man.location.x) / 2
     low, high = stage.bounds(collection)
     unit = high.z - low.z
     camera = bpy.context.scene.camera
     middle = (low + high) / 2
     middle.x = (man.location.x + woman.location.x) / 2
     middle.z = low.z + 0.58 * unit
-    camera.data.lens = 70
-    camera.location = middle + Vector((0.0, -3.05, 0.04)) * unit
+    camera.location = middle + Vector((0.0, -5.4, 0.08)) * unit
     stage.aim(camera, middle)
     add_flash(middle, unit)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The stage of the demo: a portrait lens, soft lights, a quiet background, render settings."""
+"""The stage of the demo: the add-on's studio in a dark room, and how it is rendered."""
 
 from __future__ import annotations
 
@@ -76,44 +76,25 @@ def bounds(collection):
 
 
 def build(collection):
-    """Light and frame the character; everything scales with the head's height."""
+    """The add-on's studio around a collection's face, its camera the scene's; the studio."""
     scene = bpy.context.scene
-    low, high = bounds(collection)
-    unit = high.z - low.z
-    middle = Vector(((low.x + high.x) / 2, (low.y + high.y) / 2, low.z + 0.55 * unit))
-    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    camera.data.lens = 85
-    camera.location = middle + Vector((0.36, -2.62, 0.05)) * unit
-    aim(camera, middle)
-    scene.collection.objects.link(camera)
-    scene.camera = camera
-    power = unit * unit * 100
-    add_light(
-        "Key",
-        middle + Vector((-1.9, -2.2, 1.4)) * unit,
-        middle,
-        1.15 * power,
-        1.6 * unit,
-        (1.0, 0.93, 0.86),
+    bpy.context.view_layer.objects.active = next(
+        thing for thing in collection.all_objects if thing.name.endswith("_controls")
     )
-    add_light(
-        "Fill",
-        middle + Vector((2.4, -1.8, 0.1)) * unit,
-        middle,
-        0.42 * power,
-        2.4 * unit,
-        (0.85, 0.92, 1.0),
-    )
-    add_light(
-        "Rim",
-        middle + Vector((1.5, 2.0, 1.4)) * unit,
-        middle,
-        0.5 * power,
-        0.9 * unit,
-        (0.9, 0.95, 1.0),
-    )
-    background(scene)
+    before = set(bpy.data.collections)
+    if bpy.ops.risorius.add_studio(use_scene_camera=True) != {"FINISHED"}:
+        raise RuntimeError("the studio was not added")
+    darken(scene)
     render_settings(scene)
+    return next(made for made in bpy.data.collections if made not in before)
+
+
+def darken(scene):
+    """A room whose walls give back hardly any light."""
+    world = bpy.data.worlds.new("Stage")
+    scene.world = world
+    world.use_nodes = True
+    world.node_tree.nodes["Background"].inputs["Color"].default_value = (0.012, 0.013, 0.015, 1)
 
 
 def background(scene):
@@ -150,7 +131,7 @@ def render_settings(scene):
     scene.render.use_persistent_data = True
     scene.render.resolution_percentage = 100
     scene.render.image_settings.file_format = "PNG"
-    scene.view_settings.view_transform = "Filmic" if "Filmic" in _transforms(scene) else "Standard"
+    _develop(scene.view_settings)
 
 
 def _denoise(cycles):
@@ -166,6 +147,17 @@ def _denoise(cycles):
         cycles.denoising_quality = "BALANCED"
 
 
-def _transforms(scene):
-    prop = scene.view_settings.bl_rna.properties["view_transform"]
-    return {item.identifier for item in prop.enum_items}
+def _develop(view):
+    """The contrast of a print; Blenders with a small colour configuration know some of it only."""
+    _choose(view, "view_transform", ("AgX", "Filmic", "Standard"))
+    _choose(view, "look", ("AgX - Medium High Contrast", "Medium High Contrast", "None"))
+
+
+def _choose(owner, name, wanted):
+    """The first of the choices that there is; the list of such a property is not in its type."""
+    for choice in wanted:
+        try:
+            setattr(owner, name, choice)
+        except TypeError:
+            continue
+        return

@@ -111,7 +111,7 @@ def pose(rig, values) -> None:
 
 
 class Stage:
-    """The demo's lights, a small one that eyes reflect, and three camera places."""
+    """The demo's lights and three camera places."""
 
     def __init__(self, rig):
         import bpy
@@ -124,23 +124,22 @@ class Stage:
         self.demo, self.vector, self.scene = demo, Vector, bpy.context.scene
         self.camera = self.scene.camera
         self.first = (self.camera.location.copy(), self.camera.rotation_euler.copy())
+        self.lens = self.camera.data.lens
         eye = next(o for o in bpy.data.objects if "eyeLeft" in o.name)
         corners = [eye.matrix_world @ Vector(c) for c in eye.bound_box]
         self.eye = sum(corners, Vector()) / 8
         self.unit = 2 * abs(self.eye.x)
-        place = self.eye + Vector((-1.8, -9.0, 0.9)) * self.unit
-        demo.add_light("Catch", place, self.eye, 0.35, 0.35 * self.unit, (1, 1, 1))
 
     def look(self, kind):
         """Place the camera."""
         camera, vector = self.camera, self.vector
         camera.location, camera.rotation_euler = self.first
-        camera.data.lens = 120
+        camera.data.lens = self.lens
         if kind == "face":
             return
         middle = vector((0.0, self.eye.y, self.eye.z + 0.25 * self.unit))
-        aim, away, lens = (self.eye, (0.3, -4.2, 0.1), 150) if kind == "eye" else (
-            middle, (0.8, -10.0, 0.3), 90)  # fmt: skip
+        aim, away, lens = (self.eye, (0.3, -4.2, 0.1), 100) if kind == "eye" else (
+            middle, (0.8, -10.0, 0.3), 60)  # fmt: skip
         camera.location = aim + vector(away) * self.unit
         camera.data.lens = lens
         self.demo.aim(camera, aim)

@@ -38,6 +38,7 @@ _KINDS = (
     ("eyes", ("eye",)),
     ("teeth", ("teeth", "tooth")),
     ("tongue", ("tongue",)),
+    ("cloth", ("shirt", "cloth", "garment")),
 )
 
 
@@ -72,7 +73,7 @@ class MeshPlan:
         index: number in the DNA.
         label: the name after `<character>_`.
         base: the name without its LOD: meshes with one base share a material.
-        kind: skin, eyes, teeth, tongue, lashes, hair, wet or gum.
+        kind: skin, eyes, teeth, tongue, lashes, hair, wet, gum or cloth.
         lods: levels of detail that show it.
         positions: float32[V, 3].
         face_starts: int32[F], first corner of each face.

@@ -27,6 +27,8 @@ _SPOTS: dict[str, tuple[tuple[float, float, float, float], ...]] = {
     "chin": ((0.0, -1.45, 0.34, 0.22),),
     "neck": ((0.0, -2.6, 1.3, 0.75),),
 }
+_EYES_APART = 6.2  # centimetres
+_AT_ONCE = 2048  # points
 _NEVER_BEHIND = {"neck"}  # areas that reach farther back than the eyes
 
 
@@ -119,6 +121,29 @@ def fold_coordinates(points: Points, frame: FaceFrame) -> Float32:
     local = face_coordinates(points, frame)
     x, z = local[:, 0], local[:, 2]
     return np.stack([x, z, np.hypot(x, (z + 1.0) * 0.8)], axis=1).astype(np.float32)
+
+
+def border_share(points: Points, border: NDArray[np.integer], frame: FaceFrame) -> Float32:
+    """float32[V]: 1 within a centimetre of an open border, 0 from two and a half on.
+
+    Rims of lids, lips and nostrils count as none: light may go through them.
+
+    Args:
+        points: float[V, 3], in the space of the frame.
+        border: int[B], vertices on open borders.
+        frame: where the face is, and how large.
+    """
+    local = face_coordinates(points, frame)
+    ahead = np.abs(local[border])
+    rims = (ahead[:, 0] < 1.3) & (ahead[:, 1] < 1.2) & (local[border, 2] > -1.7)
+    ends = np.asarray(points, np.float64)[border[~rims]]
+    centimetre = frame.unit / _EYES_APART
+    away = np.full(len(points), np.inf)
+    for begin in range(0, len(points) if len(ends) else 0, _AT_ONCE):
+        some = np.asarray(points[begin : begin + _AT_ONCE], np.float64)
+        gaps = np.linalg.norm(some[:, None] - ends[None], axis=2)
+        away[begin : begin + _AT_ONCE] = gaps.min(axis=1)
+    return _smooth((2.5 - away / centimetre) / 1.5).astype(np.float32)
 
 
 def left_share(points: Points, frame: FaceFrame) -> Float32:

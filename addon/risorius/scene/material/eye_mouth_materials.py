@@ -19,7 +19,9 @@ _LIMBUS = (0.022, 0.022, 0.02)
 _ENAMEL, _ENAMEL_ROOT, _GAP = (0.74, 0.66, 0.53), (0.62, 0.47, 0.29), (0.26, 0.15, 0.09)
 _GUM, _GUM_DARK = (0.44, 0.14, 0.12), (0.28, 0.065, 0.06)
 _TONGUE, _TONGUE_DARK = (0.45, 0.15, 0.14), (0.30, 0.065, 0.065)
+_CARUNCLE, _CARUNCLE_DARK = (0.58, 0.27, 0.23), (0.44, 0.15, 0.13)
 _LASH, _LASH_TIP = (0.010, 0.006, 0.004), (0.045, 0.026, 0.016)
+_CORNEA_IOR = 1.376
 _COARSE = 1500  # vertices: a mesh of teeth with fewer has no single teeth
 
 
@@ -52,6 +54,9 @@ def eyes(graph: Graph, look: Look) -> None:
         graph: of the material, with its shader and its output.
         look: sizes, textures and areas of the mesh.
     """
+    if look.cornea and look.image("color") is not None:
+        _ball(graph, look)
+        return
     x, z, front = graph.split(graph.attribute(EYES))
     flat = graph.node("CombineXYZ")
     for value, socket in zip((x, z), flat.inputs, strict=False):
@@ -73,6 +78,31 @@ def eyes(graph: Graph, look: Look) -> None:
     if not look.simple:
         relief = graph.bump(height, look.unit * 0.045, _textured_normal(graph, look), 0.55)
         graph.set(Normal=relief, Subsurface_Weight=0.25, Subsurface_Scale=look.unit * 0.02)
+        graph.set(Subsurface_Radius=(1.0, 0.55, 0.4))
+
+
+def _ball(graph: Graph, look: Look) -> None:
+    """An eye under a cornea of its own: the iris is dry and has its relief, the sclera is wet.
+
+    Args:
+        graph: of the material, with its shader and its output.
+        look: has a picture of the colour.
+    """
+    x, z, front = graph.split(graph.attribute(EYES))
+    flat = graph.math("SQRT", graph.math("MULTIPLY_ADD", x, x, graph.math("MULTIPLY", z, z)))
+    away = graph.math("MULTIPLY_ADD", graph.math("SUBTRACT", 1.0, front), 2.0, flat)
+    outside = graph.ramp(away, (0.40, (0.0,) * 3), (0.45, (1.0,) * 3))
+    color = graph.image(look.image("color"), label="Colour").outputs["Color"]
+    graph.set(Base_Color=color, Specular_Ior_Level=0.3)
+    graph.set(Roughness=graph.ramp(away, (0.40, (0.6,) * 3), (0.45, (0.32,) * 3)))
+    graph.set(Coat_Weight=outside, Coat_Roughness=_film(graph, look, 0.03, 0.09), Coat_Ior=1.38)
+    if not look.simple:
+        bumpy = graph.noise(graph.rest_points(look.extent), 34.0 / look.unit, detail=3.0)
+        fibres = graph.math("MULTIPLY", graph.split_color(color)[1], 3.0)
+        height = graph.mix(outside, _gray(graph, fibres), _gray(graph, bumpy))
+        relief = graph.bump(height, look.unit * 0.004, _textured_normal(graph, look), 0.5)
+        weight = graph.math("MULTIPLY", outside, 0.3)
+        graph.set(Normal=relief, Subsurface_Weight=weight, Subsurface_Scale=look.unit * 0.02)
         graph.set(Subsurface_Radius=(1.0, 0.55, 0.4))
 
 
@@ -169,7 +199,9 @@ def gum(graph: Graph, look: Look) -> None:
         graph: of the material, with its shader and its output.
         look: sizes, textures and areas of the mesh.
     """
-    _flesh(graph, look, (_GUM_DARK, _GUM), 26.0)
+    in_eye = any(word in look.base.lower() for word in ("cartilage", "caruncle"))
+    tones = (_CARUNCLE_DARK, _CARUNCLE) if in_eye else (_GUM_DARK, _GUM)
+    _flesh(graph, look, tones, 60.0 if in_eye else 26.0)
 
 
 def _flesh(graph: Graph, look: Look, tones: tuple[Color, Color], grain: float) -> None:
@@ -227,7 +259,8 @@ def wet(graph: Graph, look: Look) -> None:
     """A film one looks through: clear, with the reflection that water has at each angle.
 
     Transparent instead of refracting, because a refracting shell keeps light from the eye under
-    it in both engines; what bends here is only the reflection.
+    it in both engines; what bends here is only the reflection. A cornea refracts in Cycles too,
+    but for the camera alone: light and shadows pass.
 
     Args:
         graph: of the material, with its shader and its output.
@@ -235,27 +268,48 @@ def wet(graph: Graph, look: Look) -> None:
     """
     points = graph.rest_points(look.extent)
     ripples = graph.noise(points, 18.0 / look.unit, detail=3.0)
-    normal = graph.bump(ripples, look.unit * 0.006, None, 0.25)
+    base = look.base.lower()
+    cornea = "cornea" in base
+    still = cornea or "eyeedge" in base  # too narrow for ripples: they would break its one shine
+    normal = None if still else graph.bump(ripples, look.unit * 0.006, None, 0.25)
     gloss = graph.node("BsdfGlossy")
     gloss.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
-    graph.put(_film(graph, look, 0.02, 0.10), gloss.inputs["Roughness"])
+    rough = (0.008, 0.02) if still else (0.02, 0.10)
+    graph.put(_film(graph, look, *rough), gloss.inputs["Roughness"])
     graph.put(normal, gloss.inputs["Normal"])
     fresnel = graph.node("Fresnel")
-    fresnel.inputs["IOR"].default_value = 1.336
+    fresnel.inputs["IOR"].default_value = _CORNEA_IOR if cornea else 1.336
     graph.put(normal, fresnel.inputs["Normal"])
     # From behind there is no air above the film, and its far side must not mirror.
     facing = graph.math("SUBTRACT", 1.0, graph.node("NewGeometry").outputs["Backfacing"])
     amount = graph.math("MULTIPLY", fresnel.outputs[0], facing)
     clear = graph.node("BsdfTransparent")
-    tint = graph.ramp(ripples, (0.3, (0.985, 0.975, 0.97)), (0.7, (1.0, 1.0, 1.0)))
-    graph.put(tint, clear.inputs["Color"])
-    both = graph.node("MixShader")
-    graph.put(amount, both.inputs[0])
-    graph.put(clear.outputs[0], both.inputs[1])
-    graph.put(gloss.outputs[0], both.inputs[2])
-    graph.put(both.outputs[0], graph.output.inputs["Surface"])
+    if not still:
+        tint = graph.ramp(ripples, (0.3, (0.985, 0.975, 0.97)), (0.7, (1.0, 1.0, 1.0)))
+        graph.put(tint, clear.inputs["Color"])
+    under = _mixed(graph, amount, clear.outputs[0], gloss.outputs[0])
+    graph.put(under, graph.output.inputs["Surface"])
+    if cornea:
+        bent = graph.node("BsdfRefraction")
+        bent.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
+        bent.inputs["Roughness"].default_value = 0.0
+        bent.inputs["IOR"].default_value = _CORNEA_IOR
+        seen = graph.math("MULTIPLY", graph.node("LightPath").outputs["Is Camera Ray"], facing)
+        through = _mixed(graph, seen, clear.outputs[0], bent.outputs[0])
+        cycles = graph.node("OutputMaterial")
+        cycles.target = "CYCLES"
+        graph.put(_mixed(graph, amount, through, gloss.outputs[0]), cycles.inputs["Surface"])
     graph.tree.nodes.remove(graph.shader)
     _transparent(graph.material, "BLENDED")
+
+
+def _mixed(graph: Graph, amount: Value, one: Socket, other: Socket) -> Socket:
+    """A shader that has an amount of another."""
+    both = graph.node("MixShader")
+    graph.put(amount, both.inputs[0])
+    graph.put(one, both.inputs[1])
+    graph.put(other, both.inputs[2])
+    return both.outputs[0]
 
 
 def _transparent(material: bpy.types.Material, method: str) -> None:

@@ -27,8 +27,10 @@ class Look:
         vertices: of the finest mesh.
         has_uvs: whether it has a UV map.
         simple: leave out subsurface, relief and maps.
+        cornea: whether the face has a mesh of corneas over its eyes.
         uses: what the animated maps do.
         areas: areas of a face that this mesh has.
+        border: whether the mesh has an open border away from the face.
         found: texture_search.TexturePlan.
         images: loads them.
         atlas, places: image with the wrinkle masks, and where in it each region's is.
@@ -47,6 +49,8 @@ class Look:
     areas: set[str]
     found: texture_search.TexturePlan
     images: image_loading.Images
+    cornea: bool = False
+    border: bool = False
     atlas: bpy.types.Image | None = None
     places: dict[str, tuple[int, int, int, int]] = field(default_factory=dict)
     offsets: dict[str, bool] = field(default_factory=dict)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...logic.character import plans
 from ...logic.material import animated_maps, skin_folds, texture_search
 from ..base.blender_types import ArmatureObject, Attribute, MeshObject
-from . import eye_mouth_materials, hair_material, nodes, skin_material
+from . import cloth_material, eye_mouth_materials, hair_material, nodes, skin_material
 from .image_loading import Images
 from .look import Look
 from .nodes import Graph
@@ -26,6 +26,7 @@ _VIEW_COLORS = {
     "gum": (0.50, 0.17, 0.15, 1.0),
     "lashes": (0.03, 0.02, 0.015, 0.3),
     "wet": (1.0, 1.0, 1.0, 0.0),
+    "cloth": (0.10, 0.11, 0.13, 1.0),
     "hair": (0.05, 0.035, 0.025, 0.5),
 }
 _IRIS_COLOR = (0.035, 0.02, 0.012, 1.0)
@@ -63,6 +64,7 @@ def build_materials(
         areas = _add_attributes(item.data, mesh, frame)
         if mesh.base not in by_base:
             look = _look(plan, mesh, rig, frame, uses, areas, found, images, simple)
+            look.border = skin_material.BORDER in item.data.attributes
             by_base[mesh.base] = _build(plan, look, made)
         for material in by_base[mesh.base]:
             item.data.materials.append(material)
@@ -97,6 +99,7 @@ def _look(
         areas=areas,
         found=found,
         images=images,
+        cornea=any("cornea" in m.base.lower() for m in plan.meshes),
     )
     if mesh.kind == "skin" and areas and found.masks and not simple:
         wanted = {u.region for u in uses} & set(found.masks)
@@ -115,6 +118,8 @@ def _build(
     graph = nodes.Graph(material)
     if look.kind == "skin":
         skin_material.Skin(graph, look).build()
+    elif look.kind == "cloth":
+        cloth_material.build(graph, look)
     elif look.kind == "hair":
         hair_material.build(graph, look)
     else:
@@ -192,6 +197,7 @@ def _add_attributes(
         unit = frame.unit if frame else float(np.ptp(plan.positions[:, 0]))
         _add(mesh, eye_mouth_materials.TEETH, _tooth_coordinates(plan.positions, unit))
     elif plan.kind == "skin" and frame is not None:
+        _add_border(mesh, plan.positions, frame)
         return _add_areas(mesh, plan.positions, frame)
     return set()
 
@@ -201,6 +207,22 @@ def _add(
 ) -> None:
     attribute: Attribute = mesh.attributes.new(name, "FLOAT_VECTOR", "POINT")
     attribute.data.foreach_set("vector", np.ascontiguousarray(values, np.float32).ravel())
+
+
+def _add_border(
+    mesh: bpy.types.Mesh, points: NDArray[np.float32], frame: skin_folds.FaceFrame
+) -> None:
+    """Write how near an open border is; nothing where there is none away from the face."""
+    edges = np.empty(2 * len(mesh.edges), np.int32)
+    mesh.edges.foreach_get("vertices", edges)
+    used = np.empty(len(mesh.loops), np.int32)
+    mesh.loops.foreach_get("edge_index", used)
+    faces = np.bincount(used, minlength=len(mesh.edges))
+    open_ones = np.unique(edges.reshape(-1, 2)[faces == 1])
+    near = skin_folds.border_share(points, open_ones, frame)
+    if near.any():
+        attribute: Attribute = mesh.attributes.new(skin_material.BORDER, "FLOAT", "POINT")
+        attribute.data.foreach_set("value", near)
 
 
 def _add_areas(

@@ -185,6 +185,12 @@ class Graph:
         node.attribute_name = name
         return node.outputs["Vector"]
 
+    def attribute_number(self, name: str) -> Socket:
+        """A mesh attribute of one number; 0 on meshes that have none."""
+        node = self.node("Attribute", name)
+        node.attribute_name = name
+        return node.outputs["Fac"]
+
     def split(self, vector: Value) -> tuple[Socket, Socket, Socket]:
         """Three numbers of a vector."""
         node = self.node("SeparateXYZ")

@@ -16,6 +16,7 @@ from .nodes import Graph, Value
 MAP_PREFIX = "risorius_map_"
 AREAS = tuple(f"risorius_areas_{i}" for i in (1, 2, 3))  # mesh attributes: three areas each
 FOLDS = "risorius_folds"  # mesh attribute: x, height, distance from the mouth
+BORDER = "risorius_border"  # mesh attribute: 1 beside an open border, 0 on the rest
 _FRAME = "Animated maps"
 _TONE, _DARK, _RED = (0.60, 0.35, 0.25), (0.50, 0.26, 0.18), (0.54, 0.22, 0.16)
 _FLUSH = (1.0, 0.42, 0.38)
@@ -24,6 +25,12 @@ _CREASE = (0.66, 0.49, 0.45)
 _PITCH = {"level": 19.0, "upright": 24.0, "rays": 20.0, "arc": 6.0}
 _FLUSH_SHARE = 0.22  # of an area's map: without a painted mask a blush must stay faint
 _PORE_DEPTH = 0.032
+_GRAIN_DEPTH = 0.006
+# Light goes so far in light skin, in distances of the eyes; in dark skin less.
+_SUBSURFACE, _DARKEST = 0.026, 0.4
+_RADIUS = (1.0, 0.36, 0.2)
+_IOR = 1.4
+_OILY, _OIL_ROUGHNESS = 0.22, 0.55  # the second lobe, and how rough it is beside the first
 _FOLD_DEPTH = {"level": 0.45, "upright": 0.45, "rays": 0.35, "arc": 1.8, "dimples": 0.6}
 
 Member = tuple[str, Value]  # side of the face, value of the map
@@ -66,19 +73,30 @@ class Skin:
     def build(self) -> None:
         """Fill the tree."""
         graph, look = self.graph, self.look
-        graph.set(
-            Subsurface_Weight=0.0 if look.simple else 1.0,
-            Subsurface_Radius=(1.0, 0.36, 0.2),
-            Subsurface_Scale=look.unit * 0.045,
-            Specular_Ior_Level=0.42,
-        )
+        graph.set(Subsurface_Weight=0.0, Ior=_IOR)
         if not look.simple:
             self._read_maps()
-        color = self._color()
-        graph.set(Base_Color=color, Roughness=self._roughness())
+        color, roughness = self._color(), self._roughness()
+        graph.set(Base_Color=color, Roughness=roughness)
         if not look.simple:
             self._specular()
-            graph.set(Normal=self._normal())
+            self._subsurface(color)
+            normal = self._normal()
+            oily = graph.math("MULTIPLY", roughness, _OIL_ROUGHNESS)
+            graph.set(Normal=normal, Coat_Normal=normal, Coat_Roughness=oily)
+            graph.set(Coat_Weight=_OILY, Coat_Ior=_IOR)
+
+    def _subsurface(self, color: Value) -> None:
+        """Less far in dark skin, and none beside an open border, where light would fall out."""
+        graph, look = self.graph, self.look
+        light = graph.node("RGBToBW")
+        graph.put(color, light.inputs[0])
+        share = graph.math("MULTIPLY_ADD", light.outputs[0], 1.8, _DARKEST)
+        far = graph.math("MULTIPLY", graph.math("MINIMUM", share, 1.0), look.unit * _SUBSURFACE)
+        weight: Value = 1.0
+        if look.border:
+            weight = graph.math("SUBTRACT", 1.0, graph.attribute_number(BORDER), clamp=True)
+        graph.set(Subsurface_Weight=weight, Subsurface_Radius=_RADIUS, Subsurface_Scale=far)
 
     def _areas(self) -> dict[str, Socket]:
         """Area -> socket, and `left`; empty for a mesh that has no face."""
@@ -291,6 +309,9 @@ class Skin:
         grain = graph.noise(self.points, 34.0 / look.unit, detail=2.0, roughness=0.65)
         deep = _PORE_DEPTH * (0.35 if normal else 1.0)  # a texture has pores of its own
         heights = [graph.math("MULTIPLY", graph.math("ADD", pores, grain), deep)]
+        # Seen from near, where pores of a texture are soft spots.
+        finest = graph.noise(self.points, 260.0 / look.unit, detail=1.0)
+        heights.append(graph.math("MULTIPLY", finest, _GRAIN_DEPTH))
         for kind, ridge in self._ridges().items():
             height = graph.math("MULTIPLY", self.bumps[kind], _FOLD_DEPTH[kind])
             heights.append(graph.math("MULTIPLY", ridge, height))

@@ -1,6 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Between faces and DNA files: import, the sample face, replace, reload, export, and new rigs."""
+"""Between faces and DNA files: import, sample faces, replace, reload, export, rigs, studios."""
 
-from . import import_operators, operators, rig_operators
+from . import import_operators, operators, rig_operators, studio_operators
 
-CLASSES = (*import_operators.CLASSES, *operators.CLASSES, *rig_operators.CLASSES)
+CLASSES = (
+    *import_operators.CLASSES,
+    *operators.CLASSES,
+    *rig_operators.CLASSES,
+    *studio_operators.CLASSES,
+)

@@ -13,11 +13,13 @@ from ...scene.base import parts
 from ...scene.character import build, rig_placement
 from ...scene.file import sample_face
 from ...scene.frame import evaluate
+from ...scene.studio import build_studio
 from .. import words
 from ..beside import RunsBeside
 from ..blender_types import Context, FileHandler, ImportHelper, Menu, Operator, Result
 from ..common import MODES, explain, shown_progress, usable
 from . import framing
+from .studio_operators import SCENE_CAMERA
 
 FRAME_VIEW = bpy.props.BoolProperty(
     name="Frame the View",
@@ -207,10 +209,27 @@ class RISORIUS_OT_add_character(RunsBeside, Operator):
         name="Shapes", description="How blend shapes are kept", items=MODES, default="AUTO"
     )
     use_frame_view: FRAME_VIEW
+    use_studio: bpy.props.BoolProperty(
+        name="With Studio",
+        description="Also add a portrait camera, three lights and a backdrop around the face",
+        default=False,
+        options={"SKIP_SAVE"},
+    )
+    use_scene_camera: SCENE_CAMERA
 
     @classmethod
     def poll(cls, context: Context) -> bool:
         return usable(cls)
+
+    def draw(self, context: Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        for name in ("person", "shape_mode", "use_frame_view", "use_studio"):
+            layout.prop(self, name)
+        row = layout.row()
+        row.active = self.use_studio
+        row.prop(self, "use_scene_camera")
 
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:
         self.wait_beside()
@@ -240,7 +259,11 @@ class RISORIUS_OT_add_character(RunsBeside, Operator):
 
     def _import(self, context: Context) -> Result:
         options = build.BuildOptions(mode=self.shape_mode)
-        return import_character(self, context, self._path, options, self.use_frame_view)
+        done = import_character(self, context, self._path, options, self.use_frame_view)
+        rig = parts.active_rig(context)
+        if done == {"FINISHED"} and self.use_studio and rig is not None:
+            build_studio.add(context, rig, self.use_scene_camera)
+        return done
 
     def finish(self, context: Context) -> Result:
         """Import what was built."""
@@ -273,11 +296,47 @@ def draw_import(self: Menu, _context: Context) -> None:
     self.layout.operator(RISORIUS_OT_import_dna.bl_idname, text="MetaHuman DNA (.dna)")
 
 
+class RISORIUS_MT_sample(Menu):
+    """Who is added, and with what."""
+
+    bl_idname = "RISORIUS_MT_sample"
+    bl_label = "Face"
+
+    def draw(self, context: Context) -> None:
+        layout = self.layout
+        layout.operator_context = "INVOKE_REGION_WIN"
+        layout.operator_enum(RISORIUS_OT_add_character.bl_idname, "person")
+        layout.separator()
+        layout.menu(RISORIUS_MT_sample_studio.bl_idname, icon="CAMERA_DATA")
+        layout.operator("risorius.add_studio", text="Studio for This Face", icon="LIGHT_AREA")
+
+
+class RISORIUS_MT_sample_studio(Menu):
+    """Who is added with camera, lights and backdrop."""
+
+    bl_idname = "RISORIUS_MT_sample_studio"
+    bl_label = "With Studio"
+
+    def draw(self, context: Context) -> None:
+        layout = self.layout
+        layout.operator_context = "INVOKE_REGION_WIN"
+        kinds = RISORIUS_OT_add_character.bl_rna.properties["person"]
+        assert isinstance(kinds, bpy.types.EnumProperty)
+        for person in kinds.enum_items:
+            name = words.say(person.name)
+            button = layout.operator("risorius.add_character", text=name, translate=False)
+            button.person, button.use_studio = person.identifier, True
+
+
 def draw_add(self: Menu, _context: Context) -> None:
     """Entry of the 3D view's Add menu."""
-    self.layout.operator_menu_enum(
-        RISORIUS_OT_add_character.bl_idname, "person", text="Face", icon="USER"
-    )
+    self.layout.menu(RISORIUS_MT_sample.bl_idname, icon="USER")
 
 
-CLASSES = (RISORIUS_OT_import_dna, RISORIUS_FH_dna, RISORIUS_OT_add_character)
+CLASSES = (
+    RISORIUS_OT_import_dna,
+    RISORIUS_FH_dna,
+    RISORIUS_OT_add_character,
+    RISORIUS_MT_sample,
+    RISORIUS_MT_sample_studio,
+)

@@ -7,13 +7,15 @@ import numpy as np
 
 from ..base.easing import smooth_step
 from . import expressions as ex
+from .eyes import Eyes, with_eyeballs
+from .lips import Mouth, sealed
 from .people import MAN, Person
 from .polygons import Floats, Ints
 from .proportions import Proportions
 from .source import TARGETS, BaseMesh, Source
 
 FLOOR = 8.168  # what lies under the soles, in decimetres below the data's origin
-NECK_CUT = 5.53  # of height less NECK_SLOPE times the distance from the middle, in the base mesh
+NECK_CUT = 5.36  # of height less NECK_SLOPE times the distance from the middle, in the base mesh
 NECK_SLOPE = 0.35
 TEETH_SHOW = 0.035
 REACH = 1.3  # the hands are as high as the neck, but not as near
@@ -26,6 +28,8 @@ JOINTS = [
     ("FACIAL_C_Jaw", "head"),
     ("FACIAL_L_Eye", "head"),
     ("FACIAL_R_Eye", "head"),
+    ("FACIAL_C_TeethUpper", "head"),
+    ("FACIAL_C_TeethLower", "FACIAL_C_Jaw"),
 ]
 
 
@@ -111,11 +115,13 @@ def joint_positions(positions: Floats, groups: dict[str, Ints], size: float) -> 
         "FACIAL_C_Jaw": jaw_hinge,
         "FACIAL_L_Eye": eyes["L"],
         "FACIAL_R_Eye": eyes["R"],
+        "FACIAL_C_TeethUpper": middle("helper-upper-teeth"),
+        "FACIAL_C_TeethLower": middle("helper-lower-teeth"),
     }
 
 
 def spine_weights(positions: Floats, joints: dict[str, Floats]) -> Floats:
-    """Weights [V, 7] of spine_04, neck_01, neck_02 and head by height along a tilted neck.
+    """Weights [V, 9] of spine_04, neck_01, neck_02 and head by height along a tilted neck.
 
     Args:
         positions: float64[V, 3], decimetres.
@@ -142,7 +148,7 @@ def skin_weights(
     joints: dict[str, Floats],
     jaw_open: ex.Expression,
 ) -> Floats:
-    """Weights [V, 7] of the base mesh's vertices; rows sum to 1.
+    """Weights [V, 9] of the base mesh's vertices; rows sum to 1.
 
     The jaw takes of each vertex the share of its rigid motion that the jawOpen unit shows.
 
@@ -168,7 +174,10 @@ def skin_weights(
     weights *= (1 - jaw)[:, None]
     weights[:, 4] = jaw
     for column, letter in ((5, "l"), (6, "r")):
-        weights[groups[f"helper-{letter}-eye"]] = np.eye(len(JOINTS))[column]
+        for name in ("helper-{}-eye", "eyeball-{}", "cornea-{}"):
+            weights[groups[name.format(letter)]] = np.eye(len(JOINTS))[column]
+    for column, group in ((7, "helper-upper-teeth"), (8, "helper-lower-teeth")):
+        weights[groups[group]] = np.eye(len(JOINTS))[column]
     return weights
 
 
@@ -183,24 +192,38 @@ class Body:
         joints: positions of the joints by name.
         units: what each raw control does.
         further_correctives: float64[V, 3] of sticky lips and the like, by their two raw controls.
+        eyes: where they are and how their lids rest.
+        eye_correctives: float64[V, 3], what keeps lids on the eyes, by their two raw controls.
         man: the man's, for the man himself this.
-        weights: float64[V, 7], skin weights.
+        weights: float64[V, 9], skin weights.
     """
 
     def __init__(self, source: Source, base: BaseMesh, person: Person) -> None:
+        base = with_eyeballs(base)
         self.groups = groups = group_indices(base)
         man = person.shape() == MAN.shape() and person.features == MAN.features
         other = None if man else Body(source, base, MAN)
         self.positions = shaped(source, base, person)
         self.positions[:, 1] += FLOOR if man else -self.positions[groups["body"], 1].min()
+        self.eyes = Eyes(base, groups, self.positions, person.age)
+        self._raw = self.positions.copy()  # as the data have them
+        self._ways: dict[str, Floats] = {}  # likewise, of the raw controls
         self.man: Body = self
         self._change: Proportions | None = None
         size = 1.0
         if other is not None:
             self.man = other
             size = head_size(base, self.positions) / head_size(base, other.positions)
-            self._change = Proportions(base, groups, other.positions, self.positions)
-        jaw_open = self.carried(source.face_unit("jawOpen", len(self.positions)))
+            self._change = Proportions(base, groups, other._raw, self._raw)
+        count = len(self.positions)
+        wide = {
+            side[0]: self.carried(source.face_unit(f"eyeWide{side}", count))
+            for side in ("Left", "Right")
+        }
+        self.eyes.open(self.positions, wide)
+        jaw_open = self.carried(source.face_unit("jawOpen", count))
+        pucker = self.carried(source.face_unit("mouthPucker", count))
+        self.positions = sealed(Mouth(base, pucker, jaw_open), self.positions)
         show_upper_teeth(self.positions, groups, jaw_open, size)
         self.joints = joint_positions(self.positions, groups, size)
         if other is None:
@@ -211,13 +234,18 @@ class Body:
             )
         else:
             self.units = {
-                name: ex.Expression(self.carried(unit.displacement))
-                for name, unit in other.units.items()
+                name: ex.Expression(self.carried(way)) for name, way in other._ways.items()
             }
             self.further_correctives = {
                 pair: self.carried(shape) for pair, shape in other.further_correctives.items()
             }
+        self._ways = {name: unit.displacement for name, unit in self.units.items()}
+        moved = dict(self._ways)
+        self.eye_correctives = self.eyes.move(moved)
+        for name, way in moved.items():
+            self.units[name].displacement = way
         ex.add_joint_motion(self.units, groups, self.positions, self.joints)
+        ex.leave_bones(self.units, groups, self.positions, self.joints)
         if other is None:
             jaw = self.units["jawOpen"]
             self.weights = skin_weights(self.positions, groups, self.joints, jaw)

@@ -25,22 +25,28 @@ from ..author.levels import level_name
 from ..files import fileio
 from . import expressions as ex
 from . import references, wrinkles
+from .askew import askew, set_askew
 from .body import JOINTS, NECK_CUT, NECK_SLOPE, REACH, Body
+from .clothes import shirt
 from .controls import gui_table
+from .eyes import eye_parts, with_eyeballs
 from .further import CONTROLS_OF_CODE
 from .hair import add_hair, grow_hair, hair_textures
+from .paint.layout import packed
 from .paint.skin import HEAD_SIZE
 from .paint.textures import paint_textures
 from .part import Part
 from .people import MAN, Person
 from .polygons import (
     Floats,
+    Ints,
     Polygons,
     clip_below,
     compact_uvs,
     subdivide,
 )
 from .source import PACKAGE, SHA256, BaseMesh, Source, SourceError, fetch
+from .teeth import mouth_parts
 
 CM = 10.0  # the data are in decimetres
 NEW_JOINTS = 250
@@ -55,10 +61,7 @@ RIG = RigOptions(FitOptions(joints=NEW_JOINTS), tolerance_mm=TOLERANCE_MM)
 NO_SEARCH = CorrectiveOptions(most=0)
 PARTS = {  # mesh -> groups, subdivisions at LOD 0 and 1
     "head": (["body"], 1, 0),
-    "teeth": (["helper-upper-teeth", "helper-lower-teeth"], 1, 0),
     "tongue": (["helper-tongue"], 1, 0),
-    "eyeLeft": (["helper-l-eye"], 2, 1),
-    "eyeRight": (["helper-r-eye"], 2, 1),
 }
 METADATA = {
     "licence": "CC0-1.0",
@@ -69,15 +72,20 @@ METADATA = {
 }
 
 
-def make_parts(base: BaseMesh) -> list[Part]:
-    """Every mesh at both LODs."""
+def make_parts(base: BaseMesh, groups: dict[str, Ints]) -> list[Part]:
+    """Every mesh at both LODs.
+
+    Args:
+        base: the base mesh with its eyeballs.
+        groups: vertex indices by group.
+    """
     count = len(base.positions)
     out = []
     for lod in (0, 1):
-        for name, (groups, *levels) in PARTS.items():
+        for name, (own, *levels) in PARTS.items():
             corners = [
                 face
-                for group in groups
+                for group in own
                 for face in base.faces[group]
                 if abs(base.positions[face[0][0], 0]) < REACH
             ]
@@ -91,11 +99,16 @@ def make_parts(base: BaseMesh) -> list[Part]:
             aside = np.hypot(base.positions[:, 0], 0.35)  # round in front, no point
             height = base.positions[:, 1] - NECK_SLOPE * aside
             polygons, operator = clip_below(polygons, height, NECK_CUT)
+            if name == "head":
+                polygons.uvs = packed(polygons)
             part = Part(f"{name}_lod{lod}_mesh", compact_uvs(polygons), [operator])
             for _ in range(levels[lod]):
                 part.polygons, operator = subdivide(part.polygons)
                 part.operators.append(operator)
             out.append(part)
+        out += mouth_parts(base, lod)
+        out.append(shirt(base, lod))
+        out += eye_parts(base, groups, lod)
     return out
 
 
@@ -106,7 +119,7 @@ def bind_displacement(
 
     Args:
         positions: float64[v, 3], decimetres.
-        weights: float64[v, 7], skin weights.
+        weights: float64[v, 9], skin weights.
         expression: displacements of the same vertices, and what its joints do.
         joints: positions of the joints by name.
 
@@ -117,9 +130,9 @@ def bind_displacement(
         return expression.displacement
     matrices = np.tile(np.eye(3), (len(positions), 1, 1))
     offsets = np.zeros_like(positions)
-    names = [name for name, _ in JOINTS]
     for name, (rotation, shift) in expression.joints.items():
-        w = weights[:, names.index(name)]
+        w = weights[:, [k for k, (own, above) in enumerate(JOINTS) if name in (own, above)]]
+        w = w.sum(axis=1)  # a joint takes along what hangs on it
         matrices += w[:, None, None] * (rotation - np.eye(3))
         offsets += w[:, None] * (joints[name] + shift - rotation @ joints[name])
     wanted: Floats = positions + expression.displacement - offsets
@@ -142,7 +155,7 @@ def add_skin(mesh: Mesh, weights: Floats) -> None:
 
     Args:
         mesh: gets them.
-        weights: float64[v, 7].
+        weights: float64[v, 9].
     """
     kept = np.where(weights > 1e-3, weights, 0)
     kept /= kept.sum(axis=1, keepdims=True)
@@ -153,40 +166,17 @@ def add_skin(mesh: Mesh, weights: Floats) -> None:
     mesh.maximum_influence_per_vertex = int((kept > 0).sum(axis=1).max())
 
 
-def eye_uvs(polygons: Polygons, positions: Floats) -> tuple[Floats, list[list[int]]]:
-    """Azimuthal equidistant map of an eyeball: the pupil in the middle, the back at the rim.
-
-    Args:
-        polygons: the eyeball, looking along +z.
-        positions: float64[v, 3].
-
-    Returns:
-        float64[v, 2], and the indices into it by face and corner.
-    """
-    ray = positions - positions.mean(axis=0)
-    ray /= np.linalg.norm(ray, axis=1, keepdims=True)
-    angle = np.arccos(np.clip(ray[:, 2], -1, 1)) / np.pi
-    around = np.arctan2(ray[:, 1], ray[:, 0])
-    uvs = 0.5 + 0.5 * angle[:, None] * np.stack([np.cos(around), np.sin(around)], axis=1)
-    return uvs, polygons.faces
-
-
 def make_mesh(part: Part, positions: Floats, weights: Floats) -> Mesh:
     """Geometry and skin of a part, in centimetres.
 
     Args:
         part: of the base mesh.
         positions: float64[V, 3], all vertices of the base mesh, decimetres.
-        weights: float64[v, 7], skin weights of the part's own vertices.
+        weights: float64[v, 9], skin weights of the part's own vertices.
     """
     p = part.carry(positions)
     polygons = part.polygons
     uvs, uv_faces = polygons.uvs, polygons.uv_faces
-    if part.name.startswith("eyeL") or part.name.startswith("eyeR"):
-        uvs, uv_faces = eye_uvs(polygons, p)
-    if part.name.startswith("head"):
-        low, high = uvs.min(axis=0), uvs.max(axis=0)  # the texture need not hold the body
-        uvs = (uvs - low) / (high - low)
     normals = vertex_normals(p, polygons.faces)
     mesh = polygon_mesh(p * CM, normals, polygons.faces, uvs, uv_faces)
     add_skin(mesh, weights)
@@ -285,7 +275,7 @@ def add_behavior(
         values=np.ones(2 * len(correctives), np.float32),
     )
     groups = []
-    for joint in ("FACIAL_C_Jaw", "FACIAL_L_Eye", "FACIAL_R_Eye"):
+    for joint in (name for name in names if name.startswith("FACIAL_")):
         inputs = [name for name in raw if joint in units[name].joints]
         values = np.zeros((6, len(inputs)), np.float32)
         for column, name in enumerate(inputs):
@@ -373,16 +363,17 @@ def assemble(
         say: is told what is being done, a sentence at a time.
         person: whom to make.
     """
-    base = source.base_mesh()
+    base = with_eyeballs(source.base_mesh())
     say("reading 52 ARKit units and the further ones")
     body = Body(source, base, person)
     positions, joints, units = body.positions, body.joints, body.units
     correctives = ex.corrective_displacements(units) | body.further_correctives
+    correctives |= body.eye_correctives
     raw = list(units)
     pairs = list(correctives)
     channels = raw + ["_x_".join(pair) for pair in pairs]
     say(f"{len(raw)} raw controls, {len(pairs)} correctives; meshes and LODs")
-    parts = make_parts(base)
+    parts = make_parts(base, body.groups)
     weights = body.weights
     dna = Dna()
     add_definition(dna, person, parts, joints, raw, channels)
@@ -392,12 +383,14 @@ def assemble(
     for number, part in enumerate(parts):
         p, w = part.carry(positions), part.carry(weights)
         mesh = make_mesh(part, positions, w)
-        deltas = []
-        for unit in units.values():
-            here = ex.Expression(part.carry(unit.displacement), unit.joints)
-            deltas.append(bind_displacement(p, w, here, joints))
-        deltas += [part.carry(delta) for delta in correctives.values()]
-        add_targets(mesh, deltas)
+        if not part.rests:
+            deltas = []
+            for name, unit in units.items():
+                whole = unit.displacement - correctives.get((name, name), 0.0)
+                here = ex.Expression(part.carry(whole), unit.joints)
+                deltas.append(bind_displacement(p, w, here, joints))
+            deltas += [part.carry(delta) for delta in correctives.values()]
+            add_targets(mesh, deltas)
         mapping += [(number, t.blend_shape_channel_index) for t in mesh.blend_shape_targets]
         meshes.append(mesh)
     dna.meshes = meshes
@@ -564,6 +557,7 @@ def build_sample(
     if rig is not None:
         man = None if body.man is body else lambda: assemble(source, lambda _: None)[0]
         dna = joint_face(dna, man, rig, steps, begins)
+    set_askew(dna, parts, body, askew(source, body, person), CM)
     grown = grow_hair(person, body, source.base_mesh(), parts, CM)
     add_hair(dna, grown)
     hairs, shown = hair_textures(person, dna, grown, texture_size)

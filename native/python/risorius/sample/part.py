@@ -15,6 +15,7 @@ class Part:
     name: str
     polygons: Polygons
     operators: list[Operator]  # from the base mesh's vertices to this mesh's, in order
+    rests: bool = False  # whether no expression moves it but by its joints
 
     def carry(self, values: Floats) -> Floats:
         for operator in self.operators:

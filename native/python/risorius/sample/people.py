@@ -20,9 +20,10 @@ YEARS = (5.0, 90.0)
 _AGES = ((1.0, "baby"), (11.0, "child"), (20.0, "young"), (32.0, "young"), (90.0, "old"))
 HAIR_STYLES = ("none", "crop", "receding", "long", "bun", "afro")
 BEARD_STYLES = ("none", "full", "short", "goatee", "moustache")
-_COLOURS = ("skin", "flush", "lids", "lips", "hair", "brows")
-_OPTIONAL = ("muscle", "weight", "features", "hair_length", "hair_curl", "hair_grey")
+_OPTIONAL = ("muscle", "weight", "features", "asymmetry", "freckles", "scalp", "shirt")
+_OPTIONAL += ("hair_length", "hair_curl", "hair_grey")
 _OPTIONAL += ("hair_style", "beard_style")
+_COLOURS = ("skin", "flush", "lids", "lips", "hair", "brows", "shirt")
 
 
 @dataclass(frozen=True)
@@ -42,9 +43,14 @@ class Person:
     beard: float
     iris: tuple[Colour, Colour]
     """At the pupil, at the rim."""
+    shirt: Colour = (0.22, 0.24, 0.28)
     muscle: float = 0.5
     weight: float = 0.5
+    freckles: float = 0.0
+    scalp: float = 0.5
     features: dict[str, float] = field(default_factory=dict)
+    asymmetry: dict[str, float] = field(default_factory=dict)
+    """Shapes of the data that make one side unlike the other -> -1 (the right) to 1 (the left)."""
     hair_style: str = "crop"
     hair_length: float = 1.0
     hair_curl: float = 0.0
@@ -121,10 +127,13 @@ class _Reader:
             raise self.fail(key, '"female" or "male"', value)
         return str(value)
 
-    def shares(self, key: str, value: Any) -> dict[str, float]:
+    def shares(self, key: str, value: Any, low: float = 0) -> dict[str, float]:
         if not isinstance(value, dict):
             raise self.fail(key, "a table", value)
-        return {name: self.number(0, 1)(f"{key}.{name}", x) for name, x in value.items()}
+        return {name: self.number(low, 1)(f"{key}.{name}", x) for name, x in value.items()}
+
+    def sided(self, key: str, value: Any) -> dict[str, float]:
+        return self.shares(key, value, -1)
 
     def origin(self, key: str, value: Any) -> dict[str, float]:
         out = self.shares(key, value)
@@ -154,7 +163,8 @@ def _person(where: str, table: dict[str, Any], like: Person | None) -> Person:
     values |= read.take("name", read.text) | read.take("gender", read.gender)
     values |= read.take("age", read.age) | read.take("origin", read.origin)
     values |= read.take("features", read.shares) | read.take("iris", read.iris)
-    for key in ("muscle", "weight", "beard", "hair_curl", "hair_grey"):
+    values |= read.take("asymmetry", read.sided)
+    for key in ("muscle", "weight", "beard", "freckles", "scalp", "hair_curl", "hair_grey"):
         values |= read.take(key, read.number(0, 1))
     values |= read.take("hair_length", read.number(0.3, 2))
     values |= read.take("hair_style", read.one_of(HAIR_STYLES))

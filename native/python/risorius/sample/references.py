@@ -17,7 +17,7 @@ from .source import SHA256, downloads
 def _path(options: RigOptions) -> Path:
     """Its name begins alike for one version of what it depends on."""
     known = hashlib.sha256(SHA256.encode() + fingerprint())
-    for entry in sorted(Path(__file__).parent.iterdir()):
+    for entry in sorted(Path(__file__).parent.rglob("*")):
         if entry.suffix in (".py", ".toml"):
             known.update(entry.read_bytes())
     asked = hashlib.sha256(str(options).encode()).hexdigest()

@@ -22,6 +22,21 @@ def shrunk(image: Floats, side: int) -> Floats:
     return image
 
 
+def enlarged(image: Floats, side: int) -> Floats:
+    """An image [h, w] at this side, linear between the texels.
+
+    Args:
+        image: float[h, h].
+        side: a whole number of times h.
+    """
+    times = side // len(image)
+    at = (np.arange(side) + 0.5) / times - 0.5
+    low = np.clip(np.floor(at).astype(int), 0, len(image) - 2)
+    part = np.clip(at - low, 0, 1).astype(np.float32)
+    rows = image[low] * (1 - part)[:, None] + image[low + 1] * part[:, None]
+    return np.asarray(rows[:, low] * (1 - part) + rows[:, low + 1] * part)
+
+
 def smooth(low: float, high: float, x: Floats) -> Floats:
     """0 where x is at low, 1 where it is at high, and smoothly in between; held beyond both."""
     return smooth_step((x - low) / (high - low))

@@ -5,7 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..polygons import Floats, Polygons
+from ..polygons import Floats, Ints, Polygons
+
+_AT_ONCE = 1 << 20  # texels that are looked at in one go
 
 
 class Raster:
@@ -13,6 +15,7 @@ class Raster:
 
     Attributes:
         covered: bool[size, size]: which texels a face covers.
+        where: int[n]: these texels, counted along the rows.
     """
 
     def __init__(self, polygons: Polygons, uvs: Floats, size: int) -> None:
@@ -23,57 +26,142 @@ class Raster:
             uvs: float64[T, 2] in [0, 1].
             size: texels of a side.
         """
-        self._corners = np.zeros((size, size, 3), np.int32)
-        self._shares = np.zeros((size, size, 3), np.float32)
-        self.covered = np.zeros((size, size), bool)
+        corners, places = [], []
         for face, uv_face in zip(polygons.faces, polygons.uv_faces, strict=True):
             for k in range(1, len(face) - 1):
-                corners = [0, k, k + 1]
-                uv = uvs[[uv_face[c] for c in corners]] * size - 0.5
-                self._triangle([face[c] for c in corners], uv)
+                corners.append((face[0], face[k], face[k + 1]))
+                places.append((uv_face[0], uv_face[k], uv_face[k + 1]))
+        self._corners: Ints = np.array(corners, np.int32)
+        self._uv: Floats = uvs[np.array(places)] * size - 0.5
+        self._owner = np.full(size * size, -1, np.int32)
+        self._all_shares = np.zeros((size * size, 2), np.float32)
+        low = np.maximum(np.floor(self._uv.min(axis=1)).astype(int), 0)
+        high = np.minimum(np.ceil(self._uv.max(axis=1)).astype(int) + 1, size)
+        room = np.prod(np.maximum(high - low, 0), axis=1)
+        room[np.abs(self._double_area()) < 1e-9] = 0
+        begin = 0
+        total = np.cumsum(room)
+        while begin < len(room):
+            done = total[begin - 1] if begin else 0
+            end = max(begin + 1, int(np.searchsorted(total, done + _AT_ONCE)))
+            self._triangles(begin, min(end, len(room)), low, high - low, room, size)
+            begin = end
+        self.covered = (self._owner >= 0).reshape(size, size)
+        self.where: Ints = np.flatnonzero(self._owner >= 0)
+        self._owner, self._shares = self._owner[self.where], self._all_shares[self.where]
+        del self._all_shares
 
-    def _triangle(self, vertices: list[int], uv: Floats) -> None:
-        low = np.maximum(np.floor(uv.min(axis=0)).astype(int) - 1, 0)
-        high = np.minimum(np.ceil(uv.max(axis=0)).astype(int) + 2, len(self.covered))
-        (ax, ay), (bx, by), (cx, cy) = uv
-        area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
-        if (high <= low).any() or abs(area) < 1e-9:
+    def _double_area(self) -> Floats:
+        a, b = self._uv[:, 1] - self._uv[:, 0], self._uv[:, 2] - self._uv[:, 0]
+        return np.asarray(a[:, 0] * b[:, 1] - b[:, 0] * a[:, 1])
+
+    def _triangles(
+        self, begin: int, end: int, low: Ints, span: Ints, room: Ints, size: int
+    ) -> None:
+        """The texels of some triangles, looked for in the rectangle around each."""
+        count = room[begin:end]
+        which = np.repeat(np.arange(begin, end), count)
+        if not len(which):
             return
-        x, y = np.meshgrid(np.arange(low[0], high[0]), np.arange(low[1], high[1]))
-        b = ((x - ax) * (cy - ay) - (cx - ax) * (y - ay)) / area
-        c = ((bx - ax) * (y - ay) - (x - ax) * (by - ay)) / area
-        a = 1 - b - c
-        inside = (a >= -1e-3) & (b >= -1e-3) & (c >= -1e-3)
-        rows, columns = y[inside], x[inside]
-        self._shares[rows, columns] = np.stack([a[inside], b[inside], c[inside]], axis=1)
-        self._corners[rows, columns] = vertices
-        self.covered[rows, columns] = True
+        number = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
+        wide = span[which, 0]
+        column, row = low[which, 0] + number % wide, low[which, 1] + number // wide
+        a, ab, ac = (
+            self._uv[which, 0],
+            (self._uv[:, 1] - self._uv[:, 0])[which],
+            (self._uv[:, 2] - self._uv[:, 0])[which],
+        )
+        x, y = column - a[:, 0], row - a[:, 1]
+        area = self._double_area()[which]
+        b = (x * ac[:, 1] - y * ac[:, 0]) / area
+        c = (y * ab[:, 0] - x * ab[:, 1]) / area
+        inside = (b >= -1e-3) & (c >= -1e-3) & (b + c <= 1 + 1e-3)
+        texel = (row * size + column)[inside]
+        self._owner[texel] = which[inside]
+        self._all_shares[texel] = np.column_stack([b, c])[inside]
 
-    def image(self, values: Floats) -> Floats:
-        """float64[size, size, k]: values of vertices; 0 where no face is.
+    def values(self, values: Floats) -> Floats:
+        """float32[n, k]: values of vertices at the covered texels.
 
         Args:
-            values: float64[V, k].
+            values: float[V, k].
         """
-        out = np.zeros((*self.covered.shape, values.shape[1]))
-        corners, shares = self._corners[self.covered], self._shares[self.covered]
-        out[self.covered] = sum(shares[:, k, None] * values[corners[:, k]] for k in range(3))
-        return out
+        values = values.astype(np.float32)
+        first, second, third = self._corners.T
+        out = values[first][self._owner]
+        for share, corner in zip(self._shares.T, (second, third), strict=True):
+            out += share[:, None] * (values[corner] - values[first])[self._owner]
+        return np.asarray(out)
+
+    def steps(self, places: Floats) -> Floats:
+        """float32[n, 2]: how long a texel is across and up, at the covered texels.
+
+        Args:
+            places: float64[V, 3] of the vertices; lengths are in their unit.
+        """
+        uv = np.stack([self._uv[:, k] - self._uv[:, 0] for k in (1, 2)], axis=1)
+        edges = places[self._corners[:, 1:]] - places[self._corners[:, :1]]
+        flat = np.abs(self._double_area()) < 1e-9
+        uv[flat] = np.eye(2)
+        ways = np.linalg.solve(uv, edges)
+        lengths = np.linalg.norm(ways, axis=2).astype(np.float32)
+        return np.asarray(lengths[self._owner])
+
+    def spread(self, values: Floats) -> Floats:
+        """float32[size, size] or [size, size, k]: an image of values at the covered texels.
+
+        Args:
+            values: float[n] or [n, k], as they are found by `values`; 0 elsewhere.
+        """
+        size = len(self.covered)
+        out = np.zeros((size * size, *values.shape[1:]), np.float32)
+        out[self.where] = values
+        return out.reshape(size, size, *values.shape[1:])
+
+    def image(self, values: Floats) -> Floats:
+        """float32[size, size, k]: values of vertices; 0 where no face is.
+
+        Args:
+            values: float[V, k].
+        """
+        return self.spread(self.values(values))
 
 
-def bleed(image: Floats, covered: Floats, steps: int = 8) -> Floats:
-    """Grow the painted islands, so that filtering finds no foreign colour at their rims.
+def filled(image: Floats, covered: Floats) -> Floats:
+    """An image whose bare texels have the colours of those about them, near ones first.
+
+    So filtering finds no foreign colour at the rims of the islands, and what lies between them
+    packs to little.
 
     Args:
-        image: float64[h, w, 3].
+        image: float[h, w, ...]; h and w are powers of two.
         covered: bool[h, w]: what is painted.
-        steps: by how many texels; what is left then gets the mean colour.
     """
-    image, covered = image.copy(), covered.copy()
-    for _ in range(steps):
-        for axis, shift in ((0, 1), (0, -1), (1, 1), (1, -1)):
-            near = np.roll(covered, shift, axis) & ~covered
-            image[near] = np.roll(image, shift, axis)[near]
-            covered |= near
-    image[~covered] = image[covered].mean(axis=0)
-    return image
+    bare = ~covered
+    share = covered.astype(np.float32)
+    if image.ndim == 3:
+        share = share[..., None]
+    out = image.astype(np.float32)
+    out[bare] = 0
+    coarse, share = _halves(out), _halves(share)
+    coarse = _filled(coarse, share)
+    rows, columns = np.nonzero(bare)
+    out[rows, columns] = coarse[rows // 2, columns // 2]
+    return out
+
+
+def _halves(whole: Floats) -> Floats:
+    rows = whole[0::2] + whole[1::2]
+    return np.asarray((rows[:, 0::2] + rows[:, 1::2]) / 4)
+
+
+def _filled(image: Floats, share: Floats) -> Floats:
+    """Means of texels of which a share is covered, and where none is those of coarser ones."""
+    mean = image / np.maximum(share, 1e-6)
+    bare = share == 0
+    if min(image.shape[:2]) < 2 or not bare.any():
+        return np.asarray(mean)
+    coarse = _filled(_halves(image), _halves(share))
+    for axis in (0, 1):
+        coarse = np.repeat(coarse, 2, axis)
+    return np.asarray(np.where(bare, coarse, mean))

@@ -1,29 +1,59 @@
 # SPDX-License-Identifier: MIT
-"""The colour of the skin."""
+"""The colour of the skin: pigment and blood over a person's own tone.
+
+What lies in the skin takes light away by its own curve, so amounts of pigment and blood are added
+and the colour is the tone times exp(-amounts): a blush on dark skin stays darker than on light.
+"""
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 
-from ..expressions import Expression
-from ..part import Part
 from ..people import Person
-from ..polygons import Floats
-from .images import blend, noise, smooth
-from .raster import Raster, bleed
+from ..polygons import Floats, Ints
+from . import patterns, regions
+from .images import smooth
+from .raster import Raster
 
 HEAD_SIZE = 2048
+# How much of linear red, green and blue one unit takes.
+_MELANIN = np.array([0.42, 0.70, 1.0], np.float32)
+_VEINS = np.array([0.42, 0.26, 0.10], np.float32)
+_YELLOW = np.array([-0.02, 0.04, 0.36], np.float32)
+_MUCOSA = (0.66, 0.34, 0.32)
+_THROAT = (0.36, 0.15, 0.14)
+_LID_MARGIN = (0.80, 0.55, 0.50)
 
 
-def brow_mask(texels: Floats, eye: Floats, random: np.random.Generator) -> Floats:
-    """Strands along an arched line above each eye, float64[h, w] from 0 to 1.
+def linear(colour: Floats) -> Floats:
+    """Linear light of sRGB."""
+    c = np.asarray(colour, np.float32)
+    return np.asarray(np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4), np.float32)
+
+
+def encoded(light: Floats) -> Floats:
+    """sRGB of linear light."""
+    c = np.clip(light, 0, 1)
+    return np.asarray(np.where(c <= 0.0031308, 12.92 * c, 1.055 * c ** (1 / 2.4) - 0.055))
+
+
+def depth_of(person: Person) -> float:
+    """How dark a person's skin is, 0 to 1."""
+    light = float(linear(np.array(person.skin)) @ [0.21, 0.72, 0.07])
+    return float(smooth(0.42, 0.06, np.array(light)))
+
+
+def brow_mask(places: Floats, eye: Floats, uneven: Floats | float = 0.0) -> Floats:
+    """An arched line above each eye, float[...] from 0 to 1: where brows grow.
 
     Args:
-        texels: float64[h, w, 3], each texel's place on the head, decimetres.
+        places: float[..., 3], on the head, decimetres.
         eye: float64[3], the left eye's middle.
-        random: gives the strands.
+        uneven: float[...], noise of deviation 1 that frays the edge.
     """
-    x, y = np.abs(texels[:, :, 0]), texels[:, :, 1] - eye[1]
+    x, y = np.abs(places[..., 0]), places[..., 1] - eye[1]
     along = (x - (eye[0] - 0.19)) / 0.44  # 0 at the nose, 1 at the temple
     ridge = (
         0.165
@@ -31,125 +61,256 @@ def brow_mask(texels: Floats, eye: Floats, random: np.random.Generator) -> Float
         - 0.045 * np.clip(along - 0.55, 0, 1) / 0.5
     )
     half = 0.05 * (1 - 0.62 * np.clip(along, 0, 1)) * smooth(-0.04, 0.1, along) + 0.002
-    across = (y - ridge) / half
-    body = (1 - smooth(0.45, 1.05, np.abs(across))) * smooth(-0.03, 0.1, along)
-    body *= 1 - smooth(0.9, 1.02, along)
-    front = smooth(0.05, 0.2, texels[:, :, 2] - eye[2] + 0.1)
-    # Strands lean outward: lines of equal (t * lean - y) are one strand.
-    phase = (x * (1.0 + 0.8 * np.clip(along, 0, 1)) - y * (1.2 - 0.9 * np.clip(along, 0, 1))) * 620
-    jitter = 2.5 * noise(len(texels), 300, random)
-    strands = 0.5 + 0.5 * np.sin(phase + jitter)
-    return np.asarray(body * front * (0.55 + 0.45 * strands))
+    across = np.abs(y - ridge) / half + 0.12 * uneven
+    body = (1 - smooth(0.2, 1.25, across)) * smooth(-0.06, 0.2, along)
+    body *= 1 - smooth(0.8, 1.03, along)
+    front = smooth(0.05, 0.2, places[..., 2] - eye[2] + 0.1)
+    return np.asarray(body * front)
 
 
-def hair_mask(texels: Floats, eye: Floats, random: np.random.Generator) -> Floats:
-    """A shaved head's shadow, with a soft natural hairline, float64[h, w] from 0 to 1.
+def hair_mask(places: Floats, eye: Floats, uneven: Floats | float = 0.0) -> Floats:
+    """Where hair grows on the scalp, with a soft natural hairline, float[...] from 0 to 1.
 
     Args:
-        texels: float64[h, w, 3], each texel's place on the head, decimetres.
+        places: float[..., 3], on the head, decimetres.
         eye: float64[3], the left eye's middle.
-        random: makes the hairline uneven.
+        uneven: float[...], noise of deviation 1 that makes the hairline uneven.
     """
-    back = texels[:, :, 2] - eye[2]
+    back = places[..., 2] - eye[2]
     line = np.interp(
         back,
         [-1.9, -1.35, -1.05, -0.85, -0.62, -0.45, 0.1],
         [-0.62, -0.5, -0.2, 0.1, 0.22, 0.5, 0.76],
     )
-    height = texels[:, :, 1] - eye[1] - line
-    wobble = 0.03 * noise(len(texels), 60, random)
-    ear = smooth(0.8, 0.86, np.abs(texels[:, :, 0])) * (
-        1 - smooth(0.35, 0.45, texels[:, :, 1] - eye[1])
+    height = places[..., 1] - eye[1] - line
+    ear = smooth(0.8, 0.86, np.abs(places[..., 0])) * (
+        1 - smooth(0.35, 0.45, places[..., 1] - eye[1])
     )
-    return np.asarray(smooth(-0.06, 0.12, height + wobble) * (1 - ear))
+    return np.asarray(smooth(-0.10, 0.16, height + 0.02 * uneven) * (1 - ear))
 
 
-def lip_mask(part: Part, positions: Floats, place: Floats, units: dict[str, Expression]) -> Floats:
-    """The vermilion, from the line where the lips meet, float64[h, w] from 0 to 1.
+class Texels:
+    """The texels of a head that are covered: where they are, and patterns laid over them.
 
-    That line is where vertices that the jaw takes along touch vertices that it leaves.
-
-    Args:
-        part: the head.
-        positions: float64[v, 3], positions of its vertices, decimetres.
-        place: float64[h, w, 3], each texel's place on the head, decimetres.
-        units: what each raw control does, by its name.
+    Attributes:
+        raster: of the texture.
+        place: float32[n, 3], decimetres.
+        step: float32[n, 2], how long a texel is across and up, decimetres.
+        scale: texels of this texture to one of HEAD_SIZE.
     """
-    travel = np.linalg.norm(part.carry(units["jawOpen"].displacement), axis=1)
-    mouth = np.flatnonzero(
-        np.linalg.norm(part.carry(units["mouthUpperLipRollInL"].displacement), axis=1) > 0.004
-    )
-    mouth = np.union1d(
-        mouth,
-        np.flatnonzero(
-            np.linalg.norm(part.carry(units["mouthUpperLipRollInR"].displacement), axis=1) > 0.004
-        ),
-    )
-    low_lip = np.flatnonzero(travel > 0.6 * travel[np.abs(positions[:, 0]) < 0.2].max())
-    gap = np.linalg.norm(positions[mouth][:, None, :] - positions[low_lip][None, :, :], axis=2).min(
-        axis=1
-    )
-    seam = positions[mouth[gap < 0.03]]
-    seam = seam[seam[:, 2] > seam[:, 2].max() - 0.25]
-    width = float(np.abs(seam[:, 0]).max())
-    line = np.polyfit(np.abs(seam[:, 0]), seam[:, 1], 2)
-    depth = np.polyfit(np.abs(seam[:, 0]), seam[:, 2], 2)
-    x = np.abs(place[:, :, 0])
-    t = np.clip(x / (1.04 * width), 0, 1)
-    y = place[:, :, 1] - np.polyval(line, np.minimum(x, width))
-    z = place[:, :, 2] - np.polyval(depth, np.minimum(x, width))
-    bow = 1 + 0.10 * np.exp(-(((x - 0.07) / 0.05) ** 2)) - 0.12 * np.exp(-((x / 0.035) ** 2))
-    upper = 0.078 * np.sqrt(1 - t**2) * bow
-    lower = 0.098 * np.sqrt(1 - t**2)
-    high = np.where(y > 0, upper, lower)
-    inside = 1 - smooth(0.8, 1.12, np.abs(y) / np.maximum(high, 1e-3))
-    return np.asarray(inside * (z > -0.2) * (t < 1))
+
+    def __init__(self, raster: Raster, positions: Floats) -> None:
+        self.raster = raster
+        self.place = raster.values(positions)
+        self.step = raster.steps(positions)
+        self.size = len(raster.covered)
+        self.scale = self.size / HEAD_SIZE
+        self.side = max(64, self.size // 2)
+
+    def mottling(self, width: float, seed: int, high: float | None = None) -> Floats:
+        """float32[n]: noise of deviation 1.
+
+        Args:
+            width: of its spots, texels of HEAD_SIZE.
+            seed: gives the spots.
+            high: of its spots; None: as wide.
+        """
+        random = np.random.default_rng(seed)
+        tall = None if high is None else high * self.scale
+        tile = patterns.mottling(self.side, width * self.scale, random, tall)
+        return np.asarray(tile.ravel()[self.at(seed)])
+
+    def dots(self, cell: float, seed: int) -> tuple[patterns.Dots, Ints]:
+        """Dots, and int[n], where on their tile each texel is.
+
+        Args:
+            cell: side of a dot's cell, texels of HEAD_SIZE.
+            seed: gives the dots.
+        """
+        tile = patterns.dots(self.side, cell * self.scale, np.random.default_rng(seed))
+        return tile, self.at(seed)
+
+    def at(self, seed: int) -> Ints:
+        """int[n]: where on a tile each texel is.
+
+        Args:
+            seed: of the tile, so that two do not begin together.
+        """
+        shift = (37 * seed * self.side // 100, 53 * seed * self.side // 100)
+        return patterns.laid(self.raster.where, self.size, self.side, shift)
+
+    @cached_property
+    def coarse(self) -> Floats:
+        """float32[n]: spots of half a centimetre."""
+        return self.mottling(26, 1)
+
+    @cached_property
+    def middle(self) -> Floats:
+        """float32[n]: spots of two millimetres."""
+        return self.mottling(9, 2)
+
+    @cached_property
+    def fine(self) -> Floats:
+        """float32[n]: spots of half a millimetre."""
+        return self.mottling(2.6, 3)
 
 
-def paint_head(
-    person: Person,
-    part: Part,
-    raster: Raster,
-    positions: Floats,
-    eye: Floats,
-    units: dict[str, Expression],
-) -> tuple[Floats, Floats]:
-    """Skin colour [h, w, 3] and each texel's place [h, w, 3].
+class Skin:
+    """The fields of a face at its texels, float32[n] each, and what they are coloured with."""
 
-    Args:
-        person: has the colours.
-        part: the head.
-        raster: of its texture, HEAD_SIZE texels a side.
-        positions: float64[v, 3], positions of its vertices, decimetres.
-        eye: float64[3], the left eye's middle.
-        units: what each raw control does, by its name.
-    """
-    random = np.random.default_rng(7)
-    blink = sum(
-        np.linalg.norm(part.carry(units[n].displacement), axis=1)
-        for n in ("eyeBlinkL", "eyeBlinkR")
-    )
-    lids = smooth(0.1, 0.8, blink / blink.max())
-    image, covered = raster.image(np.column_stack([positions, lids])), raster.covered
-    place = image[:, :, :3]
-    lips = lip_mask(part, positions, place, units)
-    colour = np.ones((HEAD_SIZE, HEAD_SIZE, 3)) * np.array(person.skin)
-    mottle = 0.5 * noise(HEAD_SIZE, 40, random) + 0.3 * noise(HEAD_SIZE, 150, random)
-    colour += 0.018 * mottle[:, :, None] * np.array([0.6, 1.0, 1.0])
-    pores = random.normal(0, 0.008, (HEAD_SIZE, HEAD_SIZE))
-    colour += pores[:, :, None]
-    x, y = np.abs(place[:, :, 0]), place[:, :, 1] - eye[1]
-    z = place[:, :, 2] - eye[2]
-    cheeks = np.exp(-(((x - 0.42) / 0.22) ** 2) - ((y + 0.4) / 0.2) ** 2) * (z > -0.35)
-    nose = np.exp(-((x / 0.16) ** 2) - ((y + 0.42) / 0.16) ** 2) * (z > 0.1)
-    ears = smooth(0.8, 0.9, x) * (np.abs(y + 0.15) < 0.5)
-    colour = blend(colour, person.flush, 0.4 * cheeks + 0.4 * nose + 0.35 * ears)
-    colour = blend(colour, person.lids, 0.35 * image[:, :, 3])
-    beard = smooth(-0.62, -0.78, y) * smooth(-0.85, -0.55, z) * (1 - lips)
-    beard *= smooth(-1.45, -1.2, y)
-    speckle = 0.6 + 0.8 * random.random((HEAD_SIZE, HEAD_SIZE))
-    colour = blend(colour, (0.42, 0.33, 0.30), person.beard * beard * speckle)
-    colour = blend(colour, person.lips, 0.8 * lips)
-    colour = blend(colour, person.hair, 0.62 * hair_mask(place, eye, random) * speckle)
-    colour = blend(colour, person.brows, 0.92 * brow_mask(place, eye, random))
-    return bleed(np.clip(colour, 0, 1), covered), place
+    def __init__(self, person: Person, face: regions.Face, texels: Texels, eye: Floats) -> None:
+        self.person, self.texels, self.eye = person, texels, eye
+        self.deep = depth_of(person)
+        self.old = float(np.interp(person.age, (35, 75), (0, 1)))
+        fields = {
+            "blood": regions.blood(face, person.age),
+            "veins": regions.shade_of_eyes(face),
+            "yellow": regions.yellow(face),
+            "beard": regions.beard(face),
+            "pores": regions.pores(face),
+            "oil": regions.oil(face),
+            "freckled": regions.freckled(face),
+            "weathered": regions.weathered(face),
+            "forehead": regions.forehead(face),
+            "lids": face.lids,
+            "mouth": face.mouth,
+            "eyes": face.eyes,
+            "tone": face.uneven[:, 2],
+        }
+        columns = texels.raster.values(np.column_stack(list(fields.values())))
+        self.field = dict(zip(fields, np.ascontiguousarray(columns.T), strict=True))
+        rim = self.field["mouth"] + 0.16 * texels.coarse + 0.10 * texels.middle + 0.08 * texels.fine
+        self.lips = smooth(regions.LIPS_RINGS + 0.5, regions.LIPS_RINGS - 0.9, rim)
+        self.wet = smooth(3.6, 1.2, self.field["mouth"] + 0.2 * texels.middle)
+
+    def colour(self, creases: Floats) -> Floats:
+        """float32[n, 3], sRGB.
+
+        Args:
+            creases: float32[n], how deep in a fold a texel is, 0 to 1.
+        """
+        person, tone = self.person, linear(np.array(self.person.skin))
+        blush = np.log(tone / np.maximum(linear(np.array(person.flush)), 1e-3))
+        shade = np.log(tone / np.maximum(linear(np.array(person.lids)), 1e-3))
+        taken = self._amount("blood", creases)[:, None] * blush.astype(np.float32)
+        taken += self._amount("melanin", creases)[:, None] * _MELANIN
+        taken += self._amount("veins", creases)[:, None] * _VEINS
+        taken += (self.field["yellow"] * (1 - 0.5 * self.deep))[:, None] * _YELLOW
+        taken += ((0.42 + 0.2 * self.deep) * self.field["lids"])[:, None] * shade.astype(np.float32)
+        light = tone * np.exp(-taken)
+        light = self._hair(light)
+        return encoded(self._inside(self._lips(light)))
+
+    def _amount(self, what: str, creases: Floats) -> Floats:
+        field, texels = self.field, self.texels
+        if what == "blood":
+            uneven = 1 + 0.14 * texels.coarse + 0.12 * texels.middle
+            out = field["blood"] * uneven + 0.016 * texels.coarse + 0.028 * texels.middle
+            return np.asarray(out + 0.03 * texels.fine + 0.35 * creases + self._vessels())
+        if what == "veins":
+            temples = np.clip(texels.coarse - 1.2, 0, 1) * (1 - self.deep)
+            return np.asarray(field["veins"] * (0.42 + 0.05 * texels.coarse) + 0.05 * temples)
+        uneven = 0.07 * field["tone"] + (0.025 + 0.05 * self.old) * texels.coarse
+        out = uneven + (0.02 + 0.02 * self.old) * texels.middle + 0.016 * texels.fine
+        out += self.deep * (0.22 * field["veins"] + 0.12 * field["forehead"])
+        out += 0.18 * creases + self._spots()
+        return np.asarray(out)
+
+    def _vessels(self) -> Floats:
+        """Fine vessels that show on old, light cheeks and noses."""
+        amount = self.old * (1 - self.deep)
+        if amount <= 0:
+            return np.zeros(1, np.float32)
+        net, at = self.texels.dots(11, 14)
+        lines = np.clip(1 - net.gap.ravel()[at] / 0.07, 0, 1)
+        there = np.clip(self.field["blood"] * 2.2 - 0.25, 0, 1)
+        return np.asarray(0.5 * amount * there * lines * np.clip(self.texels.coarse, 0, 1.5))
+
+    def _spots(self) -> Floats:
+        """Freckles, spots of age and moles."""
+        field, texels, person = self.field, self.texels, self.person
+        out = np.zeros(len(texels.place), np.float32)
+        bent = 0.05 * texels.middle
+        if person.freckles:
+            share = np.clip(person.freckles * field["freckled"], 0, 1)
+            for cell, seed, dark in ((11, 21, 0.34), (21, 22, 0.40)):
+                tile, at = texels.dots(cell, seed)
+                out += dark * tile.over(0.75 * share, at, 0.42, 0.8, bent)
+        if self.old > 0.1:
+            tile, at = texels.dots(64, 23)
+            share = 0.5 * self.old * field["weathered"]
+            out += 0.30 * tile.over(share, at, 0.34, 0.45, 0.06 * texels.middle)
+        random = np.random.default_rng(sum(map(ord, person.name)))
+        front = np.flatnonzero((texels.place[:, 2] > 0.9) & (field["mouth"] > 10))
+        for at in random.choice(front, 5 if person.age > 12 else 2) if len(front) else ():
+            away = np.linalg.norm(texels.place - texels.place[at], axis=1)
+            radius = random.uniform(0.006, 0.013)
+            out += random.uniform(0.5, 1.3) * smooth(radius, 0.45 * radius, away)
+        return out
+
+    def _hair(self, light: Floats) -> Floats:
+        """The roots of beard, brows and hair: their shadow in the skin, and stubble as dots."""
+        person, texels = self.person, self.texels
+        hair = linear(np.array(person.hair))
+        scalp = hair_mask(texels.place, self.eye, texels.middle + texels.coarse)
+        roots, at = texels.dots(3.4, 31)
+        dark = roots.over(0.9 * scalp, at, 0.5)
+        shadow = person.scalp * scalp * (0.55 + 0.1 * texels.middle) + 0.3 * person.scalp * dark
+        light = _over(light, hair, shadow)
+        brows = linear(np.array(person.brows))
+        light = _over(
+            light, brows, 0.34 * person.scalp * brow_mask(texels.place, self.eye, texels.middle)
+        )
+        if person.beard:
+            share = np.clip(self.field["beard"] * (1 + 0.22 * texels.coarse), 0, 1)
+            light = light * np.exp(-(1.5 * person.beard * share)[:, None] * 2 * _VEINS)
+            stubble, at = texels.dots(2.5, 32)
+            dark = stubble.over(share, at, 0.46, 0.9)
+            light = _over(light, 0.5 * brows + 0.02, np.clip(2.6 * person.beard, 0, 0.6) * dark)
+        return light
+
+    def _lips(self, light: Floats) -> Floats:
+        """Their red: pale and pigmented at the rim, lines across, darker where they meet."""
+        person, texels, ring = self.person, self.texels, self.field["mouth"]
+        if not (ring < regions.FAR_RINGS).any():
+            return light
+        lips = linear(np.array(person.lips))
+        red = lips * np.exp(
+            -0.30
+            * (self.lines + 0.5 * texels.fine + texels.coarse)[:, None]
+            * np.array([0.25, 0.6, 0.55], np.float32)
+        )
+        inner = smooth(6.5, 2.5, ring)
+        pink = linear(np.array(_MUCOSA)) * (1 - 0.35 * self.deep)
+        red = _over(red, pink, (0.30 + 0.10 * self.deep) * inner)
+        red = red * np.exp(-0.22 * self.deep * _MELANIN)
+        red *= (1 - 0.30 * smooth(4.0, 2.2, ring))[:, None]
+        rim = np.exp(-(((ring - regions.LIPS_RINGS) / 1.1) ** 2)) * self.deep
+        light = light * np.exp(-(0.25 * rim)[:, None] * _MELANIN)
+        return _over(light, red, (0.86 + 0.04 * texels.coarse) * self.lips)
+
+    @cached_property
+    def lines(self) -> Floats:
+        """float32[n]: the lips' own lines, across them, mean 0 and deviation 1."""
+        texels = self.texels
+        tile = patterns.mottling(512, 3.2, np.random.default_rng(41), 14)
+        across = np.rint(texels.place[:, 0] / 0.0042 + 1.5 * texels.middle).astype(int) % 512
+        down = np.rint(4 * self.field["mouth"]).astype(int) % 512
+        return np.asarray(tile[down, across])
+
+    def _inside(self, light: Floats) -> Floats:
+        """The mouth's inside and what lies behind the lids: wet, and never skin."""
+        ring, texels = self.field["mouth"], self.texels
+        mucosa = linear(np.array(_MUCOSA)) * (1 - 0.25 * self.deep)
+        mucosa = mucosa * np.exp(-0.16 * (texels.coarse + texels.middle)[:, None] * [0.3, 1.0, 0.9])
+        back = smooth(0.1, -0.75, texels.place[:, 2] - self.eye[2])
+        mucosa = _over(mucosa, linear(np.array(_THROAT)), back)
+        light = _over(light, mucosa, smooth(2.4, 0.4, ring))
+        pink = linear(np.array(_LID_MARGIN)) * (1 - 0.45 * self.deep)
+        return _over(light, pink, 0.85 * smooth(2.8, 0.8, self.field["eyes"]))
+
+
+def _over(light: Floats, colour: Floats, mask: Floats) -> Floats:
+    """A colour laid over another where a mask says, linear."""
+    mask = np.clip(mask, 0, 1).astype(np.float32)[:, None]
+    return np.asarray(light * (1 - mask) + colour.astype(np.float32) * mask)

@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where camera, lights and backdrop of a portrait stand around a head.
+
+All places are in the head's own axes, as Blender has them: the face looks along -y, z is up, the
+origin lies between the eyes. Numbers are a photographer's, in metres for a grown head, and grow
+and shrink with the distance between the eyes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+Triple = tuple[float, float, float]
+
+GROWN = 0.063  # metres between the eyes of the head that the numbers are made for
+LENS = 100.0  # mm: a portrait lens on SENSOR
+SENSOR = 24.0  # mm, height of a full frame; the frame's height is what is fitted
+_HEIGHT = 0.46  # of the picture at the eyes: head and shoulders
+_HEADROOM = 0.028  # at least, above the hair
+_EDGE = 0.01  # the picture ends so far above the mesh's lower end
+_CHIN = 0.13  # below the eyes, and in any picture
+_THIRD = 1.0 / 3.0  # the eyes' place from the upper edge
+_ASIDE = 8.0  # degrees: the camera sees more of the side that the key leaves to the fill
+_ABOVE = 0.045  # the camera's height above the eyes
+_DEPTH = 0.075  # from the eyes back to the middle of the head, which stands in the middle
+_WALL = 1.7  # from there to the backdrop
+_WALL_SIZE = (6.0, 4.0)
+
+
+@dataclass(frozen=True)
+class Lamp:
+    """One softbox.
+
+    Attributes:
+        name: what a photographer calls it.
+        place: of its middle; it shines at the origin.
+        size: width and height.
+        watts: radiant power.
+        colour: linear, in [0, 1].
+    """
+
+    name: str
+    place: Triple
+    size: tuple[float, float]
+    watts: float
+    colour: Triple
+
+
+@dataclass(frozen=True)
+class Studio:
+    """A portrait's setting.
+
+    Attributes:
+        camera: its place.
+        target: the middle of the picture.
+        lens: mm, on a sensor SENSOR high.
+        lamps: key, fill and rim.
+        wall: middle of the backdrop, behind the head as the camera sees it.
+        wall_turn: radians about z by which it faces the camera.
+        wall_size: its width and height.
+        glow: radius of the lighter middle of the backdrop.
+    """
+
+    camera: Triple
+    target: Triple
+    lens: float
+    lamps: tuple[Lamp, ...]
+    wall: Triple
+    wall_turn: float
+    wall_size: tuple[float, float]
+    glow: float
+
+
+_Row = tuple[str, float, float, float, tuple[float, float], float, Triple]
+# Degrees aside (to the right of one who looks at the face) and up, metres away, width and height,
+# light at the face as a share of the key's, colour. Fill: two stops under the key.
+_LAMPS: tuple[_Row, ...] = (
+    ("Key", -45.0, 30.0, 1.3, (0.75, 0.75), 1.0, (1.0, 0.925, 0.84)),
+    ("Fill", 42.0, 4.0, 2.0, (1.5, 1.5), 0.25, (0.86, 0.93, 1.0)),
+    ("Rim", 148.0, 38.0, 1.35, (0.45, 0.9), 1.3, (0.93, 0.97, 1.0)),
+)
+_EXPOSURE = 4.6  # irradiance of the key at the face, in W/m2
+
+
+def plan(apart: float, low: Sequence[float], high: Sequence[float]) -> Studio:
+    """The setting of a head.
+
+    Args:
+        apart: distance between the eyes, in Blender units.
+        low, high: corners of the box around all meshes of the face.
+
+    Raises:
+        ValueError: a distance that is not above 0.
+    """
+    if not apart > 0.0 or not math.isfinite(apart):
+        raise ValueError(f"apart: a distance above 0 was expected, found {apart!r}")
+    unit = apart / GROWN
+    height, lift = _frame(unit, low[2], high[2])
+    away = height * LENS / SENSOR
+    turn = math.radians(_ASIDE)
+    towards = (math.sin(turn), -math.cos(turn))  # from the head to the camera
+    middle = (0.0, _DEPTH * unit)
+    camera = [m + (away + _DEPTH * unit) * t for m, t in zip(middle, towards, strict=True)]
+    wall = [m - max(_WALL * unit, high[1] + unit) * t for m, t in zip(middle, towards, strict=True)]
+    return Studio(
+        camera=(camera[0], camera[1], _ABOVE * unit),
+        target=(middle[0], middle[1], lift),
+        lens=LENS,
+        lamps=tuple(_lamp(row, unit) for row in _LAMPS),
+        wall=(wall[0], wall[1], 0.0),
+        wall_turn=turn,
+        wall_size=(_WALL_SIZE[0] * unit, _WALL_SIZE[1] * unit),
+        glow=0.62 * unit,
+    )
+
+
+def _frame(unit: float, low: float, high: float) -> tuple[float, float]:
+    """Height of the picture, and its middle's height over the eyes.
+
+    The eyes lie on the upper third, unless hair is higher than that leaves room for. A face that
+    ends at the neck fills the picture to its lower edge.
+    """
+    below = min(_HEIGHT * (1.0 - _THIRD) * unit, max(-low - _EDGE * unit, _CHIN * unit))
+    above = max(below * _THIRD / (1.0 - _THIRD), high + _HEADROOM * unit)
+    return above + below, (above - below) / 2
+
+
+def _lamp(row: _Row, unit: float) -> Lamp:
+    name, aside, up, away, size, share, colour = row
+    turn, lift, far = math.radians(aside), math.radians(up), away * unit
+    place = (
+        far * math.cos(lift) * math.sin(turn),
+        -far * math.cos(lift) * math.cos(turn),
+        far * math.sin(lift),
+    )
+    # A softbox of W watts sends W / pi towards its axis, and W / (pi far^2) arrive.
+    watts = share * _EXPOSURE * math.pi * far * far
+    return Lamp(name, place, (size[0] * unit, size[1] * unit), watts, colour)

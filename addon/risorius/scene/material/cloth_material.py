@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Cloth: threads across and along, a soft sheen at the edges."""
+
+from __future__ import annotations
+
+from .look import Look
+from .nodes import Graph
+
+_COLOR = (0.055, 0.065, 0.08)  # linear: a dark jersey
+_THREADS = 150.0  # for each eye distance
+
+
+def build(graph: Graph, look: Look) -> None:
+    """Fill the tree of a material.
+
+    Args:
+        graph: of the material, with its shader and its output.
+        look: sizes and textures of the mesh.
+    """
+    points = graph.rest_points(look.extent)
+    picture = look.image("color")
+    worn = graph.noise(points, 5.0 / look.unit, detail=4.0)
+    color = graph.image(picture, label="Colour").outputs["Color"] if picture else _COLOR
+    shade = graph.ramp(worn, (0.3, (0.86,) * 3), (0.7, (1.0,) * 3))
+    graph.set(Base_Color=graph.mix(1.0, color, shade, blend="MULTIPLY"), Roughness=0.85)
+    graph.set(Specular_Ior_Level=0.25)
+    if look.simple:
+        return
+    graph.set(Sheen_Weight=0.25, Sheen_Roughness=0.5)
+    x, y, z = graph.split(points)
+    turns = _THREADS / look.unit
+    across = graph.math("SINE", graph.math("MULTIPLY", graph.math("ADD", x, y), turns))
+    along = graph.math("SINE", graph.math("MULTIPLY", z, turns))
+    height = graph.math("MULTIPLY", across, along)
+    graph.set(Normal=graph.bump(height, look.unit * 0.006, None, 0.35))

@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Camera, three lights and a backdrop around a face, in a collection of their own.
+
+They are the user's from then on: nothing of the face points to them, nothing looks for them.
+"""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from mathutils import Matrix, Vector
+
+from ...logic.character import studio_plan
+from ..base import parts
+from ..base.blender_types import ArmatureObject, Context, MeshObject, NodeTree
+from ..character import runtime
+
+_MIDDLE = (0.115, 0.121, 0.130, 1.0)  # of the backdrop, behind the head
+_EDGE = (0.010, 0.011, 0.014, 1.0)
+
+
+def add(context: Context, rig: ArmatureObject, scene_camera: bool) -> bpy.types.Collection:
+    """Build the studio of a face where it stands now, as large as its head.
+
+    Args:
+        context: a Blender context, to whose scene it is added.
+        rig: deforming armature of the face.
+        scene_camera: make its camera the scene's; where the scene has none it becomes that anyway.
+
+    Returns:
+        The collection that holds all of it.
+    """
+    place, apart, low, high = _head(rig)
+    plan = studio_plan.plan(apart, low, high)
+    name = rig.name.removesuffix("_rig") + "_studio"
+    collection = bpy.data.collections.new(name)
+    context.scene.collection.children.link(collection)
+    camera = _camera(f"{name}_camera", plan, place)
+    things = [camera, _backdrop(f"{name}_backdrop", plan, place)]
+    things += [_lamp(f"{name}_{lamp.name.lower()}", lamp, place) for lamp in plan.lamps]
+    for thing in things:
+        collection.objects.link(thing)
+    if scene_camera or context.scene.camera is None:
+        context.scene.camera = camera
+    context.view_layer.update()
+    return collection
+
+
+def _head(rig: ArmatureObject) -> tuple[Matrix, float, list[float], list[float]]:
+    """The head's place in the world without scale, the eyes' distance, and the face's box in it."""
+    meshes = parts.meshes_of(rig)
+    world = np.array(rig.matrix_world, np.float64)
+    eyes = _eyes(rig)
+    corners = np.array([item.matrix_world @ Vector(c) for item in meshes for c in item.bound_box])
+    turn = rig.matrix_world.to_quaternion().to_matrix()
+    axes = np.array(turn, np.float64)
+    if len(eyes) == 2:
+        seen = eyes @ world[:3, :3].T + world[:3, 3]
+        middle, apart = seen.mean(axis=0), float(np.linalg.norm(seen[0] - seen[1]))
+    else:
+        middle, apart = _guess(corners, axes)
+    inside = (corners - middle) @ axes
+    place = Matrix.Translation(Vector(middle)) @ turn.to_4x4()
+    return place, apart, inside.min(axis=0).tolist(), inside.max(axis=0).tolist()
+
+
+def _eyes(rig: ArmatureObject) -> np.ndarray:
+    """float64[2, 3] the eyes' joints at rest in the rig's space, or fewer rows."""
+    live = runtime.of(rig)
+    if live is None:
+        return np.zeros((0, 3))
+    found = np.array([live.rest[joint][:3, 3] for joint in live.anchors.eyes.values()])
+    apart = len(found) == 2 and np.linalg.norm(found[0] - found[1]) > 0.0
+    return found if apart else np.zeros((0, 3))
+
+
+def _guess(corners: np.ndarray, axes: np.ndarray) -> tuple[np.ndarray, float]:
+    """Where eyes would be in a head of this box, and how far apart."""
+    inside = corners @ axes
+    low, high = inside.min(axis=0), inside.max(axis=0)
+    tall = max(float(high[2] - low[2]), 1e-6)
+    middle = np.array([(low[0] + high[0]) / 2, low[1] + 0.1 * tall, low[2] + 0.6 * tall])
+    return axes @ middle, 0.21 * tall
+
+
+def _camera(name: str, plan: studio_plan.Studio, place: Matrix) -> bpy.types.Object:
+    data = bpy.data.cameras.new(name)
+    data.lens = plan.lens
+    data.sensor_fit = "VERTICAL"  # a wider picture shows more of the backdrop, not less of the head
+    data.sensor_height = data.sensor_width = studio_plan.SENSOR
+    far = (Vector(plan.camera) - Vector(plan.target)).length
+    data.clip_start, data.clip_end = far / 100.0, far * 100.0
+    data.dof.focus_distance = far
+    data.dof.aperture_fstop = 5.6
+    thing = bpy.data.objects.new(name, data)
+    thing.matrix_world = place @ _looking(plan.camera, plan.target)
+    return thing
+
+
+def _lamp(name: str, lamp: studio_plan.Lamp, place: Matrix) -> bpy.types.Object:
+    data = bpy.data.lights.new(name, "AREA")
+    assert isinstance(data, bpy.types.AreaLight)
+    data.shape = "RECTANGLE"
+    data.size, data.size_y = lamp.size
+    data.energy, data.color = lamp.watts, lamp.colour
+    thing = bpy.data.objects.new(name, data)
+    thing.matrix_world = place @ _looking(lamp.place, (0.0, 0.0, 0.0))
+    return thing
+
+
+def _looking(place: studio_plan.Triple, target: studio_plan.Triple) -> Matrix:
+    """The matrix of a camera or lamp that looks from a place at another."""
+    way = Vector(target) - Vector(place)
+    return Matrix.Translation(Vector(place)) @ way.to_track_quat("-Z", "Y").to_matrix().to_4x4()
+
+
+def _backdrop(name: str, plan: studio_plan.Studio, place: Matrix) -> MeshObject:
+    width, height = plan.wall_size
+    mesh = bpy.data.meshes.new(name)
+    x, z = width / 2, height / 2
+    mesh.from_pydata([(-x, 0, -z), (x, 0, -z), (x, 0, z), (-x, 0, z)], [], [(0, 1, 2, 3)])
+    mesh.materials.append(_paper(name, plan.glow))
+    thing = bpy.data.objects.new(name, mesh)
+    turn = Matrix.Rotation(plan.wall_turn, 4, "Z")
+    thing.matrix_world = place @ Matrix.Translation(Vector(plan.wall)) @ turn
+    return thing
+
+
+def _paper(name: str, glow: float) -> bpy.types.Material:
+    """Dark paper with a lighter middle, as by a light of its own; it falls off without an edge."""
+    material = bpy.data.materials.new(name)
+    material.use_nodes = True
+    tree = material.node_tree
+    assert tree is not None
+    tree.nodes.clear()
+    shader, output = (
+        tree.nodes.new("ShaderNodeEmission"),
+        tree.nodes.new("ShaderNodeOutputMaterial"),
+    )
+    tree.links.new(_falloff(tree, glow), shader.inputs["Color"])
+    tree.links.new(shader.outputs[0], output.inputs["Surface"])
+    material.diffuse_color = _MIDDLE
+    return material
+
+
+def _falloff(tree: NodeTree, glow: float) -> bpy.types.NodeSocket:
+    """Colour by the distance from the middle: exp(-(r / glow)^2) between the two."""
+    nodes, links = tree.nodes, tree.links
+    where = nodes.new("ShaderNodeTexCoord")
+    length = nodes.new("ShaderNodeVectorMath")
+    length.operation = "DOT_PRODUCT"
+    links.new(where.outputs["Object"], length.inputs[0])
+    links.new(where.outputs["Object"], length.inputs[1])
+    power = nodes.new("ShaderNodeMath")
+    power.operation = "MULTIPLY"
+    power.inputs[1].default_value = -1.0 / (glow * glow)
+    links.new(length.outputs["Value"], power.inputs[0])
+    bell = nodes.new("ShaderNodeMath")
+    bell.operation = "EXPONENT"
+    links.new(power.outputs[0], bell.inputs[0])
+    mix = nodes.new("ShaderNodeMix")
+    mix.data_type = "RGBA"
+    links.new(bell.outputs[0], mix.inputs[0])
+    colours = [s for s in mix.inputs if s.type == "RGBA"]
+    colours[0].default_value, colours[1].default_value = _EDGE, _MIDDLE
+    return next(s for s in mix.outputs if s.type == "RGBA")

@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: MIT
+"""A shirt, so that neck and shoulders end well: cut from the base mesh's tights, with a collar.
+
+The tights follow every body of the data; all that is added are affine combinations of their
+vertices.
+Lengths are decimetres, places those of the base mesh.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .part import Part
+from .polygons import Floats, Ints, Operator, Polygons, clip_below, compact_uvs, edges_of, subdivide
+from .source import BaseMesh
+
+GROUP = "helper-tights"
+COLLAR = (
+    5.81  # of height plus COLLAR_SLOPE times the distance to the front: where the collar stands
+)
+COLLAR_SLOPE = 0.19
+HEM = 4.62  # height
+SHOULDER = 2.02  # how far to the side
+ROOM = 0.02  # by how much it is wider than the body, as a share
+# The collar's rows: away from the neck and up, in mm, from its seam over its edge to the inside.
+_COLLAR = ((1.6, -2.5), (2.6, 0.5), (2.8, 6.0), (2.2, 11.5), (0.9, 13.0), (-0.5, 12.0), (-0.9, 4.0))
+MM = 0.01
+
+
+def rings(polygons: Polygons) -> list[list[int]]:
+    """The borders of a mesh, each a ring of vertices in the order of its faces.
+
+    Args:
+        polygons: whose faces all turn the same way.
+    """
+    edges = edges_of(polygons.faces)
+    after: dict[int, int] = {}
+    for face in polygons.faces:
+        for a, b in zip(face, [*face[1:], face[0]], strict=True):
+            if len(edges[min(a, b), max(a, b)]) == 1:
+                after[a] = b
+    out = []
+    while after:
+        ring = [next(iter(after))]
+        while (following := after.pop(ring[-1], None)) is not None and following != ring[0]:
+            ring.append(following)
+        out.append(ring)
+    return out
+
+
+def shirt(base: BaseMesh, lod: int) -> Part:
+    """The shirt of a level of detail.
+
+    Args:
+        base: the base mesh.
+        lod: 0 or 1.
+    """
+    corners = base.faces[GROUP]
+    polygons = Polygons(
+        [[c[0] for c in face] for face in corners],
+        [[c[1] for c in face] for face in corners],
+        base.uvs,
+        len(base.positions),
+    )
+    x, y, z = base.positions.T
+    operators: list[Operator] = []
+    # A shoulder may be as high as the collar; only what is near the neck is cut.
+    collar = y + COLLAR_SLOPE * z - 0.5 * np.clip(np.abs(x) - 0.7, 0, None)
+    for field, level in ((y, HEM), (-collar, -COLLAR), (-np.abs(x), -SHOULDER)):
+        heights = Part("", polygons, operators).carry(field[:, None])[:, 0]
+        polygons, operator = clip_below(polygons, heights, level)
+        operators.append(operator)
+    part = Part(f"shirt_lod{lod}_mesh", compact_uvs(polygons), operators, rests=True)
+    positions = part.carry(base.positions)
+    faces, combine = with_edges(part.polygons, positions)
+    part.polygons = Polygons(faces, faces, np.zeros((combine.shape[0], 2)), combine.shape[0])
+    part.operators.append(combine)
+    if lod == 0:
+        part.polygons, operator = subdivide(part.polygons)
+        part.operators.append(operator)
+    part.polygons.uvs = unrolled(part.carry(base.positions))
+    part.polygons.uv_faces = part.polygons.faces
+    return part
+
+
+def unrolled(positions: Floats) -> Floats:
+    """float64[v, 2]: texture coordinates, round the body and up; the texture repeats every
+    decimetre.
+
+    Args:
+        positions: float64[v, 3].
+    """
+    return np.column_stack([positions[:, 0] + 0.5 * positions[:, 2], positions[:, 1]])
+
+
+def spread(vertices: Ints, most: int) -> list[int]:
+    """At most so many of the vertices, evenly taken: means over few keep operators sparse.
+
+    Args:
+        vertices: int[n].
+        most: how many.
+    """
+    return [int(v) for v in vertices[:: max(1, len(vertices) // most)]]
+
+
+def with_edges(polygons: Polygons, positions: Floats) -> tuple[list[list[int]], Operator]:
+    """The shirt with room, a collar, and hems turned in; the operator from its bare vertices.
+
+    Args:
+        polygons: the cut tights.
+        positions: float64[v, 3], decimetres.
+    """
+    count = polygons.vertex_count
+    faces = [list(face) for face in polygons.faces]
+    rows: list[tuple[int, int, float]] = []
+    trunk = spread(np.flatnonzero(np.abs(positions[:, 0]) < 1.0), 1000)
+    near = 1 / len(trunk)
+    # Room: away from the middle of the trunk at the same height would need a division; from its
+    # middle alone it is linear, and much the same for what is seen.
+    for i in range(count):
+        rows.append((i, i, 1 + ROOM))
+        rows += [(i, j, -ROOM * near) for j in trunk]
+    total = count
+    for ring in rings(polygons):
+        middle = positions[spread(np.array(ring), 16)].mean(axis=0)
+        collar = middle[1] > 5.5 and abs(middle[0]) < 0.3
+        profile = _COLLAR if collar else ((0.0, 0.0), (-3.0, 0.0), (-9.0, 0.0))
+        radius = float(np.linalg.norm(positions[ring] - middle, axis=1).mean())
+        lower = trunk
+        rise = float(np.linalg.norm(middle - positions[lower].mean(axis=0)))
+        few = spread(np.array(ring), 16)
+        share = 1 / len(few)
+        before = ring
+        for away, up in profile:
+            grow, lift = away * MM / radius, up * MM / rise
+            new = list(range(total, total + len(ring)))
+            for n, v in zip(new, ring, strict=True):
+                rows.append((n, v, 1 + grow))
+                rows += [(n, w, (lift - grow) * share) for w in few]
+                rows += [(n, w, -lift / len(lower)) for w in lower] if lift else []
+            size = len(ring)
+            for k in range(size):
+                m = (k + 1) % size
+                faces.append([before[m], before[k], new[k], new[m]])
+            before, total = new, total + size
+    table = np.array(rows)
+    return faces, Operator(
+        table[:, 0].astype(int), table[:, 1].astype(int), table[:, 2], (total, count)
+    )

@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: MIT
+"""The eyes of a person: where the balls are, how lids rest, and what all controls do with them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..polygons import Floats, Ints
+from ..source import BaseMesh
+from . import eyeball, lids
+from .lids import Lids
+from .rings import ROOT, find_rings
+
+_AGES, _OPEN = (8, 30, 75), (0.78, 0.70, 0.60)  # how far upper lids are above the eye's middle
+_SIDES = (("l", "L"), ("r", "R"))
+_LASH_RINGS = slice(ROOT - 1, ROOT + 1)
+Units = dict[str, Floats]
+Correctives = dict[tuple[str, str], Floats]
+
+
+class Eyes:
+    """The eyes of a person.
+
+    Attributes:
+        lids: by "l" and "r".
+    """
+
+    def __init__(
+        self, base: BaseMesh, groups: dict[str, Ints], positions: Floats, age: float
+    ) -> None:
+        """Put eyeballs into a face; the lids are still where the data have them.
+
+        Args:
+            base: the base mesh.
+            groups: vertex indices by group of the base mesh.
+            positions: float64[V, 3], decimetres; those of eyes are changed in place.
+            age: years.
+        """
+        self._groups = groups
+        self.lids: dict[str, Lids] = {}
+        rings = find_rings(base, groups)
+        for side, _ in _SIDES:
+            middle, radius = lids.place_ball(positions, groups, rings[side], side)
+            helper = groups[f"helper-{side}-eye"]
+            positions[helper] += middle - positions[helper].mean(axis=0)
+            eyeball.seat(positions, groups, side, middle, radius)
+            openness = float(np.interp(age, _AGES, _OPEN))
+            raw = positions.copy()
+            self.lids[side] = Lids(side, rings[side], openness, middle, radius, raw, raw.copy())
+        for eye in self.lids.values():  # the other eye was not there yet
+            eye.raw, eye.rest = positions.copy(), positions.copy()
+
+    def open(self, positions: Floats, widen: Mapping[str, Floats]) -> None:
+        """Open the lids.
+
+        Args:
+            positions: float64[V, 3] of the person, decimetres; changed in place.
+            widen: float64[V, 3] by "L" and "R": what opens the lids further, of the data.
+        """
+        for side, letter in _SIDES:
+            eye = self.lids[side]
+            opened = lids.open_lids(eye, widen[letter])
+            way = self._with_lashes(eye, eye.rest - eye.raw, opened)
+            positions += way
+        for eye in self.lids.values():
+            eye.rest = positions.copy()
+
+    def _with_lashes(self, eye: Lids, way: Floats, before: Floats) -> Floats:
+        """A way whose lashes go where the skin below them goes.
+
+        Args:
+            eye: whose lashes.
+            way: float64[V, 3]; that of the lashes is changed in place.
+            before: float64[V, 3], the skin's way that the lashes have followed already.
+        """
+        roots = eye.rings[_LASH_RINGS].ravel()
+        for number in (1, 2):
+            lashes = self._groups[f"helper-{eye.side}-eyelashes-{number}"]
+            gaps = np.linalg.norm(eye.raw[lashes][:, None] - eye.raw[roots][None], axis=2)
+            near = roots[gaps.argmin(axis=1)]
+            way[lashes] += way[near] - before[near]
+        return way
+
+    def move(self, units: Units) -> Correctives:
+        """What controls do with these eyes and lids, in place of what the data have.
+
+        Args:
+            units: float64[V, 3] by raw control; those that move eyes or lids are changed.
+
+        Returns:
+            float64[V, 3] of correctives by their two raw controls. Where both are the same one, its
+            square, the control has as much less by itself: at 1 it does what `units` says.
+        """
+        correctives: Correctives = {}
+        for side, letter in _SIDES:
+            eye = self.lids[side]
+            blink = f"eyeBlink{letter}"
+            turns = {f"eyeLook{way}{letter}": lids.look_rotation(way) for way in lids.LOOKS}
+            self._looks(eye, units, letter)
+            self._pupils(eye, units, letter)
+            units[f"eyeWiden{letter}"] = lids.WIDER * units[f"eyeWiden{letter}"]
+            for name, before in units.items():
+                if name != blink:
+                    way = lids.on_the_ball(eye, before, turns.get(name))
+                    units[name] = way if way is before else self._with_lashes(eye, way, before)
+            closed = self._with_lashes(eye, *lids.closing(eye, units[blink]))
+            still = np.zeros_like(closed)
+            half = self._with_lashes(eye, lids.between(eye, closed), still)
+            for name in lids.partners(units, letter):
+                more = lids.stays_closed(eye, closed, units[name], turns.get(name))
+                correctives[(blink, name)] = self._with_lashes(eye, more, still)
+            # 4 x (1 - x) of it: nothing where lids are open or closed, the whole half way.
+            correctives[(blink, blink)] = -4 * half
+            units[blink] = closed
+        return correctives
+
+    def _looks(self, eye: Lids, units: Units, letter: str) -> None:
+        """Eyes turn about their middle; lids follow further than in the data."""
+        names = ("helper-{}-eye", "eyeball-{}", "cornea-{}")
+        own = np.concatenate([self._groups[name.format(eye.side)] for name in names])
+        for way in lids.LOOKS:
+            unit = lids.following(eye, way, units[f"eyeLook{way}{letter}"])
+            arm = eye.rest[own] - eye.middle
+            unit[own] = arm @ lids.look_rotation(way).T - arm
+            units[f"eyeLook{way}{letter}"] = unit
+
+    def _pupils(self, eye: Lids, units: Units, letter: str) -> None:
+        own = self._groups[f"eyeball-{eye.side}"]
+        for name, share in (("eyePupilWide", 0.23), ("eyePupilNarrow", -0.15)):
+            unit = np.zeros_like(eye.rest)
+            unit[own] = share * eyeball.pupil_wide(eye.radius, eye.side)
+            units[f"{name}{letter}"] = unit

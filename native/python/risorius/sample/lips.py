@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: MIT
+"""Lips that rest on each other: the data's are a millimetre apart, which is seen as a black line.
+
+Lengths are decimetres.
+"""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+
+from .polygons import Floats, Ints, Polygons, subdivide
+from .source import BaseMesh
+
+PRESSED = 0.0015  # how far they go into each other: skin that touches is pressed flat
+_REACH = 0.035  # from the line where they meet
+_NEAR = 0.06  # vertices of one lip so near to the other are its rim
+_BINS = 24  # across the mouth
+
+
+class Mouth:
+    """The faces of the mouth as they are seen, at LOD 0.
+
+    Attributes:
+        operator: from the base mesh's vertices to those of the subdivided faces.
+        upper, lower: int[n], which of these belong to each lip.
+    """
+
+    def __init__(self, base: BaseMesh, pucker: Floats, jaw_open: Floats) -> None:
+        """Finds the lips by what moves them: space cannot tell them apart.
+
+        Args:
+            base: the base mesh.
+            pucker: float64[V, 3], a unit that moves both lips and little else.
+            jaw_open: float64[V, 3], the unit that takes the lower one along.
+        """
+        strength = np.linalg.norm(pucker, axis=1)
+        inside = strength > 0.08 * strength.max()
+        faces = [[c[0] for c in face] for face in base.faces["body"]]
+        faces = [face for face in faces if inside[face].all()]
+        polygons = Polygons(faces, faces, np.zeros((len(base.positions), 2)), len(base.positions))
+        _, self.operator = subdivide(polygons)
+        used = np.unique(self.operator.rows[self.operator.rows >= len(base.positions)])
+        used = np.concatenate([np.unique(np.concatenate(faces)), used])
+        strength = self.operator.apply(strength[:, None])[used, 0]
+        lips = used[strength > 0.25 * strength.max()]
+        travel = np.linalg.norm(self.operator.apply(jaw_open), axis=1)[lips]
+        whole = np.quantile(travel, 0.9)
+        self.upper, self.lower = lips[travel < 0.35 * whole], lips[travel > 0.6 * whole]
+
+
+def rims(mouth: Mouth, points: Floats) -> tuple[Ints, Ints]:
+    """Vertices of the upper and of the lower lip that lie near the other lip.
+
+    Args:
+        mouth: whose.
+        points: float64[v, 3] of its subdivided vertices.
+    """
+    apart = np.linalg.norm(points[mouth.upper][:, None] - points[mouth.lower][None], axis=2)
+    return mouth.upper[apart.min(axis=1) < _NEAR], mouth.lower[apart.min(axis=0) < _NEAR]
+
+
+def gap_across(mouth: Mouth, points: Floats) -> tuple[Floats, Floats]:
+    """How far apart the lips are, from one corner to the other.
+
+    Args:
+        mouth: whose.
+        points: float64[v, 3] of its subdivided vertices.
+
+    Returns:
+        float64[n] places across, and float64[n] heights of the gap there, below 0 where they
+        overlap.
+    """
+    upper, lower = (points[rim] for rim in rims(mouth, points))
+    edges = np.linspace(
+        max(upper[:, 0].min(), lower[:, 0].min()), min(upper[:, 0].max(), lower[:, 0].max()), _BINS
+    )
+    places, gaps = [], []
+    for low, high in itertools.pairwise(edges):
+        above = upper[(upper[:, 0] >= low) & (upper[:, 0] <= high), 1]
+        below = lower[(lower[:, 0] >= low) & (lower[:, 0] <= high), 1]
+        if len(above) and len(below):
+            places.append((low + high) / 2)
+            gaps.append(above.min() - below.max())
+    return np.array(places), np.array(gaps)
+
+
+def sealed(mouth: Mouth, positions: Floats) -> Floats:
+    """float64[V, 3]: positions with lips that touch; each goes half of the way.
+
+    Args:
+        mouth: of the base mesh.
+        positions: float64[V, 3] of a person; they stay as they are.
+    """
+    out = positions.copy()
+    for _ in range(3):
+        points = mouth.operator.apply(out)
+        places, gaps = gap_across(mouth, points)
+        if not len(places):
+            return out
+        for lip, rim, way in zip(
+            (mouth.upper, mouth.lower), rims(mouth, points), (-1, 1), strict=True
+        ):
+            own = lip[lip < len(positions)]  # the first vertices are those of the base mesh
+            away = np.linalg.norm(points[own][:, None] - points[rim][None], axis=2).min(axis=1)
+            half = np.interp(out[own, 0], places, (gaps + PRESSED) / 2)
+            out[own, 1] += way * half * np.exp(-((away / _REACH) ** 2))
+    return out

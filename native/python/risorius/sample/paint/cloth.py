@@ -1,0 +1,26 @@
+# SPDX-License-Identifier: MIT
+"""The colour of a shirt: a jersey whose loops are seen from near by."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..polygons import Floats
+from .images import noise
+
+CLOTH_SIZE = 256
+_LOOPS = 64  # across the texture, which repeats
+
+
+def paint_cloth(colour: tuple[float, float, float]) -> Floats:
+    """float64[CLOTH_SIZE, CLOTH_SIZE, 3]: loops in columns, each thread a little lighter or darker.
+
+    Args:
+        colour: sRGB in [0, 1].
+    """
+    random = np.random.default_rng(13)
+    at = np.arange(CLOTH_SIZE) / CLOTH_SIZE * _LOOPS
+    x, y = np.meshgrid(at, at)
+    loops = np.sin(2 * np.pi * x) * np.sin(2 * np.pi * y + np.pi * np.abs(np.sin(np.pi * x)))
+    shade = 1 + 0.06 * loops + 0.03 * noise(CLOTH_SIZE, 128, random)
+    return np.asarray(np.clip(np.array(colour) * shade[:, :, None], 0, 1))

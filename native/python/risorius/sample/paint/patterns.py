@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: MIT
+"""Patterns of skin as tiles that begin again: mottling, dots, pores, the fine net between them.
+
+Lengths are texels of the tile, whose sides wrap: it is laid over a texture by `laid`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..polygons import Floats, Ints
+
+
+def mottling(
+    side: int, width: float, random: np.random.Generator, high: float | None = None
+) -> Floats:
+    """float32[side, side]: smooth noise of mean 0 and deviation 1, its spots about `width` wide.
+
+    Args:
+        side: of the tile.
+        width: of a spot.
+        random: gives the spots.
+        high: of a spot; None: as wide.
+    """
+    across = np.fft.rfftfreq(side) * width
+    up = np.fft.fftfreq(side) * (width if high is None else high)
+    kept = np.exp(-(up[:, None] ** 2 + across**2) * 1.8**2)
+    kept[0, 0] = 0
+    white = np.fft.rfft2(random.normal(size=(side, side)))
+    out = np.fft.irfft2(white * kept, (side, side))
+    return np.asarray(out / out.std(), np.float32)
+
+
+@dataclass(frozen=True)
+class Dots:
+    """Points spread evenly and by chance, one in each cell of a grid.
+
+    Attributes:
+        near: float32[side, side]: distance to the nearest point, over a cell's side.
+        gap: float32[side, side]: how much farther the second nearest is.
+        rank: float32[side, side]: a number from 0 to 1 that the nearest point has for itself.
+    """
+
+    near: Floats
+    gap: Floats
+    rank: Floats
+
+    def over(
+        self, share: Floats, at: Ints, size: float, soft: float = 0.35, bent: Floats | float = 0.0
+    ) -> Floats:
+        """float32[n]: 1 in the dots of a share of the points, 0 between them, at some texels.
+
+        Args:
+            share: float[n] from 0 to 1: of the points that have a dot.
+            at: where on the tile, see `laid`.
+            size: radius of the largest over a cell's side.
+            soft: share of the radius over which a dot fades out.
+            bent: float[n], added to the distance, so that dots are not round.
+        """
+        rank = self.rank.ravel()[at]
+        # A dot grows with what there is over its rank: at the edge of a field they are small.
+        radius = size * np.clip(1.6 * (share - rank) / np.maximum(share, 1e-6), 0, 1)
+        depth = (radius - self.near.ravel()[at] - bent) / np.maximum(soft * radius, 1e-6)
+        return np.asarray(np.clip(depth, 0, 1) * (share > rank), np.float32)
+
+
+def dots(side: int, cell: float, random: np.random.Generator, loose: float = 0.8) -> Dots:
+    """A tile of dots.
+
+    Args:
+        side: of the tile.
+        cell: side of a grid's cell, about; a whole number of them fills the tile.
+        random: gives the points.
+        loose: how far a point may lie from the middle of its cell, 0 to 1.
+    """
+    count = max(3, round(side / cell))
+    point = 0.5 + loose * random.uniform(-0.5, 0.5, (count, count, 2))
+    rank = random.uniform(0, 1, (count, count)).astype(np.float32)
+    at = ((np.arange(side) + 0.5) * count / side).astype(np.float32)
+    low = at.astype(int)
+    part = (at - low).astype(np.float32)
+    near = np.full((side, side), 9.0, np.float32)
+    second, ranks = near.copy(), np.zeros_like(near)
+    for di in (-1, 0, 1):
+        for dj in (-1, 0, 1):
+            i, j = (low + di) % count, (low + dj) % count
+            there = point[i[:, None], j[None, :]].astype(np.float32)
+            away = np.hypot(di + there[..., 0] - part[:, None], dj + there[..., 1] - part[None, :])
+            nearer = away < near
+            second = np.where(nearer, near, np.minimum(second, away))
+            ranks = np.where(nearer, rank[i[:, None], j[None, :]], ranks)
+            near = np.where(nearer, away, near)
+    return Dots(near, second - near, ranks)
+
+
+def laid(where: Ints, size: int, side: int, shift: tuple[int, int] = (0, 0)) -> Ints:
+    """int[n]: the texels of a tile that lie under those of a texture.
+
+    Args:
+        where: int[n], texels of the texture, counted along its rows.
+        size: of the texture's side.
+        side: of the tile.
+        shift: of the tile, so that two patterns do not begin together.
+    """
+    rows, columns = np.divmod(where, size)
+    return np.asarray(((rows + shift[0]) % side) * side + (columns + shift[1]) % side)

@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: MIT
+"""The skin's relief and how rough it is: pores, its fine net, lips, lines of age.
+
+Heights are decimetres, out of the skin.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..polygons import Floats
+from . import regions
+from .images import smooth
+from .raster import filled
+from .skin import Skin
+
+PORE = 0.0024
+_NET = 0.0004
+_LIPS = 0.0009
+_CREASE = 0.0045
+
+
+def heights(skin: Skin, creases: Floats) -> Floats:
+    """float32[n]: the relief at the texels.
+
+    Args:
+        skin: the face.
+        creases: float32[n], how deep in a fold a texel is, 0 to 1.
+    """
+    field, texels = skin.field, skin.texels
+    ring = field["mouth"]
+    bare = smooth(regions.LIPS_RINGS, regions.LIPS_RINGS + 1.5, ring) * smooth(
+        0.5, 2.5, field["eyes"]
+    )
+    share = field["pores"]
+    tile, at = texels.dots(5.6, 51)
+    holes = tile.over(np.clip(0.35 + 0.65 * share, 0, 1), at, 0.46, 1.0)
+    out = -PORE * (0.25 + 0.75 * share) * holes * bare
+    net, at = texels.dots(4.4, 52)
+    out -= _NET * (1 + 1.5 * skin.old) * np.exp(-net.gap.ravel()[at] / 0.12) * bare
+    out += bare * (0.00035 * texels.middle * (0.5 + share) + 0.0012 * texels.coarse)
+    out += 0.00010 * texels.fine * bare
+    out -= _CREASE * creases
+    around = smooth(regions.LIPS_RINGS + 5, regions.LIPS_RINGS + 1, ring)
+    lines = skin.lips + 0.45 * skin.old * around * (1 - skin.lips)
+    out += _LIPS * skin.lines * np.clip(lines, 0, 1) * smooth(0.5, 2.5, ring)
+    rim = np.exp(-(((ring - regions.LIPS_RINGS - 0.9) / 0.8) ** 2))
+    out += 0.0016 * rim
+    return np.asarray(out)
+
+
+def normals(skin: Skin, height: Floats) -> Floats:
+    """float32[size, size, 3] in [0, 1]: normals of a relief in the texture's own axes.
+
+    Args:
+        skin: the face.
+        height: float32[n] at the texels.
+    """
+    raster = skin.texels.raster
+    image = filled(raster.spread(height), raster.covered)
+    step = np.maximum(skin.texels.step, 0.3 * np.median(skin.texels.step, axis=0))
+    across = np.gradient(image, axis=1).ravel()[raster.where] / step[:, 0]
+    up = np.gradient(image, axis=0).ravel()[raster.where] / step[:, 1]
+    out = np.stack([-across, -up, np.ones_like(across)], axis=1)
+    out /= np.linalg.norm(out, axis=1, keepdims=True)
+    size = skin.texels.size
+    flat = np.tile(np.array([0.5, 0.5, 1.0], np.float32), (size * size, 1))
+    flat[raster.where] = 0.5 + 0.5 * out
+    return flat.reshape(size, size, 3)
+
+
+def roughness(skin: Skin, creases: Floats) -> Floats:
+    """float32[n] in [0, 1]: cheeks are matte, nose, forehead and lips shine, the mouth is wet.
+
+    Args:
+        skin: the face.
+        creases: float32[n], how deep in a fold a texel is, 0 to 1.
+    """
+    field, texels = skin.field, skin.texels
+    dry = float(np.interp(skin.person.age, (8, 20, 40, 75), (0.03, -0.01, 0.0, 0.05)))
+    out = 0.45 + dry - 0.13 * field["oil"] + 0.02 * texels.coarse + 0.03 * texels.middle
+    out += 0.02 * texels.fine + 0.12 * creases
+    lips = 0.36 + 0.03 * texels.middle - 0.03 * skin.lines
+    out += (lips - out) * skin.lips
+    out += (0.20 - out) * skin.wet
+    return np.asarray(np.clip(out + (0.22 - out) * smooth(1.2, -0.2, field["eyes"]), 0.05, 1))
