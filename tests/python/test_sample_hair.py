@@ -130,7 +130,7 @@ def haired():
     out = []
     for person in (man, replace(man, name="Other", hair_style="bun", beard_style="short")):
         face = risorius.load(dna.to_bytes())
-        hair = grow_hair(person, body, base, parts, build.CM)
+        hair = grow_hair(person, body, body.man.positions, base, parts, build.CM)
         add_hair(face, hair)
         out.append((face, hair, person))
     return out

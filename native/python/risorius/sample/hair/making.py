@@ -43,21 +43,24 @@ class Grown:
     unit: float  # of the Dna's meshes, in decimetres
 
 
-def grow_hair(person: Person, body: Body, base: BaseMesh, parts: list[Part], unit: float) -> Grown:
+def grow_hair(
+    person: Person, body: Body, even: Floats, base: BaseMesh, parts: list[Part], unit: float
+) -> Grown:
     """Grow all hair of a person.
 
     Args:
         person: has the styles.
         body: the person's.
+        even: float64[V, 3], the man's positions with both sides alike, decimetres.
         base: the base mesh.
         parts: the meshes; the head of LOD 0 is grown on.
         unit: of the Dna's meshes, in decimetres.
     """
     head = next(p for p in parts if p.name == "head_lod0_mesh")
     man = body.man
-    eye = man.positions[body.groups["helper-l-eye"]].mean(axis=0)
+    eye = even[body.groups["helper-l-eye"]].mean(axis=0)
     at = head.carry(body.positions)
-    surface = Surface(head.polygons, at, head.carry(man.positions), eye)
+    surface = Surface(head.polygons, at, head.carry(even), eye)
     lines = {}
     for letter in "lr":
         for number, lid in ((1, "D"), (2, "U")):
