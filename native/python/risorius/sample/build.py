@@ -591,8 +591,9 @@ def build_sample(
     if rig is not None:
         man = None if body.man is body else lambda: assemble(source, lambda _: None)[0]
         dna = joint_face(dna, man, rig, steps, begins)
+    even = body.man.positions.copy()  # all people have their hair at the same places of it
     set_askew(dna, parts, body, askew(source, body, person), CM)
-    grown = grow_hair(person, body, source.base_mesh(), parts, CM)
+    grown = grow_hair(person, body, even, source.base_mesh(), parts, CM)
     add_hair(dna, grown)
     hairs, shown = hair_textures(person, dna, grown, texture_size)
     leave_maps(dna)
