@@ -76,7 +76,7 @@ def bounds(collection):
 
 
 def build(collection):
-    """The add-on's studio around the face of a collection, its camera the scene's; its collection."""
+    """The add-on's studio around a collection's face, its camera the scene's; the studio."""
     scene = bpy.context.scene
     bpy.context.view_layer.objects.active = next(
         thing for thing in collection.all_objects if thing.name.endswith("_controls")

@@ -13,7 +13,9 @@ import argparse
 import os
 import sys
 import tempfile
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[2]
 LABEL = 18
@@ -31,8 +33,20 @@ def parse() -> argparse.Namespace:
     return parser.parse_args()
 
 
+class Shot(NamedTuple):
+    """One picture: what stands under it, what the camera looks at, control -> value."""
+
+    label: str
+    look: str
+    weights: Mapping[str, float]
+
+
+# How high the middle is over the eyes and how high the picture, in distances between the eyes.
+LOOKS = {"face": (-0.42, 3.3), "mouth": (-1.05, 1.9), "eyes": (0.0, 1.9)}
+
+
 class Face:
-    """The imported character under the demo's lights."""
+    """The imported character in the studio."""
 
     def __init__(self, sample: Path, size: int, samples: int):
         import bpy
@@ -41,30 +55,29 @@ class Face:
         import scene as demo
 
         before = set(bpy.data.objects)
-        bpy.ops.risorius.import_dna(filepath=str(sample), use_simple_materials=True)
+        bpy.ops.risorius.import_dna(filepath=str(sample))
         made = set(bpy.data.objects) - before
         self.controls = next(o for o in made if o.name.endswith("_controls"))
         demo.build(self.controls.users_collection[0])
         self.scene, self.demo = bpy.context.scene, demo
         self.scene.render.resolution_x = self.scene.render.resolution_y = size
         self.scene.cycles.samples = samples
-        low, high = demo.bounds(self.controls.users_collection[0])
-        self.unit, self.low = high.z - low.z, low
-        self.middle_x = (low.x + high.x) / 2
+        bones, world = self.controls.data.bones, self.controls.matrix_world
+        eyes = [world @ bones[f"eye_{side}"].head_local for side in "LR"]
+        self.middle, self.apart = (eyes[0] + eyes[1]) / 2, (eyes[0] - eyes[1]).length
 
-    def look(self, near: bool) -> None:
-        """The camera on the whole face, or on its mouth."""
+    def look(self, at: str) -> None:
+        """The camera on a part of LOOKS."""
         from mathutils import Vector
 
         camera = self.scene.camera
-        height, away, lens = (0.365, 1.5, 83) if near else (0.54, 2.6, 100)
-        aim = Vector((self.middle_x, self.low.y + 0.1 * self.unit, 0))
-        aim.z = self.low.z + height * self.unit
-        camera.location = aim + Vector((0.15 * away, -away, 0.02)) * self.unit
-        camera.data.lens = lens
+        lift, height = (share * self.apart for share in LOOKS[at])
+        away = height * camera.data.lens / camera.data.sensor_height
+        aim = self.middle + Vector((0.0, 0.0, lift))
+        camera.location = aim + Vector((0.12, -0.99, 0.03)) * away
         self.demo.aim(camera, aim)
 
-    def show(self, weights: dict[str, float], path: Path) -> None:
+    def show(self, weights: Mapping[str, float], path: Path) -> None:
         import bpy
 
         bone = self.controls.pose.bones["face"]
@@ -90,8 +103,19 @@ def put_together(pictures: list[tuple[str, Path]], size: int, columns: int, out:
     sheet.save(out, quality=88)
 
 
-def main() -> None:
-    args = parse()
+def draw(
+    sample: Path, shots: Sequence[Shot], out: Path, size: int, samples: int, columns: int
+) -> None:
+    """Render the shots and put them on a sheet.
+
+    Args:
+        sample: a DNA file.
+        shots: in the order of the sheet.
+        out: the picture.
+        size: pixels of each, both ways.
+        samples: of Cycles.
+        columns: of the sheet.
+    """
     with tempfile.TemporaryDirectory() as folder:
         os.environ["BLENDER_USER_RESOURCES"] = folder
         import bpy  # noqa: F401  brings addon_utils onto the path
@@ -100,18 +124,24 @@ def main() -> None:
         from draw_engines import enable
 
         enable(Path(folder))
-        from risorius import expressions
+        face, pictures = Face(sample, size, samples), []
+        for shot in shots:
+            face.look(shot.look)
+            pictures.append((shot.label, Path(folder) / f"{len(pictures)}.png"))
+            face.show(shot.weights, pictures[-1][1])
+        put_together(pictures, size, columns, out)
 
-        face = Face(args.sample, args.size, args.samples)
-        pictures = []
-        for name, expression in expressions.load(args.file).items():
-            if args.only and name not in args.only:
-                continue
-            face.look(near=expression.group == "viseme")
-            path = Path(folder) / f"{len(pictures)}.png"
-            face.show(dict(expression.weights), path)
-            pictures.append((expression.label, path))
-        put_together(pictures, args.size, args.columns, args.sheet)
+
+def main() -> None:
+    args = parse()
+    from risorius import expressions
+
+    shots = [
+        Shot(e.label, "mouth" if e.group == "viseme" else "face", e.weights)
+        for name, e in expressions.load(args.file).items()
+        if not args.only or name in args.only
+    ]
+    draw(args.sample, shots, args.sheet, args.size, args.samples, args.columns)
     sys.stdout.flush()
     os._exit(0)  # bpy sometimes hangs at exit
 

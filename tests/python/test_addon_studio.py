@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The studio's plan: the picture holds head and shoulders, the lights stand as photographers say."""
+"""The studio: the picture holds head and shoulders, the lights stand as photographers say."""
 
 from __future__ import annotations
 

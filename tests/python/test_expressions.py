@@ -52,6 +52,17 @@ def test_expressions_differ(standard_controls):
     assert ((vectors >= 0) & (vectors <= 1)).all()
 
 
+def test_no_two_are_mistaken_for_each_other(standard_controls):
+    """As directions they lie apart: the same face twice, stronger and weaker, is one expression."""
+    shown = [e for e in expressions.load().values() if e.weights]
+    vectors = np.array([expressions.pose_vector(e, standard_controls) for e in shown])
+    vectors /= np.linalg.norm(vectors, axis=1, keepdims=True)
+    alike = vectors @ vectors.T - np.eye(len(shown))
+    first, second = divmod(int(alike.argmax()), len(shown))
+    # The nearest are two sounds of the tongue that look alike on people too.
+    assert alike.max() < 0.91, (shown[first].name, shown[second].name)
+
+
 def test_what_visemes_do_to_jaw_and_lips():
     weights = {n: e.weights for n, e in expressions.load().items() if e.group == "viseme"}
 

@@ -130,7 +130,7 @@ def test_extra_no_eye_goes_through_its_lids(face):
                 grid, turn = _posed(face, side, eyeBlink=blink, **look)
                 above = _height(grid[ROOT : ROOT + 3], eye.middle, eye.radius, turn @ gaze) / MM
                 where = (side, look, blink)
-                assert above[0].min() > 0.6, where  # the skin's edge stays a rim's width away
+                assert above[0].min() > 0.4, where  # the skin's edge stays a rim's width away
                 assert above[2].min() > -0.5, where
 
 
@@ -237,6 +237,4 @@ def test_extra_rings_are_where_one_subdivision_brings_them(faces):
     _, operator = polygons.subdivide(mesh)
     finer = operator.apply(face.positions)
     inner = eye.rings[1:-1]
-    np.testing.assert_allclose(
-        finer[inner], smoothed(eye.grid(face.positions))[1:-1], atol=1e-9
-    )
+    np.testing.assert_allclose(finer[inner], smoothed(eye.grid(face.positions))[1:-1], atol=1e-9)

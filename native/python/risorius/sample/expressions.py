@@ -182,7 +182,7 @@ def add_joint_motion(
     positions: Floats,
     pivots: dict[str, Floats],
 ) -> None:
-    """Give jaw and eyes their joints: the rigid motion that fits teeth and eyeballs best.
+    """Give jaw, teeth and eyes their joints: the rigid motion that fits teeth and eyeballs best.
 
     Args:
         out: the expressions by name; gets jawBack and jawOpenExtreme too.
@@ -204,6 +204,11 @@ def add_joint_motion(
         0.4 * out["jawOpen"].displacement,
         {"FACIAL_C_Jaw": (part_rotation(rotation, 0.4), 0.4 * shift)},
     )
+    for jaw_side, ends in (("Upper", "U"), ("Lower", "D")):
+        teeth = groups[f"helper-{jaw_side.lower()}-teeth"]
+        for name in [n for n in out if n.startswith("teeth") and n.endswith(ends)]:
+            shift = out[name].displacement[teeth].mean(axis=0)
+            out[name].joints[f"FACIAL_C_Teeth{jaw_side}"] = (np.eye(3), shift)
     for side, letter in (("L", "l"), ("R", "r")):
         eye = groups[f"helper-{letter}-eye"]
         for look in ("Up", "Down", "Left", "Right"):

@@ -42,6 +42,7 @@ _CLOSING, _OPENING = 0.08, 0.075  # seconds that lips take
 _QUICKEST = 0.035
 _SHORTEST_CLOSURE = 0.045  # seconds: shorter ones are not seen
 _SMOOTHING = 0.018  # seconds, standard deviation
+_FREE = 0.8  # up to here a control is what the shapes say
 
 
 def viseme_weights(phonemes: Sequence[Phoneme], times: Times) -> Curves:
@@ -151,4 +152,11 @@ def controls(weights: Curves, openness: Curves, intensity: float) -> dict[str, C
             if viseme in VOWEL_VISEMES and name.endswith(".jawOpen"):
                 part = part * openness
             curves[name] = curves.get(name, np.zeros(len(weights))) + part
-    return {name: np.clip(curve, 0.0, 1.0) for name, curve in curves.items()}
+    return {name: _rounded_off(curve) for name, curve in curves.items()}
+
+
+def _rounded_off(curve: Curves) -> Curves:
+    """Limited to [0, 1] without a corner: what is above _FREE comes ever nearer to 1."""
+    rest = 1.0 - _FREE
+    over = _FREE + rest * np.tanh((curve - _FREE) / rest)
+    return np.where(curve > _FREE, over, curve).clip(0.0, 1.0)

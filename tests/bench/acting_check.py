@@ -1,0 +1,297 @@
+# SPDX-License-Identifier: MIT
+"""Random acting on a sample person: lids through eyes, teeth through lips, skin through hair.
+
+    python tests/bench/acting_check.py SAMPLE.dna [--seed 1] [--frames 10000] [--clip SPEECH.rzc]
+        [--worst 6] [--json FILE] [--render SHEET.jpg]
+
+What is acted: acting_random.py; what is measured: acting_bodies.py. Exit code 1 where anything goes
+deeper than LIMITS say. Run by a Python with `risorius`; --render needs `bpy` and Pillow.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import json
+import os
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import acting_bodies as bodies
+import numpy as np
+import numpy.typing as npt
+import risorius
+from acting_bodies import Floats, Ints
+from acting_random import PREFIX, Acting, random_acting
+
+LIMITS = {"lid in eye": 0.5, "lip in teeth": 0.5, "hair in skin": 0.5, "root in skin": 2.0}  # mm
+_HAIR = ("hair", "brow", "beard")
+_LONG = 15.0  # mm: hair that is farther from the skin hangs, and no triangle is its own
+_ROOT = 0.5  # mm: what is nearer to the skin at rest is a root
+
+
+class Points:
+    """Vertices that are asked each frame: those of several users, each of them once."""
+
+    def __init__(self, surface: Any) -> None:
+        self._surface, self._rows, self._where = surface, [], {}
+
+    def add(self, mesh: int, vertices: Ints) -> Ints:
+        """Where in `at` the vertices of a mesh will stand. Args: vertices  any shape."""
+        unique, inverse = np.unique(vertices, return_inverse=True)
+        place = []
+        for vertex in unique:
+            key = (mesh, int(vertex))
+            if key not in self._where:
+                self._where[key] = len(self._rows)
+                self._rows.append(key)
+            place.append(self._where[key])
+        return np.array(place, np.int64)[inverse].reshape(np.shape(vertices))
+
+    def ready(self) -> None:
+        """After the last add."""
+        self._probe = self._surface.probe(np.array(self._rows, np.int64))
+
+    def at(self, raw: npt.NDArray[np.float32]) -> Floats:
+        """[points, 3] of a pose."""
+        return self._probe.positions(raw)
+
+
+class Eye:
+    """The lids around an eyeball."""
+
+    def __init__(self, face: Face, name: str) -> None:
+        mesh = face.mesh(name)
+        ball = face.rest[mesh]
+        self.name, self.ball = name, bodies.Ball(ball)
+        skin = face.skin
+        ray = skin.places - self.ball.middle
+        ray /= np.linalg.norm(ray, axis=1, keepdims=True).clip(1e-9)
+        near = np.abs(self.ball.depth(skin.places) + 0.225) < 0.375  # -0.15 to 0.6 cm outside
+        outward = np.einsum("nd,nd->n", ray, skin.normals) > -0.2  # the lids' edges too
+        self.lids = skin.kept(near & outward & (ray[:, 2] > 0.2))
+        some = np.linspace(0, len(ball) - 1, 60).astype(np.int64)
+        self._rest = ball[some]
+        self._some = face.points.add(mesh, some)
+        self._corners = face.points.add(face.head, self.lids.corners)
+
+    def depths(self, now: Floats) -> tuple[str, Floats, Floats]:
+        """The check, how deep each sample is, and where the samples are."""
+        turn, shift = bodies.rigid_motion(self._rest, now[self._some])
+        places = now[self._corners].mean(axis=1)
+        return "lid in eye", self.ball.depth((places - shift) @ turn), places
+
+
+class Mouth:
+    """The lips around both rows of teeth."""
+
+    def __init__(self, face: Face, name: str) -> None:
+        mesh = face.mesh(name)
+        teeth, triangles = face.rest[mesh], face.triangles(mesh)
+        wide = np.abs(teeth[:, 0]).max()
+        back = teeth[:, 2].max() - wide
+        below = face.moved_by_jaw(mesh)
+        self.rows = []
+        for lower in (False, True):
+            kept = triangles[(below[triangles] == lower).all(axis=1)]
+            arch = bodies.Arch(teeth, kept, back)
+            used = np.unique(kept)
+            self.rows.append((lower, arch, teeth[used], face.points.add(mesh, used)))
+        self.lips = self._lips(face.skin, teeth, back, wide)
+        self._below = face.moved_by_jaw(face.head)[self.lips.corners].mean(axis=1) > 0.5
+        self._corners = face.points.add(face.head, self.lips.corners)
+
+    @staticmethod
+    def _lips(skin: bodies.Skin, teeth: Floats, back: float, wide: float) -> bodies.Skin:
+        """Skin that is seen in front of the teeth, at rest."""
+        ray = skin.places * [1.0, 0.0, 1.0] - [0.0, 0.0, back]
+        radius = np.linalg.norm(ray, axis=1).clip(1e-9)
+        outward = np.einsum("nd,nd->n", ray / radius[:, None], skin.normals) > 0.0
+        low, high = teeth[:, 1].min() - 0.8, teeth[:, 1].max() + 0.8
+        tall = (skin.places[:, 1] > low) & (skin.places[:, 1] < high)
+        ahead = ray[:, 2] > 0.25 * radius
+        return skin.kept(outward & tall & ahead & (radius < wide + 2.0) & (radius > 0.85 * wide))
+
+    def depths(self, now: Floats) -> tuple[str, Floats, Floats]:
+        """As of Eye."""
+        places = now[self._corners].mean(axis=1)
+        deep = np.zeros(len(places))
+        for lower, arch, rest, points in self.rows:
+            turn, shift = bodies.rigid_motion(rest, now[points])
+            found = arch.depth((places - shift) @ turn, self._below != lower)
+            deep = np.maximum(deep, found)
+        return "lip in teeth", deep, places
+
+
+class Hair:
+    """Cards over the skin: their roots, or the rest."""
+
+    def __init__(self, face: Face, name: str, roots: bool, most: int = 4000) -> None:
+        mesh = face.mesh(name)
+        hairs = face.rest[mesh]
+        some = np.linspace(0, len(hairs) - 1, min(most, len(hairs))).astype(np.int64)
+        cards = bodies.Cards(hairs[some], face.rest[face.head], face.triangles(face.head))
+        short = np.abs(cards.rest) < _LONG / face.mm
+        kept = short & ((cards.rest < _ROOT / face.mm) == roots)
+        self.check = "root in skin" if roots else "hair in skin"
+        self._hairs = face.points.add(mesh, some[kept])
+        self._corners = face.points.add(face.head, cards.corners[kept])
+
+    def depths(self, now: Floats) -> tuple[str, Floats, Floats]:
+        """As of Eye."""
+        places = now[self._hairs]
+        return self.check, -bodies.Cards.height(places, now[self._corners]), places
+
+
+class Face:
+    """A person at rest, and all that is looked at."""
+
+    def __init__(self, path: Path) -> None:
+        self.dna = risorius.load(str(path))
+        self.rig = risorius.Rig(self.dna)
+        surface = risorius.Surface(self.dna, self.rig)
+        self.names, self.mm = list(self.dna.raw_control_names), surface.mm
+        self._meshes = {self.dna.mesh_names[m]: m for m in surface.mesh_indices}
+        raw = np.array(self.rig.initial_raw_controls, np.float32)
+        self.rest = {m: surface.positions(raw, m).astype(float) for m in self._meshes.values()}
+        raw = raw.copy()
+        raw[self.names.index(PREFIX + "jawOpen")] = 1.0
+        self._open = {m: surface.positions(raw, m).astype(float) for m in self._meshes.values()}
+        self.head = self.mesh("head")
+        self.points = Points(surface)
+        self.skin = bodies.skin_samples(self.rest[self.head], self.faces(self.head))
+        names = list(self._meshes)
+        eyes = [n for n in names if n.startswith(("eyeLeft", "eyeRight"))]
+        self.parts: list[Any] = [Eye(self, n) for n in eyes]
+        self.parts += [Mouth(self, n) for n in names if n.startswith("teeth")]
+        for name in names:
+            if any(word in name.lower() for word in _HAIR):
+                self.parts += [Hair(self, name, roots) for roots in (True, False)]
+        self.points.ready()
+
+    def mesh(self, name: str) -> int:
+        """The index of the mesh whose name begins so."""
+        return next(m for n, m in self._meshes.items() if n.startswith(name))
+
+    def faces(self, mesh: int) -> list[list[int]]:
+        """Vertices of each face."""
+        held = self.dna.meshes[mesh]
+        corners = np.asarray(held.layout_positions)[np.asarray(held.face_layouts)].tolist()
+        ends = np.asarray(held.face_offsets).tolist()
+        return [corners[a:b] for a, b in itertools.pairwise(ends)]
+
+    def triangles(self, mesh: int) -> Ints:
+        """[F, 3], fans of the faces."""
+        fans = ((f[0], f[i], f[i + 1]) for f in self.faces(mesh) for i in range(1, len(f) - 1))
+        return np.array(list(fans), np.int64)
+
+    def moved_by_jaw(self, mesh: int) -> npt.NDArray[np.bool_]:
+        """[V] which vertices an open jaw takes along for half of its way or more."""
+        way = np.linalg.norm(self._open[mesh] - self.rest[mesh], axis=1)
+        teeth = self.mesh("teeth")
+        return way > 0.5 * np.linalg.norm(self._open[teeth] - self.rest[teeth], axis=1).max()
+
+
+def measure(face: Face, acting: Acting) -> dict[str, npt.NDArray[np.float64]]:
+    """By check the greatest depth of each frame, in mm, and where: float64[frames, 4]."""
+    checks = {name: np.zeros((len(acting.raw), 4)) for name in LIMITS}
+    for frame, raw in enumerate(acting.raw):
+        now = face.points.at(raw)
+        for part in face.parts:
+            check, deep, places = part.depths(now)
+            worst = int(deep.argmax()) if len(deep) else 0
+            if len(deep) and deep[worst] * face.mm > checks[check][frame, 0]:
+                checks[check][frame] = (deep[worst] * face.mm, *places[worst])
+    return checks
+
+
+def report(
+    face: Face, acting: Acting, checks: dict[str, npt.NDArray[np.float64]], worst: int
+) -> list[dict[str, Any]]:
+    """The checks as rows, with the worst frames of each."""
+    rest = measure(face, Acting(np.array([face.rig.initial_raw_controls], np.float32), ["rest"]))
+    rows = []
+    for check, found in checks.items():
+        order = np.argsort(-found[:, 0])[:worst]
+        rows.append(
+            {
+                "check": check,
+                "limit_mm": LIMITS[check],
+                "rest_mm": round(float(rest[check][0, 0]), 3),
+                "beyond": int((found[:, 0] > LIMITS[check]).sum()),
+                "frames": len(found),
+                "worst": [
+                    {
+                        "frame": int(frame),
+                        "mm": round(float(found[frame, 0]), 3),
+                        "at": [round(float(x), 2) for x in found[frame, 1:]],
+                        "acting": acting.words[frame],
+                    }
+                    for frame in order
+                    if found[frame, 0] > 0
+                ],
+            }
+        )
+    return rows
+
+
+def show(rows: list[dict[str, Any]]) -> None:
+    """The rows as a table."""
+    for row in rows:
+        print(
+            f"{row['check']:14} limit {row['limit_mm']} mm, at rest {row['rest_mm']:.2f} mm, "
+            f"beyond it in {row['beyond']} of {row['frames']} frames"
+        )
+        for one in row["worst"]:
+            place = f"frame {one['frame']:6}  at {one['at']}"
+            print(f"    {one['mm']:6.2f} mm  {place}  {one['acting']}")
+
+
+def render(args: argparse.Namespace, acting: Acting, names: list[str], rows: list[Any]) -> None:
+    """The worst frames of each check on a sheet."""
+    import draw_expressions
+
+    shots = []
+    for row in rows:
+        for one in row["worst"]:
+            weights = dict(zip(names, acting.raw[one["frame"]].tolist(), strict=True))
+            look = "mouth" if row["check"] == "lip in teeth" else "eyes"
+            label = f"{row['check']} {one['mm']:.2f} mm, {one['frame']}"
+            shots.append(draw_expressions.Shot(label, look, weights))
+    draw_expressions.draw(args.sample, shots, args.render, size=256, samples=16, columns=args.worst)
+
+
+def parse() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("sample", type=Path)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--frames", type=int, default=10000)
+    parser.add_argument("--clip", type=Path, help="a .rzc of speech")
+    parser.add_argument("--worst", type=int, default=6)
+    parser.add_argument("--json", type=Path)
+    parser.add_argument("--render", type=Path)
+    return parser.parse_args()
+
+
+def main() -> int:
+    args = parse()
+    begin = time.monotonic()
+    face = Face(args.sample)
+    clip = None if args.clip is None else risorius.Clip.load(str(args.clip))
+    acting = random_acting(face.names, args.seed, args.frames, clip)
+    rows = report(face, acting, measure(face, acting), args.worst)
+    show(rows)
+    print(f"{args.frames} frames by seed {args.seed} in {time.monotonic() - begin:.0f} s")
+    if args.json is not None:
+        args.json.write_text(json.dumps({"seed": args.seed, "checks": rows}, indent=1) + "\n")
+    if args.render is not None:
+        render(args, acting, face.names, rows)
+        sys.stdout.flush()
+        os._exit(int(any(row["beyond"] for row in rows)))  # bpy sometimes hangs at exit
+    return int(any(row["beyond"] for row in rows))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
