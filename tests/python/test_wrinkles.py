@@ -173,7 +173,11 @@ def test_a_true_smile_lifts_its_own_cheek_and_no_lip(side):
     places = np.array(
         [[0.42, -0.36, 0.0], [-0.42, -0.36, 0.0], [0.1, -0.72, 0.3], [-0.1, -0.72, 0.3], [0, 0, 0]]
     )
-    moved = expressions.cheek_mass(places, side)
+    there = Expression(np.full((5, 3), 0.05))
+    units = {name + side: there for name in ("mouthCornerPull", "eyeCheekRaise")}
+    moved = expressions.cheek_mass(units, places, side)
+    still = Expression(np.zeros((5, 3)))  # teeth: nothing moves them
+    assert not expressions.cheek_mass(dict.fromkeys(units, still), places, side).any()
     own, other = (0, 1) if side == "L" else (1, 0)
     assert moved[own, 2] > 0.02
     assert sign * moved[own, 0] > 0

@@ -218,12 +218,13 @@ def add_joint_motion(
             expression.joints[f"FACIAL_{side}_Eye"] = (rotation, np.zeros(3))
 
 
-def cheek_mass(places: Floats, side: str) -> Floats:
+def cheek_mass(units: dict[str, Expression], places: Floats, side: str) -> Floats:
     """float64[V, 3]: the fat of a cheek that a true smile pushes up, and over the line of the lip.
 
-    It ends at that line, where the skin turns in: the fold is part of the shape.
+    It ends at that line, where the skin turns in: the fold is part of the shape. Teeth stay.
 
     Args:
+        units: what each raw control does, by its name.
         places: float64[V, 3] on the man's head, measured from between his eyes, decimetres.
         side: L or R.
     """
@@ -238,7 +239,42 @@ def cheek_mass(places: Floats, side: str) -> Floats:
     out = _CHEEK_BALL * ball[:, None] * [0.35 * own, 0.25, 0.9]
     out = out * smooth_step((away + 0.02) / 0.06)[:, None]
     out += _ROLL * (roll[:, None] * [0.3 * own, -0.1, 0.9] - 0.6 * dip[:, None] * [0.0, 0.0, 1.0])
-    return np.asarray(out * half[:, None])
+    moved = [units[name + side].displacement for name in ("mouthCornerPull", "eyeCheekRaise")]
+    soft = smooth_step(np.linalg.norm(moved, axis=2).max(axis=0) / 0.02)
+    return np.asarray(out * (half * soft)[:, None])
+
+
+def leave_bones(
+    out: dict[str, Expression],
+    groups: dict[str, Ints],
+    positions: Floats,
+    pivots: dict[str, Floats],
+) -> None:
+    """Teeth and eyeballs go with their joints alone: what is hard keeps its form. Pupils do not.
+
+    Args:
+        out: the expressions by name, with their joints; displacements are changed.
+        groups: vertex indices by group of the base mesh.
+        positions: float64[V, 3], decimetres.
+        pivots: joint positions by name.
+    """
+    bones = {"helper-upper-teeth": ("FACIAL_C_TeethUpper",)}
+    bones["helper-lower-teeth"] = ("FACIAL_C_TeethLower", "FACIAL_C_Jaw")
+    for side, letter in (("L", "l"), ("R", "r")):
+        for name in ("helper-{}-eye", "eyeball-{}", "cornea-{}"):
+            bones[name.format(letter)] = (f"FACIAL_{side}_Eye",)
+    for name, unit in out.items():
+        unit.displacement = unit.displacement.copy()
+        for group, joints in bones.items():
+            if "Pupil" in name and "teeth" not in group:
+                continue
+            at = positions[groups[group]]
+            way = np.zeros_like(at)
+            for joint in joints:
+                if joint in unit.joints:
+                    rotation, shift = unit.joints[joint]
+                    way += (at - pivots[joint]) @ rotation.T + pivots[joint] + shift - at
+            unit.displacement[groups[group]] = way
 
 
 def corrective_displacements(
@@ -269,7 +305,7 @@ def corrective_displacements(
         share = np.zeros(len(blink))
         share[near] = np.minimum(0.25, lid_rise[near].max() / max(travel.max(), 1e-9))
         result[(f"eyeBlink{side}", f"eyeCheekRaise{side}")] = -share[:, None] * blink
-        ball = cheek_mass(places, side)
+        ball = cheek_mass(out, places, side)
         result[(f"mouthCornerPull{side}", f"eyeCheekRaise{side}")] = ball
         for lips in ("mouthFunnel", "mouthLipsPurse"):
             # Lips that are pushed forward keep touching the teeth line less when the jaw drops.
