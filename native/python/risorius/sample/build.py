@@ -370,7 +370,8 @@ def assemble(
     say("reading 52 ARKit units and the further ones")
     body = Body(source, base, person)
     positions, joints, units = body.positions, body.joints, body.units
-    correctives = ex.corrective_displacements(units) | body.further_correctives
+    places = body.man.positions - [0, *body.man.joints["FACIAL_L_Eye"][1:]]
+    correctives = ex.corrective_displacements(units, places) | body.further_correctives
     correctives |= body.eye_correctives
     raw = list(units)
     pairs = list(correctives)

@@ -38,7 +38,7 @@ def heights(skin: Skin, creases: Floats) -> Floats:
     out = -PORE * (0.25 + 0.75 * share) * holes * bare
     net, at = texels.dots(4.4, 52)
     out -= _NET * (1 + 1.5 * skin.old) * np.exp(-net.gap.ravel()[at] / 0.12) * bare
-    out += bare * (0.00035 * texels.middle * (0.5 + share) + 0.0012 * texels.coarse)
+    out += bare * (0.00035 * texels.middle * (0.5 + share) + 0.0006 * texels.coarse)
     out += 0.00010 * texels.fine * bare
     out -= _CREASE * creases
     around = smooth(regions.LIPS_RINGS + 5, regions.LIPS_RINGS + 1, ring)
@@ -78,7 +78,7 @@ def roughness(skin: Skin, creases: Floats) -> Floats:
     """
     field, texels = skin.field, skin.texels
     dry = float(np.interp(skin.person.age, (8, 20, 40, 75), (0.03, -0.01, 0.0, 0.05)))
-    out = 0.45 + dry - 0.13 * field["oil"] + 0.02 * texels.coarse + 0.03 * texels.middle
+    out = 0.48 + dry - 0.13 * field["oil"] + 0.02 * texels.coarse + 0.03 * texels.middle
     out += 0.02 * texels.fine + 0.12 * creases
     lips = 0.36 + 0.03 * texels.middle - 0.03 * skin.lines
     out += (lips - out) * skin.lips

@@ -204,8 +204,8 @@ class Skin:
     def _amount(self, what: str, creases: Floats) -> Floats:
         field, texels = self.field, self.texels
         if what == "blood":
-            uneven = 1 + 0.14 * texels.coarse + 0.12 * texels.middle
-            out = field["blood"] * uneven + 0.016 * texels.coarse + 0.028 * texels.middle
+            uneven = 1 + 0.12 * texels.coarse + 0.08 * texels.middle
+            out = field["blood"] * uneven + 0.016 * texels.coarse + 0.018 * texels.middle
             return np.asarray(out + 0.03 * texels.fine + 0.35 * creases + self._vessels())
         if what == "veins":
             temples = np.clip(texels.coarse - 1.2, 0, 1) * (1 - self.deep)
