@@ -223,20 +223,21 @@ def test_simple_materials_have_no_drivers_and_no_subsurface(kinds_file):
 # --- what one looks through ------------------------------------------------------------------
 
 
-def _eye_under_a_film():
+def _eye_under_a_film(film="eyeshell"):
     """An eye with a film before it, as eyeshell and cornea lie."""
     face = small_face()
     patch = face.meshes[1]
     meshes = {
         "head_lod0_mesh": face.meshes[0],
         "eyeLeft_lod0_mesh": looks.copy_mesh(patch, scale=0.5),
-        "eyeshell_lod0_mesh": looks.copy_mesh(patch, (0, 0, 0.1), scale=0.52),
+        f"{film}_lod0_mesh": looks.copy_mesh(patch, (0, 0, 0.1), scale=0.52),
     }
     return looks.set_meshes(face, meshes)
 
 
-def test_the_iris_is_seen_through_the_film(tmp_path):
-    rig = scene.load(_save(tmp_path, _eye_under_a_film()))
+@pytest.mark.parametrize("name", ["eyeshell", "cornea"])
+def test_the_iris_is_seen_through_the_film(tmp_path, name):
+    rig = scene.load(_save(tmp_path, _eye_under_a_film(name)))
     head, eye, film = (scene.meshes(rig)[i] for i in range(3))
     head.hide_render = True
     setup, _ = looks.stage([eye], 24, samples=16)
@@ -250,6 +251,26 @@ def test_the_iris_is_seen_through_the_film(tmp_path):
     eye.hide_render = True
     alone = looks.render(setup, tmp_path / "alone.png")
     assert alone[..., 3].mean() < 0.6 or alone[middle][..., :3].mean() < 0.2
+
+
+def test_a_cornea_refracts_for_cycles_alone(tmp_path):
+    rig = scene.load(_save(tmp_path, _eye_under_a_film("cornea")))
+    nodes = _materials(rig)["cornea"].node_tree.nodes
+    outputs = {n.target: n for n in nodes if n.type == "OUTPUT_MATERIAL"}
+    assert set(outputs) == {"ALL", "CYCLES"}
+
+    def shaders(node):
+        found = {node.type}
+        for socket in node.inputs:
+            for link in socket.links:
+                found |= shaders(link.from_node)
+        return found
+
+    assert "BSDF_REFRACTION" in shaders(outputs["CYCLES"])
+    assert "BSDF_REFRACTION" not in shaders(outputs["ALL"])
+    # Light and shadows pass: what refracts is for rays of the camera.
+    assert "LIGHT_PATH" in shaders(outputs["CYCLES"])
+    assert "BSDF_TRANSPARENT" in shaders(outputs["CYCLES"])
 
 
 _EEVEE = """

@@ -20,7 +20,7 @@ from risorius.author import (
     pivots,
 )
 from risorius.author.fitting import bounded
-from risorius.author.geometry.simplify import fewer_triangles, simplified
+from risorius.author.geometry.simplify import attributes_of, fewer_triangles, simplified
 from risorius.author.input import matching, shape_face, spec
 
 # Skinning and morphing from the format's description alone; nothing of risorius.author is in it.
@@ -199,7 +199,7 @@ def test_a_seam_of_the_texture_stays_closed():
     )  # fmt: skip
     bend = np.zeros((1, len(positions), 3))
     bend[0, :, 2] = np.maximum(0, positions[:, 1] - 8)
-    coarse, kept = simplified(mesh, fewer_triangles(mesh, bend, 60))
+    coarse, kept = simplified(mesh, fewer_triangles(mesh, attributes_of(mesh, bend), 60))
     assert 20 < len(kept) <= 60
     triangles = np.asarray(coarse.face_layouts, int).reshape(-1, 3)
     places = np.asarray(coarse.layout_positions, int)[triangles]
@@ -225,7 +225,8 @@ def test_a_mesh_that_is_all_seams_gets_coarser_all_the_same():
     mesh = shape_face.ObjMesh(positions, uvs, faces.tolist(), corners)
     moved = face_shapes.expressions(positions)
     face = shape_face.make_shape_face(shape_face.ShapeSet("seams", mesh, moved), {})
-    few = fewer_triangles(face.meshes[0], np.stack(list(moved.values())), 100)
+    mesh = face.meshes[0]
+    few = fewer_triangles(mesh, attributes_of(mesh, np.stack(list(moved.values()))), 100)
     coarse, kept = simplified(face.meshes[0], few)
     assert 80 < len(kept) <= 100
     places = np.asarray(coarse.layout_texture_coordinates, int)

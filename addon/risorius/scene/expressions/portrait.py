@@ -160,7 +160,7 @@ def _frame(sitter: Sitter) -> tuple[Floats, float]:
         apart = float(np.linalg.norm(eyes[0] - eyes[1]))
         if apart > 0.0:
             return (eyes[0] + eyes[1]) / 2 + np.array([0.0, 0.0, -0.62 * apart]), 1.42 * apart
-    largest = max(sitter.pieces, key=lambda piece: len(piece.triangles))
+    largest = max(sitter.pieces, key=lambda piece: (not piece.hairs, len(piece.triangles)))
     points = live.space.points(live.dna.meshes[largest.index].positions)
     low, high = points.min(axis=0), points.max(axis=0)
     half = max(float((high - low)[[0, 2]].max()) / 2, 1e-6)

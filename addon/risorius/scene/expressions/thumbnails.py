@@ -131,7 +131,7 @@ def _piece(
         colors=colors * _DIM.get(kind, 1.0),
         image=_pixels(image, pixels) if image is not None else None,
         gloss=_GLOSS.get(kind, 0.1),
-        hairs=kind == "lashes",
+        hairs=kind in ("lashes", "hair"),
         weights=portrait.skin_of(mesh, len(live.dna.joint_names)),
         shapes=portrait.shapes_of(mesh),
     )

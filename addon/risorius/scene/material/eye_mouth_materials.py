@@ -268,11 +268,13 @@ def wet(graph: Graph, look: Look) -> None:
     """
     points = graph.rest_points(look.extent)
     ripples = graph.noise(points, 18.0 / look.unit, detail=3.0)
-    cornea = "cornea" in look.base.lower()
-    normal = None if cornea else graph.bump(ripples, look.unit * 0.006, None, 0.25)
+    base = look.base.lower()
+    cornea = "cornea" in base
+    still = cornea or "eyeedge" in base  # too narrow for ripples: they would break its one shine
+    normal = None if still else graph.bump(ripples, look.unit * 0.006, None, 0.25)
     gloss = graph.node("BsdfGlossy")
     gloss.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
-    rough = (0.008, 0.02) if cornea else (0.02, 0.10)
+    rough = (0.008, 0.02) if still else (0.02, 0.10)
     graph.put(_film(graph, look, *rough), gloss.inputs["Roughness"])
     graph.put(normal, gloss.inputs["Normal"])
     fresnel = graph.node("Fresnel")
@@ -282,7 +284,7 @@ def wet(graph: Graph, look: Look) -> None:
     facing = graph.math("SUBTRACT", 1.0, graph.node("NewGeometry").outputs["Backfacing"])
     amount = graph.math("MULTIPLY", fresnel.outputs[0], facing)
     clear = graph.node("BsdfTransparent")
-    if not cornea:
+    if not still:
         tint = graph.ramp(ripples, (0.3, (0.985, 0.975, 0.97)), (0.7, (1.0, 1.0, 1.0)))
         graph.put(tint, clear.inputs["Color"])
     under = _mixed(graph, amount, clear.outputs[0], gloss.outputs[0])

@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair on cards: opacity by the picture, a soft highlight drawn out across the hairs."""
+"""Hair on cards: opacity by the picture, a soft highlight that fades at flat angles."""
 
 from __future__ import annotations
 
+from ..base.blender_types import Socket
 from .look import Look
 from .nodes import Graph
 
-_ROUGH = 0.42
-_SHINE = 0.3  # as of metal: hair reflects in its own colour, also where it is seen from aside
-_DRAWN_OUT = 0.5  # how far the highlight is drawn out across the hairs
+_ROUGH = 0.45
+_SHINE = 0.16  # as of metal: hair reflects in its own colour, also where it is seen from aside
+_GLOSS, _GLOSS_FACING = 0.1, 0.35
 _BARE = (0.06, 0.045, 0.035)  # linear colour without a picture
 
 
@@ -25,19 +26,22 @@ def build(graph: Graph, look: Look) -> None:
         return
     node = graph.image(picture, label="Colour")
     graph.set(Base_Color=node.outputs["Color"], Roughness=_ROUGH)
-    graph.set(Metallic=_SHINE, Specular_Ior_Level=0.0)
+    graph.set(Metallic=_SHINE, Specular_Ior_Level=_GLOSS)
     if picture.channels == 4:
         graph.set(Alpha=node.outputs["Alpha"])
         see_through(graph)
     if look.simple:
         return
-    graph.set(Normal=outward_normal(graph))
-    along = graph.node("Tangent")
-    along.direction_type = "UV_MAP"
-    graph.set(Anisotropic=_DRAWN_OUT, Tangent=along.outputs["Tangent"])
+    normal = outward_normal(graph)
+    # A sheet mirrors all at a flat angle, a tuft of fibres does not.
+    facing = graph.node("LayerWeight")
+    graph.put(normal, facing.inputs["Normal"])
+    towards = graph.math("SUBTRACT", 1.0, facing.outputs["Facing"], clamp=True)
+    level = graph.math("MULTIPLY", graph.math("POWER", towards, 1.5), _GLOSS_FACING)
+    graph.set(Normal=normal, Specular_Ior_Level=level)
 
 
-def outward_normal(graph: Graph) -> object:
+def outward_normal(graph: Graph) -> Socket:
     """The normal that the file has, on both sides of a card: it is the skin's, not the card's.
 
     Renderers turn a normal round where a face is seen from behind.

@@ -27,10 +27,10 @@ _FLUSH_SHARE = 0.22  # of an area's map: without a painted mask a blush must sta
 _PORE_DEPTH = 0.032
 _GRAIN_DEPTH = 0.006
 # Light goes so far in light skin, in distances of the eyes; in dark skin less.
-_SUBSURFACE, _DARKEST = 0.038, 0.4
+_SUBSURFACE, _DARKEST = 0.026, 0.4
 _RADIUS = (1.0, 0.36, 0.2)
 _IOR = 1.4
-_OILY, _OIL_ROUGHNESS = 0.16, 0.62  # the second lobe, and how rough it is beside the first
+_OILY, _OIL_ROUGHNESS = 0.22, 0.55  # the second lobe, and how rough it is beside the first
 _FOLD_DEPTH = {"level": 0.45, "upright": 0.45, "rays": 0.35, "arc": 1.8, "dimples": 0.6}
 
 Member = tuple[str, Value]  # side of the face, value of the map

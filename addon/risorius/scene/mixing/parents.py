@@ -75,7 +75,8 @@ class _Seen:
     """What does not change while sliders move: masks and polygons of the finest level."""
 
     def __init__(self, context: Context, paths: Sequence[str]) -> None:
-        self.parents = [read(path) for path in paths]
+        bald = native.part("mixing").without_hair
+        self.parents = [bald(read(path)) for path in paths]
         first = self.parents[0]
         self.masks = native.part("mixing").Masks(first)
         self.space = plans.space_of(first, context.scene.unit_settings.scale_length)

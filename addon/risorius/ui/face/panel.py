@@ -6,6 +6,7 @@ from ...logic.character import plans
 from ...scene.base import parts
 from ...scene.base.blender_types import ArmatureObject
 from ...scene.character import lods, rig_placement, runtime
+from ...scene.hair import strands
 from .. import words
 from ..bake.panel import draw_state
 from ..blender_types import Context, Icon, Panel, UILayout
@@ -156,6 +157,9 @@ class RISORIUS_PT_options(FaceOnlyPanel, Panel):
             _draw_shapes(body, rig)
         on = bool(controls.get(parts.OVERDRIVE))
         layout.operator("risorius.set_overdrive", depress=on).enable = not on
+        if any(strands.cards(rig)):
+            shown = strands.are_shown(rig)
+            layout.operator("risorius.set_strands", depress=shown).enable = not shown
         attached = rig_placement.body_of(controls)
         body = "risorius.detach_body" if attached else "risorius.attach_body"
         layout.operator(body, icon="ARMATURE_DATA")

@@ -23,7 +23,7 @@ _JOINTS = (1.0, 0.8, 0.6, 0.45, 0.3, 0.2, 0.12, 0.06)
 _FALL = 0.6  # of the vertices, from level to level
 _LEAST_JOINTS = 4
 # Clear films, lashes and what lies inside the mouth; they go when nothing is left of them.
-_SMALL = ("lash", "saliva", "shell", "eyeedge", "cartilage", "tongue")
+_SMALL = ("lash", "saliva", "shell", "cornea", "eyeedge", "cartilage", "tongue")
 _LEAST_VERTICES = 24
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from .. import BlendShapeTarget, Dna, Mesh
 from .between import Between, Ways
 from .geometry import skeleton as sk
-from .geometry.simplify import fewer_triangles, simplified
+from .geometry.simplify import Floats, attributes_of, fewer_triangles, simplified
 from .geometry.skeleton import Doubles, Ints
 from .level_weights import level_weights
 from .levels import level_name, mesh_budget, vertex_budgets
@@ -57,6 +57,7 @@ class Made:
         """
         self.whole = whole
         self.work, self.options, self.weights, self.like = work, options, weights, like
+        self._attributes: dict[str, Floats] = {}  # of fine meshes, which all levels look at
         self.triangles: dict[str, Ints] = {}  # of the coarse meshes, in layouts of the fine ones
         self.ways = Ways(work)
         self.meshes: list[Mesh] = []
@@ -112,7 +113,11 @@ class Made:
         if self.like is not None:
             return self.like.triangles.get(level_name(name, lod), none)
         budget = mesh_budget(name, len(mesh.positions), share)
-        return fewer_triangles(mesh, wanted, budget) if budget else none
+        if not budget:
+            return none
+        if name not in self._attributes:
+            self._attributes[name] = attributes_of(mesh, wanted)
+        return fewer_triangles(mesh, self._attributes[name], budget)
 
     def _start(self, mesh: Mesh) -> Doubles:
         """Dense weights of the nearest vertices of the finest level."""

@@ -53,18 +53,18 @@ def _predicted(rows: npt.NDArray[np.uint8], values: int) -> npt.NDArray[np.uint8
 
 
 def read_png(data: bytes) -> Floats | None:
-    """An image that png wrote, or None where it is another kind of file, or damaged.
+    """An image without opacity that png wrote, or None: another kind of file, or damaged.
 
     Args:
         data: of the file.
 
     Returns:
-        float64[h, w], [h, w, 3] or [h, w, 4] in [0, 1]; row 0 is the bottom.
+        float64[h, w] or [h, w, 3] in [0, 1]; row 0 is the bottom.
     """
     if data[:8] != _SIGNATURE or len(data) < 33 or data[12:16] != b"IHDR":
         return None
     width, height, depth, kind, *others = struct.unpack(">IIBBBBB", data[16:29])
-    values = {0: 1, 2: 3, 6: 4}.get(kind, 0)
+    values = {0: 1, 2: 3}.get(kind, 0)
     if depth != 8 or any(others) or not 0 < width * height * values <= 3 * _MOST_TEXELS:
         return None
     body = _body(data, height * (1 + width * values))

@@ -9,6 +9,7 @@ import numpy as np
 
 from .. import Dna, Mesh
 from ..base.errors import ArgumentError
+from .hair import without_hair
 
 _NAMES = {
     "raw_control_names": "raw control",
@@ -54,6 +55,7 @@ def difference(one: Dna, other: Dna) -> str | None:
         one: a face.
         other: another one.
     """
+    one, other = without_hair(one), without_hair(other)
     for tell in (_names, _system, _lists, _behavior, _meshes):
         why = tell(one, other)
         if why is not None:

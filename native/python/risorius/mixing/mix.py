@@ -19,6 +19,7 @@ from ..author.geometry import skeleton as sk
 from ..author.geometry.skeleton import Doubles
 from ..base.errors import ArgumentError
 from ..rigs.rotation import Convention
+from .hair import give_hair, without_hair
 from .regions import REGIONS, Masks
 
 
@@ -76,8 +77,8 @@ def mix_faces(
         masks: of the first parent's regions, where they are known already.
 
     Returns:
-        Where all of it is one parent's, that parent's every bit. Metadata are those of the parent
-        with the largest share.
+        Where all of it is one parent's, that parent's every bit. Metadata and hair are those of
+        the parent with the largest share.
 
     Raises:
         ValueError: shares that make no sense, a region that the first parent does not have.
@@ -89,6 +90,8 @@ def mix_faces(
         out = copy.copy(parents[int(alone[0])])
         out.name = out.name if name is None else name
         return out
+    leading = parents[most]
+    parents = [without_hair(parent) for parent in parents]
     masks = masks or Masks(parents[0])
     for region in mix.regions:
         if masks.is_empty(region):
@@ -104,6 +107,7 @@ def mix_faces(
     out.joint_groups = _joint_groups(out, parents, of_joints)
     _maps(out, parents, mix.whole())
     _descriptor(out, parents, mix.whole(), most, name)
+    give_hair(out, leading)
     return out
 
 

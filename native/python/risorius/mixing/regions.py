@@ -16,6 +16,7 @@ from .. import Dna, Mesh
 from ..author.geometry import skeleton as sk
 from ..author.geometry.skeleton import Doubles, Ints
 from ..controls.regions import region_of
+from .hair import without_hair
 
 # Region -> regions of controls, see controls/regions.toml.
 _CONTROLS = {
@@ -43,11 +44,12 @@ class Masks:
     """Soft masks of the regions on all meshes of a face.
 
     Attributes:
-        meshes: float64[V, regions] of each mesh.
+        meshes: float64[V, regions] of each mesh, without those of hair_meshes.
         skin: the face's own mesh of the finest level.
     """
 
     def __init__(self, dna: Dna) -> None:
+        dna = without_hair(dna)
         controls = len(dna.raw_control_names)
         motions = sk.column_motions(dna, sk.column_count(dna))[:controls]
         skins: dict[int, int] = {}  # level -> the largest mesh that moves by itself

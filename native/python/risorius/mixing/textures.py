@@ -15,6 +15,7 @@ from pathlib import Path
 from .. import Dna
 from ..author.geometry.skeleton import Doubles
 from ..files.png import png, read_png
+from .hair import without_hair
 from .mix import Mix
 from .regions import Masks
 
@@ -48,7 +49,7 @@ def mix_textures(
     """
     whole = mix.whole()
     most = int(whole.argmax())
-    meshes = list(parents[0].mesh_names)
+    meshes = list(without_hair(parents[0]).mesh_names)
     files: dict[str, bytes] = {}
     own: list[str] = []
     for key, name in parents[most].metadata.items():

@@ -28,6 +28,8 @@ JOINTS = [
     ("FACIAL_C_Jaw", "head"),
     ("FACIAL_L_Eye", "head"),
     ("FACIAL_R_Eye", "head"),
+    ("FACIAL_C_TeethUpper", "head"),
+    ("FACIAL_C_TeethLower", "FACIAL_C_Jaw"),
 ]
 
 
@@ -116,11 +118,13 @@ def joint_positions(positions: Floats, groups: dict[str, Ints], size: float) -> 
         "FACIAL_C_Jaw": jaw_hinge,
         "FACIAL_L_Eye": eyes["L"],
         "FACIAL_R_Eye": eyes["R"],
+        "FACIAL_C_TeethUpper": middle("helper-upper-teeth"),
+        "FACIAL_C_TeethLower": middle("helper-lower-teeth"),
     }
 
 
 def spine_weights(positions: Floats, joints: dict[str, Floats]) -> Floats:
-    """Weights [V, 7] of spine_04, neck_01, neck_02 and head by height along a tilted neck.
+    """Weights [V, 9] of spine_04, neck_01, neck_02 and head by height along a tilted neck.
 
     Args:
         positions: float64[V, 3], decimetres.
@@ -147,7 +151,7 @@ def skin_weights(
     joints: dict[str, Floats],
     jaw_open: ex.Expression,
 ) -> Floats:
-    """Weights [V, 7] of the base mesh's vertices; rows sum to 1.
+    """Weights [V, 9] of the base mesh's vertices; rows sum to 1.
 
     The jaw takes of each vertex the share of its rigid motion that the jawOpen unit shows.
 
@@ -175,6 +179,8 @@ def skin_weights(
     for column, letter in ((5, "l"), (6, "r")):
         for name in ("helper-{}-eye", "eyeball-{}", "cornea-{}"):
             weights[groups[name.format(letter)]] = np.eye(len(JOINTS))[column]
+    for column, group in ((7, "helper-upper-teeth"), (8, "helper-lower-teeth")):
+        weights[groups[group]] = np.eye(len(JOINTS))[column]
     return weights
 
 
@@ -193,7 +199,7 @@ class Body:
         eyes: where they are and how their lids rest.
         eye_correctives: float64[V, 3], what keeps lids on the eyes, by their two raw controls.
         man: the model's, for the model itself this.
-        weights: float64[V, 7], skin weights.
+        weights: float64[V, 9], skin weights.
     """
 
     def __init__(self, source: Source, base: BaseMesh, person: Person) -> None:
@@ -206,6 +212,7 @@ class Body:
         self.positions[:, 1] += FLOOR if model else -self.positions[groups["body"], 1].min()
         self.eyes = Eyes(base, groups, self.positions, person.age)
         self._raw = self.positions.copy()  # as the data have them
+        self._ways: dict[str, Floats] = {}  # likewise, of the raw controls
         self.man: Body = self
         self._change: Proportions | None = None
         size = 1.0

@@ -118,7 +118,7 @@ def bind_displacement(
 
     Args:
         positions: float64[v, 3], decimetres.
-        weights: float64[v, 7], skin weights.
+        weights: float64[v, 9], skin weights.
         expression: displacements of the same vertices, and what its joints do.
         joints: positions of the joints by name.
 
@@ -129,9 +129,9 @@ def bind_displacement(
         return expression.displacement
     matrices = np.tile(np.eye(3), (len(positions), 1, 1))
     offsets = np.zeros_like(positions)
-    names = [name for name, _ in JOINTS]
     for name, (rotation, shift) in expression.joints.items():
-        w = weights[:, names.index(name)]
+        w = weights[:, [k for k, (own, above) in enumerate(JOINTS) if name in (own, above)]]
+        w = w.sum(axis=1)  # a joint takes along what hangs on it
         matrices += w[:, None, None] * (rotation - np.eye(3))
         offsets += w[:, None] * (joints[name] + shift - rotation @ joints[name])
     wanted: Floats = positions + expression.displacement - offsets
@@ -154,7 +154,7 @@ def add_skin(mesh: Mesh, weights: Floats) -> None:
 
     Args:
         mesh: gets them.
-        weights: float64[v, 7].
+        weights: float64[v, 9].
     """
     kept = np.where(weights > 1e-3, weights, 0)
     kept /= kept.sum(axis=1, keepdims=True)
@@ -171,7 +171,7 @@ def make_mesh(part: Part, positions: Floats, weights: Floats) -> Mesh:
     Args:
         part: of the base mesh.
         positions: float64[V, 3], all vertices of the base mesh, decimetres.
-        weights: float64[v, 7], skin weights of the part's own vertices.
+        weights: float64[v, 9], skin weights of the part's own vertices.
     """
     p = part.carry(positions)
     polygons = part.polygons
@@ -274,7 +274,7 @@ def add_behavior(
         values=np.ones(2 * len(correctives), np.float32),
     )
     groups = []
-    for joint in ("FACIAL_C_Jaw", "FACIAL_L_Eye", "FACIAL_R_Eye"):
+    for joint in (name for name in names if name.startswith("FACIAL_")):
         inputs = [name for name in raw if joint in units[name].joints]
         values = np.zeros((6, len(inputs)), np.float32)
         for column, name in enumerate(inputs):

@@ -14,6 +14,7 @@ from .further import find_places, further_units, unit_shape
 from .polygons import Floats, Ints
 from .source import BaseMesh, Source
 
+_CHEEK_BALL = 0.035  # decimetres
 PREFIX = "CTRL_expressions."
 _BROWS = [f"eyebrows-{side}-{way}" for side in ("left", "right") for way in ("down", "up")]
 
@@ -180,7 +181,7 @@ def add_joint_motion(
     positions: Floats,
     pivots: dict[str, Floats],
 ) -> None:
-    """Give jaw and eyes their joints: the rigid motion that fits teeth and eyeballs best.
+    """Give jaw, teeth and eyes their joints: the rigid motion that fits teeth and eyeballs best.
 
     Args:
         out: the expressions by name; gets jawBack and jawOpenExtreme too.
@@ -202,6 +203,11 @@ def add_joint_motion(
         0.4 * out["jawOpen"].displacement,
         {"FACIAL_C_Jaw": (part_rotation(rotation, 0.4), 0.4 * shift)},
     )
+    for jaw_side, ends in (("Upper", "U"), ("Lower", "D")):
+        teeth = groups[f"helper-{jaw_side.lower()}-teeth"]
+        for name in [n for n in out if n.startswith("teeth") and n.endswith(ends)]:
+            shift = out[name].displacement[teeth].mean(axis=0)
+            out[name].joints[f"FACIAL_C_Teeth{jaw_side}"] = (np.eye(3), shift)
     for side, letter in (("L", "l"), ("R", "r")):
         eye = groups[f"helper-{letter}-eye"]
         for look in ("Up", "Down", "Left", "Right"):
@@ -209,6 +215,23 @@ def add_joint_motion(
             moved = positions[eye] + expression.displacement[eye]
             rotation, _ = rigid_fit(positions[eye], moved)
             expression.joints[f"FACIAL_{side}_Eye"] = (rotation, np.zeros(3))
+
+
+def cheek_mass(units: dict[str, Expression], side: str) -> Floats:
+    """float64[V, 3]: the fat of a cheek that a true smile pushes up into a ball, decimetres.
+
+    It lies where raising the cheek moves most, and swells there to the front and aside.
+
+    Args:
+        units: what each raw control does, by its name.
+        side: L or R.
+    """
+    raised = units[f"eyeCheekRaise{side}"].displacement
+    pulled = units[f"mouthCornerPull{side}"].displacement
+    both = np.linalg.norm(raised, axis=1) * np.linalg.norm(pulled, axis=1)
+    share = smooth_step(both / max(float(both.max()), 1e-9))
+    aside = 1.0 if side == "L" else -1.0
+    return np.asarray(share[:, None] * _CHEEK_BALL * [0.35 * aside, 0.25, 0.9])
 
 
 def corrective_displacements(out: dict[str, Expression]) -> dict[tuple[str, str], Floats]:
@@ -233,6 +256,8 @@ def corrective_displacements(out: dict[str, Expression]) -> dict[tuple[str, str]
         share = np.zeros(len(blink))
         share[near] = np.minimum(0.25, lid_rise[near].max() / max(travel.max(), 1e-9))
         result[(f"eyeBlink{side}", f"eyeCheekRaise{side}")] = -share[:, None] * blink
+        lifted = cheek_mass(out, side)
+        result[(f"mouthCornerPull{side}", f"eyeCheekRaise{side}")] = lifted
         for lips in ("mouthFunnel", "mouthLipsPurse"):
             # Lips that are pushed forward keep touching the teeth line less when the jaw drops.
             result[("jawOpen", f"{lips}D{side}")] = -0.25 * out[f"{lips}D{side}"].displacement

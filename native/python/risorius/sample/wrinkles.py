@@ -23,6 +23,9 @@ _LEAST = 0.015  # of its length that skin loses before it folds
 _FULL = 0.15  # and where folds are as deep as they get
 _ROUNDS = 3  # of neighbours over which folds are evened out: skin is stiffer than a mesh
 DEPTH = 0.007  # decimetres
+_FOLD_DOWN = (0.36, 0.50, 0.62, 0.74, 0.86)  # below the eye, decimetres
+_FOLD_ASIDE = (0.165, 0.215, 0.27, 0.325, 0.345)  # and from the middle of the face
+_FOLD_DEPTH = 0.015  # decimetres
 _LINES = 24  # texels to either side along which noise is drawn into a line
 _FINE, _COARSE = 1.5, 3.5  # texels: the widths between which folds lie
 _TILE = 512  # texels after which the noise begins again
@@ -72,6 +75,9 @@ def mask_name(region: str, side: str) -> str:
     return f"head_wm{REGIONS[region].number}_{region}_{side}"
 
 
+SMILE = mask_name("smile", "L")
+
+
 def masks_of(number: int) -> list[str]:
     """The masks that show a set.
 
@@ -110,7 +116,8 @@ class _Surface:
         flat = np.abs(size) < 1e-12
         edges[flat] = np.eye(2)
         # From the triangle's own plane to the texture's.
-        self.to_uv = edges @ np.linalg.inv(self.rest)
+        self.back = np.linalg.inv(self.rest)
+        self.to_uv = edges @ self.back
 
     def folds(self, moved: Floats) -> Floats:
         """float64[V, 4]: how far skin is pushed together at each vertex (0 to 1), and the lines of
@@ -119,7 +126,7 @@ class _Surface:
         Args:
             moved: float64[V, 3], where the vertices are with the expression.
         """
-        change = _frames(moved[self.corners]) @ np.linalg.inv(self.rest)
+        change = _frames(moved[self.corners]) @ self.back
         _, stretch, right = np.linalg.svd(change)
         depth = np.clip((1 - stretch[:, 1] - _LEAST) / (_FULL - _LEAST), 0, 1)
         along = right[:, 0]  # the other axis than the one that is pushed together
@@ -250,6 +257,28 @@ def normals(heights: Floats, places: Floats) -> Floats:
     out = np.stack([-slopes[0], -slopes[1], np.ones_like(heights)], axis=2)
     out /= np.linalg.norm(out, axis=2, keepdims=True)
     return np.asarray(0.5 + 0.5 * out)
+
+
+def laugh_fold(places: Floats, eye: Floats) -> tuple[Floats, Floats]:
+    """The fold from the wing of the nose past the corner of the mouth, as a smile makes it.
+
+    Compression alone gives fine lines there: the cheek's fat slides over the lip as one mass.
+
+    Args:
+        places: float64[h, w, 3], where each texel is on the head, decimetres.
+        eye: float64[3], the left eye's middle.
+
+    Returns:
+        float64[h, w] heights in decimetres, and float64[h, w] where they are, 0 to 1.
+    """
+    x, y = np.abs(places[..., 0]), places[..., 1] - eye[1]
+    line = np.interp(-y, _FOLD_DOWN, _FOLD_ASIDE)
+    away = 0.86 * (x - line)
+    there = smooth_step((-y - 0.36) / 0.10) * smooth_step((0.90 + y) / 0.14)
+    there = there * smooth_step((places[..., 2] - eye[2] + 0.5) / 0.2)
+    groove = -_FOLD_DEPTH * np.exp(-((away / 0.022) ** 2))
+    cheek = 0.7 * _FOLD_DEPTH * np.exp(-(((away - 0.055) / 0.05) ** 2))
+    return there * (groove + cheek), there * np.exp(-((away / 0.14) ** 2))
 
 
 def fold_heights(folds: Floats, strength: Floats) -> Floats:

@@ -18,7 +18,7 @@ from ..work import MM, listed_meshes
 
 Controls = tuple[int, ...]
 SOLIDS = ("teeth", "eye")  # meshes that a skin is kept out of, by parts of their names
-_NO_SOLIDS = ("lash", "shell", "edge", "cartilage", "saliva")
+_NO_SOLIDS = ("lash", "shell", "cornea", "edge", "cartilage", "saliva", "hair_", "brows_", "beard_")
 
 
 class Poser:

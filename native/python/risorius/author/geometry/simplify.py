@@ -31,22 +31,34 @@ def fan_triangles(mesh: Mesh) -> Ints:
     return layouts[np.stack([first, first + step + 1, first + step + 2], axis=1)]
 
 
-def _attributes(mesh: Mesh, displacements: Doubles, size: float) -> Doubles:
-    """float64[layouts, n]: texture coordinates, and the main components of the motion."""
+def attributes_of(mesh: Mesh, displacements: Doubles) -> Floats:
+    """float32[layouts, n]: texture coordinates, and the main components of the motion.
+
+    Args:
+        mesh: stays as it is.
+        displacements: float64[E, V, 3], what expressions add to its vertices.
+    """
+    size = _size(mesh)
     places = np.asarray(mesh.layout_positions, np.int64)
     uvs = np.asarray(mesh.texture_coordinates, np.float64)
     own = uvs[np.asarray(mesh.layout_texture_coordinates, np.int64)]
+    moving = np.abs(displacements).max(axis=(1, 2), initial=0.0) > 0
+    displacements = displacements[moving]
     if not len(displacements):
-        return _UV * own
+        return (_UV * own).astype(np.float32)
     moved = displacements.transpose(1, 0, 2).reshape(len(mesh.positions), -1) / size
     spread, axes = np.linalg.eigh(moved.T @ moved)
     main = axes[:, np.argsort(-spread, kind="stable")[:_COMPONENTS]]
     # An axis has no direction of its own: the larger half of it points up, on every machine.
     main = main * np.where(main[np.abs(main).argmax(axis=0), range(main.shape[1])] < 0, -1, 1)
-    return np.column_stack([_UV * own, _MOTION * (moved @ main)[places]])
+    return np.column_stack([_UV * own, _MOTION * (moved @ main)[places]]).astype(np.float32)
 
 
-def fewer_triangles(mesh: Mesh, displacements: Doubles, vertices: int) -> Ints:
+def _size(mesh: Mesh) -> float:
+    return float(np.ptp(np.asarray(mesh.positions, np.float64), axis=0).max()) or 1.0
+
+
+def fewer_triangles(mesh: Mesh, attributes: Floats, vertices: int) -> Ints:
     """int64[n, 3]: triangles of a mesh' layouts with about so many vertices, some of those it has.
 
     What the texture and the expressions do is kept beside the form. Borders and seams stay where
@@ -55,14 +67,12 @@ def fewer_triangles(mesh: Mesh, displacements: Doubles, vertices: int) -> Ints:
 
     Args:
         mesh: stays as it is.
-        displacements: float64[E, V, 3], what expressions add to its vertices.
+        attributes: float32[layouts, n] of it, see attributes_of.
         vertices: at most, where it can be.
     """
     positions = np.asarray(mesh.positions, np.float64)
     places = np.asarray(mesh.layout_positions, np.int64)
-    size = float(np.ptp(positions, axis=0).max()) or 1.0
     points = positions[places].astype(np.float32)
-    attributes = _attributes(mesh, displacements, size).astype(np.float32)
     triangles = fan_triangles(mesh).astype(np.uint32)
     found = _fewer(points, attributes, triangles, places, vertices)
     if len(np.unique(places[found])) > _STUCK * vertices:

@@ -18,8 +18,18 @@ from .paper import MUTED, Canvas, heading, rgb
 
 Floats = npt.NDArray[np.float64]
 
-# Clear films and lashes, which a renderer draws see-through: as clay they would hide the eyes.
-_FILMS = ("eyeshell", "eyeedge", "eyelash", "saliva", "cartilage")
+# Clear films and hair, which a renderer draws see-through: as clay they would hide the face.
+_FILMS = (
+    "eyeshell",
+    "cornea",
+    "eyeedge",
+    "eyelash",
+    "saliva",
+    "cartilage",
+    "hair_",
+    "brows_",
+    "beard_",
+)
 _MARGIN = 0.04
 
 

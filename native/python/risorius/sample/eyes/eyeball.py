@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: MIT
 """Eyeballs that the data do not have: a ball, an iris behind it as a dish with a hole, a cornea.
 
-Both are surfaces of revolution about the gaze. Their vertices follow those of the base mesh, so that
-all that is known by vertex (positions, motions, skin weights) is known of them too.
+Both are surfaces of revolution about the gaze. Their vertices follow those of the base mesh, so
+that all that is known by vertex (positions, motions, skin weights) is known of them too.
 """
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,7 +69,11 @@ def side_map(angle: Floats) -> Floats:
 
 
 def side_angle(away: Floats) -> Floats:
-    """float64[...]: the angle from the gaze by distance from the picture's middle; undoes side_map."""
+    """float64[...]: the angle from the gaze; what side_map undoes.
+
+    Args:
+        away: float64[...], distance from the middle of the picture, IRIS_AT at least.
+    """
     low = _LIMBUS + (SIDE_ANGLE - _LIMBUS) * (away - IRIS_AT) / (SIDE_AT - IRIS_AT)
     high = SIDE_ANGLE + (np.pi - SIDE_ANGLE) * (away - SIDE_AT) / (0.5 - SIDE_AT)
     return np.where(away < SIDE_AT, low, np.minimum(high, np.pi))
@@ -125,7 +130,7 @@ class Revolved:
         begins = [first + r * SEGMENTS for r in rings]
         for a, b in columns:
             out.append([tip, begins[0] + a, begins[0] + b])
-            for near, far in zip(begins[:-1], begins[1:], strict=True):
+            for near, far in itertools.pairwise(begins):
                 out.append([near + a, far + a, far + b, near + b])
             if self.poles[1] is not None:
                 out.append([begins[-1] + b, begins[-1] + a, tip + 1])

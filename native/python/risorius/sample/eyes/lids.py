@@ -15,13 +15,15 @@ from .rings import COLUMNS, LOWER, ROOT, TEMPLE, UPPER, smoothed
 
 # How far the rings from the lashes' roots to the inner rim lie above the eye, in mm: the skin's
 # edge, the middle of the rim, where it touches, and what is hidden in the ball.
-_HEIGHTS = np.array([1.55, 0.85, 0.12, -0.55])
+_HEIGHTS = np.array([1.35, 0.75, 0.22, -0.55])
 _EDGE = slice(ROOT, ROOT + len(_HEIGHTS))
 _FADE = np.array([0.85, 0.65, 0.45, 0.25, 0.1, 0.0, 0.0, 0.0])  # of the rings outside of it
 _STEPS = 10
+_LIFT = 0.38  # mm: what lids are higher in a whole look, since they do not go round in half of one
 # Degrees that a look at 1 turns an eye, and how much further its lids go than the data's, whose
-# eyes turn by a third of that.
-LOOKS = {"Up": (25.0, 1.4), "Down": (30.0, 1.9), "Left": (32.0, 1.8), "Right": (32.0, 1.8)}
+# eyes turn by a third of that and leave the lower lids where they are.
+LOOKS = {"Up": (25.0, 1.9), "Down": (30.0, 1.5), "Left": (30.0, 1.8), "Right": (30.0, 1.8)}
+_LOWER_LOOKS = {"Up": 1.2, "Down": -2.4}  # mm
 # What closed lids do not do beside it: they stay closed.
 _NOT_CLOSED = [
     *(f"eyeLook{way}" for way in LOOKS),
@@ -39,7 +41,12 @@ _MOVES = 0.03 * MM  # decimetres: what moves lids less leaves them alone
 
 
 def rotation(degrees: float, axis: int) -> Floats:
-    """float64[3, 3]: about the axis x (0), y (1) or z (2)."""
+    """float64[3, 3]: a rotation.
+
+    Args:
+        degrees: by how much.
+        axis: about x (0), y (1) or z (2).
+    """
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     out = np.eye(3)
     a, b = [(1, 2), (2, 0), (0, 1)][axis]
@@ -84,17 +91,18 @@ class Lids:
         """float64[13, COLUMNS, 3]: values of the rings' vertices."""
         return np.asarray(values[self.rings])
 
-    def seated(self, grid: Floats, turn: Floats | None = None) -> Floats:
+    def seated(self, grid: Floats, turn: Floats | None = None, lift: float = 0.0) -> Floats:
         """A grid whose rim lies on the eye, what is around it drawn along.
 
         Args:
             grid: float64[13, COLUMNS, 3].
             turn: float64[3, 3], what the eye is turned by; None: it rests.
+            lift: mm, how much higher than at rest.
         """
         gaze = eyeball.gaze(self.side)[:, 2]
         gaze = gaze if turn is None else turn @ gaze
         out = grid.copy()
-        heights = (_HEIGHTS * MM * self.radius / (_RADIUS * MM))[:, None]
+        heights = ((_HEIGHTS + lift) * self.radius / _RADIUS)[:, None]
         for _ in range(_STEPS):
             arm = smoothed(out) - self.middle
             length = np.linalg.norm(arm, axis=2)
@@ -158,32 +166,46 @@ def open_lids(lids: Lids, widen: Floats) -> Floats:
     travel = smoothed(lids.grid(widen))[ROOT + 2, UPPER, 1]
     top = int(edge[UPPER, 1].argmax())
     share = (lids.openness * iris - edge[UPPER, 1][top]) / travel[top]
-    opened = max(share, 0.0) * widen
+    opened = max(share, -0.4) * widen
     lids.rest += opened
     grid = lids.grid(lids.rest)
     down = -0.98 * iris - edge[LOWER, 1].min()
-    columns = np.zeros(COLUMNS)
-    columns[LOWER] = np.sin(np.pi * np.arange(1, 14) / 14)
-    rows = np.ones(len(grid))
-    rows[:ROOT] = np.linspace(0, 1, ROOT)
     arm = grid - lids.middle
-    turn = down / np.hypot(arm[:, :, 1], arm[:, :, 2]) * rows[:, None] * columns
+    turn = down / np.hypot(arm[:, :, 1], arm[:, :, 2]) * _lower_lid(grid)[:, :, 0]
     grid[:, :, 1] += turn * arm[:, :, 2]
     grid[:, :, 2] -= turn * arm[:, :, 1]
     lids.rest[lids.rings] = lids.seated(grid)
     return np.asarray(opened)
 
 
-def _lower_closed(lids: Lids) -> Floats:
-    """float64[13, COLUMNS, 3]: the grid with its lower lid where it meets the upper one."""
-    grid = lids.grid(lids.rest)
+def _lower_lid(grid: Floats) -> Floats:
+    """float64[13, COLUMNS, 1]: 1 in the middle of the lower lid's rim, 0 at corners and cheek."""
     rows = np.ones(len(grid))
     rows[:ROOT] = np.linspace(0, 1, ROOT) ** 2
     columns = np.zeros(COLUMNS)
     columns[LOWER] = np.sin(np.pi * np.arange(1, 14) / 14)
+    return np.asarray((rows[:, None] * columns)[:, :, None])
+
+
+def _lower_closed(lids: Lids) -> Floats:
+    """float64[13, COLUMNS, 3]: the grid with its lower lid where it meets the upper one."""
+    grid = lids.grid(lids.rest)
     way = np.array([-0.7 * np.sign(lids.middle[0]), 0.7, 0.0]) * MM
-    grid += (rows[:, None] * columns)[:, :, None] * way
-    return grid
+    return np.asarray(grid + _lower_lid(grid) * way)
+
+
+def following(lids: Lids, way: str, look: Floats) -> Floats:
+    """float64[V, 3]: what the lids do when the eye looks further than in the data.
+
+    Args:
+        lids: at rest.
+        way: "Up", "Down", "Left" or "Right".
+        look: float64[V, 3], of the data.
+    """
+    out = LOOKS[way][1] * look
+    lower = _lower_lid(lids.rings)[:, :, 0] * _LOWER_LOOKS.get(way, 0.0) * MM
+    out[lids.rings, 1] += lower * lids.radius / (_RADIUS * MM)
+    return out
 
 
 def closing(lids: Lids, blink: Floats) -> tuple[Floats, Floats]:
@@ -298,7 +320,8 @@ def on_the_ball(lids: Lids, way: Floats, turn: Floats | None = None) -> Floats:
     if turn is None and np.linalg.norm(grid[_EDGE], axis=2).max() < _MOVES:
         return way
     out = way.copy()
-    out[lids.rings] = lids.seated(lids.grid(lids.rest) + grid, turn) - lids.grid(lids.rest)
+    lift = 0.0 if turn is None else _LIFT
+    out[lids.rings] = lids.seated(lids.grid(lids.rest) + grid, turn, lift) - lids.grid(lids.rest)
     return out
 
 
@@ -315,7 +338,7 @@ def stays_closed(lids: Lids, blink: Floats, other: Floats, turn: Floats | None) 
     rows[:ROOT] = np.linspace(0, 1, ROOT)
     there = lids.grid(lids.rest + blink) + (1 - rows)[:, None, None] * lids.grid(other)
     out = np.zeros_like(blink)
-    out[lids.rings] = lids.seated(there, turn) - lids.grid(lids.rest + blink + other)
+    out[lids.rings] = lids.seated(there, turn, _LIFT) - lids.grid(lids.rest + blink + other)
     return out
 
 

@@ -16,15 +16,16 @@ _BALLS = {
     "eyeRight": ["eyeball-r"],
     "cornea": ["cornea-l", "cornea-r"],
 }
-# Sections of the caruncle: how far from the corner in columns, how far in on the rim, how high it is
+# Sections of the caruncle: how far from the corner in columns, how far in on the rim, how high
 # over the line between both rims, in thicknesses of a lid.
 _MOUND = (
     (0, 0.35, -0.02),
     (0, 1.0, 0.10),
     (1, 1.5, 0.20),
-    (2, 1.9, 0.22),
-    (3, 2.15, 0.08),
-    (3, 2.7, -0.15),
+    (2, 1.9, 0.24),
+    (3, 2.1, 0.16),
+    (4, 2.25, 0.04),
+    (4, 2.7, -0.15),
 )
 Row = dict[int, float]  # shares by vertex of the base mesh, together 1
 
@@ -136,16 +137,17 @@ def _tears(rings: Ints) -> tuple[list[Row], list[list[int]], Floats]:
         meets = _rim(rings, 2.2, column)
         above = _rim(rings, 2.2, facing)
         skin, deep = _rim(rings, 0.0, column), _rim(rings, 3.0, column)
-        out = lambda row, share, skin=skin, deep=deep: _mixed(
-            (1, row), (share, skin), (-share, deep)
-        )
-        ball = out(_mixed((0.945, meets), (0.055, above)), 0.03)
-        lid = out(_rim(rings, 1.62, column), 0.02)
-        under = out(_rim(rings, 1.45, column), -0.02)
-        inner = out(_mixed((0.92, meets), (0.08, above)), -0.03)
-        middle = out(_mixed((0.38, ball), (0.36, lid), (0.26, meets)), 0.03)
+
+        def raised(row: Row, share: float, skin: Row = skin, deep: Row = deep) -> Row:
+            return _mixed((1, row), (share, skin), (-share, deep))
+
+        ball = raised(_mixed((0.945, meets), (0.055, above)), 0.03)
+        lid = raised(_rim(rings, 1.62, column), 0.02)
+        under = raised(_rim(rings, 1.45, column), -0.02)
+        inner = raised(_mixed((0.92, meets), (0.08, above)), -0.03)
+        middle = raised(_mixed((0.38, ball), (0.36, lid), (0.26, meets)), 0.03)
         rows += [under, lid, middle, ball, inner]
-    return _strip(rows, 5, rings)
+    return _strip(rows, 5)
 
 
 def _caruncle(rings: Ints) -> tuple[list[Row], list[list[int]], Floats]:
@@ -166,10 +168,10 @@ def _caruncle(rings: Ints) -> tuple[list[Row], list[list[int]], Floats]:
         for share, up in ((0.0, -0.05), (0.25, 0.8), (0.5, 1.0), (0.75, 0.8), (1.0, -0.05)):
             between = _mixed((1 - share, lower), (share, upper))
             rows.append(_mixed((1, between), (up * high, skin), (-up * high, deep)))
-    return _strip(rows, 5, rings)
+    return _strip(rows, 5)
 
 
-def _strip(rows: list[Row], across: int, rings: Ints) -> tuple[list[Row], list[list[int]], Floats]:
+def _strip(rows: list[Row], across: int) -> tuple[list[Row], list[list[int]], Floats]:
     """Quads over rows of so many vertices each, seen from the front."""
     length = len(rows) // across
     faces = []

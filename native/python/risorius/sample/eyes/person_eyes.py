@@ -119,8 +119,8 @@ class Eyes:
         """Eyes turn about their middle; lids follow further than in the data."""
         names = ("helper-{}-eye", "eyeball-{}", "cornea-{}")
         own = np.concatenate([self._groups[name.format(eye.side)] for name in names])
-        for way, (_, further) in lids.LOOKS.items():
-            unit = further * units[f"eyeLook{way}{letter}"]
+        for way in lids.LOOKS:
+            unit = lids.following(eye, way, units[f"eyeLook{way}{letter}"])
             arm = eye.rest[own] - eye.middle
             unit[own] = arm @ lids.look_rotation(way).T - arm
             units[f"eyeLook{way}{letter}"] = unit

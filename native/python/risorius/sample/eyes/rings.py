@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The lids of the base mesh as a grid: rings of skin around each eye, from the cheek to the socket."""
+"""The lids of the base mesh as a grid: rings of skin around each eye, from cheek to socket."""
 
 from __future__ import annotations
 

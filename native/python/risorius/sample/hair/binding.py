@@ -14,7 +14,7 @@ import numpy as np
 from ... import BlendShapeTarget, Dna, Mesh
 from ...author.geometry import skeleton as sk
 from ...author.geometry.polygon_mesh import polygon_mesh
-from ..polygons import Floats
+from ..polygons import Floats, Ints
 from .strips import Strips, card_faces, card_vertices
 from .surface import Roots, nearest_places
 
@@ -23,14 +23,19 @@ _MOST_INFLUENCES = 8
 
 
 def head_of(dna: Dna, lod: int) -> Mesh | None:
-    """The head's mesh of a level, if it has one."""
+    """The head's mesh of a level, if it has one.
+
+    Args:
+        dna: a sample face.
+        lod: the level.
+    """
     for m in (int(i) for i in dna.lod_mesh_mapping[lod]):
         if re.match(r"head_lod\d+_mesh$", dna.mesh_names[m]):
             return dna.meshes[m]
     return None
 
 
-def corners_of(mesh: Mesh) -> tuple[Floats, Floats]:
+def corners_of(mesh: Mesh) -> tuple[Ints, Ints]:
     """int64[T, 3], triangles by vertex, and int64[V, n], those about each vertex."""
     offsets = np.asarray(mesh.face_offsets, np.int64)
     layouts = np.asarray(mesh.layout_positions, np.int64)[np.asarray(mesh.face_layouts, np.int64)]

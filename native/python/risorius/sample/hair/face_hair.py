@@ -15,7 +15,7 @@ from .strips import Strips, joined, make_strips, unit
 from .surface import Surface
 
 _BROW_SPACING = 0.0115  # decimetres between the roots of two cards
-_BEARD_SPACING = 0.034
+_BEARD_SPACING = 0.042
 _LASHES = {"U": (48, 0.098), "D": (26, 0.050)}  # cards of a lid, longest hair in decimetres
 
 
@@ -175,6 +175,16 @@ def _arcs(root: Floats, fan: Floats, length: Floats, first: Floats, last: float)
     return np.stack(points, axis=1)
 
 
+def _in_front(man: Floats) -> Floats:
+    """float64[V]: 1 on the face, 0 in the mouth behind it, which is as high and as wide."""
+    cells = np.floor(man[:, :2] / 0.05).astype(int)
+    _, cell = np.unique(cells, axis=0, return_inverse=True)
+    front = np.full(cell.max() + 1, -np.inf)
+    np.maximum.at(front, cell.ravel(), man[:, 2])
+    mouth = (np.abs(man[:, 0]) < 0.36) & (man[:, 1] > -1.12) & (man[:, 1] < -0.45)
+    return np.asarray(~mouth | (man[:, 2] > front[cell.ravel()] - 0.09), float)
+
+
 def beard(surface: Surface, lips: Floats, person: Person) -> Strips | None:
     """Beard and moustache, or None.
 
@@ -188,14 +198,16 @@ def beard(surface: Surface, lips: Floats, person: Person) -> Strips | None:
         return None
     random = np.random.default_rng(23)
     man = surface.man
-    density = beard_density(man, surface.man_normals, lips, style)
-    roots = surface.scattered(density, _BEARD_SPACING, random)
+    density = beard_density(man, surface.man_normals, lips, style) * _in_front(man)
+    full = style == "full"
+    spacing = _BEARD_SPACING * (1.0 if full else 0.8)
+    roots = surface.scattered(density, spacing, random)
     place = roots.of(man)
     n = len(roots)
     x, y, z = place.T
     under = smooth_step((-0.75 - y) / 0.3) * (np.abs(x) < 0.45)
     lip = (y > -0.72) & (np.abs(x) < 0.33) & (z > 0.1)
-    long = {"full": 0.20, "short": 0.09, "goatee": 0.11, "moustache": 0.10}[style]
+    long = {"full": 0.20, "short": 0.10, "goatee": 0.11, "moustache": 0.10}[style]
     length = long * (0.55 + 0.75 * under) * surface.scale * random.uniform(0.75, 1.2, n)
     length = np.where(lip, np.minimum(length, 0.13 * surface.scale), length)
     length *= 0.5 + 0.5 * roots.of(density[:, None])[:, 0]
@@ -210,13 +222,14 @@ def beard(surface: Surface, lips: Floats, person: Person) -> Strips | None:
     )
     flow = flow + 0.22 * random.normal(0, 1, flow.shape)
     rise = np.radians(random.uniform(28, 50, n)), np.radians(random.uniform(2, 25, n))
+    rows = 3 if full else 2
     near = np.flatnonzero((man[:, 1] < 0.1) & (man[:, 2] > -0.9))
-    points, out = grow(surface, roots, flow, length, rise, 4, near, least=0.004, fall=0.5)
+    points, out = grow(surface, roots, flow, length, rise, rows, near, least=0.004, fall=0.5)
     if person.hair_curl:
         wind = 0.03 * person.hair_curl * random.uniform(0.5, 1, n)
         points = curled(points, out, wind, np.full(n, 0.8), random)
     tiles = tile("beard", random.integers(0, 8, n))
-    half = 0.021 * surface.scale * random.uniform(0.8, 1.25, n)
+    half = (0.024 if full else 0.013) * surface.scale * random.uniform(0.8, 1.25, n)
     turns = np.radians(random.uniform(-35, 35, n))
-    taper = np.array([0.9, 1.0, 0.9, 0.65])
+    taper = np.array([0.9, 1.0, 0.7])[-rows:]
     return make_strips(points, out, half, taper, tiles, roots, turns)

@@ -10,6 +10,8 @@ from .strips import unit
 from .surface import Roots, Surface
 
 _SUBSTEPS = 2
+_LOOSE = 0.08  # decimetres over the skin where a hair is drawn back most
+_FREE = -0.4  # height under which hair hangs freely, of the man
 
 
 def grow(
@@ -23,6 +25,7 @@ def grow(
     least: Floats | float = 0.004,
     stiff: float = 0.45,
     fall: Floats | float = 0.0,
+    hug: float = 0.0,
 ) -> tuple[Floats, Floats]:
     """Guides from roots.
 
@@ -37,6 +40,7 @@ def grow(
         least: float64[n] or a number, height over the skin that a tip has at least, decimetres.
         stiff: share of the direction so far that each step keeps.
         fall: float64[n] or a number, weight of gravity at the tip.
+        hug: how strongly a guide that has left the skin is drawn back to it, above the ears' ends.
 
     Returns:
         float64[n, rows, 3] each: points, and the way out of the skin there.
@@ -49,11 +53,15 @@ def grow(
     step = lengths[:, None] / (rows - 1) / _SUBSTEPS
     for k in range(1, (rows - 1) * _SUBSTEPS + 1):
         t = k / ((rows - 1) * _SUBSTEPS)
-        _, normal, vertex = surface.below(at, among)
+        height, normal, vertex = surface.below(at, among)
         angle = rise[0] * (1 - t) ** 1.5 + rise[1] * (1 - (1 - t) ** 1.5)
         way = tangent(flow[vertex], normal)
         way = way * np.cos(angle)[:, None] + normal * np.sin(angle)[:, None]
         way[:, 1] -= t * np.asarray(fall)
+        if hug:
+            loose = np.clip((height - 2 * np.asarray(least)) / (_LOOSE * surface.scale), 0, 1)
+            loose = loose * (surface.man[vertex, 1] > _FREE)
+            way = way - hug * loose[:, None] * normal
         before = unit(stiff * before + (1 - stiff) * way)
         at = at + before * step
         height, normal, _ = surface.below(at, among)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,7 +26,8 @@ from .surface import Surface
 
 PICTURE = "hair_color.png"
 NO_HAIR = 4  # the level from which on there are no cards
-_SHARES = (1.0, 0.6, 0.36, 0.2)  # of the strips, by level
+_SHARES = (1.0, 0.42, 0.2, 0.1)  # of the strips, by level
+_OWN = ("hair", "beard")
 _ROWS = (99, 4, 3, 3)
 _LEAST_MM = {"hair": 1.0, "brows": 0.15, "beard": 0.15, "eyelashes": 0.1}
 _MM = 10.0  # of a centimetre
@@ -77,7 +79,8 @@ def _lips(head: Part, man: Body) -> Floats:
         for name, unit in man.units.items()
         if "LipRollIn" in name or "LipsRollIn" in name
     )
-    return np.clip(np.asarray(roll) / 0.03, 0, 1)
+    share = np.asarray(roll) / max(float(np.max(roll)), 1e-9)
+    return np.clip((share - 0.5) / 0.2, 0, 1)
 
 
 def add_hair(dna: Dna, grown: Grown) -> None:
@@ -87,18 +90,19 @@ def add_hair(dna: Dna, grown: Grown) -> None:
         dna: the face; gets the meshes.
         grown: the hair.
     """
-    for lod in range(min(dna.lod_count, NO_HAIR)):
-        head = head_of(dna, lod)
+    # What each person has otherwise comes last, so that all others keep their numbers in a mix.
+    names = sorted(grown.strips, key=lambda name: name in _OWN)
+    for name, lod in itertools.product(names, range(min(dna.lod_count, NO_HAIR))):
+        head, strips = head_of(dna, lod), grown.strips[name]
         if head is None:
             continue
-        for name, strips in grown.strips.items():
-            shown = strips if lod == 0 else strips.coarser(_SHARES[lod], _ROWS[lod])
-            mesh = card_mesh(shown, grown.unit)
-            places = holds(head, shown, grown.unit)
-            bind(dna, mesh, head, places, _LEAST_MM[name] / _MM, name == "hair")
-            if name == "eyelashes":
-                add_lash_controls(dna, mesh, shown.rows, lod)
-            append_mesh(dna, f"{name}_lod{lod}_mesh", mesh, [lod])
+        shown = strips if lod == 0 else strips.coarser(_SHARES[lod], _ROWS[lod])
+        mesh = card_mesh(shown, grown.unit)
+        places = holds(head, shown, grown.unit)
+        bind(dna, mesh, head, places, _LEAST_MM[name] / _MM, name == "hair")
+        if name == "eyelashes":
+            add_lash_controls(dna, mesh, shown.rows, lod)
+        append_mesh(dna, f"{name}_lod{lod}_mesh", mesh, [lod])
 
 
 def hair_textures(

@@ -53,20 +53,23 @@ def wavy(points: Floats, random: np.random.Generator, waves: float, count: int =
     return np.asarray(np.sin(points @ ways.T + turns).sum(axis=1) / np.sqrt(count))
 
 
-def hairline_height(points: Floats, recession: float = 0.0, sideburn: float = 1.0) -> Floats:
+def hairline_height(
+    points: Floats, recession: float = 0.0, sideburn: float = 1.0, low: float = 0.0
+) -> Floats:
     """float64[n]: how far inside the hairline a place is, negative outside of it.
 
     Args:
         points: float64[n, 3], of the man.
         recession: how far the line has gone back above the temples and the forehead, 0 to 1.
         sideburn: how much of the hair before the ear there is, 0 to 1.
+        low: how much lower and rounder the line over the forehead is, as on women, 0 to 1.
     """
     line = _LINE.copy()
     line[_NO_SIDEBURN, 1] = (1 - sideburn) * 0.1 + sideburn * line[_NO_SIDEBURN, 1]
     x, back, up = np.abs(points[:, 0]), points[:, 2].copy(), points[:, 1].copy()
     front = smooth_step((back + 0.75) / 0.4)
     corner = np.exp(-(((x - 0.40) / 0.16) ** 2))
-    gone = 0.05 * corner + recession * (0.30 + 0.35 * corner)
+    gone = (0.05 - 0.09 * low) * corner + recession * (0.30 + 0.35 * corner) - 0.045 * low
     up -= front * gone * smooth_step((up - 0.25) / 0.3)
     inside = up > np.interp(back, line[:, 0], line[:, 1])
     place = np.column_stack([back, up])
@@ -131,18 +134,15 @@ def beard_density(points: Floats, normals: Floats, lips: Floats, style: str) -> 
     """
     x, y, z = np.abs(points[:, 0]), points[:, 1], points[:, 2]
     # From before the ear down over the cheek to the corner of the mouth.
-    cheek = np.interp(z, [-0.62, -0.45, -0.2, 0.0, 0.15], [-0.10, -0.22, -0.46, -0.56, -0.62])
-    under = np.interp(z, [-0.6, -0.3, 0.0, 0.3], [-0.90, -1.02, -1.17, -1.22])
+    cheek = np.interp(z, [-0.62, -0.45, -0.2, 0.0, 0.15], [-0.10, -0.22, -0.46, -0.56, -0.66])
+    under = np.interp(z, [-0.6, -0.3, 0.0, 0.3], [-0.90, -1.02, -1.20, -1.30])
     edge = smooth_step((cheek - y) / 0.10) * smooth_step((y - under) / 0.12)
     edge *= smooth_step((z + 0.66) / 0.08)
-    moustache = smooth_step((0.30 - x) / 0.05) * smooth_step((y + 0.70) / 0.03)
-    moustache *= smooth_step((-0.52 - y) / 0.05) * (z > 0.15)
-    lip_side = smooth_step((y + 0.62) / 0.06) * (x < 0.3) * (z > 0.1)
-    below = smooth_step((-0.80 - y) / 0.05)
-    bare = np.exp(-(((x - 0.17) / 0.07) ** 2) - ((y + 0.86) / 0.05) ** 2)  # beside the soul patch
-    chin = smooth_step((0.33 - x) / 0.10) * smooth_step((z + 0.02) / 0.12)
-    full = edge * np.maximum(1 - lip_side, moustache) * (1 - 0.75 * bare * (z > 0.1))
-    goatee = np.maximum(moustache, chin * below * edge * (1 - 0.8 * bare))
-    goatee = np.maximum(goatee, edge * chin * (x > 0.22) * (y < -0.6))
+    moustache = smooth_step((0.33 - x) / 0.05) * smooth_step((y + 0.76) / 0.04)
+    moustache *= smooth_step((-0.52 - y) / 0.05) * (z > 0.12)
+    chin = smooth_step((0.36 - x) / 0.10) * smooth_step((z + 0.02) / 0.12) * edge
+    bare = np.exp(-(((x - 0.17) / 0.07) ** 2) - ((y + 0.88) / 0.05) ** 2)  # beside the soul patch
+    full = np.maximum(edge * (1 - 0.7 * bare * (z > 0.1)), moustache)
+    goatee = np.maximum(moustache, chin * smooth_step((-0.66 - y) / 0.05) * (1 - 0.8 * bare))
     shape = {"full": full, "short": full, "goatee": goatee, "moustache": moustache}[style]
     return np.asarray(shape * (1 - np.clip(1.5 * lips, 0, 1)))

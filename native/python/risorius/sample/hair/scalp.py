@@ -17,6 +17,7 @@ from .strips import Strips, joined, make_strips, unit
 from .surface import Roots, Surface
 
 _WHORL = np.array([0.10, 0.86, -1.40])  # where hair turns about the crown, of the man
+_PARTING = 0.10  # how far to his left hair is parted
 _DENSE, _THIN = 5, 3  # tiles of each sort
 
 
@@ -46,15 +47,30 @@ def _roots(
     recession: float = 0.0,
     sideburn: float = 1.0,
     thin_top: float = 0.0,
+    low: float = 0.0,
+    even: bool = True,
+    fine: float = 0.0,
 ) -> tuple[Roots, Floats]:
-    """Roots inside of an uneven hairline, and how far inside each is, decimetres of the man."""
+    """Roots inside of an uneven hairline, and how far inside each is, decimetres of the man.
+
+    Those of short hair are not even: it lies flat at the sides and stands up on top. Those of
+    long hair are finer at the edge, and with `fine` 1 also at a parting.
+    """
     man = surface.man
-    inside = hairline_height(man, recession, sideburn)
+    inside = hairline_height(man, recession, sideburn, low)
     inside = inside + 0.016 * wavy(man, random, 3.0) + 0.008 * wavy(man, random, 9.0)
     density = smooth_step((inside + 0.012) / 0.05)
     bald = smooth_step((man[:, 1] - 0.55) / 0.3)
-    density = density * (1 - thin_top * bald) * (1 - 0.5 * smooth_step((man[:, 1] - 0.4) / 0.3))
-    density = density * (1 - 0.3 * smooth_step((inside - 0.08) / 0.1))
+    density = density * (1 - thin_top * bald)
+    if not even:
+        density = density * (1 - 0.5 * smooth_step((man[:, 1] - 0.4) / 0.3))
+        density = density * (1 - 0.3 * smooth_step((inside - 0.08) / 0.1))
+    if fine:
+        parting = np.exp(-(((man[:, 0] - _PARTING) / 0.09) ** 2)) * smooth_step(
+            (man[:, 1] - 0.5) / 0.2
+        )
+        within = smooth_step((inside - 0.05) / 0.08) * (1 - fine * parting)
+        density = density * (1 - 0.6 * within)
     density[surface.man_normals[:, 1] < -0.8] = 0
     roots = surface.scattered(density, spacing, random)
     return roots, roots.of(inside[:, None])[:, 0]
@@ -103,7 +119,8 @@ def _short(
     thin_top: float,
 ) -> Strips:
     random = np.random.default_rng(seed)
-    roots, inside = _roots(surface, 0.043, random, recession, 1.0, thin_top)
+    spacing = 0.043 if recession == 0 else 0.056
+    roots, inside = _roots(surface, spacing, random, recession, 1.0, thin_top, even=False)
     n = len(roots)
     man = roots.of(surface.man)
     high = smooth_step((man[:, 1] - 0.30) / 0.40)
@@ -122,7 +139,7 @@ def _short(
     low = 16 + 34 * high + 16 * fore * (recession == 0)
     rise = np.radians(low + random.uniform(-7, 9, n)), np.radians(2 + 12 * high + 0 * low)
     points, out = grow(surface, roots, flow, length, rise, 4, _scalp_vertices(surface), 0.006)
-    half = (0.024 + 0.026 * high) * surface.scale * random.uniform(0.8, 1.25, n)
+    half = (0.024 + 0.026 * high) * surface.scale * (spacing / 0.043) * random.uniform(0.8, 1.25, n)
     half *= 0.55 + 0.45 * smooth_step(inside / 0.1)
     turns = np.radians(random.uniform(-1, 1, n) * (6 + 28 * high))
     taper = np.array([0.85, 1.0, 0.95, 0.7])
@@ -144,7 +161,9 @@ def afro(surface: Surface, person: Person) -> Strips:
     length *= 0.35 + 0.65 * smooth_step(inside / 0.22)
     flow = tangent(random.normal(0, 1, surface.man.shape), surface.normals)
     rise = np.radians(random.uniform(45, 88, n)), np.radians(random.uniform(10, 80, n))
-    points, out = grow(surface, roots, flow, length, rise, 4, _scalp_vertices(surface), 0.01, 0.7)
+    rows = 4 if person.hair_length > 0.6 else 3
+    near = _scalp_vertices(surface)
+    points, out = grow(surface, roots, flow, length, rise, rows, near, 0.01, 0.7)
     wind = 0.05 * person.hair_curl * person.hair_length * random.uniform(0.6, 1.2, n)
     points = curled(points, out, wind, random.uniform(0.6, 1.3, n), random)
     half = 0.075 * (0.5 + 0.5 * person.hair_length) * random.uniform(0.8, 1.2, n)
@@ -152,7 +171,7 @@ def afro(surface: Surface, person: Person) -> Strips:
     middle = np.array([0.0, 0.1, -0.75])
     out = unit(out + 0.6 * unit(man - middle)[:, None])
     turns = random.uniform(0, np.pi, n)
-    taper = np.array([0.7, 1.0, 1.1, 0.95])
+    taper = np.array([0.7, 1.0, 1.1, 0.95])[-rows:]
     return make_strips(points, out, half, taper, _tiles(inside, random, 0.05), roots, turns)
 
 
@@ -164,7 +183,7 @@ def long(surface: Surface, person: Person) -> Strips:
         person: `hair_length` is a share of the usual.
     """
     random = np.random.default_rng(34)
-    roots, inside = _roots(surface, 0.082, random, 0.0, 0.7)
+    roots, inside = _roots(surface, 0.066, random, 0.0, 0.7, low=1.0, fine=1.0)
     n = len(roots)
     man = roots.of(surface.man)
     flow = parted_flow(surface)
@@ -173,15 +192,17 @@ def long(surface: Surface, person: Person) -> Strips:
     way = 0.85 * (man[:, 1] + 0.55) + 1.15
     length = np.clip(way, 1.0, 2.6) * person.hair_length * surface.scale
     length *= random.uniform(0.88, 1.08, n)
-    rise = np.radians(random.uniform(10, 24, n)), np.zeros(n)
+    rise = np.radians(random.uniform(6, 14, n)), np.zeros(n)
     above = np.flatnonzero(surface.man[:, 1] > -1.9)
-    least = (0.008 + 0.05 * random.random(n)) * surface.scale
-    points, out = grow(surface, roots, flow, length, rise, 10, above, least, 0.62, 0.55)
+    least = (0.006 + 0.03 * random.random(n)) * surface.scale
+    points, out = grow(surface, roots, flow, length, rise, 9, above, least, 0.5, 0.55, 1.2)
     wave = 0.05 * (0.25 + person.hair_curl) * random.uniform(0.5, 1.2, n)
     points = curled(points, out, wave, random.uniform(0.5, 1.6, n), random)
-    half = (0.062 - 0.022 * (inside < 0.08)) * surface.scale * random.uniform(0.8, 1.2, n)
+    half = (
+        (0.026 + 0.056 * smooth_step(inside / 0.14)) * surface.scale * random.uniform(0.8, 1.2, n)
+    )
     turns = np.radians(random.uniform(-10, 10, n))
-    taper = np.interp(np.linspace(0, 1, 10), [0, 0.2, 0.8, 1], [0.7, 1.0, 1.0, 0.75])
+    taper = np.interp(np.linspace(0, 1, 9), [0, 0.2, 0.8, 1], [0.7, 1.0, 1.0, 0.75])
     tiles = _tiles(inside, random, 0.05)
     return make_strips(points, out, half, taper, tiles, roots, turns, held=0.0)
 
@@ -194,9 +215,12 @@ def parted_flow(surface: Surface) -> Floats:
     """
     man = surface.man
     x, y, z = man.T
-    aside = np.tanh((x - 0.10) / 0.06)
+    aside = np.tanh((x - _PARTING) / 0.03)
     top = smooth_step((y - 0.35) / 0.45)
     flow = np.column_stack([1.0 * aside * top, -0.55 - 0.6 * (1 - top), -0.35 - 0.1 * top])
+    fore = smooth_step((z + 0.5) / 0.5) * top
+    flow[:, 1] += 0.4 * fore
+    flow[:, 2] -= 0.55 * fore
     # Before and above the ears it goes back, under them it falls.
     before = smooth_step((z + 0.95) / 0.3) * smooth_step((y + 0.35) / 0.25) * (1 - top)
     flow[:, 2] -= 0.9 * before
@@ -216,7 +240,7 @@ def bun(surface: Surface, person: Person) -> Strips:
         person: `hair_length` is a share of the knot's size.
     """
     random = np.random.default_rng(35)
-    roots, inside = _roots(surface, 0.078, random, 0.0, 0.45)
+    roots, inside = _roots(surface, 0.060, random, 0.0, 0.45, low=0.7, fine=0.01)
     n = len(roots)
     man = roots.of(surface.man)
     knot = int(((surface.man - _KNOT) ** 2).sum(axis=1).argmin())
@@ -225,13 +249,13 @@ def bun(surface: Surface, person: Person) -> Strips:
     flow = tangent(flow + 0.05 * random.normal(0, 1, flow.shape), surface.normals)
     length = 1.12 * np.linalg.norm(man - _KNOT, axis=1) * surface.scale
     length = np.minimum(length, 1.5 * surface.scale) * random.uniform(0.9, 1.0, n)
-    rise = np.radians(random.uniform(6, 16, n)), np.zeros(n)
+    rise = np.radians(random.uniform(3, 9, n)), np.zeros(n)
     above = _scalp_vertices(surface)
-    least = (0.006 + 0.028 * random.random(n)) * surface.scale
-    points, outside = grow(surface, roots, flow, length, rise, 8, above, least, 0.3)
-    half = (0.058 - 0.02 * (inside < 0.07)) * surface.scale * random.uniform(0.8, 1.2, n)
+    least = (0.004 + 0.014 * random.random(n)) * surface.scale
+    points, outside = grow(surface, roots, flow, length, rise, 6, above, least, 0.3, hug=1.2)
+    half = (0.022 + 0.05 * smooth_step(inside / 0.14)) * surface.scale * random.uniform(0.8, 1.2, n)
     turns = np.radians(random.uniform(-5, 5, n))
-    taper = np.interp(np.linspace(0, 1, 8), [0, 0.2, 0.7, 1], [0.75, 1.0, 0.8, 0.45])
+    taper = np.interp(np.linspace(0, 1, 6), [0, 0.2, 0.7, 1], [0.75, 1.0, 0.8, 0.45])
     tiles = _tiles(inside, random, 0.04)
     drawn = make_strips(points, outside, half, taper, tiles, roots, turns)
     size = 0.27 * surface.scale * person.hair_length
@@ -243,7 +267,7 @@ def _knot(
     root: Roots, middle: Floats, axis: Floats, size: float, random: np.random.Generator
 ) -> Strips:
     """Strips wound about an axis into a ball, those inside of it opaque."""
-    count, rows = 64, 8
+    count, rows = 64, 6
     across = unit(np.cross(axis, [1.0, 0.0, 0.0]))
     other = np.cross(axis, across)
     inner = np.arange(count) < 24

@@ -12,11 +12,11 @@ from ..polygons import Floats
 from .images import blend, noise, smooth
 
 EYE_SIZE = 1024
-_WHITE, _PINK, _VESSEL = (0.80, 0.765, 0.735), (0.83, 0.62, 0.56), (0.66, 0.24, 0.20)
+_WHITE, _PINK, _VESSEL = (0.80, 0.755, 0.71), (0.83, 0.62, 0.56), (0.66, 0.24, 0.20)
 _SHADE = (0.60, 0.47, 0.43)
 _COLLARETTE = 0.30  # of the way from the pupil to the root
 _CRYPTS = 46
-_VESSELS = 70
+_VESSELS = 110
 
 
 def paint_eye(person: Person) -> Floats:
@@ -112,7 +112,7 @@ def _iris(person: Person, around: Floats, reach: Floats, random: np.random.Gener
 
 
 def _crypts(around: Floats, reach: Floats, frill: Floats, random: np.random.Generator) -> Floats:
-    """float64[h, w] from 0 to 1: gaps between the fibres, lozenges along them, most at the frill."""
+    """float64[h, w] from 0 to 1: gaps between the fibres, lozenges, most of them at the frill."""
     out = np.zeros_like(around)
     for _ in range(_CRYPTS):
         where, at = random.uniform(), random.choice([0.06, 0.16, 0.30]) + random.normal(0, 0.04)
@@ -135,9 +135,9 @@ def _sclera(angle: Floats, aside: Floats, random: np.random.Generator) -> Floats
     colour = np.ones((*angle.shape, 3)) * np.array(_WHITE)
     patches = 0.5 + 0.5 * noise(len(angle), 14, random)
     corners = smooth(0.62, 1.25, angle) * (0.35 + 0.65 * aside**2)
-    colour = blend(colour, _PINK, 0.55 * corners * (0.6 + 0.4 * patches) + 0.05 * patches)
-    colour = blend(colour, _VESSEL, 0.42 * vessels(random) * (0.45 + 0.55 * aside**2))
-    return blend(colour, _SHADE, 0.45 * smooth(0.70, 1.45, angle))
+    colour = blend(colour, _PINK, 0.7 * corners * (0.6 + 0.4 * patches) + 0.05 * patches)
+    colour = blend(colour, _VESSEL, 0.85 * vessels(random) * (0.5 + 0.5 * aside**2))
+    return blend(colour, _SHADE, 0.55 * smooth(0.62, 1.35, angle))
 
 
 def vessels(random: np.random.Generator) -> Floats:
@@ -164,7 +164,7 @@ def vessels(random: np.random.Generator) -> Floats:
             if strength > 0.4 and random.uniform() < 0.012:
                 ways.append((around, away, max(end, away - random.uniform(0.03, 0.09)), 0.6 * fall))
         _draw(image, np.array(points).reshape(-1, 3))
-    return image
+    return _soft(image)
 
 
 def _draw(image: Floats, points: Floats) -> None:
@@ -186,3 +186,9 @@ def _draw(image: Floats, points: Floats) -> None:
     ):
         rows, columns = np.clip(i + down, 0, EYE_SIZE - 1), np.clip(j + aside, 0, EYE_SIZE - 1)
         np.maximum.at(image, (rows, columns), np.sqrt(share) * points[:, 2])
+
+
+def _soft(image: Floats) -> Floats:
+    """An image whose lines are two texels wide and have a faint halo."""
+    near = sum(np.roll(image, shift, axis) for axis in (0, 1) for shift in (-1, 1))
+    return np.asarray(np.clip(0.7 * image + 0.2 * near, 0, 1))

@@ -50,7 +50,7 @@ def _kinds(person: Person) -> dict[str, _Hairs]:
     wave, waves = 0.16 * curl, 1.5 + 7.0 * curl
     long = person.hair_style in ("long", "bun")
     length = (0.75, 1.0) if long else (0.5, 1.0)
-    begin = 0.06 if long else 0.3
+    begin = {"long": 0.05, "bun": 0.1}.get(person.hair_style, 0.3)  # a centimetre or less
     scalp = (46, 42, 38, 44, 40, 20, 15, 10)
     return {
         "scalp": _Hairs(

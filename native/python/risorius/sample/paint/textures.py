@@ -38,8 +38,9 @@ def fold_strength(person: Person, place: Floats, eye: Floats) -> Floats:
     age = float(np.interp(person.age, (8, 30, 80), (0.35, 1.0, 1.9)))
     x, y = np.abs(place[:, :, 0]), place[:, :, 1] - eye[1]
     cheek = np.exp(-(((x - 0.44) / 0.19) ** 2) - ((y + 0.42) / 0.24) ** 2)
+    inner = np.exp(-(((x - 0.28) / 0.13) ** 2) - ((y + 0.38) / 0.2) ** 2)
     jowl = np.exp(-(((x - 0.5) / 0.22) ** 2) - ((y + 0.85) / 0.25) ** 2)
-    return np.asarray(age * (1 - 0.9 * np.clip(cheek + jowl, 0, 1)))
+    return np.asarray(age * (1 - 0.9 * np.clip(cheek + inner + jowl, 0, 1)))
 
 
 def lasting(place: Floats, eye: Floats) -> Floats:
@@ -53,7 +54,8 @@ def lasting(place: Floats, eye: Floats) -> Floats:
     brow = smooth(0.15, 0.3, y)
     feet = np.exp(-(((x - 0.5) / 0.14) ** 2) - ((y + 0.04) / 0.2) ** 2)
     between = np.exp(-((x / 0.12) ** 2) - ((y - 0.14) / 0.14) ** 2)
-    return np.asarray(0.22 + 0.78 * np.clip(brow + feet + between, 0, 1))
+    fold = np.clip(-wrinkles.laugh_fold(place, eye)[0] / wrinkles.DEPTH, 0, 1)
+    return np.asarray(0.22 + 0.78 * np.clip(brow + feet + between + fold, 0, 1))
 
 
 @dataclass
@@ -95,15 +97,23 @@ def head_wrinkles(
     folds = wrinkles.vertex_folds(head, uvs, positions, units)
     strength = fold_strength(person, place, eye)
     out = Wrinkles({}, {}, np.zeros((size, size), np.float32))
+    deeper = float(np.interp(person.age, (8, 30, 70), (0.6, 1.0, 1.4)))
     stays = float(np.interp(person.age, STAYS[0], STAYS[1]))
     for number in wrinkles.SETS:
         names = wrinkles.masks_of(number)
         depths = np.column_stack([folds[name][:, 0] for name in names])
-        masks = np.clip(shrunk(raster.image(depths), MASK_SIZE), 0, 1)
-        out.pictures |= {f"{name}_msk.png": masks[..., k] for k, name in enumerate(names)}
+        shares = raster.image(depths)
         whole = raster.image(np.asarray(sum(folds[name] for name in names)))
         out.sets[number] = f"head_normal_wm{number}.png"
         height = wrinkles.fold_heights(whole, strength)
+        if wrinkles.SMILE in names:
+            fold, there = wrinkles.laugh_fold(place, eye)
+            height += deeper * fold
+            for side, sign in (("L", 1), ("R", -1)):
+                own = shares[..., names.index(wrinkles.SMILE[:-1] + side)]
+                np.maximum(own, there * smooth(-0.01, 0.01, sign * place[..., 0]), out=own)
+        masks = np.clip(shrunk(shares, MASK_SIZE), 0, 1)
+        out.pictures |= {f"{name}_msk.png": masks[..., k] for k, name in enumerate(names)}
         normal = wrinkles.normals(height, place)
         out.pictures[out.sets[number]] = normal - [0, 0, 0.5]
         deep = np.clip(-height / wrinkles.DEPTH, 0, 1) * lasting(place, eye)

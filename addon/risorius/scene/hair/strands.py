@@ -1,0 +1,231 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Cards of hair as Blender's hair curves, in renders: a modifier that follows the cards.
+
+Each card is a guide with a width. Strands lie across it, go where its deformed vertices go, and
+take the place of the cards in renders; the viewport and exports keep the cards.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+import bpy
+
+from ..base import compat, parts
+from ..base.blender_types import ArmatureObject, MeshObject, Node, NodeTree, Socket
+from ..character import runtime
+
+MODIFIER = "Strands"
+_TREE = "Risorius Strands"
+_PLACE = "strand_uv"  # attribute of the curves: where in the picture their colour is
+_ROWS = re.compile(r"rows=(\d+)")
+# Name of a mesh begins -> strands of a card, radius at the root in metres, share that is cut off.
+_KINDS = {
+    "hair": (22, 0.000045, 0.45),
+    "brows": (4, 0.00004, 0.35),
+    "beard": (9, 0.00005, 0.5),
+    "eyelashes": (3, 0.00005, 0.25),
+}
+
+
+def cards(rig: ArmatureObject) -> Iterator[tuple[MeshObject, str, int]]:
+    """The meshes of a character that are cards of hair, their names in the file, and the rows of a
+    card.
+
+    Args:
+        rig: the deforming armature.
+    """
+    live = runtime.of(rig)
+    if live is None:
+        return
+    names, told = live.dna.mesh_names, live.dna.metadata
+    for item in parts.meshes_of(rig):
+        number = int(item.get(parts.MESH, -1))
+        name = names[number] if 0 <= number < len(names) else ""
+        found = _ROWS.fullmatch(told.get(f"hair:{name}", ""))
+        if found and len(item.data.vertices) % (2 * int(found[1])) == 0:
+            yield item, name, int(found[1])
+
+
+def are_shown(rig: ArmatureObject) -> bool:
+    """Whether renders of a character show strands."""
+    return any(MODIFIER in item.modifiers for item, _, _ in cards(rig))
+
+
+def show(rig: ArmatureObject, unit: float) -> int:
+    """Let renders of a character show strands; how many meshes have them.
+
+    Args:
+        rig: the deforming armature.
+        unit: metres per Blender unit.
+    """
+    count = 0
+    for item, name, rows in cards(rig):
+        kind = next((k for k in _KINDS if name.startswith(k)), None)
+        if kind is None:
+            continue
+        if MODIFIER not in item.modifiers:
+            modifier = item.modifiers.new(MODIFIER, "NODES")
+            modifier.node_group = _tree(item, rows, kind, unit)
+            modifier.show_viewport = False
+        count += 1
+    return count
+
+
+def hide(rig: ArmatureObject) -> None:
+    """Let renders of a character show cards again.
+
+    Args:
+        rig: the deforming armature.
+    """
+    for item, _, _ in cards(rig):
+        modifier = item.modifiers.get(MODIFIER)
+        if modifier is None:
+            continue
+        tree = modifier.node_group
+        item.modifiers.remove(modifier)
+        if tree is not None and tree.users == 0:
+            bpy.data.node_groups.remove(tree)
+
+
+class _Tree:
+    """Short words for a geometry node tree."""
+
+    def __init__(self, tree: NodeTree) -> None:
+        self.tree = tree
+
+    def node(
+        self, kind: str, inputs: dict[str | int, object] | None = None, **settings: object
+    ) -> Node:
+        node = self.tree.nodes.new(kind)
+        for key, value in settings.items():
+            setattr(node, key, value)
+        for name, value in (inputs or {}).items():
+            self.put(value, node.inputs[name])
+        return node
+
+    def put(self, value: object, socket: Socket) -> None:
+        if hasattr(value, "is_output"):
+            self.tree.links.new(value, socket)
+        else:
+            socket.default_value = value
+
+    def math(self, operation: str, *values: object) -> Socket:
+        node = self.node("ShaderNodeMath", operation=operation)
+        for value, socket in zip(values, node.inputs, strict=False):
+            self.put(value, socket)
+        return node.outputs[0]
+
+    def random(self, low: float, high: float, seed: int, number: object) -> Socket:
+        """A number of its own for each strand."""
+        node = self.node("FunctionNodeRandomValue", {2: low, 3: high, "ID": number, "Seed": seed})
+        return node.outputs[1]
+
+    def taken(self, mesh: object, value: object, index: object, kind: str) -> Socket:
+        """A value of a vertex of the cards."""
+        node = self.node("GeometryNodeSampleIndex", data_type=kind, domain="POINT")
+        self.put(mesh, node.inputs[0])
+        self.put(value, next(s for s in node.inputs if s.name == "Value" and s.enabled))
+        self.put(index, node.inputs["Index"])
+        return next(s for s in node.outputs if s.enabled)
+
+    def between(self, a: object, b: object, share: object) -> Socket:
+        """A vector between two."""
+        node = self.node("ShaderNodeMix", data_type="VECTOR")
+        where = {s.identifier: s for s in node.inputs}
+        for value, name in ((share, "Factor_Float"), (a, "A_Vector"), (b, "B_Vector")):
+            self.put(value, where[name])
+        return next(s for s in node.outputs if s.identifier == "Result_Vector")
+
+
+def _tree(item: MeshObject, rows: int, kind: str, unit: float) -> NodeTree:
+    """Nodes that turn the cards of a mesh into strands."""
+    each, radius, cut = _KINDS[kind]
+    tree = bpy.data.node_groups.new(_TREE, "GeometryNodeTree")
+    for way in ("INPUT", "OUTPUT"):
+        tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
+    g = _Tree(tree)
+    mesh = g.node("NodeGroupInput").outputs[0]
+    count = each * len(item.data.vertices) // (2 * rows)
+    line = g.node("GeometryNodeCurvePrimitiveLine")
+    line = g.node("GeometryNodeResampleCurve", {"Curve": line.outputs[0], "Count": rows})
+    dots = g.node("GeometryNodePoints", {"Count": count})
+    many = g.node("GeometryNodeInstanceOnPoints", {0: dots.outputs[0], "Instance": line.outputs[0]})
+    real = g.node("GeometryNodeRealizeInstances", {0: many.outputs[0]})
+    # All strands have as many points as a card has rows: numbers follow from a point's own.
+    index = g.node("GeometryNodeInputIndex").outputs[0]
+    strand = g.math("FLOOR", g.math("DIVIDE", g.math("ADD", index, 0.5), rows))
+    card = g.math("FLOOR", g.math("DIVIDE", g.math("ADD", strand, 0.5), each))
+    row = g.math("SUBTRACT", index, g.math("MULTIPLY", strand, rows))
+    left = g.math("MULTIPLY", g.math("ADD", g.math("MULTIPLY", card, rows), row), 2)
+    right = g.math("ADD", left, 1)
+    # A strand wanders a little across its card.
+    across = g.random(0.04, 0.96, 1, strand)
+    lean = g.random(-0.1, 0.1, 2, strand)
+    across = g.math("ADD", across, g.math("MULTIPLY", lean, g.math("DIVIDE", row, rows)))
+    place = g.node("GeometryNodeInputPosition").outputs[0]
+    ends = [g.taken(mesh, place, i, "FLOAT_VECTOR") for i in (left, right)]
+    moved = g.node(
+        "GeometryNodeSetPosition",
+        {"Geometry": real.outputs[0], "Position": g.between(ends[0], ends[1], across)},
+    )
+    uv = g.node("GeometryNodeInputNamedAttribute", data_type="FLOAT_VECTOR")
+    uv.inputs["Name"].default_value = item.data.uv_layers[0].name if item.data.uv_layers else ""
+    value = next(s for s in uv.outputs if s.enabled)
+    ends = [g.taken(mesh, value, i, "FLOAT_VECTOR") for i in (left, right)]
+    stored = g.node(
+        "GeometryNodeStoreNamedAttribute",
+        {"Geometry": moved.outputs[0], "Name": _PLACE},
+        data_type="FLOAT_VECTOR",
+        domain="POINT",
+    )
+    spot = g.between(ends[0], ends[1], across)
+    g.put(spot, next(s for s in stored.inputs if s.name == "Value" and s.enabled))
+    round_ = g.node("GeometryNodeCurveSplineType", spline_type="CATMULL_ROM")
+    g.put(stored.outputs[0], round_.inputs["Curve"])
+    finer = g.node("GeometryNodeResampleCurve", {"Curve": round_.outputs[0], "Count": 2 * rows + 2})
+    number = g.node("GeometryNodeInputIndex").outputs[0]
+    whole = g.random(1.0 - cut, 1.0, 3, number)
+    trimmed = g.node("GeometryNodeTrimCurve", {"Curve": finer.outputs[0]}, mode="FACTOR")
+    g.put(whole, next(s for s in trimmed.inputs if s.name == "End" and s.enabled))
+    along = g.node("GeometryNodeSplineParameter").outputs["Factor"]
+    thick = g.math("MULTIPLY", g.math("SUBTRACT", 1.0, g.math("POWER", along, 3.0)), radius / unit)
+    sized = g.node("GeometryNodeSetCurveRadius", {"Curve": trimmed.outputs[0], "Radius": thick})
+    painted = g.node(
+        "GeometryNodeSetMaterial",
+        {"Geometry": sized.outputs[0], "Material": _material(item)},
+    )
+    out = g.node("NodeGroupOutput")
+    tree.links.new(painted.outputs[0], out.inputs[0])
+    return tree
+
+
+def _material(item: MeshObject) -> bpy.types.Material:
+    """What strands look like: the picture's colours, on fibres that let light through."""
+    cards_look = item.data.materials[0] if item.data.materials else None
+    material = bpy.data.materials.new(f"{item.name}_strands")
+    compat.make_node_tree(material)
+    tree = compat.tree_of(material)
+    shader = next(n for n in tree.nodes if n.type == "BSDF_PRINCIPLED")
+    output = next(n for n in tree.nodes if n.type == "OUTPUT_MATERIAL")
+    fibre = tree.nodes.new("ShaderNodeBsdfHairPrincipled")
+    if hasattr(fibre, "model"):
+        fibre.model = "CHIANG"
+    fibre.parametrization = "COLOR"
+    shader.inputs["Roughness"].default_value = 0.5
+    fibre.inputs["Roughness"].default_value = 0.35
+    source = cards_look.node_tree if cards_look is not None else None
+    pictures = [n for n in source.nodes if n.type == "TEX_IMAGE" and n.image] if source else []
+    if pictures:
+        spot = tree.nodes.new("ShaderNodeAttribute")
+        spot.attribute_name = _PLACE
+        image = tree.nodes.new("ShaderNodeTexImage")
+        image.image = pictures[0].image
+        tree.links.new(spot.outputs["Vector"], image.inputs["Vector"])
+        tree.links.new(image.outputs["Color"], shader.inputs["Base Color"])
+        tree.links.new(image.outputs["Color"], fibre.inputs["Color"])
+    cycles = tree.nodes.new("ShaderNodeOutputMaterial")
+    cycles.target, output.target = "CYCLES", "EEVEE"
+    tree.links.new(fibre.outputs[0], cycles.inputs["Surface"])
+    return material

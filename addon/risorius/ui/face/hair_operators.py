@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Blender takes properties where Python has annotations:
+# pyright: reportInvalidTypeForm=false
+"""The operator that lets renders show strands of hair instead of cards."""
+
+import bpy
+
+from ...scene.base import parts
+from ...scene.hair import strands
+from ..blender_types import Context, Operator, Result
+from ..common import FaceOperator, face_rig
+from ..words import say
+
+
+class RISORIUS_OT_set_strands(FaceOperator, Operator):
+    """Render hair as strands that follow the cards; the viewport keeps the cards"""
+
+    bl_idname = "risorius.set_strands"
+    bl_label = "Strands in Renders"
+    bl_options = {"REGISTER", "UNDO"}
+
+    enable: bpy.props.BoolProperty(name="Strands in Renders", default=True, options={"SKIP_SAVE"})
+
+    def execute(self, context: Context) -> Result:
+        rig = face_rig(context)
+        if not self.enable:
+            strands.hide(rig)
+            return {"FINISHED"}
+        unit = float(rig.get(parts.UNIT, 1.0))
+        if not strands.show(rig, unit):
+            self.report({"ERROR"}, say("This face has no cards of hair."))
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
+CLASSES = (RISORIUS_OT_set_strands,)

@@ -1,0 +1,217 @@
+# SPDX-License-Identifier: MIT
+"""Hair of the sample people: where it grows, how cards lie, and that they stay on the skin."""
+
+import zlib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import risorius
+from conftest import _not_run
+from risorius.files.png import png, read_png
+from risorius.mixing import Mix, difference, mix_faces
+from risorius.mixing.hair import hair_meshes
+from risorius.sample import build, people, source
+from risorius.sample.hair import add_hair, grow_hair, hair_textures
+from risorius.sample.hair.growth import grow
+from risorius.sample.hair.places import hairline_height
+from risorius.sample.hair.strips import card_faces, card_vertices, make_strips
+from risorius.sample.hair.surface import Surface
+from risorius.sample.polygons import Polygons, subdivide
+
+CUBE = Polygons(
+    faces=[[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]],
+    uv_faces=[[0, 1, 2, 3]] * 6,
+    uvs=np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float),
+    vertex_count=8,
+)
+CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
+MOST_VERTICES = 12_000
+
+
+@pytest.fixture(scope="module")
+def ball():
+    """A ball of radius 1 as a head."""
+    polygons, points = CUBE, CORNERS
+    for _ in range(3):
+        polygons, operator = subdivide(polygons)
+        points = operator.apply(points)
+    points = points / np.linalg.norm(points, axis=1, keepdims=True)
+    return Surface(polygons, points, points, np.zeros(3))
+
+
+def test_hair_grows_within_the_hairline():
+    """Crown, nape and side are inside; forehead, brow, ear, cheek and neck are not."""
+    inside = [[0, 1.05, -0.7], [0, -0.3, -1.6], [0.75, 0.4, -0.7]]
+    outside = [[0, 0.5, 0.2], [0.3, 0.2, 0.1], [0.8, -0.2, -0.8], [0.6, -0.5, 0], [0, -1, -1.5]]
+    assert hairline_height(np.array(inside, float)).min() > 0.1
+    assert hairline_height(np.array(outside, float)).max() < -0.05
+    forehead = np.array([[0.4, 0.75, 0.0]])
+    assert hairline_height(forehead) > 0.05
+    assert hairline_height(forehead, recession=1.0) < 0
+
+
+def test_roots_are_apart_and_on_the_skin(ball):
+    density = np.ones(len(ball.positions))
+    roots = ball.scattered(density, 0.2, np.random.default_rng(1))
+    places = roots.of(ball.man)
+    apart = np.linalg.norm(places[:, None] - places, axis=2) + 9 * np.eye(len(places))
+    assert apart.min() >= 0.2
+    assert len(roots) > 150
+    again = ball.nearest(places)
+    np.testing.assert_allclose(again.of(ball.positions), places, atol=1e-9)
+
+
+def test_guides_stay_over_the_skin_and_are_as_long_as_asked(ball):
+    roots = ball.scattered(np.ones(len(ball.positions)), 0.4, np.random.default_rng(2))
+    n = len(roots)
+    flow = np.tile([0.0, -1.0, 0.0], (len(ball.positions), 1))
+    rise = np.full(n, 0.3), np.full(n, -0.4)
+    everywhere = np.arange(len(ball.positions))
+    points, out = grow(ball, roots, flow, np.full(n, 0.5), rise, 5, everywhere, least=0.02)
+    np.testing.assert_allclose(points[:, 0], roots.of(ball.positions))
+    assert np.linalg.norm(points[:, -1], axis=1).min() > 1.0
+    long = np.linalg.norm(np.diff(points, axis=1), axis=2).sum(axis=1)
+    assert np.abs(long - 0.5).max() < 0.06
+    strips = make_strips(points, out, np.full(n, 0.05), np.ones(5), np.zeros(n, int), roots)
+    positions, _ = card_vertices(strips)
+    faces, uvs = card_faces(strips)
+    assert len(positions) == len(uvs) == 10 * n
+    corners = positions[np.array(faces)]
+    facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 3] - corners[:, 0])
+    middles = corners.mean(axis=1)
+    outward = (facing * middles).sum(axis=1)  # counter-clockwise seen from outside
+    assert outward[middles[:, 1] > -0.8].min() > 0  # below, all ways of the flow meet
+
+
+def test_a_picture_with_opacity_is_a_png_that_others_read():
+    image = np.random.default_rng(3).uniform(0, 1, (4, 6, 4))
+    data = png(image)
+    assert data[24:26] == bytes([8, 6])
+    begin = data.index(b"IDAT") + 4
+    rows = np.frombuffer(zlib.decompressobj().decompress(data[begin:]), np.uint8).reshape(4, 25)
+    if not rows[:, 0].any():
+        np.testing.assert_array_equal(rows[::-1, 1:].reshape(4, 6, 4), np.rint(image * 255))
+    assert read_png(data) is None  # pictures of hair are not mixed
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ('hair_style = "mohawk"', "hair_style: one of none, crop, receding, long, bun, afro"),
+        ('beard_style = "long"', "beard_style: one of none, full, short, goatee, moustache"),
+        ("hair_length = 9", "hair_length: a number from 0.3 to 2 was expected, found 9"),
+        ("hair_grey = -1", "hair_grey: a number from 0 to 1 was expected, found -1"),
+    ],
+)
+def test_styles_are_named_or_refused(tmp_path, text, sentence):
+    path = tmp_path / "p.toml"
+    path.write_text(f'like = "man"\nname = "P"\n{text}\n')
+    with pytest.raises(ValueError, match="p.toml") as caught:
+        people.read_person(path)
+    assert sentence in str(caught.value)
+
+
+# ---- on the real data, where they can be had
+
+
+@pytest.fixture(scope="module")
+def haired():
+    """(face of shapes with hair, its hair, person) of the man and of another with his head."""
+    try:
+        path = source.fetch()
+    except source.SourceError as error:
+        _not_run.add("the sample's CC0 data")
+        pytest.skip(f"extra not run: {error}")
+    data = source.Source(path)
+    man = people.PEOPLE["man"]
+    dna, parts, body = build.assemble(data, lambda _: None, man)
+    base = data.base_mesh()
+    out = []
+    for person in (man, replace(man, name="Other", hair_style="bun", beard_style="short")):
+        face = risorius.load(dna.to_bytes())
+        hair = grow_hair(person, body, base, parts, build.CM)
+        add_hair(face, hair)
+        out.append((face, hair, person))
+    return out
+
+
+def moved(dna, raw, name):
+    """Where linear skinning and shapes bring the vertices of a mesh."""
+    from risorius.author.geometry import skeleton as sk
+
+    pose = risorius.Rig(dna).evaluate(raw)
+    mesh = dna.meshes[dna.mesh_names.index(name)]
+    p = np.asarray(mesh.positions, float).copy()
+    for target in mesh.blend_shape_targets:
+        weight = float(pose.blend_shapes[target.blend_shape_channel_index])
+        p[target.vertex_indices] += weight * np.asarray(target.deltas, float)
+    rest = np.zeros((len(dna.joint_names), 9))
+    matrices = [sk.world_matrices(dna, d) for d in (np.asarray(pose.joints, float), rest)]
+    motions = (matrices[0] @ np.linalg.inv(matrices[1]))[:, :3]
+    return sk.skinned(p, sk.dense_weights(mesh, len(dna.joint_names)), motions)
+
+
+def test_extra_faces_with_hair_are_sane_and_small(haired):
+    for dna, hair, _ in haired:
+        assert dna.validate() == []
+        shown = [n for n in dna.mesh_names if n.split("_")[0] in hair.strips]
+        finest = sum(
+            len(dna.meshes[dna.mesh_names.index(n)].positions) for n in shown if "_lod0_" in n
+        )
+        assert 5000 < finest <= MOST_VERTICES
+        files, metadata = hair_textures(people.PEOPLE["man"], dna, hair, 64)
+        assert {f"texture:{n}:color" for n in shown} <= set(metadata)
+        assert list(files) == ["hair_color.png"]
+
+
+def test_extra_roots_stay_on_the_skin_in_each_expression(haired):
+    """Within 2 mm, for each row of the mapping at once with an open jaw."""
+    dna, hair, _ = haired[1]
+    names = dna.raw_control_names
+    worst = {}
+    for control in ("eyeBlinkL", "browRaiseOuterL", "browDownL", "mouthCornerPullL", "jawOpen"):
+        raw = np.zeros(len(names), np.float32)
+        raw[names.index(f"CTRL_expressions.{control}")] = 1
+        skin = moved(dna, raw, "head_lod0_mesh")
+        for kind, strips in hair.strips.items():
+            own = moved(dna, raw, f"{kind}_lod0_mesh").reshape(-1, strips.rows, 2, 3)
+            still = np.asarray(dna.meshes[dna.mesh_names.index(f"{kind}_lod0_mesh")].positions)
+            still = still.reshape(-1, strips.rows, 2, 3)
+            way = (own - still)[:, 0].mean(axis=1)
+            place = strips.roots.of(skin) - strips.roots.of(
+                np.asarray(dna.meshes[0].positions, float)
+            )
+            apart = 10 * np.linalg.norm(way - place, axis=1).max()
+            worst[control, kind] = max(worst.get((control, kind), 0), apart)
+    assert max(worst.values()) < 2.0, worst
+    assert {k for k in worst if worst[k] > 0.5} <= {(c, "hair") for c, _ in worst}
+
+
+def test_extra_lashes_have_controls_of_their_own(haired):
+    dna, hair, _ = haired[0]
+    names = dna.raw_control_names
+    still = moved(dna, np.zeros(len(names), np.float32), "eyelashes_lod0_mesh")
+    for control, up in (("eyelashesUpINL", 1), ("eyelashesDownOUTR", -1)):
+        raw = np.zeros(len(names), np.float32)
+        raw[names.index(f"CTRL_expressions.{control}")] = 1
+        way = moved(dna, raw, "eyelashes_lod0_mesh") - still
+        far = np.abs(way[:, 1]).argmax()
+        assert np.sign(way[far, 1]) == up
+        assert 0.2 < np.linalg.norm(way[far]) < 1.2  # centimetres
+        assert np.sign(still[far, 0]) == (1 if control.endswith("L") else -1)
+        roots = way.reshape(-1, hair.strips["eyelashes"].rows, 2, 3)[:, 0]
+        assert np.abs(roots).max() < 1e-6
+
+
+def test_extra_people_of_other_hair_can_be_mixed(haired):
+    one, other = haired[0][0], haired[1][0]
+    assert difference(one, other) is None
+    mixed = mix_faces([one, other], Mix([0.4, 0.6]))
+    assert mixed.validate() == []
+    assert mixed.mesh_names == other.mesh_names
+    assert len(hair_meshes(mixed)) == len(hair_meshes(other)) > 0
+    number = hair_meshes(mixed)[0]
+    np.testing.assert_allclose(
+        mixed.meshes[number].positions, other.meshes[number].positions, atol=1e-4
+    )
