@@ -104,9 +104,11 @@ def plan(apart: float, low: Sequence[float], high: Sequence[float]) -> Studio:
     middle = (0.0, _DEPTH * unit)
     camera = [m + (away + _DEPTH * unit) * t for m, t in zip(middle, towards, strict=True)]
     wall = [m - max(_WALL * unit, high[1] + unit) * t for m, t in zip(middle, towards, strict=True)]
+    above = _ABOVE * unit
+    farther = (away + _DEPTH * unit) / away  # the ray through `lift` at the eyes meets the middle
     return Studio(
-        camera=(camera[0], camera[1], _ABOVE * unit),
-        target=(middle[0], middle[1], lift),
+        camera=(camera[0], camera[1], above),
+        target=(middle[0], middle[1], above + (lift - above) * farther),
         lens=LENS,
         lamps=tuple(_lamp(row, unit) for row in _LAMPS),
         wall=(wall[0], wall[1], 0.0),
