@@ -190,7 +190,8 @@ def _wanted(data, body, unit, row):
     names = {name.rsplit(".", 1)[-1]: weight for name, weight in row.items()}
     own = sum(weight * body.units[name].displacement for name, weight in names.items())
     for (one, other), shape in body.eye_correctives.items():
-        own = own + names.get(one, 0) * names.get(other, 0) * shape
+        share = names.get(one, 0) * names.get(other, 0)
+        own = own + (share - names.get(one, 0) * (one == other)) * shape
     if unit.startswith(("eyeBlink", "eyeLook", "eyeWide")):
         return own
     there = [v for name, v in body.groups.items() if "eye" in name or "cornea" in name]

@@ -9,7 +9,7 @@ from ..base.easing import smooth_step
 from . import expressions as ex
 from .eyes import Eyes, with_eyeballs
 from .lips import Mouth, sealed
-from .people import MODEL, Person
+from .people import MAN, Person
 from .polygons import Floats, Ints
 from .proportions import Proportions
 from .source import TARGETS, BaseMesh, Source
@@ -55,9 +55,6 @@ def shaped(source: Source, base: BaseMesh, person: Person) -> Floats:
         out += weight * source.target(f"{TARGETS}{name}.target.gz", count)
     for name, weight in person.features.items():
         out += weight * source.feature(name, count)
-    for name, weight in person.asymmetry.items():
-        side = "l" if weight > 0 else "r"
-        out += abs(weight) * source.feature(f"asym/asym-{name}-{side}", count)
     return out
 
 
@@ -187,8 +184,7 @@ def skin_weights(
 class Body:
     """A person before there are meshes: where all is, and what each raw control does.
 
-    All people have the skin weights and units of a model, the man with two sides that are alike,
-    these in their own proportions.
+    All people have the man's skin weights and his units, these in their own proportions.
 
     Attributes:
         groups: vertex indices by group of the base mesh.
@@ -198,18 +194,17 @@ class Body:
         further_correctives: float64[V, 3] of sticky lips and the like, by their two raw controls.
         eyes: where they are and how their lids rest.
         eye_correctives: float64[V, 3], what keeps lids on the eyes, by their two raw controls.
-        man: the model's, for the model itself this.
+        man: the man's, for the man himself this.
         weights: float64[V, 9], skin weights.
     """
 
     def __init__(self, source: Source, base: BaseMesh, person: Person) -> None:
         base = with_eyeballs(base)
         self.groups = groups = group_indices(base)
-        model = person.shape() == MODEL.shape() and person.features == MODEL.features
-        model = model and not any(person.asymmetry.values())
-        other = None if model else Body(source, base, MODEL)
+        man = person.shape() == MAN.shape() and person.features == MAN.features
+        other = None if man else Body(source, base, MAN)
         self.positions = shaped(source, base, person)
-        self.positions[:, 1] += FLOOR if model else -self.positions[groups["body"], 1].min()
+        self.positions[:, 1] += FLOOR if man else -self.positions[groups["body"], 1].min()
         self.eyes = Eyes(base, groups, self.positions, person.age)
         self._raw = self.positions.copy()  # as the data have them
         self._ways: dict[str, Floats] = {}  # likewise, of the raw controls
@@ -250,6 +245,7 @@ class Body:
         for name, way in moved.items():
             self.units[name].displacement = way
         ex.add_joint_motion(self.units, groups, self.positions, self.joints)
+        ex.leave_bones(self.units, groups, self.positions, self.joints)
         if other is None:
             jaw = self.units["jawOpen"]
             self.weights = skin_weights(self.positions, groups, self.joints, jaw)

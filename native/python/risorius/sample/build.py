@@ -25,6 +25,7 @@ from ..author.levels import level_name
 from ..files import fileio
 from . import expressions as ex
 from . import references, wrinkles
+from .askew import askew, set_askew
 from .body import JOINTS, NECK_CUT, NECK_SLOPE, REACH, Body
 from .clothes import shirt
 from .controls import gui_table
@@ -384,8 +385,9 @@ def assemble(
         mesh = make_mesh(part, positions, w)
         if not part.rests:
             deltas = []
-            for unit in units.values():
-                here = ex.Expression(part.carry(unit.displacement), unit.joints)
+            for name, unit in units.items():
+                whole = unit.displacement - correctives.get((name, name), 0.0)
+                here = ex.Expression(part.carry(whole), unit.joints)
                 deltas.append(bind_displacement(p, w, here, joints))
             deltas += [part.carry(delta) for delta in correctives.values()]
             add_targets(mesh, deltas)
@@ -555,6 +557,7 @@ def build_sample(
     if rig is not None:
         man = None if body.man is body else lambda: assemble(source, lambda _: None)[0]
         dna = joint_face(dna, man, rig, steps, begins)
+    set_askew(dna, parts, body, askew(source, body, person), CM)
     grown = grow_hair(person, body, source.base_mesh(), parts, CM)
     add_hair(dna, grown)
     hairs, shown = hair_textures(person, dna, grown, texture_size)

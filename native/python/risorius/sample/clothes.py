@@ -113,7 +113,7 @@ def with_edges(polygons: Polygons, positions: Floats) -> tuple[list[list[int]], 
     count = polygons.vertex_count
     faces = [list(face) for face in polygons.faces]
     rows: list[tuple[int, int, float]] = []
-    trunk = spread(np.flatnonzero(np.abs(positions[:, 0]) < 1.0), 16)
+    trunk = spread(np.flatnonzero(np.abs(positions[:, 0]) < 1.0), 1000)
     near = 1 / len(trunk)
     # Room: away from the middle of the trunk at the same height would need a division; from its
     # middle alone it is linear, and much the same for what is seen.

@@ -234,6 +234,39 @@ def cheek_mass(units: dict[str, Expression], side: str) -> Floats:
     return np.asarray(share[:, None] * _CHEEK_BALL * [0.35 * aside, 0.25, 0.9])
 
 
+def leave_bones(
+    out: dict[str, Expression],
+    groups: dict[str, Ints],
+    positions: Floats,
+    pivots: dict[str, Floats],
+) -> None:
+    """Teeth and eyeballs go with their joints alone: what is hard keeps its form. Pupils do not.
+
+    Args:
+        out: the expressions by name, with their joints; displacements are changed.
+        groups: vertex indices by group of the base mesh.
+        positions: float64[V, 3], decimetres.
+        pivots: joint positions by name.
+    """
+    bones = {"helper-upper-teeth": ("FACIAL_C_TeethUpper",)}
+    bones["helper-lower-teeth"] = ("FACIAL_C_TeethLower", "FACIAL_C_Jaw")
+    for side, letter in (("L", "l"), ("R", "r")):
+        for name in ("helper-{}-eye", "eyeball-{}", "cornea-{}"):
+            bones[name.format(letter)] = (f"FACIAL_{side}_Eye",)
+    for name, unit in out.items():
+        unit.displacement = unit.displacement.copy()
+        for group, joints in bones.items():
+            if "Pupil" in name and "teeth" not in group:
+                continue
+            at = positions[groups[group]]
+            way = np.zeros_like(at)
+            for joint in joints:
+                if joint in unit.joints:
+                    rotation, shift = unit.joints[joint]
+                    way += (at - pivots[joint]) @ rotation.T + pivots[joint] + shift - at
+            unit.displacement[groups[group]] = way
+
+
 def corrective_displacements(out: dict[str, Expression]) -> dict[tuple[str, str], Floats]:
     """What to add where two controls meet; (a, b) fires with the product of both.
 

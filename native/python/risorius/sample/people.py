@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -187,7 +187,6 @@ def _cast() -> dict[str, Person]:
 
 PEOPLE = _cast()
 MAN = PEOPLE["man"]
-MODEL = replace(MAN, asymmetry={})  # the same on both sides: what all others take after
 
 
 def read_person(path: Path) -> Person:

@@ -355,8 +355,8 @@ def mouth_parts(base: BaseMesh, lod: int) -> list[Part]:
         used = np.unique([c[0] for f in base.faces[f"helper-{name}-teeth"] for c in f])
         for kind, builder in (("teeth", crowns), ("gums", gums)):
             polygons, points = builder.polygons()
-            made[kind].append((polygons, affine(base.positions, used[::5], points)))
-    return [Part(f"{kind}_lod{lod}_mesh", *joined(two)) for kind, two in made.items()]
+            made[kind].append((polygons, affine(base.positions, used, points)))
+    return [Part(f"{kind}_lod{lod}_mesh", *joined(two), rests=True) for kind, two in made.items()]
 
 
 def joined(parts: list[tuple[Polygons, Operator]]) -> tuple[Polygons, list[Operator]]:

@@ -27,6 +27,7 @@ _MOUND = (
     (4, 2.25, 0.04),
     (4, 2.7, -0.15),
 )
+_APART = 0.12
 Row = dict[int, float]  # shares by vertex of the base mesh, together 1
 
 
@@ -55,7 +56,7 @@ def eye_parts(base: BaseMesh, groups: dict[str, Ints], lod: int) -> list[Part]:
             uvs.append(places)
         polygons = Polygons(faces, faces, np.concatenate(uvs), len(rows))
         part = Part(f"{name}_lod{lod}_mesh", polygons, [_operator(rows, len(base.positions))])
-        for _ in range(2 - lod):
+        for _ in range(1 - lod):
             part.polygons, operator = subdivide(part.polygons)
             part.operators.append(operator)
         out.append(part)
@@ -163,6 +164,9 @@ def _caruncle(rings: Ints) -> tuple[list[Row], list[list[int]], Floats]:
     # How far from the corner in columns, how far in on the rim, how high the mound is.
     for aside, at, high in _MOUND:
         upper, lower = (_rim(rings, at, column) for column in (aside, (COLUMNS - aside) % COLUMNS))
+        if aside == 0:  # one column: a little of its neighbours, so that no two vertices coincide
+            upper = _mixed((1 - _APART, upper), (_APART, _rim(rings, at, 1)))
+            lower = _mixed((1 - _APART, lower), (_APART, _rim(rings, at, COLUMNS - 1)))
         skin = _mixed((0.5, _rim(rings, 0.0, aside)), (0.5, _rim(rings, 0.0, -aside % COLUMNS)))
         deep = _mixed((0.5, _rim(rings, 3.0, aside)), (0.5, _rim(rings, 3.0, -aside % COLUMNS)))
         for share, up in ((0.0, -0.05), (0.25, 0.8), (0.5, 1.0), (0.75, 0.8), (1.0, -0.05)):

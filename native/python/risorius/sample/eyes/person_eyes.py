@@ -13,7 +13,7 @@ from . import eyeball, lids
 from .lids import Lids
 from .rings import ROOT, find_rings
 
-_AGES, _OPEN = (8, 30, 75), (0.78, 0.68, 0.54)  # how far upper lids are above the eye's middle
+_AGES, _OPEN = (8, 30, 75), (0.78, 0.70, 0.60)  # how far upper lids are above the eye's middle
 _SIDES = (("l", "L"), ("r", "R"))
 _LASH_RINGS = slice(ROOT - 1, ROOT + 1)
 Units = dict[str, Floats]
@@ -90,7 +90,8 @@ class Eyes:
             units: float64[V, 3] by raw control; those that move eyes or lids are changed.
 
         Returns:
-            float64[V, 3] of correctives by their two raw controls.
+            float64[V, 3] of correctives by their two raw controls. Where both are the same one, its
+            square, the control has as much less by itself: at 1 it does what `units` says.
         """
         correctives: Correctives = {}
         for side, letter in _SIDES:
@@ -112,7 +113,7 @@ class Eyes:
                 correctives[(blink, name)] = self._with_lashes(eye, more, still)
             # 4 x (1 - x) of it: nothing where lids are open or closed, the whole half way.
             correctives[(blink, blink)] = -4 * half
-            units[blink] = closed + 4 * half
+            units[blink] = closed
         return correctives
 
     def _looks(self, eye: Lids, units: Units, letter: str) -> None:

@@ -307,7 +307,7 @@ class Skin:
         mucosa = _over(mucosa, linear(np.array(_THROAT)), back)
         light = _over(light, mucosa, smooth(2.4, 0.4, ring))
         pink = linear(np.array(_LID_MARGIN)) * (1 - 0.45 * self.deep)
-        return _over(light, pink, 0.85 * smooth(1.2, -0.5, self.field["eyes"]))
+        return _over(light, pink, 0.85 * smooth(2.8, 0.8, self.field["eyes"]))
 
 
 def _over(light: Floats, colour: Floats, mask: Floats) -> Floats:
