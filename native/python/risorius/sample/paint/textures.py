@@ -237,5 +237,5 @@ def packable(name: str, image: Floats, largest: int) -> Floats:
         largest: no texture has more texels than a square of this side.
     """
     out = shrunk(image, largest // 2 if name.startswith("eye") else largest)
-    steps = 31.875 if largest <= 1024 else 63.75  # a flat normal, 127.5 / 255, is one of them
+    steps = 31.875 if largest <= 1024 else 63.75  # a flat normal stays 128 of 255
     return np.round(out * steps) / steps if "normal" in name else out
