@@ -57,7 +57,7 @@ NO_WRINKLES = 4  # the level from which on there are none
 _FIT_BEGINS = 0.2  # of the whole time
 _SEARCH_ENDS = 0.4
 _REFIT_BEGINS = 0.7
-TOLERANCE_MM = 0.15  # what joints leave beyond it stays in blend shapes
+TOLERANCE_MM = 0.2  # what joints leave beyond it stays in blend shapes
 RIG = RigOptions(
     FitOptions(joints=NEW_JOINTS), tolerance_mm=TOLERANCE_MM, kept=("eyeLeft", "eyeRight")
 )

@@ -228,8 +228,8 @@ def paint_textures(
 def packable(name: str, image: Floats, largest: int) -> Floats:
     """A picture at the size at which it is kept.
 
-    Half as many texels a side do for an eye as for a head. Normals keep six bits, five where
-    the zip is to hold them: what PNG cannot pack is the noise of the others.
+    Half as many texels a side do for an eye as for a head. Where the zip is to hold them, pictures
+    keep seven bits and roughness six: what PNG cannot pack is the noise of the others.
 
     Args:
         name: of its file.
@@ -237,5 +237,7 @@ def packable(name: str, image: Floats, largest: int) -> Floats:
         largest: no texture has more texels than a square of this side.
     """
     out = shrunk(image, largest // 2 if name.startswith("eye") else largest)
-    steps = 31.875 if largest <= 1024 else 63.75  # a flat normal stays 128 of 255
-    return np.round(out * steps) / steps if "normal" in name else out
+    if largest > 1024 or not name.startswith(("head_", "eye_")):
+        return out
+    steps = 63.75 if "roughness" in name else 127.5  # of both 128 of 255, a flat normal, is one
+    return np.round(out * steps) / steps
