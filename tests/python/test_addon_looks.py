@@ -232,3 +232,18 @@ class TestFolds:
             np.array([[0.05, 0, 1.6], [-0.05, 0, 1.6], [0, 0, 1.6]]), self.frame()
         )
         np.testing.assert_allclose(shares, [1, 0, 0.5])
+
+
+def test_light_goes_nowhere_beside_the_necks_border_and_through_lids():
+    frame = folds.FaceFrame(np.zeros(3), 0.062, 0.07)
+    heights = np.linspace(-0.2, 0.0, 41)
+    neck = np.column_stack([0 * heights, 0 * heights, heights])
+    lids = np.array([[0.03, 0.0, 0.005]])
+    points = np.concatenate([neck, lids])
+    near = folds.border_share(points, np.array([0, 41]), frame)
+    assert near.dtype == np.float32
+    np.testing.assert_array_equal(near[heights.searchsorted([-0.2, -0.191])], 1)
+    assert 0 < near[heights.searchsorted(-0.182)] < 1
+    assert not near[(points[:, 2] > -0.174)].any()  # nor at the rim of a lid
+    assert not folds.border_share(points, np.array([41]), frame).any()
+    assert not folds.border_share(points, np.array([], int), frame).any()

@@ -4,6 +4,7 @@
 import copy
 import importlib.util
 import json
+import zlib
 from pathlib import Path
 
 import face_shapes
@@ -332,6 +333,12 @@ def test_pictures_are_read_back_or_refused():
     data = png(image)
     np.testing.assert_allclose(read_png(data), image, atol=1e-9)
     np.testing.assert_allclose(read_png(png(image[..., 0])), image[..., 0], atol=1e-9)
+    slope = np.rint(np.linspace(0, 1, 48).reshape(6, 8) * 255) / 255
+    for whole in (slope, slope[..., None] * [1, 0.2, 0], slope.T, random.random((6, 8)) > 0.5):
+        exact = np.rint(np.asarray(whole, float) * 255) / 255
+        np.testing.assert_allclose(read_png(png(exact)), exact, atol=1e-9)
+    level = np.rint(255 * np.add.outer(np.arange(64) / 90, np.arange(64) / 300)) / 255
+    assert len(png(level)) < 0.6 * len(zlib.compress(np.uint8(np.rint(level * 255)).tobytes(), 6))
     for _ in range(300):
         broken = bytearray(data)
         for at in random.integers(len(data), size=3):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import risorius
 from risorius.author.levels import extend_levels
-from risorius.sample import build, wrinkles
+from risorius.sample import build, expressions, wrinkles
 from risorius.sample.expressions import Expression
 from risorius.sample.part import Part
 from risorius.sample.polygons import Polygons
@@ -149,3 +149,37 @@ def test_each_map_has_a_driver():
     for control, number, slope in drivers:
         assert control[-1] == wrinkles.map_names()[number][-1]
         assert 0 < slope <= 1
+
+
+def test_a_smile_folds_the_cheek_from_the_nose_past_the_mouth():
+    eye = np.array([0.3, 16.3, 1.3])
+    x, y = np.meshgrid(np.linspace(-0.8, 0.8, 161), np.linspace(-1.2, 0.3, 151))
+    places = np.stack([x, y + eye[1], np.full_like(x, 0.1 + eye[2])], axis=2)
+    height, there = wrinkles.laugh_fold(places, eye)
+    np.testing.assert_allclose(height, height[:, ::-1], atol=1e-12)
+    row = height[np.argmin(np.abs(y[:, 0] + 0.62)), 80:]
+    deepest = x[0, 80:][row.argmin()]
+    assert deepest == pytest.approx(0.27, abs=0.011)
+    assert row.min() < -0.7 * wrinkles._FOLD_DEPTH
+    assert 0.03 < x[0, 80:][row.argmax()] - deepest < 0.12  # the cheek's mass is on its outer side
+    assert row.max() > 0.4 * wrinkles._FOLD_DEPTH
+    assert not height[(y > -0.35) | (y < -0.91)].any()
+    assert not there[(y > -0.35) | (y < -0.91)].any()
+
+
+@pytest.mark.parametrize("side", "LR")
+def test_a_true_smile_lifts_its_own_cheek_and_no_lip(side):
+    sign = 1 if side == "L" else -1
+    places = np.array(
+        [[0.42, -0.36, 0.0], [-0.42, -0.36, 0.0], [0.1, -0.72, 0.3], [-0.1, -0.72, 0.3], [0, 0, 0]]
+    )
+    there = Expression(np.full((5, 3), 0.05))
+    units = {name + side: there for name in ("mouthCornerPull", "eyeCheekRaise")}
+    moved = expressions.cheek_mass(units, places, side)
+    still = Expression(np.zeros((5, 3)))  # teeth: nothing moves them
+    assert not expressions.cheek_mass(dict.fromkeys(units, still), places, side).any()
+    own, other = (0, 1) if side == "L" else (1, 0)
+    assert moved[own, 2] > 0.02
+    assert sign * moved[own, 0] > 0
+    assert not moved[other].any()
+    np.testing.assert_allclose(moved[2:], 0, atol=1e-3)

@@ -30,7 +30,7 @@ _GRAIN_DEPTH = 0.006
 _SUBSURFACE, _DARKEST = 0.026, 0.4
 _RADIUS = (1.0, 0.36, 0.2)
 _IOR = 1.4
-_OILY, _OIL_ROUGHNESS = 0.22, 0.55  # the second lobe, and how rough it is beside the first
+_OILY, _OIL_ROUGHNESS = 0.14, 0.6  # the second lobe, and how rough it is beside the first
 _FOLD_DEPTH = {"level": 0.45, "upright": 0.45, "rays": 0.35, "arc": 1.8, "dimples": 0.6}
 
 Member = tuple[str, Value]  # side of the face, value of the map

@@ -10,11 +10,12 @@ import numpy as np
 
 from ..base.easing import smooth_step
 from ..controls.arkit import mapping
+from .folds import from_laugh_line
 from .further import find_places, further_units, unit_shape
 from .polygons import Floats, Ints
 from .source import BaseMesh, Source
 
-_CHEEK_BALL = 0.035  # decimetres
+_CHEEK_BALL, _ROLL = 0.032, 0.022  # decimetres
 PREFIX = "CTRL_expressions."
 _BROWS = [f"eyebrows-{side}-{way}" for side in ("left", "right") for way in ("down", "up")]
 
@@ -217,21 +218,30 @@ def add_joint_motion(
             expression.joints[f"FACIAL_{side}_Eye"] = (rotation, np.zeros(3))
 
 
-def cheek_mass(units: dict[str, Expression], side: str) -> Floats:
-    """float64[V, 3]: the fat of a cheek that a true smile pushes up into a ball, decimetres.
+def cheek_mass(units: dict[str, Expression], places: Floats, side: str) -> Floats:
+    """float64[V, 3]: the fat of a cheek that a true smile pushes up, and over the line of the lip.
 
-    It lies where raising the cheek moves most, and swells there to the front and aside.
+    It ends at that line, where the skin turns in: the fold is part of the shape. Teeth stay.
 
     Args:
         units: what each raw control does, by its name.
+        places: float64[V, 3] on the man's head, measured from between his eyes, decimetres.
         side: L or R.
     """
-    raised = units[f"eyeCheekRaise{side}"].displacement
-    pulled = units[f"mouthCornerPull{side}"].displacement
-    both = np.linalg.norm(raised, axis=1) * np.linalg.norm(pulled, axis=1)
-    share = smooth_step(both / max(float(both.max()), 1e-9))
-    aside = 1.0 if side == "L" else -1.0
-    return np.asarray(share[:, None] * _CHEEK_BALL * [0.35 * aside, 0.25, 0.9])
+    away, there = from_laugh_line(places)
+    x, y = np.abs(places[:, 0]), places[:, 1]
+    ball = np.exp(-(((x - 0.40) / 0.15) ** 2) - ((y + 0.36) / 0.15) ** 2)
+    ball *= smooth_step((places[:, 2] + 0.45) / 0.3)
+    roll = there * np.exp(-(((away - 0.06) / 0.07) ** 2))
+    dip = there * np.exp(-(((away + 0.015) / 0.03) ** 2))
+    own = 1.0 if side == "L" else -1.0
+    half = places[:, 0] * own > 0
+    out = _CHEEK_BALL * ball[:, None] * [0.35 * own, 0.25, 0.9]
+    out = out * smooth_step((away + 0.02) / 0.06)[:, None]
+    out += _ROLL * (roll[:, None] * [0.3 * own, -0.1, 0.9] - 0.6 * dip[:, None] * [0.0, 0.0, 1.0])
+    moved = [units[name + side].displacement for name in ("mouthCornerPull", "eyeCheekRaise")]
+    soft = smooth_step(np.linalg.norm(moved, axis=2).max(axis=0) / 0.02)
+    return np.asarray(out * (half * soft)[:, None])
 
 
 def leave_bones(
@@ -267,10 +277,16 @@ def leave_bones(
             unit.displacement[groups[group]] = way
 
 
-def corrective_displacements(out: dict[str, Expression]) -> dict[tuple[str, str], Floats]:
+def corrective_displacements(
+    out: dict[str, Expression], places: Floats
+) -> dict[tuple[str, str], Floats]:
     """What to add where two controls meet; (a, b) fires with the product of both.
 
     Where a shape adds nothing joints do: an open jaw under closed lips turns them.
+
+    Args:
+        out: what each raw control does, by its name.
+        places: float64[V, 3] of the man's vertices, measured from between his eyes, decimetres.
     """
     lower = lip_masks(out["jawOpen"].displacement)["D"][:, None]
     result: dict[tuple[str, str], Floats] = {}
@@ -289,8 +305,8 @@ def corrective_displacements(out: dict[str, Expression]) -> dict[tuple[str, str]
         share = np.zeros(len(blink))
         share[near] = np.minimum(0.25, lid_rise[near].max() / max(travel.max(), 1e-9))
         result[(f"eyeBlink{side}", f"eyeCheekRaise{side}")] = -share[:, None] * blink
-        lifted = cheek_mass(out, side)
-        result[(f"mouthCornerPull{side}", f"eyeCheekRaise{side}")] = lifted
+        ball = cheek_mass(out, places, side)
+        result[(f"mouthCornerPull{side}", f"eyeCheekRaise{side}")] = ball
         for lips in ("mouthFunnel", "mouthLipsPurse"):
             # Lips that are pushed forward keep touching the teeth line less when the jaw drops.
             result[("jawOpen", f"{lips}D{side}")] = -0.25 * out[f"{lips}D{side}"].displacement

@@ -16,6 +16,7 @@ import numpy as np
 
 from ..base.easing import smooth_step
 from .expressions import Expression
+from .folds import from_laugh_line
 from .part import Part
 from .polygons import Floats, Ints, Polygons
 
@@ -23,8 +24,6 @@ _LEAST = 0.015  # of its length that skin loses before it folds
 _FULL = 0.15  # and where folds are as deep as they get
 _ROUNDS = 3  # of neighbours over which folds are evened out: skin is stiffer than a mesh
 DEPTH = 0.007  # decimetres
-_FOLD_DOWN = (0.36, 0.50, 0.62, 0.74, 0.86)  # below the eye, decimetres
-_FOLD_ASIDE = (0.165, 0.215, 0.27, 0.325, 0.345)  # and from the middle of the face
 _FOLD_DEPTH = 0.015  # decimetres
 _LINES = 24  # texels to either side along which noise is drawn into a line
 _FINE, _COARSE = 1.5, 3.5  # texels: the widths between which folds lie
@@ -271,11 +270,7 @@ def laugh_fold(places: Floats, eye: Floats) -> tuple[Floats, Floats]:
     Returns:
         float64[h, w] heights in decimetres, and float64[h, w] where they are, 0 to 1.
     """
-    x, y = np.abs(places[..., 0]), places[..., 1] - eye[1]
-    line = np.interp(-y, _FOLD_DOWN, _FOLD_ASIDE)
-    away = 0.86 * (x - line)
-    there = smooth_step((-y - 0.36) / 0.10) * smooth_step((0.90 + y) / 0.14)
-    there = there * smooth_step((places[..., 2] - eye[2] + 0.5) / 0.2)
+    away, there = from_laugh_line(places - [0, eye[1], eye[2]])
     groove = -_FOLD_DEPTH * np.exp(-((away / 0.022) ** 2))
     cheek = 0.7 * _FOLD_DEPTH * np.exp(-(((away - 0.055) / 0.05) ** 2))
     return there * (groove + cheek), there * np.exp(-((away / 0.14) ** 2))

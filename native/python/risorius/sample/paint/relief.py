@@ -12,7 +12,7 @@ from ..polygons import Floats
 from . import regions
 from .images import smooth
 from .raster import filled
-from .skin import Skin
+from .skin import Skin, hair_mask
 
 PORE = 0.0024
 _NET = 0.0004
@@ -38,7 +38,7 @@ def heights(skin: Skin, creases: Floats) -> Floats:
     out = -PORE * (0.25 + 0.75 * share) * holes * bare
     net, at = texels.dots(4.4, 52)
     out -= _NET * (1 + 1.5 * skin.old) * np.exp(-net.gap.ravel()[at] / 0.12) * bare
-    out += bare * (0.00035 * texels.middle * (0.5 + share) + 0.0012 * texels.coarse)
+    out += bare * (0.00035 * texels.middle * (0.5 + share) + 0.0006 * texels.coarse)
     out += 0.00010 * texels.fine * bare
     out -= _CREASE * creases
     around = smooth(regions.LIPS_RINGS + 5, regions.LIPS_RINGS + 1, ring)
@@ -78,9 +78,11 @@ def roughness(skin: Skin, creases: Floats) -> Floats:
     """
     field, texels = skin.field, skin.texels
     dry = float(np.interp(skin.person.age, (8, 20, 40, 75), (0.03, -0.01, 0.0, 0.05)))
-    out = 0.45 + dry - 0.13 * field["oil"] + 0.02 * texels.coarse + 0.03 * texels.middle
+    out = 0.48 + dry - 0.13 * field["oil"] + 0.02 * texels.coarse + 0.03 * texels.middle
     out += 0.02 * texels.fine + 0.12 * creases
     lips = 0.36 + 0.03 * texels.middle - 0.03 * skin.lines
     out += (lips - out) * skin.lips
     out += (0.20 - out) * skin.wet
+    if skin.person.hair_style != "none":  # what lies under hair is in its shade
+        out += (0.9 - out) * hair_mask(texels.place, skin.eye)
     return np.asarray(np.clip(out + (0.22 - out) * smooth(1.2, -0.2, field["eyes"]), 0.05, 1))

@@ -204,8 +204,8 @@ class Skin:
     def _amount(self, what: str, creases: Floats) -> Floats:
         field, texels = self.field, self.texels
         if what == "blood":
-            uneven = 1 + 0.14 * texels.coarse + 0.12 * texels.middle
-            out = field["blood"] * uneven + 0.016 * texels.coarse + 0.028 * texels.middle
+            uneven = 1 + 0.12 * texels.coarse + 0.08 * texels.middle
+            out = field["blood"] * uneven + 0.016 * texels.coarse + 0.018 * texels.middle
             return np.asarray(out + 0.03 * texels.fine + 0.35 * creases + self._vessels())
         if what == "veins":
             temples = np.clip(texels.coarse - 1.2, 0, 1) * (1 - self.deep)
@@ -255,11 +255,11 @@ class Skin:
         scalp = hair_mask(texels.place, self.eye, texels.middle + texels.coarse)
         roots, at = texels.dots(3.4, 31)
         dark = roots.over(0.9 * scalp, at, 0.5)
-        shadow = person.scalp * scalp * (0.55 + 0.1 * texels.middle) + 0.3 * person.scalp * dark
-        light = _over(light, hair, shadow)
+        shadow = person.scalp * scalp * (0.78 + 0.08 * texels.middle) + 0.2 * person.scalp * dark
+        light = _over(light, hair, np.clip(shadow, 0, 0.95))
         brows = linear(np.array(person.brows))
         light = _over(
-            light, brows, 0.34 * person.scalp * brow_mask(texels.place, self.eye, texels.middle)
+            light, brows, 0.26 * person.scalp * brow_mask(texels.place, self.eye, texels.middle)
         )
         if person.beard:
             share = np.clip(self.field["beard"] * (1 + 0.22 * texels.coarse), 0, 1)
