@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from typing import Any
 
 import bpy
 
@@ -85,8 +86,9 @@ def _add(item: MeshObject, rows: int, kind: str, unit: float) -> None:
     for collection in item.users_collection:
         collection.objects.link(thing)
     thing.parent = item
-    modifier = thing.modifiers.new(_TREE, "NODES")
-    modifier.node_group = tree = _tree(item, rows, kind, unit)
+    modifier: Any = thing.modifiers.new(_TREE, "NODES")
+    tree: Any = _tree(item, rows, kind, unit)
+    modifier.node_group = tree
     # An input of the modifier, so that a copied face has strands that follow its own cards.
     modifier[tree.interface.items_tree[_CARDS].identifier] = item
     thing.hide_viewport = thing.hide_select = True
@@ -104,8 +106,9 @@ def hide(rig: ArmatureObject) -> None:
         thing = _strands_of(item)
         if thing is None:
             continue
-        data = thing.data
-        trees = [m.node_group for m in thing.modifiers if m.type == "NODES"]
+        data: Any = thing.data
+        modifiers: Any = thing.modifiers
+        trees = [m.node_group for m in modifiers if m.type == "NODES"]
         bpy.data.objects.remove(thing)
         bpy.data.hair_curves.remove(data)
         for tree in trees:
@@ -173,7 +176,7 @@ class _Tree:
 def _tree(item: MeshObject, rows: int, kind: str, unit: float) -> NodeTree:
     """Nodes that turn the cards of a mesh into strands."""
     each, radius, apart, cut = _KINDS[kind]
-    tree = bpy.data.node_groups.new(_TREE, "GeometryNodeTree")
+    tree: Any = bpy.data.node_groups.new(_TREE, "GeometryNodeTree")
     for way in ("INPUT", "OUTPUT"):
         tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
     g = _Tree(tree)
@@ -286,12 +289,12 @@ def _material(item: MeshObject) -> bpy.types.Material:
     fibre.parametrization = "COLOR"
     shader.inputs["Roughness"].default_value = 0.5
     fibre.inputs["Roughness"].default_value = 0.35
-    source = cards_look.node_tree if cards_look is not None else None
+    source: Any = cards_look.node_tree if cards_look is not None else None
     pictures = [n for n in source.nodes if n.type == "TEX_IMAGE" and n.image] if source else []
     if pictures:
         spot = tree.nodes.new("ShaderNodeAttribute")
         spot.attribute_name = _PLACE
-        image = tree.nodes.new("ShaderNodeTexImage")
+        image: Any = tree.nodes.new("ShaderNodeTexImage")
         image.image = pictures[0].image
         tree.links.new(spot.outputs["Vector"], image.inputs["Vector"])
         tree.links.new(image.outputs["Color"], shader.inputs["Base Color"])

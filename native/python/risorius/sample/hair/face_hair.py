@@ -234,4 +234,4 @@ def beard(surface: Surface, lips: Floats, person: Person) -> Strips | None:
     half = (0.024 if full else 0.013) * surface.scale * random.uniform(0.8, 1.25, n)
     turns = np.radians(random.uniform(-35, 35, n))
     taper = np.array([0.9, 1.0, 0.7])[-rows:]
-    return make_strips(points, out, half, taper, tiles, roots, turns)
+    return make_strips(points, out, half, taper, tiles, roots, turns, held=0.0)

@@ -17,7 +17,7 @@ from ..part import Part
 from ..people import Person
 from ..polygons import Floats
 from ..source import BaseMesh
-from .binding import append_mesh, bind, card_mesh, head_of, holds
+from .binding import append_mesh, bind, card_mesh, head_of, holds, whereabouts
 from .controls import add_lash_controls, add_lid_turns
 from .face_hair import beard, brows, lash_curves, lashes
 from .scalp import STYLES
@@ -106,13 +106,15 @@ def add_hair(dna: Dna, grown: Grown) -> None:
     """
     # What each person has otherwise comes last, so that all others keep their numbers in a mix.
     names = sorted(grown.strips, key=lambda name: name in _OWN)
-    for name, lod in itertools.product(names, range(min(dna.lod_count, NO_HAIR))):
-        head, strips = head_of(dna, lod), grown.strips[name]
-        if head is None:
-            continue
+    heads = {lod: head_of(dna, lod) for lod in range(min(dna.lod_count, NO_HAIR))}
+    there = {lod: whereabouts(dna, head) for lod, head in heads.items() if head is not None}
+    for name, lod in itertools.product(names, there):
+        head, strips = heads[lod], grown.strips[name]
+        assert head is not None
         shown = strips if lod == 0 else strips.coarser(_SHARES[lod], _ROWS[lod])
         mesh = card_mesh(shown, grown.unit)
-        places = holds(head, shown, grown.unit)
+        own = None if lod == 0 else shown.roots.of(there[0])
+        places = holds(head, shown, grown.unit, own, there[lod])
         bind(dna, mesh, head, places, _LEAST_MM[name] / _MM, name == "hair")
         if name == "eyelashes":
             add_lid_turns(dna, mesh, shown.rows, lod)
