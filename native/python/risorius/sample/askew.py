@@ -69,10 +69,7 @@ def set_askew(dna: Dna, parts: list[Part], body: Body, shape: Floats, unit: floa
     for mesh, name in zip(meshes, dna.mesh_names, strict=True):
         places = np.asarray(mesh.positions, np.float32)
         number, way = finest[name.partition("_lod")[0]]
-        if name not in ways:
-    XX
-        else:
-            way = ways[name]
+        way = ways[name] if name in ways else way[[number[p.tobytes()] for p in places]]
         if not way.any():
             continue
         mesh.positions = moved = places + way.astype(np.float32)
