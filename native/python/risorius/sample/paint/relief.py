@@ -62,7 +62,7 @@ def normals(skin: Skin, height: Floats) -> Floats:
     out /= np.linalg.norm(out, axis=1, keepdims=True)
     size = skin.texels.size
     flat = np.tile(np.array([0.5, 0.5, 1.0], np.float32), (size * size, 1))
-    flat[raster.where] = 0.5 + np.rint(0.5 * out / _STEP) * _STEP
+    flat[raster.where] = np.minimum(0.5 + np.rint(0.5 * out / _STEP) * _STEP, 1)
     return flat.reshape(size, size, 3)
 
 
