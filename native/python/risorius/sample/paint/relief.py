@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The skin's relief and how rough it is: pores, its fine net, lips, lines of age.
+"""The skin's relief and how rough it is: pores, lips, lines of age. What is finer is the shader's.
 
 Heights are decimetres, out of the skin.
 """
@@ -15,7 +15,7 @@ from .raster import filled
 from .skin import Skin, hair_mask
 
 PORE = 0.0024
-_NET = 0.0004
+_STEP = 2 / 255  # of a normal's parts: finer ones are not seen, and pack badly
 _LIPS = 0.0009
 _CREASE = 0.0045
 
@@ -36,10 +36,7 @@ def heights(skin: Skin, creases: Floats) -> Floats:
     tile, at = texels.dots(5.6, 51)
     holes = tile.over(np.clip(0.35 + 0.65 * share, 0, 1), at, 0.46, 1.0)
     out = -PORE * (0.25 + 0.75 * share) * holes * bare
-    net, at = texels.dots(4.4, 52)
-    out -= _NET * (1 + 1.5 * skin.old) * np.exp(-net.gap.ravel()[at] / 0.12) * bare
     out += bare * (0.00035 * texels.middle * (0.5 + share) + 0.0006 * texels.coarse)
-    out += 0.00010 * texels.fine * bare
     out -= _CREASE * creases
     around = smooth(regions.LIPS_RINGS + 5, regions.LIPS_RINGS + 1, ring)
     lines = skin.lips + 0.45 * skin.old * around * (1 - skin.lips)
@@ -65,7 +62,7 @@ def normals(skin: Skin, height: Floats) -> Floats:
     out /= np.linalg.norm(out, axis=1, keepdims=True)
     size = skin.texels.size
     flat = np.tile(np.array([0.5, 0.5, 1.0], np.float32), (size * size, 1))
-    flat[raster.where] = 0.5 + 0.5 * out
+    flat[raster.where] = np.minimum(0.5 + np.rint(0.5 * out / _STEP) * _STEP, 1)
     return flat.reshape(size, size, 3)
 
 
