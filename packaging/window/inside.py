@@ -193,9 +193,25 @@ def seen_in_front(vertex):
     return [left + at.x, top + height - at.y]
 
 
-def drawing():
-    """Whether a drag of the skin draws over the views."""
-    return module("ui.drag.drawing").is_drawing()
+def drags():
+    """Whether the tool that drags the face is in the hand."""
+    return module("ui.drag.tool").is_active(bpy.context)
+
+
+def two_handles():
+    """The handle that lies lowest and another near it, with their numbers and places."""
+    one, live = rig(), module("scene.character.runtime").of(rig())
+    found = module("scene.drag.picking").handles_of(bpy.context, one, live)
+    found = [f for f in found if on_screen(f[1]) is not None]
+    found.sort(key=lambda f: f[1][2])
+    low = found[0]
+    high = min(found[1:], key=lambda f: np.linalg.norm(f[1] - low[1]))
+    return [{"point": list(point), "at": on_screen(place)} for point, place in (low, high)]
+
+
+def kept(name):
+    """A list that the controls bear; empty where they do not."""
+    return list(rig()["risorius_controls"].get(name, ()))
 
 
 def bone_at(bone):

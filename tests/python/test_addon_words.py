@@ -84,7 +84,7 @@ class Reader(ast.NodeVisitor):
                 if isinstance(target, ast.Name)
             }
             self.add(given.get("bl_label"), "Risorius")
-            if "Operator" in bases and "bl_idname" in given:
+            if {"Operator", "WorkSpaceTool"} & set(bases) and "bl_idname" in given:
                 told = ast.Constant(ast.get_docstring(node, clean=False), lineno=node.lineno)
                 self.add(given.get("bl_description", told), "*")
         self.generic_visit(node)
