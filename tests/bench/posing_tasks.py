@@ -282,7 +282,7 @@ def main():
     args = parser.parse_args()
     face = Face(risorius.load(args.face))
     print("| pose | way mm | sliders: events, px, mm | board | drags |\n|---|---|---|---|---|")
-    events, openings = [], []
+    events, openings, keys, ways = [], [], [], []
     for title, task in TASKS.items():
         goal = face.raw_of(task)
         wanted = face.at(goal)
@@ -296,21 +296,36 @@ def main():
             cells.append(f"{done.events}{keys}, {done.pixels:,.0f}, {done.error:.2f}")
         events.append([(d.events, d.pixels, d.error) for d, _ in rows])
         openings.append(rows[0][0].openings)
+        keys.append(rows[2][0].keys)
         way = apart(face, face.rest, wanted, moving)
+        ways.append(way)
         print(f"| {title} | {way:.2f} | {' | '.join(cells)} |", flush=True)
     table = np.array(events)
     middles = np.median(table, axis=0)
     middle = [f"{row[0]:.0f}, {row[1]:,.0f}, {row[2]:.2f}" for row in middles]
     print(f"| **median** | | {' | '.join(middle)} |")
-    for i, word in enumerate(("events", "pixels")):
-        share = statistics.median(table[:, 2, i] / table[:, 0, i])
-        print(f"{word}: drags take {share:.2f} of what sliders take, in the median")
-    more = np.array([int((goal != 0).sum()) > 1 for goal in map(face.raw_of, TASKS.values())])
-    open_already = table[:, 0, 0] - np.array(openings)
-    for words, sliders in (("", table[:, 0, 0]), (", all regions open", open_already)):
-        share = table[:, 2, 0] / sliders
-        print(f"events{words}: {statistics.median(share):.2f}; of the {more.sum()} poses of more "
-              f"than one slider {statistics.median(share[more]):.2f}")  # fmt: skip
+    tell(table, np.array(openings), np.array(keys), np.array(ways))
+
+
+def tell(table, openings, keys, ways):
+    """What drags take of what sliders take: medians.
+
+    Args:
+        table: [pose, way of doing it, events and pixels and mm].
+        openings: events of each pose that opened regions.
+        keys: events of keys of each pose's drags.
+        ways: mm that each pose is away from rest.
+    """
+    sliders, _board, drags = table[:, 0], table[:, 1], table[:, 2]
+    near = drags[:, 2] <= 0.2 * ways
+    for words, share in (
+        ("pixels", drags[:, 1] / sliders[:, 1]),
+        ("events", drags[:, 0] / sliders[:, 0]),
+        (f"events of the {near.sum()} that end within a fifth", (drags / sliders)[near, 0]),
+        ("events, all regions open", drags[:, 0] / (sliders[:, 0] - openings)),
+        ("events and keys", (drags[:, 0] + keys) / sliders[:, 0]),
+    ):
+        print(f"{words}: drags take {statistics.median(share):.2f} of what sliders take")
 
 
 if __name__ == "__main__":
