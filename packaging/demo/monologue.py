@@ -82,7 +82,12 @@ def add_speech(controls, voices):
         start = float(frame_at(seconds))
         must(
             bpy.ops.risorius.speak(
-                filepath=str(voice), transcript=text, start=start, target="LAYER", use_blinks=False
+                filepath=str(voice),
+                transcript=text,
+                start=start,
+                target="LAYER",
+                use_blinks=False,
+                intensity=acting.INTENSITY,
             )
         )
         layer = controls.risorius_layers[-1]

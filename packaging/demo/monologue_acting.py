@@ -16,6 +16,8 @@ LINES = [
     (13.6, 125, "I only wish he could have heard it."),
 ]
 
+INTENSITY = 0.75  # of the speech, which lies on a mouth that a mood has moved already
+
 # Seconds from which a mood has come, and until which it stays: expression, strength, mirrored.
 MOODS = [
     (0.0, 0.6, "relief", 0.15, False),

@@ -42,11 +42,11 @@ def put(rig: ArmatureObject, kind: str, points: Iterable[Point]) -> None:
         points: from now on.
     """
     controls, flat = parts.controls_there(rig), [number for point in points for number in point]
+    if kind in controls:
+        del controls[kind]  # Blender keeps the length of an array that is there
     if flat:
         controls[kind] = flat
         controls.property_overridable_library_set(f'["{kind}"]', True)
-    elif kind in controls:
-        del controls[kind]
 
 
 def toggle(rig: ArmatureObject, kind: str, point: Point, counts: list[int]) -> bool:
