@@ -209,9 +209,9 @@ def two_handles():
     return [{"point": list(point), "at": on_screen(place)} for point, place in (low, high)]
 
 
-def kept(name):
+def kept(key):
     """A list that the controls bear; empty where they do not."""
-    return list(rig()["risorius_controls"].get(name, ()))
+    return list(rig()["risorius_controls"].get(key, ()))
 
 
 def bone_at(bone):

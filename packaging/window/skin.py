@@ -65,12 +65,12 @@ def handles(hand: Hand) -> Iterator[Check]:
     selected = "risorius_handles_selected"
     low, high = hand.ask("two_handles")
     hand.click(*low["at"])
-    yield "a click selects a handle", hand.ask("kept", name=selected) == low["point"]
+    yield "a click selects a handle", hand.ask("kept", key=selected) == low["point"]
     hand.do("keydown", "shift")
     hand.click(*high["at"])
     hand.do("keyup", "shift")
     both = low["point"] + high["point"]
-    yield "Shift and click another beside it", hand.ask("kept", name=selected) == both
+    yield "Shift and click another beside it", hand.ask("kept", key=selected) == both
     start = low["at"]
     hand.drag(start, (start[0], start[1] - 8))
     moved = [hand.ask("vertex_at", vertex=one["point"][1])["at"][1] for one in (low, high)]
@@ -82,9 +82,9 @@ def handles(hand: Hand) -> Iterator[Check]:
     hand.key("i")
     yield "I keys what moves them", hand.ask("keyed_frames") == [1]
     hand.key("h")
-    yield "H hides them", hand.ask("kept", name="risorius_handles_hidden") == both
+    yield "H hides them", hand.ask("kept", key="risorius_handles_hidden") == both
     hand.key("alt+h")
-    yield "Alt-H shows them", hand.ask("kept", name="risorius_handles_hidden") == []
+    yield "Alt-H shows them", hand.ask("kept", key="risorius_handles_hidden") == []
     hand.ask("run", code="bpy.ops.risorius.select_handle(vertex=-1)")
     clear(hand)
 
