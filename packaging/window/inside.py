@@ -199,13 +199,14 @@ def drags():
 
 
 def two_handles():
-    """The handle that lies lowest and another near it, with their numbers and places."""
+    """The lowest handle and the next that lies 20 pixels away, with their numbers and places."""
     one, live = rig(), module("scene.character.runtime").of(rig())
     found = module("scene.drag.picking").handles_of(bpy.context, one, live)
     found = [f for f in found if on_screen(f[1]) is not None]
     found.sort(key=lambda f: f[1][2])
     low = found[0]
-    high = min(found[1:], key=lambda f: np.linalg.norm(f[1] - low[1]))
+    apart = lambda f: np.linalg.norm(np.subtract(on_screen(f[1]), on_screen(low[1])))  # noqa: E731
+    high = min((f for f in found[1:] if apart(f) > 20), key=apart)
     return [{"point": list(point), "at": on_screen(place)} for point, place in (low, high)]
 
 

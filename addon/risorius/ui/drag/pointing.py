@@ -23,7 +23,7 @@ def counts_of(live: runtime.Runtime) -> list[int]:
 
 
 def pick(context: Context, where: view.View, event: bpy.types.Event) -> picking.Hit | None:
-    """The point that a press would take: a handle that is near, else what lies under the cursor.
+    """The point that a press would take: the nearest handle, else what lies under the cursor.
 
     Args:
         context: has the scene that is seen.
@@ -38,14 +38,14 @@ def pick(context: Context, where: view.View, event: bpy.types.Event) -> picking.
     live = runtime.of(hit.rig) if hit is not None else None
     if hit is None or live is None or not properties.choices_of(context).handles:
         return hit
-    near = _NEAR * context.preferences.system.ui_scale
+    best, near = hit, _NEAR * context.preferences.system.ui_scale
+    reach = picking.NEAR * picking.size_of(hit.rig, live)
     for point, place in picking.handles_of(context, hit.rig, live):
         pixel = where.pixel(place)
-        if pixel is None or (pixel - mouse).length > near:
-            continue
-        if np.linalg.norm(place - hit.place) < picking.NEAR * picking.size_of(hit.rig, live):
-            return picking.Hit(hit.rig, point, place, is_handle=True)
-    return hit
+        far = (pixel - mouse).length if pixel is not None else near
+        if far < near and np.linalg.norm(place - hit.place) < reach:
+            best, near = picking.Hit(hit.rig, point, place, is_handle=True), far
+    return best
 
 
 def pins_of(context: Context, rig: ArmatureObject, live: runtime.Runtime) -> list[drawing.Mark]:
