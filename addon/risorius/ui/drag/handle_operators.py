@@ -51,7 +51,9 @@ class RISORIUS_OT_pin(_PointOperator, Operator):
     bl_label = "Pin"
 
     def fits(self, hit: picking.Hit) -> bool:
-        return True
+        return (
+            not hit.is_handle
+        )  # the same click selects one; Blender turns our order of keys round
 
     def execute(self, context: Context) -> Result:
         rig = face_rig(context)
