@@ -51,9 +51,8 @@ class RISORIUS_OT_pin(_PointOperator, Operator):
     bl_label = "Pin"
 
     def fits(self, hit: picking.Hit) -> bool:
-        return (
-            not hit.is_handle
-        )  # the same click selects one; Blender turns our order of keys round
+        # The same click selects a handle, and Blender turns our order of keys round.
+        return not hit.is_handle
 
     def execute(self, context: Context) -> Result:
         rig = face_rig(context)
