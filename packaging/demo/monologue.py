@@ -53,12 +53,12 @@ def add_moods(controls):
 
 
 def add_smirk(path):
-    """One corner of the mouth is drawn up by its skin, after it was sad, before it smiles."""
+    """One corner of the mouth is drawn up by its skin, by one slider, before both smile."""
     go_to(17.4)
     must(bpy.ops.risorius.breakdown(kind="BREAKDOWN", factor=0.5))
     mesh, vertex = corner_of_mouth(path)
     offset = (0.0015, 0.0, 0.003)
-    must(bpy.ops.risorius.drag(mesh=mesh, vertex=vertex, offset=offset, region=True))
+    must(bpy.ops.risorius.drag(mesh=mesh, vertex=vertex, offset=offset, single=True))
     must(bpy.ops.risorius.key())
 
 
