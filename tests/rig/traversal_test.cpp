@@ -185,6 +185,22 @@ TEST_P(Traversals, LeaveNothingOfTheFrameBefore) {
   }
 }
 
+// An Instance fills only what the frame before wrote.
+TEST_P(Traversals, OfAnInstanceLeaveNothingOfTheFrameBefore) {
+  const Rig rig = must_compile(dna_, kernels_);
+  Instance face(rig);
+  std::mt19937 random(4);
+  for (std::uint32_t step = 0; step < 300; ++step) {
+    if (step % 9 == 8) face.set_lod(static_cast<std::uint32_t>(random() % 3));
+    const std::vector<float> raw =
+        some_active(step % 3 == 0 ? 0 : random() % 4, static_cast<std::uint32_t>(random() % kRaw));
+    Workspace fresh = make_workspace(rig);
+    Pose alone = make_pose(rig);
+    evaluate(rig, raw.data(), face.lod(), false, fresh, alone);
+    ASSERT_EQ(face.evaluate(raw.data()).joints, alone.joints) << "step " << step;
+  }
+}
+
 TEST_P(Traversals, KeepNanInTheGroupsThatHaveItAsAColumn) {
   const Rig rig = must_compile(dna_, kernels_);
   Workspace work = make_workspace(rig);

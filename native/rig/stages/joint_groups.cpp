@@ -70,14 +70,25 @@ bool shows(const JointGroup& g, const Workspace& work) noexcept {
   return live;
 }
 
-// The first of `count` bits from `at` on that differs from bit `at`.
-std::size_t next_change(std::span<const std::uint64_t> words, std::size_t at,
-                        std::size_t count) noexcept {
-  const std::uint64_t flip = ((words[at / 64] >> (at % 64)) & 1u) != 0 ? ~std::uint64_t{0} : 0;
-  std::uint64_t bits = (words[at / 64] ^ flip) & (~std::uint64_t{0} << (at % 64));
-  std::size_t word = at / 64;
-  while (bits == 0 && ++word < words.size()) bits = words[word] ^ flip;
-  return std::min(count, word * 64 + static_cast<std::size_t>(std::countr_zero(bits)));
+// The first of `count` bits from `at` on that differs from `value`. In: word  gives 64 of them
+template <class Word>
+std::size_t find_other(std::size_t at, std::size_t count, bool value, Word word) noexcept {
+  const std::uint64_t flip = value ? ~std::uint64_t{0} : 0;
+  std::uint64_t past = ~std::uint64_t{0} << (at % 64);
+  for (std::size_t w = at / 64; w * 64 < count; ++w, past = ~std::uint64_t{0}) {
+    const std::uint64_t bits = (word(w) ^ flip) & past;
+    if (bits != 0) return std::min(count, w * 64 + std::size_t(std::countr_zero(bits)));
+  }
+  return count;
+}
+
+// Calls f(first, end) for each run of set bits among the first `count`.
+template <class Word, class F>
+void for_runs(std::size_t count, Word word, F f) noexcept {
+  for (std::size_t at = 0, end = 0; (at = find_other(end, count, false, word)) < count;) {
+    end = find_other(at, count, true, word);
+    f(at, end);
+  }
 }
 
 // Blocks that groups with active columns reach, and the groups that write them.
@@ -183,17 +194,18 @@ const simd::Column* list_columns(const Rig& rig, std::uint32_t lod,
   return whole ? rig.group_columns.data() : work.columns.data();
 }
 
-void place_rows(const Rig& rig, std::uint32_t lod, const Workspace& work, const float* rows,
+void place_rows(const Rig& rig, std::uint32_t lod, Workspace& work, const float* rows,
                 float* joints) noexcept {
   Placer placer(rig, lod, rows, joints);
   const std::size_t blocks = placer.blocks();
-  for (std::size_t at = 0, end = 0; at < blocks; at = end) {
-    end = next_change(work.live_blocks, at, blocks);
-    if ((work.live_blocks[at / 64] >> (at % 64) & 1u) != 0) {
-      placer.place(at, end);
-    } else {
-      placer.rest(at, end);
-    }
+  const auto live = [&](std::size_t w) { return work.live_blocks[w]; };
+  for_runs(blocks, live, [&](std::size_t first, std::size_t end) { placer.place(first, end); });
+  const auto rest = [&](std::size_t first, std::size_t end) { placer.rest(first, end); };
+  if (work.shown_blocks.empty()) {
+    for_runs(blocks, [&](std::size_t w) { return ~live(w); }, rest);
+  } else {
+    for_runs(blocks, [&](std::size_t w) { return work.shown_blocks[w] & ~live(w); }, rest);
+    std::ranges::copy(work.live_blocks, work.shown_blocks.begin());
   }
 }
 

@@ -74,10 +74,10 @@ inline void store_rotation(const Rig& rig, const Quaternion& q, float* to) noexc
 }
 
 /// Brings the rows of all groups to their joint attributes; attributes without a row, and those of
-/// blocks that rest, become 0.
+/// blocks that rest, become 0. Where work.shown_blocks is kept, blocks that rested before are 0.
 /// In:  rows    [rows of all groups] and a vector more
 ///      work    as list_columns left it
 /// Out: joints  [joints, stride]
-void place_rows(const Rig& rig, std::uint32_t lod, const Workspace& work, const float* rows,
+void place_rows(const Rig& rig, std::uint32_t lod, Workspace& work, const float* rows,
                 float* joints) noexcept;
 }  // namespace risorius::rig::detail
