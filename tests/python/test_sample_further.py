@@ -76,7 +76,7 @@ def test_extra_lids_slide_on_the_eye_and_the_tongue_keeps_its_root(man):
     moved = np.linalg.norm(lower, axis=1) > 0.5 * MM
     assert moved.sum() > 30
     along = np.einsum("ij,ij->i", lower, arm)[moved] / np.linalg.norm(arm[moved], axis=1)
-    # Towards or away from the eye's middle only as the cornea bulges; test_sample_eyes has the rest.
+    # To or from the eye's middle only as the cornea bulges; test_sample_eyes has the rest.
     assert np.abs(along).max() < 1.0 * MM
     assert np.median(np.abs(along)) < 0.1 * MM
     assert lower[moved, 1].max() > 2 * MM

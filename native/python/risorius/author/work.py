@@ -31,10 +31,10 @@ class RigOptions:
     fit: FitOptions = field(default_factory=FitOptions)
     # A blend shape keeps what joints leave of a vertex beyond this, in mm; None: no blend shapes.
     tolerance_mm: float | None = 0.05
-    # A joint takes no part in an expression in which it moves no vertex further: others take over.
+    # A joint leaves an expression in which it moves no vertex further: others take over.
     least_effect_mm: float = 0.05
-    # Meshes that keep their weights and blend shapes as they are: those of which the name has one of
-    # these in it. Eyeballs, which turn with a joint of their own.
+    # Meshes that keep their weights and blend shapes, by parts of their names: eyeballs, which turn
+    # with a joint of their own.
     kept: tuple[str, ...] = ()
     lods: LodOptions = field(default_factory=LodOptions)
 

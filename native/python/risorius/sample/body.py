@@ -8,7 +8,7 @@ import numpy as np
 from ..base.easing import smooth_step
 from . import expressions as ex
 from .eyes import Eyes, with_eyeballs
-from .lips import Mouth, sealed
+from .parts.lips import Mouth, sealed
 from .people import MAN, Person
 from .polygons import Floats, Ints
 from .proportions import Proportions

@@ -27,7 +27,6 @@ from . import expressions as ex
 from . import references, wrinkles
 from .askew import askew, set_askew
 from .body import JOINTS, NECK_CUT, NECK_SLOPE, REACH, Body
-from .clothes import shirt
 from .controls import gui_table
 from .eyes import eye_parts, with_eyeballs
 from .further import CONTROLS_OF_CODE
@@ -36,6 +35,8 @@ from .paint.layout import packed
 from .paint.skin import HEAD_SIZE
 from .paint.textures import paint_textures
 from .part import Part
+from .parts.clothes import shirt
+from .parts.teeth import mouth_parts
 from .people import MAN, Person
 from .polygons import (
     Floats,
@@ -46,7 +47,6 @@ from .polygons import (
     subdivide,
 )
 from .source import PACKAGE, SHA256, BaseMesh, Source, SourceError, fetch
-from .teeth import mouth_parts
 
 CM = 10.0  # the data are in decimetres
 NEW_JOINTS = 250
@@ -403,7 +403,12 @@ def assemble(
 
 
 def rounded(values: Floats, step: float) -> Floats:
-    """Values as multiples of a step."""
+    """float64, as `values`: these as multiples of a step.
+
+    Args:
+        values: of any shape.
+        step: above 0.
+    """
     return np.round(np.asarray(values, np.float64) / step) * step
 
 

@@ -10,8 +10,8 @@ import itertools
 
 import numpy as np
 
-from .polygons import Floats, Ints, Polygons, subdivide
-from .source import BaseMesh
+from ..polygons import Floats, Ints, Polygons, subdivide
+from ..source import BaseMesh
 
 PRESSED = 0.0015  # how far they go into each other: skin that touches is pressed flat
 _REACH = 0.035  # from the line where they meet

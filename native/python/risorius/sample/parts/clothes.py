@@ -10,9 +10,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from .part import Part
-from .polygons import Floats, Ints, Operator, Polygons, clip_below, compact_uvs, edges_of, subdivide
-from .source import BaseMesh
+from ..part import Part
+from ..polygons import (
+    Floats,
+    Ints,
+    Operator,
+    Polygons,
+    clip_below,
+    compact_uvs,
+    edges_of,
+    subdivide,
+)
+from ..source import BaseMesh
 
 GROUP = "helper-tights"
 COLLAR = (

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .part import Part
-from .polygons import Floats, Ints, Operator, Polygons
-from .source import BaseMesh
+from ..part import Part
+from ..polygons import Floats, Ints, Operator, Polygons
+from ..source import BaseMesh
 
 MM = 0.01
 
