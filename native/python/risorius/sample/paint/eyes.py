@@ -136,7 +136,7 @@ def _sclera(angle: Floats, aside: Floats, random: np.random.Generator) -> Floats
     patches = 0.5 + 0.5 * noise(len(angle), 14, random)
     corners = smooth(0.62, 1.25, angle) * (0.35 + 0.65 * aside**2)
     colour = blend(colour, _PINK, 0.7 * corners * (0.6 + 0.4 * patches) + 0.05 * patches)
-    colour = blend(colour, _VESSEL, 0.85 * vessels(random) * (0.5 + 0.5 * aside**2))
+    colour = blend(colour, _VESSEL, 0.62 * vessels(random) * (0.5 + 0.5 * aside**2))
     return blend(colour, _SHADE, 0.55 * smooth(0.62, 1.35, angle))
 
 
