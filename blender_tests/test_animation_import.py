@@ -460,6 +460,23 @@ def test_a_face_speaks_and_is_heard(rig, voice):
     loudest = clip.frame_times()[int(np.argmax(clip.curve(JAW)))]
     assert jaw.evaluate(31.0 + loudest * 24) == pytest.approx(clip.curve(JAW).max(), abs=1e-3)
     assert clip.curve(JAW).max() > 0.1
+    _gives_the_face_back(rig, last=round(layer.action.frame_range[1]))
+
+
+def _gives_the_face_back(rig, last):
+    """Before and after a voice the face shows what its sliders say."""
+    scene.set_controls(rig, mouthCornerPullL=0.6)
+    present = scene.submodule("scene.why.present")
+    shown = {}
+    for frame in (5, 31 + 12, last + 20):
+        bpy.context.scene.frame_set(frame)
+        now = present.of(rig)
+        shown[frame] = dict(zip(now.live.labels, now.raw.tolist(), strict=True))
+    smile = "CTRL_expressions.mouthCornerPullL"
+    for frame in (5, last + 20):
+        assert shown[frame][smile] == pytest.approx(0.6)
+        assert shown[frame][JAW] == 0.0
+    assert shown[43][JAW] != 0.0 or shown[43][smile] != pytest.approx(0.6)
 
 
 def test_speech_beside_blender_is_the_same_and_can_be_cancelled(rig, voice, tmp_path):

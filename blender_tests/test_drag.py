@@ -159,6 +159,126 @@ def test_handles_lie_apart_on_both_sides(man):
     assert min((places[:, 0] > 0.01).sum(), (places[:, 0] < -0.01).sum()) >= 4
 
 
+def two_handles(rig):
+    """Two handles of the mouth, one on each side: mesh and vertex."""
+    picking = scene.submodule("scene.drag.picking")
+    live = scene.submodule("scene.character.runtime").of(rig)
+    found = [(p, at) for p, at in picking.handles_of(bpy.context, rig, live)]
+    low = sorted(found, key=lambda one: one[1][2])[:9]  # of the lower half of the face
+    left = max(low, key=lambda one: one[1][0])[0]
+    right = min(low, key=lambda one: one[1][0])[0]
+    assert left != right
+    return left, right
+
+
+def offered(rig):
+    picking = scene.submodule("scene.drag.picking")
+    live = scene.submodule("scene.character.runtime").of(rig)
+    return [point for point, _ in picking.handles_of(bpy.context, rig, live)]
+
+
+def test_selected_handles_go_together(man):
+    rig, _corner = man
+    one, other = two_handles(rig)
+    offset = np.array((0.0, 0.0, 0.002))
+    starts = [place(rig, vertex, mesh) for mesh, vertex in (one, other)]
+
+    def share(number, point):
+        """How much of the way a handle has gone."""
+        way = place(rig, point[1], point[0]) - starts[number]
+        return way @ offset / (offset @ offset)
+
+    drag(offset, vertex=one[1])
+    alone = share(1, other)
+    bpy.ops.risorius.reset()
+    for point in (one, other):
+        done = bpy.ops.risorius.select_handle(mesh=point[0], vertex=point[1], extend=True)
+        assert done == {"FINISHED"}
+    assert drag(offset, vertex=one[1], with_selected=True) == {"FINISHED"}
+    assert share(0, one) > 0.6
+    assert share(1, other) > 0.6
+    assert alone < 0.3
+
+
+def test_handles_are_selected_hidden_and_shown_as_bones(man, tmp_path):
+    rig, _corner = man
+    one, other = two_handles(rig)
+    all_of_them = offered(rig)
+    for operator in (bpy.ops.risorius.hide_handles, bpy.ops.risorius.show_handles):
+        assert not operator.poll()
+    bpy.ops.risorius.select_handle(mesh=one[0], vertex=one[1])
+    bpy.ops.risorius.select_handle(mesh=other[0], vertex=other[1], extend=True)
+    assert list(scene.controls(rig)["risorius_handles_selected"]) == [*one, *other]
+    bpy.ops.risorius.select_handle(mesh=one[0], vertex=one[1], extend=True)  # taken out again
+    assert list(scene.controls(rig)["risorius_handles_selected"]) == [*other]
+    assert bpy.ops.risorius.hide_handles() == {"FINISHED"}
+    assert offered(rig) == [point for point in all_of_them if point != other]
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "hidden.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "hidden.blend"))
+    rig = next(o for o in bpy.data.objects if "risorius_controls" in o)
+    assert other not in offered(rig)
+    with pytest.raises(RuntimeError, match="no such handle"):
+        bpy.ops.risorius.select_handle(mesh=other[0], vertex=other[1])
+    assert bpy.ops.risorius.show_handles() == {"FINISHED"}
+    assert offered(rig) == all_of_them
+    assert list(scene.controls(rig)["risorius_handles_selected"]) == [*other]
+    bpy.ops.risorius.select_handle(vertex=-1)  # a click beside them
+    assert "risorius_handles_selected" not in scene.controls(rig)
+
+
+@pytest.mark.parametrize("board", [False, True])
+def test_keys_of_handles_lie_on_what_moves_them(man, board):
+    rig, _corner = man
+    one, _other = two_handles(rig)
+    if board:
+        bpy.ops.risorius.add_board()
+    bpy.ops.risorius.select_handle(mesh=one[0], vertex=one[1])
+    bpy.context.scene.frame_set(7)
+    assert bpy.ops.risorius.key_handles() == {"FINISHED"}
+    keyed = {c.data_path for c in scene.curves(scene.controls(rig))}
+    assert keyed
+    if board:
+        assert all('"CTRL_' in path and path.endswith("location") for path in keyed)
+        return
+    start, controls = place(rig, one[1]), scene.controls(rig)
+    far = {}
+    for name in [n for n, v in scene.face(rig).items() if isinstance(v, float)]:
+        scene.set_controls(rig, **{name.removeprefix(PREFIX): 1.0})
+        far[name] = np.linalg.norm(place(rig, one[1]) - start)
+        scene.set_controls(rig, **{name.removeprefix(PREFIX): 0.0})
+    strongest = max(far, key=far.get)
+    path = 'pose.bones["face"]["{}"]'.format
+    assert path(strongest) in keyed
+    assert not [n for n, way in far.items() if way < 1e-5 and path(n) in keyed]
+    assert 2 <= len(keyed) < len(far) / 2
+    assert {k.co.x for c in scene.curves(controls) for k in c.keyframe_points} == {7.0}
+
+
+@pytest.mark.parametrize("mode", ["OBJECT", "POSE"])
+def test_the_tool_is_taken_up_and_put_down(rig, mode):
+    tool = scene.submodule("ui.drag.tool")
+    bpy.ops.object.mode_set(mode=mode)
+    assert not tool.is_active(bpy.context)
+    assert bpy.ops.risorius.drag_tool() == {"FINISHED"}
+    assert tool.is_active(bpy.context)
+    tools = bpy.context.workspace.tools
+    assert tools.from_space_view3d_mode(mode).idname == tool.IDNAME
+    assert bpy.ops.risorius.drag_tool() == {"FINISHED"}
+    assert not tool.is_active(bpy.context)
+    for operator, _event, _properties in tool._KEYS:
+        module, _, name = operator.partition(".")
+        assert name in dir(getattr(bpy.ops, module))
+    bpy.ops.risorius.drag_tool()
+    tool.unregister()  # as disabling does
+    assert tools.from_space_view3d_mode(mode).idname == "builtin.select_box"
+    tool.register()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.context.view_layer.objects.active = scene.meshes(rig)[HEAD]
+    bpy.ops.object.mode_set(mode="EDIT")
+    assert not bpy.ops.risorius.drag_tool.poll()
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
 def test_only_sliders_of_the_region(rig, dna_file):
     assert drag(reach(rig, dna_file), region=True) == {"FINISHED"}
     of_slider = scene.submodule("native").regions().of_slider
@@ -178,7 +298,10 @@ def test_a_pin_holds_and_is_saved(rig, dna_file, tmp_path):
     assert list(scene.controls(rig)["risorius_pins"]) == [HEAD, held]
     drag(offset)
     assert np.linalg.norm(place(rig, held) - was) < 0.75 * loose
-    assert bpy.ops.risorius.pin(mesh=HEAD, vertex=held) == {"FINISHED"}  # and out again
+    assert bpy.ops.risorius.pin(mesh=HEAD, vertex=held + 3) == {"FINISHED"}
+    assert list(scene.controls(rig)["risorius_pins"]) == [HEAD, held, HEAD, held + 3]
+    for vertex in (held, held + 3):  # and out again
+        assert bpy.ops.risorius.pin(mesh=HEAD, vertex=vertex) == {"FINISHED"}
     assert "risorius_pins" not in scene.controls(rig)
 
 

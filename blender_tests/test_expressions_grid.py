@@ -288,7 +288,7 @@ def test_ours_apply_them_whatever_is_selected(rig):
     assert "Walk is no expression of a face." in said
 
 
-JOY = {LEFT: 0.82, RIGHT: 0.75, JAW: 0.1}  # of what this face has
+JOY = {LEFT: 1.0, RIGHT: 0.94, JAW: 0.24}  # of what this face has
 
 # --- pictures --------------------------------------------------------------------------------
 

@@ -140,8 +140,9 @@ OTHERS = {
     "curves_from_mesh",
     "what the eyes' target hangs on": "gaze_target",
     "what is shown, and where edits go": "next_key tweak colour_curves favourite shortcut",
-    "keys what stands": "key",
-    "a hand on the skin, which keys at its end": "drag drag_mode pin clear_pins",
+    "keys what stands": "key key_handles",
+    "a hand on the skin, and a key at its end by keying.by_hand": "drag",
+    "the tool in the hand, and what is shown of it": "drag_tool drag_hover",
     "the range of sliders: keys are cut as well": "set_overdrive",
     "drivers; each side shows what it showed": "link_sides",
     "what is shown, and why": "heat hide_hints mask_renders mute show_all solo why_vertex",
@@ -150,8 +151,7 @@ OTHERS = {
     "files of expressions": "rename_expression delete_expression star_expression "
     "export_expressions import_expressions",
     "who leads; the pose stays": "add_board remove_board lead",
-    "keys at the end of each drag, by keying.by_hand": "drag drag_mode",
-    "selects, pins": "select_board pin clear_pins",
+    "selects, pins, hides": "select_board pin clear_pins select_handle hide_handles show_handles",
     "lies above the sliders": "layer_add layer_remove layer_move layer_duplicate layer_warp "
     "layers_to_nla fire unfire",
     "a hand of its own, without keys; at its end all stands as before": "live_start live_stop "

@@ -7,6 +7,7 @@ import pytest
 from bpy_extras.object_utils import world_to_camera_view
 from mathutils import Vector
 from support import scene
+from support.layout import drawn
 
 OURS = ["CAMERA", "LIGHT", "LIGHT", "LIGHT", "MESH"]
 
@@ -116,6 +117,15 @@ def test_with_a_new_face_only_where_it_is_wanted(monkeypatch, dna_file):
     made = [c for c in bpy.data.collections if c.name.endswith("_studio")]
     assert [sorted(o.type for o in c.objects) for c in made] == [OURS]
     assert len([o for o in bpy.data.objects if "risorius_controls" in o]) == 2
+
+
+def test_the_menus_offer_each_person_with_a_studio_and_without():
+    menus = scene.submodule("ui.file.import_operators")
+    people = bpy.ops.risorius.add_character.get_rna_type().properties["person"].enum_items
+    with_studio = drawn(menus.RISORIUS_MT_sample_studio)
+    assert with_studio.operators == ["risorius.add_character"] * len(people)
+    assert with_studio.labels == [person.name for person in people]
+    assert "risorius.add_studio" in drawn(menus.RISORIUS_MT_sample).operators
 
 
 def test_the_backdrop_lies_behind_the_face(rig):

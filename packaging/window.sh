@@ -9,7 +9,8 @@
 #
 #   ./packaging/window.sh OUT BLENDER...     OUT: a folder below /tmp or the project; BLENDER: as
 #                                            packaging/blenders.sh printed them
-#       STEPS=slider,... runs some steps only; ZIP= names the extension; WINDOW_DISPLAY= another display
+#       STEPS=slider,... runs some steps only; ZIP= names the extension; WINDOW_DISPLAY= another display;
+#       DOCS=1 puts the pictures of docs/ in place, of the first program (STEPS=start,shot makes them)
 set -uo pipefail
 [ $# -ge 2 ] || { echo "window.sh: window.sh OUT BLENDER..." >&2 && exit 2; }
 source "$(dirname "$0")/setup.sh"
@@ -49,6 +50,18 @@ drive() { # drive BLENDER NAME: all steps in one program
   return "$code"
 }
 
+# Picture of OUT, that of docs/images, its width there.
+pictures="first-face first_look 1366
+animator-drag animator_drag 1080
+animator-expressions animator_expressions 1080
+animator-shot animator_shot 1080"
+put_pictures() { # put_pictures FOLDER
+  local from to width
+  while read -r from to width; do
+    [ ! -e "$1/$from.png" ] || convert "$1/$from.png" -resize "$width" -quality 88 "$project/docs/images/$to.jpg"
+  done <<< "$pictures"
+}
+
 cd /tmp || exit 1
 for blender; do
   name=$(timeout -s KILL 120 "$blender" --version 2> /dev/null | grep -oE '^Blender [0-9.]+' | head -n 1)
@@ -57,5 +70,7 @@ for blender; do
     continue
   fi
   drive "$blender" "$name" || failed=1
+  [ -z "${DOCS:-}" ] || put_pictures "$top/${name// /-}"
+  DOCS=
 done
 [ $failed -eq 0 ]

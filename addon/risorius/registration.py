@@ -33,6 +33,7 @@ from .ui.about import manual, preferences, timing_overlay
 from .ui.animation import operators as animation_operators
 from .ui.drag import drawing as drag_drawing
 from .ui.drag import properties as drag_properties
+from .ui.drag import tool as drag_tool
 from .ui.expressions import previews as expression_previews
 from .ui.expressions import properties as expression_properties
 from .ui.face import channel_preview, favourites_panel, paste_flipped
@@ -136,6 +137,7 @@ def register() -> None:
     handlers.register()
     paste_flipped.register()
     capture.register()
+    drag_tool.register()
     why_overlay.start()
     bpy.app.timers.register(_refresh_once, first_interval=0.0)
 
@@ -155,6 +157,7 @@ def unregister() -> None:
         bpy.app.timers.unregister(_refresh_once)
     why_panel.stop()
     why_overlay.stop()
+    drag_tool.unregister()
     capture.unregister()
     paste_flipped.unregister()
     handlers.unregister()

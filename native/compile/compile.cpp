@@ -6,11 +6,11 @@
 #include <cmath>
 #include <functional>
 #include <iterator>
-#include <map>
 #include <numeric>
 #include <span>
 #include <string_view>
 #include <tuple>
+#include <utility>
 
 #include "compile/parts.h"
 #include "core/finite.h"
@@ -209,22 +209,59 @@ void compile_neutral(const dna::Dna& dna, RigData& out) {
   }
 }
 
-// In tiles: both sides are read and written by whole cache lines. Column c goes to
-// to[offsets[c] ...], where it is kept.
-void transpose(const float* from, std::size_t rows, std::span<const std::uint32_t> offsets,
-               float* to) {
-  constexpr std::size_t kTile = 16;
-  const std::size_t columns = offsets.size();
+// A column of a group, and where it is kept.
+struct KeptColumn {
+  std::uint32_t column, offset;
+};
+
+// In tiles: both sides are read and written by whole cache lines, four columns at a time.
+// In: from  [rows, stride]
+void transpose(const float* from, std::size_t rows, std::size_t stride,
+               std::span<const KeptColumn> columns, float* to) {
+  constexpr std::size_t kTile = 16, kTogether = 4;
   for (std::size_t r0 = 0; r0 < rows; r0 += kTile) {
-    for (std::size_t c0 = 0; c0 < columns; c0 += kTile) {
-      const std::size_t r1 = std::min(rows, r0 + kTile), c1 = std::min(columns, c0 + kTile);
-      for (std::size_t c = c0; c < c1; ++c) {
-        if (offsets[c] == rig::kNone) continue;
-        for (std::size_t r = r0; r < r1; ++r) to[offsets[c] + r] = from[r * columns + c];
+    const std::size_t r1 = std::min(rows, r0 + kTile);
+    std::size_t c = 0;
+    for (; c + kTogether <= columns.size(); c += kTogether) {
+      const KeptColumn* k = columns.data() + c;
+      float *const a = to + k[0].offset, *const b = to + k[1].offset, *const d = to + k[2].offset,
+                   *const e = to + k[3].offset;
+      for (std::size_t r = r0; r < r1; ++r) {
+        const float* row = from + r * stride;
+        a[r] = row[k[0].column], b[r] = row[k[1].column];
+        d[r] = row[k[2].column], e[r] = row[k[3].column];
+      }
+    }
+    for (; c < columns.size(); ++c) {
+      for (std::size_t r = r0; r < r1; ++r) {
+        to[columns[c].offset + r] = from[r * stride + columns[c].column];
       }
     }
   }
 }
+
+// The columns of all groups, which stay in the matrices of the file until the block is there.
+struct KeptMatrices {
+  struct Matrix {
+    const dna::JointGroup* group;
+    std::uint32_t rows;
+    std::vector<KeptColumn> columns;
+  };
+  std::vector<Matrix> matrices;
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> gaps;  // between columns: first, end
+  std::size_t size = 0;                                       // of all, in floats
+
+  // Out: to  [size], overwritten
+  void write(std::span<float> to) const {
+    for (const auto& [first, end] : gaps) {
+      std::fill(to.begin() + first, to.begin() + end, 0.0f);
+    }
+    for (const Matrix& m : matrices) {
+      transpose(m.group->values.data(), m.rows, m.group->input_indices.size(), m.columns,
+                to.data());
+    }
+  }
+};
 
 // Rows of a group at each LOD. Those beyond what any LOD has are never evaluated and not stored.
 core::Result<std::uint32_t> add_lods(const dna::JointGroup& g, const std::string& where,
@@ -270,15 +307,19 @@ Status compile_joint_group(const dna::JointGroup& g, const std::string& where, R
 // The lowest row in which each column has a value: at LODs with fewer rows it does nothing.
 std::vector<std::uint32_t> first_rows_with_values(const dna::JointGroup& g, std::uint32_t rows) {
   const std::size_t columns = g.input_indices.size();
-  std::vector<std::uint32_t> first(columns, rows);
-  std::size_t missing = columns;
-  for (std::uint32_t r = 0; r < rows && missing > 0; ++r) {
+  std::vector<std::uint32_t> first(columns, rows), missing(columns);
+  std::iota(missing.begin(), missing.end(), 0u);
+  for (std::uint32_t r = 0; r < rows && !missing.empty(); ++r) {
     const float* row = g.values.data() + r * columns;
-    for (std::size_t c = 0; c < columns; ++c) {
-      if (first[c] < rows || row[c] == 0.0f) continue;
-      first[c] = r;
-      --missing;
+    std::size_t left = 0;
+    for (const std::uint32_t c : missing) {
+      if (row[c] == 0.0f) {
+        missing[left++] = c;
+      } else {
+        first[c] = r;
+      }
     }
+    missing.resize(left);
   }
   return first;
 }
@@ -287,6 +328,17 @@ struct ColumnEntry {
   std::uint16_t control;
   std::uint32_t group, column;
 };
+
+// In the same order where the control is the same.
+std::vector<ColumnEntry> by_control(const std::vector<ColumnEntry>& entries,
+                                    std::uint32_t control_count) {
+  std::vector<std::size_t> next(control_count + std::size_t{1});
+  for (const ColumnEntry& e : entries) ++next[e.control + std::size_t{1}];
+  std::partial_sum(next.begin(), next.end(), next.begin());
+  std::vector<ColumnEntry> out(entries.size());
+  for (const ColumnEntry& e : entries) out[next[e.control]++] = e;
+  return out;
+}
 
 // The columns that have any value, by control and group: what a control drives lies together.
 std::vector<ColumnEntry> list_columns(const Groups& groups, RigData& out, Used& used) {
@@ -305,8 +357,7 @@ std::vector<ColumnEntry> list_columns(const Groups& groups, RigData& out, Used& 
       }
     }
   }
-  std::ranges::stable_sort(entries, {}, &ColumnEntry::control);
-  return entries;
+  return by_control(entries, out.control_count);
 }
 
 // The columns once more, by group and then by control.
@@ -340,18 +391,26 @@ void count_reads(const std::vector<ColumnEntry>& entries, RigData& out) {
   }
 }
 
-Status compile_columns(const Groups& groups, RigData& out, Used& used) {
-  const std::vector<ColumnEntry> entries = list_columns(groups, out, used);
-  std::vector<std::vector<std::uint32_t>> offsets;
-  for (const dna::JointGroup* g : groups) offsets.emplace_back(g->input_indices.size(), rig::kNone);
+// Where each column will lie, by control and group.
+Status place_columns(const Groups& groups, const std::vector<ColumnEntry>& entries, RigData& out,
+                     KeptMatrices& kept) {
+  for (std::size_t i = 0; i < groups.size(); ++i) {
+    kept.matrices.push_back({groups[i], out.joint_groups[i].row_count, {}});
+    kept.matrices.back().columns.reserve(out.joint_groups[i].column_count);
+  }
   std::uint64_t end = 0;
   out.joint_column_begins.assign(out.control_count + std::size_t{1}, 0);
+  out.joint_columns.reserve(entries.size());
+  const auto leave = [&](std::uint64_t to) {
+    kept.gaps.emplace_back(static_cast<std::uint32_t>(end), static_cast<std::uint32_t>(to));
+    end = to;
+  };
   for (const ColumnEntry& e : entries) {
     // A column begins on whole vectors, unless it is shorter than one: those lie side by side.
     const std::uint32_t rows = out.joint_groups[e.group].row_count;
-    if (rows >= simd::kWidest) end = simd::rounded_up(end);
+    if (rows >= simd::kWidest && end % simd::kWidest != 0) leave(simd::rounded_up(end));
     const auto offset = static_cast<std::uint32_t>(end);
-    offsets[e.group][e.column] = offset;
+    kept.matrices[e.group].columns.push_back({e.column, offset});
     out.joint_columns.push_back({offset, e.group});
     ++out.joint_column_begins[e.control + std::size_t{1}];
     end += rows;
@@ -362,14 +421,25 @@ Status compile_columns(const Groups& groups, RigData& out, Used& used) {
   }
   std::partial_sum(out.joint_column_begins.begin(), out.joint_column_begins.end(),
                    out.joint_column_begins.begin());
+  leave(end + simd::kWidest);  // kernels read on
+  kept.size = static_cast<std::size_t>(end);
+  return ok();
+}
+
+// Columns without a value are not kept, and those hold nothing that is not finite.
+bool all_finite(const KeptMatrices& kept) {
+  return std::ranges::all_of(kept.matrices, [](const KeptMatrices::Matrix& m) {
+    const std::size_t count = m.rows * m.group->input_indices.size();
+    return core::all_finite(std::span<const float>(m.group->values.data(), count));
+  });
+}
+
+Status compile_columns(const Groups& groups, RigData& out, KeptMatrices& kept, Used& used) {
+  const std::vector<ColumnEntry> entries = list_columns(groups, out, used);
+  RISORIUS_TRY(place_columns(groups, entries, out, kept));
   list_by_group(entries, out);
-  out.joint_values.resize(static_cast<std::size_t>(end) + simd::kWidest);  // kernels read on
-  for (std::size_t i = 0; i < offsets.size(); ++i) {
-    transpose(groups[i]->values.data(), out.joint_groups[i].row_count, offsets[i],
-              out.joint_values.data());
-  }
   // A column at rest may be read where that costs less, but 0 times infinity is no 0.
-  if (core::all_finite(out.joint_values)) count_reads(entries, out);
+  if (all_finite(kept)) count_reads(entries, out);
   return ok();
 }
 
@@ -472,21 +542,24 @@ Status compile_psds(const dna::Dna& dna, RigData& out) {
   const dna::Psds& source = dna.behavior.psds;
   RISORIUS_TRY(check_controls(source.columns, out.control_count, "behavior.psds.columns"));
   RISORIUS_TRY(check_controls(source.rows, out.control_count, "behavior.psds.rows"));
-  std::map<std::uint16_t, std::vector<std::size_t>> entries;  // rows may be interleaved
-  for (std::size_t i = 0; i < source.rows.size(); ++i) entries[source.rows[i]].push_back(i);
-  for (const auto& [output, list] : entries) {
+  std::vector<std::uint32_t> entries(source.rows.size());
+  std::iota(entries.begin(), entries.end(), 0u);
+  const auto row = [&](std::uint32_t i) { return source.rows[i]; };
+  if (!std::ranges::is_sorted(source.rows)) std::ranges::stable_sort(entries, {}, row);
+  out.psd_factors.reserve(entries.size());
+  for (std::size_t i = 0; i < entries.size();) {
     rig::Psd psd;
-    psd.output = output;
-    psd.factors_begin = static_cast<std::uint32_t>(out.psd_factors.size());
-    if (list.size() > UINT16_MAX) {
+    psd.output = row(entries[i]);
+    psd.factors_begin = static_cast<std::uint32_t>(i);
+    for (; i < entries.size() && row(entries[i]) == psd.output; ++i) {
+      psd.weight *= source.values[entries[i]];
+      out.psd_factors.push_back(source.columns[entries[i]]);
+    }
+    if (i - psd.factors_begin > UINT16_MAX) {
       return fail(ErrorCode::kLimitExceeded, "behavior.psds",
                   "a corrective with more than 65535 factors");
     }
-    for (const std::size_t i : list) {
-      psd.weight *= source.values[i];
-      out.psd_factors.push_back(source.columns[i]);
-    }
-    psd.factor_count = static_cast<std::uint16_t>(list.size());
+    psd.factor_count = static_cast<std::uint16_t>(i - psd.factors_begin);
     out.psds.push_back(psd);
   }
   return ok();
@@ -537,16 +610,17 @@ Status compile_channels_and_maps(const dna::Dna& dna, RigData& out) {
   return ok();
 }
 
-Status narrow(RigData& out) {
-  out.joint_halves.reserve(out.joint_values.size());
-  for (const float v : out.joint_values) {
+Status narrow(const KeptMatrices& kept, RigData& out) {
+  std::vector<float> values(kept.size);
+  kept.write(values);
+  out.joint_halves.reserve(values.size());
+  for (const float v : values) {
     if (!(std::fabs(v) <= simd::kLargestHalf)) {
       return fail(ErrorCode::kInvalidValue, "behavior.joint_groups",
                   "the joint value " + std::to_string(v) + " does not fit a float16 (65504)");
     }
     out.joint_halves.push_back(simd::to_half(v));
   }
-  out.joint_values = {};
   return ok();
 }
 
@@ -564,8 +638,9 @@ Status compile_frame(const dna::Dna& dna, core::Budget& budget, RigData& out) {
   return list_gui_ranges(budget, out);
 }
 
+// Out: kept  the joint matrices, which out.joint_halves has or neither of its arrays
 Result<RigData> compile_parts(const dna::Dna& dna, const CompileOptions& options,
-                              core::Budget& budget) {
+                              core::Budget& budget, KeptMatrices& kept) {
   RigData out;
   out.joint_stride = options.rotation == Rotation::kQuaternion ? 10 : 9;
   if (const std::uint32_t controls = dna::control_counts(dna).total(); controls > 65536) {
@@ -585,7 +660,7 @@ Result<RigData> compile_parts(const dna::Dna& dna, const CompileOptions& options
   RISORIUS_TRY(compile_channels_and_maps(dna, out));
   RISORIUS_TRY(compile_psds(dna, out));
   list_joints_written(out);
-  RISORIUS_TRY(compile_columns(groups, out, used));
+  RISORIUS_TRY(compile_columns(groups, out, kept, used));
   mark_channels_and_maps(out, used);
   detail::mark_ml_joints(out, used);
   RISORIUS_TRY(detail::schedule(used, lods, budget, out));
@@ -594,7 +669,7 @@ Result<RigData> compile_parts(const dna::Dna& dna, const CompileOptions& options
   }
   compile_pieces(groups, out);
   if (options.precision == Precision::kFloat16) {
-    RISORIUS_TRY(narrow(out));
+    RISORIUS_TRY(narrow(kept, out));
   }
   return out;
 }
@@ -629,9 +704,12 @@ Result<rig::Rig> compile(const dna::Dna& dna, const CompileOptions& options) {
                     simd::available_kernels());
   }
   core::Budget own = budget_for(dna);
-  auto out = compile_parts(dna, options, options.budget != nullptr ? *options.budget : own);
+  KeptMatrices kept;
+  auto out = compile_parts(dna, options, options.budget != nullptr ? *options.budget : own, kept);
   if (!out) return core::Unexpected{out.error()};
-  return rig::make_rig(*out, *kernels);
+  if (options.precision == Precision::kFloat16) return rig::make_rig(*out, *kernels);
+  return rig::make_rig(*out, *kernels,
+                       {kept.size, [&](std::span<float> values) { kept.write(values); }});
 }
 
 }  // namespace risorius::compile

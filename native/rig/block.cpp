@@ -135,17 +135,22 @@ void seal_block(std::span<std::uint8_t> bytes) {
   std::memcpy(bytes.data() + offsetof(BlockHeader, hash), &value, sizeof(value));
 }
 
-Result<Rig> make_rig(const RigData& data, const simd::Kernels& kernels) {
+Result<Rig> make_rig(const RigData& data, const simd::Kernels& kernels, const LateValues& late) {
   BlockHeader h{};
   std::copy(std::begin(kMagic), std::end(kMagic), h.magic);
   h.byte_order = kByteOrder;
   h.header_size = sizeof(BlockHeader);
   h.rig = data;
+  const auto is_late = [&](const auto& array) {
+    return late.count > 0 &&
+           static_cast<const void*>(&array) == static_cast<const void*>(&data.joint_values);
+  };
   std::size_t size = aligned(sizeof(BlockHeader)), longest = 0, i = 0;
   for_each_array(data, [&](const auto& array) {
-    h.places[i++] = {size, array.size()};
-    size = aligned(size + array.size() * sizeof(array[0]));
-    longest = std::max(longest, array.size());
+    const std::size_t count = is_late(array) ? late.count : array.size();
+    h.places[i++] = {size, count};
+    size = aligned(size + count * sizeof(array[0]));
+    longest = std::max(longest, count);
   });
   if (longest > UINT32_MAX) {
     return fail(
@@ -153,14 +158,23 @@ Result<Rig> make_rig(const RigData& data, const simd::Kernels& kernels) {
         "a list of " + number(longest) + " elements, an index reaches " + number(UINT32_MAX));
   }
   h.size = size;
-  const std::shared_ptr<std::uint8_t> block = core::allocate_pages(size);
+  const std::shared_ptr<std::uint8_t> block = core::allocate_pages(size, core::Fill::kNothing);
   const std::span<std::uint8_t> bytes(block.get(), size);
+  std::size_t end = sizeof(BlockHeader);
   i = 0;
   for_each_array(data, [&](const auto& array) {
-    const std::size_t length = array.size() * sizeof(array[0]);
-    if (length > 0) std::memcpy(bytes.data() + h.places[i].offset, array.data(), length);
-    ++i;
+    const Place place = h.places[i++];
+    const std::size_t length = static_cast<std::size_t>(place.count) * sizeof(array[0]);
+    std::uint8_t* const to = bytes.data() + place.offset;
+    std::fill(bytes.data() + end, to, std::uint8_t{0});  // the bytes between two arrays
+    end = static_cast<std::size_t>(place.offset) + length;
+    if (is_late(array)) {
+      late.write({reinterpret_cast<float*>(to), late.count});
+    } else if (length > 0) {
+      std::memcpy(to, array.data(), length);
+    }
   });
+  std::fill(bytes.begin() + static_cast<std::ptrdiff_t>(end), bytes.end(), std::uint8_t{0});
   std::memcpy(bytes.data(), &h, sizeof(h));
   seal_block(bytes);
   auto rig = open_rig(bytes, block, BlockCheck::kHeader, kernels);

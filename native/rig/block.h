@@ -2,7 +2,9 @@
 // A Rig as one block of bytes: how it is made, opened and checked.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 
@@ -17,11 +19,19 @@ enum class BlockCheck {
   kFull,    // and every index against its space: for bytes from anywhere, forged ones as well
 };
 
+/// The joint_values of a Rig where data has none: they are written straight into the block, for a
+/// copy of them would take longer than all the rest.
+struct LateValues {
+  std::size_t count = 0;
+  std::function<void(std::span<float>)> write;  // overwrites all of them
+};
+
 /// Copies the arrays into one block and opens it.
 /// In:    data     as compile() makes it: it is not checked
 ///        kernels  that the rig is evaluated with; they must outlive it
 /// Fails: kLimitExceeded (an array of more elements than an index reaches)
-core::Result<Rig> make_rig(const RigData& data, const simd::Kernels& kernels);
+core::Result<Rig> make_rig(const RigData& data, const simd::Kernels& kernels,
+                           const LateValues& late = {});
 
 /// A Rig from the bytes of Rig::block(). Copies nothing: they stay where owner keeps them.
 /// In:    bytes    aligned to 64

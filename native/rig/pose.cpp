@@ -19,8 +19,10 @@ Workspace make_workspace(const Rig& rig) {
   work.psd_bits.resize((std::size_t{rig.psd_count} + 63) / 64);
   work.column_ends.resize(rig.joint_groups.size());
   work.columns.resize(rig.joint_columns.size());
+  work.live.resize(rig.joint_groups.size());
   work.rows.resize(detail::rows_size(rig));
-  work.live_blocks.resize(rig.lod_count == 0 ? 0 : rig.joint_pieces.size() / rig.lod_count);
+  const std::size_t blocks = rig.lod_count == 0 ? 0 : rig.joint_pieces.size() / rig.lod_count;
+  work.live_blocks.resize((blocks + 63) / 64);
   work.last_controls.resize(rig.control_count);
   work.products.resize(rig.quaternion_joints.size());
   work.quaternion_bits.resize((rig.quaternion_columns.size() + 63) / 64);

@@ -60,7 +60,12 @@ struct alignas(128) Workspace {
   std::vector<std::uint32_t> column_ends;  // [groups]: where a group's active columns end below
   std::vector<simd::Column> columns;       // the columns of active controls, as in group_columns
   core::AlignedVector<float> rows;         // the rows of all groups
-  std::vector<std::uint8_t> live_blocks;   // [blocks]: 1 where a group that does not rest writes
+  std::vector<std::uint64_t> live_blocks;  // a bit for each block that a group which moves writes
+  std::vector<std::uint32_t> live;         // the groups that write these blocks, ascending; the
+  std::size_t live_count = 0;              // first live_count count
+  // As live_blocks was in the frame before, where the pose is an Instance's, which nobody else
+  // writes: other blocks are 0 already. Empty: nothing is known of the pose.
+  std::vector<std::uint64_t> shown_blocks;
   // Rotations by quaternions.
   std::vector<Quaternion> products;            // [quaternion joints]
   std::vector<std::uint64_t> quaternion_bits;  // a bit for each active column; 0 between calls

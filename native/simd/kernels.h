@@ -6,10 +6,6 @@
 #include <cstddef>
 #include <cstdint>
 
-#if defined(_MSC_VER) && !defined(__clang__)
-#include <intrin.h>
-#endif
-
 namespace risorius::simd {
 
 /// The widest vector. Results are rounded up to it, and a matrix needs as many readable values
@@ -22,19 +18,6 @@ constexpr T rounded_up(T rows) {
 }
 /// Frames that a batch kernel takes at once.
 inline constexpr std::size_t kFrames = 8;
-
-/// Asks for a cache line that will be read soon.
-inline void prefetch(const void* address) {
-#if defined(_MSC_VER) && !defined(__clang__)
-#if defined(_M_X64)
-  _mm_prefetch(static_cast<const char*>(address), _MM_HINT_T0);
-#elif defined(_M_ARM64)
-  __prefetch(address);
-#endif
-#else
-  __builtin_prefetch(address);
-#endif
-}
 
 /// A column of a matrix and what it is multiplied by.
 struct Column {
@@ -81,7 +64,8 @@ struct Kernels {
   /// Fills n blocks of kPlaces with their pieces, other places with 0.
   /// In: from  kPlaces values may be read from any piece's first on
   void (*place)(const Piece* pieces, std::size_t n, const float* from, float* to);
-  /// The same for extra pieces, which leave the other places of their blocks as they are.
+  /// The same for extra pieces, which leave the other places of their blocks as they are: these may
+  /// be read and written as well.
   void (*place_more)(const Piece* pieces, std::size_t n, const float* from, float* to);
   /// Euler angles x y z to quaternions x y z w in place, error below 2e-7; the same bits on every
   /// CPU.

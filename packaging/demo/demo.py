@@ -139,10 +139,10 @@ def main():
     def sheet():
         progress = Progress(len(acting.SHEET), "picture")
         for number, (frame, _) in enumerate(acting.SHEET):
-            still(stills / f"{number}.png", frame, 512)
+            still(stills / f"{number}.png", frame, 640)
             progress.step()
 
-    timed("render 8 pictures of 512 px", sheet)
+    timed("render 8 pictures of 640 px", sheet)
     frames = stage.empty_folder(args.out / "frames")
     last = acting.LAST_FRAME
     timed(f"render {last} frames of 480 px", lambda: film(frames, 1, last))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-# Sourced by demo.sh, performance.sh, physics.sh and cast.sh: what comes before and after each film. Sets: out, zip.
+# Sourced by demo.sh, performance.sh, monologue.sh, physics.sh and cast.sh: what comes before and after each film. Sets: out, zip.
 source "$(dirname "${BASH_SOURCE[0]}")/../setup.sh"
 
 # begin_film NAME: the folder build/NAME, and what is built from nothing

@@ -137,7 +137,7 @@ def perform(args, man, woman):
 
 def render(args):
     scene = bpy.context.scene
-    scene.render.resolution_x, scene.render.resolution_y = 640, 360
+    scene.render.resolution_x, scene.render.resolution_y = 800, 450
     if scene.cycles.use_denoising:
         scene.cycles.samples = 6
     if args.only:

@@ -7,7 +7,7 @@ from pathlib import Path
 from acting import SHEET
 from PIL import Image, ImageDraw, ImageFont
 
-SIZE, LABEL = 512, 40
+SIZE, LABEL = 640, 44
 
 
 def main(folder: Path, out: Path) -> None:

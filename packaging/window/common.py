@@ -38,6 +38,19 @@ def look_at_face(hand: Hand) -> None:
     hand.still()
 
 
+def take_up(hand: Hand) -> None:
+    """The tool that drags the face, by the button at the top of the tab."""
+    hand.click(*hand.find(r"risorius\.drag_tool"))
+    hand.wait("the tool is in the hand", lambda: hand.ask("drags"))
+
+
+def put_down(hand: Hand) -> None:
+    """The tool of before, by the same button."""
+    scroll(hand, -40)
+    hand.click(*hand.find(r"risorius\.drag_tool"))
+    hand.wait("the tool is put down", lambda: not hand.ask("drags"))
+
+
 def clear(hand: Hand) -> None:
     """A face at rest, without layers, keys and colours."""
     hand.ask("run", code=REST)

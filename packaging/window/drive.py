@@ -20,7 +20,6 @@ from pathlib import Path
 from board_and_grid import board, grid
 from common import (
     JAW,
-    REST,
     SMILE,
     Check,
     NotThereError,
@@ -34,6 +33,7 @@ from common import (
 )
 from hand import HEIGHT, WIDTH, Hand, LateError, difference
 from shot import shot
+from skin import drag_in_views, drag_skin
 
 
 def start(hand: Hand, _dna: Path) -> Iterator[Check]:
@@ -156,118 +156,6 @@ def drag_slider(hand: Hand, _dna: Path) -> Iterator[Check]:
     hand.wait("undone", lambda: slider(hand) == 0.0)
     yield "Ctrl-Z takes it back, in the view too", difference(before, hand.still(), low) < 0.01
     hand.ask("run", code="bpy.context.window_manager.risorius_search = ''")
-
-
-def drag_skin(hand: Hand, _dna: Path) -> Iterator[Check]:
-    """The skin itself: the corner of the mouth is dragged by the pointer."""
-    if not hand.ask("has", operator="risorius.drag_mode"):
-        raise NotThereError("risorius.drag_mode")
-    clear(hand)
-    look_at_face(hand)
-    ready_tab(hand)
-    hand.click(*hand.find(r"risorius\.drag_mode"))
-    corner = hand.ask("moved_by", control=SMILE[0])
-    start = corner["at"]
-    end = (start[0] + 14, start[1] - 12)
-    hand.begin_drag(start)
-    hand.go(start, end)
-    hand.picture("skin-dragged")
-    at = hand.ask("vertex_at", vertex=corner["vertex"])["at"]
-    apart = max(abs(a - b) for a, b in zip(at, end, strict=True))
-    yield f"the vertex is within 2 pixels of the pointer ({apart:.1f})", apart <= 2
-    hand.key("Escape")
-    hand.do("mouseup", 1)
-    sliders = hand.ask("state")["sliders"]
-    yield "Esc while it is dragged gives all sliders back what they had", sliders == {}
-    hand.move(*start)
-    hand.drag(start, end)
-    sliders = hand.ask("state")["sliders"]
-    at = hand.ask("vertex_at", vertex=corner["vertex"])["at"]
-    apart = max(abs(a - b) for a, b in zip(at, end, strict=True))
-    yield f"let go it stays within 2 pixels ({apart:.1f})", apart <= 2 and len(sliders) > 0
-    yield "and the last operator was one drag", hand.ask("state")["last"] == "RISORIUS_OT_drag"
-    hand.do("keydown", "ctrl")
-    hand.begin_drag(end)
-    hand.go(end, (end[0], end[1] + 25))
-    hand.picture("skin-one-slider")
-    hand.key("Escape")
-    hand.do("mouseup", 1)
-    hand.do("keyup", "ctrl")
-    yield "one slider by Ctrl, and Esc: as before", hand.ask("state")["sliders"] == sliders
-    hand.move(WIDTH * 0.3, HEIGHT * 0.5)
-    hand.key("ctrl+z")
-    hand.wait("undone", lambda: hand.ask("state")["sliders"] == {})
-    yield "Ctrl-Z takes the drag back while the mode goes on", True
-    hand.do("keydown", "shift")
-    hand.click(*start)
-    hand.do("keyup", "shift")
-    yield "Shift and click pins", "risorius_pins" in hand.ask("state")["keys"]
-    hand.picture("skin-pin")
-    hand.click(*start)
-    hand.key("Escape")
-    hand.move(WIDTH * 0.3, HEIGHT * 0.7)
-    yield "Esc ends it, nothing is drawn any more", not hand.ask("drawing")
-
-
-def drag_in_views(hand: Hand, _dna: Path) -> Iterator[Check]:
-    """The skin of a turned head, in a perspective, through a camera, and in one of four views."""
-    if not hand.ask("has", operator="risorius.drag_mode"):
-        raise NotThereError("risorius.drag_mode")
-    clear(hand)
-    look_at_face(hand)
-    ready_tab(hand)
-    vertex = hand.ask("moved_by", control=SMILE[0])["vertex"]
-    hand.click(*hand.find(r"risorius\.drag_mode"))
-    for name, code in VIEWS.items():
-        hand.ask("run", code=code)
-        hand.still()
-        start = hand.ask("seen_in_front", vertex=vertex)
-        end = (start[0] + 9, start[1] - 8)
-        hand.move(*start)
-        hand.drag(start, end)
-        at = hand.ask("seen_in_front", vertex=vertex)
-        apart = max(abs(a - b) for a, b in zip(at, end, strict=True))
-        moved = len(hand.ask("state")["sliders"]) > 0
-        yield f"{name}: within 2 pixels of the pointer ({apart:.1f})", apart <= 2 and moved
-        hand.picture("skin-" + name.replace(" ", "-"))
-        hand.ask("run", code=REST)
-    hand.move(WIDTH * 0.3, HEIGHT * 0.5)
-    hand.key("Escape")
-    hand.ask("run", code=ONE_VIEW)
-
-
-VIEWS = {
-    "a turned head in perspective": """
-head = rig()["risorius_controls"].pose.bones["head"]
-head.rotation_mode = "XYZ"
-head.rotation_euler = (0.2, 0.3, 0.4)
-bpy.context.view_layer.update()
-eye = view()[0].spaces.active.region_3d
-eye.view_perspective = "PERSP"
-""",
-    "through a camera": """
-eye, camera = view()[0].spaces.active.region_3d, bpy.context.scene.camera
-spots = points()
-camera.location = (spots.min(axis=0) + spots.max(axis=0)) / 2 + np.array((0.0, -1.2, 0.0))
-camera.rotation_euler = (np.pi / 2, 0.0, 0.0)
-bpy.context.view_layer.update()
-eye.view_perspective = "CAMERA"
-""",
-    "one of four views": """
-eye = view()[0].spaces.active.region_3d
-eye.view_perspective = "PERSP"
-with over(*view()[:2]):
-    bpy.ops.screen.region_quadview()
-spots = points()
-for one in view()[0].spaces.active.region_quadviews:
-    one.view_location = (spots.min(axis=0) + spots.max(axis=0)) / 2
-    one.view_distance = float(np.ptp(spots[:, 2])) * 1.9
-""",
-}
-ONE_VIEW = """
-with over(*view()[:2]):
-    bpy.ops.screen.region_quadview()
-"""
 
 
 def add_layer(hand: Hand, _dna: Path) -> Iterator[Check]:

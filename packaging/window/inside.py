@@ -193,9 +193,26 @@ def seen_in_front(vertex):
     return [left + at.x, top + height - at.y]
 
 
-def drawing():
-    """Whether a drag of the skin draws over the views."""
-    return module("ui.drag.drawing").is_drawing()
+def drags():
+    """Whether the tool that drags the face is in the hand."""
+    return module("ui.drag.tool").is_active(bpy.context)
+
+
+def two_handles():
+    """The lowest handle and the next that lies 20 pixels away, with their numbers and places."""
+    one, live = rig(), module("scene.character.runtime").of(rig())
+    found = module("scene.drag.picking").handles_of(bpy.context, one, live)
+    found = [f for f in found if on_screen(f[1]) is not None]
+    found.sort(key=lambda f: f[1][2])
+    low = found[0]
+    apart = lambda f: np.linalg.norm(np.subtract(on_screen(f[1]), on_screen(low[1])))  # noqa: E731
+    high = min((f for f in found[1:] if apart(f) > 20), key=apart)
+    return [{"point": list(point), "at": on_screen(place)} for point, place in (low, high)]
+
+
+def kept(key):
+    """A list that the controls bear; empty where they do not."""
+    return list(rig()["risorius_controls"].get(key, ()))
 
 
 def bone_at(bone):

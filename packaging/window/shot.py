@@ -7,7 +7,17 @@ from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 
-from common import SMILE, Check, clear, look_at_face, open_section, ready_tab, scroll
+from common import (
+    SMILE,
+    Check,
+    clear,
+    look_at_face,
+    open_section,
+    put_down,
+    ready_tab,
+    scroll,
+    take_up,
+)
 from hand import WIDTH, Hand, difference
 
 LAST = 240  # frames: ten seconds
@@ -55,18 +65,18 @@ def shot(hand: Hand, _dna: Path) -> Iterator[Check]:
     yield from _blink(hand)
     yield from _idle(hand)
     yield from _play(hand)
+    put_down(hand)
     clear(hand)
 
 
 def _smirk(hand: Hand) -> Iterator[Check]:
-    hand.click(*hand.find(r"risorius\.drag_mode"))
+    take_up(hand)
     at = hand.ask("moved_by", control=SMILE[0])["at"]
     hand.begin_drag(at)
     hand.go(at, (at[0] + 12, at[1] - 12))
     hand.picture("animator-drag")
     hand.do("mouseup", 1)
     hand.ask("ready")
-    hand.key("Escape")
     yield "the corner of the mouth is dragged up", len(hand.ask("state")["sliders"]) > 0
 
 

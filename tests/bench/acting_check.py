@@ -65,12 +65,13 @@ class Eye:
     def __init__(self, face: Face, name: str) -> None:
         mesh = face.mesh(name)
         ball = face.rest[mesh]
-        self.name, self.ball = name, bodies.Ball(ball)
+        self.ball = bodies.Ball(np.concatenate([ball, *face.corneas(ball[:, 0].mean())]))
         skin = face.skin
         ray = skin.places - self.ball.middle
         ray /= np.linalg.norm(ray, axis=1, keepdims=True).clip(1e-9)
-        near = np.abs(self.ball.depth(skin.places) + 0.225) < 0.375  # -0.15 to 0.6 cm outside
-        outward = np.einsum("nd,nd->n", ray, skin.normals) > -0.2  # the lids' edges too
+        deep = self.ball.depth(skin.places) * face.mm
+        near = (deep > -6.0) & (deep < 0.1)  # what is deeper at rest lines the socket, unseen
+        outward = np.einsum("nd,nd->n", ray, skin.normals) > 0.0
         self.lids = skin.kept(near & outward & (ray[:, 2] > 0.2))
         some = np.linspace(0, len(ball) - 1, 60).astype(np.int64)
         self._rest = ball[some]
@@ -174,6 +175,11 @@ class Face:
     def mesh(self, name: str) -> int:
         """The index of the mesh whose name begins so."""
         return next(m for n, m in self._meshes.items() if n.startswith(name))
+
+    def corneas(self, side: float) -> list[Floats]:
+        """The vertices of the cornea on a side, where it is a mesh of its own."""
+        found = [self.rest[m] for n, m in self._meshes.items() if n.startswith("cornea")]
+        return [places[places[:, 0] * side > 0] for places in found]
 
     def faces(self, mesh: int) -> list[list[int]]:
         """Vertices of each face."""

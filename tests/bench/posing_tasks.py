@@ -6,8 +6,10 @@
 A hand that knows its face: it knows which sliders or handles a pose needs, and, dragging, tries
 nothing in vain (of the vertices that are furthest off it takes the drag that helps most). Counted
 are presses and releases of the pointer's button: a click is two of them, a drag is two; those of
-keys (Ctrl held for one slider, Tab for the next) stand behind a +. To begin to drag costs a click.
-Pixels are those that
+keys (Ctrl held for one slider, Tab for the next) stand behind a +. The tool that drags is taken up
+once, as the tab of the sliders is opened once: neither is counted. Regions of sliders are closed at
+the beginning of a pose and opened by a click; the last lines have it with all of them open already,
+as they are for one who has just used them. Pixels are those that
 the pointer travels, on the layouts of the add-on: sliders of 75 or 150 pixels in rows of 22 below
 headings that are opened by a click, a board 285 pixels high, a head of 1.25 pixels a millimetre.
 A slider or handle is set to the pixel. A drag is one of the add-on's: least squares on the screen
@@ -77,10 +79,12 @@ TASKS: dict[str, dict[str, float]] = {
 
 @dataclass
 class Done:
-    """What a hand did: presses and releases of the button and of keys, pixels, mm that are left."""
+    """What a hand did: presses and releases of the button, those of them that opened a region,
+    those of keys, pixels, mm that are left."""
 
     events: int = 0
     keys: int = 0
+    openings: int = 0
     pixels: float = 0.0
     error: float = 0.0
     at: tuple[float, float] = (0.0, 0.0)
@@ -166,6 +170,7 @@ def by_sliders(face, goal):
         top = headings.index(region) * HEADING + above
         if region not in opened:
             done.click(20.0, top)
+            done.openings += 2
             opened[region] = True
         paired = name[-1:] in "LR" and name[:-1] in rows[region]
         row = rows[region].index(name[:-1] if paired else name)
@@ -205,7 +210,6 @@ def by_drags(face, goal, moving, most):
     done, raw = Done(), np.zeros_like(goal)
     wanted = face.at(goal)
     mirrored = is_mirrored(face, goal)
-    done.click(AWAY, -150.0)  # Drag the Face
     way = left = apart(face, face.rest, wanted, moving)
     for _ in range(most):
         if left <= ENOUGH * way:
@@ -278,7 +282,7 @@ def main():
     args = parser.parse_args()
     face = Face(risorius.load(args.face))
     print("| pose | way mm | sliders: events, px, mm | board | drags |\n|---|---|---|---|---|")
-    events = []
+    events, openings, keys, ways = [], [], [], []
     for title, task in TASKS.items():
         goal = face.raw_of(task)
         wanted = face.at(goal)
@@ -291,20 +295,37 @@ def main():
             keys = f" + {done.keys}" if done.keys else ""
             cells.append(f"{done.events}{keys}, {done.pixels:,.0f}, {done.error:.2f}")
         events.append([(d.events, d.pixels, d.error) for d, _ in rows])
+        openings.append(rows[0][0].openings)
+        keys.append(rows[2][0].keys)
         way = apart(face, face.rest, wanted, moving)
+        ways.append(way)
         print(f"| {title} | {way:.2f} | {' | '.join(cells)} |", flush=True)
     table = np.array(events)
     middles = np.median(table, axis=0)
     middle = [f"{row[0]:.0f}, {row[1]:,.0f}, {row[2]:.2f}" for row in middles]
     print(f"| **median** | | {' | '.join(middle)} |")
-    for i, word in enumerate(("events", "pixels")):
-        share = statistics.median(table[:, 2, i] / table[:, 0, i])
-        print(f"{word}: drags take {share:.2f} of what sliders take, in the median")
-    more = [int((goal != 0).sum()) > 1 for goal in map(face.raw_of, TASKS.values())]
-    share = statistics.median((table[:, 2, 0] / table[:, 0, 0])[more])
-    print(f"events of the {sum(more)} poses of more than one slider: {share:.2f}")
-    share = statistics.median((table[:, 2, 0] - 2) / table[:, 0, 0])
-    print(f"events without the click that begins to drag: {share:.2f}")
+    tell(table, np.array(openings), np.array(keys), np.array(ways))
+
+
+def tell(table, openings, keys, ways):
+    """What drags take of what sliders take: medians.
+
+    Args:
+        table: [pose, way of doing it, events and pixels and mm].
+        openings: events of each pose that opened regions.
+        keys: events of keys of each pose's drags.
+        ways: mm that each pose is away from rest.
+    """
+    sliders, _board, drags = table[:, 0], table[:, 1], table[:, 2]
+    near = drags[:, 2] <= 0.2 * ways
+    for words, share in (
+        ("pixels", drags[:, 1] / sliders[:, 1]),
+        ("events", drags[:, 0] / sliders[:, 0]),
+        (f"events of the {near.sum()} that end within a fifth", (drags / sliders)[near, 0]),
+        ("events, all regions open", drags[:, 0] / (sliders[:, 0] - openings)),
+        ("events and keys", (drags[:, 0] + keys) / sliders[:, 0]),
+    ):
+        print(f"{words}: drags take {statistics.median(share):.2f} of what sliders take")
 
 
 if __name__ == "__main__":

@@ -68,6 +68,12 @@ Step one_face(std::shared_ptr<const rig::Rig> rig, std::uint32_t lod) {
     benchmark::DoNotOptimize(pose->joints.data());
   };
 }
+Step an_instance(std::shared_ptr<const rig::Rig> rig) {
+  auto face = std::make_shared<rig::Instance>(*rig);
+  return [rig, face](const float* raw) {
+    benchmark::DoNotOptimize(face->evaluate(raw).joints.data());
+  };
+}
 Step csr(const dna::Dna& dna, std::uint32_t lod) {
   auto base = std::make_shared<bench::Baseline>(dna, lod);
   return [base](const float* raw) { base->evaluate(raw); };
@@ -269,7 +275,10 @@ class Suite {
     std::printf("  %s\n", line.asked.c_str());
   }
   void add_instance(const Frames& frames) {
-    for (const char* name : {"no change", "LOD switched and evaluated"}) row(name);
+    const Frames& one = frames_.front();
+    const std::string name = "an Instance, " + one.name;
+    add(row(name, "csr, " + one.name), an_instance(rig_), one);
+    for (const char* other : {"no change", "LOD switched and evaluated"}) row(other);
     benchmark::RegisterBenchmark("no change", [this, &frames](benchmark::State& state) {
       rig::Instance face(*rig_);
       for (auto _ : state) benchmark::DoNotOptimize(face.evaluate(frames.at(0)).joints.data());

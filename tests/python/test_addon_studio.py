@@ -17,10 +17,12 @@ GIRL = (0.056, (-0.1, -0.09, -0.2), (0.1, 0.14, 0.13))  # ends at the neck
 
 
 def edges(plan):
-    """Height of the picture's lower and upper edge over the eyes, in the plane of its middle."""
-    away = math.dist(plan.camera, plan.target)
+    """Height of the picture's lower and upper edge over the eyes, at their distance."""
+    x, y, z = plan.camera
+    away, whole = math.hypot(x, y), math.dist(plan.camera[:2], plan.target[:2])
+    middle = z + (plan.target[2] - z) * away / whole
     half = away * studio.SENSOR / plan.lens / 2
-    return plan.target[2] - half, plan.target[2] + half
+    return middle - half, middle + half
 
 
 def test_the_eyes_lie_on_the_upper_third_of_head_and_shoulders():

@@ -19,7 +19,15 @@ ADDON = ROOT / "addon" / "risorius"
 PACKAGE = ROOT / "native" / "python" / "risorius"
 LANGUAGES = sorted(p.stem.partition("_")[2] for p in (ADDON / "language").glob("interface_*.toml"))
 STANDARD = ROOT / "tests" / "data" / "controls" / "standard_raw.txt"
-CLASSES = ("Operator", "Panel", "Menu", "AddonPreferences", "FileHandler", "PropertyGroup")
+CLASSES = (
+    "WorkSpaceTool",
+    "Operator",
+    "Panel",
+    "Menu",
+    "AddonPreferences",
+    "FileHandler",
+    "PropertyGroup",
+)
 # functions that look words up -> which argument
 SENTENCES = {"say": 0, "told": 0, "mark": 0, "write": 1, "prop_or": 4}
 SHOWN = {"report": 1, "poll_message_set": 0}  # functions of Blender that show a text as it is
@@ -84,7 +92,7 @@ class Reader(ast.NodeVisitor):
                 if isinstance(target, ast.Name)
             }
             self.add(given.get("bl_label"), "Risorius")
-            if "Operator" in bases and "bl_idname" in given:
+            if {"Operator", "WorkSpaceTool"} & set(bases) and "bl_idname" in given:
                 told = ast.Constant(ast.get_docstring(node, clean=False), lineno=node.lineno)
                 self.add(given.get("bl_description", told), "*")
         self.generic_visit(node)

@@ -22,7 +22,7 @@ def man():
     except source.SourceError as error:
         _not_run.add("the sample's CC0 data")
         pytest.skip(f"extra not run: {error}")
-    return Body(data, data.base_mesh(), people.MODEL)
+    return Body(data, data.base_mesh(), people.MAN)
 
 
 @pytest.fixture(scope="module")

@@ -130,7 +130,7 @@ def haired():
     out = []
     for person in (man, replace(man, name="Other", hair_style="bun", beard_style="short")):
         face = risorius.load(dna.to_bytes())
-        hair = grow_hair(person, body, base, parts, build.CM)
+        hair = grow_hair(person, body, body.man.positions, base, parts, build.CM)
         add_hair(face, hair)
         out.append((face, hair, person))
     return out
@@ -202,6 +202,26 @@ def test_extra_lashes_have_controls_of_their_own(haired):
         assert np.sign(still[far, 0]) == (1 if control.endswith("L") else -1)
         roots = way.reshape(-1, hair.strips["eyelashes"].rows, 2, 3)[:, 0]
         assert np.abs(roots).max() < 1e-6
+
+
+def test_extra_lashes_turn_with_the_lid(haired):
+    """On a closed eye the upper ones leave it downward, as far as the lid went about the ball."""
+    dna, hair, _ = haired[0]
+    rows = hair.strips["eyelashes"].rows
+    raw = np.zeros(len(dna.raw_control_names), np.float32)
+    angles = []
+    for value in (0.0, 1.0):
+        raw[dna.raw_control_names.index("CTRL_expressions.eyeBlinkL")] = value
+        middles = moved(dna, raw, "eyelashes_lod0_mesh").reshape(-1, rows, 2, 3).mean(axis=2)
+        way = middles[:, 1] - middles[:, 0]
+        angles.append(np.degrees(np.arctan2(way[:, 1], way[:, 2])))
+        if value == 0:
+            upper = (middles[:, -1, 1] > middles[:, 0, 1]) & (middles[:, 0, 0] > 0)
+            others = middles[:, 0, 0] < 0
+    turned = angles[1] - angles[0]
+    assert np.median(turned[upper]) < -20
+    assert angles[1][upper].max() < 0
+    assert np.abs(turned[others]).max() < 1
 
 
 def test_extra_people_of_other_hair_can_be_mixed(haired):

@@ -185,6 +185,22 @@ TEST_P(Traversals, LeaveNothingOfTheFrameBefore) {
   }
 }
 
+// An Instance fills only what the frame before wrote.
+TEST_P(Traversals, OfAnInstanceLeaveNothingOfTheFrameBefore) {
+  const Rig rig = must_compile(dna_, kernels_);
+  Instance face(rig);
+  std::mt19937 random(4);
+  for (std::uint32_t step = 0; step < 300; ++step) {
+    if (step % 9 == 8) face.set_lod(static_cast<std::uint32_t>(random() % 3));
+    const std::vector<float> raw =
+        some_active(step % 3 == 0 ? 0 : random() % 4, static_cast<std::uint32_t>(random() % kRaw));
+    Workspace fresh = make_workspace(rig);
+    Pose alone = make_pose(rig);
+    evaluate(rig, raw.data(), face.lod(), false, fresh, alone);
+    ASSERT_EQ(face.evaluate(raw.data()).joints, alone.joints) << "step " << step;
+  }
+}
+
 TEST_P(Traversals, KeepNanInTheGroupsThatHaveItAsAColumn) {
   const Rig rig = must_compile(dna_, kernels_);
   Workspace work = make_workspace(rig);
@@ -203,6 +219,35 @@ TEST_P(Traversals, KeepNanInTheGroupsThatHaveItAsAColumn) {
   }
   EXPECT_GT(spoilt, 0u);
   EXPECT_LT(spoilt, clean.joints.size());
+}
+
+// The last block of attributes is cut short where joints end; it may take several pieces.
+TEST_P(Traversals, FillTheLastBlockAndNothingBehindIt) {
+  for (std::uint16_t joints = 1; joints < 4; ++joints) {
+    const auto places = static_cast<std::uint16_t>(joints * 9);
+    dna::Dna dna = make_face(2, 0, joints, 1);
+    std::vector<std::uint16_t> outputs;  // backwards: each row is a piece of its own
+    std::vector<float> values, expected(places);
+    for (std::uint16_t p = places; p-- > 0;) {
+      outputs.push_back(p);
+      values.push_back(static_cast<float>(p + 1));
+      expected[p] = values.back();
+    }
+    dna.behavior.joint_groups = std::vector{make_group({places}, {0}, outputs, values)};
+    const Rig rig = must_compile(dna, kernels_);
+    Workspace work = make_batch_workspace(rig);
+    EXPECT_EQ(evaluate_by(rig, work, Traversal::kListed, {1.0f, 0.0f}, 0).joints, expected);
+    std::vector<float> raw, all;
+    for (std::size_t f = 0; f < simd::kFrames; ++f) {
+      raw.insert(raw.end(), {static_cast<float>(f % 2), 0.0f});
+      for (const float v : expected) all.push_back(v * static_cast<float>(f % 2));
+    }
+    Pose pose = make_pose(rig);
+    pose.joints.assign(all.size(), kNan);
+    pose.controls.resize(pose.controls.size() * simd::kFrames);
+    evaluate_frames(rig, raw.data(), simd::kFrames, 0, true, work, view(pose));
+    EXPECT_EQ(pose.joints, all);
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Every, Traversals, testing::ValuesIn([] {

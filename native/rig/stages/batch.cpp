@@ -29,9 +29,9 @@ class Block {
   void joints(std::uint32_t lod) noexcept {
     const std::span active(work_.active.data(), list_union());
     const simd::Column* columns = detail::list_columns(rig_, lod, active, work_);
-    for (std::size_t i = 0; i < rig_.live_groups[lod]; ++i) {
-      const std::uint32_t rows = rig_.joint_group_lods[i * rig_.lod_count + lod];
-      if (rows > 0) sum(rig_.joint_groups[i], i, columns, rows);
+    for (std::size_t n = 0; n < work_.live_count; ++n) {
+      const std::size_t i = work_.live[n];
+      sum(rig_.joint_groups[i], i, columns, rig_.joint_group_lods[i * rig_.lod_count + lod]);
     }
     for (const std::uint16_t control : active) {
       float* weights = work_.frame_weights.data() + std::size_t{control} * kFrames;
@@ -57,7 +57,6 @@ class Block {
   void sum(const JointGroup& g, std::size_t i, const simd::Column* columns,
            std::uint32_t rows) noexcept {
     const std::size_t count = work_.column_ends[i] - g.columns_begin;
-    if (count == 0 && !detail::shows(g, work_)) return;
     const float* weights = work_.frame_weights.data();
     float* out = work_.rows.data() + g.rows_begin;
     if (rig_.is_half()) {

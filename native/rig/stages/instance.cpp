@@ -8,8 +8,19 @@
 
 namespace risorius::rig {
 
+namespace {
+
+// Whether joint groups are all that writes joints.
+bool by_groups_alone(const Rig& rig) {
+  return rig.joint_stride == 9 && rig.quaternion_joints.empty() && rig.twist_swings.empty() &&
+         rig.ml_joints.empty();
+}
+
+}  // namespace
+
 Instance::Instance(const Rig& rig)
     : rig_(&rig), work_(make_workspace(rig)), pose_(make_pose(rig)), before_(rig.control_count) {
+  if (by_groups_alone(rig)) work_.shown_blocks.resize(work_.live_blocks.size());
   rest();
   std::copy(rig.initial_controls.begin(), rig.initial_controls.begin() + rig.raw_count,
             pose_.controls.begin());
@@ -20,6 +31,7 @@ void Instance::rest() noexcept {
   std::copy(rig_->initial_controls.begin() + rig_->raw_count, rig_->initial_controls.end(),
             pose_.controls.begin() + rig_->raw_count);
   std::fill(pose_.joints.begin(), pose_.joints.end(), 0.0f);
+  std::fill(work_.shown_blocks.begin(), work_.shown_blocks.end(), 0u);
   if (rig_->joint_stride == 10) detail::euler_joints(*rig_, lod_, pose_.joints.data());
   std::fill(pose_.blend_shapes.begin(), pose_.blend_shapes.end(), 0.0f);
   std::fill(pose_.animated_maps.begin(), pose_.animated_maps.end(), 0.0f);

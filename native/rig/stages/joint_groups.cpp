@@ -2,7 +2,7 @@
 // The stage that most of the time goes to: joint attributes as sums of the columns of active
 // controls.
 #include <algorithm>
-#include <cstring>
+#include <bit>
 
 #include "rig/stages/stages.h"
 
@@ -38,63 +38,141 @@ void list_active(const Rig& rig, std::uint32_t live, std::span<const std::uint16
                  Workspace& work) noexcept {
   std::uint32_t* ends = work.column_ends.data();
   simd::Column* columns = work.columns.data();
+  const std::uint32_t* begins = rig.joint_column_begins.data();
+  const JointColumn* of_controls = rig.joint_columns.data();
   for (std::uint32_t i = 0; i < live; ++i) ends[i] = rig.joint_groups[i].columns_begin;
   for (const std::uint16_t control : active) {
-    detail::for_columns(rig, control, live, [&](const JointColumn& column) {
-      columns[ends[column.group]++] = {column.offset, control};
-    });
+    const JointColumn *at = of_controls + begins[control],
+                      *end = of_controls + begins[control + std::size_t{1}];
+    for (; at < end && at->group < live; ++at) {
+      columns[ends[at->group]++] = {at->offset, control};
+    }
   }
 }
 
+// Calls f(word, bits) with the bits from begin up to end of each word, until it says false.
+template <class F>
+void for_words(std::uint32_t begin, std::uint32_t end, F f) noexcept {
+  for (std::uint32_t at = begin; at < end;) {
+    const std::uint32_t next = std::min(end, (at | 63) + 1);
+    const std::uint64_t bits = (~std::uint64_t{0} >> (64 - (next - at))) << (at & 63);
+    if (!f(at / 64, bits)) return;
+    at = next;
+  }
+}
+
+// Whether a group has rows in a block that others write: then those must be 0 while it rests.
+bool shows(const JointGroup& g, const Workspace& work) noexcept {
+  bool live = false;
+  for_words(g.blocks_begin, g.blocks_end, [&](std::size_t word, std::uint64_t bits) {
+    return !(live = (work.live_blocks[word] & bits) != 0);
+  });
+  return live;
+}
+
+// The first of `count` bits from `at` on that differs from `value`. In: word  gives 64 of them
+template <class Word>
+std::size_t find_other(std::size_t at, std::size_t count, bool value, Word word) noexcept {
+  const std::uint64_t flip = value ? ~std::uint64_t{0} : 0;
+  std::uint64_t past = ~std::uint64_t{0} << (at % 64);
+  for (std::size_t w = at / 64; w * 64 < count; ++w, past = ~std::uint64_t{0}) {
+    const std::uint64_t bits = (word(w) ^ flip) & past;
+    if (bits != 0) return std::min(count, w * 64 + std::size_t(std::countr_zero(bits)));
+  }
+  return count;
+}
+
+// Calls f(first, end) for each run of set bits among the first `count`.
+template <class Word, class F>
+void for_runs(std::size_t count, Word word, F f) noexcept {
+  for (std::size_t at = 0, end = 0; (at = find_other(end, count, false, word)) < count;) {
+    end = find_other(at, count, true, word);
+    f(at, end);
+  }
+}
+
+// Blocks that groups with active columns reach, and the groups that write them.
 void mark_blocks(const Rig& rig, std::uint32_t lod, Workspace& work) noexcept {
-  std::fill(work.live_blocks.begin(), work.live_blocks.end(), std::uint8_t{0});
-  for (std::size_t i = 0; i < rig.live_groups[lod]; ++i) {
+  std::fill(work.live_blocks.begin(), work.live_blocks.end(), 0u);
+  const std::uint32_t live = rig.live_groups[lod];
+  for (std::uint32_t i = 0; i < live; ++i) {
     const JointGroup& g = rig.joint_groups[i];
     if (work.column_ends[i] == g.columns_begin) continue;
-    std::fill(work.live_blocks.begin() + g.blocks_begin, work.live_blocks.begin() + g.blocks_end,
-              std::uint8_t{1});
+    for_words(g.blocks_begin, g.blocks_end, [&](std::size_t word, std::uint64_t bits) {
+      work.live_blocks[word] |= bits;
+      return true;
+    });
   }
+  std::uint32_t n = 0;
+  const std::uint32_t* rows = rig.joint_group_lods.data() + lod;
+  for (std::uint32_t i = 0; i < live; ++i, rows += rig.lod_count) {
+    const JointGroup& g = rig.joint_groups[i];
+    const bool moves = work.column_ends[i] != g.columns_begin || shows(g, work);
+    if (moves && *rows > 0) work.live[n++] = i;
+  }
+  work.live_count = n;
 }
 
-constexpr std::size_t kAhead = 2;
+// Places runs of blocks of one LOD, ascending.
+class Placer {
+ public:
+  Placer(const Rig& rig, std::uint32_t lod, const float* rows, float* joints)
+      : rig_(rig),
+        rows_(rows),
+        joints_(joints),
+        places_(std::size_t{rig.joint_count} * rig.joint_stride),
+        pieces_(rig.joint_pieces.data() + lod * blocks()),
+        extra_(rig.extra_pieces.data() + rig.extra_begins[lod]),
+        extra_end_(rig.extra_pieces.data() + rig.extra_begins[lod + 1]) {}
 
-// Asks for the columns of a group while the group before is summed: listed ones lie all over the
-// matrices, where the hardware does not see them coming.
-void prefetch_columns(const Rig& rig, std::uint32_t lod, const Workspace& work,
-                      std::size_t i) noexcept {
-  if (i >= rig.live_groups[lod]) return;
-  const std::size_t size = rig.is_half() ? 2 : 4;
-  const std::size_t bytes = rig.joint_group_lods[i * rig.lod_count + lod] * size;
-  const auto* values = rig.is_half() ? reinterpret_cast<const char*>(rig.joint_halves.data())
-                                     : reinterpret_cast<const char*>(rig.joint_values.data());
-  for (std::uint32_t c = rig.joint_groups[i].columns_begin; c < work.column_ends[i]; ++c) {
-    const char* column = values + work.columns[c].offset * size;
-    for (std::size_t at = 0; at < bytes; at += 64) simd::prefetch(column + at);
+  std::size_t blocks() const { return (places_ + simd::kPlaces - 1) / simd::kPlaces; }
+  // Extra pieces add to places that the first ones left at 0.
+  void place(std::size_t first, std::size_t end) noexcept {
+    const std::size_t whole = std::min(end, places_ / simd::kPlaces);
+    rig_.kernels->place(pieces_ + first, whole - first, rows_, joints_ + first * simd::kPlaces);
+    const simd::Piece* from = extra_before(first);
+    const simd::Piece* to = extra_before(whole);
+    if (from < to) {
+      rig_.kernels->place_more(from, static_cast<std::size_t>(to - from), rows_, joints_);
+    }
+    if (whole < end) place_last(whole);
   }
-}
+  void rest(std::size_t first, std::size_t end) noexcept {
+    std::fill(joints_ + first * simd::kPlaces, joints_ + std::min(places_, end * simd::kPlaces),
+              0.0f);
+  }
 
-// Blocks first up to end; the last one may be cut short. Extra pieces add to places that the first
-// ones left at 0.
-void place_blocks(const Rig& rig, std::uint32_t lod, std::size_t first, std::size_t end,
-                  const float* rows, float* joints) noexcept {
-  const std::size_t places = std::size_t{rig.joint_count} * rig.joint_stride,
-                    whole = std::min(end, places / simd::kPlaces),
-                    blocks = (places + simd::kPlaces - 1) / simd::kPlaces;
-  const simd::Piece* pieces = rig.joint_pieces.data() + lod * blocks;
-  rig.kernels->place(pieces + first, whole - first, rows, joints + first * simd::kPlaces);
-  if (whole < end) {
+ private:
+  // The extra pieces of blocks below: past those of the last call, in steps that double.
+  const simd::Piece* extra_before(std::size_t block) noexcept {
+    std::ptrdiff_t step = 1;
+    const simd::Piece* from = extra_;
+    while (step < extra_end_ - from && from[step].block < block) {
+      from += step;
+      step *= 2;
+    }
+    extra_ = std::ranges::lower_bound(from, std::min(from + step + 1, extra_end_), block, {},
+                                      &simd::Piece::block);
+    return extra_;
+  }
+  // The last block where it is cut short: what is behind it is another's.
+  void place_last(std::size_t block) noexcept {
     float last[simd::kPlaces];
-    rig.kernels->place(pieces + whole, 1, rows, last);
-    std::copy(last, last + places % simd::kPlaces, joints + whole * simd::kPlaces);
+    rig_.kernels->place(pieces_ + block, 1, rows_, last);
+    for (; extra_ < extra_end_; ++extra_) {
+      const simd::Piece more{extra_->from, extra_->mask, 0};
+      rig_.kernels->place_more(&more, 1, rows_, last);
+    }
+    std::copy_n(last, places_ % simd::kPlaces, joints_ + block * simd::kPlaces);
   }
-  const auto extra = rig.extra_pieces.subspan(rig.extra_begins[lod],
-                                              rig.extra_begins[lod + 1] - rig.extra_begins[lod]);
-  const auto from = std::ranges::lower_bound(extra, first, {}, &simd::Piece::block);
-  const auto to = std::ranges::lower_bound(extra, end, {}, &simd::Piece::block);
-  if (from < to) {
-    rig.kernels->place_more(&*from, static_cast<std::size_t>(to - from), rows, joints);
-  }
-}
+
+  const Rig& rig_;
+  const float* rows_;
+  float* joints_;
+  std::size_t places_;
+  const simd::Piece* pieces_;
+  const simd::Piece *extra_, *extra_end_;
+};
 
 }  // namespace
 
@@ -116,25 +194,18 @@ const simd::Column* list_columns(const Rig& rig, std::uint32_t lod,
   return whole ? rig.group_columns.data() : work.columns.data();
 }
 
-bool shows(const JointGroup& g, const Workspace& work) noexcept {
-  return g.blocks_begin < g.blocks_end && std::memchr(work.live_blocks.data() + g.blocks_begin, 1,
-                                                      g.blocks_end - g.blocks_begin) != nullptr;
-}
-
-void place_rows(const Rig& rig, std::uint32_t lod, const Workspace& work, const float* rows,
+void place_rows(const Rig& rig, std::uint32_t lod, Workspace& work, const float* rows,
                 float* joints) noexcept {
-  const auto begin = work.live_blocks.begin(), last = work.live_blocks.end();
-  const std::size_t places = std::size_t{rig.joint_count} * rig.joint_stride;
-  for (auto at = begin; at < last;) {
-    const auto end = std::find(at, last, static_cast<std::uint8_t>(1 - *at));
-    const auto from = static_cast<std::size_t>(at - begin),
-               to = static_cast<std::size_t>(end - begin);
-    if (*at == 0) {
-      std::fill(joints + from * simd::kPlaces, joints + std::min(places, to * simd::kPlaces), 0.0f);
-    } else {
-      place_blocks(rig, lod, from, to, rows, joints);
-    }
-    at = end;
+  Placer placer(rig, lod, rows, joints);
+  const std::size_t blocks = placer.blocks();
+  const auto live = [&](std::size_t w) { return work.live_blocks[w]; };
+  for_runs(blocks, live, [&](std::size_t first, std::size_t end) { placer.place(first, end); });
+  const auto rest = [&](std::size_t first, std::size_t end) { placer.rest(first, end); };
+  if (work.shown_blocks.empty()) {
+    for_runs(blocks, [&](std::size_t w) { return ~live(w); }, rest);
+  } else {
+    for_runs(blocks, [&](std::size_t w) { return work.shown_blocks[w] & ~live(w); }, rest);
+    std::ranges::copy(work.live_blocks, work.shown_blocks.begin());
   }
 }
 
@@ -142,17 +213,14 @@ void joint_groups(const Rig& rig, std::uint32_t lod, Workspace& work,
                   const PoseView& pose) noexcept {
   const simd::Column* columns =
       list_columns(rig, lod, {work.active.data(), work.active_count}, work);
-  const bool scattered = columns == work.columns.data();
-  for (std::size_t i = 0; scattered && i < kAhead; ++i) prefetch_columns(rig, lod, work, i);
-  for (std::size_t i = 0; i < rig.live_groups[lod]; ++i) {
-    if (scattered) prefetch_columns(rig, lod, work, i + kAhead);
+  for (std::size_t n = 0; n < work.live_count; ++n) {
+    const std::uint32_t i = work.live[n];
     const JointGroup& g = rig.joint_groups[i];
-    const std::uint32_t rows = rig.joint_group_lods[i * rig.lod_count + lod];
-    if (rows == 0) continue;
+    const std::uint32_t rows = rig.joint_group_lods[i * std::size_t{rig.lod_count} + lod];
     const std::size_t count = work.column_ends[i] - g.columns_begin;
     float* out = work.rows.data() + g.rows_begin;
     if (count == 0) {
-      if (shows(g, work)) std::fill(out, out + rows, 0.0f);
+      std::fill(out, out + rows, 0.0f);
     } else if (rig.is_half()) {
       rig.kernels->half_columns(rig.joint_halves.data(), columns + g.columns_begin, count,
                                 pose.controls, out, rows);

@@ -51,26 +51,13 @@ void ml_joints(const Rig& rig, std::uint32_t lod, const PoseView& pose) noexcept
 void channels_and_maps(const Rig& rig, std::uint32_t lod, const Workspace& work,
                        const PoseView& pose) noexcept;
 
-/// Calls f with each column of a control in groups below live.
-template <class F>
-void for_columns(const Rig& rig, std::size_t control, std::uint32_t live, F f) noexcept {
-  const std::uint32_t end = rig.joint_column_begins[control + 1];
-  for (std::uint32_t i = rig.joint_column_begins[control]; i < end; ++i) {
-    const JointColumn& column = rig.joint_columns[i];
-    if (column.group >= live) break;
-    f(column);
-  }
-}
 /// The columns that a frame, or frames together, need: those of active controls, or all where
 /// reading the others costs less than listing. Out: columns by group; those of group i are from
 /// its columns_begin up to work.column_ends[i].
 /// In:  active  controls, ascending
-/// Out: work    also live_blocks
+/// Out: work    also live_blocks and live
 const simd::Column* list_columns(const Rig& rig, std::uint32_t lod,
                                  std::span<const std::uint16_t> active, Workspace& work) noexcept;
-/// Whether a group without active columns has rows in a block that others write: then its rows
-/// must be 0.
-bool shows(const JointGroup& group, const Workspace& work) noexcept;
 
 /// The first rotation attribute of a joint.
 inline float* rotation_of(const Rig& rig, float* joints, std::uint32_t joint) noexcept {
@@ -87,10 +74,10 @@ inline void store_rotation(const Rig& rig, const Quaternion& q, float* to) noexc
 }
 
 /// Brings the rows of all groups to their joint attributes; attributes without a row, and those of
-/// blocks that rest, become 0.
+/// blocks that rest, become 0. Where work.shown_blocks is kept, blocks that rested before are 0.
 /// In:  rows    [rows of all groups] and a vector more
 ///      work    as list_columns left it
 /// Out: joints  [joints, stride]
-void place_rows(const Rig& rig, std::uint32_t lod, const Workspace& work, const float* rows,
+void place_rows(const Rig& rig, std::uint32_t lod, Workspace& work, const float* rows,
                 float* joints) noexcept;
 }  // namespace risorius::rig::detail

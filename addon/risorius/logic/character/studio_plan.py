@@ -17,8 +17,8 @@ Triple = tuple[float, float, float]
 GROWN = 0.063  # metres between the eyes of the head that the numbers are made for
 LENS = 100.0  # mm: a portrait lens on SENSOR
 SENSOR = 24.0  # mm, height of a full frame; the frame's height is what is fitted
-_HEIGHT = 0.46  # of the picture at the eyes: head and shoulders
-_HEADROOM = 0.028  # at least, above the hair
+_HEIGHT = 0.39  # of the picture at the eyes: head and shoulders
+_HEADROOM = 0.014  # at least, above the hair
 _EDGE = 0.01  # the picture ends so far above the mesh's lower end
 _CHIN = 0.13  # below the eyes, and in any picture
 _THIRD = 1.0 / 3.0  # the eyes' place from the upper edge
@@ -77,7 +77,7 @@ _Row = tuple[str, float, float, float, tuple[float, float], float, Triple]
 # Degrees aside (to the right of one who looks at the face) and up, metres away, width and height,
 # light at the face as a share of the key's, colour. Fill: two stops under the key.
 _LAMPS: tuple[_Row, ...] = (
-    ("Key", -45.0, 30.0, 1.3, (0.75, 0.75), 1.0, (1.0, 0.925, 0.84)),
+    ("Key", -45.0, 30.0, 1.3, (0.6, 0.6), 1.0, (1.0, 0.925, 0.84)),
     ("Fill", 42.0, 4.0, 2.0, (1.5, 1.5), 0.25, (0.86, 0.93, 1.0)),
     ("Rim", 148.0, 38.0, 1.35, (0.45, 0.9), 1.3, (0.93, 0.97, 1.0)),
 )
@@ -104,9 +104,11 @@ def plan(apart: float, low: Sequence[float], high: Sequence[float]) -> Studio:
     middle = (0.0, _DEPTH * unit)
     camera = [m + (away + _DEPTH * unit) * t for m, t in zip(middle, towards, strict=True)]
     wall = [m - max(_WALL * unit, high[1] + unit) * t for m, t in zip(middle, towards, strict=True)]
+    above = _ABOVE * unit
+    farther = (away + _DEPTH * unit) / away  # the ray through `lift` at the eyes meets the middle
     return Studio(
-        camera=(camera[0], camera[1], _ABOVE * unit),
-        target=(middle[0], middle[1], lift),
+        camera=(camera[0], camera[1], above),
+        target=(middle[0], middle[1], above + (lift - above) * farther),
         lens=LENS,
         lamps=tuple(_lamp(row, unit) for row in _LAMPS),
         wall=(wall[0], wall[1], 0.0),

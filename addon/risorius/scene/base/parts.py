@@ -49,6 +49,8 @@ BOARD = "risorius_board"  # on the bones of the face board: the name of each
 LEAD = "risorius_lead"  # on the control armature: "BOARD" where the face board moves the face
 PULL = "risorius_pull"  # on the deforming armature: its driver keeps the controls evaluated
 PINS = "risorius_pins"  # on the control armature: mesh and vertex of each pin of a drag, flat
+HANDLES_SELECTED = "risorius_handles_selected"  # on the same, like pins: handles that go together
+HANDLES_HIDDEN = "risorius_handles_hidden"  # on the same, like pins: handles that are not offered
 
 
 def rigs(linked: bool = False) -> list[ArmatureObject]:

@@ -5,10 +5,17 @@ from __future__ import annotations
 
 from weakref import WeakKeyDictionary
 
+import numpy as np
+
 from ... import native
-from .skin import Point
+from ..animation import keying
+from ..base.blender_types import ArmatureObject, Context
+from ..character import board, runtime
+from . import kept_points, sliders
+from .skin import Point, Skin
 
 COUNT = 18
+_SHARE = 0.1  # of the farthest that a slider moves a handle: what moves it less is not its own
 _placed: WeakKeyDictionary[native.Surface, list[Point]] = WeakKeyDictionary()
 
 
@@ -24,3 +31,64 @@ def of(surface: native.Surface) -> list[Point]:
         found = () if head is None else native.module().place_handles(surface, head, COUNT)
         _placed[surface] = [(int(head or 0), int(vertex)) for vertex in found]
     return _placed[surface]
+
+
+def offered(rig: ArmatureObject, surface: native.Surface) -> list[Point]:
+    """The handles of a face that are not hidden.
+
+    Args:
+        rig: the character.
+        surface: as for `of`.
+    """
+    hidden = kept_points.of(rig, kept_points.HIDDEN, surface.vertex_counts)
+    return [point for point in of(surface) if point not in hidden]
+
+
+def selected(rig: ArmatureObject, surface: native.Surface) -> list[Point]:
+    """Handles that are selected and not hidden. Args: rig, surface  as for `offered`."""
+    chosen = kept_points.of(rig, kept_points.SELECTED, surface.vertex_counts)
+    return [point for point in offered(rig, surface) if point in chosen]
+
+
+def sliders_of(context: Context, rig: ArmatureObject) -> list[str]:
+    """The sliders that belong to the selected handles: those that move one of them noticeably.
+
+    What drivers or layers lead belongs to none.
+
+    Args:
+        context: has the scene that is seen.
+        rig: the character.
+    """
+    live = runtime.there(rig)
+    skin = Skin.of(context, rig, live)
+    state = sliders.read(rig, live, skin.depsgraph)
+    own = np.zeros(len(live.labels), bool)
+    for mesh, vertex in selected(rig, skin.surface):
+        reach = skin.surface.jacobian(
+            state.seen, mesh, [vertex], lowest=state.low, highest=state.high
+        )
+        far = np.linalg.norm(reach[0], axis=0) * state.free
+        own |= (far > _SHARE * far.max(initial=0.0)) & (far > 0)
+    return [live.labels[i] for i in np.flatnonzero(own)]
+
+
+def key(context: Context, rig: ArmatureObject) -> int:
+    """Key what belongs to the selected handles, as bones are keyed: on sliders or on the board.
+
+    Args:
+        context: has the settings and the frame.
+        rig: the character.
+
+    Returns:
+        How many properties were keyed.
+
+    Raises:
+        FaceError: a tweak is on that does not reach here.
+    """
+    labels, live = sliders_of(context, rig), runtime.there(rig)
+    led: list[str] = []
+    if board.leads_face(rig):
+        reached = dict(zip(live.labels, live.table.reached, strict=True))
+        led = [label for label in labels if reached[label]]
+    paths = [board.path_of(h.bone) for h in board.handles_of_labels(rig, led)] if led else []
+    return keying.key(context, rig, [n for n in labels if n not in led], paths)

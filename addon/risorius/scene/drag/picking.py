@@ -34,11 +34,13 @@ class Hit:
         rig: the character.
         point: mesh and vertex of its DNA.
         place: float64[3] of that vertex in the world.
+        is_handle: whether it is one of the handles that are offered.
     """
 
     rig: ArmatureObject
     point: Point
     place: NDArray[np.float64]
+    is_handle: bool = False
 
 
 def under(context: Context, origin: Vector, direction: Vector) -> Hit | None:
@@ -152,13 +154,13 @@ def places(
 def handles_of(
     context: Context, rig: ArmatureObject, live: runtime.Runtime
 ) -> list[tuple[Point, NDArray[np.float64]]]:
-    """The handles of a face that is seen: each point with its place in the world.
+    """The handles of a face that are offered: each point with its place in the world.
 
     Args:
         context: has the scene that is seen.
         rig, live: the character and its Runtime.
     """
-    points = handles.of(Skin.of(context, rig, live).surface)
+    points = handles.offered(rig, Skin.of(context, rig, live).surface)
     found = places(context, rig, live, points)
     return list(zip(points, found, strict=False))
 

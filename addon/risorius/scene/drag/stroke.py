@@ -22,7 +22,7 @@ from ..base.blender_types import ArmatureObject, Context
 from ..character import runtime
 from ..frame import inputs
 from ..live import sessions
-from . import pins, sliders
+from . import kept_points, sliders
 from .head_turns import HeadTurns
 from .skin import Point, Skin
 
@@ -42,6 +42,7 @@ class Options:
         single: only the one control that does it best moves; with `symmetric` its partner too.
         choice: which one: 0 is the best, 1 the next.
         region: only controls of the region of the point.
+        others: points that go the same way as the dragged one.
     """
 
     symmetric: bool = False
@@ -49,6 +50,7 @@ class Options:
     single: bool = False
     choice: int = 0
     region: bool = False
+    others: tuple[Point, ...] = ()
 
 
 @dataclass
@@ -56,15 +58,15 @@ class _Anchors:
     """The points of a drag as they were at the press.
 
     Attributes:
-        points: the dragged one, its mirror if there is one, then pins.
-        dragged: how many of them are pulled.
+        points: the dragged one, others that go with it, their mirrors, then pins.
+        mirrored: of each point that is pulled, whether it goes the mirrored way; pins are not.
         rest: float64[P, 3] in the file's space.
         world: float64[P, 3] in the scene.
         maps: float64[P, 3, 3] from directions of the file to those of the world.
     """
 
     points: list[Point]
-    dragged: int
+    mirrored: list[bool]
     rest: Float
     world: Float
     maps: Float
@@ -219,16 +221,16 @@ class Stroke:
         """Targets float64[P, 3] and axes float64[P, 3, 3] of the file's space."""
         goal, axes = anchors.rest.copy(), np.tile(np.eye(3), (len(anchors.points), 1, 1))
         shift = np.linalg.solve(anchors.maps[0], target - anchors.world[0])
-        goal[0] += shift
+        along = np.eye(3)
         if view is not None:
             # Along a screen two directions count; a third of no length leaves the depth free.
             rows = _across(view) @ anchors.maps[0]
-            axes[0, :2] = rows / np.linalg.norm(rows, axis=1, keepdims=True)
-            axes[0, 2] = 0.0
-        if anchors.dragged == 2:
-            flip = _flip(self.live)
-            goal[1] += flip @ shift
-            axes[1] = axes[0] @ flip
+            along[:2] = rows / np.linalg.norm(rows, axis=1, keepdims=True)
+            along[2] = 0.0
+        flip = _flip(self.live)
+        for number, mirrored in enumerate(anchors.mirrored):
+            goal[number] += flip @ shift if mirrored else shift
+            axes[number] = along @ flip if mirrored else along
         return goal, axes
 
     def _of(self) -> _Anchors:
@@ -238,12 +240,16 @@ class Stroke:
         return self._anchors[symmetric]
 
     def _make_anchors(self, symmetric: bool) -> _Anchors:
-        points = [self.point]
-        other = self.skin.mirrored(self.point) if symmetric else None
-        points += [other] if other is not None else []
-        dragged = len(points)
-        held = pins.of(self.rig, self.skin.surface.vertex_counts)
         shown = set(self.skin.surface.mesh_indices)
+        others = [p for p in self.options.others if p != self.point and p[0] in shown]
+        points = [self.point, *others]
+        mirrored = [False] * len(points)
+        for point in (self.point, *others) if symmetric else ():
+            other = self.skin.mirrored(point)  # one of the middle is its own, and stays there
+            if other is not None and (other == point or other not in points):
+                points.append(other)
+                mirrored.append(True)
+        held = kept_points.of(self.rig, kept_points.PINS, self.skin.surface.vertex_counts)
         points += [p for p in held if p not in points and p[0] in shown]
         maps = np.stack([self.turns.at(m, np.array([v], np.int64))[0] for m, v in points])
         raw = self.state.seen
@@ -253,7 +259,7 @@ class Stroke:
             world[0] = self.skin.pressed
         elif self._anchors:
             world[0] = next(iter(self._anchors.values())).world[0]
-        return _Anchors(points, dragged, rest.astype(np.float64), world, maps[:, :3, :3])
+        return _Anchors(points, mirrored, rest.astype(np.float64), world, maps[:, :3, :3])
 
     def _seen(self, context: Context) -> Float:
         """Where the point is after the face was evaluated."""

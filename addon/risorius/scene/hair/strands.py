@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cards of hair as Blender's hair curves, in renders: a modifier that follows the cards.
+"""Cards of hair as Blender's hair curves, in renders: curves whose nodes follow the cards.
 
 Each card is a guide with a width. Strands lie across it, go where its deformed vertices go, and
 take the place of the cards in renders; the viewport and exports keep the cards.
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from typing import Any
 
 import bpy
 
@@ -16,16 +17,19 @@ from ..base import compat, parts
 from ..base.blender_types import ArmatureObject, MeshObject, Node, NodeTree, Socket
 from ..character import runtime
 
-MODIFIER = "Strands"
+STRANDS = "risorius_strands"  # on a mesh of cards: the object that renders show instead
 _TREE = "Risorius Strands"
+_CARDS = "Cards"  # input of the modifier: the mesh that is followed
 _PLACE = "strand_uv"  # attribute of the curves: where in the picture their colour is
+_DEEPER = 1.35  # exponent of a fibre's colour
 _ROWS = re.compile(r"rows=(\d+)")
-# Name of a mesh begins -> strands of a card, radius at the root in metres, share that is cut off.
+# Name of a mesh begins -> strands of a card, radius at the root and how far tips part, in metres,
+# and the share that is cut off at most.
 _KINDS = {
-    "hair": (22, 0.000045, 0.45),
-    "brows": (4, 0.00004, 0.35),
-    "beard": (9, 0.00005, 0.5),
-    "eyelashes": (3, 0.00005, 0.25),
+    "hair": (26, 0.00006, 0.0025, 0.45),
+    "brows": (4, 0.00005, 0.0004, 0.35),
+    "beard": (9, 0.00006, 0.0015, 0.5),
+    "eyelashes": (3, 0.00006, 0.0003, 0.25),
 }
 
 
@@ -48,9 +52,14 @@ def cards(rig: ArmatureObject) -> Iterator[tuple[MeshObject, str, int]]:
             yield item, name, int(found[1])
 
 
+def _strands_of(item: MeshObject) -> bpy.types.Object | None:
+    found = item.get(STRANDS)
+    return found if isinstance(found, bpy.types.Object) else None
+
+
 def are_shown(rig: ArmatureObject) -> bool:
     """Whether renders of a character show strands."""
-    return any(MODIFIER in item.modifiers for item, _, _ in cards(rig))
+    return any(_strands_of(item) is not None for item, _, _ in cards(rig))
 
 
 def show(rig: ArmatureObject, unit: float) -> int:
@@ -63,14 +72,28 @@ def show(rig: ArmatureObject, unit: float) -> int:
     count = 0
     for item, name, rows in cards(rig):
         kind = next((k for k in _KINDS if name.startswith(k)), None)
-        if kind is None:
+        if kind is None or item.hide_render:
             continue
-        if MODIFIER not in item.modifiers:
-            modifier = item.modifiers.new(MODIFIER, "NODES")
-            modifier.node_group = _tree(item, rows, kind, unit)
-            modifier.show_viewport = False
+        if _strands_of(item) is None:
+            _add(item, rows, kind, unit)
         count += 1
     return count
+
+
+def _add(item: MeshObject, rows: int, kind: str, unit: float) -> None:
+    data = bpy.data.hair_curves.new(f"{item.name}_strands")
+    thing = bpy.data.objects.new(f"{item.name}_strands", data)
+    for collection in item.users_collection:
+        collection.objects.link(thing)
+    thing.parent = item
+    modifier: Any = thing.modifiers.new(_TREE, "NODES")
+    tree: Any = _tree(item, rows, kind, unit)
+    modifier.node_group = tree
+    # An input of the modifier, so that a copied face has strands that follow its own cards.
+    modifier[tree.interface.items_tree[_CARDS].identifier] = item
+    thing.hide_viewport = thing.hide_select = True
+    parts.point(item, STRANDS, thing)
+    item.hide_render = True
 
 
 def hide(rig: ArmatureObject) -> None:
@@ -80,13 +103,24 @@ def hide(rig: ArmatureObject) -> None:
         rig: the deforming armature.
     """
     for item, _, _ in cards(rig):
-        modifier = item.modifiers.get(MODIFIER)
-        if modifier is None:
+        thing = _strands_of(item)
+        if thing is None:
             continue
-        tree = modifier.node_group
-        item.modifiers.remove(modifier)
-        if tree is not None and tree.users == 0:
+        data: Any = thing.data
+        modifiers: Any = thing.modifiers
+        trees = [m.node_group for m in modifiers if m.type == "NODES"]
+        bpy.data.objects.remove(thing)
+        bpy.data.hair_curves.remove(data)
+        for tree in trees:
+            materials = [
+                n.inputs["Material"].default_value for n in tree.nodes if n.type == "SET_MATERIAL"
+            ]
             bpy.data.node_groups.remove(tree)
+            for material in materials:
+                if material is not None and not material.users:
+                    bpy.data.materials.remove(material)
+        del item[STRANDS]
+        item.hide_render = False
 
 
 class _Tree:
@@ -141,12 +175,15 @@ class _Tree:
 
 def _tree(item: MeshObject, rows: int, kind: str, unit: float) -> NodeTree:
     """Nodes that turn the cards of a mesh into strands."""
-    each, radius, cut = _KINDS[kind]
-    tree = bpy.data.node_groups.new(_TREE, "GeometryNodeTree")
+    each, radius, apart, cut = _KINDS[kind]
+    tree: Any = bpy.data.node_groups.new(_TREE, "GeometryNodeTree")
     for way in ("INPUT", "OUTPUT"):
         tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
     g = _Tree(tree)
-    mesh = g.node("NodeGroupInput").outputs[0]
+    tree.interface.new_socket(_CARDS, in_out="INPUT", socket_type="NodeSocketObject")
+    given = g.node("NodeGroupInput").outputs[_CARDS]
+    source = g.node("GeometryNodeObjectInfo", {"Object": given}, transform_space="RELATIVE")
+    mesh = source.outputs["Geometry"]
     count = each * len(item.data.vertices) // (2 * rows)
     line = g.node("GeometryNodeCurvePrimitiveLine")
     line = g.node("GeometryNodeResampleCurve", {"Curve": line.outputs[0], "Count": rows})
@@ -166,39 +203,76 @@ def _tree(item: MeshObject, rows: int, kind: str, unit: float) -> NodeTree:
     across = g.math("ADD", across, g.math("MULTIPLY", lean, g.math("DIVIDE", row, rows)))
     place = g.node("GeometryNodeInputPosition").outputs[0]
     ends = [g.taken(mesh, place, i, "FLOAT_VECTOR") for i in (left, right)]
+    parted = g.node("FunctionNodeRandomValue", {"ID": strand, "Seed": 4}, data_type="FLOAT_VECTOR")
+    parted.inputs["Min"].default_value = [-apart / unit] * 3
+    parted.inputs["Max"].default_value = [apart / unit] * 3
+    aside = g.node("ShaderNodeVectorMath", {0: parted.outputs["Value"]}, operation="SCALE")
+    g.put(g.math("DIVIDE", row, rows - 1), aside.inputs["Scale"])
     moved = g.node(
         "GeometryNodeSetPosition",
-        {"Geometry": real.outputs[0], "Position": g.between(ends[0], ends[1], across)},
+        {
+            "Geometry": real.outputs[0],
+            "Position": g.between(ends[0], ends[1], across),
+            "Offset": aside.outputs[0],
+        },
     )
+    stored = _store_place(g, item, mesh, moved.outputs[0], (left, right, across))
+    finished = _finish(g, stored, 2 * rows + 2, 1.0 - cut, radius / unit)
+    painted = g.node("GeometryNodeSetMaterial", {"Geometry": finished, "Material": _material(item)})
+    out = g.node("NodeGroupOutput")
+    tree.links.new(painted.outputs[0], out.inputs[0])
+    return tree
+
+
+def _store_place(
+    g: _Tree, item: MeshObject, mesh: Socket, curves: Socket, where: tuple[Socket, Socket, Socket]
+) -> Socket:
+    """Curves that know where in the cards' picture each point is.
+
+    Args:
+        g: the tree.
+        item: the cards.
+        mesh: the cards as they are deformed.
+        curves: the strands.
+        where: numbers of the vertices left and right of a point, and where it is between them.
+    """
+    left, right, across = where
     uv = g.node("GeometryNodeInputNamedAttribute", data_type="FLOAT_VECTOR")
     uv.inputs["Name"].default_value = item.data.uv_layers[0].name if item.data.uv_layers else ""
     value = next(s for s in uv.outputs if s.enabled)
     ends = [g.taken(mesh, value, i, "FLOAT_VECTOR") for i in (left, right)]
     stored = g.node(
         "GeometryNodeStoreNamedAttribute",
-        {"Geometry": moved.outputs[0], "Name": _PLACE},
+        {"Geometry": curves, "Name": _PLACE},
         data_type="FLOAT_VECTOR",
         domain="POINT",
     )
     spot = g.between(ends[0], ends[1], across)
     g.put(spot, next(s for s in stored.inputs if s.name == "Value" and s.enabled))
+    return stored.outputs[0]
+
+
+def _finish(g: _Tree, curves: Socket, points: int, least: float, radius: float) -> Socket:
+    """Strands as smooth curves of many lengths that taper to their tips.
+
+    Args:
+        g: the tree.
+        curves: the strands.
+        points: of each.
+        least: of the length, what a strand has at least.
+        radius: at the root, in Blender units.
+    """
     round_ = g.node("GeometryNodeCurveSplineType", spline_type="CATMULL_ROM")
-    g.put(stored.outputs[0], round_.inputs["Curve"])
-    finer = g.node("GeometryNodeResampleCurve", {"Curve": round_.outputs[0], "Count": 2 * rows + 2})
+    g.put(curves, round_.inputs["Curve"])
+    finer = g.node("GeometryNodeResampleCurve", {"Curve": round_.outputs[0], "Count": points})
     number = g.node("GeometryNodeInputIndex").outputs[0]
-    whole = g.random(1.0 - cut, 1.0, 3, number)
+    whole = g.random(least, 1.0, 3, number)
     trimmed = g.node("GeometryNodeTrimCurve", {"Curve": finer.outputs[0]}, mode="FACTOR")
     g.put(whole, next(s for s in trimmed.inputs if s.name == "End" and s.enabled))
     along = g.node("GeometryNodeSplineParameter").outputs["Factor"]
-    thick = g.math("MULTIPLY", g.math("SUBTRACT", 1.0, g.math("POWER", along, 3.0)), radius / unit)
+    thick = g.math("MULTIPLY", g.math("SUBTRACT", 1.0, g.math("POWER", along, 3.0)), radius)
     sized = g.node("GeometryNodeSetCurveRadius", {"Curve": trimmed.outputs[0], "Radius": thick})
-    painted = g.node(
-        "GeometryNodeSetMaterial",
-        {"Geometry": sized.outputs[0], "Material": _material(item)},
-    )
-    out = g.node("NodeGroupOutput")
-    tree.links.new(painted.outputs[0], out.inputs[0])
-    return tree
+    return sized.outputs[0]
 
 
 def _material(item: MeshObject) -> bpy.types.Material:
@@ -215,16 +289,20 @@ def _material(item: MeshObject) -> bpy.types.Material:
     fibre.parametrization = "COLOR"
     shader.inputs["Roughness"].default_value = 0.5
     fibre.inputs["Roughness"].default_value = 0.35
-    source = cards_look.node_tree if cards_look is not None else None
+    source: Any = cards_look.node_tree if cards_look is not None else None
     pictures = [n for n in source.nodes if n.type == "TEX_IMAGE" and n.image] if source else []
     if pictures:
         spot = tree.nodes.new("ShaderNodeAttribute")
         spot.attribute_name = _PLACE
-        image = tree.nodes.new("ShaderNodeTexImage")
+        image: Any = tree.nodes.new("ShaderNodeTexImage")
         image.image = pictures[0].image
         tree.links.new(spot.outputs["Vector"], image.inputs["Vector"])
         tree.links.new(image.outputs["Color"], shader.inputs["Base Color"])
-        tree.links.new(image.outputs["Color"], fibre.inputs["Color"])
+        # Light goes through several fibres: what the picture shows is what they give together.
+        deep = tree.nodes.new("ShaderNodeGamma")
+        deep.inputs["Gamma"].default_value = _DEEPER
+        tree.links.new(image.outputs["Color"], deep.inputs["Color"])
+        tree.links.new(deep.outputs["Color"], fibre.inputs["Color"])
     cycles = tree.nodes.new("ShaderNodeOutputMaterial")
     cycles.target, output.target = "CYCLES", "EEVEE"
     tree.links.new(fibre.outputs[0], cycles.inputs["Surface"])

@@ -201,7 +201,7 @@ def gum(graph: Graph, look: Look) -> None:
     """
     in_eye = any(word in look.base.lower() for word in ("cartilage", "caruncle"))
     tones = (_CARUNCLE_DARK, _CARUNCLE) if in_eye else (_GUM_DARK, _GUM)
-    _flesh(graph, look, tones, 60.0 if in_eye else 26.0)
+    _flesh(graph, look, tones, 0.0 if in_eye else 26.0)
 
 
 def _flesh(graph: Graph, look: Look, tones: tuple[Color, Color], grain: float) -> None:
@@ -215,7 +215,8 @@ def _flesh(graph: Graph, look: Look, tones: tuple[Color, Color], grain: float) -
     graph.set(Coat_Weight=0.5, Coat_Roughness=0.16, Specular_Ior_Level=0.45)
     if look.simple:
         return
-    relief = graph.cells(points, grain / look.unit)
+    # Papillae are cells; a caruncle is smooth but for some hills.
+    relief = graph.cells(points, grain / look.unit) if grain else mottled
     graph.set(
         Normal=graph.bump(relief, look.unit * 0.012, _textured_normal(graph, look), 0.6),
         Subsurface_Weight=0.8,

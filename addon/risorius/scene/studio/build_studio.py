@@ -12,7 +12,7 @@ from mathutils import Matrix, Vector
 
 from ...logic.character import studio_plan
 from ..base import parts
-from ..base.blender_types import ArmatureObject, Context, MeshObject, NodeTree
+from ..base.blender_types import ArmatureObject, Context, NodeTree
 from ..character import runtime
 
 _MIDDLE = (0.115, 0.121, 0.130, 1.0)  # of the backdrop, behind the head
@@ -60,7 +60,7 @@ def _head(rig: ArmatureObject) -> tuple[Matrix, float, list[float], list[float]]
     else:
         middle, apart = _guess(corners, axes)
     inside = (corners - middle) @ axes
-    place = Matrix.Translation(Vector(middle)) @ turn.to_4x4()
+    place = Matrix.Translation(Vector(middle.tolist())) @ turn.to_4x4()
     return place, apart, inside.min(axis=0).tolist(), inside.max(axis=0).tolist()
 
 
@@ -90,8 +90,6 @@ def _camera(name: str, plan: studio_plan.Studio, place: Matrix) -> bpy.types.Obj
     data.sensor_height = data.sensor_width = studio_plan.SENSOR
     far = (Vector(plan.camera) - Vector(plan.target)).length
     data.clip_start, data.clip_end = far / 100.0, far * 100.0
-    data.dof.focus_distance = far
-    data.dof.aperture_fstop = 5.6
     thing = bpy.data.objects.new(name, data)
     thing.matrix_world = place @ _looking(plan.camera, plan.target)
     return thing
@@ -114,7 +112,7 @@ def _looking(place: studio_plan.Triple, target: studio_plan.Triple) -> Matrix:
     return Matrix.Translation(Vector(place)) @ way.to_track_quat("-Z", "Y").to_matrix().to_4x4()
 
 
-def _backdrop(name: str, plan: studio_plan.Studio, place: Matrix) -> MeshObject:
+def _backdrop(name: str, plan: studio_plan.Studio, place: Matrix) -> bpy.types.Object:
     width, height = plan.wall_size
     mesh = bpy.data.meshes.new(name)
     x, z = width / 2, height / 2

@@ -94,11 +94,15 @@ class PlacesClip(FaceOperator):
         elif self.target == "STRIP":
             clip_actions.add_strip(rig, made.action)
         else:
-            layers.add_action(face_controls(context), made.action)
+            layers.add_action(face_controls(context), made.action, **self.layer_settings(context))
         clip_actions.set_range(context.scene, made, self.scene_range)
         evaluate.bring_up(context, rig)
         self._report_on(made, notes)
         return made.action
+
+    def layer_settings(self, context: Context) -> dict[str, object]:
+        """Properties of the layer that a clip becomes. Args: context  has the frame rate."""
+        return {}
 
     def _report_on(self, made: clip_actions.Report, notes: list[str]) -> None:
         if made.unknown:

@@ -21,10 +21,12 @@ from ..blender_types import Context
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 Colour = tuple[float, float, float, float]
+Mark = tuple[Float, Colour, float]  # a place in the world, its colour, its radius in pixels
 
 HELD: Colour = (1.0, 0.55, 0.1, 1.0)  # the point that is dragged
 OFFERED: Colour = (1.0, 1.0, 1.0, 0.9)  # the one that a press would take
 HANDLE: Colour = (1.0, 0.8, 0.3, 0.75)
+SELECTED: Colour = (1.0, 0.4, 0.0, 1.0)  # of handles, as Blender's own selection
 PIN: Colour = (0.2, 0.75, 1.0, 1.0)
 _HOT = np.array((1.0, 0.45, 0.05))
 _SHOWN = 0.04  # of the farthest move: what moves less is not coloured
@@ -44,7 +46,7 @@ class Shown:
         triangles: int32[T, 3] of that mesh.
     """
 
-    points: list[tuple[Float, Colour, float]] = field(default_factory=list)
+    points: list[Mark] = field(default_factory=list)
     lines: list[str] = field(default_factory=list)
     places: Float | None = None
     far: Float | None = None
@@ -135,23 +137,37 @@ def _draw_heat() -> None:
     gpu.state.blend_set("NONE")
 
 
-def _draw_marks() -> None:
-    context, shown = cast(Context, bpy.context), _now[0]
+def draw_points(context: Context, marks: list[Mark]) -> Vector | None:
+    """Draw points over the region that is drawn now.
+
+    Args:
+        context: of a drawing handler.
+        marks: the points.
+
+    Returns:
+        Where in the region the first of them is that is seen.
+    """
     region, data = context.region, _view()
-    if region is None or data is None or not shown.points:
-        return
-    scale = context.preferences.system.ui_scale
-    first = None
-    for place, colour, radius in shown.points:
+    if region is None or data is None:
+        return None
+    scale, first = context.preferences.system.ui_scale, None
+    for place, colour, radius in marks:
         at = view3d_utils.location_3d_to_region_2d(region, data, Vector(place.tolist()))
         if at is None:
             continue
         first = first or at
         _disc(at, radius * scale + 1.5, (0.0, 0.0, 0.0, 0.8))
         _disc(at, radius * scale, colour)
-    size = round(12 * scale)
+    return first
+
+
+def _draw_marks() -> None:
+    context, shown = cast(Context, bpy.context), _now[0]
+    first = draw_points(context, shown.points)
     if first is None:
         return
+    scale = context.preferences.system.ui_scale
+    size = round(12 * scale)
     for row, text in enumerate(shown.lines):
         blf.size(0, size)
         blf.enable(0, blf.SHADOW)

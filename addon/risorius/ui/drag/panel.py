@@ -3,17 +3,17 @@
 
 from ...scene.base import parts
 from ...scene.character import runtime
-from ...scene.drag import pins
+from ...scene.drag import kept_points
 from .. import words
 from ..blender_types import Context, Panel, UILayout
 from ..common import FaceOnlyPanel, face_rig
-from . import properties
+from . import pointing, properties, tool
 
 
 def draw_button(layout: UILayout, context: Context) -> None:
     """The button that begins to drag, with its choices. Args: layout, context  of a panel."""
     row = layout.row(align=True)
-    row.operator("risorius.drag_mode", icon="VIEW_PAN")
+    row.operator("risorius.drag_tool", icon="VIEW_PAN", depress=tool.is_active(context))
     row.popover(panel="RISORIUS_PT_drag", text="", icon="DOWNARROW_HLT")
 
 
@@ -33,10 +33,14 @@ class RISORIUS_PT_drag(FaceOnlyPanel, Panel):
         live = runtime.of(rig)
         if live is None or parts.controls_of(rig) is None:
             return
-        count = len(pins.of(rig, [len(m.positions) for m in live.dna.meshes]))
+        count = len(kept_points.of(rig, kept_points.PINS, pointing.counts_of(live)))
         row = layout.row()
         words.show(row, words.say("{count} pins", count=count), "PINNED")
         row.operator("risorius.clear_pins", text="Remove All", icon="X")
+        column = layout.column(align=True)
+        column.operator("risorius.key_handles", icon="KEYFRAME_HLT")
+        column.operator("risorius.hide_handles", icon="HIDE_ON")
+        column.operator("risorius.show_handles", icon="HIDE_OFF")
 
 
 CLASSES = (RISORIUS_PT_drag,)

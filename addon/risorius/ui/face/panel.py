@@ -84,7 +84,7 @@ def _draw_hint(layout: UILayout, context: Context, rig: ArmatureObject) -> None:
     row = box.row()
     words.show(row, words.say("First steps"), "LIGHT")
     row.operator("risorius.hide_hints", text="", icon="X")
-    words.write(box, "Open a region under Controls and drag a slider: the face follows.")
+    words.write(box, "Take Drag the Face and pull at the skin, or open a region below.")
     words.write(box, "Key All holds the pose at this frame; Layers and Animation play over it.")
 
 

@@ -320,9 +320,8 @@ class RISORIUS_MT_sample_studio(Menu):
     def draw(self, context: Context) -> None:
         layout = self.layout
         layout.operator_context = "INVOKE_REGION_WIN"
-        kinds = RISORIUS_OT_add_character.bl_rna.properties["person"]
-        assert isinstance(kinds, bpy.types.EnumProperty)
-        for person in kinds.enum_items:
+        adding = bpy.ops.risorius.add_character  # pyright: ignore  made by registration
+        for person in adding.get_rna_type().properties["person"].enum_items:
             name = words.say(person.name)
             button = layout.operator("risorius.add_character", text=name, translate=False)
             button.person, button.use_studio = person.identifier, True

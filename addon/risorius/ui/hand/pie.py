@@ -26,20 +26,13 @@ class RISORIUS_MT_pie(Menu):
         pie.menu("RISORIUS_MT_expressions", icon="MONKEY")  # left
         pie.operator("risorius.key", icon="KEYFRAME_HLT").region = ""  # right
         pie.operator("risorius.breakdown", icon="ARROW_LEFTRIGHT").kind = "BREAKDOWN"  # below
-        _draw_drag(pie)  # above
+        pie.operator("risorius.drag_tool", icon="VIEW_PAN")  # above
         pie.operator("risorius.mirror", icon="MOD_MIRROR").region = ""
         pie.operator("risorius.reset", icon="LOOP_BACK").region = ""
         pie.operator("risorius.tweak", icon="MOD_TIME").enable = not tweaks.of(controls)
         pie.operator(
             "wm.call_panel", text="Favourites", icon="SOLO_ON"
         ).name = "RISORIUS_PT_favourites"
-
-
-def _draw_drag(pie: UILayout) -> None:
-    if hasattr(bpy.types, "RISORIUS_OT_drag"):
-        pie.operator("risorius.drag", icon="VIEW_PAN")
-    else:
-        pie.operator("risorius.next_key", icon="NEXT_KEYFRAME")
 
 
 def shortcut(context: Context) -> bpy.types.KeyMapItem | None:

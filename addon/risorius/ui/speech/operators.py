@@ -22,6 +22,8 @@ _MISSING = (
     "Speech needs the package PocketSphinx: install it by the button in the add-on's preferences."
 )
 
+_FADE = 0.1  # seconds in which a voice's layer comes and goes
+
 
 class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
     """Let the active face say what is heard in a sound file; better with the words typed in"""
@@ -109,6 +111,11 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
             return {"CANCELLED"}
         self._add_sound(context)
         return {"FINISHED"}
+
+    def layer_settings(self, context: Context) -> dict[str, object]:
+        """A voice has the face while it sounds, and gives it back; a hand's layer would hold on."""
+        fade = round(_FADE * clip_actions.frame_rate(context.scene))
+        return {"extend": "NOTHING", "fade_in": float(fade), "fade_out": float(fade)}
 
     def _add_sound(self, context: Context) -> None:
         if not self.use_sound:

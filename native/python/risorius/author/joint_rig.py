@@ -144,6 +144,7 @@ def _made(
     work.levels = _level_count(dna, o.lods)
     wanted = {m: displacements(work, dna.meshes[m]) for m in range(len(dna.meshes))}
     needs = {m for m in wanted if needs_joints(work, dna.meshes[m], wanted[m])}
+    needs = {m for m in needs if not any(word in dna.mesh_names[m] for word in o.kept)}
     if like is not None:  # what rests in the other face keeps its shapes here
         needs = {m for m in needs if dna.mesh_names[m] in like.weights}
     if not needs & set(listed_meshes(dna, 0)):

@@ -33,6 +33,9 @@ class RigOptions:
     tolerance_mm: float | None = 0.05
     # A joint takes no part in an expression in which it moves no vertex further: others take over.
     least_effect_mm: float = 0.05
+    # Meshes that keep their weights and blend shapes as they are: those of which the name has one of
+    # these in it. Eyeballs, which turn with a joint of their own.
+    kept: tuple[str, ...] = ()
     lods: LodOptions = field(default_factory=LodOptions)
 
 

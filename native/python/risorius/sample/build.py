@@ -51,13 +51,16 @@ from .teeth import mouth_parts
 CM = 10.0  # the data are in decimetres
 NEW_JOINTS = 250
 FLUSH = ("head_flush_L", "head_flush_R")
-DELTA_STEP = 2.0**-11  # centimetres: 5 micrometres
+DELTA_STEP = 2.0**-10  # centimetres: 10 micrometres, of which half is the error
+WEIGHTS = 4096  # parts of a skin weight
 NO_WRINKLES = 4  # the level from which on there are none
 _FIT_BEGINS = 0.2  # of the whole time
 _SEARCH_ENDS = 0.4
 _REFIT_BEGINS = 0.7
-TOLERANCE_MM = 0.1  # what joints leave beyond it stays in blend shapes
-RIG = RigOptions(FitOptions(joints=NEW_JOINTS), tolerance_mm=TOLERANCE_MM)
+TOLERANCE_MM = 0.2  # what joints leave beyond it stays in blend shapes
+RIG = RigOptions(
+    FitOptions(joints=NEW_JOINTS), tolerance_mm=TOLERANCE_MM, kept=("eyeLeft", "eyeRight")
+)
 NO_SEARCH = CorrectiveOptions(most=0)
 PARTS = {  # mesh -> groups, subdivisions at LOD 0 and 1
     "head": (["body"], 1, 0),
@@ -399,19 +402,50 @@ def assemble(
     return dna, parts, body
 
 
-def round_targets(dna: Dna) -> None:
-    """Deltas as multiples of DELTA_STEP, which pack to a third; each is off by half of it at most.
+def rounded(values: Floats, step: float) -> Floats:
+    """Values as multiples of a step."""
+    return np.round(np.asarray(values, np.float64) / step) * step
+
+
+def even_weights(mesh: Mesh) -> None:
+    """Skin weights as multiples of 1 / 4096 that add up to 1; the largest takes what is over.
 
     Args:
-        dna: its meshes are changed.
+        mesh: is changed.
+    """
+    offsets = np.asarray(mesh.skin_offsets, np.int64)
+    shares = np.round(np.asarray(mesh.skin_weights, np.float64) * WEIGHTS)
+    vertex = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
+    over = WEIGHTS - np.bincount(vertex, shares, minlength=len(offsets) - 1)
+    # The last of a vertex in the order of vertex and weight is its largest.
+    order = np.lexsort((shares, vertex))
+    last = order[np.flatnonzero(np.diff(vertex[order], append=-1) != 0)]
+    shares[last] += over[vertex[last]]
+    mesh.skin_weights = shares / WEIGHTS
+
+
+def round_numbers(dna: Dna) -> None:
+    """All numbers as multiples of small steps, far below what is seen: they pack to two thirds.
+
+    Args:
+        dna: its meshes and joint groups are changed.
     """
     meshes = list(dna.meshes)
     for mesh in meshes:
+        mesh.positions = rounded(mesh.positions, DELTA_STEP / 2)
+        mesh.normals = rounded(mesh.normals, 2.0**-9)
+        mesh.texture_coordinates = rounded(mesh.texture_coordinates, 2.0**-14)
+        if len(mesh.skin_weights):
+            even_weights(mesh)
         targets = list(mesh.blend_shape_targets)
         for target in targets:
-            target.deltas = np.round(np.asarray(target.deltas) / DELTA_STEP) * DELTA_STEP
+            target.deltas = rounded(target.deltas, DELTA_STEP)
         mesh.blend_shape_targets = targets
     dna.meshes = meshes
+    groups = list(dna.joint_groups)
+    for group in groups:
+        group.values = rounded(group.values, DELTA_STEP / 2)  # centimetres, and degrees as fine
+    dna.joint_groups = groups
 
 
 class Steps:
@@ -558,12 +592,13 @@ def build_sample(
     if rig is not None:
         man = None if body.man is body else lambda: assemble(source, lambda _: None)[0]
         dna = joint_face(dna, man, rig, steps, begins)
+    even = body.man.positions.copy()  # all people have their hair at the same places of it
     set_askew(dna, parts, body, askew(source, body, person), CM)
-    grown = grow_hair(person, body, source.base_mesh(), parts, CM)
+    grown = grow_hair(person, body, even, source.base_mesh(), parts, CM)
     add_hair(dna, grown)
     hairs, shown = hair_textures(person, dna, grown, texture_size)
     leave_maps(dna)
-    round_targets(dna)
+    round_numbers(dna)
     by_code = {"controls_by_code": " ".join(CONTROLS_OF_CODE)}
     dna.metadata = METADATA | by_code | textures_of_levels(dna, metadata) | shown
     textures |= hairs

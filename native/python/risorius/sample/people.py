@@ -47,7 +47,7 @@ class Person:
     muscle: float = 0.5
     weight: float = 0.5
     freckles: float = 0.0
-    scalp: float = 0.5
+    scalp: float = 0.9
     features: dict[str, float] = field(default_factory=dict)
     asymmetry: dict[str, float] = field(default_factory=dict)
     """Shapes of the data that make one side unlike the other -> -1 (the right) to 1 (the left)."""

@@ -173,7 +173,7 @@ _PARTS = (("eyeball", BALL, _COARSE_BALL), ("cornea", SHELL, _COARSE_CORNEA))
 
 
 def with_eyeballs(base: BaseMesh) -> BaseMesh:
-    """The base mesh with groups eyeball-l, cornea-l and so on, and coarse ones of the same vertices.
+    """The base mesh with groups eyeball-l, cornea-l and so on, and coarse ones of their vertices.
 
     Where they are only a person says (`seat`): here all lie at the origin.
 

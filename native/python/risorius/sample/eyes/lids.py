@@ -25,15 +25,7 @@ _LIFT = 0.38  # mm: what lids are higher in a whole look, since they do not go r
 LOOKS = {"Up": (25.0, 1.9), "Down": (30.0, 1.5), "Left": (30.0, 1.8), "Right": (30.0, 1.8)}
 _LOWER_LOOKS = {"Up": 1.2, "Down": -2.4}  # mm
 # What closed lids do not do beside it: they stay closed.
-_NOT_CLOSED = [
-    *(f"eyeLook{way}" for way in LOOKS),
-    "eyeSquintInner",
-    "eyeCheekRaise",
-    "eyeLowerLidUp",
-    "eyeUpperLidUp",
-    "eyeRelax",
-    "eyeWiden",
-]
+_NOT_CLOSED = [*(f"eyeLook{way}" for way in LOOKS), "eyeSquintInner", "eyeCheekRaise"]
 WIDER = 0.75  # of the data's, which starts from lids that are half shut
 _FORWARD, _ASIDE = 1.5, 1.2  # mm: the ball from the data's, and how far at most up or down
 _RADIUS = 14.0  # mm: of the man's ball; sizes above are meant on it

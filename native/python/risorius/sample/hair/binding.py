@@ -16,10 +16,11 @@ from ...author.geometry import skeleton as sk
 from ...author.geometry.polygon_mesh import polygon_mesh
 from ..polygons import Floats, Ints
 from .strips import Strips, card_faces, card_vertices
-from .surface import Roots, nearest_places
+from .surface import Roots, nearest_places, nearest_rows
 
 _LEAST_WEIGHT = 0.01
 _MOST_INFLUENCES = 8
+_PARTING = tuple(f"CTRL_expressions.{name}" for name in ("jawOpen", "eyeBlinkL", "eyeBlinkR"))
 
 
 def head_of(dna: Dna, lod: int) -> Mesh | None:
@@ -52,20 +53,54 @@ def corners_of(mesh: Mesh) -> tuple[Ints, Ints]:
     return triangles, order[np.minimum(at, len(order) - 1)] // 3
 
 
-def holds(mesh: Mesh, strips: Strips, unit: float) -> Roots:
+def whereabouts(dna: Dna, head: Mesh) -> Floats:
+    """float64[V, 12]: where vertices are at rest, with an open jaw and with either eye closed.
+
+    What touches at rest, as lips and lids do, is far apart in it.
+
+    Args:
+        dna: has the controls.
+        head: a mesh of the head.
+    """
+    count = len(dna.raw_control_names)
+    motions = sk.column_motions(dna, sk.column_count(dna))[:count]
+    weights = sk.dense_weights(head, len(dna.joint_names))
+    positions = np.asarray(head.positions, np.float64)
+    shapes = sk.column_shapes(dna, head, count)
+    out = [positions]
+    for name in _PARTING:
+        column = list(dna.raw_control_names).index(name)
+        out.append(sk.skinned(positions + shapes.get(column, 0.0), weights, motions[column]))
+    return np.concatenate(out, axis=1)
+
+
+def holds(head: Mesh, strips: Strips, unit: float, own: Floats | None, there: Floats) -> Roots:
     """The place of the skin that each vertex of the cards moves with.
 
     Args:
-        mesh: the head.
+        head: the head.
         strips: the cards.
         unit: of the mesh, in theirs.
+        own: float64[n, 12], whereabouts of the roots; None: the head is the one that they are on.
+        there: float64[V, 12], whereabouts of the head's vertices.
     """
-    positions = np.asarray(mesh.positions, np.float64) / unit
-    triangles, around = corners_of(mesh)
-    foot = strips.points[:, :1]
-    own = np.where(strips.held[:, None, None] > 0, strips.points, foot)
-    rows = nearest_places(positions, triangles, around, own.reshape(-1, 3))
-    return Roots(np.repeat(rows.corners, 2, axis=0), np.repeat(rows.shares, 2, axis=0))
+    positions = np.asarray(head.positions, np.float64) / unit
+    triangles, around = corners_of(head)
+    rooted = strips.roots
+    if own is not None:
+        vertex = nearest_rows(own, there)
+        rooted = nearest_places(positions, triangles, around, strips.points[:, 0], vertex)
+    corners = np.repeat(rooted.corners[:, None], strips.rows, axis=1)
+    shares = np.repeat(rooted.shares[:, None], strips.rows, axis=1)
+    with_skin = strips.held > 0
+    if with_skin.any():
+        later = strips.points[with_skin, 1:]
+        rows = nearest_places(positions, triangles, around, later.reshape(-1, 3))
+        corners[with_skin, 1:] = rows.corners.reshape(*later.shape[:2], 3)
+        shares[with_skin, 1:] = rows.shares.reshape(*later.shape[:2], 3)
+    return Roots(
+        np.repeat(corners.reshape(-1, 3), 2, axis=0), np.repeat(shares.reshape(-1, 3), 2, axis=0)
+    )
 
 
 def card_mesh(strips: Strips, unit: float) -> Mesh:

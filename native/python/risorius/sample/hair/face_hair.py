@@ -16,6 +16,7 @@ from .surface import Surface
 
 _BROW_SPACING = 0.0115  # decimetres between the roots of two cards
 _BEARD_SPACING = 0.042
+_RIM = 0.010  # decimetres from the line of the data to the outer rim of the lid
 _LASHES = {"U": (48, 0.098), "D": (26, 0.050)}  # cards of a lid, longest hair in decimetres
 
 
@@ -143,12 +144,13 @@ def lashes(surface: Surface, lines: dict[str, Floats], person: Person) -> Strips
         steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
         at = np.concatenate([[0], np.cumsum(steps)]) / steps.sum()
         begin = np.column_stack([np.interp(t, at, line[:, k]) for k in range(3)])
-        roots = surface.nearest(begin)
+        # The outer rim of the lid's edge: what lies behind it folds in where the eye closes.
+        roots = surface.nearest(begin + _RIM * surface.scale * np.array([0.0, 0.0, 1.0]))
         root = roots.of(surface.positions)
         fan = np.interp(t, [0, 0.35, 0.7, 1.0], [-0.55, 0.0, 0.55, 1.05])
         fan += random.normal(0, 0.08, count)
         grown = np.interp(t, [0, 0.25, 0.7, 0.92, 1.0], [0.45, 0.75, 1.0, 0.9, 0.6])
-        size = 1.12 if person.gender == "female" or person.age < 14 else 1.0
+        size = 1.08 if person.gender == "female" or person.age < 14 else 0.85
         length = long * surface.scale * size * grown * random.uniform(0.85, 1.1, count)
         if upper:
             first, last = np.radians(random.uniform(-6, 8, count)), np.radians(78.0)
@@ -232,4 +234,4 @@ def beard(surface: Surface, lips: Floats, person: Person) -> Strips | None:
     half = (0.024 if full else 0.013) * surface.scale * random.uniform(0.8, 1.25, n)
     turns = np.radians(random.uniform(-35, 35, n))
     taper = np.array([0.9, 1.0, 0.7])[-rows:]
-    return make_strips(points, out, half, taper, tiles, roots, turns)
+    return make_strips(points, out, half, taper, tiles, roots, turns, held=0.0)

@@ -17,8 +17,8 @@ from ..part import Part
 from ..people import Person
 from ..polygons import Floats
 from ..source import BaseMesh
-from .binding import append_mesh, bind, card_mesh, head_of, holds
-from .controls import add_lash_controls
+from .binding import append_mesh, bind, card_mesh, head_of, holds, whereabouts
+from .controls import add_lash_controls, add_lid_turns
 from .face_hair import beard, brows, lash_curves, lashes
 from .scalp import STYLES
 from .strips import Strips
@@ -27,6 +27,7 @@ from .surface import Surface
 PICTURE = "hair_color.png"
 NO_HAIR = 4  # the level from which on there are no cards
 _SHARES = (1.0, 0.42, 0.2, 0.1)  # of the strips, by level
+_MOST_VERTICES = 12_000  # of all cards at LOD 0
 _OWN = ("hair", "beard")
 _ROWS = (99, 4, 3, 3)
 _LEAST_MM = {"hair": 1.0, "brows": 0.15, "beard": 0.15, "eyelashes": 0.1}
@@ -42,21 +43,24 @@ class Grown:
     unit: float  # of the Dna's meshes, in decimetres
 
 
-def grow_hair(person: Person, body: Body, base: BaseMesh, parts: list[Part], unit: float) -> Grown:
+def grow_hair(
+    person: Person, body: Body, even: Floats, base: BaseMesh, parts: list[Part], unit: float
+) -> Grown:
     """Grow all hair of a person.
 
     Args:
         person: has the styles.
         body: the person's.
+        even: float64[V, 3], the man's positions with both sides alike, decimetres.
         base: the base mesh.
         parts: the meshes; the head of LOD 0 is grown on.
         unit: of the Dna's meshes, in decimetres.
     """
     head = next(p for p in parts if p.name == "head_lod0_mesh")
     man = body.man
-    eye = man.positions[body.groups["helper-l-eye"]].mean(axis=0)
+    eye = even[body.groups["helper-l-eye"]].mean(axis=0)
     at = head.carry(body.positions)
-    surface = Surface(head.polygons, at, head.carry(man.positions), eye)
+    surface = Surface(head.polygons, at, head.carry(even), eye)
     lines = {}
     for letter in "lr":
         for number, lid in ((1, "D"), (2, "U")):
@@ -69,7 +73,17 @@ def grow_hair(person: Person, body: Body, base: BaseMesh, parts: list[Part], uni
         "beard": beard(surface, _lips(head, man), person),
         "eyelashes": lashes(surface, lines, person),
     }
-    return Grown({name: s for name, s in found.items() if s is not None}, unit)
+    return Grown(_within_budget({name: s for name, s in found.items() if s is not None}), unit)
+
+
+def _within_budget(strips: dict[str, Strips]) -> dict[str, Strips]:
+    """Fewer and wider cards on the scalp where all together have too many vertices."""
+    counts = {name: 2 * len(s) * s.rows for name, s in strips.items()}
+    over = sum(counts.values()) - _MOST_VERTICES
+    if over > 0 and "hair" in strips:
+        share = max(0.2, 1 - over / counts["hair"])
+        strips = strips | {"hair": strips["hair"].coarser(share, strips["hair"].rows)}
+    return strips
 
 
 def _lips(head: Part, man: Body) -> Floats:
@@ -92,15 +106,18 @@ def add_hair(dna: Dna, grown: Grown) -> None:
     """
     # What each person has otherwise comes last, so that all others keep their numbers in a mix.
     names = sorted(grown.strips, key=lambda name: name in _OWN)
-    for name, lod in itertools.product(names, range(min(dna.lod_count, NO_HAIR))):
-        head, strips = head_of(dna, lod), grown.strips[name]
-        if head is None:
-            continue
+    heads = {lod: head_of(dna, lod) for lod in range(min(dna.lod_count, NO_HAIR))}
+    there = {lod: whereabouts(dna, head) for lod, head in heads.items() if head is not None}
+    for name, lod in itertools.product(names, there):
+        head, strips = heads[lod], grown.strips[name]
+        assert head is not None
         shown = strips if lod == 0 else strips.coarser(_SHARES[lod], _ROWS[lod])
         mesh = card_mesh(shown, grown.unit)
-        places = holds(head, shown, grown.unit)
+        own = None if lod == 0 else shown.roots.of(there[0])
+        places = holds(head, shown, grown.unit, own, there[lod])
         bind(dna, mesh, head, places, _LEAST_MM[name] / _MM, name == "hair")
         if name == "eyelashes":
+            add_lid_turns(dna, mesh, shown.rows, lod)
             add_lash_controls(dna, mesh, shown.rows, lod)
         append_mesh(dna, f"{name}_lod{lod}_mesh", mesh, [lod])
 

@@ -108,7 +108,9 @@ def make_strips(
 def joined(parts: list[Strips]) -> Strips:
     """Strips with the same number of rows as one."""
     return Strips(
-        *(np.concatenate([getattr(p, k) for p in parts]) for k in ("points", "sides", "normals")),
+        np.concatenate([p.points for p in parts]),
+        np.concatenate([p.sides for p in parts]),
+        np.concatenate([p.normals for p in parts]),
         np.concatenate([p.tiles for p in parts]),
         Roots(
             np.concatenate([p.roots.corners for p in parts]),

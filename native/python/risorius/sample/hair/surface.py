@@ -127,7 +127,9 @@ def nearest_rows(points: Floats, others: Floats) -> Ints:
     return np.concatenate([np.zeros(0, np.int64), *parts])
 
 
-def nearest_places(positions: Floats, triangles: Ints, around: Ints, points: Floats) -> Roots:
+def nearest_places(
+    positions: Floats, triangles: Ints, around: Ints, points: Floats, vertex: Ints | None = None
+) -> Roots:
     """Of each point the nearest place on the triangles about its nearest vertex.
 
     Args:
@@ -135,8 +137,10 @@ def nearest_places(positions: Floats, triangles: Ints, around: Ints, points: Flo
         triangles: int64[T, 3].
         around: int64[V, n], triangles about each vertex.
         points: float64[n, 3].
+        vertex: int64[n], the vertex of each point, where it is known.
     """
-    vertex = nearest_rows(points, positions)
+    if vertex is None:
+        vertex = nearest_rows(points, positions)
     corners = triangles[around[vertex]]  # [n, k, 3]
     a, b, c = (positions[corners[..., k]] for k in range(3))
     u, v, w = b - a, c - a, points[:, None] - a

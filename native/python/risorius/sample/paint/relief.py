@@ -12,7 +12,7 @@ from ..polygons import Floats
 from . import regions
 from .images import smooth
 from .raster import filled
-from .skin import Skin
+from .skin import Skin, hair_mask
 
 PORE = 0.0024
 _STEP = 2 / 255  # of a normal's parts: finer ones are not seen, and pack badly
@@ -80,4 +80,6 @@ def roughness(skin: Skin, creases: Floats) -> Floats:
     lips = 0.36 + 0.03 * texels.middle - 0.03 * skin.lines
     out += (lips - out) * skin.lips
     out += (0.20 - out) * skin.wet
+    if skin.person.hair_style != "none":  # what lies under hair is in its shade
+        out += (0.9 - out) * hair_mask(texels.place, skin.eye)
     return np.asarray(np.clip(out + (0.22 - out) * smooth(1.2, -0.2, field["eyes"]), 0.05, 1))

@@ -255,11 +255,11 @@ class Skin:
         scalp = hair_mask(texels.place, self.eye, texels.middle + texels.coarse)
         roots, at = texels.dots(3.4, 31)
         dark = roots.over(0.9 * scalp, at, 0.5)
-        shadow = person.scalp * scalp * (0.55 + 0.1 * texels.middle) + 0.3 * person.scalp * dark
-        light = _over(light, hair, shadow)
+        shadow = person.scalp * scalp * (0.78 + 0.08 * texels.middle) + 0.2 * person.scalp * dark
+        light = _over(light, hair, np.clip(shadow, 0, 0.95))
         brows = linear(np.array(person.brows))
         light = _over(
-            light, brows, 0.34 * person.scalp * brow_mask(texels.place, self.eye, texels.middle)
+            light, brows, 0.26 * person.scalp * brow_mask(texels.place, self.eye, texels.middle)
         )
         if person.beard:
             share = np.clip(self.field["beard"] * (1 + 0.22 * texels.coarse), 0, 1)

@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The tool of the 3D view's toolbar: while it is in the hand, each press on the skin is a drag.
+
+Everything else of Blender goes on as it does. Handles and pins of the active face are drawn while
+the tool is the active one; what the pointer would take is drawn where it points.
+"""
+
+from typing import cast
+
+import bpy
+from bpy.types import WorkSpaceTool
+
+from ...logic.base.errors import FaceError
+from ...scene.base import parts
+from ...scene.character import runtime
+from ...scene.drag import picking
+from ..blender_types import Context, Operator, Result, UILayout
+from ..words import say
+from . import drawing, pointing, properties, view
+from .operators import can_drag
+
+IDNAME = "risorius.drag"
+_MODES = ("OBJECT", "POSE")
+_USUAL = "builtin.select_box"  # what is taken up again where nobody knows what was before
+_USUAL_KEYS = "3D View Tool: Select Box"  # Blender's name of its keymap
+_KEYS = (
+    ("risorius.drag", {"type": "LEFTMOUSE", "value": "PRESS"}, None),
+    ("risorius.drag", {"type": "LEFTMOUSE", "value": "PRESS", "ctrl": True}, None),
+    (
+        "risorius.select_handle",
+        {"type": "LEFTMOUSE", "value": "PRESS", "shift": True},
+        {"properties": [("extend", True)]},
+    ),
+    ("risorius.pin", {"type": "LEFTMOUSE", "value": "PRESS", "shift": True}, None),
+    (
+        "view3d.select",
+        {"type": "LEFTMOUSE", "value": "PRESS", "alt": True},
+        {"properties": [("deselect_all", True)]},
+    ),
+    ("risorius.key_handles", {"type": "I", "value": "PRESS"}, None),
+    ("risorius.hide_handles", {"type": "H", "value": "PRESS"}, None),
+    ("risorius.show_handles", {"type": "H", "value": "PRESS", "alt": True}, None),
+    ("risorius.drag_hover", {"type": "MOUSEMOVE", "value": "ANY"}, None),
+)
+
+_before: dict[str, str] = {}  # workspace and mode -> the tool that this one took the place of
+_pointed: list[tuple[int, tuple[int, int]]] = []  # session uid of a face, its point at the pointer
+_handles: list[object] = []
+
+
+class _Tool(WorkSpaceTool):
+    bl_space_type = "VIEW_3D"
+    bl_idname = IDNAME
+    bl_label = "Drag the Face"
+    bl_description = (
+        "Point at the skin and drag it. Ctrl: one slider, Tab the next; Shift click: pin, or "
+        "select handles, which go together; I keys and H hides those"
+    )
+    bl_icon = "ops.pose.push"
+    bl_widget = None
+    bl_keymap = _KEYS
+    bl_options = {"KEYMAP_FALLBACK"}
+
+    @staticmethod
+    def draw_settings(context: Context, layout: UILayout, _tool: object) -> None:
+        choices = properties.choices_of(context)
+        for name in ("symmetric", "region", "handles", "heat"):
+            layout.prop(choices, name)
+        layout.prop(choices, "method", text="")
+
+
+class DragInObjectMode(_Tool):
+    bl_context_mode = "OBJECT"
+
+
+class DragInPoseMode(_Tool):
+    bl_context_mode = "POSE"
+
+
+class RISORIUS_OT_drag_tool(Operator):
+    """Take up the tool that drags the face by its skin, or put it down for the one before"""
+
+    bl_idname = "risorius.drag_tool"
+    bl_label = "Drag the Face"
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        if not can_drag(cls):
+            return False
+        if context.mode not in _MODES:
+            cls.poll_message_set(say("Go to object mode or pose mode first."))
+            return False
+        return True
+
+    def execute(self, context: Context) -> Result:
+        place, now = f"{context.workspace.name} {context.mode}", _active(context)
+        wanted = _before.pop(place, _USUAL) if now == IDNAME else IDNAME
+        if now != IDNAME:
+            _before[place] = now or _USUAL
+        bpy.ops.wm.tool_set_by_id(name=wanted, space_type="VIEW_3D")
+        drawing.tag(context)
+        return {"FINISHED"}
+
+
+class RISORIUS_OT_drag_hover(Operator):
+    """Show the point that a press would take"""
+
+    bl_idname = "risorius.drag_hover"
+    bl_label = "Drag the Face"
+    bl_options = {"INTERNAL"}
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        return is_active(context) and can_drag(cls)
+
+    def invoke(self, context: Context, event: bpy.types.Event) -> Result:
+        where = view.under(context, event)
+        try:
+            hit = pointing.pick(context, where, event) if where else None
+        except FaceError:
+            hit = None  # a press says why
+        found = [(hit.rig.session_uid, hit.point)] if hit is not None else []
+        if found or _pointed:
+            _pointed[:] = found
+            drawing.tag(context)
+        return {"PASS_THROUGH"}
+
+
+def is_active(context: Context) -> bool:
+    """Whether the tool is in the hand. Args: context  has the workspace and the mode."""
+    return context.mode in _MODES and _active(context) == IDNAME
+
+
+def _active(context: Context) -> str:
+    """The name of the active tool of 3D views in the mode of now; empty where there is none."""
+    tools = context.workspace.tools
+    tool = tools.from_space_view3d_mode(context.mode, create=False)  # pyright: ignore  the stub's
+    return tool.idname if tool is not None else ""
+
+
+def _draw() -> None:
+    """Over each 3D view, while the tool is in the hand and nothing is dragged."""
+    context = cast(Context, bpy.context)
+    space = context.space_data
+    if drawing.is_drawing() or not is_active(context):
+        return
+    if not isinstance(space, bpy.types.SpaceView3D) or not space.overlay.show_overlays:
+        return
+    marks: list[drawing.Mark] = []
+    for uid, point in _pointed:
+        rig = next((r for r in parts.rigs() if r.session_uid == uid), None)
+        live = runtime.of(rig) if rig is not None else None
+        if rig is not None and live is not None and parts.controls_of(rig) is not None:
+            places = picking.places(context, rig, live, [point])
+            marks += [(place, drawing.OFFERED, 5.0) for place in places]
+    active = parts.active_rig(context)
+    if active is not None and active.library is None:
+        marks += pointing.marks_of(context, active)
+    drawing.draw_points(context, marks)
+
+
+def _lay_down() -> None:
+    """Give every workspace that holds the tool Blender's own: without the add-on a press of the
+    button would do nothing there."""
+    for workspace in getattr(bpy.data, "workspaces", ()):  # none while Blender ends
+        for mode in _MODES:
+            tool = workspace.tools.from_space_view3d_mode(mode, create=False)
+            if tool is not None and tool.idname == IDNAME:
+                tool.setup(idname=_USUAL, keymap=_USUAL_KEYS)
+
+
+def register() -> None:
+    """Put the tool into the toolbars of both modes."""
+    for cls in (DragInObjectMode, DragInPoseMode):
+        bpy.utils.register_tool(cls, separator=True)  # at the end: "after" miscounts in 4.3 and 4.5
+    if not _handles:
+        draw_over = bpy.types.SpaceView3D.draw_handler_add
+        _handles.append(draw_over(_draw, (), "WINDOW", "POST_PIXEL"))
+
+
+def unregister() -> None:
+    """Take it out again, and draw nothing any more."""
+    while _handles:
+        bpy.types.SpaceView3D.draw_handler_remove(_handles.pop(), "WINDOW")
+    _lay_down()
+    for cls in (DragInPoseMode, DragInObjectMode):
+        bpy.utils.unregister_tool(cls)
+    _before.clear()
+    _pointed.clear()
+
+
+CLASSES = (RISORIUS_OT_drag_tool, RISORIUS_OT_drag_hover)

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: MIT
+"""The acting of the monologue: what is said, felt and looked at when. Data, no Blender.
+
+python monologue_acting.py      prints the lines: milliseconds, words a minute, text, by tabs
+"""
+
+from __future__ import annotations
+
+FRAME_RATE = 24
+LAST_FRAME = 480  # twenty seconds
+
+# What is said from which second on, and how many words a minute.
+LINES = [
+    (2.3, 140, "There it is. I almost do not dare to look."),
+    (8.0, 165, "They said yes. They really said yes!"),
+    (13.6, 125, "I only wish he could have heard it."),
+]
+
+INTENSITY = 0.75  # of the speech, which lies on a mouth that a mood has moved already
+
+# Seconds from which a mood has come, and until which it stays: expression, strength, mirrored.
+MOODS = [
+    (0.0, 0.6, "relief", 0.15, False),
+    (1.4, 4.6, "doubt", 0.7, False),
+    (5.2, 6.6, "concentration", 0.75, False),
+    (7.1, 7.9, "surprise", 0.75, False),
+    (8.5, 12.2, "joy", 0.8, False),
+    (13.4, 16.6, "sadness", 0.8, False),
+    (18.2, 20.0, "smile_closed", 0.45, False),
+]
+BLINKS = [0.9, 4.9, 6.8, 12.8, 15.2, 17.2]
+
+# Where the eyes look: seconds, place beside, in front of and above the face, in heights of it.
+LOOKS = [
+    (0.0, (1.6, 2.6, 0.1)),
+    (1.1, (1.6, 2.6, 0.1)),
+    (1.3, (0.35, 1.5, -0.6)),  # the letter
+    (3.6, (0.35, 1.5, -0.6)),
+    (3.8, (-0.3, 3.0, 0.15)),  # whoever listens
+    (4.8, (-0.3, 3.0, 0.15)),
+    (5.0, (0.25, 1.5, -0.6)),
+    (5.6, (0.45, 1.5, -0.62)),
+    (5.7, (0.2, 1.5, -0.68)),
+    (6.3, (0.45, 1.5, -0.72)),
+    (7.7, (0.35, 1.5, -0.68)),
+    (7.9, (-0.2, 3.0, 0.1)),
+    (12.6, (-0.2, 3.0, 0.1)),
+    (12.9, (0.9, 2.2, -0.7)),
+    (16.8, (0.9, 2.2, -0.7)),
+    (17.3, (-0.1, 3.0, 0.05)),
+    (20.0, (-0.1, 3.0, 0.05)),
+]
+# Degrees that the head nods, tilts to a shoulder, and turns.
+TURNS = [
+    (0.0, (-2, 0, 10)),
+    (1.2, (-1, 0, 9)),
+    (1.9, (12, 2, 4)),
+    (3.5, (11, 2, 4)),
+    (4.1, (1, -3, -4)),
+    (4.8, (2, -3, -3)),
+    (5.4, (13, 1, 3)),
+    (6.9, (14, 1, 3)),
+    (7.8, (-3, 0, 0)),
+    (8.6, (2, 2, -3)),
+    (9.6, (-4, -2, -2)),
+    (10.8, (1, 3, -4)),
+    (12.3, (0, 1, -3)),
+    (13.3, (9, -5, 7)),
+    (16.6, (11, -6, 7)),
+    (18.0, (0, -2, -2)),
+    (20.0, (-1, -1, -2)),
+]
+SHEET = [10, 40, 72, 95, 140, 178, 210, 250, 330, 375, 420, 470]
+
+
+if __name__ == "__main__":
+    for seconds, speed, text in LINES:
+        print(round(seconds * 1000), speed, text, sep="\t")
