@@ -22,7 +22,6 @@ from .operators import can_drag
 IDNAME = "risorius.drag"
 _MODES = ("OBJECT", "POSE")
 _USUAL = "builtin.select_box"  # what is taken up again where nobody knows what was before
-_USUAL_KEYS = "3D View Tool: Select Box"  # Blender's name of its keymap
 _KEYS = (
     ("risorius.drag", {"type": "LEFTMOUSE", "value": "PRESS"}, None),
     ("risorius.drag", {"type": "LEFTMOUSE", "value": "PRESS", "ctrl": True}, None),
@@ -159,16 +158,6 @@ def _draw() -> None:
     drawing.draw_points(context, marks)
 
 
-def _lay_down() -> None:
-    """Give every workspace that holds the tool Blender's own: without the add-on a press of the
-    button would do nothing there."""
-    for workspace in getattr(bpy.data, "workspaces", ()):  # none while Blender ends
-        for mode in _MODES:
-            tool = workspace.tools.from_space_view3d_mode(mode, create=False)
-            if tool is not None and tool.idname == IDNAME:
-                tool.setup(idname=_USUAL, keymap=_USUAL_KEYS)
-
-
 def register() -> None:
     """Put the tool into the toolbars of both modes."""
     for cls in (DragInObjectMode, DragInPoseMode):
@@ -182,7 +171,6 @@ def unregister() -> None:
     """Take it out again, and draw nothing any more."""
     while _handles:
         bpy.types.SpaceView3D.draw_handler_remove(_handles.pop(), "WINDOW")
-    _lay_down()
     for cls in (DragInPoseMode, DragInObjectMode):
         bpy.utils.unregister_tool(cls)
     _before.clear()
