@@ -12,8 +12,8 @@
 #
 # Three lanes side by side, because half of the work keeps one core busy only: `native` is GoogleTest,
 # sanitizers, cross compilers, fuzzers and the C library installed; `python` is the wheel, style, types,
-# pytest, the documentation as a site, and a fast subset in older and newer Blenders; `blender` waits for
-# the extension's zip, and is every test inside Blender.
+# pytest, the documentation as a site, the Windows wheel in wine where wheels.sh has made it, and a fast subset
+# in older and newer Blenders; `blender` waits for the extension's zip, and is every test inside Blender.
 set -uo pipefail
 mode=${1:-all}
 case $mode in
@@ -56,13 +56,16 @@ google_tests() { # google_tests NAME PRESET
   grep -ohE 'This CPU has no [a-z0-9]+' "$logs/cmake-$preset.log" | sort -u |
     while read -r line; do say "NOT RUN, $name: ${line,}"; done
 }
-run_script() { # run_script NAME: one of packaging/ whose steps are rows
+run_script() { # run_script NAME [OPTION]: one of packaging/ whose steps are rows
   local log="$logs/${1%.sh}.log" code name good bad
-  "$project/packaging/$1" > "$log" 2>&1
+  "$project/packaging/$1" "${@:2}" > "$log" 2>&1
   code=$?
   while IFS=$'\t' read -r _ name good bad; do
     note "$name" "$good" "$bad"
   done < <(grep -P '^row\t' "$log")
+  while IFS=$'\t' read -r _ name; do say "$name"; done < <(grep -P '^say\t' "$log")
+  # One that only says that it did not run has passed nothing.
+  [ "$code" -eq 0 ] && ! grep -qP '^row\t' "$log" && grep -qP '^say\t' "$log" && return
   check "$1" [ "$code" -eq 0 ] || tail -n 40 "$log"
 }
 run_fuzzers() { # run_fuzzers SECONDS
@@ -198,6 +201,7 @@ python_lane() {
   run_pytest
   [ "$mode" = --quick ] && return
   step "documentation as a site" && run_script site.sh
+  step "the Windows wheel in wine" && run_script windows.sh --there
   zip=$(ls "$project"/build/dist/risorius-*.zip)
   run_subsets # here, because this lane ends before the other two
 }
