@@ -18,13 +18,13 @@ from risorius.controls.arkit import mapping
 from risorius.sample import (
     build,
     expressions,
-    paint,
     people,
     polygons,
     proportions,
     references,
     source,
 )
+from risorius.sample.paint import images, textures
 
 ARKIT = """browDownLeft browDownRight browInnerUp browOuterUpLeft browOuterUpRight cheekPuff
 cheekSquintLeft cheekSquintRight eyeBlinkLeft eyeBlinkRight eyeLookDownLeft eyeLookDownRight
@@ -109,16 +109,16 @@ def test_a_rigid_motion_is_found_again():
 @pytest.mark.parametrize("shape", [(8, 8), (4, 16, 3)])
 def test_a_texture_shrinks_to_the_means_of_its_blocks(shape):
     image = np.random.default_rng(3).uniform(0, 1, shape)
-    small = paint.shrunk(image, 4)
+    small = images.shrunk(image, 4)
     assert small.shape[:2] == (shape[0] // 2, shape[1] // 2)
     np.testing.assert_allclose(small[1, 0], image[2:4, 0:2].mean(axis=(0, 1)))
-    assert paint.shrunk(image, 8) is image
+    assert images.shrunk(image, 8) is image
 
 
 class _Nobody:
     """A body where nobody is painted."""
 
-    positions, units = None, {}
+    positions, units = np.zeros((0, 3)), {}
 
     def __init__(self):
         self.man = self
@@ -314,13 +314,11 @@ def test_extra_correctives_fire_only_together(sample):
     assert sorted(fired[fired > 0].tolist()) == [0.5]
 
 
-def test_extra_each_cheek_flushes_on_its_side(sample, monkeypatch):
-    _, _, parts, _, person, body = sample
-    monkeypatch.setattr(paint, "HEAD_SIZE", 256)
-    monkeypatch.setattr(paint, "MASK_SIZE", 64)
-    monkeypatch.setattr(paint, "paint_eye", lambda _: np.zeros((1, 1, 3)))
-    monkeypatch.setattr(paint, "png", lambda image: image)
-    files, _ = paint.paint_textures(person, body.man.positions, body.man.units, parts)
+def test_extra_each_cheek_flushes_on_its_side(sample):
+    _, _, parts, _, _, body = sample
+    coarse = next(part for part in parts if part.name == "head_lod1_mesh")
+    eye = body.man.positions[body.groups["helper-l-eye"]].mean(axis=0)
+    files = textures.flush_masks(coarse, body.man.positions, eye)
     left, right = files["head_flush_L.png"], files["head_flush_R.png"]
     assert 0.5 < left.max() <= 1
     assert left.sum() == pytest.approx(right.sum(), rel=0.05)
@@ -512,9 +510,14 @@ def test_a_folder_that_is_not_there_is_said_before_anything_is_fetched(tmp_path,
 @pytest.mark.skipif(os.name == "nt", reason="limits are those of POSIX")
 def test_without_room_neither_the_sample_nor_its_textures_are_there(tmp_path, monkeypatch):
     textures = {"head_color.png": b"x" * 100_000}, {"texture:head:color": "head_color.png"}
-    monkeypatch.setattr(build, "Source", lambda path: None)
+    monkeypatch.setattr(build, "Source", lambda path: _Nobody)
+    monkeypatch.setattr(_Nobody, "base_mesh", lambda: None, raising=False)
     monkeypatch.setattr(build, "assemble", lambda *_: (risorius.Dna(), [], _Nobody()))
     monkeypatch.setattr(build, "paint_textures", lambda *_: textures)
+    monkeypatch.setattr(build, "askew", lambda *_: np.zeros((0, 3)))
+    for bare in ("grow_hair", "add_hair"):
+        monkeypatch.setattr(build, bare, lambda *_: None)
+    monkeypatch.setattr(build, "hair_textures", lambda *_: ({}, {}))
     path = tmp_path / "s.dna"
     options = {"data": tmp_path, "say": lambda text: None, "rig": None}
     with no_room(50_000), pytest.raises(OSError, match=r"head_color\.png"):

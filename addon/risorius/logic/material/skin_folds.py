@@ -123,7 +123,7 @@ def fold_coordinates(points: Points, frame: FaceFrame) -> Float32:
     return np.stack([x, z, np.hypot(x, (z + 1.0) * 0.8)], axis=1).astype(np.float32)
 
 
-def border_share(points: Points, border: NDArray[np.integer], frame: FaceFrame) -> Float32:
+def border_share(points: Points, border: NDArray[np.int64], frame: FaceFrame) -> Float32:
     """float32[V]: 1 within a centimetre of an open border, 0 from two and a half on.
 
     Rims of lids, lips and nostrils count as none: light may go through them.

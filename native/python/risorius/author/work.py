@@ -33,10 +33,10 @@ class RigOptions:
     tolerance_mm: float | None = 0.05
     # A joint leaves an expression in which it moves no vertex further: others take over.
     least_effect_mm: float = 0.05
+    lods: LodOptions = field(default_factory=LodOptions)
     # Meshes that keep their weights and blend shapes, by parts of their names: eyeballs, which turn
     # with a joint of their own.
     kept: tuple[str, ...] = ()
-    lods: LodOptions = field(default_factory=LodOptions)
 
 
 @dataclass

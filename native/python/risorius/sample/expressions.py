@@ -258,8 +258,10 @@ def leave_bones(
         positions: float64[V, 3], decimetres.
         pivots: joint positions by name.
     """
-    bones = {"helper-upper-teeth": ("FACIAL_C_TeethUpper",)}
-    bones["helper-lower-teeth"] = ("FACIAL_C_TeethLower", "FACIAL_C_Jaw")
+    bones: dict[str, tuple[str, ...]] = {
+        "helper-upper-teeth": ("FACIAL_C_TeethUpper",),
+        "helper-lower-teeth": ("FACIAL_C_TeethLower", "FACIAL_C_Jaw"),
+    }
     for side, letter in (("L", "l"), ("R", "r")):
         for name in ("helper-{}-eye", "eyeball-{}", "cornea-{}"):
             bones[name.format(letter)] = (f"FACIAL_{side}_Eye",)

@@ -20,7 +20,15 @@ YEARS = (5.0, 90.0)
 _AGES = ((1.0, "baby"), (11.0, "child"), (20.0, "young"), (32.0, "young"), (90.0, "old"))
 HAIR_STYLES = ("none", "crop", "receding", "long", "bun", "afro")
 BEARD_STYLES = ("none", "full", "short", "goatee", "moustache")
-_OPTIONAL = ("muscle", "weight", "features", "asymmetry", "freckles", "scalp", "shirt")
+_OPTIONAL: tuple[str, ...] = (
+    "muscle",
+    "weight",
+    "features",
+    "asymmetry",
+    "freckles",
+    "scalp",
+    "shirt",
+)
 _OPTIONAL += ("hair_length", "hair_curl", "hair_grey")
 _OPTIONAL += ("hair_style", "beard_style")
 _COLOURS = ("skin", "flush", "lids", "lips", "hair", "brows", "shirt")

@@ -88,11 +88,14 @@ class Arch:
         way = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(edge, axis=0), axis=1))])
         both = np.concatenate([-way[:0:-1], way])
         points = np.concatenate([edge[:0:-1] * (-1, 1, 1), edge])
-        fits = [
-            np.polynomial.Polynomial.fit(both, points[:, k], 7 if k == 0 else 6) for k in range(3)
-        ]
-        fine = np.linspace(-way[-1], way[-1], 801)
-        self._points = np.stack([fit(fine) for fit in fits], axis=1)
+        fine = np.linspace(-1, 1, 801)
+        self._points = np.stack(
+            [
+                np.polyval(np.polyfit(both / way[-1], points[:, k], degree), fine)
+                for k, degree in enumerate((7, 6, 6))
+            ],
+            axis=1,
+        )
         steps = np.linalg.norm(np.diff(self._points, axis=0), axis=1)
         length = np.concatenate([[0], np.cumsum(steps)])
         self._length = length - length[-1] / 2
@@ -343,7 +346,7 @@ def mouth_parts(base: BaseMesh, lod: int) -> list[Part]:
         lod: 0 or 1.
     """
     around, steps = ((14, 6), (8, 4))[lod]
-    made = {"teeth": [], "gums": []}
+    made: dict[str, list[tuple[Polygons, Operator]]] = {"teeth": [], "gums": []}
     for name, arch in arches(base).items():
         row = UPPER if name == "upper" else LOWER
         crowns, gums = Builder(), Builder()
