@@ -318,7 +318,7 @@ def _still_times(layer: RISORIUS_PG_layer, rate: float) -> Times:
 def _expression_source(
     _controls: ArmatureObject, live: runtime.Runtime, layer: RISORIUS_PG_layer, rate: float
 ) -> Source:
-    pose = native.part("expressions").get(layer.expression).weights
+    pose = native.part("expressions").get(layer.expression, layer.edition).weights
     return _for_face(live, pose), _still_times(layer, rate)
 
 

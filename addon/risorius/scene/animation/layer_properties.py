@@ -77,6 +77,8 @@ class RISORIUS_PG_layer(bpy.types.PropertyGroup):
         description="What the layer plays",
     )
     expression: _still(bpy.props.StringProperty, name="Expression")
+    # Of the expressions that come with Risorius; files from before there were two do not say it.
+    edition: _still(bpy.props.IntProperty, name="Edition", default=1, min=1)
     seed: _still(
         bpy.props.IntProperty, name="Seed", description="Another seed is another life", min=0
     )

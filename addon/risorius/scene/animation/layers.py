@@ -141,6 +141,8 @@ def add(controls: ArmatureObject, kind: str, name: str, **settings: object) -> R
     rank = there[-1].rank + 1 if there else 0
     layer = places(controls).add()
     layer.name, layer.kind, layer.rank = layer_name, kind, rank
+    if kind == "EXPRESSION":
+        layer.edition = native.part("expressions").EDITION
     for key, value in settings.items():
         setattr(layer, key, value)
     controls.risorius_layers_index = len(places(controls)) - 1

@@ -350,9 +350,10 @@ def _copy_attributes(mesh: bpy.types.Mesh, source: bpy.types.Mesh) -> None:
     for theirs in [a for a in attributes if a.name.startswith(transfer.OUR_PREFIX)]:
         kind = (theirs.name, theirs.data_type, theirs.domain)
         ours: Attribute = mesh.attributes.get(theirs.name) or mesh.attributes.new(*kind)
-        flat = np.empty(len(theirs.data) * 3, np.float32)
-        theirs.data.foreach_get("vector", flat)
-        ours.data.foreach_set("vector", flat)
+        single = theirs.data_type == "FLOAT"
+        flat = np.empty(len(theirs.data) * (1 if single else 3), np.float32)
+        theirs.data.foreach_get("value" if single else "vector", flat)
+        ours.data.foreach_set("value" if single else "vector", flat)
 
 
 def _rebuild(

@@ -26,6 +26,8 @@ from ..controls.regions import REGIONS
 from ..controls.weights import named_weights
 
 FILES = ("emotions.toml", "visemes.toml", "faces.toml")
+EDITION = 2
+"""Of our own: what was saved by an earlier one is to look as it did, see `get`."""
 FORMAT = 1
 """Of the files that text_of writes: a newer one is refused."""
 _SAVED = (-1.0, 1.5)  # the weights of a file that says its form: rotations, and overdrive
@@ -66,7 +68,7 @@ def load(path: str | os.PathLike[str] | None = None) -> dict[str, Expression]:
         ValueError: the file, the expression, what was found and what was expected. OSError.
     """
     if path is None:
-        return dict(_own())
+        return dict(_own(EDITION))
     return _parsed(toml.read(path), os.fspath(path))
 
 
@@ -79,9 +81,17 @@ def of_text(text: str) -> dict[str, Expression]:
     return _parsed(toml.parse(text), "an expression")
 
 
-def get(name: str) -> Expression:
-    """One of Risorius' own. Raises: ValueError naming some that there are."""
-    own = _own()
+def get(name: str, edition: int = EDITION) -> Expression:
+    """One of Risorius' own.
+
+    Args:
+        name: of the expression.
+        edition: 1 for those that were milder, else those of today.
+
+    Raises:
+        ValueError: there is none of that name; some that there are.
+    """
+    own = _own(1 if edition == 1 else EDITION)
     if name not in own:
         raise ArgumentError(
             f"{name}: an expression such as {', '.join(list(own)[:6])} was expected"
@@ -164,8 +174,10 @@ def _quoted(text: str) -> str:
 
 
 @cache
-def _own() -> dict[str, Expression]:
+def _own(edition: int = EDITION) -> dict[str, Expression]:
     folder = resources.files(__package__)
+    if edition == 1:
+        folder = folder.joinpath("edition_1")
     texts = {file: folder.joinpath(file).read_text(encoding="utf-8") for file in FILES}
     return _joined({file: _parsed(toml.parse(text), file) for file, text in texts.items()})
 

@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: MIT
+"""Teeth, lips, the shirt and sides that differ, on the real data where they can be had."""
+
+import numpy as np
+import pytest
+from conftest import _not_run
+from risorius.author.geometry.polygon_mesh import polygon_mesh
+from risorius.sample import askew, build, people, source
+from risorius.sample.body import Body
+from risorius.sample.eyes import with_eyeballs
+from risorius.sample.parts import clothes, lips, teeth
+from risorius.sample.polygons import edges_of
+
+MM = 0.01  # of the data's decimetres
+
+
+@pytest.fixture(scope="module")
+def data():
+    try:
+        return source.Source(source.fetch())
+    except source.SourceError as error:
+        _not_run.add("the sample's CC0 data")
+        pytest.skip(f"extra not run: {error}")
+
+
+@pytest.fixture(scope="module")
+def base(data):
+    return data.base_mesh()
+
+
+@pytest.fixture(scope="module")
+def man(data, base):
+    return Body(data, base, people.MAN)
+
+
+def _pieces(polygons):
+    """Number of connected pieces."""
+    above = list(range(polygons.vertex_count))
+
+    def root(v):
+        while above[v] != v:
+            above[v] = above[above[v]]
+            v = above[v]
+        return v
+
+    for face in polygons.faces:
+        for v in face[1:]:
+            above[root(v)] = root(face[0])
+    return len({root(v) for v in range(polygons.vertex_count)})
+
+
+def test_extra_there_are_28_single_teeth_as_large_as_those_of_people(base):
+    crowns, gums = teeth.mouth_parts(base, 0)
+    assert _pieces(crowns.polygons) == 28
+    assert _pieces(gums.polygons) == 4  # a lip's and a tongue's side for each jaw
+    points = crowns.carry(base.positions) / MM
+    size = len(points) // 28
+    first = points[:size]  # an upper incisor in the middle
+    assert 7.5 < np.ptp(first[:, 0]) < 9.0
+    assert 9.0 < np.ptp(first[:, 1]) < 13.7  # with some of the root
+    assert np.allclose(crowns.operators[0].apply(np.ones((len(base.positions), 1))), 1)
+
+
+def test_extra_teeth_and_eyeballs_keep_their_form_in_every_expression(man):
+    for name, unit in man.units.items():
+        for group in ("helper-upper-teeth", "helper-lower-teeth", "eyeball-l"):
+            if "Pupil" in name and "eye" in group:
+                continue
+            before = man.positions[man.groups[group]]
+            after = before + unit.displacement[man.groups[group]]
+            apart = np.linalg.norm(before - before[:1], axis=1)
+            assert np.allclose(np.linalg.norm(after - after[:1], axis=1), apart, atol=1e-9), name
+    upper = man.units["teethLeftU"].displacement[man.groups["helper-upper-teeth"]]
+    assert np.allclose(np.linalg.norm(upper, axis=1), 2 * MM, atol=0.05 * MM)
+    assert not man.units["teethLeftU"].displacement[man.groups["helper-lower-teeth"]].any()
+
+
+def test_extra_lips_rest_on_each_other(data, base, man):
+    full = with_eyeballs(base)
+    count = len(full.positions)
+    mouth = lips.Mouth(full, data.face_unit("mouthPucker", count), data.face_unit("jawOpen", count))
+    gaps = lips.gap_across(mouth, mouth.operator.apply(man.positions))[1]
+    assert len(gaps) > 15
+    assert gaps.max() < 0.25 * MM
+    assert gaps.min() > -0.6 * MM
+    # The data's own are open.
+    raw = lips.gap_across(mouth, mouth.operator.apply(full.positions))[1]
+    assert raw.max() > 0.5 * MM
+
+
+def test_extra_a_shirt_has_a_collar_and_one_hem(base):
+    part = clothes.shirt(base, 1)
+    borders = clothes.rings(part.polygons)
+    assert len(borders) == 2  # no hole at a shoulder
+    assert max(len(owners) for owners in edges_of(part.polygons.faces).values()) == 2
+    points = part.carry(base.positions)
+    assert points[:, 1].max() < 6.1
+    assert np.allclose(part.carry(np.ones((len(base.positions), 1))), 1)
+
+
+def test_weights_are_even_shares_that_add_up():
+    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])
+    mesh = polygon_mesh(square, square, [[0, 1, 2, 3]], square[:, :2], [[0, 1, 2, 3]])
+    shares = np.random.default_rng(3).dirichlet(np.ones(5), 4)
+    mesh.skin_offsets = 5 * np.arange(5)
+    mesh.skin_weights = shares.ravel()
+    mesh.skin_joint_indices = np.tile(np.arange(5), 4)
+    build.even_weights(mesh)
+    found = np.asarray(mesh.skin_weights, np.float64).reshape(4, 5)
+    assert (found.sum(axis=1) == 1).all()
+    assert np.abs(found - shares).max() <= 3 / build.WEIGHTS
+    assert (found * build.WEIGHTS % 1 == 0).all()
+
+
+def test_extra_sides_differ_but_what_is_hard_stays(data, man):
+    person = people.PEOPLE["fighter"]
+    shape = askew.askew(data, man, person)
+    left = shape[man.groups["body"]]
+    assert 1 * MM < np.abs(left).max() < 10 * MM
+    for group in ("eyeball-l", "cornea-r", "helper-upper-teeth", "helper-tongue"):
+        assert not shape[man.groups[group]].any()
