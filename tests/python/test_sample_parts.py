@@ -8,6 +8,7 @@ from risorius.author.geometry.polygon_mesh import polygon_mesh
 from risorius.sample import askew, build, people, source
 from risorius.sample.body import Body
 from risorius.sample.eyes import with_eyeballs
+from risorius.sample.paint.layout import islands
 from risorius.sample.parts import clothes, lips, teeth
 from risorius.sample.polygons import edges_of
 
@@ -34,19 +35,8 @@ def man(data, base):
 
 
 def _pieces(polygons):
-    """Number of connected pieces."""
-    above = list(range(polygons.vertex_count))
-
-    def root(v):
-        while above[v] != v:
-            above[v] = above[above[v]]
-            v = above[v]
-        return v
-
-    for face in polygons.faces:
-        for v in face[1:]:
-            above[root(v)] = root(face[0])
-    return len({root(v) for v in range(polygons.vertex_count)})
+    """Number of connected pieces, which these meshes have the same ones of in the texture."""
+    return len(np.unique(islands(polygons)))
 
 
 def test_extra_there_are_28_single_teeth_as_large_as_those_of_people(base):

@@ -159,9 +159,7 @@ def skin_weights(
         jaw_open: the unit jawOpen with the motion of its joint.
     """
     weights = spine_weights(positions, joints)
-    rotation, shift = jaw_open.joints["FACIAL_C_Jaw"]
-    pivot = joints["FACIAL_C_Jaw"]
-    rigid: Floats = pivot + shift + (positions - pivot) @ rotation.T - positions
+    rigid = ex.rigid_way(positions, joints["FACIAL_C_Jaw"], *jaw_open.joints["FACIAL_C_Jaw"])
     length = np.einsum("ij,ij->i", rigid, rigid)
     share = np.einsum("ij,ij->i", jaw_open.displacement, rigid) / np.maximum(length, 1e-9)
     jaw = np.clip(share, 0, 1) * (length > 1e-6)

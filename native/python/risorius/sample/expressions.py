@@ -71,6 +71,19 @@ def about(pivot: Floats, rotation: Floats, translation: Floats) -> tuple[Floats,
     return rotation, translation - pivot + rotation @ pivot
 
 
+def rigid_way(points: Floats, pivot: Floats, rotation: Floats, shift: Floats) -> Floats:
+    """float64[n, 3]: how far a rotation about a pivot and a shift of it take points.
+
+    Args:
+        points: float64[n, 3].
+        pivot: [3].
+        rotation: [3, 3].
+        shift: [3], of the pivot.
+    """
+    way: Floats = pivot + shift + (points - pivot) @ rotation.T - points
+    return way
+
+
 def part_rotation(rotation: Floats, share: float) -> Floats:
     """The rotation by a share of the angle (Rodrigues)."""
     angle = np.arccos(np.clip((np.trace(rotation) - 1) / 2, -1, 1)) * share
@@ -274,8 +287,7 @@ def leave_bones(
             way = np.zeros_like(at)
             for joint in joints:
                 if joint in unit.joints:
-                    rotation, shift = unit.joints[joint]
-                    way += (at - pivots[joint]) @ rotation.T + pivots[joint] + shift - at
+                    way += rigid_way(at, pivots[joint], *unit.joints[joint])
             unit.displacement[groups[group]] = way
 
 

@@ -13,7 +13,6 @@ import numpy as np
 from ..part import Part
 from ..polygons import (
     Floats,
-    Ints,
     Operator,
     Polygons,
     clip_below,
@@ -24,9 +23,8 @@ from ..polygons import (
 from ..source import BaseMesh
 
 GROUP = "helper-tights"
-COLLAR = (
-    5.81  # of height plus COLLAR_SLOPE times the distance to the front: where the collar stands
-)
+# Of height plus COLLAR_SLOPE times the distance to the front: where the collar stands.
+COLLAR = 5.81
 COLLAR_SLOPE = 0.19
 HEM = 4.62  # height
 SHOULDER = 2.02  # how far to the side
@@ -102,14 +100,14 @@ def unrolled(positions: Floats) -> Floats:
     return np.column_stack([positions[:, 0] + 0.5 * positions[:, 2], positions[:, 1]])
 
 
-def spread(vertices: Ints, most: int) -> list[int]:
-    """At most so many of the vertices, evenly taken: means over few keep operators sparse.
+def spread(vertices: list[int], most: int) -> list[int]:
+    """About so many of the vertices, evenly taken: means over few keep operators sparse.
 
     Args:
-        vertices: int[n].
+        vertices: in their order.
         most: how many.
     """
-    return [int(v) for v in vertices[:: max(1, len(vertices) // most)]]
+    return vertices[:: max(1, len(vertices) // most)]
 
 
 def with_edges(polygons: Polygons, positions: Floats) -> tuple[list[list[int]], Operator]:
@@ -122,7 +120,7 @@ def with_edges(polygons: Polygons, positions: Floats) -> tuple[list[list[int]], 
     count = polygons.vertex_count
     faces = [list(face) for face in polygons.faces]
     rows: list[tuple[int, int, float]] = []
-    trunk = spread(np.flatnonzero(np.abs(positions[:, 0]) < 1.0), 1000)
+    trunk = np.flatnonzero(np.abs(positions[:, 0]) < 1.0).tolist()
     near = 1 / len(trunk)
     # Room: away from the middle of the trunk at the same height would need a division; from its
     # middle alone it is linear, and much the same for what is seen.
@@ -131,13 +129,12 @@ def with_edges(polygons: Polygons, positions: Floats) -> tuple[list[list[int]], 
         rows += [(i, j, -ROOM * near) for j in trunk]
     total = count
     for ring in rings(polygons):
-        middle = positions[spread(np.array(ring), 16)].mean(axis=0)
+        few = spread(ring, 16)
+        middle = positions[few].mean(axis=0)
         collar = middle[1] > 5.5 and abs(middle[0]) < 0.3
         profile = _COLLAR if collar else ((0.0, 0.0), (-3.0, 0.0), (-9.0, 0.0))
         radius = float(np.linalg.norm(positions[ring] - middle, axis=1).mean())
-        lower = trunk
-        rise = float(np.linalg.norm(middle - positions[lower].mean(axis=0)))
-        few = spread(np.array(ring), 16)
+        rise = float(np.linalg.norm(middle - positions[trunk].mean(axis=0)))
         share = 1 / len(few)
         before = ring
         for away, up in profile:
@@ -146,7 +143,7 @@ def with_edges(polygons: Polygons, positions: Floats) -> tuple[list[list[int]], 
             for n, v in zip(new, ring, strict=True):
                 rows.append((n, v, 1 + grow))
                 rows += [(n, w, (lift - grow) * share) for w in few]
-                rows += [(n, w, -lift / len(lower)) for w in lower] if lift else []
+                rows += [(n, w, -lift * near) for w in trunk] if lift else []
             size = len(ring)
             for k in range(size):
                 m = (k + 1) % size
