@@ -218,7 +218,7 @@ def _add_border(
     used = np.empty(len(mesh.loops), np.int32)
     mesh.loops.foreach_get("edge_index", used)
     faces = np.bincount(used, minlength=len(mesh.edges))
-    open_ones = np.unique(edges.reshape(-1, 2)[faces == 1])
+    open_ones = np.unique(edges.reshape(-1, 2)[faces == 1]).astype(np.int64)
     near = skin_folds.border_share(points, open_ones, frame)
     if near.any():
         attribute: Attribute = mesh.attributes.new(skin_material.BORDER, "FLOAT", "POINT")
