@@ -79,7 +79,7 @@ _Row = tuple[str, float, float, float, tuple[float, float], float, Triple]
 _LAMPS: tuple[_Row, ...] = (
     ("Key", -45.0, 30.0, 1.3, (0.6, 0.6), 1.0, (1.0, 0.925, 0.84)),
     ("Fill", 42.0, 4.0, 2.0, (1.5, 1.5), 0.25, (0.86, 0.93, 1.0)),
-    ("Rim", 148.0, 38.0, 1.35, (0.45, 0.9), 1.3, (0.93, 0.97, 1.0)),
+    ("Rim", 148.0, 38.0, 1.35, (0.45, 0.9), 0.8, (0.93, 0.97, 1.0)),
 )
 _EXPOSURE = 4.6  # irradiance of the key at the face, in W/m2
 

@@ -7,9 +7,9 @@ from ..base.blender_types import Socket
 from .look import Look
 from .nodes import Graph
 
-_ROUGH = 0.45
-_SHINE = 0.16  # as of metal: hair reflects in its own colour, also where it is seen from aside
-_GLOSS, _GLOSS_FACING = 0.1, 0.35
+_ROUGH = 0.5
+_SHINE = 0.12  # as of metal: hair reflects in its own colour, also where it is seen from aside
+_GLOSS, _GLOSS_FACING = 0.08, 0.22
 _BARE = (0.06, 0.045, 0.035)  # linear colour without a picture
 
 

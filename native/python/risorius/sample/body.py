@@ -8,6 +8,7 @@ import numpy as np
 from ..base.easing import smooth_step
 from . import expressions as ex
 from .eyes import Eyes, with_eyeballs
+from .parts.clothes import collar_heights
 from .parts.lips import Mouth, sealed
 from .people import MAN, Person
 from .polygons import Floats, Ints
@@ -18,6 +19,8 @@ FLOOR = 8.168  # what lies under the soles, in decimetres below the data's origi
 NECK_CUT = 5.36  # of height less NECK_SLOPE times the distance from the middle, in the base mesh
 NECK_SLOPE = 0.35
 TEETH_SHOW = 0.035
+# Above the collar's seam: skin in the shirt is at rest or it would come through, from there on free.
+COVERED = (0.06, 0.5)
 REACH = 1.3  # the hands are as high as the neck, but not as near
 # name, parent, group of the base mesh whose middle is the joint (or None: set below)
 JOINTS = [
@@ -240,8 +243,11 @@ class Body:
         self._ways = {name: unit.displacement for name, unit in self.units.items()}
         moved = dict(self._ways)
         self.eye_correctives = self.eyes.move(moved)
+        rests, free = COVERED
+        above = (collar_heights(base.positions) - rests) / (free - rests)
+        uncovered = smooth_step(above)[:, None]
         for name, way in moved.items():
-            self.units[name].displacement = way
+            self.units[name].displacement = way * uncovered
         ex.add_joint_motion(self.units, groups, self.positions, self.joints)
         ex.leave_bones(self.units, groups, self.positions, self.joints)
         if other is None:

@@ -256,7 +256,9 @@ class Skin:
         roots, at = texels.dots(3.4, 31)
         dark = roots.over(0.9 * scalp, at, 0.5)
         shadow = person.scalp * scalp * (0.78 + 0.08 * texels.middle) + 0.2 * person.scalp * dark
-        light = _over(light, hair, np.clip(shadow, 0, 0.95))
+        # Where hair parts one looks between hairs, and each of them takes a share of the light.
+        deep = (np.clip(shadow, 0, 0.95) * scalp).astype(np.float32)[:, None]
+        light = light ** (1 - deep) * np.maximum(hair, 1e-3).astype(np.float32) ** deep
         brows = linear(np.array(person.brows))
         light = _over(
             light, brows, 0.26 * person.scalp * brow_mask(texels.place, self.eye, texels.middle)

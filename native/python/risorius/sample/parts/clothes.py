@@ -34,6 +34,17 @@ _COLLAR = ((1.6, -2.5), (2.6, 0.5), (2.8, 6.0), (2.2, 11.5), (0.9, 13.0), (-0.5,
 MM = 0.01
 
 
+def collar_heights(positions: Floats) -> Floats:
+    """float64[v]: how high places are above the collar's seam, all round the neck; decimetres.
+
+    Args:
+        positions: float64[v, 3], those of the base mesh.
+    """
+    x, y, z = positions.T
+    # A shoulder may be as high as the collar; only what is near the neck is cut.
+    return np.asarray(y + COLLAR_SLOPE * z - 0.5 * np.clip(np.abs(x) - 0.7, 0, None) - COLLAR)
+
+
 def rings(polygons: Polygons) -> list[list[int]]:
     """The borders of a mesh, each a ring of vertices in the order of its faces.
 
@@ -69,11 +80,10 @@ def shirt(base: BaseMesh, lod: int) -> Part:
         base.uvs,
         len(base.positions),
     )
-    x, y, z = base.positions.T
+    x, y, _z = base.positions.T
+    collar = -collar_heights(base.positions)
     operators: list[Operator] = []
-    # A shoulder may be as high as the collar; only what is near the neck is cut.
-    collar = y + COLLAR_SLOPE * z - 0.5 * np.clip(np.abs(x) - 0.7, 0, None)
-    for field, level in ((y, HEM), (-collar, -COLLAR), (-np.abs(x), -SHOULDER)):
+    for field, level in ((y, HEM), (collar, 0.0), (-np.abs(x), -SHOULDER)):
         heights = Part("", polygons, operators).carry(field[:, None])[:, 0]
         polygons, operator = clip_below(polygons, heights, level)
         operators.append(operator)
