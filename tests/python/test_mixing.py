@@ -11,14 +11,13 @@ import face_shapes
 import numpy as np
 import pytest
 import risorius
-from conftest import _not_run
+import sample_people
 from risorius.author import FitOptions, LodOptions, RigOptions, make_joint_rig
 from risorius.author.input import spec
 from risorius.base.errors import ArgumentError
 from risorius.cli import main
 from risorius.files.png import png, read_png
 from risorius.mixing import REGIONS, Masks, Mix, check_compatible, difference, mix_faces
-from risorius.sample import build, people, source
 
 _ORACLE = Path(__file__).parents[2] / "blender_tests" / "support" / "oracle.py"
 _SPEC = importlib.util.spec_from_file_location("blender_oracle_mixing", _ORACLE)
@@ -351,12 +350,7 @@ def test_pictures_are_read_back_or_refused():
 
 def test_extra_mixed_sample_people_have_round_eyes_and_no_flipped_faces():
     """The man and who is least like him, as faces of shapes, wholly and region by region."""
-    try:
-        data = source.Source(source.fetch())
-    except source.SourceError as error:
-        _not_run.add("the sample's CC0 data")
-        pytest.skip(f"extra not run: {error}")
-    both = [build.assemble(data, lambda _: None, people.PEOPLE[n])[0] for n in ("man", "girl")]
+    both = [sample_people.assembled(name)[0] for name in ("man", "girl")]
     masks = Masks(both[0])
     mixes = [Mix([1.0, 1.0])]
     mixes += [Mix([1, 0], {region: {1: 1.0}}) for region in REGIONS if not masks.is_empty(region)]

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import risorius
+import sample_people
 from conftest import _not_run, no_room
 from risorius import expressions as poses
 from risorius.author import Reference
@@ -131,14 +132,8 @@ class _Nobody:
 def sample(request):
     """(source, dna, parts, shaped positions, person, body) of a real person: the one that the data
     are made for, and the one that is least like him."""
-    try:
-        path = source.fetch()
-    except source.SourceError as error:
-        _not_run.add("the sample's CC0 data")
-        pytest.skip(f"extra not run: {error}")
-    data = source.Source(path)
-    person = people.PEOPLE[request.param]
-    dna, parts, body = build.assemble(data, lambda _: None, person)
+    data, person = sample_people.data(), people.PEOPLE[request.param]
+    dna, parts, body = sample_people.assembled(request.param)
     return data, dna, parts, body.positions, person, body
 
 

@@ -3,9 +3,9 @@
 
 import numpy as np
 import pytest
-from conftest import _not_run
+import sample_people
 from risorius.author.geometry.polygon_mesh import vertex_normals
-from risorius.sample import body, people, polygons, source
+from risorius.sample import people, polygons
 from risorius.sample.eyes import eye_parts, eyeball, lids, with_eyeballs
 from risorius.sample.eyes.rings import COLUMNS, LOWER, ROOT, TEMPLE, UPPER, smoothed
 from risorius.sample.paint import eyes as paint
@@ -85,13 +85,8 @@ def test_the_picture_of_an_eye_gives_most_of_itself_to_the_iris():
 @pytest.fixture(scope="module")
 def faces():
     """The girl, and the one whom all people are made after."""
-    try:
-        data = source.Source(source.fetch())
-    except source.SourceError as error:
-        _not_run.add("the sample's CC0 data")
-        pytest.skip(f"extra not run: {error}")
-    girl = body.Body(data, data.base_mesh(), people.PEOPLE["girl"])
-    return {"girl": girl, "model": girl.man}, with_eyeballs(data.base_mesh())
+    girl = sample_people.body("girl")
+    return {"girl": girl, "model": girl.man}, with_eyeballs(sample_people.data().base_mesh())
 
 
 @pytest.fixture(scope="module", params=["model", "girl"])

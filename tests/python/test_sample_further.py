@@ -5,9 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import _not_run
-from risorius.sample import people, source
-from risorius.sample.body import Body
+import sample_people
 from risorius.sample.controls import gui_table
 from risorius.sample.further import CONTROLS_OF_CODE
 
@@ -17,12 +15,7 @@ MM = 0.01  # of the data's decimetres
 
 @pytest.fixture(scope="module")
 def man():
-    try:
-        data = source.Source(source.fetch())
-    except source.SourceError as error:
-        _not_run.add("the sample's CC0 data")
-        pytest.skip(f"extra not run: {error}")
-    return Body(data, data.base_mesh(), people.MAN)
+    return sample_people.body("man")
 
 
 @pytest.fixture(scope="module")

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import risorius
-from conftest import _not_run
+import sample_people
 from risorius.files.png import png, read_png
 from risorius.mixing import Mix, difference, mix_faces
 from risorius.mixing.hair import hair_meshes
-from risorius.sample import build, people, source
+from risorius.sample import build, people
 from risorius.sample.hair import add_hair, grow_hair, hair_textures
 from risorius.sample.hair.growth import grow
 from risorius.sample.hair.places import hairline_height
@@ -118,15 +118,9 @@ def test_styles_are_named_or_refused(tmp_path, text, sentence):
 @pytest.fixture(scope="module")
 def haired():
     """(face of shapes with hair, its hair, person) of the man and of another with his head."""
-    try:
-        path = source.fetch()
-    except source.SourceError as error:
-        _not_run.add("the sample's CC0 data")
-        pytest.skip(f"extra not run: {error}")
-    data = source.Source(path)
     man = people.PEOPLE["man"]
-    dna, parts, body = build.assemble(data, lambda _: None, man)
-    base = data.base_mesh()
+    dna, parts, body = sample_people.assembled("man")
+    base = sample_people.data().base_mesh()
     out = []
     for person in (man, replace(man, name="Other", hair_style="bun", beard_style="short")):
         face = risorius.load(dna.to_bytes())

@@ -3,10 +3,9 @@
 
 import numpy as np
 import pytest
-from conftest import _not_run
+import sample_people
 from risorius.author.geometry.polygon_mesh import polygon_mesh
-from risorius.sample import askew, build, people, source
-from risorius.sample.body import Body
+from risorius.sample import askew, build, people
 from risorius.sample.eyes import with_eyeballs
 from risorius.sample.paint.layout import islands
 from risorius.sample.parts import clothes, lips, teeth
@@ -17,11 +16,7 @@ MM = 0.01  # of the data's decimetres
 
 @pytest.fixture(scope="module")
 def data():
-    try:
-        return source.Source(source.fetch())
-    except source.SourceError as error:
-        _not_run.add("the sample's CC0 data")
-        pytest.skip(f"extra not run: {error}")
+    return sample_people.data()
 
 
 @pytest.fixture(scope="module")
@@ -30,8 +25,8 @@ def base(data):
 
 
 @pytest.fixture(scope="module")
-def man(data, base):
-    return Body(data, base, people.MAN)
+def man():
+    return sample_people.body("man")
 
 
 def _pieces(polygons):

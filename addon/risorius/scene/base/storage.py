@@ -86,7 +86,7 @@ def same(one: bpy.types.Text, other: bpy.types.Text) -> bool:
 
 def _packed(content: bytes) -> bytes:
     """The bytes of a file as a zlib stream, within the bound of those that are unpacked."""
-    # Level 2 takes a sixth of the time of level 6 and 9 % more room: nobody waits for a file to shrink.
+    # A sixth of the time of level 6 for 9 % more room: nobody waits for a file to shrink.
     packed = zlib.compress(content, 2)
     return packed if len(content) <= _most(packed) else zlib.compress(content, 0)
 

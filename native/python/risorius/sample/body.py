@@ -19,8 +19,8 @@ FLOOR = 8.168  # what lies under the soles, in decimetres below the data's origi
 NECK_CUT = 5.36  # of height less NECK_SLOPE times the distance from the middle, in the base mesh
 NECK_SLOPE = 0.35
 TEETH_SHOW = 0.035
-# Above the collar's seam: skin in the shirt is at rest or it would come through, from there on free.
-COVERED = (0.06, 0.5)
+# Above the collar's seam: skin in the shirt rests or it would come through, then it is free.
+COVERED = (0.06, 0.4)
 REACH = 1.3  # the hands are as high as the neck, but not as near
 # name, parent, group of the base mesh whose middle is the joint (or None: set below)
 JOINTS = [
@@ -245,9 +245,10 @@ class Body:
         self.eye_correctives = self.eyes.move(moved)
         rests, free = COVERED
         above = (collar_heights(base.positions) - rests) / (free - rests)
-        uncovered = smooth_step(above)[:, None]
-        for name, way in moved.items():
-            self.units[name].displacement = way * uncovered
+        held = np.ones((count, 1))
+        held[groups["body"]] = smooth_step(above[groups["body"]])[:, None]
+        for name, way in moved.items():  # breath is all there is to see at the pit of the throat
+            self.units[name].displacement = way if "neckThroat" in name else way * held
         ex.add_joint_motion(self.units, groups, self.positions, self.joints)
         ex.leave_bones(self.units, groups, self.positions, self.joints)
         if other is None:
