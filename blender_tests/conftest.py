@@ -28,6 +28,25 @@ def installed():
     return target
 
 
+@pytest.fixture(scope="session", autouse=True)
+def kept_wheels():
+    """Blender takes the wheel's files away with each disabling and unpacks them with the next.
+
+    It takes longer than most tests; what test_extension.py says of it is seen in other processes.
+    """
+    import addon_utils
+
+    sync = addon_utils._extension_sync_wheels
+
+    def unless_empty(*, wheel_list, **given):
+        if wheel_list:
+            sync(wheel_list=wheel_list, **given)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(addon_utils, "_extension_sync_wheels", unless_empty)
+        yield
+
+
 @pytest.fixture(autouse=True)
 def tracebacks():
     """What Blender printed of exceptions in our handlers, timers and operators; a test fails of it.
