@@ -78,17 +78,16 @@ class Between:
             out.append(moved - self.positions)
         return out
 
-    def largest(self, row: int, wanted: Doubles, weights: Doubles) -> float:
+    def largest(self, row: int, wanted: Doubles, skin: sk.Skin) -> float:
         """How far the joints are off at most, at the shares, in the file's unit.
 
         Args:
             row: the expression.
             wanted: float64[V, 3], what it adds at 1.
-            weights: float64[V, joints].
+            skin: the mesh on the joints of the face that is made.
         """
         worst = 0.0
         for share, truth in zip(SHARES, self.truth(row, wanted, SHARES), strict=True):
-            reached = sk.skinned(self.positions, weights, self.ways.made[share][row])
-            off = reached - self.positions - truth
+            off = skin.moved(self.ways.made[share][row]) - truth
             worst = max(worst, float(np.linalg.norm(off, axis=1).max()))
         return worst

@@ -27,7 +27,6 @@ from .work import (
 )
 
 _LEAST_WEIGHT = 1e-3
-_STILL = 1e-9  # of a joint's motion
 
 
 def count_deltas(meshes: Sequence[Mesh]) -> int:
@@ -224,16 +223,16 @@ def _finish_mesh(
     positions = np.asarray(mesh.positions, np.float64)
     mm = MM.get(work.dna.translation_unit, 10.0)
     channel = _channels(work.dna)
-    between = Between(ways, mesh)
+    between, skin = Between(ways, mesh), sk.Skin(positions, weights)
     found, targets = _no_errors(len(positions), work.names), []
     own = ways.whole[:, weights.any(axis=0)]
-    still = np.abs(own - np.eye(3, 4)).max(axis=(1, 2, 3)) < _STILL
+    still = np.abs(own - np.eye(3, 4)).max(axis=(1, 2, 3)) < sk.STILL
     for row, column in enumerate(work.columns):
         if still[row] and not wanted[row].any():
             continue  # it is exact, in a mesh that most expressions leave alone
         goal = positions + wanted[row]
-        error = np.linalg.norm(sk.skinned(positions, weights, ways.whole[row]) - goal, axis=1) * mm
-        found.between_largest[row] = between.largest(row, wanted[row], weights) * mm
+        error = np.linalg.norm(skin.moved(ways.whole[row]) - wanted[row], axis=1) * mm
+        found.between_largest[row] = between.largest(row, wanted[row], skin) * mm
         found.motion[row] = np.sqrt((wanted[row] ** 2).sum(axis=1).mean()) * mm
         found.joints_rms[row] = np.sqrt((error**2).mean())
         found.joints_largest[row], found.worst_vertex[row] = error.max(), error.argmax()

@@ -16,6 +16,8 @@ from ...rigs.rotation import Convention
 Doubles = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
+STILL = 1e-9  # of a joint's motion: less is rounding
+
 
 def rotation_matrices(convention: Convention, angles: Doubles) -> Doubles:
     """float64[..., 3, 3] of Euler angles: what turns a column vector.
@@ -213,6 +215,31 @@ def skinned(positions: Doubles, weights: Doubles, motions: Doubles) -> Doubles:
     """
     blended = (weights @ motions.reshape(len(motions), 12)).reshape(-1, 3, 4)
     return np.einsum("vij,vj->vi", blended[..., :3], positions) + blended[..., 3]
+
+
+class Skin:
+    """Vertices on joints of which few move at once: only those are looked at."""
+
+    def __init__(self, positions: Doubles, weights: Doubles) -> None:
+        """Args:
+        positions: float64[V, 3].
+        weights: float64[V, joints], of sum 1 for each vertex.
+        """
+        self._positions = positions
+        self._of_joints = np.ascontiguousarray(weights.T)
+
+    def moved(self, motions: Doubles) -> Doubles:
+        """float64[V, 3]: how far joints bring the vertices (linear blend skinning).
+
+        Args:
+            motions: float64[joints, 3, 4], as column_motions gives them.
+        """
+        apart = motions - np.eye(3, 4)
+        moving = np.flatnonzero(np.abs(apart).max(axis=(1, 2)) > STILL)
+        blended = self._of_joints[moving].T @ apart[moving].reshape(-1, 12)
+        blended = blended.reshape(-1, 3, 4)
+        out = np.einsum("vij,vj->vi", blended[..., :3], self._positions) + blended[..., 3]
+        return np.asarray(out)
 
 
 def before_skin(wanted: Doubles, weights: Doubles, motions: Doubles) -> Doubles:

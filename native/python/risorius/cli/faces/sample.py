@@ -49,7 +49,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     build.add_argument(
         "--texture-size",
         type=int,
-        choices=(512, 1024, 2048),
+        choices=(512, 1024, 2048, 4096),
         default=2048,
         help="no texture has more texels than a square of this side (default: 2048)",
     )
