@@ -83,6 +83,19 @@ def test_extra_a_shirt_has_a_collar_and_one_hem(base):
     assert np.allclose(part.carry(np.ones((len(base.positions), 1))), 1)
 
 
+def test_extra_skin_in_the_shirt_rests_in_every_expression(base, man):
+    """Or it would come through the collar, as in a shout; only breath is seen there."""
+    skin = man.groups["body"]
+    skin = skin[np.abs(base.positions[skin, 0]) < 1]
+    heights = clothes.collar_heights(base.positions[skin])
+    worn, bare = skin[heights < 0.06], skin[heights > 0.4]
+    assert len(worn) > 500 and len(bare) > 3000
+    for name, unit in man.units.items():
+        if "neckThroat" not in name:
+            assert not unit.displacement[worn].any(), name
+    assert np.abs(man.units["neckStretchL"].displacement[bare]).max() > 2 * MM
+
+
 def test_weights_are_even_shares_that_add_up():
     square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])
     mesh = polygon_mesh(square, square, [[0, 1, 2, 3]], square[:, :2], [[0, 1, 2, 3]])

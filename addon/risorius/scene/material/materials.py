@@ -29,6 +29,7 @@ _VIEW_COLORS = {
     "cloth": (0.10, 0.11, 0.13, 1.0),
     "hair": (0.05, 0.035, 0.025, 0.5),
 }
+_VIEW_ROUGHNESS = {"skin": 0.6, "cloth": 1.0, "hair": 0.8}  # in the solid view; others shine
 _IRIS_COLOR = (0.035, 0.02, 0.012, 1.0)
 _IRIS_RADIUS = 0.47  # of the eye's: where its limbus ends, see eyes
 _WIDE = 1.6  # a mesh wider than this times its height holds both eyes
@@ -115,6 +116,7 @@ def _build(
     material = bpy.data.materials.new(f"{plan.name}_{look.base}")
     made.append(material)
     material.diffuse_color = _VIEW_COLORS[look.kind]
+    material.roughness = _VIEW_ROUGHNESS.get(look.kind, material.roughness)
     graph = nodes.Graph(material)
     if look.kind == "skin":
         skin_material.Skin(graph, look).build()

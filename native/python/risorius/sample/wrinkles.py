@@ -45,10 +45,10 @@ REGIONS = {
     "browsRaiseOuter": Region(1, {"browRaiseOuter": 1.0}),
     "chinRaise": Region(1, {"jawChinRaiseD": 1.0}),
     "squintInner": Region(1, {"eyeSquintInner": 1.0}),
-    "browsDown": Region(2, {"browDown": 1.0}),
+    "browsDown": Region(2, {"browDown": 0.6}),
     "mouthStretch": Region(2, {"mouthStretch": 1.0}),
     "neckStretch": Region(2, {"neckStretch": 1.0}),
-    "noseWrinkler": Region(2, {"noseWrinkle": 1.0}),
+    "noseWrinkler": Region(2, {"noseWrinkle": 0.75}),
     "cheekRaiseOuter": Region(3, {"eyeCheekRaise": 1.0}),
     "smile": Region(3, {"mouthCornerPull": 1.0, "mouthSharpCornerPull": 0.6}),
 }

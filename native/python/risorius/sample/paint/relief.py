@@ -75,7 +75,11 @@ def roughness(skin: Skin, creases: Floats) -> Floats:
     """
     field, texels = skin.field, skin.texels
     dry = float(np.interp(skin.person.age, (8, 20, 40, 75), (0.03, -0.01, 0.0, 0.05)))
-    out = 0.48 + dry - 0.13 * field["oil"] + 0.02 * texels.coarse + 0.03 * texels.middle
+    dark = (
+        skin.person.darkness()
+    )  # pigment takes what skin scatters: its gloss alone is left to see
+    out = 0.48 + dry + 0.09 * dark - (0.13 - 0.06 * dark) * field["oil"]
+    out += 0.02 * texels.coarse + 0.03 * texels.middle
     out += 0.02 * texels.fine + 0.12 * creases
     lips = 0.36 + 0.03 * texels.middle - 0.03 * skin.lines
     out += (lips - out) * skin.lips
