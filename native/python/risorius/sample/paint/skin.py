@@ -22,7 +22,7 @@ HEAD_SIZE = 2048
 _MELANIN = np.array([0.42, 0.70, 1.0], np.float32)
 _VEINS = np.array([0.42, 0.26, 0.10], np.float32)
 _YELLOW = np.array([-0.02, 0.04, 0.36], np.float32)
-_MUCOSA = (0.66, 0.34, 0.32)
+_MUCOSA = (0.73, 0.41, 0.385)
 _THROAT = (0.36, 0.15, 0.14)
 _LID_MARGIN = (0.80, 0.55, 0.50)
 
@@ -286,7 +286,7 @@ class Skin:
         pink = linear(np.array(_MUCOSA)) * (1 - 0.35 * self.deep)
         red = _over(red, pink, (0.30 + 0.10 * self.deep) * inner)
         red = red * np.exp(-0.22 * self.deep * _MELANIN)
-        red *= (1 - 0.30 * smooth(4.0, 2.2, ring))[:, None]
+        red *= (1 - 0.18 * smooth(4.0, 2.2, ring))[:, None]
         rim = np.exp(-(((ring - regions.LIPS_RINGS) / 1.1) ** 2)) * self.deep
         light = light * np.exp(-(0.25 * rim)[:, None] * _MELANIN)
         return _over(light, red, (0.86 + 0.04 * texels.coarse) * self.lips)
