@@ -116,8 +116,8 @@ def build_stage(man, woman):
     camera = bpy.context.scene.camera
     middle = (low + high) / 2
     middle.x = (man.location.x + woman.location.x) / 2
-    middle.z = low.z + 0.58 * unit
-    camera.location = middle + Vector((0.0, -5.4, 0.08)) * unit
+    middle.z = low.z + 0.615 * unit  # from below the hair's top down to where shirts end
+    camera.location = middle + Vector((0.0, -3.45, 0.06)) * unit
     stage.aim(camera, middle)
     add_flash(middle, unit)
 
