@@ -116,7 +116,7 @@ def build_stage(man, woman):
     camera = bpy.context.scene.camera
     middle = (low + high) / 2
     middle.x = (man.location.x + woman.location.x) / 2
-    middle.z = low.z + 0.615 * unit  # from below the hair's top down to where shirts end
+    middle.z = low.z + 0.615 * unit  # from above the hair down to where the shirts still are
     camera.location = middle + Vector((0.0, -3.45, 0.06)) * unit
     stage.aim(camera, middle)
     add_flash(middle, unit)

@@ -10,8 +10,6 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ..base import toml
 from ..base.errors import ArgumentError
 
@@ -66,10 +64,6 @@ class Person:
     hair_curl: float = 0.0
     hair_grey: float = 0.0
     beard_style: str = "none"
-
-    def darkness(self) -> float:
-        """0 for pale skin to 1 for the darkest."""
-        return float(np.interp(np.mean(self.skin), (0.25, 0.6), (1.0, 0.0)))
 
     def shape(self) -> dict[str, float]:
         """Body shapes of the data -> weights. Features are not in it, see Source.feature."""

@@ -10,6 +10,7 @@ from ..eyes.eyeball import IRIS_AT, PUPIL, side_angle
 from ..people import Person
 from ..polygons import Floats
 from .images import blend, noise, smooth
+from .skin import depth_of
 
 EYE_SIZE = 1024
 _WHITE, _PINK, _VESSEL = (0.80, 0.755, 0.71), (0.83, 0.62, 0.56), (0.66, 0.24, 0.20)
@@ -29,7 +30,7 @@ def paint_eye(person: Person) -> Floats:
     x, y = np.meshgrid(at, at)
     away, around = np.hypot(x, y), np.arctan2(y, x) / (2 * np.pi) % 1
     colour = _sclera(side_angle(np.maximum(away, IRIS_AT)), x / np.maximum(away, 1e-9), random)
-    colour *= 1 - 0.2 * person.darkness()  # beside dark skin the same white would glow
+    colour *= 1 - 0.18 * depth_of(person)  # beside dark skin the same white would glow
     reach = (away / IRIS_AT - PUPIL) / (1 - PUPIL)  # 0 at the pupil, 1 at the limbus
     iris = _iris(person, around, reach, random)
     wobble = 0.012 * _polar(around, 0 * reach, 53, 1, random)

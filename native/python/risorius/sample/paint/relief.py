@@ -75,10 +75,9 @@ def roughness(skin: Skin, creases: Floats) -> Floats:
     """
     field, texels = skin.field, skin.texels
     dry = float(np.interp(skin.person.age, (8, 20, 40, 75), (0.03, -0.01, 0.0, 0.05)))
-    dark = (
-        skin.person.darkness()
-    )  # pigment takes what skin scatters: its gloss alone is left to see
-    out = 0.48 + dry + 0.09 * dark - (0.13 - 0.06 * dark) * field["oil"]
+    # The less light skin gives back, the more its gloss is seen.
+    matte = dry + 0.082 * skin.deep
+    out = 0.48 + matte - (0.13 - 0.054 * skin.deep) * field["oil"]
     out += 0.02 * texels.coarse + 0.03 * texels.middle
     out += 0.02 * texels.fine + 0.12 * creases
     lips = 0.36 + 0.03 * texels.middle - 0.03 * skin.lines

@@ -80,10 +80,10 @@ def shirt(base: BaseMesh, lod: int) -> Part:
         base.uvs,
         len(base.positions),
     )
-    x, y, _z = base.positions.T
-    collar = -collar_heights(base.positions)
+    x, y = base.positions.T[:2]
+    collar = collar_heights(base.positions)
     operators: list[Operator] = []
-    for field, level in ((y, HEM), (collar, 0.0), (-np.abs(x), -SHOULDER)):
+    for field, level in ((y, HEM), (-collar, 0.0), (-np.abs(x), -SHOULDER)):
         heights = Part("", polygons, operators).carry(field[:, None])[:, 0]
         polygons, operator = clip_below(polygons, heights, level)
         operators.append(operator)
