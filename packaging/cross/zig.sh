@@ -13,7 +13,7 @@ pip_venv() {
   [ -e "$stamp" ] && return 0
   python3 -m venv "$1" && "$1/bin/python" -m pip install -q -r "$2" && touch "$stamp"
 }
-# get_zig TARGET...: a compiler of each target in $tools, as CMake and ccache want it: one program
+# get_zig TARGET...: compilers of each target in $tools, as CMake and ccache want them: one program each
 get_zig() {
   local zig name
   pip_venv "$cross/venv" "$project/packaging/cross/requirements.txt" &&
@@ -25,6 +25,7 @@ get_zig() {
   done
   for name; do
     printf '#!/bin/sh\nexec "%s" c++ -target %s "$@"\n' "$zig" "$name" > "$tools/$name-c++"
+    printf '#!/bin/sh\nexec "%s" cc -target %s "$@"\n' "$zig" "$name" > "$tools/$name-cc"
   done
   chmod +x "$tools"/*
   export CCACHE_COMPILERTYPE=clang CCACHE_COMPILERCHECK
