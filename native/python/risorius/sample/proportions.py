@@ -3,7 +3,9 @@
 
 The data's units fit one build of a face. Where another is half as wide, a lid has half the way; the
 local change of form (Sumner and Popovic, "Deformation Transfer for Triangle Meshes", 2004, as
-a matrix at each vertex) says by how much, and which way it goes.
+a matrix at each vertex) says by how much, and which way it goes. What the jaw takes along
+turns with it by the same angle on everybody, and only what is left of it is carried so: changes of
+form that differ from the edge of a small lip to its chin would turn it inside out.
 """
 
 from __future__ import annotations
@@ -11,12 +13,15 @@ from __future__ import annotations
 import numpy as np
 
 from ..author.geometry.polygon_mesh import vertex_normals
+from .expressions import rigid_fit, rigid_way
 from .polygons import Floats, Ints
 from .source import BaseMesh
 
 _RINGS = 25  # of vertices about each, over which its change of form is evened out
 _WITH_SKIN = "eyelashes"  # groups that go with the skin that they are on
 _SKIN = "body"
+_JAW = "helper-lower-teeth"
+_REST = 0.005  # decimetres: where the jaw moves a place less than that, it does not carry it
 
 
 class Proportions:
@@ -33,6 +38,7 @@ class Proportions:
             before: float64[V, 3], whom the displacements are of.
             after: float64[V, 3], whom they are carried to.
         """
+        self._jaw, self._before, self._after = groups[_JAW], before, after
         self.changes = np.tile(np.eye(3), (len(before), 1, 1))
         sums = _edge_sums(base, before, after)
         skin = _evened(base, groups[_SKIN], *sums)
@@ -53,7 +59,16 @@ class Proportions:
         Args:
             displacement: float64[V, 3] on the one.
         """
-        return np.einsum("vij,vj->vi", self.changes, displacement)
+        bone, change = self._before[self._jaw], self.changes[self._jaw[0]]
+        turn, _ = rigid_fit(bone, bone + displacement[self._jaw])
+        shift = displacement[self._jaw].mean(axis=0)
+        own = rigid_way(self._before, bone.mean(axis=0), turn, shift)
+        middle = self._after[self._jaw].mean(axis=0)
+        other = rigid_way(self._after, middle, turn, change @ shift)
+        length = np.einsum("vi,vi->v", own, own) + _REST**2
+        share = np.clip(np.einsum("vi,vi->v", displacement, own) / length, 0, 1)[:, None]
+        way: Floats = np.einsum("vij,vj->vi", self.changes, displacement - share * own)
+        return way + share * other
 
 
 def _edge_sums(base: BaseMesh, before: Floats, after: Floats) -> tuple[Floats, Floats]:
