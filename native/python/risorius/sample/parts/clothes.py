@@ -23,9 +23,11 @@ from ..polygons import (
 from ..source import BaseMesh
 
 GROUP = "helper-tights"
-# Of height plus COLLAR_SLOPE times the distance to the front: where the collar stands.
-COLLAR = 5.81
-COLLAR_SLOPE = 0.19
+# Where the collar stands: its height in the middle, at the distance to the front of 0; how much lower
+# it is for each decimetre to the front, and how much higher at one to the side (square of it).
+COLLAR = 5.66
+COLLAR_SLOPE = 0.2
+COLLAR_ROUND = 0.3
 HEM = 4.62  # height
 SHOULDER = 2.02  # how far to the side
 ROOM = 0.02  # by how much it is wider than the body, as a share
@@ -42,7 +44,8 @@ def collar_heights(positions: Floats) -> Floats:
     """
     x, y, z = positions.T
     # A shoulder may be as high as the collar; only what is near the neck is cut.
-    return np.asarray(y + COLLAR_SLOPE * z - 0.5 * np.clip(np.abs(x) - 0.7, 0, None) - COLLAR)
+    sides = COLLAR_ROUND * x**2 + 0.5 * np.clip(np.abs(x) - 0.7, 0, None)
+    return np.asarray(y + COLLAR_SLOPE * z - sides - COLLAR)
 
 
 def rings(polygons: Polygons) -> list[list[int]]:
