@@ -86,7 +86,7 @@ def hair_mask(places: Floats, eye: Floats, uneven: Floats | float = 0.0) -> Floa
     ear = smooth(0.8, 0.86, np.abs(places[..., 0])) * (
         1 - smooth(0.35, 0.45, places[..., 1] - eye[1])
     )
-    return np.asarray(smooth(-0.10, 0.16, height + 0.02 * uneven) * (1 - ear))
+    return np.asarray(smooth(-0.03, 0.17, height + 0.012 * uneven) * (1 - ear))
 
 
 class Texels:
