@@ -59,7 +59,8 @@ def draw(about: str, points: dict[str, list[Point]], out: Path) -> None:
     high = max(axis.get_ylim()[1] for axis in axes)
     for axis in axes:
         axis.set_ylim(low, high)
-    axes[0].legend(frameon=False, loc="center left", fontsize=9)
+    named = axes[0].get_legend_handles_labels()
+    figure.legend(*named, frameon=False, loc="outside lower center", ncols=3, fontsize=9)
     figure.suptitle(about, fontsize=9, color="#666666")
     figure.savefig(out, dpi=110)
 
