@@ -467,13 +467,19 @@ def test_a_displacement_is_carried_by_the_change_of_form():
     before = np.column_stack([x.ravel(), y.ravel(), 0.02 * (x**2).ravel()]).astype(float)
     faces = [[a, a + 1, a + side + 1, a + side]
              for r in range(side - 1) for a in range(r * side, r * side + side - 1)]  # fmt: skip
-    base = source.BaseMesh(before, np.zeros((1, 2)), {"body": [[(v, 0) for v in f] for f in faces]})
+    jaw = [[0, 0, 5], [1, 0, 5], [0, 1, 5]]  # it rests, and nothing else goes as it does
+    before = np.vstack([before, jaw])
+    groups = {"body": np.arange(side**2), "helper-lower-teeth": side**2 + np.arange(3)}
+    faces = {"body": faces, "teeth": [groups["helper-lower-teeth"].tolist()]}
+    corners = {name: [[(v, 0) for v in f] for f in held] for name, held in faces.items()}
+    base = source.BaseMesh(before, np.zeros((1, 2)), corners)
     change = np.array([[0.5, 0.2, 0], [0, 2, 0], [0, 0, 1.0]])
     after = before @ change.T
-    carried = proportions.Proportions(base, {"body": np.arange(side**2)}, before, after)
-    along = np.gradient(before.reshape(side, side, 3), axis=0).reshape(-1, 3)
+    carried = proportions.Proportions(base, groups, before, after)
+    along = np.gradient(before[:-3].reshape(side, side, 3), axis=0).reshape(-1, 3)
+    along = np.vstack([along, np.zeros((3, 3))])
     np.testing.assert_allclose(carried.carried(along), along @ change.T, atol=0.02)
-    same = proportions.Proportions(base, {"body": np.arange(side**2)}, before, before)
+    same = proportions.Proportions(base, groups, before, before)
     np.testing.assert_allclose(same.carried(along), along, atol=1e-9)
 
 

@@ -117,6 +117,20 @@ LOOKS = [{}, *({f"eyeLook{way}": 1.0} for way in lids.LOOKS)]
 LOOKS += [{"eyeLookLeft": 0.5, "eyeLookDown": 0.5}, {"eyeLookRight": 0.5, "eyeLookUp": 0.5}]
 
 
+def test_extra_a_cheek_that_is_pushed_up_lies_over_the_eye(face):
+    """What is around the rim, where several controls push at once; the eye came through it."""
+    for side, eye in face.eyes.lids.items():
+        for pose in (
+            {"eyeCheekRaise": 1.0, "eyeSquintInner": 1.0},
+            {"eyeCheekRaise": 0.6, "eyeSquintInner": 0.85, "eyeBlink": 0.3, "eyeLookDown": 0.5},
+            {"eyeUpperLidUp": 0.7, "eyeBlink": 0.95, "eyeLookDown": 0.4},
+        ):
+            grid, turn = _posed(face, side, **pose)
+            gaze = turn @ eyeball.gaze(side)[:, 2]
+            above = _height(grid[: ROOT + 1], eye.middle, eye.radius, gaze) / MM
+            assert above.min() > 0.4, (side, pose)
+
+
 def test_extra_no_eye_goes_through_its_lids(face):
     """At each gaze, open, half closed and closed: 0.5 mm at most where they touch."""
     for side, eye in face.eyes.lids.items():

@@ -25,7 +25,18 @@ _LIFT = 0.38  # mm: what lids are higher in a whole look, since they do not go r
 LOOKS = {"Up": (25.0, 1.9), "Down": (30.0, 1.5), "Left": (30.0, 1.8), "Right": (30.0, 1.8)}
 _LOWER_LOOKS = {"Up": 1.2, "Down": -2.4}  # mm
 # What closed lids do not do beside it: they stay closed.
-_NOT_CLOSED = [*(f"eyeLook{way}" for way in LOOKS), "eyeSquintInner", "eyeCheekRaise"]
+_SKIN = 0.9  # mm over the eye, what is around the rim at least
+_TOGETHER = (
+    ("eyeCheekRaise", "eyeSquintInner"),
+    ("eyeCheekRaise", "eyeLookDown"),
+    ("eyeSquintInner", "eyeLookDown"),
+)
+_NOT_CLOSED = [
+    *(f"eyeLook{way}" for way in LOOKS),
+    "eyeSquintInner",
+    "eyeCheekRaise",
+    "eyeUpperLidUp",
+]
 WIDER = 0.75  # of the data's, which starts from lids that are half shut
 _FORWARD, _ASIDE = 1.5, 1.2  # mm: the ball from the data's, and how far at most up or down
 _RADIUS = 14.0  # mm: of the man's ball; sizes above are meant on it
@@ -104,6 +115,12 @@ class Lids:
             out[_EDGE] += lack[:, :, None] * ray[_EDGE]
             drawn = _FADE[::-1, None] * lack[0]
             out[:ROOT] += drawn[:, :, None] * ray[:ROOT]
+        # Skin that is pushed up below the rim lies over the eye as well.
+        arm = out[:ROOT] - self.middle
+        length = np.linalg.norm(arm, axis=2)
+        angle = np.arccos(np.clip(arm @ gaze / length, -1, 1))
+        least = self.radius * (eyeball.surface(angle) + _SKIN / _RADIUS)
+        out[:ROOT] += (np.maximum(least - length, 0) / length)[:, :, None] * arm
         return out
 
     def heights(self, grid: Floats, turn: Floats | None = None) -> Floats:
@@ -332,6 +349,29 @@ def stays_closed(lids: Lids, blink: Floats, other: Floats, turn: Floats | None) 
     out = np.zeros_like(blink)
     out[lids.rings] = lids.seated(there, turn, _LIFT) - lids.grid(lids.rest + blink + other)
     return out
+
+
+def stays_on_the_ball(lids: Lids, one: Floats, other: Floats, turn: Floats | None) -> Floats:
+    """float64[V, 3]: what to add where two controls push the lids at once, into the eye.
+
+    Args:
+        lids: at rest.
+        one, other: float64[V, 3], what each does alone.
+        turn: float64[3, 3], what the eye is turned by meanwhile; None: it rests.
+    """
+    both = one + other
+    return on_the_ball(lids, both, turn) - both
+
+
+def together(names: Mapping[str, object], side: str) -> list[tuple[str, str]]:
+    """Pairs of raw controls that push the lids into the eye, of those that there are.
+
+    Args:
+        names: raw controls.
+        side: "L" or "R".
+    """
+    pairs = [(one + side, other + side) for one, other in _TOGETHER]
+    return [pair for pair in pairs if all(name in names for name in pair)]
 
 
 def partners(names: Mapping[str, object], side: str) -> list[str]:

@@ -111,6 +111,10 @@ class Eyes:
             for name in lids.partners(units, letter):
                 more = lids.stays_closed(eye, closed, units[name], turns.get(name))
                 correctives[(blink, name)] = self._with_lashes(eye, more, still)
+            for one, other in lids.together(units, letter):
+                turn = turns.get(other)
+                more = lids.stays_on_the_ball(eye, units[one], units[other], turn)
+                correctives[(one, other)] = self._with_lashes(eye, more, still)
             # 4 x (1 - x) of it: nothing where lids are open or closed, the whole half way.
             correctives[(blink, blink)] = -4 * half
             units[blink] = closed

@@ -23,8 +23,8 @@ from ..polygons import (
 from ..source import BaseMesh
 
 GROUP = "helper-tights"
-# Where the collar stands: its height in the middle, at the distance to the front of 0; how much lower
-# it is for each decimetre to the front, and how much higher at one to the side (square of it).
+# Where the collar stands: its height in the middle, neither in front nor behind; how much lower it
+# is for each decimetre to the front, and how much higher by the square of those to the side.
 COLLAR = 5.66
 COLLAR_SLOPE = 0.2
 COLLAR_ROUND = 0.3
