@@ -13,7 +13,7 @@ from risorius.mixing import Mix, difference, mix_faces
 from risorius.mixing.hair import hair_meshes
 from risorius.sample import build, people
 from risorius.sample.hair import add_hair, grow_hair, hair_textures
-from risorius.sample.hair.growth import grow
+from risorius.sample.hair.growth import curled, grow
 from risorius.sample.hair.places import hairline_height
 from risorius.sample.hair.strips import card_faces, card_vertices, make_strips
 from risorius.sample.hair.surface import Surface
@@ -82,6 +82,26 @@ def test_guides_stay_over_the_skin_and_are_as_long_as_asked(ball):
     middles = corners.mean(axis=1)
     outward = (facing * middles).sum(axis=1)  # counter-clockwise seen from outside
     assert outward[middles[:, 1] > -0.8].min() > 0  # below, all ways of the flow meet
+
+
+def test_neither_a_turned_strip_nor_a_curl_goes_into_the_skin(ball):
+    """On flat skin: an edge of a root is 1.6 mm deep at most, and a curl goes away from it only."""
+    n, rows = 50, 6
+    roots = ball.scattered(np.ones(len(ball.positions)), 0.2, np.random.default_rng(3))
+    roots = roots.taken(np.arange(n))
+    points = np.zeros((n, rows, 3))
+    points[:, :, 0] = np.linspace(0, 0.5, rows)
+    outside = np.tile([0.0, 0.0, 1.0], (n, rows, 1))
+    turns = np.linspace(0, np.pi, n)
+    half, taper = np.full(n, 0.06), np.ones(rows)
+    strips = make_strips(points, outside, half, taper, np.zeros(n, int), roots, turns)
+    assert np.abs(strips.sides[:, 0, 2]).max() == pytest.approx(0.016)
+    np.testing.assert_allclose(np.linalg.norm(strips.sides[0, 0]), 0.06)  # one that lies flat
+    np.testing.assert_allclose(np.linalg.norm(strips.sides[:, 1:], axis=2), 0.06)
+    random = np.random.default_rng(4)
+    wound = curled(points, outside, np.full(n, 0.05), np.full(n, 1.5), random)
+    assert wound[:, :, 2].min() > -1e-9
+    assert wound[:, 2:, 2].max() > 0.045
 
 
 def test_a_picture_with_opacity_is_a_png_that_others_read():

@@ -101,6 +101,7 @@ def curled(
     t = np.linspace(0, 1, points.shape[1])
     angle = 2 * np.pi * (turns[:, None] * t + random.random((len(points), 1)))
     far = radius[:, None] * np.minimum(3 * t, 1)
-    return np.asarray(
-        points + (far * np.cos(angle))[..., None] * side + (far * np.sin(angle))[..., None] * up
-    )
+    # Away from the skin alone, or a curl would go through it.
+    rise = (far * np.sin(angle))[..., None] * up
+    inward = np.minimum((rise * outside).sum(axis=2, keepdims=True), 0)
+    return np.asarray(points + (far * np.cos(angle))[..., None] * side + rise - inward * outside)

@@ -18,7 +18,6 @@ from .surface import Roots, Surface
 
 _WHORL = np.array([0.10, 0.86, -1.40])  # where hair turns about the crown, of the man
 _PARTING = 0.10  # how far to his left hair is parted
-_DEEP = 0.016  # how far an edge of a turned strip lies in the skin at most, of the man
 _DENSE, _THIN = 5, 3  # tiles of each sort
 
 
@@ -143,8 +142,6 @@ def _short(
     half = (0.024 + 0.026 * high) * surface.scale * (spacing / 0.043) * random.uniform(0.8, 1.25, n)
     half *= 0.55 + 0.45 * smooth_step(inside / 0.1)
     turns = np.radians(random.uniform(-1, 1, n) * (6 + 28 * high))
-    steep = np.arcsin(np.clip(_DEEP * surface.scale / half, 0, 1))
-    turns = np.clip(turns, -steep, steep)
     taper = np.array([0.85, 1.0, 0.95, 0.7])
     return make_strips(points, out, half, taper, _tiles(inside, random), roots, turns)
 
