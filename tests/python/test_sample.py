@@ -14,6 +14,7 @@ import sample_people
 from conftest import _not_run, no_room
 from risorius import expressions as poses
 from risorius.author import Reference
+from risorius.author.geometry import rigid
 from risorius.cli import main
 from risorius.controls.arkit import mapping
 from risorius.sample import (
@@ -99,11 +100,11 @@ def test_a_rigid_motion_is_found_again():
     ry = np.array([[c[1], 0, s[1]], [0, 1, 0], [-s[1], 0, c[1]]])
     rz = np.array([[c[2], -s[2], 0], [s[2], c[2], 0], [0, 0, 1]])
     rotation = rz @ ry @ rx
-    found, shift = expressions.rigid_fit(points, points @ rotation.T + [1, 2, 3])
+    found, shift = rigid.rigid_fit(points, points @ rotation.T + [1, 2, 3])
     np.testing.assert_allclose(found, rotation, atol=1e-12)
     np.testing.assert_allclose(shift, [1, 2, 3], atol=1e-12)
     np.testing.assert_allclose(build.euler_xyz(found), [20, -10, 5], atol=1e-9)
-    third = expressions.part_rotation(found, 1 / 3)
+    third = rigid.part_rotation(found, 1 / 3)
     np.testing.assert_allclose(third @ third @ third, found, atol=1e-12)
 
 

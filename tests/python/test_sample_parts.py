@@ -4,8 +4,9 @@
 import numpy as np
 import pytest
 import sample_people
+from risorius.author.geometry import rigid
 from risorius.author.geometry.polygon_mesh import polygon_mesh
-from risorius.sample import askew, build, expressions, people, proportions, source
+from risorius.sample import askew, build, people, proportions, source
 from risorius.sample.eyes import with_eyeballs
 from risorius.sample.paint.layout import islands
 from risorius.sample.parts import clothes, lips, teeth
@@ -55,11 +56,11 @@ def test_a_jaw_turns_on_everybody_as_it_does_on_the_man():
     base = source.BaseMesh(before, np.zeros((60, 2)), {"body": faces})
     groups = {"body": np.arange(20, 60), "helper-lower-teeth": np.arange(20)}
     after = before * [0.7, 0.5, 0.9] + rng.uniform(-0.05, 0.05, (60, 3))
-    turn = expressions.part_rotation(np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0.0]]), 0.3)
+    turn = rigid.part_rotation(np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0.0]]), 0.3)
     way = proportions.Proportions(base, groups, before, after).carried(
         before @ turn.T + [0.0, -0.1, 0.05] - before
     )
-    found, shift = expressions.rigid_fit(after, after + way)
+    found, shift = rigid.rigid_fit(after, after + way)
     assert found == pytest.approx(turn, abs=1e-3)
     # Beside what it turns it moves no place by more than the 0.5 mm where it is not asked.
     assert np.abs(after @ found.T + shift - after - way).max() < 0.006

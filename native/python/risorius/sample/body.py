@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..author.geometry.rigid import rigid_way
 from ..base.easing import smooth_step
 from . import expressions as ex
 from .eyes import Eyes, with_eyeballs
@@ -162,7 +163,7 @@ def skin_weights(
         jaw_open: the unit jawOpen with the motion of its joint.
     """
     weights = spine_weights(positions, joints)
-    rigid = ex.rigid_way(positions, joints["FACIAL_C_Jaw"], *jaw_open.joints["FACIAL_C_Jaw"])
+    rigid = rigid_way(positions, joints["FACIAL_C_Jaw"], *jaw_open.joints["FACIAL_C_Jaw"])
     length = np.einsum("ij,ij->i", rigid, rigid)
     share = np.einsum("ij,ij->i", jaw_open.displacement, rigid) / np.maximum(length, 1e-9)
     jaw = np.clip(share, 0, 1) * (length > 1e-6)

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..author.geometry.polygon_mesh import vertex_normals
-from .expressions import rigid_fit, rigid_way
+from ..author.geometry.rigid import rigid_fit, rigid_way
 from .polygons import Floats, Ints
 from .source import BaseMesh
 

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: MIT
+"""Rigid motions of points: the one that fits best, about a pivot, a share of one."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .polygon_mesh import Floats
+
+
+def rigid_fit(before: Floats, after: Floats) -> tuple[Floats, Floats]:
+    """The least-squares rigid motion of points (Kabsch 1976).
+
+    Args:
+        before, after: float64[n, 3].
+
+    Returns:
+        Rotation [3, 3] and translation [3]: after is near rotation @ before + translation.
+    """
+    a, b = before - before.mean(0), after - after.mean(0)
+    u, _, vt = np.linalg.svd(a.T @ b)
+    flip = np.diag([1, 1, np.sign(np.linalg.det(u @ vt))])
+    rotation = (u @ flip @ vt).T
+    return rotation, after.mean(0) - rotation @ before.mean(0)
+
+
+def about(pivot: Floats, rotation: Floats, translation: Floats) -> tuple[Floats, Floats]:
+    """The same rigid motion as a rotation about pivot and a shift of it.
+
+    Args:
+        pivot: [3].
+        rotation: [3, 3].
+        translation: [3], of the motion as a rotation about the origin.
+    """
+    return rotation, translation - pivot + rotation @ pivot
+
+
+def rigid_way(points: Floats, pivot: Floats, rotation: Floats, shift: Floats) -> Floats:
+    """float64[n, 3]: how far a rotation about a pivot and a shift of it take points.
+
+    Args:
+        points: float64[n, 3].
+        pivot: [3].
+        rotation: [3, 3].
+        shift: [3], of the pivot.
+    """
+    way: Floats = pivot + shift + (points - pivot) @ rotation.T - points
+    return way
+
+
+def part_rotation(rotation: Floats, share: float) -> Floats:
+    """The rotation by a share of the angle (Rodrigues)."""
+    angle = np.arccos(np.clip((np.trace(rotation) - 1) / 2, -1, 1)) * share
+    axis = np.array(
+        [
+            rotation[2, 1] - rotation[1, 2],
+            rotation[0, 2] - rotation[2, 0],
+            rotation[1, 0] - rotation[0, 1],
+        ]
+    )
+    axis /= max(np.linalg.norm(axis), 1e-12)
+    k = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    return np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * (k @ k)
