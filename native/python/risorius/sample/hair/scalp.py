@@ -13,7 +13,7 @@ from ..people import Person
 from ..polygons import Floats
 from .growth import curled, grow, tangent
 from .places import hairline_height, wavy
-from .strips import Strips, joined, make_strips, unit
+from .strips import ROOT_DEEP, Strips, joined, make_strips, unit
 from .surface import Roots, Surface
 
 _WHORL = np.array([0.10, 0.86, -1.40])  # where hair turns about the crown, of the man
@@ -142,6 +142,9 @@ def _short(
     half = (0.024 + 0.026 * high) * surface.scale * (spacing / 0.043) * random.uniform(0.8, 1.25, n)
     half *= 0.55 + 0.45 * smooth_step(inside / 0.1)
     turns = np.radians(random.uniform(-1, 1, n) * (6 + 28 * high))
+    # Short hair is low along all of its length.
+    steep = np.arcsin(np.clip(ROOT_DEEP * surface.scale / half, 0, 1))
+    turns = np.clip(turns, -steep, steep)
     taper = np.array([0.85, 1.0, 0.95, 0.7])
     return make_strips(points, out, half, taper, _tiles(inside, random), roots, turns)
 

@@ -11,7 +11,7 @@ from ..paint.atlas import tile_corners
 from ..polygons import Floats, Ints
 from .surface import Roots
 
-_DEEP = 0.016  # decimetres, how far the edge of a root lies in the skin at most
+ROOT_DEEP = 0.016  # decimetres, how far the edge of a root lies in the skin at most
 
 
 def unit(vectors: Floats) -> Floats:
@@ -106,7 +106,7 @@ def make_strips(
     sides = side * half_width[:, None, None] * taper[None, :, None]
     # A strip that stands on its edge would have the half of its root deep in the skin.
     deep = np.abs((sides[:, 0] * outside[:, 0]).sum(axis=1))
-    sides[:, 0] *= np.minimum(1, _DEEP / np.maximum(deep, 1e-9))[:, None]
+    sides[:, 0] *= np.minimum(1, ROOT_DEEP / np.maximum(deep, 1e-9))[:, None]
     return Strips(points, sides, unit(outside), tiles, roots, np.full(len(points), held))
 
 
