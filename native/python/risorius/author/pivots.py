@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .geometry.rigid import rigid_fit
 from .geometry.skeleton import Doubles, rotation_vectors
 
 _LID = re.compile(r"eye(Blink|Widen|Squint|LidPress|Relax|UpperLid|LowerLid|LookUp|LookDown)")
@@ -97,13 +98,11 @@ def _hinge(positions: Doubles, displacement: Doubles) -> Doubles | None:
     length = np.linalg.norm(displacement, axis=1)
     held = length > 0.7 * length.max()
     before, after = positions[held], positions[held] + displacement[held]
-    a, b = before.mean(axis=0), after.mean(axis=0)
-    left, _, right = np.linalg.svd((before - a).T @ (after - b))
-    flip = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
-    turn = (left @ flip @ right).T
+    turn, shift = rigid_fit(before, after)
     if np.linalg.norm(rotation_vectors(turn)) < _LEAST_TURN:
         return None
-    arm, *_ = np.linalg.lstsq(np.eye(3) - turn, b - turn @ a - (a - turn @ a), rcond=1e-3)
+    a = before.mean(axis=0)
+    arm, *_ = np.linalg.lstsq(np.eye(3) - turn, shift - (a - turn @ a), rcond=1e-3)
     return np.asarray(a + arm)
 
 

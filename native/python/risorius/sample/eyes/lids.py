@@ -24,13 +24,14 @@ _LIFT = 0.38  # mm: what lids are higher in a whole look, since they do not go r
 # eyes turn by a third of that and leave the lower lids where they are.
 LOOKS = {"Up": (25.0, 1.9), "Down": (30.0, 1.5), "Left": (30.0, 1.8), "Right": (30.0, 1.8)}
 _LOWER_LOOKS = {"Up": 1.2, "Down": -2.4}  # mm
-# What closed lids do not do beside it: they stay closed.
 _SKIN = 0.9  # mm over the eye, what is around the rim at least
+# What pushes the lids into the eye where both of a pair do it.
 _TOGETHER = (
     ("eyeCheekRaise", "eyeSquintInner"),
     ("eyeCheekRaise", "eyeLookDown"),
     ("eyeSquintInner", "eyeLookDown"),
 )
+# What closed lids do not do beside it: they stay closed.
 _NOT_CLOSED = [
     *(f"eyeLook{way}" for way in LOOKS),
     "eyeSquintInner",
