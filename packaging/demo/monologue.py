@@ -33,7 +33,7 @@ def parse():
     for name in ("extension", "dna", "out"):
         parser.add_argument(f"--{name}", type=Path, required=True)
     parser.add_argument("--voices", type=Path, nargs="+", required=True)
-    parser.add_argument("--size", type=int, default=480)
+    parser.add_argument("--size", type=int, default=540)
     parser.add_argument("--only", type=int, nargs="*", help="render these frames as a still each")
     return parser.parse_args(install_extension.arguments())
 
@@ -56,14 +56,14 @@ def add_smirk(path):
     """One corner of the mouth is drawn up by its skin, by one slider, before both smile."""
     go_to(17.4)
     must(bpy.ops.risorius.breakdown(kind="BREAKDOWN", factor=0.5))
-    mesh, vertex = corner_of_mouth(path)
-    offset = (0.0015, 0.0, 0.003)
-    must(bpy.ops.risorius.drag(mesh=mesh, vertex=vertex, offset=offset, single=True))
+    mesh, vertex, way = corner_of_mouth(path)
+    must(bpy.ops.risorius.drag(mesh=mesh, vertex=vertex, offset=way * acting.SMIRK, single=True))
     must(bpy.ops.risorius.key())
 
 
 def corner_of_mouth(path):
-    """Mesh and vertex that the character's left smile moves most, by the extension's package."""
+    """Mesh and vertex that the character's left smile moves most, and where to, in metres of the
+    scene (DNA: centimetres, y up), by the extension's package."""
     import risorius
 
     dna = risorius.load(path)
@@ -72,8 +72,10 @@ def corner_of_mouth(path):
     smile = rest.copy()
     smile[list(dna.raw_control_names).index("CTRL_expressions.mouthCornerPullL")] = 1.0
     mesh = max(range(len(dna.meshes)), key=lambda m: len(dna.meshes[m].positions))
-    far = np.linalg.norm(surface.positions(smile, mesh) - surface.positions(rest, mesh), axis=1)
-    return mesh, int(np.argmax(far))
+    moves = surface.positions(smile, mesh) - surface.positions(rest, mesh)
+    vertex = int(np.argmax(np.linalg.norm(moves, axis=1)))
+    x, y, z = moves[vertex] / 100
+    return mesh, vertex, Vector((x, -z, y))
 
 
 def add_speech(controls, voices):
@@ -109,15 +111,34 @@ def add_life(controls):
     must(bpy.ops.risorius.fire(reaction="swallow"))
 
 
-def add_gaze(controls, low, high):
+def eyes_of(controls):
+    """Between the eyes, and how high a head with such eyes is: four times as far as they are apart."""
+    rig = next(
+        thing
+        for thing in controls.users_collection[0].objects
+        if thing.type == "ARMATURE" and "FACIAL_L_Eye" in thing.pose.bones
+    )
+    left, right = (rig.matrix_world @ rig.pose.bones[f"FACIAL_{side}_Eye"].head for side in "LR")
+    return (left + right) / 2, 4 * (left - right).length
+
+
+def come_nearer(controls):
+    """The face fills the frame, as one films somebody who reads a letter."""
+    eyes, height = eyes_of(controls)
+    middle = eyes + Vector((0, 0, -0.12 * height))
+    camera = bpy.context.scene.camera
+    camera.location = middle + (camera.location - middle) * acting.NEARER
+    stage.aim(camera, middle)
+
+
+def add_gaze(controls):
     """The eyes follow an Empty, which goes from the letter to whoever listens."""
-    unit = high.z - low.z
-    eyes = Vector(((low.x + high.x) / 2, low.y, low.z + 0.6 * unit))
+    eyes, height = eyes_of(controls)
     letter = bpy.data.objects.new("Looked At", None)
-    letter.empty_display_size = 0.02 * unit
+    letter.empty_display_size = 0.04 * height
     bpy.context.scene.collection.objects.link(letter)
     for seconds, (aside, before, above) in acting.LOOKS:
-        letter.location = eyes + Vector((aside, -before, above)) * unit * 0.5
+        letter.location = eyes + Vector((aside, -before, above)) * height
         letter.keyframe_insert("location", frame=frame_at(seconds))
     bpy.context.view_layer.update()
     choose(controls)
@@ -132,11 +153,11 @@ def turn_head(controls):
         head.keyframe_insert("rotation_euler", frame=frame_at(seconds))
 
 
-def act(args, controls, low, high):
+def act(args, controls):
     choose(controls)
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = 1, acting.LAST_FRAME
-    add_gaze(controls, low, high)
+    add_gaze(controls)
     add_moods(controls)
     add_smirk(args.dna)
     turn_head(controls)
@@ -171,9 +192,9 @@ def main():
     bpy.context.scene.render.fps = acting.FRAME_RATE
     controls = demo.timed("import the face", lambda: demo.import_face(args.dna))
     collection = controls.users_collection[0]
-    low, high = stage.bounds(collection)
     stage.build(collection)
-    demo.timed("act", lambda: act(args, controls, low, high))
+    come_nearer(controls)
+    demo.timed("act", lambda: act(args, controls))
     bpy.context.scene.frame_set(1)
     bpy.ops.wm.save_as_mainfile(filepath=str(args.out / "monologue.blend"))
     demo.timed("render", lambda: render(args))

@@ -28,21 +28,23 @@ MOODS = [
     (13.4, 16.6, "sadness", 0.8, False),
     (18.2, 20.0, "smile_closed", 0.45, False),
 ]
+SMIRK = 0.45  # of the way that the corner of the mouth goes in a full smile
+NEARER = 0.62  # of the studio's distance, at which the camera stands
 BLINKS = [0.9, 4.9, 6.8, 12.8, 15.2, 17.2]
 
-# Where the eyes look: seconds, place beside, in front of and above the face, in heights of it.
+# Where the eyes look: seconds, place beside, in front of and above them, in heights of the head.
 LOOKS = [
     (0.0, (1.6, 2.6, 0.1)),
     (1.1, (1.6, 2.6, 0.1)),
-    (1.3, (0.35, 1.5, -0.6)),  # the letter
-    (3.6, (0.35, 1.5, -0.6)),
+    (1.3, (0.3, 2.0, -0.8)),  # the letter
+    (3.6, (0.3, 2.0, -0.8)),
     (3.8, (-0.3, 3.0, 0.15)),  # whoever listens
     (4.8, (-0.3, 3.0, 0.15)),
-    (5.0, (0.25, 1.5, -0.6)),
-    (5.6, (0.45, 1.5, -0.62)),
-    (5.7, (0.2, 1.5, -0.68)),
-    (6.3, (0.45, 1.5, -0.72)),
-    (7.7, (0.35, 1.5, -0.68)),
+    (5.0, (0.2, 2.0, -0.8)),
+    (5.6, (0.5, 2.0, -0.82)),
+    (5.7, (0.15, 2.0, -0.9)),
+    (6.3, (0.5, 2.0, -0.95)),
+    (7.7, (0.3, 2.0, -0.9)),
     (7.9, (-0.2, 3.0, 0.1)),
     (12.6, (-0.2, 3.0, 0.1)),
     (12.9, (0.9, 2.2, -0.7)),

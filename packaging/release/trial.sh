@@ -19,6 +19,7 @@ top=$(realpath -m "$2")
 shift 2
 version=$(basename "$release")
 zip="$release/risorius-$version-linux-x64.zip"
+cd /tmp || exit 1 # a program in a chroot starts where it is called, and knows /tmp
 before=0.0.1
 export DISPLAY=:${TRIAL_DISPLAY:-77}
 port=${TRIAL_PORT:-8177}

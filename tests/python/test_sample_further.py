@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sample_people
+from risorius.anim.reactions import load_reactions
 from risorius.sample.controls import gui_table
 from risorius.sample.further import CONTROLS_OF_CODE
 
@@ -94,6 +95,26 @@ def test_extra_sticky_lips_need_an_open_jaw(man):
     np.testing.assert_allclose(
         (whole + man.units["mouthStickyDC"].displacement)[most], together[most], rtol=0.15
     )
+
+
+def test_extra_no_reaction_lifts_the_lower_lip_over_the_upper_one(man):
+    """At rest the lips are shut: what closes a mouth that the jaw has opened may not be in it."""
+    body = man.groups["body"]
+    middle = body[np.abs(man.positions[body, 0]) < 0.02]
+
+    def most(*names):
+        moved = sum(man.units[name].displacement[middle] for name in names)
+        return middle[np.linalg.norm(moved, axis=1).argmax()]
+
+    lower = most("mouthLipsTogetherDL", "mouthLipsTogetherDR")
+    upper = most("mouthUpperLipRaiseL", "mouthUpperLipRaiseR")
+    for reaction in load_reactions().values():
+        nearer = 0.0
+        for part in reaction.parts:
+            for name, weight in part.weights.items():
+                moved = man.units[name.removeprefix("CTRL_expressions.")].displacement
+                nearer += weight * (moved[lower, 1] - moved[upper, 1])
+        assert nearer < 3 * MM, f"{reaction.name}: {nearer / MM:.1f} mm"
 
 
 def test_one_gui_control_leads_to_several_raw_controls_in_turn():
