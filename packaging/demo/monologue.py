@@ -112,7 +112,7 @@ def add_life(controls):
 
 
 def eyes_of(controls):
-    """Between the eyes, and how high a head with such eyes is: four times as far as they are apart."""
+    """Between the eyes, and how high such a head is: four times as far as they are apart."""
     rig = next(
         thing
         for thing in controls.users_collection[0].objects

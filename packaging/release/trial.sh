@@ -19,7 +19,7 @@ top=$(realpath -m "$2")
 shift 2
 version=$(basename "$release")
 zip="$release/risorius-$version-linux-x64.zip"
-cd /tmp || exit 1 # a program in a chroot starts where it is called, and knows /tmp
+cd /tmp || exit 1 # a program in a chroot sees /tmp, and nothing of the project for certain
 before=0.0.1
 export DISPLAY=:${TRIAL_DISPLAY:-77}
 port=${TRIAL_PORT:-8177}
@@ -34,6 +34,7 @@ repository() { # repository FOLDER ZIP...
 }
 prepare() { # the release before, a zip that is cut short, those of other machines
   mkdir -p "$top/before" "$out/faults" "$out/twice"
+  cp "$here/trial.py" "$out/"
   "$python" "$here/older.py" "$zip" "$before" "$top/before" > /dev/null &&
     repository "$served/risorius" "$top/before"/*.zip &&
     repository "$served/risorius-cut" "$zip" || exit 1
@@ -49,12 +50,12 @@ prepare() { # the release before, a zip that is cut short, those of other machin
 }
 in_blender() { # in_blender STEP,STEP,...: with a window, which Xvfb shows
   BLENDER_USER_RESOURCES="$user" HOME="$user/home" RISORIUS_CACHE="$user/home/cache" timeout -s KILL 1800 \
-    "$blender" --window-geometry 0 0 1280 800 -noaudio --python "$here/trial.py" -- \
+    "$blender" --window-geometry 0 0 1280 800 -noaudio --python "$out/trial.py" -- \
     "$1" "$out" "http://127.0.0.1:$port/risorius/index.json" > "$out/$1.log" 2>&1
 }
 in_blender_without_window() { # the one step that asks nothing of a window
   BLENDER_USER_RESOURCES="$user" HOME="$user/home" timeout -s KILL 900 "$blender" --background -noaudio \
-    --python "$here/trial.py" -- "$1" "$out" none > "$out/$1.log" 2>&1
+    --python "$out/trial.py" -- "$1" "$out" none > "$out/$1.log" 2>&1
 }
 # command NAME ARGUMENT...: Blender's own command line; what it said and whether Risorius is there then,
 # in faults.tsv
