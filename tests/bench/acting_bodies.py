@@ -179,6 +179,8 @@ def _dense(places: Floats, triangles: Ints, fine: int) -> Floats:
 class Cards:
     """Vertices of hair, each over the triangle of skin that it is nearest to at rest."""
 
+    AROUND = 48  # triangles of skin of which one may come to be the nearest
+
     def __init__(self, hairs: Floats, places: Floats, triangles: Ints) -> None:
         """Find the triangles.
 
@@ -190,10 +192,14 @@ class Cards:
         first = np.zeros(len(places), np.int64)
         first[triangles.ravel()] = np.repeat(np.arange(len(triangles)), 3)
         nearest = np.empty(len(hairs), np.int64)
+        self.around = np.empty((len(hairs), self.AROUND, 3), np.int64)
+        middles = places[triangles].mean(axis=1)
         for begin in range(0, len(hairs), 256):
-            part = hairs[begin : begin + 256]
-            away = (part**2).sum(axis=1)[:, None] - 2 * part @ places.T + (places**2).sum(axis=1)
-            nearest[begin : begin + 256] = away.argmin(axis=1)
+            part = slice(begin, begin + 256)
+            nearest[part] = _away(hairs[part], places).argmin(axis=1)
+            away = _away(hairs[part], middles)
+            some = np.argpartition(away, self.AROUND, axis=1)[:, : self.AROUND]
+            self.around[part] = triangles[some]
         self.corners = triangles[first[nearest]]
         self.rest = self.height(hairs, places[self.corners])
 
@@ -204,3 +210,49 @@ class Cards:
         normal = np.cross(b - a, c - a)
         normal /= np.linalg.norm(normal, axis=1, keepdims=True).clip(1e-12)
         return np.einsum("nd,nd->n", hairs - a, normal)
+
+    @staticmethod
+    def height_over_nearest(hairs: Floats, corners: Floats) -> Floats:
+        """How far hairs [n, 3] lie over the nearest of triangles [n, k, 3, 3]; below 0: inside.
+
+        Where several meet in the nearest place, the one counts that looks at the hair most
+        directly: its side is the skin's there.
+        """
+        a, u, v = corners[:, :, 0], corners[:, :, 1] - corners[:, :, 0], corners[:, :, 2]
+        v = v - a
+        ray = hairs[:, None] - a - _nearest_in(u, v, hairs[:, None] - a)
+        far = np.linalg.norm(ray, axis=2)
+        normal = np.cross(u, v)
+        normal /= np.linalg.norm(normal, axis=2, keepdims=True).clip(1e-12)
+        over = np.einsum("nkd,nkd->nk", ray, normal)
+        least = far.min(axis=1)
+        there = far <= least[:, None] * 1.0001 + 1e-9
+        chosen = np.where(there, np.abs(over), -1.0).argmax(axis=1)
+        return least * np.sign(np.take_along_axis(over, chosen[:, None], axis=1)[:, 0])
+
+
+def _away(points: Floats, others: Floats) -> Floats:
+    """[n, m] squares of distances."""
+    return (points**2).sum(axis=1)[:, None] - 2 * points @ others.T + (others**2).sum(axis=1)
+
+
+def _nearest_in(u: Floats, v: Floats, way: Floats) -> Floats:
+    """The place in triangles (0, u, v), each [..., 3], that is nearest to `way`: inside, or on the
+    nearest of the three edges."""
+
+    def dot(p: Floats, q: Floats) -> Floats:
+        return np.einsum("...d,...d->...", p, q)[..., None]
+
+    uu, uv, vv, wu, wv = dot(u, u), dot(u, v), dot(v, v), dot(way, u), dot(way, v)
+    area = (uu * vv - uv * uv).clip(1e-18)
+    s, t = (vv * wu - uv * wv) / area, (uu * wv - uv * wu) / area
+    inside = (s >= 0) & (t >= 0) & (s + t <= 1)
+    side = v - u
+    on_side = (dot(way - u, side) / dot(side, side).clip(1e-18)).clip(0, 1)
+    found = np.where(inside, s * u + t * v, u + on_side * side)
+    best = np.where(inside, -1.0, dot(way - found, way - found))
+    for place in ((wu / uu.clip(1e-18)).clip(0, 1) * u, (wv / vv.clip(1e-18)).clip(0, 1) * v):
+        away = dot(way - place, way - place)
+        found = np.where(away < best, place, found)
+        best = np.minimum(best, away)
+    return found

@@ -139,11 +139,18 @@ class Hair:
         self.check = "root in skin" if roots else "hair in skin"
         self._hairs = face.points.add(mesh, some[kept])
         self._corners = face.points.add(face.head, cards.corners[kept])
+        self._around = face.points.add(face.head, cards.around[kept])
+        self._look = LIMITS[self.check] / 2 / face.mm
 
     def depths(self, now: Floats) -> tuple[str, Floats, Floats]:
-        """As of Eye."""
+        """As of Eye. A plane goes on beyond its triangle, where skin rolls in (lips): what lies
+        below one is measured again, over the skin that is nearest now."""
         places = now[self._hairs]
-        return self.check, -bodies.Cards.height(places, now[self._corners]), places
+        deep = -bodies.Cards.height(places, now[self._corners])
+        doubted = np.flatnonzero(deep > self._look)
+        corners = now[self._around[doubted]]
+        deep[doubted] = -bodies.Cards.height_over_nearest(places[doubted], corners)
+        return self.check, deep, places
 
 
 class Face:
