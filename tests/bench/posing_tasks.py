@@ -292,8 +292,8 @@ def main():
         cells = []
         for done, raw in rows:
             done.error = apart(face, face.at(raw), wanted, moving)
-            keys = f" + {done.keys}" if done.keys else ""
-            cells.append(f"{done.events}{keys}, {done.pixels:,.0f}, {done.error:.2f}")
+            behind = f" + {done.keys}" if done.keys else ""
+            cells.append(f"{done.events}{behind}, {done.pixels:,.0f}, {done.error:.2f}")
         events.append([(d.events, d.pixels, d.error) for d, _ in rows])
         openings.append(rows[0][0].openings)
         keys.append(rows[2][0].keys)
@@ -318,10 +318,11 @@ def tell(table, openings, keys, ways):
     """
     sliders, _board, drags = table[:, 0], table[:, 1], table[:, 2]
     near = drags[:, 2] <= 0.2 * ways
+    events = drags[:, 0] / sliders[:, 0]
     for words, share in (
         ("pixels", drags[:, 1] / sliders[:, 1]),
-        ("events", drags[:, 0] / sliders[:, 0]),
-        (f"events of the {near.sum()} that end within a fifth", (drags / sliders)[near, 0]),
+        ("events", events),
+        (f"events of the {near.sum()} that end within a fifth", events[near]),
         ("events, all regions open", drags[:, 0] / (sliders[:, 0] - openings)),
         ("events and keys", (drags[:, 0] + keys) / sliders[:, 0]),
     ):

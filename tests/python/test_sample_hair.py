@@ -8,15 +8,17 @@ import numpy as np
 import pytest
 import risorius
 import sample_people
+from risorius.author.geometry.polygon_mesh import polygon_mesh
 from risorius.files.png import png, read_png
 from risorius.mixing import Mix, difference, mix_faces
 from risorius.mixing.hair import hair_meshes
 from risorius.sample import build, people
 from risorius.sample.hair import add_hair, grow_hair, hair_textures
+from risorius.sample.hair.binding import Turning
 from risorius.sample.hair.growth import curled, grow
 from risorius.sample.hair.places import hairline_height
 from risorius.sample.hair.strips import card_faces, card_vertices, make_strips
-from risorius.sample.hair.surface import Surface
+from risorius.sample.hair.surface import Roots, Surface
 from risorius.sample.polygons import Polygons, subdivide
 
 CUBE = Polygons(
@@ -102,6 +104,23 @@ def test_neither_a_turned_strip_nor_a_curl_goes_into_the_skin(ball):
     wound = curled(points, outside, np.full(n, 0.05), np.full(n, 1.5), random)
     assert wound[:, :, 2].min() > -1e-9
     assert wound[:, 2:, 2].max() > 0.045
+
+
+def test_a_shape_that_turns_the_skin_turns_what_stands_on_it():
+    """Against the rotation itself: hair of 5 mm turns with it, hair of 20 mm as its first 8 do."""
+    grid = np.array([[x, 0.0, z] for x in range(5) for z in range(5)], float)
+    faces = [[5 * i + j, 5 * i + j + 1, 5 * i + j + 6, 5 * i + j + 5] for i, j in np.ndindex(4, 4)]
+    head = polygon_mesh(grid, np.tile([0.0, 1.0, 0.0], (25, 1)), faces, grid[:, [0, 2]] / 4, faces)
+    roots = Roots(np.array([[6, 7, 11], [12, 13, 17]]), np.full((2, 3), 1 / 3))
+    off = np.array([[0.0, 0.5, 0.0], [0.0, 1.6, 1.2]])
+    hair = risorius.Mesh(positions=roots.of(grid) + off)
+    angle = np.radians(40)
+    turn = np.array(
+        [[1, 0, 0], [0, np.cos(angle), -np.sin(angle)], [0, np.sin(angle), np.cos(angle)]]
+    )
+    wanted = (off * [[1], [0.8 / 2.0]]) @ (turn - np.eye(3)).T
+    found = Turning(head, roots, hair).of(grid @ turn.T - grid)
+    np.testing.assert_allclose(found, wanted, atol=1e-6)
 
 
 def test_a_picture_with_opacity_is_a_png_that_others_read():

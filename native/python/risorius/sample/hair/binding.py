@@ -16,9 +16,11 @@ from ...author.geometry import skeleton as sk
 from ...author.geometry.polygon_mesh import polygon_mesh
 from ..polygons import Floats, Ints
 from .strips import Strips, card_faces, card_vertices
+from .strips import unit as unit_vectors
 from .surface import Roots, nearest_places, nearest_rows
 
 _LEAST_WEIGHT = 0.01
+_ARM = 0.8  # centimetres of a hair that turn with the skin; what is longer hangs
 _MOST_INFLUENCES = 8
 _PARTING = tuple(f"CTRL_expressions.{name}" for name in ("jawOpen", "eyeBlinkL", "eyeBlinkR"))
 
@@ -115,7 +117,58 @@ def card_mesh(strips: Strips, unit: float) -> Mesh:
     return polygon_mesh(positions * unit, normals, faces, uvs, faces)
 
 
-def bind(dna: Dna, mesh: Mesh, head: Mesh, places: Roots, least: float, rigid: bool) -> None:
+class Turning:
+    """How far a shape of the skin turns what stands off from it.
+
+    What a joint moves turns with it; a shape only shifts, and a beard that is shifted with a lip
+    that rolls in stands in the skin beside it. Args of the constructor: as of bind.
+    """
+
+    def __init__(self, head: Mesh, places: Roots, mesh: Mesh) -> None:
+        triangles, _ = corners_of(head)
+        used, rows = np.unique(places.corners, return_inverse=True)
+        row = np.full(len(head.positions), len(used))
+        row[used] = np.arange(len(used))
+        self._triangles = triangles[(row[triangles] < len(used)).any(axis=1)]
+        self._rows = row[self._triangles].ravel()
+        self._count = len(used)
+        self._places = Roots(rows.reshape(places.corners.shape), places.shares)
+        self._skin = np.asarray(head.positions, np.float64)
+        off = np.asarray(mesh.positions, np.float64) - places.of(self._skin)
+        far = np.linalg.norm(off, axis=1, keepdims=True)
+        self._off = off * np.minimum(1.0, _ARM / far.clip(1e-12))
+        self._normals = self._normals_at(self._skin)
+
+    def _normals_at(self, skin: Floats) -> Floats:
+        """float64[n, 3], unit: of the skin, where the places are."""
+        a, b, c = (skin[self._triangles[:, k]] for k in range(3))
+        faces = np.repeat(np.cross(b - a, c - a), 3, axis=0)
+        sums = [np.bincount(self._rows, faces[:, k], self._count + 1) for k in range(3)]
+        return unit_vectors(self._places.of(unit_vectors(np.stack(sums, axis=1)[:-1])))
+
+    def of(self, delta: Floats) -> Floats:
+        """float64[n, 3], what a shape moves the cards beyond what it shifts their places.
+
+        Args:
+            delta: float64[V, 3] of the skin.
+        """
+        now = self._normals_at(self._skin + delta)
+        axis = np.cross(self._normals, now)
+        # Half around there is no one way to turn.
+        cosine = (self._normals * now).sum(axis=1, keepdims=True).clip(-0.5)
+        across = np.cross(axis, self._off)
+        return np.asarray(across + np.cross(axis, across) / (1 + cosine))
+
+
+def bind(
+    dna: Dna,
+    mesh: Mesh,
+    head: Mesh,
+    places: Roots,
+    least: float,
+    rigid: bool,
+    turns_itself: bool = False,
+) -> None:
     """Give cards the skin weights and shapes of the places that they stand on.
 
     Args:
@@ -125,6 +178,7 @@ def bind(dna: Dna, mesh: Mesh, head: Mesh, places: Roots, least: float, rigid: b
         places: on it, of each vertex of the cards.
         least: shapes that move none of them further are left out, in the mesh' unit.
         rigid: what the skin moves less than that hangs on the joint of the head alone.
+        turns_itself: something else turns the cards when a shape turns the skin.
     """
     weights = places.of(sk.dense_weights(head, len(dna.joint_names)))
     if rigid:
@@ -139,11 +193,14 @@ def bind(dna: Dna, mesh: Mesh, head: Mesh, places: Roots, least: float, rigid: b
     mesh.skin_offsets = np.concatenate([[0], np.cumsum(counts)])
     mesh.skin_weights, mesh.skin_joint_indices = weights[vertex, joint], joint
     mesh.maximum_influence_per_vertex = int(counts.max())
+    turning = None if turns_itself else Turning(head, places, mesh)
     targets = []
     for target in head.blend_shape_targets:
         delta = np.zeros((len(head.positions), 3))
         delta[np.asarray(target.vertex_indices, np.int64)] = np.asarray(target.deltas)
         own = places.of(delta)
+        if turning is not None and own.any():
+            own += turning.of(delta)
         far = np.abs(own).max(axis=1)
         if far.max(initial=0) < least:
             continue

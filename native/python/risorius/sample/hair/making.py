@@ -115,8 +115,9 @@ def add_hair(dna: Dna, grown: Grown) -> None:
         mesh = card_mesh(shown, grown.unit)
         own = None if lod == 0 else shown.roots.of(there[0])
         places = holds(head, shown, grown.unit, own, there[lod])
-        bind(dna, mesh, head, places, _LEAST_MM[name] / _MM, name == "hair")
-        if name == "eyelashes":
+        lashes = name == "eyelashes"
+        bind(dna, mesh, head, places, _LEAST_MM[name] / _MM, name == "hair", lashes)
+        if lashes:
             add_lid_turns(dna, mesh, shown.rows, lod)
             add_lash_controls(dna, mesh, shown.rows, lod)
         append_mesh(dna, f"{name}_lod{lod}_mesh", mesh, [lod])
