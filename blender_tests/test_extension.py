@@ -35,7 +35,10 @@ def home(tmp_path_factory):
 
 def _run(home, *command):
     settings = os.environ | {"BLENDER_USER_RESOURCES": str(home)}
-    settings.pop("PYTHONPATH", None)
+    # Blender's own module may be found by it (Windows, in wine); our package may not.
+    paths = os.environ.get("PYTHONPATH", "").split(os.pathsep)
+    kept = (path for path in paths if path and not (Path(path) / "risorius").is_dir())
+    settings["PYTHONPATH"] = os.pathsep.join(kept)
     done = subprocess.run(
         [str(c) for c in command],
         env=settings,

@@ -138,7 +138,8 @@ if [ -n "$blender" ]; then
 fi
 if [ "${1:-}" = --all ]; then
   step "C library for Windows"
-  "$project/packaging/host.sh" --windows || failed=1
+  # Its library of this machine is GCC's: ccache must not take it for zig.
+  env -u CCACHE_COMPILERTYPE -u CCACHE_COMPILERCHECK "$project/packaging/host.sh" --windows || failed=1
 fi
 step ""
 [ $failed -eq 0 ]

@@ -26,5 +26,5 @@ python_of() {
   local version=$1 site=$2 folder
   folder=$(windows_python "$version") || return 1
   shift 2
-  : | PYTHONPATH="Z:${site//\//\\}" PYTHONUTF8=0 timeout -s KILL 1800 "$wine" "$folder/python.exe" "$@" 2>&1 | cat
+  : | PYTHONPATH="Z:${site//\//\\}" PYTHONUTF8=0 timeout -s KILL 3600 "$wine" "$folder/python.exe" "$@" 2>&1 | cat
 }

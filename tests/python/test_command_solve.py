@@ -97,12 +97,37 @@ def test_alembic_needs_its_package_or_is_read(take, tmp_path):
         ({"vertices": np.full((2, 196, 3), np.inf)}, "finite vertices"),
         ({"vertices": np.zeros((2, 196, 3)), "neutral": np.zeros((4, 3))}, "neutral of shape"),
         ({"vertices": np.zeros((2, 196, 3)), "rate": 0.0}, "a rate above 0"),
+        ({"vertices": np.zeros((2, 196, 3)), "rate": [24.0, 25.0]}, "a rate above 0"),
+        ({"vertices": np.full((2, 196, 3), "far")}, "vertices of numbers"),
     ],
 )
 def test_a_file_that_makes_no_sense_is_one_sentence(tmp_path, content, said):
     np.savez(tmp_path / "take.npz", **content)
     with pytest.raises(PerformanceError, match=said):
         read_performance(tmp_path / "take.npz")
+
+
+def test_a_damaged_file_is_one_sentence_or_read(tmp_path):
+    """Bits of what is compressed, and of what tells NumPy its shape: those raise what they like."""
+    path = tmp_path / "take.npz"
+    np.savez(path, vertices=np.zeros((2, 4, 3)), rate=24.0)
+    plain = path.read_bytes()
+    np.savez_compressed(path, vertices=np.zeros((2, 4, 3)), rate=24.0)
+    random, refused = np.random.default_rng(5), 0
+    for data in (plain, path.read_bytes()):
+        for _ in range(200):
+            broken = bytearray(
+                data[: random.integers(len(data))] if random.random() < 0.2 else data
+            )
+            for at in random.integers(max(len(broken), 1), size=3 * bool(broken)):
+                broken[at] ^= 1 << random.integers(8)
+            path.write_bytes(broken)
+            try:
+                read_performance(path)
+            except PerformanceError as error:
+                refused += 1
+                assert str(error).startswith(f"{path}: ")
+    assert refused > 200
 
 
 @pytest.mark.parametrize(

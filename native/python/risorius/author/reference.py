@@ -10,9 +10,6 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import struct
-import zipfile
-import zlib
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
@@ -22,25 +19,13 @@ import numpy.typing as npt
 
 from .. import Mesh, _native
 from ..base.errors import ArgumentError
+from ..base.npz import DAMAGED
 from .fitting import fit_motions
 from .geometry import skeleton as sk
 from .geometry.skeleton import Doubles, Ints
 from .work import Joints, RigOptions, Work, given, joined_positions
 
 _FORMAT = 1
-_DAMAGED = (
-    ValueError,
-    LookupError,
-    TypeError,
-    AttributeError,
-    RuntimeError,
-    EOFError,
-    OSError,
-    MemoryError,
-    struct.error,
-    zipfile.BadZipFile,
-    zlib.error,
-)
 Arrays = dict[str, npt.NDArray[np.float32] | Ints]
 
 
@@ -127,7 +112,7 @@ class Reference:
                         rows = np.zeros((int(at[:, 0].max()) + 1, joints))
                         rows[at[:, 0], at[:, 1]] = file[f"values/{name}"]
                         out.weights[name] = rows
-        except _DAMAGED as error:
+        except DAMAGED as error:
             raise ArgumentError(f"no reference of a joint rig: {error}") from None
         return out
 

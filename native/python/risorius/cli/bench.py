@@ -10,13 +10,13 @@ import subprocess
 import sys
 import sysconfig
 import tempfile
-import zipfile
 from pathlib import Path
 
 import numpy as np
 
 import risorius
 from risorius.base.errors import RisoriusError
+from risorius.base.npz import DAMAGED
 
 from .files import InputError
 
@@ -76,9 +76,9 @@ def export_frames(source: Path, raw_count: int, folder: Path) -> list[str]:
     """
     try:
         return _export_frames(source, raw_count, folder)
-    except RisoriusError:
+    except (RisoriusError, OSError):
         raise
-    except (ValueError, EOFError, zipfile.BadZipFile) as error:  # raised by NumPy
+    except DAMAGED as error:  # raised by NumPy
         raise InputError(f"{source}: an .npz of arrays was expected: {error}") from error
 
 

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import os
-import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..base.errors import RisoriusError
+from ..base.npz import DAMAGED
 from .surface import Doubles, Floats
 
 _SCALES = 10.0 ** np.arange(-3, 4)
@@ -64,11 +64,12 @@ def read_performance(
 
 
 def _arrays(path: str | os.PathLike[str]) -> Performance:
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            values = {name: file[name] for name in file.files}
-    except (ValueError, zipfile.BadZipFile, EOFError, KeyError) as error:
-        raise PerformanceError(f"{path}: an .npz file was expected: {error}") from error
+    with open(path, "rb") as opened:
+        try:
+            with np.load(opened, allow_pickle=False) as file:
+                values = {name: file[name] for name in file.files}
+        except DAMAGED as error:
+            raise PerformanceError(f"{path}: an .npz file was expected: {error}") from error
     frames = values.get("vertices")
     if frames is None or frames.ndim != 3 or frames.shape[2] != 3 or not len(frames):
         found = "none" if frames is None else list(frames.shape)
@@ -79,9 +80,15 @@ def _arrays(path: str | os.PathLike[str]) -> Performance:
             f"{path}: neutral of shape {list(frames.shape[1:])} was expected, found "
             f"{list(neutral.shape)}"
         )
-    rate = float(values.get("rate", np.float64(30.0)))
+    for name in ("vertices", "neutral", "rate"):
+        if name in values and values[name].dtype.kind not in "fiu":
+            raise PerformanceError(
+                f"{path}: {name} of numbers was expected, found {values[name].dtype}"
+            )
+    given = values.get("rate", np.float64(30.0))
+    rate = float(given) if given.size == 1 else np.nan
     if not (np.isfinite(rate) and rate > 0):
-        raise PerformanceError(f"{path}: a rate above 0 was expected, found {rate}")
+        raise PerformanceError(f"{path}: a rate above 0 was expected, found {given.tolist()}")
     own = None if neutral is None else neutral.astype(np.float32)
     return Performance(frames.astype(np.float32), rate, 0.0, own)
 
