@@ -101,7 +101,8 @@ def test_it_is_installed_and_enabled(home):
         assert "risorius" in _command(home, "list")
     else:
         assert _step(home, "install", PACKAGE)["preferences"] == ["bl_ext.user_default.risorius"]
-    assert any(name.endswith("user_default/risorius") for name in _files_of_ours(home))
+    ours = [Path(name).as_posix() for name in _files_of_ours(home)]
+    assert any(name.endswith("user_default/risorius") for name in ours)
 
 
 def test_it_is_there_in_the_next_process(home):
