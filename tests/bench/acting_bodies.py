@@ -192,13 +192,14 @@ class Cards:
         first = np.zeros(len(places), np.int64)
         first[triangles.ravel()] = np.repeat(np.arange(len(triangles)), 3)
         nearest = np.empty(len(hairs), np.int64)
-        self.around = np.empty((len(hairs), self.AROUND, 3), np.int64)
+        count = min(self.AROUND, len(triangles))
+        self.around = np.empty((len(hairs), count, 3), np.int64)
         middles = places[triangles].mean(axis=1)
         for begin in range(0, len(hairs), 256):
             part = slice(begin, begin + 256)
             nearest[part] = _away(hairs[part], places).argmin(axis=1)
             away = _away(hairs[part], middles)
-            some = np.argpartition(away, self.AROUND, axis=1)[:, : self.AROUND]
+            some = np.argpartition(away, count - 1, axis=1)[:, :count]
             self.around[part] = triangles[some]
         self.corners = triangles[first[nearest]]
         self.rest = self.height(hairs, places[self.corners])

@@ -147,3 +147,17 @@ def test_a_blind_sheet_has_both_and_only_its_key_knows_which(tmp_path):
             seen = [picture.getpixel((20 * i + 10, 38))[0] for i in range(4)]
         assert seen == [{"old": 40, "new": 200}[rows[str(i + 1)]["which"]] for i in range(4)]
     assert len(orders) > 1
+
+
+def test_a_hair_beside_a_step_of_the_skin_lies_over_the_step():
+    """Against planes: below the plane of the floor, which ends at the step, and over the side."""
+    floor = np.array(
+        [[[0, 0, 0], [1, 0, 0], [0, 0, -1]], [[1, 0, 0], [1, 0, -1], [0, 0, -1]]], float
+    )
+    side = np.array(
+        [[[1, -1, 0], [1, -1, -1], [1, 0, -1]], [[1, -1, 0], [1, 0, -1], [1, 0, 0]]], float
+    )
+    skin = np.concatenate([floor, side])
+    hairs = np.array([[1.2, -0.5, -0.5], [0.8, -0.5, -0.5], [0.5, 0.3, -0.5], [1.3, 0.4, -0.5]])
+    found = bodies.Cards.height_over_nearest(hairs, np.broadcast_to(skin, (4, 4, 3, 3)))
+    np.testing.assert_allclose(found, [0.2, -0.2, 0.3, 0.5], atol=1e-12)

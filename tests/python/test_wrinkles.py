@@ -183,3 +183,24 @@ def test_a_true_smile_lifts_its_own_cheek_and_no_lip(side):
     assert sign * moved[own, 0] > 0
     assert not moved[other].any()
     np.testing.assert_allclose(moved[2:], 0, atol=1e-3)
+
+
+def test_no_fold_is_made_where_two_sides_meet(sheet):
+    """Each side alone pushes the middle together; both at once only shift the skin."""
+    part, positions = sheet
+    surface = wrinkles.Surface(part.polygons, positions[:, :2], positions)
+    left = np.clip(0.5 + (positions[:, :1] - 0.5) / 0.3, 0, 1)
+    way = np.array([[0.1, 0.0, 0.0]])
+    assert surface.folds(positions + (1 - left) * way)[:, 0].max() > 0.5
+
+    def shared(move):
+        return wrinkles.folds_of_sides(
+            surface, positions, {"L": left * move, "R": (1 - left) * move}
+        )
+
+    assert max(rows[:, 0].max() for rows in shared(way).values()) < 0.01
+    # What both push together is there with both, each side's share on its own.
+    together = positions * [[-0.4, 0, 0]]
+    found, whole = shared(together), surface.folds(positions + together)
+    np.testing.assert_allclose(found["L"] + found["R"], whole, atol=1e-9)
+    assert found["R"][positions[:, 0] > 0.9].max() < 0.01 < whole.max()

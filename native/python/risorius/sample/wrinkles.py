@@ -97,7 +97,7 @@ def drivers() -> list[tuple[str, int, float]]:
     return out
 
 
-class _Surface:
+class Surface:
     """The head's polygons as triangles, at rest, with their texture coordinates."""
 
     def __init__(self, polygons: Polygons, uvs: Floats, positions: Floats) -> None:
@@ -138,18 +138,24 @@ class _Surface:
             np.add.at(sums, self.corners[:, k], rows)
             np.add.at(count, self.corners[:, k], 1)
         out = sums / np.maximum(count, 1)[:, None]
-        for _ in range(_ROUNDS):
-            out = self._evened(out)
-        return out
+        return self.evened(out, _ROUNDS)
 
-    def _evened(self, values: Floats) -> Floats:
-        """Each vertex half itself, half the mean of its triangles."""
-        middles = values[self.corners].mean(axis=1)
-        sums, count = np.zeros_like(values), np.zeros(len(values))
-        for k in range(3):
-            np.add.at(sums, self.corners[:, k], middles)
-            np.add.at(count, self.corners[:, k], 1)
-        return np.asarray(0.5 * values + 0.5 * sums / np.maximum(count, 1)[:, None])
+    def evened(self, values: Floats, rounds: int) -> Floats:
+        """Each vertex half itself, half the mean of its triangles, so many times.
+
+        Args:
+            values: float64[V, ...].
+            rounds: how often.
+        """
+        for _ in range(rounds):
+            middles = values[self.corners].mean(axis=1)
+            sums, count = np.zeros_like(values), np.zeros(len(values))
+            for k in range(3):
+                np.add.at(sums, self.corners[:, k], middles)
+                np.add.at(count, self.corners[:, k], 1)
+            count = np.maximum(count, 1).reshape(-1, *[1] * (values.ndim - 1))
+            values = 0.5 * values + 0.5 * sums / count
+        return values
 
 
 def _frames(triangles: Floats) -> Floats:
@@ -168,7 +174,7 @@ def _frames(triangles: Floats) -> Floats:
 def vertex_folds(
     part: Part, uvs: Floats, positions: Floats, units: Mapping[str, Expression]
 ) -> dict[str, Floats]:
-    """float64[V, 4] of each mask by its name, see _Surface.folds.
+    """float64[V, 4] of each mask by its name, see Surface.folds.
 
     Args:
         part: the head.
@@ -176,14 +182,37 @@ def vertex_folds(
         positions: float64[v, 3] of its vertices, decimetres.
         units: what each raw control does, by its name.
     """
-    surface = _Surface(part.polygons, uvs, positions)
+    surface = Surface(part.polygons, uvs, positions)
     out = {}
     for name, region in REGIONS.items():
-        for side in "LR":
-            control = next(iter(region.drivers)) + side
-            moved = positions + part.carry(units[control].displacement)
-            out[mask_name(name, side)] = surface.folds(moved)
+        control = next(iter(region.drivers))
+        moves = {side: part.carry(units[control + side].displacement) for side in "LR"}
+        for side, folds in folds_of_sides(surface, positions, moves).items():
+            out[mask_name(name, side)] = folds
     return out
+
+
+def folds_of_sides(
+    surface: Surface, positions: Floats, moves: Mapping[str, Floats]
+) -> dict[str, Floats]:
+    """float64[V, 4] by side: the folds that both sides make together, shared out.
+
+    One side alone pushes skin together where it fades out in the middle of the face, which both
+    together do not.
+
+    Args:
+        surface: the head.
+        positions: float64[V, 3] of its vertices.
+        moves: float64[V, 3] by side, what the control of that side moves them.
+    """
+    both = surface.folds(positions + sum(moves.values()))
+    # Evened as far as folds are, or what stays where it is amid what moves had none.
+    far = {
+        side: surface.evened(np.linalg.norm(move, axis=1), _ROUNDS + 1)
+        for side, move in moves.items()
+    }
+    whole = np.maximum(sum(far.values()), 1e-12)
+    return {side: both * (own / whole)[:, None] for side, own in far.items()}
 
 
 def blurred(image: Floats, width: float) -> Floats:
