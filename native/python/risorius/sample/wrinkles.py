@@ -107,7 +107,7 @@ class Surface:
                 corners.append((face[0], face[k], face[k + 1]))
                 places.append((uv_face[0], uv_face[k], uv_face[k + 1]))
         self.corners: Ints = np.array(corners)
-        self.vertices = len(positions)
+        self._about = np.maximum(np.bincount(self.corners.ravel(), minlength=len(positions)), 1)
         self.rest = _frames(positions[self.corners])
         uv = uvs[np.array(places)]
         edges = np.stack([uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]], axis=2)
@@ -133,12 +133,7 @@ class Surface:
         lines /= np.maximum(np.linalg.norm(lines, axis=1, keepdims=True), 1e-12)
         x, y = lines.T
         rows = np.column_stack([depth, depth * x * x, depth * x * y, depth * y * y])
-        sums, count = np.zeros((self.vertices, 4)), np.zeros(self.vertices)
-        for k in range(3):
-            np.add.at(sums, self.corners[:, k], rows)
-            np.add.at(count, self.corners[:, k], 1)
-        out = sums / np.maximum(count, 1)[:, None]
-        return self.evened(out, _ROUNDS)
+        return self.evened(self._at_vertices(rows), _ROUNDS)
 
     def evened(self, values: Floats, rounds: int) -> Floats:
         """Each vertex half itself, half the mean of its triangles, so many times.
@@ -149,13 +144,15 @@ class Surface:
         """
         for _ in range(rounds):
             middles = values[self.corners].mean(axis=1)
-            sums, count = np.zeros_like(values), np.zeros(len(values))
-            for k in range(3):
-                np.add.at(sums, self.corners[:, k], middles)
-                np.add.at(count, self.corners[:, k], 1)
-            count = np.maximum(count, 1).reshape(-1, *[1] * (values.ndim - 1))
-            values = 0.5 * values + 0.5 * sums / count
+            values = 0.5 * values + 0.5 * self._at_vertices(middles)
         return values
+
+    def _at_vertices(self, rows: Floats) -> Floats:
+        """float64[V, ...]: the mean of what the triangles about each vertex have, [T, ...]."""
+        sums = np.zeros((len(self._about), *rows.shape[1:]))
+        for k in range(3):
+            np.add.at(sums, self.corners[:, k], rows)
+        return np.asarray(sums / self._about.reshape(-1, *[1] * (rows.ndim - 1)))
 
 
 def _frames(triangles: Floats) -> Floats:
