@@ -180,7 +180,7 @@ def offered(rig):
 def test_selected_handles_go_together(man):
     rig, _corner = man
     one, other = two_handles(rig)
-    offset = np.array((0.0, 0.0, 0.002))
+    offset = np.array((0.0, 0.0, 0.001))
     starts = [place(rig, vertex, mesh) for mesh, vertex in (one, other)]
 
     def share(number, point):
@@ -430,3 +430,32 @@ def test_a_drag_depends_on_its_end_and_not_on_its_way(rig, dna_file):
     drag(offset)
     straight = sliders(rig)
     assert winding == pytest.approx(straight, abs=1e-4)
+
+
+def test_a_dragged_brow_turns_no_eye_and_both_sides_go_alike(man):
+    """Of the sample man, whose halves differ: what moves, seen in the sliders."""
+    rig, corner = man
+    stroke = scene.submodule("scene.drag.stroke")
+    rest = rest_of(scene.meshes(rig)[HEAD])
+    scene.set_controls(rig, browDownL=1.0)
+    far = np.linalg.norm(scene.evaluated(scene.meshes(rig)[HEAD]) - rest, axis=1)
+    scene.set_controls(rig, browDownL=0.0)
+    before = sliders(rig)  # the eyes meet at something
+    down = stroke.begin(bpy.context, rig, (HEAD, int(np.argmax(far))), stroke.Options())
+    down.finish(bpy.context, down.start + np.array((0.0, 0.0, -0.004)), np.array((0.0, 1.0, 0.0)))
+    after = {name: v - before[name] for name, v in sliders(rig).items() if v != before[name]}
+    moved = {name.removeprefix(PREFIX): v for name, v in after.items()}
+    assert moved["browDownL"] > 0.2
+    assert not [name for name in moved if name.startswith("eyeLook")]
+    bpy.ops.risorius.reset()
+    pursed = stroke.begin(bpy.context, rig, (HEAD, corner), stroke.Options(symmetric=True))
+    inward = np.array((-np.sign(rest[corner, 0]) * 0.004, 0.0, 0.0))
+    pursed.finish(bpy.context, pursed.start + inward, np.array((0.0, 1.0, 0.0)))
+    after = {name: v - before[name] for name, v in sliders(rig).items() if v != before[name]}
+    moved = {name.removeprefix(PREFIX): v for name, v in after.items()}
+    assert "mouthLeft" not in moved
+    assert "mouthRight" not in moved
+    assert len(moved) > 2
+    mirrored = scene.submodule("native").regions().mirrored
+    for name, value in moved.items():
+        assert moved[mirrored(name)] == pytest.approx(value, abs=1e-6), name

@@ -37,9 +37,9 @@ struct V {
   static constexpr std::size_t kLanes = 8, kBlocks = 12, kBatchBlocks = 3;
   static constexpr int kBatchFrames = 4;
   RISORIUS_INLINE static Reg zero() { return _mm256_setzero_ps(); }
-  // Batches need all sixteen registers: twelve sums, three of rows, a weight. Clang 22 loads the next
-  // weight before this one is used up and spills sums in the innermost loop; the empty statement
-  // keeps it where it is written.
+  // Batches need all sixteen registers: twelve sums, three of rows, a weight. Clang 22 loads the
+  // next weight before this one is used up and spills sums in the innermost loop; the empty
+  // statement keeps it where it is written.
   RISORIUS_INLINE static Reg set(float v) {
     Reg all = _mm256_set1_ps(v);
 #if defined(__GNUC__)

@@ -30,7 +30,9 @@ from pathlib import Path
 
 import numpy as np
 import risorius
+from risorius.anim.reactions import load_exclusives
 from risorius.controls import regions
+from risorius.controls.sides import mirrored_name
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python"))
 import test_addon_logic  # noqa: F401  registers the package of the logic
@@ -123,6 +125,9 @@ class Face:
         columns = dna.gui_to_raw
         numbers = [columns.input_indices, columns.output_indices, columns.from_values]
         numbers += [columns.to_values, columns.slope_values, columns.cut_values]
+        index = {name: i for i, name in enumerate(dna.raw_control_names)}
+        self.partners = np.array([index.get(mirrored_name(n), i) for n, i in index.items()])
+        self.opposites = load_exclusives().rules_of(index)[1]
         self.table = board_table.of_file(list(dna.gui_control_names), numbers, len(self.names))
 
     def at(self, raw):
@@ -225,8 +230,7 @@ def by_drags(face, goal, moving, most):
 
 def is_mirrored(face, goal):
     """Whether a pose is the same on both sides."""
-    both = [(n, n[:-1] + "R") for n in face.names if n.endswith("L") and n[:-1] + "R" in face.names]
-    return all(goal[face.names.index(a)] == goal[face.names.index(b)] for a, b in both)
+    return bool((goal == goal[face.partners]).all())
 
 
 def best_drag(face, raw, wanted, moving, mirrored):
@@ -250,8 +254,15 @@ def best_drag(face, raw, wanted, moving, mirrored):
 
 
 def solutions(face, raw, vertex, wanted, mirrored):
-    """(controls, events of keys) of what a drag of this vertex may do."""
+    """(controls, events of keys) of what a drag of this vertex may do, as the add-on does it."""
     points, targets = [(face.mesh, vertex)], [wanted[vertex]]
+    ease = risorius.local_ease(
+        face.surface, face.surface.jacobian(raw, face.mesh, np.array([vertex]))
+    )
+    free = np.ones(len(raw), bool)
+    partners = face.partners if mirrored else None
+    if mirrored:
+        free[[c for a, b in face.opposites if face.partners[a] == b for c in (a, b)]] = False
     side = face.surface.side
     if mirrored and abs(face.rest[vertex, side] - face.middle[side]) * face.mm > 3:
         flip = face.rest[vertex].copy()
@@ -260,20 +271,24 @@ def solutions(face, raw, vertex, wanted, mirrored):
         points.append((face.mesh, twin))
         targets.append(wanted[twin])
     axes = np.tile(face.screen, (len(points), 1, 1))
-    solved = risorius.solve_drag(face.surface, raw, points, targets, axes=axes)
+    solved = risorius.solve_drag(
+        face.surface, raw, points, targets, axes=axes, free=free, ease=ease, partners=partners,
+        opposites=face.opposites,
+    )  # fmt: skip
     yield np.asarray(solved.raw, float), 0  # no key held
     alone = risorius.best_controls(
-        face.surface, raw, points[0], targets[0], axes=face.screen, count=3
+        face.surface, raw, points[0], targets[0], axes=face.screen, free=free, count=3
     )
-    for tab, (control, value, _left) in enumerate(alone):
-        out = raw.copy()
-        out[control] = value
-        name = face.names[control]
-        if len(points) > 1 and name[-1:] in "LR":
-            twin = name[:-1] + ("R" if name.endswith("L") else "L")
-            if twin in face.names:
-                out[face.names.index(twin)] = value
-        yield out, 2 + 2 * tab  # Ctrl down and up, Tab
+    for tab, (control, _value, _left) in enumerate(alone):
+        only = np.zeros(len(raw), bool)
+        only[control] = True
+        if mirrored:
+            only[face.partners[control]] = True
+        solved = risorius.solve_drag(
+            face.surface, raw, points, targets, axes=axes, free=only & free, partners=partners,
+            opposites=face.opposites,
+        )  # fmt: skip
+        yield np.asarray(solved.raw, float), 2 + 2 * tab  # Ctrl down and up, Tab
 
 
 def main():

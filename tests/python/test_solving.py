@@ -116,6 +116,103 @@ def test_the_transpose_moves_only_what_moves_the_point(face):
     assert (solved.raw[reach < 1e-6] == 0).all()
 
 
+PARTNERS = [JAW, RIGHT, LEFT, PUFF, TWIN, IDLE, WIDEN]
+
+
+@pytest.mark.parametrize("method", ["least_squares", "transpose"])
+def test_partners_change_alike_and_as_little_as_they_can(face, method):
+    """As the textbook has it: the pseudo-inverse over one number for both."""
+    surface = face[1]
+    vertices, begin = [14 * 3 + 5, 14 * 10 + 5], raw(left=0.2, jaw=0.1)
+    here = surface.positions(begin, 0, vertices).astype(float)
+    apart = np.array([[-0.003, 0.002, 0.001], [0.001, 0.002, 0.0]])  # not alike on both sides
+    moved = here + apart
+    points = [(0, v) for v in vertices]
+    given = {"partners": PARTNERS, "method": method, "lowest": -1, "highest": 2, "smallest": 1e-6}
+    solved = risorius.solve_drag(surface, begin, points, moved, **given)
+    change = solved.raw.astype(float) - begin
+    assert change[LEFT] == pytest.approx(change[RIGHT], abs=1e-6)
+    assert abs(change[LEFT]) > 1e-3
+    if method == "transpose":
+        return
+    root = np.sqrt(0.5)  # of a unit of what both change
+    jacobian = surface.jacobian(begin, 0, vertices, -1, 2).reshape(6, 7).astype(float)
+    jacobian[:, LEFT] = root * (jacobian[:, LEFT] + jacobian[:, RIGHT])
+    jacobian[:, RIGHT] = 0
+    best = np.linalg.pinv(jacobian, rcond=1e-4) @ apart.ravel()
+    best[LEFT] = best[RIGHT] = root * best[LEFT]
+    np.testing.assert_allclose(change, best, atol=5e-4)  # of a face that bends
+
+
+def test_of_opposites_one_alone_is_used(face):
+    """The left smile and the puff both bring this vertex up; together they fit a little better."""
+    surface, vertex = face[1], 14 * 5 + 6
+    target = surface.positions(raw(left=0.5, puff=0.4), 0, [vertex])
+    drag = [(0, vertex)], target
+    both = risorius.solve_drag(surface, raw(), *drag)
+    assert min(both.raw[LEFT], both.raw[PUFF]) > 0.05
+    one = risorius.solve_drag(surface, raw(), *drag, opposites=[(LEFT, PUFF)])
+    assert min(one.raw[LEFT], one.raw[PUFF]) == 0
+    assert max(one.raw[LEFT], one.raw[PUFF]) > 0.05
+    more = LEFT if both.raw[LEFT] > both.raw[PUFF] else PUFF
+    assert one.raw[more] > 0.05
+    # One that was on goes back before the other comes, and only then does that come.
+    begin = raw(left=0.3)
+    rest, puffed, here, lower = (
+        surface.positions(raw(**at), 0, [vertex])
+        for at in ({}, {"puff": 0.8}, {"left": 0.3}, {"left": 0.2})
+    )
+    for goal, gone in ((lower, False), (puffed + 2 * (rest - here), True)):
+        found = risorius.solve_drag(surface, begin, [(0, vertex)], goal, opposites=[(LEFT, PUFF)])
+        assert min(found.raw[LEFT], found.raw[PUFF]) <= 1e-6
+        assert (found.raw[PUFF] > 0.1) == gone
+        assert (found.raw[LEFT] > 0.01) == (not gone)
+    # Two that are on already may stay so, but go no further.
+    begin = raw(left=0.3, puff=0.2)
+    found = risorius.solve_drag(surface, begin, *drag, opposites=[(LEFT, PUFF)])
+    assert min(found.raw[LEFT], found.raw[PUFF]) <= 0.2 + 1e-6
+
+
+def test_opposites_that_are_partners_rest(face):
+    surface, vertex = face[1], 14 * 3 + 5
+    target = surface.positions(raw(left=0.5), 0, [vertex])
+    given = {"partners": PARTNERS, "opposites": [(LEFT, RIGHT)]}
+    solved = risorius.solve_drag(surface, raw(), [(0, vertex)], target, **given)
+    assert solved.raw[LEFT] == solved.raw[RIGHT] == 0
+
+
+def test_easy_are_the_controls_that_do_most_there(face):
+    surface = face[1]
+    most = np.linalg.norm(surface.jacobian(raw(), 0, np.arange(196)), axis=1).max(axis=0)
+    np.testing.assert_allclose(surface.strongest(), most, rtol=1e-4, atol=1e-6)
+    vertex = 14 * 3 + 5  # at the left corner
+    reach = surface.jacobian(raw(), 0, [vertex])
+    share = np.linalg.norm(reach[0], axis=0) / np.maximum(most, 1e-9)
+    ease = risorius.local_ease(surface, reach)
+    assert ease[LEFT] == 1
+    assert ease[RIGHT] == ease[IDLE] == 0.001
+    assert (ease == np.where(share >= 0.1 * share.max(), 1.0, 0.001)).all()
+
+
+def test_what_is_not_easy_helps_where_others_do_not_reach(face):
+    surface, vertex = face[1], 14 * 3 + 5
+    target = surface.positions(raw(left=0.3, jaw=0.2), 0, [vertex])
+    ease = np.where(np.arange(7) == LEFT, 1.0, 0.1)
+    points = [(0, vertex)]
+    loath = risorius.solve_drag(surface, raw(), points, target, ease=ease)
+    assert loath.error < 2e-3  # it comes as near
+    twin = np.where(np.arange(7) == TWIN, 0.1, 1.0)  # which does what the jaw does
+    alone = risorius.solve_drag(surface, raw(), points, target, ease=twin)
+    assert 0 < alone.raw[TWIN] < 0.02 * alone.raw[JAW]
+    # As the textbook has it: least squares weighted by the inverse of the squared ease.
+    small = surface.positions(raw(), 0, [vertex])[0] + [0.0, 0.0008, 0.0004]
+    free = {"lowest": -1, "highest": 2, "smallest": 1e-6, "ease": ease}
+    step = risorius.solve_drag(surface, raw(), points, [small], **free).raw
+    jacobian = surface.jacobian(raw(), 0, [vertex], -1, 2)[0].astype(np.float64)
+    best = ease * (np.linalg.pinv(jacobian * ease) @ [0, 0.0008, 0.0004])
+    np.testing.assert_allclose(step, best, atol=3e-4)
+
+
 def test_what_cannot_be_reached_ends_at_the_limits(face):
     surface = face[1]
     vertex = 14 * 7
@@ -165,6 +262,12 @@ def test_handles_are_few_spread_and_alike_on_both_sides(face):
         ({"axes": np.eye(3)}, "axes: finite numbers"),
         ({"raw": np.zeros(3)}, "raw: 7 numbers"),
         ({"lowest": 0.5, "highest": 0.25}, r"lowest\[0\]: at most highest\[0\] 0.25"),
+        ({"ease": 0}, "ease: numbers above 0 were expected, found 0"),
+        ({"partners": [0, 1]}, r"partners: whole numbers of shape \[7\]"),
+        ({"partners": [0, 2, 3, 1, 4, 5, 6]}, "partners: each control's partner was expected"),
+        ({"partners": [0, 1, 2, 3, 4, 5, 7]}, "partners: each control's partner was expected"),
+        ({"opposites": [(0, 7)]}, "opposites: pairs of whole numbers below 7"),
+        ({"opposites": [(0, 1, 2)]}, "opposites: pairs of whole numbers below 7"),
         ({"method": "newton"}, "least_squares or transpose"),
     ],
 )

@@ -51,7 +51,7 @@ from .base.version import __version__ as __version__
 from .rigs.cache import compile_cached
 from .rigs.load import Finding, check, load
 from .solving.clip import SolvedClip, solve_clip
-from .solving.drag import Solved, best_controls, solve_drag
+from .solving.drag import Solved, best_controls, local_ease, solve_drag
 from .solving.handles import place_handles
 from .solving.surface import Surface
 
@@ -107,6 +107,7 @@ __all__ = [
     "expressions",
     "idle",
     "load",
+    "local_ease",
     "place_handles",
     "solve_clip",
     "solve_drag",

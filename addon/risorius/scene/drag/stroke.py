@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,7 +39,8 @@ class Options:
 
     Attributes:
         symmetric: the mirrored point goes the mirrored way.
-        method: of risorius.solve_drag.
+        method: "near", by what belongs to the place of the points, "least_squares", by all
+            sliders, or "transpose".
         single: only the one control that does it best moves; with `symmetric` its partner too.
         choice: which one: 0 is the best, 1 the next.
         region: only controls of the region of the point.
@@ -46,7 +48,7 @@ class Options:
     """
 
     symmetric: bool = False
-    method: str = "least_squares"
+    method: str = "near"
     single: bool = False
     choice: int = 0
     region: bool = False
@@ -98,6 +100,7 @@ class Stroke:
     best: list[tuple[int, float, float]] = field(default_factory=list)
     _anchors: dict[bool, _Anchors] = field(default_factory=dict)
     _was: NDArray[np.float32] | None = None  # [V, 3] of the dragged mesh at the press, file space
+    _eases: dict[tuple[bool, tuple[Point, ...]], Float] = field(default_factory=dict)
     _apart: Float = field(default_factory=lambda: np.zeros(3))  # seen less predicted, world
 
     @property
@@ -141,7 +144,7 @@ class Stroke:
         self.to(context, target, view)
         change = np.abs(self.raw - self.state.seen)
         held = self._free(target, view) & (change >= _SMALL * change.max(initial=0.0))
-        for _ in range(2):  # once more where bones of the head move with the controls
+        for _ in range(4):  # again where bones of the head move with the controls
             self.raw, predicted = self._solve(target - self._apart, view, held)
             sliders.write(self.rig, self.live, self.state, self.raw)
             at = self._seen(context)
@@ -187,6 +190,10 @@ class Stroke:
             free[follower] = True
         if self.options.region:
             free &= sliders.of_region(self.live, self.dragged_region)
+        if self._is_symmetric:
+            # To one side goes no face that shall stay alike on both.
+            pairs = [p for p in self._opposites if self._partners[p[0]] == p[1]]
+            free[[control for pair in pairs for control in pair]] = False
         if not self.options.single:
             self.best = []
             return free
@@ -201,7 +208,7 @@ class Stroke:
             chosen = self.best[self.options.choice % len(self.best)][0]
             only[chosen] = True
             if self.options.symmetric:
-                only[sliders.mirrored_indices(self.live)[chosen]] = True
+                only[self._partners[chosen]] = True
         return only & free
 
     def _solve(
@@ -210,9 +217,12 @@ class Stroke:
         """float32[R] and where the point should be seen with it."""
         anchors = self._of()
         goal, axes = self._goal(anchors, target, view)
+        near = self.options.method == "near"
+        how = {"ease": self._ease()} if near else {"method": self.options.method}
         solved = native.module().solve_drag(
             self.skin.surface, self.state.seen, anchors.points, goal, axes=axes, free=free,
-            lowest=self.state.low, highest=self.state.high, method=self.options.method,
+            lowest=self.state.low, highest=self.state.high, opposites=self._opposites,
+            partners=self._partners if self._is_symmetric else None, **how,
         )  # fmt: skip
         moved = solved.positions[0].astype(np.float64) - anchors.rest[0]
         return solved.raw, anchors.world[0] + anchors.maps[0] @ moved
@@ -233,8 +243,36 @@ class Stroke:
             axes[number] = along @ flip if mirrored else along
         return goal, axes
 
+    @property
+    def _is_symmetric(self) -> bool:
+        return self.options.symmetric or bool(self.state.linked)
+
+    @cached_property
+    def _partners(self) -> NDArray[np.int64]:
+        return sliders.mirrored_indices(self.live)
+
+    @cached_property
+    def _opposites(self) -> list[tuple[int, int]]:
+        index = {name: i for i, name in enumerate(self.live.dna.raw_control_names)}
+        known = native.part("anim.reactions").load_exclusives()
+        return list(known.rules_of(index)[1])
+
+    def _ease(self) -> Float:
+        """float64[R]: how readily the controls change where the points are that are dragged."""
+        surface, key = self.skin.surface, (self._is_symmetric, self.options.others)
+        if key not in self._eases:
+            low, high = self.state.low, self.state.high
+            reach = [self.reach]
+            for mesh, vertex in self.options.others:
+                if mesh in surface.mesh_indices:
+                    reach += [*surface.jacobian(self.state.seen, mesh, [vertex], low, high)]
+            ease = native.module().local_ease(surface, np.stack(reach))
+            other = ease[self._partners] if self._is_symmetric else ease
+            self._eases[key] = np.maximum(ease, other)
+        return self._eases[key]
+
     def _of(self) -> _Anchors:
-        symmetric = self.options.symmetric or bool(self.state.linked)
+        symmetric = self._is_symmetric
         if symmetric not in self._anchors:
             self._anchors[symmetric] = self._make_anchors(symmetric)
         return self._anchors[symmetric]

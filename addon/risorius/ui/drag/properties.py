@@ -10,6 +10,12 @@ import bpy
 from ..blender_types import Context
 
 METHODS = (
+    (
+        "NEAR",
+        "Near",
+        "The smallest change of the sliders that belong to this place: a brow turns no eye. "
+        "Where they do not reach, the point lags",
+    ),
     ("LEAST_SQUARES", "Exact", "The smallest change of all sliders that brings the point there"),
     (
         "TRANSPOSE",

@@ -9,8 +9,8 @@ the transpose of the Jacobian in the place of its inverse.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +21,12 @@ from ..base.errors import ArgumentError
 from .surface import Doubles, Floats, Surface, limits, vector
 
 METHODS = ("least_squares", "transpose")
+LOCAL = 0.1
+"""A control that does less here, of what it does where it does most, than this share of what the
+most local one does, belongs elsewhere: gaze to the eyes, though lids and brows follow it."""
+ELSEWHERE = 0.001
+"""The ease of a control that belongs elsewhere."""
+_ON = 1e-6
 
 
 class Solved(NamedTuple):
@@ -48,6 +54,14 @@ class _Drag:
     roots: Doubles  # [P]: roots of weights
     low: Doubles  # [R]
     high: Doubles  # [R]
+    unknowns: _Unknowns
+
+    def held(self, controls: Sequence[int], at: Doubles) -> _Drag:
+        """The same drag with some controls kept where they are."""
+        low, high, free = self.low.copy(), self.high.copy(), self.free.copy()
+        low[controls] = high[controls] = at[controls]
+        free[controls] = False
+        return replace(self, low=low, high=high, free=free)
 
     def positions(self, raw: Doubles) -> Doubles:
         return self.probe.positions(raw)
@@ -78,6 +92,8 @@ def _drag(
     free: npt.ArrayLike | None,
     lowest: npt.ArrayLike | None,
     highest: npt.ArrayLike | None,
+    partners: npt.ArrayLike | None = None,
+    ease: npt.ArrayLike | None = None,
 ) -> _Drag:
     count = len(points)
     if not count:
@@ -96,7 +112,53 @@ def _drag(
     loose = vector("free", True if free is None else free, len(raw)).astype(bool)
     low[~loose] = high[~loose] = raw[~loose]
     probe = surface.probe(np.asarray(points, np.int64).reshape(count, 2))
-    return _Drag(probe, loose, wanted, along, np.sqrt(weight), low, high)
+    easy = vector("ease", 1.0 if ease is None else ease, len(raw))
+    unknowns = _unknowns(len(raw), partners, easy)
+    return _Drag(probe, loose, wanted, along, np.sqrt(weight), low, high, unknowns)
+
+
+@dataclass
+class _Unknowns:
+    """What is solved for: each a change of a control, or of a control and its partner alike."""
+
+    first: npt.NDArray[np.int64]  # [U] controls
+    second: npt.NDArray[np.int64]  # [U] their partners, themselves where they have none
+    scale: Doubles  # [U]: what a unit of an unknown changes each of its controls by
+
+    def columns(self, jacobian: Doubles) -> Doubles:
+        """float64[m, U] of float64[m, R]"""
+        both = jacobian[:, self.second] * (self.first != self.second)
+        return np.asarray((jacobian[:, self.first] + both) * self.scale)
+
+    def change(self, values: Doubles, count: int) -> Doubles:
+        """float64[R], R being `count`, of float64[U]."""
+        out = np.zeros(count)
+        out[self.first] = out[self.second] = values * self.scale
+        return out
+
+    def values(self, change: Doubles) -> Doubles:
+        """float64[U] of a change, float64[R], that is alike in partners."""
+        return np.asarray(change[self.first] / self.scale)
+
+    def limits(self, low: Doubles, high: Doubles) -> tuple[Doubles, Doubles]:
+        """float64[U] each, of how far each control may change down and up."""
+        lowest = np.maximum(low[self.first], low[self.second]) / self.scale
+        return lowest, np.minimum(high[self.first], high[self.second]) / self.scale
+
+
+def _unknowns(count: int, partners: npt.ArrayLike | None, ease: Doubles) -> _Unknowns:
+    if not (ease > 0).all():
+        raise ArgumentError(f"ease: numbers above 0 were expected, found {ease.min():g}")
+    each = np.arange(count)
+    partner = each if partners is None else np.asarray(partners)
+    if partner.shape != (count,) or partner.dtype.kind not in "iu":
+        raise ArgumentError(f"partners: whole numbers of shape [{count}] were expected")
+    if ((partner < 0) | (partner >= count)).any() or (partner[partner] != each).any():
+        raise ArgumentError("partners: each control's partner was expected to have it as its own")
+    first = np.unique(np.minimum(each, partner))
+    second = partner[first].astype(np.int64)
+    easier = np.maximum(ease[first], ease[second])
+    return _Unknowns(first, second, np.where(first == second, 1.0, np.sqrt(0.5)) * easier)
 
 
 def solve_drag(
@@ -110,6 +172,9 @@ def solve_drag(
     free: npt.ArrayLike | None = None,
     lowest: npt.ArrayLike | None = None,
     highest: npt.ArrayLike | None = None,
+    ease: npt.ArrayLike | None = None,
+    partners: npt.ArrayLike | None = None,
+    opposites: Sequence[tuple[int, int]] = (),
     method: str = "least_squares",
     smallest: float = 1e-3,
     rounds: int = 4,
@@ -127,6 +192,13 @@ def solve_drag(
         free: bool[R], which controls may change; None is all.
         lowest, highest: float[R] or one number: the limits; None is 0 and 1. A control that is
             beyond them may stay where it is.
+        ease: float[R] above 0, how readily each control changes: one of 0.1 costs ten times as
+            much, and is left alone where others bring the points there; None is 1.
+        partners: int[R], each control's partner, itself where it has none: the two change alike, as
+            left and right of a symmetric drag; None is no partners.
+        opposites: pairs of controls of which one at most shall be on, as mouthLeft and mouthRight.
+            A face whose halves differ finds a use for both at once, and nobody wants that. Two that
+            are partners as well stay as they are.
         method: "least_squares", or "transpose", which takes the controls that move the points
             themselves by as much as they do so: surprises less far from the drag.
         smallest: how much a small change is worth, beside the reach of the strongest control; more
@@ -140,35 +212,95 @@ def solve_drag(
     if method not in METHODS:
         raise ArgumentError(f"method: {' or '.join(METHODS)} was expected, found {method!r}")
     begin = at
-    drag = _drag(surface, begin, points, targets, axes, weights, free, lowest, highest)
-    if method == "transpose":
-        at = _transposed(drag, at, rounds)
-    else:
-        at = _least_squares(drag, at, smallest, rounds)
+    drag = _drag(
+        surface, begin, points, targets, axes, weights, free, lowest, highest, partners, ease
+    )
+
+    def solve(drag: _Drag, start: Doubles) -> Doubles:
+        if method == "transpose":
+            return _transposed(drag, begin, rounds)
+        return _least_squares(drag, begin, start, smallest, rounds)
+
+    at = _kept_apart(drag, begin, _pairs(opposites, len(begin)), solve)
     positions = drag.positions(at)
     error = drag.error(drag.residual(positions))
     change = float(np.linalg.norm(at - begin))
     return Solved(at.astype(np.float32), positions.astype(np.float32), error, change)
 
 
-def _least_squares(drag: _Drag, begin: Doubles, smallest: float, rounds: int) -> Doubles:
+def _pairs(opposites: Sequence[tuple[int, int]], count: int) -> npt.NDArray[np.int64]:
+    """int64[N, 2]"""
+    pairs = np.asarray(opposites if len(opposites) else np.empty((0, 2)), np.float64)
+    good = pairs.ndim == 2 and pairs.shape[1:] == (2,) and bool((pairs == pairs.round()).all())
+    if not good or not ((pairs >= 0) & (pairs < count)).all():
+        raise ArgumentError(f"opposites: pairs of whole numbers below {count} were expected")
+    return pairs.astype(np.int64)
+
+
+def _kept_apart(
+    drag: _Drag,
+    begin: Doubles,
+    opposites: npt.NDArray[np.int64],
+    solve: Callable[[_Drag, Doubles], Doubles],
+) -> Doubles:
+    """What `solve` finds with one of two opposites alone: the one that it uses more.
+
+    One that was on goes back before the other comes.
+    """
+    partner = np.arange(len(begin))
+    partner[drag.unknowns.first] = drag.unknowns.second
+    partner[drag.unknowns.second] = drag.unknowns.first
+    tied = opposites[partner[opposites[:, 0]] == opposites[:, 1]]
+    drag = drag.held([*tied.ravel()], begin)
+    at = solve(drag, begin)
+    lesser, more = _both_on(opposites, at, begin)
+    if not len(lesser):
+        return at
+    at = solve(drag.held([*lesser], begin), at)
+    spent = [i for i in range(len(lesser)) if begin[more[i]] > at[more[i]] <= _ON]
+    if spent:
+        gone = np.minimum(begin, at)
+        drag = drag.held([*(more[i] for i in spent)], gone)
+        at = solve(drag.held([c for i, c in enumerate(lesser) if i not in spent], begin), gone)
+    return at
+
+
+def _both_on(
+    opposites: npt.NDArray[np.int64], at: Doubles, begin: Doubles
+) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """Of the pairs that are both on, further than they were: the lesser ones, and the others.
+
+    The lesser one is that which was less on before, or, of two at rest, is so now.
+    """
+    before = np.maximum(begin[opposites].min(axis=1), 0.0)
+    pairs = opposites[at[opposites].min(axis=1) > before + _ON]
+    was, now = begin[pairs], at[pairs]
+    first = (was[:, 0] < was[:, 1]) | ((was[:, 0] == was[:, 1]) & (now[:, 0] < now[:, 1]))
+    return np.where(first, pairs[:, 0], pairs[:, 1]), np.where(first, pairs[:, 1], pairs[:, 0])
+
+
+def _least_squares(
+    drag: _Drag, begin: Doubles, start: Doubles, smallest: float, rounds: int
+) -> Doubles:
     """Gauss-Newton, whose whole change from the begin is kept small, with halved steps."""
-    at, missing = begin, drag.residual(drag.positions(begin))
+    at = np.clip(start, drag.low, drag.high)
+    missing = drag.residual(drag.positions(at))
     price = -1.0
+    low, high = drag.unknowns.limits(drag.low - begin, drag.high - begin)
     for _ in range(max(1, rounds)):
-        jacobian = drag.jacobian(at)
+        jacobian = drag.unknowns.columns(drag.jacobian(at))
         if price < 0:  # the same all along, so that what one round gains no other gives away
             strongest = float((jacobian**2).sum(axis=0).max(initial=0))
             price = max(smallest**2 * strongest, 1e-20)
-        low, high = drag.low - begin, drag.high - begin
-        goal = missing + jacobian @ (at - begin)
-        step = begin + least_change(jacobian, goal, low, high, price) - at
-        worth = missing @ missing + price * ((at - begin) @ (at - begin))
+        here = drag.unknowns.values(at - begin)
+        step = least_change(jacobian, missing + jacobian @ here, low, high, price) - here
+        worth = missing @ missing + price * (here @ here)
         gained = 0.0
         for share in (1.0, 0.5, 0.25):
-            tried = at + share * step
+            there = here + share * step
+            tried = begin + drag.unknowns.change(there, len(begin))
             left = drag.residual(drag.positions(tried))
-            gained = float(worth - left @ left - price * ((tried - begin) @ (tried - begin)))
+            gained = float(worth - left @ left - price * (there @ there))
             if gained > 0:
                 at, missing = tried, left
                 break
@@ -181,7 +313,8 @@ def _transposed(drag: _Drag, at: Doubles, rounds: int) -> Doubles:
     """Down the slope, each time as far as is best by the derivatives; in the limits."""
     for _ in range(max(1, 3 * rounds)):
         jacobian, missing = drag.jacobian(at), drag.residual(drag.positions(at))
-        toward = jacobian.T @ missing
+        toward = drag.unknowns.columns(jacobian).T @ missing
+        toward = drag.unknowns.change(toward, len(at))
         toward[((at <= drag.low) & (toward < 0)) | ((at >= drag.high) & (toward > 0))] = 0
         reach = jacobian @ toward
         if not reach @ reach > 0:
@@ -189,6 +322,22 @@ def _transposed(drag: _Drag, at: Doubles, rounds: int) -> Doubles:
         size = float(reach @ missing / (reach @ reach))
         at = np.clip(at + size * toward, drag.low, drag.high)
     return at
+
+
+def local_ease(surface: Surface, reach: npt.ArrayLike) -> Doubles:
+    """How readily controls shall change where points are dragged, for solve_drag: float64[R].
+
+    1 for those that do at least LOCAL as much there, of what they do where they do most, as the one
+    that does most of its own there; ELSEWHERE for others: a brow that is dragged then turns no eye,
+    though eyes that turn move it.
+
+    Args:
+        surface: the face.
+        reach: float[P, 3, R], what each control does to the points: of surface.jacobian.
+    """
+    here = np.linalg.norm(np.asarray(reach, np.float64), axis=1).max(axis=0, initial=0.0)
+    share = here / np.maximum(np.maximum(surface.strongest(), here), 1e-30)
+    return np.where(share >= LOCAL * share.max(initial=0.0), 1.0, ELSEWHERE)
 
 
 def best_controls(

@@ -13,6 +13,7 @@ from ..base.errors import ArgumentError
 
 Floats = npt.NDArray[np.float32]
 Doubles = npt.NDArray[np.float64]
+_LOOKED_AT = 2000
 MM = {"cm": 10.0, "m": 1000.0}
 
 
@@ -50,6 +51,7 @@ class Surface:
         self.mesh_indices = [int(m) for m in dna.lod_mesh_mapping[lod]]
         self.vertex_counts = [len(mesh.positions) for mesh in dna.meshes]
         self.mm = MM.get(dna.translation_unit, 10.0)
+        self._strongest: Doubles | None = None
         self._look_at_axes(dna.coordinate_system)
 
     def _look_at_axes(self, directions: Sequence[str]) -> None:
@@ -106,6 +108,22 @@ class Surface:
         probe = self.probe(self._points(mesh, vertices))
         probe.linearise(at, high, np.ones(len(at), bool))
         return probe.jacobian()
+
+    def strongest(self) -> Doubles:
+        """How far each control moves what it moves most, per unit of it from rest: float64[R].
+
+        Of some thousand vertices, spread evenly over the meshes of the level; found once.
+        """
+        if self._strongest is None:
+            count = self.control_count
+            every = max(1, sum(self.vertex_counts[m] for m in self.mesh_indices) // _LOOKED_AT)
+            rows = [
+                (m, v) for m in self.mesh_indices for v in range(0, self.vertex_counts[m], every)
+            ]
+            probe = self.probe(np.asarray(rows, np.int64).reshape(len(rows), 2))
+            probe.linearise(np.zeros(count), np.ones(count), np.ones(count, bool))
+            self._strongest = np.linalg.norm(probe.jacobian(), axis=1).max(axis=0, initial=0.0)
+        return self._strongest
 
     def probe(self, points: npt.NDArray[np.int64]) -> Probe:
         """Points of the surface that can be asked often.
