@@ -26,6 +26,7 @@ def grow(
     stiff: float = 0.45,
     fall: Floats | float = 0.0,
     hug: float = 0.0,
+    sway: Floats | float = 0.0,
 ) -> tuple[Floats, Floats]:
     """Guides from roots.
 
@@ -41,13 +42,15 @@ def grow(
         stiff: share of the direction so far that each step keeps.
         fall: float64[n] or a number, weight of gravity at the tip.
         hug: how strongly a guide that has left the skin is drawn back to it, above the ears' ends.
+        sway: float64[n, 3], by which each guide's own way differs from the flow, along all of it: noise
+            of the flow itself would bend a card to and fro from vertex to vertex.
 
     Returns:
         float64[n, rows, 3] each: points, and the way out of the skin there.
     """
     at = roots.of(surface.positions)
     out = unit(roots.of(surface.normals))
-    along = tangent(roots.of(flow), out)
+    along = tangent(roots.of(flow) + sway, out)
     before = along * np.cos(rise[0])[:, None] + out * np.sin(rise[0])[:, None]
     points, outside = [at], [out]
     step = lengths[:, None] / (rows - 1) / _SUBSTEPS
@@ -55,7 +58,7 @@ def grow(
         t = k / ((rows - 1) * _SUBSTEPS)
         height, normal, vertex = surface.below(at, among)
         angle = rise[0] * (1 - t) ** 1.5 + rise[1] * (1 - (1 - t) ** 1.5)
-        way = tangent(flow[vertex], normal)
+        way = tangent(flow[vertex] + sway, normal)
         way = way * np.cos(angle)[:, None] + normal * np.sin(angle)[:, None]
         way[:, 1] -= t * np.asarray(fall)
         if hug:

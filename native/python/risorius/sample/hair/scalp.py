@@ -58,8 +58,8 @@ def _roots(
     """
     man = surface.man
     inside = hairline_height(man, recession, sideburn, low)
-    inside = inside + 0.016 * wavy(man, random, 3.0) + 0.008 * wavy(man, random, 9.0)
-    density = smooth_step((inside + 0.012) / 0.05)
+    inside = inside + 0.014 * wavy(man, random, 3.0) + 0.005 * wavy(man, random, 9.0)
+    density = smooth_step((inside + 0.012) / 0.05 if even else inside / 0.07)
     bald = smooth_step((man[:, 1] - 0.55) / 0.3)
     density = density * (1 - thin_top * bald)
     if not even:
@@ -119,28 +119,31 @@ def _short(
     thin_top: float,
 ) -> Strips:
     random = np.random.default_rng(seed)
-    spacing = 0.043 if recession == 0 else 0.056
+    spacing = 0.043 if recession == 0 else 0.050
     roots, inside = _roots(surface, spacing, random, recession, 1.0, thin_top, even=False)
     n = len(roots)
     man = roots.of(surface.man)
     high = smooth_step((man[:, 1] - 0.30) / 0.40)
     fore = smooth_step((man[:, 2] + 0.5) / 0.6) * high
-    length = sides + (top - sides) * high + 0.10 * fore
-    length *= 0.5 + 0.5 * smooth_step(inside / 0.2)
+    length = sides + (top - sides) * high + 0.16 * fore
+    edge = 0.5 + 0.2 * fore * (recession == 0)  # hair over the forehead hides where it begins
+    length *= edge + (1 - edge) * smooth_step(inside / 0.2)
     nape = smooth_step((-0.25 - man[:, 1]) / 0.3)
     length *= (1 - 0.45 * nape) * person.hair_length * surface.scale * random.uniform(0.75, 1.2, n)
-    flow = whorl_flow(surface, 0.9 if recession == 0 else 0.3)
+    flow = whorl_flow(surface, 0.6 if recession == 0 else 0.3)
     if recession:
         back = tangent(np.tile([0.15, 0.1, -1.0], (len(flow), 1)), surface.normals)
         comb = smooth_step((surface.man[:, 1] - 0.2) / 0.3)[:, None]
         flow = tangent(flow * (1 - comb) + comb * back, surface.normals)
     clump = 0.14 * np.column_stack([wavy(surface.man, random, 6.0) for _ in range(3)])
-    flow = flow + clump + 0.10 * random.normal(0, 1, flow.shape)
-    low = 16 + 34 * high + 16 * fore * (recession == 0)
-    rise = np.radians(low + random.uniform(-7, 9, n)), np.radians(2 + 12 * high + 0 * low)
-    points, out = grow(surface, roots, flow, length, rise, 4, _scalp_vertices(surface), 0.006)
+    flow, sway = flow + clump, 0.14 * random.normal(0, 1, (n, 3))
+    quiff = fore * (recession == 0)
+    low = 16 + (34 if recession == 0 else 12) * high - 8 * quiff
+    rise = np.radians(low + random.uniform(-7, 9, n)), np.radians(2 + 12 * high - 12 * quiff)
+    near = _scalp_vertices(surface)
+    points, out = grow(surface, roots, flow, length, rise, 4, near, 0.006, sway=sway)
     half = (0.024 + 0.026 * high) * surface.scale * (spacing / 0.043) * random.uniform(0.8, 1.25, n)
-    half *= 0.55 + 0.45 * smooth_step(inside / 0.1)
+    half *= 0.4 + 0.6 * smooth_step(inside / 0.12)
     turns = np.radians(random.uniform(-1, 1, n) * (6 + 28 * high))
     # Short hair is low along all of its length.
     steep = np.arcsin(np.clip(ROOT_DEEP * surface.scale / half, 0, 1))
@@ -190,7 +193,7 @@ def long(surface: Surface, person: Person) -> Strips:
     n = len(roots)
     man = roots.of(surface.man)
     flow = parted_flow(surface)
-    flow = tangent(flow + 0.10 * random.normal(0, 1, flow.shape), surface.normals)
+    sway = 0.10 * random.normal(0, 1, (n, 3))
     # Each hair ends at about the same height: what begins higher is longer.
     way = 0.85 * (man[:, 1] + 0.55) + 1.15
     length = np.clip(way, 1.0, 2.6) * person.hair_length * surface.scale
@@ -198,7 +201,7 @@ def long(surface: Surface, person: Person) -> Strips:
     rise = np.radians(random.uniform(6, 14, n)), np.zeros(n)
     above = np.flatnonzero(surface.man[:, 1] > -1.9)
     least = (0.006 + 0.03 * random.random(n)) * surface.scale
-    points, out = grow(surface, roots, flow, length, rise, 9, above, least, 0.5, 0.55, 1.2)
+    points, out = grow(surface, roots, flow, length, rise, 9, above, least, 0.5, 0.55, 1.2, sway)
     wave = 0.05 * (0.25 + person.hair_curl) * random.uniform(0.5, 1.2, n)
     points = curled(points, out, wave, random.uniform(0.5, 1.6, n), random)
     half = (
@@ -249,13 +252,15 @@ def bun(surface: Surface, person: Person) -> Strips:
     knot = int(((surface.man - _KNOT) ** 2).sum(axis=1).argmin())
     at, out = surface.positions[knot], surface.normals[knot]
     flow = tangent(_KNOT - surface.man, surface.normals)
-    flow = tangent(flow + 0.05 * random.normal(0, 1, flow.shape), surface.normals)
+    sway = 0.05 * random.normal(0, 1, (n, 3))
     length = 1.12 * np.linalg.norm(man - _KNOT, axis=1) * surface.scale
     length = np.minimum(length, 1.5 * surface.scale) * random.uniform(0.9, 1.0, n)
     rise = np.radians(random.uniform(3, 9, n)), np.zeros(n)
     above = _scalp_vertices(surface)
     least = (0.004 + 0.014 * random.random(n)) * surface.scale
-    points, outside = grow(surface, roots, flow, length, rise, 6, above, least, 0.3, hug=1.2)
+    points, outside = grow(
+        surface, roots, flow, length, rise, 6, above, least, 0.3, hug=1.2, sway=sway
+    )
     half = (0.022 + 0.05 * smooth_step(inside / 0.14)) * surface.scale * random.uniform(0.8, 1.2, n)
     turns = np.radians(random.uniform(-5, 5, n))
     taper = np.interp(np.linspace(0, 1, 6), [0, 0.2, 0.7, 1], [0.75, 1.0, 0.8, 0.45])

@@ -210,8 +210,8 @@ class Skin:
         if what == "veins":
             temples = np.clip(texels.coarse - 1.2, 0, 1) * (1 - self.deep)
             return np.asarray(field["veins"] * (0.42 + 0.05 * texels.coarse) + 0.05 * temples)
-        uneven = 0.07 * field["tone"] + (0.025 + 0.05 * self.old) * texels.coarse
-        out = uneven + (0.02 + 0.02 * self.old) * texels.middle + 0.016 * texels.fine
+        uneven = 0.07 * field["tone"] + (0.022 + 0.03 * self.old) * texels.coarse
+        out = uneven + (0.02 + 0.012 * self.old) * texels.middle + 0.016 * texels.fine
         out += self.deep * (0.22 * field["veins"] + 0.12 * field["forehead"])
         out += 0.18 * creases + self._spots()
         return np.asarray(out)

@@ -46,12 +46,13 @@ class _Hairs:
 
 def _kinds(person: Person) -> dict[str, _Hairs]:
     curl = person.hair_curl
-    thin = (1.3, 2.1) if curl < 0.6 else (1.0, 1.7)
+    straight = curl < 0.6  # hairs side by side are seen one by one, and have to be thin
+    thin = (0.8, 1.35) if straight else (1.0, 1.7)
     wave, waves = 0.16 * curl, 1.5 + 7.0 * curl
     long = person.hair_style in ("long", "bun")
     length = (0.75, 1.0) if long else (0.5, 1.0)
     begin = {"long": 0.05, "bun": 0.1}.get(person.hair_style, 0.3)  # a centimetre or less
-    scalp = (46, 42, 38, 44, 40, 20, 15, 10)
+    scalp = (74, 68, 61, 70, 64, 32, 24, 16) if straight else (46, 42, 38, 44, 40, 20, 15, 10)
     return {
         "scalp": _Hairs(
             scalp, thin, length, begin, 0.08, 0.08, wave, waves, 0.25 if not long else 0.1, 0.45
@@ -59,8 +60,8 @@ def _kinds(person: Person) -> dict[str, _Hairs]:
         "brows": _Hairs((5, 4, 5, 3, 4, 4, 3, 5), (1.9, 2.7), (0.6, 1.0), 0.25, 0.16, 0.16),
         "lashes": _Hairs((3, 2, 3, 2) * 4, (2.4, 3.3), (0.7, 1.0), 0.0, 0.12, 0.16, gather=0.35),
         "beard": _Hairs(
-            (9, 8, 10, 7, 9, 6, 5, 8),
-            (1.5, 2.3),
+            (13, 11, 14, 10, 13, 8, 7, 11),
+            (1.05, 1.6),
             (0.5, 1.0),
             0.2,
             0.14,
@@ -76,7 +77,7 @@ def _shades(colour: Colour, grey: float, count: int, random: np.random.Generator
     """float64[count, 3]: colours of single hairs."""
     own = np.array(colour) * random.uniform(0.78, 1.28, (count, 1))
     own = own + random.normal(0, 0.012, (count, 1)) * [1.2, 0.6, 0.2]  # some are redder
-    white = np.array(_GREY) * random.uniform(0.8, 1.1, (count, 1))
+    white = np.array(_GREY) * random.uniform(0.55, 1.0, (count, 1))
     return np.asarray(np.where(random.random((count, 1)) < grey, white, own))
 
 

@@ -31,8 +31,12 @@ COLLAR_ROUND = 0.3
 HEM = 4.62  # height
 SHOULDER = 2.02  # how far to the side
 ROOM = 0.02  # by how much it is wider than the body, as a share
-# The collar's rows: away from the neck and up, in mm, from its seam over its edge to the inside.
-_COLLAR = ((1.6, -2.5), (2.6, 0.5), (2.8, 6.0), (2.2, 11.5), (0.9, 13.0), (-0.5, 12.0), (-0.9, 4.0))
+# The collar's rows: away from the neck and up, in mm, from its seam over its edge to the inside. It
+# leans to the neck as ribbing does: an upright one stands off the shoulders like a pipe.
+_COLLAR = (
+    (1.6, -2.5), (2.4, 0.5), (1.3, 5.0), (-1.4, 9.6), (-3.2, 10.6), (-4.0, 9.2), (-2.4, 3.0),
+)  # fmt: skip
+_EVEN = tuple(k / 64 for k in (1, 6, 15, 20, 15, 6, 1))  # means along the collar's ring
 MM = 0.01
 
 
@@ -149,15 +153,17 @@ def with_edges(polygons: Polygons, positions: Floats) -> tuple[list[list[int]], 
         radius = float(np.linalg.norm(positions[ring] - middle, axis=1).mean())
         rise = float(np.linalg.norm(middle - positions[trunk].mean(axis=0)))
         share = 1 / len(few)
-        before = ring
+        # The cut goes through large faces: an edge as it is would have their corners.
+        even = _EVEN if collar else (1.0,)
+        before, size = ring, len(ring)
         for away, up in profile:
             grow, lift = away * MM / radius, up * MM / rise
-            new = list(range(total, total + len(ring)))
-            for n, v in zip(new, ring, strict=True):
-                rows.append((n, v, 1 + grow))
+            new = list(range(total, total + size))
+            for k, n in enumerate(new):
+                for i, part in enumerate(even):
+                    rows.append((n, ring[(k + i - len(even) // 2) % size], (1 + grow) * part))
                 rows += [(n, w, (lift - grow) * share) for w in few]
                 rows += [(n, w, -lift * near) for w in trunk] if lift else []
-            size = len(ring)
             for k in range(size):
                 m = (k + 1) % size
                 faces.append([before[m], before[k], new[k], new[m]])
