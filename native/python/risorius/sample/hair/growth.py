@@ -42,8 +42,8 @@ def grow(
         stiff: share of the direction so far that each step keeps.
         fall: float64[n] or a number, weight of gravity at the tip.
         hug: how strongly a guide that has left the skin is drawn back to it, above the ears' ends.
-        sway: float64[n, 3], by which each guide's own way differs from the flow, along all of it: noise
-            of the flow itself would bend a card to and fro from vertex to vertex.
+        sway: float64[n, 3], by which each guide's own way differs from the flow, along all of it:
+            noise of the flow itself would bend a card to and fro from vertex to vertex.
 
     Returns:
         float64[n, rows, 3] each: points, and the way out of the skin there.
