@@ -107,7 +107,7 @@ def film(folder, first, last):
     if scene.cycles.use_denoising:
         # Measured: 3.6 CPU-seconds a frame; 10 samples take 5 and look alike.
         scene.cycles.samples = 6
-    scene.render.resolution_x = scene.render.resolution_y = 480
+    scene.render.resolution_x = scene.render.resolution_y = 400
     scene.frame_start, scene.frame_end = first, last
     scene.render.filepath = str(folder / "frame_####.png")
     stage.render_animation(Progress(last - first + 1, "frame"))
@@ -145,7 +145,7 @@ def main():
     timed("render 8 pictures of 640 px", sheet)
     frames = stage.empty_folder(args.out / "frames")
     last = acting.LAST_FRAME
-    timed(f"render {last} frames of 480 px", lambda: film(frames, 1, last))
+    timed(f"render {last} frames of 400 px", lambda: film(frames, 1, last))
 
 
 if __name__ == "__main__":
