@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""How fast an installed wheel is beside another: one process of each in turn, quotients of the least
-times and of the medians.
+"""How fast an installed wheel is beside another: one process of each in turn, and quotients of the
+least times and of the medians.
 
     speed.py FACE.dna FOLDER OTHER [ROUNDS]    folders that `pip install --target` filled, for this
                                                Python
@@ -74,9 +74,8 @@ def main() -> int:
     for name, (ours, others) in seen.items():
         a, b = min(ours), min(others)  # what disturbs only ever adds
         middle = statistics.median(ours) / statistics.median(others)
-        print(
-            f"{name:<30} {a * 1e3:9.3f} ms {b * 1e3:9.3f} ms   {a / b:5.3f}, of medians {middle:5.3f}"
-        )
+        both = f"{a * 1e3:9.3f} ms {b * 1e3:9.3f} ms"
+        print(f"{name:<30} {both}   {a / b:5.3f}, of medians {middle:5.3f}")
     return 0
 
 
