@@ -138,3 +138,23 @@ def test_the_backdrop_lies_behind_the_face(rig):
 
 def _corners(item):
     return [item.matrix_world @ Vector(c) for c in item.bound_box]
+
+
+def test_no_shirt_ends_in_the_picture(rig):
+    """Of a hem that is higher in the middle than at the sides, as a child's."""
+    bpy.ops.risorius.add_character()
+    man = next(
+        o for o in bpy.data.objects if o.name.startswith("Sample") and o.name.endswith("_rig")
+    )
+    shirt = next(m for m in scene.meshes(man).values() if "shirt" in m.name)
+    end = scene.controls(man).data.bones["eye_L"].head_local.z - 0.2
+    raised = [v for v in shirt.data.vertices if abs(v.co.x) < 0.07 and v.co.z < end]
+    for vertex in raised:
+        vertex.co.z = end
+    bpy.context.view_layer.objects.active = scene.controls(man)
+    camera = _camera(_add())
+    bpy.context.scene.render.resolution_x = bpy.context.scene.render.resolution_y = 100
+    bpy.context.view_layer.update()
+    ends = [shirt.matrix_world @ v.co for v in raised if v.co.y < 0]
+    assert len(ends) > 20
+    assert max(world_to_camera_view(bpy.context.scene, camera, end).y for end in ends) <= 0.0

@@ -67,6 +67,8 @@ with over(*view()[:2]):
     bpy.ops.risorius.show_all()
     bpy.ops.risorius.reset()
 bpy.context.scene.frame_set(1)
+with over(*view()[:2]):
+    bpy.ops.ed.undo_push(message="At Rest")
 """
 
 

@@ -141,9 +141,9 @@ def drag_in_views(hand: Hand, _dna: Path) -> Iterator[Check]:
 
 VIEWS = {
     "a turned head in perspective": """
-head = rig()["risorius_controls"].pose.bones["head"]
-head.rotation_mode = "XYZ"
-head.rotation_euler = (0.2, 0.3, 0.4)
+bone = rig()["risorius_controls"].pose.bones["head"]
+bone.rotation_mode = "XYZ"
+bone.rotation_euler = (0.2, -0.3, -0.4)
 bpy.context.view_layer.update()
 eye = view()[0].spaces.active.region_3d
 eye.view_perspective = "PERSP"

@@ -6,13 +6,15 @@ They are the user's from then on: nothing of the face points to them, nothing lo
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import bpy
 import numpy as np
 from mathutils import Matrix, Vector
 
 from ...logic.character import studio_plan
 from ..base import parts
-from ..base.blender_types import ArmatureObject, Context, NodeTree
+from ..base.blender_types import ArmatureObject, Context, MeshObject, NodeTree
 from ..character import runtime
 
 _MIDDLE = (0.115, 0.121, 0.130, 1.0)  # of the backdrop, behind the head
@@ -61,7 +63,37 @@ def _head(rig: ArmatureObject) -> tuple[Matrix, float, list[float], list[float]]
         middle, apart = _guess(corners, axes)
     inside = (corners - middle) @ axes
     place = Matrix.Translation(Vector(middle.tolist())) @ turn.to_4x4()
-    return place, apart, inside.min(axis=0).tolist(), inside.max(axis=0).tolist()
+    low, high = inside.min(axis=0), inside.max(axis=0)
+    low[2] = max(low[2], _hem([(_places(item) - middle) @ axes for item in meshes], apart))
+    return place, apart, low.tolist(), high.tolist()
+
+
+def _places(item: MeshObject) -> np.ndarray:
+    """float64[V, 3] the vertices of a mesh, in the world."""
+    flat = np.empty(3 * len(item.data.vertices), np.float32)
+    item.data.vertices.foreach_get("co", flat)
+    world = np.array(item.matrix_world, np.float64)
+    return np.asarray(flat.reshape(-1, 3) @ world[:3, :3].T + world[:3, 3])
+
+
+def _hem(places: list[np.ndarray], apart: float) -> float:
+    """How high the body ends in front, below the face, where it ends highest.
+
+    A shirt's hem may hang lower at the sides, and a picture down to there would show its middle.
+
+    Args:
+        places: float64[V, 3] of each mesh, in the head's axes.
+        apart: distance between the eyes.
+    """
+    x, y, z = np.concatenate([*places, np.empty((0, 3))]).T
+    edges = np.linspace(-0.8, 0.8, 9) * apart
+    ends = []
+    for left, right in pairwise(edges):
+        here = (x >= left) & (x < right)
+        if here.any():
+            front = here & (y <= (y[here].min() + y[here].max()) / 2)
+            ends.append(float(z[front].min()))
+    return max(ends, default=-np.inf)
 
 
 def _eyes(rig: ArmatureObject) -> np.ndarray:
