@@ -41,6 +41,7 @@ def board(hand: Hand, _dna: Path) -> Iterator[Check]:
     yield f"G and a move of the pointer: the jaw opens ({led:.2f})", led > 0.1
     yield "and the face moves with it", difference(before, after, box) > 0.02
     ready_tab(hand)
+    scroll(hand)
     hand.click(*hand.find(r"risorius\.lead\(.*SLIDERS", columns=(0.3, 0.2, 0.4)))
     hand.wait("the sliders lead", lambda: not hand.ask("board_leads"))
     yield "Sliders: the pose has gone over", abs(slider(hand) - led) < 0.01
