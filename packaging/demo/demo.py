@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The demo inside Blender: install the extension, import the face, key the acting, save, render.
 
-demo.py -- --extension ZIP --dna FILE --out FOLDER [--frames A B] [--sheet-only] [--no-render]
+demo.py -- --extension ZIP --dna FILE --out FOLDER [--only FRAME ...]
 """
 
 from __future__ import annotations
