@@ -105,7 +105,7 @@ def still(path, frame, size):
 def film(folder, first, last):
     scene = bpy.context.scene
     if scene.cycles.use_denoising:
-        # Measured: 3.6 CPU-seconds a frame; 10 samples take 5 and look alike.
+        # Measured at 480 px: 3.6 CPU-seconds a frame; 10 samples take 5 and look alike.
         scene.cycles.samples = 6
     scene.render.resolution_x = scene.render.resolution_y = 400
     scene.frame_start, scene.frame_end = first, last

@@ -16,6 +16,7 @@ from ...logic.character import studio_plan
 from ..base import parts
 from ..base.blender_types import ArmatureObject, Context, MeshObject, NodeTree
 from ..character import runtime
+from ..character.meshes import basis_of
 
 _MIDDLE = (0.115, 0.121, 0.130, 1.0)  # of the backdrop, behind the head
 _EDGE = (0.010, 0.011, 0.014, 1.0)
@@ -69,11 +70,9 @@ def _head(rig: ArmatureObject) -> tuple[Matrix, float, list[float], list[float]]
 
 
 def _places(item: MeshObject) -> np.ndarray:
-    """float64[V, 3] the vertices of a mesh, in the world."""
-    flat = np.empty(3 * len(item.data.vertices), np.float32)
-    item.data.vertices.foreach_get("co", flat)
+    """float64[V, 3] the vertices of a mesh at rest, in the world."""
     world = np.array(item.matrix_world, np.float64)
-    return np.asarray(flat.reshape(-1, 3) @ world[:3, :3].T + world[:3, 3])
+    return np.asarray(basis_of(item) @ world[:3, :3].T + world[:3, 3])
 
 
 def _hem(places: list[np.ndarray], apart: float) -> float:

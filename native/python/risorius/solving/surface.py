@@ -13,8 +13,8 @@ from ..base.errors import ArgumentError
 
 Floats = npt.NDArray[np.float32]
 Doubles = npt.NDArray[np.float64]
-_LOOKED_AT = 2000
 MM = {"cm": 10.0, "m": 1000.0}
+_LOOKED_AT = 2000  # about so many vertices tell what a control moves most
 
 
 class Surface:
