@@ -66,8 +66,7 @@ with over(*view()[:2]):
     bpy.ops.risorius.heat(kind="OFF")
     bpy.ops.risorius.show_all()
     bpy.ops.risorius.reset()
-bpy.context.scene.frame_set(1)
-with over(*view()[:2]):
+    bpy.context.scene.frame_set(1)
     bpy.ops.ed.undo_push(message="At Rest")
 """
 

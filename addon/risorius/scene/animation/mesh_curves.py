@@ -18,6 +18,7 @@ from ..base import parts
 from ..base.blender_types import ArmatureObject, Attribute, Context, MeshObject
 from ..base.task import Task, telling
 from ..character import runtime
+from ..character.meshes import basis_of
 from . import clip_actions
 
 _HOTTEST_MM = 2.0  # what is left over of a vertex and shown in the hottest colour, at least
@@ -113,17 +114,6 @@ def recorded(
     return out
 
 
-def rest_of(item: MeshObject) -> Floats:
-    """float32[V, 3]: an object's vertices without keys and modifiers."""
-    keys = item.data.shape_keys
-    out = np.empty(len(item.data.vertices) * 3, np.float32)
-    if keys is None:
-        item.data.vertices.foreach_get("co", out)
-    else:
-        keys.reference_key.points.foreach_get("co", out)
-    return out.reshape(-1, 3)
-
-
 class MeshCurvesTask(Task["native.SolvedClip"]):
     """Curves of a recorded mesh on their way, made in a thread.
 
@@ -162,7 +152,7 @@ class MeshCurvesTask(Task["native.SolvedClip"]):
         surface = native.module().Surface(live.dna, live.rig, lod)
         self.mm = float(surface.mm)
         made = native.part("solving.performance")
-        take = made.Performance(frames, rate, 0.0, rest_of(item))
+        take = made.Performance(frames, rate, 0.0, basis_of(item))
         own = np.asarray(live.dna.meshes[self.mesh].positions)
 
         def work(
