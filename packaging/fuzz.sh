@@ -63,7 +63,7 @@ print_row() { # print_row TARGET: fails when the target found something or did n
 }
 
 mkdir -p "$logs" "$finds" "$corpora"
-step "tools" && install_packages clang-14 libclang-rt-14-dev || exit 1
+step "tools" && install_packages clang-14 lld-14 libclang-rt-14-dev || exit 1
 step "fuzz targets" && build_targets || exit 1
 rm -rf "$corpora/seeds"
 "$programs/make_seeds" "$corpora/seeds" "$project"/tests/data/golden/*.dna || exit 1

@@ -103,8 +103,8 @@ native_lane() {
   google_tests "thread sanitizer, one Rig" tsan
   step "other compilers, systems and processors"
   run_script cross.sh
-  step "fuzz targets, 10 s each"
-  run_fuzzers 10
+  step "fuzz targets, 5 s each"
+  run_fuzzers 5
   extension_is_there || return # of the same lane as the wheel, which the next step needs
   step "C library for other programs"
   run_script host.sh
@@ -232,7 +232,7 @@ blender_lane() {
 }
 
 step "packages"
-install_packages clang-14 libclang-rt-14-dev googletest g++-aarch64-linux-gnu qemu-user || exit 1
+install_packages clang-14 lld-14 libclang-rt-14-dev googletest g++-aarch64-linux-gnu qemu-user || exit 1
 step ""
 exec 9> "$logs/libraries.lock"
 flock 9

@@ -11,7 +11,7 @@ import face_shapes
 import numpy as np
 import pytest
 import risorius
-from risorius.author import RigOptions, make_joint_rig
+from risorius.author import RigOptions, combinations, make_joint_rig
 from risorius.author.correctives import CorrectiveOptions, add_correctives, find_correctives
 from risorius.author.correctives.search import triples_of
 from risorius.author.fitting import FitOptions
@@ -380,3 +380,25 @@ def test_the_rig_of_joints_has_them_too(face, corrected):
     read = dna_bytes.Face(rig.dna.to_bytes())
     assert depth(skin_of(read, at_one("a", "b"))).max() < 0.2
     assert [c.name for c in rig.combinations] == ["a x b", "b x d"]
+
+
+def test_the_equations_of_a_corrective_are_those_of_every_vertex():
+    """The sums by moments, and those of a matrix with three rows for each vertex."""
+    random = np.random.default_rng(7)
+    joints, vertices = 9, 200
+    turns = np.linalg.qr(random.normal(size=(joints, 3, 3)))[0]
+    arms = random.normal(size=(joints, 3, 4))
+    places = random.normal((0.0, 150.0, 0.0), size=(vertices, 3))  # a head, far from the ground
+    held = random.random((vertices, joints)) * (random.random((vertices, joints)) < 0.4)
+    left = random.normal(size=(vertices, 3))
+    rows = np.zeros((joints, 6, vertices, 3))
+    for joint in range(joints):
+        away = places @ arms[joint, :, :3].T + arms[joint, :, 3]
+        for axis, unit in enumerate(np.eye(3)):
+            weight = held[:, joint, None]
+            rows[joint, axis] = weight * (turns[joint] @ unit)
+            rows[joint, 3 + axis] = weight * (np.cross(unit, away) @ turns[joint].T)
+    flat = rows.reshape(6 * joints, -1)
+    normal, asked = combinations._equations(turns, arms, places, held, left)
+    np.testing.assert_allclose(normal, flat @ flat.T, rtol=0, atol=1e-12 * np.abs(normal).max())
+    np.testing.assert_allclose(asked, flat @ left.ravel(), rtol=0, atol=1e-11 * np.abs(asked).max())

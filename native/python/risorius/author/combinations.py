@@ -203,25 +203,15 @@ class Combinations:
         """float64[joints, 6]: shifts and rotation vectors in the parents' frames."""
         count = len(joints)
         above = worlds[np.asarray(self.work.dna.joint_parents, np.int64)[joints]]
-        turns = above[:, :3, :3]
         places = np.linalg.inv(above) @ worlds[joints]
-        wholes = places @ self.after.rest[joints]
-        # A joint's columns lie side by side, so that each is filled in one piece.
-        system = np.zeros((count, 6, len(left), 3))
-        for at, joint in enumerate(joints):
-            held = np.flatnonzero(rows.weights[:, joint] > _LEAST_WEIGHT)
-            whole = wholes[at]
-            arms = rows.shaped[held] @ whole[:3, :3].T + whole[:3, 3] - places[at, :3, 3]
-            share = rows.weights[held, joint, None]
-            for axis in range(3):
-                turned = np.cross(_AXES[axis], arms) @ turns[at].T
-                system[at, axis, held] = share * turns[at, :, axis]
-                system[at, 3 + axis, held] = share * turned
-        flat = system.reshape(6 * count, -1)
-        normal = flat @ flat.T
+        arms = (places @ self.after.rest[joints])[:, :3]
+        arms[..., 3] -= places[:, :3, 3]
+        held = rows.weights[:, joints]
+        held = np.where(held > _LEAST_WEIGHT, held, 0.0)
+        normal, asked = _equations(above[:, :3, :3], arms, rows.shaped, held, left)
         diagonal = np.diag(normal)
         normal += np.diag(_DAMPING * diagonal + 1e-6 * diagonal.max(initial=1e-9) + 1e-12)
-        return np.asarray(np.linalg.solve(normal, flat @ left.ravel()).reshape(count, 6))
+        return np.asarray(np.linalg.solve(normal, asked).reshape(count, 6))
 
     def values(self) -> Doubles:
         """float64[new joints, 6, correctives]: what they add, in the order of `order`."""
@@ -299,3 +289,52 @@ class _Rows:
     goal: Doubles
     shaped: Doubles
     weights: Doubles
+
+
+def _equations(
+    turns: Doubles, arms: Doubles, shaped: Doubles, held: Doubles, left: Doubles
+) -> tuple[Doubles, Doubles]:
+    """Normal equations of small shifts and turns of joints, over vertices that hang on them.
+
+    A joint moves a vertex by its weight times T (shift + turn x arm), and the arm is linear in the
+    vertex' place: so sums over vertices are ten moments of each pair of joints, and no matrix with
+    a row for each vertex is made.
+
+    Args:
+        turns: float64[J, 3, 3], from the parents' frames.
+        arms: float64[J, 3, 4], what gives the arm of a place.
+        shaped: float64[V, 3], the places.
+        held: float64[V, J], weights.
+        left: float64[V, 3], where vertices have still to go.
+
+    Returns:
+        float64[6 J, 6 J] and float64[6 J], by joint: shift, rotation vector.
+    """
+    count, middle = len(turns), shaped.mean(axis=0)
+    arms = arms.copy()
+    arms[..., 3] += arms[..., :3] @ middle
+    places = np.concatenate([shaped - middle, np.ones((len(shaped), 1))], axis=1)
+    # What a unit of a turn about each axis does to a vertex, by each of the place's coordinates.
+    turned = np.cross(_AXES, arms.transpose(2, 0, 1)[:, :, None])  # [4, J, axis, 3]
+    turned = turned @ turns.transpose(0, 2, 1)
+    shifted = turns.transpose(0, 2, 1)
+    normal, asked = np.zeros((count, 6, count, 6)), np.empty((count, 6))
+    asked[:, :3] = (shifted @ (held.T @ left)[..., None])[..., 0]
+    asked[:, 3:] = 0.0
+
+    def products(a: Doubles, b: Doubles) -> Doubles:
+        return np.asarray((a.reshape(-1, 3) @ b.reshape(-1, 3).T).reshape(count, 3, count, 3))
+
+    for k in range(4):
+        asked[:, 3:] += (turned[k] @ (held.T @ (places[:, k, None] * left))[..., None])[..., 0]
+        for other in range(k, 4):
+            share = held.T @ (held * (places[:, k] * places[:, other])[:, None])
+            both = share[:, None, :, None] * products(turned[k], turned[other])
+            normal[:, 3:, :, 3:] += both
+            if other > k:
+                normal[:, 3:, :, 3:] += both.transpose(2, 3, 0, 1)
+        # The last one of this loop is that of places and of 1.
+        normal[:, :3, :, 3:] += share[:, None, :, None] * products(shifted, turned[k])
+    normal[:, :3, :, :3] = share[:, None, :, None] * products(shifted, shifted)
+    normal[:, 3:, :, :3] = normal[:, :3, :, 3:].transpose(2, 3, 0, 1)
+    return normal.reshape(6 * count, -1), asked.ravel()
