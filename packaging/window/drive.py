@@ -80,17 +80,18 @@ bpy.context.view_layer.update()
 
 def open_import(hand: Hand) -> None:
     """Open the menus down to our entry and click on it."""
-    hand.move(WIDTH / 2, HEIGHT / 2)
     for x in (42, 50, 60, 34):  # File, behind Blender's own sign
-        hand.click(x, 13)
-        hand.still()
-        for y in range(34, 560, 11):  # Import is the entry whose submenu has ours
+        for y in range(38, 560, 15):  # Import is the entry whose submenu has ours
+            # Anew for each: a pointer that looks where no submenu is closes the menu.
+            hand.move(WIDTH / 2, HEIGHT / 2)
+            hand.click(x, 13)
+            hand.still()
             hand.move(x + 30, y)
             found = entry_beside(hand, y)
             if found:
                 hand.click(*found)
                 return
-        hand.key("Escape")
+            hand.key("Escape")
     raise LateError("no entry for DNA files in File > Import")
 
 
@@ -99,15 +100,14 @@ def entry_beside(hand: Hand, y: int) -> tuple[float, float] | None:
     import time
 
     time.sleep(0.35)  # Blender opens a submenu when the pointer has rested
-    for x in (250, 300):
-        for dy in range(0, 420, 11):
-            if y + dy >= HEIGHT - 30:
-                break
-            said = hand.under(x, y + dy, "ctrl+c")
-            if "risorius.import_dna" in said:
-                return x, y + dy
-            if "import" not in said and "wm." not in said and dy > 44:
-                return None
+    x, misses = 300, 0
+    for below in range(y, HEIGHT - 30, 11):
+        said = hand.under(x, below, "ctrl+c")
+        if "risorius.import_dna" in said:
+            return x, below
+        misses = 0 if "import" in said else misses + 1
+        if misses == 2:  # one may be between two entries
+            return None
     return None
 
 
