@@ -182,7 +182,7 @@ def add_layer(hand: Hand, _dna: Path) -> Iterator[Check]:
     hand.ask("run", code=f"bpy.context.scene.frame_end = {FIRST_BLINK}")
     hand.key("shift+Right")
     seen = difference(first, hand.still(), box)
-    yield f"and the layer moves the face (a blink, {seen:.1%} of it)", seen > 0.002
+    yield f"and the layer moves the face (a blink, {seen:.1%} of it)", seen > 0.005
     hand.picture("blink")
     hand.ask("run", code="bpy.context.scene.frame_end = 250")
     clear(hand)

@@ -314,27 +314,19 @@ def _equations(
     arms = arms.copy()
     arms[..., 3] += arms[..., :3] @ middle
     places = np.concatenate([shaped - middle, np.ones((len(shaped), 1))], axis=1)
-    # What a unit of a turn about each axis does to a vertex, by each of the place's coordinates.
-    turned = np.cross(_AXES, arms.transpose(2, 0, 1)[:, :, None])  # [4, J, axis, 3]
-    turned = turned @ turns.transpose(0, 2, 1)
-    shifted = turns.transpose(0, 2, 1)
-    normal, asked = np.zeros((count, 6, count, 6)), np.empty((count, 6))
-    asked[:, :3] = (shifted @ (held.T @ left)[..., None])[..., 0]
-    asked[:, 3:] = 0.0
-
-    def products(a: Doubles, b: Doubles) -> Doubles:
-        return np.asarray((a.reshape(-1, 3) @ b.reshape(-1, 3).T).reshape(count, 3, count, 3))
-
+    # What a unit of a shift and of a turn does to a vertex, by each coordinate of its place.
+    moves = np.zeros((4, count, 6, 3))
+    moves[3, :, :3] = turns.transpose(0, 2, 1)
+    crossed = np.cross(_AXES, arms.transpose(2, 0, 1)[:, :, None])  # [4, J, axis, 3]
+    moves[:, :, 3:] = crossed @ turns.transpose(0, 2, 1)
+    normal, asked = np.zeros((count, 6, count, 6)), np.zeros((count, 6))
     for k in range(4):
-        asked[:, 3:] += (turned[k] @ (held.T @ (places[:, k, None] * left))[..., None])[..., 0]
+        asked += (moves[k] @ (held.T @ (places[:, k, None] * left))[..., None])[..., 0]
         for other in range(k, 4):
             share = held.T @ (held * (places[:, k] * places[:, other])[:, None])
-            both = share[:, None, :, None] * products(turned[k], turned[other])
-            normal[:, 3:, :, 3:] += both
+            products = moves[k].reshape(-1, 3) @ moves[other].reshape(-1, 3).T
+            both = share[:, None, :, None] * products.reshape(count, 6, count, 6)
+            normal += both
             if other > k:
-                normal[:, 3:, :, 3:] += both.transpose(2, 3, 0, 1)
-        # The last one of this loop is that of places and of 1.
-        normal[:, :3, :, 3:] += share[:, None, :, None] * products(shifted, turned[k])
-    normal[:, :3, :, :3] = share[:, None, :, None] * products(shifted, shifted)
-    normal[:, 3:, :, :3] = normal[:, :3, :, 3:].transpose(2, 3, 0, 1)
+                normal += both.transpose(2, 3, 0, 1)
     return normal.reshape(6 * count, -1), asked.ravel()
