@@ -118,7 +118,7 @@ build_wheel() {
 # sample_face: prints the folder of the face that each zip carries; made again when its code changed.
 sample_face() {
   local folder="$project/build/sample" code stamp
-  code=$(cat "$project"/native/python/risorius/{sample,author}/{,*/}*.{py,toml} \
+  code=$(cat "$project"/native/python/risorius/{sample,author}/{,*/}*.{py,toml,npz} \
     "$project"/native/author/*{,/*}.{h,cpp} 2>/dev/null | sha256sum | cut -c1-16)
   stamp="$folder/.$code"
   if [ ! -e "$stamp" ]; then

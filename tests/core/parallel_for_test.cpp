@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <mutex>
 #include <set>
@@ -23,6 +24,20 @@ TEST(ParallelFor, EveryElementIsVisitedOnce) {
       });
       for (std::size_t i = 0; i < n; ++i) ASSERT_EQ(visits[i], 1) << n << " by " << threads;
     }
+  }
+}
+
+TEST(ParallelFor, SeveralRangesOfAThreadVisitEveryElementOnce) {
+  for (const std::size_t n : {1u, 7u, 1001u}) {
+    std::vector<std::atomic<int>> visits(n);
+    std::atomic<std::size_t> calls = 0;
+    const auto visit = [&](std::size_t begin, std::size_t end) {
+      ++calls;
+      for (std::size_t i = begin; i < end; ++i) ++visits[i];
+    };
+    parallel_for(n, 3, visit, 5);
+    for (std::size_t i = 0; i < n; ++i) ASSERT_EQ(visits[i], 1) << n;
+    EXPECT_EQ(calls.load(), std::min(n, std::min(n, std::size_t{3}) * 5));
   }
 }
 

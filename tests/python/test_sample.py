@@ -450,6 +450,17 @@ def test_a_spec_that_makes_no_sense_is_one_sentence(tmp_path, asked, capsys, tex
     assert asked == []
 
 
+def test_the_joints_that_come_along_are_those_of_the_rig():
+    """Its fit to the man himself, names of joints and controls: every test that builds a person."""
+    like = references.shipped()
+    assert len(like.names) == build.RIG.fit.joints
+    assert len(like.levels) == build.RIG.lods.count
+    assert {word for word in build.RIG.kept for mesh in like.weights if word in mesh} == set()
+    for name, rows in like.weights.items():
+        np.testing.assert_allclose(rows.sum(axis=1), 1, atol=1e-6, err_msg=name)
+        assert (rows > 0).sum(axis=1).max() <= build.RIG.fit.influences
+
+
 def test_joints_of_several_sizes_are_kept_side_by_side(tmp_path, monkeypatch):
     monkeypatch.setenv("RISORIUS_CACHE", str(tmp_path))
     (tmp_path / "joints-0123456789abcdef.npz").write_bytes(b"another version's")

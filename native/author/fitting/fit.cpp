@@ -601,18 +601,16 @@ core::Result<Fit> fit_motions(const Shapes& shapes, const FitOptions& options,
   RISORIUS_TRY(take_new_joints(problem, weights, at, state));
   problem.influences = std::max(weights.influences, std::size_t{1});
   std::vector<float> left;
+  detail::find_residual(problem, state, left);
   for (std::size_t round = 0; round < kRoundsOfMotions; ++round) {
-    detail::find_residual(problem, state, left);
     if (round > 1 && round + 2 < kRoundsOfMotions) emphasise(problem, left, own.emphasis);
     detail::solve_motions(problem, state, left);
   }
   for (const double share : kThinning) {
     if (own.least_effect <= 0.0) break;
     detail::leave_expressions(problem, state, share * own.least_effect * problem.scale);
-    for (int round = 0; round < 2; ++round) {
-      detail::find_residual(problem, state, left);
-      detail::solve_motions(problem, state, left);
-    }
+    detail::find_residual(problem, state, left);
+    for (int round = 0; round < 2; ++round) detail::solve_motions(problem, state, left);
   }
   return pack(problem, state, shapes.expressions);
 }

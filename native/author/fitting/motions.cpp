@@ -18,6 +18,8 @@ namespace {
 using Mat6 = Eigen::Matrix<double, 6, 6>;
 using Vec6 = Eigen::Matrix<double, 6, 1>;
 
+/// Of a thread: joints that were there have nothing to solve, a turned expression costs ten others.
+constexpr std::size_t kRanges = 16;
 constexpr double kFar = 0.25;  // radians from which on arms count as turned
 // Ridges, shares of the joints' mean stiffness: what keeps joints that share vertices from turning
 // against each other. Tried from 1e-4 to 10 on a head with 52 expressions.
@@ -127,35 +129,38 @@ class System {
       at_pivot_.push_back(state.joints[j].position != state.joints[j].place);
     }
     size_ = 6 * n;
-    core::parallel_for(state.joints.size(), problem.threads, [&](std::size_t from, std::size_t to) {
-      std::vector<Moments> sums(state.joints.size());
-      std::vector<bool> met(state.joints.size());
-      std::vector<std::uint32_t> partners;
-      for (std::size_t j = from; j < to; ++j) {
-        if (column_[j] < 0) continue;
-        for (const auto& entry : weights.of[j]) {
-          const double s = problem.importance[entry.vertex] * entry.weight;
-          for (const Influence& other : state.weights[entry.vertex]) {
-            if (other.joint < j || column_[other.joint] < 0) continue;
-            if (!met[other.joint]) {
-              met[other.joint] = true;
-              partners.push_back(other.joint);
+    core::parallel_for(
+        state.joints.size(), problem.threads,
+        [&](std::size_t from, std::size_t to) {
+          std::vector<Moments> sums(state.joints.size());
+          std::vector<bool> met(state.joints.size());
+          std::vector<std::uint32_t> partners;
+          for (std::size_t j = from; j < to; ++j) {
+            if (column_[j] < 0) continue;
+            for (const auto& entry : weights.of[j]) {
+              const double s = problem.importance[entry.vertex] * entry.weight;
+              for (const Influence& other : state.weights[entry.vertex]) {
+                if (other.joint < j || column_[other.joint] < 0) continue;
+                if (!met[other.joint]) {
+                  met[other.joint] = true;
+                  partners.push_back(other.joint);
+                }
+                sums[other.joint].add(s * other.weight, problem.positions[entry.vertex]);
+              }
             }
-            sums[other.joint].add(s * other.weight, problem.positions[entry.vertex]);
+            std::sort(partners.begin(), partners.end());
+            for (const std::uint32_t k : partners) {
+              Shared s = share(sums[k], state.joints[j].position, state.joints[k].position);
+              s.column = column_[k];
+              s.joint = k;
+              rows_[j].push_back(s);
+              sums[k] = {};
+              met[k] = false;
+            }
+            partners.clear();
           }
-        }
-        std::sort(partners.begin(), partners.end());
-        for (const std::uint32_t k : partners) {
-          Shared s = share(sums[k], state.joints[j].position, state.joints[k].position);
-          s.column = column_[k];
-          s.joint = k;
-          rows_[j].push_back(s);
-          sums[k] = {};
-          met[k] = false;
-        }
-        partners.clear();
-      }
-    });
+        },
+        kRanges);
     for (std::size_t j = 0; j < rows_.size(); ++j) {
       for (const Shared& s : rows_[j]) {
         if (s.joint != j) continue;
@@ -440,40 +445,46 @@ void solve_motions(const Problem& problem, State& state, std::vector<float>& lef
   const System system(problem, state, weights);
   const std::size_t count = problem.expressions;
   Eigen::MatrixXd right = Eigen::MatrixXd::Zero(system.size(), static_cast<Eigen::Index>(count));
-  core::parallel_for(state.joints.size(), problem.threads, [&](std::size_t from, std::size_t to) {
-    std::vector<Vec6> asked(count);
-    for (std::size_t j = from; j < to; ++j) {
-      if (system.column(j) < 0) continue;
-      gradient(problem, state.joints[j], weights.of[j], left, asked);
-      const int row = 6 * system.column(j);
-      for (std::size_t e = 0; e < count; ++e) {
-        const Joint& joint = state.joints[j];
-        asked[e].head<3>() -= system.ridge(row) * rotation_vector(joint.rotations[e]);
-        asked[e].tail<3>() -= system.ridge(row + 3) * joint.translations[e];
-        right.block<6, 1>(row, static_cast<Eigen::Index>(e)) = asked[e];
-      }
-    }
-  });
+  core::parallel_for(
+      state.joints.size(), problem.threads,
+      [&](std::size_t from, std::size_t to) {
+        std::vector<Vec6> asked(count);
+        for (std::size_t j = from; j < to; ++j) {
+          if (system.column(j) < 0) continue;
+          gradient(problem, state.joints[j], weights.of[j], left, asked);
+          const int row = 6 * system.column(j);
+          for (std::size_t e = 0; e < count; ++e) {
+            const Joint& joint = state.joints[j];
+            asked[e].head<3>() -= system.ridge(row) * rotation_vector(joint.rotations[e]);
+            asked[e].tail<3>() -= system.ridge(row + 3) * joint.translations[e];
+            right.block<6, 1>(row, static_cast<Eigen::Index>(e)) = asked[e];
+          }
+        }
+      },
+      kRanges);
   Eigen::MatrixXd step(right.rows(), right.cols());
-  core::parallel_for(count, problem.threads, [&](std::size_t from, std::size_t to) {
-    for (std::size_t e = from; e < to; ++e) {
-      const auto column = static_cast<Eigen::Index>(e);
-      if (std::any_of(state.joints.begin(), state.joints.end(),
-                      [&](const Joint& j) { return j.is_idle(e); })) {
-        step.col(column) = solve_few(state, system, e, right.col(column));
-        continue;
-      }
-      const bool turned =
-          std::any_of(state.joints.begin(), state.joints.end(), [&](const Joint& j) {
-            return j.rotations[e].trace() < 3 - kFar * kFar;  // trace = 1 + 2 cos(angle)
-          });
-      if (!turned) {
-        step.col(column) = system.at_rest().solve(right.col(column));
-        continue;
-      }
-      step.col(column) = solve_turned(state, system, e, right.col(column));
-    }
-  });
+  core::parallel_for(
+      count, problem.threads,
+      [&](std::size_t from, std::size_t to) {
+        for (std::size_t e = from; e < to; ++e) {
+          const auto column = static_cast<Eigen::Index>(e);
+          if (std::any_of(state.joints.begin(), state.joints.end(),
+                          [&](const Joint& j) { return j.is_idle(e); })) {
+            step.col(column) = solve_few(state, system, e, right.col(column));
+            continue;
+          }
+          const bool turned =
+              std::any_of(state.joints.begin(), state.joints.end(), [&](const Joint& j) {
+                return j.rotations[e].trace() < 3 - kFar * kFar;  // trace = 1 + 2 cos(angle)
+              });
+          if (!turned) {
+            step.col(column) = system.at_rest().solve(right.col(column));
+            continue;
+          }
+          step.col(column) = solve_turned(state, system, e, right.col(column));
+        }
+      },
+      kRanges);
   take_step(problem, state, system, step, left);
 }
 

@@ -396,13 +396,14 @@ def _places(work: Work, meshes: Sequence[int], fit: Joints, held: Doubles) -> Do
 def _effects(work: Work, meshes: Sequence[int], motions: Doubles, held: Doubles) -> Doubles:
     """float64[C, new joints]: how far each expression moves a vertex by each joint, mm."""
     positions = joined_positions(work, meshes)
+    moves = motions - np.eye(3, 4)
     out = np.zeros(motions.shape[:2])
     for joint in range(motions.shape[1]):
         rows = np.flatnonzero(held[:, joint])
-        own = motions[:, joint]
-        moved = np.einsum("eik,vk->evi", own[..., :3], positions[rows]) + own[:, None, :, 3]
-        lengths = np.linalg.norm(moved - positions[rows], axis=2) * held[rows, joint]
-        out[:, joint] = lengths.max(axis=1, initial=0)
+        own = moves[:, joint].reshape(-1, 4)
+        moved = own[:, :3] @ positions[rows].T + own[:, 3:]
+        squares = (moved.reshape(len(moves), 3, -1) ** 2).sum(axis=1) * held[rows, joint] ** 2
+        out[:, joint] = np.sqrt(squares.max(axis=1, initial=0))
     return out * MM.get(work.source.translation_unit, 10.0)
 
 

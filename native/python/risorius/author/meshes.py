@@ -232,7 +232,8 @@ def _finish_mesh(
             continue  # it is exact, in a mesh that most expressions leave alone
         goal = positions + wanted[row]
         error = np.linalg.norm(skin.moved(ways.whole[row]) - wanted[row], axis=1) * mm
-        found.between_largest[row] = between.largest(row, wanted[row], skin) * mm
+        if options.between:
+            found.between_largest[row] = between.largest(row, wanted[row], skin) * mm
         found.motion[row] = np.sqrt((wanted[row] ** 2).sum(axis=1).mean()) * mm
         found.joints_rms[row] = np.sqrt((error**2).mean())
         found.joints_largest[row], found.worst_vertex[row] = error.max(), error.argmax()

@@ -25,8 +25,8 @@ from .geometry import skeleton as sk
 from .geometry.skeleton import Doubles, Ints
 from .work import Joints, RigOptions, Work, given, joined_positions
 
-_FORMAT = 1
-Arrays = dict[str, npt.NDArray[np.float32] | Ints]
+_FORMAT = 2
+Arrays = dict[str, npt.NDArray[np.float32] | npt.NDArray[np.unsignedinteger]]
 
 
 @dataclass
@@ -76,9 +76,11 @@ class Reference:
         arrays: Arrays = {}
         for name, rows in self.weights.items():
             vertex, joint = np.nonzero(rows)
-            arrays[f"weights/{name}"] = np.column_stack([vertex, joint])
-            arrays[f"values/{name}"] = rows[vertex, joint].astype(np.float32)
-        arrays |= {f"triangles/{name}": rows for name, rows in self.triangles.items()}
+            arrays[f"counts/{name}"] = _small(np.bincount(vertex, minlength=len(rows)))
+            arrays[f"joints/{name}"] = _small(joint)
+            arrays[f"weights/{name}"] = rows[vertex, joint].astype(np.float32)
+        for name, rows in self.triangles.items():
+            arrays[f"triangles/{name}"] = _small(rows)
         named = {
             key: getattr(self, key)
             for key in self.__dataclass_fields__
@@ -107,10 +109,11 @@ class Reference:
                     kind, _, name = key.partition("/")
                     if kind == "triangles":
                         out.triangles[name] = file[key].astype(np.int64)
-                    elif kind == "weights":
-                        at = file[key]
-                        rows = np.zeros((int(at[:, 0].max()) + 1, joints))
-                        rows[at[:, 0], at[:, 1]] = file[f"values/{name}"]
+                    elif kind == "counts":
+                        counts = file[key]
+                        rows = np.zeros((len(counts), joints))
+                        at = np.repeat(np.arange(len(counts)), counts), file[f"joints/{name}"]
+                        rows[at] = file[f"weights/{name}"]
                         out.weights[name] = rows
         except DAMAGED as error:
             raise ArgumentError(f"no reference of a joint rig: {error}") from None
@@ -132,6 +135,11 @@ def fingerprint() -> bytes:
     for entry in sorted(Path(__file__).parent.rglob("*.py")):
         known.update(entry.read_bytes())
     return known.digest()
+
+
+def _small(numbers: Ints) -> npt.NDArray[np.unsignedinteger]:
+    """The same in the fewest bytes each."""
+    return numbers.astype(np.min_scalar_type(int(numbers.max(initial=0))))
 
 
 def _counts(mesh: Mesh) -> list[int]:

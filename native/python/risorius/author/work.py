@@ -37,6 +37,7 @@ class RigOptions:
     # Meshes that keep their weights and blend shapes, by parts of their names: eyeballs, which turn
     # with a joint of their own.
     kept: tuple[str, ...] = ()
+    between: bool = True  # whether errors on the way to 1 are measured, a tenth of the work
 
 
 @dataclass

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -59,7 +60,10 @@ _SEARCH_ENDS = 0.4
 _REFIT_BEGINS = 0.7
 TOLERANCE_MM = 0.2  # what joints leave beyond it stays in blend shapes
 RIG = RigOptions(
-    FitOptions(joints=NEW_JOINTS), tolerance_mm=TOLERANCE_MM, kept=("eyeLeft", "eyeRight")
+    FitOptions(joints=NEW_JOINTS),
+    tolerance_mm=TOLERANCE_MM,
+    kept=("eyeLeft", "eyeRight"),
+    between=False,
 )
 NO_SEARCH = CorrectiveOptions(most=0)
 PARTS = {  # mesh -> groups, subdivisions at LOD 0 and 1
@@ -512,7 +516,8 @@ def joint_face(
 ) -> Dna:
     """The face with joints in place of most of what its blend shapes do, and coarser levels.
 
-    The joints are found on the man, once for all people; another's learn what they do there.
+    The joints were found on the man, once for all people; each person's learn what they do there.
+    Those of RIG come along; others are found here, and kept among the user's caches.
 
     Args:
         dna: the face of blend shapes.
@@ -522,13 +527,13 @@ def joint_face(
         begins: the share of the work that is done.
     """
     joints = options.fit.joints
-    if man is None:
+    like = references.shipped() if options == RIG else references.kept(options)
+    if like is None and man is None:
         steps.at(begins, f"finding {joints} joints, weights and levels of detail")
         rig = make_joint_rig(dna, options, steps.share_of(begins, 1.0))
         references.keep(options, rig.reference)
         return rig.dna
-    like = references.kept(options)
-    if like is None:
+    if like is None and man is not None:
         steps.at(begins, f"finding {joints} joints that all people have (once)")
         like = find_reference(man(), options, steps.share_of(begins, _REFIT_BEGINS))
         begins = _REFIT_BEGINS
@@ -589,14 +594,19 @@ def build_sample(
     dna, parts, body = assemble(source, say, person)
     steps.at(0.08, "painting textures")
     folder = path.with_name(path.stem + "_textures")
-    textures, metadata = paint_textures(
-        person, body.man.positions, body.man.units, parts, texture_size
+    # Beside the joints, whose fit leaves the interpreter alone; where the work is stopped the
+    # painter comes to its end unseen and has changed nothing.
+    painter = ThreadPoolExecutor(1)
+    painted = painter.submit(
+        paint_textures, person, body.man.positions, body.man.units, parts, texture_size
     )
+    painter.shutdown(wait=False)
     begins = _SEARCH_ENDS if correctives.most or correctives.together else _FIT_BEGINS
     dna = search_correctives(dna, correctives, steps)
     if rig is not None:
         man = None if body.man is body else lambda: assemble(source, lambda _: None)[0]
         dna = joint_face(dna, man, rig, steps, begins)
+    textures, metadata = painted.result()
     even = body.man.positions.copy()  # all people have their hair at the same places of it
     set_askew(dna, parts, body, askew(source, body, person), CM)
     grown = grow_hair(person, body, even, source.base_mesh(), parts, CM)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The joints that all sample people share: found on the man once, kept among the user's caches."""
+"""The joints that all sample people share, found on the man once: joints.npz, made by
+packaging/sample/find_joints.py, has those of the people as they come; others are kept among the
+user's caches."""
 
 from __future__ import annotations
 
@@ -12,6 +14,13 @@ from ..author.reference import fingerprint
 from ..base.errors import ArgumentError
 from ..files import fileio
 from .source import SHA256, downloads
+
+SHIPPED = Path(__file__).with_name("joints.npz")
+
+
+def shipped() -> Reference:
+    """The reference of build.RIG, which comes along."""
+    return Reference.read(SHIPPED)
 
 
 def _path(options: RigOptions) -> Path:
