@@ -26,7 +26,7 @@ from .geometry.skeleton import Doubles, Ints
 from .work import Joints, RigOptions, Work, given, joined_positions
 
 _FORMAT = 2
-Arrays = dict[str, npt.NDArray[np.float32] | npt.NDArray[np.unsignedinteger]]
+Small = npt.NDArray[np.uint8] | npt.NDArray[np.uint16] | npt.NDArray[np.uint32]
 
 
 @dataclass
@@ -73,14 +73,13 @@ class Reference:
 
     def to_bytes(self) -> bytes:
         """A file of NumPy's; read by from_bytes."""
-        arrays: Arrays = {}
+        arrays: dict[str, npt.NDArray[np.float32] | Small] = {}
         for name, rows in self.weights.items():
             vertex, joint = np.nonzero(rows)
             arrays[f"counts/{name}"] = _small(np.bincount(vertex, minlength=len(rows)))
             arrays[f"joints/{name}"] = _small(joint)
             arrays[f"weights/{name}"] = rows[vertex, joint].astype(np.float32)
-        for name, rows in self.triangles.items():
-            arrays[f"triangles/{name}"] = _small(rows)
+        arrays |= {f"triangles/{name}": _small(rows) for name, rows in self.triangles.items()}
         named = {
             key: getattr(self, key)
             for key in self.__dataclass_fields__
@@ -137,7 +136,7 @@ def fingerprint() -> bytes:
     return known.digest()
 
 
-def _small(numbers: Ints) -> npt.NDArray[np.unsignedinteger]:
+def _small(numbers: Ints) -> Small:
     """The same in the fewest bytes each."""
     return numbers.astype(np.min_scalar_type(int(numbers.max(initial=0))))
 
