@@ -176,17 +176,23 @@ class Hand:
         return np.frombuffer(raw, np.uint8).reshape(HEIGHT, WIDTH, 3).astype(np.int16)
 
     def still(self) -> Pixels:
-        """The screen when two looks at it in a row are the same."""
-        seen = self.screen()
+        """The screen when two looks at it in a row are the same, all drawn anew before each: on a
+        busy machine it stands still for a while because nothing has been drawn yet."""
+        seen = self._drawn()
         end = time.monotonic() + PATIENCE
         while True:
             time.sleep(0.4)
-            now = self.screen()
+            now = self._drawn()
             if np.array_equal(now, seen):
                 return now
             if time.monotonic() > end:
                 raise LateError("the screen never stands still")
             seen = now
+
+    def _drawn(self) -> Pixels:
+        for _ in range(2):  # the second answer comes after what the first asked for
+            self.ask("redraw")
+        return self.screen()
 
     def picture(self, name: str, box: tuple[int, int, int, int] | None = None) -> None:
         """Keep the screen as OUT/NAME.png. Args: box  left, top, right, bottom of a part."""

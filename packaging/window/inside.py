@@ -356,6 +356,13 @@ def drawn(panel):
     return _drawn[panel] > 0
 
 
+def redraw():
+    """Let all be drawn anew, which it is before the next question is answered."""
+    for area in window().screen.areas:
+        area.tag_redraw()
+    return True
+
+
 def run(code):
     """Python that sets the scene for a picture; the checks never use it."""
     exec(code, globals())
