@@ -357,9 +357,12 @@ def drawn(panel):
 
 
 def redraw():
-    """Let all be drawn anew, which it is before the next question is answered."""
+    """Let the main regions be drawn anew, which they are before the next question is answered: of
+    the sidebar 4.3 would close the menus."""
     for area in window().screen.areas:
-        area.tag_redraw()
+        for region in area.regions:
+            if region.type == "WINDOW":
+                region.tag_redraw()
     return True
 
 
