@@ -166,7 +166,7 @@ def add_layer(hand: Hand, _dna: Path) -> Iterator[Check]:
     x, y = hand.find(r"risorius\.layer_remove", columns=(0.97, 0.93, 1.0))
     hand.click(x, y - 21)  # the plus above the minus is a menu, which no shortcut names
     hand.still()
-    menu = [round(x) - 10, round(y) - 30, 150, 330]
+    menu = [round(x) - 10, round(y) - 2, 150, 300]
     entry = hand.find(r"risorius\.layer_add\(.*IDLE", columns=(0.4,), area=menu)
     hand.click(*entry)
     hand.wait("a layer is there", lambda: hand.ask("state")["layers"])

@@ -94,7 +94,7 @@ def _idle(hand: Hand) -> Iterator[Check]:
     x, y = hand.find(r"risorius\.layer_remove", columns=(0.97, 0.93, 1.0))
     hand.click(x, y - 21)  # the plus above the minus is a menu
     hand.still()
-    menu = [round(x) - 10, round(y) - 30, 150, 330]
+    menu = [round(x) - 10, round(y) - 2, 150, 300]
     hand.click(*hand.find(r"risorius\.layer_add\(.*IDLE", columns=(0.4,), area=menu))
     hand.wait("a layer is there", lambda: hand.ask("state")["layers"])
     yield "idle life lies over it", len(hand.ask("state")["layers"]) == 1
