@@ -3,7 +3,7 @@
 run again where the man, his controls or the fit change (tests/python/test_sample.py sees it). Two
 minutes on two cores, in the environment of packaging/setup.sh; the wheel is built anew after it.
 
-    python packaging/sample/find_joints.py
+    python packaging/find_joints.py
 """
 
 from pathlib import Path
@@ -25,7 +25,7 @@ def main() -> None:
         even = np.round(rows * WEIGHTS)
         even[np.arange(len(even)), even.argmax(axis=1)] += WEIGHTS - even.sum(axis=1)
         reference.weights[name] = even / WEIGHTS
-    package = Path(__file__).parents[2] / "native" / "python" / "risorius"
+    package = Path(__file__).parents[1] / "native" / "python" / "risorius"
     path = package / "sample" / SHIPPED.name
     fileio.write_bytes(path, reference.to_bytes())
     print(f"{path}: {path.stat().st_size} bytes")
