@@ -120,3 +120,15 @@ def scroll(hand: Hand, notches: int = 25) -> None:
         hand.do("click", 5 if notches > 0 else 4)
     hand.ask("ready")
     hand.still()
+
+
+def add_idle_life(hand: Hand) -> None:
+    """A layer of idle life, by the menu of the layers' list."""
+    open_section(hand, "RISORIUS_PT_layers")
+    x, y = hand.find(r"risorius\.layer_remove", columns=(0.97, 0.93, 1.0))
+    hand.click(x, y - 21)  # the plus above the minus is a menu, which no shortcut names
+    hand.still()
+    # Inside of it from the first place on: above it the pointer closes it.
+    menu = [round(x) - 10, round(y) - 2, 150, 300]
+    hand.click(*hand.find(r"risorius\.layer_add\(.*IDLE", columns=(0.4,), area=menu))
+    hand.wait("a layer is there", lambda: hand.ask("state")["layers"])

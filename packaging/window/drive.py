@@ -24,6 +24,7 @@ from common import (
     Check,
     NotThereError,
     Step,
+    add_idle_life,
     clear,
     has_face,
     look_at_face,
@@ -162,14 +163,7 @@ def add_layer(hand: Hand, _dna: Path) -> Iterator[Check]:
     """A layer by its menu: idle life, which moves the face when frames play."""
     clear(hand)
     ready_tab(hand)
-    open_section(hand, "RISORIUS_PT_layers")
-    x, y = hand.find(r"risorius\.layer_remove", columns=(0.97, 0.93, 1.0))
-    hand.click(x, y - 21)  # the plus above the minus is a menu, which no shortcut names
-    hand.still()
-    menu = [round(x) - 10, round(y) - 2, 150, 300]
-    entry = hand.find(r"risorius\.layer_add\(.*IDLE", columns=(0.4,), area=menu)
-    hand.click(*entry)
-    hand.wait("a layer is there", lambda: hand.ask("state")["layers"])
+    add_idle_life(hand)
     yield "a layer is added by its menu", len(hand.ask("state")["layers"]) == 1
     look_at_face(hand)
     box, first = hand.ask("face_box"), hand.still()

@@ -10,6 +10,7 @@ from pathlib import Path
 from common import (
     SMILE,
     Check,
+    add_idle_life,
     clear,
     look_at_face,
     open_section,
@@ -90,13 +91,7 @@ def _blink(hand: Hand) -> Iterator[Check]:
 
 
 def _idle(hand: Hand) -> Iterator[Check]:
-    open_section(hand, "RISORIUS_PT_layers")
-    x, y = hand.find(r"risorius\.layer_remove", columns=(0.97, 0.93, 1.0))
-    hand.click(x, y - 21)  # the plus above the minus is a menu
-    hand.still()
-    menu = [round(x) - 10, round(y) - 2, 150, 300]
-    hand.click(*hand.find(r"risorius\.layer_add\(.*IDLE", columns=(0.4,), area=menu))
-    hand.wait("a layer is there", lambda: hand.ask("state")["layers"])
+    add_idle_life(hand)
     yield "idle life lies over it", len(hand.ask("state")["layers"]) == 1
 
 
