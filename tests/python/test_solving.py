@@ -183,15 +183,46 @@ def test_opposites_that_are_partners_rest(face):
 
 def test_easy_are_the_controls_that_do_most_there(face):
     surface = face[1]
-    most = np.linalg.norm(surface.jacobian(raw(), 0, np.arange(196)), axis=1).max(axis=0)
+    far = np.linalg.norm(surface.jacobian(raw(), 0, np.arange(196)), axis=1)
+    most, spread = far.max(axis=0), np.sqrt((far**2).mean(axis=0))
     np.testing.assert_allclose(surface.strongest(), most, rtol=1e-4, atol=1e-6)
+    np.testing.assert_allclose(surface.spread(), spread, rtol=1e-4, atol=1e-6)
     vertex = 14 * 3 + 5  # at the left corner
     reach = surface.jacobian(raw(), 0, [vertex])
-    share = np.linalg.norm(reach[0], axis=0) / np.maximum(most, 1e-9)
+    here = np.linalg.norm(reach[0], axis=0)
+    share = here / np.maximum(most, 1e-9)
     ease = risorius.local_ease(surface, reach)
-    assert ease[LEFT] == 1
-    assert ease[RIGHT] == ease[IDLE] == 0.001
-    assert (ease == np.where(share >= 0.1 * share.max(), 1.0, 0.001)).all()
+    assert ease[RIGHT] == ease[IDLE] == 0.0003
+    local = share >= 0.1 * share.max()
+    assert local[LEFT]
+    alone = here / np.maximum(spread, 1e-9)
+    expected = np.where(local, np.sqrt(alone / alone[local].max()), 0.0003)
+    np.testing.assert_allclose(ease, expected, rtol=1e-4)
+    assert len(set(ease[local])) > 1
+
+
+def test_of_two_that_do_the_same_the_readier_moves_first(face):
+    surface, vertex = face[1], 14 * 3 + 5
+    ease = np.where(np.arange(7) == TWIN, 0.9, 1.0)  # which does what the jaw does
+    others = {"free": np.isin(np.arange(7), [JAW, TWIN]), "smallest": 1e-4}
+
+    def drag(wanted, begin=None, **options):
+        """To where a pose has the point."""
+        target = surface.positions(wanted, 0, [vertex])
+        begin = raw() if begin is None else begin
+        return risorius.solve_drag(surface, begin, [(0, vertex)], target, **others, **options).raw[
+            [JAW, TWIN]
+        ]
+
+    beyond = raw(jaw=1.0)
+    np.testing.assert_allclose(drag(raw(jaw=0.5)), [0.25, 0.25], atol=1e-3)
+    np.testing.assert_allclose(drag(raw(jaw=0.5), ease=ease), [0.5, 0], atol=1e-3)
+    for more in (0.01, 0.5):  # no jump where the first has no more to give
+        beyond[TWIN] = more
+        np.testing.assert_allclose(drag(beyond, ease=ease), [1, more], atol=1e-3)
+    begun = raw()
+    begun[TWIN] = 0.5  # one that is on already may move, and be taken back
+    assert drag(raw(), begun, ease=ease)[1] < 0.2
 
 
 def test_what_is_not_easy_helps_where_others_do_not_reach(face):

@@ -24,9 +24,13 @@ METHODS = ("least_squares", "transpose")
 LOCAL = 0.1
 """A control that does less here, of what it does where it does most, than this share of what the
 most local one does, belongs elsewhere: gaze to the eyes, though lids and brows follow it."""
-ELSEWHERE = 0.001
+ELSEWHERE = 0.0003
 """The ease of a control that belongs elsewhere."""
+ALIKE, AS_FAR = 0.99, 0.8
+"""Two controls do the same to points if their motions have this cosine and this quotient."""
+_HARD = 0.1  # of the largest ease: controls of less are looked at where others do not reach
 _ON = 1e-6
+_GAIN = 1e-5  # of the square of the whole way: what gains less is not worth another look
 
 
 class Solved(NamedTuple):
@@ -54,6 +58,7 @@ class _Drag:
     roots: Doubles  # [P]: roots of weights
     low: Doubles  # [R]
     high: Doubles  # [R]
+    ease: Doubles  # [R]
     unknowns: _Unknowns
 
     def held(self, controls: Sequence[int], at: Doubles) -> _Drag:
@@ -70,6 +75,11 @@ class _Drag:
         """float64[m]: what is missing."""
         apart = np.einsum("pki,pi->pk", self.axes, self.targets - positions)
         return np.asarray((apart * self.roots[:, None]).ravel())
+
+    def left(self, raw: Doubles) -> float:
+        """The square of what is missing at a pose."""
+        missing = self.residual(self.positions(raw))
+        return float(missing @ missing)
 
     def jacobian(self, raw: Doubles) -> Doubles:
         """float64[m, R]"""
@@ -114,7 +124,7 @@ def _drag(
     probe = surface.probe(np.asarray(points, np.int64).reshape(count, 2))
     easy = vector("ease", 1.0 if ease is None else ease, len(raw))
     unknowns = _unknowns(len(raw), partners, easy)
-    return _Drag(probe, loose, wanted, along, np.sqrt(weight), low, high, unknowns)
+    return _Drag(probe, loose, wanted, along, np.sqrt(weight), low, high, easy, unknowns)
 
 
 @dataclass
@@ -211,21 +221,53 @@ def solve_drag(
     at = vector("raw", raw, len(surface.rig.raw_control_names))
     if method not in METHODS:
         raise ArgumentError(f"method: {' or '.join(METHODS)} was expected, found {method!r}")
-    begin = at
+    given = begin = at
     drag = _drag(
         surface, begin, points, targets, axes, weights, free, lowest, highest, partners, ease
     )
 
+    hard = [*map(int, np.flatnonzero(drag.ease < _HARD * drag.ease.max()))]
+
     def solve(drag: _Drag, start: Doubles) -> Doubles:
         if method == "transpose":
             return _transposed(drag, begin, rounds)
+        if hard:  # the easy ones alone often do, and are few to look at
+            start = _least_squares(drag.held(hard, begin), begin, start, smallest, rounds)
+            if drag.left(start) <= _GAIN * drag.left(begin):
+                return start
         return _least_squares(drag, begin, start, smallest, rounds)
 
-    at = _kept_apart(drag, begin, _pairs(opposites, len(begin)), solve)
+    pairs = _pairs(opposites, len(begin))
+    doubles, readier = _doubles(drag.held(hard, begin), begin)
+    at = _kept_apart(drag.held(doubles, begin), begin, pairs, solve)
+    if (at[readier] >= drag.high[readier] - _ON).any():  # they have no more to give
+        begin = at
+        at = _kept_apart(drag, begin, pairs, solve)
     positions = drag.positions(at)
     error = drag.error(drag.residual(positions))
-    change = float(np.linalg.norm(at - begin))
+    change = float(np.linalg.norm(at - given))
     return Solved(at.astype(np.float32), positions.astype(np.float32), error, change)
+
+
+def _doubles(drag: _Drag, begin: Doubles) -> tuple[list[int], list[int]]:
+    """Controls at rest that do to the points what a readier one does; that one of each.
+
+    Least squares would toss a coin for which of them moves: a brow comes down by browDown or by
+    eyeFaceScrunch, whose brow is the same to a hundredth.
+    """
+    ease = drag.ease
+    if (ease == ease[0]).all():
+        return [], []
+    drag.probe.linearise(begin, drag.high, drag.free)
+    columns = drag.probe.jacobian().reshape(-1, len(begin)).astype(np.float64)
+    far = np.linalg.norm(columns, axis=0)
+    strong = np.flatnonzero(drag.free & (far > 0) & (far >= AS_FAR**2 * far.max(initial=0.0)))
+    unit = columns[:, strong] / far[strong]
+    quotient = far[strong][:, None] / far[strong]
+    alike = (unit.T @ unit >= ALIKE) & (quotient >= AS_FAR) & (quotient <= 1 / AS_FAR)
+    alike &= (ease[strong][:, None] < ease[strong]) & (begin[strong] <= drag.low[strong])[:, None]
+    lesser, readier = np.nonzero(alike)
+    return [*map(int, strong[lesser])], [*map(int, strong[readier])]
 
 
 def _pairs(opposites: Sequence[tuple[int, int]], count: int) -> npt.NDArray[np.int64]:
@@ -285,7 +327,7 @@ def _least_squares(
     """Gauss-Newton, whose whole change from the begin is kept small, with halved steps."""
     at = np.clip(start, drag.low, drag.high)
     missing = drag.residual(drag.positions(at))
-    price = -1.0
+    price, first = -1.0, float(missing @ missing)
     low, high = drag.unknowns.limits(drag.low - begin, drag.high - begin)
     for _ in range(max(1, rounds)):
         jacobian = drag.unknowns.columns(drag.jacobian(at))
@@ -304,7 +346,7 @@ def _least_squares(
             if gained > 0:
                 at, missing = tried, left
                 break
-        if gained <= 1e-6 * worth:
+        if gained <= _GAIN * max(float(worth), first):
             break
     return at
 
@@ -327,9 +369,10 @@ def _transposed(drag: _Drag, at: Doubles, rounds: int) -> Doubles:
 def local_ease(surface: Surface, reach: npt.ArrayLike) -> Doubles:
     """How readily controls shall change where points are dragged, for solve_drag: float64[R].
 
-    1 for those that do at least LOCAL as much there, of what they do where they do most, as the one
-    that does most of its own there; ELSEWHERE for others: a brow that is dragged then turns no eye,
-    though eyes that turn move it.
+    ELSEWHERE for those that do less than LOCAL there, of what they do where they do most, than the
+    one that does most of its own there: a brow that is dragged then turns no eye, though eyes that
+    turn move it. The others cost what they move all over the face beside what they do there: a
+    brow lowers before a face is screwed up, which lowers it as much. The readiest of them has 1.
 
     Args:
         surface: the face.
@@ -337,7 +380,11 @@ def local_ease(surface: Surface, reach: npt.ArrayLike) -> Doubles:
     """
     here = np.linalg.norm(np.asarray(reach, np.float64), axis=1).max(axis=0, initial=0.0)
     share = here / np.maximum(np.maximum(surface.strongest(), here), 1e-30)
-    return np.where(share >= LOCAL * share.max(initial=0.0), 1.0, ELSEWHERE)
+    local = share >= LOCAL * share.max(initial=0.0)
+    alone = here / np.maximum(surface.spread(), 1e-30)
+    # solve_drag squares what a change costs, so the root of that quotient makes it one of lengths.
+    readiness = np.sqrt(alone / np.maximum(alone[local].max(initial=0.0), 1e-30))
+    return np.where(local, np.maximum(readiness, ELSEWHERE), ELSEWHERE)
 
 
 def best_controls(

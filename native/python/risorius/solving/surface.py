@@ -51,7 +51,7 @@ class Surface:
         self.mesh_indices = [int(m) for m in dna.lod_mesh_mapping[lod]]
         self.vertex_counts = [len(mesh.positions) for mesh in dna.meshes]
         self.mm = MM.get(dna.translation_unit, 10.0)
-        self._strongest: Doubles | None = None
+        self._moved: Doubles | None = None
         self._look_at_axes(dna.coordinate_system)
 
     def _look_at_axes(self, directions: Sequence[str]) -> None:
@@ -114,7 +114,16 @@ class Surface:
 
         Of some thousand vertices, spread evenly over the meshes of the level; found once.
         """
-        if self._strongest is None:
+        return self._far().max(axis=0, initial=0.0)
+
+    def spread(self) -> Doubles:
+        """Root of the mean square of how far each control moves those vertices: float64[R]."""
+        far = self._far()
+        return np.asarray(np.sqrt(np.square(far).sum(axis=0) / max(1, len(far))))
+
+    def _far(self) -> Doubles:
+        """float64[V, R]: how far each control moves some thousand vertices."""
+        if self._moved is None:
             count = self.control_count
             every = max(1, sum(self.vertex_counts[m] for m in self.mesh_indices) // _LOOKED_AT)
             rows = [
@@ -122,8 +131,8 @@ class Surface:
             ]
             probe = self.probe(np.asarray(rows, np.int64).reshape(len(rows), 2))
             probe.linearise(np.zeros(count), np.ones(count), np.ones(count, bool))
-            self._strongest = np.linalg.norm(probe.jacobian(), axis=1).max(axis=0, initial=0.0)
-        return self._strongest
+            self._moved = np.linalg.norm(probe.jacobian(), axis=1).astype(np.float64)
+        return self._moved
 
     def probe(self, points: npt.NDArray[np.int64]) -> Probe:
         """Points of the surface that can be asked often.
