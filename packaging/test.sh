@@ -12,8 +12,9 @@
 #
 # Three lanes side by side, because half of the work keeps one core busy only: `native` is GoogleTest,
 # sanitizers, cross compilers, fuzzers and the C library installed; `python` is the wheel, style, types,
-# pytest, the documentation as a site, the Windows wheel in wine where wheels.sh has made it, and a fast subset
-# in older and newer Blenders; `blender` waits for the extension's zip, and is every test inside Blender.
+# pytest, the documentation as a site, the Windows wheel in wine where wheels.sh has made it; `blender` waits
+# for the extension's zip, and is every test inside Blender. The two that end first take a fast subset in an
+# older and a newer Blender.
 set -uo pipefail
 mode=${1:-all}
 case $mode in
@@ -108,6 +109,7 @@ native_lane() {
   extension_is_there || return # of the same lane as the wheel, which the next step needs
   step "C library for other programs"
   run_script host.sh
+  run_subset 4.2.23
 }
 # Waits for the python lane's extension; zip is its path.
 extension_is_there() {
@@ -133,20 +135,16 @@ run_blender() {
   note_report "$name" "$log.xml" $code --files $files
 }
 some() { printf 'blender_tests/test_%s.py ' "$@"; }
-run_subsets() { # what differs most between versions: installing, building, keys and actions, saved files
-  local subset version other
+run_subset() { # run_subset VERSION: what differs most between versions: installing, building, keys, saved files
+  local subset other
   subset=$(some extension controls frames past life_scenes)
-  for version in 4.2.23 5.0.1; do
-    step "a fast subset in bpy $version"
-    if other=$(bpy_venv "$version" 90); then
-      # shellcheck disable=SC2086
-      run_blender "bpy $version, fast subset" "$subset" "$other" blender_tests/run.py -- \
-        --extension "$zip" $subset
-    else
-      say "NOT RUN: bpy $version could not be fetched"
-    fi
-  done
-  say "NOT RUN here: all tests in bpy 4.2, 5.0 and Blender 4.3.2, 5.2.2 (packaging/matrix.sh)"
+  step "a fast subset in bpy $1"
+  if other=$(bpy_venv "$1" 90); then
+    # shellcheck disable=SC2086
+    run_blender "bpy $1, fast subset" "$subset" "$other" blender_tests/run.py -- --extension "$zip" $subset
+  else
+    say "NOT RUN: bpy $1 could not be fetched"
+  fi
 }
 run_program() { # run_program BLENDER: a program of 4.2 or newer
   local version
@@ -206,8 +204,6 @@ python_lane() {
   [ "$mode" = --quick ] && return
   step "documentation as a site" && run_script site.sh
   step "the Windows wheel in wine" && run_script windows.sh --there
-  zip=$(ls "$project"/build/dist/risorius-*.zip)
-  run_subsets # here, because this lane ends before the other two
 }
 blender_lane() {
   local version blender
@@ -225,6 +221,8 @@ blender_lane() {
   fi
   run_blender "bpy $version" "$(echo blender_tests/test_*.py)" "$python" blender_tests/run.py -- \
     --extension "$zip"
+  run_subset 5.0.1
+  say "NOT RUN here: all tests in bpy 4.2, 5.0 and Blender 4.3.2, 5.2.2 (packaging/matrix.sh)"
   for blender in $(printf '%s\n' "${BLENDER:-}" "$(command -v blender || true)" | sort -u); do
     step "Blender tests in $blender"
     run_program "$blender"

@@ -156,28 +156,36 @@ def skinned(dna, rig, raw, mesh_index, lod):
     for target in mesh.blend_shape_targets:
         weight = float(pose.blend_shapes[target.blend_shape_channel_index])
         p[target.vertex_indices] += weight * np.asarray(target.deltas, float)
-    rest = np.asarray(dna.neutral_joint_translations, float)
-    posed, bind = [], []
-    for j, parent in enumerate(dna.joint_parents):
-        x, y, z = np.radians(pose.joints[j, 3:6].astype(float))
-        local = np.eye(4)
-        local[:3, :3] = (
-            np.array([[np.cos(z), -np.sin(z), 0], [np.sin(z), np.cos(z), 0], [0, 0, 1]])
-            @ np.array([[np.cos(y), 0, np.sin(y)], [0, 1, 0], [-np.sin(y), 0, np.cos(y)]])
-            @ np.array([[1, 0, 0], [0, np.cos(x), -np.sin(x)], [0, np.sin(x), np.cos(x)]])
-        )
-        local[:3, 3] = rest[j] + pose.joints[j, :3]
-        still = np.eye(4)
-        still[:3, 3] = rest[j]
-        root = parent == j
-        posed.append(local if root else posed[parent] @ local)
-        bind.append(still if root else bind[parent] @ still)
-    moves = np.array(posed) @ np.linalg.inv(np.array(bind))
-    owner = np.repeat(np.arange(len(p)), np.diff(mesh.skin_offsets.astype(int)))
-    blend = np.zeros((len(p), 4, 4))
+    starts = np.asarray(mesh.skin_offsets, int)[:-1]
+    assert (np.diff(mesh.skin_offsets.astype(int)) > 0).all()  # who has no weight would be another
+    moves = _moves(dna, np.asarray(pose.joints, float))[mesh.skin_joint_indices]
     weights = np.asarray(mesh.skin_weights, float)
-    np.add.at(blend, owner, weights[:, None, None] * moves[mesh.skin_joint_indices])
-    return np.einsum("vij,vj->vi", blend[:, :3, :3], p) + blend[:, :3, 3]
+    blend = np.add.reduceat(weights[:, None, None] * moves[:, :3], starts)
+    return np.einsum("vij,vj->vi", blend[:, :, :3], p) + blend[:, :, 3]
+
+
+def _moves(dna, joints):
+    """float64[J, 4, 4]: from where joints rest to where they are."""
+    rest = np.asarray(dna.neutral_joint_translations, float)
+    (cx, cy, cz), (sx, sy, sz) = (f(np.radians(joints[:, 3:6])).T for f in (np.cos, np.sin))
+    zero, one = np.zeros(len(rest)), np.ones(len(rest))
+
+    def turns(*entries):
+        return np.stack(entries, axis=1).reshape(-1, 3, 3)
+
+    local, still = (np.tile(np.eye(4), (len(rest), 1, 1)) for _ in range(2))
+    local[:, :3, :3] = (
+        turns(cz, -sz, zero, sz, cz, zero, zero, zero, one)
+        @ turns(cy, zero, sy, zero, one, zero, -sy, zero, cy)
+        @ turns(one, zero, zero, zero, cx, -sx, zero, sx, cx)
+    )
+    local[:, :3, 3] = rest + joints[:, :3]
+    still[:, :3, 3] = rest
+    for j, parent in enumerate(dna.joint_parents):
+        if parent != j:
+            local[j] = local[parent] @ local[j]
+            still[j] = still[parent] @ still[j]
+    return local @ np.linalg.inv(still)
 
 
 def _wanted(data, body, unit, row):
