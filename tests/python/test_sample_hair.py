@@ -14,11 +14,12 @@ from risorius.mixing import Mix, difference, mix_faces
 from risorius.mixing.hair import hair_meshes
 from risorius.sample import build, people
 from risorius.sample.hair import add_hair, grow_hair, hair_textures
-from risorius.sample.hair.binding import Turning
+from risorius.sample.hair.binding import Turning, append_mesh, corners_of
+from risorius.sample.hair.clearance import cut_clear, narrow_roots
 from risorius.sample.hair.growth import curled, grow
 from risorius.sample.hair.places import hairline_height
 from risorius.sample.hair.strips import card_faces, card_vertices, make_strips
-from risorius.sample.hair.surface import Roots, Surface
+from risorius.sample.hair.surface import Roots, Surface, nearest_places
 from risorius.sample.polygons import Polygons, subdivide
 
 CUBE = Polygons(
@@ -121,6 +122,106 @@ def test_a_shape_that_turns_the_skin_turns_what_stands_on_it():
     wanted = (off * [[1], [0.8 / 2.0]]) @ (turn - np.eye(3)).T
     found = Turning(head, roots, hair).of(grid @ turn.T - grid)
     np.testing.assert_allclose(found, wanted, atol=1e-6)
+
+
+@pytest.fixture
+def stage():
+    """A face of one flat mesh, 2 decimetres wide, whose only control raises the left half like a
+    stage: a tenth of a decimetre up, by a slope between x = 0.15 and 0.2."""
+    side = np.arange(41)
+    x, z = np.meshgrid(0.05 * side - 1, 0.05 * side - 1, indexing="ij")
+    flat = np.stack([x, 0 * x, z], axis=-1).reshape(-1, 3)
+    corners = [[0, 0], [0, 1], [1, 1], [1, 0]]  # counter-clockwise seen from above
+    faces = [[41 * (i + a) + k + b for a, b in corners] for i in range(40) for k in range(40)]
+    up = np.tile([0.0, 1.0, 0.0], (len(flat), 1))
+    mesh = polygon_mesh(flat, up, faces, flat[:, :2], faces)
+    mesh.skin_offsets, mesh.skin_weights = np.arange(len(flat) + 1), np.ones(len(flat))
+    mesh.skin_joint_indices, mesh.maximum_influence_per_vertex = np.zeros(len(flat), int), 1
+    raised = np.flatnonzero(flat[:, 0] > 0.175)
+    mesh.blend_shape_targets = [
+        risorius.BlendShapeTarget(
+            deltas=0.1 * up[raised], vertex_indices=raised, blend_shape_channel_index=0
+        )
+    ]
+    dna = risorius.Dna()
+    dna.lod_count, dna.joint_names, dna.joint_parents = 1, ["head"], [0]
+    dna.neutral_joint_translations = dna.neutral_joint_rotations = np.zeros((1, 3))
+    dna.raw_control_names = ["CTRL_expressions.rise", "CTRL_expressions.idle"]
+    dna.blend_shape_channel_names = ["rise"]
+    dna.joint_row_count, dna.joint_column_count = 9, 2
+    dna.blend_shape_channels = risorius.BlendShapeChannels(
+        lods=[1], input_indices=[0], output_indices=[0]
+    )
+    dna.lod_joint_mapping, dna.lod_blend_shape_mapping, dna.lod_mesh_mapping = [[0]], [[0]], [[]]
+    append_mesh(dna, "head_lod0_mesh", mesh, [0])
+    return dna
+
+
+def _lying(dna, roots_x, way):
+    """Hairs of 0.3 that lie along x over the stage, 0.03 over it at their ends."""
+    n = len(roots_x)
+    at = np.column_stack([roots_x, np.zeros(n), np.full(n, 0.02)])
+    roots = nearest_places(dna.meshes[0].positions.astype(float), *corners_of(dna.meshes[0]), at)
+    t = np.linspace(0, 1, 3)[None, :, None]
+    points = at[:, None] + t * np.array([0.3 * way, 0.03, 0.0])
+    out = np.tile([0.0, 1.0, 0.0], (n, 3, 1))
+    return make_strips(points, out, np.full(n, 0.01), np.ones(3), np.zeros(n, int), roots, held=0.0)
+
+
+@pytest.mark.parametrize("faces", [[], [np.array([1.0, 0.0], np.float32)]])
+def test_a_hair_that_an_expression_would_swallow_is_cut_or_does_not_grow(stage, faces):
+    head = stage.meshes[0]
+    away = _lying(stage, [-0.055], -1)
+    kept = cut_clear(_lying(stage, [-0.055], -1), stage, head, 1.0, faces)
+    np.testing.assert_array_equal(kept.points, away.points)
+    toward = _lying(stage, [-0.055, 0.14], 1)
+    kept = cut_clear(_lying(stage, [-0.055, 0.14], 1), stage, head, 1.0, faces)
+    assert len(kept) == 1  # who stands at the slope has no room
+    np.testing.assert_array_equal(kept.points[0, 0], toward.points[0, 0])
+    np.testing.assert_allclose(
+        kept.points[0, -1] - kept.points[0, 0], 0.6 * np.array([0.3, 0.03, 0]), atol=1e-12
+    )
+
+
+def test_a_face_that_no_control_makes_alone_counts(stage):
+    """Two controls of a fifth of the height each are harmless alone, and a slope together."""
+    head = stage.meshes[0]
+    target = head.blend_shape_targets[0]
+    low = 0.2 * np.asarray(target.deltas)  # 0.02 each, and the ends are 0.03 high
+    stage.blend_shape_channels = risorius.BlendShapeChannels(
+        lods=[2], input_indices=[0, 1], output_indices=[0, 1]
+    )
+    stage.blend_shape_channel_names = ["rise", "more"]
+    stage.lod_blend_shape_mapping = [[0, 1]]
+    rows = target.vertex_indices
+    head.blend_shape_targets = [
+        risorius.BlendShapeTarget(deltas=low, vertex_indices=rows, blend_shape_channel_index=k)
+        for k in range(2)
+    ]
+    stage.meshes = [head]
+    alone = cut_clear(_lying(stage, [-0.055], 1), stage, head, 1.0, [])
+    both = [np.ones(2, np.float32)]
+    together = cut_clear(_lying(stage, [-0.055], 1), stage, head, 1.0, both)
+    assert np.linalg.norm(together.points[0, -1] - together.points[0, 0]) < 0.7 * np.linalg.norm(
+        alone.points[0, -1] - alone.points[0, 0]
+    )
+
+
+def test_no_edge_of_a_root_lies_deep_in_the_skin(ball):
+    roots = ball.scattered(np.ones(len(ball.positions)), 0.4, np.random.default_rng(2))
+    at = roots.of(ball.positions)
+    out = at / np.linalg.norm(at, axis=1, keepdims=True)
+    points = np.stack([at, at + 0.1 * out], axis=1)
+    strips = make_strips(
+        points, np.stack([out, out], axis=1), np.full(len(at), 0.1), np.ones(2),
+        np.zeros(len(at), int), roots,
+    )  # fmt: skip
+    strips.sides[:, 0] += 0.08 * out
+    narrow_roots(strips, ball)
+    edges = points[:, 0] - strips.sides[:, 0]
+    deep = np.linalg.norm(at, axis=1) - np.linalg.norm(edges, axis=1)
+    assert 0.01 < deep.max() < 0.018  # 0.08 before
+    np.testing.assert_array_equal(strips.points, points)
 
 
 def test_a_picture_with_opacity_is_a_png_that_others_read():

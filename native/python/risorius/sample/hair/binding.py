@@ -48,11 +48,21 @@ def corners_of(mesh: Mesh) -> tuple[Ints, Ints]:
         rows = layouts[offsets[:-1][sizes == size][:, None] + np.arange(size)]
         parts += [rows[:, [0, k, k + 1]] for k in range(1, size - 1)]
     triangles = np.concatenate(parts)
-    counts = np.bincount(triangles.ravel(), minlength=len(mesh.positions))
+    return triangles, about(triangles, len(mesh.positions))
+
+
+def about(triangles: Ints, count: int) -> Ints:
+    """int64[count, n]: triangles about each vertex, the last one again where there are fewer.
+
+    Args:
+        triangles: int64[T, 3].
+        count: of vertices.
+    """
+    counts = np.bincount(triangles.ravel(), minlength=count)
     order = np.argsort(triangles.ravel(), kind="stable")
     starts = np.cumsum(counts) - counts
     at = starts[:, None] + np.minimum(np.arange(counts.max()), np.maximum(counts - 1, 0)[:, None])
-    return triangles, order[np.minimum(at, len(order) - 1)] // 3
+    return np.asarray(order[np.minimum(at, len(order) - 1)] // 3)
 
 
 def whereabouts(dna: Dna, head: Mesh) -> Floats:

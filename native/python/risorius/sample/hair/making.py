@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ... import Dna
+from ...expressions import load, pose_vector
 from ...files.png import png
 from ..body import Body
 from ..paint.images import shrunk
@@ -18,6 +19,7 @@ from ..people import Person
 from ..polygons import Floats
 from ..source import BaseMesh
 from .binding import append_mesh, bind, card_mesh, head_of, holds, whereabouts
+from .clearance import cut_clear, narrow_roots
 from .controls import add_lash_controls, add_lid_turns
 from .face_hair import beard, brows, lash_curves, lashes
 from .scalp import STYLES
@@ -73,7 +75,10 @@ def grow_hair(
         "beard": beard(surface, _lips(head, man), person),
         "eyelashes": lashes(surface, lines, person),
     }
-    return Grown(_within_budget({name: s for name, s in found.items() if s is not None}), unit)
+    grown = {name: strips for name, strips in found.items() if strips is not None}
+    for strips in grown.values():
+        narrow_roots(strips, surface)
+    return Grown(_within_budget(grown), unit)
 
 
 def _within_budget(strips: dict[str, Strips]) -> dict[str, Strips]:
@@ -102,12 +107,16 @@ def add_hair(dna: Dna, grown: Grown) -> None:
 
     Args:
         dna: the face; gets the meshes.
-        grown: the hair.
+        grown: the hair; of a beard goes what skin would come through.
     """
     # What each person has otherwise comes last, so that all others keep their numbers in a mix.
     names = sorted(grown.strips, key=lambda name: name in _OWN)
     heads = {lod: head_of(dna, lod) for lod in range(min(dna.lod_count, NO_HAIR))}
     there = {lod: whereabouts(dna, head) for lod, head in heads.items() if head is not None}
+    if "beard" in grown.strips and heads[0] is not None:
+        faces = [pose_vector(face, dna.raw_control_names) for face in load().values()]
+        clear = cut_clear(grown.strips["beard"], dna, heads[0], grown.unit, faces)
+        grown.strips["beard"] = clear
     for name, lod in itertools.product(names, there):
         head, strips = heads[lod], grown.strips[name]
         assert head is not None
