@@ -20,7 +20,7 @@ from .strips import unit as unit_vectors
 from .surface import Roots, nearest_places, nearest_rows
 
 _LEAST_WEIGHT = 0.01
-_ARM = 0.8  # centimetres of a hair that turn with the skin; what is longer hangs
+ARM = 0.8  # centimetres of a hair that turn with the skin; what is longer hangs
 _MOST_INFLUENCES = 8
 _PARTING = tuple(f"CTRL_expressions.{name}" for name in ("jawOpen", "eyeBlinkL", "eyeBlinkR"))
 
@@ -146,7 +146,7 @@ class Turning:
         self._skin = np.asarray(head.positions, np.float64)
         off = np.asarray(mesh.positions, np.float64) - places.of(self._skin)
         far = np.linalg.norm(off, axis=1, keepdims=True)
-        self._off = off * np.minimum(1.0, _ARM / far.clip(1e-12))
+        self._off = off * np.minimum(1.0, ARM / far.clip(1e-12))
         self._normals = self._normals_at(self._skin)
 
     def _normals_at(self, skin: Floats) -> Floats:
@@ -162,12 +162,21 @@ class Turning:
         Args:
             delta: float64[V, 3] of the skin.
         """
-        now = self._normals_at(self._skin + delta)
-        axis = np.cross(self._normals, now)
-        # Half around there is no one way to turn.
-        cosine = (self._normals * now).sum(axis=1, keepdims=True).clip(-0.5)
-        across = np.cross(axis, self._off)
-        return np.asarray(across + np.cross(axis, across) / (1 + cosine))
+        return turned(self._off, self._normals, self._normals_at(self._skin + delta))
+
+
+def turned(off: Floats, was: Floats, now: Floats) -> Floats:
+    """float64[..., 3]: how far ends move that turn with a normal.
+
+    Args:
+        off: float64[..., 3], from where the normal stands to each end.
+        was, now: float64[..., 3], unit: the normal.
+    """
+    axis = np.cross(was, now)
+    # Half around there is no one way to turn.
+    cosine = (was * now).sum(axis=-1, keepdims=True).clip(-0.5)
+    across = np.cross(axis, off)
+    return np.asarray(across + np.cross(axis, across) / (1 + cosine))
 
 
 def bind(

@@ -15,12 +15,11 @@ from numpy.typing import NDArray
 from ... import Dna, Mesh, Rig
 from ...author.geometry import skeleton as sk
 from ..polygons import Floats, Ints
-from .binding import about, corners_of
+from .binding import ARM, about, corners_of, turned
 from .strips import ROOT_DEEP, Strips
 from .strips import unit as unit_vectors
 from .surface import Roots, Surface, nearest_places, nearest_rows
 
-_ARM = 0.08  # decimetres of a hair that turn with the skin (binding.py)
 _NEAR = 0.3  # decimetres from a hair to the skin that it may come to
 _SOME = 256  # points of all hairs tell where they are
 _LOW = 0.002  # decimetres over the skin that an end keeps, if it was as high at rest
@@ -159,11 +158,8 @@ class _Posed:
         edges = np.stack([strips.points + strips.sides, strips.points - strips.sides], axis=2)
         off = edges - roots.of(ground.rest)[:, None, None]
         far = np.linalg.norm(off, axis=-1, keepdims=True)
-        arm = off * np.minimum(1.0, _ARM / far.clip(1e-12))
-        axis = np.cross(was, now)[:, None, None]
-        cosine = (was * now).sum(axis=1).clip(-0.5)[:, None, None, None]
-        across = np.cross(axis, arm)
-        off = off + across + np.cross(axis, across) / (1 + cosine)
+        arm = off * np.minimum(1.0, ARM / ground.unit / far.clip(1e-12))
+        off = off + turned(arm, was[:, None, None], now[:, None, None])
         there = roots.of(self._shaped)[:, None, None] + off
         moves = roots.of(self._moves.reshape(-1, 12)).reshape(-1, 3, 4)
         return np.asarray(
