@@ -25,7 +25,7 @@ esac
 source "$(dirname "$0")/setup.sh"
 cd "$project" || exit 1
 logs="$project/build/logs"
-rm -rf "$logs/rows" "$logs/extension.made"
+rm -rf "$logs/rows" "$logs/extension.made" "$logs"/subset-*
 mkdir -p "$logs/rows"
 source packaging/rows.sh
 # Tests that try every byte run under the sanitizers, which see more, and --quick has none of them.
@@ -109,7 +109,7 @@ native_lane() {
   extension_is_there || return # of the same lane as the wheel, which the next step needs
   step "C library for other programs"
   run_script host.sh
-  run_subset 4.2.23
+  run_subsets
 }
 # Waits for the python lane's extension; zip is its path.
 extension_is_there() {
@@ -135,16 +135,22 @@ run_blender() {
   note_report "$name" "$log.xml" $code --files $files
 }
 some() { printf 'blender_tests/test_%s.py ' "$@"; }
-run_subset() { # run_subset VERSION: what differs most between versions: installing, building, keys, saved files
-  local subset other
+# At the end of each lane: what differs most between versions (installing, building, keys and actions, saved
+# files) in an older and a newer Blender. The lane that ends first takes the one, the next what is left.
+run_subsets() {
+  local subset version other
   subset=$(some extension controls frames past life_scenes)
-  step "a fast subset in bpy $1"
-  if other=$(bpy_venv "$1" 90); then
-    # shellcheck disable=SC2086
-    run_blender "bpy $1, fast subset" "$subset" "$other" blender_tests/run.py -- --extension "$zip" $subset
-  else
-    say "NOT RUN: bpy $1 could not be fetched"
-  fi
+  zip=$(ls "$project"/build/dist/risorius-*.zip)
+  for version in 4.2.23 5.0.1; do
+    mkdir "$logs/subset-$version" 2> /dev/null || continue
+    step "a fast subset in bpy $version"
+    if other=$(bpy_venv "$version" 90); then
+      # shellcheck disable=SC2086
+      run_blender "bpy $version, fast subset" "$subset" "$other" blender_tests/run.py -- --extension "$zip" $subset
+    else
+      say "NOT RUN: bpy $version could not be fetched"
+    fi
+  done
 }
 run_program() { # run_program BLENDER: a program of 4.2 or newer
   local version
@@ -204,6 +210,7 @@ python_lane() {
   [ "$mode" = --quick ] && return
   step "documentation as a site" && run_script site.sh
   step "the Windows wheel in wine" && run_script windows.sh --there
+  run_subsets
 }
 blender_lane() {
   local version blender
@@ -221,7 +228,7 @@ blender_lane() {
   fi
   run_blender "bpy $version" "$(echo blender_tests/test_*.py)" "$python" blender_tests/run.py -- \
     --extension "$zip"
-  run_subset 5.0.1
+  run_subsets
   say "NOT RUN here: all tests in bpy 4.2, 5.0 and Blender 4.3.2, 5.2.2 (packaging/matrix.sh)"
   for blender in $(printf '%s\n' "${BLENDER:-}" "$(command -v blender || true)" | sort -u); do
     step "Blender tests in $blender"
