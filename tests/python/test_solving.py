@@ -192,11 +192,11 @@ def test_easy_are_the_controls_that_do_most_there(face):
     here = np.linalg.norm(reach[0], axis=0)
     share = here / np.maximum(most, 1e-9)
     ease = risorius.local_ease(surface, reach)
-    assert ease[RIGHT] == ease[IDLE] == 0.0003
+    assert ease[RIGHT] == ease[IDLE] == 0.001
     local = share >= 0.1 * share.max()
     assert local[LEFT]
     alone = here / np.maximum(spread, 1e-9)
-    expected = np.where(local, np.sqrt(alone / alone[local].max()), 0.0003)
+    expected = np.where(local, np.sqrt(alone / alone[local].max()), 0.001)
     np.testing.assert_allclose(ease, expected, rtol=1e-4)
     assert len(set(ease[local])) > 1
 

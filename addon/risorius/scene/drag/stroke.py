@@ -30,7 +30,7 @@ from .skin import Point, Skin
 Float = NDArray[np.float64]
 
 _STILL = 1e-6  # of the face's size that a control must move a point by
-_SMALL = 0.01  # of the largest change: what is smaller is not worth a key
+_SMALL = 0.02  # of the largest change: what is smaller is not worth a key
 
 
 @dataclass(frozen=True)

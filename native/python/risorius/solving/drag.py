@@ -24,12 +24,13 @@ METHODS = ("least_squares", "transpose")
 LOCAL = 0.1
 """A control that does less here, of what it does where it does most, than this share of what the
 most local one does, belongs elsewhere: gaze to the eyes, though lids and brows follow it."""
-ELSEWHERE = 0.0003
+ELSEWHERE = 0.001
 """The ease of a control that belongs elsewhere."""
 ALIKE, AS_FAR = 0.99, 0.8
 """Two controls do the same to points if their motions have this cosine and this quotient."""
 _HARD = 0.1  # of the largest ease: controls of less are looked at where others do not reach
 _ON = 1e-6
+_WORTH = 0.02  # of the whole way: what two that do the same may miss for the sake of one
 _GAIN = 1e-5  # of the square of the whole way: what gains less is not worth another look
 
 
@@ -238,11 +239,15 @@ def solve_drag(
         return _least_squares(drag, begin, start, smallest, rounds)
 
     pairs = _pairs(opposites, len(begin))
+    at = whole = _kept_apart(drag, begin, pairs, solve)
     doubles, readier = _doubles(drag.held(hard, begin), begin)
-    at = _kept_apart(drag.held(doubles, begin), begin, pairs, solve)
-    if (at[readier] >= drag.high[readier] - _ON).any():  # they have no more to give
-        begin = at
-        at = _kept_apart(drag, begin, pairs, solve)
+    if doubles:
+        at = _kept_apart(drag.held(doubles, begin), begin, pairs, solve)
+        if (at[readier] >= drag.high[readier] - _ON).any():  # they have no more to give
+            begin = at
+            at = _kept_apart(drag, begin, pairs, solve)
+        worse = np.sqrt(drag.left(at)) - np.sqrt(drag.left(whole))
+        at = whole if worse > _WORTH * np.sqrt(drag.left(given)) else at
     positions = drag.positions(at)
     error = drag.error(drag.residual(positions))
     change = float(np.linalg.norm(at - given))
