@@ -115,6 +115,7 @@ def state():
         "frame": bpy.context.scene.frame_current,
         "areas": sorted(a.type for a in window().screen.areas),
         "last": operators[-1].bl_idname if operators else "",
+        "dragged": getattr(operators[-1], "vertex", -1) if operators else -1,
     }
     if found is None:
         return out

@@ -128,17 +128,31 @@ def drag_in_views(hand: Hand, _dna: Path) -> Iterator[Check]:
         end = (start[0] + 9, start[1] - 8)
         hand.move(*start)
         hand.drag(start, end)
-        at = hand.ask("seen_in_front", vertex=vertex)
-        apart = max(abs(a - b) for a, b in zip(at, end, strict=True))
-        moved = len(hand.ask("state")["sliders"]) > 0
-        yield f"{name}: within 2 pixels of the pointer ({apart:.1f})", apart <= 2 and moved
+        state = hand.ask("state")
+        # Of a small head a pixel is millimetres: the press takes the vertex that is under it.
+        at = hand.ask("seen_in_front", vertex=state["dragged"])
+        moved = len(state["sliders"]) > 0
         hand.picture("skin-" + name.replace(" ", "-"))
+        hand.ask("run", code=STILL)
+        was = hand.ask("seen_in_front", vertex=state["dragged"])
+        near = max(abs(a - b) for a, b in zip(was, start, strict=True))
+        apart = max(abs(a - b - c + d) for a, b, c, d in zip(at, was, end, start, strict=True))
+        told = f"{name}: within 2 pixels of the pointer ({apart:.1f}; pressed {near:.1f} away)"
+        yield told, apart <= 2 and near <= 4 and moved
         hand.ask("run", code=REST)
     hand.ask("run", code=HANDLES.format(True))
     hand.ask("run", code=ONE_VIEW)
     put_down(hand)
 
 
+STILL = """
+sliders_bone = rig()["risorius_controls"].pose.bones["face"]
+for name, value in list(sliders_bone.items()):
+    if isinstance(value, float) and value and name.startswith("CTRL_"):
+        sliders_bone[name] = 0.0
+sliders_bone.id_data.update_tag()
+bpy.context.view_layer.update()
+"""
 VIEWS = {
     "a turned head in perspective": """
 bone = rig()["risorius_controls"].pose.bones["head"]
