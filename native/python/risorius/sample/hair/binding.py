@@ -17,7 +17,7 @@ from ...author.geometry.polygon_mesh import polygon_mesh
 from ..polygons import Floats, Ints
 from .strips import Strips, card_faces, card_vertices
 from .strips import unit as unit_vectors
-from .surface import Roots, nearest_places, nearest_rows
+from .surface import Roots, about, nearest_places, nearest_rows
 
 _LEAST_WEIGHT = 0.01
 ARM = 0.8  # centimetres of a hair that turn with the skin; what is longer hangs
@@ -49,20 +49,6 @@ def corners_of(mesh: Mesh) -> tuple[Ints, Ints]:
         parts += [rows[:, [0, k, k + 1]] for k in range(1, size - 1)]
     triangles = np.concatenate(parts)
     return triangles, about(triangles, len(mesh.positions))
-
-
-def about(triangles: Ints, count: int) -> Ints:
-    """int64[count, n]: triangles about each vertex, the last one again where there are fewer.
-
-    Args:
-        triangles: int64[T, 3].
-        count: of vertices.
-    """
-    counts = np.bincount(triangles.ravel(), minlength=count)
-    order = np.argsort(triangles.ravel(), kind="stable")
-    starts = np.cumsum(counts) - counts
-    at = starts[:, None] + np.minimum(np.arange(counts.max()), np.maximum(counts - 1, 0)[:, None])
-    return np.asarray(order[np.minimum(at, len(order) - 1)] // 3)
 
 
 def whereabouts(dna: Dna, head: Mesh) -> Floats:

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from ... import Dna, Mesh, Rig
 from ...author.geometry import skeleton as sk
 from ..polygons import Floats, Ints
-from .binding import ARM, about, corners_of, turned
+from .binding import ARM, corners_of, turned
 from .strips import ROOT_DEEP, Strips
 from .strips import unit as unit_vectors
-from .surface import Roots, Surface, nearest_places, nearest_rows
+from .surface import Roots, Surface, about, nearest_places, nearest_rows
 
 _NEAR = 0.3  # decimetres from a hair to the skin that it may come to
 _SOME = 256  # points of all hairs tell where they are

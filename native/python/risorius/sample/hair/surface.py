@@ -66,12 +66,7 @@ class Surface:
             [[f[0], f[k], f[k + 1]] for f in polygons.faces for k in range(1, len(f) - 1)]
         )
         self.scale = float(np.ptp(positions[:, 1]) / np.ptp(man[:, 1]))
-        counts = np.bincount(self.triangles.ravel(), minlength=len(positions))
-        order = np.argsort(self.triangles.ravel(), kind="stable")
-        starts = np.concatenate([[0], np.cumsum(counts)])[:-1]
-        most = int(counts.max())
-        at = np.minimum(np.arange(most), np.maximum(counts - 1, 0)[:, None]) + starts[:, None]
-        self._around = order[np.minimum(at, len(order) - 1)] // 3  # triangles about a vertex
+        self._around = about(self.triangles, len(positions))
 
     def scattered(self, density: Floats, spacing: float, random: np.random.Generator) -> Roots:
         """Places no nearer to each other than the spacing over the root of the density.
@@ -110,6 +105,20 @@ class Surface:
         vertex = among[nearest_rows(points, self.positions[among])]
         height = ((points - self.positions[vertex]) * self.normals[vertex]).sum(axis=1)
         return height, self.normals[vertex], vertex
+
+
+def about(triangles: Ints, count: int) -> Ints:
+    """int64[count, n]: triangles about each vertex, the last one again where there are fewer.
+
+    Args:
+        triangles: int64[T, 3].
+        count: of vertices.
+    """
+    counts = np.bincount(triangles.ravel(), minlength=count)
+    order = np.argsort(triangles.ravel(), kind="stable")
+    starts = np.cumsum(counts) - counts
+    at = starts[:, None] + np.minimum(np.arange(counts.max()), np.maximum(counts - 1, 0)[:, None])
+    return np.asarray(order[np.minimum(at, len(order) - 1)] // 3)
 
 
 def nearest_rows(points: Floats, others: Floats) -> Ints:
