@@ -134,8 +134,8 @@ imported() { # imported PYTHON: the Linux wheel, by Debian's Python of that vers
     { echo "scalar bits of another Python: $scalar_bits" && return 1; }
   fact linux-x64 "$1" imported "$said"
 }
-same() { # same PLATFORM PYTHON: built elsewhere from nothing
-  source=$elsewhere CCACHE_DISABLE=1 build "$1" "$2" "$again" &&
+same() { # same PLATFORM PYTHON: built elsewhere from nothing (a cache of these builds' own: all Pythons share objects)
+  source=$elsewhere CCACHE_DIR="${elsewhere%/*}/ccache" CCACHE_BASEDIR=$elsewhere build "$1" "$2" "$again" &&
     cmp "$(wheel_of "$1" "$2")" "$(wheel_of "$1" "$2" "$again")" &&
     fact "$1" "$2" "built twice" "same bytes"
 }
@@ -248,5 +248,6 @@ for platform in "${platforms[@]}"; do
     make_platform "$platform"
   fi
 done
+rm -rf "${elsewhere%/*}"
 step ""
 [ $failed -eq 0 ]
