@@ -225,6 +225,37 @@ def test_of_two_that_do_the_same_the_readier_moves_first(face):
     assert drag(raw(), begun, ease=ease)[1] < 0.2
 
 
+def test_of_two_that_do_nearly_the_same_both_move_where_one_misses():
+    dna = small_face()
+    group = dna.joint_groups[0]
+    rows, values = [*group.output_indices, 9 + 4], np.vstack([group.values, np.zeros(7)])
+    values[7, TWIN] = 4.0  # ry of joint 1, which the jaw does not turn
+    group.output_indices, group.values, group.lods = rows, values, [8]
+    dna.joint_groups = [group]
+    surface, vertex = risorius.Surface(dna, risorius.Rig(dna)), 14 * 3 + 5
+    both = np.isin(np.arange(7), [JAW, TWIN])
+    columns = surface.jacobian(raw(), 0, [vertex])[0][:, [JAW, TWIN]]
+    far = np.linalg.norm(columns, axis=0)
+    cosine = columns[:, 0] @ columns[:, 1] / far.prod()
+    assert 0.99 < cosine < 0.998  # alike, and no line
+    assert 0.8 < far[0] / far[1] < 1.25
+    rest, ease = surface.positions(raw(), 0, [vertex]), np.where(np.arange(7) == TWIN, 0.9, 1.0)
+
+    def drag(wanted):
+        target = surface.positions(wanted, 0, [vertex])
+        options = {"free": both, "ease": ease, "smallest": 1e-4}
+        solved = risorius.solve_drag(surface, raw(), [(0, vertex)], target, **options)
+        return solved, np.linalg.norm(target - rest)
+
+    other = raw()
+    other[TWIN] = 0.5
+    solved, way = drag(other)
+    assert solved.error < 0.02 * way  # the jaw alone would be sqrt(1 - cosine**2) of it away
+    assert np.sqrt(1 - cosine**2) > 0.04
+    assert solved.raw[TWIN] > 0.4
+    assert drag(raw(jaw=0.5))[0].raw[TWIN] < 1e-3
+
+
 def test_what_is_not_easy_helps_where_others_do_not_reach(face):
     surface, vertex = face[1], 14 * 3 + 5
     target = surface.positions(raw(left=0.3, jaw=0.2), 0, [vertex])
