@@ -143,7 +143,8 @@ def sheet(rows, size):
         draw.text((8, y + 2), face, fill=(160, 190, 220), font=font)
         for column, path in enumerate(pictures.values()):
             with Image.open(path) as picture:
-                out.paste(picture.convert("RGB"), (column * size, y + label))
+                small = picture.convert("RGB").resize((size, size))
+                out.paste(small, (column * size, y + label))
     return out
 
 

@@ -28,8 +28,8 @@ _STILL = 0.002  # decimetres: a control that moves the skin less brings no hair 
 _STIRRED = 0.0005  # a control that moves the skin under a hair less brings none to it
 _SUNK = 0.0015  # of the roughly measured heights: what sinks less is not looked at
 _ROUGHLY = 4  # of so many vertices one
-_SHORTER = 0.6
-_CUTS = 3  # how often a hair is cut before it goes
+_SHORTER = 0.75
+_CUTS = 5  # how often a hair is cut before it goes
 
 
 def narrow_roots(strips: Strips, surface: Surface) -> None:

@@ -4,18 +4,21 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...base.easing import smooth_step
 from ..paint.atlas import tile
+from ..paint.places import beard_density, brow_density, brow_place, brow_width
 from ..people import Person
 from ..polygons import Floats, Ints
 from .growth import curled, grow, tangent
-from .places import beard_density, brow_density, brow_place, brow_width
 from .strips import Strips, joined, make_strips, unit
 from .surface import Surface
 
 _BROW_SPACING = 0.0115  # decimetres between the roots of two cards
-_BEARD_SPACING = 0.042
+_BEARD_SPACING = 0.037
+_OVER_LIP = 0.6  # of the spacing and the width of a beard's cards
+_LONGEST_OVER_LIP = 0.08  # decimetres
 _RIM = 0.010  # decimetres from the line of the data to the outer rim of the lid
 _LASHES = {"U": (48, 0.098), "D": (26, 0.050)}  # cards of a lid, longest hair in decimetres
 
@@ -177,16 +180,6 @@ def _arcs(root: Floats, fan: Floats, length: Floats, first: Floats, last: float)
     return np.stack(points, axis=1)
 
 
-def _in_front(man: Floats) -> Floats:
-    """float64[V]: 1 on the face, 0 in the mouth behind it, which is as high and as wide."""
-    cells = np.floor(man[:, :2] / 0.05).astype(int)
-    _, cell = np.unique(cells, axis=0, return_inverse=True)
-    front = np.full(cell.max() + 1, -np.inf)
-    np.maximum.at(front, cell.ravel(), man[:, 2])
-    mouth = (np.abs(man[:, 0]) < 0.36) & (man[:, 1] > -1.12) & (man[:, 1] < -0.45)
-    return np.asarray(~mouth | (man[:, 2] > front[cell.ravel()] - 0.09), float)
-
-
 def beard(surface: Surface, lips: Floats, person: Person) -> Strips | None:
     """Beard and moustache, or None.
 
@@ -199,30 +192,22 @@ def beard(surface: Surface, lips: Floats, person: Person) -> Strips | None:
     if style == "none":
         return None
     random = np.random.default_rng(23)
-    man = surface.man
-    density = beard_density(man, surface.man_normals, lips, style) * _in_front(man)
-    full = style == "full"
+    man, full = surface.man, style == "full"
+    density = beard_density(man, lips, style)
+    over = _over_lip(man)
     spacing = _BEARD_SPACING * (1.0 if full else 0.8)
-    roots = surface.scattered(density, spacing, random)
-    place = roots.of(man)
+    # Hair over the lip is short and fine, or skin comes through it wherever the mouth goes.
+    finer = surface.scattered(density * over, _OVER_LIP * spacing, random)
+    roots = surface.scattered(density * ~over, spacing, random).and_also(finer)
     n = len(roots)
-    x, y, z = place.T
+    lip = np.arange(n) >= n - len(finer)
+    x, y, _ = roots.of(man).T
     under = smooth_step((-0.75 - y) / 0.3) * (np.abs(x) < 0.45)
-    lip = (y > -0.72) & (np.abs(x) < 0.33) & (z > 0.1)
     long = {"full": 0.20, "short": 0.10, "goatee": 0.11, "moustache": 0.10}[style]
-    length = long * (0.55 + 0.75 * under) * surface.scale * random.uniform(0.75, 1.2, n)
-    length = np.where(lip, np.minimum(length, 0.13 * surface.scale), length)
+    length = long * (0.55 + 0.75 * under) * random.uniform(0.75, 1.2, n)
+    length = np.where(lip, np.minimum(length, _LONGEST_OVER_LIP), length) * surface.scale
     length *= 0.5 + 0.5 * roots.of(density[:, None])[:, 0]
-    flow = np.column_stack([0.25 * man[:, 0], -np.ones(len(man)), 0.15 * (man[:, 2] < 0.0)])
-    over = (man[:, 1] > -0.74) & (np.abs(man[:, 0]) < 0.34) & (man[:, 2] > 0.1)
-    flow[over] = np.column_stack(
-        [
-            np.sign(man[over, 0]) * (0.25 + 2.2 * np.abs(man[over, 0])),
-            -np.ones(over.sum()),
-            0 * over[over],
-        ]
-    )
-    flow = flow + 0.22 * random.normal(0, 1, flow.shape)
+    flow = _beard_flow(man) + 0.22 * random.normal(0, 1, man.shape)
     rise = np.radians(random.uniform(28, 50, n)), np.radians(random.uniform(2, 25, n))
     rows = 3 if full else 2
     near = np.flatnonzero((man[:, 1] < 0.1) & (man[:, 2] > -0.9))
@@ -231,7 +216,20 @@ def beard(surface: Surface, lips: Floats, person: Person) -> Strips | None:
         wind = 0.03 * person.hair_curl * random.uniform(0.5, 1, n)
         points = curled(points, out, wind, np.full(n, 0.8), random)
     tiles = tile("beard", random.integers(0, 8, n))
-    half = (0.024 if full else 0.013) * surface.scale * random.uniform(0.8, 1.25, n)
+    half = (0.034 if full else 0.026) * surface.scale * random.uniform(0.8, 1.25, n)
+    half *= np.where(lip, _OVER_LIP, 1.0)
     turns = np.radians(random.uniform(-35, 35, n))
     taper = np.array([0.9, 1.0, 0.7])[-rows:]
     return make_strips(points, out, half, taper, tiles, roots, turns, held=0.0)
+
+
+def _over_lip(man: Floats) -> NDArray[np.bool_]:
+    """bool[V]: where a moustache would be."""
+    return np.asarray((man[:, 1] > -0.72) & (np.abs(man[:, 0]) < 0.34) & (man[:, 2] > 0.1))
+
+
+def _beard_flow(man: Floats) -> Floats:
+    """float64[V, 3]: down, over the lip aside from the middle of it."""
+    x, _, z = man.T
+    aside = np.where(_over_lip(man), np.sign(x) * (0.25 + 2.2 * np.abs(x)), 0.25 * x)
+    return np.column_stack([aside, -np.ones(len(man)), 0.15 * (z < 0.0)])

@@ -13,6 +13,7 @@ from ...expressions import load, pose_vector
 from ...files.png import png
 from ..body import Body
 from ..paint.images import shrunk
+from ..paint.regions import DIVIDED, inner_rings, lips_of
 from ..paint.strands import paint_strands
 from ..part import Part
 from ..people import Person
@@ -59,10 +60,10 @@ def grow_hair(
         unit: of the Dna's meshes, in decimetres.
     """
     head = next(p for p in parts if p.name == "head_lod0_mesh")
-    man = body.man
     eye = even[body.groups["helper-l-eye"]].mean(axis=0)
     at = head.carry(body.positions)
     surface = Surface(head.polygons, at, head.carry(even), eye)
+    mouth, _ = inner_rings(head.polygons, surface.man)
     lines = {}
     for letter in "lr":
         for number, lid in ((1, "D"), (2, "U")):
@@ -72,7 +73,7 @@ def grow_hair(
     found: dict[str, Strips | None] = {
         "hair": STYLES[person.hair_style](surface, person) if person.hair_style in STYLES else None,
         "brows": brows(surface, person),
-        "beard": beard(surface, _lips(head, man), person),
+        "beard": beard(surface, lips_of(mouth / DIVIDED), person),
         "eyelashes": lashes(surface, lines, person),
     }
     grown = {name: strips for name, strips in found.items() if strips is not None}
@@ -89,17 +90,6 @@ def _within_budget(strips: dict[str, Strips]) -> dict[str, Strips]:
         share = max(0.2, 1 - over / counts["hair"])
         strips = strips | {"hair": strips["hair"].coarser(share, strips["hair"].rows)}
     return strips
-
-
-def _lips(head: Part, man: Body) -> Floats:
-    """float64[V]: 1 where lips that roll in go far, and in the mouth behind them."""
-    roll = sum(
-        np.linalg.norm(head.carry(unit.displacement), axis=1)
-        for name, unit in man.units.items()
-        if "LipRollIn" in name or "LipsRollIn" in name
-    )
-    share = np.asarray(roll) / max(float(np.max(roll)), 1e-9)
-    return np.clip((share - 0.5) / 0.2, 0, 1)
 
 
 def add_hair(dna: Dna, grown: Grown) -> None:

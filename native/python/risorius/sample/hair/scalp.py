@@ -8,17 +8,18 @@ from collections.abc import Callable
 import numpy as np
 
 from ...base.easing import smooth_step
-from ..paint.atlas import tile
+from ..paint.atlas import DENSE, TILES, tile
+from ..paint.places import HAIRLINES, hairline_height, thinned, wavy
 from ..people import Person
 from ..polygons import Floats
 from .growth import curled, grow, tangent
-from .places import hairline_height, wavy
 from .strips import ROOT_DEEP, Strips, joined, make_strips, unit
 from .surface import Roots, Surface
 
 _WHORL = np.array([0.10, 0.86, -1.40])  # where hair turns about the crown, of the man
 _PARTING = 0.10  # how far to his left hair is parted
-_DENSE, _THIN = 5, 3  # tiles of each sort
+_THIN = TILES["scalp"][4] - DENSE
+_CLOSE = 0.6  # hair_length of an afro that is so short that it lies on the head
 
 
 def whorl_flow(surface: Surface, side: float) -> Floats:
@@ -44,10 +45,7 @@ def _roots(
     surface: Surface,
     spacing: float,
     random: np.random.Generator,
-    recession: float = 0.0,
-    sideburn: float = 1.0,
-    thin_top: float = 0.0,
-    low: float = 0.0,
+    style: str,
     even: bool = True,
     fine: float = 0.0,
 ) -> tuple[Roots, Floats]:
@@ -57,11 +55,10 @@ def _roots(
     long hair are finer at the edge, and with `fine` 1 also at a parting.
     """
     man = surface.man
-    inside = hairline_height(man, recession, sideburn, low)
+    inside = hairline_height(man, *HAIRLINES[style])
     inside = inside + 0.014 * wavy(man, random, 3.0) + 0.005 * wavy(man, random, 9.0)
     density = smooth_step((inside + 0.012) / 0.05 if even else inside / 0.07)
-    bald = smooth_step((man[:, 1] - 0.55) / 0.3)
-    density = density * (1 - thin_top * bald)
+    density = density * (1 - thinned(man, style))
     if not even:
         density = density * (1 - 0.5 * smooth_step((man[:, 1] - 0.4) / 0.3))
         density = density * (1 - 0.3 * smooth_step((inside - 0.08) / 0.1))
@@ -80,7 +77,7 @@ def _tiles(inside: Floats, random: np.random.Generator, edge: float = 0.07) -> F
     """Thin tiles at the hairline and here and there, dense ones elsewhere."""
     n = len(inside)
     thin = (inside < edge * random.uniform(0.4, 1.3, n)) | (random.random(n) < 0.12)
-    numbers = np.where(thin, _DENSE + random.integers(0, _THIN, n), random.integers(0, _DENSE, n))
+    numbers = np.where(thin, DENSE + random.integers(0, _THIN, n), random.integers(0, DENSE, n))
     return tile("scalp", numbers)
 
 
@@ -96,7 +93,7 @@ def crop(surface: Surface, person: Person) -> Strips:
         surface: the head.
         person: `hair_length` is a share of the usual.
     """
-    return _short(surface, person, 31, recession=0.0, top=0.32, sides=0.22, thin_top=0.0)
+    return _short(surface, person, 31, "crop", top=0.32, sides=0.22)
 
 
 def receding(surface: Surface, person: Person) -> Strips:
@@ -106,21 +103,16 @@ def receding(surface: Surface, person: Person) -> Strips:
         surface: the head.
         person: `hair_length` is a share of the usual.
     """
-    return _short(surface, person, 32, recession=0.75, top=0.30, sides=0.20, thin_top=0.55)
+    return _short(surface, person, 32, "receding", top=0.30, sides=0.20)
 
 
 def _short(
-    surface: Surface,
-    person: Person,
-    seed: int,
-    recession: float,
-    top: float,
-    sides: float,
-    thin_top: float,
+    surface: Surface, person: Person, seed: int, style: str, top: float, sides: float
 ) -> Strips:
     random = np.random.default_rng(seed)
-    spacing = 0.043 if recession == 0 else 0.050
-    roots, inside = _roots(surface, spacing, random, recession, 1.0, thin_top, even=False)
+    recession = HAIRLINES[style][0]
+    spacing = 0.043 if recession == 0 else 0.046
+    roots, inside = _roots(surface, spacing, random, style, even=False)
     n = len(roots)
     man = roots.of(surface.man)
     high = smooth_step((man[:, 1] - 0.30) / 0.40)
@@ -143,40 +135,48 @@ def _short(
     near = _scalp_vertices(surface)
     points, out = grow(surface, roots, flow, length, rise, 4, near, 0.006, sway=sway)
     half = (0.024 + 0.026 * high) * surface.scale * (spacing / 0.043) * random.uniform(0.8, 1.25, n)
-    half *= 0.4 + 0.6 * smooth_step(inside / 0.12)
+    half *= 0.7 + 0.3 * smooth_step(inside / 0.12)
     turns = np.radians(random.uniform(-1, 1, n) * (6 + 28 * high))
     # Short hair is low along all of its length.
     steep = np.arcsin(np.clip(ROOT_DEEP * surface.scale / half, 0, 1))
     turns = np.clip(turns, -steep, steep)
     taper = np.array([0.85, 1.0, 0.95, 0.7])
-    return make_strips(points, out, half, taper, _tiles(inside, random), roots, turns)
+    return make_strips(points, out, half, taper, _tiles(inside, random, 0.15), roots, turns)
 
 
 def afro(surface: Surface, person: Person) -> Strips:
-    """Tight curls that stand away from the head on all sides.
+    """Tight curls that stand away from the head on all sides; short ones lie on it.
 
     Args:
         surface: the head.
         person: `hair_length` is a share of four centimetres.
     """
     random = np.random.default_rng(33)
-    roots, inside = _roots(surface, 0.062, random, 0.0, 0.6)
+    short = person.hair_length < _CLOSE
+    roots, inside = _roots(surface, 0.046 if short else 0.062, random, "afro")
     n = len(roots)
     man = roots.of(surface.man)
     length = 0.42 * person.hair_length * surface.scale * random.uniform(0.75, 1.15, n)
     length *= 0.35 + 0.65 * smooth_step(inside / 0.22)
     flow = tangent(random.normal(0, 1, surface.man.shape), surface.normals)
-    rise = np.radians(random.uniform(45, 88, n)), np.radians(random.uniform(10, 80, n))
-    rows = 4 if person.hair_length > 0.6 else 3
+    # Of a card that stands upright one sees the edge, where too little hair hides it.
+    upright = np.zeros(n) if short else smooth_step(inside / 0.15)
+
+    def between(lying: tuple[float, float], standing: tuple[float, float]) -> Floats:
+        low, high = random.uniform(*lying, n), random.uniform(*standing, n)
+        return np.radians(low + upright * (high - low))
+
+    rise = between((15, 40), (45, 88)), between((0, 35), (10, 80))
+    rows = 2 if short else 4
     near = _scalp_vertices(surface)
     points, out = grow(surface, roots, flow, length, rise, rows, near, 0.01, 0.7)
     wind = 0.05 * person.hair_curl * person.hair_length * random.uniform(0.6, 1.2, n)
     points = curled(points, out, wind, random.uniform(0.6, 1.3, n), random)
-    half = 0.075 * (0.5 + 0.5 * person.hair_length) * random.uniform(0.8, 1.2, n)
-    half *= (0.55 + 0.45 * smooth_step(inside / 0.12)) * surface.scale
+    half = 0.090 * (0.5 + 0.5 * person.hair_length) * random.uniform(0.8, 1.2, n)
+    half *= (0.55 + 0.45 * smooth_step(inside / 0.12)) * surface.scale * (0.75 if short else 1.0)
     middle = np.array([0.0, 0.1, -0.75])
     out = unit(out + 0.6 * unit(man - middle)[:, None])
-    turns = random.uniform(0, np.pi, n)
+    turns = between((-30, 30), (0, 180))
     taper = np.array([0.7, 1.0, 1.1, 0.95])[-rows:]
     return make_strips(points, out, half, taper, _tiles(inside, random, 0.05), roots, turns)
 
@@ -189,7 +189,7 @@ def long(surface: Surface, person: Person) -> Strips:
         person: `hair_length` is a share of the usual.
     """
     random = np.random.default_rng(34)
-    roots, inside = _roots(surface, 0.066, random, 0.0, 0.7, low=1.0, fine=1.0)
+    roots, inside = _roots(surface, 0.066, random, "long", fine=1.0)
     n = len(roots)
     man = roots.of(surface.man)
     flow = parted_flow(surface)
@@ -246,7 +246,7 @@ def bun(surface: Surface, person: Person) -> Strips:
         person: `hair_length` is a share of the knot's size.
     """
     random = np.random.default_rng(35)
-    roots, inside = _roots(surface, 0.060, random, 0.0, 0.45, low=0.7, fine=0.01)
+    roots, inside = _roots(surface, 0.060, random, "bun", fine=0.01)
     n = len(roots)
     man = roots.of(surface.man)
     knot = int(((surface.man - _KNOT) ** 2).sum(axis=1).argmin())
@@ -294,7 +294,7 @@ def _knot(
     points = middle + size * flat * ray
     half = np.where(inner, 0.62, random.uniform(0.16, 0.26, count)) * size
     numbers = np.arange(count)
-    tiles = np.where(inner, tile("solid", numbers), tile("scalp", numbers % _DENSE))
+    tiles = np.where(inner, tile("solid", numbers), tile("scalp", numbers % DENSE))
     roots = Roots(np.repeat(root.corners, count, 0), np.repeat(root.shares, count, 0))
     taper = np.interp(t, [0, 0.15, 0.85, 1], [0.8, 1.0, 1.0, 0.6])
     return make_strips(points, ray, half, taper, tiles, roots, held=0.0)

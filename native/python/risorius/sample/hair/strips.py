@@ -99,6 +99,9 @@ def make_strips(
     """
     way = unit(np.gradient(points, axis=1))
     side = unit(np.cross(way, outside))
+    # Where a hair passes the way out of the skin, its left is on the other side: it would be a bow.
+    along = np.sign((side[:, 1:] * side[:, :-1]).sum(axis=2, keepdims=True))
+    side[:, 1:] *= np.cumprod(np.where(along < 0, -1, 1), axis=1)
     if turns is not None:
         up = np.cross(side, way)
         c, s = np.cos(turns)[:, None, None], np.sin(turns)[:, None, None]

@@ -10,12 +10,13 @@ from ..polygons import Floats, Ints
 ATLAS_SIZE = 1024
 # Kind -> first column and row, width and height of a tile in texels, and how many stand in a row.
 TILES = {
-    "scalp": (0, 512, 128, 512, 8),  # 0 to 4 dense, 5 to 7 thin
+    "scalp": (0, 512, 128, 512, 8),
     "brows": (0, 256, 64, 256, 8),
     "lashes": (512, 256, 32, 256, 16),
     "beard": (0, 0, 64, 256, 8),
     "solid": (512, 0, 64, 256, 4),  # hair that nothing shows through
 }
+DENSE = 5  # tiles of the scalp before this one are dense, the others thin
 _FIRST = {"scalp": 0, "brows": 8, "lashes": 16, "beard": 32, "solid": 40}
 _MARGIN = 1.0  # texels beside a tile that cards leave out
 

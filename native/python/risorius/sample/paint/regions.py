@@ -20,6 +20,7 @@ from .layout import islands
 
 FAR_RINGS = 14.0
 LIPS_RINGS = 8.0  # loops of the base mesh from where the mouth's own island begins to the lips' rim
+DIVIDED = 2.0  # edges of the head of LOD 0 that one of the base mesh was divided into
 _REACH = 0.12  # decimetres: spots of the noise that makes fields uneven
 
 
@@ -119,6 +120,15 @@ def inner_rings(polygons: Polygons, places: Floats) -> tuple[Floats, Floats]:
     outside[corner[owner == 0]] = True
     mouth, eyes = (_rings(edges, one, outside) for one in inside)
     return mouth, eyes
+
+
+def lips_of(rings: Floats) -> Floats:
+    """float64[V]: 1 on the lips and in the mouth, where no hair grows.
+
+    Args:
+        rings: float64[V], `mouth` of a Face.
+    """
+    return smooth(LIPS_RINGS + 1.0, LIPS_RINGS, rings)
 
 
 def _rings(edges: Ints, inside: Ints, outside: Ints) -> Floats:

@@ -15,6 +15,7 @@ from ..people import Person
 from ..polygons import Floats, Ints
 from . import patterns, regions
 from .images import smooth
+from .places import HAIRLINES, beard_density, hairline_height, thinned
 from .raster import Raster
 
 HEAD_SIZE = 2048
@@ -23,6 +24,7 @@ _MELANIN = np.array([0.42, 0.70, 1.0], np.float32)
 _VEINS = np.array([0.42, 0.26, 0.10], np.float32)
 _YELLOW = np.array([-0.02, 0.04, 0.36], np.float32)
 _MUCOSA = (0.73, 0.41, 0.385)
+_IN_SHADE = 0.55  # how light hair is at its roots, beside its tips
 _THROAT = (0.36, 0.15, 0.14)
 _LID_MARGIN = (0.80, 0.55, 0.50)
 
@@ -68,25 +70,21 @@ def brow_mask(places: Floats, eye: Floats, uneven: Floats | float = 0.0) -> Floa
     return np.asarray(body * front)
 
 
-def hair_mask(places: Floats, eye: Floats, uneven: Floats | float = 0.0) -> Floats:
-    """Where hair grows on the scalp, with a soft natural hairline, float[...] from 0 to 1.
+def _hairline(face: regions.Face, person: Person) -> Floats:
+    """float64[V]: how far inside the hairline, decimetres; less where hair is thin; not on ears."""
+    at = np.column_stack([face.x, face.y, face.z])
+    inside = hairline_height(at, *HAIRLINES[person.hair_style])
+    ear = smooth(0.8, 0.86, face.aside) * (1 - smooth(0.35, 0.45, face.y))
+    thin = thinned(at, person.hair_style)
+    return np.asarray(np.where(inside > 0, inside * (1 - thin), inside) - 0.5 * ear)
 
-    Args:
-        places: float[..., 3], on the head, decimetres.
-        eye: float64[3], the left eye's middle.
-        uneven: float[...], noise of deviation 1 that makes the hairline uneven.
-    """
-    back = places[..., 2] - eye[2]
-    line = np.interp(
-        back,
-        [-1.9, -1.35, -1.05, -0.85, -0.62, -0.45, 0.1],
-        [-0.62, -0.5, -0.2, 0.1, 0.22, 0.5, 0.76],
-    )
-    height = places[..., 1] - eye[1] - line
-    ear = smooth(0.8, 0.86, np.abs(places[..., 0])) * (
-        1 - smooth(0.35, 0.45, places[..., 1] - eye[1])
-    )
-    return np.asarray(smooth(-0.03, 0.17, height + 0.012 * uneven) * (1 - ear))
+
+def _grown_beard(face: regions.Face, person: Person) -> Floats:
+    """float64[V], 0 to 1: where a beard's cards stand."""
+    if person.beard_style == "none":
+        return np.zeros(len(face.x))
+    at = np.column_stack([face.x, face.y, face.z])
+    return beard_density(at, regions.lips_of(face.mouth), person.beard_style)
 
 
 class Texels:
@@ -167,6 +165,8 @@ class Skin:
             "veins": regions.shade_of_eyes(face),
             "yellow": regions.yellow(face),
             "beard": regions.beard(face),
+            "hairline": _hairline(face, person),
+            "grown": _grown_beard(face, person),
             "pores": regions.pores(face),
             "oil": regions.oil(face),
             "freckled": regions.freckled(face),
@@ -182,6 +182,8 @@ class Skin:
         rim = self.field["mouth"] + 0.16 * texels.coarse + 0.10 * texels.middle + 0.08 * texels.fine
         self.lips = smooth(regions.LIPS_RINGS + 0.5, regions.LIPS_RINGS - 0.9, rim)
         self.wet = smooth(3.6, 1.2, self.field["mouth"] + 0.2 * texels.middle)
+        uneven = 0.012 * (texels.middle + texels.coarse)
+        self.scalp = smooth(-0.03, 0.12, self.field["hairline"] + uneven)
 
     def colour(self, creases: Floats) -> Floats:
         """float32[n, 3], sRGB.
@@ -252,13 +254,17 @@ class Skin:
         """The roots of beard, brows and hair: their shadow in the skin, and stubble as dots."""
         person, texels = self.person, self.texels
         hair = linear(np.array(person.hair))
-        scalp = hair_mask(texels.place, self.eye, texels.middle + texels.coarse)
+        scalp = self.scalp
         roots, at = texels.dots(3.4, 31)
         dark = roots.over(0.9 * scalp, at, 0.5)
         shadow = person.scalp * scalp * (0.78 + 0.08 * texels.middle) + 0.2 * person.scalp * dark
         # Where hair parts one looks between hairs, and each of them takes a share of the light.
         deep = (np.clip(shadow, 0, 0.95) * scalp).astype(np.float32)[:, None]
         light = light ** (1 - deep) * np.maximum(hair, 1e-3).astype(np.float32) ** deep
+        if person.beard_style != "none":  # its roots, between the cards
+            share = np.clip(self.field["grown"] * (1 + 0.25 * texels.coarse), 0, 1)
+            dark = roots.over(0.9 * share, at, 0.5)
+            light = _over(light, _IN_SHADE * hair, 0.5 * share + 0.4 * share * dark)
         brows = linear(np.array(person.brows))
         light = _over(
             light, brows, 0.26 * person.scalp * brow_mask(texels.place, self.eye, texels.middle)

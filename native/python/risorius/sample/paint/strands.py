@@ -3,16 +3,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..people import Colour, Person
 from ..polygons import Floats
-from .atlas import ATLAS_SIZE, TILES
+from .atlas import ATLAS_SIZE, DENSE, TILES
 
 _GREY = (0.74, 0.73, 0.71)
 _LASH_DARK = 0.3  # of the brows' colour
+_LOOSE = 0.6
+_CURLY = 0.6  # hair_curl from which on hairs are not seen one by one
 
 
 @dataclass
@@ -30,6 +32,8 @@ class _Hairs:
         waves: over the length.
         gather: how far tips come together in the middle, 0 to 1.
         taper: where a hair begins to get thinner, of its length.
+        loose: how much fewer stand at the edges than in the middle, 0 to 1: where hairs stand
+            evenly, one sees that a card is a rectangle.
     """
 
     counts: tuple[int, ...]
@@ -42,17 +46,18 @@ class _Hairs:
     waves: float = 2.0
     gather: float = 0.0
     taper: float = 0.0
+    loose: float = 0.0
 
 
 def _kinds(person: Person) -> dict[str, _Hairs]:
     curl = person.hair_curl
-    straight = curl < 0.6  # hairs side by side are seen one by one, and have to be thin
+    straight = curl < _CURLY  # hairs side by side are seen one by one, and have to be thin
     thin = (0.8, 1.35) if straight else (1.0, 1.7)
     wave, waves = 0.16 * curl, 1.5 + 7.0 * curl
     long = person.hair_style in ("long", "bun")
     length = (0.75, 1.0) if long else (0.5, 1.0)
     begin = {"long": 0.05, "bun": 0.1}.get(person.hair_style, 0.3)  # a centimetre or less
-    scalp = (74, 68, 61, 70, 64, 32, 24, 16) if straight else (46, 42, 38, 44, 40, 20, 15, 10)
+    scalp = (74, 68, 61, 70, 64, 32, 24, 16) if straight else (34, 31, 28, 33, 30, 17, 13, 9)
     return {
         "scalp": _Hairs(
             scalp, thin, length, begin, 0.08, 0.08, wave, waves, 0.25 if not long else 0.1, 0.45
@@ -63,11 +68,12 @@ def _kinds(person: Person) -> dict[str, _Hairs]:
             (13, 11, 14, 10, 13, 8, 7, 11),
             (1.05, 1.6),
             (0.5, 1.0),
-            0.2,
+            0.3,
             0.14,
             0.2,
-            0.05 + 0.12 * curl,
-            1 + 4 * curl,
+            0.05 + 0.07 * curl,
+            1 + 2.5 * curl,
+            loose=_LOOSE,
         ),
         "solid": _Hairs((70, 70, 70, 70), (1.4, 2.2), (0.9, 1.0), 0.3, 0.05, 0.05),
     }
@@ -98,12 +104,15 @@ def _paint_tile(
     shades = tint * _shades(colour, grey, count, random)
     image[..., :3] = 0.8 * shades.mean(axis=0)
     places = (np.arange(count) + random.uniform(0.1, 0.9, count)) / count
+    off = 2 * places - 1
+    places = 0.5 + 0.5 * np.sign(off) * np.abs(off) ** (1 + hairs.loose)
+    aside = 0.05 + hairs.wave  # a curl that left the tile would be cut off in a straight line
     for place, shade in zip(random.permutation(places), shades, strict=True):
         begin = random.uniform(0, hairs.begin)
         length = begin + (1 - begin) * random.uniform(*hairs.length)
         s = np.clip((v - begin) / (length - begin), 0, 1)
         lean, bend = random.normal(0, hairs.lean), random.normal(0, hairs.bend)
-        middle = 0.05 + 0.9 * place + lean * s + bend * s**2
+        middle = aside + (1 - 2 * aside) * place + lean * s + bend * s**2
         middle = middle + hairs.gather * s * (0.5 - middle)
         turn = random.uniform(0, 2 * np.pi)
         waves = hairs.waves * random.uniform(0.85, 1.15)
@@ -167,7 +176,9 @@ def paint_strands(person: Person) -> Floats:
         left, low, width, height, count = TILES[kind]
         colour, grey = colours[kind]
         for k in range(count):
-            tile = _paint_tile(hairs, k, (width, height), colour, grey, random)
+            thin = kind == "scalp" and k >= DENSE and person.hair_curl < _CURLY
+            own = replace(hairs, loose=_LOOSE) if thin else hairs
+            tile = _paint_tile(own, k, (width, height), colour, grey, random)
             if kind == "solid":
                 tile[..., 3] = np.maximum(tile[..., 3], np.where(tile[..., 3] > 0, 1, 0.97))
             image[low : low + height, left + k * width : left + (k + 1) * width] = tile

@@ -17,7 +17,7 @@ from .cloth import paint_cloth
 from .eyes import paint_eye
 from .images import enlarged, shrunk, smooth
 from .raster import Raster, filled
-from .regions import find_face
+from .regions import DIVIDED, find_face
 from .relief import heights, normals, roughness
 from .skin import HEAD_SIZE, Skin, Texels
 
@@ -144,7 +144,7 @@ def paint_head(
     p = head.carry(positions)
     raster = Raster(head.polygons, head.polygons.uvs, size)
     texels = Texels(raster, p)
-    skin = Skin(person, find_face(head, p, eye, units, 2.0), texels, eye)
+    skin = Skin(person, find_face(head, p, eye, units, DIVIDED), texels, eye)
     creases = enlarged(still, size).ravel()[raster.where]
     files = {
         "head_color.png": raster.spread(skin.colour(creases)),

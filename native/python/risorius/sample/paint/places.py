@@ -35,6 +35,15 @@ _LINE = np.array(
         (0.90, 0.74),
     ]
 )
+HAIRLINES = {  # by style: recession, sideburn and low of hairline_height
+    "none": (0.0, 1.0, 0.0),
+    "crop": (0.0, 1.0, 0.0),
+    "receding": (0.75, 1.0, 0.0),
+    "long": (0.0, 0.7, 1.0),
+    "bun": (0.0, 0.45, 0.7),
+    "afro": (0.0, 0.6, 0.0),
+}
+_THIN_TOP = {"receding": 0.55}
 _NO_SIDEBURN = slice(9, 12)  # points of the line that hang down before the ear
 
 
@@ -81,6 +90,16 @@ def hairline_height(
     return np.where(inside, distance, -distance)
 
 
+def thinned(points: Floats, style: str) -> Floats:
+    """float64[n]: the share of hair that is lost on top.
+
+    Args:
+        points: float64[n, 3], of the man.
+        style: of people.HAIR_STYLES.
+    """
+    return np.asarray(_THIN_TOP.get(style, 0.0) * smooth_step((points[:, 1] - 0.55) / 0.3))
+
+
 def brow_place(points: Floats, eye: float) -> tuple[Floats, Floats]:
     """Place along a brow, 0 at the nose and 1 at the temple, and height over its middle.
 
@@ -123,14 +142,13 @@ def brow_density(points: Floats, normals: Floats, eye: float) -> Floats:
     return np.asarray(body * ends * front)
 
 
-def beard_density(points: Floats, normals: Floats, lips: Floats, style: str) -> Floats:
+def beard_density(points: Floats, lips: Floats, style: str) -> Floats:
     """float64[n], 0 to 1: of the hair of the lower face.
 
     Args:
         points: float64[n, 3], of the man.
-        normals: float64[n, 3], of his skin.
         lips: float64[n], 1 on the lips and in the mouth.
-        style: one of styles.BEARDS.
+        style: of people.BEARD_STYLES, but "none".
     """
     x, y, z = np.abs(points[:, 0]), points[:, 1], points[:, 2]
     # From before the ear down over the cheek to the corner of the mouth.
