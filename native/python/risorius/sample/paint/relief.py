@@ -12,9 +12,9 @@ from ..polygons import Floats
 from . import regions
 from .images import smooth
 from .raster import filled
-from .skin import Skin, hair_mask
+from .skin import Skin
 
-PORE = 0.0024
+PORE = 0.0013
 _STEP = 2 / 255  # of a normal's parts: finer ones are not seen, and pack badly
 _LIPS = 0.0009
 _CREASE = 0.0045
@@ -33,7 +33,7 @@ def heights(skin: Skin, creases: Floats) -> Floats:
         0.5, 2.5, field["eyes"]
     )
     share = field["pores"]
-    tile, at = texels.dots(5.6, 51)
+    tile, at = texels.dots(4.2, 51)
     holes = tile.over(np.clip(0.35 + 0.65 * share, 0, 1), at, 0.46, 1.0)
     out = -PORE * (0.25 + 0.75 * share) * holes * bare
     out += bare * (0.00035 * texels.middle * (0.5 + share) + 0.0006 * texels.coarse)
@@ -84,5 +84,5 @@ def roughness(skin: Skin, creases: Floats) -> Floats:
     out += (lips - out) * skin.lips
     out += (0.20 - out) * skin.wet
     if skin.person.hair_style != "none":  # what lies under hair is in its shade
-        out += (0.9 - out) * hair_mask(texels.place, skin.eye)
+        out += (0.9 - out) * np.maximum(skin.scalp, skin.field["grown"])
     return np.asarray(np.clip(out + (0.22 - out) * smooth(1.2, -0.2, field["eyes"]), 0.05, 1))
