@@ -17,9 +17,11 @@ from risorius.sample.hair import add_hair, grow_hair, hair_textures
 from risorius.sample.hair.binding import Turning, append_mesh, corners_of
 from risorius.sample.hair.clearance import cut_clear, narrow_roots
 from risorius.sample.hair.growth import curled, grow
-from risorius.sample.paint.places import hairline_height
 from risorius.sample.hair.strips import card_faces, card_vertices, make_strips
 from risorius.sample.hair.surface import Roots, Surface, nearest_places
+from risorius.sample.paint.atlas import TILES
+from risorius.sample.paint.places import hairline_height
+from risorius.sample.paint.strands import paint_strands
 from risorius.sample.polygons import Polygons, subdivide
 
 CUBE = Polygons(
@@ -105,6 +107,30 @@ def test_neither_a_turned_strip_nor_a_curl_goes_into_the_skin(ball):
     wound = curled(points, outside, np.full(n, 0.05), np.full(n, 1.5), random)
     assert wound[:, :, 2].min() > -1e-9
     assert wound[:, 2:, 2].max() > 0.045
+
+
+def test_a_card_that_leans_back_over_its_root_is_no_bow(ball):
+    """Where a hair passes the way out of the skin, what was its left would be its right."""
+    roots = ball.scattered(np.ones(len(ball.positions)), 0.4, np.random.default_rng(3))
+    roots = roots.taken(np.arange(1))
+    points = np.array([[[0, 0, 0], [0.1, 0, 0.1], [0.1, 0, 0.3], [-0.1, 0, 0.3], [-0.3, 0, 0.2]]])
+    outside = np.tile([0.0, 0.0, 1.0], (1, 5, 1))
+    strips = make_strips(points, outside, np.array([0.01]), np.ones(5), np.zeros(1, int), roots)
+    np.testing.assert_array_less(0, (strips.sides[0, 1:] * strips.sides[0, :-1]).sum(axis=1))
+
+
+@pytest.mark.parametrize("who", ["man", "fighter", "woman", "elder"])
+def test_hairs_of_a_card_fade_out_to_its_sides(who):
+    """A card whose hairs stand evenly, or are cut off by its edge, is seen to be a rectangle."""
+    cover = paint_strands(people.PEOPLE[who])[..., 3]
+    curly = who in ("fighter", "woman")
+    for kind, thin in (("beard", slice(0, 8)), ("scalp", slice(0 if curly else 5, 8))):
+        left, low, width, height, count = TILES[kind]
+        tiles = cover[low : low + height, left : left + count * width]
+        tiles = tiles.reshape(height, count, width)[:, thin].mean(axis=(0, 1))
+        at = np.abs((np.arange(width) + 0.5) / width - 0.5)
+        outer, middle = (at > 0.25) & (at < 0.4), at < 0.25
+        assert tiles[outer].mean() < 0.6 * tiles[middle].mean()
 
 
 def test_a_shape_that_turns_the_skin_turns_what_stands_on_it():
