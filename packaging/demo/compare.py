@@ -45,7 +45,7 @@ COMBINED = {
     "blink, squint": ({"eyeBlink": 1, "eyeSquintInner": 1}, {}),
     "blink, look down": ({"eyeBlink": 1, "eyeLookDown": 1}, {}),
 }  # fmt: skip
-ASLEEP = {"asleep": ({"eyeBlink": 1, "eyeLookDown": 0.3, "browDown": 0.1}, {"jawOpen": 0.12})}
+ASLEEP = {"asleep": ({"eyeBlink": 1, "eyeLookDown": 0.3, "browDown": 0.1}, {})}
 FOLDS = {
     "brows up": ({"browRaiseIn": 1, "browRaiseOuter": 1}, {}),
     "frown": ({"browDown": 1, "noseWrinkle": 0.8}, {}),

@@ -201,12 +201,13 @@ def beard(surface: Surface, lips: Floats, person: Person) -> Strips | None:
     roots = surface.scattered(density * ~over, spacing, random).and_also(finer)
     n = len(roots)
     lip = np.arange(n) >= n - len(finer)
-    x, y, _ = roots.of(man).T
+    x, y, z = roots.of(man).T
     under = smooth_step((-0.75 - y) / 0.3) * (np.abs(x) < 0.45)
     long = {"full": 0.20, "short": 0.10, "goatee": 0.11, "moustache": 0.10}[style]
     length = long * (0.55 + 0.75 * under) * random.uniform(0.75, 1.2, n)
     length = np.where(lip, np.minimum(length, _LONGEST_OVER_LIP), length) * surface.scale
     length *= 0.5 + 0.5 * roots.of(density[:, None])[:, 0]
+    length *= 0.55 + 0.45 * smooth_step((z + 0.6) / 0.3)  # at the jaw's angle it is trimmed
     flow = _beard_flow(man) + 0.22 * random.normal(0, 1, man.shape)
     rise = np.radians(random.uniform(28, 50, n)), np.radians(random.uniform(2, 25, n))
     rows = 3 if full else 2

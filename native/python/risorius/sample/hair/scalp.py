@@ -209,7 +209,7 @@ def long(surface: Surface, person: Person) -> Strips:
     )
     turns = np.radians(random.uniform(-10, 10, n))
     taper = np.interp(np.linspace(0, 1, 9), [0, 0.2, 0.8, 1], [0.7, 1.0, 1.0, 0.75])
-    tiles = _tiles(inside, random, 0.05)
+    tiles = _tiles(inside, random, 0.10)
     return make_strips(points, out, half, taper, tiles, roots, turns, held=0.0)
 
 
@@ -261,10 +261,10 @@ def bun(surface: Surface, person: Person) -> Strips:
     points, outside = grow(
         surface, roots, flow, length, rise, 6, above, least, 0.3, hug=1.2, sway=sway
     )
-    half = (0.022 + 0.05 * smooth_step(inside / 0.14)) * surface.scale * random.uniform(0.8, 1.2, n)
+    half = (0.032 + 0.04 * smooth_step(inside / 0.14)) * surface.scale * random.uniform(0.8, 1.2, n)
     turns = np.radians(random.uniform(-5, 5, n))
     taper = np.interp(np.linspace(0, 1, 6), [0, 0.2, 0.7, 1], [0.75, 1.0, 0.8, 0.45])
-    tiles = _tiles(inside, random, 0.04)
+    tiles = _tiles(inside, random, 0.12)
     drawn = make_strips(points, outside, half, taper, tiles, roots, turns)
     size = 0.27 * surface.scale * person.hair_length
     wound = _knot(surface.nearest(at[None]), at + 0.72 * size * out, out, size, random)

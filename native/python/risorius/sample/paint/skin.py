@@ -182,8 +182,8 @@ class Skin:
         rim = self.field["mouth"] + 0.16 * texels.coarse + 0.10 * texels.middle + 0.08 * texels.fine
         self.lips = smooth(regions.LIPS_RINGS + 0.5, regions.LIPS_RINGS - 0.9, rim)
         self.wet = smooth(3.6, 1.2, self.field["mouth"] + 0.2 * texels.middle)
-        uneven = 0.012 * (texels.middle + texels.coarse)
-        self.scalp = smooth(-0.03, 0.12, self.field["hairline"] + uneven)
+        uneven = 0.006 * (texels.middle + texels.coarse)
+        self.scalp = smooth(-0.01, 0.17, self.field["hairline"] + uneven)
 
     def colour(self, creases: Floats) -> Floats:
         """float32[n, 3], sRGB.
