@@ -121,6 +121,7 @@ def _pressed(hand: Hand, start: Place) -> tuple[int, Place]:
     hand.move(*start)
     hand.drag(start, (start[0] + 6, start[1] - 6))
     vertex = hand.ask("state")["dragged"]
+    hand.move(WIDTH * 0.3, HEIGHT * 0.5)
     hand.key("ctrl+z")
     hand.wait("undone", lambda: hand.ask("state")["sliders"] == {})
     at = hand.ask("vertex_at", vertex=vertex)["at"]
