@@ -461,6 +461,26 @@ class Dask:
             process.wait()
 
 
+def lose_the_first(cluster, monkeypatch):
+    """What is done first is lost with its worker, before it was asked for; it is done anew."""
+    distributed = pytest.importorskip("distributed")
+    lost = []
+
+    class AsCompleted(distributed.as_completed):
+        def __next__(self):
+            future = super().__next__()
+            if not lost:
+                lost.append(future.key)
+                cluster._client._handle_lost_data(key=future.key)
+                assert future.status == "lost"
+                again = cluster._client._handle_key_in_memory
+                cluster._client.loop.call_later(0.3, again, key=future.key)
+            return future
+
+    monkeypatch.setattr(distributed, "as_completed", AsCompleted)
+    return lost
+
+
 def test_dask_with_a_worker_killed_in_the_middle(tmp_path, capsys, monkeypatch):
     version = risorius.__version__
     monkeypatch.setattr("risorius.batch.cluster._CONNECT_SECONDS", 30.0)  # of a busy machine
@@ -471,11 +491,13 @@ def test_dask_with_a_worker_killed_in_the_middle(tmp_path, capsys, monkeypatch):
         with contextlib.suppress(TimeoutError):
             cluster._client.wait_for_workers(2, timeout=30)
         assert len(cluster.workers()) == 2
+        lost = lose_the_first(cluster, monkeypatch)
         for outcome in cluster.results(plan.jobs):
             outcomes.append(outcome)
             if len(outcomes) == 4:
                 dask.processes[1].kill()
                 dask.processes[1].wait()
+        assert len(lost) == 1
         assert sorted(o.name for o in outcomes) == sorted(job.name for job in plan.jobs)
         assert [o.error for o in outcomes] == [""] * 20
         fileio.sweep({path.parent for job in plan.jobs for _, path in job.outputs})

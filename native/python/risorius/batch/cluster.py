@@ -94,6 +94,9 @@ class Cluster:
                     running[future] = job
                     finished.add(future)
                 future = next(finished)
+                if future.status == "lost":  # with the worker that did it; Dask has it done again
+                    finished.add(future)
+                    continue
                 job = running.pop(future)
                 if outcome := self._outcome(future, job, suspects):
                     yield outcome
@@ -106,7 +109,7 @@ class Cluster:
         return self._client.submit(self._work, job, key=key, pure=False)
 
     def _outcome(self, future: Any, job: Job, suspects: list[Job]) -> Outcome | None:
-        if future.status in ("cancelled", "lost"):
+        if future.status == "cancelled":
             raise self._gone()
         error = future.exception()
         if isinstance(error, self._dask.scheduler.KilledWorker):
