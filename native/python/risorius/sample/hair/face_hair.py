@@ -13,7 +13,7 @@ from ..people import Person
 from ..polygons import Floats, Ints
 from .growth import curled, grow, tangent
 from .strips import Strips, joined, make_strips, unit
-from .surface import Surface
+from .surface import Surface, joined_roots
 
 _BROW_SPACING = 0.0115  # decimetres between the roots of two cards
 _BEARD_SPACING = 0.037
@@ -180,17 +180,15 @@ def _arcs(root: Floats, fan: Floats, length: Floats, first: Floats, last: float)
     return np.stack(points, axis=1)
 
 
-def beard(surface: Surface, lips: Floats, person: Person) -> Strips | None:
-    """Beard and moustache, or None.
+def beard(surface: Surface, lips: Floats, person: Person) -> Strips:
+    """Beard and moustache.
 
     Args:
         surface: the head.
         lips: float64[V], 1 on the lips and in the mouth.
-        person: has the style.
+        person: has a style, not "none".
     """
     style = person.beard_style
-    if style == "none":
-        return None
     random = np.random.default_rng(23)
     man, full = surface.man, style == "full"
     density = beard_density(man, lips, style)
@@ -198,7 +196,7 @@ def beard(surface: Surface, lips: Floats, person: Person) -> Strips | None:
     spacing = _BEARD_SPACING * (1.0 if full else 0.8)
     # Hair over the lip is short and fine, or skin comes through it wherever the mouth goes.
     finer = surface.scattered(density * over, _OVER_LIP * spacing, random)
-    roots = surface.scattered(density * ~over, spacing, random).and_also(finer)
+    roots = joined_roots([surface.scattered(density * ~over, spacing, random), finer])
     n = len(roots)
     lip = np.arange(n) >= n - len(finer)
     x, y, z = roots.of(man).T

@@ -63,7 +63,6 @@ def grow_hair(
     eye = even[body.groups["helper-l-eye"]].mean(axis=0)
     at = head.carry(body.positions)
     surface = Surface(head.polygons, at, head.carry(even), eye)
-    mouth, _ = inner_rings(head.polygons, surface.man)
     lines = {}
     for letter in "lr":
         for number, lid in ((1, "D"), (2, "U")):
@@ -73,13 +72,18 @@ def grow_hair(
     found: dict[str, Strips | None] = {
         "hair": STYLES[person.hair_style](surface, person) if person.hair_style in STYLES else None,
         "brows": brows(surface, person),
-        "beard": beard(surface, lips_of(mouth / DIVIDED), person),
+        "beard": None if person.beard_style == "none" else _beard(surface, head, person),
         "eyelashes": lashes(surface, lines, person),
     }
     grown = {name: strips for name, strips in found.items() if strips is not None}
     for strips in grown.values():
         narrow_roots(strips, surface)
     return Grown(_within_budget(grown), unit)
+
+
+def _beard(surface: Surface, head: Part, person: Person) -> Strips:
+    mouth, _ = inner_rings(head.polygons, surface.man)
+    return beard(surface, lips_of(mouth / DIVIDED), person)
 
 
 def _within_budget(strips: dict[str, Strips]) -> dict[str, Strips]:

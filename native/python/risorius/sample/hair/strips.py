@@ -9,7 +9,7 @@ import numpy as np
 
 from ..paint.atlas import tile_corners
 from ..polygons import Floats, Ints
-from .surface import Roots
+from .surface import Roots, joined_roots
 
 ROOT_DEEP = 0.016  # decimetres, how far the edge of a root lies in the skin at most
 
@@ -120,10 +120,7 @@ def joined(parts: list[Strips]) -> Strips:
         np.concatenate([p.sides for p in parts]),
         np.concatenate([p.normals for p in parts]),
         np.concatenate([p.tiles for p in parts]),
-        Roots(
-            np.concatenate([p.roots.corners for p in parts]),
-            np.concatenate([p.roots.shares for p in parts]),
-        ),
+        joined_roots([p.roots for p in parts]),
         np.concatenate([p.held for p in parts]),
     )
 

@@ -32,16 +32,16 @@ class Roots:
     def __len__(self) -> int:
         return len(self.corners)
 
-    def and_also(self, others: Roots) -> Roots:
-        """These, and others after them."""
-        return Roots(
-            np.concatenate([self.corners, others.corners]),
-            np.concatenate([self.shares, others.shares]),
-        )
-
     def taken(self, rows: Ints) -> Roots:
         """Some of them, by number or mask."""
         return Roots(self.corners[rows], self.shares[rows])
+
+
+def joined_roots(parts: list[Roots]) -> Roots:
+    """Those of all parts, one after the other."""
+    return Roots(
+        np.concatenate([p.corners for p in parts]), np.concatenate([p.shares for p in parts])
+    )
 
 
 class Surface:
