@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Close-ups of faces in both engines: eye, mouth, brow, ear and hairline, one picture of each.
+"""Close-ups of faces in both engines: eye, mouth, brow, ear, hairline, the face. One picture each.
 
 closeups.py -- --extension ZIP --out FOLDER FILE.dna [...] [--engine cycles eevee]
     [--view eye mouth ...] [--size PIXELS]
@@ -33,6 +33,7 @@ VIEWS = {
     "brow": ("eyes", (20, 0, 22), (40, -200, 32), 60),
     "ear": ("eyes", (-74, 62, -12), (-300, -40, 0), 60),
     "hairline": ("eyes", (0, 0, 62), (35, -230, 84), 55),
+    "face": ("eyes", (0, 0, -24), (190, -760, 0), 85),
 }
 ENGINES = {"cycles": ("CYCLES",), "eevee": ("BLENDER_EEVEE_NEXT", "BLENDER_EEVEE")}
 SHEET = 320

@@ -15,7 +15,7 @@ from risorius.mixing.hair import hair_meshes
 from risorius.sample import build, people
 from risorius.sample.hair import add_hair, grow_hair, hair_textures
 from risorius.sample.hair.binding import Turning, append_mesh, corners_of
-from risorius.sample.hair.clearance import cut_clear, narrow_roots
+from risorius.sample.hair.clearance import cut_clear, narrow_edges
 from risorius.sample.hair.growth import curled, grow
 from risorius.sample.hair.strips import card_faces, card_vertices, make_strips
 from risorius.sample.hair.surface import Roots, Surface, nearest_places
@@ -237,7 +237,8 @@ def test_a_face_that_no_control_makes_alone_counts(stage):
     )
 
 
-def test_no_edge_of_a_root_lies_deep_in_the_skin(ball):
+@pytest.mark.parametrize("row", [0, 1])
+def test_no_edge_of_a_card_lies_deep_in_the_skin(ball, row):
     roots = ball.scattered(np.ones(len(ball.positions)), 0.4, np.random.default_rng(2))
     at = roots.of(ball.positions)
     out = at / np.linalg.norm(at, axis=1, keepdims=True)
@@ -246,9 +247,10 @@ def test_no_edge_of_a_root_lies_deep_in_the_skin(ball):
         points, np.stack([out, out], axis=1), np.full(len(at), 0.1), np.ones(2),
         np.zeros(len(at), int), roots,
     )  # fmt: skip
-    strips.sides[:, 0] += 0.08 * out
-    narrow_roots(strips, ball)
-    edges = points[:, 0] - strips.sides[:, 0]
+    # The second row stands 0.1 over the skin, and an edge of it comes down through it.
+    strips.sides[:, row] += (0.08, 0.18)[row] * out
+    narrow_edges(strips, ball)
+    edges = points[:, row] - strips.sides[:, row]
     deep = np.linalg.norm(at, axis=1) - np.linalg.norm(edges, axis=1)
     assert 0.01 < deep.max() < 0.018  # 0.08 before
     np.testing.assert_array_equal(strips.points, points)
@@ -272,6 +274,7 @@ def test_a_picture_with_opacity_is_a_png_that_others_read():
         ('beard_style = "long"', "beard_style: one of none, full, short, goatee, moustache"),
         ("hair_length = 9", "hair_length: a number from 0.3 to 2 was expected, found 9"),
         ("hair_grey = -1", "hair_grey: a number from 0 to 1 was expected, found -1"),
+        ("hair_fringe = 2", "hair_fringe: a number from 0 to 1 was expected, found 2"),
     ],
 )
 def test_styles_are_named_or_refused(tmp_path, text, sentence):
@@ -298,6 +301,24 @@ def haired():
         add_hair(face, hair)
         out.append((face, hair, person))
     return out
+
+
+def test_extra_a_fringe_hangs_before_the_forehead_and_ends_over_the_brows():
+    """More hair before the forehead than without, down to where it is asked, never at the eyes."""
+    _, parts, body = sample_people.assembled("man")
+    base, even = sample_people.data().base_mesh(), body.man.positions
+    eye = even[body.groups["helper-l-eye"]].mean(axis=0)
+    lowest, before = [], []
+    for share in (0.0, 0.5, 1.0):
+        person = replace(people.PEOPLE["man"], hair_style="long", hair_fringe=share)
+        strips = grow_hair(person, body, even, base, parts, build.CM).strips["hair"]
+        ends = strips.points[:, -1] - [0, *eye[1:]]
+        front = (np.abs(ends[:, 0]) < 0.35) & (ends[:, 2] > 0.2)
+        before.append(int(front.sum()))
+        lowest.append(float(ends[front, 1].min(initial=1.0)))
+    assert before[0] == 0  # parted hair goes aside
+    assert min(before[1:]) > 25
+    assert lowest == pytest.approx([1.0, 0.42, 0.24], abs=0.06)
 
 
 def moved(dna, raw, name):

@@ -29,7 +29,7 @@ _OPTIONAL: tuple[str, ...] = (
     "scalp",
     "shirt",
 )
-_OPTIONAL += ("hair_length", "hair_curl", "hair_grey")
+_OPTIONAL += ("hair_length", "hair_curl", "hair_grey", "hair_fringe")
 _OPTIONAL += ("hair_style", "beard_style")
 _COLOURS = ("skin", "flush", "lids", "lips", "hair", "brows", "shirt")
 
@@ -63,6 +63,7 @@ class Person:
     hair_length: float = 1.0
     hair_curl: float = 0.0
     hair_grey: float = 0.0
+    hair_fringe: float = 0.0
     beard_style: str = "none"
 
     def shape(self) -> dict[str, float]:
@@ -172,7 +173,9 @@ def _person(where: str, table: dict[str, Any], like: Person | None) -> Person:
     values |= read.take("age", read.age) | read.take("origin", read.origin)
     values |= read.take("features", read.shares) | read.take("iris", read.iris)
     values |= read.take("asymmetry", read.sided)
-    for key in ("muscle", "weight", "beard", "freckles", "scalp", "hair_curl", "hair_grey"):
+    for key in ("muscle", "weight", "beard", "freckles", "scalp"):
+        values |= read.take(key, read.number(0, 1))
+    for key in ("hair_curl", "hair_grey", "hair_fringe"):
         values |= read.take(key, read.number(0, 1))
     values |= read.take("hair_length", read.number(0.3, 2))
     values |= read.take("hair_style", read.one_of(HAIR_STYLES))

@@ -32,19 +32,26 @@ _SHORTER = 0.75
 _CUTS = 5  # how often a hair is cut before it goes
 
 
-def narrow_roots(strips: Strips, surface: Surface) -> None:
-    """Make those narrower at the root whose edge there would lie deep in skin that bends.
+def narrow_edges(strips: Strips, surface: Surface) -> None:
+    """Make those narrower whose edge would lie deep in skin that bends: at the root, about an ear.
 
     Args:
         strips: are changed.
         surface: the head that they grow on.
     """
+    over = np.maximum(0, -_depths(strips.points, surface))
     for side in (1, -1):
-        edges = strips.points[:, 0] + side * strips.sides[:, 0]
-        places = surface.nearest(edges)
-        normals = unit_vectors(places.of(surface.normals))
-        deep = ((places.of(surface.positions) - edges) * normals).sum(axis=1)
-        strips.sides[:, 0] *= np.minimum(1, ROOT_DEEP / np.maximum(deep, 1e-9))[:, None]
+        deep = np.maximum(ROOT_DEEP, _depths(strips.points + side * strips.sides, surface))
+        strips.sides *= ((over + ROOT_DEEP) / (over + deep))[..., None]
+
+
+def _depths(points: Floats, surface: Surface) -> Floats:
+    """float64[...]: how far below the nearest skin points lie. Args: points  float64[..., 3]."""
+    flat = points.reshape(-1, 3)
+    places = surface.nearest(flat)
+    normals = unit_vectors(places.of(surface.normals))
+    deep = ((places.of(surface.positions) - flat) * normals).sum(axis=1)
+    return np.asarray(deep.reshape(points.shape[:-1]))
 
 
 def cut_clear(

@@ -20,7 +20,7 @@ _BEARD_SPACING = 0.037
 _OVER_LIP = 0.6  # of the spacing and the width of a beard's cards
 _LONGEST_OVER_LIP = 0.08  # decimetres
 _RIM = 0.010  # decimetres from the line of the data to the outer rim of the lid
-_LASHES = {"U": (48, 0.098), "D": (26, 0.050)}  # cards of a lid, longest hair in decimetres
+_LASHES = {"U": (48, 0.098), "D": (26, 0.044)}  # cards of a lid, longest hair in decimetres
 
 
 def _turned(vectors: Floats, normals: Floats, angles: Floats) -> Floats:
@@ -45,8 +45,8 @@ def brow_flow(surface: Surface) -> Floats:
     arc = tangent(np.column_stack([side, rise, np.zeros(len(man))]), surface.normals)
     t = np.clip(along, 0, 1)
     across = np.clip(height / brow_width(t), -1, 1)
-    low = np.interp(t, [0.0, 0.12, 0.3, 0.6, 1.0], [82, 66, 42, 26, 8])
-    high = np.interp(t, [0.0, 0.12, 0.3, 0.6, 1.0], [74, 40, 2, -16, -14])
+    low = np.interp(t, [0.0, 0.12, 0.3, 0.6, 1.0], [64, 56, 42, 26, 8])
+    high = np.interp(t, [0.0, 0.12, 0.3, 0.6, 1.0], [56, 34, 2, -16, -14])
     angle = low + (high - low) * smooth_step(0.5 + 0.5 * across)
     # About the outward normal a turn to the left is up on his left side, down on his right.
     return tangent(_turned(arc, surface.normals, np.radians(angle) * side), surface.normals)
@@ -162,7 +162,7 @@ def lashes(surface: Surface, lines: dict[str, Floats], person: Person) -> Strips
         points = _arcs(root, np.sign(sign) * fan, length, first, last)
         out = np.zeros_like(points)
         out[...] = [0.0, 0.5 if upper else 0.2, 1.0]
-        half = 0.0062 * surface.scale * random.uniform(0.85, 1.15, count)
+        half = (0.0062 if upper else 0.0044) * surface.scale * random.uniform(0.85, 1.15, count)
         tiles = tile("lashes", random.integers(0, 16, count))
         taper = np.array([1.0, 1.0, 0.95, 0.85, 0.7])
         parts.append(make_strips(points, out, half, taper, tiles, roots, held=0.0))

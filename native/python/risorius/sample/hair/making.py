@@ -20,7 +20,7 @@ from ..people import Person
 from ..polygons import Floats
 from ..source import BaseMesh
 from .binding import append_mesh, bind, card_mesh, head_of, holds, whereabouts
-from .clearance import cut_clear, narrow_roots
+from .clearance import cut_clear, narrow_edges
 from .controls import add_lash_controls, add_lid_turns
 from .face_hair import beard, brows, lash_curves, lashes
 from .scalp import STYLES
@@ -77,7 +77,7 @@ def grow_hair(
     }
     grown = {name: strips for name, strips in found.items() if strips is not None}
     for strips in grown.values():
-        narrow_roots(strips, surface)
+        narrow_edges(strips, surface)
     return Grown(_within_budget(grown), unit)
 
 

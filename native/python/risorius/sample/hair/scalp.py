@@ -11,7 +11,7 @@ from ...base.easing import smooth_step
 from ..paint.atlas import DENSE, TILES, tile
 from ..paint.places import HAIRLINES, hairline_height, thinned, wavy
 from ..people import Person
-from ..polygons import Floats
+from ..polygons import Floats, Ints
 from .growth import curled, grow, tangent
 from .strips import ROOT_DEEP, Strips, joined, make_strips, unit
 from .surface import Roots, Surface
@@ -19,6 +19,7 @@ from .surface import Roots, Surface
 _WHORL = np.array([0.10, 0.86, -1.40])  # where hair turns about the crown, of the man
 _PARTING = 0.10  # how far to his left hair is parted
 _THIN = TILES["scalp"][4] - DENSE
+_LINE_OF_BROWS, _HIGH_ON_FOREHEAD = 0.27, 0.62  # heights at which a fringe ends, of the man
 _CLOSE = 0.6  # hair_length of an afro that is so short that it lies on the head
 
 
@@ -210,7 +211,62 @@ def long(surface: Surface, person: Person) -> Strips:
     turns = np.radians(random.uniform(-10, 10, n))
     taper = np.interp(np.linspace(0, 1, 9), [0, 0.2, 0.8, 1], [0.7, 1.0, 1.0, 0.75])
     tiles = _tiles(inside, random, 0.10)
+    falling = make_strips(points, out, half, taper, tiles, roots, turns, held=0.0)
+    if not person.hair_fringe:
+        return falling
+    return joined([falling, _fringe(surface, person, len(taper), random)])
+
+
+def _fringe(surface: Surface, person: Person, rows: int, random: np.random.Generator) -> Strips:
+    """Hair from behind the hairline that falls over the forehead, straight and even at its end."""
+    man = surface.man
+    inside = hairline_height(man, *HAIRLINES[person.hair_style])
+    x, y, z = man.T
+    density = smooth_step((0.34 - inside) / 0.15) * (inside > 0.01)
+    density = density * smooth_step((0.50 - np.abs(x)) / 0.10) * (y > 0.42) * (z > -0.75)
+    roots = surface.scattered(density, 0.054, random)
+    n = len(roots)
+    top = smooth_step((surface.man_normals[:, 1] - 0.3) / 0.4)
+    flow = np.column_stack([0.35 * x * top + 0.10, -1 + 0.7 * top, 0.2 + top])
+    length = 1.1 * surface.scale * random.uniform(0.9, 1.1, n)
+    rise = np.radians(random.uniform(14, 26, n)), np.zeros(n)
+    near = np.flatnonzero((y > -0.3) & (z > -1.5))
+    # The skin of the forehead comes and goes under it.
+    least = (0.025 + 0.03 * random.random(n)) * surface.scale
+    sway = 0.07 * random.normal(0, 1, (n, 3))
+    points, out = grow(surface, roots, flow, length, rise, rows, near, least, 0.4, 0.3, 1.0, sway)
+    end = _LINE_OF_BROWS + (1 - person.hair_fringe) * (_HIGH_ON_FOREHEAD - _LINE_OF_BROWS)
+    points, out = _ended(surface, points, out, end + 0.02 * random.normal(0, 1, n), near)
+    half = random.uniform(0.034, 0.056, n) * surface.scale
+    taper = np.interp(np.linspace(0, 1, rows), [0, 0.2, 0.75, 1], [0.7, 1.0, 0.9, 0.6])
+    turns = np.radians(random.uniform(-8, 8, n))
+    tiles = _tiles(roots.of(inside[:, None])[:, 0], random, 0.06)
     return make_strips(points, out, half, taper, tiles, roots, turns, held=0.0)
+
+
+def _ended(
+    surface: Surface, points: Floats, out: Floats, end: Floats, near: Ints
+) -> tuple[Floats, Floats]:
+    """Guides that end where they come down to a height of the head, as many points in each.
+
+    Args:
+        surface: the head.
+        points, out: float64[n, rows, 3] each, of grow.
+        end: float64[n], heights of the man.
+        near: vertices of the surface that they may come near.
+    """
+    n, rows, _ = points.shape
+    _, _, vertex = surface.below(points.reshape(-1, 3), near)
+    height = surface.man[vertex, 1].reshape(n, rows)
+    k = np.arange(rows)
+    for guide in range(n):
+        # What turns up again at its tip would be met from its other side.
+        down = np.minimum.accumulate(height[guide])
+        last = float(np.interp(-end[guide], -down, k))
+        at = np.linspace(0, max(last, 0.5), rows)
+        for way in (points, out):
+            way[guide] = np.column_stack([np.interp(at, k, way[guide, :, j]) for j in range(3)])
+    return points, unit(out)
 
 
 def parted_flow(surface: Surface) -> Floats:
@@ -255,9 +311,10 @@ def bun(surface: Surface, person: Person) -> Strips:
     sway = 0.05 * random.normal(0, 1, (n, 3))
     length = 1.12 * np.linalg.norm(man - _KNOT, axis=1) * surface.scale
     length = np.minimum(length, 1.5 * surface.scale) * random.uniform(0.9, 1.0, n)
-    rise = np.radians(random.uniform(3, 9, n)), np.zeros(n)
+    full = smooth_step(man[:, 1] / 0.4)  # not tight over forehead and temples
+    rise = np.radians(random.uniform(3, 9, n) + 9 * full), np.zeros(n)
     above = _scalp_vertices(surface)
-    least = (0.004 + 0.014 * random.random(n)) * surface.scale
+    least = (0.004 + 0.035 * full + (0.014 + 0.02 * full) * random.random(n)) * surface.scale
     points, outside = grow(
         surface, roots, flow, length, rise, 6, above, least, 0.3, hug=1.2, sway=sway
     )

@@ -137,7 +137,7 @@ def brow_density(points: Floats, normals: Floats, eye: float) -> Floats:
     along, height = brow_place(points, eye)
     across = height / brow_width(np.clip(along, 0, 1))
     body = 1 - smooth_step((np.abs(across) - 0.45) / 0.75)
-    ends = smooth_step((along + 0.02) / 0.18) * (1 - smooth_step((along - 0.86) / 0.18))
+    ends = smooth_step((along + 0.02) / 0.11) * (1 - smooth_step((along - 0.86) / 0.18))
     front = (points[:, 2] > -0.35) & (normals[:, 2] > 0.1)
     return np.asarray(body * ends * front)
 

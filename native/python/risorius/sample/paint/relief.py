@@ -16,7 +16,7 @@ from .skin import Skin
 
 PORE = 0.0013
 _STEP = 2 / 255  # of a normal's parts: finer ones are not seen, and pack badly
-_LIPS = 0.0009
+_LIPS = 0.0005
 _CREASE = 0.0045
 
 
@@ -36,13 +36,13 @@ def heights(skin: Skin, creases: Floats) -> Floats:
     tile, at = texels.dots(4.2, 51)
     holes = tile.over(np.clip(0.35 + 0.65 * share, 0, 1), at, 0.46, 1.0)
     out = -PORE * (0.25 + 0.75 * share) * holes * bare
-    out += bare * (0.00035 * texels.middle * (0.5 + share) + 0.0006 * texels.coarse)
+    out += bare * (0.00035 * texels.middle * (0.5 + share) + 0.00025 * texels.coarse)
     out -= _CREASE * creases
     around = smooth(regions.LIPS_RINGS + 5, regions.LIPS_RINGS + 1, ring)
     lines = skin.lips + 0.45 * skin.old * around * (1 - skin.lips)
     out += _LIPS * skin.lines * np.clip(lines, 0, 1) * smooth(0.5, 2.5, ring)
     rim = np.exp(-(((ring - regions.LIPS_RINGS - 0.9) / 0.8) ** 2))
-    out += 0.0016 * rim
+    out += 0.0010 * rim
     return np.asarray(out)
 
 
@@ -80,7 +80,7 @@ def roughness(skin: Skin, creases: Floats) -> Floats:
     out = 0.48 + matte - (0.13 - 0.054 * skin.deep) * field["oil"]
     out += 0.02 * texels.coarse + 0.03 * texels.middle
     out += 0.02 * texels.fine + 0.12 * creases
-    lips = 0.36 + 0.03 * texels.middle - 0.03 * skin.lines
+    lips = 0.41 + 0.03 * texels.middle - 0.03 * skin.lines
     out += (lips - out) * skin.lips
     out += (0.20 - out) * skin.wet
     if skin.person.hair_style != "none":  # what lies under hair is in its shade

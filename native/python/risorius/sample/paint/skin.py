@@ -26,7 +26,7 @@ _YELLOW = np.array([-0.02, 0.04, 0.36], np.float32)
 _MUCOSA = (0.73, 0.41, 0.385)
 _IN_SHADE = 0.55  # how light hair is at its roots, beside its tips
 _THROAT = (0.36, 0.15, 0.14)
-_LID_MARGIN = (0.80, 0.55, 0.50)
+_LID_MARGIN = (0.68, 0.41, 0.37)
 
 
 def linear(colour: Floats) -> Floats:
@@ -295,13 +295,13 @@ class Skin:
         red *= (1 - 0.18 * smooth(4.0, 2.2, ring))[:, None]
         rim = np.exp(-(((ring - regions.LIPS_RINGS) / 1.1) ** 2)) * self.deep
         light = light * np.exp(-(0.25 * rim)[:, None] * _MELANIN)
-        return _over(light, red, (0.86 + 0.04 * texels.coarse) * self.lips)
+        return _over(light, red, (0.80 + 0.05 * texels.coarse) * self.lips)
 
     @cached_property
     def lines(self) -> Floats:
         """float32[n]: the lips' own lines, across them, mean 0 and deviation 1."""
         texels = self.texels
-        tile = patterns.mottling(512, 3.2, np.random.default_rng(41), 14)
+        tile = patterns.mottling(512, 2.3, np.random.default_rng(41), 14)
         across = np.rint(texels.place[:, 0] / 0.0042 + 1.5 * texels.middle).astype(int) % 512
         down = np.rint(4 * self.field["mouth"]).astype(int) % 512
         return np.asarray(tile[down, across])
