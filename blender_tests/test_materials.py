@@ -67,6 +67,34 @@ def test_no_kind_of_mesh_is_flat(kinds_file, tmp_path, simple):
         assert seen.std(axis=0).max() > 0.01, base
 
 
+def test_threads_of_cloth_are_gone_where_they_would_be_grains(tmp_path):
+    """Height of the weave, as light: seen from 30 cm, even from 3 m, where one is below a pixel."""
+    face = small_face()
+    skin = face.meshes[0]
+    shirt = looks.copy_mesh(skin)
+    rig = scene.load(
+        _save(tmp_path, looks.set_meshes(face, {"head_lod0_mesh": skin, "shirt_lod0_mesh": shirt}))
+    )
+    head, item = scene.meshes(rig).values()
+    head.hide_render = True
+    tree = item.data.materials[0].node_tree
+    bump = next(n for n in tree.nodes if n.type == "BUMP")
+    light = tree.nodes.new("ShaderNodeEmission")
+    tree.links.new(bump.inputs["Height"].links[0].from_socket, light.inputs["Color"])
+    output = next(n for n in tree.nodes if n.type == "OUTPUT_MATERIAL")
+    tree.links.new(light.outputs[0], output.inputs["Surface"])
+    setup, _ = looks.stage([item], 32, samples=1)
+    middle = np.array(item.bound_box).mean(axis=0)
+    setup.camera.data.clip_end = 10
+    grains = []
+    for metres in (0.3, 3.0):
+        setup.camera.location = (middle[0], middle[1] - metres, middle[2])
+        picture = looks.render(setup, tmp_path / f"{metres}.png")
+        grains.append(picture[picture[..., 3] > 0.99][:, :3].std())
+    assert grains[0] > 0.05
+    assert grains[1] < 0.01
+
+
 def test_skin_scatters_by_the_size_of_the_head(tmp_path):
     scales = []
     for factor in (1.0, 3.0):

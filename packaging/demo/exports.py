@@ -86,6 +86,8 @@ def clothe(folder):
         material.use_nodes = True
         tree = material.node_tree
         shader = next(n for n in tree.nodes if n.type == "BSDF_PRINCIPLED")
+        if not any(folder.glob(f"{material.name}_color.*")):  # corneas and tears: clear
+            shader.inputs["Alpha"].default_value = 0.0
         for path in folder.glob(f"{material.name}_color.*"):
             node = tree.nodes.new("ShaderNodeTexImage")
             node.image = bpy.data.images.load(str(path))
@@ -97,6 +99,8 @@ def clothe(folder):
             node.image = bpy.data.images.load(str(path))
             node.image.colorspace_settings.is_data = True
             tree.links.new(node.outputs["Color"], shader.inputs["Roughness"])
+        if "shirt" in material.name:
+            shader.inputs["Roughness"].default_value = 0.9
 
 
 def pictures(args, name):

@@ -8,6 +8,7 @@ from .nodes import Graph
 
 _COLOR = (0.055, 0.065, 0.08)  # linear: a dark jersey
 _THREADS = 150.0  # for each eye distance
+_NEAR, _FAR = 7.0, 14.0  # eye distances from the camera: threads are seen, and are gone
 
 
 def build(graph: Graph, look: Look) -> None:
@@ -31,5 +32,9 @@ def build(graph: Graph, look: Look) -> None:
     turns = _THREADS / look.unit
     across = graph.math("SINE", graph.math("MULTIPLY", graph.math("ADD", x, y), turns))
     along = graph.math("SINE", graph.math("MULTIPLY", z, turns))
-    height = graph.math("MULTIPLY", across, along)
+    # Far away a thread is smaller than a pixel, and a few samples of it are grains that flicker.
+    away = graph.node("CameraData").outputs["View Distance"]
+    span = (_FAR - _NEAR) * look.unit
+    near = graph.math("DIVIDE", graph.math("SUBTRACT", _FAR * look.unit, away), span, clamp=True)
+    height = graph.math("MULTIPLY", graph.math("MULTIPLY", across, along), near)
     graph.set(Normal=graph.bump(height, look.unit * 0.006, None, 0.35))

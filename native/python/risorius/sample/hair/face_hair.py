@@ -65,7 +65,8 @@ def brows(surface: Surface, person: Person) -> Strips:
         person: a child's and a woman's are shorter, an old man's longer.
     """
     random = np.random.default_rng(21)
-    density = brow_density(surface.man, surface.man_normals, surface.eye)
+    front = surface.man_normals[:, 2] > 0.1  # not the socket's inside
+    density = brow_density(surface.man, surface.eye) * front
     roots = surface.scattered(density, _BROW_SPACING, random)
     along, _ = brow_place(roots.of(surface.man), surface.eye)
     n = len(roots)

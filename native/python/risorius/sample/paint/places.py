@@ -126,20 +126,18 @@ def brow_width(along: Floats) -> Floats:
     return np.interp(along, [0.0, 0.15, 0.5, 0.8, 1.0], [0.024, 0.033, 0.031, 0.019, 0.007])
 
 
-def brow_density(points: Floats, normals: Floats, eye: float) -> Floats:
+def brow_density(points: Floats, eye: float) -> Floats:
     """float64[n], 0 to 1: thinner at both ends, its lower edge cleaner than its upper one.
 
     Args:
         points: float64[n, 3], of the man.
-        normals: float64[n, 3], of his skin.
         eye: how far the middle of his eye is from the middle of the face.
     """
     along, height = brow_place(points, eye)
     across = height / brow_width(np.clip(along, 0, 1))
     body = 1 - smooth_step((np.abs(across) - 0.45) / 0.75)
     ends = smooth_step((along + 0.02) / 0.11) * (1 - smooth_step((along - 0.86) / 0.18))
-    front = (points[:, 2] > -0.35) & (normals[:, 2] > 0.1)
-    return np.asarray(body * ends * front)
+    return np.asarray(body * ends * (points[:, 2] > -0.35))
 
 
 def beard_density(points: Floats, lips: Floats, style: str) -> Floats:

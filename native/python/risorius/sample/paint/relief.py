@@ -36,7 +36,7 @@ def heights(skin: Skin, creases: Floats) -> Floats:
     tile, at = texels.dots(4.2, 51)
     holes = tile.over(np.clip(0.35 + 0.65 * share, 0, 1), at, 0.46, 1.0)
     out = -PORE * (0.25 + 0.75 * share) * holes * bare
-    out += bare * (0.00035 * texels.middle * (0.5 + share) + 0.00025 * texels.coarse)
+    out += bare * (0.0002 * texels.middle * (0.5 + share) + 0.00025 * texels.coarse)
     out -= _CREASE * creases
     around = smooth(regions.LIPS_RINGS + 5, regions.LIPS_RINGS + 1, ring)
     lines = skin.lips + 0.45 * skin.old * around * (1 - skin.lips)

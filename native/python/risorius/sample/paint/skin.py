@@ -15,7 +15,7 @@ from ..people import Person
 from ..polygons import Floats, Ints
 from . import patterns, regions
 from .images import smooth
-from .places import HAIRLINES, beard_density, hairline_height, thinned
+from .places import HAIRLINES, beard_density, brow_density, hairline_height, thinned
 from .raster import Raster
 
 HEAD_SIZE = 2048
@@ -45,29 +45,6 @@ def depth_of(person: Person) -> float:
     """How dark a person's skin is, 0 to 1."""
     light = float(linear(np.array(person.skin)) @ [0.21, 0.72, 0.07])
     return float(smooth(0.42, 0.06, np.array(light)))
-
-
-def brow_mask(places: Floats, eye: Floats, uneven: Floats | float = 0.0) -> Floats:
-    """An arched line above each eye, float[...] from 0 to 1: where brows grow.
-
-    Args:
-        places: float[..., 3], on the head, decimetres.
-        eye: float64[3], the left eye's middle.
-        uneven: float[...], noise of deviation 1 that frays the edge.
-    """
-    x, y = np.abs(places[..., 0]), places[..., 1] - eye[1]
-    along = (x - (eye[0] - 0.19)) / 0.44  # 0 at the nose, 1 at the temple
-    ridge = (
-        0.165
-        + 0.055 * np.sin(np.clip(along, 0, 1.1) * 2.2)
-        - 0.045 * np.clip(along - 0.55, 0, 1) / 0.5
-    )
-    half = 0.05 * (1 - 0.62 * np.clip(along, 0, 1)) * smooth(-0.04, 0.1, along) + 0.002
-    across = np.abs(y - ridge) / half + 0.12 * uneven
-    body = (1 - smooth(0.2, 1.25, across)) * smooth(-0.06, 0.2, along)
-    body *= 1 - smooth(0.8, 1.03, along)
-    front = smooth(0.05, 0.2, places[..., 2] - eye[2] + 0.1)
-    return np.asarray(body * front)
 
 
 def _hairline(face: regions.Face, person: Person) -> Floats:
@@ -266,9 +243,7 @@ class Skin:
             dark = roots.over(0.9 * share, at, 0.5)
             light = _over(light, _IN_SHADE * hair, 0.5 * share + 0.4 * share * dark)
         brows = linear(np.array(person.brows))
-        light = _over(
-            light, brows, 0.26 * person.scalp * brow_mask(texels.place, self.eye, texels.middle)
-        )
+        light = _over(light, brows, 0.30 * person.scalp * self._brows())
         if person.beard:
             share = np.clip(self.field["beard"] * (1 + 0.22 * texels.coarse), 0, 1)
             light = light * np.exp(-(1.5 * person.beard * share)[:, None] * 2 * _VEINS)
@@ -276,6 +251,16 @@ class Skin:
             dark = stubble.over(share, at, 0.46, 0.9)
             light = _over(light, 0.5 * brows + 0.02, np.clip(2.6 * person.beard, 0, 0.6) * dark)
         return light
+
+    def _brows(self) -> Floats:
+        """float32[n], 0 to 1: where their cards stand, its edge frayed."""
+        texels = self.texels
+        at = texels.place - np.array([0, *self.eye[1:]])
+        near = np.flatnonzero((at[:, 1] > 0) & (at[:, 1] < 0.4) & (at[:, 2] > -0.4))
+        out = np.zeros(len(at), np.float32)
+        share = brow_density(at[near], self.eye[0]) * (1 + 0.25 * texels.middle[near])
+        out[near] = np.clip(share, 0, 1)
+        return out
 
     def _lips(self, light: Floats) -> Floats:
         """Their red: pale and pigmented at the rim, lines across, darker where they meet."""
