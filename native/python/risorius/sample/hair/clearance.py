@@ -31,6 +31,8 @@ _ROUGHLY = 4  # of so many vertices one
 _SHORTER = 0.75
 _CUTS = 5  # how often a hair is cut before it goes
 
+_EDGE_DEEP = 0.004  # decimetres, of a card's edge beyond its root
+
 
 def narrow_edges(strips: Strips, surface: Surface) -> None:
     """Make those narrower whose edge would lie deep in skin that bends: at the root, about an ear.
@@ -40,9 +42,10 @@ def narrow_edges(strips: Strips, surface: Surface) -> None:
         surface: the head that they grow on.
     """
     over = np.maximum(0, -_depths(strips.points, surface))
+    most = np.where(np.arange(strips.rows) == 0, ROOT_DEEP, _EDGE_DEEP)
     for side in (1, -1):
-        deep = np.maximum(ROOT_DEEP, _depths(strips.points + side * strips.sides, surface))
-        strips.sides *= ((over + ROOT_DEEP) / (over + deep))[..., None]
+        deep = np.maximum(most, _depths(strips.points + side * strips.sides, surface))
+        strips.sides *= ((over + most) / (over + deep))[..., None]
 
 
 def _depths(points: Floats, surface: Surface) -> Floats:

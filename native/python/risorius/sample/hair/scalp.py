@@ -201,7 +201,7 @@ def long(surface: Surface, person: Person) -> Strips:
     length *= random.uniform(0.88, 1.08, n)
     rise = np.radians(random.uniform(6, 14, n)), np.zeros(n)
     above = np.flatnonzero(surface.man[:, 1] > -1.9)
-    least = (0.006 + 0.03 * random.random(n)) * surface.scale
+    least = (0.036 + 0.02 * random.random(n)) * surface.scale  # an ear that is raised stays under
     points, out = grow(surface, roots, flow, length, rise, 9, above, least, 0.5, 0.55, 1.2, sway)
     wave = 0.05 * (0.25 + person.hair_curl) * random.uniform(0.5, 1.2, n)
     points = curled(points, out, wave, random.uniform(0.5, 1.6, n), random)

@@ -11,7 +11,7 @@ from ..paint.atlas import tile_corners
 from ..polygons import Floats, Ints
 from .surface import Roots, joined_roots
 
-ROOT_DEEP = 0.016  # decimetres, how far the edge of a root lies in the skin at most
+ROOT_DEEP = 0.014  # decimetres, how far the edge of a root lies in the skin at most
 
 
 def unit(vectors: Floats) -> Floats:
