@@ -297,9 +297,16 @@ Status compile_joint_group(const dna::JointGroup& g, const std::string& where, R
   if (!rows) return core::Unexpected{rows.error()};
   rig::JointGroup group;
   group.row_count = *rows;
-  group.rows_begin = static_cast<std::uint32_t>(out.joint_outputs.size());
-  out.joint_outputs.insert(out.joint_outputs.end(), g.output_indices.begin(),
-                           g.output_indices.begin() + *rows);
+  std::vector<std::uint16_t>& outputs = out.joint_outputs;
+  // A long group has whole vectors of rows to itself; nothing places what is behind its last row.
+  const auto fill = [&] {
+    if (*rows < simd::kWidest) return;
+    outputs.resize(simd::rounded_up(outputs.size()), g.output_indices[0]);
+  };
+  fill();
+  group.rows_begin = static_cast<std::uint32_t>(outputs.size());
+  outputs.insert(outputs.end(), g.output_indices.begin(), g.output_indices.begin() + *rows);
+  fill();
   out.joint_groups.push_back(group);
   return ok();
 }

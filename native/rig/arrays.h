@@ -68,8 +68,10 @@ struct Watch {
 /// padding.
 struct JointGroup {
   std::uint32_t row_count = 0;
-  std::uint32_t column_count = 0;   // columns that hold at least one value other than 0
-  std::uint32_t rows_begin = 0;     // this group's first row among the rows of all groups
+  std::uint32_t column_count = 0;  // columns that hold at least one value other than 0
+  // This group's first row among the rows of all groups. Groups of kWidest rows and more take whole
+  // vectors of rows: those behind the last one belong to nobody. Others lie side by side.
+  std::uint32_t rows_begin = 0;
   std::uint32_t columns_begin = 0;  // its first column in group_columns
   // The blocks of joint attributes that its rows reach at any LOD: see joint_pieces.
   std::uint32_t blocks_begin = 0, blocks_end = 0;
@@ -81,11 +83,9 @@ struct ControlReads {
   std::uint32_t columns = 0;  // in that many columns
 };
 
-/// One column of a joint group, as it is listed at its control.
-struct JointColumn {
-  std::uint32_t offset = 0;  // the column's first value in joint_values or joint_halves
-  std::uint32_t group = 0;   // an index into joint_groups
-};
+/// One column of a joint group, as it is listed at its control: its first value in joint_values or
+/// joint_halves, and the group, an index into joint_groups.
+using JointColumn = simd::Addend;
 
 /// A joint whose rotation in one joint group is a product of quaternions. Each column that turns
 /// the joint gives one factor: the blend of no rotation and the column's quaternion by the control.

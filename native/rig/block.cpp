@@ -25,7 +25,7 @@ constexpr std::size_t kArrays = [] {
   for_each_array(all, [&](const auto&) { ++n; });
   return n;
 }();
-constexpr char kMagic[8] = {'R', 'S', 'R', 'I', 'G', 0, 0, 6};  // the last one: the version
+constexpr char kMagic[8] = {'R', 'S', 'R', 'I', 'G', 0, 0, 7};  // the last one: the version
 constexpr std::uint32_t kByteOrder = 0x01020304;
 
 struct Place {

@@ -131,10 +131,12 @@ void check_groups(const Rig& r, IndexCheck& c) {
   for (std::size_t i = 0; i < columns.size(); ++i) {
     const JointGroup& g = r.joint_groups[i];
     // One after the other: a kernel writes whole registers, into the rows of the group that
-    // follows.
+    // follows, but of long groups, which share no vector.
+    const bool wide = g.row_count >= simd::kWidest;
+    if (wide) rows = simd::rounded_up(rows);
     c.demand("joint_groups",
              columns[i] == g.column_count && g.rows_begin == rows && g.columns_begin == begin);
-    rows += g.row_count;
+    rows += wide ? simd::rounded_up(std::uint64_t{g.row_count}) : g.row_count;
     begin += g.column_count;
     for (std::uint32_t l = 0; l < r.lod_count; ++l) {
       c.demand("joint_group_lods", r.joint_group_lods[i * r.lod_count + l] <= g.row_count);

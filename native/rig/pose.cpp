@@ -3,6 +3,23 @@
 
 namespace risorius::rig {
 
+namespace {
+
+// Whole vectors of groups that have them to themselves.
+std::vector<simd::Rows> rows_of_groups(const Rig& rig) {
+  std::vector<simd::Rows> all;
+  for (std::uint32_t l = 0; l < rig.lod_count; ++l) {
+    for (std::size_t i = 0; i < rig.joint_groups.size(); ++i) {
+      const JointGroup& g = rig.joint_groups[i];
+      const std::uint32_t rows = rig.joint_group_lods[i * rig.lod_count + l];
+      all.push_back({g.rows_begin, g.row_count < simd::kWidest ? rows : simd::rounded_up(rows)});
+    }
+  }
+  return all;
+}
+
+}  // namespace
+
 Pose make_pose(const Rig& rig) {
   Pose pose;
   pose.joints.resize(std::size_t{rig.joint_count} * rig.joint_stride);
@@ -21,6 +38,8 @@ Workspace make_workspace(const Rig& rig) {
   work.columns.resize(rig.joint_columns.size());
   work.live.resize(rig.joint_groups.size());
   work.rows.resize(detail::rows_size(rig));
+  work.sums.resize(detail::rows_size(rig));
+  work.group_rows = rows_of_groups(rig);
   const std::size_t blocks = rig.lod_count == 0 ? 0 : rig.joint_pieces.size() / rig.lod_count;
   work.live_blocks.resize((blocks + 63) / 64);
   work.last_controls.resize(rig.control_count);

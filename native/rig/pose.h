@@ -34,14 +34,15 @@ inline PoseView view(Pose& pose) {
 
 /// How the columns of the joint groups are gone through.
 enum class Traversal : std::uint8_t {
-  kCounted,  // by whichever of the two moves fewer bytes in the frame
-  kListed,   // those of active controls, which are listed first
+  kCounted,  // by whichever costs least in the frame
+  kListed,   // those of active controls, which are listed by group first
+  kAdded,    // those of active controls, in the order of memory; frames in a batch are listed
   kWhole     // all of them, in the order of group_columns, where no coefficient forbids it
 };
 
 /// The scratch memory of an evaluation. Threads that evaluate at the same time need one each; its
 /// alignment keeps two of them out of one cache line, where they would slow each other down. Only
-/// masks, traversal and whole_frames mean something to a caller.
+/// masks, traversal, whole_frames and added_frames mean something to a caller.
 struct alignas(128) Workspace {
   // Which controls are not 0.
   std::vector<std::uint16_t> active;  // these controls, ascending; the first active_count count
@@ -57,9 +58,12 @@ struct alignas(128) Workspace {
   // Joint groups.
   Traversal traversal = Traversal::kCounted;
   std::size_t whole_frames = 0;            // evaluations that read all columns
+  std::size_t added_frames = 0;            // evaluations that added columns in the order of memory
   std::vector<std::uint32_t> column_ends;  // [groups]: where a group's active columns end below
   std::vector<simd::Column> columns;       // the columns of active controls, as in group_columns
   core::AlignedVector<float> rows;         // the rows of all groups
+  core::AlignedVector<float> sums;         // the same, added up column by column; 0 between calls
+  std::vector<simd::Rows> group_rows;      // [LODs, groups]: where columns are added
   std::vector<std::uint64_t> live_blocks;  // a bit for each block that a group which moves writes
   std::vector<std::uint32_t> live;         // the groups that write these blocks, ascending; the
   std::size_t live_count = 0;              // first live_count count

@@ -25,6 +25,16 @@ struct Column {
   std::uint32_t weight = 0;  // which of the weights
 };
 
+/// A column of a matrix and the run of rows that it is added to.
+struct Addend {
+  std::uint32_t offset = 0;  // of its first value
+  std::uint32_t group = 0;   // which of the runs
+};
+/// A run of rows. Where count is a multiple of kWidest they are added by whole vectors.
+struct Rows {
+  std::uint32_t begin = 0, count = 0;
+};
+
 /// Sixteen places: those whose bit is set take the values from `from` on, one after the other.
 struct Piece {
   std::uint32_t from = 0;
@@ -32,6 +42,14 @@ struct Piece {
   std::uint16_t block = 0;  // of the places; of an extra piece only
 };
 inline constexpr std::size_t kPlaces = 16;
+/// Where the values and the places of the first frame are, and those of the next ones.
+struct PlacedFrames {
+  const float* from;
+  std::size_t from_stride;
+  float* to;
+  std::size_t to_stride;
+  std::size_t count;
+};
 
 /// How Euler angles are spelled: the axis of each turn, half a unit of its angle in radians with
 /// the sign of its direction, and +1 for the cyclic orders xyz, yzx, zxy, -1 for the others.
@@ -55,18 +73,26 @@ struct Kernels {
   /// The same from IEEE half floats, none of them infinite.
   void (*half_columns)(const std::uint16_t* values, const Column* columns, std::size_t n,
                        const float* weights, float* out, std::size_t rows);
-  /// The same for kFrames frames: weights float32[.., kFrames], frame f at out + f * stride.
+  /// sums[begin + r] += weight * values[offset + r] for each row r of each column's run, one column
+  /// after the other. Other sums stay as they are.
+  /// In:  rows  by group
+  ///      sums  kWidest of them may be read from any row on
+  void (*add_columns)(const float* values, const Addend* columns, std::size_t n, float weight,
+                      const Rows* rows, float* sums);
+  void (*add_half_columns)(const std::uint16_t* values, const Addend* columns, std::size_t n,
+                           float weight, const Rows* rows, float* sums);
+  /// As columns, for kFrames frames: weights float32[.., kFrames], frame f at out + f * stride.
   void (*batch_columns)(const float* values, const Column* columns, std::size_t n,
                         const float* weights, float* out, std::size_t stride, std::size_t rows);
   void (*batch_half_columns)(const std::uint16_t* values, const Column* columns, std::size_t n,
                              const float* weights, float* out, std::size_t stride,
                              std::size_t rows);
-  /// Fills n blocks of kPlaces with their pieces, other places with 0.
+  /// Fills n blocks of kPlaces with their pieces, other places with 0; of each frame.
   /// In: from  kPlaces values may be read from any piece's first on
-  void (*place)(const Piece* pieces, std::size_t n, const float* from, float* to);
+  void (*place)(const Piece* pieces, std::size_t n, const PlacedFrames& frames);
   /// The same for extra pieces, which leave the other places of their blocks as they are: these may
   /// be read and written as well.
-  void (*place_more)(const Piece* pieces, std::size_t n, const float* from, float* to);
+  void (*place_more)(const Piece* pieces, std::size_t n, const PlacedFrames& frames);
   /// Euler angles x y z to quaternions x y z w in place, error below 2e-7; the same bits on every
   /// CPU.
   /// In:   which      n numbers of rotations

@@ -53,20 +53,36 @@ struct V {
   }
   RISORIUS_INLINE static void store(float* p, Reg v) { _mm256_storeu_ps(p, v); }
   RISORIUS_INLINE static Reg madd(Reg a, Reg b, Reg sum) { return _mm256_fmadd_ps(a, b, sum); }
-  RISORIUS_INLINE static void expand_8(const float* from, std::uint32_t mask, Reg rest, float* to) {
-    const __m256i order = _mm256_cvtepi8_epi32(
-        _mm_loadl_epi64(reinterpret_cast<const __m128i*>(kExpandOrders[mask].data())));
-    const Reg values = _mm256_permutevar8x32_ps(load(from), order);
-    store(to, _mm256_blendv_ps(rest, values, _mm256_castsi256_ps(order)));
+  // Which values eight places take, the first of them, and whether there is any.
+  struct Half {
+    __m256i order;
+    std::size_t from;
+    bool any;
+  };
+  RISORIUS_INLINE static Half half(std::uint32_t mask, std::uint32_t before) {
+    const auto* order = reinterpret_cast<const __m128i*>(kExpandOrders[mask].data());
+    return {_mm256_cvtepi8_epi32(_mm_loadl_epi64(order)),
+            static_cast<std::size_t>(std::popcount(before)), mask != 0};
   }
-  RISORIUS_INLINE static void expand(const float* from, std::uint32_t mask, float* to) {
-    expand_8(from, mask & 0xFFu, zero(), to);
-    expand_8(from + std::popcount(mask & 0xFFu), mask >> 8, zero(), to + 8);
+  RISORIUS_INLINE static void expand_8(const float* from, const Half& half, Reg rest, float* to) {
+    const Reg values = _mm256_permutevar8x32_ps(load(from + half.from), half.order);
+    store(to, _mm256_blendv_ps(rest, values, _mm256_castsi256_ps(half.order)));
   }
-  // Other places are written as they are: some CPUs take 12 cycles for a store by a mask.
-  RISORIUS_INLINE static void expand_more(const float* from, std::uint32_t mask, float* to) {
-    expand_8(from, mask & 0xFFu, load(to), to);
-    expand_8(from + std::popcount(mask & 0xFFu), mask >> 8, load(to + 8), to + 8);
+  struct Order {
+    Half low, high;
+  };
+  RISORIUS_INLINE static Order order(std::uint32_t mask) {
+    return {half(mask & 0xFFu, 0), half(mask >> 8, mask & 0xFFu)};
+  }
+  RISORIUS_INLINE static void expand(const float* from, const Order& o, float* to) {
+    expand_8(from, o.low, zero(), to);
+    expand_8(from, o.high, zero(), to + 8);
+  }
+  // Other places are written as they are: some CPUs take 12 cycles for a store by a mask. Of two
+  // extra pieces in three one half is all that there is.
+  RISORIUS_INLINE static void expand_more(const float* from, const Order& o, float* to) {
+    if (o.low.any) expand_8(from, o.low, load(to), to);
+    if (o.high.any) expand_8(from, o.high, load(to + 8), to + 8);
   }
 };
 

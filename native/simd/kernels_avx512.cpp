@@ -29,6 +29,8 @@ struct V {
   }
   RISORIUS_INLINE static void store(float* p, Reg v) { _mm512_storeu_ps(p, v); }
   RISORIUS_INLINE static Reg madd(Reg a, Reg b, Reg sum) { return _mm512_fmadd_ps(a, b, sum); }
+  using Order = std::uint32_t;
+  RISORIUS_INLINE static Order order(std::uint32_t mask) { return mask; }
   RISORIUS_INLINE static void expand(const float* from, std::uint32_t mask, float* to) {
     store(to, _mm512_maskz_expand_ps(static_cast<__mmask16>(mask), load(from)));
   }

@@ -89,6 +89,31 @@ void columns(const T* values, const Column* list, std::size_t n, const float* we
   });
 }
 
+// kWidest sums.
+template <class T>
+RISORIUS_INLINE void add(V::Reg weight, const T* values, const float* sums, float* to) {
+  for (std::size_t l = 0; l < kWidest; l += V::kLanes) {
+    V::store(to + l, V::madd(weight, V::load(values + l), V::load(sums + l)));
+  }
+}
+
+template <class T>
+RISORIUS_TARGET void add_columns(const T* values, const Addend* columns, std::size_t n,
+                                 float weight, const Rows* rows, float* sums) {
+  const V::Reg weights = V::set(weight);
+  for (std::size_t i = 0; i < n; ++i) {
+    const T* from = values + columns[i].offset;
+    const Rows run = rows[columns[i].group];
+    float* to = sums + run.begin;
+    std::size_t r = 0;
+    for (; r + kWidest <= run.count; r += kWidest) add(weights, from + r, to + r, to + r);
+    if (r == run.count) continue;
+    float last[kWidest];
+    add(weights, from + r, to + r, last);
+    for (std::size_t l = 0; r < run.count; ++l, ++r) to[r] = last[l];
+  }
+}
+
 template <class T>
 void batch_columns(const T* values, const Column* list, std::size_t n, const float* weights,
                    float* out, std::size_t stride, std::size_t rows) {
@@ -102,15 +127,28 @@ void batch_columns(const T* values, const Column* list, std::size_t n, const flo
   }
 }
 
-RISORIUS_TARGET void place(const Piece* pieces, std::size_t n, const float* from, float* to) {
+// What a piece says is made out once for all frames.
+template <bool kMore>
+RISORIUS_INLINE void place_in(const Piece* pieces, std::size_t n, PlacedFrames frames) {
   for (std::size_t i = 0; i < n; ++i) {
-    V::expand(from + pieces[i].from, pieces[i].mask, to + i * kPlaces);
+    const V::Order order = V::order(pieces[i].mask);
+    const float* from = frames.from + pieces[i].from;
+    float* to = frames.to + (kMore ? pieces[i].block : i) * kPlaces;
+    for (std::size_t f = 0; f < frames.count; ++f) {
+      kMore ? V::expand_more(from, order, to) : V::expand(from, order, to);
+      from += frames.from_stride;
+      to += frames.to_stride;
+    }
   }
 }
 
-RISORIUS_TARGET void place_more(const Piece* pieces, std::size_t n, const float* from, float* to) {
-  for (std::size_t i = 0; i < n; ++i) {
-    V::expand_more(from + pieces[i].from, pieces[i].mask, to + pieces[i].block * kPlaces);
+// One frame without the loop over them.
+template <bool kMore>
+RISORIUS_TARGET void place(const Piece* pieces, std::size_t n, const PlacedFrames& frames) {
+  if (frames.count == 1) {
+    place_in<kMore>(pieces, n, {frames.from, 0, frames.to, 0, 1});
+  } else {
+    place_in<kMore>(pieces, n, frames);
   }
 }
 
@@ -118,10 +156,12 @@ constexpr Kernels make_kernels(const char* name) {
   return {name,
           columns<float>,
           columns<std::uint16_t>,
+          add_columns<float>,
+          add_columns<std::uint16_t>,
           batch_columns<float>,
           batch_columns<std::uint16_t>,
-          place,
-          place_more,
+          place<false>,
+          place<true>,
           quaternions,
           native_u16,
           native_u32,

@@ -26,6 +26,8 @@ struct V {
   }
   RISORIUS_INLINE static void store(float* p, Reg v) { vst1q_f32(p, v); }
   RISORIUS_INLINE static Reg madd(Reg a, Reg b, Reg sum) { return vfmaq_f32(sum, a, b); }
+  using Order = std::uint32_t;
+  RISORIUS_INLINE static Order order(std::uint32_t mask) { return mask; }
   RISORIUS_INLINE static void expand(const float* from, std::uint32_t mask, float* to) {
     for (int q = 0; q < 4; ++q, mask >>= 4) {
       const uint8x16_t order = vld1q_u8(kExpandBytes[mask & 15u].data());

@@ -26,6 +26,17 @@ void columns(const T* values, const Column* list, std::size_t n, const float* we
 }
 
 template <class T>
+void add_columns(const T* values, const Addend* columns, std::size_t n, float weight,
+                 const Rows* rows, float* sums) {
+  for (std::size_t i = 0; i < n; ++i) {
+    const T* column = values + columns[i].offset;
+    const Rows run = rows[columns[i].group];
+    float* to = sums + run.begin;
+    for (std::size_t r = 0; r < run.count; ++r) to[r] += weight * widened(column[r]);
+  }
+}
+
+template <class T>
 void batch_columns(const T* values, const Column* list, std::size_t n, const float* weights,
                    float* out, std::size_t stride, std::size_t rows) {
   for (std::size_t f = 0; f < kFrames; ++f) {
@@ -39,20 +50,27 @@ void batch_columns(const T* values, const Column* list, std::size_t n, const flo
   }
 }
 
-void place(const Piece* pieces, std::size_t n, const float* from, float* to) {
-  for (std::size_t i = 0; i < n; ++i, to += kPlaces) {
-    const float* next = from + pieces[i].from;
-    for (std::size_t p = 0; p < kPlaces; ++p) {
-      const bool taken = ((pieces[i].mask >> p) & 1u) != 0;
-      to[p] = taken ? *next : 0.0f;
-      next += taken ? 1 : 0;
+void place(const Piece* pieces, std::size_t n, const PlacedFrames& frames) {
+  for (std::size_t f = 0; f < frames.count; ++f) {
+    float* to = frames.to + f * frames.to_stride;
+    for (std::size_t i = 0; i < n; ++i, to += kPlaces) {
+      const float* next = frames.from + f * frames.from_stride + pieces[i].from;
+      for (std::size_t p = 0; p < kPlaces; ++p) {
+        const bool taken = ((pieces[i].mask >> p) & 1u) != 0;
+        to[p] = taken ? *next : 0.0f;
+        next += taken ? 1 : 0;
+      }
     }
   }
 }
 
-void place_more(const Piece* pieces, std::size_t n, const float* from, float* to) {
-  for (std::size_t i = 0; i < n; ++i) {
-    place_bits(from + pieces[i].from, pieces[i].mask, to + pieces[i].block * kPlaces);
+void place_more(const Piece* pieces, std::size_t n, const PlacedFrames& frames) {
+  for (std::size_t f = 0; f < frames.count; ++f) {
+    const float* from = frames.from + f * frames.from_stride;
+    float* to = frames.to + f * frames.to_stride;
+    for (std::size_t i = 0; i < n; ++i) {
+      place_bits(from + pieces[i].from, pieces[i].mask, to + pieces[i].block * kPlaces);
+    }
   }
 }
 
@@ -62,6 +80,8 @@ const Kernels& scalar_kernels() {
   static constexpr Kernels kernels{"scalar",
                                    columns<float>,
                                    columns<std::uint16_t>,
+                                   add_columns<float>,
+                                   add_columns<std::uint16_t>,
                                    batch_columns<float>,
                                    batch_columns<std::uint16_t>,
                                    place,

@@ -38,6 +38,8 @@ struct V {
   RISORIUS_INLINE static Reg madd(Reg a, Reg b, Reg sum) {
     return _mm_add_ps(sum, _mm_mul_ps(a, b));
   }
+  using Order = std::uint32_t;
+  RISORIUS_INLINE static Order order(std::uint32_t mask) { return mask; }
   RISORIUS_INLINE static void expand(const float* from, std::uint32_t mask, float* to) {
     for (std::size_t q = 0; q < 4; ++q, mask >>= 4) {
       const __m128i order =

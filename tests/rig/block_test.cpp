@@ -221,6 +221,25 @@ TEST(Block, RowsOfGroupsFollowEachOther) {
   EXPECT_EQ(refused_field(rows), "rig.joint_groups");
 }
 
+// Whole vectors are added to the rows of long groups: those of another must not be among them.
+TEST(Block, LongGroupsHaveWholeVectorsToThemselves) {
+  constexpr std::uint16_t kLong = 18;
+  std::vector<std::uint16_t> outputs(kLong);
+  for (std::uint16_t i = 0; i < kLong; ++i) outputs[i] = i;
+  dna::Dna dna = make_face(2, 0, 3, 1);
+  dna.behavior.joint_groups =
+      std::vector{make_group({1}, {0}, {20}, {1.0f}),
+                  make_group({kLong}, {1}, outputs, std::vector<float>(kLong, 1.0f)),
+                  make_group({1}, {0}, {21}, {1.0f})};
+  const Rig rig = must_compile(dna);
+  EXPECT_EQ(rig.joint_groups[1].rows_begin, 16u);
+  EXPECT_EQ(rig.joint_groups[2].rows_begin, 48u);
+  BlockBytes closer = bytes_of(rig);
+  const std::size_t last = 2;
+  (&first_of(closer, rig, std::span(rig.joint_groups)))[last].rows_begin = 34;
+  EXPECT_EQ(refused_field(closer), "rig.joint_groups");
+}
+
 TEST(Block, ColumnsByGroupStayInTheirMatrix) {
   const Rig rig = must_compile(face_with_everything());
   BlockBytes control = bytes_of(rig), offset = bytes_of(rig);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The two ways through the columns of the joint groups: those of active controls, which are listed,
-// and all of them.
+// The ways through the columns of the joint groups: those of active controls, which are listed or
+// added one by one, and all of them.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -98,10 +98,11 @@ TEST_P(Traversals, GiveTheSumsOfTheFile) {
     for (std::uint32_t lod = 0; lod < 3; ++lod) {
       const std::vector<float> raw = some_active(active, static_cast<std::uint32_t>(active + lod));
       const auto sums = expected(dna_, raw, lod);
-      for (const Traversal way : {Traversal::kWhole, Traversal::kListed}) {
+      for (const Traversal way : {Traversal::kWhole, Traversal::kAdded, Traversal::kListed}) {
         whole += way == Traversal::kWhole ? 1 : 0;
         const Pose pose = evaluate_by(rig, work, way, raw, lod);
         EXPECT_EQ(work.whole_frames, whole);
+        EXPECT_EQ(work.added_frames, way == Traversal::kWhole ? whole - 1 : whole);
         for (std::size_t i = 0; i < sums.size(); ++i) {
           ASSERT_LE(std::fabs(pose.joints[i] - sums[i].value), sums[i].bound)
               << "attribute " << i << ", " << active << " active, LOD " << lod;
@@ -122,8 +123,9 @@ TEST_P(Traversals, GiveTheSameBitsInBothWidths) {
     for (std::size_t active = 0; active <= kRaw; ++active) {
       const std::vector<float> raw = some_active(active, 3);
       for (std::uint32_t lod = 0; lod < 3; ++lod) {
-        EXPECT_EQ(evaluate_by(*rig, work, Traversal::kWhole, raw, lod).joints,
-                  evaluate_by(*rig, work, Traversal::kListed, raw, lod).joints);
+        const Pose listed = evaluate_by(*rig, work, Traversal::kListed, raw, lod);
+        EXPECT_EQ(evaluate_by(*rig, work, Traversal::kWhole, raw, lod).joints, listed.joints);
+        EXPECT_EQ(evaluate_by(*rig, work, Traversal::kAdded, raw, lod).joints, listed.joints);
       }
     }
   }
@@ -168,8 +170,10 @@ TEST_P(Traversals, LeaveNothingOfTheFrameBefore) {
     std::vector<float> raw(kRaw, 0.0f), frames;
     raw[control] = 1.0f;
     const Pose expected = evaluate_by(rig, fresh, Traversal::kWhole, raw, 0);
-    evaluate_by(rig, work, Traversal::kListed, before, 0);
-    EXPECT_EQ(evaluate_by(rig, work, Traversal::kListed, raw, 0).joints, expected.joints);
+    for (const Traversal way : {Traversal::kListed, Traversal::kAdded}) {
+      evaluate_by(rig, work, way, before, 0);
+      EXPECT_EQ(evaluate_by(rig, work, way, raw, 0).joints, expected.joints);
+    }
     Pose all = make_pose(rig);
     all.joints.resize(all.joints.size() * simd::kFrames);
     all.controls.resize(all.controls.size() * simd::kFrames);
@@ -208,10 +212,12 @@ TEST_P(Traversals, KeepNanInTheGroupsThatHaveItAsAColumn) {
   const Pose clean = evaluate_by(rig, work, Traversal::kListed, raw, 0);
   raw[4] = kNan;
   const Pose listed = evaluate_by(rig, work, Traversal::kListed, raw, 0),
+             added = evaluate_by(rig, work, Traversal::kAdded, raw, 0),
              whole = evaluate_by(rig, work, Traversal::kWhole, raw, 0);
   std::size_t spoilt = 0;
   for (std::size_t i = 0; i < clean.joints.size(); ++i) {
     EXPECT_EQ(std::isnan(listed.joints[i]), std::isnan(whole.joints[i])) << i;
+    EXPECT_EQ(std::isnan(added.joints[i]), std::isnan(whole.joints[i])) << i;
     spoilt += std::isnan(whole.joints[i]) ? 1 : 0;
     if (!std::isnan(whole.joints[i])) {
       EXPECT_EQ(whole.joints[i], clean.joints[i]);
@@ -219,6 +225,8 @@ TEST_P(Traversals, KeepNanInTheGroupsThatHaveItAsAColumn) {
   }
   EXPECT_GT(spoilt, 0u);
   EXPECT_LT(spoilt, clean.joints.size());
+  raw = some_active(kRaw, 5);
+  EXPECT_EQ(evaluate_by(rig, work, Traversal::kAdded, raw, 0).joints, clean.joints);
 }
 
 // The last block of attributes is cut short where joints end; it may take several pieces.
@@ -237,6 +245,7 @@ TEST_P(Traversals, FillTheLastBlockAndNothingBehindIt) {
     const Rig rig = must_compile(dna, kernels_);
     Workspace work = make_batch_workspace(rig);
     EXPECT_EQ(evaluate_by(rig, work, Traversal::kListed, {1.0f, 0.0f}, 0).joints, expected);
+    EXPECT_EQ(evaluate_by(rig, work, Traversal::kAdded, {1.0f, 0.0f}, 0).joints, expected);
     std::vector<float> raw, all;
     for (std::size_t f = 0; f < simd::kFrames; ++f) {
       raw.insert(raw.end(), {static_cast<float>(f % 2), 0.0f});
@@ -285,6 +294,30 @@ TEST(Traversal, IsChosenByTheBytesThatItMoves) {
     evaluate_by(rig, work, Traversal::kCounted, raw, 0);
     EXPECT_EQ(work.whole_frames, 1u + eleven) << "everything rests";
   }
+}
+
+// With fewer than 64 active columns a group.
+TEST(Traversal, AddsTheColumnsOfFewControls) {
+  constexpr std::uint16_t kControls = 80, kColumnRows = 90;
+  dna::Dna dna = make_face(kControls, 0, 10, 1);
+  std::vector<std::uint16_t> inputs(kControls), outputs(kColumnRows);
+  for (std::uint16_t i = 0; i < kControls; ++i) inputs[i] = i;
+  for (std::uint16_t i = 0; i < kColumnRows; ++i) outputs[i] = i;
+  const std::vector<float> values(std::size_t{kColumnRows} * kControls, 1.0f);
+  dna.behavior.joint_groups = std::vector{make_group({kColumnRows}, inputs, outputs, values)};
+  const Rig rig = must_compile(dna);
+  Workspace work = make_workspace(rig);
+  std::vector<float> raw(kControls, 0.0f);
+  std::fill_n(raw.begin(), 63, 1.0f);
+  evaluate_by(rig, work, Traversal::kCounted, raw, 0);
+  EXPECT_EQ(work.added_frames, 1u);
+  raw[63] = 1.0f;
+  evaluate_by(rig, work, Traversal::kCounted, raw, 0);
+  EXPECT_EQ(work.added_frames, 1u);
+  std::ranges::fill(raw, 1.0f);
+  evaluate_by(rig, work, Traversal::kCounted, raw, 0);
+  EXPECT_EQ(work.whole_frames, 1u);
+  EXPECT_EQ(work.added_frames, 1u);
 }
 
 TEST(Traversal, NeverReadsAColumnAtRestThatIsNotFinite) {

@@ -120,6 +120,44 @@ TEST_P(SimdKernels, SumWithinTheRoundingOfItsTerms) {
   }
 }
 
+// Column by column or group by group: each row has the same terms in the same order.
+TEST_P(SimdKernels, AddColumnsToTheBitsOfTheirSums) {
+  constexpr std::size_t kCount = 9;
+  constexpr float kOthers = 7.0f;
+  std::mt19937 random(12);
+  for (const std::size_t rows : kRows) {
+    const Matrix<float> m = random_matrix(rows, 2 * kCount, random);
+    const Matrix<std::uint16_t> half = halves(m);
+    const std::vector<float> weights = random_weights(kCount, random);
+    const std::vector<Column> columns = columns_of(every_second(kCount, rows), kCount);
+    // The second of three runs; the others are of rows that nothing is added to.
+    const std::size_t first = rounded_up(rows), end = first + rows;
+    const Rows runs[] = {{0, 1},
+                         {static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(rows)}};
+    for (const bool is_half : {false, true}) {
+      std::vector<float> sums(end + kWidest, kOthers), expected(rounded_up(rows));
+      std::fill(sums.begin() + std::ptrdiff_t(first), sums.begin() + std::ptrdiff_t(end), 0.0f);
+      for (const Column& c : columns) {
+        const Addend addend{c.offset, 1};
+        const float weight = weights[c.weight];
+        is_half
+            ? kernels_.add_half_columns(half.values.data(), &addend, 1, weight, runs, sums.data())
+            : kernels_.add_columns(m.values.data(), &addend, 1, weight, runs, sums.data());
+      }
+      is_half ? kernels_.half_columns(half.values.data(), columns.data(), kCount, weights.data(),
+                                      expected.data(), rows)
+              : kernels_.columns(m.values.data(), columns.data(), kCount, weights.data(),
+                                 expected.data(), rows);
+      for (std::size_t i = 0; i < sums.size(); ++i) {
+        const bool inside = first <= i && i < end;
+        ASSERT_EQ(std::bit_cast<std::uint32_t>(sums[i]),
+                  std::bit_cast<std::uint32_t>(inside ? expected[i - first] : kOthers))
+            << rows << " rows, " << i;
+      }
+    }
+  }
+}
+
 constexpr std::size_t kLengths[] = {0, 1, 2, 3, 7, 8, 9, 15, 16, 17, 31, 32, 33, 63, 64, 65, 200};
 
 template <class T>
@@ -235,7 +273,7 @@ TEST_P(SimdKernels, PlaceByTheBitsOfThePieces) {
         {static_cast<std::uint32_t>(random() % 3984), static_cast<std::uint16_t>(random()), 0});
   }
   std::vector<float> to(pieces.size() * kPlaces + 1, 7.0f);
-  kernels_.place(pieces.data(), pieces.size(), from.data(), to.data());
+  kernels_.place(pieces.data(), pieces.size(), {from.data(), 0, to.data(), 0, 1});
   for (std::size_t i = 0; i < pieces.size(); ++i) {
     std::uint32_t next = pieces[i].from;
     for (std::size_t p = 0; p < kPlaces; ++p) {
@@ -260,9 +298,33 @@ TEST_P(SimdKernels, PlaceMoreWithoutChangingOtherPlaces) {
     for (std::size_t p = 0; p < kPlaces; ++p) {
       if ((mask >> p & 1) != 0) expected[2 * kPlaces + p] = from[next++];
     }
-    kernels_.place_more(&piece, 1, from.data(), to.data());
+    kernels_.place_more(&piece, 1, {from.data(), 0, to.data(), 0, 1});
     ASSERT_EQ(to, expected) << "mask " << mask;
   }
+}
+
+// Frames lie apart, and what is between them is another's.
+TEST_P(SimdKernels, PlaceEachFrameAsIfItWereAlone) {
+  constexpr std::size_t kCount = 5, kPieces = 40, kRowStride = 700, kStride = kPieces * kPlaces + 3;
+  std::mt19937 random(10);
+  std::vector<float> from(kCount * kRowStride), all(kCount * kStride, 7.0f), expected = all;
+  for (float& v : from) v = static_cast<float>(random() % 1000);
+  std::vector<Piece> pieces, more;
+  for (std::uint16_t i = 0; i < kPieces; ++i) {
+    const auto row = [&] { return static_cast<std::uint32_t>(random() % (kRowStride - kPlaces)); };
+    pieces.push_back({row(), static_cast<std::uint16_t>(random()), i});
+    const auto mask =
+        static_cast<std::uint16_t>(i % 3 == 0 ? random() & 0xFFu : random() & 0xFF80u);
+    more.push_back({row(), mask, i});
+  }
+  kernels_.place(pieces.data(), kPieces, {from.data(), kRowStride, all.data(), kStride, kCount});
+  kernels_.place_more(more.data(), kPieces, {from.data(), kRowStride, all.data(), kStride, kCount});
+  for (std::size_t f = 0; f < kCount; ++f) {
+    const PlacedFrames one{from.data() + f * kRowStride, 0, expected.data() + f * kStride, 0, 1};
+    kernels_.place(pieces.data(), kPieces, one);
+    kernels_.place_more(more.data(), kPieces, one);
+  }
+  EXPECT_EQ(all, expected);
 }
 
 struct Turn {

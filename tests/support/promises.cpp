@@ -238,16 +238,19 @@ std::string batch(const rig::Rig& rig, const Controls& raw, std::uint32_t lod, b
 // sum at -0, which a column at rest makes 0.
 std::string traversals(const rig::Rig& rig, const Controls& raw, std::uint32_t lod, Origin origin) {
   rig::Workspace work = rig::make_workspace(rig);
-  rig::Pose listed = rig::make_pose(rig), whole = rig::make_pose(rig);
+  rig::Pose listed = rig::make_pose(rig), whole = listed, added = listed;
   work.traversal = rig::Traversal::kListed;
   rig::evaluate(rig, raw.data(), lod, true, work, listed);
+  work.traversal = rig::Traversal::kAdded;
+  rig::evaluate(rig, raw.data(), lod, true, work, added);
   work.traversal = rig::Traversal::kWhole;
   rig::evaluate(rig, raw.data(), lod, true, work, whole);
-  return origin == Origin::kForged ||
-                 std::ranges::equal(listed.joints, whole.joints,
-                                    [](float a, float b) { return a == b || (a != a && b != b); })
+  if (origin == Origin::kForged) return kKept;
+  const auto alike = [](float a, float b) { return a == b || (a != a && b != b); };
+  return std::ranges::equal(listed.joints, whole.joints, alike) &&
+                 std::ranges::equal(listed.joints, added.joints, alike)
              ? kKept
-             : "both ways through the columns give one pose";
+             : "all ways through the columns give one pose";
 }
 
 std::string instance(const rig::Rig& rig, const Controls& raw, std::uint32_t lod, Origin origin) {

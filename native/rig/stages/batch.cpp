@@ -37,10 +37,7 @@ class Block {
       float* weights = work_.frame_weights.data() + std::size_t{control} * kFrames;
       std::fill(weights, weights + kFrames, 0.0f);
     }
-    for (std::size_t f = 0; f < count_; ++f) {
-      detail::place_rows(rig_, lod, work_, work_.rows.data() + f * stride_,
-                         first_.joints + f * rig_.joint_count * rig_.joint_stride);
-    }
+    detail::place_rows(rig_, lod, work_, work_.rows.data(), first_.joints, count_);
   }
 
   /// Adds a frame's controls to those of the block.

@@ -19,8 +19,8 @@ constexpr std::uint64_t kListed =
 // column at rest adds 0 * k to sums that begin at +0, which changes no bit.
 bool reads_whole(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> active,
                  const Workspace& work) noexcept {
-  if (work.traversal == Traversal::kListed || rig.control_reads.empty()) return false;
-  if (work.traversal == Traversal::kWhole) return true;
+  if (rig.control_reads.empty()) return false;
+  if (work.traversal != Traversal::kCounted) return work.traversal == Traversal::kWhole;
   const ControlReads* reads = rig.control_reads.data() + lod * (std::size_t{rig.control_count} + 1);
   const ControlReads& all = reads[rig.control_count];
   std::uint64_t values = 0, columns = 0;
@@ -47,6 +47,55 @@ void list_active(const Rig& rig, std::uint32_t live, std::span<const std::uint16
     for (; at < end && at->group < live; ++at) {
       columns[ends[at->group]++] = {at->offset, control};
     }
+  }
+}
+
+// Whether so few columns are active that they are added in the order of memory: no list is made and
+// no group's kernel begun, but a sum is read and written with each column. Measured on two faces
+// (AVX2): an evaluation takes 0.8 of the time of listing with 4 columns a group, 0.96 and 0.9 with
+// 11 and 14, 0.92 to 0.98 with 33 to 57, and up to 1.06 with 75 and more.
+bool adds(const Rig& rig, std::span<const std::uint16_t> active, const Workspace& work) noexcept {
+  constexpr std::size_t kFewInAGroup = 64;
+  if (work.traversal != Traversal::kCounted) return work.traversal == Traversal::kAdded;
+  std::size_t columns = 0;
+  for (const std::uint16_t control : active) {
+    columns += rig.joint_column_begins[control + std::size_t{1}] - rig.joint_column_begins[control];
+  }
+  return columns < kFewInAGroup * rig.joint_groups.size();
+}
+
+// Adds the columns of each active control to work.sums, and marks their groups as list_active does.
+// A row has its terms by ascending control here too.
+void add_active(const Rig& rig, std::uint32_t lod, Workspace& work,
+                const float* controls) noexcept {
+  const std::uint32_t live = rig.live_groups[lod];
+  const simd::Rows* rows = work.group_rows.data() + lod * rig.joint_groups.size();
+  std::uint32_t* ends = work.column_ends.data();
+  for (std::uint32_t i = 0; i < live; ++i) ends[i] = rig.joint_groups[i].columns_begin;
+  for (std::size_t a = 0; a < work.active_count; ++a) {
+    const std::uint16_t control = work.active[a];
+    const JointColumn* begin = rig.joint_columns.data() + rig.joint_column_begins[control];
+    const JointColumn* end =
+        rig.joint_columns.data() + rig.joint_column_begins[control + std::size_t{1}];
+    const JointColumn* at = begin;
+    for (; at < end && at->group < live; ++at) ++ends[at->group];
+    const auto n = static_cast<std::size_t>(at - begin);
+    if (rig.is_half()) {
+      rig.kernels->add_half_columns(rig.joint_halves.data(), begin, n, controls[control], rows,
+                                    work.sums.data());
+    } else {
+      rig.kernels->add_columns(rig.joint_values.data(), begin, n, controls[control], rows,
+                               work.sums.data());
+    }
+  }
+}
+
+// The sums of groups that moved become 0 again.
+void clear_sums(const Rig& rig, std::uint32_t lod, Workspace& work) noexcept {
+  const simd::Rows* rows = work.group_rows.data() + lod * rig.joint_groups.size();
+  for (std::size_t n = 0; n < work.live_count; ++n) {
+    const simd::Rows& run = rows[work.live[n]];
+    std::fill_n(work.sums.begin() + run.begin, run.count, 0.0f);
   }
 }
 
@@ -113,14 +162,13 @@ void mark_blocks(const Rig& rig, std::uint32_t lod, Workspace& work) noexcept {
   work.live_count = n;
 }
 
-// Places runs of blocks of one LOD, ascending.
+// Places runs of blocks of one LOD, ascending, of all frames.
 class Placer {
  public:
-  Placer(const Rig& rig, std::uint32_t lod, const float* rows, float* joints)
+  Placer(const Rig& rig, std::uint32_t lod, const float* rows, float* joints, std::size_t frames)
       : rig_(rig),
-        rows_(rows),
-        joints_(joints),
         places_(std::size_t{rig.joint_count} * rig.joint_stride),
+        frames_{rows, detail::rows_size(rig), joints, places_, frames},
         pieces_(rig.joint_pieces.data() + lod * blocks()),
         extra_(rig.extra_pieces.data() + rig.extra_begins[lod]),
         extra_end_(rig.extra_pieces.data() + rig.extra_begins[lod + 1]) {}
@@ -129,17 +177,22 @@ class Placer {
   // Extra pieces add to places that the first ones left at 0.
   void place(std::size_t first, std::size_t end) noexcept {
     const std::size_t whole = std::min(end, places_ / simd::kPlaces);
-    rig_.kernels->place(pieces_ + first, whole - first, rows_, joints_ + first * simd::kPlaces);
+    simd::PlacedFrames frames = frames_;
+    frames.to += first * simd::kPlaces;
+    rig_.kernels->place(pieces_ + first, whole - first, frames);
     const simd::Piece* from = extra_before(first);
     const simd::Piece* to = extra_before(whole);
     if (from < to) {
-      rig_.kernels->place_more(from, static_cast<std::size_t>(to - from), rows_, joints_);
+      rig_.kernels->place_more(from, static_cast<std::size_t>(to - from), frames_);
     }
-    if (whole < end) place_last(whole);
+    for (std::size_t f = 0; f < frames_.count && whole < end; ++f) place_last(whole, f);
   }
   void rest(std::size_t first, std::size_t end) noexcept {
-    std::fill(joints_ + first * simd::kPlaces, joints_ + std::min(places_, end * simd::kPlaces),
-              0.0f);
+    for (std::size_t f = 0; f < frames_.count; ++f) {
+      float* joints = frames_.to + f * places_;
+      std::fill(joints + first * simd::kPlaces, joints + std::min(places_, end * simd::kPlaces),
+                0.0f);
+    }
   }
 
  private:
@@ -156,20 +209,21 @@ class Placer {
     return extra_;
   }
   // The last block where it is cut short: what is behind it is another's.
-  void place_last(std::size_t block) noexcept {
+  void place_last(std::size_t block, std::size_t frame) noexcept {
     float last[simd::kPlaces];
-    rig_.kernels->place(pieces_ + block, 1, rows_, last);
-    for (; extra_ < extra_end_; ++extra_) {
-      const simd::Piece more{extra_->from, extra_->mask, 0};
-      rig_.kernels->place_more(&more, 1, rows_, last);
+    const simd::PlacedFrames one{frames_.from + frame * frames_.from_stride, 0, last, 0, 1};
+    rig_.kernels->place(pieces_ + block, 1, one);
+    for (const simd::Piece* extra = extra_; extra < extra_end_; ++extra) {
+      const simd::Piece more{extra->from, extra->mask, 0};
+      rig_.kernels->place_more(&more, 1, one);
     }
-    std::copy_n(last, places_ % simd::kPlaces, joints_ + block * simd::kPlaces);
+    std::copy_n(last, places_ % simd::kPlaces,
+                frames_.to + frame * places_ + block * simd::kPlaces);
   }
 
   const Rig& rig_;
-  const float* rows_;
-  float* joints_;
   std::size_t places_;
+  simd::PlacedFrames frames_;
   const simd::Piece* pieces_;
   const simd::Piece *extra_, *extra_end_;
 };
@@ -195,8 +249,8 @@ const simd::Column* list_columns(const Rig& rig, std::uint32_t lod,
 }
 
 void place_rows(const Rig& rig, std::uint32_t lod, Workspace& work, const float* rows,
-                float* joints) noexcept {
-  Placer placer(rig, lod, rows, joints);
+                float* joints, std::size_t frames) noexcept {
+  Placer placer(rig, lod, rows, joints, frames);
   const std::size_t blocks = placer.blocks();
   const auto live = [&](std::size_t w) { return work.live_blocks[w]; };
   for_runs(blocks, live, [&](std::size_t first, std::size_t end) { placer.place(first, end); });
@@ -209,10 +263,12 @@ void place_rows(const Rig& rig, std::uint32_t lod, Workspace& work, const float*
   }
 }
 
-void joint_groups(const Rig& rig, std::uint32_t lod, Workspace& work,
-                  const PoseView& pose) noexcept {
-  const simd::Column* columns =
-      list_columns(rig, lod, {work.active.data(), work.active_count}, work);
+namespace {
+
+// Out: work.rows, by group, and what list_columns leaves
+void sum_listed(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> active,
+                Workspace& work, const float* controls) noexcept {
+  const simd::Column* columns = list_columns(rig, lod, active, work);
   for (std::size_t n = 0; n < work.live_count; ++n) {
     const std::uint32_t i = work.live[n];
     const JointGroup& g = rig.joint_groups[i];
@@ -222,14 +278,30 @@ void joint_groups(const Rig& rig, std::uint32_t lod, Workspace& work,
     if (count == 0) {
       std::fill(out, out + rows, 0.0f);
     } else if (rig.is_half()) {
-      rig.kernels->half_columns(rig.joint_halves.data(), columns + g.columns_begin, count,
-                                pose.controls, out, rows);
+      rig.kernels->half_columns(rig.joint_halves.data(), columns + g.columns_begin, count, controls,
+                                out, rows);
     } else {
-      rig.kernels->columns(rig.joint_values.data(), columns + g.columns_begin, count, pose.controls,
-                           out, rows);
+      rig.kernels->columns(rig.joint_values.data(), columns + g.columns_begin, count, controls, out,
+                           rows);
     }
   }
-  place_rows(rig, lod, work, work.rows.data(), pose.joints);
+}
+
+}  // namespace
+
+void joint_groups(const Rig& rig, std::uint32_t lod, Workspace& work,
+                  const PoseView& pose) noexcept {
+  const std::span<const std::uint16_t> active(work.active.data(), work.active_count);
+  if (adds(rig, active, work) && !reads_whole(rig, lod, active, work)) {
+    ++work.added_frames;
+    add_active(rig, lod, work, pose.controls);
+    mark_blocks(rig, lod, work);
+    place_rows(rig, lod, work, work.sums.data(), pose.joints, 1);
+    clear_sums(rig, lod, work);
+  } else {
+    sum_listed(rig, lod, active, work, pose.controls);
+    place_rows(rig, lod, work, work.rows.data(), pose.joints, 1);
+  }
 }
 
 }  // namespace detail

@@ -75,9 +75,9 @@ inline void store_rotation(const Rig& rig, const Quaternion& q, float* to) noexc
 
 /// Brings the rows of all groups to their joint attributes; attributes without a row, and those of
 /// blocks that rest, become 0. Where work.shown_blocks is kept, blocks that rested before are 0.
-/// In:  rows    [rows of all groups] and a vector more
+/// In:  rows    [frames, rows_size]
 ///      work    as list_columns left it
-/// Out: joints  [joints, stride]
+/// Out: joints  [frames, joints, stride]
 void place_rows(const Rig& rig, std::uint32_t lod, Workspace& work, const float* rows,
-                float* joints) noexcept;
+                float* joints, std::size_t frames) noexcept;
 }  // namespace risorius::rig::detail
