@@ -51,6 +51,8 @@ struct alignas(128) Workspace {
   // Nobody reads this. A sum of values is stored here so that the compiler keeps the reads, which
   // bring memory into the cache.
   std::uint32_t touched = 0;
+  // In a batch: the frame before has read what most of this one needs.
+  bool warm = false;
   // Correctives.
   std::vector<std::uint16_t> candidates;  // watched correctives whose factors are not known to be 0
   std::vector<std::uint64_t> psd_bits;    // a bit for each corrective control that is not 0

@@ -91,8 +91,10 @@ void evaluate_block(const Rig& rig, const float* raw, std::size_t count, std::ui
     const PoseView pose = frame_of(rig, first, f);
     detail::begin(rig, raw + f * rig.raw_count, lod, settle, work, pose.controls);
     block.take(f);
+    work.warm = true;
     detail::channels_and_maps(rig, lod, work, pose);
   }
+  work.warm = false;
   block.joints(lod);
   for (std::size_t f = 0; f < count; ++f) {
     detail::rotations(rig, lod, work, frame_of(rig, first, f));

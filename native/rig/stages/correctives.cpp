@@ -105,7 +105,7 @@ std::uint32_t touch_column(const Rig& rig, std::uint32_t column) noexcept {
 
 // Reads one value of everything that these controls will need. None of these reads waits for
 // another, so with cold caches they are on their way at once, and the pages are known when the
-// columns are read.
+// columns are read. Frames of a batch need mostly the same: the first one asks for it.
 void touch(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> controls,
            Workspace& work) noexcept {
   const std::uint32_t* watches =
@@ -132,7 +132,7 @@ void start_correctives(const Rig& rig, std::uint32_t lod, Workspace& work,
   std::fill(controls + rig.raw_count, controls + rig.raw_count + rig.psd_count, 0.0f);
   std::fill(work.psd_bits.begin(), work.psd_bits.end(), 0u);
   const std::size_t n = list_sources(rig, controls, work);
-  touch(rig, lod, {work.active.data(), n}, work);
+  if (!work.warm) touch(rig, lod, {work.active.data(), n}, work);
   Correctives(rig, work, controls).watched(lod, {work.active.data(), n});
 }
 
