@@ -89,10 +89,12 @@ class SkinChecker {
   /// In: allowed  of the same skin; what is no worse is no fault
   /// Fails: kInvalidLength (of another skin)
   core::Result<FaultSums> sum(const SkinFaults& faults, const SkinFaults& allowed) const;
-  /// A motion after which the pose has no faults beyond `allowed`, or fewer; no sum is worse
-  /// afterwards. Near faults alone (kAround) parts of the pose are undone, those first that do
-  /// little there; what that leaves is pushed out softly. In: without  [parts][V] where the skin
-  /// lies without each part of the pose Fails: as look
+  /// A motion after which the pose has no faults beyond `allowed`, or fewer. No sum is worse
+  /// afterwards, nor the deepest place of all by 0.1 mm or the widest face by 1 %, allowed ones
+  /// too. Near faults alone (kAround) parts of the pose are undone, those first that do little
+  /// there; what that leaves is pushed out softly. Vertices without a fault keep nine tenths of
+  /// their ways, unless that would bring a fault. In: without  [parts][V] where the skin lies
+  /// without each part of the pose Fails: as look
   core::Result<Repair> repair(const SkinPose& pose, const SkinFaults& allowed,
                               const std::vector<std::vector<Vector3>>& without) const;
 

@@ -13,6 +13,7 @@ import pytest
 import risorius
 from risorius.author import RigOptions, combinations, make_joint_rig
 from risorius.author.correctives import CorrectiveOptions, add_correctives, find_correctives
+from risorius.author.correctives.poser import make_checker, worst
 from risorius.author.correctives.search import triples_of
 from risorius.author.fitting import FitOptions
 
@@ -278,6 +279,37 @@ def test_the_written_file_stays_out_of_the_ball_at_every_level(corrected, names)
         assert np.abs(posed[away] - linear[away]).max() < 1e-3
         least = np.min([push(plain, *PUSHES[name])[:, 1] for name in names], axis=0)
         assert (posed[:, 1] <= least + 0.05).all()
+
+
+@pytest.mark.parametrize("names", [("a", "b"), ("b", "d")])
+def test_what_stays_out_of_the_ball_keeps_nine_tenths_of_its_way(corrected, names):
+    _, read = corrected
+    plain, _ = sheet(SIDE)
+    way = sum(push(plain, *PUSHES[name]) for name in names)[:, 1]
+    free = (depth(plain + way[:, None] * [0, 1, 0]) <= 0.1) & (way < -0.2)
+    assert free.sum() > 200
+    kept = (skin_of(read, at_one(*names)) - plain)[free, 1] / way[free]
+    assert kept.min() > 0.9
+
+
+def test_undoing_one_part_does_not_bring_what_the_other_has_alone(face):
+    checker, (plain, _), (solid, _) = make_checker(face, 0, [1]), sheet(SIDE), ball()
+
+    def look(skin):
+        return checker.look(skin / 10, [solid / 10])
+
+    # Beside the fault, 0.35 mm in the middle, the part that is undone holds the other one up by
+    # 6 mm. What both do elsewhere makes it cheap to undo.
+    rest = plain + push(plain, -15.0, 5.0, -7.0)
+    alone, both = rest + push(plain, 6.0, 2.5, 4.0), rest + push(plain, 1.35, 4.0)
+    allowed = worst([look(plain), look(alone)])
+    moved, before, after = checker.repair(both / 10, [solid / 10], allowed, [alone / 10])
+    assert before.volume > 0
+    assert after.volume == 0
+    assert np.asarray(look(alone).depth).max() > 4
+    assert (
+        np.asarray(look(both + 10 * moved).depth).max() < np.asarray(look(both).depth).max() + 0.1
+    )
 
 
 def test_lashes_go_with_the_skin(corrected):

@@ -140,7 +140,9 @@ core::Result<SkinFaults> SkinChecker::look(const SkinPose& pose) const {
   const auto& topology = impl_->topology;
   auto here = placed(topology, pose);
   if (!here) return std::move(here).propagate();
-  return find_faults(topology, *here, find_contacts(topology, topology.whole, *here));
+  const detail::SolidSurfaces solids(topology, *here);
+  return find_faults(topology, here->skin,
+                     find_contacts(topology, topology.whole, solids, here->skin));
 }
 
 core::Result<FaultSums> SkinChecker::sum(const SkinFaults& faults,

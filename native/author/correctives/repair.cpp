@@ -17,10 +17,17 @@ constexpr std::size_t kFades = 9, kSteps = 6;  // a part is undone in so many
 constexpr double kUndone = 2.0;   // what all undone motion costs; all faults of a kind cost 1
 constexpr double kEnough = 0.15;  // a cost at which nothing else is tried
 constexpr double kWhole = 2.0;    // mm around a fault that are undone alike
+constexpr double kNarrow = 5.0;   // mm within which it is tried first: less is held back
 constexpr std::size_t kRounds = 6;
 // What an asked place, an asked edge, an asked evenness and rest weigh beside smoothness.
 constexpr double kPlace = 1.0, kEdge = 1.0, kEven = 0.5, kRest = 0.002;
 constexpr double kBeyond = 0.5;  // of kDepth: faults end well within what is left alone
+// What is given back where nothing is wrong: up to this share of the vertex' way, less by so much
+// in each round near what that makes wrong.
+constexpr double kKept = 0.91, kLess = 0.2;
+constexpr std::size_t kBacks = 12;
+// The worst place of all may be deeper by so many mm, the widest face wider by this factor.
+constexpr float kDeeper = 0.09f, kWider = 1.005f;
 
 using Rows = Eigen::Matrix<double, Eigen::Dynamic, 3>;
 
@@ -36,17 +43,19 @@ struct Asked {
 struct Work {
   const Topology& topology;
   const Placed& pose;
-  const SkinFaults& allowed;
-  std::vector<std::uint32_t> active;  // vertices that may move
-  std::vector<std::uint32_t> place;   // [V] in active, or kStill
-  std::vector<Vec3> x;                // [V] mm
+  const SolidSurfaces& solids;
+  SkinFaults allowed;
+  float deepest = 0.0f, widest = 0.0f;  // of the pose, allowed ones too; widest: kStretch at least
+  std::vector<std::uint32_t> active;    // vertices that may move
+  std::vector<std::uint32_t> place;     // [V] in active, or kStill
+  std::vector<Vec3> x;                  // [V] mm
   Asked asked;
   Region region;  // what may change
   static constexpr std::uint32_t kStill = 0xffffffffu;
 
-  Placed moved() const {
-    Placed out = pose;
-    for (std::size_t v = 0; v < x.size(); ++v) out.skin[v] += x[v];
+  std::vector<Vec3> moved() const {
+    std::vector<Vec3> out = pose.skin;
+    for (std::size_t v = 0; v < x.size(); ++v) out[v] += x[v];
     return out;
   }
 };
@@ -58,10 +67,11 @@ struct Look {
   FaultSums sums;
 };
 
-Look look_at(const Work& work, const Region& region, const Placed& pose) {
+Look look_at(const Work& work, const Region& region) {
   Look out;
-  out.contacts = find_contacts(work.topology, region, pose);
-  out.faults = find_faults(work.topology, pose, out.contacts);
+  const std::vector<Vec3> skin = work.moved();
+  out.contacts = find_contacts(work.topology, region, work.solids, skin);
+  out.faults = find_faults(work.topology, skin, out.contacts);
   out.sums = sum_faults(work.topology, out.faults, work.allowed);
   return out;
 }
@@ -128,11 +138,12 @@ void ask_contacts(Work& work, const Look& look) {
   for (const auto& [v, sum] : sums) work.asked.places[v] = work.x[v] + sum.first / sum.second;
 }
 
-/// Faces that are too large: their edges are to be shorter.
-void ask_stretched(Work& work, const Look& look, const Placed& now) {
+/// Faces that are too large, or larger than any was: their edges are to be shorter.
+void ask_stretched(Work& work, const Look& look, const std::vector<Vec3>& now) {
   const Topology& topology = work.topology;
   for (std::size_t f = 0; f < topology.face_count(); ++f) {
-    if (!is_stretched(topology, look.faults, work.allowed, f)) continue;
+    const bool is_wider = look.faults.stretch[f] > kWider * work.widest;
+    if (!is_wider && !is_stretched(topology, look.faults, work.allowed, f)) continue;
     const double limit =
         0.97 * std::max(double{SkinChecker::kStretch}, double{work.allowed.stretch[f]});
     const double size = std::sqrt(limit / double{look.faults.stretch[f]});
@@ -141,7 +152,7 @@ void ask_stretched(Work& work, const Look& look, const Placed& now) {
     for (std::uint32_t c = begin; c < end; ++c) {
       const std::uint32_t a = topology.skin.corners[c];
       const std::uint32_t b = topology.skin.corners[c + 1 == end ? begin : c + 1];
-      const Vec3 wanted = size * (now.skin[a] - now.skin[b]);
+      const Vec3 wanted = size * (now[a] - now[b]);
       work.asked.edges[{a, b}] = wanted - (work.pose.skin[a] - work.pose.skin[b]);
     }
   }
@@ -158,7 +169,7 @@ Vec3 beside(const Topology& topology, const std::vector<Vec3>& positions, std::u
 }
 
 /// A fold opens where vertices come to the middle of those around, as far as they lay there.
-void ask_folded(Work& work, const Look& look, const Placed& now) {
+void ask_folded(Work& work, const Look& look, const std::vector<Vec3>& now) {
   const Topology& topology = work.topology;
   for (std::size_t h = 0; h < topology.hinges.size(); ++h) {
     if (!is_folded(look.faults, work.allowed, h)) continue;
@@ -166,10 +177,10 @@ void ask_folded(Work& work, const Look& look, const Placed& now) {
       const std::uint32_t end = topology.skin.face_offsets[f + 1];
       for (std::uint32_t c = topology.skin.face_offsets[f]; c < end; ++c) {
         const std::uint32_t v = topology.skin.corners[c];
-        const Vec3 off = beside(topology, now.skin, v);
+        const Vec3 off = beside(topology, now, v);
         const double rest = beside(topology, topology.neutral, v).norm();
         const double kept = 0.5 * std::min(1.0, rest / std::max(off.norm(), 1e-9));
-        work.asked.even[v] = now.skin[v] - (1.0 - kept) * off - work.pose.skin[v];
+        work.asked.even[v] = now[v] - (1.0 - kept) * off - work.pose.skin[v];
       }
     }
   }
@@ -220,9 +231,15 @@ void solve(Work& work, const std::vector<Vec3>& base) {
   for (const std::uint32_t v : work.active) work.x[v] = base[v] + found.row(at(v)).transpose();
 }
 
-bool is_no_worse(const FaultSums& a, const FaultSums& b) {
-  return a.volume <= b.volume && a.deepest <= b.deepest + 0.01 && a.stretched <= b.stretched &&
-         a.widest <= 1.005 * b.widest && a.folded <= b.folded;
+/// Whether no sum is worse, nor the deepest place and the widest face of all: what one part has
+/// alone is no fault, but undoing the other must not bring it.
+bool is_no_worse(const Work& work, const Look& now, const FaultSums& before) {
+  const FaultSums& a = now.sums;
+  return a.volume <= before.volume && a.deepest <= before.deepest + 0.01 &&
+         a.stretched <= before.stretched && a.widest <= 1.005 * before.widest &&
+         a.folded <= before.folded &&
+         std::ranges::max(now.faults.depth) <= work.deepest + kDeeper &&
+         std::ranges::max(now.faults.stretch) <= kWider * work.widest;
 }
 
 /// How much of what was wrong is left; 0 where nothing is.
@@ -233,9 +250,9 @@ double share_left(const FaultSums& now, const FaultSums& before) {
   return out;
 }
 
-/// How much of an undoing a vertex takes: all of it at a fault, none kAround away.
-double fading(double distance) {
-  const double t = std::clamp((distance - kWhole) / (SkinChecker::kAround - kWhole), 0.0, 1.0);
+/// How much of an undoing a vertex takes: all of it at a fault, none `reach` away.
+double fading(double distance, double reach) {
+  const double t = std::clamp((distance - kWhole) / (reach - kWhole), 0.0, 1.0);
   return 1.0 - t * t * (3.0 - 2.0 * t);
 }
 
@@ -244,9 +261,12 @@ struct Best {
   std::vector<Vec3> x;
   FaultSums sums;
   double left = 0.0, cost = 0.0;
+  // The same of all that was looked at, even if something is worse there: pushed out of that it may
+  // be the best.
+  std::vector<Vec3> any;
+  double any_cost = 0.0;
 
   void take(const Work& work, const Look& look, const FaultSums& before) {
-    if (!is_no_worse(look.sums, before)) return;
     double undone = 0.0, moved = 0.0;
     for (const std::uint32_t v : work.active) {
       undone += work.x[v].squaredNorm();
@@ -254,7 +274,11 @@ struct Best {
     }
     const double here = share_left(look.sums, before);
     const double whole = here + kUndone * undone / std::max(moved, 1e-9);
-    if (whole >= cost) return;
+    if (whole < any_cost) {
+      any_cost = whole;
+      any = work.x;
+    }
+    if (whole >= cost || !is_no_worse(work, look, before)) return;
     cost = whole;
     left = here;
     sums = look.sums;
@@ -263,7 +287,8 @@ struct Best {
 };
 
 /// Undoes a part where faults are, further and further until there are none.
-void fade(Work& work, const Look& first, const std::vector<Vec3>& undo, Best& best) {
+/// In: reach  mm around a fault
+void fade(Work& work, const Look& first, const std::vector<Vec3>& undo, double reach, Best& best) {
   const auto& neutral = work.topology.neutral;
   std::map<std::uint32_t, double> seeds;
   Look look = first;
@@ -277,11 +302,11 @@ void fade(Work& work, const Look& first, const std::vector<Vec3>& undo, Best& be
       double share = 0.0;
       for (const auto& [seed, whole] : seeds) {
         const double away = (neutral[v] - neutral[seed]).norm();
-        if (away < SkinChecker::kAround) share = std::max(share, whole * fading(away));
+        if (away < reach) share = std::max(share, whole * fading(away, reach));
       }
       work.x[v] = share * undo[v];
     }
-    look = look_at(work, work.region, work.moved());
+    look = look_at(work, work.region);
     best.take(work, look, first.sums);
     if (share_left(look.sums, first.sums) == 0.0) return;
   }
@@ -309,46 +334,124 @@ std::vector<std::vector<Vec3>> ways_back(const Placed& pose,
   return out;
 }
 
-/// Pushes what is left out of what it is in, softly, from the best that there is.
-void polish(Work& work, const Look& first, Best& best) {
-  if (best.x.empty()) best.x.assign(work.x.size(), Vec3::Zero());
-  work.x = best.x;
-  const std::vector<Vec3> base = best.x;
+/// Pushes what is left out of what it is in, softly. In: base  from there
+void polish(Work& work, const Look& first, const std::vector<Vec3>& base, Best& best) {
+  work.x = base;
   work.asked = {};
-  for (std::size_t r = 0; r < kRounds; ++r) {
-    const Placed now = work.moved();
-    const Look look = look_at(work, work.region, now);
+  for (std::size_t r = 0; r <= kRounds; ++r) {
+    const Look look = look_at(work, work.region);
     if (r > 0) best.take(work, look, first.sums);
-    if (best.left == 0.0) return;
+    if (best.left == 0.0 || r == kRounds) return;
+    const std::vector<Vec3> now = work.moved();
     ask_contacts(work, look);
     ask_stretched(work, look, now);
     ask_folded(work, look, now);
     solve(work, base);
   }
-  best.take(work, look_at(work, work.region, work.moved()), first.sums);
+}
+
+/// What vertices without a fault lack of kKept of their ways. In: x  where they are held
+/// Out: [V], all 0 where nothing lacks
+std::vector<Vec3> lacking(const Work& work, const std::vector<std::uint32_t>& faults,
+                          const std::vector<Vec3>& x) {
+  std::vector<Vec3> out(x.size(), Vec3::Zero());
+  for (const std::uint32_t v : work.active) {
+    if (std::ranges::binary_search(faults, v)) continue;
+    const Vec3 way = work.pose.skin[v] - work.topology.neutral[v];
+    const double kept = 1.0 + x[v].dot(way) / std::max(way.squaredNorm(), 1e-9);
+    if (kept < kKept) out[v] = (kKept - kept) * way;
+  }
+  return out;
+}
+
+/// Where nothing is wrong a corrective is to undo nothing: what it does there, so that it ends
+/// softly, is taken from it as far as that brings no new fault.
+void give_back(Work& work, const Look& first, const std::vector<std::uint32_t>& faults,
+               Best& best) {
+  const Topology& topology = work.topology;
+  const std::vector<Vec3> held = best.x, more = lacking(work, faults, held);
+  if (std::ranges::all_of(more, [](const Vec3& m) { return m.isZero(0.0); })) return;
+  std::vector<double> share(held.size(), 1.0);
+  for (std::size_t r = 0; r < kBacks; ++r) {
+    for (const std::uint32_t v : work.active) work.x[v] = held[v] + share[v] * more[v];
+    const Look look = look_at(work, work.region);
+    if (share_left(look.sums, first.sums) <= best.left && is_no_worse(work, look, first.sums)) {
+      return best.take(work, look, first.sums);
+    }
+    std::vector<std::uint32_t> near = fault_vertices(work, look);
+    for (std::size_t i = 0, count = near.size(); i < count; ++i) {
+      const auto begin = topology.neighbours.begin();
+      near.insert(near.end(), begin + topology.first_neighbour[near[i]],
+                  begin + topology.first_neighbour[near[i] + 1]);
+    }
+    std::ranges::sort(near);
+    near.erase(std::unique(near.begin(), near.end()), near.end());
+    for (const std::uint32_t v : near) share[v] = std::max(0.0, share[v] - kLess);
+  }
+}
+
+/// The best of all ways, looked at in the work's region. Out: x is empty where nothing helps
+Best mend(Work& work, const Look& first, const std::vector<std::uint32_t>& faults,
+          const std::vector<std::vector<Vec3>>& ways) {
+  Best best;
+  const double whole = share_left(first.sums, first.sums);
+  best.left = best.cost = best.any_cost = whole;
+  best.x = best.any = std::vector<Vec3>(work.x.size(), Vec3::Zero());
+  for (const double reach : {kNarrow, SkinChecker::kAround}) {
+    for (const std::vector<Vec3>& undo : ways) {
+      if (best.cost > kEnough) fade(work, first, undo, reach, best);
+    }
+  }
+  const std::vector<Vec3> base = best.x, other = best.any;
+  if (best.left > 0.0) polish(work, first, base, best);
+  if (best.left > 0.0 && other != base) polish(work, first, other, best);
+  if (best.left >= whole) return {};
+  give_back(work, first, faults, best);
+  return best;
+}
+
+/// Whether nothing is worse in all of the skin, which is looked at once more: skin that rests
+/// beside the region may have been gone into. In: allowed  by what the caller counts
+bool settle(Work& work, const Look& first, const SkinFaults& allowed, Best& best) {
+  work.x = best.x;
+  const Look look = look_at(work, work.topology.whole);
+  if (!is_no_worse(work, look, first.sums)) return false;
+  best.sums = sum_faults(work.topology, look.faults, allowed);
+  return true;
+}
+
+/// What one part may have alone, no more of it than the pose has anywhere.
+void limit(Work& work, const SkinFaults& first) {
+  work.deepest = std::ranges::max(first.depth);
+  work.widest = std::max(SkinChecker::kStretch, std::ranges::max(first.stretch));
+  for (float& depth : work.allowed.depth) depth = std::min(depth, work.deepest);
+  for (float& stretch : work.allowed.stretch) stretch = std::min(stretch, work.widest);
 }
 
 }  // namespace
 
 Repair repair_pose(const Topology& topology, const Placed& pose, const SkinFaults& allowed,
                    const std::vector<std::vector<Vec3>>& without) {
-  Work work{topology, pose, allowed, {}, {}, {}, {}, {}};
+  const SolidSurfaces solids(topology, pose);
+  Work work{topology, pose, solids, allowed, 0.0f, 0.0f, {}, {}, {}, {}, {}};
   work.x.assign(topology.neutral.size(), Vec3::Zero());
-  const Look first = look_at(work, topology.whole, pose);
+  const Look first = look_at(work, topology.whole);
   Repair out;
   out.before = out.after = first.sums;
   out.displacement.assign(topology.neutral.size(), Vector3{});
   const auto faults = fault_vertices(work, first);
   if (faults.empty()) return out;
+  limit(work, first.faults);
   mark(work, faults);
+  const auto ways = ways_back(pose, without);
   work.region = region_around(topology, pose, work.active);
-  Best best;
-  best.left = best.cost = share_left(first.sums, first.sums);
-  for (const std::vector<Vec3>& undo : ways_back(pose, without)) {
-    if (best.cost > kEnough) fade(work, first, undo, best);
+  Best best = mend(work, first, faults, ways);
+  if (!best.x.empty() && !settle(work, first, allowed, best)) {
+    work.region = topology.whole;  // slower, and rare
+    best = mend(work, first, faults, ways);
+    if (!best.x.empty() && !settle(work, first, allowed, best)) best.x.clear();
   }
-  if (best.left > 0.0) polish(work, first, best);
-  if (best.left >= share_left(first.sums, first.sums)) return out;
+  if (best.x.empty()) return out;
   out.after = best.sums;
   for (std::size_t v = 0; v < best.x.size(); ++v) {
     for (std::size_t k = 0; k < 3; ++k) {

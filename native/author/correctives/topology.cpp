@@ -120,14 +120,14 @@ void keep_deeper(std::vector<Contact>& best, const Contact& found) {
 }
 
 void touch_solid(const Topology& topology, const Region& region, std::size_t number,
-                 const Placed& pose, std::vector<Contact>& best) {
+                 const SolidSurfaces& solids, const std::vector<Vec3>& skin,
+                 std::vector<Contact>& best) {
   const Skin::Solid& solid = topology.skin.solids[number];
-  const std::vector<Vec3>& positions = pose.solids[number];
   if (solid.triangles.empty()) return;
-  const std::vector<Vec3> normals = vertex_normals(solid.triangles, positions);
-  const Nearest nearest(solid.triangles, positions);
+  const std::vector<Vec3>& normals = solids.normals[number];
+  const Nearest& nearest = solids.trees[number];
   for (const std::uint32_t v : region.vertices) {
-    const Vec3& p = pose.skin[v];
+    const Vec3& p = skin[v];
     const auto hit = nearest.find(p, kReach, [](std::uint32_t) { return true; });
     if (!hit) continue;
     Vec3 normal = Vec3::Zero();
@@ -149,32 +149,31 @@ void touch_solid(const Topology& topology, const Region& region, std::size_t num
 
 /// The skin in itself: lips through lips, a lid through the other. What was behind the other
 /// surface when it rested is thin there, and touches nothing.
-void touch_skin(const Topology& topology, const Region& region, const Placed& pose,
+void touch_skin(const Topology& topology, const Region& region, const std::vector<Vec3>& skin,
                 std::vector<Contact>& best) {
-  const std::vector<Vec3> normals = vertex_normals(region.triangles, pose.skin);
-  const Nearest nearest(region.triangles, pose.skin);
+  const std::vector<Vec3> normals = vertex_normals(region.triangles, skin);
+  const Nearest nearest(region.triangles, skin);
   for (const std::uint32_t v : region.vertices) {
     // What rests is found by what moves into it.
-    if ((pose.skin[v] - topology.neutral[v]).squaredNorm() < 1e-4) continue;
+    if ((skin[v] - topology.neutral[v]).squaredNorm() < 1e-4) continue;
     const auto& near = topology.around[v];
     const auto takes = [&](std::uint32_t t) {
       const Triangle& corners = region.triangles[t];
       for (const std::uint32_t c : corners) {
         if (std::ranges::binary_search(near, c)) return false;
       }
-      const Vec3 facing = (pose.skin[corners[1]] - pose.skin[corners[0]])
-                              .cross(pose.skin[corners[2]] - pose.skin[corners[0]]);
+      const Vec3 facing =
+          (skin[corners[1]] - skin[corners[0]]).cross(skin[corners[2]] - skin[corners[0]]);
       if (facing.dot(normals[v]) > kOpposed * facing.norm()) return false;
       const Vec3 before = topology.neutral[v] - topology.neutral[corners[0]];
       return before.dot(topology.triangle_normals[region.numbers[t]]) > kInFront;
     };
-    const auto hit = nearest.find(pose.skin[v], kSkinReach, takes);
+    const auto hit = nearest.find(skin[v], kSkinReach, takes);
     if (!hit) continue;
     const Triangle& other = region.triangles[hit->triangle];
-    const Vec3 normal = (pose.skin[other[1]] - pose.skin[other[0]])
-                            .cross(pose.skin[other[2]] - pose.skin[other[0]])
-                            .normalized();
-    const double depth = (hit->point - pose.skin[v]).dot(normal);
+    const Vec3 normal =
+        (skin[other[1]] - skin[other[0]]).cross(skin[other[2]] - skin[other[0]]).normalized();
+    const double depth = (hit->point - skin[v]).dot(normal);
     // Beside the triangle's rim nothing says on which side it is.
     if (depth < 0.7 * hit->distance || depth <= 0.0) continue;
     keep_deeper(best, {v, static_cast<float>(depth), normal, true, other, hit->share});
@@ -244,13 +243,21 @@ Region region_around(const Topology& topology, const Placed& pose,
   return out;
 }
 
-std::vector<Contact> find_contacts(const Topology& topology, const Region& region,
-                                   const Placed& pose) {
-  std::vector<Contact> best(topology.neutral.size());
+SolidSurfaces::SolidSurfaces(const Topology& topology, const Placed& pose) {
   for (std::size_t s = 0; s < pose.solids.size(); ++s) {
-    touch_solid(topology, region, s, pose, best);
+    const std::vector<Triangle>& triangles = topology.skin.solids[s].triangles;
+    normals.push_back(vertex_normals(triangles, pose.solids[s]));
+    trees.emplace_back(triangles, pose.solids[s]);
   }
-  touch_skin(topology, region, pose, best);
+}
+
+std::vector<Contact> find_contacts(const Topology& topology, const Region& region,
+                                   const SolidSurfaces& solids, const std::vector<Vec3>& skin) {
+  std::vector<Contact> best(topology.neutral.size());
+  for (std::size_t s = 0; s < solids.trees.size(); ++s) {
+    touch_solid(topology, region, s, solids, skin, best);
+  }
+  touch_skin(topology, region, skin, best);
   std::erase_if(best, [](const Contact& c) { return !(c.depth > 0.0f); });
   return best;
 }
@@ -269,14 +276,14 @@ void face_shapes(const Topology& topology, const std::vector<Vec3>& positions,
   for (Vec3& n : normals) n.normalize();
 }
 
-SkinFaults find_faults(const Topology& topology, const Placed& pose,
+SkinFaults find_faults(const Topology& topology, const std::vector<Vec3>& skin,
                        const std::vector<Contact>& contacts) {
   SkinFaults out;
   out.depth.assign(topology.neutral.size(), 0.0f);
   for (const Contact& c : contacts) out.depth[c.vertex] = c.depth;
   std::vector<double> areas;
   std::vector<Vec3> normals;
-  face_shapes(topology, pose.skin, areas, normals);
+  face_shapes(topology, skin, areas, normals);
   for (std::size_t f = 0; f < areas.size(); ++f) {
     const double before = std::max(topology.face_areas[f], 1e-6);
     out.stretch.push_back(static_cast<float>(areas[f] / before));

@@ -61,6 +61,15 @@ struct Placed {
   std::vector<std::vector<Vec3>> solids;
 };
 
+/// The solids of a pose, ready to be asked what is nearest. They keep what they are made of, not a
+/// copy: topology and pose live longer.
+class SolidSurfaces {
+ public:
+  SolidSurfaces(const Topology& topology, const Placed& pose);
+  std::vector<std::vector<Vec3>> normals;  // [solids][vertices]
+  std::vector<Nearest> trees;              // [solids]
+};
+
 /// All that is shown.
 Region whole_region(const Topology& topology);
 /// Some vertices, and the triangles that lie near them in a pose.
@@ -69,13 +78,13 @@ Region region_around(const Topology& topology, const Placed& pose,
 
 /// Every vertex of a region that lies inside of something, by what it is deepest in.
 std::vector<Contact> find_contacts(const Topology& topology, const Region& region,
-                                   const Placed& pose);
+                                   const SolidSurfaces& solids, const std::vector<Vec3>& skin);
 
 /// [F] areas, and [F] normals.
 void face_shapes(const Topology& topology, const std::vector<Vec3>& positions,
                  std::vector<double>& areas, std::vector<Vec3>& normals);
 
-SkinFaults find_faults(const Topology& topology, const Placed& pose,
+SkinFaults find_faults(const Topology& topology, const std::vector<Vec3>& skin,
                        const std::vector<Contact>& contacts);
 
 FaultSums sum_faults(const Topology& topology, const SkinFaults& faults, const SkinFaults& allowed);
