@@ -14,7 +14,7 @@ import risorius
 from risorius.author import RigOptions, combinations, make_joint_rig
 from risorius.author.correctives import CorrectiveOptions, add_correctives, find_correctives
 from risorius.author.correctives.poser import make_checker, worst
-from risorius.author.correctives.search import triples_of
+from risorius.author.correctives.search import fairest_of, triples_of
 from risorius.author.fitting import FitOptions
 
 PREFIX = "CTRL_expressions."
@@ -368,6 +368,21 @@ def test_triples_are_those_of_repaired_pairs_the_worst_first():
     # 2 and 3 do not meet; 0 and 2 do, and are right by themselves.
     assert triples_of(search, sums, 9) == [(0, 1, 3), (0, 1, 2)]
     assert triples_of(search, sums, 1) == [(0, 1, 3)]
+
+
+def test_pairs_are_chosen_so_that_each_kind_of_fault_falls():
+    # By one measure of all kinds, volume / 100 + folds / 5, all that has volume would come first.
+    sums = {(0, i): SimpleNamespace(volume=100.0 + i, stretched=0, folded=0) for i in range(1, 21)}
+    sums |= {(1, i): SimpleNamespace(volume=0.0, stretched=0, folded=4) for i in range(30, 50)}
+    sums[2, 50] = SimpleNamespace(volume=5.0, stretched=0, folded=0)  # what is left alone
+    chosen = fairest_of(sums, 20)
+    assert len(chosen) == len(set(chosen)) == 20
+    folds = [on for on in chosen if on[0] == 1]
+    assert 8 <= len(folds) <= 12
+    # Of each kind the worst.
+    assert {on for on in chosen if on[0] == 0} == {(0, i) for i in range(len(folds) + 1, 21)}
+    assert set(fairest_of(sums, 40)) == set(fairest_of(sums, 999)) == set(sums) - {(2, 50)}
+    assert fairest_of(sums, 0) == []
 
 
 def test_single_controls_and_zero_are_as_before(face, corrected):

@@ -34,6 +34,8 @@ _SHARED = 4  # vertices that two expressions both move, at least, to be looked a
 # Sums of faults that count alike, and what is left alone.
 _VOLUME, _FACES, _LEAST = 100.0, 5.0, 0.1
 KINDS = ("volume", "stretched", "folded")
+_ALIKE = np.array([_VOLUME, _FACES, _FACES])  # of each kind
+_PACES = np.geomspace(4.0, 0.1, 40)  # how fast weights of kinds change, from round to round
 
 
 @dataclass(frozen=True)
@@ -196,7 +198,7 @@ def find_correctives(
     out = Found(search.skin)
     pairs = search.pairs()
     sums = dict(zip(pairs, search.sums(pairs, (0.0, 0.2)), strict=True))
-    search.repair(_worst_of(sums, o.most), (0.2, 0.7))
+    search.repair(fairest_of(sums, o.most), (0.2, 0.7))
     out.looked_at, out.faulty = len(pairs), sum(severity(s) > 0 for s in sums.values())
     ends = {on: search.found[on].after if on in search.found else s for on, s in sums.items()}
     for kind in KINDS:
@@ -217,6 +219,39 @@ def _named(search: Search, names: Sequence[str]) -> Controls:
         if name not in search.names:
             raise ArgumentError(f"correctives: there is no control {name}")
     return tuple(sorted(search.names.index(name) for name in names))
+
+
+def fairest_of(sums: dict[Controls, FaultSums], most: int) -> list[Controls]:
+    """The combinations to repair, the worst first, so that each kind of fault falls alike.
+
+    By one measure of all kinds one of them would be left behind: a pair with much volume is not
+    the one with many folds. The least of the shares that they have of the three totals is to be
+    as large as can be; weights of kinds are found for that (Arora, Hazan and Kale, "The
+    Multiplicative Weights Update Method", 2012), beginning with those of the severity.
+
+    Args:
+        sums: what is wrong in each.
+        most: at most so many.
+
+    Returns:
+        Combinations that are worse than what is left alone.
+    """
+    bad = _worst_of(sums, len(sums))
+    if len(bad) <= most or most == 0:
+        return bad[:most]
+    values = np.array([[getattr(sums[on], kind) for kind in KINDS] for on in bad], np.float64)
+    totals = values.sum(axis=0)
+    kinds = totals > 0
+    shares, weights = values[:, kinds] / totals[kinds], (totals / _ALIKE)[kinds]
+    best, least = np.arange(most), -1.0
+    for pace in _PACES:
+        weights /= weights.sum()
+        picked = np.argsort(-(shares @ weights), kind="stable")[:most]
+        taken = shares[picked].sum(axis=0)
+        if taken.min() > least:
+            best, least = picked, float(taken.min())
+        weights *= np.exp(-pace * (taken - taken.min()))
+    return [bad[i] for i in best]
 
 
 def _worst_of(sums: dict[Controls, FaultSums], most: int) -> list[Controls]:
