@@ -14,10 +14,11 @@ namespace risorius::author::detail {
 namespace {
 
 constexpr std::size_t kFades = 9, kSteps = 6;  // a part is undone in so many
-constexpr double kUndone = 2.0;   // what all undone motion costs; all faults of a kind cost 1
-constexpr double kEnough = 0.15;  // a cost at which nothing else is tried
-constexpr double kWhole = 2.0;    // mm around a fault that are undone alike
-constexpr double kNarrow = 5.0;   // mm within which it is tried first: less is held back
+constexpr double kUndone = 2.0;  // what all undone motion costs; all faults of a kind cost 1
+// A cost at which nothing else is tried. Any fault that is left costs as much beside its share.
+constexpr double kEnough = 0.15;
+constexpr double kWhole = 2.0;   // mm around a fault that are undone alike
+constexpr double kNarrow = 5.0;  // mm within which it is tried first: less is held back
 constexpr std::size_t kRounds = 6;
 // What an asked place, an asked edge, an asked evenness and rest weigh beside smoothness.
 constexpr double kPlace = 1.0, kEdge = 1.0, kEven = 0.5, kRest = 0.002;
@@ -273,7 +274,8 @@ struct Best {
       moved += (work.pose.skin[v] - work.topology.neutral[v]).squaredNorm();
     }
     const double here = share_left(look.sums, before);
-    const double whole = here + kUndone * undone / std::max(moved, 1e-9);
+    const double whole =
+        here + (here > 0.0 ? kEnough : 0.0) + kUndone * undone / std::max(moved, 1e-9);
     if (whole < any_cost) {
       any_cost = whole;
       any = work.x;
