@@ -207,7 +207,8 @@ def find_correctives(
     triples = triples_of(search, sums, o.triples)
     rest = max(0, o.most - len(search.found))
     wrong = dict(zip(triples, search.sums(triples, (0.7, 0.8)), strict=True))
-    search.repair(_worst_of(wrong, rest), (0.8, 0.9))
+    # Pairs undo no more than they have to, so that their sum may fall short by little.
+    search.repair(_worst_of(wrong, rest, 0.0), (0.8, 0.9))
     for on in sorted(together, key=len):
         search.repair([on], (0.9, 1.0))
     out.correctives = list(search.found.values())
@@ -254,8 +255,8 @@ def fairest_of(sums: dict[Controls, FaultSums], most: int) -> list[Controls]:
     return [bad[i] for i in best]
 
 
-def _worst_of(sums: dict[Controls, FaultSums], most: int) -> list[Controls]:
-    bad = [on for on, s in sums.items() if severity(s) > _LEAST]
+def _worst_of(sums: dict[Controls, FaultSums], most: int, least: float = _LEAST) -> list[Controls]:
+    bad = [on for on, s in sums.items() if severity(s) > least]
     return sorted(bad, key=lambda on: (-severity(sums[on]), on))[:most]
 
 
