@@ -33,10 +33,10 @@ def _shown(material):
     return next(n for n in nodes if n.type == "BSDF_GLOSSY").inputs["Roughness"]
 
 
-def _emit_only(material):
-    """Show the plain value of that socket, as light."""
+def _emit_only(material, socket=None):
+    """Show the plain value of that socket, or of another input, as light."""
     tree = material.node_tree
-    source = _shown(material).links[0].from_socket
+    source = (socket or _shown(material)).links[0].from_socket
     output = next(n for n in tree.nodes if n.type == "OUTPUT_MATERIAL")
     emission = tree.nodes.new("ShaderNodeEmission")
     tree.links.new(source, emission.inputs["Color"])
@@ -77,12 +77,9 @@ def test_threads_of_cloth_are_gone_where_they_would_be_grains(tmp_path):
     )
     head, item = scene.meshes(rig).values()
     head.hide_render = True
-    tree = item.data.materials[0].node_tree
-    bump = next(n for n in tree.nodes if n.type == "BUMP")
-    light = tree.nodes.new("ShaderNodeEmission")
-    tree.links.new(bump.inputs["Height"].links[0].from_socket, light.inputs["Color"])
-    output = next(n for n in tree.nodes if n.type == "OUTPUT_MATERIAL")
-    tree.links.new(light.outputs[0], output.inputs["Surface"])
+    material = item.data.materials[0]
+    bump = next(n for n in material.node_tree.nodes if n.type == "BUMP")
+    _emit_only(material, bump.inputs["Height"])
     setup, _ = looks.stage([item], 32, samples=1)
     middle = np.array(item.bound_box).mean(axis=0)
     setup.camera.data.clip_end = 10

@@ -86,9 +86,10 @@ def clothe(folder):
         material.use_nodes = True
         tree = material.node_tree
         shader = next(n for n in tree.nodes if n.type == "BSDF_PRINCIPLED")
-        if not any(folder.glob(f"{material.name}_color.*")):  # corneas and tears: clear
+        colours = list(folder.glob(f"{material.name}_color.*"))
+        if not colours:  # corneas and tears: clear
             shader.inputs["Alpha"].default_value = 0.0
-        for path in folder.glob(f"{material.name}_color.*"):
+        for path in colours:
             node = tree.nodes.new("ShaderNodeTexImage")
             node.image = bpy.data.images.load(str(path))
             tree.links.new(node.outputs["Color"], shader.inputs["Base Color"])

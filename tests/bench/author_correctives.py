@@ -25,7 +25,7 @@ import numpy as np
 import risorius
 from risorius.author.correctives import CorrectiveOptions
 from risorius.author.correctives.poser import Poser
-from risorius.author.correctives.search import KINDS, Search, fairest_of, severity
+from risorius.author.correctives.search import Search, fairest_of, severity, values_of
 from risorius.author.geometry import skeleton as sk
 from risorius.author.work import MM
 from risorius.cli.faces.author import opposites
@@ -151,15 +151,6 @@ def far_moved(dna):
     return np.array(out)
 
 
-def values_of(sums):
-    """float64[pairs, 3]: how much of each kind is wrong.
-
-    Args:
-        sums: FaultSums of pairs.
-    """
-    return np.array([[getattr(s, kind) for kind in KINDS] for s in sums], np.float64)
-
-
 def bound(values, count):
     """The share of each total that `count` pairs can have at most, of the one they have least of.
 
@@ -207,7 +198,7 @@ def main():
     )
     search.repair(bad[: args.most], (0.0, 1.0))
     made = [p for p in bad if p in search.found]
-    values = values_of(sums.values())
+    values = values_of(list(sums.values()))
     whole = values.sum(axis=0)
     print(f"{'correctives':>11} {'mm3 inside':>11} {'torn':>7} {'folded':>7}  fall by; bound")
     for count in sorted({0, len(made), *(n for n in args.counts if n < len(made))}):

@@ -222,6 +222,11 @@ def _named(search: Search, names: Sequence[str]) -> Controls:
     return tuple(sorted(search.names.index(name) for name in names))
 
 
+def values_of(sums: Sequence[FaultSums]) -> Doubles:
+    """float64[n, 3]: how much of each of KINDS is wrong."""
+    return np.array([[getattr(s, kind) for kind in KINDS] for s in sums], np.float64)
+
+
 def fairest_of(sums: dict[Controls, FaultSums], most: int) -> list[Controls]:
     """The combinations to repair, the worst first, so that each kind of fault falls alike.
 
@@ -240,7 +245,7 @@ def fairest_of(sums: dict[Controls, FaultSums], most: int) -> list[Controls]:
     bad = _worst_of(sums, len(sums))
     if len(bad) <= most or most == 0:
         return bad[:most]
-    values = np.array([[getattr(sums[on], kind) for kind in KINDS] for on in bad], np.float64)
+    values = values_of([sums[on] for on in bad])
     totals = values.sum(axis=0)
     kinds = totals > 0
     shares, weights = values[:, kinds] / totals[kinds], (totals / _ALIKE)[kinds]

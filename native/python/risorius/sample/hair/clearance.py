@@ -30,7 +30,6 @@ _SUNK = 0.0015  # of the roughly measured heights: what sinks less is not looked
 _ROUGHLY = 4  # of so many vertices one
 _SHORTER = 0.75
 _CUTS = 5  # how often a hair is cut before it goes
-
 _EDGE_DEEP = 0.004  # decimetres, of a card's edge beyond its root
 
 

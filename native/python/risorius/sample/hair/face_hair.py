@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from ...base.easing import smooth_step
 from ..paint.atlas import tile
-from ..paint.places import beard_density, brow_density, brow_place, brow_width
+from ..paint.places import beard_density, brow_density, brow_place, brow_ridge, brow_width
 from ..people import Person
 from ..polygons import Floats, Ints
 from .growth import curled, grow, tangent
@@ -40,8 +40,8 @@ def brow_flow(surface: Surface) -> Floats:
     man, eye = surface.man, surface.eye
     along, height = brow_place(man, eye)
     side = np.sign(man[:, 0])
-    slope = np.gradient(np.interp(np.linspace(-0.2, 1.2, 57), *_ridge()), 1.4 / 56)
-    rise = np.interp(along, np.linspace(-0.2, 1.2, 57), slope) / 0.44
+    steps = np.linspace(-0.2, 1.2, 57)
+    rise = np.interp(along, steps, np.gradient(brow_ridge(steps), 1.4 / 56)) / 0.44
     arc = tangent(np.column_stack([side, rise, np.zeros(len(man))]), surface.normals)
     t = np.clip(along, 0, 1)
     across = np.clip(height / brow_width(t), -1, 1)
@@ -50,11 +50,6 @@ def brow_flow(surface: Surface) -> Floats:
     angle = low + (high - low) * smooth_step(0.5 + 0.5 * across)
     # About the outward normal a turn to the left is up on his left side, down on his right.
     return tangent(_turned(arc, surface.normals, np.radians(angle) * side), surface.normals)
-
-
-def _ridge() -> tuple[list[float], list[float]]:
-    xs = [-0.2, 0.0, 0.2, 0.4, 0.6, 0.75, 0.9, 1.0, 1.2]
-    return xs, [0.150, 0.158, 0.178, 0.198, 0.214, 0.214, 0.196, 0.175, 0.125]
 
 
 def brows(surface: Surface, person: Person) -> Strips:

@@ -108,13 +108,20 @@ def brow_place(points: Floats, eye: float) -> tuple[Floats, Floats]:
         eye: how far the middle of his eye is from the middle of the face.
     """
     along = (np.abs(points[:, 0]) - (eye - 0.185)) / 0.44
-    t = np.clip(along, -0.2, 1.2)
-    ridge = np.interp(
-        t,
+    return along, points[:, 1] - brow_ridge(along)
+
+
+def brow_ridge(along: Floats) -> Floats:
+    """float64[n]: how high the middle of a brow is over the eye's, decimetres.
+
+    Args:
+        along: float64[n], 0 at the nose and 1 at the temple.
+    """
+    return np.interp(
+        along,
         [-0.2, 0.0, 0.2, 0.4, 0.6, 0.75, 0.9, 1.0, 1.2],
         [0.150, 0.158, 0.178, 0.198, 0.214, 0.214, 0.196, 0.175, 0.125],
     )
-    return along, points[:, 1] - ridge
 
 
 def brow_width(along: Floats) -> Floats:
