@@ -16,7 +16,7 @@ from risorius.sample import build, people
 from risorius.sample.hair import add_hair, grow_hair, hair_textures
 from risorius.sample.hair.binding import Turning, append_mesh, corners_of
 from risorius.sample.hair.clearance import cut_clear, narrow_edges
-from risorius.sample.hair.growth import curled, grow
+from risorius.sample.hair.growth import curled, eased, grow
 from risorius.sample.hair.strips import card_faces, card_vertices, make_strips
 from risorius.sample.hair.surface import Roots, Surface, nearest_places
 from risorius.sample.paint.atlas import TILES
@@ -131,6 +131,28 @@ def test_hairs_of_a_card_fade_out_to_its_sides(who):
         at = np.abs((np.arange(width) + 0.5) / width - 0.5)
         outer, middle = (at > 0.25) & (at < 0.4), at < 0.25
         assert tiles[outer].mean() < 0.6 * tiles[middle].mean()
+
+
+@pytest.mark.parametrize("who", ["man", "lady"])
+def test_no_straight_hair_is_cut_off_by_a_side_of_its_card(who):
+    cover = paint_strands(people.PEOPLE[who])[..., 3]
+    left, low, width, height, count = TILES["scalp"]
+    tiles = cover[low : low + height, left : left + count * width].reshape(height, count, width)
+    sides = tiles[:, :, [0, 1, -2, -1]]
+    # Bent hairs may touch a side; where leaning ones leave, it is 0.056.
+    assert (sides > 0.5).mean() < 0.02
+
+
+def test_an_eased_guide_goes_to_and_fro_no_more_and_keeps_its_ends():
+    t = np.linspace(0, 1, 5)
+    zigzag = np.column_stack([t, 0.1 * np.array([0, 1, -1, 1, 0]), t**2])[None]
+    out = eased(zigzag)
+    np.testing.assert_array_equal(out[0, [0, -1]], zigzag[0, [0, -1]])
+    bend = np.abs(np.diff(zigzag[0, :, 1], 2)).max(), np.abs(np.diff(out[0, :, 1], 2)).max()
+    assert bend[1] < 0.35 * bend[0]
+    np.testing.assert_array_equal(
+        eased(np.outer(t, [1.0, 2.0, 3.0])[None])[0], np.outer(t, [1, 2, 3])
+    )
 
 
 def test_a_shape_that_turns_the_skin_turns_what_stands_on_it():

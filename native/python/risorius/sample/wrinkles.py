@@ -74,7 +74,7 @@ def mask_name(region: str, side: str) -> str:
     return f"head_wm{REGIONS[region].number}_{region}_{side}"
 
 
-SMILE = mask_name("smile", "L")
+SMILE, FROWN = mask_name("smile", "L"), mask_name("browsDown", "L")
 
 
 def masks_of(number: int) -> list[str]:

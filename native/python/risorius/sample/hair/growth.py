@@ -11,6 +11,7 @@ from .surface import Roots, Surface
 
 _SUBSTEPS = 2
 _LOOSE = 0.08  # decimetres over the skin where a hair is drawn back most
+_EASED = 2  # how often
 _FREE = -0.4  # height under which hair hangs freely, of the man
 
 
@@ -84,6 +85,18 @@ def tangent(vectors: Floats, normals: Floats) -> Floats:
         normals: float64[n, 3], unit.
     """
     return unit(vectors - (vectors * normals).sum(axis=1, keepdims=True) * normals)
+
+
+def eased(points: Floats) -> Floats:
+    """float64[n, rows, 3]: guides that do not bend to and fro from row to row; both ends stay.
+
+    Args:
+        points: float64[n, rows, 3].
+    """
+    out = points.copy()
+    for _ in range(_EASED):
+        out[:, 1:-1] = out[:, 1:-1] / 2 + (out[:, :-2] + out[:, 2:]) / 4
+    return out
 
 
 def curled(

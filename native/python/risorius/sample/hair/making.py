@@ -30,6 +30,7 @@ from .surface import Surface
 PICTURE = "hair_color.png"
 NO_HAIR = 4  # the level from which on there are no cards
 _SHARES = (1.0, 0.42, 0.2, 0.1)  # of the strips, by level
+_BROWS = (1.0, 0.75, 0.3, 0.1)  # wider, a brow's hairs would be dashes where faces are still large
 _MOST_VERTICES = 12_000  # of all cards at LOD 0
 _OWN = ("hair", "beard")
 _ROWS = (99, 4, 3, 3)
@@ -114,7 +115,8 @@ def add_hair(dna: Dna, grown: Grown) -> None:
     for name, lod in itertools.product(names, there):
         head, strips = heads[lod], grown.strips[name]
         assert head is not None
-        shown = strips if lod == 0 else strips.coarser(_SHARES[lod], _ROWS[lod])
+        share = (_BROWS if name == "brows" else _SHARES)[lod]
+        shown = strips if lod == 0 else strips.coarser(share, _ROWS[lod])
         mesh = card_mesh(shown, grown.unit)
         own = None if lod == 0 else shown.roots.of(there[0])
         places = holds(head, shown, grown.unit, own, there[lod])

@@ -12,7 +12,7 @@ from ..paint.atlas import DENSE, TILES, tile
 from ..paint.places import HAIRLINES, hairline_height, thinned, wavy
 from ..people import Person
 from ..polygons import Floats, Ints
-from .growth import curled, grow, tangent
+from .growth import curled, eased, grow, tangent
 from .strips import ROOT_DEEP, Strips, joined, make_strips, unit
 from .surface import Roots, Surface
 
@@ -20,6 +20,7 @@ _WHORL = np.array([0.10, 0.86, -1.40])  # where hair turns about the crown, of t
 _PARTING = 0.10  # how far to his left hair is parted
 _THIN = TILES["scalp"][4] - DENSE
 _LINE_OF_BROWS, _HIGH_ON_FOREHEAD = 0.27, 0.62  # heights at which a fringe ends, of the man
+_FINE = 0.75  # spacing of short hair where it begins over the forehead, of that elsewhere
 _CLOSE = 0.6  # hair_length of an afro that is so short that it lies on the head
 
 
@@ -63,6 +64,9 @@ def _roots(
     if not even:
         density = density * (1 - 0.5 * smooth_step((man[:, 1] - 0.4) / 0.3))
         density = density * (1 - 0.3 * smooth_step((inside - 0.08) / 0.1))
+        # Over the forehead one sees single cards: there they stand closer, and are narrower.
+        edge = np.exp(-((inside / 0.09) ** 2)) * smooth_step((man[:, 2] + 0.8) / 0.4)
+        density = density * (_FINE**2 + (1 - _FINE**2) * edge)
     if fine:
         parting = np.exp(-(((man[:, 0] - _PARTING) / 0.09) ** 2)) * smooth_step(
             (man[:, 1] - 0.5) / 0.2
@@ -113,7 +117,7 @@ def _short(
     random = np.random.default_rng(seed)
     recession = HAIRLINES[style][0]
     spacing = 0.043 if recession == 0 else 0.046
-    roots, inside = _roots(surface, spacing, random, style, even=False)
+    roots, inside = _roots(surface, _FINE * spacing, random, style, even=False)
     n = len(roots)
     man = roots.of(surface.man)
     high = smooth_step((man[:, 1] - 0.30) / 0.40)
@@ -131,17 +135,18 @@ def _short(
     clump = 0.14 * np.column_stack([wavy(surface.man, random, 6.0) for _ in range(3)])
     flow, sway = flow + clump, 0.14 * random.normal(0, 1, (n, 3))
     quiff = fore * (recession == 0)
-    low = 16 + (34 if recession == 0 else 12) * high - 8 * quiff
-    rise = np.radians(low + random.uniform(-7, 9, n)), np.radians(2 + 12 * high - 12 * quiff)
+    low = 16 + (18 if recession == 0 else 12) * high - 4 * quiff
+    rise = np.radians(low + random.uniform(-7, 9, n)), np.radians(2 + 6 * high - 6 * quiff)
     near = _scalp_vertices(surface)
-    points, out = grow(surface, roots, flow, length, rise, 4, near, 0.006, sway=sway)
+    points, out = grow(surface, roots, flow, length, rise, 5, near, 0.006, sway=sway)
+    points = eased(points)
     half = (0.024 + 0.026 * high) * surface.scale * (spacing / 0.043) * random.uniform(0.8, 1.25, n)
-    half *= 0.7 + 0.3 * smooth_step(inside / 0.12)
-    turns = np.radians(random.uniform(-1, 1, n) * (6 + 28 * high))
+    half *= 0.5 + 0.5 * smooth_step(inside / 0.14)
+    turns = np.radians(random.uniform(-1, 1, n) * (6 + 20 * high))
     # Short hair is low along all of its length.
     steep = np.arcsin(np.clip(ROOT_DEEP * surface.scale / half, 0, 1))
     turns = np.clip(turns, -steep, steep)
-    taper = np.array([0.85, 1.0, 0.95, 0.7])
+    taper = np.array([0.85, 0.97, 1.0, 0.91, 0.7])
     return make_strips(points, out, half, taper, _tiles(inside, random, 0.15), roots, turns)
 
 

@@ -112,7 +112,10 @@ def _paint_tile(
         length = begin + (1 - begin) * random.uniform(*hairs.length)
         s = np.clip((v - begin) / (length - begin), 0, 1)
         lean, bend = random.normal(0, hairs.lean), random.normal(0, hairs.bend)
-        middle = aside + (1 - 2 * aside) * place + lean * s + bend * s**2
+        start = aside + (1 - 2 * aside) * place
+        if abs(start + lean + bend - 0.5) > 0.5 - aside:  # it would be cut off in a straight line
+            lean, bend = -lean, -bend
+        middle = start + lean * s + bend * s**2
         middle = middle + hairs.gather * s * (0.5 - middle)
         turn = random.uniform(0, 2 * np.pi)
         waves = hairs.waves * random.uniform(0.85, 1.15)

@@ -58,6 +58,9 @@ def lasting(place: Floats, eye: Floats) -> Floats:
     return np.asarray(0.22 + 0.78 * np.clip(brow + feet + between + fold, 0, 1))
 
 
+_FROWN_ENDS = (0.22, 0.38)  # decimetres over the eyes: higher up its lines would cross the brow's
+
+
 @dataclass
 class Wrinkles:
     """What expressions fold.
@@ -106,6 +109,8 @@ def head_wrinkles(
         whole = raster.image(np.asarray(sum(folds[name] for name in names)))
         out.sets[number] = f"head_normal_wm{number}.png"
         height = wrinkles.fold_heights(whole, strength)
+        if wrinkles.FROWN in names:
+            height *= 1 - smooth(*_FROWN_ENDS, place[..., 1] - eye[1])
         if wrinkles.SMILE in names:
             fold, there = wrinkles.laugh_fold(place, eye)
             height += deeper * fold
