@@ -7,7 +7,7 @@ from pathlib import Path
 from acting import SHEET
 from PIL import Image, ImageDraw, ImageFont
 
-SIZE, LABEL = 640, 44
+SIZE, LABEL = 512, 44
 
 
 def main(folder: Path, out: Path) -> None:
