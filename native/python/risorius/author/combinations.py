@@ -9,7 +9,10 @@ leave.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
+from typing import TypeVar
 
 import numpy as np
 
@@ -26,6 +29,8 @@ _MOST_JOINTS, _LEAST_SHARE = 128, 2e-4  # that take part: of what is off, by the
 _LEAST_WEIGHT = 0.01
 _DAMPING = 0.01
 _AXES = np.eye(3)
+_THREADS = 2  # more wait for the interpreter
+T = TypeVar("T")
 
 
 @dataclass
@@ -132,9 +137,37 @@ class Combinations:
             tell: gets the share that is done.
         """
         skins = self._skins(0)
-        for at, column in enumerate(self.order):
-            self._solve_one(column, skins)
-            tell((at + 1) / len(self.order))
+        self._each(lambda column: self._solve_one(column, skins), tell)
+
+    def _each(
+        self, work: Callable[[int], T], tell: Callable[[float], None] = lambda share: None
+    ) -> list[T]:
+        """What is found for each corrective, in their order, by threads.
+
+        Args:
+            work: gets a corrective; may use what it found for those that this one reads.
+            tell: gets the share that is done; what it raises ends the work.
+        """
+        out: list[T] = []
+        pool = ThreadPoolExecutor(_THREADS)
+        try:
+            for wave in self._waves():
+                for one in pool.map(work, wave):
+                    out.append(one)
+                    tell(len(out) / len(self.order))
+        finally:
+            pool.shutdown(cancel_futures=True)
+        return out
+
+    def _waves(self) -> list[list[int]]:
+        """The correctives in their order, in runs of which none reads another."""
+        out: list[list[int]] = []
+        for column in self.order:
+            on = self.work.combined[column]
+            if not out or any(self.work.combined[c] <= on for c in out[-1]):
+                out.append([])
+            out[-1].append(column)
+        return out
 
     def _skins(self, lod: int) -> list[_Skin]:
         source, dna = self.work.source, self.work.dna
@@ -244,8 +277,9 @@ class Combinations:
                 if not skin.hangs_on(self.first):
                     continue
                 targets = list(meshes[at].blend_shape_targets)
-                for found, column in zip(out, self.order, strict=True):
-                    target = self._left(skin, column, found if lod == 0 else None)
+                finest = dict(zip(self.order, out, strict=True)) if lod == 0 else {}
+                left = self._each(partial(self._left, skin, finest))
+                for target, column in zip(left, self.order, strict=True):
                     if target is not None and column in channel:
                         target.blend_shape_channel_index = channel[column]
                         targets.append(target)
@@ -257,8 +291,10 @@ class Combinations:
         names = self.work.source.raw_control_names
         return " x ".join(names[c].rpartition(".")[2] for c in sorted(self.work.combined[column]))
 
-    def _left(self, skin: _Skin, column: int, found: Combination | None) -> BlendShapeTarget | None:
-        active = self.active(column)
+    def _left(
+        self, skin: _Skin, of_column: dict[int, Combination], column: int
+    ) -> BlendShapeTarget | None:
+        active, found = self.active(column), of_column.get(column)
         goal, shaped = skin.goal(self.before, active), skin.shaped(active[:-1])
         motions = self.after.motions(self.after.worlds(active))
         error = np.linalg.norm(goal - skin.made(shaped, motions), axis=1)

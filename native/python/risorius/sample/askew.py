@@ -45,13 +45,12 @@ def askew(source: Source, body: Body, person: Person) -> Floats:
     return out
 
 
-def set_askew(dna: Dna, parts: list[Part], body: Body, shape: Floats, unit: float) -> None:
-    """Lay the shape over the meshes of all levels, and over the person's own vertices.
+def set_askew(dna: Dna, parts: list[Part], shape: Floats, unit: float) -> None:
+    """Lay the shape over the meshes of all levels.
 
     Args:
         dna: a face of these parts, and of levels whose vertices are some of LOD 0's; is changed.
         parts: its own meshes.
-        body: the person's; its positions are changed.
         shape: float64[V, 3], decimetres.
         unit: of the Dna's meshes, in decimetres.
     """
@@ -77,4 +76,3 @@ def set_askew(dna: Dna, parts: list[Part], body: Body, shape: Floats, unit: floa
             faces = next(part.polygons.faces for part in parts if part.name == name)
             mesh.normals = vertex_normals(np.asarray(moved, np.float64), faces)
     dna.meshes = meshes
-    body.positions = body.positions + shape

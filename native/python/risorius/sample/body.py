@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from copy import copy
+
 import numpy as np
 
 from ..author.geometry.rigid import rigid_way
@@ -265,3 +267,14 @@ class Body:
             displacement: float64[V, 3], decimetres.
         """
         return displacement if self._change is None else self._change.carried(displacement)
+
+    def moved(self, shape: Floats) -> Body:
+        """The same person with other positions.
+
+        Args:
+            shape: float64[V, 3], what is added to them, decimetres.
+        """
+        out = copy(self)
+        if shape.any():
+            out.positions = self.positions + shape
+        return out

