@@ -14,7 +14,7 @@ def one_thread() -> AbstractContextManager[object]:
     inside Blender, everything stays as it is.
     """
     try:
-        from threadpoolctl import threadpool_limits
+        from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
     except ImportError:
         return nullcontext()
     limits: AbstractContextManager[object] = threadpool_limits(1, "blas")

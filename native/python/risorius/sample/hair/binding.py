@@ -227,7 +227,7 @@ def _still(dna: Dna, head: Mesh, places: Roots, least: float) -> Floats:
     weights = sk.dense_weights(head, len(dna.joint_names))[used]
     positions = np.asarray(head.positions, np.float64)[used]
     shapes = sk.column_shapes(dna, head, count)
-    below = [j for j in range(len(dna.joint_names)) if not _hangs_on_head(dna, j)]
+    below = _apart_from_head(dna)
     far = np.where(weights[:, below].sum(axis=1) > _LEAST_WEIGHT, np.inf, 0.0)
     for column, name in enumerate(dna.raw_control_names):
         if re.search(r"\.(head|neck)", name):
@@ -238,12 +238,13 @@ def _still(dna: Dna, head: Mesh, places: Roots, least: float) -> Floats:
     return np.asarray(far[rows.reshape(places.corners.shape)].max(axis=1) < least)
 
 
-def _hangs_on_head(dna: Dna, joint: int) -> bool:
-    for _ in range(len(dna.joint_names)):
-        if dna.joint_names[joint] == "head":
-            return True
-        joint = int(dna.joint_parents[joint])
-    return False
+def _apart_from_head(dna: Dna) -> list[int]:
+    """The joints that hang neither on the joint of the head nor are it."""
+    head, parents = list(dna.joint_names).index("head"), np.asarray(dna.joint_parents, np.int64)
+    on_head = np.arange(len(parents)) == head
+    for _ in range(len(parents)):
+        on_head |= on_head[parents]
+    return np.flatnonzero(~on_head).tolist()
 
 
 def append_mesh(dna: Dna, name: str, mesh: Mesh, lods: list[int]) -> None:

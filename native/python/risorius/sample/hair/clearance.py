@@ -7,7 +7,11 @@ and what grows at the rim of a lip comes into a lip that rolls in. The finished 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +35,8 @@ _ROUGHLY = 4  # of so many vertices one
 _SHORTER = 0.75
 _CUTS = 5  # how often a hair is cut before it goes
 _EDGE_DEEP = 0.004  # decimetres, of a card's edge beyond its root
+_AHEAD = 8  # poses that are made before they are asked for
+S, T = TypeVar("S"), TypeVar("T")
 
 
 def narrow_edges(strips: Strips, surface: Surface) -> None:
@@ -75,16 +81,34 @@ def cut_clear(
     cutting = _Cutting(strips, still)
     rough = still.rough(strips)
     under = _nearest(strips.points.reshape(-1, 3), still.skin).reshape(len(strips), -1)
-    for control in range(count):
+
+    def stirred(control: int) -> tuple[_Posed, NDArray[np.bool_]] | None:
         pose = ground.posed(np.eye(1, count, control, dtype=np.float32)[0])
         way = np.linalg.norm(pose.skin - still.skin, axis=1)
-        if way.max() > _STILL:
-            some = np.flatnonzero((way[under].max(axis=1) > _STIRRED) & cutting.stays)
+        moves = way[under].max(axis=1) > _STIRRED
+        return (pose, moves) if way.max() > _STILL and moves.any() else None
+
+    for found in _ahead(stirred, range(count)):
+        if found is not None:
+            pose, moves = found
+            some = np.flatnonzero(moves & cutting.stays)
             sunk = pose.rough(strips.taken(some)) < rough[some] - _SUNK
             cutting.cut(pose, some[sunk.any(axis=1)])
-    for face in faces:
-        cutting.cut(ground.posed(face), np.flatnonzero(cutting.stays))
+    for pose in _ahead(ground.posed, faces):
+        cutting.cut(pose, np.flatnonzero(cutting.stays))
     return strips.taken(cutting.stays)
+
+
+def _ahead(work: Callable[[S], T], rows: Iterable[S]) -> Iterator[T]:
+    """What is found for each row, while a thread is at work on the next ones."""
+    waiting: deque[Future[T]] = deque()
+    with ThreadPoolExecutor(1) as pool:
+        for row in rows:
+            waiting.append(pool.submit(work, row))
+            if len(waiting) > _AHEAD:
+                yield waiting.popleft().result()
+        while waiting:
+            yield waiting.popleft().result()
 
 
 class _Ground:
@@ -134,10 +158,10 @@ class _Ground:
     def posed(self, raw: NDArray[np.float32]) -> _Posed:
         """The skin with raw controls."""
         pose = self._rig.evaluate(raw)
-        shaped = self.rest.copy()
+        shaped, shares = self.rest.copy(), np.asarray(pose.blend_shapes).tolist()
         for channel, rows, deltas in self._shapes:
-            if pose.blend_shapes[channel]:
-                shaped[rows] += float(pose.blend_shapes[channel]) * deltas
+            if shares[channel]:
+                shaped[rows] += shares[channel] * deltas
         moves = sk.world_matrices(self._dna, np.asarray(pose.joints, np.float64)) @ self._back
         moves = moves[self._joints, :3]
         moves[..., 3] /= self.unit
@@ -155,9 +179,15 @@ class _Posed:
     def __init__(self, ground: _Ground, shaped: Floats, moves: Floats) -> None:
         self._ground, self._shaped, self._moves = ground, shaped, moves
         self.skin = np.einsum("vij,vj->vi", moves[..., :3], shaped) + moves[..., 3]
-        self._normals = ground.normals(self.skin)
-        is_shaped = (shaped != ground.rest).any()
-        self._turned = ground.normals(shaped) if is_shaped else ground.upright
+
+    @cached_property
+    def _normals(self) -> Floats:
+        return self._ground.normals(self.skin)
+
+    @cached_property
+    def _turned(self) -> Floats:
+        is_shaped = (self._shaped != self._ground.rest).any()
+        return self._ground.normals(self._shaped) if is_shaped else self._ground.upright
 
     def _carried(self, strips: Strips) -> Floats:
         """float64[n, rows, 2, 3]: the left and the right edges, as binding.py has them carried."""

@@ -11,6 +11,7 @@ from ...author.geometry.polygon_mesh import vertex_normals
 from ..polygons import Floats, Ints, Polygons
 
 _CHUNK = 256
+_AT_ONCE = 64  # points whose distances to all others stay in the processor's cache
 
 
 @dataclass
@@ -136,11 +137,14 @@ def nearest_rows(points: Floats, others: Floats) -> Ints:
         others: float64[m, 3].
     """
     half = (others**2).sum(axis=1) / 2
-    parts = [
-        (half - points[at : at + _CHUNK] @ others.T).argmin(axis=1)
-        for at in range(0, len(points), _CHUNK)
-    ]
-    return np.concatenate([np.zeros(0, np.int64), *parts])
+    room = np.empty((min(_AT_ONCE, len(points)), len(others)), half.dtype)
+    out = np.empty(len(points), np.int64)
+    for at in range(0, len(points), _AT_ONCE):
+        some = points[at : at + _AT_ONCE]
+        # In one place again and again: new memory for each costs more than all sums.
+        near = np.matmul(some, others.T, out=room[: len(some)])
+        np.subtract(half, near, out=near).argmin(axis=1, out=out[at : at + len(some)])
+    return out
 
 
 def nearest_places(
