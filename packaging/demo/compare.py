@@ -2,7 +2,7 @@
 """Faces side by side in the same expressions: what joints do beside what shapes did.
 
 compare.py -- --extension ZIP --out SHEET.jpg --face NAME=FILE.dna [...] [--size PIXELS]
-    [--combined | --only EXPRESSION [...]]
+    [--combined | --only EXPRESSION [...]] [--close]
 
 One row for each face, one column for each expression, or (--combined) for combinations that go
 wrong without correctives, or for some of both; needs Pillow beside bpy.
@@ -53,7 +53,7 @@ FOLDS = {
     "chin": ({"jawChinRaiseD": 1, "jawChinRaiseU": 0.5}, {}),
 }
 # Where the camera looks: a share of the height above the lowest point, and how near.
-MOUTH, EYES = (0.40, 2.3), (0.60, 2.6)
+MOUTH, EYES, FACE = (0.40, 2.3), (0.60, 2.6), (0.53, 1.8)
 LOOKS = dict(zip(COMBINED, [(0.42, 1.5), MOUTH, MOUTH, MOUTH, EYES, EYES], strict=True))
 TURNED = {"neck": 16.0, "head": 18.0}  # degrees about the vertical
 
@@ -65,6 +65,7 @@ def parse():
     parser.add_argument("--face", nargs="+", required=True, metavar="NAME=FILE")
     parser.add_argument("--combined", action="store_true", help="combinations of expressions")
     parser.add_argument("--only", nargs="+", choices=[*EXPRESSIONS, *COMBINED, *ASLEEP, *FOLDS])
+    parser.add_argument("--close", action="store_true", help="the face alone, for folds of skin")
     parser.add_argument("--size", type=int, default=320)
     return parser.parse_args(install_extension.arguments())
 
@@ -88,9 +89,14 @@ def set_expression(controls, name, expressions):
     controls.update_tag()
 
 
-def look_at(collection, name):
-    """Turn the camera to what an expression is about."""
-    share, near = LOOKS[name]
+def look_at(collection, share, near):
+    """Turn the camera to a part of a face.
+
+    Args:
+        collection: the face's.
+        share: of its height above the lowest point, where the part is.
+        near: how many times as large as in a portrait it is seen.
+    """
     low, high = stage.bounds(collection)
     camera = bpy.context.scene.camera
     camera.data.lens = 100 * near
@@ -99,7 +105,7 @@ def look_at(collection, name):
     stage.aim(camera, middle)
 
 
-def render_row(path, folder, size, expressions):
+def render_row(path, folder, size, expressions, close):
     """Pictures of a face in all expressions, as files by expression.
 
     Args:
@@ -107,6 +113,7 @@ def render_row(path, folder, size, expressions):
         folder: where the pictures go.
         size: of a picture, pixels.
         expressions: what each is.
+        close: show the face alone in those that have no part of it to look at.
     """
     for item in list(bpy.data.objects):
         bpy.data.objects.remove(item)
@@ -116,8 +123,8 @@ def render_row(path, folder, size, expressions):
     out = {}
     for number, name in enumerate(expressions):
         set_expression(controls, name, expressions)
-        if name in LOOKS:
-            look_at(collection, name)
+        if name in LOOKS or close:
+            look_at(collection, *LOOKS.get(name, FACE))
         out[name] = folder / f"{path.stem}_{number}.png"
         demo.still(out[name], number + 1, size)
     return out
@@ -160,7 +167,7 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         for face in args.face:
             name, _, path = face.partition("=")
-            rows[name] = render_row(Path(path), Path(folder), args.size, expressions)
+            rows[name] = render_row(Path(path), Path(folder), args.size, expressions, args.close)
             print(f"    {name}: {len(expressions)} pictures", flush=True)
         sheet(rows, args.size).save(args.out, quality=88)
     print(args.out, flush=True)
