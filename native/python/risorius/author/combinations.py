@@ -355,14 +355,17 @@ def _equations(
     moves[3, :, :3] = turns.transpose(0, 2, 1)
     crossed = np.cross(_AXES, arms.transpose(2, 0, 1)[:, :, None])  # [4, J, axis, 3]
     moves[:, :, 3:] = crossed @ turns.transpose(0, 2, 1)
-    normal, asked = np.zeros((count, 6, count, 6)), np.zeros((count, 6))
+    flat = moves.reshape(4, -1, 3)
+    normal, asked = np.zeros((6 * count, 6 * count)), np.zeros((count, 6))
+    part, weighted = np.empty_like(normal), np.empty_like(held)  # one memory for all that is added
     for k in range(4):
         asked += (moves[k] @ (held.T @ (places[:, k, None] * left))[..., None])[..., 0]
         for other in range(k, 4):
-            share = held.T @ (held * (places[:, k] * places[:, other])[:, None])
-            products = moves[k].reshape(-1, 3) @ moves[other].reshape(-1, 3).T
-            both = share[:, None, :, None] * products.reshape(count, 6, count, 6)
-            normal += both
-            if other > k:
-                normal += both.transpose(2, 3, 0, 1)
-    return normal.reshape(6 * count, -1), asked.ravel()
+            np.multiply(held, (places[:, k] * places[:, other])[:, None], out=weighted)
+            share = held.T @ weighted
+            ways = [(k, other, share)] if other == k else [(k, other, share), (other, k, share.T)]
+            for one, two, shares in ways:
+                np.matmul(flat[one], flat[two].T, out=part)
+                part *= shares.repeat(6, axis=0).repeat(6, axis=1)
+                normal += part
+    return normal, asked.ravel()

@@ -18,11 +18,13 @@ class Operator:
 
     def __init__(self, rows: Ints, columns: Ints, weights: Floats, shape: tuple[int, int]) -> None:
         self.rows, self.columns, self.weights, self.shape = rows, columns, weights, shape
+        self._used = np.unique(columns)
 
     def apply(self, values: Floats) -> Floats:
         flat = values.reshape(len(values), -1)
-        out = np.empty((self.shape[0], flat.shape[1]))
-        for k in range(flat.shape[1]):
+        out = np.zeros((self.shape[0], flat.shape[1]))
+        # Most expressions leave most meshes where they are.
+        for k in np.flatnonzero(flat[self._used].any(axis=0)):
             terms = self.weights * flat[self.columns, k]
             out[:, k] = np.bincount(self.rows, terms, minlength=self.shape[0])
         return out.reshape(self.shape[0], *values.shape[1:])
@@ -43,7 +45,11 @@ def edges_of(faces: list[list[int]]) -> dict[tuple[int, int], list[int]]:
     edges: dict[tuple[int, int], list[int]] = {}
     for f, face in enumerate(faces):
         for a, b in zip(face, [*face[1:], face[0]], strict=True):
-            edges.setdefault((min(a, b), max(a, b)), []).append(f)
+            edge = (a, b) if a < b else (b, a)
+            if edge in edges:
+                edges[edge].append(f)
+            else:
+                edges[edge] = [f]
     return edges
 
 

@@ -81,8 +81,8 @@ def _edge_sums(base: BaseMesh, before: Floats, after: Floats) -> tuple[Floats, F
     own = np.zeros((len(before), 3, 3))
     a, b = before[end] - before[start], after[end] - after[start]
     for vertex in (start, end):
-        np.add.at(mixed, vertex, b[:, :, None] * a[:, None, :])
-        np.add.at(own, vertex, a[:, :, None] * a[:, None, :])
+        _add(mixed, vertex, b[:, :, None] * a[:, None, :])
+        _add(own, vertex, a[:, :, None] * a[:, None, :])
     normals = [vertex_normals(p, faces) for p in (before, after)]
     square = np.trace(own, axis1=1, axis2=2)
     grown = np.sqrt(np.trace(mixed, axis1=1, axis2=2).clip(0) / np.maximum(square, 1e-30))
@@ -109,9 +109,16 @@ def _evened(base: BaseMesh, vertices: Ints, mixed: Floats, own: Floats) -> Float
 
 def _with_neighbours(sums: Floats, start: Ints, end: Ints) -> Floats:
     out = sums.copy()
-    np.add.at(out, start, sums[end])
-    np.add.at(out, end, sums[start])
+    _add(out, start, sums[end])
+    _add(out, end, sums[start])
     return out
+
+
+def _add(sums: Floats, rows: Ints, values: Floats) -> None:
+    """As np.add.at(sums, rows, values), number by number, for which NumPy is far quicker."""
+    wide = sums[0].size
+    places = (rows[:, None] * wide + np.arange(wide)).ravel()
+    np.add.at(sums.reshape(-1), places, values.ravel())
 
 
 def _solved(mixed: Floats, own: Floats) -> Floats:

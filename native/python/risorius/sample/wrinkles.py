@@ -244,21 +244,24 @@ def relief(tensors: Floats, there: Floats) -> Floats:
     noise = np.random.default_rng(_SEED).normal(size=(_TILE, _TILE))
     band = blurred(noise, _FINE) - blurred(noise, _COARSE)
     xx, xy, yy = np.moveaxis(tensors, 2, 0)
-    angle = 0.5 * np.arctan2(2 * xy, xx - yy)
-    step = np.stack([np.cos(angle), np.sin(angle)], axis=2)
+    angle = 0.5 * np.arctan2(2 * xy, xx - yy).ravel()
+    across, up = np.cos(angle), np.sin(angle)
+    times = -(-size // _TILE)
+    band = np.tile(band, (times, times))[:size, :size].ravel()
     rows, columns = np.nonzero(there)
-    total = band[rows % _TILE, columns % _TILE]
+    start = rows * size + columns
+    total = band[start]
     for way in (1, -1):
         x, y = columns.astype(float), rows.astype(float)
-        heading = way * step[rows, columns]
+        dx, dy = way * across[start], way * up[start]
         for _ in range(_LINES):
-            x, y = x + heading[:, 0], y + heading[:, 1]
-            i = np.clip(np.rint(y).astype(int), 0, size - 1)
-            j = np.clip(np.rint(x).astype(int), 0, size - 1)
-            total += band[i % _TILE, j % _TILE]
-            here = step[i, j]
-            turned = (here * heading).sum(axis=1, keepdims=True) < 0
-            heading = np.where(turned, -here, here)
+            x, y = x + dx, y + dy
+            at = np.rint(y).clip(0, size - 1) * size + np.rint(x).clip(0, size - 1)
+            at = at.astype(np.intp)
+            total += band[at]
+            x_here, y_here = across[at], up[at]
+            turned = x_here * dx + y_here * dy < 0
+            dx, dy = np.where(turned, -x_here, x_here), np.where(turned, -y_here, y_here)
     total /= total.std() or 1.0
     out = np.zeros((size, size))
     # Valleys are narrow and hills are round.

@@ -27,11 +27,23 @@ def find_rings(base: BaseMesh, groups: dict[str, Ints]) -> dict[str, Ints]:
     """
     faces = [[c[0] for c in face] for face in base.faces["body"]]
     edges = edges_of(faces)
-    return {side: _rings(base, groups, faces, edges, side) for side in "lr"}
+    beside: dict[int, list[int]] = {}
+    for a, b in edges:
+        beside.setdefault(a, []).append(b)
+        beside.setdefault(b, []).append(a)
+    roots = {side: _lash_root(base, groups, side) for side in "lr"}
+    first = {side: _lash_ring(faces, edges, beside, root) for side, root in roots.items()}
+    return {side: _rings(base, groups, faces, edges, side, first[side]) for side in "lr"}
 
 
-def _rings(base: BaseMesh, groups: dict[str, Ints], faces: Faces, edges: Edges, side: str) -> Ints:
-    first = _lash_ring(base, groups, faces, edges, side)
+def _rings(
+    base: BaseMesh,
+    groups: dict[str, Ints],
+    faces: Faces,
+    edges: Edges,
+    side: str,
+    first: list[int],
+) -> Ints:
     ahead = [_beside(first, faces, edges, way) for way in (0, 1)]
     # The ring towards the socket lies nearer to the eye's middle.
     middle = base.positions[groups[f"helper-{side}-eye"]].mean(axis=0)
@@ -50,19 +62,24 @@ def _rings(base: BaseMesh, groups: dict[str, Ints], faces: Faces, edges: Edges, 
     return grid
 
 
-def _lash_ring(
-    base: BaseMesh, groups: dict[str, Ints], faces: Faces, edges: Edges, side: str
-) -> list[int]:
-    """The closed loop of edges through the skin's vertex that is nearest to an upper lash."""
+def _lash_root(base: BaseMesh, groups: dict[str, Ints], side: str) -> int:
+    """The skin's vertex that is nearest to an upper lash."""
     body = groups["body"]
     lashes = base.positions[groups[f"helper-{side}-eyelashes-2"]]
     middle = lashes[np.abs(lashes[:, 0] - lashes[:, 0].mean()).argsort()[:12]]
     gaps = np.linalg.norm(base.positions[body][:, None] - middle[None], axis=2).min(axis=1)
-    root = int(body[gaps.argmin()])
-    beside: dict[int, list[int]] = {}
-    for a, b in edges:
-        beside.setdefault(a, []).append(b)
-        beside.setdefault(b, []).append(a)
+    return int(body[gaps.argmin()])
+
+
+def _lash_ring(faces: Faces, edges: Edges, beside: dict[int, list[int]], root: int) -> list[int]:
+    """The closed loop of edges through a vertex of the skin.
+
+    Args:
+        faces: quads.
+        edges: the faces of each edge.
+        beside: the vertices that each has an edge to.
+        root: the vertex.
+    """
     for start in beside[root]:
         ring = [root, start]
         while len(ring) <= COLUMNS and len(beside[ring[-1]]) == 4:

@@ -76,7 +76,7 @@ def dots(side: int, cell: float, random: np.random.Generator, loose: float = 0.8
         loose: how far a point may lie from the middle of its cell, 0 to 1.
     """
     count = max(3, round(side / cell))
-    point = 0.5 + loose * random.uniform(-0.5, 0.5, (count, count, 2))
+    point = (0.5 + loose * random.uniform(-0.5, 0.5, (count, count, 2))).astype(np.float32)
     rank = random.uniform(0, 1, (count, count)).astype(np.float32)
     at = ((np.arange(side) + 0.5) * count / side).astype(np.float32)
     low = at.astype(int)
@@ -86,12 +86,13 @@ def dots(side: int, cell: float, random: np.random.Generator, loose: float = 0.8
     for di in (-1, 0, 1):
         for dj in (-1, 0, 1):
             i, j = (low + di) % count, (low + dj) % count
-            there = point[i[:, None], j[None, :]].astype(np.float32)
-            away = np.hypot(di + there[..., 0] - part[:, None], dj + there[..., 1] - part[None, :])
+            up = di + point[..., 0][i][:, j] - part[:, None]
+            away = np.hypot(up, dj + point[..., 1][i][:, j] - part[None, :])
             nearer = away < near
-            second = np.where(nearer, near, np.minimum(second, away))
-            ranks = np.where(nearer, rank[i[:, None], j[None, :]], ranks)
-            near = np.where(nearer, away, near)
+            np.minimum(second, away, out=second)
+            np.copyto(second, near, where=nearer)
+            np.copyto(ranks, rank[i][:, j], where=nearer)
+            np.copyto(near, away, where=nearer)
     return Dots(near, second - near, ranks)
 
 

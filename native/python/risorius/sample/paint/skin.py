@@ -306,4 +306,6 @@ class Skin:
 def _over(light: Floats, colour: Floats, mask: Floats) -> Floats:
     """A colour laid over another where a mask says, linear."""
     mask = np.clip(mask, 0, 1).astype(np.float32)[:, None]
-    return np.asarray(light * (1 - mask) + colour.astype(np.float32) * mask)
+    out = np.asarray(light * (1 - mask))
+    out += colour.astype(np.float32) * mask
+    return out
