@@ -24,7 +24,8 @@ class Operator:
         flat = values.reshape(len(values), -1)
         out = np.zeros((self.shape[0], flat.shape[1]))
         # Most expressions leave most meshes where they are.
-        for k in np.flatnonzero(flat[self._used].any(axis=0)):
+        moves = flat[self._used].any()
+        for k in range(flat.shape[1] if moves else 0):
             terms = self.weights * flat[self.columns, k]
             out[:, k] = np.bincount(self.rows, terms, minlength=self.shape[0])
         return out.reshape(self.shape[0], *values.shape[1:])
