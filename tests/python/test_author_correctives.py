@@ -3,6 +3,7 @@
 
 import itertools
 import json
+import time
 from types import SimpleNamespace
 
 import command_line
@@ -427,6 +428,37 @@ def test_the_rig_of_joints_has_them_too(face, corrected):
     read = dna_bytes.Face(rig.dna.to_bytes())
     assert depth(skin_of(read, at_one("a", "b"))).max() < 0.2
     assert [c.name for c in rig.combinations] == ["a x b", "b x d"]
+
+
+def _combinations(controls):
+    found = object.__new__(combinations.Combinations)
+    found.work = SimpleNamespace(combined=controls)
+    found.order = sorted(controls, key=lambda c: (len(controls[c]), c))
+    return found
+
+
+def test_correctives_that_one_reads_are_solved_before_it():
+    controls = {7: {0, 1}, 8: {1, 2}, 9: {0, 1}, 10: {3, 4}, 11: {0, 1, 2}, 12: {5, 6, 7}}
+    assert _combinations(controls)._waves() == [[7, 8], [9, 10], [11, 12]]
+
+
+def test_correctives_are_told_in_order_and_end_where_they_are_told_to():
+    found, told, begun = _combinations({c: {c, c + 1} for c in range(200)}), [], []
+
+    def tell(share):
+        told.append(share)
+        if len(told) == 3:
+            raise risorius.DnaError("stopped")
+
+    def work(column):
+        begun.append(column)
+        time.sleep(0.001)
+
+    with pytest.raises(risorius.DnaError, match="stopped"):
+        found._each(work, tell)
+    assert told == [1 / 200, 2 / 200, 3 / 200]
+    assert len(begun) < 100
+    assert found._each(lambda column: 2 * column) == [2 * c for c in found.order]
 
 
 def test_the_equations_of_a_corrective_are_those_of_every_vertex():
