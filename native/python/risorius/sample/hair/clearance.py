@@ -36,7 +36,8 @@ _SHORTER = 0.75
 _CUTS = 5  # how often a hair is cut before it goes
 _EDGE_DEEP = 0.004  # decimetres, of a card's edge beyond its root
 _AHEAD = 8  # poses that are made before they are asked for
-S, T = TypeVar("S"), TypeVar("T")
+S = TypeVar("S")
+T = TypeVar("T")
 
 
 def narrow_edges(strips: Strips, surface: Surface) -> None:
