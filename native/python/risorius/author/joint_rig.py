@@ -35,7 +35,6 @@ from .work import (
     begin,
     carried_shifts,
     dense,
-    displacements,
     given,
     joined_positions,
     listed_meshes,
@@ -142,7 +141,7 @@ def _made(
     o.lods.check()
     work = begin(dna)
     work.levels = _level_count(dna, o.lods)
-    wanted = {m: displacements(work, dna.meshes[m]) for m in range(len(dna.meshes))}
+    wanted, work.wanted = work.wanted, {}  # which are large: not kept longer than they are needed
     needs = {m for m in wanted if needs_joints(work, dna.meshes[m], wanted[m])}
     needs = {m for m in needs if not any(word in dna.mesh_names[m] for word in o.kept)}
     if like is not None:  # what rests in the other face keeps its shapes here

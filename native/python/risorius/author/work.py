@@ -90,6 +90,7 @@ class Work:
     motions: Doubles  # [C, J, 3, 4] of the joints that were there
     positions: Doubles  # [J, 3]
     head: int  # what most of the face hangs on
+    wanted: dict[int, Doubles] = field(default_factory=dict)  # displacements of each mesh, at first
     levels: int = 1
     new: list[Ints] = field(default_factory=list)  # joints of each level, among the new ones
     pivots: list[Pivot] = field(default_factory=list)
@@ -119,6 +120,7 @@ def begin(dna: Dna) -> Work:
     rest = sk.world_matrices(dna, np.zeros((len(dna.joint_names), 9)))
     work = Work(dna, copy.copy(dna), columns, names, motions[columns], rest[:, :3, 3], 0)
     work.combined = together
+    work.wanted = {m: displacements(work, mesh) for m, mesh in enumerate(dna.meshes)}
     work.head = _head(work)
     return work
 
@@ -132,8 +134,8 @@ def _head(work: Work) -> int:
     """The resting joint that most of what moves hangs on."""
     dna = work.source
     share = np.zeros(len(dna.joint_names))
-    for mesh in dna.meshes:
-        moved = np.linalg.norm(displacements(work, mesh), axis=2).max(axis=0)
+    for m, mesh in enumerate(dna.meshes):
+        moved = np.linalg.norm(work.wanted[m], axis=2).max(axis=0)
         share += moved @ sk.dense_weights(mesh, len(share))
     still = np.isclose(work.motions, np.eye(3, 4), atol=1e-12).all(axis=(0, 2, 3))
     if not still.any():
@@ -152,10 +154,10 @@ def displacements(work: Work, mesh: Mesh) -> Doubles:
     weights = sk.dense_weights(mesh, len(work.source.joint_names))
     shapes = sk.column_shapes(work.source, mesh, sk.column_count(work.source))
     out = np.zeros((len(work.columns), len(positions), 3))
-    still = np.eye(3, 4)
+    rests = np.isclose(work.motions, np.eye(3, 4), atol=1e-12).all(axis=(1, 2, 3))
     for row, column in enumerate(work.columns):
         delta = shapes.get(column)
-        if not np.allclose(work.motions[row], still, atol=1e-12):
+        if not rests[row]:
             shaped = positions if delta is None else positions + delta
             out[row] = sk.skinned(shaped, weights, work.motions[row]) - positions
         elif delta is not None:
