@@ -545,7 +545,8 @@ def test_without_room_neither_the_sample_nor_its_textures_are_there(tmp_path, mo
     monkeypatch.setattr(build, "askew", lambda *_: np.zeros((0, 3)))
     for bare in ("grow_hair", "add_hair"):
         monkeypatch.setattr(build, bare, lambda *_: None)
-    monkeypatch.setattr(build, "hair_textures", lambda *_: ({}, {}))
+    for nothing in ("hair_picture", "hair_metadata"):
+        monkeypatch.setattr(build, nothing, lambda *_: {})
     path = tmp_path / "s.dna"
     options = {"data": tmp_path, "say": lambda text: None, "rig": None}
     with no_room(50_000), pytest.raises(OSError, match=r"head_color\.png"):

@@ -13,7 +13,7 @@ from risorius.files.png import png, read_png
 from risorius.mixing import Mix, difference, mix_faces
 from risorius.mixing.hair import hair_meshes
 from risorius.sample import build, people
-from risorius.sample.hair import add_hair, grow_hair, hair_textures
+from risorius.sample.hair import add_hair, grow_hair, hair_metadata, hair_picture
 from risorius.sample.hair.binding import Turning, append_mesh, corners_of
 from risorius.sample.hair.clearance import cut_clear, narrow_edges
 from risorius.sample.hair.growth import curled, eased, grow
@@ -367,9 +367,8 @@ def test_extra_faces_with_hair_are_sane_and_small(haired):
             len(dna.meshes[dna.mesh_names.index(n)].positions) for n in shown if "_lod0_" in n
         )
         assert 5000 < finest <= MOST_VERTICES
-        files, metadata = hair_textures(people.PEOPLE["man"], dna, hair, 64)
-        assert {f"texture:{n}:color" for n in shown} <= set(metadata)
-        assert list(files) == ["hair_color.png"]
+        assert {f"texture:{n}:color" for n in shown} <= set(hair_metadata(dna, hair))
+        assert list(hair_picture(people.PEOPLE["man"], 64)) == ["hair_color.png"]
 
 
 def test_extra_roots_stay_on_the_skin_in_each_expression(haired):

@@ -32,7 +32,7 @@ from .body import JOINTS, NECK_CUT, NECK_SLOPE, REACH, Body
 from .controls import gui_table
 from .eyes import eye_parts, with_eyeballs
 from .further import CONTROLS_OF_CODE
-from .hair import add_hair, grow_hair, hair_textures
+from .hair import add_hair, grow_hair, hair_metadata, hair_picture
 from .paint.layout import packed
 from .paint.skin import HEAD_SIZE
 from .paint.textures import paint_textures
@@ -626,6 +626,7 @@ def _built(
     growing = painter.submit(
         lambda: grow_hair(person, body.moved(shape), even, source.base_mesh(), parts, CM)
     )
+    drawing = painter.submit(hair_picture, person, texture_size)
     painter.shutdown(wait=False)
     begins = _SEARCH_ENDS if correctives.most or correctives.together else _FIT_BEGINS
     dna = search_correctives(dna, correctives, steps)
@@ -636,9 +637,9 @@ def _built(
     set_askew(dna, parts, shape, CM)
     grown = growing.result()
     add_hair(dna, grown)
-    hairs, shown = hair_textures(person, dna, grown, texture_size)
     leave_maps(dna)
     round_numbers(dna)
     by_code = {"controls_by_code": " ".join(CONTROLS_OF_CODE)}
-    dna.metadata = METADATA | by_code | textures_of_levels(dna, metadata) | shown
-    return dna, textures | hairs
+    metadata = textures_of_levels(dna, metadata) | hair_metadata(dna, grown)
+    dna.metadata = METADATA | by_code | metadata
+    return dna, textures | drawing.result()

@@ -128,19 +128,25 @@ def add_hair(dna: Dna, grown: Grown) -> None:
         append_mesh(dna, f"{name}_lod{lod}_mesh", mesh, [lod])
 
 
-def hair_textures(
-    person: Person, dna: Dna, grown: Grown, largest: int
-) -> tuple[dict[str, bytes], dict[str, str]]:
-    """The picture of the hairs, and metadata that say which meshes show it, and how.
+def hair_picture(person: Person, largest: int) -> dict[str, bytes]:
+    """The picture of the hairs by its file name, as PNG.
+
+    Args:
+        person: has the colours.
+        largest: it has no more texels than a square of this side.
+    """
+    return {PICTURE: png(shrunk(paint_strands(person), largest))}
+
+
+def hair_metadata(dna: Dna, grown: Grown) -> dict[str, str]:
+    """Which meshes show the picture of the hairs, and how.
 
     `texture:<mesh>:color` -> file name; `hair:<mesh>` -> "rows=R" of its cards, which stand one
     after the other, two vertices in a row, from root to tip: renderers of strands follow them.
 
     Args:
-        person: has the colours.
         dna: has the meshes.
         grown: the hair.
-        largest: no texture has more texels than a square of this side.
     """
     metadata = {}
     for name in dna.mesh_names:
@@ -151,4 +157,4 @@ def hair_textures(
         lod = int(name.partition("_lod")[2].partition("_")[0])
         rows = grown.strips[kind].rows
         metadata[f"hair:{name}"] = f"rows={min(rows, _ROWS[lod])}"
-    return {PICTURE: png(shrunk(paint_strands(person), largest))}, metadata
+    return metadata
