@@ -212,7 +212,7 @@ declare -A numpy_of=([3.11]=1.26.4 [3.13]=2.3.5 [3.14]=2.3.5)
 tested() { # tested PYTHON: what of the tests has to do with the system
   local log="$logs/pytest-$1.log" said
   linux_pip "$1" -c <(grep -v ^numpy "$project/packaging/requirements.txt") \
-    "numpy==${numpy_of[$1]}" pytest python-osc xxhash matplotlib || return 1
+    "numpy==${numpy_of[$1]}" pytest python-osc threadpoolctl xxhash matplotlib || return 1
   # One test needs PocketSphinx, which has no wheel for 3.14.
   (cd "$project" && RISORIUS_SHARED="$cross/none" PYTHONDONTWRITEBYTECODE=1 linux_run "$1" -m pytest -q \
     -p no:cacheprovider "${tests_of_the_system[@]}" \

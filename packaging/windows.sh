@@ -36,7 +36,7 @@ install() {
   stamp="$2/.$(echo "${numpy_of[$1]}" | cat - "$project/packaging/requirements.txt" | sha256sum | cut -c1-16)"
   if [ ! -e "$stamp" ]; then
     rm -rf "$2" && windows_pip "$1" "$2" -c <(grep -v ^numpy "$project/packaging/requirements.txt") \
-      "numpy==${numpy_of[$1]}" pytest colorama python-osc xxhash matplotlib || return 1
+      "numpy==${numpy_of[$1]}" pytest colorama python-osc threadpoolctl xxhash matplotlib || return 1
     # wine 8 has no WMI, which 3.13 asks what the system is called, and not how 3.13 copies files.
     printf '%s\n' 'import sys' 'import _winapi' 'sys.modules["_wmi"] = None' \
       'vars(_winapi).pop("CopyFile2", None)' > "$2/sitecustomize.py" && touch "$stamp"

@@ -4,20 +4,19 @@
 import sys
 
 import numpy as np
-import pytest
 from risorius.base import blas
+from threadpoolctl import threadpool_info, threadpool_limits
 
 
 def test_linear_algebra_has_one_thread_and_then_as_many_as_before():
-    tool = pytest.importorskip("threadpoolctl")
-
     def threads():
-        return [p["num_threads"] for p in tool.threadpool_info() if p["user_api"] == "blas"]
+        return {p["num_threads"] for p in threadpool_info() if p["user_api"] == "blas"}
 
-    before = threads()
-    with blas.one_thread():
-        assert set(threads()) <= {1}
-    assert threads() == before
+    with threadpool_limits(2, "blas"):
+        assert threads() == {2}
+        with blas.one_thread():
+            assert threads() == {1}
+        assert threads() == {2}
 
 
 def test_without_the_library_it_is_as_it_was(monkeypatch):
