@@ -179,7 +179,8 @@ def _dense(places: Floats, triangles: Ints, fine: int) -> Floats:
 class Cards:
     """Vertices of hair, each over the triangle of skin that it is nearest to at rest."""
 
-    AROUND = 48  # triangles of skin of which one may come to be the nearest
+    # Triangles of skin of which one may come to be the nearest: mostly, and where skin folds far.
+    NEAR, AROUND = 48, 400
 
     def __init__(self, hairs: Floats, places: Floats, triangles: Ints) -> None:
         """Find the triangles.
@@ -200,7 +201,8 @@ class Cards:
             nearest[part] = _away(hairs[part], places).argmin(axis=1)
             away = _away(hairs[part], middles)
             some = np.argpartition(away, count - 1, axis=1)[:, :count]
-            self.around[part] = triangles[some]
+            order = np.take_along_axis(away, some, axis=1).argsort(axis=1)
+            self.around[part] = triangles[np.take_along_axis(some, order, axis=1)]
         self.corners = triangles[first[nearest]]
         self.rest = self.height(hairs, places[self.corners])
 

@@ -143,13 +143,15 @@ class Hair:
         self._look = LIMITS[self.check] / 2 / face.mm
 
     def depths(self, now: Floats) -> tuple[str, Floats, Floats]:
-        """As of Eye. A plane goes on beyond its triangle, where skin rolls in (lips): what lies
-        below one is measured again, over the skin that is nearest now."""
+        """As of Eye. A plane goes on beyond its triangle, where skin rolls in (lips), and so do few
+        triangles where it folds: what lies below is measured again, over the skin that is nearest
+        now of ever more."""
         places = now[self._hairs]
         deep = -bodies.Cards.height(places, now[self._corners])
-        doubted = np.flatnonzero(deep > self._look)
-        corners = now[self._around[doubted]]
-        deep[doubted] = -bodies.Cards.height_over_nearest(places[doubted], corners)
+        for count in (bodies.Cards.NEAR, bodies.Cards.AROUND):
+            doubted = np.flatnonzero(deep > self._look)
+            corners = now[self._around[doubted, :count]]
+            deep[doubted] = -bodies.Cards.height_over_nearest(places[doubted], corners)
         return self.check, deep, places
 
 

@@ -103,6 +103,29 @@ def test_hair_under_the_skin_is_seen():
     assert bodies.Cards.height(hairs, raised[cards.corners]) == pytest.approx([0.2, -0.2])
 
 
+def test_where_skin_folds_far_its_other_side_is_found_among_more_triangles():
+    """A hair beyond a roll of skin: of the triangles by its root the nearest is on the far side,
+    seen from inside."""
+    around, along = 24, 5
+    angle = 2 * np.pi * np.arange(around) / around
+    ring = np.column_stack([np.sin(angle), np.cos(angle)])
+    places = np.array([[x, y, z] for z in range(along) for x, y in ring])
+    rings = np.arange(along * around).reshape(along, around)
+    after = np.roll(rings, -1, axis=1)
+    corners = np.stack([rings[:-1], after[:-1], after[1:], rings[1:]], axis=-1)
+    faces = corners.reshape(-1, 4).tolist()
+    triangles = np.array([t for f in faces for t in (f[2::-1], [f[3], f[2], f[0]])])
+    cards = bodies.Cards(np.array([[0.0, 1.1, 2.0]]), places, triangles)
+    assert cards.rest[0] > 0
+    beyond = np.array([[0.0, -1.1, 2.0]])
+    few, more = (
+        bodies.Cards.height_over_nearest(beyond, places[cards.around[:, :count]])[0]
+        for count in (cards.NEAR, cards.AROUND)
+    )
+    assert few < -1
+    assert more == pytest.approx(0.1, abs=0.02)
+
+
 def test_samples_are_vertices_edges_and_faces():
     places = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0.5, 0]], float)
     skin = bodies.skin_samples(places, [[0, 1, 2, 3], [1, 4, 2]])

@@ -4,11 +4,9 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ... import Dna
 from ...expressions import load, pose_vector
@@ -38,7 +36,6 @@ _OWN = ("hair", "beard")
 _ROWS = (99, 4, 3, 3)
 _LEAST_MM = {"hair": 1.0, "brows": 0.15, "beard": 0.15, "eyelashes": 0.1}
 _MM = 10.0  # of a centimetre
-_WIDEST, _BESIDE = "shout", np.float32(0.4)
 
 
 @dataclass
@@ -100,17 +97,6 @@ def _within_budget(strips: dict[str, Strips]) -> dict[str, Strips]:
     return strips
 
 
-def _faces(names: Sequence[str]) -> list[NDArray[np.float32]]:
-    """What a beard stays clear of: each expression, and the widest with some of each other.
-
-    Args:
-        names: of the raw controls.
-    """
-    alone = [pose_vector(face, names) for face in load().values()]
-    widest = pose_vector(_WIDEST, names)
-    return [*alone, *(np.minimum(widest + _BESIDE * face, 1) for face in alone)]
-
-
 def add_hair(dna: Dna, grown: Grown) -> None:
     """Add the cards of all levels to a finished face.
 
@@ -123,7 +109,7 @@ def add_hair(dna: Dna, grown: Grown) -> None:
     heads = {lod: head_of(dna, lod) for lod in range(min(dna.lod_count, NO_HAIR))}
     there = {lod: whereabouts(dna, head) for lod, head in heads.items() if head is not None}
     if "beard" in grown.strips and heads[0] is not None:
-        faces = _faces(dna.raw_control_names)
+        faces = [pose_vector(face, dna.raw_control_names) for face in load().values()]
         clear = cut_clear(grown.strips["beard"], dna, heads[0], grown.unit, faces)
         grown.strips["beard"] = clear
     for name, lod in itertools.product(names, there):
