@@ -30,7 +30,7 @@ def paint_eye(person: Person) -> Floats:
     x, y = np.meshgrid(at, at)
     away, around = np.hypot(x, y), np.arctan2(y, x) / (2 * np.pi) % 1
     colour = _sclera(side_angle(np.maximum(away, IRIS_AT)), x / np.maximum(away, 1e-9), random)
-    colour *= 1 - 0.18 * depth_of(person)  # beside dark skin the same white would glow
+    colour *= 1 - 0.23 * depth_of(person)  # beside dark skin the same white would glow
     reach = (away / IRIS_AT - PUPIL) / (1 - PUPIL)  # 0 at the pupil, 1 at the limbus
     iris = _iris(person, around, reach, random)
     wobble = 0.012 * _polar(around, 0 * reach, 53, 1, random)

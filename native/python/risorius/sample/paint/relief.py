@@ -14,7 +14,7 @@ from .images import smooth
 from .raster import filled
 from .skin import Skin
 
-PORE = 0.0013
+PORE = 0.0020
 _STEP = 2 / 255  # of a normal's parts: finer ones are not seen, and pack badly
 _LIPS = 0.0005
 _CREASE = 0.0045
@@ -35,8 +35,10 @@ def heights(skin: Skin, creases: Floats) -> Floats:
     share = field["pores"]
     tile, at = texels.dots(4.2, 51)
     holes = tile.over(np.clip(0.35 + 0.65 * share, 0, 1), at, 0.46, 1.0)
+    # A forehead is stretched smooth over the bone: as deep there, they look like a rind.
+    bare = bare * (1 - 0.55 * np.clip(field["forehead"], 0, 1))
     out = -PORE * (0.25 + 0.75 * share) * holes * bare
-    out += bare * (0.0002 * texels.middle * (0.5 + share) + 0.00025 * texels.coarse)
+    out += bare * (0.00035 * texels.middle * (0.5 + share) + 0.00025 * texels.coarse)
     out -= _CREASE * creases
     around = smooth(regions.LIPS_RINGS + 5, regions.LIPS_RINGS + 1, ring)
     lines = skin.lips + 0.45 * skin.old * around * (1 - skin.lips)

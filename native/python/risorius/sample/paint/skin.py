@@ -26,7 +26,7 @@ _YELLOW = np.array([-0.02, 0.04, 0.36], np.float32)
 _MUCOSA = (0.73, 0.41, 0.385)
 _IN_SHADE = 0.55  # how light hair is at its roots, beside its tips
 _THROAT = (0.36, 0.15, 0.14)
-_LID_MARGIN = (0.68, 0.41, 0.37)
+_LID_MARGIN = (0.62, 0.36, 0.33)
 
 
 def linear(colour: Floats) -> Floats:
@@ -184,13 +184,13 @@ class Skin:
         field, texels = self.field, self.texels
         if what == "blood":
             uneven = 1 + 0.12 * texels.coarse + 0.08 * texels.middle
-            out = field["blood"] * uneven + 0.016 * texels.coarse + 0.018 * texels.middle
+            out = field["blood"] * uneven + 0.008 * texels.coarse + 0.012 * texels.middle
             return np.asarray(out + 0.03 * texels.fine + 0.35 * creases + self._vessels())
         if what == "veins":
             temples = np.clip(texels.coarse - 1.2, 0, 1) * (1 - self.deep)
             return np.asarray(field["veins"] * (0.42 + 0.05 * texels.coarse) + 0.05 * temples)
-        uneven = 0.07 * field["tone"] + (0.022 + 0.03 * self.old) * texels.coarse
-        out = uneven + (0.02 + 0.012 * self.old) * texels.middle + 0.016 * texels.fine
+        uneven = 0.07 * field["tone"] + (0.012 + 0.02 * self.old) * texels.coarse
+        out = uneven + (0.014 + 0.010 * self.old) * texels.middle + 0.016 * texels.fine
         out += self.deep * (0.22 * field["veins"] + 0.12 * field["forehead"])
         out += 0.18 * creases + self._spots()
         return np.asarray(out)
@@ -245,7 +245,7 @@ class Skin:
         brows = linear(np.array(person.brows))
         light = _over(light, brows, 0.30 * person.scalp * self._brows())
         if person.beard:
-            share = np.clip(self.field["beard"] * (1 + 0.22 * texels.coarse), 0, 1)
+            share = np.clip(self.field["beard"] * (1 + 0.10 * texels.coarse), 0, 1)
             light = light * np.exp(-(1.5 * person.beard * share)[:, None] * 2 * _VEINS)
             stubble, at = texels.dots(2.5, 32)
             dark = stubble.over(share, at, 0.46, 0.9)
@@ -300,7 +300,7 @@ class Skin:
         mucosa = _over(mucosa, linear(np.array(_THROAT)), back)
         light = _over(light, mucosa, smooth(2.4, 0.4, ring))
         pink = linear(np.array(_LID_MARGIN)) * (1 - 0.45 * self.deep)
-        return _over(light, pink, 0.85 * smooth(2.8, 0.8, self.field["eyes"]))
+        return _over(light, pink, 0.85 * smooth(3.6, 1.2, self.field["eyes"]))
 
 
 def _over(light: Floats, colour: Floats, mask: Floats) -> Floats:
