@@ -56,7 +56,12 @@ class Points:
 
     def at(self, raw: npt.NDArray[np.float32]) -> Floats:
         """[points, 3] of a pose."""
+        self._raw = raw
         return self._probe.positions(raw)
+
+    def whole(self, mesh: int) -> Floats:
+        """[V, 3] of a mesh in the pose that was asked last."""
+        return np.asarray(self._surface.positions(self._raw, mesh), np.float64)
 
 
 class Eye:
@@ -139,18 +144,22 @@ class Hair:
         self.check = "root in skin" if roots else "hair in skin"
         self._hairs = face.points.add(mesh, some[kept])
         self._corners = face.points.add(face.head, cards.corners[kept])
-        self._around = face.points.add(face.head, cards.around[kept])
-        self._look = LIMITS[self.check] / 2 / face.mm
+        self._around = face.points.add(face.head, cards.around[kept, : cards.NEAR])
+        self._far, self._points, self._head = cards.around[kept], face.points, face.head
+        self._limit = LIMITS[self.check] / face.mm
 
     def depths(self, now: Floats) -> tuple[str, Floats, Floats]:
-        """As of Eye. A plane goes on beyond its triangle, where skin rolls in (lips), and so do few
-        triangles where it folds: what lies below is measured again, over the skin that is nearest
-        now of ever more."""
+        """As of Eye. A plane goes on beyond its triangle, where skin rolls in (lips): what lies
+        below one is measured again, over the skin that is nearest now; and what is too deep then
+        over that of many more triangles, since a few end where skin folds."""
         places = now[self._hairs]
         deep = -bodies.Cards.height(places, now[self._corners])
-        for count in (bodies.Cards.NEAR, bodies.Cards.AROUND):
-            doubted = np.flatnonzero(deep > self._look)
-            corners = now[self._around[doubted, :count]]
+        doubted = np.flatnonzero(deep > self._limit / 2)
+        corners = now[self._around[doubted]]
+        deep[doubted] = -bodies.Cards.height_over_nearest(places[doubted], corners)
+        doubted = np.flatnonzero(deep > self._limit)
+        if len(doubted):
+            corners = self._points.whole(self._head)[self._far[doubted]]
             deep[doubted] = -bodies.Cards.height_over_nearest(places[doubted], corners)
         return self.check, deep, places
 
