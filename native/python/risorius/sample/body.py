@@ -275,6 +275,5 @@ class Body:
             shape: float64[V, 3], what is added to them, decimetres.
         """
         out = copy(self)
-        if shape.any():
-            out.positions = self.positions + shape
+        out.positions = self.positions + shape
         return out

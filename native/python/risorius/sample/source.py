@@ -127,10 +127,10 @@ class Source:
         """
         data = self._zip.read(name)
         text = gzip.decompress(data) if name.endswith(".gz") else data
-        rows = [r for r in text.decode().splitlines() if r and not r.startswith("#")]
+        rows = [r.split() for r in text.decode().splitlines() if r and not r.startswith("#")]
         out = np.zeros((vertex_count, 3))
         if rows:
-            table = np.fromstring(" ".join(rows), sep=" ").reshape(len(rows), -1)
+            table = np.array(rows, float)
             out[table[:, 0].astype(int)] = table[:, 1:4]
         return out
 

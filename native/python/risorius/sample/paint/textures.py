@@ -24,6 +24,7 @@ from .skin import HEAD_SIZE, Skin, Texels
 MASK_SIZE = 512
 WRINKLE_SHARE = 2  # a texel of the sets is as wide as so many of the colour
 STAYS = ((25, 40, 58, 75), (0.0, 0.06, 0.2, 0.38))  # of each fold, by years, in a face at rest
+_FROWN_ENDS = (0.22, 0.38)  # decimetres over the eyes: higher up its lines would cross the brow's
 
 
 def fold_strength(person: Person, place: Floats, eye: Floats) -> Floats:
@@ -56,9 +57,6 @@ def lasting(place: Floats, eye: Floats) -> Floats:
     between = np.exp(-((x / 0.12) ** 2) - ((y - 0.14) / 0.14) ** 2)
     fold = np.clip(-wrinkles.laugh_fold(place, eye)[0] / wrinkles.DEPTH, 0, 1)
     return np.asarray(0.22 + 0.78 * np.clip(brow + feet + between + fold, 0, 1))
-
-
-_FROWN_ENDS = (0.22, 0.38)  # decimetres over the eyes: higher up its lines would cross the brow's
 
 
 @dataclass
