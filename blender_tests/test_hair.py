@@ -50,7 +50,7 @@ def haired(tmp_path):
 
 
 def points_of(thing):
-    """float64[n, 3] of the curves that renders show, in world space, and their number."""
+    """float64[n, 3] of the curves that renders show, in world space, and each one's first."""
     thing.hide_viewport = False
     graph = bpy.context.evaluated_depsgraph_get()
     seen = thing.evaluated_get(graph)
@@ -59,7 +59,9 @@ def points_of(thing):
     curves.attributes["position"].data.foreach_get("vector", flat)
     world = np.array(seen.matrix_world)
     thing.hide_viewport = True
-    return flat.reshape(-1, 3) @ world[:3, :3].T + world[:3, 3], len(curves.curves)
+    return flat.reshape(-1, 3) @ world[:3, :3].T + world[:3, 3], [
+        curve.first_point_index for curve in curves.curves
+    ]
 
 
 def test_cards_are_seen_through_where_the_picture_says_so(haired):
@@ -72,30 +74,53 @@ def test_cards_are_seen_through_where_the_picture_says_so(haired):
     assert not bare.inputs["Alpha"].is_linked
 
 
-def test_strands_lie_on_the_cards_wherever_they_go(haired):
+# How far a strand strays: in cards' widths, in rows; metres, by which tips part on each axis.
+ASIDE, ALONG, APART = 0.35, 0.4, 0.0025 * 3**0.5
+
+
+def test_strands_go_wherever_their_cards_go(haired):
     item = scene.meshes(haired)[1]
     before = set(bpy.data.objects), len(bpy.data.node_groups), len(bpy.data.materials)
     assert bpy.ops.risorius.set_strands() == {"FINISHED"}
     (thing,) = set(bpy.data.objects) - before[0]
+    assert bpy.ops.risorius.set_strands() == {"FINISHED"}  # it has them: nothing to do
+    assert len(set(bpy.data.objects) - before[0]) == 1
     assert (item.hide_render, thing.hide_render, thing.hide_viewport) == (True, False, True)
     for jaw in (0.0, 1.0):
         scene.set_controls(haired, jawOpen=jaw)
         corners = scene.evaluated(item).reshape(CARDS, ROWS, 2, 3)
-        points, count = points_of(thing)
-        assert count == 26 * CARDS
-        # Each point is near the segment between both edges of a card at its height.
-        edges = [corners[:, r, s] for r in range(ROWS) for s in (0, 1)]
-        low, high = np.min(edges, axis=(0, 1)), np.max(edges, axis=(0, 1))
-        apart = 0.0026  # metres: tips part by so much
-        assert (points >= low - apart).all()
-        assert (points <= high + apart).all()
-        roots = corners[:, 0].mean(axis=1)
-        near = np.linalg.norm(points[:, None] - roots, axis=2).min(axis=0)
-        assert near.max() < 0.004  # metres: half the width of a card
+        points, roots = points_of(thing)
+        assert len(roots) == 26 * CARDS
+        across, along = corners[0, 0, 1] - corners[0, 0, 0], corners[0, 1, 0] - corners[0, 0, 0]
+        out = np.cross(across, along) / np.linalg.norm(np.cross(across, along))
+        local = points - corners[0, 0, 0]
+        side, up, off = np.linalg.solve(np.column_stack([across, along, out]), local.T)
+        tips = APART / np.linalg.norm(across), APART / np.linalg.norm(along)
+        pitch = 1 / 0.8  # of the cards, in widths
+        assert side.min() >= -ASIDE - tips[0]
+        assert side.max() <= (CARDS - 1) * pitch + 1 + ASIDE + tips[0]
+        assert up.min() >= -ALONG - tips[1]
+        assert up.max() <= ROWS - 1 + ALONG + tips[1]
+        assert np.abs(off).max() < APART + 1e-6
     assert bpy.ops.risorius.set_strands(enable=False) == {"FINISHED"}
     assert set(bpy.data.objects) == before[0]
     assert (len(bpy.data.node_groups), len(bpy.data.materials)) == before[1:]
     assert not item.hide_render
+
+
+def test_roots_stand_between_the_cards_too(haired):
+    item = scene.meshes(haired)[1]
+    before = set(bpy.data.objects)
+    bpy.ops.risorius.set_strands()
+    (thing,) = set(bpy.data.objects) - before
+    corners = scene.evaluated(item).reshape(CARDS, ROWS, 2, 3).astype(np.float64)
+    points, first = points_of(thing)
+    roots = points[first] - corners[0, 0, 0]
+    across, along = corners[0, 0, 1] - corners[0, 0, 0], corners[0, 1, 0] - corners[0, 0, 0]
+    side = np.sort(roots @ across / (across @ across))
+    # In tufts, each as wide as its card, there are gaps of a quarter between them.
+    assert np.diff(side).max() < 0.2
+    assert np.ptp(roots @ along / (along @ along)) > 0.3
 
 
 def test_a_face_without_cards_says_so(dna_file):

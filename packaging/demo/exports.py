@@ -52,7 +52,7 @@ def original(args):
         if done != {"FINISHED"}:
             raise RuntimeError(f"the export gave {done}")
     bpy.context.scene.frame_set(FRAMES[0])
-    studio = stage.build(controls.users_collection[0])
+    studio = stage.build(controls.users_collection[0], strands=False)
     bpy.data.libraries.write(str(args.out / STUDIO), {studio})
     pictures(args, "ORIGINAL")
 

@@ -75,8 +75,13 @@ def bounds(collection):
     )
 
 
-def build(collection):
-    """The add-on's studio around a collection's face, its camera the scene's; the studio."""
+def build(collection, strands=True):
+    """The add-on's studio around a collection's face, its camera the scene's; the studio.
+
+    Args:
+        collection: of the face.
+        strands: renders show its hair as strands, where it has cards.
+    """
     scene = bpy.context.scene
     bpy.context.view_layer.objects.active = next(
         thing for thing in collection.all_objects if thing.name.endswith("_controls")
@@ -84,6 +89,8 @@ def build(collection):
     before = set(bpy.data.collections)
     if bpy.ops.risorius.add_studio(use_scene_camera=True) != {"FINISHED"}:
         raise RuntimeError("the studio was not added")
+    if strands and any("_hair_" in thing.name for thing in collection.all_objects):
+        bpy.ops.risorius.set_strands()
     darken(scene)
     render_settings(scene)
     return next(made for made in bpy.data.collections if made not in before)

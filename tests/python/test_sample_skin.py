@@ -6,7 +6,7 @@ import dataclasses
 import numpy as np
 import pytest
 from risorius.sample import people
-from risorius.sample.paint import layout, patterns, raster, regions, relief, skin
+from risorius.sample.paint import form, layout, patterns, raster, regions, relief, skin
 from risorius.sample.part import Part
 from risorius.sample.polygons import Polygons
 
@@ -204,6 +204,32 @@ def test_nose_and_lips_shine_and_pores_are_holes(mask):
     np.testing.assert_allclose(
         rises[100, 100], 0.5 + 0.5 * np.array([0, -0.1, 1]) / np.hypot(1, 0.1), atol=0.005
     )
+
+
+def test_the_relief_has_what_a_mesh_rounds_off(mask):
+    face, texels = mask
+    polygons = Polygons(grid(np.zeros(SIDE), np.zeros(SIDE)), [], np.empty((0, 2)), SIDE**2)
+    flat = np.column_stack([face.x, face.y, face.z])
+    np.testing.assert_allclose(form.form(polygons, flat, face, texels), 0, atol=1e-9)
+
+    def groove(x, y):
+        """Three millimetres deep, beside the nose."""
+        return np.exp(-(((x - 0.3) / 0.06) ** 2)) * (np.abs(y + 0.3) < 0.35)
+
+    dug = flat - 0.03 * groove(face.x, face.y)[:, None] * [0, 0, 1]
+    found = form.form(polygons, dug, face, texels)
+    inside, beside = found[near(texels, 0.3, -0.3)], found[near(texels, 0.42, -0.3)]
+    assert inside.max() < -0.002
+    assert beside.min() > 0.0002
+    assert np.abs(found).max() <= 0.016
+    assert np.abs(found[near(texels, -0.3, -0.3, 0.2)]).max() < 1e-4
+    assert form.hollows(found)[near(texels, 0.3, -0.3)].min() > 0.3
+    assert form.hollows(found)[near(texels, -0.3, -0.3)].max() < 1e-3
+    # Where lips meet nothing is moved.
+    dug = flat - 0.03 * groove(face.x + 0.3, face.y + 0.4)[:, None] * [0, 0, 1]
+    meet = form.form(polygons, dug, face, texels)[near(texels, 0, -0.72, 0.02)]
+    assert np.abs(meet).max() < 1e-5
+    assert form.share_at(8) < 0.6 < form.share_at(30) == 1
 
 
 def test_loops_are_counted_from_the_mouths_inside():

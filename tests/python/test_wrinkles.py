@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 import risorius
 from risorius.author.levels import extend_levels
-from risorius.sample import build, expressions, wrinkles
+from risorius.sample import build, expressions, people, wrinkles
 from risorius.sample.expressions import Expression
+from risorius.sample.paint import textures
 from risorius.sample.part import Part
 from risorius.sample.polygons import Polygons
 
@@ -165,6 +166,36 @@ def test_a_smile_folds_the_cheek_from_the_nose_past_the_mouth():
     assert row.max() > 0.4 * wrinkles._FOLD_DEPTH
     assert not height[(y > -0.35) | (y < -0.91)].any()
     assert not there[(y > -0.35) | (y < -0.91)].any()
+
+
+def test_lines_of_age_make_no_grid_between_the_brows(sheet):
+    part, positions = sheet
+    face = positions * [1.2, 1.2, 0] + [-0.6, -0.5, 0]  # decimetres about the eyes
+    still = Expression(np.zeros_like(face))
+    units = {
+        control + side: still
+        for region in wrinkles.REGIONS.values()
+        for control in region.drivers
+        for side in "LR"
+    }
+    up = {f"browRaiseIn{side}": Expression(face * [0, -0.06, 0]) for side in "LR"}
+    down = {f"browDown{side}": Expression(face * [-0.06, 0, 0]) for side in "LR"}
+    person = people.PEOPLE["elder"]
+
+    def lines(moves):
+        found = textures.head_wrinkles(
+            person, part, face, np.array([0.3, 0, 0]), units | moves, 256
+        )
+        return found.still
+
+    raised, frowned, both = lines(up), lines(down), lines(up | down)
+    columns = 128 + np.array([-14, 14])  # 6.5 mm to either side of the middle
+    between = slice(110, 140), slice(*columns)  # from the eyes' height to 16 mm over it
+    forehead = slice(190, 230), slice(*columns)
+    assert frowned[between].max() > 0.05
+    assert raised[forehead].max() > 0.05
+    np.testing.assert_array_equal(both[between], frowned[between])
+    np.testing.assert_array_equal(both[forehead], raised[forehead])
 
 
 @pytest.mark.parametrize("side", "LR")

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
 import bpy
 
@@ -21,15 +21,32 @@ STRANDS = "risorius_strands"  # on a mesh of cards: the object that renders show
 _TREE = "Risorius Strands"
 _CARDS = "Cards"  # input of the modifier: the mesh that is followed
 _PLACE = "strand_uv"  # attribute of the curves: where in the picture their colour is
-_DEEPER = 1.35  # exponent of a fibre's colour
+_DEEPER = 1.35  # exponent of the colour of fibres that lie close
+_BRIGHTER = 1.8  # of single ones: half of each is turned away from the light, a card is not
 _ROWS = re.compile(r"rows=(\d+)")
-# Name of a mesh begins -> strands of a card, radius at the root and how far tips part, in metres,
-# and the share that is cut off at most.
-_KINDS = {
-    "hair": (26, 0.00006, 0.0025, 0.45),
-    "brows": (4, 0.00005, 0.0004, 0.35),
-    "beard": (9, 0.00006, 0.0015, 0.5),
-    "eyelashes": (3, 0.00006, 0.0003, 0.25),
+
+
+class _Kind(NamedTuple):
+    """How strands differ from the card that they follow."""
+
+    each: int  # strands of a card
+    radius: float  # at the root, metres
+    apart: float  # how far tips part, metres
+    cut: float  # of their length, what is cut off at most
+    # Roots stand between the cards' too, or each card would be a tuft: how far over either edge, in
+    # the card's widths, and how far before or behind the card's root, in rows.
+    aside: float
+    along: float
+    # Light goes from fibre to fibre where they lie close; single ones over skin are as the picture
+    # shows them, and fibres that let light through would be darker there.
+    dense: bool
+
+
+_KINDS = {  # by what the name of a mesh begins with
+    "hair": _Kind(26, 0.00006, 0.0025, 0.45, 0.35, 0.4, True),
+    "brows": _Kind(4, 0.00005, 0.0004, 0.35, 0.3, 0.3, False),
+    "beard": _Kind(12, 0.00005, 0.0015, 0.5, 0.9, 0.7, False),
+    "eyelashes": _Kind(3, 0.00006, 0.0003, 0.25, 0.0, 0.0, False),
 }
 
 
@@ -71,16 +88,16 @@ def show(rig: ArmatureObject, unit: float) -> int:
     """
     count = 0
     for item, name, rows in cards(rig):
-        kind = next((k for k in _KINDS if name.startswith(k)), None)
-        if kind is None or item.hide_render:
-            continue
+        kind = next((k for begin, k in _KINDS.items() if name.startswith(begin)), None)
         if _strands_of(item) is None:
+            if kind is None or item.hide_render:
+                continue
             _add(item, rows, kind, unit)
         count += 1
     return count
 
 
-def _add(item: MeshObject, rows: int, kind: str, unit: float) -> None:
+def _add(item: MeshObject, rows: int, kind: _Kind, unit: float) -> None:
     data = bpy.data.hair_curves.new(f"{item.name}_strands")
     thing = bpy.data.objects.new(f"{item.name}_strands", data)
     for collection in item.users_collection:
@@ -165,17 +182,16 @@ class _Tree:
         return next(s for s in node.outputs if s.enabled)
 
     def between(self, a: object, b: object, share: object) -> Socket:
-        """A vector between two."""
-        node = self.node("ShaderNodeMix", data_type="VECTOR")
+        """A vector between two, or beyond them where the share is."""
+        node = self.node("ShaderNodeMix", data_type="VECTOR", clamp_factor=False)
         where = {s.identifier: s for s in node.inputs}
         for value, name in ((share, "Factor_Float"), (a, "A_Vector"), (b, "B_Vector")):
             self.put(value, where[name])
         return next(s for s in node.outputs if s.identifier == "Result_Vector")
 
 
-def _tree(item: MeshObject, rows: int, kind: str, unit: float) -> NodeTree:
+def _tree(item: MeshObject, rows: int, kind: _Kind, unit: float) -> NodeTree:
     """Nodes that turn the cards of a mesh into strands."""
-    each, radius, apart, cut = _KINDS[kind]
     tree: Any = bpy.data.node_groups.new(_TREE, "GeometryNodeTree")
     for way in ("INPUT", "OUTPUT"):
         tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
@@ -184,7 +200,7 @@ def _tree(item: MeshObject, rows: int, kind: str, unit: float) -> NodeTree:
     given = g.node("NodeGroupInput").outputs[_CARDS]
     source = g.node("GeometryNodeObjectInfo", {"Object": given}, transform_space="RELATIVE")
     mesh = source.outputs["Geometry"]
-    count = each * len(item.data.vertices) // (2 * rows)
+    count = kind.each * len(item.data.vertices) // (2 * rows)
     line = g.node("GeometryNodeCurvePrimitiveLine")
     line = g.node("GeometryNodeResampleCurve", {"Curve": line.outputs[0], "Count": rows})
     dots = g.node("GeometryNodePoints", {"Count": count})
@@ -193,19 +209,19 @@ def _tree(item: MeshObject, rows: int, kind: str, unit: float) -> NodeTree:
     # All strands have as many points as a card has rows: numbers follow from a point's own.
     index = g.node("GeometryNodeInputIndex").outputs[0]
     strand = g.math("FLOOR", g.math("DIVIDE", g.math("ADD", index, 0.5), rows))
-    card = g.math("FLOOR", g.math("DIVIDE", g.math("ADD", strand, 0.5), each))
+    card = g.math("FLOOR", g.math("DIVIDE", g.math("ADD", strand, 0.5), kind.each))
     row = g.math("SUBTRACT", index, g.math("MULTIPLY", strand, rows))
     left = g.math("MULTIPLY", g.math("ADD", g.math("MULTIPLY", card, rows), row), 2)
     right = g.math("ADD", left, 1)
     # A strand wanders a little across its card.
-    across = g.random(0.04, 0.96, 1, strand)
+    across = g.random(0.04 - kind.aside, 0.96 + kind.aside, 1, strand)
     lean = g.random(-0.1, 0.1, 2, strand)
     across = g.math("ADD", across, g.math("MULTIPLY", lean, g.math("DIVIDE", row, rows)))
     place = g.node("GeometryNodeInputPosition").outputs[0]
-    ends = [g.taken(mesh, place, i, "FLOAT_VECTOR") for i in (left, right)]
+    ends = [_slid(g, mesh, place, i, row, (rows, strand, kind.along)) for i in (left, right)]
     parted = g.node("FunctionNodeRandomValue", {"ID": strand, "Seed": 4}, data_type="FLOAT_VECTOR")
-    parted.inputs["Min"].default_value = [-apart / unit] * 3
-    parted.inputs["Max"].default_value = [apart / unit] * 3
+    parted.inputs["Min"].default_value = [-kind.apart / unit] * 3
+    parted.inputs["Max"].default_value = [kind.apart / unit] * 3
     aside = g.node("ShaderNodeVectorMath", {0: parted.outputs["Value"]}, operation="SCALE")
     g.put(g.math("DIVIDE", row, rows - 1), aside.inputs["Scale"])
     moved = g.node(
@@ -217,11 +233,47 @@ def _tree(item: MeshObject, rows: int, kind: str, unit: float) -> NodeTree:
         },
     )
     stored = _store_place(g, item, mesh, moved.outputs[0], (left, right, across))
-    finished = _finish(g, stored, 2 * rows + 2, 1.0 - cut, radius / unit)
-    painted = g.node("GeometryNodeSetMaterial", {"Geometry": finished, "Material": _material(item)})
+    finished = _finish(g, stored, 2 * rows + 2, 1.0 - kind.cut, kind.radius / unit)
+    painted = g.node(
+        "GeometryNodeSetMaterial", {"Geometry": finished, "Material": _material(item, kind.dense)}
+    )
     out = g.node("NodeGroupOutput")
     tree.links.new(painted.outputs[0], out.inputs[0])
     return tree
+
+
+def _slid(
+    g: _Tree,
+    mesh: Socket,
+    place: Socket,
+    index: Socket,
+    row: Socket,
+    of: tuple[int, Socket, float],
+) -> Socket:
+    """Where a vertex of a card is once a strand has slid along it.
+
+    Args:
+        g: the tree.
+        mesh: the cards as they are deformed.
+        place: of a vertex.
+        index: the vertex's number.
+        row: its row, the root's is 0.
+        of: rows of a card, the strand's number, and how many rows it slides at most.
+    """
+    rows, strand, most = of
+    here = g.taken(mesh, place, index, "FLOAT_VECTOR")
+    if not most:
+        return here
+    # Beyond the last row a card goes on as it went.
+    last = g.math("GREATER_THAN", row, rows - 1.5)
+    back = g.math("MULTIPLY", last, 2)
+    first = g.taken(mesh, place, g.math("SUBTRACT", index, back), "FLOAT_VECTOR")
+    second = g.taken(mesh, place, g.math("SUBTRACT", g.math("ADD", index, 2), back), "FLOAT_VECTOR")
+    way = g.node("ShaderNodeVectorMath", {0: second, 1: first}, operation="SUBTRACT").outputs[0]
+    slide = g.node("ShaderNodeVectorMath", {0: way}, operation="SCALE")
+    g.put(g.random(-most, 0.4 * most, 5, strand), slide.inputs["Scale"])
+    moved = g.node("ShaderNodeVectorMath", {0: here, 1: slide.outputs[0]}, operation="ADD")
+    return moved.outputs[0]
 
 
 def _store_place(
@@ -237,6 +289,7 @@ def _store_place(
         where: numbers of the vertices left and right of a point, and where it is between them.
     """
     left, right, across = where
+    within = g.node("ShaderNodeClamp", {0: across, 1: 0.04, 2: 0.96}).outputs[0]
     uv = g.node("GeometryNodeInputNamedAttribute", data_type="FLOAT_VECTOR")
     uv.inputs["Name"].default_value = item.data.uv_layers[0].name if item.data.uv_layers else ""
     value = next(s for s in uv.outputs if s.enabled)
@@ -247,7 +300,7 @@ def _store_place(
         data_type="FLOAT_VECTOR",
         domain="POINT",
     )
-    spot = g.between(ends[0], ends[1], across)
+    spot = g.between(ends[0], ends[1], within)
     g.put(spot, next(s for s in stored.inputs if s.name == "Value" and s.enabled))
     return stored.outputs[0]
 
@@ -275,35 +328,61 @@ def _finish(g: _Tree, curves: Socket, points: int, least: float, radius: float) 
     return sized.outputs[0]
 
 
-def _material(item: MeshObject) -> bpy.types.Material:
-    """What strands look like: the picture's colours, on fibres that let light through."""
+def _material(item: MeshObject, dense: bool) -> bpy.types.Material:
+    """What strands look like: the picture's colours, where they are dense on fibres that let light
+    through.
+
+    Args:
+        item: the cards.
+        dense: whether light goes from fibre to fibre.
+    """
     cards_look = item.data.materials[0] if item.data.materials else None
     material = bpy.data.materials.new(f"{item.name}_strands")
     compat.make_node_tree(material)
     tree = compat.tree_of(material)
     shader = next(n for n in tree.nodes if n.type == "BSDF_PRINCIPLED")
-    output = next(n for n in tree.nodes if n.type == "OUTPUT_MATERIAL")
-    fibre = tree.nodes.new("ShaderNodeBsdfHairPrincipled")
-    if hasattr(fibre, "model"):
-        fibre.model = "CHIANG"
-    fibre.parametrization = "COLOR"
     shader.inputs["Roughness"].default_value = 0.5
-    fibre.inputs["Roughness"].default_value = 0.35
     source: Any = cards_look.node_tree if cards_look is not None else None
     pictures = [n for n in source.nodes if n.type == "TEX_IMAGE" and n.image] if source else []
+    colour = None
     if pictures:
         spot = tree.nodes.new("ShaderNodeAttribute")
         spot.attribute_name = _PLACE
         image: Any = tree.nodes.new("ShaderNodeTexImage")
         image.image = pictures[0].image
         tree.links.new(spot.outputs["Vector"], image.inputs["Vector"])
-        tree.links.new(image.outputs["Color"], shader.inputs["Base Color"])
+        colour = image.outputs["Color"]
+        if not dense:
+            bright = tree.nodes.new("ShaderNodeVectorMath")
+            bright.operation = "SCALE"
+            bright.inputs["Scale"].default_value = _BRIGHTER
+            tree.links.new(colour, bright.inputs[0])
+            colour = bright.outputs["Vector"]
+        tree.links.new(colour, shader.inputs["Base Color"])
+    if dense:
+        _add_fibre(tree, colour)
+    return material
+
+
+def _add_fibre(tree: NodeTree, colour: Socket | None) -> None:
+    """Fibres for Cycles beside the surface that EEVEE shows.
+
+    Args:
+        tree: of a material.
+        colour: of the picture.
+    """
+    output = next(n for n in tree.nodes if n.type == "OUTPUT_MATERIAL")
+    fibre = tree.nodes.new("ShaderNodeBsdfHairPrincipled")
+    if hasattr(fibre, "model"):
+        fibre.model = "CHIANG"
+    fibre.parametrization = "COLOR"
+    fibre.inputs["Roughness"].default_value = 0.35
+    if colour is not None:
         # Light goes through several fibres: what the picture shows is what they give together.
         deep = tree.nodes.new("ShaderNodeGamma")
         deep.inputs["Gamma"].default_value = _DEEPER
-        tree.links.new(image.outputs["Color"], deep.inputs["Color"])
+        tree.links.new(colour, deep.inputs["Color"])
         tree.links.new(deep.outputs["Color"], fibre.inputs["Color"])
     cycles = tree.nodes.new("ShaderNodeOutputMaterial")
     cycles.target, output.target = "CYCLES", "EEVEE"
     tree.links.new(fibre.outputs[0], cycles.inputs["Surface"])
-    return material

@@ -613,13 +613,14 @@ def _built(
     steps.at(0.08, "painting textures")
     even = body.man.positions  # all people have their hair at the same places of it
     shape = askew(source, body, person)
+    own = body.moved(shape)
     # Beside the joints, whose fit leaves the interpreter alone, and hair grows there as well; where
     # the work is stopped the painter comes to its end unseen and has changed nothing.
     painter = ThreadPoolExecutor(1)
-    painted = painter.submit(paint_textures, person, even, body.man.units, parts, texture_size)
-    growing = painter.submit(
-        lambda: grow_hair(person, body.moved(shape), even, source.base_mesh(), parts, CM)
+    painted = painter.submit(
+        paint_textures, person, even, own.positions, body.man.units, parts, texture_size
     )
+    growing = painter.submit(lambda: grow_hair(person, own, even, source.base_mesh(), parts, CM))
     drawing = painter.submit(hair_picture, person, texture_size)
     painter.shutdown(wait=False)
     begins = _SEARCH_ENDS if correctives.most or correctives.together else _FIT_BEGINS

@@ -202,7 +202,7 @@ def blood(face: Face, age: int) -> Floats:
     corner = face.spot(0.175, -0.03, 0.06, 0.06)
     chin = face.spot(0.0, -1.03, 0.17, 0.10)
     out = 0.26 * young * cheeks + 0.09 * sides + old * (0.30 * tip + 0.38 * wings)
-    out += 0.2 * fold + 0.3 * corner + 0.24 * chin + 0.45 * ears(face)
+    out += 0.2 * fold + 0.2 * corner + 0.24 * chin + 0.45 * ears(face)
     out += 0.12 * face.spot(0.0, 0.12, 0.12, 0.14) - 0.10 * forehead(face)
     out -= 0.10 * face.spot(0.0, -0.6, 0.13, 0.05)
     neck = smooth(-1.1, -1.4, face.y)

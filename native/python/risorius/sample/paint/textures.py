@@ -15,6 +15,7 @@ from ..people import Person
 from ..polygons import Floats
 from .cloth import paint_cloth
 from .eyes import paint_eye
+from .form import form, hollows, share_at
 from .images import enlarged, shrunk, smooth
 from .raster import Raster, filled
 from .regions import DIVIDED, find_face
@@ -24,7 +25,7 @@ from .skin import HEAD_SIZE, Skin, Texels
 MASK_SIZE = 512
 WRINKLE_SHARE = 2  # a texel of the sets is as wide as so many of the colour
 STAYS = ((25, 40, 58, 75), (0.0, 0.06, 0.2, 0.38))  # of each fold, by years, in a face at rest
-_FROWN_ENDS = (0.22, 0.38)  # decimetres over the eyes: higher up its lines would cross the brow's
+_FROWN_ENDS = (0.17, 0.27)  # decimetres over the eyes: higher up its lines would cross the brow's
 
 
 def fold_strength(person: Person, place: Floats, eye: Floats) -> Floats:
@@ -57,6 +58,17 @@ def lasting(place: Floats, eye: Floats) -> Floats:
     between = np.exp(-((x / 0.12) ** 2) - ((y - 0.14) / 0.14) ** 2)
     fold = np.clip(-wrinkles.laugh_fold(place, eye)[0] / wrinkles.DEPTH, 0, 1)
     return np.asarray(0.22 + 0.78 * np.clip(brow + feet + between + fold, 0, 1))
+
+
+def between_brows(place: Floats, eye: Floats) -> Floats:
+    """float64[h, w]: where a frown's lines stay alone, 0 to 1: lines across them would be a grid.
+
+    Args:
+        place: float64[h, w, 3], each texel's place on the head, decimetres.
+        eye: float64[3], the left eye's middle.
+    """
+    x, y = np.abs(place[:, :, 0]), place[:, :, 1] - eye[1]
+    return np.asarray(smooth(0.17, 0.10, x) * smooth(_FROWN_ENDS[1], _FROWN_ENDS[0], y))
 
 
 @dataclass
@@ -120,6 +132,8 @@ def head_wrinkles(
         normal = wrinkles.normals(height, place)
         out.pictures[out.sets[number]] = normal - [0, 0, 0.5]
         deep = np.clip(-height / wrinkles.DEPTH, 0, 1) * lasting(place, eye)
+        if wrinkles.FROWN not in names:
+            deep = deep * (1 - between_brows(place, eye))
         out.still = np.maximum(out.still, stays * deep.astype(np.float32))
     return out
 
@@ -128,6 +142,7 @@ def paint_head(
     person: Person,
     head: Part,
     positions: Floats,
+    own: Floats,
     eye: Floats,
     units: dict[str, Expression],
     still: Floats,
@@ -138,7 +153,8 @@ def paint_head(
     Args:
         person: has the colours and the age.
         head: the mesh, each edge of the base mesh two.
-        positions: float64[V, 3], all vertices of the base mesh, decimetres.
+        positions: float64[V, 3], all vertices of the base mesh on the man, decimetres.
+        own: the same on the person, whose form the relief has.
         eye: float64[3], the left eye's middle.
         units: what each raw control does, by its name.
         still: float32[h, w], how deep in a fold a texel is, in a smaller picture.
@@ -147,15 +163,17 @@ def paint_head(
     p = head.carry(positions)
     raster = Raster(head.polygons, head.polygons.uvs, size)
     texels = Texels(raster, p)
-    skin = Skin(person, find_face(head, p, eye, units, DIVIDED), texels, eye)
+    face = find_face(head, p, eye, units, DIVIDED)
+    skin = Skin(person, face, texels, eye)
     creases = enlarged(still, size).ravel()[raster.where]
+    formed = share_at(person.age) * form(head.polygons, head.carry(own), face, texels)
     files = {
-        "head_color.png": raster.spread(skin.colour(creases)),
+        "head_color.png": raster.spread(skin.colour(np.maximum(creases, 0.5 * hollows(formed)))),
         "head_roughness.png": raster.spread(roughness(skin, creases)),
     }
     files = {name: filled(image, raster.covered) for name, image in files.items()}
     files["head_roughness.png"] = shrunk(files["head_roughness.png"], size // 2)
-    files["head_normal.png"] = normals(skin, heights(skin, creases))
+    files["head_normal.png"] = normals(skin, heights(skin, creases) + formed)
     return files
 
 
@@ -180,6 +198,7 @@ def flush_masks(head: Part, positions: Floats, eye: Floats) -> dict[str, Floats]
 def paint_textures(
     person: Person,
     positions: Floats,
+    own: Floats,
     units: dict[str, Expression],
     parts: list[Part],
     largest: int = HEAD_SIZE,
@@ -188,7 +207,8 @@ def paint_textures(
 
     Args:
         person: has the colours.
-        positions: float64[V, 3], all vertices of the base mesh, decimetres.
+        positions: float64[V, 3], all vertices of the base mesh on the man, decimetres.
+        own: the same on the person.
         units: what each raw control does, by its name.
         parts: the meshes.
         largest: no texture has more texels than a square of this side.
@@ -206,7 +226,7 @@ def paint_textures(
         person, coarse, coarse.carry(positions), eye, units, size // WRINKLE_SHARE
     )
     head = next(part for part in parts if part.name == "head_lod0_mesh")
-    files = paint_head(person, head, positions, eye, units, folded.still, size)
+    files = paint_head(person, head, positions, own, eye, units, folded.still, size)
     files |= flush_masks(coarse, positions, eye)
     files |= folded.pictures | {
         "eye_color.png": paint_eye(person),
