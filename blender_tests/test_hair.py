@@ -90,7 +90,7 @@ def test_strands_go_wherever_their_cards_go(haired):
         scene.set_controls(haired, jawOpen=jaw)
         corners = scene.evaluated(item).reshape(CARDS, ROWS, 2, 3)
         points, roots = points_of(thing)
-        assert len(roots) == 26 * CARDS
+        assert len(roots) == 32 * CARDS
         across, along = corners[0, 0, 1] - corners[0, 0, 0], corners[0, 1, 0] - corners[0, 0, 0]
         out = np.cross(across, along) / np.linalg.norm(np.cross(across, along))
         local = points - corners[0, 0, 0]
@@ -118,6 +118,9 @@ def test_roots_stand_between_the_cards_too(haired):
     roots = points[first] - corners[0, 0, 0]
     across, along = corners[0, 0, 1] - corners[0, 0, 0], corners[0, 1, 0] - corners[0, 0, 0]
     side = np.sort(roots @ across / (across @ across))
+    # Between the picture's hairs as well, where it is clear, strands have its colour.
+    pictures = {n.image for n in item.data.materials[0].node_tree.nodes if n.type == "TEX_IMAGE"}
+    assert [picture.alpha_mode for picture in pictures] == ["CHANNEL_PACKED"]
     # In tufts, each as wide as its card, there are gaps of a quarter between them.
     assert np.diff(side).max() < 0.2
     assert np.ptp(roots @ along / (along @ along)) > 0.3

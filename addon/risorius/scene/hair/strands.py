@@ -22,7 +22,6 @@ _TREE = "Risorius Strands"
 _CARDS = "Cards"  # input of the modifier: the mesh that is followed
 _PLACE = "strand_uv"  # attribute of the curves: where in the picture their colour is
 _DEEPER = 1.35  # exponent of the colour of fibres that lie close
-_BRIGHTER = 1.8  # of single ones: half of each is turned away from the light, a card is not
 _ROWS = re.compile(r"rows=(\d+)")
 
 
@@ -43,7 +42,7 @@ class _Kind(NamedTuple):
 
 
 _KINDS = {  # by what the name of a mesh begins with
-    "hair": _Kind(26, 0.00006, 0.0025, 0.45, 0.35, 0.4, True),
+    "hair": _Kind(32, 0.00008, 0.0025, 0.45, 0.35, 0.4, True),
     "brows": _Kind(4, 0.00005, 0.0004, 0.35, 0.3, 0.3, False),
     "beard": _Kind(12, 0.00005, 0.0015, 0.5, 0.9, 0.7, False),
     "eyelashes": _Kind(3, 0.00006, 0.0003, 0.25, 0.0, 0.0, False),
@@ -350,14 +349,10 @@ def _material(item: MeshObject, dense: bool) -> bpy.types.Material:
         spot.attribute_name = _PLACE
         image: Any = tree.nodes.new("ShaderNodeTexImage")
         image.image = pictures[0].image
+        # Strands lie between the picture's hairs too, where other modes have no colour.
+        image.image.alpha_mode = "CHANNEL_PACKED"
         tree.links.new(spot.outputs["Vector"], image.inputs["Vector"])
         colour = image.outputs["Color"]
-        if not dense:
-            bright = tree.nodes.new("ShaderNodeVectorMath")
-            bright.operation = "SCALE"
-            bright.inputs["Scale"].default_value = _BRIGHTER
-            tree.links.new(colour, bright.inputs[0])
-            colour = bright.outputs["Vector"]
         tree.links.new(colour, shader.inputs["Base Color"])
     if dense:
         _add_fibre(tree, colour)
@@ -376,7 +371,8 @@ def _add_fibre(tree: NodeTree, colour: Socket | None) -> None:
     if hasattr(fibre, "model"):
         fibre.model = "CHIANG"
     fibre.parametrization = "COLOR"
-    fibre.inputs["Roughness"].default_value = 0.35
+    fibre.inputs["Roughness"].default_value = 0.4
+    fibre.inputs["IOR"].default_value = 1.4  # oiled: with 1.55 light from behind makes it grey
     if colour is not None:
         # Light goes through several fibres: what the picture shows is what they give together.
         deep = tree.nodes.new("ShaderNodeGamma")

@@ -249,6 +249,8 @@ def relief(tensors: Floats, there: Floats) -> Floats:
     times = -(-size // _TILE)
     band = np.tile(band, (times, times))[:size, :size].ravel()
     rows, columns = np.nonzero(there)
+    if not len(rows):
+        return np.zeros((size, size))
     start = rows * size + columns
     total = band[start]
     for way in (1, -1):

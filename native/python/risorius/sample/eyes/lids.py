@@ -29,6 +29,7 @@ _SKIN = 0.9  # mm over the eye, what is around the rim at least
 _TOGETHER = (
     ("eyeCheekRaise", "eyeSquintInner"),
     ("eyeCheekRaise", "eyeLookDown"),
+    ("eyeCheekRaise", "eyeLookUp"),
     ("eyeSquintInner", "eyeLookDown"),
 )
 # What closed lids do not do beside it: they stay closed.

@@ -16,7 +16,7 @@ from .skin import Skin
 
 PORE = 0.0020
 _STEP = 2 / 255  # of a normal's parts: finer ones are not seen, and pack badly
-_LIPS = 0.0005
+_LIPS = 0.0004
 _CREASE = 0.0045
 
 
@@ -78,7 +78,7 @@ def roughness(skin: Skin, creases: Floats) -> Floats:
     field, texels = skin.field, skin.texels
     dry = float(np.interp(skin.person.age, (8, 20, 40, 75), (0.03, -0.01, 0.0, 0.05)))
     # The less light skin gives back, the more its gloss is seen.
-    matte = dry + 0.082 * skin.deep
+    matte = dry + 0.11 * skin.deep
     out = 0.48 + matte - (0.13 - 0.054 * skin.deep) * field["oil"]
     out += 0.02 * texels.coarse + 0.03 * texels.middle
     out += 0.02 * texels.fine + 0.12 * creases
@@ -87,4 +87,4 @@ def roughness(skin: Skin, creases: Floats) -> Floats:
     out += (0.20 - out) * skin.wet
     if skin.person.hair_style != "none":  # what lies under hair is in its shade
         out += (0.9 - out) * np.maximum(skin.scalp, skin.field["grown"])
-    return np.asarray(np.clip(out + (0.22 - out) * smooth(1.2, -0.2, field["eyes"]), 0.05, 1))
+    return np.asarray(np.clip(out + (0.38 - out) * smooth(1.2, -0.2, field["eyes"]), 0.05, 1))

@@ -26,7 +26,7 @@ _YELLOW = np.array([-0.02, 0.04, 0.36], np.float32)
 _MUCOSA = (0.73, 0.41, 0.385)
 _IN_SHADE = 0.55  # how light hair is at its roots, beside its tips
 _THROAT = (0.36, 0.15, 0.14)
-_LID_MARGIN = (0.62, 0.36, 0.33)
+_LID_MARGIN = (0.54, 0.29, 0.26)
 
 
 def linear(colour: Floats) -> Floats:
