@@ -75,7 +75,7 @@ def test_cards_are_seen_through_where_the_picture_says_so(haired):
 
 
 # How far a strand strays: in cards' widths, in rows; metres, by which tips part on each axis.
-ASIDE, ALONG, APART = 0.35, 0.4, 0.0025 * 3**0.5
+ASIDE, ALONG, APART = 0.2, 0.3, 0.0015 * 3**0.5
 
 
 def test_strands_go_wherever_their_cards_go(haired):

@@ -21,7 +21,7 @@ STRANDS = "risorius_strands"  # on a mesh of cards: the object that renders show
 _TREE = "Risorius Strands"
 _CARDS = "Cards"  # input of the modifier: the mesh that is followed
 _PLACE = "strand_uv"  # attribute of the curves: where in the picture their colour is
-_DEEPER = 1.35  # exponent of the colour of fibres that lie close
+_DEEPER = 1.6  # exponent of the colour of fibres that lie close
 _ROWS = re.compile(r"rows=(\d+)")
 
 
@@ -42,7 +42,7 @@ class _Kind(NamedTuple):
 
 
 _KINDS = {  # by what the name of a mesh begins with
-    "hair": _Kind(32, 0.00008, 0.0025, 0.45, 0.35, 0.4, True),
+    "hair": _Kind(32, 0.00008, 0.0015, 0.45, 0.2, 0.3, True),
     "brows": _Kind(4, 0.00005, 0.0004, 0.35, 0.3, 0.3, False),
     "beard": _Kind(12, 0.00005, 0.0015, 0.5, 0.9, 0.7, False),
     "eyelashes": _Kind(3, 0.00006, 0.0003, 0.25, 0.0, 0.0, False),
