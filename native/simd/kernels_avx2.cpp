@@ -14,6 +14,7 @@
 #define RISORIUS_TARGET __attribute__((target("avx2,fma,f16c")))
 #endif
 #include "simd/kernels_inline.h"
+#include "simd/rotation_parts_avx2.h"
 
 namespace risorius::simd {
 
@@ -33,6 +34,7 @@ constexpr auto kExpandOrders = [] {
 }();
 
 struct V {
+  using Parts = EightByFour;
   using Reg = __m256;
   static constexpr std::size_t kLanes = 8, kBlocks = 12, kBatchBlocks = 3;
   static constexpr int kBatchFrames = 4;

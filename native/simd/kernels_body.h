@@ -4,7 +4,7 @@
 // linker an inline standard function that older CPUs cannot run) and V with
 //   Reg, kLanes, zero(), set(float), load(const float*), load(const uint16_t*), store(float*, Reg),
 //   madd(a, b, sum), expand(from, mask, to) and expand_more (kernels.h, place), and kBlocks,
-//   kBatchBlocks: registers of rows at once; kBatchFrames.
+//   kBatchBlocks: registers of rows at once; kBatchFrames; Parts: as OneByOne of rotations_body.h.
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -162,7 +162,7 @@ constexpr Kernels make_kernels(const char* name) {
           batch_columns<std::uint16_t>,
           place<false>,
           place<true>,
-          quaternions,
+          quaternions<V::Parts>,
           native_u16,
           native_u32,
           native_f32};

@@ -9,6 +9,7 @@
 #define RISORIUS_TARGET
 #include "simd/expand_bytes.h"
 #include "simd/kernels_inline.h"
+#include "simd/rotations_body.h"
 
 namespace risorius::simd {
 
@@ -26,6 +27,7 @@ struct V {
   }
   RISORIUS_INLINE static void store(float* p, Reg v) { vst1q_f32(p, v); }
   RISORIUS_INLINE static Reg madd(Reg a, Reg b, Reg sum) { return vfmaq_f32(sum, a, b); }
+  using Parts = OneByOne;
   using Order = std::uint32_t;
   RISORIUS_INLINE static Order order(std::uint32_t mask) { return mask; }
   RISORIUS_INLINE static void expand(const float* from, std::uint32_t mask, float* to) {

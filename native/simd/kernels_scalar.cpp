@@ -86,7 +86,7 @@ const Kernels& scalar_kernels() {
                                    batch_columns<std::uint16_t>,
                                    place,
                                    place_more,
-                                   quaternions,
+                                   quaternions<OneByOne>,
                                    native_u16,
                                    native_u32,
                                    native_f32};

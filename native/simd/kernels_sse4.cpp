@@ -14,13 +14,37 @@
 #endif
 #include "simd/expand_bytes.h"
 #include "simd/kernels_inline.h"
+#include "simd/rotations_body.h"
 
 namespace risorius::simd {
 
 namespace {
 
+// Four rotations at a time: the fourth number of each is read, and written, with the others.
+struct FourByFour {
+  RISORIUS_INLINE static void split(const float* rotations, std::size_t stride,
+                                    const std::uint16_t* which, Turns (&angles)[3]) {
+    for (std::size_t l = 0; l < kTurns; l += 4) {
+      __m128 r[4];
+      for (std::size_t i = 0; i < 4; ++i) r[i] = _mm_loadu_ps(rotations + which[l + i] * stride);
+      _MM_TRANSPOSE4_PS(r[0], r[1], r[2], r[3]);
+      for (std::size_t a = 0; a < 3; ++a) _mm_store_ps(&angles[a][l], r[a]);
+    }
+  }
+  RISORIUS_INLINE static void join(const Turns* const (&parts)[4], float* rotations,
+                                   std::size_t stride, const std::uint16_t* which) {
+    for (std::size_t l = 0; l < kTurns; l += 4) {
+      __m128 r[4];
+      for (std::size_t k = 0; k < 4; ++k) r[k] = _mm_load_ps(&(*parts[k])[l]);
+      _MM_TRANSPOSE4_PS(r[0], r[1], r[2], r[3]);
+      for (std::size_t i = 0; i < 4; ++i) _mm_storeu_ps(rotations + which[l + i] * stride, r[i]);
+    }
+  }
+};
+
 // Products and sums are rounded one by one, as in the scalar path.
 struct V {
+  using Parts = FourByFour;
   using Reg = __m128;
   static constexpr std::size_t kLanes = 4, kBlocks = 12, kBatchBlocks = 3;
   static constexpr int kBatchFrames = 4;

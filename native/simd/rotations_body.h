@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: MIT
 // Euler angles to quaternions, for the file of each instruction set: loops of a constant count, of
 // which the compiler makes vectors under RISORIUS_TARGET. Their bits are the same on every CPU.
+#pragma once
+
 #include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 
 #include "simd/kernels.h"
 #include "simd/kernels_inline.h"
@@ -15,11 +18,14 @@ namespace {
 
 constexpr std::size_t kTurns = 16;
 using Turns = float[kTurns];
+// About all three axes: one loop over them keeps more sines under way than three loops do.
+constexpr std::size_t kAngles = 3 * kTurns;
+using Angles = float[kAngles];
 
 // Sine and cosine by Cephes' polynomials after a reduction by quarter turns; error below 1e-7.
-RISORIUS_INLINE void sine_and_cosine(const Turns& x, Turns& sines, Turns& cosines) {
+RISORIUS_INLINE void sine_and_cosine(const Angles& x, Angles& sines, Angles& cosines) {
   constexpr float kRound = 12582912.0f;  // 1.5 * 2^23: what is added to it ends as an integer
-  for (std::size_t l = 0; l < kTurns; ++l) {
+  for (std::size_t l = 0; l < kAngles; ++l) {
     const float shifted = x[l] * 0.636619772367581343f + kRound, quarters = shifted - kRound;
     const auto n = std::bit_cast<std::uint32_t>(shifted);
     const float r = ((x[l] - quarters * 1.5703125f) - quarters * 4.837512969970703125e-4f) -
@@ -37,17 +43,18 @@ RISORIUS_INLINE void sine_and_cosine(const Turns& x, Turns& sines, Turns& cosine
   }
 }
 
-// Angles too large for the reduction, infinities and NaN.
-RISORIUS_INLINE bool any_beyond(const Turns& x) {
+// Angles too large for the reduction, infinities and NaN: the sign of a difference says it, which
+// the compiler makes a vector of where it takes a comparison apart.
+RISORIUS_INLINE bool any_beyond(const Angles& x) {
   constexpr std::uint32_t kLimit = 0x46000000u;  // the bits of 8192
   std::uint32_t beyond = 0;
-  for (std::size_t l = 0; l < kTurns; ++l) {
-    beyond |= (std::bit_cast<std::uint32_t>(x[l]) & 0x7FFFFFFFu) > kLimit ? 1u : 0u;
+  for (std::size_t l = 0; l < kAngles; ++l) {
+    beyond |= kLimit - (std::bit_cast<std::uint32_t>(x[l]) & 0x7FFFFFFFu);
   }
-  return beyond != 0;
+  return (beyond >> 31) != 0;
 }
-void repair(const Turns& x, Turns& sines, Turns& cosines) {
-  for (std::size_t l = 0; l < kTurns; ++l) {
+void repair(const Angles& x, Angles& sines, Angles& cosines) {
+  for (std::size_t l = 0; l < kAngles; ++l) {
     if (std::fabs(x[l]) <= 8192.0f) continue;
     sines[l] = std::sin(x[l]);
     cosines[l] = std::cos(x[l]);
@@ -55,15 +62,15 @@ void repair(const Turns& x, Turns& sines, Turns& cosines) {
 }
 
 // Half angles in the order of rotation to quaternions, w last.
-RISORIUS_INLINE void turn(float parity, const Turns (&half)[3], Turns (&q)[4]) {
-  Turns s[3], c[3];
-  for (std::size_t a = 0; a < 3; ++a) {
-    sine_and_cosine(half[a], s[a], c[a]);
-    if (any_beyond(half[a])) repair(half[a], s[a], c[a]);
-  }
+RISORIUS_INLINE void turn(float parity, const Angles& half, Turns (&q)[4]) {
+  alignas(64) Angles sines, cosines;
+  sine_and_cosine(half, sines, cosines);
+  if (any_beyond(half)) repair(half, sines, cosines);
+  const float *s0 = sines, *s1 = s0 + kTurns, *s2 = s1 + kTurns;
+  const float *c0 = cosines, *c1 = c0 + kTurns, *c2 = c1 + kTurns;
   for (std::size_t l = 0; l < kTurns; ++l) {
-    const float cc = c[1][l] * c[0][l], cs = c[1][l] * s[0][l], sc = s[1][l] * c[0][l],
-                ss = parity * (s[1][l] * s[0][l]), sk = s[2][l], ck = c[2][l];
+    const float cc = c1[l] * c0[l], cs = c1[l] * s0[l], sc = s1[l] * c0[l],
+                ss = parity * (s1[l] * s0[l]), sk = s2[l], ck = c2[l];
     q[0][l] = ck * cs - parity * (sk * sc);
     q[1][l] = ck * sc + parity * (sk * cs);
     q[2][l] = sk * cc - ck * ss;
@@ -71,22 +78,70 @@ RISORIUS_INLINE void turn(float parity, const Turns (&half)[3], Turns (&q)[4]) {
   }
 }
 
-RISORIUS_TARGET void quaternions(const EulerTurns& e, const std::uint16_t* which, std::size_t n,
-                                 float* rotations, std::size_t stride) {
-  Turns half[3] = {}, q[4];
-  for (std::size_t i = 0; i < n; i += kTurns) {
-    const std::size_t count = n - i < kTurns ? n - i : kTurns;
-    for (std::size_t l = 0; l < count; ++l) {
-      const float* from = rotations + which[i + l] * stride;
-      for (std::size_t a = 0; a < 3; ++a) half[a][l] = from[e.order[a]] * e.half_units[a];
-    }
-    turn(e.parity, half, q);
-    for (std::size_t l = 0; l < count; ++l) {
-      float* to = rotations + which[i + l] * stride;
-      for (std::size_t a = 0; a < 3; ++a) to[e.order[a]] = q[a][l];
-      to[3] = q[3][l];
+// Brings rotations that lie apart into arrays of their parts, and back. In: which  kTurns of them
+struct OneByOne {
+  RISORIUS_INLINE static void split(const float* rotations, std::size_t stride,
+                                    const std::uint16_t* which, Turns (&angles)[3]) {
+    for (std::size_t l = 0; l < kTurns; ++l) {
+      const float* from = rotations + which[l] * stride;
+      for (std::size_t a = 0; a < 3; ++a) angles[a][l] = from[a];
     }
   }
+  RISORIUS_INLINE static void join(const Turns* const (&parts)[4], float* rotations,
+                                   std::size_t stride, const std::uint16_t* which) {
+    for (std::size_t l = 0; l < kTurns; ++l) {
+      float* to = rotations + which[l] * stride;
+      for (std::size_t k = 0; k < 4; ++k) to[k] = (*parts[k])[l];
+    }
+  }
+};
+
+template <class Parts>
+RISORIUS_TARGET void turn_together(const EulerTurns& e, const std::uint16_t* which,
+                                   float* rotations, std::size_t stride) {
+  alignas(64) Turns angles[3], q[4];
+  alignas(64) Angles half;
+  Parts::split(rotations, stride, which, angles);
+  const Turns* parts[4] = {};
+  for (std::size_t a = 0; a < 3; ++a) {
+    const Turns& of_axis = angles[e.order[a]];
+    float* to = half + a * kTurns;
+    for (std::size_t l = 0; l < kTurns; ++l) to[l] = of_axis[l] * e.half_units[a];
+    parts[e.order[a]] = &q[a];
+  }
+  parts[3] = &q[3];
+  turn(e.parity, half, q);
+  Parts::join(parts, rotations, stride, which);
+}
+
+// Whether an angle is anything but +0.
+RISORIUS_INLINE bool turns(const float* angles) {
+  std::uint32_t bits[3];
+  std::memcpy(bits, angles, sizeof(bits));
+  return (bits[0] | bits[1] | bits[2]) != 0;
+}
+
+// Those that turn are gathered until they fill the arrays; the others are no rotation already.
+template <class Parts>
+RISORIUS_TARGET void quaternions(const EulerTurns& e, const std::uint16_t* which, std::size_t n,
+                                 float* rotations, std::size_t stride) {
+  std::uint16_t turning[2 * kTurns];
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < n; i += kTurns) {
+    const std::size_t end = n - i < kTurns ? n : i + kTurns;
+    for (std::size_t j = i; j < end; ++j) {
+      turning[count] = which[j];
+      count += turns(rotations + which[j] * stride) ? 1 : 0;
+    }
+    if (count < kTurns) continue;
+    turn_together<Parts>(e, turning, rotations, stride);
+    count -= kTurns;
+    for (std::size_t l = 0; l < kTurns; ++l) turning[l] = turning[kTurns + l];
+  }
+  if (count == 0) return;
+  // Arrays that are not full get the last one over and over: it is read before it is written.
+  for (std::size_t l = count; l < kTurns; ++l) turning[l] = turning[count - 1];
+  turn_together<Parts>(e, turning, rotations, stride);
 }
 
 }  // namespace

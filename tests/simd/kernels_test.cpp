@@ -8,6 +8,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <random>
 #include <string>
@@ -379,6 +380,33 @@ TEST_P(SimdKernels, TurnEulerAnglesIntoQuaternions) {
         }
       }
     }
+  }
+}
+
+// Those that turn share a pass with others than their neighbours, and have the bits of one alone.
+TEST_P(SimdKernels, LeaveRotationsWhoseAnglesAreZero) {
+  constexpr std::size_t kCount = 100, kStride = 10;
+  constexpr float kLeft = 7.0f;  // no rotation's w: it shows that nobody wrote it
+  std::mt19937 random(12);
+  std::uniform_real_distribution<float> angle(-2.0f, 2.0f);
+  for (const std::size_t one_in : {1u, 2u, 7u, 200u}) {
+    std::vector<float> rotations(kStride * kCount);
+    std::vector<std::uint16_t> which(kCount);
+    for (std::size_t i = 0; i < kCount; ++i) {
+      which[i] = static_cast<std::uint16_t>(i);
+      if (i % one_in == 1 % one_in) rotations[i * kStride + i % 3] = angle(random);
+      rotations[i * kStride + 3] = kLeft;
+    }
+    rotations[5 * kStride] = -0.0f;  // turns, by nothing
+    std::vector<float> alone = rotations;
+    kernels_.quaternions({}, which.data(), kCount, rotations.data(), kStride);
+    for (std::size_t i = 0; i < kCount; ++i) {
+      float* own = alone.data() + i * kStride;
+      const bool turns = i == 5 || own[0] != 0.0f || own[1] != 0.0f || own[2] != 0.0f;
+      kernels_.quaternions({}, &which[i], 1, alone.data(), kStride);
+      EXPECT_EQ(own[3] != kLeft, turns) << i;
+    }
+    EXPECT_EQ(std::memcmp(rotations.data(), alone.data(), alone.size() * sizeof(float)), 0);
   }
 }
 

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: MIT
+// Rotations into arrays of their parts and back by AVX2, for the kernels that have it. After
+// RISORIUS_TARGET.
+#pragma once
+
+#include <immintrin.h>
+
+#include <cstddef>
+#include <cstdint>
+
+#include "simd/kernels_inline.h"
+#include "simd/rotations_body.h"
+
+namespace risorius::simd {
+
+namespace {
+
+// Eight rotations at a time, the fifth to eighth in the upper halves: what is stored here is what
+// the sines load, which would have to wait for two stores of half a register. The fourth number of
+// each rotation is read, and written, with the others.
+struct EightByFour {
+  // Of each half: r[k] lane i becomes r[i] lane k.
+  RISORIUS_INLINE static void transpose(__m256 (&r)[4]) {
+    const __m256 a = _mm256_unpacklo_ps(r[0], r[1]), b = _mm256_unpackhi_ps(r[0], r[1]),
+                 c = _mm256_unpacklo_ps(r[2], r[3]), d = _mm256_unpackhi_ps(r[2], r[3]);
+    r[0] = _mm256_shuffle_ps(a, c, _MM_SHUFFLE(1, 0, 1, 0));
+    r[1] = _mm256_shuffle_ps(a, c, _MM_SHUFFLE(3, 2, 3, 2));
+    r[2] = _mm256_shuffle_ps(b, d, _MM_SHUFFLE(1, 0, 1, 0));
+    r[3] = _mm256_shuffle_ps(b, d, _MM_SHUFFLE(3, 2, 3, 2));
+  }
+  RISORIUS_INLINE static void split(const float* rotations, std::size_t stride,
+                                    const std::uint16_t* which, Turns (&angles)[3]) {
+    for (std::size_t l = 0; l < kTurns; l += 8) {
+      __m256 r[4];
+      for (std::size_t i = 0; i < 4; ++i) {
+        const __m128 low = _mm_loadu_ps(rotations + which[l + i] * stride);
+        const __m128 high = _mm_loadu_ps(rotations + which[l + 4 + i] * stride);
+        r[i] = _mm256_insertf128_ps(_mm256_castps128_ps256(low), high, 1);
+      }
+      transpose(r);
+      for (std::size_t a = 0; a < 3; ++a) _mm256_store_ps(&angles[a][l], r[a]);
+    }
+  }
+  RISORIUS_INLINE static void join(const Turns* const (&parts)[4], float* rotations,
+                                   std::size_t stride, const std::uint16_t* which) {
+    for (std::size_t l = 0; l < kTurns; l += 8) {
+      __m256 r[4];
+      for (std::size_t k = 0; k < 4; ++k) r[k] = _mm256_load_ps(&(*parts[k])[l]);
+      transpose(r);
+      for (std::size_t i = 0; i < 4; ++i) {
+        _mm_storeu_ps(rotations + which[l + i] * stride, _mm256_castps256_ps128(r[i]));
+        _mm_storeu_ps(rotations + which[l + 4 + i] * stride, _mm256_extractf128_ps(r[i], 1));
+      }
+    }
+  }
+};
+
+}  // namespace
+
+}  // namespace risorius::simd
