@@ -35,6 +35,7 @@ Workspace make_workspace(const Rig& rig) {
   work.candidates.resize(rig.psds.size() + 1);
   work.psd_bits.resize((std::size_t{rig.psd_count} + 63) / 64);
   work.column_ends.resize(rig.joint_groups.size());
+  work.moves.resize(rig.joint_groups.size());
   work.columns.resize(rig.joint_columns.size());
   work.live.resize(rig.joint_groups.size());
   work.rows.resize(detail::rows_size(rig));

@@ -62,6 +62,7 @@ struct alignas(128) Workspace {
   std::size_t whole_frames = 0;            // evaluations that read all columns
   std::size_t added_frames = 0;            // evaluations that added columns in the order of memory
   std::vector<std::uint32_t> column_ends;  // [groups]: where a group's active columns end below
+  std::vector<std::uint8_t> moves;         // [groups]: 1 where a group has active columns
   std::vector<simd::Column> columns;       // the columns of active controls, as in group_columns
   core::AlignedVector<float> rows;         // the rows of all groups
   core::AlignedVector<float> sums;         // the same, added up column by column; 0 between calls

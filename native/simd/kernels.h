@@ -34,6 +34,13 @@ struct Addend {
 struct Rows {
   std::uint32_t begin = 0, count = 0;
 };
+/// What columns are added to.
+struct Sums {
+  const Rows* runs = nullptr;     // by group
+  std::uint32_t groups = 0;       // those from here on have no rows
+  float* values = nullptr;        // of all runs; kWidest of them may be read from any row on
+  std::uint8_t* added = nullptr;  // by group: becomes 1 where a column is added
+};
 
 /// Sixteen places: those whose bit is set take the values from `from` on, one after the other.
 struct Piece {
@@ -73,14 +80,13 @@ struct Kernels {
   /// The same from IEEE half floats, none of them infinite.
   void (*half_columns)(const std::uint16_t* values, const Column* columns, std::size_t n,
                        const float* weights, float* out, std::size_t rows);
-  /// sums[begin + r] += weight * values[offset + r] for each row r of each column's run, one column
-  /// after the other. Other sums stay as they are.
-  /// In:  rows  by group
-  ///      sums  kWidest of them may be read from any row on
+  /// sums.values[begin + r] += weight * values[offset + r] for each row r of each column's run,
+  /// one column after the other, up to the first of a group that has no rows. Other sums stay as they are.
+  /// In: columns  by ascending group
   void (*add_columns)(const float* values, const Addend* columns, std::size_t n, float weight,
-                      const Rows* rows, float* sums);
+                      const Sums& sums);
   void (*add_half_columns)(const std::uint16_t* values, const Addend* columns, std::size_t n,
-                           float weight, const Rows* rows, float* sums);
+                           float weight, const Sums& sums);
   /// As columns, for kFrames frames: weights float32[.., kFrames], frame f at out + f * stride.
   void (*batch_columns)(const float* values, const Column* columns, std::size_t n,
                         const float* weights, float* out, std::size_t stride, std::size_t rows);

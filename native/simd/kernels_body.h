@@ -99,12 +99,14 @@ RISORIUS_INLINE void add(V::Reg weight, const T* values, const float* sums, floa
 
 template <class T>
 RISORIUS_TARGET void add_columns(const T* values, const Addend* columns, std::size_t n,
-                                 float weight, const Rows* rows, float* sums) {
+                                 float weight, const Sums& sums) {
   const V::Reg weights = V::set(weight);
-  for (std::size_t i = 0; i < n; ++i) {
-    const T* from = values + columns[i].offset;
-    const Rows run = rows[columns[i].group];
-    float* to = sums + run.begin;
+  const Sums all = sums;
+  for (const Addend* at = columns; at < columns + n && at->group < all.groups; ++at) {
+    const T* from = values + at->offset;
+    const Rows run = all.runs[at->group];
+    all.added[at->group] = 1;
+    float* to = all.values + run.begin;
     std::size_t r = 0;
     for (; r + kWidest <= run.count; r += kWidest) add(weights, from + r, to + r, to + r);
     if (r == run.count) continue;

@@ -27,11 +27,12 @@ void columns(const T* values, const Column* list, std::size_t n, const float* we
 
 template <class T>
 void add_columns(const T* values, const Addend* columns, std::size_t n, float weight,
-                 const Rows* rows, float* sums) {
-  for (std::size_t i = 0; i < n; ++i) {
+                 const Sums& sums) {
+  for (std::size_t i = 0; i < n && columns[i].group < sums.groups; ++i) {
     const T* column = values + columns[i].offset;
-    const Rows run = rows[columns[i].group];
-    float* to = sums + run.begin;
+    const Rows run = sums.runs[columns[i].group];
+    sums.added[columns[i].group] = 1;
+    float* to = sums.values + run.begin;
     for (std::size_t r = 0; r < run.count; ++r) to[r] += weight * widened(column[r]);
   }
 }

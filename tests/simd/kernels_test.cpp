@@ -138,12 +138,13 @@ TEST_P(SimdKernels, AddColumnsToTheBitsOfTheirSums) {
     for (const bool is_half : {false, true}) {
       std::vector<float> sums(end + kWidest, kOthers), expected(rounded_up(rows));
       std::fill(sums.begin() + std::ptrdiff_t(first), sums.begin() + std::ptrdiff_t(end), 0.0f);
+      std::uint8_t added[2] = {};
+      const Sums to{runs, 2, sums.data(), added};
       for (const Column& c : columns) {
         const Addend addend{c.offset, 1};
         const float weight = weights[c.weight];
-        is_half
-            ? kernels_.add_half_columns(half.values.data(), &addend, 1, weight, runs, sums.data())
-            : kernels_.add_columns(m.values.data(), &addend, 1, weight, runs, sums.data());
+        is_half ? kernels_.add_half_columns(half.values.data(), &addend, 1, weight, to)
+                : kernels_.add_columns(m.values.data(), &addend, 1, weight, to);
       }
       is_half ? kernels_.half_columns(half.values.data(), columns.data(), kCount, weights.data(),
                                       expected.data(), rows)
@@ -155,6 +156,34 @@ TEST_P(SimdKernels, AddColumnsToTheBitsOfTheirSums) {
                   std::bit_cast<std::uint32_t>(inside ? expected[i - first] : kOthers))
             << rows << " rows, " << i;
       }
+    }
+  }
+}
+
+// A coarse LOD has none of the last groups: their runs are not known, and may be anywhere.
+TEST_P(SimdKernels, AddNoColumnOfAGroupWithoutRows) {
+  constexpr std::uint32_t kRowCount = 16;
+  std::mt19937 random(13);
+  const Matrix<float> m = random_matrix(kRowCount, 4, random);
+  const Matrix<std::uint16_t> half = halves(m);
+  const Addend columns[] = {{0, 0}, {kRowCount, 2}, {2 * kRowCount, 3}};
+  constexpr Rows kNowhere{0x7FFFFFFFu, kRowCount};
+  const Rows runs[] = {{0, kRowCount}, {kRowCount, kRowCount}, {2 * kRowCount, kRowCount}, kNowhere};
+  for (const bool is_half : {false, true}) {
+    std::vector<float> sums(4 * kRowCount, 0.0f);
+    std::uint8_t added[4] = {};
+    const Sums to{runs, 3, sums.data(), added};
+    is_half ? kernels_.add_half_columns(half.values.data(), columns, 3, 2.0f, to)
+            : kernels_.add_columns(m.values.data(), columns, 3, 2.0f, to);
+    EXPECT_EQ(std::vector(added, added + 4), (std::vector<std::uint8_t>{1, 0, 1, 0}));
+    for (std::uint32_t r = 0; r < kRowCount; ++r) {
+      const auto value = [&](std::uint32_t i) {
+        return is_half ? from_half(half.values[i]) : m.values[i];
+      };
+      EXPECT_EQ(sums[r], 2.0f * value(r));
+      EXPECT_EQ(sums[kRowCount + r], 0.0f);
+      EXPECT_EQ(sums[2 * kRowCount + r], 2.0f * value(kRowCount + r));
+      EXPECT_EQ(sums[3 * kRowCount + r], 0.0f);
     }
   }
 }

@@ -64,28 +64,22 @@ bool adds(const Rig& rig, std::span<const std::uint16_t> active, const Workspace
   return columns < kFewInAGroup * rig.joint_groups.size();
 }
 
-// Adds the columns of each active control to work.sums, and marks their groups as list_active does.
-// A row has its terms by ascending control here too.
+// Adds the columns of each active control to work.sums. A row has its terms by ascending control
+// here too.
 void add_active(const Rig& rig, std::uint32_t lod, Workspace& work,
                 const float* controls) noexcept {
-  const std::uint32_t live = rig.live_groups[lod];
-  const simd::Rows* rows = work.group_rows.data() + lod * rig.joint_groups.size();
-  std::uint32_t* ends = work.column_ends.data();
-  for (std::uint32_t i = 0; i < live; ++i) ends[i] = rig.joint_groups[i].columns_begin;
+  std::fill(work.moves.begin(), work.moves.end(), std::uint8_t{0});
+  const simd::Sums sums{work.group_rows.data() + lod * rig.joint_groups.size(),
+                        rig.live_groups[lod], work.sums.data(), work.moves.data()};
   for (std::size_t a = 0; a < work.active_count; ++a) {
     const std::uint16_t control = work.active[a];
-    const JointColumn* begin = rig.joint_columns.data() + rig.joint_column_begins[control];
-    const JointColumn* end =
-        rig.joint_columns.data() + rig.joint_column_begins[control + std::size_t{1}];
-    const JointColumn* at = begin;
-    for (; at < end && at->group < live; ++at) ++ends[at->group];
-    const auto n = static_cast<std::size_t>(at - begin);
+    const std::uint32_t begin = rig.joint_column_begins[control];
+    const std::size_t n = rig.joint_column_begins[control + std::size_t{1}] - begin;
+    const JointColumn* columns = rig.joint_columns.data() + begin;
     if (rig.is_half()) {
-      rig.kernels->add_half_columns(rig.joint_halves.data(), begin, n, controls[control], rows,
-                                    work.sums.data());
+      rig.kernels->add_half_columns(rig.joint_halves.data(), columns, n, controls[control], sums);
     } else {
-      rig.kernels->add_columns(rig.joint_values.data(), begin, n, controls[control], rows,
-                               work.sums.data());
+      rig.kernels->add_columns(rig.joint_values.data(), columns, n, controls[control], sums);
     }
   }
 }
@@ -146,7 +140,7 @@ void mark_blocks(const Rig& rig, std::uint32_t lod, Workspace& work) noexcept {
   const std::uint32_t live = rig.live_groups[lod];
   for (std::uint32_t i = 0; i < live; ++i) {
     const JointGroup& g = rig.joint_groups[i];
-    if (work.column_ends[i] == g.columns_begin) continue;
+    if (work.moves[i] == 0) continue;
     for_words(g.blocks_begin, g.blocks_end, [&](std::size_t word, std::uint64_t bits) {
       work.live_blocks[word] |= bits;
       return true;
@@ -156,7 +150,7 @@ void mark_blocks(const Rig& rig, std::uint32_t lod, Workspace& work) noexcept {
   const std::uint32_t* rows = rig.joint_group_lods.data() + lod;
   for (std::uint32_t i = 0; i < live; ++i, rows += rig.lod_count) {
     const JointGroup& g = rig.joint_groups[i];
-    const bool moves = work.column_ends[i] != g.columns_begin || shows(g, work);
+    const bool moves = work.moves[i] != 0 || shows(g, work);
     if (moves && *rows > 0) work.live[n++] = i;
   }
   work.live_count = n;
@@ -243,6 +237,9 @@ const simd::Column* list_columns(const Rig& rig, std::uint32_t lod,
     }
   } else {
     list_active(rig, live, active, work);
+  }
+  for (std::uint32_t i = 0; i < live; ++i) {
+    work.moves[i] = work.column_ends[i] != rig.joint_groups[i].columns_begin ? 1 : 0;
   }
   mark_blocks(rig, lod, work);
   return whole ? rig.group_columns.data() : work.columns.data();
