@@ -81,8 +81,8 @@ struct Kernels {
   void (*half_columns)(const std::uint16_t* values, const Column* columns, std::size_t n,
                        const float* weights, float* out, std::size_t rows);
   /// sums.values[begin + r] += weight * values[offset + r] for each row r of each column's run,
-  /// one column after the other, up to the first of a group that has no rows. Other sums stay as they are.
-  /// In: columns  by ascending group
+  /// one column after the other, up to the first of a group that has no rows. Other sums stay as
+  /// they are. In: columns  by ascending group
   void (*add_columns)(const float* values, const Addend* columns, std::size_t n, float weight,
                       const Sums& sums);
   void (*add_half_columns)(const std::uint16_t* values, const Addend* columns, std::size_t n,

@@ -136,7 +136,7 @@ RISORIUS_TARGET void quaternions(const EulerTurns& e, const std::uint16_t* which
     if (count < kTurns) continue;
     turn_together<Parts>(e, turning, rotations, stride);
     count -= kTurns;
-    for (std::size_t l = 0; l < kTurns; ++l) turning[l] = turning[kTurns + l];
+    for (std::size_t l = 0; l < count; ++l) turning[l] = turning[kTurns + l];
   }
   if (count == 0) return;
   // Arrays that are not full get the last one over and over: it is read before it is written.

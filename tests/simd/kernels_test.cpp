@@ -168,7 +168,8 @@ TEST_P(SimdKernels, AddNoColumnOfAGroupWithoutRows) {
   const Matrix<std::uint16_t> half = halves(m);
   const Addend columns[] = {{0, 0}, {kRowCount, 2}, {2 * kRowCount, 3}};
   constexpr Rows kNowhere{0x7FFFFFFFu, kRowCount};
-  const Rows runs[] = {{0, kRowCount}, {kRowCount, kRowCount}, {2 * kRowCount, kRowCount}, kNowhere};
+  const Rows runs[] = {
+      {0, kRowCount}, {kRowCount, kRowCount}, {2 * kRowCount, kRowCount}, kNowhere};
   for (const bool is_half : {false, true}) {
     std::vector<float> sums(4 * kRowCount, 0.0f);
     std::uint8_t added[4] = {};

@@ -50,11 +50,11 @@ void list_active(const Rig& rig, std::uint32_t live, std::span<const std::uint16
   }
 }
 
-// Whether columns are added in the order of memory: no list is made and no group's kernel begun, but
-// a sum is read and written with each column. Measured on two faces (AVX2): an evaluation takes 0.7
-// to 1.0 of the time of listing with 4 to 60 columns a group, 0.93 to 1.04 with 77 to 149 columns of
-// 106 rows, and 0.8 to 1.0 with 138 to 295 of 80. Of float16 half as many bytes come in for the same
-// sums: with 64 columns and more listing takes as long or less.
+// Whether columns are added in the order of memory: no list is made and no group's kernel begun,
+// but a sum is read and written with each column. Measured on two faces (AVX2): an evaluation takes
+// 0.7 to 1.0 of the time of listing with 4 to 60 columns a group, 0.93 to 1.04 with 77 to 149
+// columns of 106 rows, and 0.8 to 1.0 with 138 to 295 of 80. Of float16 half as many bytes come in
+// for the same sums: with 64 columns and more listing takes as long or less.
 bool adds(const Rig& rig, std::span<const std::uint16_t> active, const Workspace& work) noexcept {
   constexpr std::size_t kFewInAGroup = 64;
   if (work.traversal != Traversal::kCounted) return work.traversal == Traversal::kAdded;
