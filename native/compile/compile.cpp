@@ -220,8 +220,7 @@ struct KeptColumn {
 
 // A store waits for its cache line, and the lines of columns lie apart: so those of columns that
 // come soon are asked for.
-void fetch_to_write([[maybe_unused]] std::span<const KeptColumn> columns,
-                    [[maybe_unused]] const float* to) {
+inline void fetch_to_write(std::span<const KeptColumn> columns, const float* to) {
 #if defined(__GNUC__)
   for (const KeptColumn& k : columns) __builtin_prefetch(to + k.offset, 1);
 #elif defined(_M_X64)
