@@ -20,10 +20,6 @@
 #include "rig/block.h"
 #include "simd/half.h"
 
-#if defined(_M_X64)
-#include <intrin.h>
-#endif
-
 namespace risorius::compile {
 
 namespace {
@@ -218,18 +214,6 @@ struct KeptColumn {
   std::uint32_t column, offset;
 };
 
-// A store waits for its cache line, and the lines of columns lie apart: so those of columns that
-// come soon are asked for.
-inline void fetch_to_write(std::span<const KeptColumn> columns, const float* to) {
-#if defined(__GNUC__)
-  for (const KeptColumn& k : columns) __builtin_prefetch(to + k.offset, 1);
-#elif defined(_M_X64)
-  for (const KeptColumn& k : columns) {
-    _mm_prefetch(reinterpret_cast<const char*>(to + k.offset), _MM_HINT_T0);
-  }
-#endif
-}
-
 // In tiles: both sides are read and written by whole cache lines, four columns at a time.
 // In: from  [rows, stride]
 void transpose(const float* from, std::size_t rows, std::size_t stride,
@@ -240,8 +224,6 @@ void transpose(const float* from, std::size_t rows, std::size_t stride,
     std::size_t c = 0;
     for (; c + kTogether <= columns.size(); c += kTogether) {
       const KeptColumn* k = columns.data() + c;
-      const std::size_t ahead = std::min(columns.size(), c + 2 * kTogether);
-      fetch_to_write(columns.subspan(ahead, std::min(kTogether, columns.size() - ahead)), to + r0);
       float *const a = to + k[0].offset, *const b = to + k[1].offset, *const d = to + k[2].offset,
                    *const e = to + k[3].offset;
       for (std::size_t r = r0; r < r1; ++r) {
