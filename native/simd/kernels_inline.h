@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: MIT
-// RISORIUS_INLINE: a function of the file's target, always inlined. After RISORIUS_TARGET.
+// What the kernels' files share. RISORIUS_INLINE: a function of the file's target, always inlined.
+// After RISORIUS_TARGET.
 #pragma once
 
+#include <array>
 #include <bit>
+#include <cstddef>
 #include <cstdint>
 
 #if defined(_MSC_VER) && !defined(__clang__)
@@ -12,6 +15,23 @@
 #endif
 
 namespace risorius::simd {
+
+/// For each mask of four places the bytes that each takes; of none, 0. For vectors whose bytes a
+/// table orders.
+inline constexpr auto kExpandBytes = [] {
+  std::array<std::array<std::uint8_t, 16>, 16> orders{};
+  for (std::size_t mask = 0; mask < 16; ++mask) {
+    std::uint8_t next = 0;
+    for (std::size_t p = 0; p < 4; ++p) {
+      const bool taken = ((mask >> p) & 1u) != 0;
+      for (std::size_t b = 0; b < 4; ++b) {
+        orders[mask][4 * p + b] = taken ? static_cast<std::uint8_t>(next + b) : std::uint8_t{0x80};
+      }
+      if (taken) next = static_cast<std::uint8_t>(next + 4);
+    }
+  }
+  return orders;
+}();
 
 namespace {
 

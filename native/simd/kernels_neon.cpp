@@ -7,7 +7,6 @@
 #include <arm_neon.h>
 
 #define RISORIUS_TARGET
-#include "simd/expand_bytes.h"
 #include "simd/kernels_inline.h"
 #include "simd/rotations_body.h"
 

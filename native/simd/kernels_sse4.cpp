@@ -12,7 +12,6 @@
 #else
 #define RISORIUS_TARGET __attribute__((target("sse4.1")))
 #endif
-#include "simd/expand_bytes.h"
 #include "simd/kernels_inline.h"
 #include "simd/rotations_body.h"
 

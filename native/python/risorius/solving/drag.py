@@ -21,7 +21,7 @@ from ..base.errors import ArgumentError
 from .surface import Doubles, Floats, Surface, limits, vector
 
 METHODS = ("least_squares", "transpose")
-LOCAL = 0.1
+LOCAL = 0.15
 """A control that does less here, of what it does where it does most, than this share of what the
 most local one does, belongs elsewhere: gaze to the eyes, though lids and brows follow it."""
 ELSEWHERE = 0.001
@@ -30,7 +30,9 @@ ALIKE, AS_FAR = 0.99, 0.8
 """Two controls do the same to points if their motions have this cosine and this quotient."""
 _HARD = 0.1  # of the largest ease: controls of less are looked at where others do not reach
 _ON = 1e-6
-_WORTH = 0.02  # of the whole way: what two that do the same may miss for the sake of one
+# Of the whole way: what two that do the same may miss for the sake of one, and what controls that
+# belong elsewhere have to bring the points nearer.
+_WORTH = 0.02
 _GAIN = 1e-5  # of the square of the whole way: what gains less is not worth another look
 
 
@@ -232,11 +234,15 @@ def solve_drag(
     def solve(drag: _Drag, start: Doubles) -> Doubles:
         if method == "transpose":
             return _transposed(drag, begin, rounds)
-        if hard:  # the easy ones alone often do, and are few to look at
-            start = _least_squares(drag.held(hard, begin), begin, start, smallest, rounds)
-            if drag.left(start) <= _GAIN * drag.left(begin):
-                return start
-        return _least_squares(drag, begin, start, smallest, rounds)
+        if not hard:
+            return _least_squares(drag, begin, start, smallest, rounds)
+        # The easy ones alone often do, and are few to look at.
+        easy = _least_squares(drag.held(hard, begin), begin, start, smallest, rounds)
+        if drag.left(easy) <= _GAIN * drag.left(begin):
+            return easy
+        every = _least_squares(drag, begin, easy, smallest, rounds)
+        gained = np.sqrt(drag.left(easy)) - np.sqrt(drag.left(every))
+        return every if gained > _WORTH * np.sqrt(drag.left(begin)) else easy
 
     pairs = _pairs(opposites, len(begin))
     at = whole = _kept_apart(drag, begin, pairs, solve)
