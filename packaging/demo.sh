@@ -23,5 +23,5 @@ fi
 shown "$out/blender.log" timeout -s KILL 7200 "${run[@]}" "${arguments[@]}"
 step "contact sheet and film"
 "$python" "$project/packaging/demo/sheet.py" "$out/sheet" "$out/contact_sheet.png"
-crf=17 end_film 1 demo.mp4
+rate=12 crf=17 end_film 1 demo.mp4
 tell contact_sheet.png demo.mp4 demo.blend sample.dna

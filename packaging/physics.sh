@@ -12,5 +12,5 @@ fresh_blender
 shown "$out/blender.log" timeout -s KILL 7200 "$python" "$project/packaging/demo/physics.py" -- \
   --extension "$zip" --dna "$out/sample.dna" --out "$out"
 step "film"
-end_film 31 physics.mp4
+end_film 1 physics.mp4
 tell physics.mp4 physics.blend

@@ -252,7 +252,7 @@ def main():
             demo.still(args.out / f"still_{frame:04d}.png", frame, 480)
         return
     frames = stage.empty_folder(args.out / "frames")
-    demo.timed("render", lambda: demo.film(frames, SETTLE + 1, last))
+    demo.timed("render", lambda: demo.film(frames, range(SETTLE + 1, last + 1)))
 
 
 if __name__ == "__main__":
