@@ -21,7 +21,7 @@ from ..base.errors import ArgumentError
 from .surface import Doubles, Floats, Surface, limits, vector
 
 METHODS = ("least_squares", "transpose")
-LOCAL = 0.15
+LOCAL = 0.12
 """A control that does less here, of what it does where it does most, than this share of what the
 most local one does, belongs elsewhere: gaze to the eyes, though lids and brows follow it."""
 ELSEWHERE = 0.001
@@ -31,7 +31,7 @@ ALIKE, AS_FAR = 0.99, 0.8
 _HARD = 0.1  # of the largest ease: controls of less are looked at where others do not reach
 _ON = 1e-6
 # Of the whole way: what two that do the same may miss for the sake of one, and what controls that
-# belong elsewhere have to bring the points nearer.
+# belong elsewhere have to bring points nearer that stay out of reach.
 _WORTH = 0.02
 _GAIN = 1e-5  # of the square of the whole way: what gains less is not worth another look
 
@@ -241,8 +241,9 @@ def solve_drag(
         if drag.left(easy) <= _GAIN * drag.left(begin):
             return easy
         every = _least_squares(drag, begin, easy, smallest, rounds)
-        gained = np.sqrt(drag.left(easy)) - np.sqrt(drag.left(every))
-        return every if gained > _WORTH * np.sqrt(drag.left(begin)) else easy
+        # Where the points stay out of reach a little nearer is not worth what it takes along.
+        near, nearer, way = (np.sqrt(drag.left(x)) for x in (easy, every, begin))
+        return easy if near - nearer < _WORTH * way < nearer else every
 
     pairs = _pairs(opposites, len(begin))
     at = whole = _kept_apart(drag, begin, pairs, solve)
