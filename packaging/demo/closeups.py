@@ -95,11 +95,13 @@ def pictures(path, args):
     for item in list(bpy.data.objects):
         bpy.data.objects.remove(item)
     collection = demo.import_face(path).users_collection[0]
-    stage.build(collection, strands=not args.cards)
+    stage.build(collection)
     bpy.context.scene.eevee.taa_render_samples = 8  # a second each and more without a graphics card
     out = {engine: {} for engine in args.engine}
     for engine in args.engine:
         use_engine(engine)
+        # In EEVEE a strand is a pixel wide at least, which makes brows too heavy.
+        bpy.ops.risorius.set_strands(enable=engine == "cycles" and not args.cards)
         for view in args.view:
             begin = time.monotonic()
             look(collection, view)
