@@ -95,7 +95,7 @@ def pictures(path, args):
     for item in list(bpy.data.objects):
         bpy.data.objects.remove(item)
     collection = demo.import_face(path).users_collection[0]
-    stage.build(collection)
+    stage.build(collection, strands=False)
     bpy.context.scene.eevee.taa_render_samples = 8  # a second each and more without a graphics card
     out = {engine: {} for engine in args.engine}
     for engine in args.engine:

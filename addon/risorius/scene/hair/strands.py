@@ -217,7 +217,16 @@ def _tree(item: MeshObject, rows: int, kind: _Kind, unit: float) -> NodeTree:
     lean = g.random(-0.1, 0.1, 2, strand)
     across = g.math("ADD", across, g.math("MULTIPLY", lean, g.math("DIVIDE", row, rows)))
     place = g.node("GeometryNodeInputPosition").outputs[0]
-    ends = [_slid(g, mesh, place, i, row, (rows, strand, kind.along)) for i in (left, right)]
+    ends = [g.taken(mesh, place, i, "FLOAT_VECTOR") for i in (left, right)]
+    if kind.along:
+        # Beyond the last row a card goes on as it went.
+        back = g.math("MULTIPLY", g.math("GREATER_THAN", row, rows - 1.5), 2)
+        share = g.random(-kind.along, 0.4 * kind.along, 5, strand)
+        starts = [g.math("SUBTRACT", i, back) for i in (left, right)]
+        ends = [
+            _slid(g, mesh, place, end, start, share)
+            for end, start in zip(ends, starts, strict=True)
+        ]
     parted = g.node("FunctionNodeRandomValue", {"ID": strand, "Seed": 4}, data_type="FLOAT_VECTOR")
     parted.inputs["Min"].default_value = [-kind.apart / unit] * 3
     parted.inputs["Max"].default_value = [kind.apart / unit] * 3
@@ -242,12 +251,7 @@ def _tree(item: MeshObject, rows: int, kind: _Kind, unit: float) -> NodeTree:
 
 
 def _slid(
-    g: _Tree,
-    mesh: Socket,
-    place: Socket,
-    index: Socket,
-    row: Socket,
-    of: tuple[int, Socket, float],
+    g: _Tree, mesh: Socket, place: Socket, end: Socket, start: Socket, share: Socket
 ) -> Socket:
     """Where a vertex of a card is once a strand has slid along it.
 
@@ -255,24 +259,17 @@ def _slid(
         g: the tree.
         mesh: the cards as they are deformed.
         place: of a vertex.
-        index: the vertex's number.
-        row: its row, the root's is 0.
-        of: rows of a card, the strand's number, and how many rows it slides at most.
+        end: where the vertex is.
+        start: number of the vertex of its edge from which the way to the next row is taken.
+        share: of that way.
     """
-    rows, strand, most = of
-    here = g.taken(mesh, place, index, "FLOAT_VECTOR")
-    if not most:
-        return here
-    # Beyond the last row a card goes on as it went.
-    last = g.math("GREATER_THAN", row, rows - 1.5)
-    back = g.math("MULTIPLY", last, 2)
-    first = g.taken(mesh, place, g.math("SUBTRACT", index, back), "FLOAT_VECTOR")
-    second = g.taken(mesh, place, g.math("SUBTRACT", g.math("ADD", index, 2), back), "FLOAT_VECTOR")
+    first, second = (
+        g.taken(mesh, place, i, "FLOAT_VECTOR") for i in (start, g.math("ADD", start, 2))
+    )
     way = g.node("ShaderNodeVectorMath", {0: second, 1: first}, operation="SUBTRACT").outputs[0]
     slide = g.node("ShaderNodeVectorMath", {0: way}, operation="SCALE")
-    g.put(g.random(-most, 0.4 * most, 5, strand), slide.inputs["Scale"])
-    moved = g.node("ShaderNodeVectorMath", {0: here, 1: slide.outputs[0]}, operation="ADD")
-    return moved.outputs[0]
+    g.put(share, slide.inputs["Scale"])
+    return g.node("ShaderNodeVectorMath", {0: end, 1: slide.outputs[0]}, operation="ADD").outputs[0]
 
 
 def _store_place(
