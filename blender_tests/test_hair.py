@@ -126,6 +126,68 @@ def test_roots_stand_between_the_cards_too(haired):
     assert np.ptp(roots @ along / (along @ along)) > 0.3
 
 
+RADIUS, PITCH, LOCK, LOCKS = 2.0, 5.0, 6, 5  # mm; strands of a lock, locks of a card
+
+
+@pytest.fixture
+def curly(tmp_path):
+    """As `haired`, and its hair winds; a factory of one, by what the metadata say of it."""
+
+    def made(words):
+        dna = small_face()
+        meshes = {"head_lod0_mesh": dna.meshes[0], "hair_lod0_mesh": cards(0)}
+        looks.set_meshes(dna, meshes)
+        told = {"hair:hair_lod0_mesh": f"rows={ROWS}", "coil:hair_lod0_mesh": words}
+        dna.metadata = told
+        path = tmp_path / "curly.dna"
+        path.write_bytes(dna.to_bytes())
+        return scene.load(path)
+
+    return made
+
+
+def strands_of(face):
+    """(points, numbers of the first of each strand, metres of a width and of a row) of a face."""
+    corners = scene.evaluated(scene.meshes(face)[1]).reshape(CARDS, ROWS, 2, 3).astype(float)
+    before = set(bpy.data.objects)
+    bpy.ops.risorius.set_strands()
+    (thing,) = set(bpy.data.objects) - before
+    points, first = points_of(thing)
+    return points, first, corners
+
+
+def test_strands_of_tight_curls_wind_about_their_way(curly):
+    points, first, corners = strands_of(curly(f"radius={RADIUS} pitch={PITCH}"))
+    along = corners[0, -1, 0] - corners[0, 0, 0]
+    long = np.linalg.norm(along)
+    along /= long
+    ways = [points[a:b] for a, b in zip(first, [*first[1:], len(points)], strict=True)]
+    assert len(ways) == LOCK * LOCKS * CARDS
+    locks = {}
+    for number, way in enumerate(ways):
+        place = way - corners[0, 0, 0]
+        up = place @ along
+        off = place - up[:, None] * along
+        wound = up > up[0] + 2 * RADIUS / 1000
+        # The axis is straight, as the card is; its own lean and parting are smaller than the coil.
+        flat = off[wound] - off[wound].mean(axis=0)
+        radius = np.linalg.norm(flat, axis=1) * 1000
+        assert 0.5 * RADIUS < np.median(radius) < 1.5 * RADIUS
+        turned = np.unwrap(np.arctan2(flat[:, 2], flat[:, 0]))
+        pitch = np.ptp(up[wound]) * 1000 / (np.ptp(turned) / (2 * np.pi))
+        assert abs(pitch - PITCH) < 0.2 * PITCH
+        locks.setdefault(number // LOCK, []).append(place[0])
+    # A lock's strands begin together.
+    for roots in locks.values():
+        assert np.ptp(np.array(roots), axis=0).max() < 0.0005
+
+
+@pytest.mark.parametrize("words", ["radius=0 pitch=5", "radius=2", "pitch=5 radius=2", "tight"])
+def test_curls_that_the_metadata_do_not_say_rightly_are_none(curly, words):
+    _, first, _ = strands_of(curly(words))
+    assert len(first) == 32 * CARDS
+
+
 def test_a_face_without_cards_says_so(dna_file):
     scene.load(dna_file)
     with pytest.raises(RuntimeError, match="This face has no cards of hair"):

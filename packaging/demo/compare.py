@@ -120,6 +120,7 @@ def render_row(path, folder, size, expressions, close):
     controls = demo.import_face(path)
     collection = controls.users_collection[0]
     stage.build(collection)
+    stage.meet_eyes()
     out = {}
     for number, name in enumerate(expressions):
         set_expression(controls, name, expressions)

@@ -129,6 +129,7 @@ def main():
     count = timed("key the acting", lambda: act(controls))
     print(f"    {count} controls keyed", flush=True)
     stage.build(collection)
+    stage.meet_eyes()
     scene.frame_start, scene.frame_end = 1, acting.LAST_FRAME
     scene.frame_set(1)
     blend = args.out / "demo.blend"

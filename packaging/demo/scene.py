@@ -96,6 +96,12 @@ def build(collection, strands=True):
     return next(made for made in bpy.data.collections if made not in before)
 
 
+def meet_eyes():
+    """Let the active face look into the camera, as one who is photographed does."""
+    if bpy.ops.risorius.gaze_target(mode="OBJECT") != {"FINISHED"}:
+        raise RuntimeError("the eyes did not follow the camera")
+
+
 def darken(scene):
     """A room whose walls give back hardly any light."""
     world = bpy.data.worlds.new("Stage")

@@ -367,8 +367,27 @@ def test_extra_faces_with_hair_are_sane_and_small(haired):
             len(dna.meshes[dna.mesh_names.index(n)].positions) for n in shown if "_lod0_" in n
         )
         assert 5000 < finest <= MOST_VERTICES
-        assert {f"texture:{n}:color" for n in shown} <= set(hair_metadata(dna, hair))
+        assert {f"texture:{n}:color" for n in shown} <= set(
+            hair_metadata(dna, hair, people.PEOPLE["man"])
+        )
         assert list(hair_picture(people.PEOPLE["man"], 64)) == ["hair_color.png"]
+
+
+def test_metadata_say_where_strands_wind(haired):
+    for dna, hair, _ in haired:
+        wound = {}
+        for who in ("man", "woman", "fighter"):
+            told = hair_metadata(dna, hair, people.PEOPLE[who])
+            wound[who] = {k: told[k] for k in told if k.startswith("coil:")}
+        own = [n for n in dna.mesh_names if n.split("_")[0] in {"hair", "beard"} & set(hair.strips)]
+        assert wound["man"] == {}
+        assert own
+        assert set(wound["woman"]) == set(wound["fighter"]) == {f"coil:{n}" for n in own}
+        # Shorter hair winds in smaller coils.
+        for name in wound["woman"]:
+            sizes = [float(wound[who][name].split()[0][7:]) for who in ("fighter", "woman")]
+            assert 0.3 < sizes[0] <= sizes[1] < 3
+            assert (sizes[0] < sizes[1]) == ("hair" in name)
 
 
 def test_extra_roots_stay_on_the_skin_in_each_expression(haired):

@@ -635,6 +635,6 @@ def _built(
     leave_maps(dna)
     round_numbers(dna)
     by_code = {"controls_by_code": " ".join(CONTROLS_OF_CODE)}
-    metadata = textures_of_levels(dna, metadata) | hair_metadata(dna, grown)
+    metadata = textures_of_levels(dna, metadata) | hair_metadata(dna, grown, person)
     dna.metadata = METADATA | by_code | metadata
     return dna, textures | drawing.result()

@@ -36,6 +36,8 @@ _OWN = ("hair", "beard")
 _ROWS = (99, 4, 3, 3)
 _LEAST_MM = {"hair": 1.0, "brows": 0.15, "beard": 0.15, "eyelashes": 0.1}
 _MM = 10.0  # of a centimetre
+_COIL = 1.6  # mm: radius of the coils of an afro of four centimetres
+_PITCH = 2.4  # of a coil's radius, from turn to turn, where hair winds most tightly
 
 
 @dataclass
@@ -138,15 +140,17 @@ def hair_picture(person: Person, largest: int) -> dict[str, bytes]:
     return {PICTURE: png(shrunk(paint_strands(person), largest))}
 
 
-def hair_metadata(dna: Dna, grown: Grown) -> dict[str, str]:
+def hair_metadata(dna: Dna, grown: Grown, person: Person) -> dict[str, str]:
     """Which meshes show the picture of the hairs, and how.
 
     `texture:<mesh>:color` -> file name; `hair:<mesh>` -> "rows=R" of its cards, which stand one
-    after the other, two vertices in a row, from root to tip: renderers of strands follow them.
+    after the other, two vertices in a row, from root to tip: renderers of strands follow them;
+    `coil:<mesh>` -> "radius=R pitch=P", millimetres, where strands wind about their way.
 
     Args:
         dna: has the meshes.
         grown: the hair.
+        person: has the curls.
     """
     metadata = {}
     for name in dna.mesh_names:
@@ -157,4 +161,9 @@ def hair_metadata(dna: Dna, grown: Grown) -> dict[str, str]:
         lod = int(name.partition("_lod")[2].partition("_")[0])
         rows = grown.strips[kind].rows
         metadata[f"hair:{name}"] = f"rows={min(rows, _ROWS[lod])}"
+        if kind in _OWN and person.hair_style == "afro" and person.hair_curl > 0:
+            long = person.hair_length if kind == "hair" else 0.0
+            radius = _COIL * (0.4 + 0.6 * min(long, 1.0))
+            pitch = _PITCH * radius / person.hair_curl
+            metadata[f"coil:{name}"] = f"radius={radius:.2f} pitch={pitch:.2f}"
     return metadata

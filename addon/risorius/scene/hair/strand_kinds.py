@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How strands of hair differ from the card that they follow, by what they are."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import NamedTuple
+
+_COIL = re.compile(r"radius=(\d+(?:\.\d+)?) pitch=(\d+(?:\.\d+)?)")  # mm
+_LOCK, _LOCKS = 6, 5  # strands that wind together, and how many such locks follow a card
+
+
+class Coil(NamedTuple):
+    """How strands wind about the way of their card; metres."""
+
+    radius: float
+    pitch: float
+
+
+class Kind(NamedTuple):
+    """How strands differ from the card that they follow."""
+
+    each: int  # strands of a card
+    radius: float  # at the root, metres
+    apart: float  # how far tips part, metres
+    cut: float  # of their length, what is cut off at most
+    # Roots stand between the cards' too, or each card would be a tuft: how far over either edge, in
+    # the card's widths, and how far before or behind the card's root, in rows.
+    aside: float
+    along: float
+    # Light goes from fibre to fibre where they lie close; single ones over skin are as the picture
+    # shows them, and fibres that let light through would be darker there.
+    dense: bool
+    coil: Coil | None = None
+    lock: int = 1  # strands that begin and go together
+
+
+_KINDS = {  # by what the name of a mesh begins with
+    "hair": Kind(32, 0.00008, 0.0015, 0.45, 0.2, 0.3, True),
+    "brows": Kind(4, 0.00005, 0.0004, 0.35, 0.3, 0.3, False),
+    "beard": Kind(12, 0.00005, 0.0015, 0.5, 0.9, 0.7, False),
+    "eyelashes": Kind(3, 0.00006, 0.0003, 0.25, 0.0, 0.0, False),
+}
+
+
+def kind_of(name: str, told: Mapping[str, str]) -> Kind | None:
+    """How strands of a mesh are.
+
+    Args:
+        name: of the mesh, in the file.
+        told: the file's metadata.
+    """
+    kind = next((k for begin, k in _KINDS.items() if name.startswith(begin)), None)
+    found = _COIL.fullmatch(told.get(f"coil:{name}", ""))
+    if kind is None or found is None or not (float(found[1]) > 0 and float(found[2]) > 0):
+        return kind
+    coil = Coil(0.001 * float(found[1]), 0.001 * float(found[2]))
+    locks = max(2, round(_LOCKS * kind.each / _KINDS["hair"].each))
+    aside, along = max(kind.aside, 0.35), max(kind.along, 0.5)
+    return kind._replace(each=_LOCK * locks, aside=aside, along=along, coil=coil, lock=_LOCK)

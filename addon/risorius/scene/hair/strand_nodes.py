@@ -1,0 +1,271 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The geometry nodes that turn cards of hair into strands."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ..base.blender_types import MeshObject, Node, NodeTree, Socket
+from .strand_kinds import Coil, Kind
+from .strand_material import PLACE, material_of
+
+TREE = "Risorius Strands"
+CARDS = "Cards"  # input of the modifier: the mesh that is followed
+_OF_A_TURN = 7  # points of a strand that winds
+_MOST_POINTS = 100
+
+
+class _Tree:
+    """Short words for a geometry node tree."""
+
+    def __init__(self, tree: NodeTree) -> None:
+        self.tree = tree
+
+    def node(
+        self, kind: str, inputs: dict[str | int, object] | None = None, **settings: object
+    ) -> Node:
+        node = self.tree.nodes.new(kind)
+        for key, value in settings.items():
+            setattr(node, key, value)
+        for name, value in (inputs or {}).items():
+            self.put(value, node.inputs[name])
+        return node
+
+    def put(self, value: object, socket: Socket) -> None:
+        if hasattr(value, "is_output"):
+            self.tree.links.new(value, socket)
+        else:
+            socket.default_value = value
+
+    def math(self, operation: str, *values: object) -> Socket:
+        node = self.node("ShaderNodeMath", operation=operation)
+        for value, socket in zip(values, node.inputs, strict=False):
+            self.put(value, socket)
+        return node.outputs[0]
+
+    def random(self, low: float, high: float, seed: int, number: object) -> Socket:
+        """A number of its own for each strand."""
+        node = self.node("FunctionNodeRandomValue", {2: low, 3: high, "ID": number, "Seed": seed})
+        return node.outputs[1]
+
+    def taken(self, mesh: object, value: object, index: object, kind: str) -> Socket:
+        """A value of a vertex of the cards."""
+        node = self.node("GeometryNodeSampleIndex", data_type=kind, domain="POINT")
+        self.put(mesh, node.inputs[0])
+        self.put(value, next(s for s in node.inputs if s.name == "Value" and s.enabled))
+        self.put(index, node.inputs["Index"])
+        return next(s for s in node.outputs if s.enabled)
+
+    def between(self, a: object, b: object, share: object) -> Socket:
+        """A vector between two, or beyond them where the share is."""
+        node = self.node("ShaderNodeMix", data_type="VECTOR", clamp_factor=False)
+        where = {s.identifier: s for s in node.inputs}
+        for value, name in ((share, "Factor_Float"), (a, "A_Vector"), (b, "B_Vector")):
+            self.put(value, where[name])
+        return next(s for s in node.outputs if s.identifier == "Result_Vector")
+
+
+def strand_tree(item: MeshObject, rows: int, kind: Kind, unit: float) -> NodeTree:
+    """Nodes that turn the cards of a mesh into strands.
+
+    Args:
+        item: the cards.
+        rows: of each card.
+        kind: of the strands.
+        unit: metres per Blender unit.
+    """
+    tree: Any = bpy.data.node_groups.new(TREE, "GeometryNodeTree")
+    for way in ("INPUT", "OUTPUT"):
+        tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
+    g = _Tree(tree)
+    tree.interface.new_socket(CARDS, in_out="INPUT", socket_type="NodeSocketObject")
+    given = g.node("NodeGroupInput").outputs[CARDS]
+    source = g.node("GeometryNodeObjectInfo", {"Object": given}, transform_space="RELATIVE")
+    mesh = source.outputs["Geometry"]
+    count = kind.each * len(item.data.vertices) // (2 * rows)
+    line = g.node("GeometryNodeCurvePrimitiveLine")
+    line = g.node("GeometryNodeResampleCurve", {"Curve": line.outputs[0], "Count": rows})
+    dots = g.node("GeometryNodePoints", {"Count": count})
+    many = g.node("GeometryNodeInstanceOnPoints", {0: dots.outputs[0], "Instance": line.outputs[0]})
+    real = g.node("GeometryNodeRealizeInstances", {0: many.outputs[0]})
+    # All strands have as many points as a card has rows: numbers follow from a point's own.
+    index = g.node("GeometryNodeInputIndex").outputs[0]
+    strand = g.math("FLOOR", g.math("DIVIDE", g.math("ADD", index, 0.5), rows))
+    card = g.math("FLOOR", g.math("DIVIDE", g.math("ADD", strand, 0.5), kind.each))
+    row = g.math("SUBTRACT", index, g.math("MULTIPLY", strand, rows))
+    left = g.math("MULTIPLY", g.math("ADD", g.math("MULTIPLY", card, rows), row), 2)
+    right = g.math("ADD", left, 1)
+    # A strand wanders a little across its card.
+    lock = _lock(g, strand, kind)
+    across = g.random(0.04 - kind.aside, 0.96 + kind.aside, 1, lock)
+    lean = g.random(-0.1, 0.1, 2, lock)
+    across = g.math("ADD", across, g.math("MULTIPLY", lean, g.math("DIVIDE", row, rows)))
+    place = g.node("GeometryNodeInputPosition").outputs[0]
+    ends = [g.taken(mesh, place, i, "FLOAT_VECTOR") for i in (left, right)]
+    if kind.along:
+        # Beyond the last row a card goes on as it went.
+        back = g.math("MULTIPLY", g.math("GREATER_THAN", row, rows - 1.5), 2)
+        share = g.random(-kind.along, 0.4 * kind.along, 5, lock)
+        starts = [g.math("SUBTRACT", i, back) for i in (left, right)]
+        ends = [
+            _slid(g, mesh, place, end, start, share)
+            for end, start in zip(ends, starts, strict=True)
+        ]
+    parted = g.node("FunctionNodeRandomValue", {"ID": lock, "Seed": 4}, data_type="FLOAT_VECTOR")
+    parted.inputs["Min"].default_value = [-kind.apart / unit] * 3
+    parted.inputs["Max"].default_value = [kind.apart / unit] * 3
+    aside = g.node("ShaderNodeVectorMath", {0: parted.outputs["Value"]}, operation="SCALE")
+    g.put(g.math("DIVIDE", row, rows - 1), aside.inputs["Scale"])
+    moved = g.node(
+        "GeometryNodeSetPosition",
+        {
+            "Geometry": real.outputs[0],
+            "Position": g.between(ends[0], ends[1], across),
+            "Offset": aside.outputs[0],
+        },
+    )
+    stored = _store_place(g, item, mesh, moved.outputs[0], (left, right, across))
+    finished = _finish(g, stored, _points_of(item, rows, kind, unit), kind, unit)
+    painted = g.node(
+        "GeometryNodeSetMaterial", {"Geometry": finished, "Material": material_of(item, kind.dense)}
+    )
+    out = g.node("NodeGroupOutput")
+    tree.links.new(painted.outputs[0], out.inputs[0])
+    return tree
+
+
+def _slid(
+    g: _Tree, mesh: Socket, place: Socket, end: Socket, start: Socket, share: Socket
+) -> Socket:
+    """Where a vertex of a card is once a strand has slid along it.
+
+    Args:
+        g: the tree.
+        mesh: the cards as they are deformed.
+        place: of a vertex.
+        end: where the vertex is.
+        start: number of the vertex of its edge from which the way to the next row is taken.
+        share: of that way.
+    """
+    first, second = (
+        g.taken(mesh, place, i, "FLOAT_VECTOR") for i in (start, g.math("ADD", start, 2))
+    )
+    way = g.node("ShaderNodeVectorMath", {0: second, 1: first}, operation="SUBTRACT").outputs[0]
+    slide = g.node("ShaderNodeVectorMath", {0: way}, operation="SCALE")
+    g.put(share, slide.inputs["Scale"])
+    return g.node("ShaderNodeVectorMath", {0: end, 1: slide.outputs[0]}, operation="ADD").outputs[0]
+
+
+def _store_place(
+    g: _Tree, item: MeshObject, mesh: Socket, curves: Socket, where: tuple[Socket, Socket, Socket]
+) -> Socket:
+    """Curves that know where in the cards' picture each point is.
+
+    Args:
+        g: the tree.
+        item: the cards.
+        mesh: the cards as they are deformed.
+        curves: the strands.
+        where: numbers of the vertices left and right of a point, and where it is between them.
+    """
+    left, right, across = where
+    within = g.node("ShaderNodeClamp", {0: across, 1: 0.04, 2: 0.96}).outputs[0]
+    uv = g.node("GeometryNodeInputNamedAttribute", data_type="FLOAT_VECTOR")
+    uv.inputs["Name"].default_value = item.data.uv_layers[0].name if item.data.uv_layers else ""
+    value = next(s for s in uv.outputs if s.enabled)
+    ends = [g.taken(mesh, value, i, "FLOAT_VECTOR") for i in (left, right)]
+    stored = g.node(
+        "GeometryNodeStoreNamedAttribute",
+        {"Geometry": curves, "Name": PLACE},
+        data_type="FLOAT_VECTOR",
+        domain="POINT",
+    )
+    spot = g.between(ends[0], ends[1], within)
+    g.put(spot, next(s for s in stored.inputs if s.name == "Value" and s.enabled))
+    return stored.outputs[0]
+
+
+def _lock(g: _Tree, strand: object, kind: Kind) -> object:
+    """The number of the lock that a strand belongs to, or its own."""
+    if kind.lock == 1:
+        return strand
+    return g.math("FLOOR", g.math("DIVIDE", g.math("ADD", strand, 0.5), kind.lock))
+
+
+def _finish(g: _Tree, curves: Socket, points: int, kind: Kind, unit: float) -> Socket:
+    """Strands as smooth curves of many lengths that taper to their tips.
+
+    Args:
+        g: the tree.
+        curves: the strands.
+        points: of each.
+        kind: of them.
+        unit: metres per Blender unit.
+    """
+    round_ = g.node("GeometryNodeCurveSplineType", spline_type="CATMULL_ROM")
+    g.put(curves, round_.inputs["Curve"])
+    if kind.coil is None:
+        finer = g.node("GeometryNodeResampleCurve", {"Curve": round_.outputs[0], "Count": points})
+    else:
+        finer = _wound(g, round_.outputs[0], points, kind, kind.coil, unit)
+    number = g.node("GeometryNodeInputIndex").outputs[0]
+    whole = g.random(1.0 - kind.cut, 1.0, 3, _lock(g, number, kind))
+    trimmed = g.node("GeometryNodeTrimCurve", {"Curve": finer.outputs[0]}, mode="FACTOR")
+    g.put(whole, next(s for s in trimmed.inputs if s.name == "End" and s.enabled))
+    along = g.node("GeometryNodeSplineParameter").outputs["Factor"]
+    radius = kind.radius / unit
+    thick = g.math("MULTIPLY", g.math("SUBTRACT", 1.0, g.math("POWER", along, 3.0)), radius)
+    sized = g.node("GeometryNodeSetCurveRadius", {"Curve": trimmed.outputs[0], "Radius": thick})
+    return sized.outputs[0]
+
+
+def _points_of(item: MeshObject, rows: int, kind: Kind, unit: float) -> int:
+    """How many points a strand of these cards needs."""
+    if kind.coil is None:
+        return 2 * rows + 2
+    places = np.empty(3 * len(item.data.vertices), np.float32)
+    item.data.vertices.foreach_get("co", places)
+    edge = places.reshape(-1, rows, 2, 3)[:, :, 0]
+    long = np.linalg.norm(np.diff(edge, axis=1), axis=2).sum(axis=1)
+    turns = float(np.quantile(long, 0.9)) * unit / kind.coil.pitch
+    return int(np.clip(_OF_A_TURN * turns, 8, _MOST_POINTS))
+
+
+def _wound(g: _Tree, curves: Socket, points: int, kind: Kind, coil: Coil, unit: float) -> Node:
+    """Strands that wind about their way, those of a lock nearly alike; the last node.
+
+    Args:
+        g: the tree.
+        curves: smooth strands.
+        points: of each.
+        kind: of them.
+        coil: how they wind.
+        unit: metres per Blender unit.
+    """
+    radius, pitch = coil.radius / unit, coil.pitch / unit
+    finer = g.node("GeometryNodeResampleCurve", {"Curve": curves, "Count": points})
+    strand = g.node("GeometryNodeCurveOfPoint").outputs["Curve Index"]
+    way = g.node("GeometryNodeSplineParameter").outputs["Length"]
+    begin = g.math(
+        "ADD", g.random(0.0, math.tau, 6, _lock(g, strand, kind)), g.random(-0.6, 0.6, 7, strand)
+    )
+    angle = g.math("ADD", g.math("MULTIPLY", way, math.tau / pitch), begin)
+    # From nothing at the root on, or roots would stand in circles.
+    far = g.math("MULTIPLY", g.math("MINIMUM", g.math("DIVIDE", way, 2 * radius), 1.0), radius)
+    far = g.math("MULTIPLY", far, g.random(0.7, 1.3, 8, strand))
+    normal = g.node("GeometryNodeInputNormal").outputs[0]
+    tangent = g.node("GeometryNodeInputTangent").outputs[0]
+    other = g.node("ShaderNodeVectorMath", {0: tangent, 1: normal}, operation="CROSS_PRODUCT")
+    parts_ = []
+    for axis, wave in ((normal, "COSINE"), (other.outputs[0], "SINE")):
+        part = g.node("ShaderNodeVectorMath", {0: axis}, operation="SCALE")
+        g.put(g.math("MULTIPLY", far, g.math(wave, angle)), part.inputs["Scale"])
+        parts_.append(part.outputs[0])
+    both = g.node("ShaderNodeVectorMath", {0: parts_[0], 1: parts_[1]}, operation="ADD")
+    return g.node(
+        "GeometryNodeSetPosition", {"Geometry": finer.outputs[0], "Offset": both.outputs[0]}
+    )
