@@ -188,6 +188,31 @@ def test_curls_that_the_metadata_do_not_say_rightly_are_none(curly, words):
     assert len(first) == 32 * CARDS
 
 
+def test_coarse_cards_have_as_many_strands_together_as_fine_ones(tmp_path):
+    dna = small_face()
+    few = polygon_mesh(
+        np.asarray(cards(0).positions)[: 4 * ROWS].astype(float),
+        np.tile([0.0, 0, 1], (4 * ROWS, 1)),
+        [[a, a + 1, a + 3, a + 2] for a in (0, 2, 6, 8)],
+        np.zeros((4 * ROWS, 2)),
+        [[a, a + 1, a + 3, a + 2] for a in (0, 2, 6, 8)],
+    )
+    meshes = {"head_lod0_mesh": dna.meshes[0], "hair_lod0_mesh": cards(0), "hair_lod1_mesh": few}
+    looks.set_meshes(dna, meshes)
+    dna.metadata = {f"hair:hair_lod{lod}_mesh": f"rows={ROWS}" for lod in (0, 1)}
+    path = tmp_path / "levels.dna"
+    path.write_bytes(dna.to_bytes())
+    rig = scene.load(path)
+    before = set(bpy.data.objects)
+    bpy.ops.risorius.set_strands()
+    made = {thing.name.split("_lod")[1][0]: thing for thing in set(bpy.data.objects) - before}
+    assert len(scene.meshes(rig)) == 3
+    assert {lod: len(points_of(thing)[1]) for lod, thing in made.items()} == {
+        "0": 32 * CARDS,
+        "1": 32 * CARDS,
+    }
+
+
 def test_a_face_without_cards_says_so(dna_file):
     scene.load(dna_file)
     with pytest.raises(RuntimeError, match="This face has no cards of hair"):

@@ -108,6 +108,8 @@ def stand_side_by_side(man, woman):
 def build_stage(man, woman):
     """The man's studio, moved to the middle between the two, from farther away."""
     collection = man.users_collection[0]
+    choose(woman)
+    must(bpy.ops.risorius.set_strands())
     studio = stage.build(collection)
     for thing in studio.objects:
         thing.location.x += (woman.location.x - man.location.x) / 2

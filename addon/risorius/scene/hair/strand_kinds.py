@@ -59,3 +59,13 @@ def kind_of(name: str, told: Mapping[str, str]) -> Kind | None:
     locks = max(2, round(_LOCKS * kind.each / _KINDS["hair"].each))
     aside, along = max(kind.aside, 0.35), max(kind.along, 0.5)
     return kind._replace(each=_LOCK * locks, aside=aside, along=along, coil=coil, lock=_LOCK)
+
+
+def thicker(kind: Kind, more: float) -> Kind:
+    """The kind with more strands for each card, whole locks of them.
+
+    Args:
+        kind: of cards at LOD 0.
+        more: times as many; below 1 as 1.
+    """
+    return kind._replace(each=kind.lock * round(max(1.0, more) * kind.each / kind.lock))

@@ -16,11 +16,12 @@ import bpy
 from ..base import parts
 from ..base.blender_types import ArmatureObject, MeshObject
 from ..character import runtime
-from .strand_kinds import Kind, kind_of
+from .strand_kinds import Kind, kind_of, thicker
 from .strand_nodes import CARDS, TREE, strand_tree
 
 STRANDS = "risorius_strands"  # on a mesh of cards: the object that renders show instead
 _ROWS = re.compile(r"rows=(\d+)")
+_LEVEL = re.compile(r"_lod\d+_")
 
 
 def cards(rig: ArmatureObject) -> Iterator[tuple[MeshObject, str, int]]:
@@ -61,15 +62,33 @@ def show(rig: ArmatureObject, unit: float) -> int:
     """
     count = 0
     live = runtime.of(rig)
-    told = live.dna.metadata if live is not None else {}
+    if live is None:
+        return count
     for item, name, rows in cards(rig):
-        kind = kind_of(name, told)
         if _strands_of(item) is None:
+            kind = kind_of(name, live.dna.metadata)
             if kind is None or item.hide_render:
                 continue
-            _add(item, rows, kind, unit)
+            more = _cards_at_finest(live, name) * 2 * rows / len(item.data.vertices)
+            _add(item, rows, thicker(kind, more), unit)
         count += 1
     return count
+
+
+def _cards_at_finest(live: runtime.Runtime, name: str) -> int:
+    """How many cards a mesh has at LOD 0, of which a coarser one has fewer and wider ones; 0 where
+    the file does not say so.
+
+    Args:
+        live: of the character.
+        name: of the mesh at its level, in the file.
+    """
+    finest = _LEVEL.sub("_lod0_", name)
+    found = _ROWS.fullmatch(live.dna.metadata.get(f"hair:{finest}", ""))
+    names = list(live.dna.mesh_names)
+    if found is None or finest not in names:
+        return 0
+    return len(live.dna.meshes[names.index(finest)].positions) // (2 * int(found[1]))
 
 
 def _add(item: MeshObject, rows: int, kind: Kind, unit: float) -> None:

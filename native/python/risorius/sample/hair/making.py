@@ -36,6 +36,7 @@ _OWN = ("hair", "beard")
 _ROWS = (99, 4, 3, 3)
 _LEAST_MM = {"hair": 1.0, "brows": 0.15, "beard": 0.15, "eyelashes": 0.1}
 _MM = 10.0  # of a centimetre
+_OVERDONE = np.float32(1.4)  # times an expression, each control at most 1
 _COIL = 1.6  # mm: radius of the coils of an afro of four centimetres
 _PITCH = 2.4  # of a coil's radius, from turn to turn, where hair winds most tightly
 
@@ -112,6 +113,8 @@ def add_hair(dna: Dna, grown: Grown) -> None:
     there = {lod: whereabouts(dna, head) for lod, head in heads.items() if head is not None}
     if "beard" in grown.strips and heads[0] is not None:
         faces = [pose_vector(face, dna.raw_control_names) for face in load().values()]
+        # Two that are played together are more than either.
+        faces += [np.minimum(_OVERDONE * face, 1) for face in faces]
         clear = cut_clear(grown.strips["beard"], dna, heads[0], grown.unit, faces)
         grown.strips["beard"] = clear
     for name, lod in itertools.product(names, there):
