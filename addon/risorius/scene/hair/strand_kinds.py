@@ -8,7 +8,9 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 _COIL = re.compile(r"radius=(\d+(?:\.\d+)?) pitch=(\d+(?:\.\d+)?)")  # mm
-_LOCK, _LOCKS = 6, 5  # strands that wind together, and how many such locks follow a card
+# Strands that wind together, and how many such locks follow a card: of large coils, of small ones.
+_LOCKS = ((6, 5), (3, 10))
+_LARGE = 0.0013  # metres, radius of a coil
 
 
 class Coil(NamedTuple):
@@ -38,7 +40,7 @@ class Kind(NamedTuple):
 
 _KINDS = {  # by what the name of a mesh begins with
     "hair": Kind(32, 0.00008, 0.0015, 0.45, 0.2, 0.3, True),
-    "brows": Kind(4, 0.00005, 0.0004, 0.35, 0.3, 0.3, False),
+    "brows": Kind(5, 0.000055, 0.0004, 0.35, 0.3, 0.3, False),
     "beard": Kind(12, 0.00005, 0.0015, 0.5, 0.9, 0.7, False),
     "eyelashes": Kind(3, 0.00006, 0.0003, 0.25, 0.0, 0.0, False),
 }
@@ -56,9 +58,10 @@ def kind_of(name: str, told: Mapping[str, str]) -> Kind | None:
     if kind is None or found is None or not (float(found[1]) > 0 and float(found[2]) > 0):
         return kind
     coil = Coil(0.001 * float(found[1]), 0.001 * float(found[2]))
-    locks = max(2, round(_LOCKS * kind.each / _KINDS["hair"].each))
+    lock, locks = _LOCKS[coil.radius < _LARGE]
+    locks = max(2, round(locks * kind.each / _KINDS["hair"].each))
     aside, along = max(kind.aside, 0.35), max(kind.along, 0.5)
-    return kind._replace(each=_LOCK * locks, aside=aside, along=along, coil=coil, lock=_LOCK)
+    return kind._replace(each=lock * locks, aside=aside, along=along, coil=coil, lock=lock)
 
 
 def thicker(kind: Kind, more: float) -> Kind:

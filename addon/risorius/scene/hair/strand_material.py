@@ -28,6 +28,7 @@ def material_of(item: MeshObject, dense: bool) -> bpy.types.Material:
     tree = compat.tree_of(material)
     shader = next(n for n in tree.nodes if n.type == "BSDF_PRINCIPLED")
     shader.inputs["Roughness"].default_value = 0.5
+    shader.inputs["Specular IOR Level"].default_value = 0.2  # more makes brows grey
     source: Any = cards_look.node_tree if cards_look is not None else None
     pictures = [n for n in source.nodes if n.type == "TEX_IMAGE" and n.image] if source else []
     colour = None
@@ -59,7 +60,7 @@ def _add_fibre(tree: NodeTree, colour: Socket | None) -> None:
         fibre.model = "CHIANG"
     fibre.parametrization = "COLOR"
     fibre.inputs["Roughness"].default_value = 0.55
-    fibre.inputs["IOR"].default_value = 1.4  # oiled: with 1.55 light from behind makes it grey
+    fibre.inputs["IOR"].default_value = 1.3  # oiled: with 1.55 light from behind makes it grey
     if colour is not None:
         # Light goes through several fibres: what the picture shows is what they give together.
         deep = tree.nodes.new("ShaderNodeGamma")

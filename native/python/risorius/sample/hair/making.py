@@ -7,6 +7,7 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ... import Dna
 from ...expressions import load, pose_vector
@@ -37,6 +38,7 @@ _ROWS = (99, 4, 3, 3)
 _LEAST_MM = {"hair": 1.0, "brows": 0.15, "beard": 0.15, "eyelashes": 0.1}
 _MM = 10.0  # of a centimetre
 _OVERDONE = np.float32(1.4)  # times an expression, each control at most 1
+_WIDEST, _OVER = "smile_open", np.float32(0.5)  # what brings most of a beard to where skin folds
 _COIL = 1.6  # mm: radius of the coils of an afro of four centimetres
 _PITCH = 2.4  # of a coil's radius, from turn to turn, where hair winds most tightly
 
@@ -112,10 +114,9 @@ def add_hair(dna: Dna, grown: Grown) -> None:
     heads = {lod: head_of(dna, lod) for lod in range(min(dna.lod_count, NO_HAIR))}
     there = {lod: whereabouts(dna, head) for lod, head in heads.items() if head is not None}
     if "beard" in grown.strips and heads[0] is not None:
-        faces = [pose_vector(face, dna.raw_control_names) for face in load().values()]
-        # Two that are played together are more than either.
-        faces += [np.minimum(_OVERDONE * face, 1) for face in faces]
-        clear = cut_clear(grown.strips["beard"], dna, heads[0], grown.unit, faces)
+        clear = cut_clear(
+            grown.strips["beard"], dna, heads[0], grown.unit, _played(dna.raw_control_names)
+        )
         grown.strips["beard"] = clear
     for name, lod in itertools.product(names, there):
         head, strips = heads[lod], grown.strips[name]
@@ -131,6 +132,18 @@ def add_hair(dna: Dna, grown: Grown) -> None:
             add_lid_turns(dna, mesh, shown.rows, lod)
             add_lash_controls(dna, mesh, shown.rows, lod)
         append_mesh(dna, f"{name}_lod{lod}_mesh", mesh, [lod])
+
+
+def _played(names: list[str]) -> list[NDArray[np.float32]]:
+    """What raw controls do in each expression, alone and with another over it, which is more.
+
+    Args:
+        names: of the raw controls.
+    """
+    alone = [pose_vector(face, names) for face in load().values()]
+    smile = _OVER * pose_vector(_WIDEST, names)
+    out = [*alone, *(_OVERDONE * face for face in alone), *(face + smile for face in alone)]
+    return [np.minimum(face, 1) for face in out]
 
 
 def hair_picture(person: Person, largest: int) -> dict[str, bytes]:

@@ -59,7 +59,9 @@ def _roots(
     man = surface.man
     inside = hairline_height(man, *HAIRLINES[style])
     inside = inside + 0.014 * wavy(man, random, 3.0) + 0.005 * wavy(man, random, 9.0)
-    density = smooth_step((inside + 0.012) / 0.05 if even else inside / 0.07)
+    if even:  # no line: single hairs stand before it, and the corners over the temples are round
+        inside = inside + 0.016 * wavy(man, random, 1.6)
+    density = smooth_step((inside + 0.03) / 0.11 if even else inside / 0.07)
     density = density * (1 - thinned(man, style))
     if not even:
         density = density * (1 - 0.5 * smooth_step((man[:, 1] - 0.4) / 0.3))
