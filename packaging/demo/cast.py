@@ -20,7 +20,6 @@ import install_extension  # noqa: E402
 import scene as stage  # noqa: E402
 from mathutils import Vector  # noqa: E402
 from performance import must  # noqa: E402
-from progress import Progress  # noqa: E402
 
 CELL = Vector((0.26, 0.0, 0.325))  # metres from face to face, to the right and down
 RESOLUTION = 128, 160  # pixels of a cell
@@ -114,18 +113,13 @@ def build_stage(columns, rows):
 
 
 def render(args):
-    scene = bpy.context.scene
-    if scene.cycles.use_denoising:
-        scene.cycles.samples = 4  # at this size more look alike
-    frames = args.only or range(1, acting.LAST_FRAME + 1, STEP)
-    folder = args.out if args.only else stage.empty_folder(args.out / "frames")
-    progress = Progress(len(frames), "frame")
-    for number, frame in enumerate(frames, 1):
-        scene.frame_set(frame)
-        name = f"still_{frame:04d}.png" if args.only else f"frame_{number:04d}.png"
-        scene.render.filepath = str(folder / name)
-        bpy.ops.render.render(write_still=True)
-        progress.step()
+    if args.only:
+        for frame in args.only:
+            demo.still(args.out / f"still_{frame:04d}.png", frame)
+        return
+    frames = range(1, acting.LAST_FRAME + 1, STEP)
+    # At this size more samples look alike.
+    stage.render_frames(stage.empty_folder(args.out / "frames"), frames, samples=4)
 
 
 def main():

@@ -2,7 +2,7 @@
 """Close-ups of faces in both engines: eye, mouth, brow, ear, hairline, the face. One picture each.
 
 closeups.py -- --extension ZIP --out FOLDER FILE.dna [...] [--engine cycles eevee]
-    [--view eye mouth ...] [--size PIXELS] [--cards]
+    [--view eye mouth ...] [--size PIXELS] [--samples N] [--cards]
 
 Leaves FOLDER/<file>_<view>_<engine>.png, and a sheet of each engine: a row for each face.
 """
@@ -47,6 +47,7 @@ def parse():
     parser.add_argument("--engine", nargs="+", choices=ENGINES, default=[*ENGINES])
     parser.add_argument("--view", nargs="+", choices=VIEWS, default=[*VIEWS])
     parser.add_argument("--size", type=int, default=1024)
+    parser.add_argument("--samples", type=int, default=8, help="of Cycles, in each pixel")
     parser.add_argument("--cards", action="store_true", help="hair as the viewport shows it")
     return parser.parse_args(install_extension.arguments())
 
@@ -96,6 +97,7 @@ def pictures(path, args):
         bpy.data.objects.remove(item)
     collection = demo.import_face(path).users_collection[0]
     stage.build(collection, strands=False)
+    bpy.context.scene.cycles.samples = args.samples
     bpy.context.scene.eevee.taa_render_samples = 8  # a second each and more without a graphics card
     out = {engine: {} for engine in args.engine}
     for engine in args.engine:

@@ -9,6 +9,7 @@ import traceback
 
 import bpy
 from mathutils import Vector
+from progress import Progress
 
 
 def end_with(main):
@@ -46,6 +47,25 @@ def render_animation(progress):
         bpy.ops.render.render(animation=True)
     finally:
         bpy.app.handlers.render_write.remove(written)
+
+
+def render_frames(folder, frames, samples):
+    """Pictures frame_0001.png and on, of frames that need not follow each other.
+
+    Args:
+        folder: where they go.
+        frames: of the scene.
+        samples: of Cycles, where noise is taken away.
+    """
+    scene = bpy.context.scene
+    if scene.cycles.use_denoising:
+        scene.cycles.samples = samples
+    progress = Progress(len(frames), "frame")
+    for number, frame in enumerate(frames, 1):
+        scene.frame_set(frame)
+        scene.render.filepath = str(folder / f"frame_{number:04d}.png")
+        bpy.ops.render.render(write_still=True)
+        progress.step()
 
 
 def aim(thing, target):
