@@ -168,7 +168,7 @@ def afro(surface: Surface, person: Person) -> Strips:
     length *= 0.35 + 0.65 * smooth_step(inside / 0.22)
     flow = tangent(random.normal(0, 1, surface.man.shape), surface.normals)
     # Of a card that stands upright one sees the edge, where too little hair hides it.
-    upright = np.zeros(n) if short else smooth_step(inside / 0.15)
+    upright = np.zeros(n) if short else smooth_step((inside - 0.03) / 0.15)
 
     def between(lying: tuple[float, float], standing: tuple[float, float]) -> Floats:
         low, high = random.uniform(*lying, n), random.uniform(*standing, n)
@@ -181,12 +181,17 @@ def afro(surface: Surface, person: Person) -> Strips:
     wind = 0.05 * person.hair_curl * person.hair_length * random.uniform(0.6, 1.2, n)
     points = curled(points, out, wind, random.uniform(0.6, 1.3, n), random)
     half = 0.090 * (0.5 + 0.5 * person.hair_length) * random.uniform(0.8, 1.2, n)
-    half *= (0.55 + 0.45 * smooth_step(inside / 0.12)) * surface.scale * (0.75 if short else 1.0)
+    half *= (
+        (0.4 + 0.6 * smooth_step((inside + 0.02) / 0.15)) * surface.scale * (0.75 if short else 1.0)
+    )
     middle = np.array([0.0, 0.1, -0.75])
     out = unit(out + 0.6 * unit(man - middle)[:, None])
-    turns = between((-30, 30), (0, 180))
+    turns = between((-16, 16), (0, 180))
     taper = np.array([0.7, 1.0, 1.1, 0.95])[-rows:]
-    return make_strips(points, out, half, taper, _tiles(inside, random, 0.05), roots, turns)
+    strips = make_strips(points, out, half, taper, _tiles(inside, random, 0.05), roots, turns)
+    # Over the forehead a frown moves the skin: what stands deep in it there would go deeper.
+    strips.sides[:, 0] *= (0.5 + 0.5 * smooth_step(inside / 0.15))[:, None]
+    return strips
 
 
 def long(surface: Surface, person: Person) -> Strips:
