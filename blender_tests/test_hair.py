@@ -74,8 +74,9 @@ def test_cards_are_seen_through_where_the_picture_says_so(haired):
     assert not bare.inputs["Alpha"].is_linked
 
 
-# How far a strand strays: in cards' widths, in rows; metres, by which tips part on each axis.
-ASIDE, ALONG, APART = 0.2, 0.3, 0.0015 * 3**0.5
+# How far a strand strays: in cards' widths, in rows of two centimetres; metres, by which tips part
+# on each axis.
+ASIDE, ALONG, APART = 0.45, 0.005 / 0.02, 0.0015 * 3**0.5
 
 
 def test_strands_go_wherever_their_cards_go(haired):

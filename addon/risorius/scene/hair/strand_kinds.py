@@ -28,7 +28,7 @@ class Kind(NamedTuple):
     apart: float  # how far tips part, metres
     cut: float  # of their length, what is cut off at most
     # Roots stand between the cards' too, or each card would be a tuft: how far over either edge, in
-    # the card's widths, and how far before or behind the card's root, in rows.
+    # the card's widths, and how far before the card's root, metres.
     aside: float
     along: float
     # Light goes from fibre to fibre where they lie close; single ones over skin are as the picture
@@ -39,9 +39,9 @@ class Kind(NamedTuple):
 
 
 _KINDS = {  # by what the name of a mesh begins with
-    "hair": Kind(32, 0.00008, 0.0015, 0.45, 0.2, 0.3, True),
-    "brows": Kind(5, 0.000055, 0.0004, 0.35, 0.3, 0.3, False),
-    "beard": Kind(12, 0.00005, 0.0015, 0.5, 0.9, 0.7, False),
+    "hair": Kind(32, 0.00008, 0.0015, 0.45, 0.45, 0.005, True),
+    "brows": Kind(5, 0.000055, 0.0004, 0.35, 0.3, 0.0013, False),
+    "beard": Kind(12, 0.00005, 0.0015, 0.5, 0.9, 0.0022, False),
     "eyelashes": Kind(3, 0.00006, 0.0003, 0.25, 0.0, 0.0, False),
 }
 
@@ -60,7 +60,7 @@ def kind_of(name: str, told: Mapping[str, str]) -> Kind | None:
     coil = Coil(0.001 * float(found[1]), 0.001 * float(found[2]))
     lock, locks = _LOCKS[coil.radius < _LARGE]
     locks = max(2, round(locks * kind.each / _KINDS["hair"].each))
-    aside, along = max(kind.aside, 0.35), max(kind.along, 0.5)
+    aside, along = max(kind.aside, 0.35), max(kind.along, 0.007)
     return kind._replace(each=lock * locks, aside=aside, along=along, coil=coil, lock=lock)
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ..base.blender_types import MeshObject, Node, NodeTree, Socket
 from .strand_kinds import Coil, Kind
@@ -17,6 +18,7 @@ TREE = "Risorius Strands"
 CARDS = "Cards"  # input of the modifier: the mesh that is followed
 _OF_A_TURN = 7  # points of a strand that winds
 _MOST_POINTS = 100
+_MOST_SLID = 0.9  # rows: farther, a card that bends would be left
 
 
 class _Tree:
@@ -109,7 +111,8 @@ def strand_tree(item: MeshObject, rows: int, kind: Kind, unit: float) -> NodeTre
     if kind.along:
         # Beyond the last row a card goes on as it went.
         back = g.math("MULTIPLY", g.math("GREATER_THAN", row, rows - 1.5), 2)
-        share = g.random(-kind.along, 0.4 * kind.along, 5, lock)
+        most = min(_MOST_SLID, kind.along / unit / (_lengths(item, rows).mean() / (rows - 1)))
+        share = g.random(-most, 0.4 * most, 5, lock)
         starts = [g.math("SUBTRACT", i, back) for i in (left, right)]
         ends = [
             _slid(g, mesh, place, end, start, share)
@@ -223,15 +226,19 @@ def _finish(g: _Tree, curves: Socket, points: int, kind: Kind, unit: float) -> S
     return sized.outputs[0]
 
 
+def _lengths(item: MeshObject, rows: int) -> NDArray[np.float32]:
+    """float32[cards]: how long each card is along its left edge, Blender units; above 0."""
+    places = np.empty(3 * len(item.data.vertices), np.float32)
+    item.data.vertices.foreach_get("co", places)
+    edge = places.reshape(-1, rows, 2, 3)[:, :, 0]
+    return np.maximum(np.linalg.norm(np.diff(edge, axis=1), axis=2).sum(axis=1), 1e-9)
+
+
 def _points_of(item: MeshObject, rows: int, kind: Kind, unit: float) -> int:
     """How many points a strand of these cards needs."""
     if kind.coil is None:
         return 2 * rows + 2
-    places = np.empty(3 * len(item.data.vertices), np.float32)
-    item.data.vertices.foreach_get("co", places)
-    edge = places.reshape(-1, rows, 2, 3)[:, :, 0]
-    long = np.linalg.norm(np.diff(edge, axis=1), axis=2).sum(axis=1)
-    turns = float(np.quantile(long, 0.9)) * unit / kind.coil.pitch
+    turns = float(np.quantile(_lengths(item, rows), 0.9)) * unit / kind.coil.pitch
     return int(np.clip(_OF_A_TURN * turns, 8, _MOST_POINTS))
 
 
