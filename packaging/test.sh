@@ -101,7 +101,7 @@ native_lane() {
     google_tests "GoogleTest" tests "$every_byte"
     return 0
   fi
-  google_tests "GoogleTest" tests "$every_byte" "${optimised[@]/%/_test}"
+  google_tests "GoogleTest" tests "$every_byte" "${optimised[@]/%/_test}" risorius_shared
   # What follows keeps any number of cores busy: it takes what the two other lanes leave.
   renice -n 5 "$BASHPID" > /dev/null
   step "GoogleTest with sanitizers"

@@ -339,12 +339,10 @@ def test_extra_each_cheek_flushes_on_its_side(sample):
 def test_people_are_shares_of_the_data():
     """The formula of the data's own program: ages, muscle and weight are each a line."""
     girl = people.PEOPLE["girl"].shape()
-    assert girl["macrodetails/universal-female-child-averagemuscle-averageweight"] == (
-        pytest.approx(0.7)
-    )
-    assert girl["macrodetails/universal-female-baby-averagemuscle-averageweight"] == (
-        pytest.approx(0.3)
-    )
+    for weight, share in (("averageweight", 0.8), ("minweight", 0.2)):  # hers is 0.4
+        for age, years in (("child", 0.7), ("baby", 0.3)):
+            name = f"macrodetails/universal-female-{age}-averagemuscle-{weight}"
+            assert girl[name] == pytest.approx(years * share)
     assert girl["macrodetails/asian-female-child"] == pytest.approx(0.7 * 0.7)
     assert sum(w for n, w in girl.items() if "universal" in n) == pytest.approx(1)
     assert people.PEOPLE["man"].shape() == {
