@@ -47,7 +47,7 @@ def parse():
     parser.add_argument("--engine", nargs="+", choices=ENGINES, default=[*ENGINES])
     parser.add_argument("--view", nargs="+", choices=VIEWS, default=[*VIEWS])
     parser.add_argument("--size", type=int, default=1024)
-    parser.add_argument("--samples", type=int, default=8, help="of Cycles, in each pixel")
+    parser.add_argument("--samples", type=int, default=8, help="in each pixel")
     parser.add_argument("--cards", action="store_true", help="hair as the viewport shows it")
     return parser.parse_args(install_extension.arguments())
 
@@ -97,8 +97,8 @@ def pictures(path, args):
         bpy.data.objects.remove(item)
     collection = demo.import_face(path).users_collection[0]
     stage.build(collection, strands=False)
-    bpy.context.scene.cycles.samples = args.samples
-    bpy.context.scene.eevee.taa_render_samples = 8  # a second each and more without a graphics card
+    scene = bpy.context.scene
+    scene.cycles.samples = scene.eevee.taa_render_samples = args.samples
     out = {engine: {} for engine in args.engine}
     for engine in args.engine:
         use_engine(engine)
