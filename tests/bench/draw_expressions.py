@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import shutil
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
@@ -41,8 +42,26 @@ class Shot(NamedTuple):
     weights: Mapping[str, float]
 
 
+MODULE = "bl_ext.user_default.risorius"
 # How high the middle is over the eyes and how high the picture, in distances between the eyes.
 LOOKS = {"face": (-0.42, 3.3), "mouth": (-1.05, 1.9), "eyes": (0.0, 1.9)}
+
+
+def enable(user: Path) -> None:
+    """The add-on of this tree, in a throw-away user folder."""
+    import addon_utils
+    import bpy
+
+    target = user / "extensions" / "user_default" / "risorius"
+    shutil.copytree(ROOT / "addon" / "risorius", target)
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    repos = bpy.context.preferences.extensions.repos
+    place = next((r for r in repos if r.module == "user_default"), None)
+    place = place or repos.new(name="User Default", module="user_default")
+    place.use_custom_directory, place.custom_directory = True, str(target.parent)
+    addon_utils.extensions_refresh(ensure_wheels=False)
+    if addon_utils.enable(MODULE) is None:
+        raise SystemExit("The add-on cannot be enabled.")
 
 
 class Face:
@@ -51,7 +70,7 @@ class Face:
     def __init__(self, sample: Path, size: int, samples: int):
         import bpy
 
-        sys.path[:0] = [str(ROOT / "packaging" / "demo"), str(Path(__file__).parent)]
+        sys.path.insert(0, str(ROOT / "packaging" / "demo"))
         import scene as demo
 
         before = set(bpy.data.objects)
@@ -119,9 +138,6 @@ def draw(
     with tempfile.TemporaryDirectory() as folder:
         os.environ["BLENDER_USER_RESOURCES"] = folder
         import bpy  # noqa: F401  brings addon_utils onto the path
-
-        sys.path.insert(0, str(Path(__file__).parent))
-        from draw_engines import enable
 
         enable(Path(folder))
         face, pictures = Face(sample, size, samples), []
