@@ -21,8 +21,13 @@ import scene as stage  # noqa: E402
 from mathutils import Vector  # noqa: E402
 from performance import must  # noqa: E402
 
-CELL = Vector((0.26, 0.0, 0.325))  # metres from face to face, to the right and down
-RESOLUTION = 128, 160  # pixels of a cell
+# Metres from face to face, to the right and down. Shirts are wider and longer: who stands lower
+# stands nearer, and every second one of a row farther away, which a camera without perspective
+# does not show.
+CELL = Vector((0.38, 0.0, 0.36))
+NEARER, FARTHER = 0.7, 0.35
+RAISED = 0.035  # of the picture's middle: room for hair
+RESOLUTION = 168, 160  # pixels of a cell; a film has even sides
 STEP = 2  # frames of the acting between two of the film
 
 
@@ -61,7 +66,7 @@ def place(controls, column, row):
         row: from the top.
     """
     low, high = stage.bounds(controls.users_collection[0])
-    cell = Vector((column * CELL.x, 0.0, -row * CELL.z))
+    cell = Vector((column * CELL.x, column % 2 * FARTHER - row * NEARER, -row * CELL.z))
     controls.location += cell - (low + high) / 2
     bpy.context.view_layer.update()
 
@@ -92,7 +97,7 @@ def build_stage(columns, rows):
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     camera.data.type = "ORTHO"
     camera.data.ortho_scale = max(columns * CELL.x, rows * CELL.z)
-    middle = Vector(((columns - 1) * CELL.x / 2, 0.0, -(rows - 1) * CELL.z / 2))
+    middle = Vector(((columns - 1) * CELL.x / 2, 0.0, RAISED - (rows - 1) * CELL.z / 2))
     camera.location = middle + Vector((0.0, -5.0, 0.0))
     stage.aim(camera, middle)
     scene.collection.objects.link(camera)
