@@ -66,6 +66,12 @@ struct EulerTurns {
   float parity = 1;
 };
 
+/// Fewer columns a group than these are best added in the order of memory (add_columns); where
+/// there are more, a list for `columns` takes less time. Measured for each instruction set.
+struct FewColumns {
+  std::uint32_t floats = 0xffffffff, halves = 64;
+};
+
 /// All sums are taken in the order of the columns, so that a frame of a batch has the bits of the
 /// frame alone.
 struct Kernels {
@@ -115,6 +121,8 @@ struct Kernels {
   std::uint32_t (*native_u32)(const std::uint8_t* from, std::uint32_t* to, std::size_t n);
   /// The same. Out: whether all numbers are finite.
   bool (*native_f32)(const std::uint8_t* from, float* to, std::size_t n);
+
+  FewColumns few = {};
 };
 
 /// No fused operations and a fixed order of sums: the same bits on every machine.

@@ -51,7 +51,7 @@ struct V {
 namespace risorius::simd {
 
 const Kernels* avx512_kernels() {
-  static constexpr Kernels kernels = make_kernels("avx512");
+  static constexpr Kernels kernels = make_kernels("avx512", {.floats = 6, .halves = 6});
   static const bool supported = cpu_has_avx512();
   return supported ? &kernels : nullptr;
 }

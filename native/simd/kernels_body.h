@@ -154,7 +154,7 @@ RISORIUS_TARGET void place(const Piece* pieces, std::size_t n, const PlacedFrame
   }
 }
 
-constexpr Kernels make_kernels(const char* name) {
+constexpr Kernels make_kernels(const char* name, FewColumns few = {}) {
   return {name,
           columns<float>,
           columns<std::uint16_t>,
@@ -167,7 +167,8 @@ constexpr Kernels make_kernels(const char* name) {
           quaternions<V::Parts>,
           native_u16,
           native_u32,
-          native_f32};
+          native_f32,
+          few};
 }
 
 }  // namespace

@@ -51,19 +51,20 @@ void list_active(const Rig& rig, std::uint32_t live, std::span<const std::uint16
 }
 
 // Whether columns are added in the order of memory: no list is made and no group's kernel begun,
-// but a sum is read and written with each column. Measured on two faces (AVX2): an evaluation takes
-// 0.7 to 1.0 of the time of listing with 4 to 60 columns a group, 0.93 to 1.04 with 77 to 149
-// columns of 106 rows, and 0.8 to 1.0 with 138 to 295 of 80. Of float16 half as many bytes come in
-// for the same sums: with 64 columns and more listing takes as long or less.
+// but a sum is read and written with each column. Measured on two faces: by AVX2 an evaluation
+// takes 0.7 to 1.0 of the time of listing with 4 to 60 columns a group, 0.93 to 1.04 with 77 to 149
+// columns of 106 rows, and 0.8 to 1.0 with 138 to 295 of 80; of float16 half as many bytes come in
+// for the same sums, and with 64 columns and more listing takes as long or less. By AVX-512, which
+// has a group's sums in registers, 0.86 with one or two columns a group, 1.0 with 5 and 1.1 to 1.3
+// with 13 to 50.
 bool adds(const Rig& rig, std::span<const std::uint16_t> active, const Workspace& work) noexcept {
-  constexpr std::size_t kFewInAGroup = 64;
   if (work.traversal != Traversal::kCounted) return work.traversal == Traversal::kAdded;
-  if (!rig.is_half()) return true;
-  std::size_t columns = 0;
+  const simd::FewColumns& few = rig.kernels->few;
+  std::uint64_t columns = 0;
   for (const std::uint16_t control : active) {
     columns += rig.joint_column_begins[control + std::size_t{1}] - rig.joint_column_begins[control];
   }
-  return columns < kFewInAGroup * rig.joint_groups.size();
+  return columns < std::uint64_t{rig.is_half() ? few.halves : few.floats} * rig.joint_groups.size();
 }
 
 // Adds the columns of each active control to work.sums. A row has its terms by ascending control
