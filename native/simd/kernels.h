@@ -69,7 +69,8 @@ struct EulerTurns {
 /// Fewer columns a group than these are best added in the order of memory (add_columns); where
 /// there are more, a list for `columns` takes less time. Measured for each instruction set.
 struct FewColumns {
-  std::uint32_t floats = 0xffffffff, halves = 64;
+  static constexpr std::uint32_t kAny = 0xffffffff;  // any number of columns is added so
+  std::uint32_t floats = kAny, halves = 64;
 };
 
 /// All sums are taken in the order of the columns, so that a frame of a batch has the bits of the

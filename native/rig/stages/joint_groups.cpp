@@ -59,12 +59,13 @@ void list_active(const Rig& rig, std::uint32_t live, std::span<const std::uint16
 // with 13 to 50.
 bool adds(const Rig& rig, std::span<const std::uint16_t> active, const Workspace& work) noexcept {
   if (work.traversal != Traversal::kCounted) return work.traversal == Traversal::kAdded;
-  const simd::FewColumns& few = rig.kernels->few;
+  const std::uint32_t few = rig.is_half() ? rig.kernels->few.halves : rig.kernels->few.floats;
+  if (few == simd::FewColumns::kAny) return true;
   std::uint64_t columns = 0;
   for (const std::uint16_t control : active) {
     columns += rig.joint_column_begins[control + std::size_t{1}] - rig.joint_column_begins[control];
   }
-  return columns < std::uint64_t{rig.is_half() ? few.halves : few.floats} * rig.joint_groups.size();
+  return columns < std::uint64_t{few} * rig.joint_groups.size();
 }
 
 // Adds the columns of each active control to work.sums. A row has its terms by ascending control
