@@ -49,6 +49,10 @@ class _Tree:
             self.put(value, socket)
         return node.outputs[0]
 
+    def group(self, number: object, size: int) -> Socket:
+        """Which group of so many a number, from 0 on, belongs to."""
+        return self.math("FLOOR", self.math("DIVIDE", self.math("ADD", number, 0.5), size))
+
     def random(self, low: float, high: float, seed: int, number: object) -> Socket:
         """A number of its own for each strand."""
         node = self.node("FunctionNodeRandomValue", {2: low, 3: high, "ID": number, "Seed": seed})
@@ -96,8 +100,8 @@ def strand_tree(item: MeshObject, rows: int, kind: Kind, unit: float) -> NodeTre
     real = g.node("GeometryNodeRealizeInstances", {0: many.outputs[0]})
     # All strands have as many points as a card has rows: numbers follow from a point's own.
     index = g.node("GeometryNodeInputIndex").outputs[0]
-    strand = g.math("FLOOR", g.math("DIVIDE", g.math("ADD", index, 0.5), rows))
-    card = g.math("FLOOR", g.math("DIVIDE", g.math("ADD", strand, 0.5), kind.each))
+    strand = g.group(index, rows)
+    card = g.group(strand, kind.each)
     row = g.math("SUBTRACT", index, g.math("MULTIPLY", strand, rows))
     left = g.math("MULTIPLY", g.math("ADD", g.math("MULTIPLY", card, rows), row), 2)
     right = g.math("ADD", left, 1)
@@ -196,7 +200,7 @@ def _lock(g: _Tree, strand: object, kind: Kind) -> object:
     """The number of the lock that a strand belongs to, or its own."""
     if kind.lock == 1:
         return strand
-    return g.math("FLOOR", g.math("DIVIDE", g.math("ADD", strand, 0.5), kind.lock))
+    return g.group(strand, kind.lock)
 
 
 def _finish(g: _Tree, curves: Socket, points: int, kind: Kind, unit: float) -> Socket:
