@@ -11,14 +11,14 @@
 #define RISORIUS_TARGET __attribute__((target("avx512f,avx512bw,avx512dq,avx512vl,fma,f16c")))
 #endif
 #include "simd/kernels_inline.h"
-#include "simd/rotation_parts_avx2.h"
+#include "simd/rotation_parts_avx512.h"
 
 namespace risorius::simd {
 
 namespace {
 
 struct V {
-  using Parts = EightByFour;
+  using Parts = SixteenByFour;
   using Reg = __m512;
   static constexpr std::size_t kLanes = 16, kBlocks = 8, kBatchBlocks = 3;
   static constexpr int kBatchFrames = 8;

@@ -116,9 +116,12 @@ RISORIUS_TARGET void turn_together(const EulerTurns& e, const std::uint16_t* whi
 
 // Whether an angle is anything but +0.
 RISORIUS_INLINE bool turns(const float* angles) {
-  std::uint32_t bits[3];
-  std::memcpy(bits, angles, sizeof(bits));
-  return (bits[0] | bits[1] | bits[2]) != 0;
+  // Two numbers, no array: that would be stored and read again.
+  std::uint64_t two = 0;
+  std::uint32_t third = 0;
+  std::memcpy(&two, angles, sizeof(two));
+  std::memcpy(&third, angles + 2, sizeof(third));
+  return (two | third) != 0;
 }
 
 // Those that turn are gathered until they fill the arrays; the others are no rotation already.
