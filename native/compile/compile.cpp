@@ -19,6 +19,7 @@
 #include "dna/validate.h"
 #include "rig/block.h"
 #include "simd/half.h"
+#include "simd/turn.h"
 
 namespace risorius::compile {
 
@@ -226,7 +227,13 @@ void transpose(const float* from, std::size_t rows, std::size_t stride,
       const KeptColumn* k = columns.data() + c;
       float *const a = to + k[0].offset, *const b = to + k[1].offset, *const d = to + k[2].offset,
                    *const e = to + k[3].offset;
-      for (std::size_t r = r0; r < r1; ++r) {
+      std::size_t r = r0;
+      if (k[3].column == k[0].column + 3) {
+        for (; r + kTogether <= r1; r += kTogether) {
+          simd::turn_four(from + r * stride + k[0].column, stride, a + r, b + r, d + r, e + r);
+        }
+      }
+      for (; r < r1; ++r) {
         const float* row = from + r * stride;
         a[r] = row[k[0].column], b[r] = row[k[1].column];
         d[r] = row[k[2].column], e[r] = row[k[3].column];
@@ -387,14 +394,14 @@ void count_reads(const std::vector<ColumnEntry>& entries, RigData& out) {
   out.control_reads.resize(out.lod_count * stride);
   for (std::uint32_t l = 0; l < out.lod_count; ++l) {
     rig::ControlReads* reads = out.control_reads.data() + l * stride;
+    rig::ControlReads all;
     for (const ColumnEntry& e : entries) {
       if (e.group >= out.live_groups[l]) continue;
       const std::uint32_t rows = out.joint_group_lods[e.group * out.lod_count + l];
-      for (rig::ControlReads* r : {reads + e.control, reads + out.control_count}) {
-        r->values += rows;
-        ++r->columns;
-      }
+      reads[e.control].values += rows, ++reads[e.control].columns;
+      all.values += rows, ++all.columns;
     }
+    reads[out.control_count] = all;
   }
 }
 
@@ -441,12 +448,14 @@ bool all_finite(const KeptMatrices& kept) {
   });
 }
 
-Status compile_columns(const Groups& groups, RigData& out, KeptMatrices& kept, Used& used) {
+// In: finite  all numbers of the file are known to be finite
+Status compile_columns(const Groups& groups, bool finite, RigData& out, KeptMatrices& kept,
+                       Used& used) {
   const std::vector<ColumnEntry> entries = list_columns(groups, out, used);
   RISORIUS_TRY(place_columns(groups, entries, out, kept));
   list_by_group(entries, out);
   // A column at rest may be read where that costs less, but 0 times infinity is no 0.
-  if (all_finite(kept)) count_reads(entries, out);
+  if (finite || all_finite(kept)) count_reads(entries, out);
   return ok();
 }
 
@@ -465,17 +474,20 @@ std::vector<std::uint32_t> rows_by_attribute(const RigData& r,
 }
 
 // The rows that one block of attributes takes, as pieces of rows that follow each other.
-std::vector<simd::Piece> pieces_of(std::span<const std::uint32_t> rows, std::size_t block) {
-  std::vector<simd::Piece> pieces;
+void add_pieces(std::span<const std::uint32_t> rows, std::size_t block, RigData& out) {
+  out.joint_pieces.push_back({0, 0, static_cast<std::uint16_t>(block)});
+  simd::Piece* piece = &out.joint_pieces.back();
   std::uint32_t next = rig::kNone;
   for (std::size_t p = 0; p < rows.size(); ++p) {
     if (rows[p] == rig::kNone) continue;
-    if (rows[p] != next) pieces.push_back({rows[p], 0, static_cast<std::uint16_t>(block)});
-    pieces.back().mask = static_cast<std::uint16_t>(pieces.back().mask | (1u << p));
+    if (rows[p] != next && piece->mask != 0) {
+      out.extra_pieces.push_back({0, 0, static_cast<std::uint16_t>(block)});
+      piece = &out.extra_pieces.back();
+    }
+    if (piece->mask == 0) piece->from = rows[p];
+    piece->mask = static_cast<std::uint16_t>(piece->mask | (1u << p));
     next = rows[p] + 1;
   }
-  if (pieces.empty()) pieces.push_back({0, 0, static_cast<std::uint16_t>(block)});
-  return pieces;
 }
 
 // The blocks that each group's rows reach.
@@ -499,9 +511,7 @@ void compile_pieces(const Groups& groups, RigData& out) {
     const std::vector<std::uint32_t> rows = rows_by_attribute(out, file_order, lod);
     for (std::size_t at = 0; at < rows.size(); at += simd::kPlaces) {
       const std::size_t count = std::min(simd::kPlaces, rows.size() - at);
-      const auto pieces = pieces_of(std::span(rows).subspan(at, count), at / simd::kPlaces);
-      out.joint_pieces.push_back(pieces[0]);
-      out.extra_pieces.insert(out.extra_pieces.end(), pieces.begin() + 1, pieces.end());
+      add_pieces(std::span(rows).subspan(at, count), at / simd::kPlaces, out);
     }
     out.extra_begins.push_back(static_cast<std::uint32_t>(out.extra_pieces.size()));
   }
@@ -645,8 +655,9 @@ Status compile_frame(const dna::Dna& dna, core::Budget& budget, RigData& out) {
   return list_gui_ranges(budget, out);
 }
 
+// In:  finite  all numbers of the file are known to be finite
 // Out: kept  the joint matrices, which out.joint_halves has or neither of its arrays
-Result<RigData> compile_parts(const dna::Dna& dna, const CompileOptions& options,
+Result<RigData> compile_parts(const dna::Dna& dna, bool finite, const CompileOptions& options,
                               core::Budget& budget, KeptMatrices& kept) {
   RigData out;
   out.joint_stride = options.rotation == Rotation::kQuaternion ? 10 : 9;
@@ -667,7 +678,7 @@ Result<RigData> compile_parts(const dna::Dna& dna, const CompileOptions& options
   RISORIUS_TRY(compile_channels_and_maps(dna, out));
   RISORIUS_TRY(compile_psds(dna, out));
   list_joints_written(out);
-  RISORIUS_TRY(compile_columns(groups, out, kept, used));
+  RISORIUS_TRY(compile_columns(groups, finite, out, kept, used));
   mark_channels_and_maps(out, used);
   detail::mark_ml_joints(out, used);
   RISORIUS_TRY(detail::schedule(used, lods, budget, out));
@@ -712,7 +723,9 @@ Result<rig::Rig> compile(const dna::Dna& dna, const CompileOptions& options) {
   }
   core::Budget own = budget_for(dna);
   KeptMatrices kept;
-  auto out = compile_parts(dna, options, options.budget != nullptr ? *options.budget : own, kept);
+  const bool finite = warnings.empty();  // there is one for each list with a number that is not
+  core::Budget& budget = options.budget != nullptr ? *options.budget : own;
+  auto out = compile_parts(dna, finite, options, budget, kept);
   if (!out) return core::Unexpected{out.error()};
   if (options.precision == Precision::kFloat16) return rig::make_rig(*out, *kernels);
   return rig::make_rig(*out, *kernels,

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstring>
+#include <mutex>
 
 #include "core/aligned.h"
 #include "core/hash.h"
@@ -78,7 +79,24 @@ Status check_header(std::span<const std::uint8_t> bytes, const BlockHeader& h) {
 
 }  // namespace
 
+// Of a block that was made here: its hash is a tenth of the time of making it, and who never keeps
+// the bytes need not wait for it.
+struct Rig::Seal {
+  std::span<std::uint8_t> bytes;
+  std::once_flag done;
+};
+
+std::span<const std::uint8_t> Rig::block() const {
+  if (seal_ != nullptr) std::call_once(seal_->done, seal_block, seal_->bytes);
+  return block_;
+}
+
 struct BlockReader {
+  static void seal_later(Rig& rig, std::span<std::uint8_t> bytes) {
+    rig.seal_ = std::make_shared<Rig::Seal>();
+    rig.seal_->bytes = bytes;
+  }
+
   static Result<Rig> read(std::span<const std::uint8_t> bytes, std::shared_ptr<const void> owner) {
     BlockHeader h;
     if (bytes.size() < sizeof(h)) {
@@ -176,9 +194,10 @@ Result<Rig> make_rig(const RigData& data, const simd::Kernels& kernels, const La
   });
   std::fill(bytes.begin() + static_cast<std::ptrdiff_t>(end), bytes.end(), std::uint8_t{0});
   std::memcpy(bytes.data(), &h, sizeof(h));
-  seal_block(bytes);
   auto rig = open_rig(bytes, block, BlockCheck::kHeader, kernels);
-  if (rig && !detail::scratch_fits(*rig)) {
+  if (!rig) return rig;
+  BlockReader::seal_later(*rig, bytes);
+  if (!detail::scratch_fits(*rig)) {
     return fail(ErrorCode::kLimitExceeded, "machine_learned_behavior",
                 number(data.operation_values) + " values and " + number(data.mask_count) +
                     " regions of networks, more than 64 times the compiled face");

@@ -372,7 +372,7 @@ void check_table(const char* where, View<ConditionalRow> rows, std::uint64_t inp
 bool detail::scratch_fits(const Rig& r) {
   std::uint64_t values = 0;
   for (const MlOperation& op : r.ml_operations) values += op.value_count;
-  const std::uint64_t most = (std::uint64_t{1} << 20) + 64 * std::uint64_t{r.block().size()};
+  const std::uint64_t most = (std::uint64_t{1} << 20) + 64 * std::uint64_t{r.memory_bytes()};
   return r.operation_values <= values &&
          sizeof(float) * (std::uint64_t{r.operation_values} + r.mask_count) <= most;
 }

@@ -33,15 +33,18 @@ class Rig : public RigHeader, public RigArrays<View> {
   }
   bool is_half() const { return !joint_halves.empty(); }
   /// The whole Rig as bytes: a header with version and hash, then the arrays. Written to a file it
-  /// is a cache, for machines of the same byte order.
-  std::span<const std::uint8_t> block() const { return block_; }
+  /// is a cache, for machines of the same byte order. The first call for a Rig that was compiled
+  /// here works out the hash; any number of threads may call.
+  std::span<const std::uint8_t> block() const;
   std::size_t memory_bytes() const { return sizeof(Rig) + block_.size(); }
 
  private:
   friend struct BlockReader;
+  struct Seal;
   std::vector<std::string> texts(std::size_t first, std::size_t count) const;
   std::span<const std::uint8_t> block_;
   std::shared_ptr<const void> owner_;
+  std::shared_ptr<Seal> seal_;  // null where the bytes had their hash from the beginning
 };
 
 }  // namespace risorius::rig

@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "core/parallel_for.h"
+#include "rig/block.h"
 #include "rig/stages/evaluate.h"
 #include "rig/stages/instance.h"
 #include "support/face.h"
@@ -145,6 +146,17 @@ TEST(OneRig, MayBeLetGoByThreadsInAnyOrder) {
     });
   }
   EXPECT_EQ(wrong, 0);
+}
+
+TEST(OneRig, SealsItsBlockOnceWhoeverAsksFirst) {
+  const Rig rig = full_rig({});
+  std::atomic<int> wrong{0};
+  together([&, rig](std::size_t) {
+    const auto opened = open_rig(rig.block(), nullptr, BlockCheck::kHash, *rig.kernels);
+    wrong += opened.has_value() ? 0 : 1;
+  });
+  EXPECT_EQ(wrong, 0);
+  EXPECT_EQ(rig.block().data(), Rig(rig).block().data());
 }
 
 // Not of the tsan preset's OneRig: exceptions pass between threads.

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "simd/half.h"
+#include "simd/turn.h"
 
 namespace risorius::simd {
 
@@ -531,6 +532,20 @@ TEST(Half, RoundsToTheNearest) {
       if ((near & 0x7FFF) >= 0x7C00 || (near & 0x8000) != (half & 0x8000) || near < 0) continue;
       ASSERT_LE(error, std::fabs(double{from_half(static_cast<std::uint16_t>(near))} - double{v}));
     }
+  }
+}
+
+TEST(TurnFour, RowsBecomeColumns) {
+  constexpr std::size_t kStride = 7;
+  float rows[4 * kStride], columns[4][6] = {};
+  for (std::size_t i = 0; i < std::size(rows); ++i) rows[i] = static_cast<float>(i);
+  turn_four(rows + 2, kStride, columns[0] + 1, columns[1] + 1, columns[2] + 1, columns[3] + 1);
+  for (std::size_t c = 0; c < 4; ++c) {
+    for (std::size_t r = 0; r < 4; ++r) {
+      EXPECT_EQ(columns[c][1 + r], static_cast<float>(r * kStride + 2 + c));
+    }
+    EXPECT_EQ(columns[c][0], 0.0f);
+    EXPECT_EQ(columns[c][5], 0.0f);
   }
 }
 
