@@ -15,22 +15,52 @@ namespace {
 constexpr std::uint64_t kListed =
     sizeof(JointColumn) + 2 * sizeof(std::uint32_t) + 2 * sizeof(simd::Column);
 
+// What the active controls have in the joint groups, as far as anything asks.
+ControlReads count_active(const Rig& rig, std::uint32_t lod,
+                          std::span<const std::uint16_t> active) noexcept {
+  ControlReads sum;
+  if (rig.control_reads.empty()) {
+    for (const std::uint16_t control : active) {
+      sum.columns += rig.joint_column_begins[control + std::size_t{1}];
+      sum.columns -= rig.joint_column_begins[control];
+    }
+    return sum;
+  }
+  const ControlReads* reads = rig.control_reads.data() + lod * (std::size_t{rig.control_count} + 1);
+  for (const std::uint16_t control : active) {
+    sum.values += reads[control].values;
+    sum.columns += reads[control].columns;
+  }
+  return sum;
+}
+
 // By counted bytes: all columns, those at rest included, or the active ones and their listing. A
 // column at rest adds 0 * k to sums that begin at +0, which changes no bit.
-bool reads_whole(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> active,
+bool whole_costs_less(const Rig& rig, std::uint32_t lod, const ControlReads& active) noexcept {
+  const std::size_t stride = std::size_t{rig.control_count} + 1;
+  const ControlReads& all = rig.control_reads[lod * stride + rig.control_count];
+  const std::uint64_t rest = all.values - active.values, size = rig.is_half() ? 2 : 4;
+  return rest * size + all.columns * sizeof(simd::Column) <= active.columns * kListed;
+}
+
+// Which way these controls go. Columns that are added in the order of memory need no list and no
+// group's kernel is begun, but a sum is read and written with each column. Measured on two faces:
+// by AVX2 an evaluation takes 0.7 to 1.0 of the time of listing with 4 to 60 columns a group, 0.93
+// to 1.04 with 77 to 149 columns of 106 rows, and 0.8 to 1.0 with 138 to 295 of 80; of float16 half
+// as many bytes come in for the same sums, and with 64 columns and more listing takes as long or
+// less. By AVX-512, which has a group's sums in registers, 0.86 with one or two columns a
+// group, 1.0 with 5 and 1.1 to 1.3 with 13 to 50.
+Traversal way_of(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> active,
                  const Workspace& work) noexcept {
-  if (rig.control_reads.empty()) return false;
-  if (work.traversal != Traversal::kCounted) return work.traversal == Traversal::kWhole;
-  const ControlReads* reads = rig.control_reads.data() + lod * (std::size_t{rig.control_count} + 1);
-  const ControlReads& all = reads[rig.control_count];
-  std::uint64_t values = 0, columns = 0;
-  for (const std::uint16_t control : active) {
-    values += reads[control].values;
-    columns += reads[control].columns;
-  }
-  const std::uint64_t size = rig.is_half() ? 2 : 4;
-  const std::uint64_t whole = (all.values - values) * size + all.columns * sizeof(simd::Column);
-  return whole <= columns * kListed;
+  const bool may_read_all = !rig.control_reads.empty();
+  if (work.traversal == Traversal::kWhole && !may_read_all) return Traversal::kListed;
+  if (work.traversal != Traversal::kCounted) return work.traversal;
+  const ControlReads sum = count_active(rig, lod, active);
+  if (may_read_all && whole_costs_less(rig, lod, sum)) return Traversal::kWhole;
+  const std::uint32_t few = rig.is_half() ? rig.kernels->few.halves : rig.kernels->few.floats;
+  const bool adds =
+      few == simd::FewColumns::kAny || sum.columns < std::uint64_t{few} * rig.live_groups[lod];
+  return adds ? Traversal::kAdded : Traversal::kListed;
 }
 
 // By ascending control, so that sums have one order.
@@ -48,24 +78,6 @@ void list_active(const Rig& rig, std::uint32_t live, std::span<const std::uint16
       columns[ends[at->group]++] = {at->offset, control};
     }
   }
-}
-
-// Whether columns are added in the order of memory: no list is made and no group's kernel begun,
-// but a sum is read and written with each column. Measured on two faces: by AVX2 an evaluation
-// takes 0.7 to 1.0 of the time of listing with 4 to 60 columns a group, 0.93 to 1.04 with 77 to 149
-// columns of 106 rows, and 0.8 to 1.0 with 138 to 295 of 80; of float16 half as many bytes come in
-// for the same sums, and with 64 columns and more listing takes as long or less. By AVX-512, which
-// has a group's sums in registers, 0.86 with one or two columns a group, 1.0 with 5 and 1.1 to 1.3
-// with 13 to 50.
-bool adds(const Rig& rig, std::span<const std::uint16_t> active, const Workspace& work) noexcept {
-  if (work.traversal != Traversal::kCounted) return work.traversal == Traversal::kAdded;
-  const std::uint32_t few = rig.is_half() ? rig.kernels->few.halves : rig.kernels->few.floats;
-  if (few == simd::FewColumns::kAny) return true;
-  std::uint64_t columns = 0;
-  for (const std::uint16_t control : active) {
-    columns += rig.joint_column_begins[control + std::size_t{1}] - rig.joint_column_begins[control];
-  }
-  return columns < std::uint64_t{few} * rig.joint_groups.size();
 }
 
 // Adds the columns of each active control to work.sums. A row has its terms by ascending control
@@ -226,14 +238,10 @@ class Placer {
   const simd::Piece *extra_, *extra_end_;
 };
 
-}  // namespace
-
-namespace detail {
-
-const simd::Column* list_columns(const Rig& rig, std::uint32_t lod,
+// In: whole  all columns, or those of active controls
+const simd::Column* list_columns(const Rig& rig, std::uint32_t lod, bool whole,
                                  std::span<const std::uint16_t> active, Workspace& work) noexcept {
   const std::uint32_t live = rig.live_groups[lod];
-  const bool whole = reads_whole(rig, lod, active, work);
   if (whole) {
     ++work.whole_frames;
     for (std::uint32_t i = 0; i < live; ++i) {
@@ -247,6 +255,16 @@ const simd::Column* list_columns(const Rig& rig, std::uint32_t lod,
   }
   mark_blocks(rig, lod, work);
   return whole ? rig.group_columns.data() : work.columns.data();
+}
+
+}  // namespace
+
+namespace detail {
+
+const simd::Column* list_columns(const Rig& rig, std::uint32_t lod,
+                                 std::span<const std::uint16_t> active, Workspace& work) noexcept {
+  const bool whole = way_of(rig, lod, active, work) == Traversal::kWhole;
+  return risorius::rig::list_columns(rig, lod, whole, active, work);
 }
 
 void place_rows(const Rig& rig, std::uint32_t lod, Workspace& work, const float* rows,
@@ -267,9 +285,10 @@ void place_rows(const Rig& rig, std::uint32_t lod, Workspace& work, const float*
 namespace {
 
 // Out: work.rows, by group, and what list_columns leaves
-void sum_listed(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> active,
-                Workspace& work, const float* controls) noexcept {
-  const simd::Column* columns = list_columns(rig, lod, active, work);
+void sum_listed(const Rig& rig, std::uint32_t lod, bool whole,
+                std::span<const std::uint16_t> active, Workspace& work,
+                const float* controls) noexcept {
+  const simd::Column* columns = risorius::rig::list_columns(rig, lod, whole, active, work);
   for (std::size_t n = 0; n < work.live_count; ++n) {
     const std::uint32_t i = work.live[n];
     const JointGroup& g = rig.joint_groups[i];
@@ -293,14 +312,15 @@ void sum_listed(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t
 void joint_groups(const Rig& rig, std::uint32_t lod, Workspace& work,
                   const PoseView& pose) noexcept {
   const std::span<const std::uint16_t> active(work.active.data(), work.active_count);
-  if (adds(rig, active, work) && !reads_whole(rig, lod, active, work)) {
+  const Traversal way = way_of(rig, lod, active, work);
+  if (way == Traversal::kAdded) {
     ++work.added_frames;
     add_active(rig, lod, work, pose.controls);
     mark_blocks(rig, lod, work);
     place_rows(rig, lod, work, work.sums.data(), pose.joints, 1);
     clear_sums(rig, lod, work);
   } else {
-    sum_listed(rig, lod, active, work, pose.controls);
+    sum_listed(rig, lod, way == Traversal::kWhole, active, work, pose.controls);
     place_rows(rig, lod, work, work.rows.data(), pose.joints, 1);
   }
 }
