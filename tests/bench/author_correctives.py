@@ -3,6 +3,7 @@
 
     risorius sample build man.dna --joints 0
     python tests/bench/author_correctives.py man.dna [--counts 100 300 500 1000]
+    python tests/bench/author_correctives.py full_man.dna --built man.dna
 
 Looks at all pairs of expressions that move some vertices together and are no opposites, repairs
 them and measures each pair again with its corrective; of fewer correctives those that the search
@@ -11,7 +12,9 @@ the total that falls least. *Undone*: of vertices that are moved
 by 0.5 mm at least and have no fault of their own, those that keep less than nine tenths of the
 linear sum's motion. *Worse*: pairs in which anything is deeper by 0.1 mm, or a face by 1 % larger
 beyond 2.5 times, than without. *Held out*: the correctives that the face has are taken away, and
-the search repairs their pairs: how far what it makes is from what was given.
+the search repairs their pairs: how far what it makes is from what was given. *Built*: the same
+totals in a finished face of joints and shapes, with all its correctives and with those alone that
+the face has from which it was made.
 """
 
 from __future__ import annotations
@@ -19,6 +22,7 @@ from __future__ import annotations
 import argparse
 import copy
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -83,7 +87,16 @@ def worse(search, on):
     """
     solids = search.poser.pose(on)[1:]
     a = search.checker.look(search.poser.pose(on, corrected=False)[0], solids)
-    b = search.faults(on)
+    return grew(a, search.faults(on))
+
+
+def grew(a, b):
+    """Whether the deepest place or the widest face of b is beyond that of a.
+
+    Args:
+        a: faults.
+        b: of the same skin.
+    """
     deeper = np.asarray(b.depth).max() > np.asarray(a.depth).max() + 0.1
     larger = np.asarray(b.stretch).max() > max(TORN, 1.01 * np.asarray(a.stretch).max())
     return deeper or larger
@@ -122,6 +135,43 @@ def held_out(dna):
         f"{np.mean(moving_means):.2f} of what moves"
     )
     return out
+
+
+def built(dna, source):
+    """A line: what is wrong in all pairs of a finished face, without and with what was found.
+
+    Args:
+        dna: a face of joints and shapes, whose coarsest level is one that both have.
+        source: what it was made from: its correctives are at work in both.
+    """
+    kept = sorted(sk.psd_parts(source))
+    parts, plain = dna.psds, copy.copy(dna)
+    stays = np.isin(parts.rows, kept)
+    plain.psds = risorius.Psds(
+        rows=np.asarray(parts.rows)[stays],
+        columns=np.asarray(parts.columns)[stays],
+        values=np.asarray(parts.values)[stays],
+    )
+    options = CorrectiveOptions(apart=opposites())
+    without, having = Search(plain, options, None), Search(dna, options, None)
+
+    def look(on):
+        allowed = without.allowed(on)
+        faults = [search.faults(on) for search in (without, having)]
+        sums = values_of([without.checker.sum(one, allowed) for one in faults])
+        return sums, grew(*faults)
+
+    pairs = without.pairs()
+    with ThreadPoolExecutor(2) as pool:
+        rows = list(pool.map(look, pairs))
+    before, after = np.sum([sums for sums, _ in rows], axis=0)
+    fall = " ".join(f"{share:.1%}" for share in 1 - after / before)
+    return (
+        f"{len(pairs):,} pairs, {len(kept):,} correctives given, "
+        f"{len(sk.psd_parts(dna)) - len(kept):,} found: {before[0]:,.0f} mm3 inside, "
+        f"{before[1]:,.0f} torn, {before[2]:,.0f} folded fall by {fall}; "
+        f"worse in {sum(bool(w) for _, w in rows):,} pairs"
+    )
 
 
 def far_moved(dna):
@@ -175,11 +225,16 @@ def main():
     parser.add_argument("--looked-at", type=int, default=400, help="for what is undone")
     parser.add_argument("--held-out", action="store_true", help="that alone")
     parser.add_argument("--moves", action="store_true", help="how far each moves, that alone")
+    parser.add_argument("--built", type=Path, help="what the face was made from; that alone")
     args = parser.parse_args()
     begin, cpu = time.monotonic(), time.process_time()
     dna = risorius.load(args.face)
     if args.held_out:
         print("\n".join(held_out(dna)))
+        return
+    if args.built:
+        source = risorius.load(args.built)
+        print(built(risorius.load(args.face, lods=range(source.lod_count)), source))
         return
     if args.moves:
         moved = far_moved(dna)

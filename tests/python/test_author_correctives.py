@@ -266,6 +266,13 @@ def test_pairs_that_go_into_the_ball_are_found_and_no_others(corrected):
     assert found.after == {"volume": 0.0, "stretched": 0.0, "folded": 0.0}
 
 
+def test_what_has_a_corrective_is_as_somebody_wanted_it(face):
+    # The sculpt goes deeper into the ball: the search leaves it, and mends the other pair.
+    sculpt = push(sheet(SIDE)[0], 0.5, 9.0) / 10
+    found = find_correctives(add_correctives(face, 0, [((0, 1), sculpt)]))
+    assert {one.controls for one in found.correctives} == {(0, 3), (1, 3)}
+
+
 @pytest.mark.parametrize("names", [("a", "b"), ("b", "d")])
 def test_the_written_file_stays_out_of_the_ball_at_every_level(corrected, names):
     _, read = corrected

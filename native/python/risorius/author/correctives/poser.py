@@ -34,6 +34,7 @@ class Poser:
         self._meshes = [_Posed(dna, dna.meshes[m], self._columns) for m in (skin, *solids)]
         self.added: dict[Controls, Doubles] = {}
         self._psds = sk.psd_parts(dna)
+        self.given = set(self._psds.values())  # the combinations that have a corrective
 
     @property
     def neutral(self) -> list[Doubles]:

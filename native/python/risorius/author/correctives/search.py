@@ -108,12 +108,14 @@ class Search:
         return worst(self._faults[part] for part in parts)
 
     def pairs(self) -> list[Controls]:
-        """All that move some vertices together and are no opposites."""
+        """All that move some vertices together, are no opposites and have no corrective yet: of
+        those that have one somebody has said how they look."""
         apart = {frozenset(pair) for pair in self.options.apart}
         return [
             (a, b)
             for a, b in itertools.combinations(range(self.poser.controls), 2)
             if frozenset((self.names[a], self.names[b])) not in apart
+            and frozenset((a, b)) not in self.poser.given
             and np.count_nonzero(self._moves[a] & self._moves[b]) >= _SHARED
         ]
 
