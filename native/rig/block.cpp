@@ -2,6 +2,7 @@
 #include "rig/block.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cstddef>
 #include <cstring>
 #include <mutex>
@@ -134,9 +135,11 @@ Result<Rig> open_rig(std::span<const std::uint8_t> bytes, std::shared_ptr<const 
   if (reinterpret_cast<std::uintptr_t>(bytes.data()) % kAlignment != 0) {
     return fail(ErrorCode::kInvalidArgument, "rig", "the bytes must be aligned to 64");
   }
+  static std::atomic<std::uint64_t> opened = 0;
   auto rig = BlockReader::read(bytes, std::move(owner));
   if (!rig) return rig;
   rig->kernels = &kernels;
+  rig->number = ++opened;
   if (check == BlockCheck::kHeader) return rig;
   BlockHeader h;
   std::memcpy(&h, bytes.data(), sizeof(h));

@@ -32,7 +32,9 @@ Pose make_pose(const Rig& rig) {
 Workspace make_workspace(const Rig& rig) {
   Workspace work;
   work.active.resize(std::size_t{rig.control_count} + 1);  // one is written past the last
-  work.candidates.resize(rig.psds.size() + 1);
+  work.firing_for.controls.resize(rig.control_count);
+  work.listed_for.controls.resize(rig.control_count);
+  work.firing.resize(rig.psds.size() + 1);  // one is written past the last
   work.psd_bits.resize((std::size_t{rig.psd_count} + 63) / 64);
   work.column_ends.resize(rig.joint_groups.size());
   work.moves.resize(rig.joint_groups.size());

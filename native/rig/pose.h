@@ -2,7 +2,9 @@
 // Pose: what an evaluation gives. Workspace: the memory that it needs.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "core/aligned.h"
@@ -40,6 +42,24 @@ enum class Traversal : std::uint8_t {
   kWhole     // all of them, in the order of group_columns, where no coefficient forbids it
 };
 
+/// The controls that something in a workspace was found for: while the same ones are not 0 it
+/// holds. In a film of 60 frames a second five of six have those of the frame before.
+struct KeptControls {
+  std::vector<std::uint16_t> controls;  // [controls]: the first count count
+  std::size_t count = 0;
+  std::uint64_t rig = 0;  // Rig::number; 0: nothing is kept
+  std::uint32_t lod = 0;
+
+  bool are(const Rig& of, std::uint32_t level, std::span<const std::uint16_t> list) const noexcept {
+    return rig == of.number && rig != 0 && lod == level && count == list.size() &&
+           std::equal(list.begin(), list.end(), controls.begin());
+  }
+  void keep(const Rig& of, std::uint32_t level, std::span<const std::uint16_t> list) noexcept {
+    rig = of.number, lod = level, count = list.size();
+    std::copy(list.begin(), list.end(), controls.begin());
+  }
+};
+
 /// The scratch memory of an evaluation. Threads that evaluate at the same time need one each; its
 /// alignment keeps two of them out of one cache line, where they would slow each other down. Only
 /// masks, traversal, whole_frames and added_frames mean something to a caller.
@@ -54,11 +74,16 @@ struct alignas(128) Workspace {
   // In a batch: the frame before has read what most of this one needs.
   bool warm = false;
   // Correctives.
-  std::vector<std::uint16_t> candidates;  // watched correctives whose factors are not known to be 0
-  std::vector<std::uint64_t> psd_bits;    // a bit for each corrective control that is not 0
-  std::vector<float> last_controls;       // [controls]: the controls before the correctives ran
+  KeptControls firing_for;              // of what is listed in firing
+  std::vector<std::uint16_t> firing;    // watched correctives that may not be 0; the first
+  std::size_t firing_count = 0;         // firing_count count
+  bool fires_all = false;               // none of their factors is 0
+  std::vector<std::uint64_t> psd_bits;  // a bit for each corrective control that is not 0
+  std::vector<float> last_controls;     // [controls]: the controls before the correctives ran
   // Joint groups.
   Traversal traversal = Traversal::kCounted;
+  KeptControls listed_for;                 // of the columns, ends, moves and blocks below
+  Traversal listed = Traversal::kListed;   // which of them are listed; kAdded: none
   std::size_t whole_frames = 0;            // evaluations that read all columns
   std::size_t added_frames = 0;            // evaluations that added columns in the order of memory
   std::vector<std::uint32_t> column_ends;  // [groups]: where a group's active columns end below

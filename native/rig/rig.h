@@ -19,6 +19,9 @@ namespace risorius::rig {
 class Rig : public RigHeader, public RigArrays<View> {
  public:
   const simd::Kernels* kernels = nullptr;
+  /// Another one for each Rig that this process opens, copies apart; never 0 for one that was
+  /// opened. What a workspace keeps from one frame to the next is kept for this number.
+  std::uint64_t number = 0;
 
   std::vector<std::string> raw_control_names() const { return texts(0, raw_count); }
   std::vector<std::string> gui_control_names() const { return texts(raw_count, gui_count); }

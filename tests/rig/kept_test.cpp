@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: MIT
+// What a workspace keeps from one frame to the next is never seen: whatever it was used for before,
+// a pose has the bits of one from a workspace of its own.
+#include <cstring>
+#include <random>
+#include <span>
+
+#include "support/face.h"
+
+namespace risorius::rig {
+namespace {
+
+using namespace testing_support;
+
+constexpr std::size_t kInputs = 12, kCorrectives = 40, kBones = 30, kLevels = 3;
+
+// Correctives of two to four raw controls, and groups that all controls drive; the numbers are by
+// chance, the sizes are not.
+dna::Dna correcting_face(std::uint32_t seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> value(-2.0f, 2.0f);
+  dna::Dna dna = make_face(kInputs, 0, kBones, kLevels);
+  dna::Psds& psds = dna.behavior.psds;
+  dna.behavior.psd_count = kCorrectives;
+  std::vector<std::uint16_t> rows, columns;
+  for (std::size_t p = 0; p < kCorrectives; ++p) {
+    const std::size_t first = random() % kInputs;
+    for (std::size_t f = 0; f < 2 + p % 3; ++f) {
+      rows.push_back(static_cast<std::uint16_t>(kInputs + p));
+      columns.push_back(static_cast<std::uint16_t>((first + f * (1 + p % 2)) % kInputs));
+    }
+  }
+  psds.values = std::vector<float>(rows.size(), 1.25f);
+  psds.rows = std::move(rows);
+  psds.columns = std::move(columns);
+  std::vector<std::uint16_t> inputs(kInputs + kCorrectives);
+  for (std::size_t c = 0; c < inputs.size(); ++c) inputs[c] = static_cast<std::uint16_t>(c);
+  std::vector<dna::JointGroup> groups;
+  for (const int first : {0, 100, 200}) {
+    std::vector<std::uint16_t> outputs(70);
+    for (std::size_t r = 0; r < outputs.size(); ++r) {
+      outputs[r] = static_cast<std::uint16_t>(static_cast<std::size_t>(first) + r);
+    }
+    std::vector<float> values(inputs.size() * outputs.size());
+    // A third of the columns is not kept, another one in each face.
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      values[i] = (i % inputs.size() + seed) % 3 == 0 ? 0.0f : value(random);
+    }
+    groups.push_back(make_group({70, 33, static_cast<std::uint16_t>(first == 100 ? 0 : 9)}, inputs,
+                                outputs, std::move(values)));
+  }
+  dna.behavior.joint_groups = std::move(groups);
+  return dna;
+}
+
+// Frames that keep their active controls for a while, some of them below 0 or no number.
+class Film {
+ public:
+  const std::vector<float>& next() {
+    std::uniform_real_distribution<float> value(0.1f, 1.2f);
+    if (random_() % 3 == 0) active_ = random_() % (1u << kInputs);
+    for (std::size_t c = 0; c < kInputs; ++c) {
+      raw_[c] = (active_ >> c & 1) == 0 ? 0.0f : value(random_);
+      if (random_() % 40 == 0) raw_[c] = -raw_[c];
+    }
+    if (random_() % 25 == 0) raw_[random_() % kInputs] = kNan;
+    return raw_;
+  }
+  std::uint32_t any(std::uint32_t below) { return static_cast<std::uint32_t>(random_()) % below; }
+
+ private:
+  std::mt19937 random_{5};
+  std::uint64_t active_ = 0;
+  std::vector<float> raw_ = std::vector<float>(kInputs);
+};
+
+// NaN is not equal to itself.
+bool same_bits(std::span<const float> a, std::span<const float> b) {
+  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size_bytes()) == 0;
+}
+
+TEST(Kept, IsNeverSeenInAPose) {
+  const Rig rigs[2] = {must_compile(correcting_face(1)), must_compile(correcting_face(2))};
+  Workspace work = make_batch_workspace(rigs[0]);
+  Film film;
+  for (int n = 0; n < 3000; ++n) {
+    const Rig& rig = rigs[film.any(8) == 0 ? 1 : 0];
+    const std::uint32_t lod = film.any(6) == 0 ? film.any(kLevels) : 0;
+    const std::size_t count = film.any(5) == 0 ? simd::kFrames : 1;
+    work.traversal = film.any(7) == 0 ? static_cast<Traversal>(film.any(4)) : Traversal::kCounted;
+    std::vector<float> frames;
+    for (std::size_t f = 0; f < count; ++f) {
+      const std::vector<float>& raw = film.next();
+      frames.insert(frames.end(), raw.begin(), raw.end());
+    }
+    Pose all = make_pose(rig);
+    const std::size_t joints = all.joints.size(), controls = all.controls.size();
+    all.joints.assign(joints * count, 7.0f);
+    all.controls.resize(controls * count);
+    evaluate_frames(rig, frames.data(), count, lod, true, work, view(all));
+    for (std::size_t f = 0; f < count; ++f) {
+      const auto from = frames.begin() + static_cast<std::ptrdiff_t>(f * kInputs);
+      const Pose one = evaluate_once(rig, {from, from + kInputs}, lod);
+      ASSERT_TRUE(same_bits(one.joints, std::span(all.joints).subspan(f * joints, joints)))
+          << "frame " << n << ", " << f << " of " << count;
+      ASSERT_TRUE(same_bits(one.controls, std::span(all.controls).subspan(f * controls, controls)))
+          << "frame " << n << ", " << f << " of " << count;
+    }
+  }
+}
+
+TEST(Kept, IsOfOneRigThoughAnotherTakesItsPlace) {
+  Workspace work;
+  std::vector<float> raw(kInputs, 0.5f);
+  for (const std::uint32_t seed : {1u, 2u}) {
+    // The second one may well lie where the first one was.
+    const Rig rig = must_compile(correcting_face(seed));
+    if (seed == 1) work = make_workspace(rig);
+    work.traversal = Traversal::kListed;
+    Pose pose = make_pose(rig);
+    evaluate(rig, raw.data(), 0, true, work, pose);
+    EXPECT_TRUE(same_bits(pose.joints, evaluate_once(rig, raw).joints));
+  }
+}
+
+}  // namespace
+}  // namespace risorius::rig
