@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <functional>
+#include <list>
 #include <set>
 
 #include "bindings/numpy_arrays.h"
@@ -302,14 +304,42 @@ py::tuple solver_poses(const rig::Rig& rig, std::uint32_t index, const py::objec
   return py::make_tuple(distances, weights);
 }
 
+// Of this thread, for one of the last few Rigs that it evaluated: to make a workspace takes longer
+// than an evaluation, and what it keeps from the frame before makes that shorter.
+rig::Workspace& workspace_of(const rig::Rig& rig) {
+  struct Kept {
+    std::uint64_t rig;
+    rig::Workspace work;
+  };
+  constexpr std::size_t kMost = 8;
+  thread_local std::list<Kept> last;  // the latest first
+  auto found = std::ranges::find(last, rig.number, &Kept::rig);
+  if (found != last.end()) {
+    last.splice(last.begin(), last, found);
+  } else {
+    last.push_front({rig.number, rig::make_workspace(rig)});
+    if (last.size() > kMost) last.pop_back();
+  }
+  return last.front().work;
+}
+
 PoseArrays evaluate(const rig::Rig& rig, const py::object& raw, std::uint32_t lod, bool settle,
                     bool check) {
   const FloatArray in = vector_argument(raw, "raw", rig.raw_count);
   if (check) unwrap(rig::check_finite(rig, in.data(), 1));
-  rig::Workspace work = rig::make_workspace(rig);
-  rig::Pose pose = rig::make_pose(rig);
-  rig::evaluate(rig, in.data(), lod, settle, work, pose);
-  return to_arrays(rig, pose);
+  const auto length = [](std::uint32_t n) { return static_cast<py::ssize_t>(n); };
+  PoseArrays out{FloatArray({length(rig.joint_count), stride_of(rig)}),
+                 FloatArray(length(rig.blend_shape_count)),
+                 FloatArray(length(rig.animated_map_count)), FloatArray(length(rig.control_count))};
+  const rig::PoseView pose{out.joints.mutable_data(), out.blend_shapes.mutable_data(),
+                           out.animated_maps.mutable_data(), out.controls.mutable_data()};
+  if (settle) {
+    rig::evaluate(rig, in.data(), lod, true, workspace_of(rig), pose);
+  } else {  // it reads what the frame before left, and there was none
+    rig::Workspace work = rig::make_workspace(rig);
+    rig::evaluate(rig, in.data(), lod, false, work, pose);
+  }
+  return out;
 }
 
 PoseArrays evaluate_batch(const rig::Rig& rig, const py::object& raw, std::uint32_t lod,

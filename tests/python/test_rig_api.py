@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: MIT
 """Rig and Morph as callers meet them: wrong arguments, edited files, the choice of SIMD."""
 
+import copy
 import os
 import re
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -62,6 +64,27 @@ def test_poses_do_not_share_memory(rig):
     kept = a.joints.copy()
     rig.evaluate(np.zeros(4, np.float32))
     np.testing.assert_array_equal(a.joints, kept)
+
+
+def test_faces_in_turn_and_in_threads_do_not_see_each_other(dna):
+    rigs = []
+    for times in range(1, 13):  # more than one thread keeps memory for
+        one, groups = copy.copy(dna), list(dna.joint_groups)
+        groups[0] = copy.copy(groups[0])
+        groups[0].values = np.asarray(groups[0].values) * times
+        one.joint_groups = groups
+        rigs.append(risorius.Rig(one))
+    raw = np.float32([0.5, 0.25, 0, 1])
+    # Of a batch, which has its memory for itself.
+    wanted = [rig.evaluate_batch(raw[None]).joints[0] for rig in rigs]
+    assert not np.array_equal(wanted[0], wanted[1])
+
+    def in_turn(_):
+        got = [[rig.evaluate(raw).joints for rig in rigs] for _ in range(3)]
+        return all(np.array_equal(a, b) for row in got for a, b in zip(row, wanted, strict=True))
+
+    with ThreadPoolExecutor(4) as pool:
+        assert all(pool.map(in_turn, range(4)))
 
 
 def test_neutral_pose_comes_from_the_definition(dna, rig):
