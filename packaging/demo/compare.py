@@ -53,8 +53,8 @@ FOLDS = {
     "chin": ({"jawChinRaiseD": 1, "jawChinRaiseU": 0.5}, {}),
 }
 # Where the camera looks: a share of the height above the lowest point, and how near.
-MOUTH, EYES, FACE = (0.40, 2.3), (0.60, 2.6), (0.65, 1.8)
-LOOKS = dict(zip(COMBINED, [(0.42, 1.5), MOUTH, MOUTH, MOUTH, EYES, EYES], strict=True))
+MOUTH, EYES, FACE = (0.54, 2.4), (0.69, 2.8), (0.65, 1.8)
+LOOKS = dict(zip(COMBINED, [(0.57, 1.6), MOUTH, MOUTH, MOUTH, EYES, EYES], strict=True))
 TURNED = {"neck": 16.0, "head": 18.0}  # degrees about the vertical
 
 

@@ -40,9 +40,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     build.add_argument(
         "--spec",
         metavar="SPEC",
-        help="what the rig is to be: full (800 joints, up to 1,000 correctives found by "
-        "themselves; takes half an hour of CPU), or a .toml with the tables of risorius author but "
-        "the source",
+        help="what the rig is to be: full (800 joints, up to 1,600 correctives found by "
+        "themselves; takes a quarter of an hour of CPU), or a .toml with the tables of risorius "
+        "author but the source",
     )
     build.add_argument("--data", type=Path, help="the wheel of data, instead of downloading it")
     build.add_argument("--offline", action="store_true", help="use the cached data only")
