@@ -13,7 +13,12 @@ import numpy as np
 import pytest
 import risorius
 from risorius.author import RigOptions, combinations, make_joint_rig
-from risorius.author.correctives import CorrectiveOptions, add_correctives, find_correctives
+from risorius.author.correctives import (
+    CorrectiveOptions,
+    add_correctives,
+    correct_again,
+    find_correctives,
+)
 from risorius.author.correctives.poser import make_checker, worst
 from risorius.author.correctives.search import fairest_of, triples_of
 from risorius.author.fitting import FitOptions
@@ -119,7 +124,10 @@ def test_a_sculpt_of_another_topology_is_one_sentence(tmp_path):
     [
         ('most = "many"', "correctives.most: 'many' is of another kind"),
         ("most = -1", "correctives.most: 0 or more was expected"),
-        ("depth = 3", "correctives.depth: one of most, solids, triples, together was expected"),
+        (
+            "depth = 3",
+            "correctives.depth: one of most, again, solids, triples, together was expected",
+        ),
         ("solids = [3]", "correctives.solids: names were expected, found [3]"),
         ('together = ["jawOpen"]', "correctives.together: names were expected, found 'jawOpen'"),
         ('together = [["jawOpen", "grin"]]', "correctives: there is no control grin"),
@@ -435,6 +443,27 @@ def test_the_rig_of_joints_has_them_too(face, corrected):
     read = dna_bytes.Face(rig.dna.to_bytes())
     assert depth(skin_of(read, at_one("a", "b"))).max() < 0.2
     assert [c.name for c in rig.combinations] == ["a x b", "b x d"]
+
+
+def test_what_joints_and_shapes_leave_is_mended_once_more(face, corrected):
+    found, _ = corrected
+    rows = {one.controls: one.shape for one in found.correctives}
+    first = add_correctives(face, found.skin, [((0, 1), rows[0, 1])])
+    # So few joints and so little else that the sheet goes into the ball again.
+    rig = make_joint_rig(first, RigOptions(FitOptions(joints=2, rounds=2), tolerance_mm=0.5)).dna
+    options = CorrectiveOptions(apart=(("a", "d"),))
+    again = correct_again(rig, face, options)
+    before, after = (dna_bytes.Face(dna.to_bytes()) for dna in (rig, again))
+    for names in (("a", "b"), ("b", "d")):
+        assert depth(skin_of(before, at_one(*names))).max() > 0.35
+        assert depth(skin_of(after, at_one(*names))).max() < 0.11
+    # One has its own already, the other gets one; alone each control does what it did.
+    assert (rig.psd_count, again.psd_count) == (1, 2)
+    for name in PUSHES:
+        assert (skin_of(before, at_one(name)) == skin_of(after, at_one(name))).all()
+    # Were it sculpted, it would stay.
+    kept = dna_bytes.Face(correct_again(rig, first, options).to_bytes())
+    assert (skin_of(before, at_one("a", "b")) == skin_of(kept, at_one("a", "b"))).all()
 
 
 def _combinations(controls):

@@ -67,16 +67,14 @@ class _Skin:
         self.weights = sk.dense_weights(mesh, len(before.joint_names))
         self._own = self.weights.any(axis=0)
         dense = sk.dense_weights(made, len(after.joint_names))
-        most = int((dense > 0).sum(axis=1).max(initial=1))
-        self._joints = np.argsort(-dense, axis=1, kind="stable")[:, :most]
-        self._held = np.take_along_axis(dense, self._joints, axis=1)
+        self._made = sk.Influences(dense)
         self._count = dense.shape[1]
         self.shapes = sk.column_shapes(before, mesh, columns)
         self.made_shapes = sk.column_shapes(after, made, columns)
 
     def hangs_on(self, first: int) -> bool:
         """Whether a joint from this one on moves it."""
-        return bool(self._held[self._joints >= first].any())
+        return bool(self._made.weights[self._made.joints >= first].any())
 
     def goal(self, side: _Side, active: Sequence[int]) -> Doubles:
         shaped = self.positions + sum((self.shapes[c] for c in active if c in self.shapes), 0.0)
@@ -92,24 +90,20 @@ class _Skin:
 
     def made(self, shaped: Doubles, motions: Doubles) -> Doubles:
         """float64[V, 3]: where the joints bring it."""
-        flat = motions.reshape(len(motions), 12)
-        blended = sum(
-            self._held[:, k, None] * flat[self._joints[:, k]] for k in range(self._held.shape[1])
-        )
-        turned = np.asarray(blended).reshape(-1, 3, 4)
-        return np.einsum("vij,vj->vi", turned[..., :3], shaped) + turned[..., 3]
+        return self._made.bring(shaped, motions)
 
     def rows(self, at: Ints) -> Doubles:
         """float64[n, joints]: weights of some vertices."""
         out = np.zeros((len(at), self._count))
-        np.put_along_axis(out, self._joints[at], self._held[at], axis=1)
+        np.put_along_axis(out, self._made.joints[at], self._made.weights[at], axis=1)
         return out
 
     def touched(self, joints: Ints) -> Ints:
         """The vertices that hang on one of these joints."""
         there = np.zeros(self._count, bool)
         there[joints] = True
-        return np.flatnonzero((there[self._joints] & (self._held > 0)).any(axis=1))
+        held = there[self._made.joints] & (self._made.weights > 0)
+        return np.flatnonzero(held.any(axis=1))
 
 
 class Combinations:

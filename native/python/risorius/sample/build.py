@@ -20,7 +20,12 @@ from .. import (
     Psds,
 )
 from ..author import FitOptions, Progress, RigOptions, find_reference, make_joint_rig
-from ..author.correctives import CorrectiveOptions, add_correctives, find_correctives
+from ..author.correctives import (
+    CorrectiveOptions,
+    add_correctives,
+    correct_again,
+    find_correctives,
+)
 from ..author.geometry.polygon_mesh import polygon_mesh, vertex_normals
 from ..author.levels import level_name
 from ..base import blas
@@ -624,10 +629,13 @@ def _built(
     drawing = painter.submit(hair_picture, person, texture_size)
     painter.shutdown(wait=False)
     begins = _SEARCH_ENDS if correctives.most or correctives.together else _FIT_BEGINS
-    dna = search_correctives(dna, correctives, steps)
+    shapes, dna = dna, search_correctives(dna, correctives, steps)
     if rig is not None:
         man = None if body.man is body else lambda: assemble(source, lambda _: None)[0]
         dna = joint_face(dna, man, rig, steps, begins)
+        if dna.psd_count > shapes.psd_count and rig.tolerance_mm is not None:
+            steps.say("looking once more at what joints and shapes do together")
+            dna = correct_again(dna, shapes, correctives)
     textures, metadata = painted.result()
     set_askew(dna, parts, shape, CM)
     grown = growing.result()

@@ -2,6 +2,13 @@
 """Correctives: what goes wrong where expressions meet, found and repaired."""
 
 from .adding import add_correctives
-from .search import Corrective, CorrectiveOptions, Found, find_correctives
+from .search import Corrective, CorrectiveOptions, Found, correct_again, find_correctives
 
-__all__ = ["Corrective", "CorrectiveOptions", "Found", "add_correctives", "find_correctives"]
+__all__ = [
+    "Corrective",
+    "CorrectiveOptions",
+    "Found",
+    "add_correctives",
+    "correct_again",
+    "find_correctives",
+]

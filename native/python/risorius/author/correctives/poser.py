@@ -34,7 +34,6 @@ class Poser:
         self._meshes = [_Posed(dna, dna.meshes[m], self._columns) for m in (skin, *solids)]
         self.added: dict[Controls, Doubles] = {}
         self._psds = sk.psd_parts(dna)
-        self.given = set(self._psds.values())  # the combinations that have a corrective
 
     @property
     def neutral(self) -> list[Doubles]:
@@ -63,7 +62,7 @@ class Poser:
                 for parts, shape in self.added.items():
                     if set(parts) <= set(on):
                         shaped = shaped + shape
-            out.append(shaped if motions is None else sk.skinned(shaped, mesh.weights, motions))
+            out.append(shaped if motions is None else mesh.skin.bring(shaped, motions))
         return out
 
     def before_joints(self, on: Controls, displacement: Doubles) -> Doubles:
@@ -76,9 +75,8 @@ class Poser:
         motions = self.motions(on)
         if motions is None:
             return displacement
-        weights = self._meshes[0].weights
-        blended = (weights @ motions.reshape(len(motions), 12)).reshape(-1, 3, 4)[..., :3]
-        return np.asarray(np.linalg.solve(blended, displacement[..., None])[..., 0])
+        posed = self._meshes[0].skin.bring(np.zeros_like(displacement), motions) + displacement
+        return sk.before_skin(posed, self._meshes[0].weights, motions)
 
     def _active(self, on: Controls) -> list[int]:
         return [*on, *(column for column, parts in self._psds.items() if parts <= set(on))]
@@ -88,6 +86,7 @@ class _Posed:
     def __init__(self, dna: Dna, mesh: Mesh, columns: int) -> None:
         self.positions = np.asarray(mesh.positions, np.float64)
         self.weights = sk.dense_weights(mesh, len(dna.joint_names))
+        self.skin = sk.Influences(self.weights)
         self.shapes = sk.column_shapes(dna, mesh, columns)
 
 

@@ -9,7 +9,7 @@ the fault alone, what does little there (native/author/correct.h).
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import TypeVar
@@ -21,8 +21,9 @@ from ... import Dna, DnaError
 from ..._native import FaultSums, SkinFaults
 from ...base.errors import ArgumentError
 from ..fitting import Progress
-from ..geometry.skeleton import Doubles
+from ..geometry.skeleton import Doubles, psd_parts
 from ..work import MM
+from .adding import add_correctives
 from .poser import SOLIDS, Controls, Poser, make_checker, skin_and_solids, worst
 
 T = TypeVar("T")
@@ -45,8 +46,14 @@ class CorrectiveOptions:
     most: int = 500
     solids: tuple[str, ...] = SOLIDS  # parts of the names of meshes that the skin is kept out of
     triples: int = 200  # combinations of three that are looked at
+    # More pairs that are mended in the finished face of joints; None: a share of most.
+    again: int | None = None
     together: tuple[tuple[str, ...], ...] = ()  # larger ones, by names of controls
     apart: tuple[tuple[str, str], ...] = ()  # opposites: never at the same time
+
+    @property
+    def once_more(self) -> int:
+        return 3 * self.most // 8 if self.again is None else self.again
 
 
 @dataclass
@@ -75,8 +82,22 @@ class Found:
 class Search:
     """Looks at combinations, and repairs those that are worst."""
 
-    def __init__(self, dna: Dna, options: CorrectiveOptions, progress: Progress | None) -> None:
+    def __init__(
+        self,
+        dna: Dna,
+        options: CorrectiveOptions,
+        progress: Progress | None,
+        sculpted: Collection[frozenset[int]] | None = None,
+    ) -> None:
+        """Args:
+        dna: the face.
+        options: which.
+        progress: told the share that is done.
+        sculpted: combinations that look as somebody wanted them, None: all that have a corrective.
+        """
         self.options, self.progress = options, progress
+        given = psd_parts(dna).values() if sculpted is None else sculpted
+        self.sculpted = frozenset(given)
         self.skin, self.solids = skin_and_solids(dna, options.solids, _level(dna))
         self.checker = make_checker(dna, self.skin, self.solids)
         self.poser = Poser(dna, self.skin, self.solids)
@@ -108,14 +129,13 @@ class Search:
         return worst(self._faults[part] for part in parts)
 
     def pairs(self) -> list[Controls]:
-        """All that move some vertices together, are no opposites and have no corrective yet: of
-        those that have one somebody has said how they look."""
+        """All that move some vertices together, are no opposites and not sculpted."""
         apart = {frozenset(pair) for pair in self.options.apart}
         return [
             (a, b)
             for a, b in itertools.combinations(range(self.poser.controls), 2)
             if frozenset((self.names[a], self.names[b])) not in apart
-            and frozenset((a, b)) not in self.poser.given
+            and frozenset((a, b)) not in self.sculpted
             and np.count_nonzero(self._moves[a] & self._moves[b]) >= _SHARED
         ]
 
@@ -166,13 +186,13 @@ class Search:
 
 
 def _level(dna: Dna) -> int:
-    """The coarsest level whose skin is fine enough to be looked at."""
-    fine = [
-        lod
-        for lod in range(max(1, dna.lod_count))
-        if len(dna.meshes[skin_and_solids(dna, (), lod)[0]].positions) >= _ENOUGH
-    ]
-    return max(fine, default=0)
+    """The coarsest level whose skin has shapes and is fine enough to be looked at."""
+
+    def fine(lod: int) -> bool:
+        skin = dna.meshes[skin_and_solids(dna, (), lod)[0]]
+        return len(skin.positions) >= _ENOUGH and len(skin.blend_shape_targets) > 0
+
+    return max(filter(fine, range(max(1, dna.lod_count))), default=0)
 
 
 def severity(sums: FaultSums) -> float:
@@ -215,6 +235,36 @@ def find_correctives(
         search.repair([on], (0.9, 1.0))
     out.correctives = list(search.found.values())
     return out
+
+
+def correct_again(
+    rig: Dna, source: Dna, options: CorrectiveOptions, progress: Progress | None = None
+) -> Dna:
+    """A finished face whose pairs have been looked at and mended once more, by shapes.
+
+    What joints and shapes leave of each expression is small, but not where lips and lids lie on
+    one another; and turns do not add up as the shapes did that were looked at first. A pair that
+    has a corrective gets more of it, others one of their own.
+
+    Args:
+        rig: of joints and shapes; it stays as it is.
+        source: the face without the correctives that were found: those it has stay as they are.
+        options: which; beside pairs that have a corrective, once_more others at most.
+        progress: told the share that is done, 0 to 1; False stops.
+
+    Raises:
+        DnaError: a value that is not finite, or progress said False.
+    """
+    search = Search(rig, options, progress, psd_parts(source).values())
+    pairs = search.pairs()
+    sums = dict(zip(pairs, search.sums(pairs, (0.0, 0.6)), strict=True))
+    found = frozenset(psd_parts(rig).values()) - search.sculpted
+    had = {on: s for on, s in sums.items() if frozenset(on) in found}
+    new = {on: s for on, s in sums.items() if on not in had}
+    wrong = [*_worst_of(had, len(had), 0.0), *fairest_of(new, options.once_more)]
+    search.repair(wrong, (0.6, 1.0))
+    rows = [(one.controls, one.shape) for one in search.found.values()]
+    return add_correctives(rig, search.skin, rows)
 
 
 def _named(search: Search, names: Sequence[str]) -> Controls:

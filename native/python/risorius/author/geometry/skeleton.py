@@ -217,6 +217,32 @@ def skinned(positions: Doubles, weights: Doubles, motions: Doubles) -> Doubles:
     return np.einsum("vij,vj->vi", blended[..., :3], positions) + blended[..., 3]
 
 
+class Influences:
+    """Skin weights as a few joints of each vertex, where there are many joints."""
+
+    def __init__(self, weights: Doubles) -> None:
+        """Args:
+        weights: float64[V, joints].
+        """
+        most = int((weights > 0).sum(axis=1).max(initial=1))
+        self.joints = np.argsort(-weights, axis=1, kind="stable")[:, :most]  # int64[V, most]
+        self.weights = np.take_along_axis(weights, self.joints, axis=1)
+
+    def bring(self, positions: Doubles, motions: Doubles) -> Doubles:
+        """float64[V, 3]: where joints bring vertices, as skinned.
+
+        Args:
+            positions: float64[V, 3].
+            motions: float64[joints, 3, 4].
+        """
+        flat = motions.reshape(len(motions), 12)
+        blended = sum(
+            self.weights[:, k, None] * flat[self.joints[:, k]] for k in range(self.joints.shape[1])
+        )
+        turned = np.asarray(blended).reshape(-1, 3, 4)
+        return np.einsum("vij,vj->vi", turned[..., :3], positions) + turned[..., 3]
+
+
 class Skin:
     """Vertices on joints of which few move at once: only those are looked at."""
 

@@ -41,7 +41,13 @@ _TABLES: dict[str, dict[str, tuple[type, ...]]] = {
         "least_effect_mm": (int, float),
     },
     "shapes": {"tolerance_mm": (int, float), "keep": (bool,)},
-    "correctives": {"most": (int,), "solids": (list,), "triples": (int,), "together": (list,)},
+    "correctives": {
+        "most": (int,),
+        "again": (int,),
+        "solids": (list,),
+        "triples": (int,),
+        "together": (list,),
+    },
     "lods": {"count": (int,), "joints": (list,), "vertices": (list,)},
 }
 
@@ -151,7 +157,7 @@ def _correctives(path: Path, table: dict[str, Any]) -> CorrectiveOptions:
         return tuple(rows)
 
     asked = dict(table)
-    for key in ("most", "triples"):
+    for key in ("most", "again", "triples"):
         if int(asked.get(key, 0)) < 0:
             raise ShapeFileError(f"{path}: correctives.{key}: 0 or more was expected")
     asked.setdefault("most", CorrectiveOptions.most if asked else 0)

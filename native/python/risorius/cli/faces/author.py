@@ -16,6 +16,7 @@ from ...author.correctives import (
     CorrectiveOptions,
     Found,
     add_correctives,
+    correct_again,
     find_correctives,
 )
 from ...author.fitting import bounded
@@ -86,13 +87,16 @@ def run(args: argparse.Namespace) -> int:
         require_suffix(args.report, (".html",), "--report")
         fileio.check_writable(args.report)
         need_plot()
-    say = _Clock(quiet=args.json)
+    say, source = _Clock(quiet=args.json), dna
     if asked.most or asked.together:
         say.line("looking for what goes wrong where expressions meet")
         found = find_correctives(dna, asked, say)
         dna = add_correctives(dna, found.skin, [(x.controls, x.shape) for x in found.correctives])
         say.line("\n".join(as_found(found)))
     rig = make_joint_rig(dna, options, say)
+    if dna is not source and options.tolerance_mm is not None and asked.once_more:
+        say.line("looking once more at what joints and shapes do together")
+        rig.dna = correct_again(rig.dna, source, asked, say)
     rig.dna.save(args.out)
     if args.report is not None:
         write_report(args.report, dna, rig, args.out)
