@@ -82,8 +82,8 @@ struct alignas(128) Workspace {
   std::vector<float> last_controls;     // [controls]: the controls before the correctives ran
   // Joint groups.
   Traversal traversal = Traversal::kCounted;
-  KeptControls listed_for;                 // of the columns, ends, moves and blocks below
-  Traversal listed = Traversal::kListed;   // which of them are listed; kAdded: none
+  KeptControls listed_for;                 // of the moves and blocks below
+  Traversal listed = Traversal::kListed;   // and of columns and ends, but for kAdded
   std::size_t whole_frames = 0;            // evaluations that read all columns
   std::size_t added_frames = 0;            // evaluations that added columns in the order of memory
   std::vector<std::uint32_t> column_ends;  // [groups]: where a group's active columns end below

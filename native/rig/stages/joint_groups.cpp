@@ -338,10 +338,12 @@ void joint_groups(const Rig& rig, std::uint32_t lod, Workspace& work,
   const std::span<const std::uint16_t> active(work.active.data(), work.active_count);
   if (!is_listed(rig, lod, active, work) && way_of(rig, lod, active, work) == Traversal::kAdded) {
     ++work.added_frames;
-    work.listed = Traversal::kAdded;
-    work.listed_for.keep(rig, lod, active);
     add_active(rig, lod, work, pose.controls);
-    mark_blocks(rig, lod, work);
+    if (!was_added(rig, lod, active, work)) {
+      mark_blocks(rig, lod, work);
+      work.listed = Traversal::kAdded;
+      work.listed_for.keep(rig, lod, active);
+    }
     place_rows(rig, lod, work, work.sums.data(), pose.joints, 1);
     clear_sums(rig, lod, work);
   } else {
