@@ -3,8 +3,9 @@
 // RISORIUS_TARGET (the functions' target attribute: a file compiled with -mavx2 could give the
 // linker an inline standard function that older CPUs cannot run) and V with
 //   Reg, kLanes, zero(), set(float), load(const float*), load(const uint16_t*), store(float*, Reg),
-//   madd(a, b, sum), expand(from, mask, to) and expand_more (kernels.h, place), and kBlocks,
-//   kBatchBlocks: registers of rows at once; kBatchFrames; Parts: as OneByOne of rotations_body.h.
+//   madd(a, b, sum), order(mask), expand(from, order, to) and expand_more (kernels.h, place), where
+//   it has one for many frames orders(mask), and kBlocks, kBatchBlocks: registers of rows at once;
+//   kBatchFrames; Parts: as OneByOne of rotations_body.h.
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -129,11 +130,20 @@ void batch_columns(const T* values, const Column* list, std::size_t n, const flo
   }
 }
 
+template <class Set, bool kMany>
+RISORIUS_INLINE auto order_of(std::uint32_t mask) {
+  if constexpr (kMany && requires { Set::orders(mask); }) {
+    return Set::orders(mask);
+  } else {
+    return Set::order(mask);
+  }
+}
+
 // What a piece says is made out once for all frames.
-template <bool kMore>
+template <bool kMore, bool kMany>
 RISORIUS_INLINE void place_in(const Piece* pieces, std::size_t n, PlacedFrames frames) {
   for (std::size_t i = 0; i < n; ++i) {
-    const V::Order order = V::order(pieces[i].mask);
+    const auto order = order_of<V, kMany>(pieces[i].mask);
     const float* from = frames.from + pieces[i].from;
     float* to = frames.to + (kMore ? pieces[i].block : i) * kPlaces;
     for (std::size_t f = 0; f < frames.count; ++f) {
@@ -148,9 +158,9 @@ RISORIUS_INLINE void place_in(const Piece* pieces, std::size_t n, PlacedFrames f
 template <bool kMore>
 RISORIUS_TARGET void place(const Piece* pieces, std::size_t n, const PlacedFrames& frames) {
   if (frames.count == 1) {
-    place_in<kMore>(pieces, n, {frames.from, 0, frames.to, 0, 1});
+    place_in<kMore, false>(pieces, n, {frames.from, 0, frames.to, 0, 1});
   } else {
-    place_in<kMore>(pieces, n, frames);
+    place_in<kMore, true>(pieces, n, frames);
   }
 }
 
