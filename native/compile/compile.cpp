@@ -713,7 +713,7 @@ core::Budget budget_for(const dna::Dna& dna) {
 
 Result<rig::Rig> compile(const dna::Dna& dna, const CompileOptions& options) {
   std::vector<dna::Warning> warnings;
-  RISORIUS_TRY(dna::validate(dna, warnings));
+  RISORIUS_TRY(dna::validate_behavior(dna, warnings));
   const simd::Kernels* kernels =
       options.kernels != nullptr ? options.kernels : simd::find_kernels(nullptr);
   if (kernels == nullptr) {

@@ -533,26 +533,22 @@ void check_setups(Checker& c, const Where& name, const List<TwistSwingSetup>& se
   }
 }
 
-}  // namespace
-
-std::vector<Finding> detail::find_all(const Dna& dna, Known known) {
-  Checker c(known);
+void check_layers(Checker& c, const Dna& dna, bool geometry) {
   check_descriptor(c, dna);
   check_definition(c, dna);
   // Without a definition there are no spaces to check against: a descriptor-only load.
   if (dna.behavior != Behavior{}) check_behavior(c, dna);
-  check_geometry(c, dna);
+  if (geometry) check_geometry(c, dna);
   check_networks(c, dna);
   check_operations(c, dna);
   check_rbf(c, dna);
   check_joint_metadata(c, dna);
   check_setups(c, "twist_swing_behavior.twists", dna.twist_swing_behavior.twists, dna);
   check_setups(c, "twist_swing_behavior.swings", dna.twist_swing_behavior.swings, dna);
-  return c.take();
 }
 
-Status detail::validate(const Dna& dna, Known known, std::vector<Warning>& warnings) {
-  std::vector<Finding> findings = find_all(dna, known);
+// The first error, or warnings.
+Status told(std::vector<Finding> findings, std::vector<Warning>& warnings) {
   for (Finding& f : findings) {
     if (f.is_error) return core::Unexpected{std::move(f.error)};
   }
@@ -562,8 +558,26 @@ Status detail::validate(const Dna& dna, Known known, std::vector<Warning>& warni
   return ok();
 }
 
+}  // namespace
+
+std::vector<Finding> detail::find_all(const Dna& dna, Known known) {
+  Checker c(known);
+  check_layers(c, dna, true);
+  return c.take();
+}
+
+Status detail::validate(const Dna& dna, Known known, std::vector<Warning>& warnings) {
+  return told(find_all(dna, known), warnings);
+}
+
 Status validate(const Dna& dna, std::vector<Warning>& warnings) {
   return detail::validate(dna, {}, warnings);
+}
+
+Status validate_behavior(const Dna& dna, std::vector<Warning>& warnings) {
+  Checker c{detail::Known{}};
+  check_layers(c, dna, false);
+  return told(c.take(), warnings);
 }
 
 }  // namespace risorius::dna

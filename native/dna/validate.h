@@ -20,6 +20,8 @@ struct Finding {
 /// read safely to warnings.
 /// Fails: kInvalidLength, kInvalidIndex, kInvalidValue, with the field and no offset.
 core::Status validate(const Dna& dna, std::vector<Warning>& warnings);
+/// The same of everything but the geometry: what evaluation reads.
+core::Status validate_behavior(const Dna& dna, std::vector<Warning>& warnings);
 
 namespace detail {
 

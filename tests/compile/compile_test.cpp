@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // A Dna may have been edited: whatever stands in it, compile gives a Rig or an error with the
 // field.
+#include <algorithm>
 #include <cmath>
 #include <ctime>
 #include <functional>
@@ -8,6 +9,7 @@
 #include <numeric>
 #include <ostream>
 
+#include "dna/validate.h"
 #include "rig/block.h"
 #include "support/face.h"
 #include "support/full_face.h"
@@ -178,6 +180,19 @@ TEST(Compile, ChoicesThatTheFormatDoesNotKnowStayInsideTheRig) {
   for (const rig::RbfSolver& s : rig.rbf_solvers) EXPECT_LT(s.axis, 3u);
   EXPECT_LT(rig.twist_swings[0].axis, 3u);
   EXPECT_TRUE(rig::open_rig(rig.block(), nullptr, rig::BlockCheck::kFull, *rig.kernels));
+}
+
+TEST(Compile, GeometryIsNotLookedAt) {
+  dna::Dna dna = good_face();
+  dna::Mesh mesh;
+  mesh.face_layouts = {7};  // of no vertex
+  mesh.face_offsets = {0, 1};
+  dna.geometry.meshes = std::vector{mesh};
+  std::vector<dna::Warning> warnings;
+  EXPECT_FALSE(dna::validate(dna, warnings));
+  EXPECT_TRUE(dna::validate_behavior(dna, warnings));
+  const rig::Rig with = must_compile(dna), without = must_compile(good_face());
+  EXPECT_TRUE(std::ranges::equal(with.block(), without.block()));
 }
 
 TEST(Compile, SolversBeyondAnyFaceAreRefused) {
