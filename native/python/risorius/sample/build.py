@@ -64,6 +64,7 @@ NO_WRINKLES = 4  # the level from which on there are none
 _FIT_BEGINS = 0.2  # of the whole time
 _SEARCH_ENDS = 0.4
 _REFIT_BEGINS = 0.7
+_AGAIN_BEGINS = 0.75
 TOLERANCE_MM = 0.2  # what joints leave beyond it stays in blend shapes
 RIG = RigOptions(
     FitOptions(joints=NEW_JOINTS),
@@ -518,7 +519,12 @@ def search_correctives(dna: Dna, options: CorrectiveOptions, steps: Steps) -> Dn
 
 
 def joint_face(
-    dna: Dna, man: Callable[[], Dna] | None, options: RigOptions, steps: Steps, begins: float
+    dna: Dna,
+    man: Callable[[], Dna] | None,
+    options: RigOptions,
+    steps: Steps,
+    begins: float,
+    ends: float = 1.0,
 ) -> Dna:
     """The face with joints in place of most of what its blend shapes do, and coarser levels.
 
@@ -531,12 +537,13 @@ def joint_face(
         options: how many joints, and what blend shapes keep.
         steps: told how far it is.
         begins: the share of the work that is done.
+        ends: the share that is done then.
     """
     joints = options.fit.joints
     like = references.shipped() if options == RIG else references.kept(options)
     if like is None and man is None:
         steps.at(begins, f"finding {joints} joints, weights and levels of detail")
-        rig = make_joint_rig(dna, options, steps.share_of(begins, 1.0))
+        rig = make_joint_rig(dna, options, steps.share_of(begins, ends))
         references.keep(options, rig.reference)
         return rig.dna
     if like is None and man is not None:
@@ -545,7 +552,7 @@ def joint_face(
         begins = _REFIT_BEGINS
         references.keep(options, like)
     steps.at(begins, f"finding what {joints} joints do here")
-    return make_joint_rig(dna, options, steps.share_of(begins, 1.0), like).dna
+    return make_joint_rig(dna, options, steps.share_of(begins, ends), like).dna
 
 
 def textures_of_levels(dna: Dna, metadata: dict[str, str]) -> dict[str, str]:
@@ -632,10 +639,11 @@ def _built(
     shapes, dna = dna, search_correctives(dna, correctives, steps)
     if rig is not None:
         man = None if body.man is body else lambda: assemble(source, lambda _: None)[0]
-        dna = joint_face(dna, man, rig, steps, begins)
-        if dna.psd_count > shapes.psd_count and rig.tolerance_mm is not None:
-            steps.say("looking once more at what joints and shapes do together")
-            dna = correct_again(dna, shapes, correctives)
+        again = dna.psd_count > shapes.psd_count and rig.tolerance_mm is not None
+        dna = joint_face(dna, man, rig, steps, begins, _AGAIN_BEGINS if again else 1.0)
+        if again:
+            steps.at(_AGAIN_BEGINS, "looking once more at what joints and shapes do together")
+            dna = correct_again(dna, shapes, correctives, steps.share_of(_AGAIN_BEGINS, 1.0))
     textures, metadata = painted.result()
     set_askew(dna, parts, shape, CM)
     grown = growing.result()
