@@ -215,6 +215,13 @@ struct KeptColumn {
   std::uint32_t column, offset;
 };
 
+// Whether four columns are: a file may list a group's controls in any order.
+bool side_by_side(const KeptColumn* four) {
+  bool all = true;
+  for (std::uint32_t i = 1; i < 4; ++i) all = all && four[i].column == four[0].column + i;
+  return all;
+}
+
 // In tiles: both sides are read and written by whole cache lines, four columns at a time.
 // In: from  [rows, stride]
 void transpose(const float* from, std::size_t rows, std::size_t stride,
@@ -228,7 +235,7 @@ void transpose(const float* from, std::size_t rows, std::size_t stride,
       float *const a = to + k[0].offset, *const b = to + k[1].offset, *const d = to + k[2].offset,
                    *const e = to + k[3].offset;
       std::size_t r = r0;
-      if (k[3].column == k[0].column + 3) {
+      if (side_by_side(k)) {
         for (; r + kTogether <= r1; r += kTogether) {
           simd::turn_four(from + r * stride + k[0].column, stride, a + r, b + r, d + r, e + r);
         }

@@ -182,6 +182,27 @@ TEST(Compile, ChoicesThatTheFormatDoesNotKnowStayInsideTheRig) {
   EXPECT_TRUE(rig::open_rig(rig.block(), nullptr, rig::BlockCheck::kFull, *rig.kernels));
 }
 
+TEST(Compile, AGroupMayListItsControlsInAnyOrder) {
+  // By control, four of its columns lie three apart, but not side by side.
+  const std::vector<std::uint16_t> inputs = {0, 2, 1, 3, 5, 4, 6, 7};
+  constexpr std::size_t kRows = 9;
+  std::vector<std::uint16_t> outputs(kRows);
+  std::iota(outputs.begin(), outputs.end(), std::uint16_t{0});
+  std::vector<float> values(kRows * inputs.size());
+  std::iota(values.begin(), values.end(), 1.0f);
+  dna::Dna dna = make_face(inputs.size(), 0, 1);
+  dna.behavior.joint_groups = std::vector{make_group({kRows, kRows}, inputs, outputs, values)};
+  const rig::Rig rig = must_compile(dna);
+  for (std::size_t column = 0; column < inputs.size(); ++column) {
+    std::vector<float> raw(inputs.size(), 0.0f);
+    raw[inputs[column]] = 1.0f;
+    const rig::Pose pose = evaluate_once(rig, raw);
+    for (std::size_t row = 0; row < kRows; ++row) {
+      EXPECT_EQ(pose.joints[row], values[row * inputs.size() + column]);
+    }
+  }
+}
+
 TEST(Compile, GeometryIsNotLookedAt) {
   dna::Dna dna = good_face();
   dna::Mesh mesh;
