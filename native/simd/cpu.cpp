@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "simd/cpu.h"
+#include "simd/kernels.h"
 
 #if defined(__x86_64__) || defined(__i386__) || defined(_M_X64) || defined(_M_IX86)
 #define RISORIUS_X86

@@ -134,6 +134,11 @@ const Kernels* avx2_kernels();    // with FMA and F16C
 const Kernels* avx512_kernels();  // F, BW, DQ, VL
 const Kernels* neon_kernels();
 
+/// What CPU and operating system both support.
+bool cpu_has_sse4();    // 4.1
+bool cpu_has_avx2();    // with FMA and F16C
+bool cpu_has_avx512();  // F, BW, DQ, VL
+
 /// The table of that name ("scalar", "sse4", "avx2", "avx512", "neon"), or nullptr. An empty name
 /// is the environment variable RISORIUS_SIMD when it is set, else the best that this CPU has.
 const Kernels* find_kernels(const char* name);

@@ -2,7 +2,6 @@
 #include <array>
 #include <bit>
 
-#include "simd/cpu.h"
 #include "simd/kernels.h"
 
 #if defined(__x86_64__) || defined(_M_X64)

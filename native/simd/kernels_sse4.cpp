@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <bit>
 
-#include "simd/cpu.h"
 #include "simd/kernels.h"
 
 #if defined(__x86_64__) || defined(_M_X64)

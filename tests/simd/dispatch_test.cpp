@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "simd/cpu.h"
 #include "simd/kernels.h"
 
 namespace risorius::simd {
