@@ -40,8 +40,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     build.add_argument(
         "--spec",
         metavar="SPEC",
-        help="what the rig is to be: full (800 joints, up to 1,600 correctives found by "
-        "themselves; takes a quarter of an hour of CPU), or a .toml with the tables of risorius "
+        help="what the rig is to be: full (800 joints, up to 2,400 correctives found by "
+        "themselves; takes 24 minutes of CPU), or a .toml with the tables of risorius "
         "author but the source",
     )
     build.add_argument("--data", type=Path, help="the wheel of data, instead of downloading it")
