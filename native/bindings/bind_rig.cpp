@@ -165,6 +165,13 @@ py::array_t<float> copied(std::span<const float> values, std::vector<py::ssize_t
 
 py::ssize_t stride_of(const rig::Rig& rig) { return static_cast<py::ssize_t>(rig.joint_stride); }
 
+py::ssize_t length(std::uint32_t n) { return static_cast<py::ssize_t>(n); }
+
+rig::PoseView view_of(PoseArrays& out) {
+  return {out.joints.mutable_data(), out.blend_shapes.mutable_data(),
+          out.animated_maps.mutable_data(), out.controls.mutable_data()};
+}
+
 PoseArrays to_arrays(const rig::Rig& rig, const rig::Pose& pose) {
   const auto size = [](const std::vector<float>& v) { return static_cast<py::ssize_t>(v.size()); };
   return {copied(pose.joints, {static_cast<py::ssize_t>(rig.joint_count), stride_of(rig)}),
@@ -327,12 +334,10 @@ PoseArrays evaluate(const rig::Rig& rig, const py::object& raw, std::uint32_t lo
                     bool check) {
   const FloatArray in = vector_argument(raw, "raw", rig.raw_count);
   if (check) unwrap(rig::check_finite(rig, in.data(), 1));
-  const auto length = [](std::uint32_t n) { return static_cast<py::ssize_t>(n); };
   PoseArrays out{FloatArray({length(rig.joint_count), stride_of(rig)}),
                  FloatArray(length(rig.blend_shape_count)),
                  FloatArray(length(rig.animated_map_count)), FloatArray(length(rig.control_count))};
-  const rig::PoseView pose{out.joints.mutable_data(), out.blend_shapes.mutable_data(),
-                           out.animated_maps.mutable_data(), out.controls.mutable_data()};
+  const rig::PoseView pose = view_of(out);
   if (settle) {
     rig::evaluate(rig, in.data(), lod, true, workspace_of(rig), pose);
   } else {  // it reads what the frame before left, and there was none
@@ -351,13 +356,11 @@ PoseArrays evaluate_batch(const rig::Rig& rig, const py::object& raw, std::uint3
   }
   const auto n = in.shape(0);
   if (check) unwrap(rig::check_finite(rig, in.data(), static_cast<std::size_t>(n)));
-  const auto columns = [](std::uint32_t v) { return static_cast<py::ssize_t>(v); };
-  PoseArrays out{FloatArray({n, columns(rig.joint_count), stride_of(rig)}),
-                 FloatArray({n, columns(rig.blend_shape_count)}),
-                 FloatArray({n, columns(rig.animated_map_count)}),
-                 FloatArray({n, columns(rig.control_count)})};
-  const rig::PoseView all{out.joints.mutable_data(), out.blend_shapes.mutable_data(),
-                          out.animated_maps.mutable_data(), out.controls.mutable_data()};
+  PoseArrays out{FloatArray({n, length(rig.joint_count), stride_of(rig)}),
+                 FloatArray({n, length(rig.blend_shape_count)}),
+                 FloatArray({n, length(rig.animated_map_count)}),
+                 FloatArray({n, length(rig.control_count)})};
+  const rig::PoseView all = view_of(out);
   const float* rows = in.data();
   py::gil_scoped_release released;
   core::parallel_for(static_cast<std::size_t>(n), threads, [&](std::size_t begin, std::size_t end) {

@@ -48,12 +48,6 @@ bool whole_costs_less(const Rig& rig, std::uint32_t lod, const ControlReads& act
 // and 60 active takes 0.75 of the time of adding; with fewer columns than this 1.1 to 1.2.
 constexpr std::uint32_t kFewOfMany = 6;
 
-// Whether the frame before added the columns of these controls.
-bool was_added(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> active,
-               const Workspace& work) noexcept {
-  return work.listed == Traversal::kAdded && work.listed_for.are(rig, lod, active);
-}
-
 // Which way these controls go. Columns that are added in the order of memory need no list and no
 // group's kernel is begun, but a sum is read and written with each column. Measured on two faces:
 // by AVX2 an evaluation takes 0.7 to 1.0 of the time of listing with 4 to 60 columns a group, 0.93
@@ -61,15 +55,16 @@ bool was_added(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t>
 // as many bytes come in for the same sums, and with 64 columns and more listing takes as long or
 // less. By AVX-512, which has a group's sums in registers, 0.86 with one or two columns a
 // group, 1.0 with 5 and 1.1 to 1.3 with 13 to 50.
+// In: seen  the frame before added the columns of these controls
 Traversal way_of(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> active,
-                 const Workspace& work) noexcept {
+                 bool seen, const Workspace& work) noexcept {
   const bool may_read_all = !rig.control_reads.empty();
   if (work.traversal == Traversal::kWhole && !may_read_all) return Traversal::kListed;
   if (work.traversal != Traversal::kCounted) return work.traversal;
   const ControlReads sum = count_active(rig, lod, active);
   if (may_read_all && whole_costs_less(rig, lod, sum)) return Traversal::kWhole;
   std::uint32_t few = rig.is_half() ? rig.kernels->few.halves : rig.kernels->few.floats;
-  if (was_added(rig, lod, active, work)) few = std::min(few, kFewOfMany);
+  if (seen) few = std::min(few, kFewOfMany);
   const bool adds =
       few == simd::FewColumns::kAny || sum.columns < std::uint64_t{few} * rig.live_groups[lod];
   return adds ? Traversal::kAdded : Traversal::kListed;
@@ -90,13 +85,6 @@ void list_active(const Rig& rig, std::uint32_t live, std::span<const std::uint16
       columns[ends[at->group]++] = {at->offset, control};
     }
   }
-}
-
-// Whether work has the lists of these controls from the frame before.
-bool is_listed(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> active,
-               const Workspace& work) noexcept {
-  const bool asked = work.traversal == Traversal::kCounted || work.traversal == work.listed;
-  return asked && work.listed != Traversal::kAdded && work.listed_for.are(rig, lod, active);
 }
 
 // Adds the columns of each active control to work.sums. A row has its terms by ascending control
@@ -211,6 +199,28 @@ void list(const Rig& rig, std::uint32_t lod, Traversal way, std::span<const std:
   work.listed_for.keep(rig, lod, active);
 }
 
+// Lists the columns of these controls, unless they are to be added or work has them listed from the
+// frame before. Out: the way that they go; same  the frame before had these controls and its way
+Traversal prepare(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> active,
+                  bool may_add, Workspace& work, bool& same) noexcept {
+  const bool kept = work.listed_for.are(rig, lod, active);
+  const bool added = kept && work.listed == Traversal::kAdded;
+  const bool asked = work.traversal == Traversal::kCounted || work.traversal == work.listed;
+  same = kept && !added && asked;
+  if (same) return work.listed;
+  const Traversal way = way_of(rig, lod, active, added, work);
+  same = added && way == Traversal::kAdded;
+  if (way == Traversal::kAdded && may_add) return way;
+  list(rig, lod, way == Traversal::kWhole ? way : Traversal::kListed, active, work);
+  return work.listed;
+}
+
+const simd::Column* listed_columns(const Rig& rig, Workspace& work) noexcept {
+  if (work.listed == Traversal::kListed) return work.columns.data();
+  ++work.whole_frames;
+  return rig.group_columns.data();
+}
+
 // Places runs of blocks of one LOD, ascending, of all frames.
 class Placer {
  public:
@@ -283,13 +293,9 @@ namespace detail {
 
 const simd::Column* list_columns(const Rig& rig, std::uint32_t lod,
                                  std::span<const std::uint16_t> active, Workspace& work) noexcept {
-  if (!is_listed(rig, lod, active, work)) {
-    const bool all = way_of(rig, lod, active, work) == Traversal::kWhole;
-    list(rig, lod, all ? Traversal::kWhole : Traversal::kListed, active, work);
-  }
-  if (work.listed == Traversal::kListed) return work.columns.data();
-  ++work.whole_frames;
-  return rig.group_columns.data();
+  bool same = false;
+  prepare(rig, lod, active, false, work, same);
+  return listed_columns(rig, work);
 }
 
 void place_rows(const Rig& rig, std::uint32_t lod, Workspace& work, const float* rows,
@@ -310,9 +316,9 @@ void place_rows(const Rig& rig, std::uint32_t lod, Workspace& work, const float*
 namespace {
 
 // Out: work.rows, by group, and what list_columns leaves
-void sum_listed(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> active,
-                Workspace& work, const float* controls) noexcept {
-  const simd::Column* columns = list_columns(rig, lod, active, work);
+void sum_listed(const Rig& rig, std::uint32_t lod, Workspace& work,
+                const float* controls) noexcept {
+  const simd::Column* columns = listed_columns(rig, work);
   for (std::size_t n = 0; n < work.live_count; ++n) {
     const std::uint32_t i = work.live[n];
     const JointGroup& g = rig.joint_groups[i];
@@ -336,10 +342,11 @@ void sum_listed(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t
 void joint_groups(const Rig& rig, std::uint32_t lod, Workspace& work,
                   const PoseView& pose) noexcept {
   const std::span<const std::uint16_t> active(work.active.data(), work.active_count);
-  if (!is_listed(rig, lod, active, work) && way_of(rig, lod, active, work) == Traversal::kAdded) {
+  bool same = false;
+  if (prepare(rig, lod, active, true, work, same) == Traversal::kAdded) {
     ++work.added_frames;
     add_active(rig, lod, work, pose.controls);
-    if (!was_added(rig, lod, active, work)) {
+    if (!same) {
       mark_blocks(rig, lod, work);
       work.listed = Traversal::kAdded;
       work.listed_for.keep(rig, lod, active);
@@ -347,7 +354,7 @@ void joint_groups(const Rig& rig, std::uint32_t lod, Workspace& work,
     place_rows(rig, lod, work, work.sums.data(), pose.joints, 1);
     clear_sums(rig, lod, work);
   } else {
-    sum_listed(rig, lod, active, work, pose.controls);
+    sum_listed(rig, lod, work, pose.controls);
     place_rows(rig, lod, work, work.rows.data(), pose.joints, 1);
   }
 }

@@ -75,8 +75,9 @@ class Poser:
         motions = self.motions(on)
         if motions is None:
             return displacement
-        posed = self._meshes[0].skin.bring(np.zeros_like(displacement), motions) + displacement
-        return sk.before_skin(posed, self._meshes[0].weights, motions)
+        weights = self._meshes[0].weights
+        blended = (weights @ motions.reshape(len(motions), 12)).reshape(-1, 3, 4)[..., :3]
+        return np.asarray(np.linalg.solve(blended, displacement[..., None])[..., 0])
 
     def _active(self, on: Controls) -> list[int]:
         return [*on, *(column for column, parts in self._psds.items() if parts <= set(on))]
