@@ -19,45 +19,56 @@ namespace risorius::simd {
 
 namespace {
 
-// kCount registers of rows of one frame.
+// kCount registers of rows of some frames. Without loops: of these gcc 12 keeps the sums in memory
+// before and after the loop over columns.
+template <class Frames, class Rows>
+struct BlockSums;
+template <std::size_t... kFrame, std::size_t... kRow>
+struct BlockSums<std::index_sequence<kFrame...>, std::index_sequence<kRow...>> {
+  V::Reg sums[sizeof...(kFrame)][sizeof...(kRow)];
+
+  RISORIUS_INLINE void clear(std::size_t f) { ((sums[f][kRow] = V::zero()), ...); }
+  RISORIUS_INLINE void clear() { (clear(kFrame), ...); }
+  RISORIUS_INLINE void add(std::size_t f, V::Reg weight, const V::Reg* rows) {
+    ((sums[f][kRow] = V::madd(weight, rows[kRow], sums[f][kRow])), ...);
+  }
+  // In: weights  one of each frame
+  template <class T>
+  RISORIUS_INLINE void add(const T* column, const float* weights) {
+    const V::Reg rows[] = {V::load(column + kRow * V::kLanes)...};
+    (add(kFrame, V::set(weights[kFrame]), rows), ...);
+  }
+  RISORIUS_INLINE void store(std::size_t f, float* out) const {
+    (V::store(out + kRow * V::kLanes, sums[f][kRow]), ...);
+  }
+  RISORIUS_INLINE void store(float* out, std::size_t stride) const {
+    (store(kFrame, out + kFrame * stride), ...);
+  }
+};
+template <std::size_t kFrameCount, std::size_t kCount>
+using Block = BlockSums<std::make_index_sequence<kFrameCount>, std::make_index_sequence<kCount>>;
+
 template <int kCount, class T>
 RISORIUS_TARGET void block(const T* values, const Column* columns, std::size_t n,
                            const float* weights, float* out) {
-  V::Reg sums[kCount];
-  for (int b = 0; b < kCount; ++b) sums[b] = V::zero();
+  Block<1, kCount> sums;
+  sums.clear();
   for (std::size_t i = 0; i < n; ++i) {
-    const T* column = values + columns[i].offset;
-    const V::Reg weight = V::set(weights[columns[i].weight]);
-    for (int b = 0; b < kCount; ++b) {
-      sums[b] = V::madd(weight, V::load(column + b * V::kLanes), sums[b]);
-    }
+    sums.add(values + columns[i].offset, weights + columns[i].weight);
   }
-  for (int b = 0; b < kCount; ++b) V::store(out + b * V::kLanes, sums[b]);
+  sums.store(out, 0);
 }
 
-// kCount registers of rows of V::kBatchFrames frames: each value read serves them all.
+// Of V::kBatchFrames frames: each value read serves them all.
 template <int kCount, class T>
 RISORIUS_TARGET void batch_block(const T* values, const Column* columns, std::size_t n,
                                  const float* weights, float* out, std::size_t stride) {
-  V::Reg sums[V::kBatchFrames][kCount];
-  for (int f = 0; f < V::kBatchFrames; ++f) {
-    for (int b = 0; b < kCount; ++b) sums[f][b] = V::zero();
-  }
+  Block<V::kBatchFrames, kCount> sums;
+  sums.clear();
   for (std::size_t i = 0; i < n; ++i) {
-    const T* column = values + columns[i].offset;
-    const float* own = weights + std::size_t{columns[i].weight} * kFrames;
-    V::Reg rows[kCount];
-    for (int b = 0; b < kCount; ++b) rows[b] = V::load(column + b * V::kLanes);
-    for (int f = 0; f < V::kBatchFrames; ++f) {
-      const V::Reg weight = V::set(own[f]);
-      for (int b = 0; b < kCount; ++b) sums[f][b] = V::madd(weight, rows[b], sums[f][b]);
-    }
+    sums.add(values + columns[i].offset, weights + std::size_t{columns[i].weight} * kFrames);
   }
-  for (int f = 0; f < V::kBatchFrames; ++f) {
-    for (int b = 0; b < kCount; ++b) {
-      V::store(out + static_cast<std::size_t>(f) * stride + b * V::kLanes, sums[f][b]);
-    }
-  }
+  sums.store(out, stride);
 }
 
 template <class T, int... kCounts>
