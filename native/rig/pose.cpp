@@ -18,6 +18,18 @@ std::vector<simd::Rows> rows_of_groups(const Rig& rig) {
   return all;
 }
 
+// Where poses hold quaternions.
+std::vector<std::uint16_t> straight_joints(const Rig& rig) {
+  if (rig.joint_stride != 10) return {};
+  std::vector<bool> turns(rig.joint_count);
+  for (const std::uint16_t joint : rig.euler_joints) turns[joint] = true;
+  std::vector<std::uint16_t> all;
+  for (std::uint32_t j = 0; j < rig.joint_count; ++j) {
+    if (!turns[j]) all.push_back(static_cast<std::uint16_t>(j));
+  }
+  return all;
+}
+
 }  // namespace
 
 Pose make_pose(const Rig& rig) {
@@ -46,6 +58,7 @@ Workspace make_workspace(const Rig& rig) {
   const std::size_t blocks = rig.lod_count == 0 ? 0 : rig.joint_pieces.size() / rig.lod_count;
   work.live_blocks.resize((blocks + 63) / 64);
   work.last_controls.resize(rig.control_count);
+  work.straight_joints = straight_joints(rig);
   work.products.resize(rig.quaternion_joints.size());
   work.quaternion_bits.resize((rig.quaternion_columns.size() + 63) / 64);
   work.solver.resize(std::size_t{rig.solver_inputs} + 2 * std::size_t{rig.solver_poses});

@@ -99,6 +99,7 @@ struct alignas(128) Workspace {
   // writes: other blocks are 0 already. Empty: nothing is known of the pose.
   std::vector<std::uint64_t> shown_blocks;
   // Rotations by quaternions.
+  std::vector<std::uint16_t> straight_joints;  // those that no Euler angles turn at any LOD
   std::vector<Quaternion> products;            // [quaternion joints]
   std::vector<std::uint64_t> quaternion_bits;  // a bit for each active column; 0 between calls
   // Solvers and networks.

@@ -109,8 +109,7 @@ struct Kernels {
   /// Euler angles x y z to quaternions x y z w in place, error below 2e-7; the same bits on every
   /// CPU.
   /// In:   which      n numbers of rotations
-  ///       rotations  the angles of rotation i are at i * stride, behind them its w, which is 1: a
-  ///                  rotation whose angles are all +0 is left as it is
+  ///       rotations  the angles of rotation i are at i * stride, behind them there is room for w
   void (*quaternions)(const EulerTurns& turns, const std::uint16_t* which, std::size_t n,
                       float* rotations, std::size_t stride);
 

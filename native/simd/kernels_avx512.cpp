@@ -35,11 +35,11 @@ struct SixteenByFour {
     r[2] = _mm512_maskz_shuffle_ps(kAll, b, d, _MM_SHUFFLE(1, 0, 1, 0));
     r[3] = _mm512_maskz_shuffle_ps(kAll, b, d, _MM_SHUFFLE(3, 2, 3, 2));
   }
-  RISORIUS_INLINE static void split(const float* rotations, std::size_t stride,
-                                    const std::uint16_t* which, Turns (&angles)[3]) {
+  RISORIUS_INLINE static void split(const float* rotations, const std::uint32_t* at,
+                                    Turns (&angles)[3]) {
     __m512 r[4];
     for (std::size_t i = 0; i < 4; ++i) {
-      const auto four = [&](std::size_t l) { return _mm_loadu_ps(rotations + which[l] * stride); };
+      const auto four = [&](std::size_t l) { return _mm_loadu_ps(rotations + at[l]); };
       r[i] = _mm512_castps128_ps512(four(i));
       r[i] = _mm512_maskz_insertf32x4(kAll, r[i], four(i + 4), 1);
       r[i] = _mm512_maskz_insertf32x4(kAll, r[i], four(i + 8), 2);
@@ -49,19 +49,28 @@ struct SixteenByFour {
     for (std::size_t a = 0; a < 3; ++a) _mm512_store_ps(angles[a], r[a]);
   }
   RISORIUS_INLINE static void join(const Turns* const (&parts)[4], float* rotations,
-                                   std::size_t stride, const std::uint16_t* which) {
+                                   const std::uint32_t* at) {
     __m512 r[4];
     for (std::size_t k = 0; k < 4; ++k) r[k] = _mm512_load_ps(*parts[k]);
     transpose(r);
     for (std::size_t i = 0; i < 4; ++i) {
-      _mm_storeu_ps(rotations + which[i] * stride, _mm512_maskz_extractf32x4_ps(kFour, r[i], 0));
-      _mm_storeu_ps(rotations + which[i + 4] * stride,
-                    _mm512_maskz_extractf32x4_ps(kFour, r[i], 1));
-      _mm_storeu_ps(rotations + which[i + 8] * stride,
-                    _mm512_maskz_extractf32x4_ps(kFour, r[i], 2));
-      _mm_storeu_ps(rotations + which[i + 12] * stride,
-                    _mm512_maskz_extractf32x4_ps(kFour, r[i], 3));
+      _mm_storeu_ps(rotations + at[i], _mm512_maskz_extractf32x4_ps(kFour, r[i], 0));
+      _mm_storeu_ps(rotations + at[i + 4], _mm512_maskz_extractf32x4_ps(kFour, r[i], 1));
+      _mm_storeu_ps(rotations + at[i + 8], _mm512_maskz_extractf32x4_ps(kFour, r[i], 2));
+      _mm_storeu_ps(rotations + at[i + 12], _mm512_maskz_extractf32x4_ps(kFour, r[i], 3));
     }
+  }
+  // As OneByOne: one instruction gathers the signs.
+  RISORIUS_INLINE static bool any_beyond(const Angles& x, std::uint32_t limit) {
+    const __m512i most = _mm512_set1_epi32(static_cast<int>(limit)),
+                  all_but_sign = _mm512_set1_epi32(0x7FFFFFFF);
+    __m512i beyond = _mm512_setzero_si512();
+    for (std::size_t l = 0; l < kAngles; l += 16) {
+      const __m512i bits = _mm512_castps_si512(_mm512_load_ps(&x[l]));
+      beyond =
+          _mm512_or_si512(beyond, _mm512_sub_epi32(most, _mm512_and_si512(bits, all_but_sign)));
+    }
+    return _mm512_movepi32_mask(beyond) != 0;
   }
 };
 

@@ -20,23 +20,34 @@ namespace {
 
 // Four rotations at a time: the fourth number of each is read, and written, with the others.
 struct FourByFour {
-  RISORIUS_INLINE static void split(const float* rotations, std::size_t stride,
-                                    const std::uint16_t* which, Turns (&angles)[3]) {
+  RISORIUS_INLINE static void split(const float* rotations, const std::uint32_t* at,
+                                    Turns (&angles)[3]) {
     for (std::size_t l = 0; l < kTurns; l += 4) {
       __m128 r[4];
-      for (std::size_t i = 0; i < 4; ++i) r[i] = _mm_loadu_ps(rotations + which[l + i] * stride);
+      for (std::size_t i = 0; i < 4; ++i) r[i] = _mm_loadu_ps(rotations + at[l + i]);
       _MM_TRANSPOSE4_PS(r[0], r[1], r[2], r[3]);
       for (std::size_t a = 0; a < 3; ++a) _mm_store_ps(&angles[a][l], r[a]);
     }
   }
   RISORIUS_INLINE static void join(const Turns* const (&parts)[4], float* rotations,
-                                   std::size_t stride, const std::uint16_t* which) {
+                                   const std::uint32_t* at) {
     for (std::size_t l = 0; l < kTurns; l += 4) {
       __m128 r[4];
       for (std::size_t k = 0; k < 4; ++k) r[k] = _mm_load_ps(&(*parts[k])[l]);
       _MM_TRANSPOSE4_PS(r[0], r[1], r[2], r[3]);
-      for (std::size_t i = 0; i < 4; ++i) _mm_storeu_ps(rotations + which[l + i] * stride, r[i]);
+      for (std::size_t i = 0; i < 4; ++i) _mm_storeu_ps(rotations + at[l + i], r[i]);
     }
+  }
+  // As OneByOne: one instruction gathers the signs.
+  RISORIUS_INLINE static bool any_beyond(const Angles& x, std::uint32_t limit) {
+    const __m128i most = _mm_set1_epi32(static_cast<int>(limit)),
+                  all_but_sign = _mm_set1_epi32(0x7FFFFFFF);
+    __m128i beyond = _mm_setzero_si128();
+    for (std::size_t l = 0; l < kAngles; l += 4) {
+      const __m128i bits = _mm_castps_si128(_mm_load_ps(&x[l]));
+      beyond = _mm_or_si128(beyond, _mm_sub_epi32(most, _mm_and_si128(bits, all_but_sign)));
+    }
+    return _mm_movemask_ps(_mm_castsi128_ps(beyond)) != 0;
   }
 };
 

@@ -28,13 +28,13 @@ struct EightByFour {
     r[2] = _mm256_shuffle_ps(b, d, _MM_SHUFFLE(1, 0, 1, 0));
     r[3] = _mm256_shuffle_ps(b, d, _MM_SHUFFLE(3, 2, 3, 2));
   }
-  RISORIUS_INLINE static void split(const float* rotations, std::size_t stride,
-                                    const std::uint16_t* which, Turns (&angles)[3]) {
+  RISORIUS_INLINE static void split(const float* rotations, const std::uint32_t* at,
+                                    Turns (&angles)[3]) {
     for (std::size_t l = 0; l < kTurns; l += 8) {
       __m256 r[4];
       for (std::size_t i = 0; i < 4; ++i) {
-        const __m128 low = _mm_loadu_ps(rotations + which[l + i] * stride);
-        const __m128 high = _mm_loadu_ps(rotations + which[l + 4 + i] * stride);
+        const __m128 low = _mm_loadu_ps(rotations + at[l + i]);
+        const __m128 high = _mm_loadu_ps(rotations + at[l + 4 + i]);
         r[i] = _mm256_insertf128_ps(_mm256_castps128_ps256(low), high, 1);
       }
       transpose(r);
@@ -42,16 +42,28 @@ struct EightByFour {
     }
   }
   RISORIUS_INLINE static void join(const Turns* const (&parts)[4], float* rotations,
-                                   std::size_t stride, const std::uint16_t* which) {
+                                   const std::uint32_t* at) {
     for (std::size_t l = 0; l < kTurns; l += 8) {
       __m256 r[4];
       for (std::size_t k = 0; k < 4; ++k) r[k] = _mm256_load_ps(&(*parts[k])[l]);
       transpose(r);
       for (std::size_t i = 0; i < 4; ++i) {
-        _mm_storeu_ps(rotations + which[l + i] * stride, _mm256_castps256_ps128(r[i]));
-        _mm_storeu_ps(rotations + which[l + 4 + i] * stride, _mm256_extractf128_ps(r[i], 1));
+        _mm_storeu_ps(rotations + at[l + i], _mm256_castps256_ps128(r[i]));
+        _mm_storeu_ps(rotations + at[l + 4 + i], _mm256_extractf128_ps(r[i], 1));
       }
     }
+  }
+  // As OneByOne: one instruction gathers the signs.
+  RISORIUS_INLINE static bool any_beyond(const Angles& x, std::uint32_t limit) {
+    const __m256i most = _mm256_set1_epi32(static_cast<int>(limit)),
+                  all_but_sign = _mm256_set1_epi32(0x7FFFFFFF);
+    __m256i beyond = _mm256_setzero_si256();
+    for (std::size_t l = 0; l < kAngles; l += 8) {
+      const __m256i bits = _mm256_castps_si256(_mm256_load_ps(&x[l]));
+      beyond =
+          _mm256_or_si256(beyond, _mm256_sub_epi32(most, _mm256_and_si256(bits, all_but_sign)));
+    }
+    return _mm256_movemask_ps(_mm256_castsi256_ps(beyond)) != 0;
   }
 };
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <numeric>
 #include <random>
 
@@ -56,6 +57,37 @@ TEST(EvaluateJoints, LastGroupThatWritesARowWins) {
   EXPECT_EQ(evaluate_once(rig, {1.0f, 1.0f}, 0).joints[4], 10.0f);
   EXPECT_EQ(evaluate_once(rig, {1.0f, 0.0f}, 0).joints[4], 0.0f) << "a zero is written as well";
   EXPECT_EQ(evaluate_once(rig, {1.0f, 1.0f}, 1).joints[4], 1.0f) << "no row at this LOD";
+}
+
+// Of four joints the first turns at both LODs, the second at the finer one, the third moves and the
+// fourth does nothing: each has a w, whatever was in memory.
+TEST(EvaluateJoints, EveryQuaternionHasItsW) {
+  dna::Dna dna = make_face(1, 0, 4);
+  dna.behavior.joint_groups =
+      std::vector{make_group({3, 2}, {0}, {3, 18, 12}, {0.5f, 2.0f, 0.25f})};
+  compile::CompileOptions options;
+  options.rotation = compile::Rotation::kQuaternion;
+  const Rig rig = compile::compile(dna, options).value();
+  Workspace work = make_workspace(rig);
+  Pose pose = make_pose(rig);
+  Instance face(rig);
+  for (const std::uint32_t lod : {0u, 1u}) {
+    face.set_lod(lod);
+    for (const float raw : {0.0f, 1.0f}) {
+      std::ranges::fill(pose.joints, kNan);
+      evaluate(rig, &raw, lod, true, work, pose);
+      const double first = 0.25 * raw * std::numbers::pi / 180;
+      const double second = lod == 0 ? 0.125 * raw * std::numbers::pi / 180 : 0.0;
+      for (const std::vector<float>& joints : {pose.joints, face.evaluate(&raw).joints}) {
+        EXPECT_NEAR(joints[6], std::cos(first), 1e-7);
+        EXPECT_NEAR(joints[3], std::sin(first), 1e-8);
+        EXPECT_NEAR(joints[16], std::cos(second), 1e-7);
+        EXPECT_NEAR(joints[13], std::sin(second), 1e-8);
+        EXPECT_EQ(joints[26], 1.0f);
+        EXPECT_EQ(joints[36], 1.0f);
+      }
+    }
+  }
 }
 
 TEST(EvaluateJoints, PoseOfTheFrameBeforeDoesNotShine) {

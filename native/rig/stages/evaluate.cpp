@@ -10,12 +10,12 @@ namespace risorius::rig {
 namespace {
 
 // A face without LODs has nothing that moves.
-void rest(const Rig& rig, const float* raw, const PoseView& pose) noexcept {
+void rest(const Rig& rig, const float* raw, const Workspace& work, const PoseView& pose) noexcept {
   std::copy(raw, raw + rig.raw_count, pose.controls);
   std::copy(rig.initial_controls.begin() + rig.raw_count, rig.initial_controls.end(),
             pose.controls + rig.raw_count);
   std::fill(pose.joints, pose.joints + std::size_t{rig.joint_count} * rig.joint_stride, 0.0f);
-  if (rig.joint_stride == 10) detail::euler_joints(rig, 0, pose.joints);
+  if (rig.joint_stride == 10) detail::euler_joints(rig, 0, work, pose.joints);
   std::fill(pose.blend_shapes, pose.blend_shapes + rig.blend_shape_count, 0.0f);
   std::fill(pose.animated_maps, pose.animated_maps + rig.animated_map_count, 0.0f);
 }
@@ -52,7 +52,7 @@ void outputs(const Rig& rig, std::uint32_t lod, Workspace& work, const PoseView&
 void evaluate(const Rig& rig, const float* raw, std::uint32_t lod, bool settle, Workspace& work,
               const PoseView& pose) noexcept {
   const std::uint32_t level = detail::clamp_lod(rig, lod);
-  if (rig.lod_count == 0) return rest(rig, raw, pose);
+  if (rig.lod_count == 0) return rest(rig, raw, work, pose);
   detail::begin(rig, raw, level, settle, work, pose.controls);
   detail::outputs(rig, level, work, pose);
 }

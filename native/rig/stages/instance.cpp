@@ -32,7 +32,7 @@ void Instance::rest() noexcept {
             pose_.controls.begin() + rig_->raw_count);
   std::fill(pose_.joints.begin(), pose_.joints.end(), 0.0f);
   std::fill(work_.shown_blocks.begin(), work_.shown_blocks.end(), 0u);
-  if (rig_->joint_stride == 10) detail::euler_joints(*rig_, lod_, pose_.joints.data());
+  if (rig_->joint_stride == 10) detail::euler_joints(*rig_, lod_, work_, pose_.joints.data());
   std::fill(pose_.blend_shapes.begin(), pose_.blend_shapes.end(), 0.0f);
   std::fill(pose_.animated_maps.begin(), pose_.animated_maps.end(), 0.0f);
 }

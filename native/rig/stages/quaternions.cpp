@@ -40,8 +40,15 @@ void find_columns(const Rig& rig, Workspace& work, const float* controls) noexce
 
 namespace detail {
 
-void euler_joints(const Rig& rig, std::uint32_t lod, float* joints) noexcept {
-  for (std::uint32_t j = 0; j < rig.joint_count; ++j) rotation_of(rig, joints, j)[3] = 1.0f;
+void euler_joints(const Rig& rig, std::uint32_t lod, const Workspace& work,
+                  float* joints) noexcept {
+  const std::uint32_t turning = rig.lod_count == 0 ? 0 : rig.euler_joint_lods[lod];
+  for (const std::uint16_t joint : rig.euler_joints.subspan(turning)) {
+    rotation_of(rig, joints, joint)[3] = 1.0f;
+  }
+  for (const std::uint16_t joint : work.straight_joints) {
+    rotation_of(rig, joints, joint)[3] = 1.0f;
+  }
   if (rig.euler_joints.empty()) return;  // there may be no joint at all, and no place for one
   const EulerConvention& c = rig.euler;
   simd::EulerTurns turns;
@@ -50,9 +57,8 @@ void euler_joints(const Rig& rig, std::uint32_t lod, float* joints) noexcept {
     turns.half_units[a] = 0.5f * c.signs[axis] * c.radians_per_unit;
   }
   turns.parity = c.order[1] == (c.order[0] + 1) % 3 ? 1.0f : -1.0f;
-  rig.kernels->quaternions(turns, rig.euler_joints.data(),
-                           rig.lod_count == 0 ? 0 : rig.euler_joint_lods[lod],
-                           rotation_of(rig, joints, 0), rig.joint_stride);
+  rig.kernels->quaternions(turns, rig.euler_joints.data(), turning, rotation_of(rig, joints, 0),
+                           rig.joint_stride);
 }
 
 // Columns in the order of the file, so that the products are; those at rest are passed over.
@@ -85,7 +91,7 @@ void quaternion_joints(const Rig& rig, std::uint32_t lod, Workspace& work,
 }
 
 void rotations(const Rig& rig, std::uint32_t lod, Workspace& work, const PoseView& pose) noexcept {
-  if (rig.joint_stride == 10) euler_joints(rig, lod, pose.joints);
+  if (rig.joint_stride == 10) euler_joints(rig, lod, work, pose.joints);
   quaternion_joints(rig, lod, work, pose);
   twist_and_swing(rig, pose);
   ml_joints(rig, lod, pose);

@@ -43,7 +43,7 @@ void joint_groups(const Rig& rig, std::uint32_t lod, Workspace& work,
 /// The stages behind the joint groups, which a batch runs frame by frame. rotations() calls the
 /// four functions behind it in their order.
 void rotations(const Rig& rig, std::uint32_t lod, Workspace& work, const PoseView& pose) noexcept;
-void euler_joints(const Rig& rig, std::uint32_t lod, float* joints) noexcept;
+void euler_joints(const Rig& rig, std::uint32_t lod, const Workspace& work, float* joints) noexcept;
 void quaternion_joints(const Rig& rig, std::uint32_t lod, Workspace& work,
                        const PoseView& pose) noexcept;
 void twist_and_swing(const Rig& rig, const PoseView& pose) noexcept;
