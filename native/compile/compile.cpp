@@ -18,8 +18,8 @@
 #include "dna/size.h"
 #include "dna/validate.h"
 #include "rig/block.h"
+#include "simd/four.h"
 #include "simd/half.h"
-#include "simd/turn.h"
 
 namespace risorius::compile {
 

@@ -71,7 +71,7 @@ struct alignas(128) Workspace {
   // Nobody reads this. A sum of values is stored here so that the compiler keeps the reads, which
   // bring memory into the cache.
   std::uint32_t touched = 0;
-  // In a batch: the frame before has read what most of this one needs.
+  // In evaluate_frames: the frames before have read what most of this one needs.
   bool warm = false;
   // Correctives.
   KeptControls firing_for;              // of what is listed in firing
@@ -109,8 +109,9 @@ struct alignas(128) Workspace {
   core::AlignedVector<float> layers[2];         // what a layer of a network reads and writes
   std::vector<simd::Column> layer_columns;      // the columns of a layer whose inputs are not 0
   // For evaluate_frames, which evaluates kFrames frames together.
-  std::vector<std::uint64_t> union_bits;  // a bit for each control that is not 0 in any frame
-  std::vector<float> frame_weights;       // [controls, kFrames]: their values; 0 between calls
+  std::vector<std::uint64_t> union_bits;     // a bit for each control that is not 0 in any frame
+  core::AlignedVector<float> frame_weights;  // [controls, kFrames]: their values; those of
+                                             // correctives and networks are 0 between calls
 };
 
 /// A pose and a workspace of the sizes that the rig needs.

@@ -15,8 +15,8 @@
 #include <utility>
 #include <vector>
 
+#include "simd/four.h"
 #include "simd/half.h"
-#include "simd/turn.h"
 
 namespace risorius::simd {
 
@@ -542,7 +542,23 @@ TEST(Half, RoundsToTheNearest) {
   }
 }
 
-TEST(TurnFour, RowsBecomeColumns) {
+TEST(Four, KeepNanAndSayWhatIsNot0) {
+  const float nan = std::nanf(""), values[4] = {-0.0f, nan, 3.0f, -2.0f};
+  const Four four = Four::load(values);
+  EXPECT_TRUE(four.any_but_0());
+  EXPECT_FALSE(Four::all(-0.0f).any_but_0());
+  EXPECT_TRUE(four.any_nan());
+  EXPECT_FALSE((Four::all(2.0f) * Four::all(3.0f)).any_nan());
+  float out[4];
+  (four.at_least(0.0f).at_most(1.0f) * Four::all(5.0f) + Four::all(0.0f)).store(out);
+  EXPECT_EQ(out[0], 0.0f);
+  EXPECT_FALSE(std::signbit(out[0]));
+  EXPECT_TRUE(std::isnan(out[1]));
+  EXPECT_EQ(out[2], 5.0f);
+  EXPECT_EQ(out[3], 0.0f);
+}
+
+TEST(Four, RowsBecomeColumns) {
   constexpr std::size_t kStride = 7;
   float rows[4 * kStride], columns[4][6] = {};
   for (std::size_t i = 0; i < std::size(rows); ++i) rows[i] = static_cast<float>(i);

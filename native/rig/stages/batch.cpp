@@ -27,7 +27,7 @@ class Block {
       : rig_(rig), work_(work), first_(first), count_(count) {}
 
   void joints(std::uint32_t lod) noexcept {
-    const std::span active(work_.active.data(), list_union());
+    const std::span active(work_.active.data(), work_.active_count);
     const simd::Column* columns = detail::list_columns(rig_, lod, active, work_);
     for (std::size_t n = 0; n < work_.live_count; ++n) {
       const std::size_t i = work_.live[n];
@@ -64,19 +64,6 @@ class Block {
                                   weights, out, stride_, rows);
     }
   }
-  // The controls that any of the frames uses, ascending, at the begin of work.active.
-  std::size_t list_union() noexcept {
-    std::size_t n = 0;
-    for (std::size_t word = 0; word < work_.union_bits.size(); ++word) {
-      for (std::uint64_t bits = work_.union_bits[word]; bits != 0; bits &= bits - 1) {
-        work_.active[n++] = static_cast<std::uint16_t>(
-            word * 64 + static_cast<std::size_t>(std::countr_zero(bits)));
-      }
-      work_.union_bits[word] = 0;
-    }
-    return n;
-  }
-
   const Rig& rig_;
   Workspace& work_;
   PoseView first_;
@@ -87,14 +74,20 @@ class Block {
 void evaluate_block(const Rig& rig, const float* raw, std::size_t count, std::uint32_t lod,
                     bool settle, Workspace& work, const PoseView& first) noexcept {
   Block block(rig, work, first, count);
-  for (std::size_t f = 0; f < count; ++f) {
-    const PoseView pose = frame_of(rig, first, f);
-    detail::begin(rig, raw + f * rig.raw_count, lod, settle, work, pose.controls);
-    block.take(f);
-    work.warm = true;
-    detail::channels_and_maps(rig, lod, work, pose);
+  if (detail::go_together(rig, lod) &&
+      detail::frame_controls(rig, raw, count, lod, work, first.controls)) {
+    detail::frame_channels_and_maps(rig, lod, count, work, first);
+  } else {
+    for (std::size_t f = 0; f < count; ++f) {
+      const PoseView pose = frame_of(rig, first, f);
+      detail::begin(rig, raw + f * rig.raw_count, lod, settle, work, pose.controls);
+      block.take(f);
+      work.warm = true;
+      detail::channels_and_maps(rig, lod, work, pose);
+    }
+    detail::list_union(work);
   }
-  work.warm = false;
+  work.warm = true;
   block.joints(lod);
   for (std::size_t f = 0; f < count; ++f) {
     detail::rotations(rig, lod, work, frame_of(rig, first, f));
@@ -117,6 +110,7 @@ void evaluate_frames(const Rig& rig, const float* raw, std::size_t count, std::u
       evaluate_block(rig, from, std::min(kFrames, count - n), level, settle, work, first);
     }
   }
+  work.warm = false;
 }
 
 }  // namespace risorius::rig

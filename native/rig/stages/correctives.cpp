@@ -4,8 +4,10 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <utility>
 
 #include "rig/stages/stages.h"
+#include "simd/four.h"
 
 namespace risorius::rig {
 
@@ -19,14 +21,6 @@ float corrective(const Rig& rig, const Psd& psd, const float* values) noexcept {
   return product > 1.0f ? 1.0f : product;
 }
 
-// Whether eight controls are 0, of either sign.
-bool rest(const float* controls) noexcept {
-  constexpr std::uint64_t kSigns = 0x8000'0000'8000'0000;
-  std::uint64_t pairs[4];
-  std::memcpy(pairs, controls, sizeof(pairs));
-  return ((pairs[0] | pairs[1] | pairs[2] | pairs[3]) & ~kSigns) == 0;
-}
-
 // Faces are sparse in time: what rests at 0 costs no more than being passed over here, eight
 // controls at a time where all of them rest.
 std::size_t append_active(const float* controls, std::uint32_t begin, std::uint32_t end,
@@ -34,7 +28,7 @@ std::size_t append_active(const float* controls, std::uint32_t begin, std::uint3
   constexpr std::uint32_t kTogether = 8;
   std::size_t n = 0;
   for (std::uint32_t c = begin; c < end;) {
-    if (end - c >= kTogether && rest(controls + c)) {
+    if (end - c >= kTogether && detail::rest_eight(controls + c)) {
       c += kTogether;
       continue;
     }
@@ -46,24 +40,57 @@ std::size_t append_active(const float* controls, std::uint32_t begin, std::uint3
   return n;
 }
 
+bool rests_any(const Rig& rig, const Psd& psd, auto rests) noexcept {
+  const std::uint16_t* factors = rig.psd_factors.data() + psd.factors_begin;
+  return std::any_of(factors, factors + psd.factor_count, rests);
+}
+
+// Lists the watched correctives that may not be 0: those of which two factors are known not to be,
+// and where a second evaluation has the same active controls, none. To leave the others out takes
+// longer than one evaluation gains by it.
+// In:  active  controls that are not 0, without the correctives
+//      kept    they are those of the evaluation before
+//      rests   whether a control is 0
+// Out: work    firing
+template <class Rests>
+void list_firing(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> active,
+                 bool kept, Workspace& work, Rests rests) noexcept {
+  std::uint16_t* firing = work.firing.data();
+  if (kept) {
+    if (std::exchange(work.fires_all, true)) return;
+    const auto at_rest = [&](std::uint16_t p) { return rests_any(rig, rig.psds[p], rests); };
+    std::uint16_t* left = std::remove_if(firing, firing + work.firing_count, at_rest);
+    work.firing_count = static_cast<std::size_t>(left - firing);
+    return;
+  }
+  const std::uint32_t* begins =
+      rig.watch_begins.data() + std::size_t{lod} * (std::size_t{rig.control_count} + 1);
+  std::size_t n = 0;
+  for (const std::uint16_t control : active) {
+    for (std::uint32_t i = begins[control]; i < begins[control + std::size_t{1}]; ++i) {
+      firing[n] = rig.watched[i].psd;
+      n += rests(rig.watched[i].other) ? 0 : 1;
+    }
+  }
+  work.firing_count = n;
+  work.fires_all = false;
+  work.firing_for.keep(rig, lod, active);
+}
+
 class Correctives {
  public:
   Correctives(const Rig& rig, Workspace& work, float* controls)
       : rig_(rig), work_(work), controls_(controls) {}
 
   // In: active  controls that are not 0, without the correctives
-  void watched(std::uint32_t lod, std::span<const std::uint16_t> active) noexcept {
-    if (!work_.firing_for.are(rig_, lod, active)) {
-      list_firing(lod, active);
-      work_.firing_for.keep(rig_, lod, active);
-    } else if (!work_.fires_all) {
-      shorten();
-    }
+  void watched(std::uint32_t lod, std::span<const std::uint16_t> active, bool kept) noexcept {
+    const auto rests = [this](std::uint16_t control) { return controls_[control] == 0.0f; };
+    list_firing(rig_, lod, active, kept, work_, rests);
     for (std::size_t i = 0; i < work_.firing_count; ++i) {
       const Psd& psd = rig_.psds[work_.firing[i]];
       const float value = corrective(rig_, psd, controls_);
       // 0 times NaN: it is at rest here, as it is where it was left out.
-      if (std::isnan(value) && rests(psd)) continue;
+      if (std::isnan(value) && rests_any(rig_, psd, rests)) continue;
       set(psd.output, value);
     }
   }
@@ -79,36 +106,6 @@ class Correctives {
   }
 
  private:
-  // Those of which two factors are known not to be 0.
-  void list_firing(std::uint32_t lod, std::span<const std::uint16_t> active) noexcept {
-    const std::uint32_t* begins =
-        rig_.watch_begins.data() + std::size_t{lod} * (rig_.control_count + 1);
-    std::uint16_t* firing = work_.firing.data();
-    std::size_t n = 0;
-    for (const std::uint16_t control : active) {
-      for (std::uint32_t i = begins[control]; i < begins[control + 1]; ++i) {
-        firing[n] = rig_.watched[i].psd;
-        n += controls_[rig_.watched[i].other] == 0.0f ? 0 : 1;
-      }
-    }
-    work_.firing_count = n;
-    work_.fires_all = false;
-  }
-  bool rests(const Psd& psd) const noexcept {
-    const std::uint16_t* factors = rig_.psd_factors.data() + psd.factors_begin;
-    return std::any_of(factors, factors + psd.factor_count,
-                       [&](std::uint16_t factor) { return controls_[factor] == 0.0f; });
-  }
-  // Leaves those of which no factor is 0. It takes longer than one evaluation gains by it, so it is
-  // done where a second one has the same active controls.
-  void shorten() noexcept {
-    const auto begin = work_.firing.begin();
-    const auto end = begin + static_cast<std::ptrdiff_t>(work_.firing_count);
-    const auto left =
-        std::remove_if(begin, end, [&](std::uint16_t p) { return rests(rig_.psds[p]); });
-    work_.firing_count = static_cast<std::size_t>(left - begin);
-    work_.fires_all = true;
-  }
   void set(std::uint32_t output, float value) noexcept {
     if (value == 0.0f) return;
     controls_[output] = value;
@@ -157,14 +154,24 @@ void touch(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> con
   work.touched = sum;
 }
 
+// Touches what these controls will need. Where the evaluation before had the same ones its lists
+// are kept, and what they need is read at once anyway. Out: whether it had
+bool reach(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> active,
+           Workspace& work) noexcept {
+  const bool kept = work.firing_for.are(rig, lod, active);
+  if (!kept && !work.warm) touch(rig, lod, active, work);
+  return kept;
+}
+
 // The correctives that a control watches; the others are left at 0.
 void start_correctives(const Rig& rig, std::uint32_t lod, Workspace& work,
                        float* controls) noexcept {
   std::fill(controls + rig.raw_count, controls + rig.raw_count + rig.psd_count, 0.0f);
   std::fill(work.psd_bits.begin(), work.psd_bits.end(), 0u);
   const std::size_t n = list_sources(rig, controls, work);
-  if (!work.warm) touch(rig, lod, {work.active.data(), n}, work);
-  Correctives(rig, work, controls).watched(lod, {work.active.data(), n});
+  const std::span<const std::uint16_t> active(work.active.data(), n);
+  const bool kept = reach(rig, lod, active, work);
+  Correctives(rig, work, controls).watched(lod, active, kept);
 }
 
 // In ascending order: raw, correctives, networks and poses. In: as list_sources left it, but for
@@ -191,9 +198,152 @@ void run(const Rig& rig, std::uint32_t step, std::uint32_t lod, Workspace& work,
   }
 }
 
+// Turns raw controls of frames, so that a control's values lie side by side.
+// Out: values  [raw controls, kFrames]; frames beyond count are 0
+void turn_raw(const Rig& rig, const float* raw, std::size_t count, float* values) noexcept {
+  static_assert(simd::kFrames == 8);
+  std::uint32_t c = 0;
+  for (; count == simd::kFrames && c + 4 <= rig.raw_count; c += 4) {
+    float* to = values + c * simd::kFrames;
+    for (std::size_t f = 0; f < simd::kFrames; f += 4, to += 4) {
+      simd::turn_four(raw + f * rig.raw_count + c, rig.raw_count, to, to + simd::kFrames,
+                      to + 2 * simd::kFrames, to + 3 * simd::kFrames);
+    }
+  }
+  for (; c < rig.raw_count; ++c) {
+    float* to = values + c * simd::kFrames;
+    std::fill(to, to + simd::kFrames, 0.0f);
+    for (std::size_t f = 0; f < count; ++f) to[f] = raw[f * rig.raw_count + c];
+  }
+}
+
+bool any_negative_0(const float* values, std::size_t count) noexcept {
+  return std::any_of(values, values + count, [](float v) { return v == 0.0f && std::signbit(v); });
+}
+
+// Lists raw controls that are not 0 in any frame. Out: signs  whether any number has a sign
+std::size_t list_raw(const Rig& rig, Workspace& work, bool& signs) noexcept {
+  const float* values = work.frame_weights.data();
+  std::uint64_t all = 0;
+  std::size_t n = 0;
+  for (std::uint32_t c = 0; c < rig.raw_count; ++c, values += simd::kFrames) {
+    const std::uint64_t bits = detail::bits_of_eight(values);
+    const bool moves = (bits & ~detail::kSigns) != 0;
+    all |= bits;
+    work.active[n] = static_cast<std::uint16_t>(c);
+    n += moves ? 1 : 0;
+    work.union_bits[c / 64] |= std::uint64_t{moves} << (c % 64);
+  }
+  signs = (all & detail::kSigns) != 0;
+  return n;
+}
+
+// A corrective of four frames: products, roundings and their order are those of corrective().
+simd::Four four_correctives(const Psd& psd, const std::uint16_t* factors,
+                            const float* values) noexcept {
+  simd::Four product = simd::Four::all(psd.weight);
+  for (std::uint32_t k = 0; k < psd.factor_count; ++k) {
+    const simd::Four factor = simd::Four::load(values + factors[k] * simd::kFrames);
+    product = product * factor.at_least(0.0f).at_most(1.0f);
+  }
+  product = product.at_most(1.0f) + simd::Four::all(0.0f);  // no -0
+  if (!product.any_nan()) return product;
+  float one[4];
+  product.store(one);
+  for (std::uint32_t k = 0; k < psd.factor_count; ++k) {
+    const float* factor = values + factors[k] * simd::kFrames;
+    for (std::size_t f = 0; f < 4; ++f) one[f] = factor[f] == 0.0f ? 0.0f : one[f];
+  }
+  return simd::Four::load(one);
+}
+
+// The listed correctives of frames.
+// In/out: values  [controls, kFrames]
+//         bits    a bit for each control: set where a corrective is not 0 in a frame
+void frame_correctives(const Rig& rig, std::span<const std::uint16_t> firing, float* values,
+                       std::uint64_t* bits) noexcept {
+  for (const std::uint16_t p : firing) {
+    const Psd& psd = rig.psds[p];
+    const std::uint16_t* factors = rig.psd_factors.data() + psd.factors_begin;
+    bool moves = false;
+    for (std::size_t f = 0; f < simd::kFrames; f += 4) {
+      const simd::Four four = four_correctives(psd, factors, values + f);
+      four.store(values + psd.output * simd::kFrames + f);
+      moves |= four.any_but_0();
+    }
+    bits[psd.output / 64u] |= std::uint64_t{moves} << (psd.output % 64u);
+  }
+}
+
+// Out: controls  [count, controls]
+void write_frames(const Rig& rig, const float* raw, std::size_t count, const Workspace& work,
+                  float* controls) noexcept {
+  const std::uint32_t correctives_end = rig.raw_count + rig.psd_count;
+  for (std::size_t f = 0; f < count; ++f) {
+    float* to = controls + f * rig.control_count;
+    to = std::copy_n(raw + f * rig.raw_count, rig.raw_count, to);
+    to = std::fill_n(to, rig.psd_count, 0.0f);
+    std::copy(rig.initial_controls.begin() + correctives_end, rig.initial_controls.end(), to);
+  }
+  for (const std::uint16_t control : std::span(work.active.data(), work.active_count)) {
+    if (control < rig.raw_count || control >= correctives_end) continue;
+    const float* from = work.frame_weights.data() + control * simd::kFrames;
+    for (std::size_t f = 0; f < count; ++f) controls[f * rig.control_count + control] = from[f];
+  }
+}
+
 }  // namespace
 
 namespace detail {
+
+bool go_together(const Rig& rig, std::uint32_t lod) noexcept {
+  for (std::uint32_t list = 0; list < kStepLists; ++list) {
+    if (!rig.steps_of(lod, static_cast<StepList>(list)).empty()) return false;
+  }
+  return true;
+}
+
+bool frame_controls(const Rig& rig, const float* raw, std::size_t count, std::uint32_t lod,
+                    Workspace& work, float* controls) noexcept {
+  float* values = work.frame_weights.data();
+  std::uint64_t* bits = work.union_bits.data();
+  turn_raw(rig, raw, count, values);
+  bool signs = false;
+  std::size_t n = list_raw(rig, work, signs);
+  if (signs && any_negative_0(raw, count * rig.raw_count)) {
+    std::fill_n(values, rig.raw_count * simd::kFrames, 0.0f);
+    std::ranges::fill(work.union_bits, 0u);
+    return false;
+  }
+  const std::uint32_t correctives_end = rig.raw_count + rig.psd_count;
+  for (std::uint32_t c = correctives_end; c < rig.control_count; ++c) {
+    if (rig.initial_controls[c] == 0.0f) continue;
+    std::fill_n(values + c * simd::kFrames, count, rig.initial_controls[c]);
+    work.active[n++] = static_cast<std::uint16_t>(c);
+    bits[c / 64] |= std::uint64_t{1} << (c % 64);
+  }
+  const std::span<const std::uint16_t> active(work.active.data(), n);
+  const bool kept = reach(rig, lod, active, work);
+  list_firing(rig, lod, active, kept, work, [bits](std::uint16_t control) {
+    return ((bits[control / 64] >> (control % 64)) & 1) == 0;
+  });
+  frame_correctives(rig, {work.firing.data(), work.firing_count}, values, bits);
+  list_union(work);
+  write_frames(rig, raw, count, work, controls);
+  return true;
+}
+
+void list_union(Workspace& work) noexcept {
+  std::size_t n = 0;
+  for (std::size_t word = 0; word < work.union_bits.size(); ++word) {
+    for (std::uint64_t bits = work.union_bits[word]; bits != 0; bits &= bits - 1) {
+      work.active[n++] =
+          static_cast<std::uint16_t>(word * 64 + static_cast<std::size_t>(std::countr_zero(bits)));
+    }
+    work.union_bits[word] = 0;
+  }
+  work.active_count = n;
+}
 
 void settled_controls(const Rig& rig, std::uint32_t lod, Workspace& work,
                       float* controls) noexcept {

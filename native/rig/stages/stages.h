@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <cstring>
 #include <span>
 
 #include "rig/pose.h"
@@ -24,12 +25,37 @@ void latent_controls(const Rig& rig, std::uint32_t lod, Workspace& work, float* 
 void begin(const Rig& rig, const float* raw, std::uint32_t lod, bool settle, Workspace& work,
            float* controls) noexcept;
 
+/// Whether nothing but correctives follows from the raw controls at that LOD.
+bool go_together(const Rig& rig, std::uint32_t lod) noexcept;
+/// The controls of up to kFrames frames of such a rig, together: each with the bits of begin.
+/// In:  raw       [count, raw controls]
+///      work      of make_batch_workspace
+/// Out: controls  [count, controls]
+///      work      frame_weights; active: the controls that are not 0 in a frame
+///      false, and nothing is done, where a raw control is -0: that one reaches its channels where
+///      all channels are looked at, and none where the active controls name theirs
+bool frame_controls(const Rig& rig, const float* raw, std::size_t count, std::uint32_t lod,
+                    Workspace& work, float* controls) noexcept;
+/// work.active from work.union_bits, which become 0.
+void list_union(Workspace& work) noexcept;
+
 /// Runs one operation of the graph of networks; a scatter writes controls, others scratch memory.
 void run_operation(const Rig& rig, std::uint32_t index, std::uint32_t lod, Workspace& work,
                    float* controls) noexcept;
 /// Runs one RBF solver; overwrites the controls that its poses write.
 void run_solver(const Rig& rig, std::uint32_t index, Workspace& work, float* controls) noexcept;
 
+/// The bits that any of eight numbers has, in two halves; kSigns are their signs.
+constexpr std::uint64_t kSigns = 0x8000'0000'8000'0000;
+inline std::uint64_t bits_of_eight(const float* numbers) noexcept {
+  std::uint64_t pairs[4];
+  std::memcpy(pairs, numbers, sizeof(pairs));
+  return pairs[0] | pairs[1] | pairs[2] | pairs[3];
+}
+/// Whether eight controls, or one of eight frames, are 0, of either sign.
+inline bool rest_eight(const float* controls) noexcept {
+  return (bits_of_eight(controls) & ~kSigns) == 0;
+}
 inline float clamp01(float v) { return v < 0.0f ? 0.0f : (v > 1.0f ? 1.0f : v); }
 
 /// Joints, channels and maps from the controls and from work.active.
@@ -50,6 +76,11 @@ void twist_and_swing(const Rig& rig, const PoseView& pose) noexcept;
 void ml_joints(const Rig& rig, std::uint32_t lod, const PoseView& pose) noexcept;
 void channels_and_maps(const Rig& rig, std::uint32_t lod, const Workspace& work,
                        const PoseView& pose) noexcept;
+
+/// The same of up to kFrames frames, as frame_controls left them.
+/// Out: first  the first frame; the others follow
+void frame_channels_and_maps(const Rig& rig, std::uint32_t lod, std::size_t count,
+                             const Workspace& work, const PoseView& first) noexcept;
 
 /// The columns that a frame, or frames together, need: those of active controls, or all where
 /// reading the others costs less than listing. Out: columns by group; those of group i are from

@@ -48,28 +48,79 @@ bool lists_channels(const Rig& rig, std::uint32_t run, std::uint32_t shapes,
          active * kNamed + run * sizeof(float) < (shapes - run) * kLooked;
 }
 
+// Calls f(channel) for what a control moves.
+template <class F>
+void for_channels(const Rig& rig, std::uint32_t shapes, std::uint16_t control, F f) noexcept {
+  const std::uint32_t end = rig.shape_begins[control + std::size_t{1}];
+  for (std::uint32_t i = rig.shape_begins[control]; i < end; ++i) {
+    const std::uint16_t shape = rig.shapes_of_controls[i];
+    if (shape < shapes) f(rig.shape_outputs[shape]);
+  }
+}
+
+void every_channel(const Rig& rig, std::uint32_t shapes, const float* controls,
+                   float* out) noexcept {
+  const std::uint32_t run = std::min(shapes, rig.shape_run);
+  float* to = out + (run > 0 ? rig.shape_outputs[0] : 0);
+  std::fill(out, to, 0.0f);
+  if (run > 0) to = std::copy_n(controls + rig.shape_inputs[0], run, to);
+  std::fill(to, out + rig.blend_shape_count, 0.0f);
+  for (std::uint32_t i = run; i < shapes; ++i) {
+    out[rig.shape_outputs[i]] = controls[rig.shape_inputs[i]];
+  }
+}
+
 void channels(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> active,
               const PoseView& pose) noexcept {
   const std::uint32_t shapes = rig.shape_lods.empty() ? 0 : rig.shape_lods[lod];
-  const std::uint32_t run = std::min(shapes, rig.shape_run);
   float* const out = pose.blend_shapes;
-  if (lists_channels(rig, run, shapes, active.size())) {
-    std::fill(out, out + rig.blend_shape_count, 0.0f);
-    for (const std::uint16_t control : active) {
-      const std::uint32_t end = rig.shape_begins[control + std::size_t{1}];
-      for (std::uint32_t i = rig.shape_begins[control]; i < end; ++i) {
-        const std::uint16_t shape = rig.shapes_of_controls[i];
-        if (shape < shapes) out[rig.shape_outputs[shape]] = pose.controls[control];
-      }
+  if (!lists_channels(rig, std::min(shapes, rig.shape_run), shapes, active.size())) {
+    return every_channel(rig, shapes, pose.controls, out);
+  }
+  std::fill(out, out + rig.blend_shape_count, 0.0f);
+  for (const std::uint16_t control : active) {
+    for_channels(rig, shapes, control,
+                 [&](std::uint16_t channel) { out[channel] = pose.controls[control]; });
+  }
+}
+
+// The maps of frames: a run that rests in all of them is looked at once.
+// In: values  [controls, kFrames]
+void frame_maps(const Rig& rig, std::uint32_t lod, const float* values, std::size_t count,
+                float* out) noexcept {
+  const std::size_t maps = rig.animated_map_count;
+  std::fill(out, out + count * maps, 0.0f);
+  const std::uint32_t rows = rig.map_lods.empty() ? 0 : rig.map_lods[lod];
+  for (const RowRun& run : rig.map_runs) {
+    if (run.begin >= rows) break;
+    const float* v = values + std::size_t{run.input} * simd::kFrames;
+    if (run.wakes == 0 && detail::rest_eight(v)) continue;
+    const std::uint32_t end = std::min(rig.map_rows[run.begin].run_end, rows);
+    for (std::size_t f = 0; f < count; ++f) {
+      if (v[f] == 0.0f && run.wakes == 0) continue;
+      add_run(rig.map_rows.subspan(run.begin, end - run.begin), v[f], out + f * maps);
+    }
+  }
+  clamp(out, count * maps);
+}
+
+// As channels, of frames. In: values  [controls, kFrames]; controls  [count, controls]: the same
+void frame_channels(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> active,
+                    const float* values, std::size_t count, const float* controls,
+                    float* out) noexcept {
+  const std::uint32_t shapes = rig.shape_lods.empty() ? 0 : rig.shape_lods[lod];
+  if (!lists_channels(rig, std::min(shapes, rig.shape_run), shapes, active.size())) {
+    for (std::size_t f = 0; f < count; ++f) {
+      every_channel(rig, shapes, controls + f * rig.control_count, out + f * rig.blend_shape_count);
     }
     return;
   }
-  float* to = out + (run > 0 ? rig.shape_outputs[0] : 0);
-  std::fill(out, to, 0.0f);
-  if (run > 0) to = std::copy_n(pose.controls + rig.shape_inputs[0], run, to);
-  std::fill(to, out + rig.blend_shape_count, 0.0f);
-  for (std::uint32_t i = run; i < shapes; ++i) {
-    out[rig.shape_outputs[i]] = pose.controls[rig.shape_inputs[i]];
+  std::fill(out, out + count * rig.blend_shape_count, 0.0f);
+  for (const std::uint16_t control : active) {
+    const float* from = values + std::size_t{control} * simd::kFrames;
+    for_channels(rig, shapes, control, [&](std::uint16_t channel) {
+      for (std::size_t f = 0; f < count; ++f) out[f * rig.blend_shape_count + channel] = from[f];
+    });
   }
 }
 
@@ -116,6 +167,14 @@ void detail::channels_and_maps(const Rig& rig, std::uint32_t lod, const Workspac
                                const PoseView& pose) noexcept {
   channels(rig, lod, {work.active.data(), work.active_count}, pose);
   maps(rig, lod, pose);
+}
+
+void detail::frame_channels_and_maps(const Rig& rig, std::uint32_t lod, std::size_t count,
+                                     const Workspace& work, const PoseView& first) noexcept {
+  const float* values = work.frame_weights.data();
+  frame_channels(rig, lod, {work.active.data(), work.active_count}, values, count, first.controls,
+                 first.blend_shapes);
+  frame_maps(rig, lod, values, count, first.animated_maps);
 }
 
 }  // namespace risorius::rig
