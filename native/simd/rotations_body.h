@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <iterator>
 
 #include "simd/kernels.h"
 #include "simd/kernels_inline.h"
@@ -142,12 +143,14 @@ RISORIUS_INLINE bool turns(const float* angles) {
   return (two | third) != 0;
 }
 
-// Those that turn are gathered until they fill the arrays; the others are no rotation already.
+// Those that turn are gathered; the others are no rotation. Sixteen are turned when as many twice
+// have been gathered behind them: what was written just before would have to be waited for.
 template <class Parts>
 RISORIUS_TARGET void quaternions(const EulerTurns& e, const std::uint16_t* which, std::size_t n,
                                  float* rotations, std::size_t stride) {
-  std::uint32_t turning[2 * kTurns];  // where they begin
-  std::size_t count = 0;
+  constexpr std::size_t kBehind = 3 * kTurns;
+  std::uint32_t turning[17 * kTurns];  // where they begin
+  std::size_t count = 0, done = 0;
   float elsewhere = 0;
   for (std::size_t i = 0; i < n; i += kTurns) {
     const std::size_t end = n - i < kTurns ? n : i + kTurns;
@@ -159,15 +162,22 @@ RISORIUS_TARGET void quaternions(const EulerTurns& e, const std::uint16_t* which
       turning[count] = static_cast<std::uint32_t>(at);
       count += moves ? 1 : 0;
     }
-    if (count < kTurns) continue;
-    turn_together<Parts>(e, turning, rotations);
-    count -= kTurns;
-    for (std::size_t l = 0; l < count; ++l) turning[l] = turning[kTurns + l];
+    if (count - done >= kBehind) {
+      turn_together<Parts>(e, turning + done, rotations);
+      done += kTurns;
+    }
+    if (count + kTurns <= std::size(turning)) continue;
+    for (std::size_t l = done; l < count; ++l) turning[l - done] = turning[l];
+    count -= done;
+    done = 0;
   }
-  if (count == 0) return;
+  for (; count - done >= kTurns; done += kTurns) {
+    turn_together<Parts>(e, turning + done, rotations);
+  }
+  if (count == done) return;
   // Arrays that are not full get the last one over and over: it is read before it is written.
-  for (std::size_t l = count; l < kTurns; ++l) turning[l] = turning[count - 1];
-  turn_together<Parts>(e, turning, rotations);
+  for (std::size_t l = count; l < done + kTurns; ++l) turning[l] = turning[count - 1];
+  turn_together<Parts>(e, turning + done, rotations);
 }
 
 }  // namespace

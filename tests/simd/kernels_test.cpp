@@ -421,7 +421,7 @@ TEST_P(SimdKernels, TurnEulerAnglesIntoQuaternions) {
 // Those that turn share a pass with others than their neighbours, large angles with small ones, and
 // each has the bits of one alone.
 TEST_P(SimdKernels, TurnRotationsTogetherAsAlone) {
-  constexpr std::size_t kCount = 100, kStride = 10;
+  constexpr std::size_t kCount = 700, kStride = 10;
   std::mt19937 random(12);
   for (const float most : {0.5f, 1.57f, 2.0f, 40.0f}) {
     std::uniform_real_distribution<float> angle(-most, most);
