@@ -64,6 +64,7 @@ class Block {
                                   weights, out, stride_, rows);
     }
   }
+
   const Rig& rig_;
   Workspace& work_;
   PoseView first_;

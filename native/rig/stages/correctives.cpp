@@ -275,7 +275,7 @@ void frame_correctives(const Rig& rig, std::span<const std::uint16_t> firing, fl
   }
 }
 
-// Out: controls  [count, controls]
+// What work has of the controls, frame after frame. Out: controls  [count, controls]
 void write_frames(const Rig& rig, const float* raw, std::size_t count, const Workspace& work,
                   float* controls) noexcept {
   const std::uint32_t correctives_end = rig.raw_count + rig.psd_count;
