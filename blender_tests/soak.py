@@ -20,7 +20,6 @@ import json
 import os
 import random
 import shutil
-import subprocess
 import sys
 import tempfile
 import time
@@ -28,9 +27,13 @@ import traceback
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
+sys.path.append(str(HERE.parent / "packaging"))
+
+import limits  # noqa: E402
+
 MODULE = "bl_ext.user_default.risorius"
 MAX_GROWTH = 0.03  # of the memory in use, over the second half of the run
-SECONDS_PER_ACTION = 1.0  # in the mean, before the child counts as hung
+SECONDS_PER_ACTION = 1.0  # of CPU, in the mean, before the child counts as hung
 
 
 def arguments(given):
@@ -43,7 +46,7 @@ def arguments(given):
     parser.add_argument("--check", type=int, default=250, help="look at all faces every N actions")
     parser.add_argument("--blender", default=None, help="an executable; else the bpy module")
     parser.add_argument("--log", type=Path, default=None)
-    parser.add_argument("--timeout", type=float, default=None, help="seconds")
+    parser.add_argument("--still", type=float, default=limits.STILL, help="seconds idle")
     parser.add_argument("--child", type=Path, default=None, help=argparse.SUPPRESS)
     return parser.parse_args(given)
 
@@ -76,14 +79,13 @@ def parent(options):
     environment = dict(os.environ, BLENDER_USER_RESOURCES=str(folder / "user"))
     environment["RISORIUS_TEST_USER"] = str(folder / "user")
     begin = time.monotonic()
-    limit = options.timeout or 120 + options.actions * SECONDS_PER_ACTION
+    limit = 120 + options.actions * SECONDS_PER_ACTION
     try:
-        code = subprocess.run(
-            command(options, folder), env=environment, timeout=limit, check=False
-        ).returncode
-        ending = "" if code == 0 else f"the child ended with exit code {code}"
-    except subprocess.TimeoutExpired:
-        ending = f"the child was killed after {limit:.0f} s"
+        done = limits.run(command(options, folder), limit, options.still, env=environment)
+        print(done.stdout, done.stderr, sep="", end="")
+        ending = "" if done.returncode == 0 else f"the child ended with exit code {done.returncode}"
+    except limits.Exceeded as error:
+        ending = f"the child was killed, {error.why}"
     text, failed = report(options, folder, ending, time.monotonic() - begin)
     log.write_text(text, encoding="utf-8")
     print(text, end="")

@@ -9,12 +9,12 @@ on each other, in this order.
 
 import json
 import os
-import subprocess
 import sys
 import zipfile
 from pathlib import Path
 
 import bpy
+import limits
 import pytest
 from support.faces import small_face
 
@@ -39,14 +39,7 @@ def _run(home, *command):
     paths = os.environ.get("PYTHONPATH", "").split(os.pathsep)
     kept = (path for path in paths if path and not (Path(path) / "risorius").is_dir())
     settings["PYTHONPATH"] = os.pathsep.join(kept)
-    done = subprocess.run(
-        [str(c) for c in command],
-        env=settings,
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
+    done = limits.run([str(c) for c in command], 120, env=settings)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "Traceback" not in done.stdout + done.stderr, done.stdout + done.stderr
     return done.stdout

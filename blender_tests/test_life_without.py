@@ -2,11 +2,11 @@
 """A Blender without the add-on shows the last pose, loses nothing, and its edits count later."""
 
 import os
-import subprocess
 import sys
 from pathlib import Path
 
 import bpy
+import limits
 import numpy as np
 import pytest
 from support import scene
@@ -45,7 +45,7 @@ def _in_another_blender(blend, folder):
     if bpy.app.binary_path:  # Blender itself: sys.executable is its Python, without bpy
         flags = ["-b", "--factory-startup", "-noaudio", "--python-exit-code", "1"]
         program = [bpy.app.binary_path, *flags, "--python", str(script), "--"]
-    subprocess.run([*program, str(blend), str(out)], env=environment, check=True, timeout=120)
+    limits.run([*program, str(blend), str(out)], 120, env=environment).check_returncode()
     return np.load(out)
 
 

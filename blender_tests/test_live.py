@@ -4,12 +4,12 @@
 import json
 import math
 import socket
-import subprocess
 import sys
 from pathlib import Path
 from time import monotonic, sleep
 
 import bpy
+import limits
 import numpy as np
 import pytest
 import risorius.live
@@ -59,7 +59,7 @@ def send(port, *steps):
     """Run the sender to its end."""
     lines = "".join(json.dumps(step) + "\n" for step in steps)
     command = [sys.executable, str(SENDER), str(port)]
-    subprocess.run(command, input=lines, text=True, check=True, timeout=60)
+    limits.run(command, 60, input=lines).check_returncode()
 
 
 def session_of(rig):

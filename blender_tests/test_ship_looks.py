@@ -4,11 +4,11 @@
 import importlib.util
 import json
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
 import bpy
+import limits
 import numpy as np
 import pytest
 from support import looks, scene
@@ -56,7 +56,7 @@ def _read(kind, path):
     if kind == "FBX" and shutil.which("assimp") is None:
         pytest.skip("EXTRA NOT RUN: FBX files read by Assimp, which is not there")
     command = [sys.executable, str(READERS), kind, str(path)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=100, check=False)
+    done = limits.run(command, 100)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
 

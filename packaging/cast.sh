@@ -15,7 +15,7 @@ for person in man woman girl lady fighter elder; do
 done
 step "Blender: one action on eighteen faces"
 fresh_blender
-shown "$out/blender.log" timeout -s KILL 14400 "$python" "$project/packaging/demo/cast.py" -- \
+shown "$out/blender.log" limited 28800 "$python" "$project/packaging/demo/cast.py" -- \
   --extension "$zip" --out "$out" --face "${faces[@]}"
 step "film"
 rate=12 crf=26 end_film 1 cast.mp4

@@ -20,7 +20,7 @@ counted() {
   local folder=$1
   shift
   COVERAGE_RCFILE="$project/packaging/coverage.ini" PYTHONPATH="$folder" RISORIUS_TEST_PATH="$folder" \
-    timeout -s KILL 5400 "$python" -m coverage run --rcfile packaging/coverage.ini "$@" \
+    limited 5400 "$python" -m coverage run --rcfile packaging/coverage.ini "$@" \
     "${slow[@]/#/--ignore=}"
 }
 

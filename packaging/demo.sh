@@ -20,7 +20,7 @@ if [ -n "${BLENDER:-}" ]; then
 else
   run=("$python" "$project/packaging/demo/demo.py")
 fi
-shown "$out/blender.log" timeout -s KILL 7200 "${run[@]}" "${arguments[@]}"
+shown "$out/blender.log" limited 14400 "${run[@]}" "${arguments[@]}"
 step "contact sheet and film"
 "$python" "$project/packaging/demo/sheet.py" "$out/sheet" "$out/contact_sheet.png"
 rate=12 crf=17 end_film 1 demo.mp4

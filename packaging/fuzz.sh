@@ -32,8 +32,8 @@ run_target() {
   local longest=4400
   case $1 in json) longest=8192 ;; rig) longest=14000 ;; esac
   mkdir -p "$corpora/$1" "$corpora/seeds/$1"
-  ASAN_OPTIONS=malloc_context_size=4:quarantine_size_mb=32 "$programs/$1_fuzz" \
-    -max_total_time="$2" -timeout=5 -rss_limit_mb=2048 -max_len=$longest -print_final_stats=1 \
+  ASAN_OPTIONS=malloc_context_size=4:quarantine_size_mb=32 limited $(($2 + 60)) "$programs/$1_fuzz" \
+    -max_total_time="$2" -timeout=60 -rss_limit_mb=2048 -max_len=$longest -print_final_stats=1 \
     -dict="$project/tests/fuzz/dna.dict" -artifact_prefix="$finds/$1-" \
     "$corpora/$1" "$corpora/seeds/$1" > "$logs/$1.log" 2>&1
 }
@@ -47,7 +47,7 @@ find_planted() { # find_planted TARGET WORDS
 
 # Faces whose lists multiply each other, once each: too slow to be changed and run again.
 run_bombs() {
-  "$programs/evaluate_fuzz" -timeout=60 -rss_limit_mb=2048 -artifact_prefix="$finds/bombs-" \
+  limited 300 "$programs/evaluate_fuzz" -timeout=600 -rss_limit_mb=2048 -artifact_prefix="$finds/bombs-" \
     "$corpora/seeds/bombs"/* > "$logs/bombs.log" 2>&1
 }
 

@@ -31,7 +31,7 @@ run() { # run NAME KEY COMMAND...: the tests in one Blender, with a user folder 
   rm -f "$logs/$key.xml"
   user=$(mktemp -d)
   # Freed memory is filled, so that what reads it dies here and not only now and then.
-  MALLOC_PERTURB_=165 BLENDER_USER_RESOURCES="$user" timeout -s KILL 1800 "$@" --extension "$zip" \
+  MALLOC_PERTURB_=165 BLENDER_USER_RESOURCES="$user" limited 1800 "$@" --extension "$zip" \
     --junitxml "$logs/$key.xml" "${arguments[@]}" > "$logs/$key.log" 2>&1
   local code=$?
   rm -rf "$user"
@@ -50,7 +50,7 @@ for version in ${BPY-4.2.0 4.2.23 4.5.15 5.0.1}; do
   fi
 done
 for program in "$prefix-trixie/blender.sh" "$prefix-sid/blender.sh" ${BLENDER:-}; do
-  version=$(timeout -s KILL 60 "$program" --version 2> /dev/null |
+  version=$(limited 60 "$program" --version 2> /dev/null |
     grep -oE '^Blender [0-9.]+' | head -n 1)
   if [ -z "$version" ]; then
     echo "$program does not start (packaging/blenders.sh makes it)" >&2

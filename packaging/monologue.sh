@@ -24,7 +24,7 @@ done < <("$python" "$project/packaging/demo/monologue_acting.py")
 ffmpeg -y -loglevel error "${sounds[@]}" -filter_complex "$delays${labels}amix=inputs=${#voices[@]}:normalize=0,apad" -t 20 "$out/voice.wav"
 step "Blender: read, hope, rejoice, remember"
 fresh_blender
-shown "$out/blender.log" timeout -s KILL 14400 "$python" "$project/packaging/demo/monologue.py" -- \
+shown "$out/blender.log" limited 28800 "$python" "$project/packaging/demo/monologue.py" -- \
   --extension "$zip" --dna "$person" --voices "${voices[@]}" --out "$out" "$@"
 case " $* " in *" --only "*) exit 0 ;; esac
 step "film"

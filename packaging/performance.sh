@@ -15,7 +15,7 @@ done
 step "voice" && espeak-ng -v en-us -s 165 -p 45 -w "$out/voice.wav" "$text"
 step "Blender: speak, smile, flinch"
 fresh_blender
-shown "$out/blender.log" timeout -s KILL 14400 "$python" "$project/packaging/demo/performance.py" -- \
+shown "$out/blender.log" limited 28800 "$python" "$project/packaging/demo/performance.py" -- \
   --extension "$zip" --man "$out/man.dna" --woman "$out/woman.dna" --voice "$out/voice.wav" \
   --text "$text" --out "$out"
 step "film"

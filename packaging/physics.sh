@@ -9,7 +9,7 @@ begin_film physics
 step "sample person" && "$venv/bin/risorius" sample build "$out/sample.dna"
 step "Blender: act, simulate, render"
 fresh_blender
-shown "$out/blender.log" timeout -s KILL 7200 "$python" "$project/packaging/demo/physics.py" -- \
+shown "$out/blender.log" limited 14400 "$python" "$project/packaging/demo/physics.py" -- \
   --extension "$zip" --dna "$out/sample.dna" --out "$out"
 step "film"
 end_film 1 physics.mp4

@@ -51,6 +51,10 @@ shown() {
   fi
 }
 
+# limited CPU_SECONDS COMMAND...: killed when it and its children have used so much CPU, or stand still.
+# What has no limit by the clock passes on a busy machine too; bpy sometimes hangs at exit.
+limited() { python3 "$project/packaging/limits.py" "$@"; }
+
 install_packages() { # install_packages [MORE...]: what every build needs, and more
   local missing=()
   for package in python3-venv python3-dev g++ cmake ninja-build ccache libgtest-dev libgmock-dev libbenchmark-dev \

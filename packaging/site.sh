@@ -27,7 +27,7 @@ zip=$(ls "$project"/build/dist/risorius-*.zip 2> /dev/null | head -n 1)
 
 step "site"
 works "site: tools" tools site_tools &&
-  works "site: panels and operators" panels timeout -s KILL 300 "$python" "$own/blender_classes.py" "$zip" "$site/classes.json" &&
+  works "site: panels and operators" panels limited 300 "$python" "$own/blender_classes.py" "$zip" "$site/classes.json" &&
   works "site: pages" pages "$python" "$own/gather.py" "$site/pages" "$site/classes.json" &&
   works "site: mkdocs build --strict" mkdocs "$tools/bin/python" -m mkdocs build --strict --quiet -f "$site/mkdocs.yml" &&
   works "site: links" links "$tools/bin/python" "$own/links.py" "$site/html"

@@ -134,7 +134,7 @@ run_blender() {
   rm -f "$log.xml"
   # A throw-away user folder: a Blender program reads it before the tests could set it.
   user=$(mktemp -d)
-  BLENDER_USER_RESOURCES="$user" timeout -s KILL 2400 "$@" --durations 15 --junitxml "$log.xml" \
+  BLENDER_USER_RESOURCES="$user" limited 2400 "$@" --durations 15 --junitxml "$log.xml" \
     > "$log" 2>&1
   code=$?
   rm -rf "$user"
@@ -162,13 +162,13 @@ run_subsets() {
 }
 run_program() { # run_program BLENDER: a program of 4.2 or newer
   local version
-  version=$(timeout -s KILL 60 "$1" --version 2> /dev/null | grep -oE '^Blender [0-9.]+' | head -n 1)
+  version=$(limited 60 "$1" --version 2> /dev/null | grep -oE '^Blender [0-9.]+' | head -n 1)
   if [ -z "$version" ]; then
     note "$1 (does not start)" 0 1
   elif [ "$(printf '%s\n4.2\n' "${version#Blender }" | sort -V | head -n 1)" != 4.2 ]; then
     say "NOT RUN: $version at $1 is older than 4.2"
   else
-    check "manifest, $version" timeout -s KILL 60 "$1" --factory-startup --command extension \
+    check "manifest, $version" limited 60 "$1" --factory-startup --command extension \
       validate "$zip"
     run_blender "$version" "$(echo blender_tests/test_*.py)" "$1" -b --factory-startup -noaudio \
       --python-exit-code 1 --python blender_tests/run.py -- --extension "$zip"

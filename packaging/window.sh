@@ -34,13 +34,13 @@ drive() { # drive BLENDER NAME: all steps in one program
   cp "$zip" "$project/packaging/window/inside.py" "$user/"
   cd "$user" || return 1
   export BLENDER_USER_RESOURCES="$user" HOME="$user"
-  timeout -s KILL 600 "$blender" --command extension install-file -r user_default -e "$user/$(basename "$zip")" > "$out/install.log" 2>&1 ||
+  limited 600 "$blender" --command extension install-file -r user_default -e "$user/$(basename "$zip")" > "$out/install.log" 2>&1 ||
     { printf 'row\t%s: the extension is installed\t0\t1\n' "$2" && return 1; }
   unzip -q -o -j "$zip" 'sample/man.dna' -d "$user" 2> /dev/null || cp "$project/build/sample/man.dna" "$user/"
   Xvfb "$DISPLAY" -screen 0 1440x900x24 > "$out/xvfb.log" 2>&1 &
   x=$!
   trap 'kill $x 2> /dev/null' EXIT
-  timeout -s KILL 3000 "$python" "$project/packaging/window/drive.py" "$out" "$user" "${STEPS:-}" "$blender" \
+  limited 3000 "$python" "$project/packaging/window/drive.py" "$out" "$user" "${STEPS:-}" "$blender" \
     2> "$out/drive.log" | sed -u "s/^row\t/row\t$2: /"
   local code=${PIPESTATUS[0]}
   kill $x 2> /dev/null
@@ -64,7 +64,7 @@ put_pictures() { # put_pictures FOLDER
 
 cd /tmp || exit 1
 for blender; do
-  name=$(timeout -s KILL 120 "$blender" --version 2> /dev/null | grep -oE '^Blender [0-9.]+' | head -n 1)
+  name=$(limited 120 "$blender" --version 2> /dev/null | grep -oE '^Blender [0-9.]+' | head -n 1)
   if [ -z "$name" ]; then
     printf 'say\tNOT RUN: the real window of %s, which does not start\n' "$blender"
     continue

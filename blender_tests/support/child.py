@@ -2,11 +2,11 @@
 """Runs a few lines in a Blender of their own: for other environments, and for what may crash."""
 
 import os
-import subprocess
 import sys
 from pathlib import Path
 
 import bpy
+import limits
 
 HERE = Path(__file__).resolve().parents[1]
 _START = """
@@ -36,13 +36,13 @@ os._exit(code)
 """
 
 
-def run(tmp_path, body, timeout=300, **environment):
+def run(tmp_path, body, cpu=300, **environment):
     """Run lines of Python with `bpy` and `scene` at hand.
 
     Args:
         tmp_path: folder for the script.
         body: the lines.
-        timeout: seconds.
+        cpu: seconds of CPU.
         environment: variables to set.
 
     Returns:
@@ -56,12 +56,5 @@ def run(tmp_path, body, timeout=300, **environment):
     if bpy.app.binary_path:
         program = [bpy.app.binary_path, "-b", "--factory-startup", "-noaudio"]
         program += ["--python-exit-code", "1", "--python", str(script)]
-    done = subprocess.run(
-        program,
-        env={**os.environ, **environment},
-        capture_output=True,
-        text=True,
-        timeout=timeout,
-        check=False,
-    )
+    done = limits.run(program, cpu, env={**os.environ, **environment})
     return done.returncode, done.stdout + done.stderr

@@ -49,12 +49,12 @@ prepare() { # the release before, a zip that is cut short, those of other machin
   cp "$zip" "$out/twice/"
 }
 in_blender() { # in_blender STEP,STEP,...: with a window, which Xvfb shows
-  BLENDER_USER_RESOURCES="$user" HOME="$user/home" RISORIUS_CACHE="$user/home/cache" timeout -s KILL 1800 \
+  BLENDER_USER_RESOURCES="$user" HOME="$user/home" RISORIUS_CACHE="$user/home/cache" limited 1800 \
     "$blender" --window-geometry 0 0 1280 800 -noaudio --python "$out/trial.py" -- \
     "$1" "$out" "http://127.0.0.1:$port/risorius/index.json" > "$out/$1.log" 2>&1
 }
 in_blender_without_window() { # the one step that asks nothing of a window
-  BLENDER_USER_RESOURCES="$user" HOME="$user/home" timeout -s KILL 900 "$blender" --background -noaudio \
+  BLENDER_USER_RESOURCES="$user" HOME="$user/home" limited 900 "$blender" --background -noaudio \
     --python "$out/trial.py" -- "$1" "$out" none > "$out/$1.log" 2>&1
 }
 # command NAME ARGUMENT...: Blender's own command line; what it said and whether Risorius is there then,
@@ -62,7 +62,7 @@ in_blender_without_window() { # the one step that asks nothing of a window
 command_of_blender() {
   local name=$1 said
   shift
-  said=$(BLENDER_USER_RESOURCES="$user" HOME="$user/home" timeout -s KILL 900 "$blender" --online-mode \
+  said=$(BLENDER_USER_RESOURCES="$user" HOME="$user/home" limited 900 "$blender" --online-mode \
     --command extension "$@" 2>&1 | grep -iE 'error|warn|incompatible|not |fail' | grep -vE 'mounted|blender[._]org' | head -n 3 |
     sed "s|$top[^\" ]*/||g;s|$user[^\" ]*/||g" | paste -sd ' ')
   printf '%s\t%s\t%s\n' "$name" "$(ls -d "$user"/extensions/{user_default,cut,gone}/risorius 2> /dev/null | wc -l)" \
@@ -85,7 +85,7 @@ make_faults() {
 left_behind() { find "$user" -iname '*risorius*' -not -path '*/home/*' | grep -v __pycache__ || true; }
 
 for blender; do
-  name=$(timeout -s KILL 120 "$blender" --version 2> /dev/null | grep -oE '^Blender [0-9.]+' | head -n 1)
+  name=$(limited 120 "$blender" --version 2> /dev/null | grep -oE '^Blender [0-9.]+' | head -n 1)
   [ -n "$name" ] || { row "$blender starts" 0 && continue; }
   out="$top/${name// /-}" served="$top/served"
   rm -rf "$out" "$served"

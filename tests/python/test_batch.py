@@ -489,7 +489,7 @@ def test_dask_with_a_worker_killed_in_the_middle(tmp_path, capsys, monkeypatch):
     with Dask(tmp_path) as dask:
         cluster = Cluster(dask.address, batch_work.slow)
         with contextlib.suppress(TimeoutError):
-            cluster._client.wait_for_workers(2, timeout=30)
+            cluster._client.wait_for_workers(2, timeout=600)
         assert len(cluster.workers()) == 2
         lost = lose_the_first(cluster, monkeypatch)
         for outcome in cluster.results(plan.jobs):

@@ -6,10 +6,10 @@ import errno
 import os
 import signal
 import stat
-import subprocess
 import sys
 import textwrap
 
+import limits
 import pytest
 from conftest import no_room
 from risorius.files import fileio
@@ -18,10 +18,8 @@ posix = pytest.mark.skipif(os.name == "nt", reason="of POSIX")
 
 
 def run(code, *arguments, **options):
-    return subprocess.run(
-        [sys.executable, "-c", textwrap.dedent(code), *map(str, arguments)],
-        capture_output=True, text=True, check=False, timeout=60, **options,
-    )  # fmt: skip
+    command = [sys.executable, "-c", textwrap.dedent(code), *map(str, arguments)]
+    return limits.run(command, 60, **options)
 
 
 def test_nothing_is_seen_before_it_is_whole(tmp_path):

@@ -3,12 +3,12 @@
 
 import os
 import shutil
-import subprocess
 import sys
 import textwrap
 
 import conftest
 import espeak_truth
+import limits
 import numpy as np
 import pytest
 from risorius.speech import AudioError, CancelledError, apart, speak
@@ -82,9 +82,9 @@ def test_another_libpocketsphinx_in_this_process_does_not_matter(voice, tmp_path
     (tmp_path / "clash.c").write_text(CLASH)
     library = tmp_path / "libclash.so"
     build = [compiler, "-shared", "-fPIC", "-o", str(library), str(tmp_path / "clash.c")]
-    subprocess.run(build, check=True, timeout=60)
+    limits.run(build, 60).check_returncode()
     command = [sys.executable, "-c", textwrap.dedent(PROGRAM), str(library), str(voice), WORDS]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    done = limits.run(command, 120)
     said = done.stdout.splitlines()
     assert said[-1:] == ["apart: aligned"], done.stderr
     # And the library does clash: without a process of its own there is no speech.
