@@ -144,6 +144,40 @@ def test_partners_change_alike_and_as_little_as_they_can(face, method):
     np.testing.assert_allclose(change, best, atol=5e-4)  # of a face that bends
 
 
+def test_partners_keep_the_limits_of_both(face):
+    """How far each may go is how far both go, up and down."""
+    surface, points = face[1], [(0, 14 * 3 + 5), (0, 14 * 10 + 5)]
+    begin = raw(left=0.5, right=0.5)
+    both = {"free": np.isin(np.arange(7), [LEFT, RIGHT]), "partners": PARTNERS}
+    for goal, narrow in ((0.0, LEFT), (0.0, RIGHT), (1.0, LEFT), (1.0, RIGHT)):
+        targets = surface.positions(raw(left=goal, right=goal), 0, [v for _, v in points])
+        low, high = np.zeros(7), np.ones(7)
+        low[narrow], high[narrow] = 0.4, 0.7
+        solved = risorius.solve_drag(
+            surface, begin, points, targets, lowest=low, highest=high, **both
+        )
+        bound = 0.7 if goal else 0.4
+        assert solved.raw[[LEFT, RIGHT]] == pytest.approx(bound, abs=1e-6)
+
+
+@pytest.mark.parametrize("eases", [(1, 0.01), (0.01, 1)])
+def test_partners_change_as_readily_as_the_readier_one(face, eases):
+    """Others come there as well, and it is the pair that is to move."""
+    surface, vertex = face[1], 14 * 5 + 6
+    axis = np.array([0, 0.6, 0.8])
+    target = surface.positions(raw(), 0, [vertex]) + 0.1 * axis
+
+    def drag(left, right):
+        ease = np.full(7, 0.2)
+        ease[LEFT], ease[RIGHT] = left, right
+        given = {"axes": [[axis]], "ease": ease, "partners": PARTNERS}
+        return risorius.solve_drag(surface, raw(), [(0, vertex)], target, **given).raw
+
+    ready = drag(1, 1)
+    assert ready[LEFT] == ready[RIGHT] > 0.3
+    np.testing.assert_array_equal(drag(*eases), ready)
+
+
 def test_of_opposites_one_alone_is_used(face):
     """The left smile and the puff both bring this vertex up; together they fit a little better."""
     surface, vertex = face[1], 14 * 5 + 6
@@ -283,6 +317,21 @@ def test_what_cannot_be_reached_ends_at_the_limits(face):
     assert solved.raw[JAW] == 1
     assert solved.raw[TWIN] == 1
     assert ((solved.raw >= 0) & (solved.raw <= 1)).all()
+
+
+@pytest.mark.parametrize("method", ["least_squares", "transpose"])
+def test_a_control_beyond_its_limits_stays_or_comes_back(face, method):
+    """A pose from elsewhere may be beyond the limits; a drag goes no further and jumps nowhere."""
+    surface, vertex = face[1], 14 * 7
+    only = {"free": np.arange(7) == JAW, "method": method}
+    for start, wanted, found in (
+        (1.4, 1.4, 1.4), (1.4, 1.8, 1.4), (1.4, 1.2, 1.2),
+        (-0.3, -0.3, -0.3), (-0.3, -0.6, -0.3), (-0.3, -0.1, -0.1),
+    ):  # fmt: skip
+        target = surface.positions(raw(jaw=wanted), 0, [vertex])
+        solved = risorius.solve_drag(surface, raw(jaw=start), [(0, vertex)], target, **only)
+        assert solved.raw[JAW] == pytest.approx(found, abs=1e-4)
+        assert (np.delete(solved.raw, JAW) == 0).all()
 
 
 def test_the_best_control_is_the_one_that_was_moved(face):

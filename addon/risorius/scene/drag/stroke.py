@@ -100,7 +100,7 @@ class Stroke:
     best: list[tuple[int, float, float]] = field(default_factory=list)
     _anchors: dict[bool, _Anchors] = field(default_factory=dict)
     _was: NDArray[np.float32] | None = None  # [V, 3] of the dragged mesh at the press, file space
-    _eases: dict[tuple[bool, tuple[Point, ...]], Float] = field(default_factory=dict)
+    _eases: dict[tuple[Point, ...], Float] = field(default_factory=dict)
     _apart: Float = field(default_factory=lambda: np.zeros(3))  # seen less predicted, world
 
     @property
@@ -259,16 +259,14 @@ class Stroke:
 
     def _ease(self) -> Float:
         """float64[R]: how readily the controls change where the points are that are dragged."""
-        surface, key = self.skin.surface, (self._is_symmetric, self.options.others)
+        surface, key = self.skin.surface, self.options.others
         if key not in self._eases:
             low, high = self.state.low, self.state.high
             reach = [self.reach]
             for mesh, vertex in self.options.others:
                 if mesh in surface.mesh_indices:
                     reach += [*surface.jacobian(self.state.seen, mesh, [vertex], low, high)]
-            ease = native.module().local_ease(surface, np.stack(reach))
-            other = ease[self._partners] if self._is_symmetric else ease
-            self._eases[key] = np.maximum(ease, other)
+            self._eases[key] = native.module().local_ease(surface, np.stack(reach))
         return self._eases[key]
 
     def _of(self) -> _Anchors:

@@ -127,7 +127,10 @@ def _drag(
     probe = surface.probe(np.asarray(points, np.int64).reshape(count, 2))
     easy = vector("ease", 1.0 if ease is None else ease, len(raw))
     unknowns = _unknowns(len(raw), partners, easy)
-    return _Drag(probe, loose, wanted, along, np.sqrt(weight), low, high, easy, unknowns)
+    # A pair is as ready as its readier half: the other half alone would hold both back.
+    pair = easy.copy()
+    pair[unknowns.first] = pair[unknowns.second] = unknowns.ease
+    return _Drag(probe, loose, wanted, along, np.sqrt(weight), low, high, pair, unknowns)
 
 
 @dataclass
@@ -136,6 +139,7 @@ class _Unknowns:
 
     first: npt.NDArray[np.int64]  # [U] controls
     second: npt.NDArray[np.int64]  # [U] their partners, themselves where they have none
+    ease: Doubles  # [U]: of two partners that of the readier one
     scale: Doubles  # [U]: what a unit of an unknown changes each of its controls by
 
     def columns(self, jacobian: Doubles) -> Doubles:
@@ -171,7 +175,8 @@ def _unknowns(count: int, partners: npt.ArrayLike | None, ease: Doubles) -> _Unk
     first = np.unique(np.minimum(each, partner))
     second = partner[first].astype(np.int64)
     easier = np.maximum(ease[first], ease[second])
-    return _Unknowns(first, second, np.where(first == second, 1.0, np.sqrt(0.5)) * easier)
+    scale = np.where(first == second, 1.0, np.sqrt(0.5)) * easier
+    return _Unknowns(first, second, easier, scale)
 
 
 def solve_drag(
@@ -206,7 +211,8 @@ def solve_drag(
         lowest, highest: float[R] or one number: the limits; None is 0 and 1. A control that is
             beyond them may stay where it is.
         ease: float[R] above 0, how readily each control changes: one of 0.1 costs ten times as
-            much, and is left alone where others bring the points there; None is 1.
+            much, and is left alone where others bring the points there; of two partners the readier
+            one counts; None is 1.
         partners: int[R], each control's partner, itself where it has none: the two change alike, as
             left and right of a symmetric drag; None is no partners.
         opposites: pairs of controls of which one at most shall be on, as mouthLeft and mouthRight.
