@@ -321,6 +321,30 @@ TEST(Fit, WhatIsMoreImportantComesNearer) {
   EXPECT_LT(left_error(), 0.8 * alike);
 }
 
+TEST(Fit, WhatIsImportantIsNotSmoothedAway) {
+  Shapes shapes = sheet(1);
+  for (std::size_t y = 1; y < kSide; y += 2) {  // peaks among vertices that rest
+    for (std::size_t x = 1; x < kSide; x += 2) at(shapes, y * kSide + x, 0, 2) = 0.1f;
+  }
+  const std::size_t peak = 11 * kSide + 11;
+  GivenJoint head, riser;
+  riser.motions.resize(1);
+  riser.motions[0].translation = {0.0, 0.0, 0.1};
+  FitOptions options = few(2);
+  options.smoothness = 10.0;
+  options.symmetric = false;
+  const auto error = [&] {
+    auto fit = fit_weights(shapes, {head, riser}, options);
+    EXPECT_TRUE(fit) << fit.error().describe();
+    return std::abs(posed(shapes, *fit, peak, 0)[2] - 0.1);
+  };
+  const double alike = error();
+  EXPECT_GT(alike, 0.01);
+  shapes.importance.assign(shapes.vertex_count(), 1.0);
+  shapes.importance[peak] = 100.0;
+  EXPECT_LT(error(), 0.1 * alike);
+}
+
 TEST(Fit, WeightsGoOnFromThoseOfTheFinerMesh) {
   const Shapes shapes = two_sides();
   auto fit = fit_joints(shapes, few(9));

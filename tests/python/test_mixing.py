@@ -116,6 +116,18 @@ def test_a_mix_moves_half_way_between_its_parents(faces):
     assert np.linalg.norm(posed[1] - posed[2], axis=1).max() > 0.005
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_mean_of_two_turns_lies_on_the_short_way(faces, sign):
+    """Between 170 and -170 degrees is 180, and not 0."""
+    parents = [copy.copy(faces[0]), copy.copy(faces[0])]
+    for dna, angle in zip(parents, (170.0, -170.0), strict=True):
+        turns = np.array(dna.neutral_joint_rotations)
+        turns[-1] = [0, 0, sign * angle]
+        dna.neutral_joint_rotations = turns
+    mixed = np.asarray(mix_faces(parents, Mix([0.5, 0.5])).neutral_joint_rotations)
+    np.testing.assert_allclose([*mixed[-1, :2], abs(mixed[-1, 2])], [0, 0, 180], atol=1e-4)
+
+
 def test_levels_keep_their_rows(faces):
     mixed = mix_faces(faces[:2], Mix([0.5, 0.5]))
     for lod in range(3):

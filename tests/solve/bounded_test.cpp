@@ -109,6 +109,35 @@ TEST(Descend, MeetsTheConditionsOfTheLeast) {
   }
 }
 
+TEST(Descend, ComesNearTheLeastWhereControlsDoNearlyTheSame) {
+  std::mt19937 numbers(13);
+  constexpr std::size_t kCount = 4, kRows = 5;
+  for (int i = 0; i < 200; ++i) {
+    Doubles a = random(numbers, kRows * kCount, -1, 1), h(kCount * kCount), g(kCount);
+    for (std::size_t r = 0; r < kRows; ++r) {
+      for (std::size_t c = 1; c < kCount; ++c)
+        a[r * kCount + c] = a[r * kCount] + 0.01 * a[r * kCount + c];
+    }
+    for (std::size_t r = 0; r < kRows; ++r) {
+      for (std::size_t j = 0; j < kCount * kCount; ++j) {
+        h[j] += a[r * kCount + j / kCount] * a[r * kCount + j % kCount];
+      }
+    }
+    const Doubles goal = random(numbers, kCount, -1.5, 1.5);  // often beyond the bounds
+    const Doubles low = random(numbers, kCount, -1, -0.2), high = random(numbers, kCount, 0.2, 1);
+    for (std::size_t j = 0; j < kCount * kCount; ++j) g[j / kCount] += h[j] * goal[j % kCount];
+    const Doubles rest(kCount, 0.0), sparse(kCount, i % 2 == 0 ? 1e-4 : 0.0);
+    Doubles x(kCount, 0.0), slope(kCount);
+    descend({kCount, h.data(), g.data(), low.data(), high.data(), rest.data(), sparse.data()}, 1e-7,
+            x.data());
+    for (std::size_t c = 0; c < kCount; ++c) {
+      slope[c] = -g[c];
+      for (std::size_t k = 0; k < kCount; ++k) slope[c] += h[c * kCount + k] * x[k];
+    }
+    EXPECT_LT(violation(x, slope, low, high, rest, sparse), 0.005 * h[0]) << i;
+  }
+}
+
 TEST(Descend, LeavesAtRestWhatIsNotWorthItsPrice) {
   const Doubles h{2, 0, 0, 2}, g{1, 1}, low{-1, -1}, high{1, 1}, rest{0, 0.1}, sparse{1.5, 0.2};
   Doubles x{0.3, 0.3};

@@ -70,7 +70,7 @@ TEST(Probe, BringsVerticesWhereJointsAndShapesDo) {
   const std::vector<Point> points{{0, 1}, {0, 0}};
   Probe probe(surface, points);
   for (const float turn : {0.0f, 0.25f, 1.0f}) {
-    for (const float lift : {0.0f, 0.5f}) {
+    for (const float lift : {0.0f, 0.5f, 1.0f}) {
       const std::vector<float> raw{turn, lift};
       std::vector<double> found(6);
       probe.positions(raw.data(), found.data());
@@ -117,6 +117,18 @@ TEST(Probe, GoesToTheSideThatALimitLeaves) {
   for (std::size_t k = 0; k < 3; ++k) {
     EXPECT_NEAR(double{found.blocks[0].values[k]}, (here[k] - there[k]) / kStep, 2e-3);
   }
+}
+
+TEST(Probe, AShapeThatAStepTakesToNothingCounts) {
+  const Surface surface = surface_of(arm()).value();
+  const std::vector<Point> points{{0, 0}};
+  Probe probe(surface, points);
+  const auto step = static_cast<float>(kStep);
+  const std::vector<float> raw{0, step}, high{1, step};  // no room above: the step ends at 0
+  const std::vector<std::uint8_t> free{0, 1};
+  const Jacobian found = probe.jacobian(raw.data(), high.data(), free.data());
+  ASSERT_EQ(found.blocks[0].controls, (std::vector<std::uint32_t>{1}));
+  EXPECT_NEAR(found.blocks[0].values[2], 2.0f, 2e-3f);  // the whole shape along z
 }
 
 TEST(Probe, IsTheSameAfterDerivatives) {
