@@ -511,6 +511,12 @@ TEST(Fit, JointsOfALidLieInTheEye) {
   EXPECT_GT(at_pivot(0.5), 0);
   EXPECT_EQ(at_pivot(0.5), at_pivot(-0.5));
   EXPECT_LT(largest_error(shapes, *fit), 0.02);
+  // Eyes that are not quite alike: the joints of both sides are, half way between.
+  options.pivots[1].position[0] = -0.48;
+  fit = fit_joints(shapes, options);
+  ASSERT_TRUE(fit) << fit.error().describe();
+  EXPECT_GT(at_pivot(0.49), 0);
+  EXPECT_EQ(at_pivot(0.49), at_pivot(-0.49));
   options.pivots[0].expressions = {3};
   EXPECT_NE(fit_joints(shapes, options).error().describe().find("pivots[0]"), std::string::npos);
 }

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstddef>
 #include <cstring>
 #include <random>
@@ -325,6 +326,30 @@ TEST(Block, ScratchIsHeldAgainstTheBlock) {
   std::memcpy(forged.data() + kRigHeader + offsetof(RigHeader, mask_count), &regions,
               sizeof(regions));
   EXPECT_EQ(refused_field(forged), "rig.header");
+}
+
+// A network whose last layer has more rows than values are its own: the value behind is another's.
+TEST(Block, ANetworkWritesNoMoreThanItsOwnValues) {
+  const Rig rig = must_compile(face_that_learns());
+  BlockBytes changed = bytes_of(rig);
+  MlOperation* operations = &first_of(changed, rig, std::span(rig.ml_operations));
+  int networks = 0, scatters = 0;
+  for (std::size_t i = 0; i < rig.ml_operations.size(); ++i) {
+    MlOperation& operation = operations[i];
+    if (operation.kind == MlOperation::kMlp && networks++ == 0) operation.value_count -= 1;
+    // All together are as many as the block says.
+    if (operation.kind == MlOperation::kScatter && scatters++ == 0) {
+      operation.values_begin = 0, operation.value_count = 1;
+    }
+  }
+  ASSERT_GT(networks * scatters, 0);
+  seal_block(changed);
+  const auto forged = opened(changed, BlockCheck::kFull);
+  ASSERT_TRUE(forged.has_value()) << forged.error().describe();
+  const std::vector<float> raw(5, 0.5f);
+  const auto whole = evaluate_once(rig, raw), cut = evaluate_once(*forged, raw);
+  EXPECT_EQ(cut.controls[7], whole.controls[7]);
+  for (const float value : cut.controls) EXPECT_TRUE(std::isfinite(value));
 }
 
 TEST(Block, BytesThatAreNotAlignedAreRefused) {
