@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Which small faults does a test see? Draws mutants by a seed, tries each in a copy of the project.
 
-    packaging/mutants.sh native|package|scene [--count N] [--seed N] [--list] [--survivors]
+    packaging/mutants.sh native|package|scene [--under PATH...] [--count N] [--seed N] [--list]
+                         [--programs] [--survivors]
 
 A mutant is killed by the first test that fails, or that takes far longer than it does without it;
 tests.toml says which tests stand for which file, the quickest first. One that does not build is
@@ -27,6 +28,7 @@ import tempfile
 import time
 import tomllib
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -42,7 +44,8 @@ SOURCES = {
     "package": (["native/python/risorius/**/*.py"], []),
     "scene": (["addon/risorius/logic/**/*.py", "addon/risorius/scene/**/*.py"], []),
 }
-SLOW = 300  # seconds for a test of which it is not yet known how long it takes
+SLOW = 300  # CPU seconds for a test of which it is not yet known how many it takes
+WAITS = 10  # seconds of the clock for each CPU second: other programs use the machine too
 MEMORY = 6 << 30  # bytes of any program: a count without end is not to fill the machine
 # Each mutant is compiled and linked: neither symbols for a debugger nor the last optimisations.
 OPTIONS = [
@@ -54,11 +57,29 @@ OPTIONS = [
 ]  # fmt: skip
 
 
-def sources(root: Path, part: str) -> list[str]:
-    """The files of a part that mutants are made of, from the root."""
+def sources(root: Path, part: str, under: Sequence[str] = ()) -> list[str]:
+    """The files of a part that mutants are made of, from the root.
+
+    Args:
+        root: The project.
+        part: native, package or scene.
+        under: Folders or files, from the root, of which they are; none: of the whole part.
+
+    Raises:
+        SystemExit: The part has no file under one of them.
+    """
     patterns, left_out = SOURCES[part]
     found = {str(p.relative_to(root)) for pattern in patterns for p in root.glob(pattern)}
-    return sorted(f for f in found if not any(fnmatch.fnmatch(f, pattern) for pattern in left_out))
+    found = {f for f in found if not any(fnmatch.fnmatch(f, pattern) for pattern in left_out)}
+    places = [place.rstrip("/") for place in under]
+    for place in places:
+        if not any(_lies_under(f, place) for f in found):
+            sys.exit(f"--under {place}: no source of the part {part} lies there")
+    return sorted(f for f in found if not places or any(_lies_under(f, p) for p in places))
+
+
+def _lies_under(path: str, place: str) -> bool:
+    return path == place or path.startswith(f"{place}/")
 
 
 def tests_of(path: str, table: dict[str, list[str]]) -> list[str]:
@@ -88,7 +109,7 @@ class Copy:
         self.targets = targets
         self.root = PROJECT / "build" / "mutants" / part
         self._times = self.root.with_suffix(".json")
-        # Seconds that a test takes when nothing is wrong.
+        # CPU seconds that a test takes when nothing is wrong.
         self.usual: dict[str, float] = (
             json.loads(self._times.read_text()) if self._times.exists() else {}
         )
@@ -202,8 +223,13 @@ class Copy:
         return "killed", lines[-1] if lines else f"exit {code}"
 
     def _run(self, command: list[str], limit: float) -> tuple[int | None, float, str]:
-        """Exit code, None if the time was over; seconds; what was printed."""
-        began = time.monotonic()
+        """Exit code, None if the time was over; CPU seconds; what was printed.
+
+        Args:
+            command: What is run.
+            limit: CPU seconds of each of its processes.
+        """
+        began = _seconds_of_children()
         with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as room:
             environment = {
                 **os.environ, "TMPDIR": room, "XDG_CACHE_HOME": f"{room}/cache",
@@ -215,15 +241,25 @@ class Copy:
                     command, cwd=self.root, env=environment, stdin=subprocess.DEVNULL,
                     stdout=printed, stderr=subprocess.STDOUT, start_new_session=True,
                 )  # fmt: skip
+                with contextlib.suppress(ProcessLookupError):  # what it starts has the limit too
+                    resource.prlimit(process.pid, resource.RLIMIT_CPU, (int(limit),) * 2)
                 try:
-                    code = process.wait(limit)
+                    code = process.wait(WAITS * limit)
                 except subprocess.TimeoutExpired:
                     code = None
                 finally:
                     _kill_group(process)
                 printed.seek(0)
                 text = printed.read().decode(errors="replace")
-        return code, time.monotonic() - began, text
+        if code is not None and -code in (signal.SIGXCPU, signal.SIGKILL):
+            code = None
+        return code, _seconds_of_children() - began, text
+
+
+def _seconds_of_children() -> float:
+    """CPU seconds of all programs that were started and have ended."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 def _kill_group(process: subprocess.Popen[bytes]) -> None:
@@ -262,6 +298,7 @@ def main() -> None:
     """Draw, try, count."""
     parser = argparse.ArgumentParser()
     parser.add_argument("part", choices=SOURCES)
+    parser.add_argument("--under", nargs="+", default=[], metavar="PATH", help="only of these")
     parser.add_argument("--count", type=int)
     parser.add_argument("--seed", type=int, default=SEED)
     parser.add_argument("--list", action="store_true", help="draw only")
@@ -272,14 +309,16 @@ def main() -> None:
     signal.signal(signal.SIGINT, signal.default_int_handler)
     resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))  # what it starts has it too
     part, wanted = options.part, options.count or COUNTS[options.part]
-    order = drawn(PROJECT, sources(PROJECT, part), options.seed)
+    paths = sources(PROJECT, part, options.under)
+    order = drawn(PROJECT, paths, options.seed)
     if options.list:
         for mutant, _ in zip(order, range(wanted), strict=False):
             print(told(mutant, "drawn", ""))
         return
     table = tomllib.loads((HERE / "tests.toml").read_text(encoding="utf-8"))[part]
     # The Python module is a long build that the programs alone do not wait for.
-    copy = Copy(part, programs(table) + ([] if options.programs else ["_native"]))
+    used = {"": [test for path in paths for test in tests_of(path, table)]}
+    copy = Copy(part, programs(used) + ([] if options.programs else ["_native"]))
     copy.root.mkdir(parents=True, exist_ok=True)
     kept = PROJECT / "build" / "mutants" / f"{part}-{options.seed}.jsonl"
     before = [json.loads(line) for line in kept.read_text().splitlines()] if kept.exists() else []

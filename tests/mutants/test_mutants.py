@@ -38,3 +38,12 @@ def test_every_pattern_fits_a_file(part):
     files = mutants.sources(PROJECT, part)
     alone = {p: [f for f in files if mutants.tests_of(f, {p: ["x"]})] for p in TABLE[part]}
     assert [pattern for pattern, fits in alone.items() if not fits] == []
+
+
+def test_some_places_of_a_part_are_drawn_from_alone():
+    files = mutants.sources(PROJECT, "native", ["native/solve/", "native/author/mirror.cpp"])
+    assert "native/author/mirror.cpp" in files
+    assert {f.rpartition("/")[0] for f in files} == {"native/solve", "native/author"}
+    assert len([f for f in files if f.startswith("native/author")]) == 1
+    with pytest.raises(SystemExit, match="--under native/solv: no source of the part native"):
+        mutants.sources(PROJECT, "native", ["native/solve", "native/solv"])
