@@ -183,6 +183,72 @@ TEST(Correct, WhatDoesMostAtAVertexStays) {
   }
 }
 
+/// The repair of a pose of which no part can be undone, beside the sheet at rest.
+Repair pushed_out(const Scene& scene, const std::vector<Vector3>& positions) {
+  const SkinChecker check = checker(scene);
+  const auto allowed = look(check, scene.pose(scene.skin.neutral));
+  auto repair = check.repair(scene.pose(positions), allowed, {positions});
+  EXPECT_TRUE(repair) << repair.error().describe();
+  auto mended = positions;
+  for (std::uint32_t v = 0; v < mended.size(); ++v) {
+    const auto& x = repair->displacement[v];
+    if (std::hypot(x_of(v), y_of(v)) > 6.0 + SkinChecker::kAround) {
+      EXPECT_EQ(x, Vector3{}) << v;
+    }
+    for (std::size_t k = 0; k < 3; ++k) mended[v][k] += x[k];
+  }
+  // What is told of the repair is what the mended pose has.
+  const auto sums = check.sum(look(check, scene.pose(mended)), allowed);
+  EXPECT_NEAR(sums->volume, repair->after.volume, 1e-3);
+  EXPECT_EQ(sums->stretched, repair->after.stretched);
+  EXPECT_EQ(sums->folded, repair->after.folded);
+  return std::move(*repair);
+}
+
+TEST(Correct, WhatCannotBeUndoneIsPushedOutOfTheBall) {
+  const Scene scene;
+  const Repair repair = pushed_out(scene, scene.pushed(2.0));
+  EXPECT_GT(repair.before.volume, 5.0);
+  EXPECT_EQ(repair.after.volume, 0.0);
+  EXPECT_GT(repair.displacement[kMiddle][2], 0.8);
+  EXPECT_LT(repair.displacement[kMiddle][2], 1.2);
+}
+
+TEST(Correct, AStretchThatCannotBeUndoneIsEased) {
+  const Scene scene;
+  auto positions = scene.skin.neutral;
+  for (std::uint32_t v = 0; v < positions.size(); ++v) {  // apart from the middle to one side
+    const double d = (x_of(v) * x_of(v) + y_of(v) * y_of(v)) / 81.0;
+    if (x_of(v) > 0.5 && d < 1.0) positions[v][0] += 1.9 * (1.0 - d) * (1.0 - d);
+  }
+  const Repair repair = pushed_out(scene, positions);
+  EXPECT_GT(repair.before.stretched, 2u);
+  EXPECT_EQ(repair.after.stretched, 0u);
+}
+
+TEST(Correct, AFoldThatCannotBeUndoneIsOpened) {
+  const Scene scene;
+  auto positions = scene.skin.neutral;
+  positions[kMiddle][0] += 2.4;
+  const Repair repair = pushed_out(scene, positions);
+  EXPECT_GT(repair.before.folded, 0u);
+  EXPECT_EQ(repair.after.folded, 0u);
+}
+
+TEST(Correct, VerticesWithoutAFaultKeepNineTenthsOfTheirWays) {
+  const Scene scene;
+  auto positions = scene.pushed(0.9);
+  positions[kMiddle][2] += 2.8;
+  const Repair repair = pushed_out(scene, positions);
+  EXPECT_LT(repair.after.stretched, repair.before.stretched);
+  EXPECT_GT(repair.after.stretched, 0u);  // it holds where something is left, too
+  for (std::uint32_t v = 0; v < positions.size(); ++v) {
+    const bool near = std::max(std::abs(x_of(v)), std::abs(y_of(v))) < 2.5;
+    if (near || positions[v][2] > -0.01) continue;
+    EXPECT_LE(repair.displacement[v][2], -0.1 * positions[v][2]) << v;
+  }
+}
+
 TEST(Correct, WhatOnePartDoesByItselfIsNoFault) {
   const Scene scene;
   const SkinChecker check = checker(scene);
