@@ -215,6 +215,7 @@ def test_the_ramp_grows_brighter_from_end_to_end():
 
 def test_colours_follow_the_pose(rig, dna_file):
     bpy.ops.risorius.heat(kind="POSE")
+    assert bpy.app.timers.is_registered(why("heat")._look)
     assert why("heat").of(rig).most == 0.0
     scene.set_controls(rig, jawOpen=1.0)
     graph = bpy.context.evaluated_depsgraph_get()

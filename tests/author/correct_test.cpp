@@ -301,6 +301,29 @@ TEST(Correct, TheSkinInItselfIsFoundWhereItTouchedNothingBefore) {
   EXPECT_FALSE(check.shown()[kMiddle]);
 }
 
+TEST(Correct, WhatGoesIntoOneAnotherGoesBackByHalfEach) {
+  const Scene scene = sheets(false);
+  const SkinChecker check = checker(scene);
+  const auto allowed = look(check, {scene.skin.neutral, {}});
+  const std::uint32_t count = kSheet * kSheet;
+  auto positions = scene.skin.neutral;  // at the rim, where light gets in, the upper one goes down
+  for (std::uint32_t v = 0; v < count; ++v) {
+    const double d = std::hypot(x_of(v) + 20.0, y_of(v)) / 6.0;
+    if (d < 1.0) positions[count + v][2] -= 1.6 * (1.0 - d * d) * (1.0 - d * d);
+  }
+  auto repair = check.repair({positions, {}}, allowed, {positions});
+  ASSERT_TRUE(repair) << repair.error().describe();
+  EXPECT_GT(repair->before.volume, 3.0);
+  EXPECT_EQ(repair->after.volume, 0.0);
+  double up = 0.0, down = 0.0;
+  for (std::uint32_t v = 0; v < count; ++v) {
+    down = std::max(down, -repair->displacement[v][2]);
+    up = std::max(up, repair->displacement[count + v][2]);
+  }
+  EXPECT_GT(up, 0.2);
+  EXPECT_NEAR(up, down, 0.02);
+}
+
 TEST(Correct, AThinPlateTouchesNothing) {
   const Scene scene = sheets(true);
   const SkinChecker check = checker(scene);

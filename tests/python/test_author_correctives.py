@@ -186,8 +186,9 @@ def mesh_of(positions, faces):
     return mesh
 
 
-def make_face(pushes, turning=None):
-    """A face of these pushes; `turning` also turns everything about x, by 25 degrees."""
+def make_face(pushes, turning=None, first="head_lod0_mesh"):
+    """A face of these pushes; `turning` also turns everything about x, by 25 degrees; `first` is
+    the first mesh of its file."""
     count = len(pushes)
     parts = {
         "head_lod0_mesh": sheet(SIDE),
@@ -196,6 +197,7 @@ def make_face(pushes, turning=None):
         "hat_lod0_mesh": (sheet(7)[0] * [0.3, 1, 0.3] + [0, 15, 0], sheet(7)[1]),
         "head_lod1_mesh": sheet(21),
     }
+    parts = {first: parts[first], **parts}
     dna = risorius.Dna()
     dna.joint_names, dna.joint_parents = ["root"], [0]
     dna.neutral_joint_translations = dna.neutral_joint_rotations = np.zeros((1, 3))
@@ -337,6 +339,21 @@ def test_lashes_go_with_the_skin(corrected):
     middle = np.linalg.norm(plain[:, [0, 2]], axis=1).argmin()
     moved = 10 * one.displacement[np.linalg.norm(sheet(SIDE)[0], axis=1).argmin()]
     assert np.abs(lashes[middle] - linear[middle] - moved).max() < 1e-3
+
+
+def test_lashes_go_with_the_skin_also_where_they_stand_before_it(face, corrected):
+    rows = [(one.controls, one.shape) for one in corrected[0].correctives]
+    before = add_correctives(make_face(PUSHES, first="eyelashes_lod0_mesh"), 1, rows).meshes[0]
+    behind = add_correctives(face, 0, rows).meshes[2]
+    assert len(before.blend_shape_targets) == len(PUSHES) + len(rows)
+    for one, other in zip(before.blend_shape_targets, behind.blend_shape_targets, strict=True):
+        np.testing.assert_array_equal(one.vertex_indices, other.vertex_indices)
+        np.testing.assert_allclose(one.deltas, other.deltas, atol=1e-6)
+
+
+def test_a_face_of_one_control_needs_none():
+    found = find_correctives(make_face({"a": PUSHES["a"]}))
+    assert (found.looked_at, found.correctives) == (0, [])
 
 
 def test_what_is_far_from_the_skin_stays(corrected):

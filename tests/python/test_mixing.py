@@ -116,6 +116,18 @@ def test_a_mix_moves_half_way_between_its_parents(faces):
     assert np.linalg.norm(posed[1] - posed[2], axis=1).max() > 0.005
 
 
+def test_blend_shapes_keep_the_order_of_the_first_parent(faces):
+    one, narrow = (copy.copy(dna) for dna in faces[:2])
+    targets = one.meshes[0].blend_shape_targets
+    order = [int(t.blend_shape_channel_index) for t in targets][::-1]
+    assert order != sorted(order)
+    mesh = one.meshes[0]
+    mesh.blend_shape_targets = targets[::-1]
+    one.meshes = [mesh, *one.meshes[1:]]
+    mixed = mix_faces([one, narrow], Mix([0.5, 0.5])).meshes[0].blend_shape_targets
+    assert [int(t.blend_shape_channel_index) for t in mixed] == order
+
+
 @pytest.mark.parametrize("sign", [1, -1])
 def test_the_mean_of_two_turns_lies_on_the_short_way(faces, sign):
     """Between 170 and -170 degrees is 180, and not 0."""
@@ -207,6 +219,14 @@ def _rename(field, index, name):
     return change
 
 
+def _exchanged(field):
+    def change(dna):
+        names = list(getattr(dna, field))
+        setattr(dna, field, [names[1], names[0], *names[2:]])
+
+    return change
+
+
 def _fewer_faces(dna):
     mesh = dna.meshes[0]
     mesh.face_layouts = np.asarray(mesh.face_layouts)[: mesh.face_offsets[-2]]
@@ -236,6 +256,7 @@ def _hung_elsewhere(dna):
         (_rename("raw_control_names", 0, "CTRL_expressions.other"), "it has no raw control CTRL"),
         (_rename("joint_names", -1, "other"), "it has no joint FACIAL"),
         (_rename("mesh_names", 0, "other"), "it has no mesh"),
+        (_exchanged("raw_control_names"), "its raw controls are in another order"),
         (_fewer_faces, "faces, not"),
         (_turned_faces, "has its faces in another order"),
         (_metres, "translation_unit is m, not cm"),
