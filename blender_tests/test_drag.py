@@ -84,6 +84,18 @@ def test_of_what_is_out_of_reach_the_sliders_stay_within_limits(rig, dna_file):
     assert values.max() == 1.0
 
 
+@pytest.mark.parametrize(("start", "wanted"), [(1.4, 1.2), (-0.4, -0.2)])
+def test_a_slider_beyond_its_limit_makes_no_jump(rig, dna_file, start, wanted):
+    scene.set_controls(rig, jawOpen=wanted)
+    goal = place(rig)
+    scene.set_controls(rig, jawOpen=start)
+    was = place(rig)
+    assert drag(goal - was) == {"FINISHED"}
+    assert follows(rig, was, goal - was)
+    low, high = sorted((start, wanted))
+    assert low <= scene.face(rig)[PREFIX + "jawOpen"] <= high
+
+
 def test_a_turned_head_on_a_moved_face_drags_right(rig, dna_file):
     controls, offset = scene.controls(rig), reach(rig, dna_file)
     controls.matrix_world = Quaternion((0.3, 0.5, -0.2, 0.7)).to_matrix().to_4x4() * 2.0
