@@ -231,6 +231,7 @@ def test_two_faces_follow_two_phones_on_one_port(dna_file, port):
         bpy.context.view_layer.objects.active = scene.controls(rig)
         chosen.subject = name
         assert bpy.ops.risorius.live_start() == {"FINISHED"}
+    assert session_of(rigs[0]).receiver._reserved == {"Ada", "Bob"}  # no flood takes their places
     send(port, packet(1, "Ada", _17=0.25), packet(7, "Bob", _17=0.5), packet(2, "Ada", _17=0.75))
     tick_until(rigs[0], 2)
     tick_until(rigs[1], 1)
@@ -239,6 +240,7 @@ def test_two_faces_follow_two_phones_on_one_port(dna_file, port):
     bpy.context.view_layer.objects.active = scene.controls(rigs[0])
     bpy.ops.risorius.live_stop()
     assert session_of(rigs[1]).receiver.status().subjects == ("Ada", "Bob")
+    assert session_of(rigs[1]).receiver._reserved == {"Bob"}
 
 
 def test_vmc_and_neutral_now(dna_file, port):

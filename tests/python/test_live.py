@@ -427,8 +427,77 @@ def test_subjects_that_stream_keep_their_places():
     fed(receiver, v6(0, face(), "one more"), 1.2)
     assert list(receiver.status().subjects) == names
     assert receiver.status().reasons[0][0].startswith("32 subjects are heard at once")
-    fed(receiver, v6(0, face(), "one more"), 3.0)  # they fell silent; the first of them goes
-    assert list(receiver.status().subjects) == [*names[1:], "one more"]
+    fed(receiver, v6(0, face(), "one more"), 3.0)  # they fell silent; the second of them goes
+    assert list(receiver.status().subjects) == [names[0], *names[2:], "one more"]
+
+
+def flood(receiver, seconds, at, steps=lambda n: ()):
+    """32 invented subjects, six packets a second each, and beside them what `steps` sends."""
+    for n in range(round(6 * seconds)):
+        for k in range(32):
+            address = at(k)
+            fed(receiver, v6(n, face(), f"made up {k}", OTHER), 10.0 + n / 6 + k / 1000, address)
+        for step, sender in steps(n):
+            fed(receiver, step, 10.0 + n / 6 + 0.1, sender)
+
+
+@pytest.mark.parametrize("at", ["127.0.0.1", "10.0.0.66", "10.0.{}.66"])
+def test_a_phone_that_was_there_first_keeps_its_place_in_a_flood(at):
+    receiver = Receiver("livelink")
+    for n in range(10):
+        fed(receiver, v6(n, face(i17=0.25)), 9.0 + n / 60)
+
+    def phone(n):  # silent for 12 s
+        return [(v6(n, face(i17=0.75)), "127.0.0.1")] if n > 72 else []
+
+    flood(receiver, 14.0, at.format, phone)
+    assert receiver.status().subject == receiver.status().subjects[0] == "iPhone"
+    assert receiver.latest().values[JAW] == np.float32(0.75)
+    assert len(receiver.status().subjects) == 32
+
+
+def test_invented_subjects_of_one_address_lock_no_phone_of_another_out():
+    receiver = Receiver("livelink")
+    for n in range(6):
+        fed(receiver, v6(n, face(), "second", OTHER), 9.0 + n / 60, "10.0.0.2")
+
+    def phone(n):  # the second of its address too, and silent for some time
+        busy = n < 3 or n > 20
+        return [(v6(6 * n, face(i17=0.5), f"iPhone {k}"), "10.0.0.1") for k in range(2 * busy)]
+
+    flood(receiver, 5.0, "10.0.0.66".format, phone)
+    subjects = receiver.status().subjects
+    assert {"second", "iPhone 0", "iPhone 1"} <= set(subjects)
+    assert [receiver.latest(f"iPhone {k}").sequence for k in (0, 1)] == [12, 12]
+    assert len(subjects) == 32
+
+
+@pytest.mark.parametrize("way", ["record", "reserve"])
+def test_a_named_subject_gets_a_place_in_a_flood_that_came_first(way):
+    receiver = Receiver("livelink")
+    getattr(receiver, way)("iPhone" if way == "record" else ["iPhone"])
+
+    def phone(n):  # from the address of the flood, with long silences
+        return [(v6(10 * n, face(i17=n / 64.0)), "127.0.0.1")] if n > 12 and n % 12 == 1 else []
+
+    flood(receiver, 20.0, "127.0.0.1".format, phone)
+    latest = receiver.latest("iPhone")
+    assert (latest.sequence, latest.values[JAW]) == (9, np.float32(109 / 64.0))
+    receiver.reserve([])
+    assert len(receiver.status().subjects) == 32
+
+
+def test_a_named_sender_of_osc_gets_a_place_in_a_flood_that_came_first():
+    receiver, bundle = Receiver("osc"), ["bundle", [["/jawOpen", [0.5]]]]
+    receiver.reserve(["10.9.9.9"])
+    for n in range(30):
+        for k in range(32):
+            fed(receiver, bundle, 10.0 + n / 6, f"10.0.0.{k}")
+    fed(receiver, bundle, 15.0, "10.8.8.8")
+    assert receiver.latest("10.8.8.8") is None
+    assert "no room for another that is not named" in receiver.status().reasons[0][0]
+    fed(receiver, bundle, 15.0, "10.9.9.9")
+    assert receiver.latest("10.9.9.9").sequence == 1
 
 
 def test_a_subject_is_forgotten_after_a_minute_but_not_while_it_is_recorded():

@@ -129,6 +129,7 @@ def apply_settings(session: Session, settings: Settings) -> None:
         settings: as they are now; source, port and mapping are left as they were at the start.
     """
     session.subject = settings.subject
+    _reserve(session.key)
     session.shaper.smoothing = settings.smoothing
     session.shaper.gain, session.shaper.head_gain = settings.gain, settings.head_gain
 
@@ -136,8 +137,16 @@ def apply_settings(session: Session, settings: Settings) -> None:
 def close(session: Session) -> None:
     """End a session, and its receiver where no other listens there."""
     del _sessions[session.uid]
-    if not any(other.key == session.key for other in _sessions.values()):
+    if any(other.key == session.key for other in _sessions.values()):
+        _reserve(session.key)
+    else:
         _receivers.pop(session.key).stop()
+
+
+def _reserve(key: tuple[str, int, str]) -> None:
+    """Let a receiver keep a place for each subject that somebody chose."""
+    chosen = {s.subject for s in _sessions.values() if s.key == key and s.subject}
+    _receivers[key].reserve(chosen)
 
 
 def neutral_now(session: Session) -> bool:

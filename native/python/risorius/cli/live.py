@@ -43,7 +43,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         action="store_true",
         help="listen to the network too, as a phone needs; else to this machine alone",
     )
-    parser.add_argument("--subject", default="", metavar="NAME", help="default: the first heard")
+    parser.add_argument(
+        "--subject",
+        default="",
+        metavar="NAME",
+        help="as the app names it; it gets a place whoever else sends (default: the first heard)",
+    )
     parser.add_argument("--record", type=Path, metavar="OUT", help="clip.rzc or clip.csv")
     parser.add_argument("--seconds", type=float, metavar="N", help="end after them")
     parser.add_argument(

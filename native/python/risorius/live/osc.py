@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from time import perf_counter
 from typing import Any
 
@@ -97,10 +97,14 @@ def _message(data: bytes) -> tuple[str, list[Any]]:
 
 
 class Decoder:
-    """Puts the messages of all senders together to faces."""
+    """Puts the messages of all senders together to faces.
 
-    def __init__(self) -> None:
-        self._faces: Roster[str, _Face] = Roster()
+    Args:
+        wanted: whether a sender gets a place before all others and keeps it.
+    """
+
+    def __init__(self, wanted: Callable[[str], bool] = lambda _sender: False) -> None:
+        self._faces: Roster[str, _Face] = Roster(lambda face: wanted(face.sender))
 
     def feed(self, data: bytes, sender: str, now: float | None = None) -> list[Packet]:
         """Take a packet in.
@@ -121,8 +125,11 @@ class Decoder:
         face = self._faces.hear(sender, now)
         if face is None:
             face = _Face(sender)
-            if not self._faces.add(sender, face, now):
-                raise LiveError(f"{MOST} senders are heard at once: there is no room for another")
+            if not self._faces.add(sender, face, now, sender):
+                raise LiveError(
+                    f"{MOST} senders are heard at once: there is no room for another that is not "
+                    "named as the subject to follow"
+                )
         time, done = bundle_time(data), []
         for address, values in found:
             if packet := face.take(address, values, time):

@@ -11,6 +11,7 @@ import errno
 import socket
 import threading
 from collections import Counter, deque
+from collections.abc import Iterable
 from importlib import resources
 from statistics import median
 from time import perf_counter
@@ -155,11 +156,12 @@ class Receiver:
         self.host = host
         self.port = PORTS[source] if port is None else port
         self._lock = threading.Lock()
-        self._subjects: Roster[tuple[str, str], _Subject] = Roster()
+        self._subjects: Roster[tuple[str, str], _Subject] = Roster(lambda s: self._kept(s.label))
         self._takes: list[Take] = []
+        self._reserved: frozenset[str] = frozenset()
         self._reasons: Counter[str] = Counter()
         self._counts: Counter[str] = Counter()
-        self._decoder = osc.Decoder()
+        self._decoder = osc.Decoder(self._kept)
         self._stop = threading.Event()
         self._socket: socket.socket | None = None
         self._thread: threading.Thread | None = None
@@ -198,6 +200,20 @@ class Receiver:
         with self._lock:
             found = self._find(subject)
             return found.latest if found else None
+
+    def reserve(self, subjects: Iterable[str]) -> None:
+        """Keep a place for these subjects, however many others are heard.
+
+        A subject that is recorded has its place without this.
+
+        Args:
+            subjects: as the app names them; they replace what was reserved before.
+        """
+        self._reserved = frozenset(subjects)
+
+    def _kept(self, label: str) -> bool:
+        """Whether a subject keeps its place: a take would jump if its clock began anew."""
+        return label in self._reserved or any(take.subject == label for take in self._takes)
 
     def record(self, subject: str = "", limit: int = 108_000) -> Take:
         """Record a subject, or the one heard first of those that are known, until `finish`.
@@ -284,7 +300,7 @@ class Receiver:
         except Exception as error:  # noqa: BLE001  no packet may end the thread
             self._refuse(f"{type(error).__name__}: {error}")
         else:
-            self._keep(packets, now)
+            self._keep(packets, now, sender)
         self._counts["packets"] += 1
 
     def _refuse(self, reason: str) -> None:
@@ -292,11 +308,14 @@ class Receiver:
             known = reason in self._reasons or len(self._reasons) < 50
             self._reasons[reason[:200] if known else "other reasons"] += 1
 
-    def _keep(self, packets: list[Packet], now: float) -> None:
+    def _keep(self, packets: list[Packet], now: float, sender: str = "") -> None:
         for packet in packets:
-            subject = self._subject_of(packet, now)
+            subject = self._subject_of(packet, now, sender)
             if subject is None:
-                self._refuse(f"{MOST} subjects are heard at once: there is no room for another")
+                self._refuse(
+                    f"{MOST} subjects are heard at once: there is no room for another that is not "
+                    "named as the subject to follow"
+                )
                 continue
             with self._lock:
                 frame = subject.accept(packet, now)
@@ -307,8 +326,14 @@ class Receiver:
                 for take in self._takes:
                     take.add(frame)
 
-    def _subject_of(self, packet: Packet, now: float) -> _Subject | None:
-        """Whose face it is; None where there is no room for another."""
+    def _subject_of(self, packet: Packet, now: float, sender: str) -> _Subject | None:
+        """Whose face it is; None where there is no room for another.
+
+        Args:
+            packet: a face.
+            now: seconds.
+            sender: the address it came from; of OSC the subject is the address.
+        """
         key = (packet.device, packet.subject)
         with self._lock:
             subject = self._subjects.hear(key, now)
@@ -318,9 +343,7 @@ class Receiver:
             if any(s.label == label for s in self._subjects):
                 label = f"{label} ({packet.device[:8]})"
             subject = _Subject(label)
-            # A sender that is being recorded is kept: its clock would restart within the take.
-            recorded = {take.subject for take in self._takes}
-            added = self._subjects.add(key, subject, now, lambda s: s.label in recorded)
+            added = self._subjects.add(key, subject, now, sender or packet.subject)
         return subject if added else None
 
 

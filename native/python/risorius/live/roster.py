@@ -1,30 +1,71 @@
 # SPDX-License-Identifier: MIT
-"""Who is listened to: at most so many senders, and one that is silent makes room for a new one."""
+"""Who is listened to: a bounded number of senders, and who gives its place to a new one.
+
+A flood of invented senders must not push out a phone. So:
+
+    a wanted sender (it is named, or it is recorded) always gets a place and keeps it
+    the first sender of each address keeps its place once it has streamed, also while it is silent
+    an address with several senders more than the newcomer's address gives one of them up
+    of the others, a silent one gives way to a newcomer
+"""
 
 from __future__ import annotations
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Hashable, Iterator
+from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
 MOST = 32
-_STREAM = 5  # times within a second that make a sender one that streams: it keeps its place
+_STREAM = 5  # times within a second that make a sender one that streams
 _FORGOTTEN = 60.0  # seconds of silence after which whoever comes next takes the place
 
 Key = TypeVar("Key", bound=Hashable)
 Item = TypeVar("Item")
 
 
-class Roster(Generic[Key, Item]):
-    """What is kept of each sender, in the order in which they were first heard."""
+@dataclass
+class _Place(Generic[Item]):
+    """A sender that is listened to.
 
-    def __init__(self, most: int = MOST) -> None:
+    Attributes:
+        item: what is kept of it.
+        address: where it sends from.
+        heard: seconds at which it was heard last.
+        streamed: whether it was ever heard _STREAM times within a second.
+    """
+
+    item: Item
+    address: str
+    heard: deque[float] = field(default_factory=lambda: deque(maxlen=_STREAM))
+    streamed: bool = False
+
+    def hear(self, now: float) -> None:
+        self.heard.append(now)
+        self.streamed = self.streamed or self.times(now) == _STREAM
+
+    def times(self, now: float) -> int:
+        """How often it was heard within the last second, at most _STREAM."""
+        return sum(time > now - 1.0 for time in self.heard)
+
+
+class Roster(Generic[Key, Item]):
+    """What is kept of each sender, in the order in which they were first heard.
+
+    Args:
+        wanted: whether an item gets a place before all others and keeps it.
+        most: places.
+    """
+
+    def __init__(
+        self, wanted: Callable[[Item], bool] = lambda _item: False, most: int = MOST
+    ) -> None:
         self._most = most
-        self._items: dict[Key, Item] = {}
-        self._heard: dict[Key, deque[float]] = {}
+        self._wanted = wanted
+        self._places: dict[Key, _Place[Item]] = {}
 
     def __iter__(self) -> Iterator[Item]:
-        return iter(self._items.values())
+        return (place.item for place in self._places.values())
 
     def hear(self, key: Key, now: float) -> Item | None:
         """What is kept of a sender that was heard just now; None for one that is not known.
@@ -33,45 +74,57 @@ class Roster(Generic[Key, Item]):
             key: of the sender.
             now: seconds, of a clock that does not run back.
         """
-        if key not in self._items:
+        place = self._places.get(key)
+        if place is None:
             return None
-        self._heard[key].append(now)
-        return self._items[key]
+        place.hear(now)
+        return place.item
 
-    def add(
-        self,
-        key: Key,
-        item: Item,
-        now: float,
-        wanted: Callable[[Item], bool] = lambda _item: False,
-    ) -> bool:
+    def add(self, key: Key, item: Item, now: float, address: str = "") -> bool:
         """Keep a sender that was heard for the first time just now.
 
         Args:
             key, item: the sender and what is kept of it.
             now: seconds.
-            wanted: whether an item stays however long it is silent.
+            address: where it sends from.
 
         Returns:
-            Whether there was room: not, where all others stream or are wanted.
+            Whether there was room for it.
         """
-        for old in [k for k, heard in self._heard.items() if heard[-1] < now - _FORGOTTEN]:
-            if not wanted(self._items[old]):
-                self._drop(old)
-        if len(self._items) >= self._most:
-            found = [(self._rank(k, now), k) for k, i in self._items.items() if not wanted(i)]
-            rank, least = min(found, key=lambda pair: pair[0], default=((_STREAM, now), None))
-            if least is None or rank[0] >= _STREAM:
+        for old, place in list(self._places.items()):
+            if place.heard[-1] < now - _FORGOTTEN and not self._wanted(place.item):
+                del self._places[old]
+        if len(self._places) >= self._most:
+            leaving = self._leaving(item, address, now)
+            if leaving is None:
                 return False
-            self._drop(least)
-        self._items[key] = item
-        self._heard[key] = deque([now], maxlen=_STREAM)
+            del self._places[leaving]
+        self._places[key] = _Place(item, address)
+        self._places[key].hear(now)
         return True
 
-    def _rank(self, key: Key, now: float) -> tuple[int, float]:
-        """How often it was heard within the last second, at most _STREAM, and when last."""
-        heard = self._heard[key]
-        return sum(time > now - 1.0 for time in heard), heard[-1]
+    def _leaving(self, newcomer: Item, address: str, now: float) -> Key | None:
+        """The sender that gives its place to a newcomer, or None."""
+        shares = Counter(place.address for place in self._places.values())
+        firsts: dict[str, Key] = {}
+        for key, place in self._places.items():
+            firsts.setdefault(place.address, key)
 
-    def _drop(self, key: Key) -> None:
-        del self._items[key], self._heard[key]
+        def gives_way(key: Key, place: _Place[Item]) -> bool:
+            if self._wanted(place.item):
+                return False
+            if self._wanted(newcomer) or not place.streamed:
+                return True
+            if firsts[place.address] == key:
+                return False
+            more = shares[place.address] - shares[address]
+            return more >= 2 or (more >= 0 and place.times(now) < _STREAM)
+
+        def order(key: Key) -> tuple[bool, bool, int, int, float]:
+            place = self._places[key]
+            is_first = place.streamed and firsts[place.address] == key
+            share = shares[place.address]
+            return is_first, place.streamed, -share, place.times(now), place.heard[-1]
+
+        found = [key for key, place in self._places.items() if gives_way(key, place)]
+        return min(found, key=order, default=None)
