@@ -15,6 +15,7 @@ from risorius.importing import process
 
 from ..base.words import counted
 from .files import CommandLineError, refuse_same_file, require_writable
+from .ranges import add_learn, with_ranges
 
 OUTPUTS = (".rzc", ".csv", ".json")
 _MAPPING = (
@@ -34,14 +35,15 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     _add_info(commands)
     _add_mappings(commands)
     _add_check(commands)
+    add_learn(commands, _add_input, load)
 
 
 def _add_convert(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = commands.add_parser(
         "convert",
         help="a file of animation as .rzc, .csv or .json of raw controls",
-        description="What is asked for is done in this order: mapping, neutral, gain and offset, "
-        "repeats, gaps, smoothing, mirror, cut, rate, shift.",
+        description="What is asked for is done in this order: mapping, range, neutral, gain and "
+        "offset, repeats, gaps, smoothing, mirror, cut, rate, shift.",
     )
     _add_input(parser)
     parser.add_argument("-o", "--output", required=True, type=Path, metavar="OUT")
@@ -54,6 +56,11 @@ def _add_convert(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
         choices=importing.ROTATIONS,
         default="head",
         help="angles to keep beside the controls: of the head (default), of the eyes too, none",
+    )
+    parser.add_argument(
+        "--range",
+        metavar="FILE|self",
+        help="neutral and extremes of the person, from risorius clip learn; self: from this take",
     )
     parser.add_argument(
         "--neutral", metavar="A[:B]", help="frame or frames of a neutral face, which become 0"
@@ -156,6 +163,7 @@ def run_convert(args: argparse.Namespace) -> int:
         rig=risorius.Rig(dna) if dna else None,
         rotations=args.rotations,
     )
+    clip = with_ranges(clip, args.range, report)
     for step in steps:
         clip = step(clip)
     _save(clip, args.output)

@@ -22,6 +22,7 @@ from ..live import (
     Take,
     own_address,
 )
+from ..ranges import load_ranges
 from .files import CommandLineError, InputError, require_suffix, require_writable
 
 _KINDS = (".rzc", ".csv")
@@ -54,6 +55,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--mapping", default="arkit", metavar="NAME|FILE", help="of names to controls, as TOML"
     )
+    parser.add_argument(
+        "--range", type=Path, metavar="FILE", help="of the person, from risorius clip learn"
+    )
     parser.add_argument("--gain", type=float, default=1.0, metavar="X", help="on all units")
     parser.set_defaults(func=run)
 
@@ -74,6 +78,8 @@ def run(args: argparse.Namespace) -> int:
     complain(args)
     receiver = Receiver(args.source, args.port, EVERYWHERE if args.everywhere else THIS_MACHINE)
     shaper = Shaper(args.mapping, gain=args.gain)
+    if args.range is not None:
+        shaper.ranges = load_ranges(args.range)
     receiver.start()
     take = receiver.record(args.subject)
     try:

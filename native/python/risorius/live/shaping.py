@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""From what a sender says to raw controls: calibration, gain, mapping, smoothing."""
+"""From what a sender says to raw controls: calibration, mapping, ranges, gain, smoothing."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ import numpy as np
 from ..base import toml
 from ..base.filters import OneEuro
 from ..importing import Mapping, load_mapping
+from ..ranges import Ranges, Remap
 from .frame import Floats, Frame
 
 HEAD = ("head.yaw", "head.pitch", "head.roll")
@@ -134,6 +135,8 @@ class Shaper:
             quick move pass.
         maximum: controls are clamped to it.
         neutral: the values that count as a face at rest, by name; see `capture`.
+        ranges: of the person, taken out of the controls before the gain; None: controls are as
+            captured. Beside `neutral` only their extremes count.
     """
 
     def __init__(
@@ -151,20 +154,35 @@ class Shaper:
         self.gain, self.head_gain, self.maximum = gain, head_gain, maximum
         self.gains: dict[str, float] = {}
         self.neutral: dict[str, float] = {}
+        self._ranges: Ranges | None = None
+        self._remap: Remap | None = None
         self._plan: Plan | None = None
         self._names: tuple[str, ...] = ()
         self._filter = _new_filter()
+
+    @property
+    def ranges(self) -> Ranges | None:
+        return self._ranges
+
+    @ranges.setter
+    def ranges(self, ranges: Ranges | None) -> None:
+        self._ranges, self._remap = ranges, None
 
     def plan(self, names: tuple[str, ...]) -> Plan:
         """The way of these names; kept for the next frame, which mostly has the same."""
         if self._plan is None or names != self._names:
             self._plan, self._names = Plan(names, self.mapping), names
-            self._filter = _new_filter()
+            self._filter, self._remap = _new_filter(), None
+        if self._remap is None:
+            used = self._ranges.used() if self._ranges is not None else {}
+            if self.neutral:
+                used = {name: range_.calibrated() for name, range_ in used.items()}
+            self._remap = Remap(self._plan.controls, used)
         return self._plan
 
     def capture(self, frame: Frame | None) -> None:
         """Take a frame as the face at rest; None forgets it."""
-        self.neutral = {}
+        self.neutral, self._remap = {}, None
         if frame is not None:
             self.neutral = dict(zip(frame.names, map(float, frame.values), strict=True))
 
@@ -177,6 +195,7 @@ class Shaper:
         """One of the same settings for a recording."""
         other = Shaper(self.mapping, gain=self.gain, head_gain=self.head_gain, maximum=self.maximum)
         other.gains, other.neutral = dict(self.gains), dict(self.neutral)
+        other.ranges = self.ranges
         return other
 
     def apply(self, frame: Frame) -> Controls:
@@ -188,6 +207,8 @@ class Shaper:
         result = plan.matrix @ values
         for place, change in plan.adjusted:
             result[place] = change.apply(result[place])
+        if self._remap is not None and self._remap.changes:
+            result = self._remap(result)
         result *= np.where(plan.head, np.float32(self.head_gain), np.float32(self.gain))
         if self.smoothing > 0.0:
             self._filter.cutoff = _STILL * 0.05 ** min(self.smoothing, 1.0)

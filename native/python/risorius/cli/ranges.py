@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: MIT
+"""risorius clip learn: how far a person's controls go; and what takes it out of other clips."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+
+from risorius import Clip, importing
+
+from ..base.words import counted
+from ..importing import Imported, Report
+from ..ranges import MOST_GAIN, Ranges, learn, load_ranges, ranges_text
+from .files import CommandLineError, refuse_same_file, require_suffix, require_writable
+
+_HEADINGS = ("control", "neutral", "extreme", "gain", "left as captured")
+
+
+def add_learn(
+    commands: argparse._SubParsersAction[argparse.ArgumentParser],
+    add_input: Callable[[argparse.ArgumentParser], None],
+    load: Callable[[argparse.Namespace], Imported],
+) -> None:
+    """Add the command.
+
+    Args:
+        commands: of risorius clip.
+        add_input: gives the parser the arguments of a file of animation.
+        load: reads that file.
+    """
+    parser = commands.add_parser(
+        "learn",
+        help="neutral and extremes of a person, from a capture",
+        description="Finds how far each control goes in a take in which the person goes from a "
+        "face at rest to all extremes, one after another. The file is text: look at it, edit it, "
+        "give it to clip convert and live as --range.",
+    )
+    add_input(parser)
+    parser.add_argument("-o", "--output", required=True, type=Path, metavar="NAME.range.toml")
+    parser.add_argument("--mapping", metavar="M", help="as of clip convert")
+    parser.add_argument(
+        "--performance",
+        action="store_true",
+        help="the take shows acting: only peaks that stop at one height again and again, and "
+        "blinks, count as extremes",
+    )
+    parser.add_argument(
+        "--most-gain",
+        type=float,
+        default=MOST_GAIN,
+        metavar="X",
+        help=f"controls that would need more are left as captured, 1 to 4 (default {MOST_GAIN:g}; "
+        "lids 2)",
+    )
+    parser.set_defaults(func=lambda args: _run(args, load))
+
+
+def _run(args: argparse.Namespace, load: Callable[[argparse.Namespace], Imported]) -> int:
+    require_suffix(args.output, (".toml",), "-o")
+    if not 1.0 <= args.most_gain <= 4.0:
+        raise CommandLineError(f"--most-gain: 1 to 4 was expected, found {args.most_gain:g}")
+    refuse_same_file(str(args.input), str(args.output))
+    if args.output.exists():
+        raise CommandLineError(f"{args.output}: it is there already")
+    require_writable(args.output)
+    clip, _ = load(args).apply(args.mapping, rotations="none")
+    found = _learn(clip, args.input, performance=args.performance, most_gain=args.most_gain)
+    importing.write_text(ranges_text(found), args.output)
+    _print(found)
+    print(f"{args.output}: {_counted(found)}")
+    return 0
+
+
+def with_ranges(clip: Clip, source: str | None, report: Report) -> Clip:
+    """A clip of raw controls with the ranges of its person taken out.
+
+    Args:
+        clip: as mapped.
+        source: None for none, "self" for those of the clip, or a file of ranges.
+        report: gets a note.
+
+    Raises:
+        AnimationFileError: the file, or the clip for "self", cannot be used.
+    """
+    if source is None:
+        return clip
+    if source == "self":
+        found = _learn(clip, report.source, performance=True)
+    else:
+        found = load_ranges(source)
+    own = {name: found.controls[name] for name in clip.names if name in found.controls}
+    report.notes.append(f"range {source}: {_counted(Ranges(own))}")
+    return found.apply(clip)
+
+
+def _learn(clip: Clip, path: str | Path, **options: float) -> Ranges:
+    """`learn`, whose errors name the file."""
+    try:
+        return learn(clip, **options)  # type: ignore[arg-type]
+    except ValueError as error:
+        raise importing.AnimationFileError(str(path), str(error)) from error
+
+
+def _counted(ranges: Ranges) -> str:
+    used = len(ranges.used())
+    return f"{counted(used, 'control')} stretched, {len(ranges.controls) - used} left as captured"
+
+
+def _print(ranges: Ranges) -> None:
+    rows = [_HEADINGS, *ranges.rows()]
+    width = max(len(row[0]) for row in rows)
+    for control, neutral, extreme, gain, reason in rows:
+        print(f"{control:<{width}}  {neutral:>7}  {extreme:>7}  {gain:>4}  {reason}".rstrip())

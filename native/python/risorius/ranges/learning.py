@@ -1,0 +1,178 @@
+# SPDX-License-Identifier: MIT
+"""Finds neutral and extreme of each control in a take.
+
+A control is left as captured where the take does not prove its range: what hardly moves, what is
+never at rest, what does not come near its extreme. Both sides of a face get the same range.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from ..anim.clip import Clip
+from ..base.errors import ArgumentError
+from ..controls.sides import mirrored_name
+from .remap import WIDTHS, Learned, Range, Ranges
+
+Doubles = npt.NDArray[np.float64]
+
+MOST_GAIN = 1.6
+"""A range that would be stretched more than this was not shown by the take."""
+SHORTEST = 2.0
+"""Seconds that a take must last at least."""
+_LID_GAIN = 2.0  # of lids: everybody shuts them, so a low peak is a weak capture
+_LEAST_RANGE = 0.15  # below this a control hardly moves
+_LEAST_OVER_NOISE = 8.0  # standard deviations of its noise that a control must move by
+_REST_SHARE = 10  # percent of the frames in which a control is at rest at least
+_HIGHEST_REST = 0.25  # a control whose lowest tenth lies above this is never at rest
+_SPIKE = 0.05  # seconds: what is shorter is no peak
+_WIDEST = 4  # frames to either side: bounds the memory for takes of many frames a second
+_NEAR = 0.8  # share of the highest peak from which on a peak is one to the extreme
+_LOW_PEAKS = 25  # percent of these peaks that may stay below 1
+_CEILING = 0.85  # of a performance: at least half of the peaks reach this share of the highest
+_LEAST_PEAKS = 3  # and there are this many
+_SAME = 0.7  # sides whose extremes differ by less both get the lesser one
+_PREFIX = "CTRL_expressions."
+
+
+@dataclass
+class _Measured:
+    """What the curve of a control is like.
+
+    Attributes:
+        neutral, extreme: values.
+        noise: standard deviation of what changes from frame to frame without a direction.
+        rests: whether it is near 0 for some time.
+        has_ceiling: whether its peaks stop at one height.
+    """
+
+    neutral: float
+    extreme: float
+    noise: float
+    rests: bool
+    has_ceiling: bool
+
+
+def learn(clip: Clip, *, performance: bool = False, most_gain: float = MOST_GAIN) -> Ranges:
+    """The ranges of the person of a take.
+
+    Args:
+        clip: raw controls, as captured: without gain, smoothing or ranges.
+        performance: the take shows acting, not all extremes one after another: only controls
+            whose peaks stop at one height again and again are believed to reach their extreme.
+        most_gain: stretch at most so much, 1 to 4; lids to 2 at least.
+
+    Returns:
+        Ranges; its controls in the clip's order, head and gaze angles left out.
+
+    Raises:
+        ArgumentError: a take shorter than SHORTEST, no control of a face in it, a value that is not
+            finite, a gain outside 1 to 4.
+    """
+    if not 1.0 <= most_gain <= 4.0:
+        raise ArgumentError(f"a largest gain of 1 to 4 was expected, found {most_gain:g}")
+    if clip.duration < SHORTEST:
+        raise ArgumentError(
+            f"a take of at least {SHORTEST:g} s was expected to learn ranges from, "
+            f"found {clip.duration:.2f} s"
+        )
+    bad = np.argwhere(~np.isfinite(clip.curves))
+    if bad.size:
+        control, frame = bad[0]
+        raise ArgumentError(f"{clip.names[control]}, frame {frame}: a finite number was expected")
+    names = [name for name in clip.names if name.startswith("CTRL_")]
+    if not names:
+        raise ArgumentError(
+            "raw controls (CTRL_expressions.*) were expected to learn ranges from, found none"
+        )
+    measured = {n: _measure(clip.curve(n).astype(np.float64), clip.rate, n) for n in names}
+    found: dict[str, Learned] = {}
+    for name in names:
+        pair = [measured[name]]
+        if mirrored_name(name) in measured:
+            pair.append(measured[mirrored_name(name)])
+        found[name] = _judge(name, _together(pair), performance, most_gain)
+    return Ranges(_with_the_jaw(found), clip.metadata.get("source", ""))
+
+
+def _with_the_jaw(found: dict[str, Learned]) -> dict[str, Learned]:
+    """Closed lips get the range of the jaw: a capture holds both to the same value."""
+    jaw = found.get(f"{_PREFIX}jawOpen")
+    if jaw is None:
+        return found
+    return {n: jaw if "mouthLipsTogether" in n else learned for n, learned in found.items()}
+
+
+def _measure(curve: Doubles, rate: float, name: str) -> _Measured:
+    """A curve of one control. Args: curve  float64[frames]; rate  frames a second."""
+    calm = _without_spikes(curve, rate)
+    lowest = float(np.percentile(calm, _REST_SHARE))
+    neutral = min(max(lowest, 0.0), _HIGHEST_REST)
+    peaks = _peaks(calm, neutral)
+    highest = float(peaks.max(initial=neutral))
+    near = peaks[peaks - neutral >= _NEAR * (highest - neutral)]
+    extreme = float(np.percentile(near, _LOW_PEAKS)) if near.size else neutral
+    high = int((peaks - neutral >= _CEILING * (highest - neutral)).sum())
+    steps = np.abs(np.diff(curve, 2))
+    return _Measured(
+        neutral,
+        extreme,
+        float(1.4826 * np.median(steps) / np.sqrt(6.0)) if steps.size else 0.0,
+        lowest <= _HIGHEST_REST,
+        peaks.size >= _LEAST_PEAKS and (_is_lid(name) or 2 * high >= peaks.size),
+    )
+
+
+def _without_spikes(curve: Doubles, rate: float) -> Doubles:
+    """The median of the frames around each frame, over _SPIKE seconds, 3 frames at least."""
+    half = min(max(1, round(0.5 * _SPIKE * rate)), _WIDEST)
+    padded = np.pad(curve, half, mode="edge")
+    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1)
+    out: Doubles = np.median(windows, axis=1)
+    return out
+
+
+def _peaks(curve: Doubles, neutral: float) -> Doubles:
+    """The highest values of the times in which a curve is above half of its way."""
+    above = curve - neutral > 0.5 * (curve.max(initial=neutral) - neutral)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], above, [False]]).astype(np.int8)))
+    pairs = edges.reshape(-1, 2)
+    return np.array([curve[first:end].max() for first, end in pairs], np.float64)
+
+
+def _together(pair: list[_Measured]) -> _Measured:
+    """One measurement for both sides: a face that is captured evenly stays even."""
+    extremes = [side.extreme for side in pair]
+    least, most = min(extremes), max(extremes)
+    # Sides that go equally far both reach 1. Else one side was not taken to its extreme.
+    return _Measured(
+        float(np.mean([side.neutral for side in pair])),
+        least if least >= _SAME * most else most,
+        max(side.noise for side in pair),
+        all(side.rests for side in pair),
+        all(side.has_ceiling for side in pair),
+    )
+
+
+def _judge(name: str, found: _Measured, performance: bool, most_gain: float) -> Learned:
+    """The range of a control, and why it is not used where it is not."""
+    moved = found.extreme - found.neutral
+    gain = max(most_gain, _LID_GAIN) if _is_lid(name) else most_gain
+    reasons = {
+        "gaze is an angle": "eyeLook" in name,
+        "hardly moves": moved < _LEAST_RANGE,
+        "moves no more than its noise": moved < _LEAST_OVER_NOISE * found.noise,
+        "is never at rest": not found.rests,
+        "its peaks differ, so none is an extreme": performance and not found.has_ceiling,
+        "does not come near its extreme": moved * gain < 1.0 or moved > WIDTHS[1],
+    }
+    # Rounded down: a peak is never left a little below 1.
+    range_ = Range(round(found.neutral, 3), float(np.floor(found.extreme * 1e3)) / 1e3)
+    return Learned(range_, next((reason for reason, holds in reasons.items() if holds), ""))
+
+
+def _is_lid(name: str) -> bool:
+    return name.startswith(f"{_PREFIX}eyeBlink")

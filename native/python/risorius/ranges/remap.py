@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: MIT
+"""Values of controls by the ranges of a person: neutral becomes 0, extreme becomes 1.
+
+    share = (value - neutral) / (extreme - neutral)         0 to 1
+    result = share * (width + (1 - width) * share)          width = extreme - neutral
+
+The slope is 1 at the neutral: what trembles at rest trembles no more than it was captured.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from ..anim.clip import Clip
+from ..base.errors import ArgumentError
+
+Floats = npt.NDArray[np.float32]
+
+NEUTRALS = (0.0, 0.9)
+"""The lowest and highest neutral that a range may have."""
+WIDTHS = (0.1, 1.9)
+"""The smallest and largest difference of extreme and neutral; wider ones would not ascend."""
+
+
+class Range(NamedTuple):
+    """Of one control."""
+
+    neutral: float
+    """The value of a face at rest, NEUTRALS."""
+    extreme: float
+    """The value at which the face can go no further; the neutral and WIDTHS."""
+
+    @property
+    def gain(self) -> float:
+        """By how much the way from neutral to extreme is stretched; 1 leaves it as it is."""
+        return 1.0 / (self.extreme - self.neutral)
+
+    def calibrated(self) -> Range:
+        """The range of values from which the face at rest was taken away: see process.calibrate."""
+        return Range(0.0, (self.extreme - self.neutral) / (1.0 - self.neutral))
+
+    def trouble(self) -> tuple[str, str] | None:
+        """(field, what was expected and found) where the numbers make no range; None: all well."""
+        low, high = NEUTRALS
+        if not low <= self.neutral <= high:
+            return "neutral", f"{low:g} to {high:g} was expected, found {self.neutral:g}"
+        low, high = (self.neutral + width for width in WIDTHS)
+        if not low - 1e-6 <= self.extreme <= high + 1e-6:
+            return "extreme", (
+                f"{low:g} to {high:g} was expected for the neutral {self.neutral:g}, "
+                f"found {self.extreme:g}"
+            )
+        return None
+
+
+class Learned(NamedTuple):
+    """What a take shows of one control."""
+
+    range: Range
+    """As found, also where it is left alone."""
+    reason: str = ""
+    """Why the control is left as captured; "" where its range is used."""
+
+
+@dataclass(frozen=True)
+class Ranges:
+    """The ranges of a person.
+
+    Attributes:
+        controls: raw control, as a DNA spells it -> what was learned of it.
+        source: the take that they were learned from.
+    """
+
+    controls: Mapping[str, Learned] = field(default_factory=dict)
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        """Raises: ArgumentError for a range that is used and makes no sense."""
+        for name, range_ in self.used().items():
+            if trouble := range_.trouble():
+                raise ArgumentError(f"{name}: {trouble[0]}: {trouble[1]}")
+
+    def used(self) -> dict[str, Range]:
+        """The ranges of the controls that are changed."""
+        return {name: found.range for name, found in self.controls.items() if not found.reason}
+
+    def apply(self, clip: Clip) -> Clip:
+        """A clip of raw controls with the ranges taken out; other curves keep their bits."""
+        remap = Remap(clip.names, self.used())
+        return clip.replaced(curves=remap(clip.curves.T).T) if remap.changes else clip
+
+    def rows(self) -> Iterable[tuple[str, str, str, str, str]]:
+        """For a table: control, neutral, extreme, gain, why it is left alone."""
+        for name, (range_, reason) in self.controls.items():
+            gain = "" if reason else f"{range_.gain:.2f}"
+            yield name, f"{range_.neutral:.3f}", f"{range_.extreme:.3f}", gain, reason
+
+
+class Remap:
+    """Ranges compiled for values in the order of some names.
+
+    Args:
+        names: of the controls.
+        ranges: by name; names without one keep their values.
+
+    Attributes:
+        changes: whether any value may change.
+    """
+
+    def __init__(self, names: Sequence[str], ranges: Mapping[str, Range]) -> None:
+        found = [(i, ranges[name]) for i, name in enumerate(names) if name in ranges]
+        self.changes = bool(found)
+        self._places = np.array([place for place, _ in found], np.intp)
+        self._neutral = np.array([range_.neutral for _, range_ in found], np.float32)
+        self._extreme = np.array([range_.extreme for _, range_ in found], np.float32)
+        self._width = self._extreme - self._neutral
+
+    def __call__(self, values: Floats) -> Floats:
+        """The values with the ranges taken out.
+
+        Args:
+            values: float32[..., names]. A value below 0 stays; so does one above 1 that lies
+                beyond the extreme, which overdrive may use.
+
+        Returns:
+            float32[..., names], a copy.
+        """
+        out = np.array(values, np.float32)
+        if not self.changes:
+            return out
+        given = out[..., self._places]
+        share = np.clip((given - self._neutral) / self._width, np.float32(0.0), np.float32(1.0))
+        result = share * (self._width + (np.float32(1.0) - self._width) * share)
+        beyond = (given > 1.0) & (given > self._extreme) & (self._extreme <= 1.0)
+        out[..., self._places] = np.where((given < 0.0) | beyond, given, result)
+        return out
