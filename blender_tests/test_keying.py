@@ -155,6 +155,8 @@ OTHERS = {
     "selects, pins, hides": "select_board pin clear_pins select_handle hide_handles show_handles",
     "lies above the sliders": "layer_add layer_remove layer_move layer_duplicate layer_warp "
     "layers_to_nla fire unfire",
+    "how captures become values of controls; nothing moves": "learn_range learn_range_live "
+    "load_range save_range forget_range",
     "a hand of its own, without keys; at its end all stands as before": "live_start live_stop "
     "live_record live_finish live_discard live_neutral live_subject",
 }

@@ -36,7 +36,8 @@ if TYPE_CHECKING:  # names for annotations: nothing else may import the wheel
     from risorius.controls.control_names import ControlNames  # noqa: F401
     from risorius.expressions import Expression  # noqa: F401
     from risorius.importing import Report  # noqa: F401
-    from risorius.live import Receiver, Shaper, Take  # noqa: F401
+    from risorius.live import Frame, Receiver, Shaper, Take  # noqa: F401
+    from risorius.ranges import Ranges  # noqa: F401
 
 _risorius: ModuleType | None
 try:

@@ -5,7 +5,7 @@ import bpy
 
 from . import native
 from .language import tables
-from .scene.animation import layer_properties
+from .scene.animation import layer_properties, range_properties
 from .scene.base import compat, console
 from .scene.character import gaze_settings
 from .scene.life import handlers
@@ -48,6 +48,7 @@ from .ui.why import properties as why_properties
 # Panels of one bl_order stand in the order in which they are registered.
 CLASSES = (
     *layer_properties.CLASSES,
+    *range_properties.CLASSES,
     *about.CLASSES,
     *file.CLASSES,
     *life.CLASSES,
@@ -119,6 +120,7 @@ def register() -> None:
         words.give_context(cls)
         bpy.utils.register_class(cls)
     layer_properties.register()
+    range_properties.register()
     gaze_settings.register()
     for name, choice in _window_properties().items():
         setattr(bpy.types.WindowManager, name, choice)
@@ -175,6 +177,7 @@ def unregister() -> None:
     for name in reversed(_window_properties()):
         delattr(bpy.types.WindowManager, name)
     gaze_settings.unregister()
+    range_properties.unregister()
     layer_properties.unregister()
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

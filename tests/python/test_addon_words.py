@@ -144,6 +144,7 @@ def sources() -> Iterator[Path]:
     yield from sorted((ADDON / "ui").rglob("*.py"))
     yield ADDON / "registration.py"
     yield ADDON / "scene" / "animation" / "layer_properties.py"
+    yield ADDON / "scene" / "animation" / "range_properties.py"
     yield ADDON / "scene" / "character" / "gaze_settings.py"
 
 

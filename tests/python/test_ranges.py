@@ -11,7 +11,16 @@ from risorius import Clip, importing
 from risorius.cli import main
 from risorius.live import Frame, Shaper, livelink
 from risorius.live import Take as LiveTake
-from risorius.ranges import Range, Ranges, Remap, learn, load_ranges, parse_ranges, ranges_text
+from risorius.ranges import (
+    Range,
+    Ranges,
+    Remap,
+    is_captured,
+    learn,
+    load_ranges,
+    parse_ranges,
+    ranges_text,
+)
 
 REAL = SHARED / "data" / "real" / "livelink" / "rom_134s.csv"
 RIG = "CTRL_expressions."
@@ -195,6 +204,7 @@ def test_a_stream_gives_the_values_of_the_file(folder):
     for frame in frames(performance()):
         take.add(frame)
     clip = take.clip(shaper)
+    assert not is_captured(clip)
     assert clip.curve(f"{RIG}eyeBlinkL").max() > 0.8  # the extreme of rom.csv is higher
     for name in want.names:
         if not name.startswith(("head.", "eye")):
@@ -207,6 +217,17 @@ def test_a_stream_gives_the_values_of_the_file(folder):
     lid = plain.names.index(f"{RIG}eyeBlinkL")
     assert ranged.values[lid] == want.curve(f"{RIG}eyeBlinkL")[BLINKS[0]]
     assert plain.values[lid] == np.float32(round(performance()[BLINKS[0]][0], 10))
+
+
+def test_ranges_are_taken_out_once(folder, tmp_path, capsys):
+    once = tmp_path / "once.rzc"
+    assert run("convert", folder / "take.csv", "-o", once, "--range", "self") == 0
+    assert is_captured(importing.import_file(folder / "take.csv")[0])
+    assert not is_captured(Clip.load(once))
+    assert run("convert", once, "-o", tmp_path / "twice.rzc", "--range", "self") == 1
+    error = capsys.readouterr().err
+    assert "once.rzc: a capture as it came was expected, found one whose range was" in error
+    assert not (tmp_path / "twice.rzc").exists()
 
 
 def test_neutral_now_is_not_taken_away_twice():

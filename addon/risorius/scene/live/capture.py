@@ -15,7 +15,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ... import native
-from ..animation import clip_actions
+from ..animation import clip_actions, range_properties
 from ..base import parts
 from ..base.blender_types import ArmatureObject, current_context
 from ..character import runtime
@@ -210,6 +210,7 @@ def _before_save(*_arguments: object) -> None:
 @persistent
 def _undone(*_arguments: object) -> None:
     _state.undone = True
+    range_properties.touch()
     for session in sessions.running():
         session.sequence = 0
 

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 import bpy
 from mathutils import Euler, Quaternion
 
-from ..animation import clip_actions
+from ..animation import clip_actions, range_properties
 from ..base import parts
 from ..base.blender_types import ArmatureObject
 from ..character import runtime
@@ -30,10 +30,13 @@ def show(session: Session, controls: ArmatureObject) -> bool:
     Returns:
         Whether there was one.
     """
+    _follow_ranges(session, controls)
     frame = session.receiver.latest(session.subject)
     if frame is None or frame.sequence == session.sequence:
         return False
     session.sequence = frame.sequence
+    if not session.recent or session.recent[-1] is not frame:
+        session.recent.append(frame)
     shaper = session.shaper
     shaper.maximum = parts.maximum_of(controls)
     controlled, values = shaper.apply(frame)
@@ -48,6 +51,14 @@ def show(session: Session, controls: ArmatureObject) -> bool:
         _turn_head(session, controls, dict(zip(controlled, values, strict=True)))
     controls.update_tag()
     return True
+
+
+def _follow_ranges(session: Session, controls: ArmatureObject) -> None:
+    """Take over the ranges of the face where they may have changed; the face is shown anew."""
+    if session.ranges_seen != range_properties.changes():
+        session.ranges_seen = range_properties.changes()
+        session.shaper.ranges = range_properties.of(controls)
+        session.sequence = 0
 
 
 def _plan(session: Session, controls: ArmatureObject, controlled: tuple[str, ...]) -> None:

@@ -6,6 +6,7 @@ No Blender object is kept: a character is found anew each time, and may have gon
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass, field
 from typing import cast
 
@@ -55,6 +56,8 @@ class Session:
         before: slider -> value before the capture.
         turn: the head bone's (rotation mode, rotation as that mode keeps it) before it, or None.
         recording: Recording, while one is made.
+        recent: the frames that were shown lately, of any subject: a minute of 60 a second.
+        ranges_seen: range_properties.changes() when the shaper got the ranges of the face.
         names, sliders: the control names of the last frame, and (slider, place) of those that this
             character has.
     """
@@ -68,6 +71,8 @@ class Session:
     before: dict[str, float] = field(default_factory=dict)
     turn: tuple[str, tuple[float, ...]] | None = None
     recording: Recording | None = None
+    recent: deque[native.Frame] = field(default_factory=lambda: deque(maxlen=3600))
+    ranges_seen: int = -1
     names: tuple[str, ...] = ()
     sliders: tuple[tuple[str, int], ...] = ()
 

@@ -12,12 +12,12 @@ from ... import native
 from ...logic.base.errors import FaceError
 from ...logic.base.names import printable
 from ...logic.base.sentences import told
-from ...scene.animation import retarget_shape_keys
+from ...scene.animation import range_properties, retarget_shape_keys
 from ...scene.base import parts
 from ...scene.character import runtime
 from .. import words
 from ..blender_types import Context, FileHandler, ImportHelper, Item, Menu, Operator, Result
-from ..common import explain, face_rig, shown_progress
+from ..common import explain, face_controls, face_rig, shown_progress
 from .place_clip import PlacesClip
 
 RATES = (
@@ -28,6 +28,15 @@ RATES = (
     ),
     ("TIME", "Every Sample", "A key for each sample at its time, between frames where need be"),
     ("SCENE", "Set Scene Rate", "The scene takes over the rate of the file; a key for each sample"),
+)
+CAPTURE_RANGES = (
+    (
+        "FACE",
+        "Of the Face",
+        "Captures are stretched by the range that this face has, see the panel Capture Range",
+    ),
+    ("TAKE", "Of This File", "Neutral and extremes are learned from the file, for it alone"),
+    ("NONE", "None", "Values stay as captured"),
 )
 EXTENSIONS = (
     ".csv",
@@ -92,6 +101,11 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
         min=0.0,
         soft_max=240.0,
     )
+    capture_range: bpy.props.EnumProperty(
+        name="Range",
+        description="Which values of the capture become 0 and 1, so that blinks close the eyes",
+        items=CAPTURE_RANGES,
+    )
     gain: bpy.props.FloatProperty(
         name="Gain", description="Factor of all controls", default=1.0, min=0.0, soft_max=2.0
     )
@@ -138,6 +152,7 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
         try:
             with shown_progress(context) as progress:
                 clip, notes = self._read(live)
+                clip = self._ranged(context, clip, notes)
                 progress(0.4)
                 clip = self._adjusted(clip)
                 if self.rate_mode == "SCENE":
@@ -170,6 +185,19 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
         )
         return clip, lines_of(report)
 
+    def _ranged(self, context: Context, clip: "native.Clip", notes: list[str]) -> "native.Clip":
+        """Stretched as the user chose; notes get a line on it."""
+        module, ranges = native.part("ranges"), None
+        if self.capture_range == "TAKE":
+            ranges = module.learn(clip, performance=True)
+        elif self.capture_range == "FACE" and module.is_captured(clip):
+            ranges = range_properties.of(face_controls(context))
+        if ranges is None:
+            return clip
+        used = len(ranges.used().keys() & set(clip.names))
+        notes.append(words.say("{used} controls are stretched by the range.", used=used))
+        return ranges.apply(clip)
+
     def _adjusted(self, clip: "native.Clip") -> "native.Clip":
         """Calibrated, smoothed and multiplied."""
         process = native.part("importing.process")
@@ -195,6 +223,7 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
             layout.prop(self, "mapping_file")
         layout.prop(self, "rate_mode")
         words.prop_or(layout, self, "file_rate", 0.0, "0: as the file says")
+        layout.prop(self, "capture_range")
         layout.prop(self, "gain")
         words.prop_or(layout, self, "gains", "", "as *jawOpen=1.3 *Blink*=1.1")
         words.prop_or(layout, self, "smoothing", 0.0, "0: none")

@@ -23,6 +23,7 @@ class RISORIUS_PT_animation(FaceOnlyPanel, Panel):
         column.operator(RISORIUS_OT_import_animation.bl_idname, icon="IMPORT")
         column.operator(RISORIUS_OT_import_arkit_rig.bl_idname, icon="SHAPEKEY_DATA")
         column.operator(RISORIUS_OT_curves_from_mesh.bl_idname, icon="MESH_DATA")
+        column.operator("risorius.learn_range", icon="DRIVER_DISTANCE")
         column.operator("risorius.speak", icon="SPEAKER")
         column.menu(RISORIUS_MT_expressions.bl_idname, icon="USER")
         data = face_controls(context).animation_data

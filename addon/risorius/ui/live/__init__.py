@@ -1,6 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Live capture: choices, operators, panel."""
+"""Live capture: choices, operators, panel; the range of a person in captures."""
 
-from . import operators, panel, properties
+from . import operators, panel, properties, range_operators, range_panel
 
-CLASSES = (*properties.CLASSES, *operators.CLASSES, *panel.CLASSES)
+CLASSES = (
+    *properties.CLASSES,
+    *operators.CLASSES,
+    *range_operators.CLASSES,
+    *panel.CLASSES,
+    *range_panel.CLASSES,
+)

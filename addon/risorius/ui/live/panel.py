@@ -44,6 +44,7 @@ class RISORIUS_PT_live(FaceOnlyPanel, Panel):
         row = layout.row(align=True)
         row.operator("risorius.live_neutral")
         row.operator("risorius.live_neutral", text="", icon="X").forget = True
+        layout.operator("risorius.learn_range_live", text="Learn Range", icon="DRIVER_DISTANCE")
         _draw_status(layout, session)
 
 

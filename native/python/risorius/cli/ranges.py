@@ -4,11 +4,13 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from risorius import Clip, importing
 
+from ..base.errors import ArgumentError
 from ..base.words import counted
 from ..importing import Imported, Report
 from ..ranges import MOST_GAIN, Ranges, learn, load_ranges, ranges_text
@@ -91,14 +93,22 @@ def with_ranges(clip: Clip, source: str | None, report: Report) -> Clip:
         found = load_ranges(source)
     own = {name: found.controls[name] for name in clip.names if name in found.controls}
     report.notes.append(f"range {source}: {_counted(Ranges(own))}")
-    return found.apply(clip)
+    with _named(report.source):
+        return found.apply(clip)
 
 
 def _learn(clip: Clip, path: str | Path, **options: float) -> Ranges:
     """`learn`, whose errors name the file."""
-    try:
+    with _named(path):
         return learn(clip, **options)  # type: ignore[arg-type]
-    except ValueError as error:
+
+
+@contextmanager
+def _named(path: str | Path) -> Iterator[None]:
+    """Let errors on a clip name the file that it is of."""
+    try:
+        yield
+    except ArgumentError as error:
         raise importing.AnimationFileError(str(path), str(error)) from error
 
 

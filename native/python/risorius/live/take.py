@@ -60,7 +60,10 @@ class Take:
             curves[[names[name] for name in row.names], column] = row.values
         times = np.array([frame.time for frame in self._frames], np.float64)
         times -= times[0] if len(times) else 0.0
-        return Clip(names, curves, _rate(times), times=times, metadata={"subject": self.subject})
+        metadata = {"subject": self.subject}
+        if shaper.ranges is not None and shaper.ranges.used():
+            metadata = shaper.ranges.noted(metadata)
+        return Clip(names, curves, _rate(times), times=times, metadata=metadata)
 
     def unmapped(self, shaper: Shaper) -> list[str]:
         """Names of its frames that a shaper's mapping does not know."""

@@ -12,16 +12,19 @@ A range says which values of a control are its neutral and its extreme; they bec
 from __future__ import annotations
 
 from .learning import MOST_GAIN, SHORTEST, learn
-from .remap import Learned, Range, Ranges, Remap
+from .remap import NEUTRALS, WIDTHS, Learned, Range, Ranges, Remap, is_captured
 from .text import load_ranges, parse_ranges, ranges_text
 
 __all__ = [
     "MOST_GAIN",
+    "NEUTRALS",
     "SHORTEST",
+    "WIDTHS",
     "Learned",
     "Range",
     "Ranges",
     "Remap",
+    "is_captured",
     "learn",
     "load_ranges",
     "parse_ranges",

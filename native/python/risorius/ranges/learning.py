@@ -15,7 +15,7 @@ import numpy.typing as npt
 from ..anim.clip import Clip
 from ..base.errors import ArgumentError
 from ..controls.sides import mirrored_name
-from .remap import WIDTHS, Learned, Range, Ranges
+from .remap import WIDTHS, Learned, Range, Ranges, require_untouched
 
 Doubles = npt.NDArray[np.float64]
 
@@ -70,7 +70,7 @@ def learn(clip: Clip, *, performance: bool = False, most_gain: float = MOST_GAIN
 
     Raises:
         ArgumentError: a take shorter than SHORTEST, no control of a face in it, a value that is not
-            finite, a gain outside 1 to 4.
+            finite, a clip whose ranges were taken out, a gain outside 1 to 4.
     """
     if not 1.0 <= most_gain <= 4.0:
         raise ArgumentError(f"a largest gain of 1 to 4 was expected, found {most_gain:g}")
@@ -79,6 +79,7 @@ def learn(clip: Clip, *, performance: bool = False, most_gain: float = MOST_GAIN
             f"a take of at least {SHORTEST:g} s was expected to learn ranges from, "
             f"found {clip.duration:.2f} s"
         )
+    require_untouched(clip)
     bad = np.argwhere(~np.isfinite(clip.curves))
     if bad.size:
         control, frame = bad[0]

@@ -27,6 +27,25 @@ WIDTHS = (0.1, 1.9)
 """The smallest and largest difference of extreme and neutral; wider ones would not ascend."""
 
 
+_APPLIED = "range"  # in the metadata of a clip: whose ranges were taken out of it
+_CAPTURES = ("live_link_face", "csv", "json")  # kinds of files that captures are in
+
+
+def is_captured(clip: Clip) -> bool:
+    """Whether a clip has values as a capture app gives them: no speech, nothing ranged before."""
+    is_capture = clip.metadata.get("kind") in _CAPTURES or "subject" in clip.metadata
+    return is_capture and _APPLIED not in clip.metadata
+
+
+def require_untouched(clip: Clip) -> None:
+    """Raises: ArgumentError, where ranges were taken out of a clip before."""
+    if _APPLIED in clip.metadata:
+        raise ArgumentError(
+            "a capture as it came was expected, found one whose range was taken out before: "
+            f"{clip.metadata[_APPLIED]}"
+        )
+
+
 class Range(NamedTuple):
     """Of one control."""
 
@@ -90,9 +109,20 @@ class Ranges:
         return {name: found.range for name, found in self.controls.items() if not found.reason}
 
     def apply(self, clip: Clip) -> Clip:
-        """A clip of raw controls with the ranges taken out; other curves keep their bits."""
+        """A clip of raw controls with the ranges taken out; other curves keep their bits.
+
+        Raises:
+            ArgumentError: ranges were taken out of the clip before.
+        """
+        require_untouched(clip)
         remap = Remap(clip.names, self.used())
-        return clip.replaced(curves=remap(clip.curves.T).T) if remap.changes else clip
+        if not remap.changes:
+            return clip
+        return clip.replaced(curves=remap(clip.curves.T).T, metadata=self.noted(clip.metadata))
+
+    def noted(self, metadata: Mapping[str, str]) -> dict[str, str]:
+        """Metadata of a clip out of which these ranges are taken."""
+        return {**metadata, _APPLIED: self.source or "without a source"}
 
     def rows(self) -> Iterable[tuple[str, str, str, str, str]]:
         """For a table: control, neutral, extreme, gain, why it is left alone."""

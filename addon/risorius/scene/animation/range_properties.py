@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The capture range of a face as properties of its control armature: saved, copied, overridden."""
+
+# Blender takes properties where Python has annotations:
+# pyright: reportInvalidTypeForm=false
+
+from typing import Any
+
+import bpy
+
+from ... import native
+from ...language import tables
+from ..base import parts
+from ..base.blender_types import ArmatureObject
+
+ROWS = parts.RANGES
+INDEX = "risorius_ranges_index"
+SWITCH = "risorius_use_range"
+SOURCE = "risorius_range_source"
+_OVERRIDE: Any = {"LIBRARY_OVERRIDABLE"}
+_LEAST, _MOST = 0.1, 1.9  # difference of extreme and neutral, as risorius.ranges has them
+_changes = {"count": 0}  # of any range, since Blender started
+
+
+def _touch(_self: bpy.types.bpy_struct, _context: bpy.types.Context) -> None:
+    touch()
+
+
+def _mend(self: "RISORIUS_PG_range", _context: bpy.types.Context) -> None:
+    """Keep the extreme above the neutral, and tell live capture."""
+    wanted = min(max(self.extreme, self.neutral + _LEAST), self.neutral + _MOST)
+    if abs(wanted - self.extreme) > 1e-6:
+        self.extreme = wanted
+    touch()
+
+
+class RISORIUS_PG_range(bpy.types.PropertyGroup):
+    """The range of one control; its name is the raw control's."""
+
+    used: bpy.props.BoolProperty(
+        name="Use",
+        description="Stretch this control; off: it stays as captured",
+        override=_OVERRIDE,
+        update=_touch,
+    )
+    neutral: bpy.props.FloatProperty(
+        name="Neutral",
+        description="Captured value of the face at rest, which becomes 0",
+        min=0.0,
+        max=0.9,
+        precision=3,
+        override=_OVERRIDE,
+        update=_mend,
+    )
+    extreme: bpy.props.FloatProperty(
+        name="Extreme",
+        description="Captured value at which the face can go no further, which becomes 1",
+        default=1.0,
+        min=0.0,
+        max=2.8,
+        precision=3,
+        override=_OVERRIDE,
+        update=_mend,
+    )
+    reason: bpy.props.StringProperty(override=_OVERRIDE)
+
+
+def touch() -> None:
+    """Say that ranges may have changed: by a hand, undo, or another file."""
+    _changes["count"] += 1
+
+
+def changes() -> int:
+    """How often ranges may have changed; whoever keeps some compares it."""
+    return _changes["count"]
+
+
+def rows_of(controls: ArmatureObject) -> list[RISORIUS_PG_range]:
+    """The rows of a face. Args: controls  its control armature."""
+    return list(getattr(controls, ROWS))
+
+
+def all_of(controls: ArmatureObject) -> "native.Ranges":
+    """The ranges of a face, also while they are switched off.
+
+    Args:
+        controls: its control armature. A row whose numbers make no range counts as off.
+
+    Returns:
+        risorius.ranges.Ranges.
+    """
+    module = native.part("ranges")
+    found = {}
+    for row in rows_of(controls):
+        # Blender keeps float32: 0.67 shall be written as 0.67.
+        range_ = module.Range(round(row.neutral, 5), round(row.extreme, 5))
+        reason = "" if row.used and range_.trouble() is None else row.reason or "off"
+        found[row.name] = module.Learned(range_, reason)
+    return module.Ranges(found, getattr(controls, SOURCE))
+
+
+def of(controls: ArmatureObject) -> "native.Ranges | None":
+    """The ranges that captures of a face are stretched by, or None.
+
+    Args:
+        controls: its control armature.
+
+    Returns:
+        risorius.ranges.Ranges.
+    """
+    if not getattr(controls, SWITCH) or not len(getattr(controls, ROWS)):
+        return None
+    return all_of(controls)
+
+
+def keep(controls: ArmatureObject, ranges: "native.Ranges") -> None:
+    """Let a face have ranges; those before them go.
+
+    Args:
+        controls: its control armature.
+        ranges: risorius.ranges.Ranges.
+    """
+    rows: Any = getattr(controls, ROWS)
+    rows.clear()
+    for name, (range_, reason) in ranges.controls.items():
+        row = rows.add()
+        row.name, row.reason, row.used = name, reason, not reason
+        row.neutral, row.extreme = range_
+    setattr(controls, INDEX, 0)
+    setattr(controls, SOURCE, ranges.source)
+    setattr(controls, SWITCH, True)
+    touch()
+
+
+def forget(controls: ArmatureObject) -> None:
+    """Take a face's ranges away. Args: controls  its control armature."""
+    rows: Any = getattr(controls, ROWS)
+    rows.clear()
+    setattr(controls, SOURCE, "")
+    touch()
+
+
+def _all() -> dict[str, object]:
+    """The properties of objects, by their names."""
+    insertable: Any = {*_OVERRIDE, "USE_INSERTION"}
+    return {
+        ROWS: bpy.props.CollectionProperty(type=RISORIUS_PG_range, override=insertable),
+        INDEX: bpy.props.IntProperty(options=set(), override=_OVERRIDE),
+        SOURCE: bpy.props.StringProperty(options=set(), override=_OVERRIDE),
+        SWITCH: bpy.props.BoolProperty(
+            name="Use the Range",
+            description="Stretch captures of this face, imported and live, from neutral to extreme",
+            translation_context=tables.CONTEXT,
+            default=True,
+            options=set(),
+            override=_OVERRIDE,
+            update=_touch,
+        ),
+    }
+
+
+CLASSES = (RISORIUS_PG_range,)
+
+
+def register() -> None:
+    """Add the properties to objects; the classes are there."""
+    for name, kind in _all().items():
+        setattr(bpy.types.Object, name, kind)
+
+
+def unregister() -> None:
+    """Take them away; what files hold of them stays."""
+    for name in _all():
+        delattr(bpy.types.Object, name)

@@ -1,0 +1,32 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The range of a person from what live capture has received in the last seconds."""
+
+from __future__ import annotations
+
+from ... import native
+from ...logic.base.errors import FaceError
+from ...logic.base.sentences import told
+from .sessions import Session
+
+
+def recent_clip(session: Session, seconds: float) -> native.Clip:
+    """What a session has shown lately, as captured: without ranges, gain, smoothing, neutral.
+
+    Args:
+        session: of the character.
+        seconds: how far back.
+
+    Returns:
+        risorius.Clip of raw controls.
+
+    Raises:
+        FaceError: nothing was received.
+    """
+    if not session.recent:
+        raise FaceError(told("No face was received yet."))
+    live, newest = native.part("live"), session.recent[-1]
+    take = live.Take(newest.subject)
+    for frame in session.recent:
+        if frame.arrival >= newest.arrival - seconds:
+            take.add(frame)
+    return take.clip(live.Shaper(session.shaper.mapping))
