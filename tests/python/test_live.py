@@ -472,6 +472,33 @@ def test_invented_subjects_of_one_address_lock_no_phone_of_another_out():
     assert len(subjects) == 32
 
 
+def test_packets_of_another_address_do_not_move_a_face_that_is_followed():
+    receiver = Receiver("livelink")
+    take = receiver.record("iPad")
+    for n in range(6):  # version 1 has no device: the name alone is the same
+        fed(receiver, ["v1", "iPad", n / 60, n, face(52, i17=0.25)], 1.0 + n / 60, "10.0.0.1")
+        fed(receiver, ["v1", "iPad", n / 60, n, face(52, i17=1.0)], 1.0 + n / 60, "10.0.0.66")
+        fed(receiver, v6(n, face(i17=1.0), "iPad", PHONE), 1.0 + n / 60, "10.0.0.66")
+        twin = PHONE[:8] + OTHER[8:]
+        fed(receiver, v6(n, face(i17=1.0), "iPad", twin), 1.0 + n / 60, "10.0.0.66")
+    labels = ("iPad", "iPad (10.0.0.66)", f"iPad ({PHONE[:8]})", "iPad (10.0.0.66 2)")
+    assert receiver.status().subjects == labels
+    jaw = receiver.finish(take).clip().curve("CTRL_expressions.jawOpen")
+    assert jaw.tolist() == [0.25] * 6
+
+
+def test_a_phone_that_changes_its_address_stays_the_same_subject():
+    receiver = Receiver("livelink")
+    take = receiver.record()
+    fed(receiver, v6(0, face(i17=0.25)), 1.0, "10.0.0.1")
+    fed(receiver, v6(0, face(), "Bob", OTHER), 1.0, "10.0.0.2")
+    fed(receiver, v6(120, face(i17=0.5)), 3.0, "10.0.0.9")
+    assert receiver.status().subjects == ("iPhone", "Bob")
+    clip = receiver.finish(take).clip()
+    assert clip.curve("CTRL_expressions.jawOpen").tolist() == [0.25, 0.5]
+    assert np.allclose(clip.times, [0.0, 2.0])
+
+
 @pytest.mark.parametrize("way", ["record", "reserve"])
 def test_a_named_subject_gets_a_place_in_a_flood_that_came_first(way):
     receiver = Receiver("livelink")

@@ -8,6 +8,7 @@ frame; whoever shows the face asks when it suits.
 from __future__ import annotations
 
 import errno
+import itertools
 import socket
 import threading
 from collections import Counter, deque
@@ -35,6 +36,9 @@ _BACK = 1.0  # seconds; a packet older by less came late, by more: the sender's 
 _AHEAD = 2.0  # seconds that a sender's clock may get ahead of ours and still be believed
 _DRIFT = 0.001  # and this share of the time since its first face, as clocks run unevenly
 _DAY = 86400.0
+
+
+_Key = tuple[str, str, str]  # of a subject: address, device, name
 
 
 class Status(NamedTuple):
@@ -156,7 +160,7 @@ class Receiver:
         self.host = host
         self.port = PORTS[source] if port is None else port
         self._lock = threading.Lock()
-        self._subjects: Roster[tuple[str, str], _Subject] = Roster(lambda s: self._kept(s.label))
+        self._subjects: Roster[_Key, _Subject] = Roster(lambda s: self._kept(s.label))
         self._takes: list[Take] = []
         self._reserved: frozenset[str] = frozenset()
         self._reasons: Counter[str] = Counter()
@@ -334,17 +338,28 @@ class Receiver:
             now: seconds.
             sender: the address it came from; of OSC the subject is the address.
         """
-        key = (packet.device, packet.subject)
+        key = (sender or packet.subject, packet.device, packet.subject)
         with self._lock:
+            if packet.device:  # a phone that changed its address, and fell silent at the one before
+                self._subjects.move(key, lambda other: other[1:] == key[1:], now, key[0])
             subject = self._subjects.hear(key, now)
             if subject is not None:
                 return subject
-            label = packet.subject or packet.device or "unnamed"
-            if any(s.label == label for s in self._subjects):
-                label = f"{label} ({packet.device[:8]})"
-            subject = _Subject(label)
-            added = self._subjects.add(key, subject, now, sender or packet.subject)
+            subject = _Subject(self._free_label(packet, key[0]))
+            added = self._subjects.add(key, subject, now, key[0])
         return subject if added else None
+
+    def _free_label(self, packet: Packet, address: str) -> str:
+        """What a new subject is called: as it says itself, if no other is called so."""
+        name, taken = (
+            packet.subject or packet.device or "unnamed",
+            {s.label for s in self._subjects},
+        )
+        labels = itertools.chain(
+            (name, f"{name} ({packet.device[:8] or address})", f"{name} ({address})"),
+            (f"{name} ({address} {number})" for number in itertools.count(2)),
+        )
+        return next(label for label in labels if label not in taken)
 
 
 def own_address() -> str:

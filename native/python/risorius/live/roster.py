@@ -80,6 +80,24 @@ class Roster(Generic[Key, Item]):
         place.hear(now)
         return place.item
 
+    def move(self, key: Key, same: Callable[[Key], bool], now: float, address: str) -> None:
+        """Let a sender that is heard under another key have the place that it had.
+
+        Args:
+            key: under which it is heard; where it is known nothing changes.
+            same: whether another key is of the same sender, which was silent for a second there.
+            now: seconds.
+            address: where it sends from now.
+        """
+        if key in self._places:
+            return
+        for old, place in self._places.items():
+            if same(old) and place.times(now) == 0:
+                place.address = address
+                # The order of the places stays: it says who was there first.
+                self._places = {key if k == old else k: p for k, p in self._places.items()}
+                return
+
     def add(self, key: Key, item: Item, now: float, address: str = "") -> bool:
         """Keep a sender that was heard for the first time just now.
 
