@@ -151,8 +151,8 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
         rate = render.fps, render.fps_base
         try:
             with shown_progress(context) as progress:
-                clip, notes = self._read(live)
-                clip = self._ranged(context, clip, notes)
+                clip, notes, mapping = self._read(live)
+                clip = self._ranged(context, clip, notes, mapping)
                 progress(0.4)
                 clip = self._adjusted(clip)
                 if self.rate_mode == "SCENE":
@@ -167,10 +167,10 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
             return {"CANCELLED"}
         return {"FINISHED"}
 
-    def _read(self, live: runtime.Runtime) -> tuple["native.Clip", list[str]]:
-        """The file as a clip of raw controls, and lines on what became of its curves."""
+    def _read(self, live: runtime.Runtime) -> tuple["native.Clip", list[str], str]:
+        """The file as a clip of raw controls, lines on its curves, and the mapping used or ""."""
         if Path(self.filepath).suffix.lower() == CLIP_EXTENSION:
-            return native.module().Clip.load(self.filepath), []
+            return native.module().Clip.load(self.filepath), [], ""
         mapping = None if self.mapping == "AUTO" else self.mapping
         if mapping == "FILE":
             mapping = bpy.path.abspath(self.mapping_file)
@@ -183,14 +183,20 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
             rig=live.rig,
             rotations="all" if self.use_eyes else "head",
         )
-        return clip, lines_of(report)
+        return clip, lines_of(report), report.mapping
 
-    def _ranged(self, context: Context, clip: "native.Clip", notes: list[str]) -> "native.Clip":
-        """Stretched as the user chose; notes get a line on it."""
+    def _ranged(
+        self, context: Context, clip: "native.Clip", notes: list[str], mapping: str
+    ) -> "native.Clip":
+        """Stretched as the user chose; notes get a line on it.
+
+        A table of raw controls is no capture: it may have been stretched before.
+        """
         module, ranges = native.part("ranges"), None
+        is_raw = mapping == "controls"
         if self.capture_range == "TAKE":
             ranges = module.learn(clip, performance=True)
-        elif self.capture_range == "FACE" and module.is_captured(clip):
+        elif self.capture_range == "FACE" and module.is_captured(clip) and not is_raw:
             ranges = range_properties.of(face_controls(context))
         if ranges is None:
             return clip

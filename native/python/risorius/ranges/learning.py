@@ -32,6 +32,7 @@ _SPIKE = 0.05  # seconds: what is shorter is no peak
 _WIDEST = 4  # frames to either side: bounds the memory for takes of many frames a second
 _NEAR = 0.8  # share of the highest peak from which on a peak is one to the extreme
 _LOW_PEAKS = 25  # percent of these peaks that may stay below 1
+_LOW_BLINKS = 10  # of lids: a blink that is not shut is what one sees
 _CEILING = 0.85  # of a performance: at least half of the peaks reach this share of the highest
 _LEAST_PEAKS = 3  # and there are this many
 _SAME = 0.7  # sides whose extremes differ by less both get the lesser one
@@ -115,7 +116,8 @@ def _measure(curve: Doubles, rate: float, name: str) -> _Measured:
     peaks = _peaks(calm, neutral)
     highest = float(peaks.max(initial=neutral))
     near = peaks[peaks - neutral >= _NEAR * (highest - neutral)]
-    extreme = float(np.percentile(near, _LOW_PEAKS)) if near.size else neutral
+    low = _LOW_BLINKS if _is_lid(name) else _LOW_PEAKS
+    extreme = float(np.percentile(near, low)) if near.size else neutral
     high = int((peaks - neutral >= _CEILING * (highest - neutral)).sum())
     steps = np.abs(np.diff(curve, 2))
     return _Measured(
