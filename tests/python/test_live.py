@@ -447,10 +447,10 @@ def test_a_phone_that_was_there_first_keeps_its_place_in_a_flood(at):
     for n in range(10):
         fed(receiver, v6(n, face(i17=0.25)), 9.0 + n / 60)
 
-    def phone(n):  # silent for 12 s
-        return [(v6(n, face(i17=0.75)), "127.0.0.1")] if n > 72 else []
+    def phone(n):  # silent for 3 s
+        return [(v6(n, face(i17=0.75)), "127.0.0.1")] if n > 18 else []
 
-    flood(receiver, 14.0, at.format, phone)
+    flood(receiver, 4.0, at.format, phone)
     assert receiver.status().subject == receiver.status().subjects[0] == "iPhone"
     assert receiver.latest().values[JAW] == np.float32(0.75)
     assert len(receiver.status().subjects) == 32
@@ -507,9 +507,9 @@ def test_a_named_subject_gets_a_place_in_a_flood_that_came_first(way):
     def phone(n):  # from the address of the flood, with long silences
         return [(v6(10 * n, face(i17=n / 64.0)), "127.0.0.1")] if n > 12 and n % 12 == 1 else []
 
-    flood(receiver, 20.0, "127.0.0.1".format, phone)
+    flood(receiver, 8.0, "127.0.0.1".format, phone)
     latest = receiver.latest("iPhone")
-    assert (latest.sequence, latest.values[JAW]) == (9, np.float32(109 / 64.0))
+    assert (latest.sequence, latest.values[JAW]) == (3, np.float32(37 / 64.0))
     receiver.reserve([])
     assert len(receiver.status().subjects) == 32
 
