@@ -235,7 +235,7 @@ def test_empty_cells_are_filled_and_said(tmp_path):
             "line 1: a header with the names of the curves was expected, found numbers",
         ),
         (b"time,b\n0,hello\n", "columns with curves were expected, found none"),
-        (b"a,b\n0,1\n", "no column gives the time: give the rate"),
+        (b"a,b\n0,1\n", "nothing gives the time: give the rate"),
         (b"frame,b\n0,1\n", r"column 1 \(frame\): its time is a frame number: give the rate"),
         (b'time,a\n0,"1\n1,2\n', "no table"),
         (b"time,a\n0,\x001\n", "line 2: text was expected, found a zero byte"),
@@ -282,8 +282,8 @@ def test_options_that_make_no_sense(tmp_path):
 
 
 def test_frames_out_of_order_are_left_out_and_said(tmp_path):
-    found = read(tmp_path, "time,a\n0,0\n1,1\n1,5\n0.5,6\n2,2\n")
-    np.testing.assert_array_equal(found.clip.curve("a"), [0, 1, 2])
+    found = read(tmp_path, "time,a\n0,0\n1,1\n1,5\n0.5,6\n2,2\n3,3\n")
+    np.testing.assert_array_equal(found.clip.curve("a"), [0, 1, 2, 3])
     assert found.notes[0].startswith("2 frame(s) left out whose time is not after the one before")
 
 

@@ -29,6 +29,17 @@ RATES = (
     ("TIME", "Every Sample", "A key for each sample at its time, between frames where need be"),
     ("SCENE", "Set Scene Rate", "The scene takes over the rate of the file; a key for each sample"),
 )
+TIME_UNITS = (
+    ("AUTO", "As the File Says", "Its header names the unit, or its numbers show it"),
+    ("S", "Seconds", ""),
+    ("MS", "Milliseconds", ""),
+    ("US", "Microseconds", ""),
+    ("NS", "Nanoseconds", ""),
+    ("MIN", "Minutes", ""),
+    ("H", "Hours", ""),
+    ("FRAMES", "Frame Numbers", "At the rate of the file"),
+    ("ROWS", "Rows", "Its times are left aside: each row is a frame at the rate of the file"),
+)
 EXTENSIONS = (
     ".csv",
     ".tsv",
@@ -91,6 +102,17 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
         description="Frames per second of a file that does not say it; 0: as found",
         min=0.0,
         soft_max=240.0,
+    )
+    timecode_rate: bpy.props.FloatProperty(
+        name="Timecode Rate",
+        description="Frames that timecodes count a second, where they do not tell; 0: as found",
+        min=0.0,
+        soft_max=240.0,
+    )
+    time_unit: bpy.props.EnumProperty(
+        name="Time Unit",
+        description="What the times of a table or a JSON count in",
+        items=TIME_UNITS,
     )
     gain: bpy.props.FloatProperty(
         name="Gain", description="Factor of all controls", default=1.0, min=0.0, soft_max=2.0
@@ -165,6 +187,8 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
             kind=None if self.kind == "AUTO" else self.kind,
             mapping=mapping,
             rate=self.file_rate or None,
+            timecode_rate=self.timecode_rate or None,
+            time_unit=None if self.time_unit == "AUTO" else self.time_unit.lower(),
             rig=live.rig,
             rotations="all" if self.use_eyes else "head",
         )
@@ -194,7 +218,9 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
         if self.mapping == "FILE":
             layout.prop(self, "mapping_file")
         layout.prop(self, "rate_mode")
-        words.prop_or(layout, self, "file_rate", 0.0, "0: as the file says")
+        layout.prop(self, "time_unit")
+        for name in ("file_rate", "timecode_rate"):
+            words.prop_or(layout, self, name, 0.0, "0: as the file says")
         layout.prop(self, "gain")
         words.prop_or(layout, self, "gains", "", "as *jawOpen=1.3 *Blink*=1.1")
         words.prop_or(layout, self, "smoothing", 0.0, "0: none")

@@ -104,6 +104,12 @@ def _add_input(parser: argparse.ArgumentParser) -> None:
         "--timecode-rate", type=float, metavar="FPS", help="of timecodes that do not tell it"
     )
     parser.add_argument(
+        "--time-unit",
+        choices=importing.TIME_UNITS,
+        help="what the times of a table or a JSON count in, where they do not say it; rows: they "
+        "are left aside, and each row is a frame at --input-rate",
+    )
+    parser.add_argument(
         "--take", metavar="NAME", help="animation of a glTF or FBX, by name or number (the first)"
     )
 
@@ -139,6 +145,7 @@ def load(args: argparse.Namespace) -> importing.Imported:
         kind=args.kind,
         rate=args.input_rate,
         timecode_rate=args.timecode_rate,
+        time_unit=args.time_unit,
         take=args.take,
     )
 

@@ -7,6 +7,7 @@ file --read--> Imported (the file's own curves) --apply(mapping)--> Clip of raw 
 from __future__ import annotations
 
 from . import process
+from .clock.units import CHOICES as TIME_UNITS
 from .errors import AnimationFileError
 from .mapping import (
     Mapping,
@@ -24,6 +25,7 @@ from .writing import csv_text, json_text, write_text
 __all__ = [
     "KINDS",
     "ROTATIONS",
+    "TIME_UNITS",
     "AnimationFileError",
     "Imported",
     "Mapping",

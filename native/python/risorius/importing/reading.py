@@ -16,6 +16,7 @@ from ..anim.clip import Clip
 from ..base.budget import Budget
 from ..base.errors import ArgumentError
 from . import fbx, gltf, named_json, tables, visemes
+from .clock import units
 from .errors import AnimationFileError
 from .keys import Keys, on_one_clock
 from .mapping import ANGLES, Mapped, apply_rows, best_mapping, load_mapping
@@ -40,8 +41,7 @@ class Options(NamedTuple):
     """Of `read`."""
 
     kind: str | None
-    rate: float | None
-    timecode_rate: float | None
+    asked: units.Asked
     take: str | None
     budget: Budget
 
@@ -188,6 +188,7 @@ def read(
     kind: str | None = None,
     rate: float | None = None,
     timecode_rate: float | None = None,
+    time_unit: str | None = None,
     take: str | None = None,
 ) -> Imported:
     """Read a file of animation.
@@ -198,6 +199,9 @@ def read(
         rate: frames a second, of tables whose time is a frame number or is not there.
         timecode_rate: frames a second of timecodes, where they do not tell; 29.97 and the like
             stand for 30000/1001.
+        time_unit: one of importing.TIME_UNITS, of tables and JSON whose times do not say it;
+            "rows": their times are left aside, and each row is a frame at `rate`. None: the file
+            tells.
         take: name or number of an animation, of files that hold several; None: the first.
 
     Raises:
@@ -209,11 +213,15 @@ def read(
     for name, value in (("rate", rate), ("timecode_rate", timecode_rate)):
         if value is not None and not 0.0 < value < 1e6:
             raise ArgumentError(f"{name}: frames a second above 0 were expected, found {value}")
+    if time_unit is not None and time_unit not in units.CHOICES:
+        raise ArgumentError(
+            f"time_unit: one of {', '.join(units.CHOICES)} was expected, found {time_unit!r}"
+        )
     file = Path(path)
     data = read_bytes(file)
     try:
-        budget = Budget.of(len(data))
-        found = _read_kind(file, data, Options(kind, rate, timecode_rate, take, budget))
+        budget, asked = Budget.of(len(data)), units.Asked(rate, timecode_rate, time_unit)
+        found = _read_kind(file, data, Options(kind, asked, take, budget))
     except AnimationFileError:
         raise
     except (ValueError, ArithmeticError) as error:  # numbers in the file that no reader expects
@@ -249,7 +257,7 @@ def _read_kind(file: Path, data: bytes, options: Options) -> Take:
 def _read_mouth(text: str, name: str, options: Options) -> Take | None:
     """Mouth shapes, where a text holds such."""
     if options.kind in (None, "moho") and text.lstrip().startswith("MohoSwitch1"):
-        return visemes.read_dat(text.lstrip(), name, options.rate)
+        return visemes.read_dat(text.lstrip(), name, options.asked.rate)
     reader = visemes.reader_of(text) if options.kind in (None, "rhubarb", "papagayo") else None
     return reader(text, name) if reader is not None else None
 
@@ -264,8 +272,8 @@ def _read_table(text: str, name: str, options: Options) -> Take:
     table = tables.read_table(text, name)
     is_capture = options.kind is None and tables.is_live_link_face(table.header)
     if is_capture or options.kind == "live_link_face":
-        return tables.read_live_link_face(table, options.timecode_rate)
-    return tables.read_plain(table, options.rate, options.timecode_rate)
+        return tables.read_live_link_face(table, options.asked)
+    return tables.read_plain(table, options.asked)
 
 
 def _read_json(document: object, file: Path, options: Options) -> Take:
@@ -277,7 +285,7 @@ def _read_json(document: object, file: Path, options: Options) -> Take:
             return visemes.read_rhubarb_json(document, name)
         if "voices" in document and "fps" in document:
             return visemes.read_pgo_json(document, name)
-    return named_json.read(document, name, options.rate, options.budget)
+    return named_json.read(document, name, options.asked, options.budget)
 
 
 def import_file(
@@ -288,6 +296,7 @@ def import_file(
     kind: str | None = None,
     rate: float | None = None,
     timecode_rate: float | None = None,
+    time_unit: str | None = None,
     take: str | None = None,
     rig: RigLike | None = None,
     rotations: str = "head",
@@ -295,13 +304,15 @@ def import_file(
     """A file as a clip of raw controls, and what became of each of its curves.
 
     Args:
-        path, kind, rate, timecode_rate, take: as of `read`.
+        path, kind, rate, timecode_rate, time_unit, take: as of `read`.
         rig_names, mapping, rig, rotations: as of `Imported.apply`.
 
     Raises:
         ValueError: as they do.
     """
-    found = read(path, kind=kind, rate=rate, timecode_rate=timecode_rate, take=take)
+    found = read(
+        path, kind=kind, rate=rate, timecode_rate=timecode_rate, time_unit=time_unit, take=take
+    )
     return found.apply(mapping, rig_names=rig_names, rig=rig, rotations=rotations)
 
 

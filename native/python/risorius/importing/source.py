@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..anim.clip import Clip, Event
+from .clock.units import COUNT_ROWS
 from .errors import AnimationFileError
 
 Doubles = npt.NDArray[np.float64]
@@ -21,6 +22,8 @@ MAX_BYTES = 1 << 30
 # Times that lie further apart than this rate gives are times of keys, not of frames.
 LEAST_RATE = 8.0
 USUAL_RATE = 60.0
+# Of frames whose time goes back or stands still, the share that a take may lose.
+MOST_LOST = 1.0 / 3.0
 RATES = (12.0, 23.976, 24.0, 25.0, 29.97, 30.0, 48.0, 50.0, 59.94, 60.0, 90.0, 100.0, 120.0, 240.0)
 
 
@@ -199,15 +202,19 @@ def number(text: str, name: str, line: int, column: int | str) -> float:
     return value
 
 
-def keep_ascending(times: Doubles, notes: list[str]) -> npt.NDArray[np.intp]:
+def keep_ascending(times: Doubles, notes: list[str], name: str) -> npt.NDArray[np.intp]:
     """Indices of the frames whose time comes after all times before; the others are noted.
 
     Args:
         times: float64[frames], seconds.
         notes: gets a sentence where frames are left out.
+        name: what errors call the file.
 
     Returns:
         int[kept frames].
+
+    Raises:
+        AnimationFileError: more than MOST_LOST of the frames would be lost.
     """
     highest = np.maximum.accumulate(times) if times.size else times
     good = np.ones(times.size, bool)
@@ -215,8 +222,15 @@ def keep_ascending(times: Doubles, notes: list[str]) -> npt.NDArray[np.intp]:
     dropped = int(times.size - good.sum())
     if dropped:
         first = int(np.argmin(good))
+        where = f"(the first: frame {first}, {times[first]:.6f} s)"
+        if dropped > MOST_LOST * times.size:
+            raise AnimationFileError(
+                name,
+                f"times that ascend were expected, found {dropped} of {times.size} frames whose "
+                f"time is not after the one before {where}: {COUNT_ROWS}",
+            )
         notes.append(
-            f"{dropped} frame(s) left out whose time is not after the one before "
-            f"(the first: frame {first}, {times[first]:.6f} s)"
+            f"{dropped} frame(s) left out whose time is not after the one before {where}; "
+            f"{COUNT_ROWS}"
         )
     return np.flatnonzero(good)

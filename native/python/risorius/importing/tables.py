@@ -13,23 +13,14 @@ import numpy as np
 import numpy.typing as npt
 
 from ..controls import arkit
-from . import timecode
+from .clock import timecode
+from .clock.units import FRAMES, Asked, TimeName, plain, row_times, seconds_of, time_name
 from .errors import AnimationFileError
 from .source import Take, keep_ascending, make_clip, number
 
 Doubles = npt.NDArray[np.float64]
 
 DELIMITERS = (",", "\t", ";", "|")
-# Headers of a time column, without letter case, blanks and signs -> seconds of 1, or 0 for frames.
-TIME_COLUMNS = {
-    "time": 1.0, "timecode": 1.0, "timestamp": 1.0, "seconds": 1.0, "second": 1.0, "sec": 1.0,
-    "secs": 1.0, "s": 1.0, "t": 1.0, "times": 1.0, "timesec": 1.0, "timeseconds": 1.0,
-    "timesecs": 1.0, "timeins": 1.0, "timeinseconds": 1.0,
-    "ms": 1e-3, "timems": 1e-3, "milliseconds": 1e-3, "timemilliseconds": 1e-3, "millis": 1e-3,
-    "timestampms": 1e-3,
-    "frame": 0.0, "frames": 0.0, "framenumber": 0.0, "frameindex": 0.0, "frameid": 0.0,
-    "frameno": 0.0,
-}  # fmt: skip
 # Curves of a take of Live Link Face, in their order.
 LIVE_LINK_FACE = (
     *(unit[0].upper() + unit[1:] for unit in arkit.order("live_link_face_take")),
@@ -38,6 +29,7 @@ LIVE_LINK_FACE = (
 )
 # Columns that tell how many blend shapes there are; they hold no curve.
 COUNTS = ("blendshapecount",)
+_FILE_TELLS = Asked()
 
 
 @dataclass
@@ -176,37 +168,28 @@ def _is_number(text: str) -> bool:
     return True
 
 
-def plain(header: str) -> str:
-    """A header without letter case, blanks and signs."""
-    return re.sub(r"[^a-z0-9]", "", header.lower())
-
-
 def is_live_link_face(header: Sequence[str]) -> bool:
     """A timecode, the count of shapes, then shapes: what Live Link Face and its likes write."""
     names = [plain(cell) for cell in header]
     return len(names) > 2 and names[0] == "timecode" and names[1] in COUNTS
 
 
-def read_live_link_face(table: Table, timecode_rate: float | None = None) -> Take:
+def read_live_link_face(table: Table, asked: Asked = _FILE_TELLS) -> Take:
     """A take of Live Link Face: time from the timecode and its rate, not from the row.
 
     Args:
         table: 2 columns and 51 to 61 curves, in any order, in either style of names.
-        timecode_rate: frames a second of the timecode, where the file does not tell.
+        asked: what the caller says of its timecodes.
 
     Raises:
         AnimationFileError: a cell that is none, timecodes whose rate cannot be told.
     """
     notes: list[str] = []
-    codes = [
-        timecode.parse(row[0], table.name, line, table.place(0))
-        for row, line in zip(table.rows, table.lines, strict=True)
-    ]
-    seconds = _timecode_seconds(table, codes, timecode_rate, notes)
+    seconds = _timecode_seconds(table, 0, asked, notes)
     columns = [i for i, cell in enumerate(table.header) if i > 1 and cell]
     curves = np.array([table.column(c) for c in columns])
     _note_count(table, len(columns), notes)
-    keep = keep_ascending(seconds, notes)
+    keep = keep_ascending(seconds, notes, table.name)
     times = seconds[keep] - seconds[0]
     _note_dropped(times, notes)
     clip = make_clip(
@@ -218,9 +201,15 @@ def read_live_link_face(table: Table, timecode_rate: float | None = None) -> Tak
     return Take(clip, "live_link_face", "live_link_face", notes)
 
 
-def _timecode_seconds(
-    table: Table, codes: list[timecode.Timecode], rate: float | None, notes: list[str]
-) -> Doubles:
+def _timecode_seconds(table: Table, column: int, asked: Asked, notes: list[str]) -> Doubles:
+    """Seconds of the timecodes in a column, or of its rows where those are to be counted."""
+    if asked.counts_rows:
+        return row_times(len(table.rows), asked, table.name)
+    codes = [
+        timecode.parse(row[column], table.name, line, table.place(column))
+        for row, line in zip(table.rows, table.lines, strict=True)
+    ]
+    rate = asked.timecode_rate
     if rate is not None:
         base = round(rate)
     else:
@@ -230,8 +219,8 @@ def _timecode_seconds(
                 table.name,
                 "its timecodes do not tell whether they count 24, 25, 30 or 60 frames a second "
                 f"(the largest frame number is {max(c.frames for c in codes):g}): give the "
-                "timecode rate",
-                column=table.place(0),
+                "timecode rate (--timecode-rate; Timecode Rate in Blender)",
+                column=table.place(column),
             )
         base = found
     over = next((i for i, code in enumerate(codes) if code.frames >= base), None)
@@ -240,7 +229,7 @@ def _timecode_seconds(
             table.name,
             f"a frame number below {base} was expected, found {codes[over].frames:g}",
             line=table.lines[over],
-            column=table.place(0),
+            column=table.place(column),
         )
     if any(code.is_dropped for code in codes) and base % 30:
         raise AnimationFileError(
@@ -272,82 +261,59 @@ def _note_dropped(times: Doubles, notes: list[str]) -> None:
         )
 
 
-def read_plain(table: Table, rate: float | None = None, timecode_rate: float | None = None) -> Take:
+def read_plain(table: Table, asked: Asked = _FILE_TELLS) -> Take:
     """Curves by column.
 
-    Time is the column that is headed so (seconds, milliseconds, timecodes, or frame numbers at
-    `rate`), else the row number at `rate`. An empty cell is a value that is not there: the curve
-    goes straight across, or keeps its first or last value.
+    Time is the column that is headed so (in a unit of `clock.units`, timecodes, or frame numbers at
+    the rate that is asked for), else the row number at that rate. An empty cell is a value that is
+    not there: the curve goes straight across, or keeps its first or last value.
 
     Args:
         table: of `read_table`.
-        rate: frames a second of frame and row numbers; None: unknown.
-        timecode_rate: frames a second of timecodes; None: told from them.
+        asked: what the caller says of its time.
 
     Raises:
-        AnimationFileError: no time and no rate, a cell that is no number, no curve.
+        AnimationFileError: no time and no rate, a cell that is no number, no curve, a unit of time
+            that nobody knows.
     """
     notes: list[str] = []
     at = _time_column(table)
-    times = _plain_times(table, at, rate, timecode_rate, notes)
+    times = _plain_times(table, at, asked, notes)
     columns = [i for i, cell in enumerate(table.header) if i != at and _is_curve(table, i, notes)]
     if not columns:
         raise AnimationFileError(table.name, "columns with curves were expected, found none")
-    keep = keep_ascending(times, notes)
+    keep = keep_ascending(times, notes, table.name)
     curves = np.stack([_column(table, column, times, notes) for column in columns])
     clip = make_clip(
         [table.header[c] for c in columns], curves[:, keep], times[keep],
-        rate=rate if at is None else None,
+        rate=asked.rate if at is None or asked.counts_rows else None,
     )  # fmt: skip
     return Take(clip, "csv", "", notes)
 
 
 def _time_column(table: Table) -> int | None:
     """The first column of the best kind: a time before a frame number."""
-    found = [(i, plain(re.sub(r"\(.*?\)|\[.*?\]", _unit, h))) for i, h in enumerate(table.header)]
-    times = [i for i, header in found if TIME_COLUMNS.get(header, 0.0) > 0.0]
-    frames = [i for i, header in found if TIME_COLUMNS.get(header) == 0.0]
-    return next(iter(times + frames), None)
+    found = [(i, name) for i, h in enumerate(table.header) if (name := time_name(h)) is not None]
+    found.sort(key=lambda row: row[1].unit == FRAMES)
+    return found[0][0] if found else None
 
 
-def _unit(match: re.Match[str]) -> str:
-    """What a unit in brackets adds to a header: "time (ms)"."""
-    return "ms" if match[0].strip("()[] ").lower() in ("ms", "msec", "milliseconds") else ""
-
-
-def _plain_times(
-    table: Table, at: int | None, rate: float | None, timecode_rate: float | None, notes: list[str]
-) -> Doubles:
+def _plain_times(table: Table, at: int | None, asked: Asked, notes: list[str]) -> Doubles:
     if at is None:
-        if rate is None:
-            raise AnimationFileError(
-                table.name, "no column gives the time: give the rate in frames a second"
-            )
-        return np.arange(len(table.rows)) / rate
-    header = plain(re.sub(r"\(.*?\)|\[.*?\]", _unit, table.header[at]))
+        return row_times(len(table.rows), asked, table.name)
     if ":" in table.rows[0][at]:
-        codes = [
-            timecode.parse(row[at], table.name, line, table.place(at))
-            for row, line in zip(table.rows, table.lines, strict=True)
-        ]
-        seconds = _timecode_seconds(table, codes, timecode_rate, notes)
+        seconds = _timecode_seconds(table, at, asked, notes)
         return seconds - seconds[0]
-    values = table.column(at)
-    unit = TIME_COLUMNS[header]
-    if unit:
-        return values * unit
-    if rate is None:
-        raise AnimationFileError(
-            table.name, "its time is a frame number: give the rate in frames a second",
-            column=table.place(at),
-        )  # fmt: skip
-    return values / rate
+    if asked.counts_rows:
+        return row_times(len(table.rows), asked, table.name)
+    said = time_name(table.header[at]) or TimeName("")
+    return seconds_of(table.column(at), said, asked, notes, name=table.name, column=table.place(at))
 
 
 def _is_curve(table: Table, column: int, notes: list[str]) -> bool:
     """Not a row number, a count, a second time, or a column of text."""
     header = plain(table.header[column])
-    if header in COUNTS or header in TIME_COLUMNS:
+    if header in COUNTS or time_name(table.header[column]) is not None:
         return False
     cells = [row[column].strip() for row in table.rows]
     if not any(cells):

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from .errors import AnimationFileError
+from ..errors import AnimationFileError
 
 BASES = (24, 25, 30, 48, 50, 60, 100, 120)
 DAY = 86400.0
