@@ -147,6 +147,47 @@ def test_a_take_that_loses_over_a_third_names_what_mends_it(tmp_path, make, form
     np.testing.assert_allclose(clip.frame_times(), np.arange(60) / 30, atol=1e-6)
 
 
+@pytest.mark.parametrize(
+    "base", [15, 36, 40, 45, 72, 75, 80, 90, 100, 110, 120, 144, 200, 240, 1000]
+)
+def test_timecodes_of_any_rate_are_measured(tmp_path, base):
+    """Two and a half seconds, each frame or each third, from any frame on, rows lost or none."""
+    for stride, first, lost in ((1, 0, ()), (1, 7, (9, 10, 33)), (3, 2, ())):
+        count = np.delete(np.arange(first, first + base * 5 // 2, stride), lost)
+        text = live_link_face(capture(count.size, FEW), 36600 + count / base, names=FEW, base=base)
+        (tmp_path / "take.csv").write_text(text)
+        found = importing.read(tmp_path / "take.csv")
+        assert f"the timecode counts {base} frames a second" in found.notes
+        wanted = (count - count[0]) / base
+        np.testing.assert_allclose(found.clip.frame_times(), wanted, atol=2e-5)
+
+
+@pytest.mark.parametrize("base", [30, 48, 50, 60])
+def test_rows_lost_where_the_second_turns_make_no_rate_of_their_own(tmp_path, base):
+    """A second and a half of which the rows before, or after, the turn are lost, and others."""
+    for lost in (range(base - 3, base), range(base, base + 4), range(base - 3, base + 3)):
+        count = np.delete(np.arange(base * 3 // 2), [*lost, 3, 4, base + 9])
+        text = live_link_face(capture(count.size, FEW), 36600 + count / base, names=FEW, base=base)
+        (tmp_path / "take.csv").write_text(text)
+        try:
+            found = importing.read(tmp_path / "take.csv")
+        except importing.AnimationFileError as error:
+            assert "give the timecode rate (--timecode-rate" in str(error)
+            continue
+        note = next(note for note in found.notes if note.startswith("the timecode counts"))
+        # 48 and 50 without what tells them look like 60, the rate of nearly all phones.
+        assert note.split()[3] in (str(base), "60")
+
+
+def test_a_short_take_of_many_frames_a_second_is_asked_for(tmp_path, capsys):
+    text = live_link_face(capture(80, FEW), 36600 + np.arange(80) / 120, names=FEW, base=120)
+    assert convert(tmp_path, "take.csv", text)[0] == 1
+    assert "(the largest frame number is 79): give the timecode rate" in capsys.readouterr().err
+    code, clip = convert(tmp_path, "take.csv", text, "--timecode-rate", "120")
+    assert code == 0
+    np.testing.assert_allclose(clip.frame_times(), np.arange(80) / 120, atol=2e-5)
+
+
 def test_times_that_make_no_sense_as_an_option(tmp_path):
     (tmp_path / "a.csv").write_text("time,jawOpen\n0,0\n")
     with pytest.raises(ValueError, match="time_unit: one of s, ms, .* was expected, found 'weeks'"):

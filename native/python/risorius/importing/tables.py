@@ -217,7 +217,7 @@ def _timecode_seconds(table: Table, column: int, asked: Asked, notes: list[str])
         if found is None:
             raise AnimationFileError(
                 table.name,
-                "its timecodes do not tell whether they count 24, 25, 30 or 60 frames a second "
+                "its timecodes do not tell how many frames a second they count "
                 f"(the largest frame number is {max(c.frames for c in codes):g}): give the "
                 "timecode rate (--timecode-rate; Timecode Rate in Blender)",
                 column=table.place(column),
