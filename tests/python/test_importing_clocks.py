@@ -23,25 +23,25 @@ def convert(tmp_path, name, text, *options):
 
 
 def table(header, times):
-    rows = (f"{t},{0.1 * i:g}" for i, t in enumerate(times))
+    rows = (f"{t},{0.01 * i:g}" for i, t in enumerate(times))
     return "\n".join([f"{header},jawOpen", *rows]) + "\n"
 
 
 def frames(key, times):
-    return json.dumps([{key: t, "jawOpen": 0.1 * i} for i, t in enumerate(times)])
+    return json.dumps([{key: t, "jawOpen": 0.01 * i} for i, t in enumerate(times)])
 
 
 def lists(key, times):
-    return json.dumps({key: times, "jawOpen": [0.1 * i for i in range(len(times))]})
+    return json.dumps({key: times, "jawOpen": [0.01 * i for i in range(len(times))]})
 
 
 def matrix(key, times):
-    rows = [[0.1 * i] for i in range(len(times))]
+    rows = [[0.01 * i] for i in range(len(times))]
     return json.dumps({"names": ["jawOpen"], "frames": rows, key: times})
 
 
 def matrix_of_tables(key, times):
-    rows = [{key: t, "weights": [0.1 * i]} for i, t in enumerate(times)]
+    rows = [{key: t, "weights": [0.01 * i]} for i, t in enumerate(times)]
     return json.dumps({"names": ["jawOpen"], "frames": rows})
 
 

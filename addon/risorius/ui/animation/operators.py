@@ -40,6 +40,11 @@ TIME_UNITS = (
     ("FRAMES", "Frame Numbers", "At the rate of the file"),
     ("ROWS", "Rows", "Its times are left aside: each row is a frame at the rate of the file"),
 )
+ANGLES = (
+    ("AUTO", "As the File Says", "Radians; what no head can turn is asked about"),
+    ("RADIANS", "Radians", ""),
+    ("DEGREES", "Degrees", ""),
+)
 EXTENSIONS = (
     ".csv",
     ".tsv",
@@ -113,6 +118,16 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
         name="Time Unit",
         description="What the times of a table or a JSON count in",
         items=TIME_UNITS,
+    )
+    full_value: bpy.props.FloatProperty(
+        name="Full Value",
+        description="The file's value of a whole movement: 100 for per cent, 255 for bytes, 1 "
+        "keeps values however large; 0: 1, and values far above it are asked about",
+        min=0.0,
+        soft_max=255.0,
+    )
+    angles: bpy.props.EnumProperty(
+        name="Angles", description="What the file's angles of head and eyes are in", items=ANGLES
     )
     gain: bpy.props.FloatProperty(
         name="Gain", description="Factor of all controls", default=1.0, min=0.0, soft_max=2.0
@@ -191,6 +206,8 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
             time_unit=None if self.time_unit == "AUTO" else self.time_unit.lower(),
             rig=live.rig,
             rotations="all" if self.use_eyes else "head",
+            full_value=self.full_value or None,
+            angles=None if self.angles == "AUTO" else self.angles.lower(),
         )
         return clip, lines_of(report)
 
@@ -221,6 +238,8 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
         layout.prop(self, "time_unit")
         for name in ("file_rate", "timecode_rate"):
             words.prop_or(layout, self, name, 0.0, "0: as the file says")
+        words.prop_or(layout, self, "full_value", 0.0, "0: as the file says")
+        layout.prop(self, "angles")
         layout.prop(self, "gain")
         words.prop_or(layout, self, "gains", "", "as *jawOpen=1.3 *Blink*=1.1")
         words.prop_or(layout, self, "smoothing", 0.0, "0: none")

@@ -18,11 +18,13 @@ from .mapping import (
     mapping_names,
     mapping_text,
 )
+from .ranges import ANGLE_UNITS
 from .reading import KINDS, ROTATIONS, Imported, import_curves, import_file, read
 from .report import Report
 from .writing import csv_text, json_text, write_text
 
 __all__ = [
+    "ANGLE_UNITS",
     "KINDS",
     "ROTATIONS",
     "TIME_UNITS",

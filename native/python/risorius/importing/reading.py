@@ -15,7 +15,7 @@ import numpy.typing as npt
 from ..anim.clip import Clip
 from ..base.budget import Budget
 from ..base.errors import ArgumentError
-from . import fbx, gltf, named_json, tables, visemes
+from . import fbx, gltf, named_json, ranges, tables, visemes
 from .clock import units
 from .errors import AnimationFileError
 from .keys import Keys, on_one_clock
@@ -35,6 +35,8 @@ KINDS = {
     "fbx": "FBX: properties, blend shapes, face boards",
 }
 ROTATIONS = ("head", "all", "none")
+# Curves that are controls of Risorius already, or that an animator set: any value is meant.
+_OWN_KINDS = ("clip", "rzc", "curves")
 
 
 class Options(NamedTuple):
@@ -83,6 +85,8 @@ class Imported:
         rig_names: Iterable[str] | None = None,
         rig: RigLike | None = None,
         rotations: str = "head",
+        full_value: float | None = None,
+        angles: str | None = None,
     ) -> tuple[Clip, Report]:
         """A clip of raw controls, and what became of each curve.
 
@@ -93,16 +97,22 @@ class Imported:
             rig: for a mapping of GUI controls, whose table is the rig's.
             rotations: "head": the head's angles, if it was captured; the eyes come as eyeLook
                 controls. "all": the eyes' angles too. "none": neither.
+            full_value: the file's value of a whole movement: 100 for per cent, 255 for bytes.
+                None: 1, and values far above it are refused.
+            angles: one of ANGLE_UNITS, of the file's angles. None: radians, and angles that no
+                head has are refused.
 
         Raises:
-            ValueError: no mapping fits, a mapping that cannot be used, a GUI mapping without a rig.
+            ValueError: no mapping fits, a mapping that cannot be used, a GUI mapping without a rig,
+                values of another scale.
         """
+        ranges.check_options(full_value, angles)
         if rotations not in ROTATIONS:
             raise ArgumentError(
                 f"rotations: one of {', '.join(ROTATIONS)} was expected, found {rotations!r}"
             )
         chosen = load_mapping(mapping if mapping is not None else self._fitting())
-        done = apply_rows(chosen, self.clip)
+        done = apply_rows(chosen, ranges.rescaled(self.clip, chosen, full_value, angles))
         report = Report(
             self.source, self.kind, chosen.name, done.mapped, done.unmapped, done.ignored,
             absent=done.absent, notes=[*self.notes, *done.notes],
@@ -113,6 +123,8 @@ class Imported:
             if not row.any()
         ]
         clip = _without_angles(done, rotations, report)
+        if self.kind not in _OWN_KINDS:
+            ranges.refuse_other_scales(clip, self.source, full_value, angles)
         if chosen.is_gui:
             if rig is None:
                 raise ArgumentError(
@@ -300,12 +312,14 @@ def import_file(
     take: str | None = None,
     rig: RigLike | None = None,
     rotations: str = "head",
+    full_value: float | None = None,
+    angles: str | None = None,
 ) -> tuple[Clip, Report]:
     """A file as a clip of raw controls, and what became of each of its curves.
 
     Args:
         path, kind, rate, timecode_rate, time_unit, take: as of `read`.
-        rig_names, mapping, rig, rotations: as of `Imported.apply`.
+        rig_names, mapping, rig, rotations, full_value, angles: as of `Imported.apply`.
 
     Raises:
         ValueError: as they do.
@@ -313,7 +327,14 @@ def import_file(
     found = read(
         path, kind=kind, rate=rate, timecode_rate=timecode_rate, time_unit=time_unit, take=take
     )
-    return found.apply(mapping, rig_names=rig_names, rig=rig, rotations=rotations)
+    return found.apply(
+        mapping,
+        rig_names=rig_names,
+        rig=rig,
+        rotations=rotations,
+        full_value=full_value,
+        angles=angles,
+    )
 
 
 def import_curves(
