@@ -19,7 +19,7 @@ from . import fbx, gltf, named_json, ranges, tables, visemes
 from .clock import units
 from .errors import AnimationFileError
 from .keys import Keys, on_one_clock
-from .mapping import ANGLES, Mapped, apply_rows, best_mapping, load_mapping
+from .mapping import ANGLES, Mapped, apply_rows, best_mapping, load_mapping, single_letters
 from .mapping import Mapping as ControlMapping
 from .report import Report
 from .source import Take, decode, make_clip, read_bytes, refuse_other_kinds
@@ -139,10 +139,19 @@ class Imported:
     def _fitting(self) -> str:
         if self.mapping:
             return self.mapping
+        letters = single_letters(_moving(self.clip))
+        if letters:
+            raise AnimationFileError(
+                self.source,
+                "names longer than a letter were expected, found curves "
+                f"{', '.join(self.clip.names[:10])}, which stand for other shapes in each of "
+                f"{', '.join(letters)}: give one of these mappings (--mapping; Mapping in Blender)",
+            )
         raise AnimationFileError(
             self.source,
             f"no mapping knows any of its {len(self.clip.names)} curves "
-            f"({', '.join(self.clip.names[:4])} ...): give a mapping of your own",
+            f"({', '.join(self.clip.names[:4])} ...): give a mapping of your own (--mapping; "
+            "Mapping in Blender)",
         )
 
 
@@ -240,7 +249,7 @@ def read(
         raise AnimationFileError(str(path), str(error)) from error
     except RecursionError as error:
         raise AnimationFileError(str(path), "nested too deeply to be read") from error
-    mapping = found.mapping or best_mapping(_moving(found.clip)) or ""
+    mapping = found.mapping or best_mapping(_moving(found.clip), found.clip.names) or ""
     facts = {"source": file.name, "kind": found.kind, **found.clip.metadata}
     return Imported(
         found.clip.replaced(metadata=facts), found.kind, mapping, str(path), found.notes
@@ -363,7 +372,7 @@ def import_curves(
     budget = Budget.of(sum(key.times.nbytes + key.values.nbytes for key in keys.values()))
     times, rows = on_one_clock(list(keys.values()), None, budget)
     clip = make_clip(list(keys), rows, times, metadata={"source": source, "kind": "curves"})
-    found = Imported(clip, "curves", best_mapping(_moving(clip)) or "", source)
+    found = Imported(clip, "curves", best_mapping(_moving(clip), clip.names) or "", source)
     return found.apply(mapping, rig_names=rig_names, rig=rig, rotations=rotations)
 
 
