@@ -214,6 +214,65 @@ def test_empty_cells_are_filled_and_said(tmp_path):
     assert "c: empty, left out" in found.notes
 
 
+TABLES = {
+    "sep": "sep=;\r\ntime;jawOpen;mouthClose\r\n0,0;0,5;0,1\r\n0,04;0,6;0,2\r\n",
+    "sep, quoted, tab": '"sep=\\t"\ntime\tjawOpen\tmouthClose\n0\t0.5\t0.1\n0.04\t0.6\t0.2\n',
+    "sep against the header": "sep=;\ntime;jawOpen;mouthClose\n0,0;0,5;0,1\n0,04;0,6;0,2\n",
+    "comments": "# a, b; c\n// fps: 60\ntime,jawOpen,mouthClose\n0,.5,.1\n# cut\n0.04,.6,.2\n",
+    "NumPy": "# time,jawOpen,mouthClose\n0.0,0.5,0.1\n4e-2,0.6,0.2\n",
+    "tab, decimal commas": "time\tjawOpen\tmouthClose\n0,0\t0,5\t0,1\n0,04\t0,6\t0,2\n",
+    "bars, decimal commas": "time|jawOpen|mouthClose\n0,0|0,5|0,1\n0,04|0,6|0,2\n",
+    "quoted decimal commas": 'time,jawOpen,mouthClose\n"0,0","0,5","0,1"\n"0,04","0,6","0,2"\n',
+    "a cut last row": "time,jawOpen,mouthClose\n0,0.5,0.1\n0.04,0.6,0.2\n0.08,0\n",
+    "a row without a time": "time,jawOpen,mouthClose\n0,.5,.1\n,.9,.9\n0.04,.6,.2\n0.08,0",
+}
+
+
+@pytest.mark.parametrize("form", TABLES)
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
+def test_tables_as_spreadsheets_write_them(tmp_path, form, encoding):
+    clip = read(tmp_path, TABLES[form].encode(encoding)).clip
+    np.testing.assert_allclose(clip.curve("jawOpen"), [0.5, 0.6])
+    np.testing.assert_allclose(clip.curve("mouthClose"), [0.1, 0.2], rtol=1e-6)
+    np.testing.assert_allclose(clip.frame_times(), [0.0, 0.04])
+
+
+@pytest.mark.parametrize("hole", ["", " ", "-", "N/A", "NULL"])
+def test_holes_in_tables_and_in_captures_are_filled_and_said(tmp_path, hole):
+    """One cell, a column, a timecode and the end of a take of Live Link Face; cells of a table."""
+    rows = [line.split(",") for line in take(60).splitlines()]
+    rows[5][2] = rows[9][0] = hole
+    for row in rows[1:]:
+        row[4] = hole
+    rows[-1] = rows[-1][:30]
+    found = read(tmp_path, "\n".join(map(",".join, rows)))
+    kept = np.delete(np.arange(59), 8)
+    values = capture(60)[:, 0]
+    values[4] = (values[3] + values[5]) / 2
+    np.testing.assert_allclose(found.clip.curve("EyeBlinkLeft"), values[kept], atol=1e-3)
+    np.testing.assert_allclose(found.clip.frame_times(), kept / 30.0, atol=1e-4)
+    assert "EyeLookInLeft: empty, left out" in found.notes
+    assert "EyeBlinkLeft: 1 empty cell(s) filled" in found.notes
+    assert "1 row(s) without a time left out" in found.notes
+    assert "the last row (line 61) is cut short and left out" in found.notes
+    table = f"time,jawOpen,jawLeft\n0,0.5,{hole}\n0.04,{hole},0.2\n0.08,0.7,0.3\n"
+    clip = read(tmp_path, table).clip
+    np.testing.assert_allclose(clip.curves, [[0.5, 0.6, 0.7], [0.2, 0.2, 0.3]], rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ('time,a\n0.5,"1,234"\n', r"line 2, column 2 \(a\): a number was expected, found '1,234'"),
+        ("time;a\n0;1,2,3\n", "a number was expected, found '1.2.3'"),
+        ("time,a\n0,1\n,2\n,3\n", "times were expected, found none in 2 of 3 rows: --time-unit"),
+    ],
+)
+def test_what_is_no_decimal_comma_and_no_time_is_refused(tmp_path, text, sentence):
+    with pytest.raises(importing.AnimationFileError, match=sentence):
+        read(tmp_path, text)
+
+
 @pytest.mark.parametrize(
     ("data", "sentence"),
     [
@@ -227,7 +286,7 @@ def test_empty_cells_are_filled_and_said(tmp_path):
         (b"time,a\n0,nan\n", r"line 2, column 2 \(a\): a finite number was expected, found 'nan'"),
         (b"time,a\n0,1e39\n", r"line 2, column 2 \(a\): a finite number was expected"),
         (b"time,a\n0,1_0\n", r"line 2, column 2 \(a\): a number was expected"),
-        (b"time,a\n0,1\n1\n", "line 3: 2 columns as in the header were expected, found 1"),
+        (b"time,a\n0,1\n1\n2,3\n", "line 3: 2 columns as in the header were expected, found 1"),
         (b"time,a,a\n0,1,1\n", "line 1: 'a' was expected once, found in the columns 2 and 3"),
         (b"time,a\n", "rows after the header were expected"),
         (

@@ -438,7 +438,8 @@ def _frame_column(
     values = [reader.number(tables[i][curve], f"frame {i}, {curve}") for i in known]
     if len(known) < len(tables):
         reader.notes.append(f"{curve}: missing in {len(tables) - len(known)} frame(s), filled")
-    return np.interp(clock, clock[known], values)
+    at = np.maximum.accumulate(clock)  # frames whose time goes back are left out later
+    return np.interp(at, at[known], values)
 
 
 def _time_key(table: Mapping[str, Any], *, of_lists: bool = False) -> str | None:

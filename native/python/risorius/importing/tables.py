@@ -6,7 +6,7 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -14,13 +14,26 @@ import numpy.typing as npt
 
 from ..controls import arkit
 from .clock import timecode
-from .clock.units import FRAMES, Asked, TimeName, plain, row_times, seconds_of, time_name
+from .clock.units import (
+    COUNT_ROWS,
+    FRAMES,
+    Asked,
+    TimeName,
+    plain,
+    row_times,
+    seconds_of,
+    time_name,
+)
 from .errors import AnimationFileError
-from .source import Take, keep_ascending, make_clip, number
+from .source import MOST_LOST, Take, keep_ascending, make_clip, number
 
 Doubles = npt.NDArray[np.float64]
 
 DELIMITERS = (",", "\t", ";", "|")
+COMMENTS = ("#", "//", "%")
+_NAMED_DELIMITER = re.compile(r"sep=(.|\\t)", re.IGNORECASE)
+# What stands in a cell whose value is not there.
+_MISSING = frozenset(("", "-", "--", "\N{EN DASH}", "na", "n/a", "#n/a", "null", "none"))
 # Curves of a take of Live Link Face, in their order.
 LIVE_LINK_FACE = (
     *(unit[0].upper() + unit[1:] for unit in arkit.order("live_link_face_take")),
@@ -41,6 +54,7 @@ class Table:
         rows: the other rows.
         lines: line of the file, from 1, at which each row ends.
         delimiter: what stands between cells.
+        notes: what was left out of the table.
     """
 
     name: str
@@ -48,6 +62,7 @@ class Table:
     rows: list[list[str]]
     lines: list[int]
     delimiter: str
+    notes: list[str] = field(default_factory=list)
 
     def cell(self, row: int, column: int) -> float:
         """The number in a cell.
@@ -60,9 +75,14 @@ class Table:
             AnimationFileError: no finite number.
         """
         text = self.rows[row][column].strip()
-        if self.delimiter == ";" and "." not in text:
+        if "." not in text and (self.delimiter != "," or not self.has_points):
             text = text.replace(",", ".")  # a decimal comma, as spreadsheets of many lands write
         return number(text, self.name, self.lines[row], self.place(column))
+
+    @cached_property
+    def has_points(self) -> bool:
+        """Whether numbers have decimal points: then a comma inside a cell is no decimal one."""
+        return any(re.fullmatch(r"\s*[-+]?\d*\.\d+\s*", c) for row in self.rows for c in row)
 
     @cached_property
     def columns(self) -> list[tuple[str, ...]]:
@@ -88,14 +108,15 @@ class Table:
         return f"{column + 1} ({header})" if header else str(column + 1)
 
 
-def sniff(text: str) -> str:
-    """The delimiter: the sign that parts the first line into most cells outside quotes."""
-    first = re.sub(r'"[^"]*"', '""', text.lstrip("\r\n").splitlines()[0])
-    return max(DELIMITERS, key=first.count)
+def sniff(line: str) -> str:
+    """The delimiter: the sign that parts a header into most cells outside quotes."""
+    return max(DELIMITERS, key=re.sub(r'"[^"]*"', '""', line).count)
 
 
 def read_table(text: str, name: str) -> Table:
     """A table with a header.
+
+    Comments are passed over, and a line "sep=;" says the delimiter, as Excel writes and reads it.
 
     Args:
         text: of the file; commas, semicolons or tabs stand between the cells.
@@ -107,9 +128,10 @@ def read_table(text: str, name: str) -> Table:
     if "\0" in text:
         line = text[: text.index("\0")].count("\n") + 1
         raise AnimationFileError(name, "text was expected, found a zero byte", line=line)
-    delimiter = sniff(text)
+    content, delimiter, comment = _without_comments(re.split(r"\r\n|\n|\r", text))
+    delimiter = delimiter or sniff(next((line for line in content if line.strip()), ""))
     # strict: a quote that is never closed would swallow the rest of the file
-    reader = csv.reader(re.split(r"\r\n|\n|\r", text), delimiter=delimiter, strict=True)
+    reader = csv.reader(content, delimiter=delimiter, strict=True)
     rows: list[list[str]] = []
     lines: list[int] = []
     try:
@@ -121,9 +143,31 @@ def read_table(text: str, name: str) -> Table:
         raise AnimationFileError(name, f"no table: {error}", line=reader.line_num) from error
     if not rows:
         raise AnimationFileError(name, "it holds nothing")
+    # NumPy writes its header as a comment.
+    named = next(csv.reader([comment], delimiter=delimiter), [])
+    if len(named) == len(rows[0]) and all(map(_is_number, rows[0])):
+        rows.insert(0, named)
+        lines.insert(0, lines[0])
     table = Table(name, [cell.strip() for cell in rows[0]], rows[1:], lines[1:], delimiter)
     _check(table, lines[0])
     return table
+
+
+def _without_comments(lines: list[str]) -> tuple[list[str], str, str]:
+    """Lines of which comments are empty; the delimiter that one names, the last one at the top."""
+    delimiter = comment = ""
+    is_top = True
+    for i, line in enumerate(lines):
+        start = line.lstrip()
+        named = _NAMED_DELIMITER.fullmatch(line.strip('"\ufeff ')) if is_top else None
+        if named is not None:
+            delimiter, lines[i] = named[1].replace("\\t", "\t"), ""
+        elif start.startswith(COMMENTS):
+            comment = start.lstrip("#/% ") if is_top else comment
+            lines[i] = ""
+        elif start:
+            is_top = False
+    return lines, delimiter, comment
 
 
 def _check(table: Table, line: int) -> None:
@@ -149,6 +193,10 @@ def _check(table: Table, line: int) -> None:
                 line=line,
             )
         seen[header] = column
+    if len(table.rows) > 1 and len(table.rows[-1]) < len(table.header):
+        # A program that was ended while it wrote; the last number may be cut too.
+        table.notes.append(f"the last row (line {table.lines[-1]}) is cut short and left out")
+        del table.rows[-1], table.lines[-1]
     for row, at in zip(table.rows, table.lines, strict=True):
         if len(row) != len(table.header):
             raise AnimationFileError(
@@ -162,10 +210,38 @@ def _check(table: Table, line: int) -> None:
 
 def _is_number(text: str) -> bool:
     try:
-        float(text)
+        float(text.replace(",", "."))
     except ValueError:
         return False
     return True
+
+
+def _is_missing(cell: str) -> bool:
+    return cell.strip().lower() in _MISSING
+
+
+def _with_times(table: Table, at: int, asked: Asked) -> Table:
+    """The rows that have a time, or all if rows are counted.
+
+    Raises:
+        AnimationFileError: more than MOST_LOST of the rows have none.
+    """
+    keep = [i for i, row in enumerate(table.rows) if not _is_missing(row[at])]
+    lost = len(table.rows) - len(keep)
+    if asked.counts_rows or not lost:
+        return table
+    if lost > MOST_LOST * len(table.rows):
+        raise AnimationFileError(
+            table.name,
+            f"times were expected, found none in {lost} of {len(table.rows)} rows: {COUNT_ROWS}",
+            column=table.place(at),
+        )
+    return replace(
+        table,
+        rows=[table.rows[i] for i in keep],
+        lines=[table.lines[i] for i in keep],
+        notes=[*table.notes, f"{lost} row(s) without a time left out"],
+    )
 
 
 def is_live_link_face(header: Sequence[str]) -> bool:
@@ -184,10 +260,11 @@ def read_live_link_face(table: Table, asked: Asked = _FILE_TELLS) -> Take:
     Raises:
         AnimationFileError: a cell that is none, timecodes whose rate cannot be told.
     """
-    notes: list[str] = []
+    table = _with_times(table, 0, asked)
+    notes = list(table.notes)
     seconds = _timecode_seconds(table, 0, asked, notes)
-    columns = [i for i, cell in enumerate(table.header) if i > 1 and cell]
-    curves = np.array([table.column(c) for c in columns])
+    columns = [i for i in range(2, len(table.header)) if _is_curve(table, i, notes)]
+    curves = np.array([_column(table, c, seconds, notes) for c in columns])
     _note_count(table, len(columns), notes)
     keep = keep_ascending(seconds, notes, table.name)
     times = seconds[keep] - seconds[0]
@@ -276,8 +353,10 @@ def read_plain(table: Table, asked: Asked = _FILE_TELLS) -> Take:
         AnimationFileError: no time and no rate, a cell that is no number, no curve, a unit of time
             that nobody knows.
     """
-    notes: list[str] = []
     at = _time_column(table)
+    if at is not None:
+        table = _with_times(table, at, asked)
+    notes = list(table.notes)
     times = _plain_times(table, at, asked, notes)
     columns = [i for i, cell in enumerate(table.header) if i != at and _is_curve(table, i, notes)]
     if not columns:
@@ -316,7 +395,7 @@ def _is_curve(table: Table, column: int, notes: list[str]) -> bool:
     if header in COUNTS or time_name(table.header[column]) is not None:
         return False
     cells = [row[column].strip() for row in table.rows]
-    if not any(cells):
+    if all(map(_is_missing, cells)):
         notes.append(f"{table.header[column] or f'column {column + 1}'}: empty, left out")
         return False
     if not header:
@@ -328,10 +407,12 @@ def _is_curve(table: Table, column: int, notes: list[str]) -> bool:
 
 
 def _column(table: Table, column: int, times: Doubles, notes: list[str]) -> Doubles:
-    filled = np.array([bool(row[column].strip()) for row in table.rows])
+    filled = np.array([not _is_missing(row[column]) for row in table.rows])
     known = np.flatnonzero(filled)
     values = table.column(column, known.tolist())
     if filled.all():
         return values
     notes.append(f"{table.header[column]}: {int((~filled).sum())} empty cell(s) filled")
-    return np.interp(times, times[known], values)
+    # A clock that runs back would lead the curve astray; the frames it loses are left out later.
+    at = np.maximum.accumulate(times)
+    return np.interp(at, at[known], values)
