@@ -279,7 +279,8 @@ def _read_mouth(text: str, name: str, options: Options) -> Take | None:
     """Mouth shapes, where a text holds such."""
     if options.kind in (None, "moho") and text.lstrip().startswith("MohoSwitch1"):
         return visemes.read_dat(text.lstrip(), name, options.asked.rate)
-    reader = visemes.reader_of(text) if options.kind in (None, "rhubarb", "papagayo") else None
+    is_asked = options.kind in (None, "rhubarb", "papagayo")
+    reader = visemes.reader_of(text, options.kind) if is_asked else None
     return reader(text, name) if reader is not None else None
 
 
@@ -288,13 +289,18 @@ def _read_table(text: str, name: str, options: Options) -> Take:
         raise AnimationFileError(
             name, "a binary FBX was expected, found one as text: export as binary"
         )
-    if options.kind not in (None, "live_link_face", "csv"):
+    if options.kind not in (None, "live_link_face", "csv", "rhubarb"):
         raise AnimationFileError(name, f"{KINDS[options.kind]} was expected, found something else")
     table = tables.read_table(text, name)
     is_capture = options.kind is None and tables.is_live_link_face(table.header)
     if is_capture or options.kind == "live_link_face":
         return tables.read_live_link_face(table, options.asked)
-    return tables.read_plain(table, options.asked)
+    take = tables.read_plain(table, options.asked)
+    if options.kind == "rhubarb" and take.kind != "rhubarb":
+        raise AnimationFileError(
+            name, "a time, a tab and a shape A-H or X in each line were expected, found a table"
+        )
+    return take
 
 
 def _read_json(document: object, file: Path, options: Options) -> Take:

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..controls import arkit
+from . import visemes
 from .clock import timecode
 from .clock.units import (
     COUNT_ROWS,
@@ -359,6 +360,9 @@ def read_plain(table: Table, asked: Asked = _FILE_TELLS) -> Take:
     notes = list(table.notes)
     times = _plain_times(table, at, asked, notes)
     columns = [i for i, cell in enumerate(table.header) if i != at and _is_curve(table, i, notes)]
+    shapes = _shapes(table, at) if not columns else None
+    if shapes is not None:
+        return visemes.rhubarb_column(times, table.columns[shapes], table.name)
     if not columns:
         raise AnimationFileError(table.name, "columns with curves were expected, found none")
     keep = keep_ascending(times, notes, table.name)
@@ -404,6 +408,16 @@ def _is_curve(table: Table, column: int, notes: list[str]) -> bool:
         notes.append(f"{table.header[column]}: text, left out")
         return False
     return True
+
+
+def _shapes(table: Table, at: int | None) -> int | None:
+    """The one column that holds nothing but mouth shapes of Rhubarb's, or None."""
+    found = [
+        i
+        for i in range(len(table.header))
+        if i != at and all(map(visemes.is_shape, table.columns[i]))
+    ]
+    return found[0] if len(found) == 1 else None
 
 
 def _column(table: Table, column: int, times: Doubles, notes: list[str]) -> Doubles:
