@@ -412,31 +412,6 @@ def test_seeded_damage_never_ends_in_anything_but_a_sentence(tmp_path):
     assert 10 < read_count < 150
 
 
-KINDS = {
-    "wav": (b"RIFF\x24\0\0\0WAVEfmt \x10\0\0\0", "a sound: Speak from Audio in Blender"),
-    "flac": (b"fLaC\0\0\0\x22", "`risorius speech` on the command line"),
-    "mp3": (b"ID3\x04\0\0\0\0", "a sound"),
-    "png": (b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", "a picture (PNG)"),
-    "jpg": (b"\xff\xd8\xff\xe0\0\x10JFIF", "a picture (JPEG)"),
-    "mp4": (b"\0\0\0\x20ftypisom", "a film"),
-    "zip": (b"PK\x03\x04\x14\0", "an archive (ZIP)"),
-    "blend": (b"BLENDER-v405", "a scene of Blender (.blend)"),
-    "zst.blend": (b"\x28\xb5\x2f\xfd\x04\0", "Zstandard"),
-    "dna": (b"DNA\0\2\0\x08\0\0\0\x0bd", "a face (DNA)"),
-}
-
-
-@pytest.mark.parametrize("suffix", KINDS)
-def test_a_file_of_another_kind_is_called_by_its_kind(suffix, tmp_path):
-    start, words = KINDS[suffix]
-    path = tmp_path / f"take.{suffix}"
-    path.write_bytes(start + bytes(range(256)))
-    with pytest.raises(AnimationFileError) as found:
-        importing.read(path)
-    assert str(found.value).startswith(f"{path}: animation was expected, this is ")
-    assert words in str(found.value)
-
-
 def test_a_clip_without_its_suffix_is_called_a_clip(tmp_path):
     path = tmp_path / "take.csv"
     Clip(["a"], [[0.0]], 60.0).save(path)
