@@ -255,6 +255,9 @@ def test_holes_in_tables_and_in_captures_are_filled_and_said(tmp_path, hole):
     assert "EyeBlinkLeft: 1 empty cell(s) filled" in found.notes
     assert "1 row(s) without a time left out" in found.notes
     assert "the last row (line 61) is cut short and left out" in found.notes
+    rows[7][5:10] = [hole] * 5
+    found = read(tmp_path, "\n".join(map(",".join, rows)))
+    assert "6 empty cell(s) filled in 6 curves, as EyeBlinkLeft" in found.notes
     table = f"time,jawOpen,jawLeft\n0,0.5,{hole}\n0.04,{hole},0.2\n0.08,0.7,0.3\n"
     clip = read(tmp_path, table).clip
     np.testing.assert_allclose(clip.curves, [[0.5, 0.6, 0.7], [0.2, 0.2, 0.3]], rtol=1e-6)

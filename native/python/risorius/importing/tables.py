@@ -44,6 +44,7 @@ LIVE_LINK_FACE = (
 # Columns that tell how many blend shapes there are; they hold no curve.
 COUNTS = ("blendshapecount",)
 _FILE_TELLS = Asked()
+_HOLES_BY_NAME = 3  # curves with holes that notes name each
 
 
 @dataclass
@@ -265,7 +266,7 @@ def read_live_link_face(table: Table, asked: Asked = _FILE_TELLS) -> Take:
     notes = list(table.notes)
     seconds = _timecode_seconds(table, 0, asked, notes)
     columns = [i for i in range(2, len(table.header)) if _is_curve(table, i, notes)]
-    curves = np.array([_column(table, c, seconds, notes) for c in columns])
+    curves = _curves(table, columns, seconds, notes)
     _note_count(table, len(columns), notes)
     keep = keep_ascending(seconds, notes, table.name)
     times = seconds[keep] - seconds[0]
@@ -366,7 +367,7 @@ def read_plain(table: Table, asked: Asked = _FILE_TELLS) -> Take:
     if not columns:
         raise AnimationFileError(table.name, "columns with curves were expected, found none")
     keep = keep_ascending(times, notes, table.name)
-    curves = np.stack([_column(table, column, times, notes) for column in columns])
+    curves = _curves(table, columns, times, notes)
     clip = make_clip(
         [table.header[c] for c in columns], curves[:, keep], times[keep],
         rate=asked.rate if at is None or asked.counts_rows else None,
@@ -420,13 +421,25 @@ def _shapes(table: Table, at: int | None) -> int | None:
     return found[0] if len(found) == 1 else None
 
 
-def _column(table: Table, column: int, times: Doubles, notes: list[str]) -> Doubles:
+def _curves(table: Table, columns: Sequence[int], times: Doubles, notes: list[str]) -> Doubles:
+    """float64[columns, rows]; cells without a value are filled from the rows around them."""
+    holes: list[tuple[str, int]] = []
+    curves = np.array([_column(table, column, times, holes) for column in columns])
+    if len(holes) > _HOLES_BY_NAME:
+        cells = sum(count for _, count in holes)
+        notes.append(f"{cells} empty cell(s) filled in {len(holes)} curves, as {holes[0][0]}")
+    else:
+        notes += [f"{name}: {count} empty cell(s) filled" for name, count in holes]
+    return curves.reshape(len(columns), len(table.rows))
+
+
+def _column(table: Table, column: int, times: Doubles, holes: list[tuple[str, int]]) -> Doubles:
     filled = np.array([not _is_missing(row[column]) for row in table.rows])
     known = np.flatnonzero(filled)
     values = table.column(column, known.tolist())
     if filled.all():
         return values
-    notes.append(f"{table.header[column]}: {int((~filled).sum())} empty cell(s) filled")
+    holes.append((table.header[column], int((~filled).sum())))
     # A clock that runs back would lead the curve astray; the frames it loses are left out later.
     at = np.maximum.accumulate(times)
     return np.interp(at, at[known], values)
