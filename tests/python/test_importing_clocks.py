@@ -110,7 +110,7 @@ def test_few_times_too_far_apart_for_seconds_are_asked_for(tmp_path, form, capsy
 def test_frame_numbers_need_a_rate(tmp_path, form, header, capsys):
     text = FORMS[form](header, [10, 12, 14])
     assert convert(tmp_path, form, text)[0] == 1
-    assert "give the rate in frames a second (--input-rate;" in capsys.readouterr().err
+    assert "give the rate in frames a second (clip convert --input-rate;" in capsys.readouterr().err
     _, clip = convert(tmp_path, form, text, "--input-rate", "24")
     np.testing.assert_allclose(clip.frame_times(), np.array([10, 12, 14]) / 24, atol=1e-9)
 
@@ -138,9 +138,9 @@ def test_a_take_that_loses_over_a_third_names_what_mends_it(tmp_path, make, form
     assert convert(tmp_path, form, make(form))[0] == 1
     said = capsys.readouterr().err
     assert "of 60 frames whose time is not after the one before" in said
-    assert "--time-unit rows with --input-rate" in said
+    assert "clip convert --time-unit rows with --input-rate" in said
     assert convert(tmp_path, form, make(form), "--time-unit", "rows")[0] == 1
-    assert "give the rate in frames a second (--input-rate" in capsys.readouterr().err
+    assert "give the rate in frames a second (clip convert --input-rate" in capsys.readouterr().err
     rows = ("--time-unit", "rows", "--input-rate", "30")
     code, clip = convert(tmp_path, form, make(form), *rows)
     assert code == 0
@@ -172,7 +172,7 @@ def test_rows_lost_where_the_second_turns_make_no_rate_of_their_own(tmp_path, ba
         try:
             found = importing.read(tmp_path / "take.csv")
         except importing.AnimationFileError as error:
-            assert "give the timecode rate (--timecode-rate" in str(error)
+            assert "give the timecode rate (clip convert --timecode-rate" in str(error)
             continue
         note = next(note for note in found.notes if note.startswith("the timecode counts"))
         # 48 and 50 without what tells them look like 60, the rate of nearly all phones.

@@ -48,7 +48,7 @@ def test_values_far_above_1_are_asked_about_in_every_reader(tmp_path, form, full
     assert not (tmp_path / "out.rzc").exists()
     said = capsys.readouterr().err
     assert f"1 was expected for a whole movement, found {JAW} at {full:g}" in said
-    assert f"(--full-value {full:g}; Full Value in Blender" in said
+    assert f"(clip convert --full-value {full:g}; Full Value in Blender" in said
     code, clip = convert(tmp_path, name, form(SOME * full), "--full-value", f"{full:g}")
     assert code == 0
     np.testing.assert_allclose(clip.curve(JAW), SOME, atol=1e-6)
@@ -72,7 +72,7 @@ def test_a_head_in_degrees_is_asked_about_beside_weights_in_per_cent(tmp_path, c
     said = capsys.readouterr().err
     assert "--full-value 100" in said
     assert "radians were expected, found head." in said
-    assert "(--angles degrees; Angles in Blender" in said
+    assert "(clip convert --angles degrees; Angles in Blender" in said
     options = ("--full-value", "100", "--angles", "degrees", "--rotations", "all")
     code, clip = convert(tmp_path, "take.csv", text, *options)
     want, _ = importing.import_file(

@@ -268,7 +268,10 @@ def test_holes_in_tables_and_in_captures_are_filled_and_said(tmp_path, hole):
     [
         ('time,a\n0.5,"1,234"\n', r"line 2, column 2 \(a\): a number was expected, found '1,234'"),
         ("time;a\n0;1,2,3\n", "a number was expected, found '1.2.3'"),
-        ("time,a\n0,1\n,2\n,3\n", "times were expected, found none in 2 of 3 rows: --time-unit"),
+        (
+            "time,a\n0,1\n,2\n,3\n",
+            "times were expected, found none in 2 of 3 rows: clip convert --time-unit",
+        ),
     ],
 )
 def test_what_is_no_decimal_comma_and_no_time_is_refused(tmp_path, text, sentence):

@@ -71,15 +71,16 @@ def refuse_other_scales(clip: Clip, name: str, full: float | None, angles: str |
         whole = next((usual for usual in _USUAL if controls[worst] <= usual * 1.01), 1.0)
         said.append(
             f"1 was expected for a whole movement, found {clip.names[worst]} at "
-            f"{controls[worst]:g}: give the value that is whole (--full-value {whole:g}; "
-            "Full Value in Blender; 1 keeps all as it is)"
+            f"{controls[worst]:g}: give the value that is whole (clip convert --full-value "
+            f"{whole:g}; Full Value in Blender; 1 keeps all as it is)"
         )
     turns = np.where(is_angle, reached, 0.0)
     if angles is None and turns.max(initial=0.0) > _LARGEST_ANGLE:
         worst = int(turns.argmax())
         said.append(
             f"radians were expected, found {clip.names[worst]} at {turns[worst]:g}: give the unit "
-            "of the angles (--angles degrees; Angles in Blender; radians keeps all as it is)"
+            "of the angles (clip convert --angles degrees; Angles in Blender; radians keeps all as it "
+            "is)"
         )
     if said:
         raise AnimationFileError(name, "; ".join(said))

@@ -93,17 +93,21 @@ class Table:
 
     def column(self, column: int, rows: Sequence[int] | None = None) -> Doubles:
         """float64[rows] of a column, all or some. Raises: as cell."""
-        cells = self.columns[column]
-        if rows is not None:
-            cells = tuple(cells[row] for row in rows)
-        try:  # the whole column at once; where that fails, each cell by itself finds the error
-            values = np.array(list(map(float, cells)))
-        except ValueError:
-            values = np.full(len(cells), np.nan)
-        if "_" in "".join(cells) or not (np.abs(values) <= np.finfo(np.float32).max).all():
-            wanted = range(len(cells)) if rows is None else rows
+        values = self.whole_column(column) if rows is None else None
+        if values is None:
+            wanted = range(len(self.rows)) if rows is None else rows
             values = np.array([self.cell(row, column) for row in wanted])
         return values
+
+    def whole_column(self, column: int) -> Doubles | None:
+        """float64[rows] of a column at once; None where a cell is no plain number."""
+        cells = self.columns[column]
+        try:
+            values = np.array(list(map(float, cells)))
+        except ValueError:
+            return None
+        is_plain = (np.abs(values) <= np.finfo(np.float32).max).all() and "_" not in "".join(cells)
+        return values if is_plain else None
 
     def place(self, column: int) -> str:
         header = self.header[column]
@@ -298,7 +302,7 @@ def _timecode_seconds(table: Table, column: int, asked: Asked, notes: list[str])
                 table.name,
                 "its timecodes do not tell how many frames a second they count "
                 f"(the largest frame number is {max(c.frames for c in codes):g}): give the "
-                "timecode rate (--timecode-rate; Timecode Rate in Blender)",
+                "timecode rate (clip convert --timecode-rate; Timecode Rate in Blender)",
                 column=table.place(column),
             )
         base = found
@@ -399,7 +403,7 @@ def _is_curve(table: Table, column: int, notes: list[str]) -> bool:
     header = plain(table.header[column])
     if header in COUNTS or time_name(table.header[column]) is not None:
         return False
-    cells = [row[column].strip() for row in table.rows]
+    cells = table.columns[column]
     if all(map(_is_missing, cells)):
         notes.append(f"{table.header[column] or f'column {column + 1}'}: empty, left out")
         return False
@@ -434,11 +438,14 @@ def _curves(table: Table, columns: Sequence[int], times: Doubles, notes: list[st
 
 
 def _column(table: Table, column: int, times: Doubles, holes: list[tuple[str, int]]) -> Doubles:
+    whole = table.whole_column(column)
+    if whole is not None:
+        return whole
     filled = np.array([not _is_missing(row[column]) for row in table.rows])
     known = np.flatnonzero(filled)
     values = table.column(column, known.tolist())
     if filled.all():
-        return values
+        return values  # decimal commas
     holes.append((table.header[column], int((~filled).sum())))
     # A clock that runs back would lead the curve astray; the frames it loses are left out later.
     at = np.maximum.accumulate(times)

@@ -18,9 +18,10 @@ UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
 FRAMES, ROWS = "frames", "rows"
 CHOICES = (*UNITS, FRAMES, ROWS)
 """What a caller may say that times count in; ROWS: they say nothing, each row is a frame."""
-GIVE_RATE = "give the rate in frames a second (--input-rate; File Rate in Blender)"
+GIVE_RATE = "give the rate in frames a second (clip convert --input-rate; File Rate in Blender)"
 COUNT_ROWS = (
-    "--time-unit rows with --input-rate (Time Unit and File Rate in Blender) counts rows instead"
+    "clip convert --time-unit rows with --input-rate (Time Unit and File Rate in Blender) counts "
+    "rows instead"
 )
 
 _SPELLINGS = {
@@ -158,7 +159,7 @@ def seconds_of(
         raise AnimationFileError(
             name,
             f"its unit of time is not known ({said.odd[:40]!r}; known are {', '.join(CHOICES)} and "
-            "their full names): give it (--time-unit; Time Unit in Blender)",
+            "their full names): give it (clip convert --time-unit; Time Unit in Blender)",
             column=column,
         )
     if unit == FRAMES:
@@ -197,6 +198,6 @@ def _shown(values: Doubles, name: str, column: str | None) -> str:
     raise AnimationFileError(
         name,
         f"its times say no unit and go up by {step:g} from frame to frame, which is too much for "
-        "seconds: give their unit (--time-unit ms or s; Time Unit in Blender)",
+        "seconds: give their unit (clip convert --time-unit ms or s; Time Unit in Blender)",
         column=column,
     )
