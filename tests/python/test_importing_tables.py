@@ -263,6 +263,21 @@ def test_holes_in_tables_and_in_captures_are_filled_and_said(tmp_path, hole):
     np.testing.assert_allclose(clip.curves, [[0.5, 0.6, 0.7], [0.2, 0.2, 0.3]], rtol=1e-6)
 
 
+def test_a_row_for_each_time_and_name_becomes_a_column_for_each_name(tmp_path):
+    rows = [(t, n, v) for t in (0.0, 0.04, 0.08) for n, v in (("jawOpen", t), ("tongueOut", 0.5))]
+    del rows[3]  # a value that is not there
+    text = "timestamp,category_name,score\n" + "".join(f"{t},{n},{v}\n" for t, n, v in rows)
+    found = read(tmp_path, text)
+    assert found.mapping == "arkit"
+    assert found.clip.names == ("jawOpen", "tongueOut")
+    np.testing.assert_allclose(found.clip.curves, [[0, 0.04, 0.08], [0.5] * 3], rtol=1e-6)
+    np.testing.assert_allclose(found.clip.frame_times(), [0, 0.04, 0.08])
+    assert "the column category_name names the curves" in found.notes
+    many = "".join(f"{i // 2},name{i},1\n" for i in range(40))
+    with pytest.raises(importing.AnimationFileError, match="found 40 for 20 times and 40 names"):
+        read(tmp_path, "time,name,value\n" + many)
+
+
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [

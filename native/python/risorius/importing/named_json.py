@@ -85,19 +85,23 @@ class Reader:
             return found
         raise self.fail(f"a finite number was expected, found {_shown(value)}", place)
 
-    def numbers(self, values: object, place: str) -> list[float]:
+    def numbers(self, values: object, place: str, *, has_holes: bool = False) -> list[float]:
         """A list of finite numbers.
 
         Args:
             values: a value of the JSON.
             place: what errors call it.
+            has_holes: null is a value that is not there, and comes as NaN for `take` to fill.
 
         Raises:
             AnimationFileError: it is no list, or something in it is no such number.
         """
         if not isinstance(values, list):
             raise self.fail(f"a list of numbers was expected, found {_kind(values)}", place)
-        return [self.number(value, f"{place}[{i}]") for i, value in enumerate(values)]
+        return [
+            math.nan if has_holes and value is None else self.number(value, f"{place}[{i}]")
+            for i, value in enumerate(values)
+        ]
 
     def strings(self, values: object, place: str) -> list[str]:
         """A list of names.
@@ -170,7 +174,7 @@ class Reader:
 
         Args:
             names: of the curves, each once.
-            rows: float[controls, frames].
+            rows: float[controls, frames]; NaN where a value is not there.
             times: float64[frames], seconds.
             rate: frames a second; None: told from the times.
 
@@ -181,7 +185,14 @@ class Reader:
             twice = next(name for name in names if list(names).count(name) > 1)
             raise self.fail(f"{twice!r} was expected once, found it twice")
         keep = keep_ascending(times, self.notes, self.name)
-        curves = np.asarray(rows, np.float64).reshape(len(names), times.size)[:, keep]
+        curves = np.array(rows, np.float64).reshape(len(names), times.size)[:, keep]
+        for name, curve in zip(names, curves, strict=True):
+            holes = np.isnan(curve)
+            if holes.all() and holes.size:
+                raise self.fail("numbers were expected, found null alone", name)
+            if holes.any():
+                curve[holes] = np.interp(times[keep][holes], times[keep][~holes], curve[~holes])
+                self.notes.append(f"{name}: null in {int(holes.sum())} frame(s), filled")
         return Take(make_clip(names, curves, times[keep], rate=rate), "json", "", self.notes)
 
 
@@ -327,9 +338,9 @@ def matrix(reader: Reader, document: object) -> Take | None:
             at = _first(frame, WEIGHT_KEYS)
             if at is None:
                 raise reader.fail(f"one of {', '.join(WEIGHT_KEYS)} was expected", place)
-            row = reader.numbers(frame[at], f"{place}.{at}")
+            row = reader.numbers(frame[at], f"{place}.{at}", has_holes=True)
         else:
-            row = reader.numbers(frame, place)
+            row = reader.numbers(frame, place, has_holes=True)
         if len(row) != len(names):
             raise reader.fail(
                 f"{len(names)} values as in {names_key} were expected, found {len(row)}", place
@@ -366,7 +377,9 @@ def neurosync(reader: Reader, document: object) -> Take | None:
     count = len(rows[0])
     if count not in (len(LIVE_LINK_FACE), len(columns)):
         return None
-    values = [reader.numbers(row, f"blendshapes[{i}]") for i, row in enumerate(rows)]
+    values = [
+        reader.numbers(row, f"blendshapes[{i}]", has_holes=True) for i, row in enumerate(rows)
+    ]
     for i, row in enumerate(values):
         if len(row) != count:
             raise reader.fail(
@@ -561,7 +574,7 @@ def lists_by_name(reader: Reader, document: object) -> Take | None:
     if not lists:
         return None
     count = len(next(iter(lists.values())))
-    rows = [reader.numbers(values, name) for name, values in lists.items()]
+    rows = [reader.numbers(values, name, has_holes=True) for name, values in lists.items()]
     for name, row in zip(lists, rows, strict=True):
         if len(row) != count:
             raise reader.fail(

@@ -79,8 +79,8 @@ def refuse_other_scales(clip: Clip, name: str, full: float | None, angles: str |
         worst = int(turns.argmax())
         said.append(
             f"radians were expected, found {clip.names[worst]} at {turns[worst]:g}: give the unit "
-            "of the angles (clip convert --angles degrees; Angles in Blender; radians keeps all as it "
-            "is)"
+            "of the angles (clip convert --angles degrees; Angles in Blender; radians keeps all "
+            "as it is)"
         )
     if said:
         raise AnimationFileError(name, "; ".join(said))

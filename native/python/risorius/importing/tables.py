@@ -44,6 +44,7 @@ LIVE_LINK_FACE = (
 # Columns that tell how many blend shapes there are; they hold no curve.
 COUNTS = ("blendshapecount",)
 _FILE_TELLS = Asked()
+_SPARSEST = 4  # cells of a table by curve for each row of one by time and name
 _HOLES_BY_NAME = 3  # curves with holes that notes name each
 
 
@@ -362,6 +363,7 @@ def read_plain(table: Table, asked: Asked = _FILE_TELLS) -> Take:
     at = _time_column(table)
     if at is not None:
         table = _with_times(table, at, asked)
+        table, at = _by_curve(table, at)
     notes = list(table.notes)
     times = _plain_times(table, at, asked, notes)
     columns = [i for i, cell in enumerate(table.header) if i != at and _is_curve(table, i, notes)]
@@ -413,6 +415,44 @@ def _is_curve(table: Table, column: int, notes: list[str]) -> bool:
         notes.append(f"{table.header[column]}: text, left out")
         return False
     return True
+
+
+def _by_curve(table: Table, at: int) -> tuple[Table, int]:
+    """A table with a row for each time and name as one with a column for each name; else as it is.
+
+    Args:
+        table: its columns a time, a name and a value, as MediaPipe's results are often kept.
+        at: the column of the time.
+
+    Returns:
+        A table and its column of the time.
+
+    Raises:
+        AnimationFileError: most names have no value at most times.
+    """
+    others = [i for i in range(len(table.header)) if i != at and table.header[i]]
+    is_named = {i: not any(map(_is_number, table.columns[i])) for i in others}
+    times = dict.fromkeys(table.columns[at])
+    repeated = len(table.rows) - len(times)
+    if sorted(is_named.values()) != [False, True] or repeated <= MOST_LOST * len(table.rows):
+        return table, at
+    named, valued = sorted(others, key=lambda i: not is_named[i])
+    names = dict.fromkeys(cell.strip() for cell in table.columns[named])
+    if len(names) * len(times) > _SPARSEST * len(table.rows):
+        raise AnimationFileError(
+            table.name,
+            f"a value for each time and each name in the column {table.place(named)} was expected, "
+            f"found {len(table.rows)} for {len(times)} times and {len(names)} names",
+        )
+    row_of = {time: i for i, time in enumerate(times)}
+    place_of = {name: i for i, name in enumerate(names, start=1)}
+    rows = [[time, *([""] * len(names))] for time in times]
+    lines = [0] * len(rows)
+    for row, line in zip(table.rows, table.lines, strict=True):
+        rows[row_of[row[at]]][place_of[row[named].strip()]] = row[valued]
+        lines[row_of[row[at]]] = line
+    notes = [*table.notes, f"the column {table.header[named]} names the curves"]
+    return Table(table.name, [table.header[at], *names], rows, lines, table.delimiter, notes), 0
 
 
 def _shapes(table: Table, at: int | None) -> int | None:
