@@ -224,8 +224,8 @@ def capture(tmp_path):
     return path
 
 
-def _import(path, **options):
-    return bpy.ops.risorius.import_animation(filepath=str(path), start=1.0, **options)
+def _import(filepath, **options):
+    return bpy.ops.risorius.import_animation(filepath=str(filepath), start=1.0, **options)
 
 
 def test_a_capture_lands_on_the_face_at_its_timecodes(rig, capture):
@@ -277,7 +277,7 @@ def test_a_long_pause_makes_no_keys(rig, tmp_path):
     (curve,) = _curves(scene.controls(rig).animation_data.action)
     frames = [1, 2, 13, 40000 * 24 + 1]  # each sample has the frame before it and the one after
     assert [k.co[0] for k in curve.keyframe_points] == frames
-    path.write_text(f"time,{JAW}\n0,0.25\n1e12,0.5\n", encoding="utf-8")
+    path.write_text(f"time (s),{JAW}\n0,0.25\n1e12,0.5\n", encoding="utf-8")
     with pytest.raises(RuntimeError, match="beyond what Blender can play"):
         _import(path)
 
@@ -339,6 +339,66 @@ def test_options_of_an_import(rig, capture):
 def test_what_cannot_be_is_said_in_a_sentence(rig, capture, options, words):
     with pytest.raises(RuntimeError, match=words):
         _import(capture, **options)
+    assert not bpy.data.actions
+
+
+def _last_jaw(rig):
+    """Frame and value of the last key of the jaw."""
+    action = scene.controls(rig).animation_data.action
+    key = next(c for c in _curves(action) if "jawOpen" in c.data_path).keyframe_points[-1]
+    return pytest.approx((key.co[0], key.co[1]), abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence", "mends"),
+    [
+        ("time,jawOpen\n0,0\n500,0.5\n1000,1\n", "Time Unit in Blender", {"time_unit": "MS"}),
+        ("time (frames),jawOpen\n0,0\n24,1\n", "File Rate in Blender", {"file_rate": 24.0}),
+        (
+            "time,jawOpen\n0,0\n0,0.5\n0,1\n",
+            r"2 of 3 frames whose time is not after .* rows",
+            {"time_unit": "ROWS", "file_rate": 2.0},
+        ),
+        (
+            "Timecode,BlendShapeCount,JawOpen\n01:00:00:05,1,0\n01:00:01:05,1,1\n",
+            "Timecode Rate in Blender",
+            {"timecode_rate": 24.0},
+        ),
+        ("time,jawOpen\n0,0\n1,100\n", "Full Value in Blender", {"full_value": 100.0}),
+        (
+            "time,jawOpen,HeadYaw\n0,0,0\n1,1,45\n",
+            "Angles in Blender",
+            {"angles": "DEGREES"},
+        ),
+        ("time,A\n0,0\n1,1\n", "Mapping in Blender", {"mapping": "vrm"}),
+    ],
+    ids=["unit", "frames", "clock", "timecode", "per cent", "degrees", "letters"],
+)
+def test_a_capture_of_another_scale_is_asked_about_and_an_option_mends_it(
+    rig, tmp_path, text, sentence, mends
+):
+    bpy.context.scene.render.fps = 24
+    path = tmp_path / "odd.csv"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(RuntimeError, match=sentence):
+        _import(path)
+    assert not bpy.data.actions
+    assert _import(path, **mends) == {"FINISHED"}
+    assert _last_jaw(rig) == (25.0, 0.6 if "mapping" in mends else 1.0)
+
+
+def test_a_file_of_another_kind_is_called_by_its_kind(rig, tmp_path):
+    pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 1\n"
+    for name, text, words in (
+        ("take.csv", "<!DOCTYPE html><html></html>", "this is a web page: download the file"),
+        ("body.txt", "HIERARCHY\nROOT Hips\n", "this is motion of a body"),
+        ("face.dna", pointer, "it is a pointer of Git LFS"),
+    ):
+        path = tmp_path / name
+        path.write_text(text, encoding="utf-8")
+        bring = bpy.ops.risorius.import_dna if path.suffix == ".dna" else _import
+        with pytest.raises(RuntimeError, match=words):
+            bring(filepath=str(path))
     assert not bpy.data.actions
 
 

@@ -134,7 +134,7 @@ def test_cubic_keys_and_repeated_curves_are_said(tmp_path):
         ("[1, 2]", "named curves were expected, found none"),
         ({"a": [1, 2]}, "nothing gives the time: give the rate"),
         ({"a": [1, 2], "b": [1], "fps": 30}, "b: 2 values as in the first curve were expected"),
-        ({"a": [1, None], "fps": 30}, r"a\[1\]: a finite number was expected, found None"),
+        ({"a": [1, True], "fps": 30}, r"a\[1\]: a finite number was expected, found True"),
         ('{"a": [1, NaN], "fps": 30}', r"a\[1\]: a finite number was expected, found nan"),
         ('{"a": [1, 1e999], "fps": 30}', r"a\[1\]: a finite number was expected, found inf"),
         ({"a": [1, 2], "fps": 0}, "fps: frames a second above 0 were expected"),
@@ -188,3 +188,28 @@ def test_seeded_damage_never_ends_in_anything_but_a_sentence(tmp_path):
             assert "\n" not in str(error)
             outcomes[False] += 1
     assert min(outcomes.values()) > 30
+
+
+@pytest.mark.parametrize(
+    "document",
+    [
+        {"time": [0, 0.1, 0.2], "jawOpen": [0, None, 1]},
+        {"names": ["jawOpen"], "frames": [[0], [None], [1]], "time": [0, 0.1, 0.2]},
+        {"names": ["jawOpen"], "frames": [
+            {"time": t, "weights": [w]} for t, w in ((0, 0), (0.1, None), (0.2, 1))]},
+        [{"time": 0, "jawOpen": 0}, {"time": 0.1, "jawOpen": None}, {"time": 0.2, "jawOpen": 1}],
+    ],
+)  # fmt: skip
+def test_null_is_a_value_that_is_not_there(tmp_path, document):
+    path = tmp_path / "a.json"
+    path.write_text(json.dumps(document))
+    found = importing.read(path)
+    np.testing.assert_allclose(found.clip.curve("jawOpen"), [0, 0.5, 1])
+    assert any("jawOpen" in note and "filled" in note for note in found.notes)
+
+
+def test_a_curve_of_null_alone_is_refused(tmp_path):
+    path = tmp_path / "a.json"
+    path.write_text('{"time": [0, 1], "jawOpen": [null, null]}')
+    with pytest.raises(importing.AnimationFileError, match="jawOpen: numbers were expected, found"):
+        importing.read(path)

@@ -214,6 +214,86 @@ def test_empty_cells_are_filled_and_said(tmp_path):
     assert "c: empty, left out" in found.notes
 
 
+TABLES = {
+    "sep": "sep=;\r\ntime;jawOpen;mouthClose\r\n0,0;0,5;0,1\r\n0,04;0,6;0,2\r\n",
+    "sep, quoted, tab": '"sep=\\t"\ntime\tjawOpen\tmouthClose\n0\t0.5\t0.1\n0.04\t0.6\t0.2\n',
+    "sep against the header": "sep=;\ntime;jawOpen;mouthClose\n0,0;0,5;0,1\n0,04;0,6;0,2\n",
+    "comments": "# a, b; c\n// fps: 60\ntime,jawOpen,mouthClose\n0,.5,.1\n# cut\n0.04,.6,.2\n",
+    "NumPy": "# time,jawOpen,mouthClose\n0.0,0.5,0.1\n4e-2,0.6,0.2\n",
+    "tab, decimal commas": "time\tjawOpen\tmouthClose\n0,0\t0,5\t0,1\n0,04\t0,6\t0,2\n",
+    "bars, decimal commas": "time|jawOpen|mouthClose\n0,0|0,5|0,1\n0,04|0,6|0,2\n",
+    "quoted decimal commas": 'time,jawOpen,mouthClose\n"0,0","0,5","0,1"\n"0,04","0,6","0,2"\n',
+    "a cut last row": "time,jawOpen,mouthClose\n0,0.5,0.1\n0.04,0.6,0.2\n0.08,0\n",
+    "a row without a time": "time,jawOpen,mouthClose\n0,.5,.1\n,.9,.9\n0.04,.6,.2\n0.08,0",
+}
+
+
+@pytest.mark.parametrize("form", TABLES)
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
+def test_tables_as_spreadsheets_write_them(tmp_path, form, encoding):
+    clip = read(tmp_path, TABLES[form].encode(encoding)).clip
+    np.testing.assert_allclose(clip.curve("jawOpen"), [0.5, 0.6])
+    np.testing.assert_allclose(clip.curve("mouthClose"), [0.1, 0.2], rtol=1e-6)
+    np.testing.assert_allclose(clip.frame_times(), [0.0, 0.04])
+
+
+@pytest.mark.parametrize("hole", ["", " ", "-", "N/A", "NULL"])
+def test_holes_in_tables_and_in_captures_are_filled_and_said(tmp_path, hole):
+    """One cell, a column, a timecode and the end of a take of Live Link Face; cells of a table."""
+    rows = [line.split(",") for line in take(60).splitlines()]
+    rows[5][2] = rows[9][0] = hole
+    for row in rows[1:]:
+        row[4] = hole
+    rows[-1] = rows[-1][:30]
+    found = read(tmp_path, "\n".join(map(",".join, rows)))
+    kept = np.delete(np.arange(59), 8)
+    values = capture(60)[:, 0]
+    values[4] = (values[3] + values[5]) / 2
+    np.testing.assert_allclose(found.clip.curve("EyeBlinkLeft"), values[kept], atol=1e-3)
+    np.testing.assert_allclose(found.clip.frame_times(), kept / 30.0, atol=1e-4)
+    assert "EyeLookInLeft: empty, left out" in found.notes
+    assert "EyeBlinkLeft: 1 empty cell(s) filled" in found.notes
+    assert "1 row(s) without a time left out" in found.notes
+    assert "the last row (line 61) is cut short and left out" in found.notes
+    rows[7][5:10] = [hole] * 5
+    found = read(tmp_path, "\n".join(map(",".join, rows)))
+    assert "6 empty cell(s) filled in 6 curves, as EyeBlinkLeft" in found.notes
+    table = f"time,jawOpen,jawLeft\n0,0.5,{hole}\n0.04,{hole},0.2\n0.08,0.7,0.3\n"
+    clip = read(tmp_path, table).clip
+    np.testing.assert_allclose(clip.curves, [[0.5, 0.6, 0.7], [0.2, 0.2, 0.3]], rtol=1e-6)
+
+
+def test_a_row_for_each_time_and_name_becomes_a_column_for_each_name(tmp_path):
+    rows = [(t, n, v) for t in (0.0, 0.04, 0.08) for n, v in (("jawOpen", t), ("tongueOut", 0.5))]
+    del rows[3]  # a value that is not there
+    text = "timestamp,category_name,score\n" + "".join(f"{t},{n},{v}\n" for t, n, v in rows)
+    found = read(tmp_path, text)
+    assert found.mapping == "arkit"
+    assert found.clip.names == ("jawOpen", "tongueOut")
+    np.testing.assert_allclose(found.clip.curves, [[0, 0.04, 0.08], [0.5] * 3], rtol=1e-6)
+    np.testing.assert_allclose(found.clip.frame_times(), [0, 0.04, 0.08])
+    assert "the column category_name names the curves" in found.notes
+    many = "".join(f"{i // 2},name{i},1\n" for i in range(40))
+    with pytest.raises(importing.AnimationFileError, match="found 40 for 20 times and 40 names"):
+        read(tmp_path, "time,name,value\n" + many)
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ('time,a\n0.5,"1,234"\n', r"line 2, column 2 \(a\): a number was expected, found '1,234'"),
+        ("time;a\n0;1,2,3\n", "a number was expected, found '1.2.3'"),
+        (
+            "time,a\n0,1\n,2\n,3\n",
+            "times were expected, found none in 2 of 3 rows: clip convert --time-unit",
+        ),
+    ],
+)
+def test_what_is_no_decimal_comma_and_no_time_is_refused(tmp_path, text, sentence):
+    with pytest.raises(importing.AnimationFileError, match=sentence):
+        read(tmp_path, text)
+
+
 @pytest.mark.parametrize(
     ("data", "sentence"),
     [
@@ -227,7 +307,7 @@ def test_empty_cells_are_filled_and_said(tmp_path):
         (b"time,a\n0,nan\n", r"line 2, column 2 \(a\): a finite number was expected, found 'nan'"),
         (b"time,a\n0,1e39\n", r"line 2, column 2 \(a\): a finite number was expected"),
         (b"time,a\n0,1_0\n", r"line 2, column 2 \(a\): a number was expected"),
-        (b"time,a\n0,1\n1\n", "line 3: 2 columns as in the header were expected, found 1"),
+        (b"time,a\n0,1\n1\n2,3\n", "line 3: 2 columns as in the header were expected, found 1"),
         (b"time,a,a\n0,1,1\n", "line 1: 'a' was expected once, found in the columns 2 and 3"),
         (b"time,a\n", "rows after the header were expected"),
         (
@@ -235,7 +315,7 @@ def test_empty_cells_are_filled_and_said(tmp_path):
             "line 1: a header with the names of the curves was expected, found numbers",
         ),
         (b"time,b\n0,hello\n", "columns with curves were expected, found none"),
-        (b"a,b\n0,1\n", "no column gives the time: give the rate"),
+        (b"a,b\n0,1\n", "nothing gives the time: give the rate"),
         (b"frame,b\n0,1\n", r"column 1 \(frame\): its time is a frame number: give the rate"),
         (b'time,a\n0,"1\n1,2\n', "no table"),
         (b"time,a\n0,\x001\n", "line 2: text was expected, found a zero byte"),
@@ -282,8 +362,8 @@ def test_options_that_make_no_sense(tmp_path):
 
 
 def test_frames_out_of_order_are_left_out_and_said(tmp_path):
-    found = read(tmp_path, "time,a\n0,0\n1,1\n1,5\n0.5,6\n2,2\n")
-    np.testing.assert_array_equal(found.clip.curve("a"), [0, 1, 2])
+    found = read(tmp_path, "time,a\n0,0\n1,1\n1,5\n0.5,6\n2,2\n3,3\n")
+    np.testing.assert_array_equal(found.clip.curve("a"), [0, 1, 2, 3])
     assert found.notes[0].startswith("2 frame(s) left out whose time is not after the one before")
 
 
@@ -351,31 +431,6 @@ def test_seeded_damage_never_ends_in_anything_but_a_sentence(tmp_path):
         except importing.AnimationFileError as error:
             assert "\n" not in str(error)
     assert 10 < read_count < 150
-
-
-KINDS = {
-    "wav": (b"RIFF\x24\0\0\0WAVEfmt \x10\0\0\0", "a sound: Speak from Audio in Blender"),
-    "flac": (b"fLaC\0\0\0\x22", "`risorius speech` on the command line"),
-    "mp3": (b"ID3\x04\0\0\0\0", "a sound"),
-    "png": (b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", "a picture (PNG)"),
-    "jpg": (b"\xff\xd8\xff\xe0\0\x10JFIF", "a picture (JPEG)"),
-    "mp4": (b"\0\0\0\x20ftypisom", "a film"),
-    "zip": (b"PK\x03\x04\x14\0", "an archive (ZIP)"),
-    "blend": (b"BLENDER-v405", "a scene of Blender (.blend)"),
-    "zst.blend": (b"\x28\xb5\x2f\xfd\x04\0", "Zstandard"),
-    "dna": (b"DNA\0\2\0\x08\0\0\0\x0bd", "a face (DNA)"),
-}
-
-
-@pytest.mark.parametrize("suffix", KINDS)
-def test_a_file_of_another_kind_is_called_by_its_kind(suffix, tmp_path):
-    start, words = KINDS[suffix]
-    path = tmp_path / f"take.{suffix}"
-    path.write_bytes(start + bytes(range(256)))
-    with pytest.raises(AnimationFileError) as found:
-        importing.read(path)
-    assert str(found.value).startswith(f"{path}: animation was expected, this is ")
-    assert words in str(found.value)
 
 
 def test_a_clip_without_its_suffix_is_called_a_clip(tmp_path):

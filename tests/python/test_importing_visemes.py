@@ -14,6 +14,7 @@ from animation_files import (
     rhubarb_xml,
 )
 from risorius import importing
+from risorius.cli import main
 from risorius.importing.visemes import Cue, flowing_curves
 
 RIG = "CTRL_expressions."
@@ -101,7 +102,7 @@ def test_the_mouth_opens_where_the_cue_says(tmp_path):
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("0.00\tX\n0.30\tQ\n", "columns|no column|header"),
+        ("0.00\tX\n0.30\tQ\n", r"line 2: a time, a tab and a shape A-H or X were expected, found"),
         ("0.50\tA\n0.30\tB\n0.9\tX\n", "line 2: times that ascend from 0 were expected, found 0.3"),
         ("0.00\tX\n", "two lines at least"),
         ("<rhubarbResult><mouthCues>", "line 1, column .*: not XML"),
@@ -154,3 +155,44 @@ def test_seeded_damage_never_ends_in_anything_but_a_sentence(tmp_path):
             assert "\n" not in str(error)
             outcomes[False] += 1
     assert min(outcomes.values()) > 10
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        str.lower,
+        lambda text: text.replace("\n", " \n"),
+        lambda text: text.replace(".", ","),
+        lambda text: text.replace("\t", "  "),
+        lambda text: text.replace("\t", ","),
+        lambda text: text.replace("\t", ";").replace(".", ","),
+        lambda text: "time\tviseme\n" + text,
+        lambda text: "Time (s);shape\n" + text.replace("\t", ";").replace(".", ",").lower(),
+    ],
+)
+@pytest.mark.parametrize("kind", [None, "rhubarb"])
+def test_rhubarb_as_people_and_spreadsheets_leave_it(tmp_path, change, kind):
+    found = read(tmp_path, change(rhubarb_tsv(CUES)), kind=kind)
+    assert (found.kind, found.mapping) == ("rhubarb", "rhubarb")
+    assert [(e.time, e.value) for e in found.clip.events] == [(s, shape) for s, _, shape in CUES]
+
+
+@pytest.mark.parametrize("odd", ["0.40\tQ", "0.40 B C", "B\t0.40", "0.40", "hello", "nan\tB"])
+def test_the_odd_line_of_a_rhubarb_track_is_named(tmp_path, odd, capsys):
+    path = tmp_path / "cues.tsv"
+    path.write_text(rhubarb_tsv(CUES).replace("0.31\tB", odd))
+    for options in ([], ["--kind", "rhubarb"]):
+        out = ["-o", str(tmp_path / "out.rzc"), *options]
+        assert main(["clip", "convert", str(path), *out]) == 1
+        said = capsys.readouterr().err
+        assert f"line 4: a time, a tab and a shape A-H or X were expected, found {odd!r}" in said
+
+
+def test_a_table_that_is_said_to_be_rhubarbs_is_not(tmp_path):
+    with pytest.raises(
+        importing.AnimationFileError, match="shape A-H or X in each line .* a table"
+    ):
+        read(tmp_path, "time,jawOpen\n0,1\n", kind="rhubarb")
+    # Two columns of letters, or letters beside numbers, are no track.
+    with pytest.raises(importing.AnimationFileError, match="columns with curves were expected"):
+        read(tmp_path, "time,a,b\n0,A,B\n1,C,D\n")

@@ -38,6 +38,22 @@ CAPTURE_RANGES = (
     ("TAKE", "Of This File", "Neutral and extremes are learned from the file, for it alone"),
     ("NONE", "None", "Values stay as captured"),
 )
+TIME_UNITS = (
+    ("AUTO", "As the File Says", "Its header names the unit, or its numbers show it"),
+    ("S", "Seconds", ""),
+    ("MS", "Milliseconds", ""),
+    ("US", "Microseconds", ""),
+    ("NS", "Nanoseconds", ""),
+    ("MIN", "Minutes", ""),
+    ("H", "Hours", ""),
+    ("FRAMES", "Frame Numbers", "At the rate of the file"),
+    ("ROWS", "Rows", "Its times are left aside: each row is a frame at the rate of the file"),
+)
+ANGLES = (
+    ("AUTO", "As the File Says", "Radians; what no head can turn is asked about"),
+    ("RADIANS", "Radians", ""),
+    ("DEGREES", "Degrees", ""),
+)
 EXTENSIONS = (
     ".csv",
     ".tsv",
@@ -105,6 +121,27 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
         name="Range",
         description="Which values of the capture become 0 and 1, so that blinks close the eyes",
         items=CAPTURE_RANGES,
+    )
+    timecode_rate: bpy.props.FloatProperty(
+        name="Timecode Rate",
+        description="Frames that timecodes count a second, where they do not tell; 0: as found",
+        min=0.0,
+        soft_max=240.0,
+    )
+    time_unit: bpy.props.EnumProperty(
+        name="Time Unit",
+        description="What the times of a table or a JSON count in",
+        items=TIME_UNITS,
+    )
+    full_value: bpy.props.FloatProperty(
+        name="Full Value",
+        description="The file's value of a whole movement: 100 for per cent, 255 for bytes, 1 "
+        "keeps values however large; 0: 1, and values far above it are asked about",
+        min=0.0,
+        soft_max=255.0,
+    )
+    angles: bpy.props.EnumProperty(
+        name="Angles", description="What the file's angles of head and eyes are in", items=ANGLES
     )
     gain: bpy.props.FloatProperty(
         name="Gain", description="Factor of all controls", default=1.0, min=0.0, soft_max=2.0
@@ -180,8 +217,12 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
             kind=None if self.kind == "AUTO" else self.kind,
             mapping=mapping,
             rate=self.file_rate or None,
+            timecode_rate=self.timecode_rate or None,
+            time_unit=None if self.time_unit == "AUTO" else self.time_unit.lower(),
             rig=live.rig,
             rotations="all" if self.use_eyes else "head",
+            full_value=self.full_value or None,
+            angles=None if self.angles == "AUTO" else self.angles.lower(),
         )
         return clip, lines_of(report), report.mapping
 
@@ -228,7 +269,11 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
         if self.mapping == "FILE":
             layout.prop(self, "mapping_file")
         layout.prop(self, "rate_mode")
-        words.prop_or(layout, self, "file_rate", 0.0, "0: as the file says")
+        layout.prop(self, "time_unit")
+        for name in ("file_rate", "timecode_rate"):
+            words.prop_or(layout, self, name, 0.0, "0: as the file says")
+        words.prop_or(layout, self, "full_value", 0.0, "0: as the file says")
+        layout.prop(self, "angles")
         layout.prop(self, "capture_range")
         layout.prop(self, "gain")
         words.prop_or(layout, self, "gains", "", "as *jawOpen=1.3 *Blink*=1.1")

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .._native import ClipError, ClipFile, encode_clip, write_clip
+from ..base import signatures
 from ..base.budget import BYTES_PER_BYTE, Budget, BudgetError
 from ..base.errors import ArgumentError
 
@@ -334,7 +335,13 @@ class ClipReader:
         """
         if isinstance(source, bytearray | memoryview):
             source = bytes(source)
-        self._file = ClipFile(source if isinstance(source, bytes) else os.fspath(source), recover)
+        given = source if isinstance(source, bytes) else os.fspath(source)
+        try:
+            self._file = ClipFile(given, recover)
+        except ClipError as error:
+            if error.code != "not_clip":
+                raise
+            raise signatures.named(error, source) from None
         self._size = len(source) if isinstance(source, bytes) else os.path.getsize(source)
         self.names: tuple[str, ...] = self._file.names
         self.rate: float = self._file.rate

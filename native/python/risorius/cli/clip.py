@@ -63,6 +63,19 @@ def _add_convert(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="neutral and extremes of the person, from risorius clip learn; self: from this take",
     )
     parser.add_argument(
+        "--full-value",
+        type=float,
+        metavar="N",
+        help="value of IN that is a whole movement: 100 for per cent, 255 for bytes; 1 keeps "
+        "values however large (default: 1, and far larger ones are refused)",
+    )
+    parser.add_argument(
+        "--angles",
+        choices=importing.ANGLE_UNITS,
+        help="of the head and the eyes in IN (default: radians, and a head that turns too far is "
+        "refused)",
+    )
+    parser.add_argument(
         "--neutral", metavar="A[:B]", help="frame or frames of a neutral face, which become 0"
     )
     for name, what in (("gain", "factor"), ("offset", "what is added")):
@@ -111,6 +124,12 @@ def _add_input(parser: argparse.ArgumentParser) -> None:
         "--timecode-rate", type=float, metavar="FPS", help="of timecodes that do not tell it"
     )
     parser.add_argument(
+        "--time-unit",
+        choices=importing.TIME_UNITS,
+        help="what the times of a table or a JSON count in, where they do not say it; rows: they "
+        "are left aside, and each row is a frame at --input-rate",
+    )
+    parser.add_argument(
         "--take", metavar="NAME", help="animation of a glTF or FBX, by name or number (the first)"
     )
 
@@ -146,15 +165,23 @@ def load(args: argparse.Namespace) -> importing.Imported:
         kind=args.kind,
         rate=args.input_rate,
         timecode_rate=args.timecode_rate,
+        time_unit=args.time_unit,
         take=args.take,
     )
 
 
-def run_convert(args: argparse.Namespace) -> int:
+def complain(args: argparse.Namespace) -> None:
+    """Raises CommandLineError for what is wrong before anything is read."""
+    if args.full_value is not None and not 0.0 < args.full_value < 1e9:
+        raise CommandLineError(f"--full-value: above 0 was expected, found {args.full_value:g}")
     if args.output.suffix.lower() not in OUTPUTS:
         raise CommandLineError(f"{args.output}: a name ending in {', '.join(OUTPUTS)} was expected")
     refuse_same_file(str(args.input), str(args.output))
     require_writable(args.output)
+
+
+def run_convert(args: argparse.Namespace) -> int:
+    complain(args)
     steps = _steps(args)
     dna = risorius.load(args.rig, layers="behavior") if args.rig else None
     clip, report = load(args).apply(
@@ -162,6 +189,8 @@ def run_convert(args: argparse.Namespace) -> int:
         rig_names=dna.raw_control_names if dna else None,
         rig=risorius.Rig(dna) if dna else None,
         rotations=args.rotations,
+        full_value=args.full_value,
+        angles=args.angles,
     )
     clip = with_ranges(clip, args.range, report)
     for step in steps:

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import risorius
+from risorius.base import signatures
 from risorius.base.errors import RisoriusError
 from risorius.base.words import counted
 from risorius.files import fileio
@@ -134,8 +135,12 @@ def from_json(name: str) -> risorius.Dna:
     Raises:
         InputError: not UTF-8, not JSON, not a Dna; with the place.
     """
+    data = read_bytes(name)
+    kind = signatures.kind_of(data)
+    if kind is not None:
+        raise InputError(f"{label(name)}: JSON was expected, this is {kind}")
     try:
-        return risorius.Dna.from_json(read_bytes(name).decode())
+        return risorius.Dna.from_json(data.decode())
     except UnicodeDecodeError as error:
         found = error.object[error.start]
         bad = InputError(f"{label(name)}: not JSON: {found:#04x} is not UTF-8 (byte {error.start})")

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 from ..anim.clip import Clip
+from ..base import signatures
 from ..importing import writing
 from ..speech import Heard, Phoneme, animate, listen
 from ..speech.listening import confidence
@@ -50,6 +51,10 @@ def complain(args: argparse.Namespace) -> None:
     """Raises CommandLineError for what is wrong before the voice is listened to."""
     require_suffix(args.out, _KINDS, "-o")
     require_writable(args.out, args.phonemes)
+    if args.text is not None and Path(args.text).is_file():
+        raise CommandLineError(
+            f"--text: what is said was expected, found the file {args.text}: --transcript reads it"
+        )
     if not 1.0 <= args.rate <= 1000.0:
         raise CommandLineError(f"--rate: 1 to 1000 was expected, found {args.rate:g}")
     if not 0.0 <= args.intensity <= 4.0:
@@ -74,8 +79,12 @@ def _spoken(args: argparse.Namespace) -> tuple[Heard, Clip]:
     """Raises: InputError, ValueError."""
     said = args.text
     if args.transcript is not None:
+        data = read_bytes(args.transcript)
+        kind = signatures.kind_of(data)
+        if kind is not None:
+            raise InputError(f"{args.transcript}: text was expected, this is {kind}")
         try:
-            said = read_bytes(args.transcript).decode("utf-8-sig")
+            said = data.decode("utf-8-sig")
         except UnicodeDecodeError as error:
             raise InputError(f"{args.transcript}: not UTF-8 (byte {error.start})") from error
     shown = sys.stderr.isatty()

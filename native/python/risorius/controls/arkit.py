@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The ARKit units in terms of raw controls, and in the orders of others, read from arkit.toml."""
+"""The ARKit units in terms of raw controls, and in the orders of others, read from arkit.toml.
+
+Beside them the expressions of VRM in terms of the units, read from vrm.toml.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,9 @@ from importlib import resources
 from typing import Any
 
 from ..base import toml
+
+FULL_SET = 10
+"""ARKit units from which on the expressions of VRM beside them are taken to repeat them."""
 
 
 @cache
@@ -19,6 +25,26 @@ def mapping() -> dict[str, dict[str, float]]:
         unit: {prefix + name: float(weight) for name, weight in row.items()}
         for unit, row in table["units"].items()
     }
+
+
+@cache
+def vrm() -> dict[str, dict[str, float]]:
+    """VRM expression, in lower case -> {ARKit unit: weight}; of VRM 0 and 1."""
+    table = _table("vrm.toml")
+    found = {name: dict(row) for name, row in table["expressions"].items()}
+    return found | {name: found[same] for name, same in table["same"].items()}
+
+
+def vrm_mapping() -> dict[str, dict[str, float]]:
+    """VRM expression, in lower case -> {raw control name as a DNA spells it: weight}."""
+    units = mapping()
+    out: dict[str, dict[str, float]] = {}
+    for name, row in vrm().items():
+        out[name] = {}
+        for unit, weight in row.items():
+            for control, share in units[unit].items():
+                out[name][control] = out[name].get(control, 0.0) + weight * share
+    return out
 
 
 def order(name: str) -> tuple[str, ...]:
@@ -33,6 +59,6 @@ def order(name: str) -> tuple[str, ...]:
 
 
 @cache
-def _table() -> dict[str, Any]:
-    text = resources.files(__package__).joinpath("arkit.toml").read_text(encoding="utf-8")
+def _table(name: str = "arkit.toml") -> dict[str, Any]:
+    text = resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
     return toml.parse(text)

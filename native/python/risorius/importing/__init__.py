@@ -7,6 +7,7 @@ file --read--> Imported (the file's own curves) --apply(mapping)--> Clip of raw 
 from __future__ import annotations
 
 from . import process
+from .clock.units import CHOICES as TIME_UNITS
 from .errors import AnimationFileError
 from .mapping import (
     Mapping,
@@ -17,13 +18,16 @@ from .mapping import (
     mapping_names,
     mapping_text,
 )
+from .ranges import ANGLE_UNITS
 from .reading import KINDS, ROTATIONS, Imported, import_curves, import_file, read
 from .report import Report
 from .writing import csv_text, json_text, write_text
 
 __all__ = [
+    "ANGLE_UNITS",
     "KINDS",
     "ROTATIONS",
+    "TIME_UNITS",
     "AnimationFileError",
     "Imported",
     "Mapping",

@@ -274,7 +274,7 @@ def read(data: bytes, name: str, take: str | None = None, budget: Budget | None 
             names = ", ".join(object_name(node) for node in stacks.values())
             notes.append(f"animation {title} is taken of {len(stacks)}: {names[:200]}")
         times, rows = on_one_clock(list(curves.values()), _rate(scene), scene.budget)
-        keep = keep_ascending(times, notes)
+        keep = keep_ascending(times, notes, name)
         clip = make_clip(list(curves), rows[:, keep], times[keep], metadata={"take": title})
         return Take(clip, "fbx", "", notes)
     raise AnimationFileError(

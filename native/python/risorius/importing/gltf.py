@@ -349,7 +349,7 @@ def read(document: Document, take: str | None = None) -> Take:
         )
         notes.append(f"animation {title} is taken of {len(animations)}: {names[:200]}")
     times, rows = on_one_clock(list(curves.values()), RATE, document.budget)
-    keep = keep_ascending(times, notes)
+    keep = keep_ascending(times, notes, document.name)
     clip = make_clip(list(curves), rows[:, keep], times[keep], metadata={"take": title})
     return Take(clip, "gltf", "", notes)
 

@@ -37,6 +37,7 @@ _KEYS = {
     "name", "description", "base", "prefix", "strip", "matching", "gui", "ignore", "rows",
     "controls", "metadata",
 }  # fmt: skip
+VOWELS = "AIUEO"
 _PATTERN_STEPS = 50  # of a budget, to look whether a pattern fits a name
 _SIDE = re.compile(r"(?:(?<=[a-z])(?=[LR]$)|(?<=[._\- ])(?=[LlRr]$))")
 
@@ -323,12 +324,19 @@ def parse_mapping(text: str, where: str, name: str = "") -> Mapping:
 
 
 def _base(table: Table[str, Any], where: str) -> Mapping:
-    """The mapping whose rows come first; "arkit units" are those of controls/arkit.toml."""
+    """The mapping whose rows come first.
+
+    "arkit units" are those of controls/arkit.toml, "vrm expressions" those of controls/vrm.toml and
+    the units beside them.
+    """
     base = _text(table, "base", where)
     if not base:
         return Mapping("")
     if base == "arkit units":
         return Mapping("", rows={unit: dict(row) for unit, row in arkit.mapping().items()})
+    if base == "vrm expressions":
+        rows = {**arkit.mapping(), **arkit.vrm_mapping()}
+        return Mapping("", rows={name: dict(row) for name, row in rows.items()})
     if base not in mapping_names():
         raise MappingError(
             where, f"base: one of {', '.join(mapping_names())} was expected, found {base}"
@@ -451,17 +459,40 @@ def check(mapping: Mapping, rig_names: Iterable[str]) -> list[str]:
     return out
 
 
-def best_mapping(names: Sequence[str]) -> str | None:
-    """The built-in mapping that knows most of these curves; None if none knows any.
+def best_mapping(names: Sequence[str], columns: Sequence[str] | None = None) -> str | None:
+    """The built-in mapping that knows most of these curves; None if none is sure to.
 
-    Of equals the one with fewer rows: it was made for less.
+    Of equals the one that knows more of all columns, then the one with fewer rows: it was made for
+    less. A letter alone decides nothing, as mouth shapes of several vocabularies are letters; the
+    vowels A, I, U, E, O together are VRM.
+
+    Args:
+        names: of the curves that say something.
+        columns: of all curves; None: the same.
     """
+    columns = names if columns is None else columns
+    letters = {name.upper() for name in columns if len(name) == 1}
+    has_vowels = letters >= set(VOWELS)
+    known: dict[str, set[str]] = {}
     scores = []
     for mapping, find in _finders():
-        hits = sum(1 for curve in names if find(curve) is not None)
-        if hits:
-            scores.append((-hits, len(mapping.rows), mapping.name))
-    return min(scores)[2] if scores else None
+        known[mapping.name] = hits = {curve for curve in columns if find(curve) is not None}
+        if has_vowels and mapping.name != "vrm":
+            hits -= {curve for curve in hits if curve.upper() in VOWELS}
+        is_sure = any(len(curve) > 1 for curve in hits) or (has_vowels and mapping.name == "vrm")
+        if is_sure and (found := hits.intersection(names)):
+            scores.append((-len(found), -len(hits), len(mapping.rows), mapping.name))
+    if len(known["arkit"]) >= arkit.FULL_SET:  # the expressions of VRM repeat the units
+        scores = [score for score in scores if score[-1] != "vrm"]
+    return min(scores)[-1] if scores else None
+
+
+def single_letters(names: Iterable[str]) -> list[str]:
+    """The mappings that know curves which are a letter each; none if not all of them are."""
+    names = list(names)
+    if not names or any(len(name) > 1 for name in names):
+        return []
+    return [mapping.name for mapping, find in _finders() if any(map(find, names))]
 
 
 @cache

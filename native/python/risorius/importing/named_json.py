@@ -13,6 +13,14 @@ import numpy.typing as npt
 
 from ..anim.clip import Event
 from ..base.budget import Budget
+from .clock.units import (
+    FRAMES,
+    Asked,
+    TimeName,
+    row_times,
+    seconds_of,
+    time_name,
+)
 from .errors import AnimationFileError
 from .keys import VALUE_BYTES, Keys, on_one_clock
 from .source import Take, keep_ascending, make_clip
@@ -26,8 +34,6 @@ NAME_KEYS = (
 )  # fmt: skip
 MATRIX_KEYS = ("weightMat", "frames", "weights", "values", "data", "blendshapes", "blendShapes")
 RATE_KEYS = ("exportFps", "fps", "rate", "frameRate", "framerate", "frame_rate", "sampleRate")
-TIME_KEYS = ("time", "timeCode", "timecode", "timestamp", "t", "seconds")
-TIMES_KEYS = ("times", "timeCodes", "timecodes", "timestamps", "time")
 WEIGHT_KEYS = ("weights", "values", "blendShapes", "blendshapes", "curves", "shapes")
 # NeuroSync returns rows without names: Live Link Face's columns, and seven emotions after them.
 NEUROSYNC_EMOTIONS = ("Angry", "Disgusted", "Fearful", "Happy", "Neutral", "Sad", "Surprised")
@@ -42,11 +48,11 @@ _LARGEST = float(np.finfo(np.float32).max)
 
 
 class Reader:
-    """One file and its budget; `rate` is what the caller says of its frames a second, or None."""
+    """One file, its budget, and what the caller says of its time."""
 
-    def __init__(self, name: str, rate: float | None, budget: Budget) -> None:
+    def __init__(self, name: str, asked: Asked, budget: Budget) -> None:
         self.name = name
-        self.rate = rate
+        self.asked = asked
         self.budget = budget
         self.notes: list[str] = []
 
@@ -79,19 +85,23 @@ class Reader:
             return found
         raise self.fail(f"a finite number was expected, found {_shown(value)}", place)
 
-    def numbers(self, values: object, place: str) -> list[float]:
+    def numbers(self, values: object, place: str, *, has_holes: bool = False) -> list[float]:
         """A list of finite numbers.
 
         Args:
             values: a value of the JSON.
             place: what errors call it.
+            has_holes: null is a value that is not there, and comes as NaN for `take` to fill.
 
         Raises:
             AnimationFileError: it is no list, or something in it is no such number.
         """
         if not isinstance(values, list):
             raise self.fail(f"a list of numbers was expected, found {_kind(values)}", place)
-        return [self.number(value, f"{place}[{i}]") for i, value in enumerate(values)]
+        return [
+            math.nan if has_holes and value is None else self.number(value, f"{place}[{i}]")
+            for i, value in enumerate(values)
+        ]
 
     def strings(self, values: object, place: str) -> list[str]:
         """A list of names.
@@ -109,8 +119,8 @@ class Reader:
 
     def rate_of(self, *tables: object) -> float | None:
         """Frames a second: as the caller says, else as the first of these tables does."""
-        if self.rate is not None:
-            return self.rate
+        if self.asked.rate is not None:
+            return self.asked.rate
         for table in tables:
             if isinstance(table, dict) and (key := _first(table, RATE_KEYS)):
                 return self.frames_a_second(table[key], key)
@@ -139,22 +149,23 @@ class Reader:
         """float64[count] seconds of frames: as given, else by the rate from 0 on.
 
         Args:
-            given: a list of seconds out of the JSON, or None.
+            given: a list of times out of the JSON, or None.
             count: how many frames there are.
             rate: frames a second; None: unknown.
-            place: what errors call the times.
+            place: the key of the times, which may say their unit, and what errors call them.
 
         Raises:
-            AnimationFileError: another number of times, or neither times nor a rate.
+            AnimationFileError: another number of times, neither times nor a rate, a unit that
+                nobody knows.
         """
-        if given is not None:
-            times = np.array(self.numbers(given, place))
-            if times.size != count:
-                raise self.fail(f"{count} times were expected, found {times.size}", place)
-            return times
-        if rate is None:
-            raise self.fail("nothing gives the time: give the rate in frames a second")
-        return np.arange(count) / rate
+        asked = self.asked._replace(rate=rate)
+        if given is None or asked.counts_rows:
+            return row_times(count, asked, self.name)
+        times = np.array(self.numbers(given, place))
+        if times.size != count:
+            raise self.fail(f"{count} times were expected, found {times.size}", place)
+        said = time_name(place) or TimeName("")
+        return seconds_of(times, said, asked, self.notes, name=self.name, column=place)
 
     def take(
         self, names: Sequence[str], rows: npt.ArrayLike, times: Doubles, rate: float | None = None
@@ -163,7 +174,7 @@ class Reader:
 
         Args:
             names: of the curves, each once.
-            rows: float[controls, frames].
+            rows: float[controls, frames]; NaN where a value is not there.
             times: float64[frames], seconds.
             rate: frames a second; None: told from the times.
 
@@ -173,8 +184,15 @@ class Reader:
         if len(set(names)) != len(names):
             twice = next(name for name in names if list(names).count(name) > 1)
             raise self.fail(f"{twice!r} was expected once, found it twice")
-        keep = keep_ascending(times, self.notes)
-        curves = np.asarray(rows, np.float64).reshape(len(names), times.size)[:, keep]
+        keep = keep_ascending(times, self.notes, self.name)
+        curves = np.array(rows, np.float64).reshape(len(names), times.size)[:, keep]
+        for name, curve in zip(names, curves, strict=True):
+            holes = np.isnan(curve)
+            if holes.all() and holes.size:
+                raise self.fail("numbers were expected, found null alone", name)
+            if holes.any():
+                curve[holes] = np.interp(times[keep][holes], times[keep][~holes], curve[~holes])
+                self.notes.append(f"{name}: null in {int(holes.sum())} frame(s), filled")
         return Take(make_clip(names, curves, times[keep], rate=rate), "json", "", self.notes)
 
 
@@ -201,21 +219,21 @@ def parse(text: str, name: str) -> object:
 
 
 def read(
-    document: object, name: str, rate: float | None = None, budget: Budget | None = None
+    document: object, name: str, asked: Asked | None = None, budget: Budget | None = None
 ) -> Take:
     """Curves of a document, by the first shape that fits.
 
     Args:
         document: parsed JSON.
         name: what errors call the file.
-        rate: frames a second, where the file does not say it; it wins if it does.
+        asked: what the caller says of its time; it wins over what the file says. None: nothing.
         budget: bounds memory and work; None: that of a small file.
 
     Raises:
         AnimationFileError: none of the shapes, or one that does not hold together.
         BudgetError: far more curves and frames than a file of this size may hold.
     """
-    reader = Reader(name, rate, budget or Budget.of(0))
+    reader = Reader(name, asked or Asked(), budget or Budget.of(0))
     for shape in (
         own_clip,
         matrix,
@@ -259,9 +277,11 @@ def own_clip(reader: Reader, document: object) -> Take | None:
     rate = reader.frames_a_second(document.get("rate"), "rate")
     start = reader.number(document.get("start", 0.0), "start")
     given = document.get("times")
-    times = start + np.arange(count) / rate if given is None else None
-    if times is None:
-        times = reader.times(given, count, None, "times")
+    times = start + np.arange(count) / rate
+    if given is not None:
+        times = np.array(reader.numbers(given, "times"))
+        if times.size != count:
+            raise reader.fail(f"{count} times were expected, found {times.size}", "times")
     take = reader.take(list(curves), rows, times, rate)
     take.clip = take.clip.replaced(
         events=_own_events(reader, document.get("events", [])),
@@ -310,30 +330,31 @@ def matrix(reader: Reader, document: object) -> Take | None:
     names = reader.strings(names_in[names_key], names_key)
     frames = document[key]
     values, times = [], []
+    clock = _time_key(frames[0]) if isinstance(frames[0], dict) else None
     for i, frame in enumerate(frames):
         place = f"{key}[{i}]"
         if isinstance(frame, dict):
-            times.append(_frame_time(reader, frame, place))
+            times.append(frame.get(clock))
             at = _first(frame, WEIGHT_KEYS)
             if at is None:
                 raise reader.fail(f"one of {', '.join(WEIGHT_KEYS)} was expected", place)
-            row = reader.numbers(frame[at], f"{place}.{at}")
+            row = reader.numbers(frame[at], f"{place}.{at}", has_holes=True)
         else:
-            row = reader.numbers(frame, place)
+            row = reader.numbers(frame, place, has_holes=True)
         if len(row) != len(names):
             raise reader.fail(
                 f"{len(names)} values as in {names_key} were expected, found {len(row)}", place
             )
         values.append(row)
     rate = reader.rate_of(document, inner)
-    at = _first(document, TIMES_KEYS)
-    given = document[at] if at and isinstance(document[at], list) else None
+    at = _time_key({k: v for k, v in document.items() if k != key}, of_lists=True)
+    given = document[at] if at else None
     if given is None and times and None not in times:
-        given = times
-    clock = reader.times(given, len(values), rate, at or "time")
-    by_time = given is not None
+        at, given = clock, times
+    seconds = reader.times(given, len(values), rate, at or "time")
+    by_time = given is not None and not reader.asked.counts_rows
     return reader.take(
-        names, np.array(values).reshape(-1, len(names)).T, clock, None if by_time else rate
+        names, np.array(values).reshape(-1, len(names)).T, seconds, None if by_time else rate
     )
 
 
@@ -356,7 +377,9 @@ def neurosync(reader: Reader, document: object) -> Take | None:
     count = len(rows[0])
     if count not in (len(LIVE_LINK_FACE), len(columns)):
         return None
-    values = [reader.numbers(row, f"blendshapes[{i}]") for i, row in enumerate(rows)]
+    values = [
+        reader.numbers(row, f"blendshapes[{i}]", has_holes=True) for i, row in enumerate(rows)
+    ]
     for i, row in enumerate(values):
         if len(row) != count:
             raise reader.fail(
@@ -396,12 +419,13 @@ def frame_tables(reader: Reader, document: object) -> Take | None:
     # Curves with keys, and rows of a curve table, are lists of tables too.
     if not names or any(_first(frame, CURVE_NAME_KEYS) for frame in frames):
         return None
-    times = [_frame_time(reader, frame, f"frame {i}") for i, frame in enumerate(frames)]
     rate = reader.rate_of(outer, outer.get("metadata"))
-    if any(time is None for time in times):
-        clock = reader.times(None, len(frames), rate, "time")
-    else:
-        clock, rate = np.array(times, np.float64), None
+    key = _time_key(frames[0])
+    times = [frame.get(key) for frame in frames]
+    given = None if key is None or None in times else times
+    clock = reader.times(given, len(frames), rate, key or "time")
+    if given is not None and not reader.asked.counts_rows:
+        rate = None
     place = f"{len(names)} curves of {len(frames)} frames"
     reader.budget.hold(len(names) * len(frames) * VALUE_BYTES, place)
     reader.budget.work(len(names) * len(frames), place)
@@ -416,7 +440,7 @@ def _weights(frame: Mapping[str, Any]) -> dict[str, Any]:
     return {
         key: value
         for key, value in table.items()
-        if key not in TIME_KEYS and isinstance(value, int | float) and not isinstance(value, bool)
+        if time_name(key) is None and isinstance(value, int | float) and not isinstance(value, bool)
     }
 
 
@@ -427,12 +451,19 @@ def _frame_column(
     values = [reader.number(tables[i][curve], f"frame {i}, {curve}") for i in known]
     if len(known) < len(tables):
         reader.notes.append(f"{curve}: missing in {len(tables) - len(known)} frame(s), filled")
-    return np.interp(clock, clock[known], values)
+    at = np.maximum.accumulate(clock)  # frames whose time goes back are left out later
+    return np.interp(at, at[known], values)
 
 
-def _frame_time(reader: Reader, frame: Mapping[str, Any], place: str) -> float | None:
-    key = _first(frame, TIME_KEYS)
-    return None if key is None else reader.number(frame[key], f"{place}.{key}")
+def _time_key(table: Mapping[str, Any], *, of_lists: bool = False) -> str | None:
+    """The key of a time, or of a list of times; of frame numbers only where there is no time."""
+    found = [
+        (name.unit == FRAMES, key)
+        for key, value in table.items()
+        if (name := time_name(key)) is not None
+        and (_is_list(value) if of_lists else not isinstance(value, dict | list))
+    ]
+    return min(found, key=lambda row: row[0])[1] if found else None
 
 
 def curve_table(reader: Reader, document: object) -> Take | None:
@@ -539,21 +570,22 @@ def lists_by_name(reader: Reader, document: object) -> Take | None:
         return None
     inner = next((document[k] for k in WEIGHT_KEYS if isinstance(document.get(k), dict)), None)
     table = inner or document
-    lists = {k: v for k, v in table.items() if k not in TIMES_KEYS and _is_list(v)}
+    lists = {k: v for k, v in table.items() if time_name(k) is None and _is_list(v)}
     if not lists:
         return None
     count = len(next(iter(lists.values())))
-    rows = [reader.numbers(values, name) for name, values in lists.items()]
+    rows = [reader.numbers(values, name, has_holes=True) for name, values in lists.items()]
     for name, row in zip(lists, rows, strict=True):
         if len(row) != count:
             raise reader.fail(
                 f"{count} values as in the first curve were expected, found {len(row)}", name
             )
-    at_table = next((t for t in (table, document) if _first(t, TIMES_KEYS)), {})
-    at = _first(at_table, TIMES_KEYS)
+    at_table = next((t for t in (table, document) if _time_key(t, of_lists=True)), {})
+    at = _time_key(at_table, of_lists=True)
     rate = reader.rate_of(document, document.get("metadata"))
     times = reader.times(at_table[at] if at else None, count, rate, at or "times")
-    return reader.take(list(lists), rows, times, None if at else rate)
+    by_time = at is not None and not reader.asked.counts_rows
+    return reader.take(list(lists), rows, times, None if by_time else rate)
 
 
 def _first(table: Mapping[str, Any], keys: Sequence[str]) -> str | None:

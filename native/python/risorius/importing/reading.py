@@ -15,10 +15,11 @@ import numpy.typing as npt
 from ..anim.clip import Clip
 from ..base.budget import Budget
 from ..base.errors import ArgumentError
-from . import fbx, gltf, named_json, tables, visemes
+from . import fbx, gltf, named_json, ranges, tables, visemes
+from .clock import units
 from .errors import AnimationFileError
 from .keys import Keys, on_one_clock
-from .mapping import ANGLES, Mapped, apply_rows, best_mapping, load_mapping
+from .mapping import ANGLES, Mapped, apply_rows, best_mapping, load_mapping, single_letters
 from .mapping import Mapping as ControlMapping
 from .report import Report
 from .source import Take, decode, make_clip, read_bytes, refuse_other_kinds
@@ -34,14 +35,15 @@ KINDS = {
     "fbx": "FBX: properties, blend shapes, face boards",
 }
 ROTATIONS = ("head", "all", "none")
+# Curves that are controls of Risorius already, or that an animator set: any value is meant.
+_OWN_KINDS = ("clip", "rzc", "curves")
 
 
 class Options(NamedTuple):
     """Of `read`."""
 
     kind: str | None
-    rate: float | None
-    timecode_rate: float | None
+    asked: units.Asked
     take: str | None
     budget: Budget
 
@@ -83,6 +85,8 @@ class Imported:
         rig_names: Iterable[str] | None = None,
         rig: RigLike | None = None,
         rotations: str = "head",
+        full_value: float | None = None,
+        angles: str | None = None,
     ) -> tuple[Clip, Report]:
         """A clip of raw controls, and what became of each curve.
 
@@ -93,16 +97,22 @@ class Imported:
             rig: for a mapping of GUI controls, whose table is the rig's.
             rotations: "head": the head's angles, if it was captured; the eyes come as eyeLook
                 controls. "all": the eyes' angles too. "none": neither.
+            full_value: the file's value of a whole movement: 100 for per cent, 255 for bytes.
+                None: 1, and values far above it are refused.
+            angles: one of ANGLE_UNITS, of the file's angles. None: radians, and angles that no
+                head has are refused.
 
         Raises:
-            ValueError: no mapping fits, a mapping that cannot be used, a GUI mapping without a rig.
+            ValueError: no mapping fits, a mapping that cannot be used, a GUI mapping without a rig,
+                values of another scale.
         """
+        ranges.check_options(full_value, angles)
         if rotations not in ROTATIONS:
             raise ArgumentError(
                 f"rotations: one of {', '.join(ROTATIONS)} was expected, found {rotations!r}"
             )
         chosen = load_mapping(mapping if mapping is not None else self._fitting())
-        done = apply_rows(chosen, self.clip)
+        done = apply_rows(chosen, ranges.rescaled(self.clip, chosen, full_value, angles))
         report = Report(
             self.source, self.kind, chosen.name, done.mapped, done.unmapped, done.ignored,
             absent=done.absent, notes=[*self.notes, *done.notes],
@@ -113,6 +123,8 @@ class Imported:
             if not row.any()
         ]
         clip = _without_angles(done, rotations, report)
+        if self.kind not in _OWN_KINDS:
+            ranges.refuse_other_scales(clip, self.source, full_value, angles)
         if chosen.is_gui:
             if rig is None:
                 raise ArgumentError(
@@ -127,10 +139,19 @@ class Imported:
     def _fitting(self) -> str:
         if self.mapping:
             return self.mapping
+        letters = single_letters(_moving(self.clip))
+        if letters:
+            raise AnimationFileError(
+                self.source,
+                "names longer than a letter were expected, found curves "
+                f"{', '.join(self.clip.names[:10])}, which stand for other shapes in each of "
+                f"{', '.join(letters)}: give one of these mappings (--mapping; Mapping in Blender)",
+            )
         raise AnimationFileError(
             self.source,
             f"no mapping knows any of its {len(self.clip.names)} curves "
-            f"({', '.join(self.clip.names[:4])} ...): give a mapping of your own",
+            f"({', '.join(self.clip.names[:4])} ...): give a mapping of your own (--mapping; "
+            "Mapping in Blender)",
         )
 
 
@@ -188,6 +209,7 @@ def read(
     kind: str | None = None,
     rate: float | None = None,
     timecode_rate: float | None = None,
+    time_unit: str | None = None,
     take: str | None = None,
 ) -> Imported:
     """Read a file of animation.
@@ -198,6 +220,9 @@ def read(
         rate: frames a second, of tables whose time is a frame number or is not there.
         timecode_rate: frames a second of timecodes, where they do not tell; 29.97 and the like
             stand for 30000/1001.
+        time_unit: one of importing.TIME_UNITS, of tables and JSON whose times do not say it;
+            "rows": their times are left aside, and each row is a frame at `rate`. None: the file
+            tells.
         take: name or number of an animation, of files that hold several; None: the first.
 
     Raises:
@@ -209,18 +234,22 @@ def read(
     for name, value in (("rate", rate), ("timecode_rate", timecode_rate)):
         if value is not None and not 0.0 < value < 1e6:
             raise ArgumentError(f"{name}: frames a second above 0 were expected, found {value}")
+    if time_unit is not None and time_unit not in units.CHOICES:
+        raise ArgumentError(
+            f"time_unit: one of {', '.join(units.CHOICES)} was expected, found {time_unit!r}"
+        )
     file = Path(path)
     data = read_bytes(file)
     try:
-        budget = Budget.of(len(data))
-        found = _read_kind(file, data, Options(kind, rate, timecode_rate, take, budget))
+        budget, asked = Budget.of(len(data)), units.Asked(rate, timecode_rate, time_unit)
+        found = _read_kind(file, data, Options(kind, asked, take, budget))
     except AnimationFileError:
         raise
     except (ValueError, ArithmeticError) as error:  # numbers in the file that no reader expects
         raise AnimationFileError(str(path), str(error)) from error
     except RecursionError as error:
         raise AnimationFileError(str(path), "nested too deeply to be read") from error
-    mapping = found.mapping or best_mapping(_moving(found.clip)) or ""
+    mapping = found.mapping or best_mapping(_moving(found.clip), found.clip.names) or ""
     facts = {"source": file.name, "kind": found.kind, **found.clip.metadata}
     return Imported(
         found.clip.replaced(metadata=facts), found.kind, mapping, str(path), found.notes
@@ -249,8 +278,9 @@ def _read_kind(file: Path, data: bytes, options: Options) -> Take:
 def _read_mouth(text: str, name: str, options: Options) -> Take | None:
     """Mouth shapes, where a text holds such."""
     if options.kind in (None, "moho") and text.lstrip().startswith("MohoSwitch1"):
-        return visemes.read_dat(text.lstrip(), name, options.rate)
-    reader = visemes.reader_of(text) if options.kind in (None, "rhubarb", "papagayo") else None
+        return visemes.read_dat(text.lstrip(), name, options.asked.rate)
+    is_asked = options.kind in (None, "rhubarb", "papagayo")
+    reader = visemes.reader_of(text, options.kind) if is_asked else None
     return reader(text, name) if reader is not None else None
 
 
@@ -259,13 +289,18 @@ def _read_table(text: str, name: str, options: Options) -> Take:
         raise AnimationFileError(
             name, "a binary FBX was expected, found one as text: export as binary"
         )
-    if options.kind not in (None, "live_link_face", "csv"):
+    if options.kind not in (None, "live_link_face", "csv", "rhubarb"):
         raise AnimationFileError(name, f"{KINDS[options.kind]} was expected, found something else")
     table = tables.read_table(text, name)
     is_capture = options.kind is None and tables.is_live_link_face(table.header)
     if is_capture or options.kind == "live_link_face":
-        return tables.read_live_link_face(table, options.timecode_rate)
-    return tables.read_plain(table, options.rate, options.timecode_rate)
+        return tables.read_live_link_face(table, options.asked)
+    take = tables.read_plain(table, options.asked)
+    if options.kind == "rhubarb" and take.kind != "rhubarb":
+        raise AnimationFileError(
+            name, "a time, a tab and a shape A-H or X in each line were expected, found a table"
+        )
+    return take
 
 
 def _read_json(document: object, file: Path, options: Options) -> Take:
@@ -277,7 +312,7 @@ def _read_json(document: object, file: Path, options: Options) -> Take:
             return visemes.read_rhubarb_json(document, name)
         if "voices" in document and "fps" in document:
             return visemes.read_pgo_json(document, name)
-    return named_json.read(document, name, options.rate, options.budget)
+    return named_json.read(document, name, options.asked, options.budget)
 
 
 def import_file(
@@ -288,21 +323,33 @@ def import_file(
     kind: str | None = None,
     rate: float | None = None,
     timecode_rate: float | None = None,
+    time_unit: str | None = None,
     take: str | None = None,
     rig: RigLike | None = None,
     rotations: str = "head",
+    full_value: float | None = None,
+    angles: str | None = None,
 ) -> tuple[Clip, Report]:
     """A file as a clip of raw controls, and what became of each of its curves.
 
     Args:
-        path, kind, rate, timecode_rate, take: as of `read`.
-        rig_names, mapping, rig, rotations: as of `Imported.apply`.
+        path, kind, rate, timecode_rate, time_unit, take: as of `read`.
+        rig_names, mapping, rig, rotations, full_value, angles: as of `Imported.apply`.
 
     Raises:
         ValueError: as they do.
     """
-    found = read(path, kind=kind, rate=rate, timecode_rate=timecode_rate, take=take)
-    return found.apply(mapping, rig_names=rig_names, rig=rig, rotations=rotations)
+    found = read(
+        path, kind=kind, rate=rate, timecode_rate=timecode_rate, time_unit=time_unit, take=take
+    )
+    return found.apply(
+        mapping,
+        rig_names=rig_names,
+        rig=rig,
+        rotations=rotations,
+        full_value=full_value,
+        angles=angles,
+    )
 
 
 def import_curves(
@@ -331,7 +378,7 @@ def import_curves(
     budget = Budget.of(sum(key.times.nbytes + key.values.nbytes for key in keys.values()))
     times, rows = on_one_clock(list(keys.values()), None, budget)
     clip = make_clip(list(keys), rows, times, metadata={"source": source, "kind": "curves"})
-    found = Imported(clip, "curves", best_mapping(_moving(clip)) or "", source)
+    found = Imported(clip, "curves", best_mapping(_moving(clip), clip.names) or "", source)
     return found.apply(mapping, rig_names=rig_names, rig=rig, rotations=rotations)
 
 

@@ -12,6 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ..anim.clip import Clip, Event
+from ..base import signatures
+from .clock.units import COUNT_ROWS
 from .errors import AnimationFileError
 
 Doubles = npt.NDArray[np.float64]
@@ -21,31 +23,9 @@ MAX_BYTES = 1 << 30
 # Times that lie further apart than this rate gives are times of keys, not of frames.
 LEAST_RATE = 8.0
 USUAL_RATE = 60.0
+# Of frames whose time goes back or stands still, the share that a take may lose.
+MOST_LOST = 1.0 / 3.0
 RATES = (12.0, 23.976, 24.0, 25.0, 29.97, 30.0, 48.0, 50.0, 59.94, 60.0, 90.0, 100.0, 120.0, 240.0)
-
-
-_SOUND = (
-    "a sound: Speak from Audio in Blender, or `risorius speech` on the command line, moves a face "
-    "to it"
-)
-# First bytes, where they stand, and what such a file is. None of them is text in UTF-8 or UTF-16.
-_OTHER_KINDS = (
-    (b"WAVE", 8, _SOUND),
-    (b"AIFF", 8, _SOUND),
-    (b"fLaC", 0, _SOUND),
-    (b"OggS", 0, _SOUND),
-    (b"ID3", 0, _SOUND),
-    (b"\xff\xfb", 0, _SOUND),
-    (b"\x89PNG", 0, "a picture (PNG)"),
-    (b"\xff\xd8\xff", 0, "a picture (JPEG)"),
-    (b"ftyp", 4, "a film: its sound goes through Speak from Audio or `risorius speech`"),
-    (b"PK\x03\x04", 0, "an archive (ZIP): unpack it first"),
-    (b"\x1f\x8b", 0, "an archive (gzip): unpack it first"),
-    (b"BLENDER", 0, "a scene of Blender (.blend): open it there"),
-    (b"\x28\xb5\x2f\xfd", 0, "packed by Zstandard, as Blender packs its scenes (.blend)"),
-    (b"DNA\0", 0, "a face (DNA): Import DNA in Blender takes it, or give it as --rig"),
-    (b"RZC\x1a", 0, "a clip of Risorius whose name does not end in .rzc: rename it"),
-)
 
 
 @dataclass
@@ -89,11 +69,11 @@ def refuse_other_kinds(data: bytes, name: str) -> None:
         name: what errors call the file.
 
     Raises:
-        AnimationFileError: a sound, a picture, a film, an archive, a scene, a face.
+        AnimationFileError: a sound, a picture, an archive, a document, a scene, a face ...
     """
-    for start, at, kind in _OTHER_KINDS:
-        if data[at : at + len(start)] == start:
-            raise AnimationFileError(name, f"animation was expected, this is {kind}")
+    kind = signatures.other_kind(data)
+    if kind is not None:
+        raise AnimationFileError(name, f"animation was expected, this is {kind}")
 
 
 def decode(data: bytes, name: str) -> str:
@@ -199,15 +179,19 @@ def number(text: str, name: str, line: int, column: int | str) -> float:
     return value
 
 
-def keep_ascending(times: Doubles, notes: list[str]) -> npt.NDArray[np.intp]:
+def keep_ascending(times: Doubles, notes: list[str], name: str) -> npt.NDArray[np.intp]:
     """Indices of the frames whose time comes after all times before; the others are noted.
 
     Args:
         times: float64[frames], seconds.
         notes: gets a sentence where frames are left out.
+        name: what errors call the file.
 
     Returns:
         int[kept frames].
+
+    Raises:
+        AnimationFileError: more than MOST_LOST of the frames would be lost.
     """
     highest = np.maximum.accumulate(times) if times.size else times
     good = np.ones(times.size, bool)
@@ -215,8 +199,15 @@ def keep_ascending(times: Doubles, notes: list[str]) -> npt.NDArray[np.intp]:
     dropped = int(times.size - good.sum())
     if dropped:
         first = int(np.argmin(good))
+        where = f"(the first: frame {first}, {times[first]:.6f} s)"
+        if dropped > MOST_LOST * times.size:
+            raise AnimationFileError(
+                name,
+                f"times that ascend were expected, found {dropped} of {times.size} frames whose "
+                f"time is not after the one before {where}: {COUNT_ROWS}",
+            )
         notes.append(
-            f"{dropped} frame(s) left out whose time is not after the one before "
-            f"(the first: frame {first}, {times[first]:.6f} s)"
+            f"{dropped} frame(s) left out whose time is not after the one before {where}; "
+            f"{COUNT_ROWS}"
         )
     return np.flatnonzero(good)

@@ -6,30 +6,35 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
 from ..controls import arkit
-from . import timecode
+from . import visemes
+from .clock import timecode
+from .clock.units import (
+    COUNT_ROWS,
+    FRAMES,
+    Asked,
+    TimeName,
+    plain,
+    row_times,
+    seconds_of,
+    time_name,
+)
 from .errors import AnimationFileError
-from .source import Take, keep_ascending, make_clip, number
+from .source import MOST_LOST, Take, keep_ascending, make_clip, number
 
 Doubles = npt.NDArray[np.float64]
 
 DELIMITERS = (",", "\t", ";", "|")
-# Headers of a time column, without letter case, blanks and signs -> seconds of 1, or 0 for frames.
-TIME_COLUMNS = {
-    "time": 1.0, "timecode": 1.0, "timestamp": 1.0, "seconds": 1.0, "second": 1.0, "sec": 1.0,
-    "secs": 1.0, "s": 1.0, "t": 1.0, "times": 1.0, "timesec": 1.0, "timeseconds": 1.0,
-    "timesecs": 1.0, "timeins": 1.0, "timeinseconds": 1.0,
-    "ms": 1e-3, "timems": 1e-3, "milliseconds": 1e-3, "timemilliseconds": 1e-3, "millis": 1e-3,
-    "timestampms": 1e-3,
-    "frame": 0.0, "frames": 0.0, "framenumber": 0.0, "frameindex": 0.0, "frameid": 0.0,
-    "frameno": 0.0,
-}  # fmt: skip
+COMMENTS = ("#", "//", "%")
+_NAMED_DELIMITER = re.compile(r"sep=(.|\\t)", re.IGNORECASE)
+# What stands in a cell whose value is not there.
+_MISSING = frozenset(("", "-", "--", "\N{EN DASH}", "na", "n/a", "#n/a", "null", "none"))
 # Curves of a take of Live Link Face, in their order.
 LIVE_LINK_FACE = (
     *(unit[0].upper() + unit[1:] for unit in arkit.order("live_link_face_take")),
@@ -38,6 +43,9 @@ LIVE_LINK_FACE = (
 )
 # Columns that tell how many blend shapes there are; they hold no curve.
 COUNTS = ("blendshapecount",)
+_FILE_TELLS = Asked()
+_SPARSEST = 4  # cells of a table by curve for each row of one by time and name
+_HOLES_BY_NAME = 3  # curves with holes that notes name each
 
 
 @dataclass
@@ -49,6 +57,7 @@ class Table:
         rows: the other rows.
         lines: line of the file, from 1, at which each row ends.
         delimiter: what stands between cells.
+        notes: what was left out of the table.
     """
 
     name: str
@@ -56,6 +65,7 @@ class Table:
     rows: list[list[str]]
     lines: list[int]
     delimiter: str
+    notes: list[str] = field(default_factory=list)
 
     def cell(self, row: int, column: int) -> float:
         """The number in a cell.
@@ -68,9 +78,14 @@ class Table:
             AnimationFileError: no finite number.
         """
         text = self.rows[row][column].strip()
-        if self.delimiter == ";" and "." not in text:
+        if "." not in text and (self.delimiter != "," or not self.has_points):
             text = text.replace(",", ".")  # a decimal comma, as spreadsheets of many lands write
         return number(text, self.name, self.lines[row], self.place(column))
+
+    @cached_property
+    def has_points(self) -> bool:
+        """Whether numbers have decimal points: then a comma inside a cell is no decimal one."""
+        return any(re.fullmatch(r"\s*[-+]?\d*\.\d+\s*", c) for row in self.rows for c in row)
 
     @cached_property
     def columns(self) -> list[tuple[str, ...]]:
@@ -79,31 +94,36 @@ class Table:
 
     def column(self, column: int, rows: Sequence[int] | None = None) -> Doubles:
         """float64[rows] of a column, all or some. Raises: as cell."""
-        cells = self.columns[column]
-        if rows is not None:
-            cells = tuple(cells[row] for row in rows)
-        try:  # the whole column at once; where that fails, each cell by itself finds the error
-            values = np.array(list(map(float, cells)))
-        except ValueError:
-            values = np.full(len(cells), np.nan)
-        if "_" in "".join(cells) or not (np.abs(values) <= np.finfo(np.float32).max).all():
-            wanted = range(len(cells)) if rows is None else rows
+        values = self.whole_column(column) if rows is None else None
+        if values is None:
+            wanted = range(len(self.rows)) if rows is None else rows
             values = np.array([self.cell(row, column) for row in wanted])
         return values
+
+    def whole_column(self, column: int) -> Doubles | None:
+        """float64[rows] of a column at once; None where a cell is no plain number."""
+        cells = self.columns[column]
+        try:
+            values = np.array(list(map(float, cells)))
+        except ValueError:
+            return None
+        is_plain = (np.abs(values) <= np.finfo(np.float32).max).all() and "_" not in "".join(cells)
+        return values if is_plain else None
 
     def place(self, column: int) -> str:
         header = self.header[column]
         return f"{column + 1} ({header})" if header else str(column + 1)
 
 
-def sniff(text: str) -> str:
-    """The delimiter: the sign that parts the first line into most cells outside quotes."""
-    first = re.sub(r'"[^"]*"', '""', text.lstrip("\r\n").splitlines()[0])
-    return max(DELIMITERS, key=first.count)
+def sniff(line: str) -> str:
+    """The delimiter: the sign that parts a header into most cells outside quotes."""
+    return max(DELIMITERS, key=re.sub(r'"[^"]*"', '""', line).count)
 
 
 def read_table(text: str, name: str) -> Table:
     """A table with a header.
+
+    Comments are passed over, and a line "sep=;" says the delimiter, as Excel writes and reads it.
 
     Args:
         text: of the file; commas, semicolons or tabs stand between the cells.
@@ -115,9 +135,10 @@ def read_table(text: str, name: str) -> Table:
     if "\0" in text:
         line = text[: text.index("\0")].count("\n") + 1
         raise AnimationFileError(name, "text was expected, found a zero byte", line=line)
-    delimiter = sniff(text)
+    content, delimiter, comment = _without_comments(re.split(r"\r\n|\n|\r", text))
+    delimiter = delimiter or sniff(next((line for line in content if line.strip()), ""))
     # strict: a quote that is never closed would swallow the rest of the file
-    reader = csv.reader(re.split(r"\r\n|\n|\r", text), delimiter=delimiter, strict=True)
+    reader = csv.reader(content, delimiter=delimiter, strict=True)
     rows: list[list[str]] = []
     lines: list[int] = []
     try:
@@ -129,9 +150,31 @@ def read_table(text: str, name: str) -> Table:
         raise AnimationFileError(name, f"no table: {error}", line=reader.line_num) from error
     if not rows:
         raise AnimationFileError(name, "it holds nothing")
+    # NumPy writes its header as a comment.
+    named = next(csv.reader([comment], delimiter=delimiter), [])
+    if len(named) == len(rows[0]) and all(map(_is_number, rows[0])):
+        rows.insert(0, named)
+        lines.insert(0, lines[0])
     table = Table(name, [cell.strip() for cell in rows[0]], rows[1:], lines[1:], delimiter)
     _check(table, lines[0])
     return table
+
+
+def _without_comments(lines: list[str]) -> tuple[list[str], str, str]:
+    """Lines of which comments are empty; the delimiter that one names, the last one at the top."""
+    delimiter = comment = ""
+    is_top = True
+    for i, line in enumerate(lines):
+        start = line.lstrip()
+        named = _NAMED_DELIMITER.fullmatch(line.strip('"\ufeff ')) if is_top else None
+        if named is not None:
+            delimiter, lines[i] = named[1].replace("\\t", "\t"), ""
+        elif start.startswith(COMMENTS):
+            comment = start.lstrip("#/% ") if is_top else comment
+            lines[i] = ""
+        elif start:
+            is_top = False
+    return lines, delimiter, comment
 
 
 def _check(table: Table, line: int) -> None:
@@ -157,6 +200,10 @@ def _check(table: Table, line: int) -> None:
                 line=line,
             )
         seen[header] = column
+    if len(table.rows) > 1 and len(table.rows[-1]) < len(table.header):
+        # A program that was ended while it wrote; the last number may be cut too.
+        table.notes.append(f"the last row (line {table.lines[-1]}) is cut short and left out")
+        del table.rows[-1], table.lines[-1]
     for row, at in zip(table.rows, table.lines, strict=True):
         if len(row) != len(table.header):
             raise AnimationFileError(
@@ -170,15 +217,38 @@ def _check(table: Table, line: int) -> None:
 
 def _is_number(text: str) -> bool:
     try:
-        float(text)
+        float(text.replace(",", "."))
     except ValueError:
         return False
     return True
 
 
-def plain(header: str) -> str:
-    """A header without letter case, blanks and signs."""
-    return re.sub(r"[^a-z0-9]", "", header.lower())
+def _is_missing(cell: str) -> bool:
+    return cell.strip().lower() in _MISSING
+
+
+def _with_times(table: Table, at: int, asked: Asked) -> Table:
+    """The rows that have a time, or all if rows are counted.
+
+    Raises:
+        AnimationFileError: more than MOST_LOST of the rows have none.
+    """
+    keep = [i for i, row in enumerate(table.rows) if not _is_missing(row[at])]
+    lost = len(table.rows) - len(keep)
+    if asked.counts_rows or not lost:
+        return table
+    if lost > MOST_LOST * len(table.rows):
+        raise AnimationFileError(
+            table.name,
+            f"times were expected, found none in {lost} of {len(table.rows)} rows: {COUNT_ROWS}",
+            column=table.place(at),
+        )
+    return replace(
+        table,
+        rows=[table.rows[i] for i in keep],
+        lines=[table.lines[i] for i in keep],
+        notes=[*table.notes, f"{lost} row(s) without a time left out"],
+    )
 
 
 def is_live_link_face(header: Sequence[str]) -> bool:
@@ -187,26 +257,23 @@ def is_live_link_face(header: Sequence[str]) -> bool:
     return len(names) > 2 and names[0] == "timecode" and names[1] in COUNTS
 
 
-def read_live_link_face(table: Table, timecode_rate: float | None = None) -> Take:
+def read_live_link_face(table: Table, asked: Asked = _FILE_TELLS) -> Take:
     """A take of Live Link Face: time from the timecode and its rate, not from the row.
 
     Args:
         table: 2 columns and 51 to 61 curves, in any order, in either style of names.
-        timecode_rate: frames a second of the timecode, where the file does not tell.
+        asked: what the caller says of its timecodes.
 
     Raises:
         AnimationFileError: a cell that is none, timecodes whose rate cannot be told.
     """
-    notes: list[str] = []
-    codes = [
-        timecode.parse(row[0], table.name, line, table.place(0))
-        for row, line in zip(table.rows, table.lines, strict=True)
-    ]
-    seconds = _timecode_seconds(table, codes, timecode_rate, notes)
-    columns = [i for i, cell in enumerate(table.header) if i > 1 and cell]
-    curves = np.array([table.column(c) for c in columns])
+    table = _with_times(table, 0, asked)
+    notes = list(table.notes)
+    seconds = _timecode_seconds(table, 0, asked, notes)
+    columns = [i for i in range(2, len(table.header)) if _is_curve(table, i, notes)]
+    curves = _curves(table, columns, seconds, notes)
     _note_count(table, len(columns), notes)
-    keep = keep_ascending(seconds, notes)
+    keep = keep_ascending(seconds, notes, table.name)
     times = seconds[keep] - seconds[0]
     _note_dropped(times, notes)
     clip = make_clip(
@@ -218,9 +285,15 @@ def read_live_link_face(table: Table, timecode_rate: float | None = None) -> Tak
     return Take(clip, "live_link_face", "live_link_face", notes)
 
 
-def _timecode_seconds(
-    table: Table, codes: list[timecode.Timecode], rate: float | None, notes: list[str]
-) -> Doubles:
+def _timecode_seconds(table: Table, column: int, asked: Asked, notes: list[str]) -> Doubles:
+    """Seconds of the timecodes in a column, or of its rows where those are to be counted."""
+    if asked.counts_rows:
+        return row_times(len(table.rows), asked, table.name)
+    codes = [
+        timecode.parse(row[column], table.name, line, table.place(column))
+        for row, line in zip(table.rows, table.lines, strict=True)
+    ]
+    rate = asked.timecode_rate
     if rate is not None:
         base = round(rate)
     else:
@@ -228,10 +301,10 @@ def _timecode_seconds(
         if found is None:
             raise AnimationFileError(
                 table.name,
-                "its timecodes do not tell whether they count 24, 25, 30 or 60 frames a second "
+                "its timecodes do not tell how many frames a second they count "
                 f"(the largest frame number is {max(c.frames for c in codes):g}): give the "
-                "timecode rate",
-                column=table.place(0),
+                "timecode rate (clip convert --timecode-rate; Timecode Rate in Blender)",
+                column=table.place(column),
             )
         base = found
     over = next((i for i, code in enumerate(codes) if code.frames >= base), None)
@@ -240,7 +313,7 @@ def _timecode_seconds(
             table.name,
             f"a frame number below {base} was expected, found {codes[over].frames:g}",
             line=table.lines[over],
-            column=table.place(0),
+            column=table.place(column),
         )
     if any(code.is_dropped for code in codes) and base % 30:
         raise AnimationFileError(
@@ -272,85 +345,68 @@ def _note_dropped(times: Doubles, notes: list[str]) -> None:
         )
 
 
-def read_plain(table: Table, rate: float | None = None, timecode_rate: float | None = None) -> Take:
+def read_plain(table: Table, asked: Asked = _FILE_TELLS) -> Take:
     """Curves by column.
 
-    Time is the column that is headed so (seconds, milliseconds, timecodes, or frame numbers at
-    `rate`), else the row number at `rate`. An empty cell is a value that is not there: the curve
-    goes straight across, or keeps its first or last value.
+    Time is the column that is headed so (in a unit of `clock.units`, timecodes, or frame numbers at
+    the rate that is asked for), else the row number at that rate. An empty cell is a value that is
+    not there: the curve goes straight across, or keeps its first or last value.
 
     Args:
         table: of `read_table`.
-        rate: frames a second of frame and row numbers; None: unknown.
-        timecode_rate: frames a second of timecodes; None: told from them.
+        asked: what the caller says of its time.
 
     Raises:
-        AnimationFileError: no time and no rate, a cell that is no number, no curve.
+        AnimationFileError: no time and no rate, a cell that is no number, no curve, a unit of time
+            that nobody knows.
     """
-    notes: list[str] = []
     at = _time_column(table)
-    times = _plain_times(table, at, rate, timecode_rate, notes)
+    if at is not None:
+        table = _with_times(table, at, asked)
+        table, at = _by_curve(table, at)
+    notes = list(table.notes)
+    times = _plain_times(table, at, asked, notes)
     columns = [i for i, cell in enumerate(table.header) if i != at and _is_curve(table, i, notes)]
+    shapes = _shapes(table, at) if not columns else None
+    if shapes is not None:
+        return visemes.rhubarb_column(times, table.columns[shapes], table.name)
     if not columns:
         raise AnimationFileError(table.name, "columns with curves were expected, found none")
-    keep = keep_ascending(times, notes)
-    curves = np.stack([_column(table, column, times, notes) for column in columns])
+    keep = keep_ascending(times, notes, table.name)
+    curves = _curves(table, columns, times, notes)
     clip = make_clip(
         [table.header[c] for c in columns], curves[:, keep], times[keep],
-        rate=rate if at is None else None,
+        rate=asked.rate if at is None or asked.counts_rows else None,
     )  # fmt: skip
     return Take(clip, "csv", "", notes)
 
 
 def _time_column(table: Table) -> int | None:
     """The first column of the best kind: a time before a frame number."""
-    found = [(i, plain(re.sub(r"\(.*?\)|\[.*?\]", _unit, h))) for i, h in enumerate(table.header)]
-    times = [i for i, header in found if TIME_COLUMNS.get(header, 0.0) > 0.0]
-    frames = [i for i, header in found if TIME_COLUMNS.get(header) == 0.0]
-    return next(iter(times + frames), None)
+    found = [(i, name) for i, h in enumerate(table.header) if (name := time_name(h)) is not None]
+    found.sort(key=lambda row: row[1].unit == FRAMES)
+    return found[0][0] if found else None
 
 
-def _unit(match: re.Match[str]) -> str:
-    """What a unit in brackets adds to a header: "time (ms)"."""
-    return "ms" if match[0].strip("()[] ").lower() in ("ms", "msec", "milliseconds") else ""
-
-
-def _plain_times(
-    table: Table, at: int | None, rate: float | None, timecode_rate: float | None, notes: list[str]
-) -> Doubles:
+def _plain_times(table: Table, at: int | None, asked: Asked, notes: list[str]) -> Doubles:
     if at is None:
-        if rate is None:
-            raise AnimationFileError(
-                table.name, "no column gives the time: give the rate in frames a second"
-            )
-        return np.arange(len(table.rows)) / rate
-    header = plain(re.sub(r"\(.*?\)|\[.*?\]", _unit, table.header[at]))
+        return row_times(len(table.rows), asked, table.name)
     if ":" in table.rows[0][at]:
-        codes = [
-            timecode.parse(row[at], table.name, line, table.place(at))
-            for row, line in zip(table.rows, table.lines, strict=True)
-        ]
-        seconds = _timecode_seconds(table, codes, timecode_rate, notes)
+        seconds = _timecode_seconds(table, at, asked, notes)
         return seconds - seconds[0]
-    values = table.column(at)
-    unit = TIME_COLUMNS[header]
-    if unit:
-        return values * unit
-    if rate is None:
-        raise AnimationFileError(
-            table.name, "its time is a frame number: give the rate in frames a second",
-            column=table.place(at),
-        )  # fmt: skip
-    return values / rate
+    if asked.counts_rows:
+        return row_times(len(table.rows), asked, table.name)
+    said = time_name(table.header[at]) or TimeName("")
+    return seconds_of(table.column(at), said, asked, notes, name=table.name, column=table.place(at))
 
 
 def _is_curve(table: Table, column: int, notes: list[str]) -> bool:
     """Not a row number, a count, a second time, or a column of text."""
     header = plain(table.header[column])
-    if header in COUNTS or header in TIME_COLUMNS:
+    if header in COUNTS or time_name(table.header[column]) is not None:
         return False
-    cells = [row[column].strip() for row in table.rows]
-    if not any(cells):
+    cells = table.columns[column]
+    if all(map(_is_missing, cells)):
         notes.append(f"{table.header[column] or f'column {column + 1}'}: empty, left out")
         return False
     if not header:
@@ -361,11 +417,76 @@ def _is_curve(table: Table, column: int, notes: list[str]) -> bool:
     return True
 
 
-def _column(table: Table, column: int, times: Doubles, notes: list[str]) -> Doubles:
-    filled = np.array([bool(row[column].strip()) for row in table.rows])
+def _by_curve(table: Table, at: int) -> tuple[Table, int]:
+    """A table with a row for each time and name as one with a column for each name; else as it is.
+
+    Args:
+        table: its columns a time, a name and a value, as MediaPipe's results are often kept.
+        at: the column of the time.
+
+    Returns:
+        A table and its column of the time.
+
+    Raises:
+        AnimationFileError: most names have no value at most times.
+    """
+    others = [i for i in range(len(table.header)) if i != at and table.header[i]]
+    is_named = {i: not any(map(_is_number, table.columns[i])) for i in others}
+    times = dict.fromkeys(table.columns[at])
+    repeated = len(table.rows) - len(times)
+    if sorted(is_named.values()) != [False, True] or repeated <= MOST_LOST * len(table.rows):
+        return table, at
+    named, valued = sorted(others, key=lambda i: not is_named[i])
+    names = dict.fromkeys(cell.strip() for cell in table.columns[named])
+    if len(names) * len(times) > _SPARSEST * len(table.rows):
+        raise AnimationFileError(
+            table.name,
+            f"a value for each time and each name in the column {table.place(named)} was expected, "
+            f"found {len(table.rows)} for {len(times)} times and {len(names)} names",
+        )
+    row_of = {time: i for i, time in enumerate(times)}
+    place_of = {name: i for i, name in enumerate(names, start=1)}
+    rows = [[time, *([""] * len(names))] for time in times]
+    lines = [0] * len(rows)
+    for row, line in zip(table.rows, table.lines, strict=True):
+        rows[row_of[row[at]]][place_of[row[named].strip()]] = row[valued]
+        lines[row_of[row[at]]] = line
+    notes = [*table.notes, f"the column {table.header[named]} names the curves"]
+    return Table(table.name, [table.header[at], *names], rows, lines, table.delimiter, notes), 0
+
+
+def _shapes(table: Table, at: int | None) -> int | None:
+    """The one column that holds nothing but mouth shapes of Rhubarb's, or None."""
+    found = [
+        i
+        for i in range(len(table.header))
+        if i != at and all(map(visemes.is_shape, table.columns[i]))
+    ]
+    return found[0] if len(found) == 1 else None
+
+
+def _curves(table: Table, columns: Sequence[int], times: Doubles, notes: list[str]) -> Doubles:
+    """float64[columns, rows]; cells without a value are filled from the rows around them."""
+    holes: list[tuple[str, int]] = []
+    curves = np.array([_column(table, column, times, holes) for column in columns])
+    if len(holes) > _HOLES_BY_NAME:
+        cells = sum(count for _, count in holes)
+        notes.append(f"{cells} empty cell(s) filled in {len(holes)} curves, as {holes[0][0]}")
+    else:
+        notes += [f"{name}: {count} empty cell(s) filled" for name, count in holes]
+    return curves.reshape(len(columns), len(table.rows))
+
+
+def _column(table: Table, column: int, times: Doubles, holes: list[tuple[str, int]]) -> Doubles:
+    whole = table.whole_column(column)
+    if whole is not None:
+        return whole
+    filled = np.array([not _is_missing(row[column]) for row in table.rows])
     known = np.flatnonzero(filled)
     values = table.column(column, known.tolist())
     if filled.all():
-        return values
-    notes.append(f"{table.header[column]}: {int((~filled).sum())} empty cell(s) filled")
-    return np.interp(times, times[known], values)
+        return values  # decimal commas
+    holes.append((table.header[column], int((~filled).sum())))
+    # A clock that runs back would lead the curve astray; the frames it loses are left out later.
+    at = np.maximum.accumulate(times)
+    return np.interp(at, at[known], values)

@@ -39,7 +39,7 @@ DOMINANCE = {
 RHUBARB = frozenset("ABCDEFGHX")
 # Names that only Papagayo's ten mouth shapes have tell its files from Rhubarb's; E is in both.
 PAPAGAYO = frozenset(("AI", "E", "etc", "FV", "L", "MBP", "O", "rest", "U", "WQ"))
-_TSV = re.compile(r"\d+(\.\d+)?\t\S+")
+_TSV = re.compile(r"\s*(-?\d+(?:[.,]\d+)?)(?:\s+|\s*[;,|]\s*)([A-HXa-hx])\s*")
 
 
 class Cue(NamedTuple):
@@ -125,15 +125,16 @@ def _from_starts(starts: Sequence[tuple[float, str]], end: float, rest: str) -> 
 
 
 def is_rhubarb_tsv(text: str) -> bool:
-    """Lines of a time, a tab and a shape of Rhubarb's."""
-    lines = [line for line in re.split(r"\r\n|\n|\r", text) if line]
-    return bool(lines) and all(
-        _TSV.fullmatch(line) and line.partition("\t")[2] in RHUBARB for line in lines
-    )
+    """Lines of a time and a shape of Rhubarb's, at least half of all; the others are mistakes."""
+    lines = [line for line in re.split(r"\r\n|\n|\r", text) if line.strip()]
+    hits = sum(_TSV.fullmatch(line) is not None for line in lines)
+    return bool(lines) and lines[0].strip()[:1].isdigit() and 2 * hits >= len(lines)
 
 
 def read_rhubarb_tsv(text: str, name: str) -> Take:
     """Rhubarb's lines "0.32<tab>B", seconds and a shape; the last one tells the end.
+
+    Small letters, blanks, decimal commas and another sign than the tab are forgiven.
 
     Args:
         text: of the file.
@@ -146,15 +147,42 @@ def read_rhubarb_tsv(text: str, name: str) -> Take:
     for line, row in enumerate(re.split(r"\r\n|\n|\r", text), start=1):
         if not row.strip():
             continue
-        time, tab, shape = row.partition("\t")
-        if not tab or shape.strip() not in RHUBARB:
+        match = _TSV.fullmatch(row)
+        if match is None:
             raise AnimationFileError(
                 name,
                 f"a time, a tab and a shape A-H or X were expected, found {row[:40]!r}",
                 line=line,
             )
-        starts.append((number(time, name, line, 1), shape.strip()))
+        starts.append((number(match[1].replace(",", "."), name, line, 1), match[2].upper()))
         _check_order(starts, name, line)
+    return _rhubarb_starts(starts, name)
+
+
+def rhubarb_column(times: Doubles, shapes: Sequence[str], name: str) -> Take:
+    """Shapes of Rhubarb's in one column of a table.
+
+    Args:
+        times: float64[rows], seconds.
+        shapes: of each row, from its time on; the last one tells the end.
+        name: what errors call the file.
+
+    Raises:
+        AnimationFileError: times that do not ascend, fewer than two rows.
+    """
+    starts: list[tuple[float, str]] = []
+    for row, (time, shape) in enumerate(zip(times.tolist(), shapes, strict=True), start=2):
+        starts.append((time, shape.strip().upper()))
+        _check_order(starts, name, row)
+    return _rhubarb_starts(starts, name)
+
+
+def is_shape(text: str) -> bool:
+    """Whether a cell is one of Rhubarb's shapes."""
+    return text.strip().upper() in RHUBARB
+
+
+def _rhubarb_starts(starts: list[tuple[float, str]], name: str) -> Take:
     if len(starts) < 2:
         raise AnimationFileError(name, "two lines at least were expected: a shape and the end")
     return _take(_from_starts(starts[:-1], starts[-1][0], "X"), "rhubarb", name, [])
@@ -246,7 +274,7 @@ def _rhubarb_cues(rows: Sequence[tuple[str, str, str]], name: str) -> Take:
             raise AnimationFileError(
                 name, f"{place}: numbers for start and end were expected, found {start!r}, {end!r}"
             ) from None
-        if shape not in RHUBARB:
+        if not is_shape(shape):
             raise AnimationFileError(
                 name, f"{place}: a shape A-H or X was expected, found {shape!r}"
             )
@@ -257,7 +285,7 @@ def _rhubarb_cues(rows: Sequence[tuple[str, str, str]], name: str) -> Take:
             )
         if cue.start > before + 0.005:
             cues.append(Cue(before, cue.start, "X"))
-        cues.append(Cue(max(cue.start, before), cue.end, shape))
+        cues.append(Cue(max(cue.start, before), cue.end, shape.strip().upper()))
     return _take(cues, "rhubarb", name, [])
 
 
@@ -448,13 +476,19 @@ def _from_voices(voices: Sequence[tuple[str, list[Word]]], rate: float, name: st
     return _take(cues, "papagayo", name, notes, events)
 
 
-def reader_of(text: str) -> Callable[[str, str], Take] | None:
-    """What reads a text that is neither JSON nor a table, or None."""
+def reader_of(text: str, kind: str | None) -> Callable[[str, str], Take] | None:
+    """What reads a text that is neither JSON nor a table, or None.
+
+    Args:
+        text: of the file.
+        kind: one of `importing.KINDS` that the caller says it is, or None.
+    """
     head = text.lstrip()[:200]
     if head.startswith("<"):
         return read_rhubarb_xml
     if head.startswith("lipsync version"):
         return read_pgo
-    if is_rhubarb_tsv(text):
+    # Whoever says that it is Rhubarb's is told which line is not; a header makes it a table.
+    if is_rhubarb_tsv(text) or (kind == "rhubarb" and head[:1].isdigit()):
         return read_rhubarb_tsv
     return None

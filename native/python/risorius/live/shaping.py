@@ -5,14 +5,12 @@ from __future__ import annotations
 
 import math
 import os
-from functools import cache
-from importlib import resources
 from typing import NamedTuple
 
 import numpy as np
 
-from ..base import toml
 from ..base.filters import OneEuro
+from ..controls import arkit
 from ..importing import Mapping, load_mapping
 from ..ranges import Ranges, Remap
 from .frame import Floats, Frame
@@ -21,7 +19,6 @@ HEAD = ("head.yaw", "head.pitch", "head.roll")
 _EYES = ("eyeL.yaw", "eyeL.pitch", "eyeR.yaw", "eyeR.pitch")
 _IGNORED = {"eyeL.roll", "eyeR.roll"}
 _LOOK_AT_ONE = math.radians(30.0)  # an eye's turn that a look control at 1 stands for
-_FULL_SET = 10  # ARKit units from which on the expressions of VRM are taken to repeat them
 _STILL = 12.0  # Hz at which a still face is cut with almost no smoothing, to a twentieth with all
 _LONGEST_GAP = 0.5  # seconds without a frame after which smoothing begins anew
 Row = dict[str, float]
@@ -35,15 +32,6 @@ class Controls(NamedTuple):
     """Raw controls as a DNA spells them, and head.yaw, head.pitch, head.roll."""
     values: Floats
     """float32[names]: controls 0 to 1, the head in radians."""
-
-
-@cache
-def expressions() -> dict[str, Row]:
-    """VRM expression, in lower case -> {ARKit unit: weight}; of VRM 0 and 1."""
-    text = resources.files(__package__).joinpath("vrm.toml").read_text(encoding="utf-8")
-    table = toml.parse(text)
-    found = {name: dict(row) for name, row in table["expressions"].items()}
-    return found | {name: found[same] for name, same in table["same"].items()}
 
 
 class Plan:
@@ -87,9 +75,9 @@ def _rows(names: tuple[str, ...], mapping: Mapping) -> list[Row | None]:
             continue
         if name in HEAD or name.startswith("CTRL_"):
             rows[i] = {name: 1.0}
-        elif name.lower() in expressions():
-            full = units >= _FULL_SET
-            rows[i] = {} if full else _through(expressions()[name.lower()], mapping)
+        elif name.lower() in arkit.vrm():
+            full = units >= arkit.FULL_SET
+            rows[i] = {} if full else _through(arkit.vrm()[name.lower()], mapping)
         elif name in _ANGLES:
             rows[i] = _look(name, mapping) if name in _EYES and not looks else {}
     return rows

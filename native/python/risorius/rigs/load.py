@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from .._native import (
     Dna,
+    DnaError,
     Limits,
     ParseOptions,
     check_bytes,
@@ -16,6 +17,7 @@ from .._native import (
     parse_bytes,
     parse_file,
 )
+from ..base import signatures
 from ..base.errors import ArgumentError
 
 # What each name of `layers` brings, as in the format's own data layers.
@@ -99,9 +101,14 @@ def load(
     if limits is not None:
         options.limits = limits
     options.set_lods(lods)
-    if isinstance(source, bytes | bytearray | memoryview):
-        return parse_bytes(bytes(source), options)
-    return parse_file(os.fspath(source), options)
+    try:
+        if isinstance(source, bytes | bytearray | memoryview):
+            return parse_bytes(bytes(source), options)
+        return parse_file(os.fspath(source), options)
+    except DnaError as error:
+        if error.code != "not_dna":
+            raise
+        raise signatures.named(error, source) from None
 
 
 def check(source: str | os.PathLike[str] | bytes, *, limits: Limits | None = None) -> list[Finding]:
@@ -119,4 +126,10 @@ def check(source: str | os.PathLike[str] | bytes, *, limits: Limits | None = Non
         found = check_bytes(bytes(source), limits)
     else:
         found = check_file(os.fspath(source), limits)
-    return [Finding(*finding) for finding in found]
+    findings = [Finding(*finding) for finding in found]
+    if [finding.code for finding in findings] != ["not_dna"]:
+        return findings
+    kind = signatures.kind_of(signatures.ends_of(source))
+    if kind is None:
+        return findings
+    return [findings[0]._replace(message=f"{findings[0].message}; it is {kind}")]

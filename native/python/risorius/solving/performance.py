@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from ..base import signatures
 from ..base.errors import RisoriusError
 from ..base.npz import DAMAGED
 from .surface import Doubles, Floats
@@ -57,6 +58,9 @@ def read_performance(
     if suffix not in (".abc", ".npz"):
         raise PerformanceError(f"{path}: a name ending in .abc or .npz was expected")
     fitting = None if counts is None else set(counts.values())
+    kind = signatures.other_kind(signatures.ends_of(path), ("alembic", "npz", "zip"))
+    if kind is not None:
+        raise PerformanceError(f"{path}: vertices that move were expected, this is {kind}")
     take = _alembic(path, name, fitting) if suffix == ".abc" else _arrays(path)
     if not np.isfinite(take.frames).all():
         raise PerformanceError(f"{path}: finite vertices were expected")

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from ..base import signatures
 from ..base.errors import RisoriusError
 
 Samples = npt.NDArray[np.float32]
@@ -60,6 +61,9 @@ def read_audio(path: str | os.PathLike[str]) -> tuple[Samples, int]:
         data = Path(path).read_bytes()
     except OSError as error:
         raise AudioError(f"{path}: cannot read it: {error.strerror}") from error
+    kind = signatures.other_kind(data, (signatures.SOUND.code, signatures.FILM.code))
+    if kind is not None:
+        raise AudioError(f"{path}: a sound was expected, this is {kind}")
     if data[:4] != b"RIFF" or data[8:12] != b"WAVE":
         data = _converted(path, "not a WAV file")
     try:

@@ -14,11 +14,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ...base import signatures
 from ...base.budget import Budget
 from ...importing.fbx import Node, Parser, Scene, is_fbx, object_name, properties, read_scene
 from ...importing.source import read_bytes
 from ..geometry.skeleton import Doubles, Ints
-from .obj import ObjMesh, ShapeFileError, choose_mesh
+from .obj import ObjMesh, ShapeFileError, choose_mesh, refuse_other_kinds
 
 SUFFIX = ".fbx"
 _SKIPPED = frozenset(("Video", "Texture", "Material", "Pose", "Implementation"))
@@ -43,6 +44,7 @@ def read_fbx(path: Path, mesh: str = "") -> tuple[ObjMesh, dict[str, Doubles]]:
         BudgetError: more numbers than a file of this size may hold.
     """
     data = read_bytes(path)
+    refuse_other_kinds(path, "a binary FBX", (signatures.FBX.code,))
     if not is_fbx(data):
         raise ShapeFileError(f"{path}: a binary FBX was expected")
     scene = read_scene(Parser(data, str(path), Budget.of(len(data)), _SKIPPED))

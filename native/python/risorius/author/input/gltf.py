@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from ...base import signatures
 from ...importing import named_json
 from ...importing.gltf import Document, is_glb, is_gltf, open_glb, open_gltf
 from ...importing.source import decode, read_bytes
 from ..geometry.skeleton import Doubles, Ints
-from .obj import ObjMesh, ShapeFileError, choose_mesh
+from .obj import ObjMesh, ShapeFileError, choose_mesh, refuse_other_kinds
 
 SUFFIXES = (".glb", ".gltf")
 _COMPRESSED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression")
@@ -35,6 +36,7 @@ def read_gltf(path: Path, mesh: str = "") -> tuple[ObjMesh, dict[str, Doubles]]:
         BudgetError: more numbers than a file of this size may hold.
     """
     data = read_bytes(path)
+    refuse_other_kinds(path, "a glTF", (signatures.GLB.code,))
     if is_glb(data):
         document = open_glb(path, data)
     else:

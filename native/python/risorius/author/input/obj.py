@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
+from ...base import signatures
 from ...base.errors import RisoriusError
 from ..geometry.skeleton import Doubles
 
@@ -40,6 +41,7 @@ def read_obj(path: Path) -> ObjMesh:
     uvs: list[list[float]] = []
     faces: list[list[int]] = []
     uv_faces: list[list[int]] = []
+    refuse_other_kinds(path, "an OBJ")
     text = path.read_text(encoding="utf-8", errors="replace")
     for number, line in enumerate(text.splitlines(), 1):
         kind, _, rest = line.strip().partition(" ")
@@ -93,6 +95,7 @@ def read_positions(path: Path, count: int) -> Doubles:
         ShapeFileError: another number of vertices, or a value that is no finite number.
         OSError: the file cannot be read.
     """
+    refuse_other_kinds(path, "an OBJ")
     positions = []
     with path.open(encoding="utf-8", errors="replace") as lines:
         for number, line in enumerate(lines, 1):
@@ -107,6 +110,22 @@ def read_positions(path: Path, count: int) -> Doubles:
             f"found {len(positions):,}"
         )
     return np.array(positions)
+
+
+def refuse_other_kinds(path: Path, expected: str, own: Container[str] = ()) -> None:
+    """Say what a file is that holds no mesh, where its bytes tell.
+
+    Args:
+        path: the file.
+        expected: what it was to be, for the error.
+        own: codes of base.signatures that it may be.
+
+    Raises:
+        ShapeFileError: another kind of file.
+    """
+    kind = signatures.other_kind(signatures.ends_of(path), own)
+    if kind is not None:
+        raise ShapeFileError(f"{path}: {expected} was expected, this is {kind}")
 
 
 def _numbers(text: str, count: int) -> list[float]:

@@ -10,9 +10,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from .errors import AnimationFileError
+from ..errors import AnimationFileError
 
 BASES = (24, 25, 30, 48, 50, 60, 100, 120)
+PHONES = (30, 60)  # what nearly all of them count
 DAY = 86400.0
 # A second sign ; or , before the frames says drop-frame, as edit lists write it.
 _FORM = re.compile(r"(\d{1,2})[:;](\d{1,2})[:;](\d{1,2})([:;,])(\d{1,3}(?:\.\d*)?)")
@@ -61,29 +62,49 @@ def parse(text: str, name: str, line: int, column: int | str) -> Timecode:
 def infer_base(codes: Sequence[Timecode]) -> int | None:
     """Frames a second of the timecodes' own clock, or None if nothing tells.
 
-    Where the second changes by one, the frame number must fall by base minus a step; that tells it
-    even of few frames. Otherwise the largest frame number does, where only one base is usual.
+    What the timecodes show themselves wins; where they never reach the next second, or have lost
+    too much around it, the largest frame number tells, if one rate alone is usual there.
     """
     frames = np.array([code.frames for code in codes])
     seconds = np.array([3600 * c.hours + 60 * c.minutes + c.seconds for c in codes])
     largest = int(frames.max(initial=0.0))
     if largest == 0 and not frames.any():
         return 30  # every frame number is 0: any base gives the same times
-    change, step = np.diff(seconds), np.diff(frames)
-    within = step[(change == 0) & (step > 0.0)]
-    wraps = np.flatnonzero(change == 1)
-    if within.size and wraps.size:
-        estimate = float(np.median(np.median(within) - step[wraps]))
-        near = min(BASES, key=lambda base: abs(base - estimate))
-        if abs(near - estimate) <= 0.04 * near and near > largest:
-            return near
-    usual = (30, 60) if largest < 60 else (100, 120)
+    measured = _measured(frames, seconds, largest)
+    if measured is not None:
+        return measured
     if largest >= 30:
-        return next((base for base in (*usual, 1000) if base > largest), None)
+        return 60 if largest < 60 else None
     # Frame 29 is the highest in a take so long that at 60 frames a second it would pass 29.
     if len(codes) > 1 and largest == 29 and seconds[-1] - seconds[0] >= 2:
         return 30
     return None
+
+
+def _measured(
+    frames: npt.NDArray[np.float64], seconds: npt.NDArray[np.int_], largest: int
+) -> int | None:
+    """The base that the frame numbers show where the second changes by one, or None.
+
+    There they fall by the base less a step. Rows that were lost there let them fall by less, so a
+    base that is not usual counts only where others agree with it, or where nothing is lost.
+    """
+    change, step = np.diff(seconds), np.diff(frames)
+    within = step[(change == 0) & (step > 0.0)]
+    falls = -step[change == 1]
+    if not (within.size and falls.size):
+        return None
+    usual = float(np.median(within))
+    near = float(np.median(falls)) + usual
+    whole = within[within < 1.5 * usual]
+    agree = falls[np.abs(falls + usual - near) <= 0.75 * usual]
+    is_clear = within.size == whole.size or (agree.size > 1 and 2 * agree.size > falls.size)
+    known = min(BASES, key=lambda base: abs(base - near))
+    distance = abs(known - near)
+    if distance <= (0.04 * known if is_clear or known in PHONES else 0.5) and known > largest:
+        return known
+    base = round(float(agree.mean() + whole.mean())) if agree.size and whole.size else 0
+    return base if is_clear and largest < base <= largest + np.ceil(usual) else None
 
 
 def seconds_of(codes: Sequence[Timecode], base: int, is_true_rate: bool) -> npt.NDArray[np.float64]:

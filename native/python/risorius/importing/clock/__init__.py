@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""When the frames of a file are: units of time as people spell them, and timecodes."""

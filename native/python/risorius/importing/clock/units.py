@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: MIT
+"""Units of time in headers and keys, and the seconds that times in them are."""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from ..errors import AnimationFileError
+
+Doubles = npt.NDArray[np.float64]
+
+UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
+"""Seconds of 1."""
+FRAMES, ROWS = "frames", "rows"
+CHOICES = (*UNITS, FRAMES, ROWS)
+"""What a caller may say that times count in; ROWS: they say nothing, each row is a frame."""
+GIVE_RATE = "give the rate in frames a second (clip convert --input-rate; File Rate in Blender)"
+COUNT_ROWS = (
+    "clip convert --time-unit rows with --input-rate (Time Unit and File Rate in Blender) counts "
+    "rows instead"
+)
+
+_SPELLINGS = {
+    "s": "s sec secs second seconds",
+    "ms": "ms msec msecs millis millisec millisecs millisecond milliseconds",
+    "us": "us usec usecs micros microsec microsecs microsecond microseconds",
+    "ns": "ns nsec nsecs nanos nanosec nanosecs nanosecond nanoseconds",
+    "min": "min mins minute minutes",
+    "h": "h hr hrs hour hours",
+    FRAMES: "frame frames",
+}
+_UNIT_OF = {word: unit for unit, words in _SPELLINGS.items() for word in words.split()}
+_WORDS = (
+    "time times timestamp timestamps timecode timecodes elapsed elapsedtime timeelapsed epoch "
+    "unixtime unixtimestamp frametime sampletime"
+).split()
+_FRAME_NUMBERS = "frame frames framenumber frameindex frameid frameno framenr".split()
+# Of units that stand alone these are no names of curves or of mouth shapes.
+_ALONE = "s sec secs second seconds ms msec millis milliseconds us microseconds nanoseconds".split()
+_NAMES: dict[str, str] = {
+    **{word + unit: of for word in _WORDS for unit, of in _UNIT_OF.items()},
+    **{f"{word}in{unit}": of for word in _WORDS for unit, of in _UNIT_OF.items()},
+    **{unit: _UNIT_OF[unit] for unit in _ALONE},
+    **dict.fromkeys(_FRAME_NUMBERS, FRAMES),
+    **dict.fromkeys([*_WORDS, "t", "ts"], ""),  # "times" is no "time" in "s"
+}
+# What brackets behind a frame number say that is no unit.
+_NUMBERED = ("", "no", "nr", "number", "index", "id", "count")
+_BRACKETS = re.compile(r"\(([^)]*)\)|\[([^\]]*)\]|\{([^}]*)\}")
+# Seconds between two frames up to which times without a unit are taken for seconds: keys lie as far
+# apart, frames never.
+_LONGEST_STEP = 4.0
+# Milliseconds between two frames of a capture: 250 to 5 frames a second.
+_STEPS = (4.0, 200.0)
+_LEAST_ROWS = 8  # from which on even steps tell a unit
+# Since 1970: from 1973 on in milliseconds, microseconds and nanoseconds.
+_DATES = (("ns", 1e17), ("us", 1e14), ("ms", 1e11))
+_LONGEST = 1e8  # seconds; what begins later is a date
+
+
+class TimeName(NamedTuple):
+    """What a header says of the times below it."""
+
+    unit: str
+    """One of UNITS, FRAMES, or "": it does not say."""
+    odd: str = ""
+    """A unit in brackets that nobody knows."""
+
+
+class Asked(NamedTuple):
+    """What the caller says of a file's time; None: the file tells."""
+
+    rate: float | None = None
+    """Frames a second."""
+    timecode_rate: float | None = None
+    """Frames a second of timecodes."""
+    unit: str | None = None
+    """One of CHOICES."""
+
+    @property
+    def counts_rows(self) -> bool:
+        return self.unit == ROWS
+
+
+def plain(header: str) -> str:
+    """A header without letter case, blanks and signs; both letters for micro are a u."""
+    return re.sub(r"[^a-z0-9]", "", re.sub("[µμ]", "u", header.lower()))
+
+
+def time_name(header: str) -> TimeName | None:
+    """What a header of times says: "Time (ms)", "timestamp_us", "frame"; None: it is no time's.
+
+    Args:
+        header: of a column, or a key of JSON.
+    """
+    brackets = _BRACKETS.search(header)
+    if brackets is None:
+        unit = _NAMES.get(plain(header))
+        return None if unit is None else TimeName(unit)
+    base = _NAMES.get(plain(header[: brackets.start()] + header[brackets.end() :]))
+    if base is None:
+        return None
+    written = next(part for part in brackets.groups() if part is not None)
+    inside = _UNIT_OF.get(plain(written), "")
+    if inside:
+        return TimeName(inside)
+    if base == FRAMES and plain(written) in _NUMBERED:
+        return TimeName(FRAMES)
+    return TimeName(base, written.strip() or "()")
+
+
+def row_times(count: int, asked: Asked, name: str) -> Doubles:
+    """float64[count] seconds of rows that lie evenly.
+
+    Args:
+        count: of rows.
+        asked: has the rate.
+        name: what errors call the file.
+
+    Raises:
+        AnimationFileError: no rate.
+    """
+    if asked.rate is None:
+        raise AnimationFileError(name, f"nothing gives the time: {GIVE_RATE}")
+    return np.arange(count) / asked.rate
+
+
+def seconds_of(
+    values: Doubles,
+    said: TimeName,
+    asked: Asked,
+    notes: list[str],
+    *,
+    name: str,
+    column: str | None = None,
+) -> Doubles:
+    """Seconds of times in the unit that is asked for, else said, else the one that they show.
+
+    Args:
+        values: float64[frames], as the file has them.
+        said: by their header.
+        asked: by the caller; `counts_rows` is the caller's to look at.
+        notes: gets a sentence where a unit is assumed.
+        name: what errors call the file.
+        column: where the times stand, for errors.
+
+    Returns:
+        float64[frames]; dates count from the first frame.
+
+    Raises:
+        AnimationFileError: an unknown unit, a frame number without a rate, times that tell no unit.
+    """
+    unit = asked.unit or said.unit
+    if said.odd and not asked.unit:
+        raise AnimationFileError(
+            name,
+            f"its unit of time is not known ({said.odd[:40]!r}; known are {', '.join(CHOICES)} and "
+            "their full names): give it (clip convert --time-unit; Time Unit in Blender)",
+            column=column,
+        )
+    if unit == FRAMES:
+        if asked.rate is None:
+            raise AnimationFileError(
+                name, f"its time is a frame number: {GIVE_RATE}", column=column
+            )
+        return values / asked.rate
+    if not unit:
+        unit = _shown(values, name, column)
+        if unit != "s":
+            notes.append(f"its times say no unit and are read as {unit} (--time-unit says another)")
+    seconds = values * UNITS[unit]
+    if seconds.size and seconds[0] > _LONGEST:
+        notes.append("its times are dates: they count from the first frame")
+        seconds = seconds - seconds[0]
+    return seconds
+
+
+def _shown(values: Doubles, name: str, column: str | None) -> str:
+    """The unit that times show by their size. Raises: AnimationFileError: none."""
+    smallest = float(values.min(initial=np.inf))
+    for unit, least in _DATES:
+        if np.isfinite(smallest) and smallest > least:
+            return unit
+    steps = np.diff(values)
+    steps = np.sort(steps[steps > 0.0])
+    step = float(steps[(steps.size - 1) // 2]) if steps.size else 0.0  # one gap says nothing
+    if step <= _LONGEST_STEP:
+        return "s"
+    is_even = float(np.mean(np.abs(steps - step) <= 0.5 * step)) >= 0.8
+    if values.size >= _LEAST_ROWS and is_even:
+        for unit in ("ms", "us", "ns"):
+            if _STEPS[0] <= step * UNITS[unit] * 1e3 <= _STEPS[1]:
+                return unit
+    raise AnimationFileError(
+        name,
+        f"its times say no unit and go up by {step:g} from frame to frame, which is too much for "
+        "seconds: give their unit (clip convert --time-unit ms or s; Time Unit in Blender)",
+        column=column,
+    )

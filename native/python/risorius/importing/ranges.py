@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: MIT
+"""Values of per cent, bytes and degrees: told by their size, and brought to 0..1 and radians."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..anim.clip import Clip
+from ..base.errors import ArgumentError
+from .errors import AnimationFileError
+from .mapping import ANGLES, Mapping
+
+ANGLE_UNITS = ("radians", "degrees")
+# Of a control a whole movement is 1, overdriven it is 2; more is another scale.
+_LARGEST = 4.0
+# Radians; no head turns as far.
+_LARGEST_ANGLE = 2.0
+_USUAL = (100.0, 255.0)
+
+
+def check_options(full: float | None, angles: str | None) -> None:
+    """Raises: ArgumentError: a full value that is not above 0, or angles in a strange unit."""
+    if full is not None and not 0.0 < full < 1e9:
+        raise ArgumentError(f"full_value: a number above 0 was expected, found {full}")
+    if angles is not None and angles not in ANGLE_UNITS:
+        raise ArgumentError(
+            f"angles: one of {', '.join(ANGLE_UNITS)} was expected, found {angles!r}"
+        )
+
+
+def rescaled(clip: Clip, mapping: Mapping, full: float | None, angles: str | None) -> Clip:
+    """A file's curves as a mapping expects them: a whole movement is 1, angles are radians.
+
+    Args:
+        clip: curves of the file's own names.
+        mapping: tells which of them are angles.
+        full: value of a whole movement; None: 1.
+        angles: one of ANGLE_UNITS; None: radians.
+    """
+    if full in (None, 1.0) and angles != "degrees":
+        return clip
+    find = mapping.finder()
+    factors = np.ones(len(clip.names))
+    for i, name in enumerate(clip.names):
+        found = find(name)
+        if found is not None and found[1] and set(found[1]) <= set(ANGLES):
+            factors[i] = np.pi / 180.0 if angles == "degrees" else 1.0
+        else:
+            factors[i] = 1.0 / (full or 1.0)
+    return clip.replaced(curves=clip.curves * factors[:, None])
+
+
+def refuse_other_scales(clip: Clip, name: str, full: float | None, angles: str | None) -> None:
+    """Say so where values lie far outside the range of what they move.
+
+    Args:
+        clip: curves of controls and ANGLES.
+        name: what errors call the file.
+        full: as of `rescaled`; None: nobody said it, so it is looked at.
+        angles: likewise.
+
+    Raises:
+        AnimationFileError: a control far above 1, a head that turns farther than any.
+    """
+    said = []
+    reached = np.abs(clip.curves).max(axis=1, initial=0.0)
+    is_angle = np.array([control in ANGLES for control in clip.names], bool)
+    controls = np.where(is_angle, 0.0, reached)
+    if full is None and controls.max(initial=0.0) > _LARGEST:
+        worst = int(controls.argmax())
+        whole = next((usual for usual in _USUAL if controls[worst] <= usual * 1.01), 1.0)
+        said.append(
+            f"1 was expected for a whole movement, found {clip.names[worst]} at "
+            f"{controls[worst]:g}: give the value that is whole (clip convert --full-value "
+            f"{whole:g}; Full Value in Blender; 1 keeps all as it is)"
+        )
+    turns = np.where(is_angle, reached, 0.0)
+    if angles is None and turns.max(initial=0.0) > _LARGEST_ANGLE:
+        worst = int(turns.argmax())
+        said.append(
+            f"radians were expected, found {clip.names[worst]} at {turns[worst]:g}: give the unit "
+            "of the angles (clip convert --angles degrees; Angles in Blender; radians keeps all "
+            "as it is)"
+        )
+    if said:
+        raise AnimationFileError(name, "; ".join(said))
