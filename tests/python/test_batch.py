@@ -597,6 +597,9 @@ GOOD = 'output = "out"\n[[jobs]]\nclips = "clips/*.csv"\ncharacters = "faces/*.d
         (GOOD + 'name = "../{clip}"', "jobs[0].name: a name inside the output folder"),
         (GOOD + 'name = "..\\\\..\\\\{clip}"', "jobs[0].name: a name inside the output folder"),
         (GOOD + 'name = "/tmp/{clip}"', "jobs[0].name: a name inside the output folder"),
+        (GOOD + 'name = "nul/{clip}"', "names of files as every system takes them"),
+        (GOOD + 'name = "C:{clip}"', "of 200 bytes at most, were expected, found 'C:take0'"),
+        ('summary = "com1.csv"\n' + GOOD, "summary: names of files as every system takes them"),
         (GOOD + 'name = "{folder}"', "jobs[0].name: a name inside the output folder"),
         (GOOD + 'name = "one"\nwrite = "npz"', "take0.csv on core.dna at LOD 0"),
         (GOOD + 'name = "one"', "name: a file of its own was expected for each job"),
@@ -627,6 +630,23 @@ def test_names_that_are_one_file_on_other_systems_collide(tmp_path):
         return
     with pytest.raises(JobsError, match="a file of its own"):
         read_jobs(jobs)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no files of these names")
+def test_names_of_what_is_found_become_no_folders_and_no_devices(tmp_path):
+    jobs = make(tmp_path / "j", clips=1, faces=["core"], table='write = "npz"\nname = "{clip}"\n')
+    clips = tmp_path / "j" / "clips"
+    hostile = ["x\\..\\..\\y", "CON", "a:b", "two\nlines", " .. ", "end. ", "n" * 240]
+    for name in hostile:
+        shutil.copy(clips / "take0.csv", clips / f"{name}.csv")
+    plan = read_jobs(jobs)
+    names = {job.clip.stem: job.name for job in plan.jobs}
+    assert names.pop("take0") == "take0"
+    assert {names[name] for name in hostile[:-1]} == {
+        "x_.._.._y", "_CON", "a_b", "two_lines", "unnamed", "end",
+    }  # fmt: skip
+    assert names["n" * 240] == "n" * 199
+    assert {path.parent for job in plan.jobs for _, path in job.outputs} == {plan.output}
 
 
 def test_bad_command_lines_are_exit_code_2(tmp_path, capsys):
