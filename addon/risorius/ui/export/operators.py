@@ -184,10 +184,12 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, Oper
             with export_animation.copies(context, characters, options) as (override, loans):
                 if self.bake_materials:
                     run(context, plain_materials.flatten(override, loans, self.texture_size))
-                export(self, override, path)
-                if self.bake_materials and self.format == "ALEMBIC":
-                    folder = path.with_name(path.stem + "_textures")
-                    plain_materials.write_images(override["scene"], folder)
+                # Blender's exporters write over an old file from its first byte on.
+                with native.part("files.fileio").staging(path) as made:
+                    export(self, override, made)
+                    if self.bake_materials and self.format == "ALEMBIC":
+                        folder = made.with_name(path.stem + "_textures")
+                        plain_materials.write_images(override["scene"], folder)
         return f"{path.name}: {frames} frames, {path.stat().st_size:,} bytes"
 
 
