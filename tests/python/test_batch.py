@@ -281,6 +281,20 @@ def test_interrupted_goes_on_where_it_was(tmp_path, how, capsys):
     assert not list(out.rglob("*.part"))
 
 
+def test_what_killed_workers_left_goes_where_all_jobs_are_done_too(tmp_path):
+    jobs = make(tmp_path / "j", clips=1, faces=["core"])
+    assert main(["batch", str(jobs), "--workers", "1"]) == 0
+    code = (
+        "import os, sys; from risorius.files import fileio\n"
+        "with fileio.replacing(sys.argv[1]): os.kill(os.getpid(), 9)"
+    )
+    folder = jobs.parent / "out" / "core" / "lod1"
+    subprocess.run([sys.executable, "-c", code, str(folder / "take0.npz")], check=False)
+    assert len(list(folder.glob(".risorius-*.part"))) == 1
+    assert main(["batch", str(jobs), "--workers", "1"]) == 0
+    assert os.listdir(folder) == ["take0.npz"]
+
+
 def test_a_second_batch_in_a_folder_is_told_who_works_there(tmp_path):
     jobs = make(tmp_path / "j", clips=4, frames=1500)
     first = start(jobs)
