@@ -420,3 +420,26 @@ def test_a_baked_face_is_not_exported(dna_file, tmp_path):
     with pytest.raises(RuntimeError, match="is baked: choose Back to Live first"):
         bpy.ops.risorius.export_animation(filepath=str(tmp_path / "face.glb"), format="GLTF")
     assert not list(tmp_path.glob("*.glb"))
+
+
+def test_blenders_own_gltf_says_that_live_faces_rest(dna_file, tmp_path, capsys):
+    if bpy.context.preferences.addons.get(scene.MODULE) is None:  # where the exporter looks
+        bpy.context.preferences.addons.new().module = scene.MODULE
+    path = str(tmp_path / "a.glb")
+    rig = scene.load(dna_file)
+    animate(rig)
+
+    def said(**options):
+        capsys.readouterr()
+        assert bpy.ops.export_scene.gltf(filepath=path, **options) == {"FINISHED"}
+        return capsys.readouterr()
+
+    warned = "".join(said())
+    assert f"{rig.name.removesuffix('_rig')}: Blender's own export knows no live faces" in warned
+    bpy.ops.object.select_all(action="DESELECT")
+    assert "no live faces" not in "".join(said(use_selection=True))
+    capsys.readouterr()
+    _export("GLTF", tmp_path)
+    assert "no live faces" not in "".join(capsys.readouterr())
+    rig["risorius_baked"] = True
+    assert "no live faces" not in "".join(said())

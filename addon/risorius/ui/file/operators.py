@@ -169,8 +169,12 @@ class RISORIUS_OT_export_dna(_FileOperator, Operator, ExportHelper):
 
 
 def draw_export(self: Menu, _context: Context) -> None:
-    """Entry of File > Export."""
+    """Entries of File > Export."""
     self.layout.operator(RISORIUS_OT_export_dna.bl_idname, text="MetaHuman DNA (.dna)")
+    # Beside Blender's own entries of these formats, which write live faces at rest.
+    self.layout.operator(
+        "risorius.export_animation", text="Face Animation (.glb, .fbx, .usd, .abc)"
+    )
 
 
 CLASSES = (RISORIUS_OT_replace_dna, RISORIUS_OT_reload, RISORIUS_OT_export_dna)
