@@ -188,6 +188,26 @@ def test_images_of_an_export_get_names_of_their_own(rig, tmp_path):
     assert sorted(images) == expected
 
 
+def test_an_image_without_a_path_is_written_beside_the_usd(rig, tmp_path):
+    if not bpy.app.build_options.usd:
+        return
+    item = next(m for m in scene.meshes(rig).values() if 0 in list(m["dna_lods"]))
+    item.data.materials.clear()
+    item.data.materials.append(_painted("../../../up", tmp_path))
+    image = bpy.data.images["../../../up"]
+    image.filepath_raw = ""
+    image.pack(data=(tmp_path / "p.png").read_bytes(), data_len=(tmp_path / "p.png").stat().st_size)
+    path = tmp_path / "a" / "b" / "out.usdc"
+    path.parent.mkdir(parents=True)
+    before = everything(tmp_path)
+    settings = {"format": "USD", "range": "CUSTOM", "start": 1, "end": 1, "bake_materials": False}
+    assert bpy.ops.risorius.export_animation(filepath=str(path), **settings) == {"FINISHED"}
+    after = everything(tmp_path)
+    assert set(after) - set(before) == {"a/b/out.usdc", "a/b/textures/_.._.._up.png"}
+    assert {p: data for p, data in after.items() if p in before} == before
+    assert image.name == "../../../up"
+
+
 def _painted(name, folder):
     """A material that shows an image unchanged."""
     material = bpy.data.materials.new(name)

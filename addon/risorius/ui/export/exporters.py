@@ -2,6 +2,7 @@
 """Blender's own exporters: the settings that each is called with."""
 
 import os
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Protocol
 
@@ -11,7 +12,7 @@ from ...logic.base.errors import FaceError
 from ...logic.base.sentences import told
 from ...scene.base.blender_types import Override
 from ...scene.base.console import quiet
-from ...scene.export import whole_files
+from ...scene.export import lent_names, whole_files
 from ..words import say
 
 FORMATS = (
@@ -152,7 +153,8 @@ def export(operator: ExportOperator, override: Override, path: Path) -> None:
     function = getattr(getattr(bpy.ops, group), name)
     known = set(function.get_rna_type().properties.keys())
     settings = _SETTINGS[operator.format](operator, override["scene"])
-    with bpy.context.temp_override(**override), quiet():
+    named = lent_names.images_as_files() if operator.format == "USD" else nullcontext()
+    with named, bpy.context.temp_override(**override), quiet():
         try:
             done = function(filepath=str(path), **{k: v for k, v in settings.items() if k in known})
         except RuntimeError as error:  # what Blender's exporter says of the file or the scene
