@@ -301,6 +301,14 @@ def test_names_of_pictures_lead_nowhere_and_two_of_one_file_are_one(files, capsy
         "new.dna", "new_textures", "new_textures/Two.png",
         "new_textures/head_wm1_blink_L_msk.png",
     }  # fmt: skip
+    mine = files / "new_textures" / "Two.png"
+    mine.write_bytes(b"mine")
+    (files / "new.dna").unlink()
+    capsys.readouterr()
+    assert main(command) == 1
+    assert f"{mine}: a picture of this name is there, and no new.dna" in capsys.readouterr().err
+    assert mine.read_bytes() == b"mine"
+    assert not (files / "new.dna").exists()
 
 
 @pytest.mark.parametrize(

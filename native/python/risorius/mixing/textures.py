@@ -9,11 +9,12 @@ mixed; of others the leading parent's file is taken as it is.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from .. import Dna
 from ..author.geometry.skeleton import Doubles
+from ..base.errors import ArgumentError
 from ..files.names import folded, is_file_name
 from ..files.png import png, read_png
 from .hair import without_hair
@@ -75,6 +76,25 @@ def mix_textures(
         data = [_bytes(path, mask.name) for path in paths]
         files[mask.name] = _mixed(data, whole) or mask.read_bytes()
     return files, own
+
+
+def check_room(path: Path, pictures: Iterable[str]) -> None:
+    """Refuse to write over pictures that belong to no face of this name.
+
+    Args:
+        path: of the new DNA file; where it is there, its pictures may be replaced with it.
+        pictures: file names, which the parents' metadata have chosen.
+
+    Raises:
+        ArgumentError: the file is new, and a picture is there; names it.
+    """
+    for name in () if path.exists() else pictures:
+        there = texture_folder(path) / name
+        if there.exists():
+            raise ArgumentError(
+                f"{there}: a picture of this name is there, and no {path.name} that it belongs to: "
+                "another name for the new face was expected"
+            )
 
 
 def _data(parent: Dna, path: Path, key: str) -> bytes | None:
