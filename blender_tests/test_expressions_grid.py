@@ -234,7 +234,7 @@ def test_export_and_import_take_all_or_none(rig, folder, tmp_path):
     apply("half_grin")
     assert values(rig) == other(left=0.9, right=0)
     said = refused(bpy.ops.risorius.import_expressions, directory=str(out))
-    assert "There is an expression Half Grin already." in said
+    assert "There is an expression Half Grin already: choose Replace" in said
     assert "no library of expressions" in refused(
         bpy.ops.risorius.import_expressions, directory=str(out / "gone") + "/"
     )

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Exported animation comes back from the file as the same vertices, and nothing is left behind."""
 
+import contextlib
 import csv
 import json
+import os
 import struct
 
 import bpy
@@ -317,6 +319,60 @@ def test_a_linked_face_bakes_its_controls_and_is_exported(shapes, dna_file, tmp_
     assert _error(_film(_import("GLTF", path)), wanted) < NEAR["GLTF"]
 
 
+@pytest.mark.skipif(os.name == "nt", reason="limits are those of POSIX")
+@pytest.mark.parametrize("kind", ENDINGS)
+def test_without_room_the_old_file_stays(kind, dna_file, tmp_path, monkeypatch):
+    rig = scene.load(dna_file)
+    if not _is_built(kind):
+        return
+    animate(rig)
+    path = tmp_path / "out" / f"a.{ENDINGS[kind]}"
+    path.parent.mkdir()
+    path.write_text("old")
+    settings = {"range": "CUSTOM", "start": 1, "end": 3, "format": kind, "bake_materials": False}
+    said = rf"^Error: {path.name}: .*\.$"
+    with _no_room(kind, monkeypatch), pytest.raises(RuntimeError, match=said) as error:
+        bpy.ops.risorius.export_animation(filepath=str(path), **settings)
+    assert "risorius-" not in str(error.value)
+    assert os.listdir(path.parent) == [path.name]
+    assert path.read_text() == "old"
+    link = path.with_name(f"link.{ENDINGS[kind]}")
+    link.symlink_to(path.name)
+    assert bpy.ops.risorius.export_animation(filepath=str(link), **settings) == {"FINISHED"}
+    assert link.is_symlink()
+    content = path.read_bytes()
+    assert len(content) > 4000
+    assert b"risorius-" not in content
+    assert sorted(os.listdir(path.parent)) == [path.name, link.name]
+
+
+@contextlib.contextmanager
+def _no_room(kind, monkeypatch):
+    """No file gets longer than a few bytes: as on a full disk."""
+    import resource
+    import signal
+
+    if kind == "ALEMBIC":  # Blender's own would end this process
+
+        def export(_operator, _override, path):
+            path.write_bytes(b"half")
+            raise scene.submodule("logic.base.errors").FaceError("no room")
+
+        with monkeypatch.context() as planted:
+            planted.setattr(scene.submodule("ui.export.operators"), "export", export)
+            yield
+        return
+
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    ignored = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # Blender 4.3 does not
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4000, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        signal.signal(signal.SIGXFSZ, ignored)
+
+
 def test_a_missing_exporter_is_one_sentence(dna_file, tmp_path):
     import addon_utils
 
@@ -364,3 +420,26 @@ def test_a_baked_face_is_not_exported(dna_file, tmp_path):
     with pytest.raises(RuntimeError, match="is baked: choose Back to Live first"):
         bpy.ops.risorius.export_animation(filepath=str(tmp_path / "face.glb"), format="GLTF")
     assert not list(tmp_path.glob("*.glb"))
+
+
+def test_blenders_own_gltf_says_that_live_faces_rest(dna_file, tmp_path, capsys):
+    if bpy.context.preferences.addons.get(scene.MODULE) is None:  # where the exporter looks
+        bpy.context.preferences.addons.new().module = scene.MODULE
+    path = str(tmp_path / "a.glb")
+    rig = scene.load(dna_file)
+    animate(rig)
+
+    def said(**options):
+        capsys.readouterr()
+        assert bpy.ops.export_scene.gltf(filepath=path, **options) == {"FINISHED"}
+        return capsys.readouterr()
+
+    warned = "".join(said())
+    assert f"{rig.name.removesuffix('_rig')}: Blender's own export knows no live faces" in warned
+    bpy.ops.object.select_all(action="DESELECT")
+    assert "no live faces" not in "".join(said(use_selection=True))
+    capsys.readouterr()
+    _export("GLTF", tmp_path)
+    assert "no live faces" not in "".join(capsys.readouterr())
+    rig["risorius_baked"] = True
+    assert "no live faces" not in "".join(said())

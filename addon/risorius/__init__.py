@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Risorius: faces from DNA files in Blender. Delegates to registration."""
 
+from collections.abc import Mapping
+
 
 def register() -> None:
     """Add everything to Blender."""
@@ -14,3 +16,14 @@ def unregister() -> None:
     from . import registration
 
     registration.unregister()
+
+
+def glTF2_pre_export_callback(settings: Mapping[str, object]) -> None:
+    """Blender's glTF exporter looks for this name in every add-on and calls it before it writes.
+
+    Args:
+        settings: the exporter's.
+    """
+    from . import registration
+
+    registration.before_gltf(settings)

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """One ordered list of classes, and what goes with them; unregistered in reverse."""
 
+from collections.abc import Mapping
+
 import bpy
 
 from . import native
@@ -34,6 +36,7 @@ from .ui.animation import operators as animation_operators
 from .ui.drag import drawing as drag_drawing
 from .ui.drag import properties as drag_properties
 from .ui.drag import tool as drag_tool
+from .ui.export import live_faces
 from .ui.expressions import previews as expression_previews
 from .ui.expressions import properties as expression_properties
 from .ui.face import channel_preview, favourites_panel, paste_flipped
@@ -142,6 +145,16 @@ def register() -> None:
     drag_tool.register()
     why_overlay.start()
     bpy.app.timers.register(_refresh_once, first_interval=0.0)
+
+
+def before_gltf(settings: Mapping[str, object]) -> None:
+    """What is done before Blender's own glTF exporter writes.
+
+    Args:
+        settings: the exporter's.
+    """
+    if not _idle:
+        live_faces.before_gltf(settings)
 
 
 def _refresh_once() -> None:

@@ -63,6 +63,37 @@ void bind_files(py::module_& m) {
       .def("commit", &FileReplacement::commit)
       .def("discard", &FileReplacement::discard);
   m.def(
+      "make_hidden_folder",
+      [](const std::filesystem::path& path) {
+        std::error_code reason;
+        std::filesystem::path folder;
+        {
+          const py::gil_scoped_release release;
+          const std::filesystem::path target = core::linked_file(path);
+          core::remove_leftovers(target.parent_path());
+          folder = core::make_hidden_folder(target, reason);
+        }
+        if (reason) throw_os_error(path, reason);
+        return folder;
+      },
+      py::arg("path"),
+      "Makes a hidden folder beside the file that `path` means, and removes there what "
+      "remove_leftovers does; its own goes so, should this process end before it is removed.");
+  m.def(
+      "put_in_place",
+      [](const std::filesystem::path& file, const std::filesystem::path& path) {
+        std::error_code reason;
+        {
+          const py::gil_scoped_release release;
+          auto made = core::NewFile::adopt(file, reason);
+          if (made) reason = made->take_place_of(core::linked_file(path));
+        }
+        if (reason) throw_os_error(path, reason);
+      },
+      py::arg("file"), py::arg("path"),
+      "Brings a whole file to the disk and puts it in the place of the one that `path` means, with "
+      "an old one's rights; both must be of one file system.");
+  m.def(
       "remove_leftovers",
       [](const std::filesystem::path& folder) {
         const py::gil_scoped_release release;

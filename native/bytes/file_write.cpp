@@ -5,6 +5,7 @@
 #include <cerrno>
 #include <charconv>
 #include <cstdio>
+#include <fstream>
 #include <random>
 #include <string>
 #include <string_view>
@@ -53,6 +54,14 @@ int create_file(const fs::path& path, bool) {
   return reason == 0 ? file : -1;
 }
 
+int open_made_file(const fs::path& path) {
+  int file = -1;
+  const int reason =
+      _wsopen_s(&file, path.c_str(), _O_WRONLY | _O_BINARY | _O_NOINHERIT, _SH_DENYNO, 0);
+  if (reason != 0) errno = reason;
+  return reason == 0 ? file : -1;
+}
+
 std::ptrdiff_t write_some(int file, const std::uint8_t* bytes, std::size_t count) {
   return _write(file, bytes, static_cast<unsigned>(count));
 }
@@ -87,6 +96,8 @@ int create_file(const fs::path& path, bool is_private) {
   return ::open(path.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, is_private ? 0600 : 0666);
 }
 
+int open_made_file(const fs::path& path) { return ::open(path.c_str(), O_WRONLY | O_CLOEXEC); }
+
 std::ptrdiff_t write_some(int file, const std::uint8_t* bytes, std::size_t count) {
   return ::write(file, bytes, count);
 }
@@ -104,8 +115,20 @@ int sync_folder(const fs::path& folder) {
 
 long long process_number() { return ::getpid(); }
 
+// In some containers nobody asks for the ends of processes that lost their parent: such a process
+// has its number for as long as the container runs, and does nothing any more.
+bool has_ended(long long process) {
+  std::ifstream stat("/proc/" + std::to_string(process) + "/stat");
+  std::string text;
+  std::getline(stat, text, '\0');
+  const std::size_t end = text.rfind(") ");  // of the program's name, which may hold anything
+  return end != std::string::npos && end + 2 < text.size() &&
+         (text[end + 2] == 'Z' || text[end + 2] == 'X');
+}
+
 bool is_running(long long process) {
-  return ::kill(static_cast<pid_t>(process), 0) == 0 || errno != ESRCH;
+  if (::kill(static_cast<pid_t>(process), 0) != 0 && errno == ESRCH) return false;
+  return !has_ended(process);
 }
 
 // Containers of one machine number their processes each for itself.
@@ -222,7 +245,7 @@ void remove_leftovers(const fs::path& folder) {
   for (; !error && entry != fs::directory_iterator(); entry.increment(error)) {
     const auto maker = maker_of(utf8(entry->path().filename()), begin);
     std::error_code ignored;
-    if (maker && !is_running(*maker)) fs::remove(entry->path(), ignored);
+    if (maker && !is_running(*maker)) fs::remove_all(entry->path(), ignored);
   }
 }
 
@@ -293,6 +316,16 @@ std::optional<NewFile> NewFile::beside(const fs::path& target, std::error_code& 
   return file;
 }
 
+std::optional<NewFile> NewFile::adopt(const fs::path& path, std::error_code& error,
+                                      const FileCalls& calls) {
+  error.clear();
+  errno = 0;
+  const int file = open_made_file(path);
+  if (file >= 0) return NewFile(path, Leftover::kKeep, file, calls);
+  error = last_error();
+  return {};
+}
+
 std::error_code NewFile::write(std::span<const std::uint8_t> bytes) {
   constexpr std::size_t kMost = std::size_t{1} << 30;  // macOS and Windows refuse 2 GiB and more
   while (!bytes.empty()) {
@@ -327,6 +360,19 @@ std::error_code NewFile::take_place_of(const fs::path& target) {
   // Some network folders do not know it, and the file is in its place already.
   static_cast<void>(calls_->sync_folder(target.parent_path()));
   return {};
+}
+
+fs::path make_hidden_folder(const fs::path& target, std::error_code& error) {
+  std::error_code ignored;
+  error.clear();
+  if (fs::is_directory(target, ignored)) error = std::make_error_code(std::errc::is_a_directory);
+  const fs::path folder = target.parent_path() / hidden_name();
+  if (!error) fs::create_directory(folder, error);
+  if (error == std::errc::no_such_file_or_directory &&
+      fs::is_regular_file(target.parent_path(), ignored)) {
+    error = std::make_error_code(std::errc::not_a_directory);  // as in NewFile::beside
+  }
+  return error ? fs::path() : folder;
 }
 
 Status write_file_atomically(const fs::path& path, std::span<const std::uint8_t> bytes,

@@ -45,6 +45,11 @@ class NewFile {
   static std::optional<NewFile> beside(const std::filesystem::path& target, std::error_code& error,
                                        const FileCalls& calls = system_file_calls());
 
+  /// A file that another writer has made on the file system of its future place; it stays where it
+  /// is until it takes that place. Fails: the system's reason.
+  static std::optional<NewFile> adopt(const std::filesystem::path& path, std::error_code& error,
+                                      const FileCalls& calls = system_file_calls());
+
   NewFile(NewFile&& other) noexcept;
   NewFile& operator=(NewFile&& other) noexcept;
   ~NewFile();
@@ -74,8 +79,13 @@ class NewFile {
 /// The file that `path` means: itself, or what it links to.
 std::filesystem::path linked_file(const std::filesystem::path& path);
 
-/// Removes what processes of this machine that have ended left in a folder: files with names as
-/// NewFile::beside gives them. Of what cannot be read or removed nothing is said.
+/// Makes a folder in the folder of `target` under a hidden name as NewFile::beside gives them, for
+/// what several files are before they have their places. Fails: as NewFile::beside; then no path.
+std::filesystem::path make_hidden_folder(const std::filesystem::path& target,
+                                         std::error_code& error);
+
+/// Removes what processes of this machine that have ended left in a folder: files and folders with
+/// names as NewFile::beside gives them. Of what cannot be read or removed nothing is said.
 void remove_leftovers(const std::filesystem::path& folder);
 
 /// Why a file could not be written, in the system's words or better ones.

@@ -188,6 +188,40 @@ TEST_F(FileWrite, WhatADeadWriterLeftGoesAndWhatALiveOneWritesStays) {
   EXPECT_EQ(std::set<std::string>(found.begin(), found.end()), stay);
 }
 
+TEST_F(FileWrite, AFileOfAnotherWriterTakesItsPlaceWholeOrStaysWhereItIs) {
+  const fs::path target = folder_ / "a";
+  std::ofstream(target) << "old";
+  std::error_code error;
+  const fs::path hidden = make_hidden_folder(target, error);
+  ASSERT_FALSE(error);
+  EXPECT_EQ(hidden.parent_path(), folder_);
+  std::ofstream(hidden / "a") << "new";
+  for (const char call : {'s', 'c', 'r'}) {
+    failing = call;
+    reason = ENOSPC;
+    auto file = NewFile::adopt(hidden / "a", error, kCalls);
+    ASSERT_TRUE(file);
+    EXPECT_EQ(file->take_place_of(target), std::errc::no_space_on_device);
+    EXPECT_EQ(read_file(target).size(), 3U);
+    EXPECT_TRUE(fs::exists(hidden / "a"));
+  }
+  failing = 0;
+  asked.clear();
+  auto file = NewFile::adopt(hidden / "a", error, kCalls);
+  ASSERT_TRUE(file);
+  EXPECT_FALSE(file->take_place_of(target));
+  EXPECT_EQ(asked, "scrf");
+  EXPECT_FALSE(fs::exists(hidden / "a"));
+  EXPECT_FALSE(NewFile::adopt(hidden / "a", error));
+  EXPECT_EQ(error, std::errc::no_such_file_or_directory);
+  EXPECT_TRUE(make_hidden_folder(folder_, error).empty());
+  EXPECT_EQ(error, std::errc::is_a_directory);
+  EXPECT_TRUE(make_hidden_folder(folder_ / "none" / "a", error).empty());
+  EXPECT_EQ(error, std::errc::no_such_file_or_directory);
+  remove_leftovers(folder_);
+  EXPECT_TRUE(fs::exists(hidden));  // this process lives
+}
+
 TEST_F(FileWrite, LinksAreFollowedAlsoToWhereNothingIsYet) {
   fs::create_directory(folder_ / "far");
   fs::create_symlink("far/a", folder_ / "b");

@@ -4,7 +4,9 @@
 import importlib.util
 import itertools
 import json
+import os
 from pathlib import Path
+from types import SimpleNamespace
 
 import command_line
 import dna_bytes
@@ -12,6 +14,7 @@ import face_shapes
 import numpy as np
 import pytest
 import risorius
+from conftest import GOLDEN, no_room
 from risorius.author import (
     FitOptions,
     LodOptions,
@@ -22,6 +25,8 @@ from risorius.author import (
 from risorius.author.fitting import bounded
 from risorius.author.geometry.simplify import attributes_of, fewer_triangles, simplified
 from risorius.author.input import matching, shape_face, spec
+from risorius.cli import main
+from risorius.cli.faces import author
 
 # Skinning and morphing from the format's description alone; nothing of risorius.author is in it.
 _ORACLE = Path(__file__).parents[2] / "blender_tests" / "support" / "oracle.py"
@@ -249,6 +254,26 @@ def test_a_report_is_one_page(folder, made, tmp_path):
     assert (done.returncode, done.stderr.count("\n")) == (2, 1)
     assert "a name ending in .html was expected" in done.stderr
     assert not (tmp_path / "b.dna").exists()
+
+
+@pytest.mark.skipif(os.name == "nt", reason="limits are those of POSIX")
+def test_without_room_for_the_page_there_is_no_face_either(folder, tmp_path, monkeypatch, capsys):
+    out, page = tmp_path / "a.dna", tmp_path / "a.html"
+    out.write_text("old")
+    page.write_text("old too")
+    made = SimpleNamespace(dna=risorius.load(GOLDEN / "core.dna"))
+    monkeypatch.setattr(author, "make_joint_rig", lambda *_given: made)
+    monkeypatch.setattr(author, "report_page", lambda *_given: b"x" * 1_000_000)
+    command = ["author", str(folder / "spec.toml"), "-o", str(out)]
+    with no_room(500_000):
+        assert main([*command, "--report", str(page)]) == 1
+    assert str(page) in capsys.readouterr().err
+    assert {p.name: p.read_text() for p in tmp_path.iterdir()} == {
+        "a.dna": "old", "a.html": "old too",
+    }  # fmt: skip
+    command[-1] = str(page)
+    assert main([*command, "--report", str(page)]) == 2
+    assert "another file than that of -o" in capsys.readouterr().err
 
 
 def test_joints_alone_come_near(folder, tmp_path):

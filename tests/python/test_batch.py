@@ -281,6 +281,20 @@ def test_interrupted_goes_on_where_it_was(tmp_path, how, capsys):
     assert not list(out.rglob("*.part"))
 
 
+def test_what_killed_workers_left_goes_where_all_jobs_are_done_too(tmp_path):
+    jobs = make(tmp_path / "j", clips=1, faces=["core"])
+    assert main(["batch", str(jobs), "--workers", "1"]) == 0
+    code = (
+        "import os, sys; from risorius.files import fileio\n"
+        "with fileio.replacing(sys.argv[1]): os.kill(os.getpid(), 9)"
+    )
+    folder = jobs.parent / "out" / "core" / "lod1"
+    subprocess.run([sys.executable, "-c", code, str(folder / "take0.npz")], check=False)
+    assert len(list(folder.glob(".risorius-*.part"))) == 1
+    assert main(["batch", str(jobs), "--workers", "1"]) == 0
+    assert os.listdir(folder) == ["take0.npz"]
+
+
 def test_a_second_batch_in_a_folder_is_told_who_works_there(tmp_path):
     jobs = make(tmp_path / "j", clips=4, frames=1500)
     first = start(jobs)
@@ -597,6 +611,9 @@ GOOD = 'output = "out"\n[[jobs]]\nclips = "clips/*.csv"\ncharacters = "faces/*.d
         (GOOD + 'name = "../{clip}"', "jobs[0].name: a name inside the output folder"),
         (GOOD + 'name = "..\\\\..\\\\{clip}"', "jobs[0].name: a name inside the output folder"),
         (GOOD + 'name = "/tmp/{clip}"', "jobs[0].name: a name inside the output folder"),
+        (GOOD + 'name = "nul/{clip}"', "names of files as every system takes them"),
+        (GOOD + 'name = "C:{clip}"', "of 200 bytes at most, were expected, found 'C:take0'"),
+        ('summary = "com1.csv"\n' + GOOD, "summary: names of files as every system takes them"),
         (GOOD + 'name = "{folder}"', "jobs[0].name: a name inside the output folder"),
         (GOOD + 'name = "one"\nwrite = "npz"', "take0.csv on core.dna at LOD 0"),
         (GOOD + 'name = "one"', "name: a file of its own was expected for each job"),
@@ -627,6 +644,23 @@ def test_names_that_are_one_file_on_other_systems_collide(tmp_path):
         return
     with pytest.raises(JobsError, match="a file of its own"):
         read_jobs(jobs)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no files of these names")
+def test_names_of_what_is_found_become_no_folders_and_no_devices(tmp_path):
+    jobs = make(tmp_path / "j", clips=1, faces=["core"], table='write = "npz"\nname = "{clip}"\n')
+    clips = tmp_path / "j" / "clips"
+    hostile = ["x\\..\\..\\y", "CON", "a:b", "two\nlines", " .. ", "end. ", "n" * 240]
+    for name in hostile:
+        shutil.copy(clips / "take0.csv", clips / f"{name}.csv")
+    plan = read_jobs(jobs)
+    names = {job.clip.stem: job.name for job in plan.jobs}
+    assert names.pop("take0") == "take0"
+    assert {names[name] for name in hostile[:-1]} == {
+        "x_.._.._y", "_CON", "a_b", "two_lines", "unnamed", "end",
+    }  # fmt: skip
+    assert names["n" * 240] == "n" * 199
+    assert {path.parent for job in plan.jobs for _, path in job.outputs} == {plan.output}
 
 
 def test_bad_command_lines_are_exit_code_2(tmp_path, capsys):

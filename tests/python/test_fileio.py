@@ -109,6 +109,65 @@ def test_what_a_killed_writer_left_goes_with_the_next_one_and_a_live_ones_stays(
     assert (tmp_path / "live").read_bytes() == b"live"
 
 
+def _staged(target, files):
+    """Write a file and others beside it as a writer that is not ours does; no file: it fails."""
+    with fileio.staging(target) as made:
+        for name, data in files.items():
+            path = made.with_name(name) if "/" not in name else made.parent / name
+            path.parent.mkdir(exist_ok=True)
+            path.write_text(data)
+        if target.name not in files:
+            raise RuntimeError("no room")
+
+
+def test_what_another_writer_makes_takes_its_place_when_it_is_whole(tmp_path):
+    target = tmp_path / "a.abc"
+    old = {"a.abc": "old", "textures/skin": "old", "textures/mine": "mine"}
+    (tmp_path / "textures").mkdir()
+    for name, data in old.items():
+        (tmp_path / name).write_text(data)
+
+    def found():
+        return {
+            p.relative_to(tmp_path).as_posix(): p.read_text()
+            for p in tmp_path.rglob("*")
+            if p.is_file()
+        }
+
+    with pytest.raises(RuntimeError, match="no room"):
+        _staged(target, {"textures/skin": "half"})
+    with pytest.raises(FileNotFoundError, match="nothing was written"), fileio.staging(target):
+        pass
+    assert found() == old
+    _staged(target, {"a.abc": "new", "textures/skin": "new", "more/b": "b"})
+    assert found() == {**old, "a.abc": "new", "textures/skin": "new", "more/b": "b"}
+    with pytest.raises(FileNotFoundError, match="its folder is not there"):
+        _staged(tmp_path / "none" / "a", {})
+    assert sorted(os.listdir(tmp_path)) == ["a.abc", "more", "textures"]
+
+
+@posix
+def test_what_a_killed_process_staged_goes_also_where_nobody_waits_for_its_end(tmp_path):
+    code = """
+        import os, signal, sys
+        from risorius.files import fileio
+        with fileio.staging(sys.argv[1]) as made:
+            made.write_text("half")
+            made.with_name("textures").mkdir()
+            os.kill(os.getpid(), signal.SIGKILL)
+        """
+    program = [sys.executable, "-c", textwrap.dedent(code), str(tmp_path / "a")]
+    with subprocess.Popen(program) as process:  # a zombie until somebody waits for it
+        os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT)
+        assert len(os.listdir(tmp_path)) == 1
+        fileio.write_bytes(tmp_path / "b", b"b")
+        left = os.listdir(tmp_path)
+        assert process.wait() == -signal.SIGKILL
+    assert left == ["b"] or sys.platform != "linux"
+    fileio.write_bytes(tmp_path / "b", b"b")
+    assert os.listdir(tmp_path) == ["b"]
+
+
 @posix
 def test_rights_and_links_stay_and_the_mask_is_the_systems(tmp_path):
     path, link = tmp_path / "a", tmp_path / "link"
@@ -121,6 +180,10 @@ def test_rights_and_links_stay_and_the_mask_is_the_systems(tmp_path):
     assert stat.S_IMODE(path.stat().st_mode) == 0o640
     path.chmod(0o604)
     link.symlink_to("a")
+    _staged(path, {"a": "staged"})
+    assert stat.S_IMODE(path.stat().st_mode) == 0o604
+    _staged(link, {"link": "staged"})
+    assert (link.is_symlink(), path.read_text()) == (True, "staged")
     fileio.write_text(link, "newer\n")
     assert link.is_symlink()
     assert path.read_bytes() == b"newer\n"

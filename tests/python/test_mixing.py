@@ -4,6 +4,7 @@
 import copy
 import importlib.util
 import json
+import os
 import zlib
 from pathlib import Path
 
@@ -314,6 +315,33 @@ def test_a_picture_of_another_program_is_taken_as_it_is(files, capsys):
     assert main(command) == 0
     assert "skin.png" in capsys.readouterr().out
     assert (files / "child_textures" / "skin.png").read_bytes() == picture.read_bytes()
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no files of these names")
+def test_names_of_pictures_lead_nowhere_and_two_of_one_file_are_one(files, capsys):
+    dna = risorius.load(files / "one.dna")
+    hostile = ["../up.png", "..\\up.png", "CON.png", "x:y.png", ".hid.png", str(files / "abs.png")]
+    names = [*hostile, "Two.png", "two.png"]
+    dna.metadata = {f"texture:{dna.mesh_names[0]}:{n}": name for n, name in enumerate(names)}
+    dna.save(files / "one.dna")
+    for name in names:
+        (files / "one_textures" / name).write_bytes(b"a picture")
+    before = {path for path in files.rglob("*")}
+    command = ["mix", str(files / "one.dna"), str(files / "one.dna"), "-o", str(files / "new.dna")]
+    assert main(command) == 0
+    new = {path.relative_to(files).as_posix() for path in set(files.rglob("*")) - before}
+    assert new == {
+        "new.dna", "new_textures", "new_textures/Two.png",
+        "new_textures/head_wm1_blink_L_msk.png",
+    }  # fmt: skip
+    mine = files / "new_textures" / "Two.png"
+    mine.write_bytes(b"mine")
+    (files / "new.dna").unlink()
+    capsys.readouterr()
+    assert main(command) == 1
+    assert f"{mine}: a picture of this name is there, and no new.dna" in capsys.readouterr().err
+    assert mine.read_bytes() == b"mine"
+    assert not (files / "new.dna").exists()
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 """Speech to animation: sound files, transcripts, phonemes against espeak-ng's, and the mouth."""
 
 import json
+import os
 import shutil
 import struct
 import subprocess
@@ -12,7 +13,9 @@ import conftest
 import espeak_truth
 import numpy as np
 import pytest
+from conftest import no_room
 from risorius import Clip, cli, expressions
+from risorius.cli import speech as command
 from risorius.speech import (
     CancelledError,
     Heard,
@@ -513,6 +516,21 @@ def test_command_writes_clips_and_phonemes(tmp_path, voice, capsys):
     binary = tmp_path / "clip.rzc"
     assert cli.main([*command[:3], str(binary), "--text", "My map.", "--no-blinks"]) == 0
     assert P + "eyeBlinkL" not in Clip.load(binary)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="limits are those of POSIX")
+def test_a_clip_and_its_phonemes_are_written_both_or_none(tmp_path, monkeypatch, capsys):
+    out, table = tmp_path / "a.csv", tmp_path / "a.tsv"
+    out.write_text("old")
+    heard = Heard([Phoneme(0.0, 0.1, "AA")] * 20_000, np.zeros(0, np.float32), False, [])
+    monkeypatch.setattr(command, "_spoken", lambda _args: (heard, Clip(["a"], [[0.0]], 30.0)))
+    options = ["speech", "hum.wav", "-o", str(out), "--phonemes"]
+    with no_room(200_000):
+        assert cli.main([*options, str(table)]) == 1
+    assert str(table) in capsys.readouterr().err
+    assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("a.csv", "old")]
+    assert cli.main([*options, str(out)]) == 2
+    assert "another file than that of -o" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

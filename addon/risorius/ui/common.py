@@ -5,6 +5,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import bpy
+
 from .. import native
 from ..logic.base import names
 from ..logic.base.errors import FaceError
@@ -33,6 +35,26 @@ def explain(path: str | Path, error: Exception) -> str:
     text = names.printable(reason or of_error(error)).strip().rstrip(".")
     name = names.printable(Path(path).name)
     return f"{text}." if name in text else f"{name}: {text}."
+
+
+def system_path(path: str) -> str:
+    """A path that a dialog or a script gave, as the system has it: `//` is the .blend's folder.
+
+    Args:
+        path: of a file or a folder; an empty one stays.
+    """
+    return bpy.path.abspath(path) if path else path
+
+
+def proposed_file(name: str, ending: str) -> str:
+    """The name that a file dialog proposes; names of a .blend lead into no other folder.
+
+    Args:
+        name: of what is written.
+        ending: of its file, with the dot.
+    """
+    found: str = native.part("files.names").file_name(name.removesuffix("_rig"), ending)
+    return found
 
 
 def usable(cls: type[Operator]) -> bool:

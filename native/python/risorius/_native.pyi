@@ -852,6 +852,14 @@ class FileReplacement:
     def commit(self) -> None: ...
     def discard(self) -> None: ...
 
+def make_hidden_folder(path: _Path) -> PathLike[str]:
+    """Makes a hidden folder beside the file that `path` means, and removes there what
+    remove_leftovers does; its own goes so, should this process end before it is removed."""
+
+def put_in_place(file: _Path, path: _Path) -> None:
+    """Brings a whole file to the disk and puts it in the place of the one that `path` means, with
+    an old one's rights; both must be of one file system."""
+
 def remove_leftovers(folder: _Path) -> None:
     """Removes what processes of this machine that have ended left of files that they wrote."""
 

@@ -3,7 +3,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import bpy
+
+from ... import native
+from ...logic.base.errors import FaceError
+from ...logic.base.names import printable
+from ...logic.base.sentences import told
 
 
 class Loans:
@@ -35,3 +43,32 @@ class Loans:
         while self._lent:
             holder, name = self._lent.pop()
             holder.name = name
+
+
+@contextmanager
+def images_as_files() -> Iterator[None]:
+    """All images of the file bear names of files meanwhile.
+
+    Blender's USD exporter writes an image that has no path under its name, `../` and all.
+
+    Raises:
+        FaceError: an image of a linked file has such a name, which cannot be changed here.
+    """
+    names = native.part("files.names")
+    odd = [image for image in bpy.data.images if not names.is_file_name(image.name)]
+    for image in odd:
+        if image.library is not None:
+            raise FaceError(
+                told(
+                    "the linked image {name} needs a name without / or other signs that paths have",
+                    name=printable(image.name),
+                )
+            )
+    before = [(image, image.name) for image in odd]
+    try:
+        for image in odd:
+            image.name = names.file_name(image.name, taken=[i.name for i in bpy.data.images])
+        yield
+    finally:
+        for image, name in before:
+            image.name = name

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from ... import native
 from ...logic.base.errors import FaceError
 from ...logic.base.sentences import told
-from ...logic.material import uv_grid
+from ...logic.material import texture_search, uv_grid
 from ..base import compat
 from ..base.blender_types import MeshObject, Node, NodeTree, Override, Socket
 from ..base.console import quiet
@@ -91,7 +91,8 @@ def flatten(override: Override, loans: Loans, size: int) -> Generator[float, Non
         _lay_out(flat)
     if any(flat.baked for flat in flats):
         yield from _bake(override, items, flats, size)
-    made = [_build(flat, loans) for flat in flats]
+    files: list[str] = []
+    made = [_build(flat, loans, files) for flat in flats]
     for flat, material in zip(flats, made, strict=True):
         for item, slot in flat.users:
             item.material_slots[slot].material = material
@@ -388,8 +389,9 @@ def _pixels(image: bpy.types.Image) -> NDArray[np.float32]:
 # --- the plain material ------------------------------------------------------------------------
 
 
-def _build(flat: _Flat, loans: Loans) -> bpy.types.Material:
-    """The plain material of one of the user's, under its name."""
+def _build(flat: _Flat, loans: Loans, files: list[str]) -> bpy.types.Material:
+    """The plain material of one of the user's, under its name; adds its images' files to those
+    of the others."""
     user = flat.material
     material = bpy.data.materials.new(flat.name)
     loans.take("materials", material, flat.name)
@@ -402,7 +404,7 @@ def _build(flat: _Flat, loans: Loans) -> bpy.types.Material:
         _plain_look(flat, shader)
     else:
         _take_numbers(flat, shader)
-        _take_images(flat, material, shader)
+        _take_images(flat, material, shader, files)
     if flat.clear or shader.inputs["Alpha"].is_linked or shader.inputs["Alpha"].default_value < 1:
         material.surface_render_method = "BLENDED"
     return material
@@ -433,11 +435,11 @@ def _take_numbers(flat: _Flat, shader: Node) -> None:
             shader.inputs[socket].default_value = value
 
 
-def _take_images(flat: _Flat, material: bpy.types.Material, shader: Node) -> None:
+def _take_images(flat: _Flat, material: bpy.types.Material, shader: Node, files: list[str]) -> None:
     tree = compat.tree_of(material)
     for name, image in flat.images.items():
         node = tree.nodes.new("ShaderNodeTexImage")
-        node.image = _packed(flat, name, image)
+        node.image = _packed(flat, name, image, files)
         socket, feeding = shader.inputs[_SOCKETS[name]], node.outputs["Color"]
         if name == "normal":
             between = tree.nodes.new("ShaderNodeNormalMap")
@@ -468,17 +470,30 @@ def write_images(scene: bpy.types.Scene, folder: Path) -> int:
     return len(images)
 
 
-def _packed(flat: _Flat, name: str, image: bpy.types.Image) -> bpy.types.Image:
-    """An image that exporters write from memory, under a name of its own."""
+def _pack(image: bpy.types.Image) -> None:
+    """Take an image's file in. Raises: FaceError: it is gone."""
+    try:
+        image.pack()
+    except RuntimeError as error:
+        name = PurePath(image.filepath_raw).name
+        raise FaceError(
+            told("the file {name} of an image is gone: find it, or take it out", name=name)
+        ) from error
+
+
+def _packed(flat: _Flat, name: str, image: bpy.types.Image, files: list[str]) -> bpy.types.Image:
+    """An image that exporters write from memory, under a file's name that is not in files yet."""
     taken = name not in flat.baked
     if taken:
         image = image.copy()
         image.name = f"{flat.name}_{name}"
         if image.packed_file is None:
-            image.pack()
-    ending = PurePath(image.filepath_raw).suffix if taken else ""
+            _pack(image)
+    ending = PurePath(image.filepath_raw).suffix.lower() if taken else ""
     # Exporters tell images apart by their paths, and no path of this machine goes out.
-    image.filepath_raw = f"//{_file_name(image.name)}{ending or '.png'}"
+    known = ending if ending in texture_search.EXTENSIONS else ".png"
+    files.append(native.part("files.names").file_name(image.name, known, files))
+    image.filepath_raw = f"//{files[-1]}"
     if taken:
         assert image.packed_file is not None
         data = image.packed_file.data  # packed anew: USD writes it under the path it was packed by
@@ -486,7 +501,3 @@ def _packed(flat: _Flat, name: str, image: bpy.types.Image) -> bpy.types.Image:
     else:
         image.pack()
     return image
-
-
-def _file_name(name: str) -> str:
-    return "".join(c if c.isalnum() or c in "-_." else "_" for c in name)

@@ -165,7 +165,7 @@ def _add_catalogs(path: Path, wanted: Iterable[str]) -> None:
     for group in sorted(wanted):
         number = str(catalog_id(group))
         if number not in text:
-            plain = "".join(c for c in group if c not in ":/\\\n") or "own"
+            plain = "".join(c for c in group if c not in ":/\\" and c.isprintable()) or "own"
             title = f"{plain[:1].upper()}{plain[1:]}s"
             text = f"{text.rstrip()}\n{number}:{CATALOG}/{title}:{CATALOG}-{title}\n"
     # The file belongs to every .blend of the folder: it is whole at all times.

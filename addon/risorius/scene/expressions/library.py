@@ -8,15 +8,17 @@ its picture beside it. Those of this file are pose assets that bear the same tex
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
+from typing import NamedTuple
 
 import bpy
 
 from ... import native
 from ...logic.base.errors import FaceError
+from ...logic.base.names import printable
 from ...logic.base.sentences import told
 from ..base.blender_types import Context
 
@@ -24,10 +26,15 @@ RISORIUS, LIBRARY, FILE = "RISORIUS", "LIBRARY", "FILE"
 MARK = "risorius_expression"  # on an action and its asset: the text of the expression
 _FAVOURITES = "favourites.txt"
 _MOST = 2000  # files of a library that are read
+_AT_ONCE = 100  # expressions whose files are open together while they are written
 
 
 class LibraryError(FaceError):
     """A library or an expression that cannot be used; the text is one sentence for users."""
+
+
+class TakenError(LibraryError):
+    """Files or expressions of the user's would be replaced, and nobody has said that they may."""
 
 
 @dataclass(frozen=True)
@@ -174,27 +181,84 @@ def free_label(items: dict[str, Item], label: str) -> str:
     return tried
 
 
-def write(where: Path, expression: native.Expression, picture: bytes = b"") -> Path:
-    """Put an expression into a library; one of its name is written over, whole at all times.
+class Entry(NamedTuple):
+    """An expression on its way into a library.
+
+    Attributes:
+        expression: risorius.expressions.Expression.
+        picture: a PNG file that goes beside it; none leaves what is there.
+        over: the file that it takes the place of; None: a file of its own.
+    """
+
+    expression: native.Expression
+    picture: bytes = b""
+    over: Path | None = None
+
+
+def write(where: Path, entries: Sequence[Entry]) -> list[Path]:
+    """Put expressions into a library, each file whole at all times.
+
+    An expression's name only proposes the name of its file, and no file is replaced but those
+    that entries name.
 
     Args:
         where: the folder; made where it is not there.
-        expression: its name is that of the file.
-        picture: a PNG file that goes beside it; none leaves what is there.
+        entries: what goes into it; all of them, or of more than _AT_ONCE those that have room.
 
     Returns:
-        The path of its file.
+        The paths of their files.
 
     Raises:
-        ValueError: it cannot be written in this form. OSError.
+        ValueError: one cannot be written in this form; then nothing was. OSError.
     """
-    text = native.part("expressions").text_of(expression)
-    path = where / f"{expression.name}.toml"
-    files = {path: text.encode()}
-    if picture:
-        files[path.with_suffix(".png")] = picture
-    native.part("files.fileio").write_all(files)
-    return path
+    part, taken = native.part("expressions"), _stems(where)
+    files: list[dict[Path, bytes]] = []
+    for expression, picture, over in entries:
+        path = over or where / _file_name(expression, taken)
+        taken.append(path.name)
+        files.append({path: part.text_of(expression).encode()})
+        if picture:
+            files[-1][path.with_suffix(".png")] = picture
+    for first in range(0, len(files), _AT_ONCE):
+        joined = {p: data for row in files[first : first + _AT_ONCE] for p, data in row.items()}
+        native.part("files.fileio").write_all(joined)
+    return [next(iter(row)) for row in files]
+
+
+def in_the_way(where: Path, entries: Sequence[Entry]) -> list[Entry]:
+    """The same entries, each over the file in a folder that has its name.
+
+    Args:
+        where: the folder.
+        entries: without a file to replace.
+    """
+    folded = native.part("files.names").folded
+    there = {folded(name): name for name in reversed(_stems(where))}
+    given: list[str] = []
+    for expression, *_ in entries:
+        given.append(_file_name(expression, given))
+    found = [there.get(folded(name)) for name in given]
+    return [
+        entry._replace(over=where / name if name else None)
+        for entry, name in zip(entries, found, strict=True)
+    ]
+
+
+def _file_name(expression: native.Expression, taken: Sequence[str]) -> str:
+    name: str = native.part("files.names").file_name(expression.name, ".toml", taken)
+    return name
+
+
+def _stems(where: Path) -> list[str]:
+    """The files that expressions in a folder have, or would have beside its pictures."""
+    try:
+        return sorted(
+            p.name if p.suffix == ".toml" else f"{p.stem}.toml"
+            for p in where.iterdir()
+            if p.suffix.lower() in (".toml", ".png")
+        )
+    except FileNotFoundError:  # it is made
+        return []
 
 
 def check_own(item: Item) -> None:
@@ -244,13 +308,23 @@ def read_all(where: Path) -> list[native.Expression]:
         where: a folder with TOML files.
 
     Raises:
-        LibraryError: one cannot be used, or there are none.
+        LibraryError: one cannot be used, two have one name, or there are none.
     """
     found, troubles = of_folder(where)
     if troubles:
         raise LibraryError(troubles[0])
     if not found:
         raise LibraryError(told("{folder}: it holds no expressions.", folder=where.name))
+    names = [expression.name for _, expression in found]
+    for number, name in enumerate(names):
+        if name in names[:number]:
+            raise LibraryError(
+                told(
+                    "{file}: another file of the folder has an expression {name} too.",
+                    file=found[number][0].name,
+                    name=printable(name),
+                )
+            )
     return [expression for _, expression in found]
 
 

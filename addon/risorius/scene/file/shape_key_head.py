@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import cast
 
 import bpy
@@ -142,8 +141,3 @@ def take_materials(face: MeshObject, item: MeshObject) -> None:
     index = np.empty(len(made.polygons), np.int32)
     item.data.polygons.foreach_get("material_index", index)
     made.polygons.foreach_set("material_index", index)
-
-
-def name_of(item: bpy.types.Object) -> str:
-    """A file's name for an object's."""
-    return Path(bpy.path.clean_name(item.name)).name + ".dna"

@@ -196,7 +196,8 @@ def write(
     Raises:
         MixError: the file is one of the parents.
         OSError: it cannot be written; then each file is as it was.
-        ValueError: shares that make no sense, a region that the first face does not have.
+        ValueError: shares that make no sense, a region that the first face does not have, a picture
+            of the user's that would be replaced.
     """
     target = Path(path)
     if any(target.resolve() == Path(p).resolve() for p in paths):
@@ -212,6 +213,7 @@ def write(
     progress(0.5)
     pictures, own = textures.mix_textures(parents, [Path(p) for p in paths], mix, masks)
     progress(0.9)
+    textures.check_room(target, pictures)
     folder = textures.texture_folder(target)
     files = {target: dna.to_bytes()} | {folder / name: data for name, data in pictures.items()}
     fileio.write_all(files)

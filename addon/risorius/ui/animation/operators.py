@@ -17,7 +17,7 @@ from ...scene.base import parts
 from ...scene.character import runtime
 from .. import words
 from ..blender_types import Context, FileHandler, ImportHelper, Item, Menu, Operator, Result
-from ..common import explain, face_controls, face_rig, shown_progress
+from ..common import explain, face_controls, face_rig, shown_progress, system_path
 from .place_clip import PlacesClip
 
 RATES = (
@@ -178,6 +178,7 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
         return ImportHelper.invoke(self, context, event)
 
     def execute(self, context: Context) -> Result:
+        self.filepath = system_path(self.filepath)
         if _is_sound(self.filepath):
             name = printable(Path(self.filepath).name)
             self.report(
@@ -210,7 +211,7 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
             return native.module().Clip.load(self.filepath), [], ""
         mapping = None if self.mapping == "AUTO" else self.mapping
         if mapping == "FILE":
-            mapping = bpy.path.abspath(self.mapping_file)
+            mapping = system_path(self.mapping_file)
         clip, report = native.part("importing").import_file(
             self.filepath,
             live.dna.raw_control_names,

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Blender's own exporters: the settings that each is called with."""
 
+import os
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Protocol
 
@@ -10,6 +12,7 @@ from ...logic.base.errors import FaceError
 from ...logic.base.sentences import told
 from ...scene.base.blender_types import Override
 from ...scene.base.console import quiet
+from ...scene.export import lent_names, whole_files
 from ..words import say
 
 FORMATS = (
@@ -141,19 +144,25 @@ def export(operator: ExportOperator, override: Override, path: Path) -> None:
     Args:
         operator: has the format and the settings that the user chose.
         override: the context for the exporter, from export_animation.copies.
-        path: of the file.
+        path: of the file, in a folder that is there for this export alone.
 
     Raises:
-        FaceError: the exporter says what it cannot, or wrote nothing.
+        FaceError: the exporter says what it cannot, wrote nothing, or a part of the file.
     """
     group, name = _OPERATORS[operator.format]
     function = getattr(getattr(bpy.ops, group), name)
     known = set(function.get_rna_type().properties.keys())
     settings = _SETTINGS[operator.format](operator, override["scene"])
-    with bpy.context.temp_override(**override), quiet():
+    named = lent_names.images_as_files() if operator.format == "USD" else nullcontext()
+    with named, bpy.context.temp_override(**override), quiet():
         try:
             done = function(filepath=str(path), **{k: v for k, v in settings.items() if k in known})
         except RuntimeError as error:  # what Blender's exporter says of the file or the scene
-            raise FaceError(str(error).strip().removeprefix("Error: ")) from error
+            said = str(error).replace(f"{path.parent}{os.sep}", "")  # hidden, and gone by then
+            raise FaceError(said.strip().removeprefix("Error: ")) from error
     if "FINISHED" not in done or not path.exists():
         raise FaceError(told("Blender's exporter wrote nothing to {file}.", file=path.name))
+    if whole_files.is_cut(path):
+        raise FaceError(
+            told("Blender's exporter wrote only a part: see that the disk has room for the file")
+        )

@@ -19,7 +19,7 @@ from ...scene.export import export_animation, plain_materials
 from .. import words
 from ..bake.selection import FacesOperator, FrameRange, selected_rigs
 from ..blender_types import Context, ExportHelper, Operator, Result
-from ..common import shown_progress
+from ..common import proposed_file, shown_progress, system_path
 from .exporters import FORMATS, export, missing
 
 _T = TypeVar("_T")
@@ -104,7 +104,7 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, Oper
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:
         rigs = selected_rigs(context)
         if not self.filepath and rigs:
-            self.filepath = rigs[0].name.removesuffix("_rig") + _ENDINGS[self.format]
+            self.filepath = proposed_file(rigs[0].name, _ENDINGS[self.format])
         return ExportHelper.invoke(self, context, event)
 
     def check(self, context: Context) -> bool:
@@ -170,7 +170,7 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, Oper
         characters: list[tuple[ArmatureObject, int, sampling.Samples]],
         options: export_animation.ShipOptions,
     ) -> str:
-        path = Path(bpy.path.abspath(self.filepath))
+        path = Path(system_path(self.filepath))
         frames = len(characters[0][2].frames)
         if self.format in ("RZC", "CSV"):
             if len(characters) > 1:
@@ -184,10 +184,12 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, Oper
             with export_animation.copies(context, characters, options) as (override, loans):
                 if self.bake_materials:
                     run(context, plain_materials.flatten(override, loans, self.texture_size))
-                export(self, override, path)
-                if self.bake_materials and self.format == "ALEMBIC":
-                    folder = path.with_name(path.stem + "_textures")
-                    plain_materials.write_images(override["scene"], folder)
+                # Blender's exporters write over an old file from its first byte on.
+                with native.part("files.fileio").staging(path) as made:
+                    export(self, override, made)
+                    if self.bake_materials and self.format == "ALEMBIC":
+                        folder = made.with_name(path.stem + "_textures")
+                        plain_materials.write_images(override["scene"], folder)
         return f"{path.name}: {frames} frames, {path.stat().st_size:,} bytes"
 
 

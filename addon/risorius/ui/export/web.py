@@ -15,7 +15,7 @@ from ...scene.file import export_dna
 from .. import words
 from ..bake.selection import FrameRange
 from ..blender_types import Context, ExportHelper, Operator, Result
-from ..common import FaceOperator, explain, face_rig
+from ..common import FaceOperator, explain, face_rig, proposed_file, system_path
 from .operators import run
 
 
@@ -43,7 +43,7 @@ class RISORIUS_OT_export_web(FrameRange, FaceOperator, ExportHelper, Operator):
 
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:
         if not self.filepath:
-            self.filepath = face_rig(context).name.removesuffix("_rig") + ".html"
+            self.filepath = proposed_file(face_rig(context).name, ".html")
         return ExportHelper.invoke(self, context, event)
 
     def draw(self, context: Context) -> None:
@@ -56,6 +56,7 @@ class RISORIUS_OT_export_web(FrameRange, FaceOperator, ExportHelper, Operator):
 
     def execute(self, context: Context) -> Result:
         fileio = native.part("files.fileio")
+        self.filepath = system_path(self.filepath)
         try:
             fileio.check_writable(self.filepath)
             rig = face_rig(context)

@@ -10,6 +10,7 @@ import bpy
 
 from ... import native
 from ...logic.base.errors import FaceError
+from ...logic.base.names import printable
 from ...logic.base.sentences import told
 from ...scene.base.blender_types import ArmatureObject, current_context
 from ...scene.base.task import Task
@@ -17,7 +18,7 @@ from ...scene.character import runtime
 from ...scene.expressions import assets, library, poses, thumbnails
 from ..beside import RunsBeside
 from ..blender_types import Context, Operator, OperatorBase, Result
-from ..common import FaceOperator, face_rig
+from ..common import FaceOperator, face_rig, system_path
 from ..words import of_error, say
 from . import previews
 from .properties import choices, region_items
@@ -113,6 +114,8 @@ class _LibraryOperator(FaceOperator):
     def execute(self, context: Context) -> Result:
         try:
             self.work(context)
+        except library.TakenError:
+            raise  # an operator that can be told to replace asks
         except native.user_errors() as error:
             self.report({"ERROR"}, of_error(error))
             return {"CANCELLED"}
@@ -125,9 +128,14 @@ class _LibraryOperator(FaceOperator):
 
 
 def _put(
-    context: Context, rig: ArmatureObject, expression: "native.Expression", shared: bool
+    context: Context,
+    rig: ArmatureObject,
+    expression: "native.Expression",
+    shared: bool,
+    over: Path | None = None,
 ) -> None:
-    """An expression of one's own as a pose asset of this file, and in the library."""
+    """An expression of one's own as a pose asset of this file, and in the library, there in the
+    place of a file or in one of its own."""
     picture = assets.picture_of(rig, expression)
     sitter = None if picture.is_file() else thumbnails.sitter_of(rig)
     if sitter is not None:
@@ -135,7 +143,7 @@ def _put(
         thumbnails.make(sitter, [thumbnails.Job(picture, weights)])
     if shared:
         held = picture.read_bytes() if picture.is_file() else b""
-        library.write(library.folder(context), expression, held)
+        library.write(library.folder(context), [library.Entry(expression, held, over)])
     assets.make_asset(rig, expression)
 
 
@@ -213,7 +221,8 @@ class RISORIUS_OT_update_expression(_OfOne, Operator):
         library.check_own(item)
         old = item.expression
         expression = poses.captured(rig, old.name, old.label, old.group)
-        _put(context, rig, replace(expression, description=old.description), item.path is not None)
+        new = replace(expression, description=old.description)
+        _put(context, rig, new, item.path is not None, item.path)
 
 
 class RISORIUS_OT_rename_expression(_OfOne, Operator):
@@ -248,8 +257,9 @@ class RISORIUS_OT_rename_expression(_OfOne, Operator):
         group = self.group.strip() or item.expression.group
         new = replace(item.expression, name=name, label=label, group=group)
         poses.check(runtime.there(rig), item)
-        _put(context, rig, new, item.path is not None)
-        if name != item.expression.name:
+        same = name == item.expression.name
+        _put(context, rig, new, item.path is not None, item.path if same else None)
+        if not same:
             library.remove(item)
         if item.expression.name in library.favourites():
             library.set_favourite([item.expression.name], False)
@@ -287,17 +297,48 @@ class RISORIUS_OT_star_expression(_OfOne, Operator):
 
 
 class _OfFolder(_LibraryOperator, OperatorBase):
-    """On a folder that the user chooses."""
+    """On a folder that the user chooses; asks before it writes over what is the user's."""
 
     directory: bpy.props.StringProperty(name="Folder", subtype="DIR_PATH")
     filter_folder: bpy.props.BoolProperty(default=True, options={"HIDDEN"})
+    replace: bpy.props.BoolProperty(
+        name="Replace",
+        description="Write over expressions of yours that have the same names",
+        options={"SKIP_SAVE"},
+    )
+    asked: bpy.props.StringProperty(options={"HIDDEN", "SKIP_SAVE"})
+    _in_dialog = False
 
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:
+        if self.asked:  # by execute(), which has the folder by now
+            self.replace = True
+            return context.window_manager.invoke_confirm(
+                self,
+                event,
+                title=say("Replace expressions of yours?"),
+                message=self.asked,
+                confirm_text=say("Replace"),
+                icon="WARNING",
+                translate=False,
+            )
+        self._in_dialog = True
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
+    def execute(self, context: Context) -> Result:
+        try:
+            return super().execute(context)
+        except library.TakenError as error:
+            if not self._in_dialog:
+                self.report({"ERROR"}, of_error(error))
+                return {"CANCELLED"}
+            ours = bpy.ops.risorius  # pyright: ignore  made by registration
+            again = getattr(ours, self.bl_idname.partition(".")[2])
+            again("INVOKE_DEFAULT", directory=self.directory, asked=of_error(error))
+            return {"CANCELLED"}  # the question does the work
+
     def chosen(self) -> Path:
-        return Path(bpy.path.abspath(self.directory))
+        return Path(system_path(self.directory))
 
 
 class RISORIUS_OT_export_expressions(_OfFolder, Operator):
@@ -313,10 +354,21 @@ class RISORIUS_OT_export_expressions(_OfFolder, Operator):
         own = [item.expression for item in items.values() if item.source != library.RISORIUS]
         if not own:
             raise library.LibraryError(told("There are no expressions of your own."))
-        for expression in own:
-            picture = assets.picture_of(rig, expression)
-            held = picture.read_bytes() if picture.is_file() else b""
-            library.write(self.chosen(), expression, held)
+        pictures = [assets.picture_of(rig, expression) for expression in own]
+        held = [p.read_bytes() if p.is_file() else b"" for p in pictures]
+        entries = [library.Entry(*pair) for pair in zip(own, held, strict=True)]
+        entries = library.in_the_way(self.chosen(), entries)
+        taken = [entry.over for entry in entries if entry.over is not None]
+        if taken and not self.replace:
+            raise library.TakenError(
+                told(
+                    "{folder} holds a file {file} already: choose Replace to write over files of "
+                    "these names, or another folder.",
+                    folder=self.chosen().name,
+                    file=taken[0].name,
+                )
+            )
+        library.write(self.chosen(), entries)
         self.report({"INFO"}, say("{count} expressions", count=len(own)))
 
 
@@ -330,13 +382,22 @@ class RISORIUS_OT_import_expressions(_OfFolder, Operator):
     def work(self, context: Context) -> None:
         found = library.read_all(self.chosen())
         items, _ = library.all_items(library.folder(context))
+        entries = []
         for expression in found:
-            if expression.name in items:
-                raise library.LibraryError(
-                    told("There is an expression {label} already.", label=expression.label)
-                )
-        for expression in found:
-            library.write(library.folder(context), expression)
+            item = items.get(expression.name)
+            if item is not None:
+                library.check_own(item)
+                if not self.replace:
+                    raise library.TakenError(
+                        told(
+                            "There is an expression {label} already: choose Replace to write over "
+                            "those of your own.",
+                            label=printable(expression.label),
+                        )
+                    )
+            over = item.path if item is not None else None
+            entries.append(library.Entry(expression, over=over))
+        library.write(library.folder(context), entries)
         self.report({"INFO"}, say("{count} expressions", count=len(found)))
 
 

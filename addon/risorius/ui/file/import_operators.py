@@ -17,7 +17,7 @@ from ...scene.studio import build_studio
 from .. import words
 from ..beside import RunsBeside
 from ..blender_types import Context, FileHandler, ImportHelper, Menu, Operator, Result
-from ..common import MODES, explain, shown_progress, usable
+from ..common import MODES, explain, shown_progress, system_path, usable
 from . import framing
 from .studio_operators import SCENE_CAMERA
 
@@ -135,8 +135,9 @@ class RISORIUS_OT_import_dna(Operator, ImportHelper):
             texture_folder=self.texture_folder,
             simple_materials=self.use_simple_materials,
         )
-        named = [str(Path(self.directory, item.name)) for item in self.files if item.name]
-        paths = named or [self.filepath]
+        folder = system_path(self.directory)
+        named = [str(Path(folder, item.name)) for item in self.files if item.name]
+        paths = named or [system_path(self.filepath)]
         show = self.use_frame_view and len(paths) == 1
         results = [import_character(self, context, path, options, show) for path in paths]
         return {"FINISHED"} if {"FINISHED"} in results else {"CANCELLED"}

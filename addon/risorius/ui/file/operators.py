@@ -13,7 +13,14 @@ from ...scene.base import parts
 from ...scene.file import export_dna, replace_dna
 from ...scene.frame import evaluate
 from ..blender_types import Context, ExportHelper, ImportHelper, Menu, Operator, Result
-from ..common import FaceOperator, explain, face_rig, shown_progress
+from ..common import (
+    FaceOperator,
+    explain,
+    face_rig,
+    proposed_file,
+    shown_progress,
+    system_path,
+)
 from ..words import local, of_error, say
 
 
@@ -69,7 +76,7 @@ class RISORIUS_OT_replace_dna(_FileOperator, Operator, ImportHelper):
     filter_glob: bpy.props.StringProperty(default="*.dna", options={"HIDDEN"})
 
     def execute(self, context: Context) -> Result:
-        return _replace(self, context, self.filepath)
+        return _replace(self, context, system_path(self.filepath))
 
 
 class RISORIUS_OT_reload(_FileOperator, Operator):
@@ -133,11 +140,12 @@ class RISORIUS_OT_export_dna(_FileOperator, Operator, ExportHelper):
 
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:
         if not self.filepath:
-            self.filepath = face_rig(context).name.removesuffix("_rig") + ".dna"
+            self.filepath = proposed_file(face_rig(context).name, ".dna")
         return ExportHelper.invoke(self, context, event)
 
     def execute(self, context: Context) -> Result:
         rig = face_rig(context)
+        self.filepath = system_path(self.filepath)
         options = export_dna.ExportOptions(
             self.use_shapes, self.use_neutral, self.use_joints, self.use_weights
         )
@@ -161,8 +169,12 @@ class RISORIUS_OT_export_dna(_FileOperator, Operator, ExportHelper):
 
 
 def draw_export(self: Menu, _context: Context) -> None:
-    """Entry of File > Export."""
+    """Entries of File > Export."""
     self.layout.operator(RISORIUS_OT_export_dna.bl_idname, text="MetaHuman DNA (.dna)")
+    # Beside Blender's own entries of these formats, which write live faces at rest.
+    self.layout.operator(
+        "risorius.export_animation", text="Face Animation (.glb, .fbx, .usd, .abc)"
+    )
 
 
 CLASSES = (RISORIUS_OT_replace_dna, RISORIUS_OT_reload, RISORIUS_OT_export_dna)

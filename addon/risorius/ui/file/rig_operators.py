@@ -16,7 +16,7 @@ from ...scene.frame import evaluate
 from .. import words
 from ..beside import RunsBeside
 from ..blender_types import Context, ExportHelper, Menu, Operator, Result
-from ..common import explain, usable
+from ..common import explain, proposed_file, system_path, usable
 from . import framing
 from .import_operators import import_character
 
@@ -65,11 +65,12 @@ class RISORIUS_OT_make_rig(RunsBeside, Operator, ExportHelper):
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:
         self.wait_beside()
         if not self.filepath and context.active_object is not None:
-            self.filepath = shape_key_head.name_of(context.active_object)
+            self.filepath = proposed_file(context.active_object.name, ".dna")
         return ExportHelper.invoke(self, context, event)
 
     def execute(self, context: Context) -> Result:
         item = cast(MeshObject, context.active_object)
+        self.filepath = system_path(self.filepath)
         try:
             shapes = shape_key_head.shapes_of(context, item)
         except native.user_errors() as error:

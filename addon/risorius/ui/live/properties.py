@@ -10,7 +10,7 @@ import bpy
 from ... import native
 from ...scene.live import sessions
 from ..blender_types import Context
-from ..common import active_controls
+from ..common import active_controls, system_path
 
 SOURCES = tuple(
     (name, row["title"], row["description"]) for name, row in native.live_sources().items()
@@ -100,7 +100,7 @@ def settings_of(context: Context) -> sessions.Settings:
         chosen.smoothing,
         chosen.gain,
         chosen.head_gain,
-        bpy.path.abspath(chosen.mapping) or "arkit",
+        system_path(chosen.mapping) or "arkit",
     )
 
 

@@ -12,7 +12,7 @@ from ...scene.base import parts
 from ...scene.character import build
 from ...scene.mixing import parents
 from ..blender_types import Context, ExportHelper, ImportHelper, Operator, Result
-from ..common import explain, shown_progress, usable
+from ..common import explain, shown_progress, system_path, usable
 from ..file.import_operators import import_character
 from ..words import of_error, say
 from .properties import choices, follow, paths_of, shares_of
@@ -63,7 +63,8 @@ class RISORIUS_OT_mix_add(_Usable, Operator, ImportHelper):
 
     def execute(self, context: Context) -> Result:
         names = [file.name for file in self.files if file.name]
-        paths = [str(Path(self.directory) / name) for name in names] or [self.filepath]
+        folder = system_path(self.directory)
+        paths = [str(Path(folder, name)) for name in names] or [system_path(self.filepath)]
         return _add(self, context, paths)
 
 
@@ -152,6 +153,7 @@ class RISORIUS_OT_mix_write(_Mixes, Operator, ExportHelper):
     def execute(self, context: Context) -> Result:
         shares, regions = shares_of(context)
         paths = paths_of(context)
+        self.filepath = system_path(self.filepath)
         try:
             with shown_progress(context) as progress:
                 own = parents.write(self.filepath, paths, shares, regions, progress)

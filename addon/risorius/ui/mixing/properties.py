@@ -10,6 +10,7 @@ import bpy
 from ... import native
 from ...scene.mixing import parents
 from ..blender_types import Context
+from ..common import system_path
 
 REGIONS = ("brow", "eyes", "nose", "cheeks", "mouth", "jaw", "neck", "skull")
 
@@ -63,7 +64,7 @@ def paths_of(context: Context) -> list[str]:
     Args:
         context: Blender context.
     """
-    return [bpy.path.abspath(parent.path) for parent in choices(context).parents]
+    return [system_path(parent.path) for parent in choices(context).parents]
 
 
 def shares_of(context: Context) -> tuple[list[float], dict[str, dict[int, float]]]:

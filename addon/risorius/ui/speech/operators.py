@@ -16,7 +16,7 @@ from ..animation.operators import SOUNDS
 from ..animation.place_clip import PlacesClip
 from ..beside import RunsBeside
 from ..blender_types import Context, ImportHelper, Operator, Result
-from ..common import explain, face_rig
+from ..common import explain, face_rig, system_path
 
 _MISSING = (
     "Speech needs the package PocketSphinx: install it by the button in the add-on's preferences."
@@ -69,6 +69,7 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
         if not speech_task.has_recogniser():
             self.report({"ERROR"}, words.say(_MISSING))
             return {"CANCELLED"}
+        self.filepath = system_path(self.filepath)
         text = bpy.data.texts.get(self.transcript_text) if self.transcript_text else None
         if self.transcript_text and text is None:
             self.report({"ERROR"}, words.say("There is no text {name}.", name=self.transcript_text))

@@ -7,7 +7,6 @@ import glob
 import math
 import os
 import string
-import unicodedata
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +18,7 @@ from risorius.base.errors import RisoriusError
 
 from ..baking.bake import DEFAULT_PARTS, KINDS
 from ..baking.face import PARTS
+from ..files.names import LONGEST, file_name, folded, is_file_name
 
 FIELDS = ("clip", "character", "lod", "folder", "character_folder")
 DEFAULT_NAME = "{character}/lod{lod}/{folder}/{clip}"
@@ -291,23 +291,34 @@ def _check_pattern(table: _Table, pattern: str) -> None:
 
 
 def _fill(pattern: str, clip: _Found, character: _Found, lod: int) -> str:
+    """The name of a job. Files and folders that were found give parts of it, and no separators."""
     return pattern.format(
-        clip=clip.path.stem,
-        character=character.path.stem,
+        clip=file_name(clip.path.stem),
+        character=file_name(character.path.stem),
         lod=lod,
-        folder=clip.folder,
-        character_folder=character.folder,
+        folder=_folder_name(clip.folder),
+        character_folder=_folder_name(character.folder),
     )
+
+
+def _folder_name(folder: str) -> str:
+    return "/".join(map(file_name, folder.split("/"))) if folder else ""
 
 
 def _inside(table: _Table, key: str, output: Path, name: str) -> Path:
     """A path below the output folder. A field that is empty leaves no folder."""
     parts = [part for part in name.replace("\\", "/").split("/") if part not in ("", ".")]
-    rooted = name.startswith(("/", "\\")) or (parts and ":" in parts[0] and os.name == "nt")
-    if not parts or ".." in parts or rooted:
+    if not parts or ".." in parts or name.startswith(("/", "\\")):
         raise table.error(
             key, f"a name inside the output folder was expected, found {_shown(name)}"
         )
+    for part in parts:
+        if not is_file_name(part.lstrip(".")):
+            raise table.error(
+                key,
+                f"names of files as every system takes them, of {LONGEST} bytes at most, were "
+                f"expected, found {_shown(part)}",
+            )
     return output.joinpath(*parts)
 
 
@@ -334,4 +345,4 @@ def _refuse_collisions(plan: Plan) -> None:
 
 
 def _folded(path: Path) -> str:
-    return unicodedata.normalize("NFC", os.path.abspath(path)).casefold()
+    return folded(os.path.abspath(path))

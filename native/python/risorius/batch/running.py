@@ -100,7 +100,7 @@ def _run(plan: Plan, workers: int | None, scheduler: str | None, restart: bool) 
         journal.read()
     jobs = pending(plan, journal, report)
     journal.begin(job.name for job in plan.jobs if job.name in report.reused)
-    folders = {path.parent for job in jobs for _, path in job.outputs}
+    folders = {path.parent for job in plan.jobs for _, path in job.outputs}
     progress = Progress(len(plan.jobs), "jobs", before=len(report.reused))
     if report.reused:
         progress.say(f"{len(report.reused):,} of {len(plan.jobs):,} jobs are done already")

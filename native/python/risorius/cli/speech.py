@@ -10,6 +10,7 @@ from pathlib import Path
 
 from ..anim.clip import Clip
 from ..base import signatures
+from ..files import fileio
 from ..importing import writing
 from ..speech import Heard, Phoneme, animate, listen
 from ..speech.listening import confidence
@@ -55,6 +56,8 @@ def complain(args: argparse.Namespace) -> None:
         raise CommandLineError(
             f"--text: what is said was expected, found the file {args.text}: --transcript reads it"
         )
+    if args.phonemes is not None and args.phonemes.resolve() == args.out.resolve():
+        raise CommandLineError("--phonemes: another file than that of -o was expected")
     if not 1.0 <= args.rate <= 1000.0:
         raise CommandLineError(f"--rate: 1 to 1000 was expected, found {args.rate:g}")
     if not 0.0 <= args.intensity <= 4.0:
@@ -66,9 +69,10 @@ def complain(args: argparse.Namespace) -> None:
 def run(args: argparse.Namespace) -> int:
     complain(args)
     heard, clip = _spoken(args)
-    _save(clip, args.out)
+    files = {args.out: _content(clip, args.out)}
     if args.phonemes is not None:
-        writing.write_text(phoneme_table(heard.phonemes), args.phonemes)
+        files[args.phonemes] = phoneme_table(heard.phonemes).encode()
+    fileio.write_all(files)
     for note in heard.notes:
         print(f"risorius: {args.voice}: {note}", file=sys.stderr)
     print(json.dumps(_report(heard, clip), indent=1) if args.json else _summary(heard, clip, args))
@@ -133,12 +137,9 @@ def _summary(heard: Heard, clip: Clip, args: argparse.Namespace) -> str:
     )
 
 
-def _save(clip: Clip, path: Path) -> None:
-    """Write a clip whole or not at all. Raises: OSError, ValueError."""
+def _content(clip: Clip, path: Path) -> bytes:
+    """The bytes of a clip's file, by its suffix. Raises: ValueError."""
     suffix = path.suffix.lower()
     if suffix == ".csv":
-        writing.write_text(writing.csv_text(clip), path)
-    elif suffix == ".json":
-        writing.write_text(writing.json_text(clip), path)
-    else:
-        clip.save(path)
+        return writing.csv_text(clip).encode()
+    return writing.json_text(clip).encode() if suffix == ".json" else clip.to_bytes()

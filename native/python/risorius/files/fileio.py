@@ -4,18 +4,28 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import io
 import os
+import shutil
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
-from .._native import FileReplacement, remove_leftovers
+from .._native import FileReplacement, make_hidden_folder, put_in_place, remove_leftovers
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
 
-__all__ = ["check_writable", "replacing", "sweep", "write_all", "write_bytes", "write_text"]
+__all__ = [
+    "check_writable",
+    "replacing",
+    "staging",
+    "sweep",
+    "write_all",
+    "write_bytes",
+    "write_text",
+]
 
 _Path = str | os.PathLike[str]
 
@@ -115,6 +125,47 @@ def write_all(files: Mapping[Path, ReadableBuffer]) -> None:
             with contextlib.suppress(OSError):  # it is not empty
                 folder.rmdir()
         raise
+
+
+@contextlib.contextmanager
+def staging(path: _Path) -> Iterator[Path]:
+    """A path of the same name in a hidden folder beside, for writers that are not ours.
+
+    When the block ends, all that lies in that folder takes its place beside the file, with what
+    they are in, and the file last; each old one stays until then, and for good after an exception
+    or when the process is killed. The folder of a killed process goes when somebody writes there
+    again. Devices and pipes are given as they are.
+
+    Args:
+        path: of a file in a folder that is there.
+
+    Raises:
+        OSError: nothing can be written there, or the block has written no file; the error names
+            path.
+    """
+    target = Path(path)
+    if os.path.exists(target) and not target.is_file() and not target.is_dir():
+        yield target
+        return
+    folder = Path(make_hidden_folder(target))
+    try:
+        yield folder / target.name
+        _take_places(folder, target)
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _take_places(folder: Path, target: Path) -> None:
+    """Move the files of a staging folder to where they are meant to be."""
+    main = folder / target.name
+    if not main.is_file():
+        raise FileNotFoundError(errno.ENOENT, "nothing was written", os.fspath(target))
+    others = [p for p in folder.rglob("*") if p.is_file() and p != main]
+    places = [folder.parent / other.relative_to(folder) for other in others]
+    for place in places:
+        place.parent.mkdir(parents=True, exist_ok=True)
+    for file, place in zip([*others, main], [*places, target], strict=True):
+        put_in_place(file, place)
 
 
 def _made(folder: Path) -> list[Path]:

@@ -9,11 +9,13 @@ mixed; of others the leading parent's file is taken as it is.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from .. import Dna
 from ..author.geometry.skeleton import Doubles
+from ..base.errors import ArgumentError
+from ..files.names import folded, is_file_name
 from ..files.png import png, read_png
 from .hair import without_hair
 from .mix import Mix
@@ -52,9 +54,11 @@ def mix_textures(
     meshes = list(without_hair(parents[0]).mesh_names)
     files: dict[str, bytes] = {}
     own: list[str] = []
+    taken: set[str] = set()
     for key, name in parents[most].metadata.items():
         mesh = key.split(":")[1] if key.startswith(_KEY) and key.count(":") >= 2 else ""
-        if mesh not in meshes or name in files or Path(name).name != name:
+        # A second name for one file of some system is left out as one that leads elsewhere is.
+        if mesh not in meshes or not is_file_name(name) or folded(name) in taken:
             continue
         data = [_data(p, path, key) for p, path in zip(parents, paths, strict=True)]
         leading = data[most]
@@ -65,6 +69,7 @@ def mix_textures(
         shares = mix.table()[int(part[0].argmax())] if rigid else whole
         mixed = _mixed(data, shares)
         files[name] = leading if mixed is None else mixed
+        taken.add(folded(name))
         if mixed is None:
             own.append(name)
     for mask in sorted(texture_folder(paths[most]).glob(_MASKS)):
@@ -73,9 +78,28 @@ def mix_textures(
     return files, own
 
 
+def check_room(path: Path, pictures: Iterable[str]) -> None:
+    """Refuse to write over pictures that belong to no face of this name.
+
+    Args:
+        path: of the new DNA file; where it is there, its pictures may be replaced with it.
+        pictures: file names, which the parents' metadata have chosen.
+
+    Raises:
+        ArgumentError: the file is new, and a picture is there; names it.
+    """
+    for name in () if path.exists() else pictures:
+        there = texture_folder(path) / name
+        if there.exists():
+            raise ArgumentError(
+                f"{there}: a picture of this name is there, and no {path.name} that it belongs to: "
+                "another name for the new face was expected"
+            )
+
+
 def _data(parent: Dna, path: Path, key: str) -> bytes | None:
     name = parent.metadata.get(key, "")
-    return _bytes(path, name) if name and Path(name).name == name else None
+    return _bytes(path, name) if is_file_name(name) else None
 
 
 def _bytes(path: Path, name: str) -> bytes | None:

@@ -7,6 +7,7 @@ import base64
 from pathlib import Path
 
 from .._native import Dna
+from ..files.names import is_file_name
 
 _KINDS = {
     b"\x89PNG\r\n\x1a\n": "image/png",
@@ -47,7 +48,7 @@ def find_pictures(dna: Dna, file: Path) -> Pictures:
 
 def _url(name: str, folders: tuple[Path, ...]) -> str:
     """A data URL, "" where no such picture is there. Metadata may name no file elsewhere."""
-    if Path(name).name != name:
+    if not is_file_name(name):
         return ""
     for folder in folders:
         path = folder / name

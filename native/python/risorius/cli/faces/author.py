@@ -26,7 +26,7 @@ from ...author.work import RigOptions
 from ...base.words import counted
 from ...files import fileio
 from ..files import CommandLineError, require_suffix
-from ..pages.authoring import need_plot, write_report
+from ..pages.authoring import need_plot, report_page
 
 _DESCRIPTION = """\
 Finds joints, skin weights and joint motions that repeat the expressions of a face, and writes them
@@ -86,6 +86,8 @@ def run(args: argparse.Namespace) -> int:
     if args.report is not None:
         require_suffix(args.report, (".html",), "--report")
         fileio.check_writable(args.report)
+        if args.report.resolve() == args.out.resolve():
+            raise CommandLineError("author: another file than that of -o was expected of --report")
         need_plot()
     say, source = _Clock(quiet=args.json), dna
     if asked.most or asked.together:
@@ -97,9 +99,10 @@ def run(args: argparse.Namespace) -> int:
     if dna is not source and options.tolerance_mm is not None and asked.once_more:
         say.line("looking once more at what joints and shapes do together")
         rig.dna = correct_again(rig.dna, source, asked, say)
-    rig.dna.save(args.out)
+    files = {args.out: rig.dna.to_bytes()}
     if args.report is not None:
-        write_report(args.report, dna, rig, args.out)
+        files[args.report] = report_page(dna, rig, files[args.out], args.out.name)
+    fileio.write_all(files)  # the page last of what can fail: there is no face without it
     print(json.dumps(as_json(rig)) if args.json else "\n".join(as_lines(rig, args.out)))
     return 0
 

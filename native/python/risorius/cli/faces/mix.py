@@ -11,7 +11,7 @@ import risorius
 
 from ...files import fileio
 from ...mixing import REGIONS, Masks, Mix, check_compatible, mix_faces
-from ...mixing.textures import mix_textures, texture_folder
+from ...mixing.textures import check_room, mix_textures, texture_folder
 from ..files import CommandLineError, read, refuse_same_file, require_suffix, summary
 
 _DESCRIPTION = """\
@@ -72,6 +72,7 @@ def run(args: argparse.Namespace) -> int:
     masks = Masks(parents[0])
     dna = mix_faces(parents, mix, name=args.name or out.stem, masks=masks)
     pictures, own = mix_textures(parents, [Path(f) for f in files], mix, masks)
+    check_room(out, pictures)
     folder = texture_folder(out)
     fileio.write_all({out: dna.to_bytes()} | {folder / n: data for n, data in pictures.items()})
     _say(out, dna, files, mix, own)

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import statistics
 import time
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,7 +13,6 @@ import risorius
 
 from ...author.joint_rig import JointRig
 from ...author.measure import expression_errors
-from ...files import fileio
 from ..files import InputError
 
 if TYPE_CHECKING:  # they need Matplotlib
@@ -37,19 +35,21 @@ def need_plot() -> None:
         raise InputError(_NEEDS) from error
 
 
-def write_report(path: Path, source: risorius.Dna, rig: JointRig, made: Path) -> None:
-    """Draws what was made beside what it was made from.
+def report_page(source: risorius.Dna, rig: JointRig, data: bytes, name: str) -> bytes:
+    """What was made, drawn beside what it was made from.
 
     Args:
-        path: of the page.
         source: the face of shapes.
         rig: the face of joints and its errors.
-        made: the DNA file that was written of it.
+        data: the bytes of its DNA file.
+        name: of that file.
+
+    Returns:
+        The page, as HTML.
     """
     from ...plot.content.facts import gather
     from ...plot.report import LevelRow, render
 
-    data = made.read_bytes()
     dna = risorius.load(data)
     levels = [
         LevelRow(
@@ -64,8 +64,7 @@ def write_report(path: Path, source: risorius.Dna, rig: JointRig, made: Path) ->
         )
         for lod, level in enumerate(rig.levels)
     ]
-    page = render(gather(dna, data, made.name), levels, _rows(rig), _worst(source, rig), _DPI)
-    fileio.write_bytes(path, page)
+    return render(gather(dna, data, name), levels, _rows(rig), _worst(source, rig), _DPI)
 
 
 def _microseconds(dna: risorius.Dna, lod: int) -> float:

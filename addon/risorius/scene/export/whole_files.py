@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whether a file of Blender's exporters has its end: USD reports success on a full disk too."""
+
+from __future__ import annotations
+
+import struct
+import zipfile
+from pathlib import Path
+
+_CRATE, _OGAWA = b"PXR-USDC", b"Ogawa"
+_SECTION = struct.Struct("<16sqq")  # of a crate's table of contents: name, first byte, bytes
+
+
+def is_cut(path: Path) -> bool:
+    """Whether a part of a file is missing, by what its format says of itself.
+
+    Args:
+        path: of a file that an exporter has closed; of a format that tells nothing it is False.
+
+    Raises:
+        OSError: it cannot be read.
+    """
+    if path.suffix.lower() == ".usdz":
+        return not zipfile.is_zipfile(path)  # its directory is at its end
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        head = file.read(24)
+        if head.startswith(_CRATE):
+            contents = int.from_bytes(head[16:24], "little")
+            file.seek(min(contents, size))
+            return _contents_cut(file.read(), size) or not 0 < contents < size
+        if head.startswith(_OGAWA):  # a byte that is set last, the version, the root's place
+            return head[5:6] != b"\xff" or not 0 < int.from_bytes(head[8:16], "little") < size
+        if head.startswith(b"#usda"):
+            file.seek(max(0, size - 64))
+            return not file.read().rstrip().endswith((b"}", b")"))
+    return size == 0
+
+
+def _contents_cut(table: bytes, size: int) -> bool:
+    """Whether a section of a crate, or the table of them, ends beyond the file."""
+    count = int.from_bytes(table[:8], "little")
+    if not 0 < count <= (len(table) - 8) // _SECTION.size:
+        return True
+    rows = [_SECTION.unpack_from(table, 8 + i * _SECTION.size) for i in range(count)]
+    return any(begin < 0 or length < 0 or begin + length > size for _, begin, length in rows)

@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Paths that begin with two slashes, as Blender writes them, in each operator that takes a file."""
+
+import bpy
+import pytest
+import risorius
+from support import scene
+
+JAW = "CTRL_expressions.jawOpen"
+
+
+def _library(folder, name):
+    """A folder with one expression."""
+    folder.mkdir()
+    expression = risorius.expressions.Expression(name, name, "own", "", {JAW: 0.5}, ())
+    text = risorius.expressions.text_of(expression)
+    (folder / f"{name}.toml").write_text(text, encoding="utf-8")
+
+
+def _calls(folder):
+    """Operator -> calls with `//`, each with the file in the folder that it must have made."""
+    risorius.Clip([JAW], [[0.0, 0.5]], 24.0).save(folder / "take.rzc")
+    _library(folder / "bad", "grin")
+    one = {"filepath": "//small.dna"}
+    many = {"directory": "//", "files": [{"name": "small.dna"}]}
+    csv = {"filepath": "//out.csv", "format": "CSV", "range": "CUSTOM", "start": 1, "end": 2}
+    return {
+        "replace_dna": [(one, "")],
+        "export_dna": [({"filepath": "//out.dna"}, "out.dna")],
+        "export_animation": [(csv, "out.csv")],
+        "import_animation": [({"filepath": "//take.rzc"}, "")],
+        "export_expressions": [({"directory": "//given"}, "given/mine.toml")],
+        "import_expressions": [({"directory": "//bad"}, "library/grin.toml")],
+        "mix_add": [(one, ""), (many, "")],
+        "mix_write": [({"filepath": "//mix.dna", "use_import": False}, "mix.dna")],
+        "export_web": [({"filepath": "//page.html", "use_animation": False}, "page.html")],
+        "import_dna": [(one, ""), (many, "")],
+        "make_rig": [({"filepath": "//rig.dna", "joints": 2, "levels": 1}, "rig.dna")],
+        "speak": {"filepath": "//voice.wav"},
+    }
+
+
+def _head():
+    """An active mesh with a shape key that a rig can be made of."""
+    mesh = bpy.data.meshes.new("Head")
+    places = [(x, y, z) for x in (-0.1, 0.1) for y in (0, 0.1) for z in (0, 0.1, 0.2)]
+    mesh.from_pydata(places, [], [(0, 1, 4, 3), (1, 2, 5, 4), (6, 7, 10, 9), (7, 8, 11, 10)])
+    mesh.uv_layers.new(name="UVMap")
+    item = bpy.data.objects.new("Head", mesh)
+    bpy.context.scene.collection.objects.link(item)
+    item.shape_key_add(name="Basis")
+    item.shape_key_add(name="jawOpen").data[0].co.z -= 0.05
+    return item
+
+
+def _deaf(monkeypatch):
+    """The paths that are given to a recogniser, which hears nothing."""
+    heard = []
+
+    class Task:
+        result, error = None, scene.submodule("logic.base.errors").FaceError("nobody speaks")
+
+        def __init__(self, path, *_given, **_named):
+            heard.append(path)
+
+        def run(self):
+            pass
+
+    speech = scene.submodule("scene.animation.speech_task")
+    monkeypatch.setattr(speech, "has_recogniser", lambda: True)
+    monkeypatch.setattr(speech, "SpeechTask", Task)
+    return heard
+
+
+def test_two_slashes_begin_at_the_blend_in_every_operator(dna_file, tmp_path, monkeypatch):
+    folder = tmp_path / "file"
+    folder.mkdir()
+    _library(folder / "library", "mine")
+    dna_file.rename(folder / "small.dna")
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "scene.blend"))
+    rig = scene.load("//small.dna")
+    addon = bpy.context.preferences.addons.get(scene.MODULE) or bpy.context.preferences.addons.new()
+    addon.module = scene.MODULE
+    addon.preferences.expression_library = str(folder / "library")
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    table, run, paths = _calls(folder), bpy.ops.risorius, {"filepath", "directory"}
+    assert set(table) == {
+        name for name in dir(run) if paths & {*getattr(run, name).get_rna_type().properties.keys()}
+    }
+    monkeypatch.setattr(scene.submodule("scene.export.web_page"), "page", lambda *_given: b"a page")
+    heard = _deaf(monkeypatch)
+    bpy.context.view_layer.objects.active = scene.controls(rig)
+    with pytest.raises(RuntimeError, match=r"voice.wav: nobody speaks"):
+        run.speak(**table.pop("speak"))
+    assert heard == [str(folder / "voice.wav")]
+    for name, calls in table.items():
+        for given, made in calls:
+            bpy.context.view_layer.objects.active = (
+                _head() if name == "make_rig" else scene.controls(rig)
+            )
+            if name == "mix_add" and len(bpy.context.window_manager.risorius_mix.parents):
+                run.mix_remove(index=0)
+            assert getattr(run, name)(**given) == {"FINISHED"}, name
+            assert (folder / made).exists(), name
+    run.mix_remove(index=0)
+    assert list((tmp_path / "elsewhere").iterdir()) == []
