@@ -6,6 +6,7 @@ import errno
 import os
 import signal
 import stat
+import subprocess
 import sys
 import textwrap
 

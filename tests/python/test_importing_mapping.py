@@ -92,6 +92,42 @@ def test_a_pattern_stands_for_many():
     assert report.unmapped == ["face_w"]
 
 
+def test_lips_that_a_capture_shuts_are_the_whole_share_of_its_jaw():
+    """mouthClose is as large as jawOpen where lips are shut; the control is 1 there."""
+    jaw = [0.5, 0.5, 0.5, 0.0, 0.01, 0.01, 0.3]
+    close = [0.5, 0.25, 0.7, 0.0, 0.005, 0.02, -0.1]
+    take = importing.Imported(Clip(["JawOpen", "MouthClose"], [jaw, close], 30.0), "csv", "", "a")
+    clip, _ = take.apply("live_link_face")
+    lips = [RIG + "mouthLipsTogether" + quarter for quarter in ("UL", "UR", "DL", "DR")]
+    for name in lips:
+        # Below a jaw of 0.02 the share falls to 0: noise over noise would jump from 0 to 1.
+        np.testing.assert_allclose(clip.curve(name), [1, 0.5, 1, 0, 0.25, 1, 0], atol=1e-6)
+    np.testing.assert_allclose(clip.curve(RIG + "jawOpen"), jaw, atol=1e-6)
+    # What a copy of the mapping does to the jaw parts no lips; it adjusts the share itself.
+    own = '[controls]\n"jaw*" = { gain = 2.0 }\n"mouthLipsTogether??" = { gain = 0.5 }'
+    clip, _ = take.apply(parse_mapping('base = "arkit"\n' + own, "m"))
+    np.testing.assert_allclose(clip.curve(lips[0])[:2], [0.5, 0.25])
+    np.testing.assert_allclose(clip.curve(RIG + "jawOpen")[0], 1.0)
+    # It can take the share away, and without a jaw nothing is divided.
+    none = 'base = "arkit"\nprefix = "CTRL_expressions."\n[shares]\n"mouthLipsTogether**" = ""'
+    clip, _ = take.apply(parse_mapping(none, "m"))
+    np.testing.assert_allclose(clip.curve(lips[3]), close)
+    alone, _ = mapped('base = "arkit"', {"mouthClose": 0.25})
+    assert alone.curve(lips[0]).tolist() == [0.25, 0.25]
+
+
+def test_lips_that_are_shut_at_two_keys_are_shut_between_them():
+    keys = {"jawOpen": ([0.0, 1.0], [0.0, 0.5]), "mouthClose": ([0.0, 1.0], [0.0, 0.5])}
+    clip, _ = importing.import_curves(keys)
+    jaw, lips = clip.curve(RIG + "jawOpen"), clip.curve(RIG + "mouthLipsTogetherUL")
+    at = np.linspace(0, 1, 400)
+    straight = np.interp(at, clip.frame_times(), jaw)
+    parted = straight * (1 - np.interp(at, clip.frame_times(), lips))
+    np.testing.assert_allclose(straight, 0.5 * at, atol=1e-6)
+    assert parted.max() < 0.006  # of 35 mm
+    assert clip.frame_times()[[0, -1]].tolist() == [0, 1]
+
+
 def test_a_curve_that_comes_twice_is_taken_once_and_said():
     clip, report = mapped('base = "arkit"', {"jawOpen": 0.5, "JawOpen": 0.25})
     assert clip.curve(RIG + "jawOpen").tolist() == [0.5, 0.5]
@@ -214,6 +250,8 @@ def test_check_names_what_a_rig_lacks():
         ('[rows]\na = "nosuch"', "rows.a.@nosuch: nosuch: an expression such as .* was expected"),
         ('[rows]\n"a*b*" = { c = 1.0 }', r"rows.a\*b\*: one \* at most was expected"),
         ("strip = 3", "strip: a list of names was expected"),
+        ("[shares]\na = 1", "shares.a: a control was expected, found 1"),
+        ('[shares]\na = "b"\nb = "c"', "shares.a: a control that is no share .*, found b"),
         ("[controls]\na = { gian = 1 }", "controls.a: gain, offset, curve were expected"),
         ("[controls]\na = { curve = [[1, 2]] }", "controls.a.curve: two or more ascending"),
         ("[controls]\na = { curve = [1] }", r"controls.a.curve: a list of \[value, result\]"),

@@ -76,6 +76,17 @@ def test_the_neutral_becomes_0_and_full_stays_1():
             process.calibrate(before, *frames)
 
 
+def test_a_face_at_rest_with_shut_lips_keeps_them_shut():
+    """At rest the jaw is a little open and the lips are shut: their share is 1, and stays 1."""
+    lips = RIG + "mouthLipsTogetherDL"
+    before = Clip([lips, RIG + "jawOpen"], [[1.0, 1.0, 0.5], [0.04, 0.52, 0.52]])
+    after = process.calibrate(before, 0)
+    np.testing.assert_allclose(after.curve(RIG + "jawOpen"), [0, 0.5, 0.5], atol=1e-6)
+    np.testing.assert_allclose(after.curve(lips), [0, 1, (0.26 - 0.04) / 0.48], atol=1e-6)
+    alone = process.calibrate(Clip([lips], [[0.5, 0.75]]), 0)
+    np.testing.assert_allclose(alone.curve(lips), [0, 0.5])
+
+
 def test_smoothing_passes_cubics_and_takes_noise():
     cubic = 0.2 + AT - 0.7 * AT**2 + 0.2 * AT**3
     np.testing.assert_allclose(only(process.smooth(clip(cubic), 0.2)), cubic, atol=1e-5)

@@ -654,6 +654,19 @@ def test_neutral_now_and_gains():
     assert got.values.tolist() == pytest.approx([0.5, 0.0, 1.0])  # clamped; 1 is still reached
 
 
+def test_gains_leave_shut_lips_shut():
+    shaper = Shaper(gain=0.5)
+    shaper.gains = {"jawOpen": 1.5}
+    shaper.capture(frame_of(jawOpen=0.02, mouthClose=0.02))
+    for close, share in ((0.51, 1.0), (0.265, 0.5), (0.8, 1.0), (0.0, 0.0)):
+        got = shaper.apply(frame_of(jawOpen=0.51, mouthClose=close))
+        values = dict(zip(got.names, got.values.tolist(), strict=True))
+        assert values["CTRL_expressions.jawOpen"] == pytest.approx(0.375)
+        assert values["CTRL_expressions.mouthLipsTogetherUR"] == pytest.approx(share)
+    got = shaper.apply(frame_of(jawOpen=0.025, mouthClose=0.03))
+    assert 0 < got.values[1] < 1  # near a shut jaw the share falls to 0
+
+
 def test_a_mapping_of_ones_own(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text(

@@ -359,12 +359,14 @@ def test_yields_see_values_before_any_of_them():
     assert Mixer(["a", "b"], exclusives=Exclusives(both)).evaluate(0, [1, 1]).tolist() == [0, 0]
 
 
-def test_the_lip_seal_closes_the_jaw():
+def test_the_seal_of_an_open_jaw_stills_the_lips():
+    """Lips together under a shut jaw do nothing, and hide no teeth; they hold no jaw either."""
     lips = [f"CTRL_expressions.mouthLipsTogether{q}" for q in ("UL", "UR", "DL", "DR")]
-    names = [*lips, "CTRL_expressions.jawOpen"]
-    base = np.float32([1, 1, 1, 1, 0.8])
-    assert Mixer(names).evaluate(0, base)[4] == np.float32(0.8)
-    assert Mixer(names, exclusives="default").evaluate(0, base)[4] == pytest.approx(0.12)
+    names = [*lips, "CTRL_expressions.jawOpen", "CTRL_expressions.mouthUpperLipRaiseL"]
+    for jaw, left in ((0.8, 1 - 0.7 * 0.8), (0.0, 1.0)):
+        base = np.float32([1, 1, 1, 1, jaw, 1])
+        found = Mixer(names, exclusives="default").evaluate(0, base)
+        np.testing.assert_allclose(found, [1, 1, 1, 1, jaw, left], atol=1e-6)
 
 
 def test_a_jaw_cannot_go_both_ways():

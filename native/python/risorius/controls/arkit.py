@@ -47,6 +47,17 @@ def vrm_mapping() -> dict[str, dict[str, float]]:
     return out
 
 
+@cache
+def shares() -> dict[str, str]:
+    """Raw control that takes back a share of another -> that other; see `shares.share_of`."""
+    rows = mapping()
+    return {
+        control: next(iter(rows[whole]))
+        for unit, whole in _table()["shares"].items()
+        for control in rows[unit]
+    }
+
+
 def order(name: str) -> tuple[str, ...]:
     """The 52 units in the order of a protocol.
 

@@ -26,6 +26,7 @@ from ..base import toml
 from ..base.budget import Budget
 from ..controls import arkit
 from ..controls.regions import expand_sides
+from ..controls.shares import share_of
 from .errors import AnimationFileError
 
 Doubles = npt.NDArray[np.float64]
@@ -35,10 +36,12 @@ Row = dict[str, float]
 ANGLES = ("head.yaw", "head.pitch", "head.roll", "eyeL.yaw", "eyeL.pitch", "eyeR.yaw", "eyeR.pitch")
 _KEYS = {
     "name", "description", "base", "prefix", "strip", "matching", "gui", "ignore", "rows",
-    "controls", "metadata",
+    "shares", "controls", "metadata",
 }  # fmt: skip
 VOWELS = "AIUEO"
 _PATTERN_STEPS = 50  # of a budget, to look whether a pattern fits a name
+# Seconds between keys of curves that were keyed; between frames that are added to them; how many.
+_KEYED, _STEP, _MOST_STEPS = 0.1, 1 / 24, 64
 _SIDE = re.compile(r"(?:(?<=[a-z])(?=[LR]$)|(?<=[._\- ])(?=[LlRr]$))")
 
 
@@ -75,6 +78,9 @@ class Mapping:
         description: a sentence.
         rows: curve of the source -> {control: weight}. A name with * stands for many; the * of its
             control is what the * of the curve was. A row that is empty leaves the curve out.
+        shares: control -> the control that it takes back a share of: the value that the rows give
+            it is divided by the value that they give the other one (controls.shares.share_of). It
+            is left as it is where no curve moves the other one.
         controls: pattern of control names -> what is done to them; the last that fits counts.
         strip: beginnings that curve names may have, and that say nothing.
         is_loose: letter case, "_" and Left or L at the end make no difference.
@@ -85,6 +91,7 @@ class Mapping:
     name: str
     description: str = ""
     rows: Table[str, Row] = field(default_factory=dict)
+    shares: Table[str, str] = field(default_factory=dict)
     controls: Table[str, Adjustment] = field(default_factory=dict)
     strip: tuple[str, ...] = ()
     is_loose: bool = True
@@ -148,8 +155,9 @@ class Mapped:
 def apply_rows(mapping: Mapping, clip: Clip) -> Mapped:
     """The controls that a clip of a source's curves gives.
 
-    Curves that move one control are added up, weighted; then the control is adjusted. A curve that
-    is one control with weight 1, not adjusted, keeps its bits.
+    Curves that move one control are added up, weighted; then a control that is a share of another
+    is divided by that one, and adjusted. A curve that is one control with weight 1, and neither a
+    share nor adjusted, keeps its bits.
 
     Raises:
         BudgetError: a mapping of so many controls or patterns that the clip cannot be worth them.
@@ -187,6 +195,7 @@ def apply_rows(mapping: Mapping, clip: Clip) -> Mapped:
     ]
     adjustments = len(sums) * len(mapping.controls)
     budget.work(adjustments * _PATTERN_STEPS, f"{place}: {len(mapping.controls)} in controls")
+    clip, sums = _divided(mapping, clip, sums, budget)
     curves = np.zeros((len(sums), clip.frame_count), np.float32)
     for i, (control, values) in enumerate(sums.items()):
         what = mapping.adjustment(control)
@@ -195,6 +204,42 @@ def apply_rows(mapping: Mapping, clip: Clip) -> Mapped:
         names=tuple(sums), curves=curves, metadata={**clip.metadata, **mapping.metadata}
     )
     return out
+
+
+def _divided(
+    mapping: Mapping, clip: Clip, sums: dict[str, Doubles], budget: Budget
+) -> tuple[Clip, dict[str, Doubles]]:
+    """The sums with shares in place of what they are shares by, and the clip at their times."""
+    place = f"mapping {mapping.name}"
+    shares = [(c, w) for c, w in mapping.shares.items() if c in sums and w in sums]
+    times = _between(clip.frame_times()) if any(sums[c].any() for c, _ in shares) else None
+    if times is not None:
+        budget.hold(16 * len(sums) * len(times), f"{place}: frames between keys")
+        sums = {c: np.interp(times, clip.frame_times(), values) for c, values in sums.items()}
+        clip = clip.replaced(curves=np.zeros((len(clip.names), len(times))), times=times)
+    for control, whole in shares:
+        budget.work(clip.frame_count, f"{place}: {len(shares)} shares")
+        sums[control] = share_of(sums[control], sums[whole])
+    return clip, sums
+
+
+def _between(times: Doubles) -> Doubles | None:
+    """Times with some between keys that lie far apart: a straight share of a straight control would
+    not be straight there, and lips that are shut at both keys would part between them.
+
+    Args:
+        times: float64[frames], seconds.
+
+    Returns:
+        None where there is nothing to add: a capture has frames enough, and its gaps are gaps.
+    """
+    steps = np.diff(times)
+    if len(steps) == 0 or np.median(steps) <= _KEYED:
+        return None
+    parts = np.clip(np.ceil(steps / _STEP), 1, _MOST_STEPS).astype(int)
+    rows = [np.linspace(at, at + step, n, endpoint=False)
+            for at, step, n in zip(times, steps, parts, strict=False)]  # fmt: skip
+    return np.concatenate([*rows, times[-1:]])
 
 
 def fits(control: str, pattern: str) -> bool:
@@ -305,6 +350,7 @@ def parse_mapping(text: str, where: str, name: str = "") -> Mapping:
     for key in mapping.rows:  # a row of the base is replaced under its exact spelling only
         if key not in rows and loose_name(key) in {loose_name(own) for own in rows}:
             raise MappingError(where, f"rows: {key} is in the base with another spelling")
+    shares = _shares(_table(table, "shares", where), prefix, where)
     controls = {
         key: _adjustment(key, value, where)
         for key, value in _table(table, "controls", where).items()
@@ -315,6 +361,7 @@ def parse_mapping(text: str, where: str, name: str = "") -> Mapping:
         name=_text(table, "name", where) or name,
         description=_text(table, "description", where) or mapping.description,
         rows={**mapping.rows, **rows},
+        shares={c: whole for c, whole in {**mapping.shares, **shares}.items() if whole},
         controls={**mapping.controls, **controls},
         strip=(*mapping.strip, *_texts(table, "strip", where)),
         is_loose=_matching(table, mapping.is_loose, where),
@@ -333,10 +380,12 @@ def _base(table: Table[str, Any], where: str) -> Mapping:
     if not base:
         return Mapping("")
     if base == "arkit units":
-        return Mapping("", rows={unit: dict(row) for unit, row in arkit.mapping().items()})
+        rows = {unit: dict(row) for unit, row in arkit.mapping().items()}
+        return Mapping("", rows=rows, shares=arkit.shares())
     if base == "vrm expressions":
-        rows = {**arkit.mapping(), **arkit.vrm_mapping()}
-        return Mapping("", rows={name: dict(row) for name, row in rows.items()})
+        found = {**arkit.mapping(), **arkit.vrm_mapping()}
+        rows = {name: dict(row) for name, row in found.items()}
+        return Mapping("", rows=rows, shares=arkit.shares())
     if base not in mapping_names():
         raise MappingError(
             where, f"base: one of {', '.join(mapping_names())} was expected, found {base}"
@@ -412,6 +461,26 @@ def _expression(name: str, at: str, where: str) -> Table[str, float]:
         return expressions.get(name).weights
     except ValueError as error:
         raise MappingError(where, f"{at}: {error}") from error
+
+
+def _shares(table: Table[str, Any], prefix: str, where: str) -> dict[str, str]:
+    """Shares with names in full; "" takes a share of the base away.
+
+    No control is a share of a share: both would have to be divided in their order.
+    """
+    out: dict[str, str] = {}
+    for key, value in table.items():
+        if not isinstance(value, str):
+            raise MappingError(where, f"shares.{key}: a control was expected, found {value!r}")
+        names = [name if "." in name or not name else prefix + name for name in (key, value)]
+        out |= dict.fromkeys(expand_sides(names[0]), names[1])
+    chained = next((control for control, whole in out.items() if whole in out), None)
+    if chained is not None:
+        raise MappingError(
+            where, f"shares.{chained}: a control that is no share itself was expected, "
+            f"found {out[chained]}"
+        )  # fmt: skip
+    return out
 
 
 def _adjustment(key: str, value: object, where: str) -> Adjustment:

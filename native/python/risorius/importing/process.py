@@ -13,6 +13,8 @@ from ..base import filters
 from ..base.budget import Budget
 from ..base.errors import ArgumentError
 from ..base.filters import OneEuro
+from ..controls import arkit
+from ..controls.shares import part_of, share_of
 from ..controls.sides import mirrored_name
 from .mapping import ANGLES, fits
 
@@ -93,7 +95,9 @@ def calibrate(clip: Clip, first: int, last: int | None = None) -> Clip:
     """Make a neutral face neutral: subtract it, and stretch the rest so that full stays full.
 
     A control whose neutral value is n becomes (value - n) / (1 - n), and 0 where that is negative
-    and the control never was. Of the head and the eyes the angles are subtracted only.
+    and the control never was. Of the head and the eyes the angles are subtracted only. A control
+    that says which share of another it takes back (lips of an open jaw) is calibrated as the part
+    that it takes back: a face at rest with shut lips may have any share.
 
     Args:
         clip: a capture with a stretch of neutral face in it.
@@ -109,12 +113,19 @@ def calibrate(clip: Clip, first: int, last: int | None = None) -> Clip:
             f"frames from 0 to {clip.frame_count - 1} were expected, found {first} to {last}"
         )
     curves = clip.curves.astype(np.float64)
+    place = {name: row for row, name in enumerate(clip.names)}
+    shares = [(place[c], place[w]) for c, w in arkit.shares().items() if c in place and w in place]
+    for control, whole in shares:
+        curves[control] = part_of(curves[control], curves[whole])
     neutral = curves[:, first : last + 1].mean(axis=1)[:, None]
     is_angle = np.array([name in ANGLES for name in clip.names], bool)[:, None]
     left = np.where(is_angle, 1.0, np.maximum(1.0 - neutral, LEAST_RANGE))
     out = (curves - neutral) / left
     is_positive = ~is_angle & (curves.min(axis=1, initial=0.0)[:, None] >= 0.0)
-    return clip.replaced(curves=np.where(is_positive, np.maximum(out, 0.0), out))
+    out = np.where(is_positive, np.maximum(out, 0.0), out)
+    for control, whole in shares:
+        out[control] = share_of(out[control], out[whole])
+    return clip.replaced(curves=out)
 
 
 def smooth(clip: Clip, window: float, *, order: int = 3) -> Clip:

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..base.filters import OneEuro
 from ..controls import arkit
+from ..controls.shares import share_of
 from ..importing import Mapping, load_mapping
 from ..ranges import Ranges, Remap
 from .frame import Floats, Frame
@@ -40,10 +41,12 @@ class Plan:
     Attributes:
         controls: the controls that the names reach.
         matrix: float32[controls, names].
+        shares: place of a control, and of the one that it takes back a share of.
         adjusted: (place of a control, what the mapping does to it).
         unmapped: names that reach none, and that the mapping does not leave out either.
         is_angle: bool[names].
         head: bool[controls], the three angles of the head.
+        is_share: bool[controls].
     """
 
     def __init__(self, names: tuple[str, ...], mapping: Mapping) -> None:
@@ -57,11 +60,18 @@ class Plan:
         for column, row in enumerate(rows):
             for control, weight in (row or {}).items():
                 self.matrix[found[control], column] = weight
+        self.shares = tuple(
+            (found[control], found[whole])
+            for control, whole in mapping.shares.items()
+            if control in found and whole in found
+        )
         changes = ((i, mapping.adjustment(control)) for control, i in found.items())
         self.adjusted = tuple((i, change) for i, change in changes if change is not None)
         self.unmapped = tuple(n for n, row in zip(names, rows, strict=True) if row is None)
         self.is_angle = np.array([name in _ANGLES for name in names], bool)
         self.head = np.array([name in HEAD for name in self.controls], bool)
+        self.is_share = np.zeros(len(found), bool)
+        self.is_share[[place for place, _ in self.shares]] = True
 
 
 def _rows(names: tuple[str, ...], mapping: Mapping) -> list[Row | None]:
@@ -117,7 +127,8 @@ class Shaper:
     Attributes:
         mapping: the Mapping; names that it does not have may be raw controls, angles of the head,
             expressions of VRM.
-        gain: factor on all units; head_gain: on the head's angles, negative to turn them round.
+        gain: factor on all units, but none on a share of another control: shut lips stay shut.
+        head_gain: factor on the head's angles, negative to turn them round.
         gains: factor for single units, by their name as the frame has it, beside `gain`.
         smoothing: 0 for none, to 1: a one-euro filter, which holds a still face still and lets a
             quick move pass.
@@ -189,15 +200,18 @@ class Shaper:
     def apply(self, frame: Frame) -> Controls:
         """The controls of a frame. Frames are to come in the order of their times."""
         plan = self.plan(frame.names)
-        values = self._calibrated(frame, plan.is_angle)
+        values = plain = self._calibrated(frame, plan.is_angle)
         if self.gains:
             values = values * np.array([self.gains.get(n, 1.0) for n in frame.names], np.float32)
         result = plan.matrix @ values
+        for place, whole in plan.shares:  # of what was captured: a gain of the jaw parts no lips
+            result[place] = share_of(result[place], plan.matrix[whole] @ plain)
         for place, change in plan.adjusted:
             result[place] = change.apply(result[place])
         if self._remap is not None and self._remap.changes:
             result = self._remap(result)
-        result *= np.where(plan.head, np.float32(self.head_gain), np.float32(self.gain))
+        factors = np.where(plan.head, np.float32(self.head_gain), np.float32(self.gain))
+        result *= np.where(plan.is_share, np.float32(1.0), factors)
         if self.smoothing > 0.0:
             self._filter.cutoff = _STILL * 0.05 ** min(self.smoothing, 1.0)
             result = self._filter(frame.time, result).astype(np.float32)

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from ..anim.clip import Clip
 from ..base.errors import ArgumentError
+from ..controls import arkit
 from ..controls.sides import mirrored_name
 from .remap import WIDTHS, Learned, Range, Ranges, require_untouched
 
@@ -97,15 +98,7 @@ def learn(clip: Clip, *, performance: bool = False, most_gain: float = MOST_GAIN
         if mirrored_name(name) in measured:
             pair.append(measured[mirrored_name(name)])
         found[name] = _judge(name, _together(pair), performance, most_gain)
-    return Ranges(_with_the_jaw(found), clip.metadata.get("source", ""))
-
-
-def _with_the_jaw(found: dict[str, Learned]) -> dict[str, Learned]:
-    """Closed lips get the range of the jaw: a capture holds both to the same value."""
-    jaw = found.get(f"{_PREFIX}jawOpen")
-    if jaw is None:
-        return found
-    return {n: jaw if "mouthLipsTogether" in n else learned for n, learned in found.items()}
+    return Ranges(found, clip.metadata.get("source", ""))
 
 
 def _measure(curve: Doubles, rate: float, name: str) -> _Measured:
@@ -166,6 +159,7 @@ def _judge(name: str, found: _Measured, performance: bool, most_gain: float) -> 
     gain = max(most_gain, _LID_GAIN) if _is_lid(name) else most_gain
     reasons = {
         "gaze is an angle": "eyeLook" in name,
+        "is a share of another control": name in arkit.shares(),
         "hardly moves": moved < _LEAST_RANGE,
         "moves no more than its noise": moved < _LEAST_OVER_NOISE * found.noise,
         "is never at rest": not found.rests,

@@ -195,7 +195,7 @@ class Body:
         positions: float64[V, 3], decimetres.
         joints: positions of the joints by name.
         units: what each raw control does.
-        further_correctives: float64[V, 3] of sticky lips and the like, by their two raw controls.
+        closing: float64[V, 3], what closes lips that the jaw has opened, by their two raw controls.
         eyes: where they are and how their lids rest.
         eye_correctives: float64[V, 3], what keeps lids on the eyes, by their two raw controls.
         man: the man's, for the man himself this.
@@ -233,16 +233,15 @@ class Body:
         if other is None:
             self.units = ex.split_units(source, self.positions)
             self.units |= ex.extra_units(source, self.positions, person.origin)
-            self.further_correctives = ex.add_further_units(
+            self.closing = ex.add_further_units(
                 self.units, source, base, groups, self.positions, person.origin
             )
+            self.closing |= ex.take_closing(self.units)
         else:
             self.units = {
                 name: ex.Expression(self.carried(way)) for name, way in other._ways.items()
             }
-            self.further_correctives = {
-                pair: self.carried(shape) for pair, shape in other.further_correctives.items()
-            }
+            self.closing = self._carried_closing(other)
         self._ways = {name: unit.displacement for name, unit in self.units.items()}
         moved = dict(self._ways)
         self.eye_correctives = self.eyes.move(moved)
@@ -267,6 +266,26 @@ class Body:
             displacement: float64[V, 3], decimetres.
         """
         return displacement if self._change is None else self._change.carried(displacement)
+
+    def _carried_closing(self, man: Body) -> dict[tuple[str, str], Floats]:
+        """Another's `closing` in this person's proportions.
+
+        It is carried with the jaw, whose turn both lips share: by itself each would miss the other.
+        The lips' quarters are parts of what is carried whole, since such parts do not add up.
+
+        Args:
+            man: whose they are.
+        """
+        jaw = man._ways["jawOpen"]
+        rest = self.carried(jaw)
+        out = {pair: self.carried(jaw + way) - rest for pair, way in man.closing.items()}
+        quarters = {pair: man.closing[pair] for pair in out if pair[1] in ex.LIPS_TOGETHER}
+        whole = np.sum(list(quarters.values()), axis=0)
+        length = np.maximum(np.einsum("vi,vi->v", whole, whole), 1e-12)
+        carried = self.carried(jaw + whole) - rest
+        for pair, way in quarters.items():
+            out[pair] = carried * (np.einsum("vi,vi->v", way, whole) / length)[:, None]
+        return out
 
     def moved(self, shape: Floats) -> Body:
         """The same person with other positions.

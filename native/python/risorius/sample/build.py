@@ -271,7 +271,7 @@ def add_behavior(
     dna: Dna,
     raw: list[str],
     units: dict[str, ex.Expression],
-    correctives: list[tuple[str, str]],
+    correctives: list[tuple[str, ...]],
 ) -> None:
     """Fill the correctives, joint groups, blend shape channels and animated maps.
 
@@ -279,14 +279,14 @@ def add_behavior(
         dna: is filled.
         raw: names of the raw controls without their prefix.
         units: what each raw control does, by its name.
-        correctives: the two raw controls of each corrective.
+        correctives: the raw controls of each corrective.
     """
     names = [name for name, _ in JOINTS]
     dna.psd_count = len(correctives)
     dna.psds = Psds(
-        rows=[len(raw) + i for i in range(len(correctives)) for _ in range(2)],
-        columns=[raw.index(name) for pair in correctives for name in pair],
-        values=np.ones(2 * len(correctives), np.float32),
+        rows=[len(raw) + i for i, names in enumerate(correctives) for _ in names],
+        columns=[raw.index(name) for names in correctives for name in names],
+        values=np.ones(sum(map(len, correctives)), np.float32),
     )
     groups = []
     for joint in (name for name in names if name.startswith("FACIAL_")):
@@ -382,8 +382,11 @@ def assemble(
     body = Body(source, base, person)
     positions, joints, units = body.positions, body.joints, body.units
     places = body.man.positions - [0, *body.man.joints["FACIAL_L_Eye"][1:]]
-    correctives = ex.corrective_displacements(units, places) | body.further_correctives
-    correctives |= body.eye_correctives
+    correctives: dict[tuple[str, ...], Floats] = {}
+    for found in (ex.corrective_displacements(units, places), body.closing, body.eye_correctives):
+        correctives |= {tuple(pair): way for pair, way in found.items()}
+    # It adds no shape: the turns of the joints of its factors do not add up, and it mends that.
+    correctives[ex.CLOSED] = np.zeros_like(positions)
     raw = list(units)
     pairs = list(correctives)
     channels = raw + ["_x_".join(pair) for pair in pairs]
@@ -404,7 +407,14 @@ def assemble(
                 whole = unit.displacement - correctives.get((name, name), 0.0)
                 here = ex.Expression(part.carry(whole), unit.joints)
                 deltas.append(bind_displacement(p, w, here, joints))
-            deltas += [part.carry(delta) for delta in correctives.values()]
+            jaw = raw.index("jawOpen")
+            for pair, way in correctives.items():
+                delta = part.carry(way)
+                if pair in body.closing:  # a way in space, not one that the open jaw turns
+                    open_jaw = units["jawOpen"]
+                    both = ex.Expression(part.carry(open_jaw.displacement) + delta, open_jaw.joints)
+                    delta = bind_displacement(p, w, both, joints) - deltas[jaw]
+                deltas.append(delta)
             add_targets(mesh, deltas)
         mapping += [(number, t.blend_shape_channel_index) for t in mesh.blend_shape_targets]
         meshes.append(mesh)

@@ -18,6 +18,8 @@ from .source import BaseMesh, Source
 
 _CHEEK_BALL, _ROLL = 0.032, 0.022  # decimetres
 PREFIX = "CTRL_expressions."
+LIPS_TOGETHER = [f"mouthLipsTogether{lip}{side}" for lip in "UD" for side in "LR"]
+CLOSED = ("jawOpen", *LIPS_TOGETHER)
 _BROWS = [f"eyebrows-{side}-{way}" for side in ("left", "right") for way in ("down", "up")]
 
 
@@ -237,12 +239,26 @@ def leave_bones(
             unit.displacement[groups[group]] = way
 
 
+def take_closing(out: dict[str, Expression]) -> dict[tuple[str, str], Floats]:
+    """What brings lips together under an open jaw, by jawOpen and the control of each quarter.
+
+    The data's shape takes back what the jaw opens: over a shut jaw it would lift the lower lip far
+    over the upper one. So the controls do nothing by themselves.
+
+    Args:
+        out: the expressions by name; those of the lips' quarters become still.
+    """
+    result: dict[tuple[str, str], Floats] = {}
+    for name in LIPS_TOGETHER:
+        result[("jawOpen", name)] = out[name].displacement
+        out[name] = Expression(np.zeros_like(out[name].displacement))
+    return result
+
+
 def corrective_displacements(
     out: dict[str, Expression], places: Floats
 ) -> dict[tuple[str, str], Floats]:
     """What to add where two controls meet; (a, b) fires with the product of both.
-
-    Where a shape adds nothing joints do: an open jaw under closed lips turns them.
 
     Args:
         out: what each raw control does, by its name.
@@ -251,8 +267,6 @@ def corrective_displacements(
     lower = lip_masks(out["jawOpen"].displacement)["D"][:, None]
     result: dict[tuple[str, str], Floats] = {}
     for side in ("L", "R"):
-        for lip in ("U", "D"):
-            result[("jawOpen", f"mouthLipsTogether{lip}{side}")] = np.zeros((len(lower), 3))
         # The open jaw stretches the lower lip: a smile cannot lift it as far.
         smile = out[f"mouthCornerPull{side}"].displacement
         result[("jawOpen", f"mouthCornerPull{side}")] = -0.3 * lower * smile

@@ -18,7 +18,7 @@ from .places import MM, Places, bell
 
 _ROWS = toml.parse(files(__package__).joinpath("further.toml").read_text(encoding="utf-8"))
 _SIDE = "{s}"
-_OF_DATA = {"data", "units", "size", "with", "alone"}
+_OF_DATA = {"data", "units", "size", "with"}
 
 
 def names_of(row: str) -> list[str]:
@@ -69,15 +69,14 @@ def further_units(
         whole = _ways(source, origin, places, units, keys) * _weight(places, keys)[:, None]
         if keys.get("flat"):
             whole -= places.normals * np.einsum("ij,ij->i", whole, places.normals)[:, None]
-        furthest = np.linalg.norm(whole, axis=1).max()
         if "size" in keys:
-            whole = whole * (keys["size"] * MM / furthest)
-        alone = keys["alone"] * MM / furthest if "with" in keys else 1.0
+            whole = whole * (keys["size"] * MM / np.linalg.norm(whole, axis=1).max())
         for name in names_of(row):
             half = whole * (sides[_side(row, name)][:, None] if _SIDE in row else 1.0)
-            out[name] = alone * half
+            out[name] = half
             if "with" in keys:
-                correctives[(keys["with"], name)] = (1 - alone) * half
+                correctives[(keys["with"], name)] = half
+                out[name] = np.zeros_like(half)
     return out, correctives
 
 
