@@ -21,6 +21,7 @@ MM = {"cm": 10.0, "m": 1000.0}
 # A vertex that follows another joint of the neck than before counts as one that is so far off: a
 # head that is turned moves them about so far against each other.
 CARRIED_MM = 20.0
+_FARTHEST = 1e9  # in the unit of the file: 10,000 km
 _RIGID_MM = 0.02  # a mesh that its joints bring so near needs no others
 
 
@@ -106,6 +107,7 @@ class Work:
 def begin(dna: Dna) -> Work:
     if not dna.meshes or not dna.joint_names:
         raise ArgumentError("a face with meshes and at least one joint was expected")
+    _require_sizes(dna)
     count = sk.column_count(dna)
     deltas = sk.column_deltas(dna, count)
     if np.any(deltas[..., 6:9]):
@@ -123,6 +125,23 @@ def begin(dna: Dna) -> Work:
     work.wanted = {m: displacements(work, mesh) for m, mesh in enumerate(dna.meshes)}
     work.head = _head(work)
     return work
+
+
+def _require_sizes(dna: Dna) -> None:
+    """Refuse meshes whose squares or quotients leave the numbers that can be computed with."""
+    spread = 0.0
+    for name, mesh in zip(dna.mesh_names, dna.meshes, strict=False):
+        points = np.asarray(mesh.positions, np.float64)
+        moved = [np.asarray(t.deltas, np.float64) for t in mesh.blend_shape_targets]
+        largest = max((float(np.abs(x).max(initial=0.0)) for x in (points, *moved)), default=0.0)
+        if not largest <= _FARTHEST:
+            raise ArgumentError(
+                f"mesh {name}: coordinates up to {_FARTHEST:g} were expected, found {largest:g}"
+            )
+        if len(points):
+            spread = max(spread, float(np.ptp(points, axis=0).max()))
+    if not spread:
+        raise ArgumentError("a mesh of some size was expected, found vertices in one point")
 
 
 def _column_name(dna: Dna, column: int) -> str:

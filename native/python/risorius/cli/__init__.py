@@ -13,6 +13,7 @@ import io
 import os
 import sys
 from collections.abc import Sequence
+from typing import NoReturn
 
 from .. import __version__
 from ..base.errors import RisoriusError, sentence
@@ -70,9 +71,23 @@ def _drop_output() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
+class _Parser(argparse.ArgumentParser):
+    """A parser that leaves to `main` what is wrong with the value of one option."""
+
+    def error(self, message: str) -> NoReturn:
+        if message.startswith("argument "):
+            raise CommandLineError(message.removeprefix("argument "))
+        super().error(message)
+
+
 def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
-    """What was typed; `func` is the command. Raises: SystemExit: it makes no sense."""
-    parser = argparse.ArgumentParser(prog="risorius", description="Face rigs from DNA files.")
+    """What was typed; `func` is the command.
+
+    Raises:
+        CommandLineError: an option has no such value.
+        SystemExit: it makes no sense as a whole; the usage was printed.
+    """
+    parser = _Parser(prog="risorius", description="Face rigs from DNA files.")
     parser.add_argument("--version", action="version", version=__version__)
     subparsers = parser.add_subparsers(dest="command", required=True)
     commands = (

@@ -9,10 +9,18 @@ import sys
 from pathlib import Path
 
 from ..anim.clip import Clip
+from ..base.reading import TEXT
 from ..importing import writing
 from ..speech import Heard, Phoneme, animate, listen
 from ..speech.listening import confidence
-from .files import CommandLineError, InputError, read_bytes, require_suffix, require_writable
+from .files import (
+    InputError,
+    number,
+    read_bytes,
+    require_suffix,
+    require_writable,
+    whole_number,
+)
 
 _KINDS = (".rzc", ".csv", ".json")
 
@@ -32,11 +40,15 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     known = parser.add_mutually_exclusive_group()
     known.add_argument("--text", help="what is said")
     known.add_argument("--transcript", metavar="FILE", help="a text file of what is said")
-    parser.add_argument("--rate", type=float, default=60.0, metavar="FPS", help="(default 60)")
     parser.add_argument(
-        "--intensity", type=float, default=1.0, metavar="X", help="of the shapes, 0 to 4"
+        "--rate", type=number(1.0, 1000.0), default=60.0, metavar="FPS", help="(default 60)"
     )
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the blinks")
+    parser.add_argument(
+        "--intensity", type=number(0.0, 4.0), default=1.0, metavar="X", help="of the shapes, 0 to 4"
+    )
+    parser.add_argument(
+        "--seed", type=whole_number(0), default=0, metavar="N", help="of the blinks"
+    )
     parser.add_argument("--no-blinks", action="store_true")
     parser.add_argument("--no-accents", action="store_true", help="brows and head keep still")
     parser.add_argument(
@@ -47,15 +59,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def complain(args: argparse.Namespace) -> None:
-    """Raises CommandLineError for what is wrong before the voice is listened to."""
+    """Raises what is wrong with the names of outputs before the voice is listened to."""
     require_suffix(args.out, _KINDS, "-o")
     require_writable(args.out, args.phonemes)
-    if not 1.0 <= args.rate <= 1000.0:
-        raise CommandLineError(f"--rate: 1 to 1000 was expected, found {args.rate:g}")
-    if not 0.0 <= args.intensity <= 4.0:
-        raise CommandLineError(f"--intensity: 0 to 4 was expected, found {args.intensity:g}")
-    if args.seed < 0:
-        raise CommandLineError(f"--seed: 0 or more was expected, found {args.seed}")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -75,7 +81,7 @@ def _spoken(args: argparse.Namespace) -> tuple[Heard, Clip]:
     said = args.text
     if args.transcript is not None:
         try:
-            said = read_bytes(args.transcript).decode("utf-8-sig")
+            said = read_bytes(args.transcript, TEXT).decode("utf-8-sig")
         except UnicodeDecodeError as error:
             raise InputError(f"{args.transcript}: not UTF-8 (byte {error.start})") from error
     shown = sys.stderr.isatty()

@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..base.budget import Budget
+from ..base.given import GivenError, shown, whole
 from . import named_json
 from .errors import AnimationFileError
 from .keys import CONSTANT, CUBIC, LINEAR, Keys, on_one_clock
@@ -66,7 +67,7 @@ class Document:
         """
         rows = self.json.get(kind)
         if not isinstance(rows, list) or isinstance(index, bool) or not isinstance(index, int):
-            raise self.fail(place, f"an index of {kind} was expected, found {index!r}")
+            raise self.fail(place, f"an index of {kind} was expected, found {shown(index)}")
         if not 0 <= index < len(rows) or not isinstance(rows[index], dict):
             raise self.fail(place, f"{kind}[{index}] was expected, there are {len(rows)}")
         return rows[index]
@@ -84,9 +85,10 @@ class Document:
             AnimationFileError: something else is there.
         """
         value = table.get(key, default)
-        if isinstance(value, bool) or not isinstance(value, int) or value < 0:
-            raise self.fail(f"{place}.{key}", f"a whole number was expected, found {value!r}")
-        return value
+        try:
+            return whole(value, 0)
+        except GivenError as error:
+            raise self.fail(f"{place}.{key}", str(error)) from None
 
     def numbers(self, index: object, place: str) -> Doubles:
         """float64[count] of a scalar accessor; whole numbers as the fractions they stand for.
@@ -225,7 +227,7 @@ class Document:
         # A glTF may name files in its own folder, and no others on the disk.
         if re.match(r"[a-zA-Z]+:|[/\\]", file) or ".." in re.split(r"[/\\]", file):
             raise self.fail(place, f"a file beside this one was expected, found {uri[:80]!r}")
-        data = read_bytes(self.path.parent / file)
+        data = read_bytes(self.path.parent / file, found=True)
         # A buffer in a file of its own counts as input; but a short JSON may name that file often.
         self.budget.hold(len(data), place)
         return data

@@ -42,7 +42,7 @@ def read_fbx(path: Path, mesh: str = "") -> tuple[ObjMesh, dict[str, Doubles]]:
         AnimationFileError: the file is damaged; with the place in it.
         BudgetError: more numbers than a file of this size may hold.
     """
-    data = read_bytes(path)
+    data = read_bytes(path, found=True)
     if not is_fbx(data):
         raise ShapeFileError(f"{path}: a binary FBX was expected")
     scene = read_scene(Parser(data, str(path), Budget.of(len(data)), _SKIPPED))

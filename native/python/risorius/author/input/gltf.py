@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ...base.given import GivenError, finite, several
 from ...importing import named_json
 from ...importing.gltf import Document, is_glb, is_gltf, open_glb, open_gltf
 from ...importing.source import decode, read_bytes
@@ -34,7 +35,7 @@ def read_gltf(path: Path, mesh: str = "") -> tuple[ObjMesh, dict[str, Doubles]]:
         AnimationFileError: the file is damaged; with the place in it.
         BudgetError: more numbers than a file of this size may hold.
     """
-    data = read_bytes(path)
+    data = read_bytes(path, found=True)
     if is_glb(data):
         document = open_glb(path, data)
     else:
@@ -207,10 +208,13 @@ def _node_matrix(document: Document, mesh: int) -> Doubles:
 def _local(document: Document, node: Mapping[str, Any], place: str) -> Doubles:
     def numbers(key: str, default: list[float]) -> Doubles:
         value = node.get(key, default)
-        good = isinstance(value, list) and len(value) == len(default)
-        if not good or not all(isinstance(x, int | float) for x in value):
-            raise document.fail(f"{place}.{key}", f"{len(default)} numbers were expected")
-        return np.array(value, np.float64)
+        try:
+            found = several(value, finite)
+        except GivenError:
+            found = ()
+        if len(found) != len(default):
+            raise document.fail(f"{place}.{key}", f"{len(default)} finite numbers were expected")
+        return np.array(found, np.float64)
 
     if "matrix" in node:
         return numbers("matrix", [0.0] * 16).reshape(4, 4).T

@@ -3,13 +3,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import io
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from ...base.errors import RisoriusError
+from ...base.reading import MESH, read_file
 from ..geometry.skeleton import Doubles
 
 
@@ -40,8 +42,7 @@ def read_obj(path: Path) -> ObjMesh:
     uvs: list[list[float]] = []
     faces: list[list[int]] = []
     uv_faces: list[list[int]] = []
-    text = path.read_text(encoding="utf-8", errors="replace")
-    for number, line in enumerate(text.splitlines(), 1):
+    for number, line in enumerate(_lines(path), 1):
         kind, _, rest = line.strip().partition(" ")
         try:
             if kind == "v":
@@ -94,19 +95,24 @@ def read_positions(path: Path, count: int) -> Doubles:
         OSError: the file cannot be read.
     """
     positions = []
-    with path.open(encoding="utf-8", errors="replace") as lines:
-        for number, line in enumerate(lines, 1):
-            if line.startswith("v "):
-                try:
-                    positions.append(_numbers(line[2:], 3))
-                except ValueError as error:
-                    raise ShapeFileError(f"{path}: line {number}: {error}") from None
+    for number, line in enumerate(_lines(path), 1):
+        if line.startswith("v "):
+            try:
+                positions.append(_numbers(line[2:], 3))
+            except ValueError as error:
+                raise ShapeFileError(f"{path}: line {number}: {error}") from None
     if len(positions) != count:
         raise ShapeFileError(
             f"{path}: {count:,} vertices were expected, as the neutral mesh has, "
             f"found {len(positions):,}"
         )
     return np.array(positions)
+
+
+def _lines(path: Path) -> Iterator[str]:
+    """Raises: ReadingError: larger than a mesh may be, or no file; OSError."""
+    data = read_file(path, MESH, found=True)
+    yield from io.TextIOWrapper(io.BytesIO(data), encoding="utf-8", errors="replace")
 
 
 def _numbers(text: str, count: int) -> list[float]:

@@ -37,6 +37,8 @@ def check_shapes(shapes: ShapeSet) -> list[str]:
         ValueError: no expression moves a vertex, or one is not of the mesh' size.
     """
     size = float(np.ptp(shapes.mesh.positions, axis=0).max())
+    if not size:
+        raise ArgumentError("the neutral mesh: some size was expected, found vertices in one point")
     out: list[str] = []
     seen: dict[bytes, str] = {}
     moving = 0
