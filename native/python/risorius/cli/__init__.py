@@ -32,6 +32,7 @@ from . import eval as evaluate
 from .faces import author, mix, sample, solve
 from .files import CommandLineError
 from .pages import plot, web
+from .terminal import obeyed_by_nobody
 
 INTERRUPTED = 130
 
@@ -41,6 +42,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # names need not be text that a terminal can show
             stream.reconfigure(errors="backslashreplace")
+    with obeyed_by_nobody():
+        return _run(arguments)
+
+
+def _run(arguments: Sequence[str] | None) -> int:
     try:
         args = parse(arguments)
         code = int(args.func(args))
