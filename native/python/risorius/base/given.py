@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
+from numbers import Integral, Real
 from typing import TypeVar
 
 from .errors import ArgumentError
@@ -43,11 +44,12 @@ def whole(value: object, low: int, high: int = MOST) -> int:
     Raises:
         GivenError: it is none, or outside that range.
     """
-    if isinstance(value, bool) or not isinstance(value, int):
+    if isinstance(value, bool) or not isinstance(value, Integral):
         raise GivenError(f"a whole number was expected, found {shown(value)}")
-    if not low <= value <= high:
-        raise GivenError(f"{_range(value, low, high)} was expected, found {shown(value)}")
-    return int(value)
+    number = int(value)
+    if not low <= number <= high:
+        raise GivenError(f"{_range(number, low, high)} was expected, found {shown(number)}")
+    return number
 
 
 def finite(
@@ -64,9 +66,10 @@ def finite(
     Raises:
         GivenError: it is none, or outside that range.
     """
-    if isinstance(value, bool) or not isinstance(value, int | float):
+    if isinstance(value, bool) or not isinstance(value, Real):
         raise GivenError(f"a number was expected, found {shown(value)}")
-    return _inside(value, value, low, high, above=above)
+    number = int(value) if isinstance(value, Integral) else float(value)
+    return _inside(number, value, low, high, above=above)
 
 
 def whole_text(typed: str, low: int, high: int = MOST) -> int:
@@ -147,6 +150,25 @@ def several(value: object, of: Callable[[object], T]) -> tuple[T, ...]:
     if not isinstance(value, list):
         raise GivenError(f"a list was expected, found {shown(value)}")
     return tuple(of(item) for item in value)
+
+
+def checked(name: str, check: Callable[..., T], value: object, low: float, high: float) -> T:
+    """An argument of a function, by `whole` or `finite`.
+
+    Args:
+        name: of the argument.
+        check: one of the two.
+        value: of any type.
+        low: the least that is allowed.
+        high: the most that is allowed.
+
+    Raises:
+        ArgumentError: it is none, or outside that range; names the argument.
+    """
+    try:
+        return check(value, low, high)
+    except GivenError as error:
+        raise ArgumentError(f"{name}: {error}") from None
 
 
 def shown(value: object) -> str:
