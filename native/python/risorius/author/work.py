@@ -21,7 +21,6 @@ MM = {"cm": 10.0, "m": 1000.0}
 # A vertex that follows another joint of the neck than before counts as one that is so far off: a
 # head that is turned moves them about so far against each other.
 CARRIED_MM = 20.0
-_FARTHEST = 1e9  # in the unit of the file: 10,000 km
 _RIGID_MM = 0.02  # a mesh that its joints bring so near needs no others
 
 
@@ -134,9 +133,9 @@ def _require_sizes(dna: Dna) -> None:
         points = np.asarray(mesh.positions, np.float64)
         moved = [np.asarray(t.deltas, np.float64) for t in mesh.blend_shape_targets]
         largest = max((float(np.abs(x).max(initial=0.0)) for x in (points, *moved)), default=0.0)
-        if not largest <= _FARTHEST:
+        if not largest <= sk.FARTHEST:
             raise ArgumentError(
-                f"mesh {name}: coordinates up to {_FARTHEST:g} were expected, found {largest:g}"
+                f"mesh {name}: coordinates up to {sk.FARTHEST:g} were expected, found {largest:g}"
             )
         if len(points):
             spread = max(spread, float(np.ptp(points, axis=0).max()))

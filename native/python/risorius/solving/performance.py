@@ -58,7 +58,8 @@ def read_performance(
         raise PerformanceError(f"{path}: a name ending in .abc or .npz was expected")
     fitting = None if counts is None else set(counts.values())
     take = _alembic(path, name, fitting) if suffix == ".abc" else _arrays(path)
-    if not np.isfinite(take.frames).all():
+    finite = np.isfinite(take.frames).all()
+    if not finite or (take.neutral is not None and not np.isfinite(take.neutral).all()):
         raise PerformanceError(f"{path}: finite vertices were expected")
     return take
 
@@ -89,8 +90,9 @@ def _arrays(path: str | os.PathLike[str]) -> Performance:
     rate = float(given) if given.size == 1 else np.nan
     if not (np.isfinite(rate) and rate > 0):
         raise PerformanceError(f"{path}: a rate above 0 was expected, found {given.tolist()}")
-    own = None if neutral is None else neutral.astype(np.float32)
-    return Performance(frames.astype(np.float32), rate, 0.0, own)
+    with np.errstate(over="ignore"):  # what leaves float32 is infinite, and refused
+        own = None if neutral is None else neutral.astype(np.float32)
+        return Performance(frames.astype(np.float32), rate, 0.0, own)
 
 
 def _alembic(
