@@ -262,8 +262,9 @@ TRIALS: dict[str, tuple[list[str], str]] = {
     "sample": (["person.toml", "rig.toml"], "sample build OUT.dna --person person.toml --spec "
                "rig.toml --offline"),
     "mix": (["face.dna"], "mix FILE=0.5 face.dna=0.5 -o OUT.dna --nose FILE=1"),
-    "edit": (["core.dna", "face.dna", "regions.json"], "edit regroup core.dna OUT.dna --regions "
+    "edit": (["core.dna", "regions.json"], "edit regroup core.dna OUT.dna --regions "
              "regions.json --combinations 2 --threshold 0.1 --seed 3"),
+    "edit face": (["face.dna"], "edit regroup FILE OUT.dna --combinations 2 --json"),
     "solve": (["frames.npz", "face.dna"], "solve face.dna frames.npz -o OUT.rzc --report"),
     "batch": (["jobs.toml", "map.toml"], "batch jobs.toml --dry-run"),
     "speech": (["voice.wav", "said.txt"], "speech voice.wav -o OUT.rzc --transcript said.txt "

@@ -177,6 +177,8 @@ def test_what_is_no_head_is_one_sentence(tmp_path):
         lambda j: j.update(extensionsRequired=["KHR_draco_mesh_compression"])
     )
     assert "triangles were expected" in said(primitive("mode", 1))
+    assert "VEC3 was expected" in said(accessor(0, componentType=[]))
+    assert "found a list" in said(accessor(0, type=[1]))
     huge = 10**400
     assert "found a number of 401 digits" in said(accessor(0, count=huge))
     assert "found a number of 401 digits" in said(

@@ -2,6 +2,7 @@
 """Numbers and files that people give: of any size, of another kind, without an end."""
 
 import os
+import threading
 
 import command_line
 import face_shapes
@@ -264,3 +265,16 @@ def test_what_is_found_in_a_folder_is_a_file(tmp_path):
             1, "author", path, "-o", tmp_path / "out.dna"
         )
         odd.unlink()
+
+
+@needs_pipes
+def test_a_pipe_that_was_typed_is_read_once(tmp_path):
+    take = tmp_path / "take.csv"
+    take.write_text("time,jawOpen\n0,0\n1,1\n")
+    pipe = tmp_path / "face.dna"
+    os.mkfifo(pipe)
+    writer = threading.Thread(target=lambda: pipe.open("wb").close())
+    writer.start()
+    said = refused(1, "eval", take, pipe, "-o", tmp_path / "out.npz")
+    writer.join()
+    assert f"{pipe}: the file is empty" in said

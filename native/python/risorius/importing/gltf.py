@@ -9,7 +9,7 @@ import re
 import struct
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 from urllib.parse import unquote
 
 import numpy as np
@@ -109,7 +109,7 @@ class Document:
         accessor = self.item("accessors", index, place)
         at = f"accessors[{index}]"
         kind = accessor.get("componentType")
-        if kind not in _TYPES or accessor.get("type") != "SCALAR":
+        if not _is_key(kind, _TYPES) or accessor.get("type") != "SCALAR":
             raise self.fail(at, "numbers one by one were expected")
         if "sparse" in accessor:
             raise self.fail(at, "an accessor that is not sparse was expected")
@@ -147,8 +147,8 @@ class Document:
         """
         accessor = self.item("accessors", index, place)
         at = f"accessors[{index}]"
-        if accessor.get("type") != kind or accessor.get("componentType") not in _TYPES:
-            raise self.fail(at, f"{kind} was expected, found {accessor.get('type')!r}")
+        if accessor.get("type") != kind or not _is_key(accessor.get("componentType"), _TYPES):
+            raise self.fail(at, f"{kind} was expected, found {shown(accessor.get('type'))}")
         width = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}[kind]
         dtype = np.dtype(_TYPES[accessor["componentType"]])
         count = self.whole(accessor, "count", at)
@@ -231,6 +231,11 @@ class Document:
         # A buffer in a file of its own counts as input; but a short JSON may name that file often.
         self.budget.hold(len(data), place)
         return data
+
+
+def _is_key(value: object, table: Mapping[Any, object]) -> TypeGuard[Any]:
+    """Whether a value of the JSON, which may be a list, stands in a table."""
+    return isinstance(value, int | str) and value in table
 
 
 def is_glb(data: bytes) -> bool:
@@ -454,8 +459,8 @@ def _keys(
     if not isinstance(sampler, dict):
         raise document.fail(place, f"a sampler was expected, found {index!r}")
     way = sampler.get("interpolation", "LINEAR")
-    if way not in _KINDS:
-        raise document.fail(place, f"one of {', '.join(_KINDS)} was expected, found {way!r}")
+    if not _is_key(way, _KINDS):
+        raise document.fail(place, f"one of {', '.join(_KINDS)} was expected, found {shown(way)}")
     times = document.numbers(sampler.get("input"), f"{place}, input")
     document.budget.work(times.size, place)
     if times.size == 0 or (np.diff(times) <= 0.0).any():

@@ -52,7 +52,11 @@ def compile_cached(
         return Rig.load(file, trusted=None, simd=simd)
     try:
         dna = load(data)
-    except DnaError:
+    except DnaError as error:
+        if not os.path.isfile(path):  # a pipe gives its bytes once
+            named = DnaError(f"{os.fspath(path)}: {error}")
+            named.code, named.where, named.offset = error.code, error.where, error.offset
+            raise named from None
         dna = load(path)  # names the file
     rig = Rig(dna, precision=precision, rotation=rotation, simd=simd)
     with contextlib.suppress(OSError, DnaError):

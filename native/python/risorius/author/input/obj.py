@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ...base.errors import RisoriusError
+from ...base.given import MOST, finite_text, shown, whole_text
 from ...base.reading import MESH, read_file
 from ..geometry.skeleton import Doubles
 
@@ -117,9 +118,12 @@ def _lines(path: Path) -> Iterator[str]:
 
 def _numbers(text: str, count: int) -> list[float]:
     words = text.split()[:count]
-    values = [float(word) for word in words]
-    if len(values) != count or not np.isfinite(values).all():
-        raise ValueError(f"{count} finite numbers were expected, found {text.strip()!r}")
+    try:
+        values = [finite_text(word) for word in words]
+    except ValueError:
+        values = []
+    if len(values) != count:
+        raise ValueError(f"{count} finite numbers were expected, found {shown(text.strip())}")
     return values
 
 
@@ -131,13 +135,13 @@ def _polygon(text: str, vertices: int, uvs: int) -> tuple[list[int], list[int]]:
         if len(parts) > 1 and parts[1]:
             uv_face.append(_index(parts[1], uvs, "texture coordinate"))
     if len(face) < 3 or len(uv_face) not in (0, len(face)):
-        raise ValueError(f"a polygon of three corners or more was expected, found {text!r}")
+        raise ValueError(f"a polygon of three corners or more was expected, found {shown(text)}")
     return face, uv_face
 
 
 def _index(text: str, count: int, what: str) -> int:
     """From 0; a negative number counts from the end. Raises: ValueError."""
-    number = int(text)
+    number = whole_text(text, -MOST)
     index = number - 1 if number > 0 else count + number
     if not 0 <= index < count:
         raise ValueError(f"{what} {number} of {count} is not there")
