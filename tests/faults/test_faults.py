@@ -7,7 +7,6 @@ import sys
 
 import faults
 import mutants_of_inputs
-import numpy as np
 import pytest
 import room
 from conftest import PROJECT
@@ -73,14 +72,14 @@ def test_mutants_are_told_by_their_seed(tmp_path):
         ("os.kill(os.getpid(), 11)", "ended by SIGSEGV"),
         ("sys.exit(3)", "exit code 3"),
         ("open('half', 'w'); raise OSError(5, 'bad', 'x')", "left ['half']"),
-        ("hold = bytearray(400 << 20); hold[::4096] = bytes(len(hold[::4096]))", "were allowed"),
-        ("np.float32(1e30) * np.float32(1e30)", "a warning of Python's"),
+        ("b'x' * (400 << 20)", "were allowed"),
+        ("import warnings; warnings.warn('odd', RuntimeWarning)", "a warning of Python's"),
         ("os.write(1, b''); raise MemoryError", "all memory was asked for"),
     ],
 )
 def test_a_planted_fault_is_seen_by_mutations(fault, seen, monkeypatch):
     def run(args):
-        exec(fault, {"os": os, "sys": sys, "np": np})
+        exec(fault, {"os": os, "sys": sys})
         return 0
 
     monkeypatch.setattr("risorius.cli.info.run", run)

@@ -95,6 +95,8 @@ def test_alembic_needs_its_package_or_is_read(take, tmp_path):
         ({"points": np.zeros((2, 196, 3))}, r"vertices of shape \[F, V, 3\]"),
         ({"vertices": np.zeros((2, 3))}, r"vertices of shape \[F, V, 3\]"),
         ({"vertices": np.full((2, 196, 3), np.inf)}, "finite vertices"),
+        ({"vertices": np.full((2, 196, 3), 1e38)}, "vertices up to 1e.09"),
+        ({"vertices": np.full((2, 196, 3), 1e300)}, "finite vertices"),
         ({"vertices": np.zeros((2, 196, 3)), "neutral": np.zeros((4, 3))}, "neutral of shape"),
         ({"vertices": np.zeros((2, 196, 3)), "rate": 0.0}, "a rate above 0"),
         ({"vertices": np.zeros((2, 196, 3)), "rate": [24.0, 25.0]}, "a rate above 0"),

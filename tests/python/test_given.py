@@ -6,8 +6,10 @@ import threading
 
 import command_line
 import face_shapes
+import numpy as np
 import pytest
 from conftest import GOLDEN
+from risorius.author.input import spec
 from risorius.base import given
 from risorius.base.budget import Budget, BudgetError
 
@@ -157,6 +159,20 @@ def test_heads_of_no_size_or_of_any(tmp_path):
         file.write_text("v 0 1 0\n")
     (path.parent / "neutral.obj").write_text("v 0 0 0\nf 1 1 1\n")
     assert "some size was expected" in refused(1, "author", path, "-o", out)
+
+
+def test_a_vertex_without_weights_goes_with_the_root(egg, tmp_path):
+    dna, _, _ = spec.read_face(spec.read_spec(egg))
+    mesh = dna.meshes[0]
+    weights = np.array(mesh.skin_weights)
+    weights[19] = 0
+    mesh.skin_weights = weights
+    dna.meshes = [mesh]
+    dna.save(tmp_path / "face.dna")
+    path = tmp_path / "spec.toml"
+    path.write_text('[source]\ndna = "face.dna"\n[joints]\ncount = 3\nrounds = 0\n')
+    done = command_line.run("author", path, "-o", tmp_path / "out.dna", text=True)
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 @pytest.mark.parametrize("weight", [str(HUGE), f"0x{'f' * 5000}", "nan", "1e39", "[]", "true"])

@@ -413,13 +413,17 @@ def _meshes(
         if not isinstance(mesh, int | np.integer) or not 0 <= mesh < len(surface.vertex_counts):
             end = len(surface.vertex_counts)
             raise ArgumentError(f"{name}: meshes below {end} were expected, found {shown(mesh)}")
-        array = numbers(name, value).astype(np.float32)
+        is_real = isinstance(value, np.ndarray) and value.dtype.kind == "f"
+        with np.errstate(over="ignore"):  # what leaves float32 is infinite, and refused below
+            array = np.asarray(value if is_real else numbers(name, value), np.float32)
         count = surface.vertex_counts[mesh]
         if array.ndim != axes or array.shape[-2:] != (count, 3):
             shape = f"[F, {count}, 3]" if axes == 3 else f"[{count}, 3]"
             raise ArgumentError(
                 f"{name}: {shape} was expected for mesh {mesh}, found {list(array.shape)}"
             )
+        if not np.isfinite(array).all():
+            raise ArgumentError(f"{name}: finite numbers were expected for mesh {mesh}")
         out[int(mesh)] = array
     if not out:
         raise ArgumentError(f"{name}: one mesh at least was expected, found 0")

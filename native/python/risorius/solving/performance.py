@@ -16,6 +16,7 @@ from ..base.npz import DAMAGED
 from .surface import Doubles, Floats
 
 _SCALES = 10.0 ** np.arange(-3, 4)
+_FARTHEST = 1e9  # in any unit; squares of what lies farther leave the numbers
 _NEAR = 0.03  # of a face's size: a mesh nearer than this to an even placement is meant to be there
 
 
@@ -58,9 +59,13 @@ def read_performance(
         raise PerformanceError(f"{path}: a name ending in .abc or .npz was expected")
     fitting = None if counts is None else set(counts.values())
     take = _alembic(path, name, fitting) if suffix == ".abc" else _arrays(path)
-    finite = np.isfinite(take.frames).all()
-    if not finite or (take.neutral is not None and not np.isfinite(take.neutral).all()):
-        raise PerformanceError(f"{path}: finite vertices were expected")
+    for points in (take.frames, take.neutral):
+        if (
+            points is not None
+            and points.size
+            and not -_FARTHEST < points.min() <= points.max() < _FARTHEST
+        ):
+            raise PerformanceError(f"{path}: finite vertices up to {_FARTHEST:g} were expected")
     return take
 
 
@@ -87,7 +92,7 @@ def _arrays(path: str | os.PathLike[str]) -> Performance:
                 f"{path}: {name} of numbers was expected, found {values[name].dtype}"
             )
     given = values.get("rate", np.float64(30.0))
-    rate = float(given) if given.size == 1 else np.nan
+    rate = float(given.item()) if given.size == 1 else np.nan
     if not (np.isfinite(rate) and rate > 0):
         raise PerformanceError(f"{path}: a rate above 0 was expected, found {given.tolist()}")
     with np.errstate(over="ignore"):  # what leaves float32 is infinite, and refused

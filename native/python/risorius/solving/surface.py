@@ -210,6 +210,8 @@ def wholes(name: str, values: npt.ArrayLike) -> npt.NDArray[np.int64]:
     Raises:
         ValueError: no whole numbers, or larger ones.
     """
+    if isinstance(values, np.ndarray) and values.dtype.kind in "iu" and values.dtype != np.uint64:
+        return values.astype(np.int64, copy=False)
     out = numbers(name, values)
     if not (np.abs(out) <= MOST).all() or (out != np.round(out)).any():
         raise ArgumentError(f"{name}: whole numbers were expected")
