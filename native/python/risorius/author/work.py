@@ -106,7 +106,7 @@ class Work:
 def begin(dna: Dna) -> Work:
     if not dna.meshes or not dna.joint_names:
         raise ArgumentError("a face with meshes and at least one joint was expected")
-    _require_sizes(dna)
+    require_sizes(dna)
     count = sk.column_count(dna)
     deltas = sk.column_deltas(dna, count)
     if np.any(deltas[..., 6:9]):
@@ -126,8 +126,18 @@ def begin(dna: Dna) -> Work:
     return work
 
 
-def _require_sizes(dna: Dna) -> None:
-    """Refuse meshes whose squares or quotients leave the numbers that can be computed with."""
+def require_sizes(dna: Dna) -> None:
+    """Refuse a face whose meshes cannot be computed with.
+
+    Args:
+        dna: of any file.
+
+    Raises:
+        ArgumentError: no mesh, all of its vertices in one point, coordinates that are not finite
+            or beyond FARTHEST, whose squares leave the numbers.
+    """
+    if not dna.meshes:
+        raise ArgumentError("a face with meshes was expected")
     spread = 0.0
     for name, mesh in zip(dna.mesh_names, dna.meshes, strict=False):
         points = np.asarray(mesh.positions, np.float64)

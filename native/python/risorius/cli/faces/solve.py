@@ -12,6 +12,7 @@ import numpy as np
 
 import risorius
 
+from ...author.work import require_sizes
 from ...solving.performance import Performance, fitted, read_performance
 from ..files import (
     CommandLineError,
@@ -74,6 +75,10 @@ def run(args: argparse.Namespace) -> int:
     require_suffix(args.out, (".rzc",), "-o")
     require_writable(args.out)
     dna = risorius.load(args.face)
+    try:
+        require_sizes(dna)
+    except risorius.RisoriusError as error:
+        raise InputError(f"{args.face}: {error}") from None
     rig = risorius.Rig(dna)
     if not 0 <= args.lod < max(1, rig.lod_count):
         last = max(1, rig.lod_count) - 1
